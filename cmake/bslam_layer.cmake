@@ -1,0 +1,40 @@
+# bslam_layer(NAME [USES layer...] [LINKS target...]): the static library of src/NAME, made of its .cc files.
+# Which layers a layer may use is checked against its includes by scripts/check_layers.
+function(bslam_layer name)
+  cmake_parse_arguments(ARG "" "" "USES;LINKS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cc)
+  list(TRANSFORM ARG_USES PREPEND bslam_)
+  if(sources)
+    add_library(bslam_${name} STATIC ${sources})
+    target_link_libraries(bslam_${name} PUBLIC ${ARG_USES} ${ARG_LINKS} bslam_flags)
+    target_include_directories(bslam_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src)
+  else()  # headers only
+    add_library(bslam_${name} INTERFACE)
+    target_link_libraries(bslam_${name} INTERFACE ${ARG_USES} ${ARG_LINKS})
+    target_include_directories(bslam_${name} INTERFACE ${PROJECT_SOURCE_DIR}/src)
+  endif()
+endfunction()
+
+# bslam_test(NAME [USES layer...]): one executable of all tests/NAME/*.cc.
+function(bslam_test name)
+  cmake_parse_arguments(ARG "" "" "USES;LINKS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cc)
+  if(NOT sources)
+    return()
+  endif()
+  list(TRANSFORM ARG_USES PREPEND bslam_)
+  add_executable(test_${name} ${sources})
+  target_link_libraries(test_${name} PRIVATE ${ARG_USES} ${ARG_LINKS} GTest::gtest GTest::gtest_main bslam_flags)
+  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  include(GoogleTest)
+  gtest_discover_tests(test_${name} TEST_PREFIX ${name}/ DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+endfunction()
+
+# Flags of our own code: warnings are errors, results do not depend on contraction of multiply and add.
+add_library(bslam_flags INTERFACE)
+target_compile_options(bslam_flags INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Wconversion -Wno-sign-conversion
+                                             -Werror -ffp-contract=off)
+if(BSLAM_SANITIZE)
+  target_compile_options(bslam_flags INTERFACE -fsanitize=${BSLAM_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(bslam_flags INTERFACE -fsanitize=${BSLAM_SANITIZE})
+endif()

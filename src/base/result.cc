@@ -1,0 +1,18 @@
+#include "base/result.h"
+
+namespace bslam {
+
+std::string Error::message() const {
+  std::string text;
+  for (const std::string* part : {&file, &key}) {
+    if (!part->empty()) text += *part + ": ";
+  }
+  if (!found.empty()) text += "found " + found;
+  if (!expected.empty()) text += std::string(found.empty() ? "" : ", ") + "expected " + expected;
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+  }
+  return text;
+}
+
+}  // namespace bslam

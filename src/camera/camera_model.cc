@@ -1,0 +1,198 @@
+#include "camera/camera_model.h"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "base/assert.h"
+
+namespace bslam::camera {
+namespace {
+
+constexpr double kMinDepth = 1e-6;  // metres: closer to the plane of a pinhole nothing can be said
+
+Vector2d to_pixel(const Intrinsics& k, const Vector2d& m) { return {k.fx * m.x() + k.cx, k.fy * m.y() + k.cy}; }
+Vector2d from_pixel(const Intrinsics& k, const Vector2d& u) { return {(u.x() - k.cx) / k.fx, (u.y() - k.cy) / k.fy}; }
+
+// d (x/z, y/z) / d (x, y, z)
+Matrix23d plane_jacobian(const Vector3d& p) {
+  const double iz = 1.0 / p.z();
+  Matrix23d J;
+  J << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz;
+  return J;
+}
+
+}  // namespace
+
+std::optional<Vector2d> Pinhole::project(const Vector3d& point) const {
+  if (!(point.z() > kMinDepth)) return std::nullopt;
+  return to_pixel(k_, point.head<2>() / point.z());
+}
+
+std::optional<Projection> Pinhole::project_with_jacobian(const Vector3d& point) const {
+  if (!(point.z() > kMinDepth)) return std::nullopt;
+  Projection out{to_pixel(k_, point.head<2>() / point.z()), plane_jacobian(point)};
+  out.jacobian.row(0) *= k_.fx;
+  out.jacobian.row(1) *= k_.fy;
+  return out;
+}
+
+std::optional<Vector3d> Pinhole::unproject(const Vector2d& pixel) const {
+  if (!pixel.allFinite()) return std::nullopt;
+  return from_pixel(k_, pixel).homogeneous().normalized();
+}
+
+PinholeRadTan::PinholeRadTan(const Intrinsics& k, const std::vector<double>& distortion) : k_(k) {
+  BSLAM_ASSERT(distortion.size() == 4 || distortion.size() == 5 || distortion.size() == 8,
+               "radial-tangential distortion has 4, 5 or 8 coefficients");
+  count_ = static_cast<int>(distortion.size());
+  std::copy(distortion.begin(), distortion.end(), d_.begin());
+  // The radial part r f(r) grows from 0; march until it stops. Beyond tan 89 degrees nothing ordinary is left.
+  max_radius_ = std::numeric_limits<double>::infinity();
+  constexpr double kStep = 0.002, kLast = 57.0;
+  for (double r = kStep, last = 0.0; r < kLast; r += kStep) {
+    const double r2 = r * r;
+    const double denominator = 1 + r2 * (d_[5] + r2 * (d_[6] + r2 * d_[7]));
+    const double value = r * (1 + r2 * (d_[0] + r2 * (d_[1] + r2 * d_[4]))) / denominator;
+    if (!(denominator > 0) || !(value > last)) {
+      max_radius_ = r - kStep;
+      break;
+    }
+    last = value;
+  }
+}
+
+PinholeRadTan::Distorted PinholeRadTan::distort(const Vector2d& m) const {
+  const auto [k1, k2, p1, p2, k3, k4, k5, k6] = d_;
+  const double x = m.x(), y = m.y(), r2 = m.squaredNorm();
+  const double a = 1 + r2 * (k1 + r2 * (k2 + r2 * k3)), da = k1 + r2 * (2 * k2 + r2 * 3 * k3);
+  const double b = 1 + r2 * (k4 + r2 * (k5 + r2 * k6)), db = k4 + r2 * (2 * k5 + r2 * 3 * k6);
+  const double f = a / b, df = (da * b - a * db) / (b * b);  // df = d f / d r2
+  Distorted out;
+  out.point << x * f + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * f + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
+  out.jacobian << f + 2 * x * x * df + 2 * p1 * y + 6 * p2 * x, 2 * x * y * df + 2 * p1 * x + 2 * p2 * y,
+      2 * x * y * df + 2 * p1 * x + 2 * p2 * y, f + 2 * y * y * df + 6 * p1 * y + 2 * p2 * x;
+  return out;
+}
+
+std::optional<Vector2d> PinholeRadTan::project(const Vector3d& point) const {
+  if (!(point.z() > kMinDepth)) return std::nullopt;
+  const Vector2d m = point.head<2>() / point.z();
+  if (!(m.norm() < max_radius_)) return std::nullopt;
+  return to_pixel(k_, distort(m).point);
+}
+
+std::optional<Projection> PinholeRadTan::project_with_jacobian(const Vector3d& point) const {
+  if (!(point.z() > kMinDepth)) return std::nullopt;
+  const Vector2d m = point.head<2>() / point.z();
+  if (!(m.norm() < max_radius_)) return std::nullopt;
+  const Distorted d = distort(m);
+  Projection out{to_pixel(k_, d.point), d.jacobian * plane_jacobian(point)};
+  out.jacobian.row(0) *= k_.fx;
+  out.jacobian.row(1) *= k_.fy;
+  return out;
+}
+
+std::optional<Vector3d> PinholeRadTan::unproject(const Vector2d& pixel) const {
+  if (!pixel.allFinite()) return std::nullopt;
+  const Vector2d target = from_pixel(k_, pixel);
+  Vector2d m = target;
+  if (!(m.norm() < max_radius_)) m *= 0.9 * max_radius_ / m.norm();
+  for (int i = 0; i < 30; ++i) {  // Newton, kept inside the domain
+    const Distorted d = distort(m);
+    const Vector2d residual = d.point - target;
+    if (residual.squaredNorm() < 1e-26) break;
+    Vector2d step = d.jacobian.inverse() * residual;
+    if (!step.allFinite()) return std::nullopt;
+    double share = 1.0;
+    while (share > 1e-3 && !((m - share * step).norm() < max_radius_)) share *= 0.5;
+    m -= share * step;
+  }
+  if (!(m.norm() < max_radius_) || !((distort(m).point - target).norm() < 1e-9)) return std::nullopt;
+  return m.homogeneous().normalized();
+}
+
+KannalaBrandt::KannalaBrandt(const Intrinsics& k, const std::array<double, 4>& distortion) : k_(k), d_(distortion) {
+  max_theta_ = std::numbers::pi;
+  constexpr double kStep = 0.001;
+  for (double theta = kStep; theta < std::numbers::pi; theta += kStep) {
+    const double t2 = theta * theta;
+    const double slope = 1 + t2 * (3 * d_[0] + t2 * (5 * d_[1] + t2 * (7 * d_[2] + t2 * 9 * d_[3])));
+    if (!(slope > 0)) {
+      max_theta_ = theta - kStep;
+      break;
+    }
+  }
+  const double t2 = max_theta_ * max_theta_;
+  max_r_ = max_theta_ * (1 + t2 * (d_[0] + t2 * (d_[1] + t2 * (d_[2] + t2 * d_[3]))));
+}
+
+std::optional<Vector2d> KannalaBrandt::project(const Vector3d& point) const {
+  const double rho = point.head<2>().norm();
+  const double theta = std::atan2(rho, point.z());
+  if (!(theta < max_theta_) || !(point.squaredNorm() > kMinDepth * kMinDepth)) return std::nullopt;
+  const double t2 = theta * theta;
+  const double r = theta * (1 + t2 * (d_[0] + t2 * (d_[1] + t2 * (d_[2] + t2 * d_[3]))));
+  const double scale = rho > 1e-12 ? r / rho : 1.0 / point.z();
+  return to_pixel(k_, scale * point.head<2>());
+}
+
+std::optional<Projection> KannalaBrandt::project_with_jacobian(const Vector3d& point) const {
+  const double rho = point.head<2>().norm(), z = point.z();
+  const double theta = std::atan2(rho, z), norm2 = point.squaredNorm();
+  if (!(theta < max_theta_) || !(norm2 > kMinDepth * kMinDepth)) return std::nullopt;
+  if (rho < 1e-9 * std::sqrt(norm2)) {  // on the axis the model is a pinhole
+    return Pinhole(k_).project_with_jacobian(point);
+  }
+  const double t2 = theta * theta;
+  const double r = theta * (1 + t2 * (d_[0] + t2 * (d_[1] + t2 * (d_[2] + t2 * d_[3]))));
+  const double slope = 1 + t2 * (3 * d_[0] + t2 * (5 * d_[1] + t2 * (7 * d_[2] + t2 * 9 * d_[3])));  // dr / dtheta
+  const double ux = point.x() / rho, uy = point.y() / rho;
+  const Eigen::RowVector3d dtheta(ux * z / norm2, uy * z / norm2, -rho / norm2);
+  const double s = r / rho;
+  Projection out;
+  out.pixel = to_pixel(k_, Vector2d(r * ux, r * uy));
+  out.jacobian.row(0) = ux * slope * dtheta + s * Eigen::RowVector3d(uy * uy, -ux * uy, 0);
+  out.jacobian.row(1) = uy * slope * dtheta + s * Eigen::RowVector3d(-ux * uy, ux * ux, 0);
+  out.jacobian.row(0) *= k_.fx;
+  out.jacobian.row(1) *= k_.fy;
+  return out;
+}
+
+std::optional<Vector3d> KannalaBrandt::unproject(const Vector2d& pixel) const {
+  if (!pixel.allFinite()) return std::nullopt;
+  const Vector2d m = from_pixel(k_, pixel);
+  const double r = m.norm();
+  if (!(r < max_r_)) return std::nullopt;
+  double low = 0.0, high = max_theta_, theta = std::min(r, 0.5 * max_theta_);
+  for (int i = 0; i < 60; ++i) {  // Newton with bisection as its guard: r(theta) grows on the domain
+    const double t2 = theta * theta;
+    const double value = theta * (1 + t2 * (d_[0] + t2 * (d_[1] + t2 * (d_[2] + t2 * d_[3])))) - r;
+    if (std::abs(value) < 1e-14) break;
+    (value > 0 ? high : low) = theta;
+    const double slope = 1 + t2 * (3 * d_[0] + t2 * (5 * d_[1] + t2 * (7 * d_[2] + t2 * 9 * d_[3])));
+    double next = theta - value / slope;
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (std::abs(next - theta) < 1e-16) break;
+    theta = next;
+  }
+  if (r < 1e-12) return Vector3d::UnitZ();
+  return Vector3d(std::sin(theta) * m.x() / r, std::sin(theta) * m.y() / r, std::cos(theta));
+}
+
+std::string_view model_name(const CameraModel& model) {
+  return std::visit([](const auto& m) { return m.kName; }, model);
+}
+
+const Intrinsics& intrinsics(const CameraModel& model) {
+  return std::visit([](const auto& m) -> const Intrinsics& { return m.intrinsics(); }, model);
+}
+
+std::vector<double> distortion(const CameraModel& model) {
+  return std::visit([](const auto& m) { return m.distortion(); }, model);
+}
+
+}  // namespace bslam::camera

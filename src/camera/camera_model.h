@@ -1,0 +1,99 @@
+// Camera models: a closed set behind one interface. Points in the camera frame (x right, y down, z forward), metres;
+// pixels of the raw image, (0, 0) at the centre of the top-left pixel. Each model knows its true domain: outside of it
+// project and unproject answer nothing instead of something wrong.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace bslam::camera {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Matrix23d = Eigen::Matrix<double, 2, 3>;
+
+struct Projection {
+  Vector2d pixel;
+  Matrix23d jacobian;  // d pixel / d point
+};
+
+// fx, fy, cx, cy in pixels of the raw image.
+struct Intrinsics {
+  double fx = 0, fy = 0, cx = 0, cy = 0;
+};
+
+// Pinhole without distortion: domain z > 0.
+class Pinhole {
+ public:
+  explicit Pinhole(const Intrinsics& k) : k_(k) {}
+  std::optional<Vector2d> project(const Vector3d& point) const;
+  std::optional<Projection> project_with_jacobian(const Vector3d& point) const;
+  std::optional<Vector3d> unproject(const Vector2d& pixel) const;  // unit bearing
+  const Intrinsics& intrinsics() const { return k_; }
+  std::vector<double> distortion() const { return {}; }
+  static constexpr std::string_view kName = "pinhole";
+
+ private:
+  Intrinsics k_;
+};
+
+// Pinhole with the radial-tangential (Brown-Conrady) distortion of OpenCV: k1 k2 p1 p2 [k3 [k4 k5 k6]]; with eight
+// coefficients the radial factor is rational. Domain: z > 0 and a normalised radius below the first one at which the
+// distorted radius stops growing (beyond it two directions share a pixel).
+class PinholeRadTan {
+ public:
+  // `distortion` has 4, 5 or 8 entries.
+  PinholeRadTan(const Intrinsics& k, const std::vector<double>& distortion);
+  std::optional<Vector2d> project(const Vector3d& point) const;
+  std::optional<Projection> project_with_jacobian(const Vector3d& point) const;
+  std::optional<Vector3d> unproject(const Vector2d& pixel) const;
+  const Intrinsics& intrinsics() const { return k_; }
+  std::vector<double> distortion() const { return {d_.begin(), d_.begin() + count_}; }
+  double max_radius() const { return max_radius_; }  // tan of the widest valid angle, or infinity
+  static constexpr std::string_view kName = "pinhole-radtan";
+
+ private:
+  struct Distorted {
+    Vector2d point;
+    Eigen::Matrix2d jacobian;
+  };
+  Distorted distort(const Vector2d& m) const;
+
+  Intrinsics k_;
+  std::array<double, 8> d_{};  // k1 k2 p1 p2 k3 k4 k5 k6
+  int count_ = 0;
+  double max_radius_ = 0;
+};
+
+// Kannala-Brandt fisheye (PAMI 2006; OpenCV's fisheye, Kalibr's equidistant): r = theta (1 + k1 theta^2 + ... k4 theta^8).
+// Sees behind its plane: domain theta below the first angle at which r stops growing, at most pi.
+class KannalaBrandt {
+ public:
+  KannalaBrandt(const Intrinsics& k, const std::array<double, 4>& distortion);
+  std::optional<Vector2d> project(const Vector3d& point) const;
+  std::optional<Projection> project_with_jacobian(const Vector3d& point) const;
+  std::optional<Vector3d> unproject(const Vector2d& pixel) const;
+  const Intrinsics& intrinsics() const { return k_; }
+  std::vector<double> distortion() const { return {d_.begin(), d_.end()}; }
+  double max_theta() const { return max_theta_; }  // radians
+  static constexpr std::string_view kName = "kannala-brandt";
+
+ private:
+  Intrinsics k_;
+  std::array<double, 4> d_{};
+  double max_theta_ = 0, max_r_ = 0;
+};
+
+using CameraModel = std::variant<Pinhole, PinholeRadTan, KannalaBrandt>;
+
+// Name as written in rig files.
+std::string_view model_name(const CameraModel& model);
+const Intrinsics& intrinsics(const CameraModel& model);
+std::vector<double> distortion(const CameraModel& model);
+
+}  // namespace bslam::camera

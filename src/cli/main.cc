@@ -1,0 +1,25 @@
+// bslam: the command line. Verbs are in files of their own; this one only puts them together.
+#include <cstdio>
+
+#include "cli/verbs.h"
+#include "cli/version.h"
+
+int main(int argc, char** argv) {
+  using namespace bslam::cli;
+  CLI::App app{"bslam: visual SLAM for rigs of any number of cameras"};
+  app.set_version_flag("--version", version_text());
+  app.require_subcommand(1);
+  int exit_status = kExitOk;
+  add_run(app, exit_status);
+  add_eval(app, exit_status);
+  add_simulate(app, exit_status);
+  add_inspect(app, exit_status);
+  add_rig(app, exit_status);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return app.exit(e);  // help and version
+    return report_error({.file = "command line", .key = e.get_name(), .found = e.what(), .expected = "see bslam --help"});
+  }
+  return exit_status;
+}

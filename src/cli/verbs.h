@@ -1,0 +1,22 @@
+// One function per verb: adds its subcommand to the parser. When the verb was chosen and has run, `exit_status` holds
+// its status (0, 2, 3 or 130 as docs/cli.md says).
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "base/result.h"
+
+namespace bslam::cli {
+
+constexpr int kExitOk = 0, kExitBadInput = 2, kExitNothingTracked = 3, kExitInterrupted = 130;
+
+void add_run(CLI::App& app, int& exit_status);
+void add_eval(CLI::App& app, int& exit_status);
+void add_simulate(CLI::App& app, int& exit_status);
+void add_inspect(CLI::App& app, int& exit_status);
+void add_rig(CLI::App& app, int& exit_status);
+
+// Prints "bslam: MESSAGE" as one line on stderr and returns kExitBadInput.
+int report_error(const Error& error);
+
+}  // namespace bslam::cli

@@ -1,0 +1,63 @@
+// The Bundled table of a frame: which keypoints of different cameras are one unique feature.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "base/id.h"
+
+namespace bslam::frame {
+
+// A keypoint of one camera of the frame.
+struct KeypointRef {
+  CameraIndex camera;
+  KeypointIndex keypoint;
+  friend auto operator<=>(const KeypointRef&, const KeypointRef&) = default;
+};
+
+// Triangulated point of a matched feature.
+struct BundledPoint {
+  Eigen::Vector3d point_rig;    // metres, camera 0
+  Eigen::Matrix3d covariance;   // metres^2
+};
+
+// Every keypoint of the frame belongs to exactly one unique feature; a feature has at most one keypoint per camera;
+// unique = monocular + matched. Stored as a compressed table from FeatureId to keypoints, and its inverse. Matched
+// features come first, each with its keypoints in order of camera; monocular ones follow in order of camera and keypoint.
+class Bundled {
+ public:
+  Bundled() = default;
+
+  // `keypoint_counts`: keypoints per camera. `matched`: features of two or more keypoints, cameras distinct, no keypoint
+  // twice; `points` has one entry per matched feature. All remaining keypoints become monocular features.
+  Bundled(std::span<const std::size_t> keypoint_counts, std::span<const std::vector<KeypointRef>> matched,
+          std::span<const std::optional<BundledPoint>> points);
+
+  std::size_t size() const { return begin_.empty() ? 0 : begin_.size() - 1; }  // unique features
+  std::size_t num_matched() const { return num_matched_; }
+  std::size_t num_monocular() const { return size() - num_matched_; }
+  bool is_matched(FeatureId f) const { return f.index() < num_matched_; }
+
+  std::span<const KeypointRef> keypoints(FeatureId f) const {
+    return {refs_.data() + begin_[f.index()], refs_.data() + begin_[f.index() + 1]};
+  }
+  FeatureId feature(CameraIndex c, KeypointIndex k) const { return feature_[camera_begin_[c.index()] + k.index()]; }
+  FeatureId feature(KeypointRef r) const { return feature(r.camera, r.keypoint); }
+
+  // Empty for monocular features and matched ones whose rays do not meet in front of the cameras.
+  const std::optional<BundledPoint>& point(FeatureId f) const { return is_matched(f) ? points_[f.index()] : kNone; }
+
+ private:
+  static inline const std::optional<BundledPoint> kNone;
+  std::vector<KeypointRef> refs_;
+  std::vector<std::uint32_t> begin_;         // size() + 1
+  std::vector<FeatureId> feature_;           // per keypoint, cameras one after the other
+  std::vector<std::size_t> camera_begin_;    // per camera + 1
+  std::vector<std::optional<BundledPoint>> points_;
+  std::size_t num_matched_ = 0;
+};
+
+}  // namespace bslam::frame

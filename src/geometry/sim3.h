@@ -1,0 +1,34 @@
+// Similarity transforms Sim(3): p_a = s R p_b + t, with T_a_b read as for SE3.
+#pragma once
+
+#include "geometry/se3.h"
+
+namespace bslam::geometry {
+
+class Sim3 {
+ public:
+  Sim3() = default;  // identity
+  Sim3(double scale, const Quaterniond& rotation, const Vector3d& translation)
+      : scale_(scale), rotation_(rotation.normalized()), translation_(translation) {}
+  explicit Sim3(const SE3& rigid) : Sim3(1.0, rigid.rotation(), rigid.translation()) {}
+
+  double scale() const { return scale_; }
+  const Quaterniond& rotation() const { return rotation_; }
+  const Vector3d& translation() const { return translation_; }
+
+  Sim3 inverse() const;
+  Sim3 operator*(const Sim3& other) const;
+  Vector3d operator*(const Vector3d& point) const { return scale_ * (rotation_ * point) + translation_; }
+
+  // The rigid pose of a frame after the similarity moved the world around it: rotation and position, no scale.
+  SE3 apply_to_pose(const SE3& T_b_frame) const {
+    return SE3(rotation_ * T_b_frame.rotation(), *this * T_b_frame.translation());
+  }
+
+ private:
+  double scale_ = 1.0;
+  Quaterniond rotation_ = Quaterniond::Identity();
+  Vector3d translation_ = Vector3d::Zero();
+};
+
+}  // namespace bslam::geometry

@@ -1,0 +1,29 @@
+// The rotation group SO(3): exponential, logarithm and their Jacobians. Angles in radians. Equations: docs/math.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace bslam::geometry {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// [v]x, so that skew(v) * w = v x w.
+Matrix3d skew(const Vector3d& v);
+
+// exp: rotation vector -> unit quaternion, exact also near zero.
+Quaterniond so3_exp(const Vector3d& omega);
+
+// log: unit quaternion -> rotation vector with norm in [0, pi].
+Vector3d so3_log(const Quaterniond& q);
+
+// J_l with exp(omega + d) ~ exp(J_l(omega) d) exp(omega), and its inverse.
+Matrix3d so3_left_jacobian(const Vector3d& omega);
+Matrix3d so3_left_jacobian_inverse(const Vector3d& omega);
+
+}  // namespace bslam::geometry

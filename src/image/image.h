@@ -1,0 +1,45 @@
+// 8-bit grey images: an owning one and a view.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace bslam::image {
+
+// Borrowed pixels, row-major; `stride` bytes from one row to the next.
+struct ImageView {
+  const std::uint8_t* data = nullptr;
+  int width = 0, height = 0;
+  std::ptrdiff_t stride = 0;
+
+  bool empty() const { return data == nullptr || width <= 0 || height <= 0; }
+  const std::uint8_t* row(int y) const { return data + y * stride; }
+  std::uint8_t at(int x, int y) const { return row(y)[x]; }
+};
+
+class Image {
+ public:
+  Image() = default;
+  Image(int width, int height) { resize(width, height); }
+
+  // Keeps its memory where that suffices; pixels are undefined after a change of size.
+  void resize(int width, int height) {
+    width_ = width;
+    height_ = height;
+    pixels_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  }
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  bool empty() const { return pixels_.empty(); }
+  std::uint8_t* row(int y) { return pixels_.data() + static_cast<std::ptrdiff_t>(y) * width_; }
+  const std::uint8_t* row(int y) const { return pixels_.data() + static_cast<std::ptrdiff_t>(y) * width_; }
+  ImageView view() const { return {pixels_.data(), width_, height_, width_}; }
+
+ private:
+  int width_ = 0, height_ = 0;
+  std::vector<std::uint8_t> pixels_;
+};
+
+}  // namespace bslam::image

@@ -1,0 +1,26 @@
+// Image pyramid: level 0 is the raw image, each level is smaller than the one before by a constant factor.
+#pragma once
+
+#include <vector>
+
+#include "image/image.h"
+
+namespace bslam::image {
+
+// Pixel (x, y) of level l lies at pixel ((x + 0.5) * scale(l) - 0.5, ...) of level 0, as pixel centres are whole numbers.
+struct Pyramid {
+  std::vector<Image> levels;
+  std::vector<double> scale_x, scale_y;  // level-0 pixels per pixel of the level (exact: width_0 / width_l)
+
+  std::size_t size() const { return levels.size(); }
+  double to_base_x(std::size_t level, double x) const { return (x + 0.5) * scale_x[level] - 0.5; }
+  double to_base_y(std::size_t level, double y) const { return (y + 0.5) * scale_y[level] - 0.5; }
+  double from_base_x(std::size_t level, double x) const { return (x + 0.5) / scale_x[level] - 0.5; }
+  double from_base_y(std::size_t level, double y) const { return (y + 0.5) / scale_y[level] - 0.5; }
+};
+
+// Builds `levels` levels with ratio `factor` (> 1) into `pyramid`, whose memory is reused. Levels smaller than
+// 32 pixels a side are left out. Each level is resampled from the one before (area-true bilinear).
+void build_pyramid(const ImageView& base, int levels, double factor, Pyramid& pyramid);
+
+}  // namespace bslam::image

@@ -1,0 +1,30 @@
+// The paper's BundledKeyframe: a BundledFrame with a pose and its place in the map.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "base/id.h"
+#include "frame/bundled_frame.h"
+#include "geometry/se3.h"
+
+namespace bslam::map {
+
+// A neighbour in the covisibility graph; weight = landmarks both keyframes observe.
+struct Covisible {
+  KeyframeId keyframe;
+  int weight = 0;
+};
+
+struct BundledKeyframe {
+  std::shared_ptr<const frame::BundledFrame> frame;  // null once removed
+  geometry::SE3 T_rig_world;                         // while alive
+  std::vector<LandmarkId> landmarks;                 // per FeatureId; invalid = none. Empty once removed
+  std::vector<Covisible> covisible;                  // every keyframe with weight > 0, in order of id
+  KeyframeId parent;                                 // spanning tree; invalid for the root
+  std::vector<KeyframeId> children;                  // in order of id
+  geometry::SE3 T_rig_parent;                        // once removed: its pose relative to `parent`
+  bool alive = false;
+};
+
+}  // namespace bslam::map

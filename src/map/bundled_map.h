@@ -1,0 +1,106 @@
+// The paper's BundledMap: keyframes, landmarks, covisibility graph and spanning tree. A value: copying it shares all
+// chunks and costs microseconds; changing a copy detaches only the chunks it touches. Published versions are const, so
+// a reader may keep one for as long as it likes. ARCHITECTURE.md tells who may change what.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/id.h"
+#include "camera/rig.h"
+#include "map/bundled_keyframe.h"
+#include "map/cow_vector.h"
+#include "map/landmark.h"
+
+namespace bslam::map {
+
+enum class Scale { kMetric, kUpToScale, kUnobservable };
+
+class BundledMap {
+ public:
+  explicit BundledMap(std::shared_ptr<const camera::Rig> rig) : rig_(std::move(rig)) {}
+
+  // ---- reading
+  const camera::Rig& rig() const { return *rig_; }
+  MapVersion version() const { return version_; }
+  Scale scale() const { return scale_; }
+
+  // Slots include removed ones; ids are slot numbers and never reused.
+  std::size_t keyframe_slots() const { return keyframes_.size(); }
+  std::size_t landmark_slots() const { return landmarks_.size(); }
+  std::size_t num_keyframes() const { return alive_keyframes_; }
+  std::size_t num_landmarks() const { return alive_landmarks_; }
+  std::size_t num_observations() const { return observations_total_; }  // keypoints, not features
+  bool alive(KeyframeId k) const { return k.valid() && k.index() < keyframes_.size() && keyframes_[k.index()].alive; }
+  bool alive(LandmarkId l) const { return l.valid() && l.index() < landmarks_.size() && landmarks_[l.index()].alive; }
+
+  const BundledKeyframe& keyframe(KeyframeId k) const { return keyframes_[k.index()]; }  // also removed ones
+  const Landmark& landmark(LandmarkId l) const { return landmarks_[l.index()]; }
+  std::span<const Observation> observations(LandmarkId l) const { return observations_[l.index()]; }  // in order of keyframe
+  LandmarkId landmark_of(KeyframeId k, FeatureId f) const { return keyframes_[k.index()].landmarks[f.index()]; }
+
+  // Alive ids in ascending order.
+  std::vector<KeyframeId> keyframe_ids() const;
+  std::vector<LandmarkId> landmark_ids() const;
+  KeyframeId newest_keyframe() const;  // invalid in an empty map
+
+  // Follows merges; invalid where the landmark was removed.
+  LandmarkId resolve(LandmarkId l) const;
+  // T_rig_world of a keyframe, alive or removed (then carried by its parent).
+  geometry::SE3 resolved_pose(KeyframeId k) const;
+
+  // Covisible keyframes by falling weight (ties: newer first), at most `limit` (0 = all) with at least `min_weight`.
+  std::vector<Covisible> best_covisible(KeyframeId k, std::size_t limit, int min_weight = 1) const;
+
+  // Pixel, level and patch owner of one keypoint of a keyframe.
+  const feature::Keypoints& keypoints(KeyframeId k, CameraIndex c) const { return keyframe(k).frame->keypoints(c); }
+
+  // First broken rule in words, or nothing. Rules: observations and keyframes' landmark tables mirror one another; no
+  // alive landmark without observations or observed by a removed keyframe, no feature twice; the reference is one of the
+  // landmark's observations; covisibility is symmetric, its weights are the shared landmarks; the spanning tree is a tree
+  // over all alive keyframes, parents alive or root; counters are right.
+  std::optional<std::string> check_invariants() const;
+
+  // ---- changing (on a private copy only)
+  void set_scale(Scale scale) { scale_ = scale; }
+  void set_version(MapVersion v) { version_ = v; }
+
+  // Appends a keyframe observing the given landmarks (alive, distinct features, distinct landmarks); its parent becomes
+  // the keyframe with which it shares most (ties: newer), or `fallback_parent` where it shares nothing.
+  KeyframeId add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
+                          std::span<const std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent);
+  // Appends a landmark with one or more observations (keyframes distinct and alive, features free); the first
+  // keypoint of the first is the reference unless another is named. Calls refresh_landmark.
+  LandmarkId add_landmark(const Eigen::Vector3d& position, std::span<const Observation> observations,
+                          const LandmarkReference& reference);
+  // Does nothing and returns false where the keyframe observes the landmark already or the feature is taken.
+  bool add_observation(LandmarkId l, Observation o);
+  // Where the last observation goes, the landmark goes; where the reference goes, the oldest remaining one follows it.
+  void remove_observation(LandmarkId l, KeyframeId k);
+  void remove_landmark(LandmarkId l);
+  // `from` ends in `into`: observations move (where the keyframe has none of `into` yet), counters add.
+  void merge_landmarks(LandmarkId from, LandmarkId into);
+  // Not the root. Its observations go, children get the best of their covisible keyframes as parent that keeps a tree.
+  void remove_keyframe(KeyframeId k);
+  void set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
+  void set_position(LandmarkId l, const Eigen::Vector3d& position);
+  void add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
+  // Recomputes view direction, distance range and descriptor from the observations.
+  void refresh_landmark(LandmarkId l);
+
+ private:
+  std::shared_ptr<const camera::Rig> rig_;
+  MapVersion version_{0};
+  Scale scale_ = Scale::kMetric;
+  CowVector<BundledKeyframe, 1> keyframes_;
+  CowVector<Landmark, 64> landmarks_;
+  CowVector<std::vector<Observation>, 64> observations_;
+  std::size_t alive_keyframes_ = 0, alive_landmarks_ = 0, observations_total_ = 0;
+};
+
+using MapSnapshot = std::shared_ptr<const BundledMap>;
+
+}  // namespace bslam::map

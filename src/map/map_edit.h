@@ -1,0 +1,117 @@
+// A proposed change of the map, as a value: what a stage hands to MapStore::commit.
+//
+// Rebase rules, where other edits were committed between the edit's base and its commit:
+//   | operation            | rule                                                                                      |
+//   | AddKeyframe          | gets the next id; matches to removed landmarks are dropped, to merged ones are forwarded   |
+//   | AddLandmark          | gets the next id; observations in removed keyframes or taken features are dropped; with    |
+//   |                      | none left the landmark is dropped                                                          |
+//   | AddObservation       | forwarded along merges; dropped where landmark or keyframe is gone or the feature is taken |
+//   | RemoveObservation    | dropped where it is gone already                                                           |
+//   | RemoveLandmark       | dropped where it is gone already; kept where a newer keyframe has found it meanwhile       |
+//   | MergeLandmarks       | both ends forwarded; dropped where they are one already or one is gone                     |
+//   | RemoveKeyframe       | dropped where it is gone already or is the root                                            |
+//   | SetPoses             | entries of removed keyframes and landmarks are dropped; keyframes made after the base move |
+//   |                      | with their parent, landmarks made after the base move with the keyframe of their reference |
+//   | AddSightings         | forwarded along merges, dropped where gone                                                 |
+//   | RefreshLandmarks     | forwarded along merges, dropped where gone                                                 |
+#pragma once
+
+#include <memory>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "map/bundled_map.h"
+
+namespace bslam::map {
+
+// Ids of things an edit adds are provisional: those the base version would give next.
+struct AddKeyframe {
+  KeyframeId provisional;
+  std::shared_ptr<const frame::BundledFrame> frame;
+  geometry::SE3 T_rig_world;
+  std::vector<std::pair<FeatureId, LandmarkId>> matches;
+  KeyframeId fallback_parent;
+};
+struct AddLandmark {
+  LandmarkId provisional;
+  Eigen::Vector3d position;
+  std::vector<Observation> observations;
+  LandmarkReference reference;
+};
+struct AddObservation {
+  LandmarkId landmark;
+  Observation observation;
+};
+struct RemoveObservation {
+  LandmarkId landmark;
+  KeyframeId keyframe;
+};
+struct RemoveLandmark {
+  LandmarkId landmark;
+};
+struct MergeLandmarks {
+  LandmarkId from, into;
+};
+struct RemoveKeyframe {
+  KeyframeId keyframe;
+};
+struct SetPoses {
+  std::vector<std::pair<KeyframeId, geometry::SE3>> keyframes;        // T_rig_world
+  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> landmarks;
+};
+struct Sighting {
+  LandmarkId landmark;
+  std::uint32_t expected = 0, found = 0;
+};
+struct AddSightings {
+  std::vector<Sighting> sightings;
+};
+struct RefreshLandmarks {
+  std::vector<LandmarkId> landmarks;
+};
+
+using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark, MergeLandmarks,
+                               RemoveKeyframe, SetPoses, AddSightings, RefreshLandmarks>;
+
+struct MapEdit {
+  std::string_view stage;  // a literal
+  MapSnapshot base;
+  std::vector<Operation> operations;
+};
+
+// A snapshot with a private overlay: a stage writes to it, reads back what it wrote, and hands out the edit. One per run
+// of a stage; not shared between threads.
+class MapDraft {
+ public:
+  MapDraft(std::string_view stage, MapSnapshot base);
+
+  const BundledMap& map() const { return working_; }  // the base with all that was written so far
+
+  KeyframeId add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
+                          std::vector<std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent);
+  LandmarkId add_landmark(const Eigen::Vector3d& position, std::vector<Observation> observations,
+                          const LandmarkReference& reference);
+  bool add_observation(LandmarkId l, Observation o);
+  void remove_observation(LandmarkId l, KeyframeId k);
+  void remove_landmark(LandmarkId l);
+  void merge_landmarks(LandmarkId from, LandmarkId into);
+  void remove_keyframe(KeyframeId k);
+  void set_poses(SetPoses poses);
+  void add_sightings(std::vector<Sighting> sightings);
+  void refresh_landmarks(std::vector<LandmarkId> landmarks);
+
+  // The edit and the working copy, which MapStore publishes as it is where the base is still the newest version.
+  struct Finished {
+    MapEdit edit;
+    BundledMap result;
+  };
+  Finished finish() &&;
+
+ private:
+  MapEdit edit_;
+  BundledMap working_;
+};
+
+}  // namespace bslam::map

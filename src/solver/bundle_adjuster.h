@@ -1,0 +1,58 @@
+// Bundle adjustment over rig poses and points by Levenberg-Marquardt and the Schur complement. Local and global BA are
+// the same problem with other variables free. It knows no map.
+#pragma once
+
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "base/options.h"
+#include "solver/reprojection.h"
+
+namespace bslam::solver {
+
+// Flat: observations refer to poses and points by position. A pose is that of the rig, so N cameras do not enlarge it.
+struct ReprojectionProblem {
+  struct Observation {
+    int pose = 0, point = 0;
+    CameraIndex camera;
+    Eigen::Vector2f pixel;   // raw image
+    float sigma = 1.0f;      // px, per axis
+  };
+  const Rig* rig = nullptr;            // extrinsics are constant, as in the paper
+  std::vector<SE3> T_rig_world;
+  std::vector<std::uint8_t> pose_free;   // per pose
+  std::vector<Vector3d> points;          // metres, world; all free
+  std::vector<Observation> observations; // sorted by (point, pose, camera)
+};
+
+struct BundleOptions {
+  int iterations = 10;             // accepted or rejected steps at most
+  double relative_decrease = 1e-4; // of the cost, below which it has converged
+  bool robust = true;              // Huber kernel at the 95 % bound
+  bool keep_scale = false;         // up to scale: hold the distance of the second fixed pose (needs two fixed poses)
+};
+
+enum class BundleStop { kConverged, kIterations, kStopped, kFailed };
+
+struct BundleSummary {
+  struct Step {
+    double cost = 0, damping = 0, step_norm = 0;
+    bool accepted = false;
+  };
+  BundleStop stop = BundleStop::kFailed;
+  double initial_cost = 0, final_cost = 0;  // sum of (robust) normalised squared errors / 2
+  std::vector<Step> steps;
+  bool usable() const { return stop != BundleStop::kFailed; }
+};
+
+// Improves the free poses and all points in place; on kFailed the problem is as it was. `skip` (one per observation, or
+// empty) leaves observations out. A stop request ends it after the step in hand, keeping what was gained.
+BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip = {},
+                     std::stop_token stop = {});
+
+// Squared normalised error of each observation at the present values; infinite where it does not project.
+std::vector<double> squared_errors(const ReprojectionProblem& problem);
+
+}  // namespace bslam::solver

@@ -1,0 +1,57 @@
+// Motion-only bundle adjustment: the pose of camera 0 from all cameras (the paper's tracking equation).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/options.h"
+#include "base/random.h"
+#include "solver/reprojection.h"
+
+namespace bslam::solver {
+
+struct PoseObservation {
+  CameraIndex camera;
+  Vector3d point_world;  // metres
+  Vector2d pixel;        // raw image
+  double sigma = 1.0;    // px, per axis
+};
+
+struct PoseSolverOptions {
+  int rounds = 4;          // solves with re-classification of outliers between them; the last one without robust kernel
+  int iterations = 10;     // Gauss-Newton steps a round at most
+  int min_inliers = 10;    // fewer say nothing about a pose
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("rounds", self.rounds, Range{1, 20}, "", "solve rounds with re-classification of outliers between them");
+    visitor("iterations", self.iterations, Range{1, 100}, "", "Gauss-Newton steps a round at most");
+    visitor("min_inliers", self.min_inliers, Range{3, 1000}, "", "fewer inliers say nothing about a pose");
+  }
+};
+
+struct PoseSolution {
+  bool ok = false;                   // enough inliers and a well-conditioned system
+  SE3 T_rig_world;
+  std::vector<std::uint8_t> inlier;  // per observation
+  int num_inliers = 0;
+  std::vector<int> inliers_per_camera;
+  geometry::Matrix6d information = geometry::Matrix6d::Zero();  // of the left perturbation, at the solution
+  double mean_chi2 = 0.0;            // over the inliers, per observation
+};
+
+PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
+                        const PoseSolverOptions& options);
+
+struct PoseRansacOptions {
+  int iterations = 200;       // samples at most
+  double inlier_chi2 = 25.0;  // squared normalised error that counts as agreement while sampling
+  double confidence = 0.999;  // of having drawn one sample without outliers, given the best share so far
+};
+
+// Seeded RANSAC for correspondences with many outliers: minimal samples of three observations, from any cameras, solved
+// by Newton's method from the guess; the best is refined by solve_pose. For motions between neighbouring frames.
+PoseSolution ransac_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
+                         const PoseSolverOptions& options, const PoseRansacOptions& ransac, Random random);
+
+}  // namespace bslam::solver
