@@ -7,6 +7,7 @@
 #include "base/id.h"
 #include "frame/bundled_frame.h"
 #include "geometry/se3.h"
+#include "map/cow_vector.h"
 
 namespace bslam::map {
 
@@ -16,11 +17,13 @@ struct Covisible {
   int weight = 0;
 };
 
+// The two tables are shared between versions apart from the rest, so that a change of pose copies neither; both read like
+// a const std::vector.
 struct BundledKeyframe {
   std::shared_ptr<const frame::BundledFrame> frame;  // null once removed
   geometry::SE3 T_rig_world;                         // while alive
-  std::vector<LandmarkId> landmarks;                 // per FeatureId; invalid = none. Empty once removed
-  std::vector<Covisible> covisible;                  // every keyframe with weight > 0, in order of id
+  CowArray<LandmarkId> landmarks;                    // per FeatureId; invalid = none. Empty once removed
+  CowArray<Covisible> covisible;                     // every keyframe with weight > 0, in order of id
   KeyframeId parent;                                 // spanning tree; invalid for the root
   std::vector<KeyframeId> children;                  // in order of id
   geometry::SE3 T_rig_parent;                        // once removed: its pose relative to `parent`

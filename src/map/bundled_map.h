@@ -1,6 +1,7 @@
 // The paper's BundledMap: keyframes, landmarks, covisibility graph and spanning tree. A value: copying it shares all
 // chunks and costs microseconds; changing a copy detaches only the chunks it touches. Published versions are const, so
-// a reader may keep one for as long as it likes. ARCHITECTURE.md tells who may change what.
+// a reader may keep one for as long as it likes. ARCHITECTURE.md tells who may change what. References and spans into a
+// copy that is being changed are valid until its next change.
 #pragma once
 
 #include <memory>
@@ -14,17 +15,26 @@
 #include "map/bundled_keyframe.h"
 #include "map/cow_vector.h"
 #include "map/landmark.h"
+#include "map/observation_column.h"
 
 namespace bslam::map {
 
 enum class Scale { kMetric, kUpToScale, kUnobservable };
 
+// The pyramid keypoints were found on: what a landmark's distance range is made of.
+struct PyramidShape {
+  double scale_factor = 1.2;  // between neighbouring levels
+  int levels = 8;
+};
+
 class BundledMap {
  public:
-  explicit BundledMap(std::shared_ptr<const camera::Rig> rig) : rig_(std::move(rig)) {}
+  explicit BundledMap(std::shared_ptr<const camera::Rig> rig, PyramidShape pyramid = {})
+      : rig_(std::move(rig)), pyramid_(pyramid) {}
 
   // ---- reading
   const camera::Rig& rig() const { return *rig_; }
+  const PyramidShape& pyramid() const { return pyramid_; }
   MapVersion version() const { return version_; }
   Scale scale() const { return scale_; }
 
@@ -64,40 +74,64 @@ class BundledMap {
   // over all alive keyframes, parents alive or root; counters are right.
   std::optional<std::string> check_invariants() const;
 
-  // ---- changing (on a private copy only)
+  // ---- changing (on a private copy only). Functions that return bool change nothing and return false where the landmark
+  // or keyframe they name is not alive, or for the reason they give.
   void set_scale(Scale scale) { scale_ = scale; }
   void set_version(MapVersion v) { version_ = v; }
 
   // Appends a keyframe observing the given landmarks (alive, distinct features, distinct landmarks); its parent becomes
-  // the keyframe with which it shares most (ties: newer), or `fallback_parent` where it shares nothing.
+  // the keyframe with which it shares most (ties: newer), else `fallback_parent`, else (not alive) the newest keyframe.
+  // The first keyframe is the root.
   KeyframeId add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                           std::span<const std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent);
-  // Appends a landmark with one or more observations (keyframes distinct and alive, features free); the first
-  // keypoint of the first is the reference unless another is named. Calls refresh_landmark.
+  // Appends a landmark with one or more observations (keyframes distinct and alive, features free); the first keypoint of
+  // the first is the reference unless another is named (keyframe valid). Calls refresh_landmark.
   LandmarkId add_landmark(const Eigen::Vector3d& position, std::span<const Observation> observations,
-                          const LandmarkReference& reference);
-  // Does nothing and returns false where the keyframe observes the landmark already or the feature is taken.
+                          const LandmarkReference& reference = {});
+  // False also where the keyframe observes the landmark already or the feature is taken.
   bool add_observation(LandmarkId l, Observation o);
-  // Where the last observation goes, the landmark goes; where the reference goes, the oldest remaining one follows it.
-  void remove_observation(LandmarkId l, KeyframeId k);
-  void remove_landmark(LandmarkId l);
-  // `from` ends in `into`: observations move (where the keyframe has none of `into` yet), counters add.
-  void merge_landmarks(LandmarkId from, LandmarkId into);
-  // Not the root. Its observations go, children get the best of their covisible keyframes as parent that keeps a tree.
-  void remove_keyframe(KeyframeId k);
-  void set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
-  void set_position(LandmarkId l, const Eigen::Vector3d& position);
-  void add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
+  // Where the last observation goes, the landmark goes; where the reference goes, the first keypoint of the oldest
+  // remaining observation follows it. False also where the keyframe does not observe the landmark.
+  bool remove_observation(LandmarkId l, KeyframeId k);
+  bool remove_landmark(LandmarkId l);
+  // `from` ends in `into`: observations move (where the keyframe has none of `into` yet), counters add. False also where
+  // the two are one.
+  bool merge_landmarks(LandmarkId from, LandmarkId into);
+  // Its observations go, children get the best of their covisible keyframes as parent that keeps a tree. False also for
+  // the root.
+  bool remove_keyframe(KeyframeId k);
+  bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
+  bool set_position(LandmarkId l, const Eigen::Vector3d& position);
+  bool add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes view direction, distance range and descriptor from the observations.
-  void refresh_landmark(LandmarkId l);
+  bool refresh_landmark(LandmarkId l);
 
  private:
+  BundledKeyframe& edit(KeyframeId k) { return keyframes_.mutate(k.index(), owner_.tag()); }
+  Landmark& edit(LandmarkId l) { return landmarks_.mutate(l.index(), owner_.tag()); }
+  std::size_t num_keypoints(Observation o) const { return keyframe(o.keyframe).frame->bundled.keypoints(o.feature).size(); }
+
+  // bundled_map.cc. `link` and `unlink` keep list, table, counter and covisibility in step; nothing else does.
+  void link(LandmarkId l, Observation o);
+  void unlink(LandmarkId l, Observation o);
+  void bury(LandmarkId l, LandmarkId merged_into);  // without observations left
+
+  // covisibility.cc
+  void change_weight(KeyframeId a, KeyframeId b, int change);
+  void change_half_weight(KeyframeId at, KeyframeId neighbour, int change);
+  void connect_new_keyframe(KeyframeId k);  // the newest: weights from its landmark table, on both sides
+  KeyframeId choose_parent(KeyframeId k, KeyframeId fallback) const;
+  void attach(KeyframeId child, KeyframeId parent);
+  void hand_over_children(KeyframeId removed);
+
   std::shared_ptr<const camera::Rig> rig_;
+  PyramidShape pyramid_;
   MapVersion version_{0};
   Scale scale_ = Scale::kMetric;
+  CowOwner owner_;
   CowVector<BundledKeyframe, 1> keyframes_;
-  CowVector<Landmark, 64> landmarks_;
-  CowVector<std::vector<Observation>, 64> observations_;
+  CowVector<Landmark, 16> landmarks_;
+  ObservationColumn observations_;
   std::size_t alive_keyframes_ = 0, alive_landmarks_ = 0, observations_total_ = 0;
 };
 

@@ -1,39 +1,150 @@
-// A vector whose copies share memory, chunk by chunk, until one of them is changed (copy on write).
+// Vectors whose copies share memory until one of them is changed (copy on write), and who may change which piece.
+//
+// Every piece carries the tag of the copy that made it; a copy changes a piece in place if and only if the piece bears its
+// own tag, and makes its own piece otherwise. Reference counts decide about lifetime only, never about writing: a count of
+// one, as read by one thread, says nothing about what another thread read from the piece just before it let go.
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
 
 namespace bslam::map {
 
-// Copies cost one shared pointer per chunk. Reading a const CowVector from several threads is safe; changing one is safe
-// as long as no other thread uses that very object.
+// The tag of one copy of a family of values that share pieces. Copying takes the right to change pieces in place from both
+// sides, as all pieces are shared from then on; each side draws a new tag, unique in the family, at its next change. So
+// copying is safe from several threads at once, which is what drafts do with a published version.
+class CowOwner {
+ public:
+  CowOwner() : family_(std::make_shared<std::atomic<std::uint64_t>>(0)) {}
+  CowOwner(const CowOwner& other) : family_(other.family_) { other.share(); }
+  CowOwner(CowOwner&& other) noexcept
+      : family_(std::move(other.family_)), tag_(other.tag_), shared_(other.shared_.load(std::memory_order_relaxed)) {}
+  CowOwner& operator=(const CowOwner& other) {
+    if (this == &other) return *this;
+    family_ = other.family_;
+    other.share();
+    share();
+    return *this;
+  }
+  CowOwner& operator=(CowOwner&& other) noexcept {
+    family_ = std::move(other.family_);
+    tag_ = other.tag_;
+    shared_.store(other.shared_.load(std::memory_order_relaxed), std::memory_order_relaxed);
+    return *this;
+  }
+  ~CowOwner() = default;
+
+  // The tag of pieces that may be changed in place. Only for whoever may change the value.
+  std::uint64_t tag() {
+    if (shared_.load(std::memory_order_relaxed)) {
+      tag_ = family_->fetch_add(1, std::memory_order_relaxed) + 1;
+      shared_.store(false, std::memory_order_relaxed);
+    }
+    return tag_;
+  }
+
+ private:
+  void share() const {
+    if (!shared_.load(std::memory_order_relaxed)) shared_.store(true, std::memory_order_relaxed);
+  }
+
+  std::shared_ptr<std::atomic<std::uint64_t>> family_;  // last tag given
+  std::uint64_t tag_ = 0;
+  // Relaxed order does: whoever copies or changes a value has it by a synchronised way already. It is atomic because
+  // several threads may copy one published value at a time.
+  mutable std::atomic<bool> shared_ = true;
+};
+
+// Two-level: nodes of chunks, so that a copy costs one shared pointer per 64 chunks. `tag` is that of the CowOwner which
+// lives, and is copied, beside the vector.
 template <class T, std::size_t kChunk>
 class CowVector {
  public:
   std::size_t size() const { return size_; }
-  const T& operator[](std::size_t i) const { return (*chunks_[i / kChunk])[i % kChunk]; }
-
-  // For writing: detaches the chunk of element i first where another copy shares it.
-  T& mutate(std::size_t i) {
-    std::shared_ptr<Chunk>& chunk = chunks_[i / kChunk];
-    if (chunk.use_count() != 1) chunk = std::make_shared<Chunk>(*chunk);
-    return (*chunk)[i % kChunk];
+  const T& operator[](std::size_t i) const {
+    return nodes_[i / kPerNode]->chunks[i / kChunk % kNode]->values[i % kChunk];
   }
 
-  void push_back(T value) {
-    if (size_ % kChunk == 0) chunks_.push_back(std::make_shared<Chunk>());
+  // For writing: detaches the chunk of element i where it is not this copy's own.
+  T& mutate(std::size_t i, std::uint64_t tag) {
+    std::shared_ptr<Node>& node = nodes_[i / kPerNode];
+    detach(node, tag);
+    std::shared_ptr<Chunk>& chunk = node->chunks[i / kChunk % kNode];
+    detach(chunk, tag);
+    return chunk->values[i % kChunk];
+  }
+
+  void push_back(T value, std::uint64_t tag) {
+    if (size_ % kPerNode == 0) nodes_.push_back(std::make_shared<Node>(Node{tag, {}}));
+    if (size_ % kChunk == 0) {
+      detach(nodes_.back(), tag);
+      nodes_.back()->chunks[size_ / kChunk % kNode] = std::make_shared<Chunk>(Chunk{tag, {}});
+    }
     ++size_;
-    mutate(size_ - 1) = std::move(value);
+    mutate(size_ - 1, tag) = std::move(value);
   }
 
  private:
-  using Chunk = std::array<T, kChunk>;
-  std::vector<std::shared_ptr<Chunk>> chunks_;
+  static constexpr std::size_t kNode = 64;  // chunks
+  static constexpr std::size_t kPerNode = kNode * kChunk;
+  struct Chunk {
+    std::uint64_t tag;
+    std::array<T, kChunk> values;
+  };
+  struct Node {
+    std::uint64_t tag;
+    std::array<std::shared_ptr<Chunk>, kNode> chunks;
+  };
+  template <class Piece>
+  static void detach(std::shared_ptr<Piece>& piece, std::uint64_t tag) {
+    if (piece->tag == tag) return;
+    piece = std::make_shared<Piece>(*piece);
+    piece->tag = tag;
+  }
+
+  std::vector<std::shared_ptr<Node>> nodes_;
   std::size_t size_ = 0;
+};
+
+// A contiguous array that is shared and detached as a whole. Reads like a const std::vector.
+template <class T>
+class CowArray {
+ public:
+  CowArray() = default;
+  CowArray(std::vector<T> values, std::uint64_t tag) : piece_(std::make_shared<Piece>(Piece{tag, std::move(values)})) {}
+
+  const std::vector<T>& values() const { return piece_ ? piece_->values : kNone; }
+  operator const std::vector<T>&() const { return values(); }  // NOLINT: implicit on purpose
+  std::size_t size() const { return values().size(); }
+  bool empty() const { return values().empty(); }
+  const T& operator[](std::size_t i) const { return piece_->values[i]; }
+  auto begin() const { return values().begin(); }
+  auto end() const { return values().end(); }
+
+  // For writing: detaches the array where it is not this copy's own.
+  std::vector<T>& mutate(std::uint64_t tag) {
+    if (!piece_) {
+      piece_ = std::make_shared<Piece>(Piece{tag, {}});
+    } else if (piece_->tag != tag) {
+      piece_ = std::make_shared<Piece>(*piece_);
+      piece_->tag = tag;
+    }
+    return piece_->values;
+  }
+  void clear() { piece_.reset(); }
+
+ private:
+  struct Piece {
+    std::uint64_t tag;
+    std::vector<T> values;
+  };
+  static inline const std::vector<T> kNone;
+  std::shared_ptr<Piece> piece_;
 };
 
 }  // namespace bslam::map

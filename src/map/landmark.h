@@ -15,6 +15,8 @@ namespace bslam::map {
 struct Observation {
   KeyframeId keyframe;
   FeatureId feature;
+  bool aligned = true;  // its keypoints were placed by the landmark's reference patch, so that their own sigma holds; else
+                        // they were found by descriptor alone, or belonged to a landmark merged into this one
   friend auto operator<=>(const Observation&, const Observation&) = default;
 };
 

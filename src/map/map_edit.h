@@ -1,19 +1,26 @@
 // A proposed change of the map, as a value: what a stage hands to MapStore::commit.
 //
-// Rebase rules, where other edits were committed between the edit's base and its commit:
-//   | operation            | rule                                                                                      |
-//   | AddKeyframe          | gets the next id; matches to removed landmarks are dropped, to merged ones are forwarded   |
-//   | AddLandmark          | gets the next id; observations in removed keyframes or taken features are dropped; with    |
-//   |                      | none left the landmark is dropped                                                          |
-//   | AddObservation       | forwarded along merges; dropped where landmark or keyframe is gone or the feature is taken |
-//   | RemoveObservation    | dropped where it is gone already                                                           |
-//   | RemoveLandmark       | dropped where it is gone already; kept where a newer keyframe has found it meanwhile       |
-//   | MergeLandmarks       | both ends forwarded; dropped where they are one already or one is gone                     |
-//   | RemoveKeyframe       | dropped where it is gone already or is the root                                            |
-//   | SetPoses             | entries of removed keyframes and landmarks are dropped; keyframes made after the base move |
-//   |                      | with their parent, landmarks made after the base move with the keyframe of their reference |
-//   | AddSightings         | forwarded along merges, dropped where gone                                                 |
-//   | RefreshLandmarks     | forwarded along merges, dropped where gone                                                 |
+// Rebase rules, where other edits were committed between the edit's base and its commit (`newer` = made by those others):
+//   | operation         | rule                                                                                          |
+//   | AddKeyframe       | gets the next id; matches to removed landmarks are dropped, to merged ones are forwarded;     |
+//   |                   | where its parent was moved since the base, it moves along                                     |
+//   | AddLandmark       | gets the next id; observations in removed keyframes or taken features are dropped; with none  |
+//   |                   | left the landmark is dropped; where the keyframe of its reference was moved since the base,   |
+//   |                   | it moves along                                                                                |
+//   | AddObservation    | forwarded along merges; dropped where landmark or keyframe is gone, the feature is taken or   |
+//   |                   | the keyframe observes the landmark already                                                    |
+//   | RemoveObservation | dropped where it is gone already, also by a merge                                             |
+//   | RemoveLandmark    | dropped where it is gone already, also by a merge; and where a newer keyframe observes it     |
+//   | MergeLandmarks    | both ends forwarded; dropped where they are one already or one is gone                        |
+//   | RemoveKeyframe    | dropped where it is gone already or is the root                                               |
+//   | SetPoses          | entries of removed keyframes and of removed or merged landmarks are dropped; newer keyframes  |
+//   |                   | move with their parent (chains with the nearest older ancestor), newer landmarks with the     |
+//   |                   | keyframe of their reference                                                                   |
+//   | AddSightings      | forwarded along merges, entries dropped where gone                                            |
+//   | RefreshLandmarks  | forwarded along merges, entries dropped where gone                                            |
+// So the order in which a new keyframe and a correction of its surroundings are committed does not change where it ends up.
+// An operation of several entries counts as dropped where all of them are. An operation on something the edit itself added
+// is dropped where that was.
 #pragma once
 
 #include <memory>
@@ -33,6 +40,7 @@ struct AddKeyframe {
   geometry::SE3 T_rig_world;
   std::vector<std::pair<FeatureId, LandmarkId>> matches;
   KeyframeId fallback_parent;
+  KeyframeId parent;  // in the draft; invalid for the root
 };
 struct AddLandmark {
   LandmarkId provisional;
@@ -71,9 +79,12 @@ struct AddSightings {
 struct RefreshLandmarks {
   std::vector<LandmarkId> landmarks;
 };
+struct SetScale {
+  Scale scale = Scale::kMetric;
+};
 
 using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark, MergeLandmarks,
-                               RemoveKeyframe, SetPoses, AddSightings, RefreshLandmarks>;
+                               RemoveKeyframe, SetPoses, AddSightings, RefreshLandmarks, SetScale>;
 
 struct MapEdit {
   std::string_view stage;  // a literal
@@ -82,25 +93,30 @@ struct MapEdit {
 };
 
 // A snapshot with a private overlay: a stage writes to it, reads back what it wrote, and hands out the edit. One per run
-// of a stage; not shared between threads.
+// of a stage; not shared between threads. Functions that return bool do as those of BundledMap; what changes nothing is not
+// recorded.
 class MapDraft {
  public:
   MapDraft(std::string_view stage, MapSnapshot base);
 
   const BundledMap& map() const { return working_; }  // the base with all that was written so far
 
+  // Matches may stem from an older version: those to merged landmarks are forwarded; those to removed ones, and later ones
+  // of a feature or landmark that occurs twice, are dropped.
   KeyframeId add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                           std::vector<std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent);
   LandmarkId add_landmark(const Eigen::Vector3d& position, std::vector<Observation> observations,
-                          const LandmarkReference& reference);
+                          const LandmarkReference& reference = {});
   bool add_observation(LandmarkId l, Observation o);
-  void remove_observation(LandmarkId l, KeyframeId k);
-  void remove_landmark(LandmarkId l);
-  void merge_landmarks(LandmarkId from, LandmarkId into);
-  void remove_keyframe(KeyframeId k);
+  bool remove_observation(LandmarkId l, KeyframeId k);
+  bool remove_landmark(LandmarkId l);
+  bool merge_landmarks(LandmarkId from, LandmarkId into);
+  bool remove_keyframe(KeyframeId k);
+  // Entries of what is not alive are left out.
   void set_poses(SetPoses poses);
   void add_sightings(std::vector<Sighting> sightings);
   void refresh_landmarks(std::vector<LandmarkId> landmarks);
+  void set_scale(Scale scale);
 
   // The edit and the working copy, which MapStore publishes as it is where the base is still the newest version.
   struct Finished {

@@ -5,20 +5,18 @@
 #include <mutex>
 
 #include "map/map_edit.h"
+#include "map/rebase.h"
 
 namespace bslam::map {
 
-// What became of an edit.
-struct CommitReport {
-  MapSnapshot published;        // the new version
-  bool rebased = false;         // other edits had been committed since its base
-  std::size_t applied = 0;      // operations
-  std::size_t dropped = 0;      // operations whose objects were gone
-  // Ids given to what the edit added, in order of the operations; invalid where dropped.
-  std::vector<KeyframeId> keyframes;
-  std::vector<LandmarkId> landmarks;
+// What became of an edit: how it was applied, and the new version.
+struct CommitReport : RebaseReport {
+  MapSnapshot published;
+  bool rebased = false;  // other edits had been committed since its base
 };
 
+// Versions it hands out are const and are never changed, nor is anything that could change them handed out: a draft works
+// on its own copy. See cow_vector.h for why the memory they share is safe to read while drafts are written.
 class MapStore {
  public:
   explicit MapStore(BundledMap initial);
@@ -26,8 +24,9 @@ class MapStore {
   // The newest version; from any thread.
   MapSnapshot snapshot() const;
 
-  // Applies the draft, by the rebase rules of map_edit.h where its base is no longer the newest, and publishes the next
-  // version. From any thread; commits are one after the other.
+  // Publishes the draft as the next version: its working copy as it is where its base is still the newest, with the
+  // provisional ids as given; else its operations, applied to the newest by the rebase rules of map_edit.h. From any
+  // thread; commits are one after the other.
   CommitReport commit(MapDraft draft);
 
  private:

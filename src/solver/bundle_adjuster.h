@@ -31,7 +31,7 @@ struct BundleOptions {
   int iterations = 10;             // accepted or rejected steps at most
   double relative_decrease = 1e-4; // of the cost, below which it has converged
   bool robust = true;              // Huber kernel at the 95 % bound
-  bool keep_scale = false;         // up to scale: hold the distance of the second fixed pose (needs two fixed poses)
+  int dense_poses = 150;           // free poses up to which the reduced camera system is solved densely
 };
 
 enum class BundleStop { kConverged, kIterations, kStopped, kFailed };
@@ -47,8 +47,11 @@ struct BundleSummary {
   bool usable() const { return stop != BundleStop::kFailed; }
 };
 
-// Improves the free poses and all points in place; on kFailed the problem is as it was. `skip` (one per observation, or
-// empty) leaves observations out. A stop request ends it after the step in hand, keeping what was gained.
+// Improves the free poses and all points in place; on kFailed the problem is as it was (also where nothing is left to
+// learn from). At least one pose is fixed; a map up to scale keeps its scale by two fixed poses. `skip` (one per
+// observation, or empty) leaves observations out. So are, for the call, observations that do not project or miss by more
+// than kLostChi2 at the start, and points with fewer than two observations left; the costs do not count them. A stop
+// request ends it after the step in hand, keeping what was gained. Deterministic to the bit.
 BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip = {},
                      std::stop_token stop = {});
 

@@ -1,4 +1,4 @@
-// The one reprojection residual of motion-only, local and global bundle adjustment (docs/math.md).
+// The one reprojection residual of motion-only, local and global bundle adjustment (docs/math.md, sections 2 to 4).
 #pragma once
 
 #include <optional>
@@ -30,8 +30,23 @@ struct ReprojectionResidual {
 // chi-square bounds at 95 %.
 constexpr double kChi2OneDof95 = 3.841, kChi2TwoDof95 = 5.991;
 
-// Huber weight of a squared normalised error, with its knee at the 95 % bound of two degrees of freedom.
+// Squared normalised error from which on an observation is lost: it costs as much as at this bound, whether it misses by
+// more or does not project at all, and pulls nowhere. So a step never gains by pushing a point behind a camera.
+constexpr double kLostChi2 = 1e6;
+
+enum class Kernel { kNone, kHuber };
+
+// Huber weight of a squared normalised error, with its knee at the 95 % bound of two degrees of freedom; and its cost,
+// on the scale of chi2 (twice what enters the sum to be minimised).
 double huber_weight(double chi2, double knee_chi2 = kChi2TwoDof95);
 double huber_cost(double chi2, double knee_chi2 = kChi2TwoDof95);
+
+// The same under either kernel.
+inline double kernel_weight(Kernel kernel, double chi2) {
+  return kernel == Kernel::kNone || chi2 <= kChi2TwoDof95 ? 1.0 : huber_weight(chi2);
+}
+inline double kernel_cost(Kernel kernel, double chi2) {
+  return kernel == Kernel::kNone || chi2 <= kChi2TwoDof95 ? chi2 : huber_cost(chi2);
+}
 
 }  // namespace bslam::solver

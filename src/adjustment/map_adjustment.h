@@ -1,0 +1,46 @@
+// Bundle adjustment of part of a map: chooses nothing, only turns what was chosen into a flat problem and the answer into
+// operations of a draft. Local and global adjustment differ in what they choose.
+#pragma once
+
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "base/options.h"
+#include "map/map_edit.h"
+#include "solver/bundle_adjuster.h"
+
+namespace bslam::adjustment {
+
+struct AdjustmentOptions {
+  int robust_iterations = 5;   // with Huber kernel, before observations are judged
+  int final_iterations = 5;    // without it, on those that agree
+  double outlier_chi2 = solver::kChi2TwoDof95;  // squared normalised error above which an observation is removed
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("robust_iterations", self.robust_iterations, Range{0, 200}, "", "steps with Huber kernel");
+    visitor("final_iterations", self.final_iterations, Range{0, 200}, "", "steps without it on the observations that agree");
+    visitor("outlier_chi2", self.outlier_chi2, Range{0.1, 1e6}, "", "squared normalised error above which an observation goes");
+  }
+};
+
+// What takes part; ids alive, distinct, in ascending order. Observations by other keyframes are left out.
+struct Selection {
+  std::vector<KeyframeId> free_keyframes, fixed_keyframes;
+  std::vector<LandmarkId> landmarks;
+};
+
+struct AdjustmentReport {
+  bool done = false;            // false: nothing to adjust, or the solver failed; the draft is as it was
+  std::size_t observations = 0, outliers = 0;
+  double initial_cost = 0, final_cost = 0;  // of the last round
+};
+
+// Adjusts the free keyframes and the landmarks with all cameras' observations, two rounds, and writes poses, positions and
+// the removal of outlying observations to the draft. `sigma_px`: standard deviation of a keypoint that is not aligned to
+// its landmark's patch, on its level.
+AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options, double sigma_px, double scale_factor,
+                            map::MapDraft& draft, std::stop_token stop = {});
+
+}  // namespace bslam::adjustment

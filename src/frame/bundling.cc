@@ -1,0 +1,205 @@
+#include "frame/bundling.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "frame/epipolar_search.h"
+#include "frame/point_estimation.h"
+
+namespace bslam::frame {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// A match of keypoints of two cameras, with the second one's aligned place.
+struct Edge {
+  KeypointRef a, b;
+  int hamming = 0;
+  AlignedKeypoint aligned;
+  Vector3d bearing;  // of the aligned pixel
+};
+
+struct CameraPair {
+  CameraIndex a, b;
+};
+
+std::vector<CameraPair> overlapping_pairs(const camera::Rig& rig) {
+  std::vector<CameraPair> pairs;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    for (std::size_t j = i + 1; j < rig.size(); ++j) {
+      if (rig.overlap(i, j) || rig.overlap(j, i)) pairs.push_back({CameraIndex(i), CameraIndex(j)});
+    }
+  }
+  return pairs;
+}
+
+PointObservation observation(const camera::Rig& rig, std::span<const CameraFrame> cameras, KeypointRef ref) {
+  const feature::Keypoints& k = cameras[ref.camera.index()].keypoints;
+  const std::size_t i = ref.keypoint.index();
+  return {&rig.camera(ref.camera), rig.cam_from_rig(ref.camera), k.pixel[i].cast<double>(), k.bearing[i], k.sigma[i]};
+}
+
+// Places keypoint b where the patch of keypoint a is seen. Empty where it does not look alike there.
+bool align_edge(const camera::Rig& rig, std::span<const CameraFrame> cameras, std::span<const image::Pyramid> pyramids,
+                const AlignmentOptions& options, Edge& edge) {
+  const feature::Keypoints& ka = cameras[edge.a.camera.index()].keypoints;
+  const feature::Keypoints& kb = cameras[edge.b.camera.index()].keypoints;
+  const std::size_t ia = edge.a.keypoint.index(), ib = edge.b.keypoint.index();
+  const geometry::SE3 T_b_a = rig.cam_from_rig(edge.b.camera) * rig.rig_from_cam(edge.a.camera.index());
+  const std::array<PointObservation, 2> pair = {observation(rig, cameras, edge.a), observation(rig, cameras, edge.b)};
+  const double far_m = 1000.0 * T_b_a.translation().norm();
+  const auto estimated = estimate_point(pair, 1e-4);
+  const Vector3d point_a = estimated ? rig.cam_from_rig(edge.a.camera) * estimated->point : (far_m * ka.bearing[ia]).eval();
+  const image::Pyramid& pyramid_a = pyramids[edge.a.camera.index()];
+  const auto warp = patch_warp(rig.camera(edge.a.camera), rig.camera(edge.b.camera), T_b_a, point_a,
+                               pyramid_a.scale_x[ka.level[ia]]);
+  if (!warp) return false;
+  const auto aligned = align_patch(ka.patch[ia], *warp, pyramids[edge.b.camera.index()], kb.pixel[ib].cast<double>(), options);
+  if (!aligned) return false;
+  const auto bearing = rig.camera(edge.b.camera).unproject(aligned->pixel);
+  if (!bearing) return false;
+  edge.aligned = *aligned;
+  edge.bearing = *bearing;
+  return true;
+}
+
+std::vector<Edge> match_pair(const camera::Rig& rig, std::span<const CameraFrame> cameras,
+                             std::span<const image::Pyramid> pyramids, CameraPair pair, const BundlingOptions& options,
+                             const AlignmentOptions& alignment) {
+  const EpipolarView a{&rig.camera(pair.a), &cameras[pair.a.index()].keypoints, rig.rig_from_cam(pair.a.index()), {}};
+  const EpipolarView b{&rig.camera(pair.b), &cameras[pair.b.index()].keypoints, rig.rig_from_cam(pair.b.index()), {}};
+  const EpipolarOptions search{.near_m = options.near_m,
+                               .sigmas = options.sigmas,
+                               .max_hamming = options.max_hamming,
+                               .ratio = options.ratio,
+                               .max_level_difference = 2};
+  std::vector<Edge> edges;
+  for (const EpipolarMatch& m : match_epipolar(a, b, search)) {
+    Edge edge{{pair.a, m.a}, {pair.b, m.b}, m.hamming, {}, {}};
+    if (align_edge(rig, cameras, pyramids, alignment, edge)) edges.push_back(edge);
+  }
+  return edges;
+}
+
+// Groups of keypoints joined by edges, the strongest first; an edge that would bring two keypoints of one camera together
+// is left out.
+class Grouping {
+ public:
+  explicit Grouping(std::span<const CameraFrame> cameras) {
+    begin_.push_back(0);
+    for (const CameraFrame& c : cameras) begin_.push_back(begin_.back() + c.keypoints.size());
+    group_of_.assign(begin_.back(), -1);
+  }
+
+  bool join(KeypointRef a, KeypointRef b) {
+    int& ga = group_of_[slot(a)];
+    int& gb = group_of_[slot(b)];
+    if (ga >= 0 && ga == gb) return false;
+    std::vector<KeypointRef> merged = members(ga, a);
+    const std::vector<KeypointRef> other = members(gb, b);
+    merged.insert(merged.end(), other.begin(), other.end());
+    std::sort(merged.begin(), merged.end());
+    for (std::size_t i = 1; i < merged.size(); ++i) {
+      if (merged[i - 1].camera == merged[i].camera) return false;
+    }
+    if (gb >= 0) groups_[static_cast<std::size_t>(gb)].clear();
+    const int target = ga >= 0 ? ga : static_cast<int>(groups_.size());
+    if (ga < 0) groups_.emplace_back();
+    for (const KeypointRef r : merged) group_of_[slot(r)] = target;
+    groups_[static_cast<std::size_t>(target)] = std::move(merged);
+    return true;
+  }
+
+  std::vector<std::vector<KeypointRef>> take() {
+    std::erase_if(groups_, [](const auto& g) { return g.size() < 2; });
+    return std::move(groups_);
+  }
+
+ private:
+  std::size_t slot(KeypointRef r) const { return begin_[r.camera.index()] + r.keypoint.index(); }
+  std::vector<KeypointRef> members(int group, KeypointRef self) const {
+    return group < 0 ? std::vector<KeypointRef>{self} : groups_[static_cast<std::size_t>(group)];
+  }
+  std::vector<std::size_t> begin_;
+  std::vector<int> group_of_;
+  std::vector<std::vector<KeypointRef>> groups_;
+};
+
+// Moves the second keypoint of an edge to its aligned place; the first defines the feature, so its own place is exact.
+void place_keypoints(std::span<CameraFrame> cameras, std::span<const image::Pyramid> pyramids, const Edge& edge,
+                     const AlignmentOptions& alignment) {
+  feature::Keypoints& ka = cameras[edge.a.camera.index()].keypoints;
+  feature::Keypoints& kb = cameras[edge.b.camera.index()].keypoints;
+  const std::size_t ia = edge.a.keypoint.index(), ib = edge.b.keypoint.index();
+  const double scale_a = pyramids[edge.a.camera.index()].scale_x[ka.level[ia]];
+  ka.sigma[ia] = std::min(ka.sigma[ia], static_cast<float>(alignment.min_sigma_px * scale_a));
+  kb.pixel[ib] = edge.aligned.pixel.cast<float>();
+  kb.bearing[ib] = edge.bearing;
+  kb.sigma[ib] = static_cast<float>(edge.aligned.sigma);
+}
+
+}  // namespace
+
+std::optional<BundledPoint> triangulate_group(const camera::Rig& rig, std::span<const CameraFrame> cameras,
+                                              std::span<const KeypointRef> group, double min_parallax, double max_chi2) {
+  std::vector<PointObservation> observations;
+  for (const KeypointRef ref : group) observations.push_back(observation(rig, cameras, ref));
+  const auto estimated = estimate_point(observations, min_parallax);
+  if (!estimated || estimated->worst_chi2 > max_chi2) return std::nullopt;
+  return BundledPoint{estimated->point, estimated->covariance};
+}
+
+Bundled make_bundled(const camera::Rig& rig, std::span<const CameraFrame> cameras,
+                     std::span<const std::vector<KeypointRef>> matched, double min_parallax) {
+  std::vector<std::optional<BundledPoint>> points;
+  for (const auto& group : matched) points.push_back(triangulate_group(rig, cameras, group, min_parallax));
+  std::vector<std::size_t> counts;
+  for (const CameraFrame& c : cameras) counts.push_back(c.keypoints.size());
+  return Bundled(counts, matched, points);
+}
+
+Bundled bundle(const camera::Rig& rig, std::span<CameraFrame> cameras, std::span<const image::Pyramid> pyramids,
+               const BundlingOptions& options, const AlignmentOptions& alignment, ThreadPool& pool) {
+  const std::vector<CameraPair> pairs = overlapping_pairs(rig);
+  std::vector<std::vector<Edge>> found(pairs.size());
+  pool.for_each(pairs.size(), [&](std::size_t p) {
+    found[p] = match_pair(rig, cameras, pyramids, pairs[p], options, alignment);
+  });
+  std::vector<Edge> edges;
+  for (const auto& list : found) edges.insert(edges.end(), list.begin(), list.end());
+  std::stable_sort(edges.begin(), edges.end(), [](const Edge& p, const Edge& q) { return p.hamming < q.hamming; });
+
+  Grouping grouping(cameras);
+  std::vector<std::vector<std::uint8_t>> placed;  // a keypoint is moved by its strongest edge only
+  for (const CameraFrame& c : cameras) placed.emplace_back(c.keypoints.size(), 0);
+  for (const Edge& e : edges) {
+    if (!grouping.join(e.a, e.b)) continue;
+    std::uint8_t& done = placed[e.b.camera.index()][e.b.keypoint.index()];
+    if (!done) place_keypoints(cameras, pyramids, e, alignment);
+    done = placed[e.a.camera.index()][e.a.keypoint.index()] = 1;
+  }
+
+  // Keypoints that do not meet in one point are no feature: the worst goes until the rest agrees.
+  std::vector<std::vector<KeypointRef>> groups = grouping.take();
+  std::vector<std::vector<KeypointRef>> kept;
+  for (std::vector<KeypointRef>& group : groups) {
+    while (group.size() >= 2) {
+      std::vector<PointObservation> observations;
+      for (const KeypointRef ref : group) observations.push_back(observation(rig, cameras, ref));
+      const auto estimated = estimate_point(observations, 0.0);
+      if (!estimated) {
+        group.clear();
+      } else if (estimated->worst_chi2 > options.max_chi2) {
+        group.erase(group.begin() + static_cast<std::ptrdiff_t>(estimated->worst));
+      } else {
+        break;
+      }
+    }
+    if (group.size() >= 2) kept.push_back(std::move(group));
+  }
+  std::sort(kept.begin(), kept.end());
+  return make_bundled(rig, cameras, kept, options.min_parallax);
+}
+
+}  // namespace bslam::frame

@@ -1,0 +1,35 @@
+#include "frame/frame_builder.h"
+
+#include <utility>
+
+#include "base/assert.h"
+
+namespace bslam::frame {
+
+FrameBuilder::FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions& options, std::vector<image::Image> masks)
+    : rig_(rig), masks_(std::move(masks)), pyramids_(rig.size()) {
+  masks_.resize(rig.size());
+  for (std::size_t i = 0; i < rig.size(); ++i) extractors_.emplace_back(options);
+}
+
+BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool& pool) {
+  BSLAM_ASSERT(images.images.size() == rig_.size(), "one image slot per camera of the rig");
+  BundledFrame frame;
+  frame.id = images.id;
+  frame.time_ns = images.time_ns;
+  frame.cameras.resize(rig_.size());
+  pool.for_each(rig_.size(), [&](std::size_t i) {
+    const image::CameraImage& input = images.images[i];
+    CameraFrame& camera = frame.cameras[i];
+    camera.state = input.state;
+    camera.time_ns = input.time_ns;
+    if (input.state == image::ImageState::kPresent) {
+      extractors_[i].extract(input.image.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], camera.keypoints);
+    } else {
+      pyramids_[i].levels.clear();
+    }
+  });
+  return frame;
+}
+
+}  // namespace bslam::frame

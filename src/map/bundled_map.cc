@@ -1,0 +1,207 @@
+#include "map/bundled_map.h"
+
+#include <algorithm>
+
+#include "base/assert.h"
+
+namespace bslam::map {
+
+std::vector<KeyframeId> BundledMap::keyframe_ids() const {
+  std::vector<KeyframeId> ids;
+  ids.reserve(alive_keyframes_);
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    if (keyframes_[i].alive) ids.emplace_back(i);
+  }
+  return ids;
+}
+
+std::vector<LandmarkId> BundledMap::landmark_ids() const {
+  std::vector<LandmarkId> ids;
+  ids.reserve(alive_landmarks_);
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (landmarks_[i].alive) ids.emplace_back(i);
+  }
+  return ids;
+}
+
+KeyframeId BundledMap::newest_keyframe() const {
+  for (std::size_t i = keyframes_.size(); i-- > 0;) {
+    if (keyframes_[i].alive) return KeyframeId(i);
+  }
+  return {};
+}
+
+LandmarkId BundledMap::resolve(LandmarkId l) const {
+  while (l.valid() && l.index() < landmarks_.size()) {
+    const Landmark& entry = landmark(l);
+    if (entry.alive) return l;
+    l = entry.merged_into;
+  }
+  return {};
+}
+
+geometry::SE3 BundledMap::resolved_pose(KeyframeId k) const {
+  const BundledKeyframe* entry = &keyframe(k);
+  if (entry->alive) return entry->T_rig_world;
+  geometry::SE3 T_rig_ancestor;
+  for (; !entry->alive; entry = &keyframe(entry->parent)) T_rig_ancestor = T_rig_ancestor * entry->T_rig_parent;
+  return T_rig_ancestor * entry->T_rig_world;
+}
+
+KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
+                                    std::span<const std::pair<FeatureId, LandmarkId>> matches,
+                                    KeyframeId fallback_parent) {
+  const KeyframeId k(keyframes_.size());
+  if (!alive(fallback_parent)) fallback_parent = newest_keyframe();
+  std::vector<LandmarkId> table(frame->bundled.size());
+  BundledKeyframe entry;
+  entry.frame = std::move(frame);
+  entry.T_rig_world = T_rig_world;
+  entry.alive = true;
+  keyframes_.push_back(std::move(entry), owner_.tag());
+  ++alive_keyframes_;
+
+  for (const auto& [feature, l] : matches) {
+    BSLAM_ASSERT(alive(l) && !table[feature.index()].valid(), "a new keyframe's matches are alive and features distinct");
+    const auto list = observations(l);
+    BSLAM_ASSERT(list.empty() || list.back().keyframe != k, "a new keyframe's matches are distinct landmarks");
+    table[feature.index()] = l;
+    observations_.insert(l.index(), {k, feature}, owner_.tag());
+    observations_total_ += num_keypoints({k, feature});
+  }
+  edit(k).landmarks = CowArray<LandmarkId>(std::move(table), owner_.tag());
+  connect_new_keyframe(k);
+  const KeyframeId parent = choose_parent(k, fallback_parent);
+  if (parent.valid()) attach(k, parent);
+  return k;
+}
+
+LandmarkId BundledMap::add_landmark(const Eigen::Vector3d& position, std::span<const Observation> observations,
+                                    const LandmarkReference& reference) {
+  BSLAM_ASSERT(!observations.empty(), "a landmark has an observation");
+  const LandmarkId l(landmarks_.size());
+  Landmark entry;
+  entry.position = position;
+  entry.born = newest_keyframe();
+  entry.alive = true;
+  entry.reference = reference;
+  if (!reference.keyframe.valid()) {
+    const Observation first = observations.front();
+    entry.reference = {first.keyframe, keyframe(first.keyframe).frame->bundled.keypoints(first.feature).front()};
+  }
+  landmarks_.push_back(entry, owner_.tag());
+  observations_.push_back(owner_.tag());
+  ++alive_landmarks_;
+  for (const Observation& o : observations) {
+    const bool added = add_observation(l, o);
+    BSLAM_ASSERT(added, "a new landmark's keyframes are alive and distinct, its features free");
+  }
+  refresh_landmark(l);
+  return l;
+}
+
+bool BundledMap::add_observation(LandmarkId l, Observation o) {
+  if (!alive(l) || !alive(o.keyframe) || landmark_of(o.keyframe, o.feature).valid()) return false;
+  const auto list = observations(l);
+  if (std::ranges::find(list, o.keyframe, &Observation::keyframe) != list.end()) return false;
+  link(l, o);
+  return true;
+}
+
+bool BundledMap::remove_observation(LandmarkId l, KeyframeId k) {
+  if (!alive(l)) return false;
+  const auto list = observations(l);
+  const auto at = std::ranges::find(list, k, &Observation::keyframe);
+  if (at == list.end()) return false;
+  unlink(l, Observation(*at));
+  const auto rest = observations(l);
+  if (rest.empty()) {
+    bury(l, {});
+  } else if (landmark(l).reference.keyframe == k) {
+    const Observation oldest = rest.front();
+    edit(l).reference = {oldest.keyframe, keyframe(oldest.keyframe).frame->bundled.keypoints(oldest.feature).front()};
+  }
+  return true;
+}
+
+bool BundledMap::remove_landmark(LandmarkId l) {
+  if (!alive(l)) return false;
+  while (!observations(l).empty()) unlink(l, Observation(observations(l).back()));
+  bury(l, {});
+  return true;
+}
+
+bool BundledMap::merge_landmarks(LandmarkId from, LandmarkId into) {
+  if (!alive(from) || !alive(into) || from == into) return false;
+  const auto list = observations(from);
+  const std::vector<Observation> moving(list.begin(), list.end());
+  for (Observation o : moving) {
+    unlink(from, o);
+    o.aligned = false;  // to the patch of another reference
+    add_observation(into, o);
+  }
+  add_sightings(into, landmark(from).expected, landmark(from).found);
+  bury(from, into);
+  return true;
+}
+
+bool BundledMap::remove_keyframe(KeyframeId k) {
+  if (!alive(k) || !keyframe(k).parent.valid()) return false;
+  const CowArray<LandmarkId> table = keyframe(k).landmarks;
+  for (const LandmarkId l : table) {
+    if (l.valid()) remove_observation(l, k);
+  }
+  hand_over_children(k);
+  BundledKeyframe& entry = edit(k);
+  const geometry::SE3& T_parent_world = keyframe(entry.parent).T_rig_world;
+  entry.T_rig_parent = entry.T_rig_world * T_parent_world.inverse();
+  entry.frame.reset();
+  entry.landmarks.clear();
+  entry.covisible.clear();
+  entry.alive = false;
+  --alive_keyframes_;
+  return true;
+}
+
+bool BundledMap::set_pose(KeyframeId k, const geometry::SE3& T_rig_world) {
+  if (!alive(k)) return false;
+  edit(k).T_rig_world = T_rig_world;
+  return true;
+}
+
+bool BundledMap::set_position(LandmarkId l, const Eigen::Vector3d& position) {
+  if (!alive(l)) return false;
+  edit(l).position = position;
+  return true;
+}
+
+bool BundledMap::add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found) {
+  if (!alive(l)) return false;
+  Landmark& entry = edit(l);
+  entry.expected += expected;
+  entry.found += found;
+  return true;
+}
+
+void BundledMap::link(LandmarkId l, Observation o) {
+  for (const Observation& other : observations(l)) change_weight(o.keyframe, other.keyframe, +1);
+  edit(o.keyframe).landmarks.mutate(owner_.tag())[o.feature.index()] = l;
+  observations_.insert(l.index(), o, owner_.tag());
+  observations_total_ += num_keypoints(o);
+}
+
+void BundledMap::unlink(LandmarkId l, Observation o) {
+  observations_.erase(l.index(), o, owner_.tag());
+  edit(o.keyframe).landmarks.mutate(owner_.tag())[o.feature.index()] = LandmarkId();
+  observations_total_ -= num_keypoints(o);
+  for (const Observation& other : observations(l)) change_weight(o.keyframe, other.keyframe, -1);
+}
+
+void BundledMap::bury(LandmarkId l, LandmarkId merged_into) {
+  Landmark& entry = edit(l);
+  entry.alive = false;
+  entry.merged_into = merged_into;
+  --alive_landmarks_;
+}
+
+}  // namespace bslam::map

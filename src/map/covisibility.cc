@@ -1,0 +1,96 @@
+// The covisibility graph and the spanning tree of a map.
+#include <algorithm>
+
+#include "map/bundled_map.h"
+
+namespace bslam::map {
+namespace {
+
+// Of two neighbours, the one with more weight; of equal ones the newer.
+bool better(const Covisible& a, const Covisible& b) {
+  return a.weight != b.weight ? a.weight > b.weight : a.keyframe > b.keyframe;
+}
+
+}  // namespace
+
+std::vector<Covisible> BundledMap::best_covisible(KeyframeId k, std::size_t limit, int min_weight) const {
+  std::vector<Covisible> best;
+  for (const Covisible& c : keyframe(k).covisible) {
+    if (c.weight >= min_weight) best.push_back(c);
+  }
+  const std::size_t count = limit == 0 ? best.size() : std::min(limit, best.size());
+  std::partial_sort(best.begin(), best.begin() + static_cast<std::ptrdiff_t>(count), best.end(), better);
+  best.resize(count);
+  return best;
+}
+
+void BundledMap::change_weight(KeyframeId a, KeyframeId b, int change) {
+  change_half_weight(a, b, change);
+  change_half_weight(b, a, change);
+}
+
+void BundledMap::change_half_weight(KeyframeId at, KeyframeId neighbour, int change) {
+  std::vector<Covisible>& list = edit(at).covisible.mutate(owner_.tag());
+  const auto entry = std::ranges::lower_bound(list, neighbour, {}, &Covisible::keyframe);
+  if (entry == list.end() || entry->keyframe != neighbour) {
+    list.insert(entry, {neighbour, change});
+  } else if ((entry->weight += change) == 0) {
+    list.erase(entry);
+  }
+}
+
+void BundledMap::connect_new_keyframe(KeyframeId k) {
+  std::vector<int> weight(k.index(), 0);  // per older keyframe
+  for (const LandmarkId l : keyframe(k).landmarks) {
+    if (!l.valid()) continue;
+    for (const Observation& o : observations(l)) {
+      if (o.keyframe != k) ++weight[o.keyframe.index()];
+    }
+  }
+  std::vector<Covisible> list;
+  for (std::size_t i = 0; i < weight.size(); ++i) {
+    if (weight[i] == 0) continue;
+    list.push_back({KeyframeId(i), weight[i]});
+    edit(KeyframeId(i)).covisible.mutate(owner_.tag()).push_back({k, weight[i]});  // the newest id comes last
+  }
+  edit(k).covisible = CowArray<Covisible>(std::move(list), owner_.tag());
+}
+
+KeyframeId BundledMap::choose_parent(KeyframeId k, KeyframeId fallback) const {
+  const auto& list = keyframe(k).covisible;
+  if (list.empty()) return fallback;
+  return std::min_element(list.begin(), list.end(), better)->keyframe;
+}
+
+void BundledMap::attach(KeyframeId child, KeyframeId parent) {
+  edit(child).parent = parent;
+  std::vector<KeyframeId>& children = edit(parent).children;
+  children.insert(std::ranges::lower_bound(children, child), child);
+}
+
+// The children are attached one after the other to the removed keyframe's parent or to a child attached before, always the
+// strongest link of those that are left; so no circle can close. Children without a link go to the parent.
+void BundledMap::hand_over_children(KeyframeId removed) {
+  const KeyframeId parent = keyframe(removed).parent;
+  std::erase(edit(parent).children, removed);
+  std::vector<KeyframeId> waiting = std::exchange(edit(removed).children, {});
+  std::vector<KeyframeId> attached = {parent};  // in order of id
+  while (!waiting.empty()) {
+    KeyframeId child = waiting.front();
+    Covisible best{parent, 0};
+    for (const KeyframeId candidate : waiting) {
+      for (const Covisible& link : keyframe(candidate).covisible) {
+        if (!std::ranges::binary_search(attached, link.keyframe)) continue;
+        if (link.weight > best.weight || (link.weight == best.weight && candidate == child && better(link, best))) {
+          best = link;
+          child = candidate;
+        }
+      }
+    }
+    attach(child, best.keyframe);
+    std::erase(waiting, child);
+    attached.insert(std::ranges::lower_bound(attached, child), child);
+  }
+}
+
+}  // namespace bslam::map

@@ -1,0 +1,74 @@
+// What a landmark looks like, from where: view direction, distance range, descriptor.
+#include <algorithm>
+#include <cmath>
+
+#include "feature/hamming.h"
+#include "map/bundled_map.h"
+
+namespace bslam::map {
+namespace {
+
+// Descriptors compared for the medoid, the newest ones: the cost grows with the square.
+constexpr std::size_t kMaxDescriptors = 24;
+
+// The one with the least median distance to the others; of equal ones the first. Not empty.
+feature::Descriptor medoid(std::span<const feature::Descriptor> descriptors) {
+  const std::size_t n = descriptors.size();
+  std::array<std::array<int, kMaxDescriptors>, kMaxDescriptors> distance;
+  for (std::size_t i = 0; i < n; ++i) {
+    distance[i][i] = 0;
+    for (std::size_t j = 0; j < i; ++j) distance[i][j] = distance[j][i] = feature::hamming(descriptors[i], descriptors[j]);
+  }
+  std::size_t best = 0;
+  int best_median = 257;
+  for (std::size_t i = 0; i < n; ++i) {
+    // The zero to itself is the smallest, so that the lower median of the others stands at n / 2.
+    const auto middle = distance[i].begin() + static_cast<std::ptrdiff_t>(n / 2);
+    std::nth_element(distance[i].begin(), middle, distance[i].begin() + static_cast<std::ptrdiff_t>(n));
+    if (*middle < best_median) {
+      best_median = *middle;
+      best = i;
+    }
+  }
+  return descriptors[best];
+}
+
+}  // namespace
+
+bool BundledMap::refresh_landmark(LandmarkId l) {
+  if (!alive(l)) return false;
+  Landmark& entry = edit(l);
+  const auto centre_map = [&](const geometry::SE3& T_rig_world, CameraIndex camera) -> Eigen::Vector3d {
+    const Eigen::Vector3d& centre_rig = rig_->rig_from_cam(camera.index()).translation();
+    return T_rig_world.rotation().conjugate() * (centre_rig - T_rig_world.translation());
+  };
+
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::array<feature::Descriptor, kMaxDescriptors> ring;
+  std::size_t count = 0;
+  for (const Observation& o : observations(l)) {
+    const BundledKeyframe& k = keyframe(o.keyframe);
+    for (const frame::KeypointRef& r : k.frame->bundled.keypoints(o.feature)) {
+      sum += (entry.position - centre_map(k.T_rig_world, r.camera)).normalized();
+      ring[count++ % kMaxDescriptors] = k.frame->keypoints(r.camera).descriptor[r.keypoint.index()];
+    }
+  }
+  entry.view_direction = sum.normalized();
+  if (count > kMaxDescriptors) {  // oldest first, for ties
+    std::rotate(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(count % kMaxDescriptors), ring.end());
+  }
+  entry.descriptor = medoid(std::span(ring).first(std::min(count, kMaxDescriptors)));
+
+  // Found on level n at distance d, a patch looks as on level 0 at distance d * scale^n, and as on the highest level at
+  // that divided by the scale of the whole pyramid.
+  const BundledKeyframe& k = keyframe(entry.reference.keyframe);
+  const frame::KeypointRef r = entry.reference.keypoint;
+  const int level = k.frame->keypoints(r.camera).level[r.keypoint.index()];
+  const double distance = (entry.position - centre_map(k.T_rig_world, r.camera)).norm();
+  const double max_distance = distance * std::pow(pyramid_.scale_factor, level);
+  entry.max_distance = static_cast<float>(max_distance);
+  entry.min_distance = static_cast<float>(max_distance / std::pow(pyramid_.scale_factor, pyramid_.levels - 1));
+  return true;
+}
+
+}  // namespace bslam::map

@@ -1,0 +1,81 @@
+#include "map/map_edit.h"
+
+#include "map/rebase.h"
+
+namespace bslam::map {
+
+MapDraft::MapDraft(std::string_view stage, MapSnapshot base) : edit_{stage, std::move(base), {}}, working_(*edit_.base) {}
+
+KeyframeId MapDraft::add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
+                                  std::vector<std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent) {
+  matches = usable_matches(working_, matches);
+  const KeyframeId k = working_.add_keyframe(frame, T_rig_world, matches, fallback_parent);
+  edit_.operations.emplace_back(
+      AddKeyframe{k, std::move(frame), T_rig_world, std::move(matches), fallback_parent, working_.keyframe(k).parent});
+  return k;
+}
+
+LandmarkId MapDraft::add_landmark(const Eigen::Vector3d& position, std::vector<Observation> observations,
+                                  const LandmarkReference& reference) {
+  const LandmarkId l = working_.add_landmark(position, observations, reference);
+  edit_.operations.emplace_back(AddLandmark{l, position, std::move(observations), working_.landmark(l).reference});
+  return l;
+}
+
+bool MapDraft::add_observation(LandmarkId l, Observation o) {
+  if (!working_.add_observation(l, o)) return false;
+  edit_.operations.emplace_back(AddObservation{l, o});
+  return true;
+}
+
+bool MapDraft::remove_observation(LandmarkId l, KeyframeId k) {
+  if (!working_.remove_observation(l, k)) return false;
+  edit_.operations.emplace_back(RemoveObservation{l, k});
+  return true;
+}
+
+bool MapDraft::remove_landmark(LandmarkId l) {
+  if (!working_.remove_landmark(l)) return false;
+  edit_.operations.emplace_back(RemoveLandmark{l});
+  return true;
+}
+
+bool MapDraft::merge_landmarks(LandmarkId from, LandmarkId into) {
+  if (!working_.merge_landmarks(from, into)) return false;
+  edit_.operations.emplace_back(MergeLandmarks{from, into});
+  return true;
+}
+
+bool MapDraft::remove_keyframe(KeyframeId k) {
+  if (!working_.remove_keyframe(k)) return false;
+  edit_.operations.emplace_back(RemoveKeyframe{k});
+  return true;
+}
+
+void MapDraft::set_poses(SetPoses poses) {
+  std::erase_if(poses.keyframes, [&](const auto& entry) { return !working_.set_pose(entry.first, entry.second); });
+  std::erase_if(poses.landmarks, [&](const auto& entry) { return !working_.set_position(entry.first, entry.second); });
+  if (poses.keyframes.empty() && poses.landmarks.empty()) return;
+  edit_.operations.emplace_back(std::move(poses));
+}
+
+void MapDraft::add_sightings(std::vector<Sighting> sightings) {
+  std::erase_if(sightings, [&](const Sighting& s) { return !working_.add_sightings(s.landmark, s.expected, s.found); });
+  if (sightings.empty()) return;
+  edit_.operations.emplace_back(AddSightings{std::move(sightings)});
+}
+
+void MapDraft::refresh_landmarks(std::vector<LandmarkId> landmarks) {
+  std::erase_if(landmarks, [&](LandmarkId l) { return !working_.refresh_landmark(l); });
+  if (landmarks.empty()) return;
+  edit_.operations.emplace_back(RefreshLandmarks{std::move(landmarks)});
+}
+
+void MapDraft::set_scale(Scale scale) {
+  working_.set_scale(scale);
+  edit_.operations.emplace_back(SetScale{scale});
+}
+
+MapDraft::Finished MapDraft::finish() && { return {std::move(edit_), std::move(working_)}; }
+
+}  // namespace bslam::map

@@ -1,0 +1,35 @@
+#include "map/map_store.h"
+
+namespace bslam::map {
+
+MapStore::MapStore(BundledMap initial) : current_(std::make_shared<const BundledMap>(std::move(initial))) {}
+
+MapSnapshot MapStore::snapshot() const {
+  const std::lock_guard lock(mutex_);
+  return current_;
+}
+
+CommitReport MapStore::commit(MapDraft draft) {
+  const std::lock_guard writer(commit_mutex_);
+  MapSnapshot current = snapshot();
+  auto [edit, result] = std::move(draft).finish();
+  CommitReport report;
+  report.rebased = edit.base != current;
+  if (report.rebased) {
+    result = *current;
+    static_cast<RebaseReport&>(report) = rebase(edit, result);
+  } else {
+    report.applied = edit.operations.size();
+    for (std::size_t k = current->keyframe_slots(); k < result.keyframe_slots(); ++k) report.keyframes.emplace_back(k);
+    for (std::size_t l = current->landmark_slots(); l < result.landmark_slots(); ++l) report.landmarks.emplace_back(l);
+  }
+  result.set_version(current->version().next());
+  report.published = std::make_shared<const BundledMap>(std::move(result));
+  {
+    const std::lock_guard lock(mutex_);
+    current_ = report.published;
+  }
+  return report;  // `current` lets the old version go only here, outside of the lock readers wait for
+}
+
+}  // namespace bslam::map

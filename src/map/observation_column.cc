@@ -1,0 +1,41 @@
+#include "map/observation_column.h"
+
+#include <algorithm>
+
+#include "base/assert.h"
+
+namespace bslam::map {
+
+void ObservationColumn::push_back(std::uint64_t tag) {
+  if (size_ % kBlock == 0) blocks_.push_back({}, tag);
+  ++size_;
+}
+
+void ObservationColumn::insert(std::size_t landmark, Observation o, std::uint64_t tag) {
+  Block& block = blocks_.mutate(landmark / kBlock, tag);
+  const std::size_t row = landmark % kBlock;
+  const auto first = block.entries.begin() + block.begin[row], last = block.entries.begin() + block.begin[row + 1];
+  block.entries.insert(std::lower_bound(first, last, o), o);
+  for (std::size_t r = row + 1; r <= kBlock; ++r) ++block.begin[r];
+}
+
+void ObservationColumn::erase(std::size_t landmark, Observation o, std::uint64_t tag) {
+  Block& block = blocks_.mutate(landmark / kBlock, tag);
+  const std::size_t row = landmark % kBlock;
+  const auto first = block.entries.begin() + block.begin[row], last = block.entries.begin() + block.begin[row + 1];
+  const auto at = std::lower_bound(first, last, o);
+  BSLAM_ASSERT(at != last && *at == o, "an observation that is erased is there");
+  block.entries.erase(at);
+  for (std::size_t r = row + 1; r <= kBlock; ++r) --block.begin[r];
+}
+
+void ObservationColumn::clear(std::size_t landmark, std::uint64_t tag) {
+  Block& block = blocks_.mutate(landmark / kBlock, tag);
+  const std::size_t row = landmark % kBlock;
+  const std::uint32_t count = block.begin[row + 1] - block.begin[row];
+  const auto first = block.entries.begin() + block.begin[row];
+  block.entries.erase(first, first + count);
+  for (std::size_t r = row + 1; r <= kBlock; ++r) block.begin[r] -= count;
+}
+
+}  // namespace bslam::map

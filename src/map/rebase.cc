@@ -1,0 +1,195 @@
+#include "map/rebase.h"
+
+#include <algorithm>
+#include <optional>
+#include <unordered_map>
+#include <unordered_set>
+
+namespace bslam::map {
+namespace {
+
+using geometry::SE3;
+
+// How things that hang on a keyframe move in the map when its T_rig_world goes from `before` to `after`: poses become
+// T_rig_world * T, points T^-1 * p, so that both keep their place in the keyframe. Empty where nothing moves, so that what
+// does not move keeps its bits.
+using Motion = std::optional<SE3>;
+
+Motion motion_between(const SE3& before, const SE3& after) {
+  if (before.rotation().coeffs() == after.rotation().coeffs() && before.translation() == after.translation()) return {};
+  return before.inverse() * after;
+}
+
+class Rebase {
+ public:
+  Rebase(const MapEdit& edit, BundledMap& map)
+      : base_(*edit.base), map_(map), others_keyframes_end_(map.keyframe_slots()),
+        others_landmarks_end_(map.landmark_slots()) {}
+
+  // Each applies one operation; false where it is dropped.
+  bool operator()(const AddKeyframe& op);
+  bool operator()(const AddLandmark& op);
+  bool operator()(const AddObservation& op) {
+    Observation observation = op.observation;
+    observation.keyframe = here(observation.keyframe);
+    return map_.add_observation(forward(op.landmark), observation);
+  }
+  bool operator()(const RemoveObservation& op) { return map_.remove_observation(here(op.landmark), here(op.keyframe)); }
+  bool operator()(const RemoveLandmark& op);
+  bool operator()(const MergeLandmarks& op) { return map_.merge_landmarks(forward(op.from), forward(op.into)); }
+  bool operator()(const RemoveKeyframe& op) { return map_.remove_keyframe(here(op.keyframe)); }
+  bool operator()(const SetPoses& op);
+  bool operator()(const AddSightings& op);
+  bool operator()(const RefreshLandmarks& op);
+  bool operator()(const SetScale& op) { return map_.set_scale(op.scale), true; }
+
+  RebaseReport take_report() && { return std::move(report_); }
+  void count(bool was_applied) { ++(was_applied ? report_.applied : report_.dropped); }
+
+ private:
+  // Ids of the edit as ids of the map: what the edit added itself got another id at commit, or none.
+  KeyframeId here(KeyframeId k) const { return own(k) ? report_.keyframes[k.index() - base_.keyframe_slots()] : k; }
+  LandmarkId here(LandmarkId l) const {
+    if (!l.valid() || l.index() < base_.landmark_slots()) return l;
+    return report_.landmarks[l.index() - base_.landmark_slots()];
+  }
+  LandmarkId forward(LandmarkId l) const { return map_.resolve(here(l)); }
+  bool own(KeyframeId k) const { return k.valid() && k.index() >= base_.keyframe_slots(); }
+
+  bool newer(KeyframeId k) const { return k.index() >= base_.keyframe_slots() && k.index() < others_keyframes_end_; }
+
+  Motion motion_since_base(KeyframeId edit_id) const;
+  void carry_along(const std::unordered_map<KeyframeId, Motion>& motions);
+
+  const BundledMap& base_;
+  BundledMap& map_;
+  const std::size_t others_keyframes_end_, others_landmarks_end_;  // slots; newer ones are the edit's own
+  std::vector<Motion> own_motions_;                                // per keyframe the edit added, when it was
+  std::unordered_set<KeyframeId> written_;                         // keyframes the edit has set; ids of the edit
+  RebaseReport report_;
+};
+
+// By which others moved a keyframe of the edit since the edit's base. What the edit itself has set stands in the map as
+// the edit meant it.
+Motion Rebase::motion_since_base(KeyframeId edit_id) const {
+  if (!edit_id.valid() || written_.contains(edit_id)) return {};
+  if (own(edit_id)) return own_motions_[edit_id.index() - base_.keyframe_slots()];
+  return motion_between(base_.resolved_pose(edit_id), map_.resolved_pose(edit_id));
+}
+
+bool Rebase::operator()(const AddKeyframe& op) {
+  std::vector<std::pair<FeatureId, LandmarkId>> matches = op.matches;
+  for (auto& [feature, l] : matches) l = here(l);
+  const Motion motion = motion_since_base(op.parent);
+  const SE3 T_rig_world = motion ? op.T_rig_world * *motion : op.T_rig_world;
+  KeyframeId fallback = here(op.fallback_parent.valid() ? op.fallback_parent : op.parent);
+  while (fallback.valid() && !map_.alive(fallback)) fallback = map_.keyframe(fallback).parent;
+  report_.keyframes.push_back(map_.add_keyframe(op.frame, T_rig_world, usable_matches(map_, matches), fallback));
+  own_motions_.push_back(motion);
+  return true;
+}
+
+bool Rebase::operator()(const AddLandmark& op) {
+  std::vector<Observation> observations;
+  LandmarkReference reference;
+  for (Observation o : op.observations) {
+    const bool has_reference = o.keyframe == op.reference.keyframe;
+    o.keyframe = here(o.keyframe);
+    if (!map_.alive(o.keyframe) || map_.landmark_of(o.keyframe, o.feature).valid()) continue;
+    observations.push_back(o);
+    if (has_reference) reference = {o.keyframe, op.reference.keypoint};
+  }
+  if (observations.empty()) {
+    report_.landmarks.emplace_back();
+    return false;
+  }
+  const Motion motion = motion_since_base(op.reference.keyframe);
+  const Eigen::Vector3d position = motion ? motion->inverse() * op.position : op.position;
+  report_.landmarks.push_back(map_.add_landmark(position, observations, reference));
+  return true;
+}
+
+bool Rebase::operator()(const RemoveLandmark& op) {
+  const LandmarkId l = here(op.landmark);
+  if (!map_.alive(l)) return false;
+  for (const Observation& o : map_.observations(l)) {
+    if (newer(o.keyframe)) return false;
+  }
+  return map_.remove_landmark(l);
+}
+
+bool Rebase::operator()(const SetPoses& op) {
+  bool any = false;
+  std::unordered_map<KeyframeId, Motion> motions;  // ids of the map
+  for (const auto& [edit_id, T_rig_world] : op.keyframes) {
+    const KeyframeId k = here(edit_id);
+    if (!map_.alive(k)) continue;
+    motions[k] = motion_between(map_.keyframe(k).T_rig_world, T_rig_world);
+    written_.insert(edit_id);
+    any |= map_.set_pose(k, T_rig_world);
+  }
+  for (const auto& [edit_id, position] : op.landmarks) any |= map_.set_position(here(edit_id), position);
+  carry_along(motions);
+  return any;
+}
+
+// Newer keyframes inherit the motion of their nearest ancestor that is not newer: as each keeps its pose relative to its
+// parent, T_rig_world_new = T_rig_parent * T_parent_world_new, the motion is the same all the way down. Newer landmarks
+// take that of their reference's keyframe.
+void Rebase::carry_along(const std::unordered_map<KeyframeId, Motion>& motions) {
+  const auto motion_of = [&](KeyframeId k) -> Motion {
+    while (newer(k)) k = map_.keyframe(k).parent;
+    const auto entry = motions.find(k);
+    return entry == motions.end() ? Motion() : entry->second;
+  };
+  for (std::size_t i = base_.keyframe_slots(); i < others_keyframes_end_; ++i) {
+    const KeyframeId k(i);
+    if (!map_.alive(k)) continue;
+    if (const Motion motion = motion_of(k)) map_.set_pose(k, map_.keyframe(k).T_rig_world * *motion);
+  }
+  for (std::size_t i = base_.landmark_slots(); i < others_landmarks_end_; ++i) {
+    const LandmarkId l(i);
+    if (!map_.alive(l)) continue;
+    const Motion motion = motion_of(map_.landmark(l).reference.keyframe);
+    if (!motion) continue;
+    map_.set_position(l, motion->inverse() * map_.landmark(l).position);
+    map_.refresh_landmark(l);
+  }
+}
+
+bool Rebase::operator()(const AddSightings& op) {
+  bool any = false;
+  for (const Sighting& s : op.sightings) any |= map_.add_sightings(forward(s.landmark), s.expected, s.found);
+  return any;
+}
+
+bool Rebase::operator()(const RefreshLandmarks& op) {
+  bool any = false;
+  for (const LandmarkId l : op.landmarks) any |= map_.refresh_landmark(forward(l));
+  return any;
+}
+
+}  // namespace
+
+std::vector<std::pair<FeatureId, LandmarkId>> usable_matches(
+    const BundledMap& map, std::span<const std::pair<FeatureId, LandmarkId>> matches) {
+  std::vector<std::pair<FeatureId, LandmarkId>> usable;
+  std::unordered_set<FeatureId> features;
+  std::unordered_set<LandmarkId> landmarks;
+  for (const auto& [feature, l] : matches) {
+    const LandmarkId resolved = map.resolve(l);
+    if (!resolved.valid() || features.contains(feature) || landmarks.contains(resolved)) continue;
+    features.insert(feature);
+    landmarks.insert(resolved);
+    usable.emplace_back(feature, resolved);
+  }
+  return usable;
+}
+
+RebaseReport rebase(const MapEdit& edit, BundledMap& onto) {
+  Rebase step(edit, onto);
+  for (const Operation& operation : edit.operations) step.count(std::visit(step, operation));
+  return std::move(step).take_report();
+}
+
+}  // namespace bslam::map

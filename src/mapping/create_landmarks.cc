@@ -1,0 +1,151 @@
+#include "mapping/create_landmarks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "frame/epipolar_search.h"
+#include "frame/point_estimation.h"
+
+namespace bslam::mapping {
+namespace {
+
+using Eigen::Vector3d;
+using frame::KeypointRef;
+using geometry::SE3;
+
+constexpr double kMaxScaleRatio = 2.0;   // between the size a point should have in the two views and the levels it was found on
+constexpr std::size_t kProbeStep = 16;   // every so many keypoints are projected to see whether two cameras share a view
+constexpr double kMinShared = 0.1;
+
+double median_depth(const map::BundledMap& map, KeyframeId k) {
+  const map::BundledKeyframe& keyframe = map.keyframe(k);
+  std::vector<double> depths;
+  for (const LandmarkId l : keyframe.landmarks) {
+    if (l.valid()) depths.push_back((keyframe.T_rig_world * map.landmark(l).position).norm());
+  }
+  if (depths.empty()) return 0.0;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
+// Keypoints of one camera whose feature has no landmark.
+std::vector<std::uint8_t> free_keypoints(const map::BundledKeyframe& keyframe, CameraIndex c) {
+  const std::size_t n = keyframe.frame->keypoints(c).size();
+  std::vector<std::uint8_t> free(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    free[k] = !keyframe.landmarks[keyframe.frame->bundled.feature(c, KeypointIndex(k)).index()].valid();
+  }
+  return free;
+}
+
+struct View {
+  KeyframeId keyframe;
+  CameraIndex camera;
+};
+
+SE3 cam_from_world(const map::BundledMap& map, View v) {
+  return map.rig().cam_from_rig(v.camera) * map.keyframe(v.keyframe).T_rig_world;
+}
+
+// Does camera b see part of what camera a sees at about `depth` metres?
+bool shares_view(const map::BundledMap& map, View a, View b, double depth) {
+  const feature::Keypoints& keypoints = map.keypoints(a.keyframe, a.camera);
+  const camera::Camera& camera_b = map.rig().camera(b.camera);
+  const SE3 T_b_a = cam_from_world(map, b) * cam_from_world(map, a).inverse();
+  std::size_t probes = 0, seen = 0;
+  for (std::size_t k = 0; k < keypoints.size(); k += kProbeStep, ++probes) {
+    const auto pixel = camera_b.project(T_b_a * (depth * keypoints.bearing[k]));
+    seen += pixel && camera_b.contains(*pixel);
+  }
+  return static_cast<double>(seen) > kMinShared * static_cast<double>(probes);
+}
+
+void append(const map::BundledMap& map, KeyframeId k, FeatureId f, std::vector<frame::PointObservation>& out, double sigma_px,
+            double scale_factor) {
+  const map::BundledKeyframe& keyframe = map.keyframe(k);
+  for (const KeypointRef r : keyframe.frame->bundled.keypoints(f)) {
+    const feature::Keypoints& keypoints = keyframe.frame->keypoints(r.camera);
+    const std::size_t i = r.keypoint.index();
+    out.push_back({&map.rig().camera(r.camera), cam_from_world(map, {k, r.camera}), keypoints.pixel[i].cast<double>(),
+                   keypoints.bearing[i], sigma_px * std::pow(scale_factor, keypoints.level[i])});
+  }
+}
+
+// The size on the image falls with distance; levels must tell the same story.
+bool sizes_agree(const Vector3d& point, View a, KeypointIndex ka, View b, KeypointIndex kb, const map::BundledMap& map,
+                 double scale_factor) {
+  const double da = (cam_from_world(map, a) * point).norm(), db = (cam_from_world(map, b) * point).norm();
+  const int levels = map.keypoints(a.keyframe, a.camera).level[ka.index()] - map.keypoints(b.keyframe, b.camera).level[kb.index()];
+  const double ratio = da / db * std::pow(scale_factor, levels);
+  return ratio < kMaxScaleRatio && ratio > 1.0 / kMaxScaleRatio;
+}
+
+// The landmark two features make, if they make one.
+std::optional<Vector3d> new_point(const map::BundledMap& map, View a, const frame::EpipolarMatch& match, View b,
+                                  const CreationOptions& options, const FeatureModel& features) {
+  const FeatureId fa = map.keyframe(a.keyframe).frame->bundled.feature(a.camera, match.a);
+  const FeatureId fb = map.keyframe(b.keyframe).frame->bundled.feature(b.camera, match.b);
+  std::vector<frame::PointObservation> observations;
+  append(map, a.keyframe, fa, observations, features.sigma_px, features.scale_factor);
+  append(map, b.keyframe, fb, observations, features.sigma_px, features.scale_factor);
+  const auto estimated = frame::estimate_point(observations, options.min_parallax);
+  if (!estimated || estimated->worst_chi2 > options.max_chi2) return std::nullopt;
+  const Vector3d from_a = estimated->point - cam_from_world(map, a).inverse().translation();
+  const Vector3d ray = from_a.normalized();
+  if (std::sqrt(ray.dot(estimated->covariance * ray)) > options.max_depth_error * from_a.norm()) return std::nullopt;
+  if (!sizes_agree(estimated->point, a, match.a, b, match.b, map, features.scale_factor)) return std::nullopt;
+  return estimated->point;
+}
+
+int create_between(View a, View b, double depth, const CreationOptions& options, const FeatureModel& features,
+                   map::MapDraft& draft) {
+  const map::BundledMap& map = draft.map();
+  if (!shares_view(map, a, b, depth)) return 0;
+  const std::vector<std::uint8_t> free_a = free_keypoints(map.keyframe(a.keyframe), a.camera);
+  const std::vector<std::uint8_t> free_b = free_keypoints(map.keyframe(b.keyframe), b.camera);
+  const frame::EpipolarView view_a{&map.rig().camera(a.camera), &map.keypoints(a.keyframe, a.camera),
+                                   cam_from_world(map, a).inverse(), free_a};
+  const frame::EpipolarView view_b{&map.rig().camera(b.camera), &map.keypoints(b.keyframe, b.camera),
+                                   cam_from_world(map, b).inverse(), free_b};
+  const frame::EpipolarOptions search{.near_m = 0.05 * depth,
+                                      .sigmas = 2.0,
+                                      .max_hamming = options.max_hamming,
+                                      .ratio = options.ratio,
+                                      .max_level_difference = 3};
+  int made = 0;
+  for (const frame::EpipolarMatch& m : frame::match_epipolar(view_a, view_b, search)) {
+    const FeatureId fa = draft.map().keyframe(a.keyframe).frame->bundled.feature(a.camera, m.a);
+    const FeatureId fb = draft.map().keyframe(b.keyframe).frame->bundled.feature(b.camera, m.b);
+    if (draft.map().landmark_of(a.keyframe, fa).valid() || draft.map().landmark_of(b.keyframe, fb).valid()) continue;
+    const auto point = new_point(draft.map(), a, m, b, options, features);
+    if (!point) continue;
+    // The newer view is the reference: what comes next looks more like it.
+    std::vector<map::Observation> observations = {{b.keyframe, fb, false}, {a.keyframe, fa, true}};
+    std::sort(observations.begin(), observations.end());
+    draft.add_landmark(*point, std::move(observations), {a.keyframe, {a.camera, m.a}});
+    ++made;
+  }
+  return made;
+}
+
+}  // namespace
+
+int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features, map::MapDraft& draft) {
+  const double depth = median_depth(draft.map(), keyframe);
+  if (depth <= 0) return 0;
+  int made = 0;
+  const Vector3d centre = draft.map().keyframe(keyframe).T_rig_world.inverse().translation();
+  for (const map::Covisible& neighbour : draft.map().best_covisible(keyframe, static_cast<std::size_t>(options.neighbours))) {
+    const Vector3d other = draft.map().keyframe(neighbour.keyframe).T_rig_world.inverse().translation();
+    if ((centre - other).norm() < options.min_baseline_share * depth) continue;
+    for (std::size_t i = 0; i < draft.map().rig().size(); ++i) {
+      for (std::size_t j = 0; j < draft.map().rig().size(); ++j) {
+        made += create_between({keyframe, CameraIndex(i)}, {neighbour.keyframe, CameraIndex(j)}, depth, options, features, draft);
+      }
+    }
+  }
+  return made;
+}
+
+}  // namespace bslam::mapping

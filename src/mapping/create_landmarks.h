@@ -1,0 +1,12 @@
+// New landmarks from features that have none: any camera of the new keyframe to any camera of its covisible neighbours.
+#pragma once
+
+#include "map/map_edit.h"
+#include "mapping/options.h"
+
+namespace bslam::mapping {
+
+// Returns how many landmarks were written to the draft.
+int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features, map::MapDraft& draft);
+
+}  // namespace bslam::mapping

@@ -1,0 +1,86 @@
+#include "mapping/local_adjustment.h"
+
+#include <algorithm>
+
+namespace bslam::mapping {
+namespace {
+
+bool is_root(const map::BundledMap& map, KeyframeId k) { return !map.keyframe(k).parent.valid(); }
+
+// Landmarks seen by the keyframes, by how many of them, falling; at most `limit`, then in order of id.
+std::vector<LandmarkId> most_seen(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes, int limit) {
+  std::vector<int> count(map.landmark_slots(), 0);
+  std::vector<LandmarkId> out;
+  for (const KeyframeId k : keyframes) {
+    for (const LandmarkId l : map.keyframe(k).landmarks) {
+      if (l.valid() && count[l.index()]++ == 0) out.push_back(l);
+    }
+  }
+  std::sort(out.begin(), out.end(), [&](LandmarkId a, LandmarkId b) {
+    const int na = count[a.index()], nb = count[b.index()];
+    return na != nb ? na > nb : a > b;
+  });
+  if (out.size() > static_cast<std::size_t>(limit)) out.resize(static_cast<std::size_t>(limit));
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Other keyframes that see the landmarks, those that see most of them, at most `limit`, in order of id.
+std::vector<KeyframeId> other_observers(const map::BundledMap& map, const std::vector<LandmarkId>& landmarks,
+                                        const std::vector<KeyframeId>& inside, int limit) {
+  std::vector<int> count(map.keyframe_slots(), 0);
+  for (const LandmarkId l : landmarks) {
+    for (const map::Observation& o : map.observations(l)) ++count[o.keyframe.index()];
+  }
+  for (const KeyframeId k : inside) count[k.index()] = 0;
+  std::vector<KeyframeId> out;
+  for (std::size_t k = 0; k < count.size(); ++k) {
+    if (count[k] > 0) out.emplace_back(k);
+  }
+  std::sort(out.begin(), out.end(), [&](KeyframeId a, KeyframeId b) {
+    const int na = count[a.index()], nb = count[b.index()];
+    return na != nb ? na > nb : a < b;
+  });
+  if (out.size() > static_cast<std::size_t>(limit)) out.resize(static_cast<std::size_t>(limit));
+  return out;
+}
+
+// Poses that must be held besides the root so that the gauge is fixed: without metric scale two in all.
+std::size_t held_poses(const map::BundledMap& map) { return map.scale() == map::Scale::kUpToScale ? 2 : 1; }
+
+// Fixes the oldest free keyframes until enough poses are held; sorts both lists.
+void fix_gauge(const map::BundledMap& map, adjustment::Selection& selection) {
+  std::sort(selection.free_keyframes.begin(), selection.free_keyframes.end());
+  while (selection.fixed_keyframes.size() < held_poses(map) && selection.free_keyframes.size() > 1) {
+    selection.fixed_keyframes.push_back(selection.free_keyframes.front());
+    selection.free_keyframes.erase(selection.free_keyframes.begin());
+  }
+  std::sort(selection.fixed_keyframes.begin(), selection.fixed_keyframes.end());
+}
+
+}  // namespace
+
+adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyframe, const LocalWindowOptions& options) {
+  std::vector<KeyframeId> window = {keyframe};
+  for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(options.free_keyframes - 1))) {
+    window.push_back(c.keyframe);
+  }
+  adjustment::Selection selection;
+  selection.landmarks = most_seen(map, window, options.max_landmarks);
+  selection.fixed_keyframes = other_observers(map, selection.landmarks, window, options.fixed_keyframes);
+  for (const KeyframeId k : window) (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
+  fix_gauge(map, selection);
+  return selection;
+}
+
+adjustment::Selection select_all(const map::BundledMap& map) {
+  adjustment::Selection selection;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
+  }
+  selection.landmarks = map.landmark_ids();
+  fix_gauge(map, selection);
+  return selection;
+}
+
+}  // namespace bslam::mapping

@@ -1,0 +1,16 @@
+// What local and global bundle adjustment choose: the paper's B_L, P_L and B_F, and everything.
+#pragma once
+
+#include "adjustment/map_adjustment.h"
+#include "mapping/options.h"
+
+namespace bslam::mapping {
+
+// B_L: `keyframe` and its best covisible keyframes, free; P_L: the landmarks they see; B_F: further keyframes that see
+// them, fixed. The root is always fixed; where the scale is not observable and nothing else holds it, so is one more.
+adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyframe, const LocalWindowOptions& options);
+
+// All keyframes but the root, all landmarks.
+adjustment::Selection select_all(const map::BundledMap& map);
+
+}  // namespace bslam::mapping

@@ -1,0 +1,44 @@
+// What of a ReprojectionProblem takes part in an adjustment, laid out for its loops: terms grouped by pose within points.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "solver/block_pattern.h"
+#include "solver/bundle_adjuster.h"
+
+namespace bslam::solver {
+
+struct BundleStructure {
+  struct Term {  // one observation
+    Eigen::Vector2f pixel;
+    float inverse_sigma;  // 1 / px
+    int camera;
+  };
+  struct Group {  // observations of one point by all cameras of one pose
+    int pose = 0;
+    int slot = -1;  // position of a free pose in the reduced camera system; -1: the pose is fixed
+    std::size_t first_term = 0;
+  };
+  struct Point {
+    int point = 0;  // in the problem
+    std::size_t first_group = 0;
+    std::size_t first_pair = 0;  // in pair_block
+  };
+
+  std::vector<Term> terms;
+  std::vector<Group> groups;  // and one more that ends the last
+  std::vector<Point> points;  // and one more that ends the last
+  std::vector<int> pose_of_slot;
+  BlockPattern pattern{0};
+  // Block number of each pair of free groups (a, b), b <= a, of each point, in the order of a, then b.
+  std::vector<int> pair_block;
+
+  std::size_t num_points() const { return points.size() - 1; }
+};
+
+// Leaves out what `skip` names, what is lost at the present values, points with fewer than two observations left (they
+// say nothing about a pose) and free poses without observations.
+BundleStructure make_structure(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip);
+
+}  // namespace bslam::solver

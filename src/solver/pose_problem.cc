@@ -1,0 +1,192 @@
+#include "solver/pose_problem.h"
+
+#include <algorithm>
+#include <limits>
+#include <variant>
+
+#include "base/assert.h"
+
+namespace bslam::solver {
+namespace {
+
+using geometry::Matrix3d;
+using geometry::Matrix6d;
+using geometry::Vector6d;
+
+struct CameraPose {
+  Matrix3d R;  // R_cam_world
+  Vector3d t;  // metres
+};
+
+CameraPose camera_pose(const Rig& rig, std::size_t i, const SE3& T_rig_world) {
+  const SE3 T_cam_world = rig.cam_from_rig(i) * T_rig_world;
+  return {T_cam_world.matrix3(), T_cam_world.translation()};
+}
+
+// Squared normalised error; beyond every bound where the point does not project.
+template <class Model>
+double squared_error(const Model& model, const CameraPose& pose, const PoseProblem::Item& item) {
+  const auto pixel = model.project(pose.R * item.point_world + pose.t);
+  if (!pixel) return std::numeric_limits<double>::infinity();
+  return (item.pixel - *pixel).squaredNorm() * item.inverse_sigma * item.inverse_sigma;
+}
+
+// Adds one observation to equations in the camera's own perturbation, T_cam_world <- exp(delta) T_cam_world, where the
+// Jacobian is J_h [-[p]x  I] without a rotation (docs/math.md, section 4).
+void accumulate(const camera::Matrix23d& J_h, const Vector3d& p, const Vector2d& e, double weight, PoseEquations& out) {
+  Eigen::Matrix<double, 6, 2> Jt;
+  for (int k = 0; k < 2; ++k) {
+    const double x = J_h(k, 0), y = J_h(k, 1), z = J_h(k, 2);
+    Jt.col(k) << p.y() * z - p.z() * y, p.z() * x - p.x() * z, p.x() * y - p.y() * x, x, y, z;
+  }
+  const Eigen::Matrix<double, 6, 2> wJt = weight * Jt;
+  for (int c = 0; c < 6; ++c) out.H.col(c) += wJt.col(0) * Jt(c, 0) + wJt.col(1) * Jt(c, 1);
+  out.b += wJt.col(0) * e.x() + wJt.col(1) * e.y();
+}
+
+// `admit(item, chi2)` says whether an item is in use, and may change that.
+template <class Model, class Items, class Admit>
+void accumulate_camera(const Model& model, const CameraPose& pose, Items items, Kernel kernel, const Admit& admit,
+                       PoseEquations& out) {
+  for (auto& item : items) {
+    if (!admit.worth_a_look(item)) continue;
+    const Vector3d p = pose.R * item.point_world + pose.t;
+    const auto projection = model.project_with_jacobian(p);
+    const Vector2d e = projection ? Vector2d(item.pixel - projection->pixel) : Vector2d::Zero();
+    const double information = item.inverse_sigma * item.inverse_sigma;
+    const double chi2 = projection ? e.squaredNorm() * information : std::numeric_limits<double>::infinity();
+    if (!admit(item, chi2)) continue;
+    if (chi2 < kLostChi2) {
+      out.cost += 0.5 * kernel_cost(kernel, chi2);
+      accumulate(projection->jacobian, p, e, kernel_weight(kernel, chi2) * information, out);
+    } else {
+      out.cost += 0.5 * kernel_cost(kernel, kLostChi2);
+    }
+  }
+}
+
+struct AdmitInUse {
+  bool worth_a_look(const PoseProblem::Item& item) const { return item.in_use; }
+  bool operator()(const PoseProblem::Item&, double) const { return true; }
+};
+
+struct AdmitWithinBound {
+  double bound;
+  int& changed;
+  int& num_in_use;
+  bool worth_a_look(const PoseProblem::Item&) const { return true; }
+  bool operator()(PoseProblem::Item& item, double chi2) const {
+    const bool in_use = chi2 <= bound;
+    changed += in_use != item.in_use;
+    num_in_use += in_use - item.in_use;
+    return item.in_use = in_use;
+  }
+};
+
+// T_cam_rig exp(delta) = exp(Ad delta) T_cam_rig turns a camera's equations into the rig's.
+void add_in_rig(const SE3& T_cam_rig, const PoseEquations& camera, PoseEquations& rig) {
+  const Matrix6d ad = T_cam_rig.adjoint();
+  rig.H += ad.transpose() * camera.H * ad;
+  rig.b += ad.transpose() * camera.b;
+  rig.cost += camera.cost;
+}
+
+}  // namespace
+
+PoseProblem::PoseProblem(const Rig& rig, std::span<const PoseObservation> observations)
+    : rig_(&rig), items_(observations.size()), first_(rig.size() + 1, 0) {
+  for (const PoseObservation& o : observations) {
+    BSLAM_ASSERT(o.camera.valid() && o.camera.index() < rig.size(), "an observation names a camera of the rig");
+    BSLAM_ASSERT(o.sigma > 0, "a standard deviation is positive");
+    ++first_[o.camera.index() + 1];
+  }
+  for (std::size_t i = 0; i < rig.size(); ++i) first_[i + 1] += first_[i];
+  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+  for (std::size_t k = 0; k < observations.size(); ++k) {
+    const PoseObservation& o = observations[k];
+    items_[next[o.camera.index()]++] = {o.point_world, o.pixel, 1.0 / o.sigma, o.camera, static_cast<int>(k), false};
+  }
+}
+
+int PoseProblem::select(const SE3& T_rig_world, double bound) {
+  int changed = 0;
+  const AdmitWithinBound admit{bound, changed, num_in_use_};
+  for (std::size_t i = 0; i < rig_->size(); ++i) {
+    const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
+    std::visit([&](const auto& model) {
+      for (Item& item : of_camera(i)) admit(item, squared_error(model, pose, item));
+    }, rig_->camera(i).model);
+  }
+  return changed;
+}
+
+PoseEquations PoseProblem::linearise(const SE3& T_rig_world, Kernel kernel) const {
+  PoseEquations out;
+  for (std::size_t i = 0; i < rig_->size(); ++i) {
+    const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
+    PoseEquations camera;
+    std::visit([&](const auto& model) {
+      accumulate_camera(model, pose, of_camera(i), kernel, AdmitInUse{}, camera);
+    }, rig_->camera(i).model);
+    add_in_rig(rig_->cam_from_rig(i), camera, out);
+  }
+  return out;
+}
+
+PoseEquations PoseProblem::reselect_and_linearise(const SE3& T_rig_world, Kernel kernel, double bound, int& changed) {
+  PoseEquations out;
+  changed = 0;
+  const AdmitWithinBound admit{bound, changed, num_in_use_};
+  for (std::size_t i = 0; i < rig_->size(); ++i) {
+    const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
+    PoseEquations camera;
+    std::visit([&](const auto& model) {
+      accumulate_camera(model, pose, of_camera(i), kernel, admit, camera);
+    }, rig_->camera(i).model);
+    add_in_rig(rig_->cam_from_rig(i), camera, out);
+  }
+  return out;
+}
+
+double PoseProblem::truncated_cost(const SE3& T_rig_world, double bound, double limit) const {
+  double cost = 0.0;
+  for (std::size_t i = 0; i < rig_->size() && cost <= limit; ++i) {
+    const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
+    std::visit([&](const auto& model) {
+      for (const Item& item : of_camera(i)) {
+        const double chi2 = squared_error(model, pose, item);
+        cost += chi2 < bound ? chi2 : bound;
+        if (cost > limit) return;
+      }
+    }, rig_->camera(i).model);
+  }
+  return cost;
+}
+
+SE3 minimise(const PoseProblem& problem, const SE3& T_rig_world, PoseEquations equations, Kernel kernel, int iterations,
+             double tolerance) {
+  constexpr double kFirstDamping = 1e-3, kMaxDamping = 1e6, kRidge = 1e-9;  // of the diagonal
+  SE3 T = T_rig_world;
+  double damping = 0.0;  // Gauss-Newton until a step fails
+  for (int i = 0; i < iterations && damping < kMaxDamping; ++i) {
+    Matrix6d damped = equations.H;
+    damped.diagonal() *= 1.0 + damping;
+    damped.diagonal().array() += kRidge * equations.H.diagonal().maxCoeff();
+    const Vector6d delta = damped.ldlt().solve(equations.b);
+    if (!delta.allFinite()) break;
+    const SE3 trial = T.perturbed(delta);
+    // The step in standard deviations: below the tolerance nothing is left to gain, or to check.
+    if (damping == 0.0 && delta.dot(equations.H * delta) < tolerance * tolerance) return trial;
+    const PoseEquations next = problem.linearise(trial, kernel);
+    if (next.cost <= equations.cost) {
+      T = trial;
+      equations = next;
+      damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
+    } else {
+      damping = std::max(kFirstDamping, 10.0 * damping);
+    }
+  }
+  return T;
+}
+
+}  // namespace bslam::solver

@@ -1,0 +1,65 @@
+// The observations of one rig pose, laid out camera by camera for the loops of motion-only bundle adjustment.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "solver/pose_solver.h"
+
+namespace bslam::solver {
+
+// H delta = b for the left perturbation of T_rig_world, with cost = sum of kernel costs / 2 over what is in use.
+struct PoseEquations {
+  geometry::Matrix6d H = geometry::Matrix6d::Zero();
+  geometry::Vector6d b = geometry::Vector6d::Zero();
+  double cost = 0.0;
+};
+
+class PoseProblem {
+ public:
+  struct Item {
+    Vector3d point_world;  // metres
+    Vector2d pixel;        // raw image
+    double inverse_sigma;  // 1 / px
+    CameraIndex camera;
+    int observation;  // its place in the caller's order
+    bool in_use;
+  };
+
+  PoseProblem(const Rig& rig, std::span<const PoseObservation> observations);
+
+  const Rig& rig() const { return *rig_; }
+  std::span<const Item> items() const { return items_; }
+
+  // Which items take part: those whose squared error at a pose is at most `bound`. Returns how many changed.
+  int select(const SE3& T_rig_world, double bound);
+  int num_in_use() const { return num_in_use_; }
+
+  // Normal equations over the items in use; `reselect` first applies select(T_rig_world, bound) in the same pass.
+  PoseEquations linearise(const SE3& T_rig_world, Kernel kernel) const;
+  PoseEquations reselect_and_linearise(const SE3& T_rig_world, Kernel kernel, double bound, int& changed);
+
+  // Sum of min(squared error, bound) over all items (MSAC); stops early, with what it has, once beyond `limit`.
+  double truncated_cost(const SE3& T_rig_world, double bound, double limit) const;
+
+ private:
+  std::span<Item> of_camera(std::size_t i) { return {items_.data() + first_[i], items_.data() + first_[i + 1]}; }
+  std::span<const Item> of_camera(std::size_t i) const {
+    return {items_.data() + first_[i], items_.data() + first_[i + 1]};
+  }
+
+  const Rig* rig_;
+  std::vector<Item> items_;         // by camera, within a camera in the caller's order
+  std::vector<std::size_t> first_;  // per camera and one more
+  int num_in_use_ = 0;
+};
+
+// At most `iterations` Levenberg-Marquardt steps over the items in use, from `equations` at T_rig_world; ends once a step
+// is shorter than `tolerance` standard deviations of the pose. Returns the pose reached.
+SE3 minimise(const PoseProblem& problem, const SE3& T_rig_world, PoseEquations equations, Kernel kernel, int iterations,
+             double tolerance);
+
+// Rounds of minimisation and re-classification from a problem whose items in use agree with T_rig_world.
+PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, const PoseSolverOptions& options);
+
+}  // namespace bslam::solver

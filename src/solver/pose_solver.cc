@@ -1,0 +1,86 @@
+#include "solver/pose_solver.h"
+
+#include <algorithm>
+
+#include <Eigen/Eigenvalues>
+
+#include "solver/pose_problem.h"
+
+namespace bslam::solver {
+namespace {
+
+using geometry::Matrix6d;
+using geometry::Vector6d;
+
+// Largest standard deviation an acceptable pose may have in any direction: radians, and share of the distance to what is
+// seen. A sound pose of ten points has less than a tenth of it; points along one ray have far more.
+constexpr double kMaxDeviation = 0.05;
+
+// Steps shorter than this many standard deviations of the pose decide nothing, between rounds and at the end.
+constexpr double kRoundTolerance = 0.1, kFinalTolerance = 1e-3;
+
+// Distance that makes rotation and translation comparable: harmonic mean, so that far points do not count.
+double typical_distance(const PoseProblem& problem, const SE3& T_rig_world) {
+  double inverse = 0.0;
+  int count = 0;
+  for (const PoseProblem::Item& item : problem.items()) {
+    if (!item.in_use) continue;
+    inverse += 1.0 / std::max(1e-3, (T_rig_world * item.point_world).norm());
+    ++count;
+  }
+  return count > 0 ? count / inverse : 1.0;
+}
+
+bool well_conditioned(const Matrix6d& information, double distance) {
+  Vector6d unit = Vector6d::Ones();
+  unit.tail<3>().setConstant(distance);
+  const Matrix6d scaled = unit.asDiagonal() * information * unit.asDiagonal();
+  const double smallest = Eigen::SelfAdjointEigenSolver<Matrix6d>(scaled, Eigen::EigenvaluesOnly).eigenvalues()(0);
+  return smallest * kMaxDeviation * kMaxDeviation > 1.0;
+}
+
+PoseSolution report(PoseProblem& problem, const SE3& T_rig_world, const PoseSolverOptions& options) {
+  int changed = 0;
+  const PoseEquations equations =
+      problem.reselect_and_linearise(T_rig_world, Kernel::kNone, kChi2TwoDof95, changed);
+  PoseSolution out;
+  out.T_rig_world = T_rig_world;
+  out.information = 0.5 * (equations.H + equations.H.transpose());
+  out.num_inliers = problem.num_in_use();
+  out.mean_chi2 = out.num_inliers > 0 ? 2.0 * equations.cost / out.num_inliers : 0.0;
+  out.inlier.assign(problem.items().size(), 0);
+  out.inliers_per_camera.assign(problem.rig().size(), 0);
+  for (const PoseProblem::Item& item : problem.items()) {
+    out.inlier[static_cast<std::size_t>(item.observation)] = item.in_use;
+    out.inliers_per_camera[item.camera.index()] += item.in_use;
+  }
+  out.ok = out.num_inliers >= options.min_inliers && out.num_inliers >= 3 && T_rig_world.translation().allFinite() &&
+           well_conditioned(out.information, typical_distance(problem, T_rig_world));
+  return out;
+}
+
+}  // namespace
+
+PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, const PoseSolverOptions& options) {
+  SE3 T = T_rig_world;
+  for (int round = 0; round < options.rounds; ++round) {
+    const bool last = round == options.rounds - 1;
+    const Kernel kernel = last && round > 0 ? Kernel::kNone : Kernel::kHuber;
+    int changed = 0;
+    const PoseEquations equations = round == 0
+                                        ? problem.linearise(T, kernel)
+                                        : problem.reselect_and_linearise(T, kernel, kChi2TwoDof95, changed);
+    if (problem.num_in_use() < 3) break;
+    T = minimise(problem, T, equations, kernel, options.iterations, last ? kFinalTolerance : kRoundTolerance);
+  }
+  return report(problem, T, options);
+}
+
+PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
+                        const PoseSolverOptions& options) {
+  PoseProblem problem(rig, observations);
+  problem.select(T_rig_world_guess, kLostChi2);
+  return solve_rounds(problem, T_rig_world_guess, options);
+}
+
+}  // namespace bslam::solver

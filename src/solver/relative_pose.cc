@@ -1,0 +1,192 @@
+#include "solver/relative_pose.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <Eigen/SVD>
+
+#include <opengv/relative_pose/CentralRelativeAdapter.hpp>
+#include <opengv/relative_pose/methods.hpp>
+
+#include "geometry/triangulation.h"
+#include "solver/epipolar.h"
+
+namespace bslam::solver {
+namespace {
+
+using Eigen::Matrix3d;
+
+constexpr std::size_t kSampleSize = 5;
+constexpr double kConfidence = 0.999;  // of having drawn one sample without outliers
+constexpr int kMinSamples = 50;        // a rival solution must have had its chance to be found
+constexpr std::size_t kMaxRivals = 24;
+// Two solutions are rivals where they differ by more than this in rotation or direction of motion, and the worse has at
+// least this share of the better's inliers.
+constexpr double kDistinctRotation = 0.02, kDistinctDirection = 0.2;  // radians
+constexpr double kRivalShare = 0.8;
+
+struct Candidate {
+  EpipolarPose pose;
+  double cost = std::numeric_limits<double>::infinity();
+};
+
+// The two rotations and two signs of translation of an essential matrix E = [t]x R (Hartley and Zisserman, 9.6.2).
+std::array<EpipolarPose, 4> decompose(const Matrix3d& E) {
+  const Eigen::JacobiSVD<Matrix3d> svd(E, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Matrix3d W = (Matrix3d() << 0, -1, 0, 1, 0, 0, 0, 0, 1).finished();
+  const Eigen::Vector3d t = svd.matrixU().col(2);
+  Matrix3d R1 = svd.matrixU() * W * svd.matrixV().transpose();
+  Matrix3d R2 = svd.matrixU() * W.transpose() * svd.matrixV().transpose();
+  if (R1.determinant() < 0) R1 = -R1;
+  if (R2.determinant() < 0) R2 = -R2;
+  return {EpipolarPose{R1, t}, EpipolarPose{R1, -t}, EpipolarPose{R2, t}, EpipolarPose{R2, -t}};
+}
+
+std::array<std::size_t, kSampleSize> draw(std::size_t count, Random& random) {
+  std::array<std::size_t, kSampleSize> out{};
+  for (std::size_t k = 0; k < kSampleSize;) {
+    out[k] = random.below(static_cast<std::uint32_t>(count));
+    if (std::find(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(k), out[k]) ==
+        out.begin() + static_cast<std::ptrdiff_t>(k)) {
+      ++k;
+    }
+  }
+  return out;
+}
+
+// Poses of the five-point algorithm that have all five points in front of both cameras. OpenGV's viewpoint 1 is our b
+// and its viewpoint 2 our a, for its E = [t]x R maps from 2 to 1.
+void solve_sample(std::span<const BearingPair> pairs, const std::array<std::size_t, kSampleSize>& sample,
+                  std::vector<EpipolarPose>& out) {
+  opengv::bearingVectors_t a, b;
+  for (const std::size_t i : sample) {
+    a.push_back(pairs[i].a);
+    b.push_back(pairs[i].b);
+  }
+  const opengv::relative_pose::CentralRelativeAdapter adapter(b, a);
+  out.clear();
+  for (const auto& E : opengv::relative_pose::fivept_nister(adapter)) {
+    if (!E.allFinite()) continue;
+    for (const EpipolarPose& pose : decompose(E)) {
+      const bool in_front = std::all_of(sample.begin(), sample.end(),
+                                        [&](std::size_t i) { return in_front_of_both(pose, pairs[i]); });
+      if (in_front) out.push_back(pose);
+    }
+  }
+}
+
+// Sum of truncated squared angles, in units of the inlier bound; stops once beyond `limit`.
+double truncated_cost(const EpipolarPose& pose, std::span<const BearingPair> pairs, double bound, double limit) {
+  double cost = 0.0;
+  for (const BearingPair& pair : pairs) {
+    const double share = epipolar_angle(pose, pair) / bound;
+    cost += share < 1.0 && in_front_of_both(pose, pair) ? share * share : 1.0;
+    if (cost > limit) break;
+  }
+  return cost;
+}
+
+std::vector<std::uint8_t> inliers(const EpipolarPose& pose, std::span<const BearingPair> pairs, double bound) {
+  std::vector<std::uint8_t> out;
+  out.reserve(pairs.size());
+  for (const BearingPair& pair : pairs) {
+    out.push_back(epipolar_angle(pose, pair) < bound && in_front_of_both(pose, pair));
+  }
+  return out;
+}
+
+int count(const std::vector<std::uint8_t>& mask) { return std::accumulate(mask.begin(), mask.end(), 0); }
+
+bool distinct(const EpipolarPose& x, const EpipolarPose& y) {
+  const double rotation = Eigen::AngleAxisd(x.R_b_a * y.R_b_a.transpose()).angle();
+  const double direction = geometry::angle_between(x.t_b_a, y.t_b_a);
+  return rotation > kDistinctRotation || direction > kDistinctDirection;
+}
+
+// Keeps the cheapest candidates, cheapest first.
+void keep(std::vector<Candidate>& best, const Candidate& candidate) {
+  const auto at = std::upper_bound(best.begin(), best.end(), candidate,
+                                   [](const Candidate& x, const Candidate& y) { return x.cost < y.cost; });
+  best.insert(at, candidate);
+  if (best.size() > kMaxRivals) best.pop_back();
+}
+
+std::vector<Candidate> sample_candidates(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
+                                         Random& random) {
+  std::vector<Candidate> best;
+  std::vector<EpipolarPose> poses;
+  double needed = options.iterations;
+  for (int i = 0; i < options.iterations && i < std::max<double>(kMinSamples, needed); ++i) {
+    solve_sample(pairs, draw(pairs.size(), random), poses);
+    for (const EpipolarPose& pose : poses) {
+      const double limit = best.size() < kMaxRivals ? std::numeric_limits<double>::infinity() : best.back().cost;
+      const double cost = truncated_cost(pose, pairs, options.inlier_angle, limit);
+      if (cost >= limit) continue;
+      const bool improved = best.empty() || cost < best.front().cost;
+      keep(best, {pose, cost});
+      if (!improved) continue;
+      const double share = count(inliers(pose, pairs, options.inlier_angle)) / static_cast<double>(pairs.size());
+      needed = std::log(1.0 - kConfidence) / std::log1p(-std::min(std::pow(share, 5), 1.0 - 1e-12));
+    }
+  }
+  return best;
+}
+
+// Least squares over the inliers, and over those it then has.
+EpipolarPose refine_and_reselect(const EpipolarPose& start, std::span<const BearingPair> pairs, double bound) {
+  EpipolarPose pose = start;
+  for (int round = 0; round < 3; ++round) pose = refine_epipolar(pose, pairs, inliers(pose, pairs, bound), bound);
+  return pose;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+RelativePose describe(const EpipolarPose& pose, std::span<const BearingPair> pairs, double bound) {
+  RelativePose out;
+  out.T_b_a = geometry::SE3(pose.R_b_a, pose.t_b_a);
+  out.inlier = inliers(pose, pairs, bound);
+  out.num_inliers = count(out.inlier);
+  out.points_a.assign(pairs.size(), Eigen::Vector3d::Zero());
+  std::vector<double> parallax;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (out.inlier[i] == 0) continue;
+    out.points_a[i] = midpoint_in_a(pose, pairs[i]);
+    parallax.push_back(geometry::angle_between(pose.R_b_a * pairs[i].a, pairs[i].b));
+  }
+  if (!parallax.empty()) out.median_parallax = median(std::move(parallax));
+  return out;
+}
+
+}  // namespace
+
+std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
+                                          Random random) {
+  if (pairs.size() < std::max<std::size_t>(kSampleSize, static_cast<std::size_t>(std::max(0, options.min_inliers)))) {
+    return std::nullopt;
+  }
+  std::vector<Candidate> candidates = sample_candidates(pairs, options, random);
+  if (candidates.empty()) return std::nullopt;
+  for (Candidate& c : candidates) {
+    c.pose = refine_and_reselect(c.pose, pairs, options.inlier_angle);
+    c.cost = truncated_cost(c.pose, pairs, options.inlier_angle, std::numeric_limits<double>::infinity());
+  }
+  const Candidate& best = *std::min_element(candidates.begin(), candidates.end(),
+                                            [](const Candidate& x, const Candidate& y) { return x.cost < y.cost; });
+  RelativePose out = describe(best.pose, pairs, options.inlier_angle);
+  if (out.num_inliers < options.min_inliers || out.median_parallax < options.min_parallax) return std::nullopt;
+  const bool ambiguous = std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) {
+    return distinct(c.pose, best.pose) &&
+           count(inliers(c.pose, pairs, options.inlier_angle)) >= kRivalShare * out.num_inliers;
+  });
+  if (ambiguous) return std::nullopt;
+  return out;
+}
+
+}  // namespace bslam::solver

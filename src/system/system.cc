@@ -1,0 +1,95 @@
+#include "system/system.h"
+
+#include "mapping/map_keyframe.h"
+#include "system/stopwatch.h"
+
+namespace bslam::system {
+namespace {
+
+constexpr std::size_t kYoungMap = 4;  // keyframes: a map lost before it has grown beyond them was no good start
+
+}  // namespace
+
+System::System(camera::Rig rig, Config config, std::vector<image::Image> masks)
+    : rig_(std::move(rig)), config_(std::move(config)), pipeline_(rig_, config_, std::move(masks)) {
+  begin_map();
+}
+
+System::~System() = default;
+
+void System::begin_map() {
+  mapping_.reset();
+  store_ = std::make_unique<map::MapStore>(map::BundledMap(std::make_shared<const camera::Rig>(rig_)));
+  mapping_ = make_mapping_executor(*store_, config_, [this](KeyframeId k, double ms) {
+    const TimeNs time_ns = store_->snapshot()->keyframe(k).frame ? store_->snapshot()->keyframe(k).frame->time_ns : 0;
+    const std::lock_guard lock(records_mutex_);
+    mapping_runs_.push_back({k, time_ns, ms});
+  });
+}
+
+// A start up to scale can be wrong and shows it at once: the next frames find nothing. What it told is withdrawn.
+void System::give_up_young_map() {
+  mapping_->drain();
+  for (FrameRecord& record : frames_) {
+    if (record.map_number != maps_started_ || record.result.status != tracking::TrackStatus::kTracking) continue;
+    record.result.status = tracking::TrackStatus::kLost;
+    record.result.reason = tracking::LostReason::kNotStarted;
+    record.keyframe = false;
+  }
+  pipeline_.restart();
+  begin_map();
+}
+
+const FrameRecord& System::process(const image::ImageBundle& images) {
+  const bool had_map = pipeline_.state().status != tracking::TrackStatus::kNotStarted;
+  Pipeline::Outcome outcome = pipeline_.process(images, *store_);
+  if (!had_map && !outcome.keyframes.empty()) ++maps_started_;
+  const Stopwatch watch;
+  for (const KeyframeId k : outcome.keyframes) mapping_->enqueue(k);
+  if (!outcome.keyframes.empty()) outcome.record.stages.push_back({"wait", watch.ms()});
+  outcome.record.map_number = maps_started_;
+  outcome.record.frame_ms += config_.mode == Mode::kParallel ? watch.ms() : 0.0;
+  frames_.push_back(std::move(outcome.record));
+  const bool lost = had_map && frames_.back().result.status == tracking::TrackStatus::kLost;
+  if (lost && store_->snapshot()->scale() != map::Scale::kMetric && store_->snapshot()->keyframe_slots() <= kYoungMap) {
+    give_up_young_map();
+  }
+  return frames_.back();
+}
+
+void System::finish() {
+  mapping_->drain();
+  if (!config_.final_adjustment) return;
+  const Stopwatch watch;
+  map::MapDraft draft("global adjustment", store_->snapshot());
+  mapping::adjust_globally(config_.mapping, config_.feature_model(), draft);
+  store_->commit(std::move(draft));
+  final_adjustment_ms_ = watch.ms();
+}
+
+std::vector<MappingRecord> System::mapping_runs() const {
+  const std::lock_guard lock(records_mutex_);
+  return mapping_runs_;
+}
+
+evaluation::Trajectory System::trajectory() const {
+  const map::MapSnapshot map = store_->snapshot();
+  evaluation::Trajectory out;
+  for (const FrameRecord& record : frames_) {
+    const tracking::TrackResult& r = record.result;
+    if (r.status != tracking::TrackStatus::kTracking || record.map_number != maps_started_) continue;
+    out.push_back({r.time_ns, (r.T_rig_reference * map->resolved_pose(r.reference)).inverse()});
+  }
+  return out;
+}
+
+evaluation::Trajectory System::live_trajectory() const {
+  evaluation::Trajectory out;
+  for (const FrameRecord& record : frames_) {
+    if (record.result.status != tracking::TrackStatus::kTracking) continue;
+    out.push_back({record.result.time_ns, record.result.T_rig_world.inverse()});
+  }
+  return out;
+}
+
+}  // namespace bslam::system

@@ -1,0 +1,151 @@
+#include "tracking/frame_matches.h"
+
+#include <algorithm>
+
+namespace bslam::tracking {
+
+using geometry::SE3;
+
+std::size_t count(const FrameMatches& matches) {
+  std::size_t n = 0;
+  for (const auto& camera : matches) n += camera.size();
+  return n;
+}
+
+std::vector<frame::SearchPoint> search_points(const map::BundledMap& map, std::span<const LandmarkId> landmarks) {
+  std::vector<frame::SearchPoint> points(landmarks.size());
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const map::Landmark& l = map.landmark(landmarks[i]);
+    points[i] = {l.position, l.view_direction, l.min_distance, l.max_distance, &l.descriptor, 0};
+  }
+  return points;
+}
+
+MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                           std::span<const LandmarkId> landmarks, const FrameMatches& known,
+                           const frame::ProjectionSearchOptions& options, ThreadPool& pool) {
+  const camera::Rig& rig = map.rig();
+  const std::vector<frame::SearchPoint> points = search_points(map, landmarks);
+  std::vector<std::uint32_t> place_of(map.landmark_slots(), 0);  // position in `points` + 1
+  for (std::size_t i = 0; i < landmarks.size(); ++i) place_of[landmarks[i].index()] = static_cast<std::uint32_t>(i + 1);
+
+  MatchSearch out;
+  out.found.resize(rig.size());
+  std::vector<std::vector<std::uint32_t>> visible(rig.size());
+  pool.for_each(rig.size(), [&](std::size_t c) {
+    const frame::CameraFrame& camera_frame = frame.cameras[c];
+    if (camera_frame.keypoints.empty()) return;
+    std::vector<frame::SearchPoint> own = points;
+    std::vector<std::uint8_t> taken(camera_frame.keypoints.size(), 0);
+    if (!known.empty()) {
+      for (const Match& m : known[c]) {
+        taken[m.keypoint.index()] = 1;
+        if (const std::uint32_t place = place_of[m.landmark.index()]) own[place - 1].skip = 1;
+      }
+    }
+    auto result = frame::search_by_projection(rig.camera(c), camera_frame, rig.cam_from_rig(c) * T_rig_world, own, taken, options);
+    visible[c] = std::move(result.visible);
+    for (const frame::ProjectionMatch& m : result.matches) out.found[c].push_back({m.keypoint, landmarks[m.point]});
+    std::sort(out.found[c].begin(), out.found[c].end(), [](const Match& a, const Match& b) { return a.keypoint < b.keypoint; });
+  });
+  std::vector<std::uint8_t> seen(landmarks.size(), 0);
+  for (const auto& list : visible) {
+    for (const std::uint32_t i : list) seen[i] = 1;
+  }
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (seen[i]) out.visible.push_back(landmarks[i]);
+  }
+  return out;
+}
+
+FrameMatches merge(const FrameMatches& a, const FrameMatches& b) {
+  FrameMatches out(std::max(a.size(), b.size()));
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    if (c < a.size()) out[c] = a[c];
+    if (c < b.size()) out[c].insert(out[c].end(), b[c].begin(), b[c].end());
+    std::sort(out[c].begin(), out[c].end(), [](const Match& p, const Match& q) { return p.keypoint < q.keypoint; });
+  }
+  return out;
+}
+
+namespace {
+
+// Aligns one matched keypoint to its landmark's reference patch.
+std::optional<frame::AlignedKeypoint> align_to_reference(const map::BundledMap& map, const camera::Camera& camera,
+                                                         const SE3& T_cam_world, const image::Pyramid& pyramid,
+                                                         const map::Landmark& landmark, const Eigen::Vector2d& guess,
+                                                         const frame::AlignmentOptions& options) {
+  const map::LandmarkReference& reference = landmark.reference;
+  const camera::Rig& rig = map.rig();
+  const feature::Keypoints& keypoints = map.keypoints(reference.keyframe, reference.keypoint.camera);
+  const std::size_t k = reference.keypoint.keypoint.index();
+  const SE3 T_ref_world = rig.cam_from_rig(reference.keypoint.camera) * map.keyframe(reference.keyframe).T_rig_world;
+  const auto warp = frame::patch_warp(rig.camera(reference.keypoint.camera), camera, T_cam_world * T_ref_world.inverse(),
+                                      T_ref_world * landmark.position, pyramid.scale_x[std::min<std::size_t>(
+                                          keypoints.level[k], pyramid.size() - 1)]);
+  if (!warp) return std::nullopt;
+  return frame::align_patch(keypoints.patch[k], *warp, pyramid, guess, options);
+}
+
+}  // namespace
+
+void align_matches(const map::BundledMap& map, const SE3& T_rig_world, const FrameMatches& matches,
+                   std::span<const image::Pyramid> pyramids, const frame::AlignmentOptions& options,
+                   const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool) {
+  const camera::Rig& rig = map.rig();
+  pool.for_each(matches.size(), [&](std::size_t c) {
+    if (matches[c].empty()) return;
+    feature::Keypoints& keypoints = frame.cameras[c].keypoints;
+    const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
+    for (const Match& m : matches[c]) {
+      const std::size_t k = m.keypoint.index();
+      const auto aligned = align_to_reference(map, rig.camera(c), T_cam_world, pyramids[c], map.landmark(m.landmark),
+                                              keypoints.pixel[k].cast<double>(), options);
+      const auto bearing = aligned ? rig.camera(c).unproject(aligned->pixel) : std::nullopt;
+      if (bearing) {
+        keypoints.pixel[k] = aligned->pixel.cast<float>();
+        keypoints.bearing[k] = *bearing;
+        keypoints.sigma[k] = static_cast<float>(aligned->sigma);
+      } else {
+        keypoints.sigma[k] = static_cast<float>(noise.sigma_px * pyramids[c].scale_x[keypoints.level[k]]);
+      }
+    }
+  });
+}
+
+std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                                       const FrameMatches& matches) {
+  std::vector<solver::PoseObservation> out;
+  out.reserve(count(matches));
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
+    for (const Match& m : matches[c]) {
+      const std::size_t k = m.keypoint.index();
+      out.push_back({CameraIndex(c), map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>(), keypoints.sigma[k]});
+    }
+  }
+  return out;
+}
+
+FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier) {
+  FrameMatches out(matches.size());
+  std::size_t i = 0;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    for (const Match& m : matches[c]) {
+      if (inlier[i++]) out[c].push_back(m);
+    }
+  }
+  return out;
+}
+
+std::vector<LandmarkId> landmarks_of(const FrameMatches& matches) {
+  std::vector<LandmarkId> ids;
+  for (const auto& camera : matches) {
+    for (const Match& m : camera) ids.push_back(m.landmark);
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  return ids;
+}
+
+}  // namespace bslam::tracking

@@ -1,0 +1,62 @@
+// Which keypoints of a frame show which landmarks.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/thread_pool.h"
+#include "frame/bundled_frame.h"
+#include "frame/bundling.h"
+#include "frame/patch_alignment.h"
+#include "frame/projection_search.h"
+#include "map/bundled_map.h"
+#include "solver/pose_solver.h"
+#include "tracking/options.h"
+
+namespace bslam::tracking {
+
+// One keypoint that shows a landmark.
+struct Match {
+  KeypointIndex keypoint;
+  LandmarkId landmark;
+};
+
+// Per camera, in order of keypoint; a keypoint at most once, a landmark at most once per camera.
+using FrameMatches = std::vector<std::vector<Match>>;
+
+std::size_t count(const FrameMatches& matches);
+
+// The points of landmarks as projection_search wants them. Descriptors point into `map`.
+std::vector<frame::SearchPoint> search_points(const map::BundledMap& map, std::span<const LandmarkId> landmarks);
+
+struct MatchSearch {
+  FrameMatches found;
+  std::vector<LandmarkId> visible;  // expected in some camera, each once, in order of the input
+};
+
+// Looks for `landmarks` in every camera at `T_rig_world`, leaving out the keypoints and, per camera, the landmarks that
+// are in `known` already.
+MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame& frame, const geometry::SE3& T_rig_world,
+                           std::span<const LandmarkId> landmarks, const FrameMatches& known,
+                           const frame::ProjectionSearchOptions& options, ThreadPool& pool);
+
+// `a` and `b` together; they share no keypoint.
+FrameMatches merge(const FrameMatches& a, const FrameMatches& b);
+
+// Moves each matched keypoint of `frame` to where the reference patch of its landmark is seen from `T_rig_world`, with the
+// standard deviation of that; a keypoint whose patch does not align keeps its place and gets the detector's.
+void align_matches(const map::BundledMap& map, const geometry::SE3& T_rig_world, const FrameMatches& matches,
+                   std::span<const image::Pyramid> pyramids, const frame::AlignmentOptions& options,
+                   const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool);
+
+// Observations for the pose solver, camera by camera in the order of `matches`.
+std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                                       const FrameMatches& matches);
+
+// The matches whose observation is an inlier.
+FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier);
+
+// The landmarks in `matches`, each once, in order of id.
+std::vector<LandmarkId> landmarks_of(const FrameMatches& matches);
+
+}  // namespace bslam::tracking

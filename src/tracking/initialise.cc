@@ -1,0 +1,127 @@
+#include "tracking/initialise.h"
+
+#include <algorithm>
+
+#include "feature/hamming.h"
+
+namespace bslam::tracking {
+namespace {
+
+using frame::BundledFrame;
+using frame::KeypointRef;
+using geometry::SE3;
+
+constexpr int kMaxHamming = 50;        // bits, of 256: without any prediction only clear matches count
+constexpr double kRatio = 0.8;
+constexpr double kWindow = 0.25;       // radians a bearing may move between the two frames
+constexpr int kMinInliers = 50;
+
+struct KeypointPair {
+  KeypointIndex a, b;
+};
+
+// Best match of keypoint `i` of a among those of b in the window; false where it is not clear.
+bool best_in_window(const feature::Keypoints& a, std::size_t i, const feature::Keypoints& b, std::size_t& match) {
+  const double min_cosine = std::cos(kWindow);
+  int best = 257, second = 257;
+  for (std::size_t j = 0; j < b.size(); ++j) {
+    if (std::abs(a.level[i] - b.level[j]) > 1 || a.bearing[i].dot(b.bearing[j]) < min_cosine) continue;
+    const int distance = feature::hamming(a.descriptor[i], b.descriptor[j]);
+    if (distance < best) {
+      second = best;
+      best = distance;
+      match = j;
+    } else if (distance < second) {
+      second = distance;
+    }
+  }
+  return best <= kMaxHamming && best < kRatio * second;
+}
+
+// Mutual best matches of one camera between two frames.
+std::vector<KeypointPair> match_frames(const feature::Keypoints& a, const feature::Keypoints& b) {
+  std::vector<KeypointPair> pairs;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t j = 0, back = 0;
+    if (best_in_window(a, i, b, j) && best_in_window(b, j, a, back) && back == i) {
+      pairs.push_back({KeypointIndex(i), KeypointIndex(j)});
+    }
+  }
+  return pairs;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+struct TwoView {
+  std::size_t camera = 0;
+  std::vector<KeypointPair> pairs;
+  solver::RelativePose pose;
+};
+
+// The camera with the widest parallax among those that see enough.
+std::optional<TwoView> best_two_view(const BundledFrame& first, const BundledFrame& second, const InitialisationOptions& options,
+                                     std::uint64_t seed) {
+  std::optional<TwoView> best;
+  for (std::size_t c = 0; c < first.cameras.size(); ++c) {
+    const feature::Keypoints &a = first.cameras[c].keypoints, &b = second.cameras[c].keypoints;
+    TwoView view{c, match_frames(a, b), {}};
+    if (view.pairs.size() < static_cast<std::size_t>(options.min_monocular)) continue;
+    std::vector<solver::BearingPair> bearings;
+    for (const KeypointPair& p : view.pairs) bearings.push_back({a.bearing[p.a.index()], b.bearing[p.b.index()]});
+    const auto pose = solver::relative_pose(bearings, {.min_inliers = kMinInliers}, Random(seed, "two views", c));
+    if (!pose || pose->num_inliers < options.min_monocular_points) continue;
+    view.pose = *pose;
+    if (!best || view.pose.median_parallax > best->pose.median_parallax) best = view;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<StartedMap> start_metric(const BundledFrame& frame, std::span<const image::Pyramid> pyramids,
+                                       const InitialisationOptions& options, map::MapDraft& draft) {
+  int metric = 0;
+  for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) metric += frame.bundled.point(FeatureId(f)).has_value();
+  if (metric < options.min_matched) return std::nullopt;
+  StartedMap out;
+  out.keyframes.push_back(make_keyframe(frame, {}, SE3(), pyramids, KeyframeId(), options, draft));
+  return out;
+}
+
+std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const BundledFrame& frame,
+                                            std::span<const image::Pyramid> pyramids, const InitialisationOptions& options,
+                                            Random random, map::MapDraft& draft) {
+  const auto view = best_two_view(*first.frame, frame, options, random.next());
+  if (!view) return std::nullopt;
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < view->pairs.size(); ++i) {
+    if (view->pose.inlier[i]) depths.push_back(view->pose.points_a[i].norm());
+  }
+  const double unit = 1.0 / median(depths);
+  const SE3 T_b_a(view->pose.T_b_a.rotation(), unit * view->pose.T_b_a.translation());
+  const SE3 T_cam_rig = draft.map().rig().cam_from_rig(view->camera), T_rig_cam = T_cam_rig.inverse();
+
+  StartedMap out;
+  out.scale = draft.map().rig().size() == 1 ? map::Scale::kUpToScale : map::Scale::kUnobservable;
+  out.keyframes.push_back(make_keyframe(*first.frame, {}, SE3(), first.pyramids, KeyframeId(), options, draft));
+  const KeyframeId key_a = out.keyframes[0].keyframe;
+  out.keyframes.push_back(make_keyframe(frame, {}, T_rig_cam * T_b_a * T_cam_rig, pyramids, key_a, options, draft));
+  const KeyframeId key_b = out.keyframes[1].keyframe;
+  const CameraIndex camera(view->camera);
+  for (std::size_t i = 0; i < view->pairs.size(); ++i) {
+    if (!view->pose.inlier[i]) continue;
+    const FeatureId fa = draft.map().keyframe(key_a).frame->bundled.feature(camera, view->pairs[i].a);
+    const FeatureId fb = draft.map().keyframe(key_b).frame->bundled.feature(camera, view->pairs[i].b);
+    if (draft.map().landmark_of(key_a, fa).valid() || draft.map().landmark_of(key_b, fb).valid()) continue;
+    const LandmarkId l = draft.add_landmark(T_rig_cam * (unit * view->pose.points_a[i]), {{key_a, fa}, {key_b, fb}},
+                                            {key_a, {camera, view->pairs[i].a}});
+    for (NewKeyframe& k : out.keyframes) k.landmarks.push_back(l);
+  }
+  return out;
+}
+
+}  // namespace bslam::tracking

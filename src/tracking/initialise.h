@@ -1,0 +1,33 @@
+// Starting a map: at once from matched features with metric points, or up to scale from two frames of one camera.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "solver/relative_pose.h"
+#include "tracking/make_keyframe.h"
+
+namespace bslam::tracking {
+
+// The frame a start up to scale compares later ones with, and what is needed of it to become a keyframe.
+struct StartCandidate {
+  std::shared_ptr<const frame::BundledFrame> frame;
+  std::vector<image::Pyramid> pyramids;
+};
+
+struct StartedMap {
+  std::vector<NewKeyframe> keyframes;  // one (metric) or two (up to scale), in the draft
+  map::Scale scale = map::Scale::kMetric;
+};
+
+// Writes the first keyframe, at the origin, where the frame has enough features of metric depth.
+std::optional<StartedMap> start_metric(const frame::BundledFrame& frame, std::span<const image::Pyramid> pyramids,
+                                       const InitialisationOptions& options, map::MapDraft& draft);
+
+// Writes two keyframes where some camera sees enough parallax between `first` and `frame`: the first at the origin, the
+// median depth of the points in the first is 1. For rigs whose cameras do not overlap the scale stays unknown.
+std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const frame::BundledFrame& frame,
+                                            std::span<const image::Pyramid> pyramids, const InitialisationOptions& options,
+                                            Random random, map::MapDraft& draft);
+
+}  // namespace bslam::tracking

@@ -1,0 +1,138 @@
+#include "tracking/make_keyframe.h"
+
+#include <algorithm>
+#include <map>
+
+#include "frame/bundling.h"
+
+namespace bslam::tracking {
+namespace {
+
+using frame::BundledFrame;
+using frame::KeypointRef;
+
+constexpr double kMinParallax = 5e-4;  // radians, as BundlingOptions::min_parallax
+
+// Landmark of every keypoint of every camera; invalid = none.
+using LandmarkTable = std::vector<std::vector<LandmarkId>>;
+
+LandmarkTable landmark_table(const BundledFrame& frame, const FrameMatches& matches) {
+  LandmarkTable table;
+  for (const frame::CameraFrame& c : frame.cameras) table.emplace_back(c.keypoints.size(), LandmarkId());
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    for (const Match& m : matches[c]) table[c][m.keypoint.index()] = m.landmark;
+  }
+  return table;
+}
+
+bool has_camera(const std::vector<KeypointRef>& group, CameraIndex camera) {
+  return std::any_of(group.begin(), group.end(), [&](const KeypointRef& r) { return r.camera == camera; });
+}
+
+struct Groups {
+  std::vector<std::vector<KeypointRef>> matched;  // two or more keypoints
+  std::vector<LandmarkId> landmark;               // of each, invalid = none
+};
+
+// Keypoints that show one landmark are one feature; bundled keypoints without a landmark join the feature they were
+// bundled with, as far as its landmark has none in their camera.
+Groups regroup(const BundledFrame& frame, const LandmarkTable& table) {
+  std::map<LandmarkId, std::vector<KeypointRef>> by_landmark;
+  for (std::size_t c = 0; c < table.size(); ++c) {
+    for (std::size_t k = 0; k < table[c].size(); ++k) {
+      if (table[c][k].valid()) by_landmark[table[c][k]].push_back({CameraIndex(c), KeypointIndex(k)});
+    }
+  }
+  Groups groups;
+  for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) {
+    const auto keypoints = frame.bundled.keypoints(FeatureId(f));
+    std::vector<KeypointRef> free;
+    LandmarkId owner;
+    bool disputed = false;
+    for (const KeypointRef r : keypoints) {
+      const LandmarkId l = table[r.camera.index()][r.keypoint.index()];
+      if (!l.valid()) {
+        free.push_back(r);
+      } else {
+        disputed |= owner.valid() && owner != l;
+        owner = l;
+      }
+    }
+    if (!owner.valid() && free.size() >= 2) {
+      groups.matched.push_back(free);
+      groups.landmark.push_back(LandmarkId());
+    } else if (owner.valid() && !disputed) {
+      for (const KeypointRef r : free) {
+        if (!has_camera(by_landmark[owner], r.camera)) by_landmark[owner].push_back(r);
+      }
+    }
+  }
+  for (auto& [landmark, keypoints] : by_landmark) {
+    if (keypoints.size() < 2) continue;
+    std::sort(keypoints.begin(), keypoints.end());
+    groups.matched.push_back(keypoints);
+    groups.landmark.push_back(landmark);
+  }
+  return groups;
+}
+
+std::shared_ptr<BundledFrame> regrouped_frame(const BundledFrame& frame, const Groups& groups, const camera::Rig& rig,
+                                              std::span<const image::Pyramid> pyramids) {
+  auto out = std::make_shared<BundledFrame>(frame);
+  for (std::size_t c = 0; c < out->cameras.size(); ++c) {
+    frame::CameraFrame& camera = out->cameras[c];
+    if (camera.keypoints.empty()) continue;
+    for (std::size_t k = 0; k < camera.keypoints.size(); ++k) {  // alignment moved keypoints: their patches follow
+      camera.keypoints.patch[k] =
+          frame::sample_patch(pyramids[c], camera.keypoints.level[k], camera.keypoints.pixel[k].cast<double>());
+    }
+    camera.grid = frame::FeatureGrid(camera.keypoints, rig.camera(c).width, rig.camera(c).height);
+  }
+  out->bundled = frame::make_bundled(rig, out->cameras, groups.matched, kMinParallax);
+  return out;
+}
+
+// Standard deviation of the distance from the rig, relative to it.
+double relative_depth_error(const frame::BundledPoint& p) {
+  const Eigen::Vector3d ray = p.point_rig.normalized();
+  return std::sqrt(ray.dot(p.covariance * ray)) / p.point_rig.norm();
+}
+
+}  // namespace
+
+NewKeyframe make_keyframe(const BundledFrame& frame, const FrameMatches& matches, const geometry::SE3& T_rig_world,
+                          std::span<const image::Pyramid> pyramids, KeyframeId reference,
+                          const InitialisationOptions& options, map::MapDraft& draft) {
+  const LandmarkTable table = landmark_table(frame, matches);
+  const Groups groups = regroup(frame, table);
+  const std::shared_ptr<const BundledFrame> stored = regrouped_frame(frame, groups, draft.map().rig(), pyramids);
+
+  std::vector<std::pair<FeatureId, LandmarkId>> observed;
+  std::vector<std::uint8_t> has_landmark(stored->bundled.size(), 0);
+  NewKeyframe out;
+  for (std::size_t c = 0; c < table.size(); ++c) {
+    for (std::size_t k = 0; k < table[c].size(); ++k) {
+      if (!table[c][k].valid()) continue;
+      const FeatureId f = stored->bundled.feature(CameraIndex(c), KeypointIndex(k));
+      if (std::exchange(has_landmark[f.index()], std::uint8_t{1})) continue;
+      observed.emplace_back(f, table[c][k]);
+      out.landmarks.push_back(table[c][k]);
+    }
+  }
+  out.keyframe = draft.add_keyframe(stored, T_rig_world, std::move(observed), reference);
+
+  const geometry::SE3 T_world_rig = T_rig_world.inverse();
+  for (std::size_t f = 0; f < stored->bundled.num_matched(); ++f) {
+    const FeatureId feature(f);
+    const auto& point = stored->bundled.point(feature);
+    if (has_landmark[f] || !point || relative_depth_error(*point) > options.max_depth_error) continue;
+    const KeypointRef first = stored->bundled.keypoints(feature).front();
+    out.landmarks.push_back(draft.add_landmark(T_world_rig * point->point_rig, {{out.keyframe, feature}}, {out.keyframe, first}));
+  }
+  std::vector<LandmarkId> seen_again = out.landmarks;
+  draft.refresh_landmarks(std::move(seen_again));
+  std::sort(out.landmarks.begin(), out.landmarks.end());
+  return out;
+}
+
+}  // namespace bslam::tracking

@@ -1,0 +1,87 @@
+// What steers tracking; gathered in system::Config.
+#pragma once
+
+#include "base/options.h"
+#include "frame/patch_alignment.h"
+#include "map/local_view.h"
+#include "solver/pose_solver.h"
+
+namespace bslam::tracking {
+
+struct MatchingOptions {
+  double predicted_radius = 0.025;  // rad: where the motion model puts a landmark, it is looked for this far
+  double wide_radius = 0.12;        // rad: when that finds too little
+  double local_radius = 0.006;      // rad: landmarks of the local view, once the pose is nearly known
+  int max_hamming = 80;             // bits
+  double ratio = 0.9;               // best to second best descriptor distance on one level
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("predicted_radius", self.predicted_radius, Range{1e-4, 1}, "rad", "search radius about the motion model's prediction");
+    visitor("wide_radius", self.wide_radius, Range{1e-4, 1.5}, "rad", "search radius when that finds too little");
+    visitor("local_radius", self.local_radius, Range{1e-4, 1}, "rad", "search radius once the pose is nearly known");
+    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "largest descriptor distance of a match");
+    visitor("ratio", self.ratio, Range{0.1, 1}, "", "best to second best descriptor distance on one level");
+  }
+};
+
+struct KeyframeOptions {
+  int min_interval = 2;          // frames between keyframes at least
+  int max_interval = 40;         // frames between keyframes at most
+  double min_overlap = 0.75;     // landmarks of the reference keyframe still tracked, below which a keyframe is due
+  double max_parallax = 0.06;    // rad: median parallax against the reference keyframe above which one is due
+  int starved_camera = 40;       // inliers of a camera below which ...
+  double starved_share = 0.15;   // ... and below this share of its keypoints it asks for a keyframe
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("min_interval", self.min_interval, Range{1, 1000}, "frames", "frames between keyframes at least");
+    visitor("max_interval", self.max_interval, Range{1, 100000}, "frames", "frames between keyframes at most");
+    visitor("min_overlap", self.min_overlap, Range{0, 1}, "", "share of the reference keyframe's landmarks still tracked");
+    visitor("max_parallax", self.max_parallax, Range{0, 3}, "rad", "median parallax against the reference keyframe");
+    visitor("starved_camera", self.starved_camera, Range{0, 10000}, "", "inliers below which a camera may ask for a keyframe");
+    visitor("starved_share", self.starved_share, Range{0, 1}, "", "share of its keypoints below which it does");
+  }
+};
+
+struct InitialisationOptions {
+  int min_matched = 60;          // features with a metric point that start a map at once
+  double max_depth_error = 0.15; // relative standard deviation of the depth of a point that becomes a landmark
+  int min_monocular = 80;        // matches between two frames that start a map up to scale
+  int min_monocular_points = 50; // points it needs
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("min_matched", self.min_matched, Range{10, 10000}, "", "features with a metric point that start a map at once");
+    visitor("max_depth_error", self.max_depth_error, Range{0.001, 10}, "", "relative depth error of a point that becomes a landmark");
+    visitor("min_monocular", self.min_monocular, Range{10, 10000}, "", "matches between two frames that start a map up to scale");
+    visitor("min_monocular_points", self.min_monocular_points, Range{10, 10000}, "", "points such a start needs");
+  }
+};
+
+struct TrackingOptions {
+  int min_inliers = 30;          // keypoints that must support a pose, all cameras together
+  int min_inliers_wide = 50;     // the same after a search without a usable prediction
+  double min_inlier_share = 0.3; // of the matches: fewer agree by chance
+  MatchingOptions matching;
+  KeyframeOptions keyframe;
+  InitialisationOptions initialisation;
+  frame::AlignmentOptions alignment;
+  map::LocalViewOptions local_view;
+  solver::PoseSolverOptions pose;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("min_inliers", self.min_inliers, Range{6, 10000}, "", "keypoints that must support a pose");
+    visitor("min_inliers_wide", self.min_inliers_wide, Range{6, 10000}, "", "the same after a search without a prediction");
+    visitor("min_inlier_share", self.min_inlier_share, Range{0, 1}, "", "share of the matches that must agree");
+    visitor.section("matching", self.matching);
+    visitor.section("keyframe", self.keyframe);
+    visitor.section("initialisation", self.initialisation);
+    visitor.section("alignment", self.alignment);
+    visitor.section("local_view", self.local_view);
+    visitor.section("pose", self.pose);
+  }
+};
+
+}  // namespace bslam::tracking

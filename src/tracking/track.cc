@@ -1,0 +1,219 @@
+#include "tracking/track.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "tracking/keyframe_decision.h"
+
+namespace bslam::tracking {
+namespace {
+
+using geometry::SE3;
+
+constexpr double kMaxPrediction_s = 0.5;  // the motion model says nothing farther ahead
+
+// Last pose, in the map as it is now, moved on by the twist.
+SE3 predict(const TrackInput& input, TimeNs time_ns) {
+  const TrackerState& state = input.state;
+  const SE3 last = state.T_rig_reference * input.map.resolved_pose(state.reference);
+  const double dt = to_seconds(time_ns - state.time_ns);
+  if (!state.twist || dt <= 0 || dt > kMaxPrediction_s) return last;
+  return SE3::exp(dt * *state.twist) * last;
+}
+
+// Landmarks of the last frame that the present map still knows.
+std::vector<LandmarkId> surviving(const map::BundledMap& map, std::span<const LandmarkId> landmarks) {
+  std::vector<LandmarkId> out;
+  for (const LandmarkId l : landmarks) {
+    const LandmarkId now = map.resolve(l);
+    if (now.valid()) out.push_back(now);
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+bool supported(const solver::PoseSolution& solution, std::size_t num_matches, int min_inliers, const TrackingOptions& options) {
+  return solution.ok && solution.num_inliers >= min_inliers &&
+         solution.num_inliers >= options.min_inlier_share * static_cast<double>(num_matches);
+}
+
+struct Coarse {
+  SE3 T_rig_world;
+  FrameMatches matches;  // inliers
+  LostReason reason = LostReason::kNone;
+};
+
+frame::ProjectionSearchOptions search_options(const TrackInput& input, const MatchingOptions& matching, double radius) {
+  return {.radius = radius, .max_hamming = matching.max_hamming, .ratio = matching.ratio, .scale_factor = input.scale_factor};
+}
+
+// Pose from the landmarks of the last frame: guided by the motion model, and where that finds too little, in wide windows
+// with a consensus.
+Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
+                        ThreadPool& pool) {
+  const map::BundledMap& map = input.map;
+  const SE3 predicted = predict(input, frame.time_ns);
+  const std::vector<LandmarkId> landmarks = surviving(map, input.state.landmarks);
+  Coarse out{predicted, {}, LostReason::kFewMatches};
+  if (input.state.status == TrackStatus::kTracking) {
+    const MatchSearch search = find_landmarks(map, frame, predicted, landmarks, {},
+                                              search_options(input, options.matching, options.matching.predicted_radius), pool);
+    const auto observations = pose_observations(map, frame, search.found);
+    if (count(search.found) >= static_cast<std::size_t>(options.min_inliers)) {
+      const auto solution = solver::solve_pose(map.rig(), observations, predicted, options.pose);
+      if (supported(solution, observations.size(), options.min_inliers, options)) {
+        return {solution.T_rig_world, keep_inliers(search.found, solution.inlier), LostReason::kNone};
+      }
+    }
+  }
+  const map::LocalView view = map::make_local_view(map, landmarks, input.state.reference, options.local_view);
+  auto wide = search_options(input, options.matching, options.matching.wide_radius);
+  wide.level_slack = 2;
+  wide.ratio = 0.8 * options.matching.ratio;
+  const MatchSearch search = find_landmarks(map, frame, predicted, view.landmarks, {}, wide, pool);
+  if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return out;
+  const auto observations = pose_observations(map, frame, search.found);
+  const auto solution = solver::ransac_pose(map.rig(), observations, predicted, options.pose, {},
+                                            Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
+  out.reason = LostReason::kFewInliers;
+  if (!supported(solution, observations.size(), options.min_inliers_wide, options)) return out;
+  return {solution.T_rig_world, keep_inliers(search.found, solution.inlier), LostReason::kNone};
+}
+
+struct Fine {
+  solver::PoseSolution solution;
+  FrameMatches matches;                 // all, inliers and outliers
+  std::vector<LandmarkId> visible;
+};
+
+// Pose from all landmarks of the local view, with keypoints aligned to their landmarks' patches.
+Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::BundledFrame& frame,
+                      const TrackingOptions& options, ThreadPool& pool) {
+  const map::BundledMap& map = input.map;
+  const map::LocalView view =
+      map::make_local_view(map, landmarks_of(coarse.matches), input.state.reference, options.local_view);
+  MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, coarse.matches,
+                                      search_options(input, options.matching, options.matching.local_radius), pool);
+  Fine out;
+  out.matches = merge(coarse.matches, search.found);
+  out.visible = std::move(search.visible);
+  align_matches(map, coarse.T_rig_world, out.matches, input.pyramids, options.alignment, input.noise, frame, pool);
+  out.solution = solver::solve_pose(map.rig(), pose_observations(map, frame, out.matches), coarse.T_rig_world, options.pose);
+  return out;
+}
+
+std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const FrameMatches& matched, const FrameMatches& inliers) {
+  std::vector<CameraCounts> counts(frame.cameras.size());
+  for (std::size_t c = 0; c < counts.size(); ++c) {
+    counts[c].keypoints = static_cast<int>(frame.cameras[c].keypoints.size());
+    if (c < matched.size()) counts[c].matched = static_cast<int>(matched[c].size());
+    if (c < inliers.size()) counts[c].inliers = static_cast<int>(inliers[c].size());
+  }
+  return counts;
+}
+
+// Each landmark that should have been seen counts once, also when several cameras should have.
+void note_sightings(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found, TrackerState& state) {
+  for (const LandmarkId l : found) state.sightings.push_back({l, 1, 1});
+  for (const LandmarkId l : visible) {
+    if (!std::binary_search(found.begin(), found.end(), l)) state.sightings.push_back({l, 1, 0});
+  }
+}
+
+TrackOutput lost(const TrackInput& input, const frame::BundledFrame& frame, LostReason reason) {
+  TrackOutput out;
+  out.result.frame = frame.id;
+  out.result.time_ns = frame.time_ns;
+  out.result.status = TrackStatus::kLost;
+  out.result.reason = reason;
+  out.result.cameras = camera_counts(frame, {}, {});
+  out.state = input.state;
+  out.state.status = TrackStatus::kLost;
+  out.state.twist.reset();
+  return out;
+}
+
+TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, Fine fine, const TrackingOptions& options) {
+  const map::BundledMap& map = input.map;
+  TrackOutput out;
+  out.matches = keep_inliers(fine.matches, fine.solution.inlier);
+  TrackResult& result = out.result;
+  result.frame = frame.id;
+  result.time_ns = frame.time_ns;
+  result.status = TrackStatus::kTracking;
+  result.reason = LostReason::kNone;
+  result.T_rig_world = fine.solution.T_rig_world;
+  result.cameras = camera_counts(frame, fine.matches, out.matches);
+
+  TrackerState& state = out.state;
+  state = input.state;
+  state.reference = map.alive(state.reference) ? state.reference : map.newest_keyframe();
+  const SE3 T_ref_world = map.resolved_pose(state.reference);
+  state.T_rig_reference = result.T_rig_world * T_ref_world.inverse();
+  result.reference = state.reference;
+  result.T_rig_reference = state.T_rig_reference;
+
+  const double dt = to_seconds(frame.time_ns - input.state.time_ns);
+  const SE3 last = input.state.T_rig_reference * map.resolved_pose(input.state.reference);
+  state.twist.reset();
+  if (dt > 0 && dt < kMaxPrediction_s) state.twist = (result.T_rig_world * last.inverse()).log() / dt;
+  state.status = TrackStatus::kTracking;
+  state.time_ns = frame.time_ns;
+  state.landmarks = landmarks_of(out.matches);
+  note_sightings(fine.visible, state.landmarks, state);
+
+  ++state.frames_since_keyframe;
+  KeyframeEvidence evidence = keyframe_evidence(map, frame, out.matches, state.reference, result.T_rig_world, options.keyframe);
+  state.best_overlap = std::max(state.best_overlap, evidence.overlap);
+  evidence.best_overlap = state.best_overlap;
+  evidence.frames_since_keyframe = state.frames_since_keyframe;
+  out.keyframe_due = keyframe_due(evidence, options.keyframe);
+  return out;
+}
+
+}  // namespace
+
+std::string_view describe(LostReason reason) {
+  switch (reason) {
+    case LostReason::kNone: return "";
+    case LostReason::kNotStarted: return "not started";
+    case LostReason::kNoImages: return "no images";
+    case LostReason::kFewFeatures: return "too few features";
+    case LostReason::kFewMatches: return "too few matches";
+    case LostReason::kFewInliers: return "too few matches agree";
+    case LostReason::kUnstablePose: return "pose not supported";
+  }
+  return "";
+}
+
+TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options, ThreadPool& pool) {
+  const bool any_image = std::any_of(frame.cameras.begin(), frame.cameras.end(), [](const frame::CameraFrame& c) {
+    return c.state == image::ImageState::kPresent;
+  });
+  if (!any_image) return lost(input, frame, LostReason::kNoImages);
+  if (frame.num_keypoints() < static_cast<std::size_t>(options.min_inliers)) return lost(input, frame, LostReason::kFewFeatures);
+  const Coarse coarse = track_last_frame(input, frame, options, pool);
+  if (coarse.reason != LostReason::kNone) return lost(input, frame, coarse.reason);
+  Fine fine = track_local_view(input, coarse, frame, options, pool);
+  if (!supported(fine.solution, count(fine.matches), options.min_inliers, options)) {
+    return lost(input, frame, fine.solution.num_inliers < options.min_inliers ? LostReason::kFewInliers : LostReason::kUnstablePose);
+  }
+  return tracked(input, frame, std::move(fine), options);
+}
+
+TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,
+                               std::vector<LandmarkId> landmarks) {
+  TrackerState state = before;
+  state.status = TrackStatus::kTracking;
+  state.time_ns = time_ns;
+  state.reference = keyframe;
+  state.T_rig_reference = SE3();
+  state.landmarks = std::move(landmarks);
+  state.frames_since_keyframe = 0;
+  state.best_overlap = 0;
+  state.sightings.clear();
+  return state;
+}
+
+}  // namespace bslam::tracking

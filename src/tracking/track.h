@@ -1,0 +1,72 @@
+// Tracking: the pose of camera 0 for each frame, from all cameras, against an immutable version of the map.
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "base/random.h"
+#include "map/map_edit.h"
+#include "tracking/frame_matches.h"
+
+namespace bslam::tracking {
+
+enum class TrackStatus { kNotStarted, kTracking, kLost };
+
+// Why a frame has no pose. A frame whose pose is not supported is lost, never guessed.
+enum class LostReason { kNone, kNotStarted, kNoImages, kFewFeatures, kFewMatches, kFewInliers, kUnstablePose };
+
+std::string_view describe(LostReason reason);
+
+struct CameraCounts {
+  int keypoints = 0, matched = 0, inliers = 0;
+};
+
+struct TrackResult {
+  FrameId frame;
+  TimeNs time_ns = 0;
+  TrackStatus status = TrackStatus::kNotStarted;
+  LostReason reason = LostReason::kNotStarted;
+  geometry::SE3 T_rig_world;      // meaningful while tracking
+  KeyframeId reference;           // the pose is kept relative to this keyframe, so that corrections carry it along
+  geometry::SE3 T_rig_reference;
+  std::vector<CameraCounts> cameras;
+};
+
+// What the tracker carries from frame to frame; a value.
+struct TrackerState {
+  TrackStatus status = TrackStatus::kNotStarted;
+  TimeNs time_ns = 0;                         // of the last tracked frame
+  KeyframeId reference;                       // as in TrackResult, of the last tracked frame
+  geometry::SE3 T_rig_reference;
+  std::optional<geometry::Vector6d> twist;    // T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); rad/s, m/s
+  std::vector<LandmarkId> landmarks;          // inliers of the last tracked frame
+  int frames_since_keyframe = 0;
+  int best_overlap = 0;                       // most landmarks of the reference found in a frame since it was made
+  std::vector<map::Sighting> sightings;       // not yet folded into the map
+};
+
+struct TrackOutput {
+  TrackResult result;
+  TrackerState state;
+  FrameMatches matches;       // inliers
+  bool keyframe_due = false;
+};
+
+struct TrackInput {
+  const map::BundledMap& map;
+  std::span<const image::Pyramid> pyramids;
+  const TrackerState& state;
+  frame::DetectionNoise noise;
+  double scale_factor = 1.2;  // of the pyramid
+  std::uint64_t seed = 1;
+};
+
+// Finds the pose of `frame`, moving matched keypoints to their aligned places. The map has at least one keyframe.
+TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options, ThreadPool& pool);
+
+// The state from which tracking goes on after `keyframe` was made of a frame at `T_rig_world` that shows `landmarks`.
+TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,
+                               std::vector<LandmarkId> landmarks);
+
+}  // namespace bslam::tracking
