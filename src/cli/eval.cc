@@ -1,0 +1,171 @@
+// bslam eval: errors of a trajectory against ground truth.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "cli/verbs.h"
+#include "evaluation/trajectory_error.h"
+#include "io/atomic_file.h"
+#include "io/rig_file.h"
+#include "io/trajectory_file.h"
+#include "report/trajectory_plot.h"
+
+namespace bslam::cli {
+
+namespace {
+
+using evaluation::AlignMode;
+using evaluation::Trajectory;
+using evaluation::TrajectoryEvaluation;
+
+struct EvalArguments {
+  std::string estimate, ground_truth;
+  std::string align = "se3";
+  std::string gt_frame = "cam0";
+  double max_dt_s = 0.01;
+  double delta_s = 1.0;
+  int camera = 0;
+  std::optional<std::filesystem::path> rig, plot, times;
+  bool json = false;
+};
+
+AlignMode align_mode(const std::string& name) {
+  if (name == "sim3") return AlignMode::kSim3;
+  return name == "none" ? AlignMode::kNone : AlignMode::kSe3;
+}
+
+// The estimate as poses of the body, where the ground truth is that: T_world_body = T_world_cam * T_cam_body.
+Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& arguments) {
+  if (arguments.gt_frame != "body") return estimate;
+  if (!arguments.rig) {
+    return Error{.file = "command line",
+                 .key = "--gt-frame body",
+                 .found = "no --rig",
+                 .expected = "--rig FILE, for the camera's place on the body"};
+  }
+  const auto rig = io::read_rig(*arguments.rig);
+  if (!rig) return rig.error();
+  if (static_cast<std::size_t>(arguments.camera) >= rig->size()) {
+    return Error{.file = arguments.rig->string(),
+                 .key = "--camera",
+                 .found = std::to_string(arguments.camera),
+                 .expected = fmt::format("one of its {} cameras, from 0", rig->size())};
+  }
+  const auto camera = static_cast<std::size_t>(arguments.camera);
+  return evaluation::moved_to_frame(estimate, rig->body_from_cam(camera).inverse());
+}
+
+nlohmann::ordered_json number(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
+}
+
+std::string json_text(const TrajectoryEvaluation& e) {
+  const nlohmann::ordered_json json = {
+      {"ate",
+       {{"rmse", number(e.ate.rmse)},
+        {"mean", number(e.ate.mean)},
+        {"median", number(e.ate.median)},
+        {"max", number(e.ate.max)},
+        {"count", e.ate.count}}},
+      {"rpe",
+       {{"delta_s", e.rpe.delta_s},
+        {"trans_rmse", number(e.rpe.translation_m.rmse)},
+        {"rot_rmse_deg", number(e.rpe.rotation_deg.rmse)},
+        {"count", e.rpe.translation_m.count}}},
+      {"scale", e.scale ? nlohmann::ordered_json(*e.scale) : nlohmann::ordered_json(nullptr)},
+      {"coverage", number(e.coverage)},
+      {"gt_length_m", number(e.gt_length_m)}};
+  return json.dump(2) + "\n";
+}
+
+std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& arguments) {
+  const auto row = [](std::string_view name, const std::string& value) {
+    return fmt::format("{:<24}{}\n", name, value);
+  };
+  const auto errors = [](const evaluation::ErrorStatistics& s, std::string_view unit) {
+    if (s.count == 0) return std::string("no pairs of poses so far apart in time");
+    return fmt::format("rmse {:.6f}  mean {:.6f}  median {:.6f}  max {:.6f}  {}  ({})", s.rmse, s.mean, s.median, s.max,
+                       unit, s.count);
+  };
+  return row("ATE, position", errors(e.ate, "m")) +
+         row(fmt::format("RPE over {:g} s, position", e.rpe.delta_s), errors(e.rpe.translation_m, "m")) +
+         row(fmt::format("RPE over {:g} s, rotation", e.rpe.delta_s), errors(e.rpe.rotation_deg, "deg")) +
+         row("alignment", arguments.align) +
+         row("scale of best fit", e.scale ? fmt::format("{:.6f}", *e.scale) : "not determined") +
+         row("coverage", fmt::format("{:.2f} %", 100.0 * e.coverage)) +
+         row("ground truth, length", fmt::format("{:.3f} m", e.gt_length_m));
+}
+
+Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
+  for (const double value : {arguments.max_dt_s, arguments.delta_s}) {  // CLI11 lets NaN pass as within any range
+    if (std::isfinite(value)) continue;
+    return Error{.file = "command line", .key = "--max-dt, --delta", .found = "not a number", .expected = "seconds"};
+  }
+  auto read = io::read_trajectory(arguments.estimate, arguments.times);
+  if (!read) return read.error();
+  const auto ground_truth = io::read_trajectory(arguments.ground_truth, arguments.times);
+  if (!ground_truth) return ground_truth.error();
+  const auto estimate = in_frame_of_truth(std::move(read).value(), arguments);
+  if (!estimate) return estimate.error();
+  const evaluation::EvaluationOptions options{.align = align_mode(arguments.align),
+                                              .max_dt_ns = from_seconds(arguments.max_dt_s),
+                                              .rpe_delta_s = arguments.delta_s};
+  auto result = evaluation::evaluate(*estimate, *ground_truth, options);
+  if (!result) {
+    Error error = result.error();
+    error.file = arguments.estimate;
+    return error;
+  }
+  if (arguments.plot) {
+    const std::string title = std::filesystem::path(arguments.estimate).filename().string() + " against " +
+                              std::filesystem::path(arguments.ground_truth).filename().string();
+    const std::string svg = report::trajectory_plot_svg(report::evaluation_plot_input(*result, *ground_truth, title));
+    if (const Status status = io::write_atomically(*arguments.plot, svg); !status) return status.error();
+  }
+  return result;
+}
+
+int run_eval(const EvalArguments& arguments) {
+  const auto result = evaluate_files(arguments);
+  if (!result) return report_error(result.error());
+  const std::string text = arguments.json ? json_text(*result) : table_text(*result, arguments);
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  return kExitOk;
+}
+
+}  // namespace
+
+void add_eval(CLI::App& app, int& exit_status) {
+  const auto arguments = std::make_shared<EvalArguments>();
+  CLI::App* verb = app.add_subcommand("eval", "trajectory error against ground truth: ATE, RPE, coverage");
+  verb->add_option("EST", arguments->estimate, "estimated trajectory: TUM, EuRoC csv or KITTI poses")->required();
+  verb->add_option("GT", arguments->ground_truth, "true trajectory, in any of these formats")->required();
+  verb->add_option("--align", arguments->align, "how the estimate is moved onto the truth first")
+      ->check(CLI::IsMember({"se3", "sim3", "none"}))
+      ->capture_default_str();
+  verb->add_option("--max-dt", arguments->max_dt_s, "seconds up to which poses belong together; the nearest counts")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  verb->add_option("--gt-frame", arguments->gt_frame, "whose poses the ground truth has; body needs --rig")
+      ->check(CLI::IsMember({"cam0", "body"}))
+      ->capture_default_str();
+  verb->add_option("--rig", arguments->rig, "calibration with the camera's place on the body");
+  verb->add_option("--camera", arguments->camera, "the rig's camera that the estimate calls camera 0")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  verb->add_option("--delta", arguments->delta_s, "seconds over which relative errors are taken")
+      ->check(CLI::Range(1e-6, 1e6))
+      ->capture_default_str();
+  verb->add_option("--times", arguments->times, "times of KITTI poses, one a line; default: times.txt beside them");
+  verb->add_flag("--json", arguments->json, "JSON instead of a table");
+  verb->add_option("--plot", arguments->plot, "write an SVG with views of the paths and the error over time");
+  verb->callback([arguments, &exit_status] { exit_status = run_eval(*arguments); });
+}
+
+}  // namespace bslam::cli

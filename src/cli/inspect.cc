@@ -1,0 +1,101 @@
+// bslam inspect: the BundledFrame of one input frame, as JSON.
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "cli/dataset_arguments.h"
+#include "cli/verbs.h"
+#include "io/atomic_file.h"
+#include "io/config_file.h"
+#include "io/frame_reader.h"
+#include "io/image_file.h"
+#include "system/pipeline.h"
+
+namespace bslam::cli {
+namespace {
+
+struct InspectArguments {
+  DatasetArguments data;
+  std::string out, config_file;
+  std::vector<std::string> settings;
+  int frame = 0;
+};
+
+nlohmann::ordered_json to_json(const frame::BundledFrame& frame, const io::Dataset& dataset) {
+  nlohmann::ordered_json cameras = nlohmann::ordered_json::array();
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    const feature::Keypoints& k = frame.cameras[c].keypoints;
+    nlohmann::ordered_json keypoints = nlohmann::ordered_json::array();
+    for (std::size_t i = 0; i < k.size(); ++i) {
+      keypoints.push_back({k.pixel[i].x(), k.pixel[i].y(), k.level[i], k.angle[i] * 180.0 / std::numbers::pi});
+    }
+    cameras.push_back({{"name", dataset.rig.camera(c).name}, {"keypoints", std::move(keypoints)}});
+  }
+  nlohmann::ordered_json features = nlohmann::ordered_json::array();
+  for (std::size_t f = 0; f < frame.bundled.size(); ++f) {
+    nlohmann::ordered_json observations = nlohmann::ordered_json::array();
+    for (const frame::KeypointRef r : frame.bundled.keypoints(FeatureId(f))) {
+      observations.push_back({r.camera.value(), r.keypoint.value()});
+    }
+    const auto& point = frame.bundled.point(FeatureId(f));
+    nlohmann::ordered_json place;
+    if (point) place = {point->point_rig.x(), point->point_rig.y(), point->point_rig.z()};
+    features.push_back({{"id", f}, {"observations", std::move(observations)}, {"point_cam0", std::move(place)}});
+  }
+  return {{"time", to_seconds(frame.time_ns)}, {"cameras", std::move(cameras)}, {"features", std::move(features)}};
+}
+
+Result<system::Config> resolve_config(const InspectArguments& arguments) {
+  system::Config config;
+  OptionTable table(config);
+  if (!arguments.config_file.empty()) {
+    if (const Status s = io::apply_config_file(table, arguments.config_file); !s) return s.error();
+  }
+  for (const std::string& setting : arguments.settings) {
+    if (const Status s = io::apply_setting(table, setting); !s) return s.error();
+  }
+  return config;
+}
+
+int inspect(const InspectArguments& arguments) {
+  const auto config = resolve_config(arguments);
+  if (!config) return report_error(config.error());
+  const auto request = dataset_request(arguments.data, config->io.sync_tolerance);
+  if (!request) return report_error(request.error());
+  const auto dataset = io::open_dataset(*request);
+  if (!dataset) return report_error(dataset.error());
+  if (arguments.frame < 0 || static_cast<std::size_t>(arguments.frame) >= dataset->frames.size()) {
+    return report_error({arguments.data.path, "--frame", std::to_string(arguments.frame),
+                         "0 to " + std::to_string(dataset->frames.size() - 1)});
+  }
+  std::vector<image::Image> masks;
+  for (std::size_t c = 0; c < dataset->rig.size(); ++c) {
+    auto mask = io::read_mask(dataset->rig.camera(c));
+    if (!mask) return report_error(mask.error());
+    masks.push_back(std::move(*mask));
+  }
+  system::Pipeline pipeline(dataset->rig, *config, std::move(masks));
+  std::vector<system::StageTime> stages;
+  const auto frame = pipeline.make_frame(io::read_frame(*dataset, static_cast<std::size_t>(arguments.frame)), stages);
+  const Status written = io::write_atomically(arguments.out, to_json(frame, *dataset).dump(1) + "\n");
+  if (!written) return report_error(written.error());
+  std::printf("%zu keypoints, %zu unique features = %zu monocular + %zu matched\n%s\n", frame.num_keypoints(),
+              frame.bundled.size(), frame.bundled.num_monocular(), frame.bundled.num_matched(), arguments.out.c_str());
+  return kExitOk;
+}
+
+}  // namespace
+
+void add_inspect(CLI::App& app, int& exit_status) {
+  const auto a = std::make_shared<InspectArguments>();
+  CLI::App* verb = app.add_subcommand("inspect", "the BundledFrame of one input frame: keypoints and the Bundled table");
+  add_dataset_options(*verb, a->data);
+  verb->add_option("--frame", a->frame, "number of the input frame, from 0")->required();
+  verb->add_option("--out", a->out, "JSON file to write")->required();
+  verb->add_option("--config", a->config_file, "settings in YAML");
+  verb->add_option("--set", a->settings, "key=value, over the file; repeats")->expected(1)->take_all();
+  verb->callback([a, &exit_status] { exit_status = inspect(*a); });
+}
+
+}  // namespace bslam::cli

@@ -1,0 +1,31 @@
+#include "cli/progress_bar.h"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <utility>
+
+namespace bslam::cli {
+
+ProgressBar::ProgressBar(bool wanted, std::string unit)
+    : active_(wanted && isatty(STDERR_FILENO) == 1), unit_(std::move(unit)) {}
+
+void ProgressBar::show(std::size_t done, std::size_t all) {
+  const auto now = Clock::now();
+  if (!active_ || all == 0 || (done < all && now - drawn_ < std::chrono::milliseconds(100))) return;
+  drawn_ = now;
+  constexpr std::size_t kWidth = 40;
+  const std::size_t filled = kWidth * done / all;
+  const double elapsed = std::chrono::duration<double>(now - start_).count();
+  const double left = done > 0 ? elapsed * static_cast<double>(all - done) / static_cast<double>(done) : 0.0;
+  std::fprintf(stderr, "\r[%s%s] %zu/%zu %s, %.0f s left ", std::string(filled, '#').c_str(),
+               std::string(kWidth - filled, '.').c_str(), done, all, unit_.c_str(), left);
+  std::fflush(stderr);
+}
+
+void ProgressBar::finish() {
+  if (active_) std::fputc('\n', stderr);
+  active_ = false;
+}
+
+}  // namespace bslam::cli

@@ -1,0 +1,136 @@
+// bslam run: SLAM over a recorded data set.
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cli/dataset_arguments.h"
+#include "cli/progress_bar.h"
+#include "cli/verbs.h"
+#include "io/config_file.h"
+#include "session/run_session.h"
+
+namespace bslam::cli {
+namespace {
+
+std::atomic<bool> g_interrupted{false};  // a signal handler can reach nothing else
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+void on_signal(int) { g_interrupted.store(true); }
+
+const auto g_program_start = std::chrono::steady_clock::now();
+
+struct RunArguments {
+  DatasetArguments data;
+  std::string out, config_file, mode, pace = "fast", late = "block", progress = "auto";
+  std::vector<std::string> settings;
+  std::optional<int> seed;
+  bool no_loop = false, no_final_ba = false, overwrite = false;
+};
+
+// File first, then single settings, then the options of the command line.
+Result<system::Config> resolve_config(const RunArguments& arguments) {
+  system::Config config;
+  OptionTable table(config);
+  if (!arguments.config_file.empty()) {
+    if (const Status s = io::apply_config_file(table, arguments.config_file); !s) return s.error();
+  }
+  for (const std::string& setting : arguments.settings) {
+    if (const Status s = io::apply_setting(table, setting); !s) return s.error();
+  }
+  if (!arguments.mode.empty()) {
+    if (const Status s = table.set("mode", arguments.mode); !s) return s.error();
+  }
+  if (arguments.seed) config.seed = *arguments.seed;
+  if (arguments.no_final_ba) config.final_adjustment = false;
+  return config;
+}
+
+// Makes the folder; an existing one must be empty or given up for overwriting, and then loses the files of an earlier run.
+Status prepare_folder(const std::filesystem::path& folder, bool overwrite) {
+  std::error_code error;
+  const bool exists = std::filesystem::exists(folder, error);
+  if (exists && !std::filesystem::is_directory(folder, error)) {
+    return Error{folder.string(), "--out", "a file", "a folder"};
+  }
+  if (exists && !overwrite && !std::filesystem::is_empty(folder, error)) {
+    return Error{folder.string(), "--out", "a folder that is not empty", "an empty or new one, or --overwrite"};
+  }
+  std::filesystem::create_directories(folder, error);
+  if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be made"};
+  for (const char* name : {"trajectory.tum", "trajectory_live.tum", "config.yaml", "summary.json", "trajectory.svg", "run.svg"}) {
+    std::filesystem::remove(folder / name, error);
+  }
+  return {};
+}
+
+void print_result(const report::RunRecord& record, const std::string& out) {
+  const auto tracked = std::count_if(record.frames.begin(), record.frames.end(), [](const report::FrameRecord& f) {
+    return f.outcome == report::FrameOutcome::kTracked;
+  });
+  std::printf("%zd of %zu frames have a pose, %lld keyframes, %lld landmarks, scale %s; %.1f s\n%s\n",
+              static_cast<std::ptrdiff_t>(tracked), record.frames.size(), static_cast<long long>(record.map.keyframes),
+              static_cast<long long>(record.map.landmarks), record.map.scale.c_str(), record.wall_s, out.c_str());
+}
+
+int run(const RunArguments& arguments) {
+  const auto config = resolve_config(arguments);
+  if (!config) return report_error(config.error());
+  const auto request = dataset_request(arguments.data, config->io.sync_tolerance);
+  if (!request) return report_error(request.error());
+  const auto dataset = io::open_dataset(*request);
+  if (!dataset) return report_error(dataset.error());
+  if (const Status s = prepare_folder(arguments.out, arguments.overwrite); !s) return report_error(s.error());
+  for (const std::string& warning : dataset->warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  ProgressBar bar(arguments.progress == "auto", "frames");
+  session::SessionOptions options;
+  options.config = *config;
+  options.pace = arguments.pace == "realtime" ? session::Pace::kRealtime : session::Pace::kFast;
+  options.late = arguments.late == "drop" ? session::Late::kDrop : session::Late::kBlock;
+  options.start_up_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - g_program_start).count();
+  options.interrupted = &g_interrupted;
+  options.progress = [&bar](std::size_t done, std::size_t all) { bar.show(done, all); };
+  const auto result = session::run_session(*dataset, options);
+  bar.finish();
+  if (!result) return report_error(result.error());
+  if (const Status s = session::write_outputs(*result, *config, arguments.out); !s) return report_error(s.error());
+  print_result(result->record, arguments.out);
+  if (!result->record.complete) return kExitInterrupted;
+  return result->live.empty() ? kExitNothingTracked : kExitOk;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, int& exit_status) {
+  const auto a = std::make_shared<RunArguments>();
+  CLI::App* verb = app.add_subcommand("run", "SLAM over a recorded data set");
+  add_dataset_options(*verb, a->data);
+  verb->add_option("--out", a->out, "folder for trajectory, summary, configuration and plots")->required();
+  verb->add_option("--config", a->config_file, "settings in YAML, as config.yaml of an earlier run");
+  verb->add_option("--set", a->settings, "key=value, over the file; repeats")->expected(1)->take_all();
+  verb->add_option("--mode", a->mode, "sequential (identical bytes on every run) or parallel; default parallel");
+  verb->add_option("--pace", a->pace, "fast, or realtime: images at their recorded pace")
+      ->check(CLI::IsMember({"fast", "realtime"}))
+      ->capture_default_str();
+  verb->add_option("--late", a->late, "at the recorded pace: block keeps every frame, drop leaves out those there is no time for")
+      ->check(CLI::IsMember({"block", "drop"}))
+      ->capture_default_str();
+  verb->add_flag("--no-loop", a->no_loop, "loop closing off (there is none yet)");
+  verb->add_flag("--no-final-ba", a->no_final_ba, "no global bundle adjustment at the end");
+  verb->add_option("--seed", a->seed, "of all randomness; default 1")->check(CLI::NonNegativeNumber);
+  verb->add_option("--progress", a->progress, "auto: a bar when stderr is a terminal; never")
+      ->check(CLI::IsMember({"auto", "never"}))
+      ->capture_default_str();
+  verb->add_flag("--overwrite", a->overwrite, "the folder may exist; files of an earlier run are replaced");
+  verb->callback([a, &exit_status] { exit_status = run(*a); });
+}
+
+}  // namespace bslam::cli

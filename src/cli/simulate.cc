@@ -1,0 +1,162 @@
+// bslam simulate: renders the built-in world through a rig.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "cli/verbs.h"
+#include "io/fault_file.h"
+#include "io/rig_file.h"
+#include "io/simulation_writer.h"
+#include "simulation/rigs.h"
+
+namespace bslam::cli {
+namespace {
+
+struct SimulateArguments {
+  std::string folder, progress = "auto";
+  std::optional<std::string> rig, faults;
+  double duration_s = 20.0, rate_hz = 20.0, exposure_ms = 5.0, noise = 1.0, speed_mps = 0.0;
+  std::uint64_t seed = 1;
+  int laps = 0, threads = 0;
+  bool overwrite = false;
+};
+
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "may be set in a signal handler");
+
+Result<io::SimulationRequest> make_request(const SimulateArguments& arguments) {
+  std::optional<camera::Rig> rig;
+  if (arguments.rig) {
+    auto read = io::read_rig(*arguments.rig);
+    if (!read) return read.error();
+    rig = std::move(read).value();
+  } else {
+    rig = simulation::default_rig();
+  }
+  io::SimulationRequest request{.folder = arguments.folder,
+                                .rig = *rig,
+                                .recording = {},
+                                .tour = {},
+                                .imaging = {},
+                                .world = {},
+                                .seed = arguments.seed,
+                                .overwrite = arguments.overwrite};
+  request.recording.duration_s = arguments.duration_s;
+  request.recording.rate_hz = arguments.rate_hz;
+  request.recording.exposure_s = 1e-3 * arguments.exposure_ms;
+  request.imaging.noise = arguments.noise;
+  request.imaging.seed = request.tour.seed = arguments.seed;
+  request.tour.laps = arguments.laps;
+  request.tour.speed_mps = arguments.speed_mps;
+  if (arguments.faults) {
+    auto faults = io::read_faults(*arguments.faults, rig->size());
+    if (!faults) return faults.error();
+    request.recording.faults = std::move(faults).value();
+  }
+  return request;
+}
+
+// A bar on stderr, redrawn when its percentage changes.
+class Bar {
+ public:
+  explicit Bar(bool shown) : shown_(shown) {}
+  ~Bar() {
+    if (drawn_ >= 0) std::fputc('\n', stderr);
+  }
+  Bar(const Bar&) = delete;
+  Bar& operator=(const Bar&) = delete;
+
+  void show(std::size_t done, std::size_t total) {
+    const int percent = static_cast<int>(100 * done / total);
+    if (!shown_ || percent == drawn_) return;
+    drawn_ = percent;
+    constexpr int kWidth = 40;
+    const int filled = kWidth * percent / 100;
+    const std::string line =
+        fmt::format("\rsimulate [{:#<{}}{:.<{}}] {}/{} images", "", filled, "", kWidth - filled, done, total);
+    std::fputs(line.c_str(), stderr);
+    std::fflush(stderr);
+  }
+
+ private:
+  bool shown_;
+  int drawn_ = -1;  // percentage that stands there
+};
+
+int run_simulate(const SimulateArguments& arguments) {
+  const auto request = make_request(arguments);
+  if (!request) return report_error(request.error());
+  const int cores = static_cast<int>(std::thread::hardware_concurrency());
+  ThreadPool pool(arguments.threads > 0 ? arguments.threads : std::max(1, cores));
+  std::signal(SIGINT, [](int) { interrupted = true; });
+  std::signal(SIGTERM, [](int) { interrupted = true; });
+  const auto outcome = [&] {
+    Bar bar(arguments.progress == "auto" && ::isatty(STDERR_FILENO) != 0);
+    return io::write_simulation(*request, pool, [&](std::size_t done, std::size_t total) {
+      bar.show(done, total);
+      return !interrupted;
+    });
+  }();
+  if (!outcome) {
+    Error error = outcome.error();
+    if (error.file.empty()) {  // a value out of range, named as the request names it
+      error.file = "command line";
+      error.key = "--" + error.key;
+    }
+    return report_error(error);
+  }
+  switch (*outcome) {
+    case io::SimulationOutcome::kWritten:
+      fmt::print("{}: {} frames of {} cameras\n", arguments.folder, simulation::frame_count(request->recording),
+                 request->rig.size());
+      break;
+    case io::SimulationOutcome::kWasComplete:
+      fmt::print("{}: already complete\n", arguments.folder);
+      break;
+    case io::SimulationOutcome::kInterrupted:
+      fmt::print(stderr, "bslam: interrupted; the same command goes on from here\n");
+      return kExitInterrupted;
+  }
+  return kExitOk;
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app, int& exit_status) {
+  const auto arguments = std::make_shared<SimulateArguments>();
+  SimulateArguments& a = *arguments;
+  CLI::App* verb =
+      app.add_subcommand("simulate", "render the built-in world through a rig, in EuRoC layout with ground truth");
+  verb->add_option("--out", a.folder, "folder to write into")->required();
+  verb->add_option("--rig", a.rig, "calibration of the rig (default: four cameras, two of them in front)");
+  verb->add_option("--duration", a.duration_s, "seconds")->capture_default_str();
+  verb->add_option("--rate", a.rate_hz, "images a second of each camera")->capture_default_str();
+  verb->add_option("--seed", a.seed, "of the world, the motion and the noise")->capture_default_str();
+  verb->add_option("--laps", a.laps, "rounds of the tour within the duration; 0: as many as suit a walking pace")
+      ->capture_default_str();
+  verb->add_option("--speed", a.speed_mps, "metres a second; 0: follows from duration and laps")->capture_default_str();
+  verb->add_option("--exposure-ms", a.exposure_ms, "exposure, which blurs motion")->capture_default_str();
+  verb->add_option("--noise", a.noise, "factor on the sensor's noise")->capture_default_str();
+  verb->add_option("--faults", a.faults,
+                   "YAML or JSON list of {type, cameras, from, to}; type: black, frozen, over_exposed, "
+                   "dropped or delayed (with delay_s)");
+  verb->add_option("--threads", a.threads, "threads to work with; 0: one a core")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  verb->add_option("--progress", a.progress, "a bar when stderr is a terminal")
+      ->check(CLI::IsMember({"auto", "never"}))
+      ->capture_default_str();
+  verb->add_flag("--overwrite", a.overwrite,
+                 "write into a folder that is not empty; a recording made before is replaced");
+  verb->callback([arguments, &exit_status] { exit_status = run_simulate(*arguments); });
+}
+
+}  // namespace bslam::cli

@@ -1,0 +1,44 @@
+#include "session/frame_source.h"
+
+#include "system/stopwatch.h"
+
+namespace bslam::session {
+
+FrameSource::FrameSource(const io::Dataset& dataset, std::size_t ahead)
+    : dataset_(dataset), ahead_(ahead), reader_([this](std::stop_token stop) { read(std::move(stop)); }) {}
+
+std::optional<FrameSource::Item> FrameSource::next() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return !ready_.empty() || finished_; });
+  if (ready_.empty()) {
+    if (failure_) std::rethrow_exception(failure_);
+    return std::nullopt;
+  }
+  Item item = std::move(ready_.front());
+  ready_.pop_front();
+  changed_.notify_all();
+  return item;
+}
+
+void FrameSource::read(std::stop_token stop) {
+  std::exception_ptr failure;
+  try {
+    for (std::size_t i = 0; i < dataset_.frames.size() && !stop.stop_requested(); ++i) {
+      const system::Stopwatch watch;
+      Item item{io::read_frame(dataset_, i), 0};
+      item.read_ms = watch.ms();
+      std::unique_lock lock(mutex_);
+      if (!changed_.wait(lock, stop, [this] { return ready_.size() < ahead_; })) break;
+      ready_.push_back(std::move(item));
+      changed_.notify_all();
+    }
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  const std::lock_guard lock(mutex_);
+  finished_ = true;
+  failure_ = failure;
+  changed_.notify_all();
+}
+
+}  // namespace bslam::session

@@ -1,0 +1,130 @@
+#include "session/record_builder.h"
+
+#include <algorithm>
+#include <fstream>
+#include <string>
+
+namespace bslam::session {
+namespace {
+
+using report::RunRecord;
+
+constexpr int kFewKeypoints = 30;  // in an image: a camera that sees less helps nobody
+
+double seconds(const RecordInput& input, TimeNs time_ns) { return to_seconds(time_ns - input.dataset.first_time_ns); }
+
+report::FrameRecord frame_record(const RecordInput& input, const InputFrame& in, const system::FrameRecord* frame) {
+  report::FrameRecord out;
+  out.time_s = seconds(input, in.time_ns);
+  if (frame == nullptr) {
+    out.outcome = report::FrameOutcome::kDropped;
+    return out;
+  }
+  const bool tracked = frame->result.status == tracking::TrackStatus::kTracking;
+  out.outcome = tracked ? report::FrameOutcome::kTracked : report::FrameOutcome::kLost;
+  if (!tracked) out.lost_reason = tracking::describe(frame->result.reason);
+  out.keyframe = frame->keyframe;
+  for (std::size_t c = 0; c < frame->images.size(); ++c) {
+    const tracking::CameraCounts& n = frame->result.cameras[c];
+    out.cameras.push_back({frame->images[c] == image::ImageState::kPresent, n.keypoints, n.matched, n.inliers});
+  }
+  out.unique_features = frame->unique;
+  out.monocular_features = frame->monocular;
+  out.matched_features = frame->matched;
+  out.frame_ms = frame->frame_ms;
+  return out;
+}
+
+// State of a camera in one frame, from what it delivered.
+report::CameraInterval camera_state(const report::FrameRecord& frame, std::size_t c) {
+  if (!frame.cameras[c].has_image) return {"out", "no-images", frame.time_s, frame.time_s};
+  if (frame.cameras[c].keypoints < kFewKeypoints) return {"degraded", "few-features", frame.time_s, frame.time_s};
+  return {"ok", "", frame.time_s, frame.time_s};
+}
+
+void add_cameras(const RecordInput& input, RunRecord& record) {
+  const auto& frames = input.system.frames();
+  for (std::size_t c = 0; c < input.dataset.rig.size(); ++c) {
+    report::CameraRecord camera;
+    camera.name = input.dataset.rig.camera(c).name;
+    for (const system::FrameRecord& f : frames) {
+      camera.images += f.images[c] == image::ImageState::kPresent;
+      camera.skipped += f.images[c] == image::ImageState::kDamaged;
+    }
+    for (const report::FrameRecord& f : record.frames) {
+      if (f.cameras.empty()) continue;
+      const report::CameraInterval state = camera_state(f, c);
+      if (camera.states.empty() || camera.states.back().state != state.state || camera.states.back().reason != state.reason) {
+        camera.states.push_back(state);
+      }
+      camera.states.back().to_s = f.time_s;
+    }
+    record.cameras.push_back(std::move(camera));
+  }
+}
+
+void add_stages(const RecordInput& input, RunRecord& record) {
+  std::size_t next = 0;
+  for (const InputFrame& in : input.inputs) {
+    const double time_s = seconds(input, in.time_ns);
+    report::add_stage_sample(record, "read", report::StagePlace::kBackground, {time_s, in.read_ms});
+    if (in.dropped) continue;
+    for (const system::StageTime& s : input.system.frames()[next].stages) {
+      report::add_stage_sample(record, s.stage, report::StagePlace::kFrame, {time_s, s.ms});
+    }
+    ++next;
+  }
+  for (const system::MappingRecord& m : input.system.mapping_runs()) {
+    report::add_stage_sample(record, "map", report::StagePlace::kBackground, {seconds(input, m.time_ns), m.ms});
+  }
+  if (input.system.final_adjustment_ms() > 0 && !input.inputs.empty()) {
+    report::add_stage_sample(record, "global adjustment", report::StagePlace::kBackground,
+                             {seconds(input, input.inputs.back().time_ns), input.system.final_adjustment_ms()});
+  }
+}
+
+std::string scale_name(map::Scale scale) {
+  switch (scale) {
+    case map::Scale::kMetric: return "metric";
+    case map::Scale::kUpToScale: return "up-to-scale";
+    case map::Scale::kUnobservable: return "unobservable";
+  }
+  return "";
+}
+
+// Largest resident size of this process, as Linux tells it.
+std::optional<double> peak_memory_mb() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("VmHWM:", 0) == 0) return std::stod(line.substr(6)) / 1024.0;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+RunRecord build_record(const RecordInput& input) {
+  RunRecord record;
+  record.version = BSLAM_VERSION;
+  record.data = input.dataset.name;
+  record.mode = input.config.mode == system::Mode::kSequential ? "sequential" : "parallel";
+  record.complete = input.complete;
+  record.seed = static_cast<std::uint64_t>(input.config.seed);
+  record.cameras_used = input.dataset.cameras_used;
+  std::size_t next = 0;
+  for (const InputFrame& in : input.inputs) {
+    record.frames.push_back(frame_record(input, in, in.dropped ? nullptr : &input.system.frames()[next++]));
+  }
+  add_cameras(input, record);
+  add_stages(input, record);
+  const map::MapSnapshot map = input.system.snapshot();
+  record.map = {static_cast<std::int64_t>(map->num_keyframes()), static_cast<std::int64_t>(map->num_landmarks()),
+                static_cast<std::int64_t>(map->num_observations()), scale_name(map->scale()), false};
+  record.maps_started = input.system.maps_started();
+  record.start_up_s = input.start_up_s;
+  record.wall_s = input.wall_s;
+  record.peak_memory_mb = peak_memory_mb();
+  return record;
+}
+
+}  // namespace bslam::session

@@ -1,0 +1,30 @@
+// What the system knows of a run, as the plain record of summary and plots.
+#pragma once
+
+#include <vector>
+
+#include "io/dataset.h"
+#include "report/run_record.h"
+#include "system/system.h"
+
+namespace bslam::session {
+
+// One input frame of the session, also those the system never saw.
+struct InputFrame {
+  TimeNs time_ns = 0;
+  bool dropped = false;  // no time for it
+  double read_ms = 0;
+};
+
+struct RecordInput {
+  const io::Dataset& dataset;
+  const system::Config& config;
+  const std::vector<InputFrame>& inputs;  // in order; those not dropped match the frames of `system` one by one
+  const system::System& system;
+  bool complete = true;
+  double start_up_s = 0, wall_s = 0;
+};
+
+report::RunRecord build_record(const RecordInput& input);
+
+}  // namespace bslam::session
