@@ -133,7 +133,7 @@ void place_keypoints(std::span<CameraFrame> cameras, std::span<const image::Pyra
   feature::Keypoints& kb = cameras[edge.b.camera.index()].keypoints;
   const std::size_t ia = edge.a.keypoint.index(), ib = edge.b.keypoint.index();
   const double scale_a = pyramids[edge.a.camera.index()].scale_x[ka.level[ia]];
-  ka.sigma[ia] = std::min(ka.sigma[ia], static_cast<float>(alignment.min_sigma_px * scale_a));
+  ka.sigma[ia] = std::min(ka.sigma[ia], static_cast<float>(alignment.sigma(0.0, scale_a)));
   kb.pixel[ib] = edge.aligned.pixel.cast<float>();
   kb.bearing[ib] = edge.bearing;
   kb.sigma[ib] = static_cast<float>(edge.aligned.sigma);

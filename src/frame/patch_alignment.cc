@@ -172,7 +172,7 @@ std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Ei
   if (!converged || !(c.ncc > options.min_ncc)) return std::nullopt;
   AlignedKeypoint out;
   out.pixel = {target.to_base_x(level, at.x()), target.to_base_y(level, at.y())};
-  out.sigma = std::max(options.min_sigma_px, static_cast<double>(std::sqrt(c.residual_variance / t->weakest))) * scale;
+  out.sigma = options.sigma(std::sqrt(c.residual_variance / t->weakest), scale);
   out.ncc = c.ncc;
   return out;
 }
