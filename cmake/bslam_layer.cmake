@@ -36,5 +36,7 @@ target_compile_options(bslam_flags INTERFACE -Wall -Wextra -Wshadow -Wnon-virtua
                                              -Werror -ffp-contract=off)
 if(BSLAM_SANITIZE)
   target_compile_options(bslam_flags INTERFACE -fsanitize=${BSLAM_SANITIZE} -fno-omit-frame-pointer)
+  # Under AddressSanitizer Eigen would choose another allocator than the OpenGV library it shares vectors with.
+  target_compile_definitions(bslam_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
   target_link_options(bslam_flags INTERFACE -fsanitize=${BSLAM_SANITIZE})
 endif()

@@ -18,7 +18,15 @@ ThreadPool::~ThreadPool() {
 
 void ThreadPool::for_each(std::size_t count, const std::function<void(std::size_t)>& body) {
   if (workers_.empty() || count <= 1) {
-    for (std::size_t i = 0; i < count; ++i) body(i);
+    std::exception_ptr failure;
+    for (std::size_t i = 0; i < count; ++i) {
+      try {
+        body(i);
+      } catch (...) {
+        if (!failure) failure = std::current_exception();
+      }
+    }
+    if (failure) std::rethrow_exception(failure);
     return;
   }
   {

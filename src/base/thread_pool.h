@@ -21,8 +21,9 @@ class ThreadPool {
 
   int size() const { return static_cast<int>(workers_.size()) + 1; }
 
-  // Calls body(i) once for every i in [0, count) and returns when all are done. `body` writes only to slots of its
-  // own index. The first exception thrown is rethrown here. One loop at a time; not to be called from within `body`.
+  // Calls body(i) once for every i in [0, count) and returns when all are done, also where some throw. `body` writes
+  // only to slots of its own index. The first exception thrown is rethrown here. One loop at a time; not to be called
+  // from within `body`.
   void for_each(std::size_t count, const std::function<void(std::size_t)>& body);
 
  private:

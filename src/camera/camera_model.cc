@@ -1,11 +1,10 @@
 #include "camera/camera_model.h"
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <cmath>
 #include <limits>
 #include <numbers>
-
-#include <Eigen/Geometry>
-#include <Eigen/LU>
 
 #include "base/assert.h"
 
@@ -29,12 +28,16 @@ Matrix23d plane_jacobian(const Vector3d& p) {
 
 std::optional<Vector2d> Pinhole::project(const Vector3d& point) const {
   if (!(point.z() > kMinDepth)) return std::nullopt;
-  return to_pixel(k_, point.head<2>() / point.z());
+  const Vector2d m = point.head<2>() / point.z();
+  if (!m.allFinite()) return std::nullopt;
+  return to_pixel(k_, m);
 }
 
 std::optional<Projection> Pinhole::project_with_jacobian(const Vector3d& point) const {
   if (!(point.z() > kMinDepth)) return std::nullopt;
-  Projection out{to_pixel(k_, point.head<2>() / point.z()), plane_jacobian(point)};
+  const Vector2d m = point.head<2>() / point.z();
+  if (!m.allFinite()) return std::nullopt;
+  Projection out{to_pixel(k_, m), plane_jacobian(point)};
   out.jacobian.row(0) *= k_.fx;
   out.jacobian.row(1) *= k_.fy;
   return out;

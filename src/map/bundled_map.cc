@@ -62,7 +62,8 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
   ++alive_keyframes_;
 
   for (const auto& [feature, l] : matches) {
-    BSLAM_ASSERT(alive(l) && !table[feature.index()].valid(), "a new keyframe's matches are alive and features distinct");
+    BSLAM_ASSERT(alive(l) && !table[feature.index()].valid(),
+                 "a new keyframe's matches are alive and features distinct");
     const auto list = observations(l);
     BSLAM_ASSERT(list.empty() || list.back().keyframe != k, "a new keyframe's matches are distinct landmarks");
     table[feature.index()] = l;

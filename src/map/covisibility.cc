@@ -68,8 +68,8 @@ void BundledMap::attach(KeyframeId child, KeyframeId parent) {
   children.insert(std::ranges::lower_bound(children, child), child);
 }
 
-// The children are attached one after the other to the removed keyframe's parent or to a child attached before, always the
-// strongest link of those that are left; so no circle can close. Children without a link go to the parent.
+// The children are attached one after the other to the removed keyframe's parent or to a child attached before, always
+// the strongest link of those that are left; so no circle can close. Children without a link go to the parent.
 void BundledMap::hand_over_children(KeyframeId removed) {
   const KeyframeId parent = keyframe(removed).parent;
   std::erase(edit(parent).children, removed);

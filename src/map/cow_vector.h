@@ -1,8 +1,9 @@
 // Vectors whose copies share memory until one of them is changed (copy on write), and who may change which piece.
 //
-// Every piece carries the tag of the copy that made it; a copy changes a piece in place if and only if the piece bears its
-// own tag, and makes its own piece otherwise. Reference counts decide about lifetime only, never about writing: a count of
-// one, as read by one thread, says nothing about what another thread read from the piece just before it let go.
+// Every piece carries the tag of the copy that made it; a copy changes a piece in place if and only if the piece bears
+// its own tag, and makes its own piece otherwise. Reference counts decide about lifetime only, never about writing: a
+// count of one, as read by one thread, says nothing about what another thread read from the piece just before it let
+// go.
 #pragma once
 
 #include <array>
@@ -15,9 +16,9 @@
 
 namespace bslam::map {
 
-// The tag of one copy of a family of values that share pieces. Copying takes the right to change pieces in place from both
-// sides, as all pieces are shared from then on; each side draws a new tag, unique in the family, at its next change. So
-// copying is safe from several threads at once, which is what drafts do with a published version.
+// The tag of one copy of a family of values that share pieces. Copying takes the right to change pieces in place from
+// both sides, as all pieces are shared from then on; each side draws a new tag, unique in the family, at its next
+// change. So copying is safe from several threads at once, which is what drafts do with a published version.
 class CowOwner {
  public:
   CowOwner() : family_(std::make_shared<std::atomic<std::uint64_t>>(0)) {}
@@ -60,8 +61,8 @@ class CowOwner {
   mutable std::atomic<bool> shared_ = true;
 };
 
-// Two-level: nodes of chunks, so that a copy costs one shared pointer per 64 chunks. `tag` is that of the CowOwner which
-// lives, and is copied, beside the vector.
+// Two-level: nodes of chunks, so that a copy costs one shared pointer per 64 chunks. `tag` is that of the CowOwner
+// which lives, and is copied, beside the vector.
 template <class T, std::size_t kChunk>
 class CowVector {
  public:

@@ -38,7 +38,8 @@ Broken check_landmark(const BundledMap& map, LandmarkId l, std::size_t& keypoint
     const FeatureId f = list[i].feature;
     if (!map.alive(k)) return name(l) + " is observed by removed " + name(k);
     if (i > 0 && list[i - 1].keyframe >= k) return name(l) + " has observations out of order or twice in " + name(k);
-    if (map.landmark_of(k, f) != l) return name(l) + " is observed by " + name(f) + " of " + name(k) + ", whose table differs";
+    if (map.landmark_of(k, f) != l)
+      return name(l) + " is observed by " + name(f) + " of " + name(k) + ", whose table differs";
     keypoints += map.keyframe(k).frame->bundled.keypoints(f).size();
   }
   return check_reference(map, l);
@@ -79,11 +80,13 @@ Broken check_covisibility(const BundledMap& map, KeyframeId k) {
   auto expected = weight.begin();
   for (const Covisible& c : map.keyframe(k).covisible) {
     if (expected == weight.end() || expected->first != c.keyframe || expected->second != c.weight) {
-      return name(k) + " has weight " + std::to_string(c.weight) + " with " + name(c.keyframe) + " out of place or wrong";
+      return name(k) + " has weight " + std::to_string(c.weight) + " with " + name(c.keyframe) +
+             " out of place or wrong";
     }
     ++expected;
   }
-  if (expected != weight.end()) return name(k) + " shares landmarks with " + name(expected->first) + " without a weight";
+  if (expected != weight.end())
+    return name(k) + " shares landmarks with " + name(expected->first) + " without a weight";
   return {};
 }
 
@@ -104,7 +107,8 @@ Broken check_tree(const BundledMap& map) {
     if (!std::ranges::is_sorted(children)) return name(k) + " has children out of order";
     for (const KeyframeId child : children) {
       if (!map.alive(child)) return name(k) + " has removed child " + name(child);
-      if (map.keyframe(child).parent != k) return name(child) + " is a child of " + name(k) + " but names another parent";
+      if (map.keyframe(child).parent != k)
+        return name(child) + " is a child of " + name(k) + " but names another parent";
       stack.push_back(child);
     }
   }

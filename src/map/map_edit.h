@@ -1,26 +1,27 @@
 // A proposed change of the map, as a value: what a stage hands to MapStore::commit.
 //
 // Rebase rules, where other edits were committed between the edit's base and its commit (`newer` = made by those others):
-//   | operation         | rule                                                                                          |
-//   | AddKeyframe       | gets the next id; matches to removed landmarks are dropped, to merged ones are forwarded;     |
-//   |                   | where its parent was moved since the base, it moves along                                     |
-//   | AddLandmark       | gets the next id; observations in removed keyframes or taken features are dropped; with none  |
-//   |                   | left the landmark is dropped; where the keyframe of its reference was moved since the base,   |
-//   |                   | it moves along                                                                                |
-//   | AddObservation    | forwarded along merges; dropped where landmark or keyframe is gone, the feature is taken or   |
-//   |                   | the keyframe observes the landmark already                                                    |
-//   | RemoveObservation | dropped where it is gone already, also by a merge                                             |
-//   | RemoveLandmark    | dropped where it is gone already, also by a merge; and where a newer keyframe observes it     |
-//   | MergeLandmarks    | both ends forwarded; dropped where they are one already or one is gone                        |
-//   | RemoveKeyframe    | dropped where it is gone already or is the root                                               |
-//   | SetPoses          | entries of removed keyframes and of removed or merged landmarks are dropped; newer keyframes  |
-//   |                   | move with their parent (chains with the nearest older ancestor), newer landmarks with the     |
-//   |                   | keyframe of their reference                                                                   |
-//   | AddSightings      | forwarded along merges, entries dropped where gone                                            |
-//   | RefreshLandmarks  | forwarded along merges, entries dropped where gone                                            |
-// So the order in which a new keyframe and a correction of its surroundings are committed does not change where it ends up.
-// An operation of several entries counts as dropped where all of them are. An operation on something the edit itself added
-// is dropped where that was.
+// | operation         | rule                                                                                         |
+// | AddKeyframe       | gets the next id; matches to removed landmarks are dropped, to merged ones are forwarded;    |
+// |                   | where its parent was moved since the base, it moves along                                    |
+// | AddLandmark       | gets the next id; observations in removed keyframes or taken features are dropped; with none |
+// |                   | left the landmark is dropped; where the keyframe of its reference was moved since the base,  |
+// |                   | it moves along                                                                               |
+// | AddObservation    | forwarded along merges; dropped where landmark or keyframe is gone, the feature is taken or  |
+// |                   | the keyframe observes the landmark already                                                   |
+// | RemoveObservation | dropped where it is gone already, also by a merge                                            |
+// | RemoveLandmark    | dropped where it is gone already, also by a merge; and where a newer keyframe observes it    |
+// | MergeLandmarks    | both ends forwarded; dropped where they are one already or one is gone                       |
+// | RemoveKeyframe    | dropped where it is gone already or is the root                                              |
+// | SetPoses          | entries of removed keyframes and of removed or merged landmarks are dropped; newer keyframes |
+// |                   | move with their parent (chains with the nearest older ancestor), newer landmarks with the    |
+// |                   | keyframe of their reference                                                                  |
+// | AddSightings      | forwarded along merges, entries dropped where gone                                           |
+// | RefreshLandmarks  | forwarded along merges, entries dropped where gone                                           |
+// | SetScale          | the later one holds                                                                          |
+// So the order in which a new keyframe and a correction of its surroundings are committed does not change where it ends
+// up. An operation of several entries counts as dropped where all of them are. An operation on something the edit itself
+// added is dropped where that was.
 #pragma once
 
 #include <memory>
@@ -93,8 +94,8 @@ struct MapEdit {
 };
 
 // A snapshot with a private overlay: a stage writes to it, reads back what it wrote, and hands out the edit. One per run
-// of a stage; not shared between threads. Functions that return bool do as those of BundledMap; what changes nothing is not
-// recorded.
+// of a stage; not shared between threads. Functions that return bool do as those of BundledMap; what changes nothing is
+// not recorded.
 class MapDraft {
  public:
   MapDraft(std::string_view stage, MapSnapshot base);

@@ -11,8 +11,8 @@ namespace {
 using geometry::SE3;
 
 // How things that hang on a keyframe move in the map when its T_rig_world goes from `before` to `after`: poses become
-// T_rig_world * T, points T^-1 * p, so that both keep their place in the keyframe. Empty where nothing moves, so that what
-// does not move keeps its bits.
+// T_rig_world * T, points T^-1 * p, so that both keep their place in the keyframe. Empty where nothing moves, so that
+// what does not move keeps its bits.
 using Motion = std::optional<SE3>;
 
 Motion motion_between(const SE3& before, const SE3& after) {
@@ -23,7 +23,9 @@ Motion motion_between(const SE3& before, const SE3& after) {
 class Rebase {
  public:
   Rebase(const MapEdit& edit, BundledMap& map)
-      : base_(*edit.base), map_(map), others_keyframes_end_(map.keyframe_slots()),
+      : base_(*edit.base),
+        map_(map),
+        others_keyframes_end_(map.keyframe_slots()),
         others_landmarks_end_(map.landmark_slots()) {}
 
   // Each applies one operation; false where it is dropped.
@@ -133,9 +135,9 @@ bool Rebase::operator()(const SetPoses& op) {
   return any;
 }
 
-// Newer keyframes inherit the motion of their nearest ancestor that is not newer: as each keeps its pose relative to its
-// parent, T_rig_world_new = T_rig_parent * T_parent_world_new, the motion is the same all the way down. Newer landmarks
-// take that of their reference's keyframe.
+// Newer keyframes inherit the motion of their nearest ancestor that is not newer: as each keeps its pose relative to
+// its parent, T_rig_world_new = T_rig_parent * T_parent_world_new, the motion is the same all the way down. Newer
+// landmarks take that of their reference's keyframe.
 void Rebase::carry_along(const std::unordered_map<KeyframeId, Motion>& motions) {
   const auto motion_of = [&](KeyframeId k) -> Motion {
     while (newer(k)) k = map_.keyframe(k).parent;

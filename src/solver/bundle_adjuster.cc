@@ -113,9 +113,9 @@ std::vector<double> squared_errors(const ReprojectionProblem& problem) {
   std::vector<double> out;
   out.reserve(problem.observations.size());
   for (const ReprojectionProblem::Observation& o : problem.observations) {
-    const auto e = ReprojectionResidual::error_only(
-        *problem.rig, o.camera, problem.T_rig_world[static_cast<std::size_t>(o.pose)],
-        problem.points[static_cast<std::size_t>(o.point)], o.pixel.cast<double>());
+    const auto e =
+        ReprojectionResidual::error_only(*problem.rig, o.camera, problem.T_rig_world[static_cast<std::size_t>(o.pose)],
+                                         problem.points[static_cast<std::size_t>(o.point)], o.pixel.cast<double>());
     const double sigma = static_cast<double>(o.sigma);
     out.push_back(e ? e->squaredNorm() / (sigma * sigma) : std::numeric_limits<double>::infinity());
   }

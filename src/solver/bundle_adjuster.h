@@ -17,21 +17,21 @@ struct ReprojectionProblem {
   struct Observation {
     int pose = 0, point = 0;
     CameraIndex camera;
-    Eigen::Vector2f pixel;   // raw image
-    float sigma = 1.0f;      // px, per axis
+    Eigen::Vector2f pixel;  // raw image
+    float sigma = 1.0f;     // px, per axis
   };
-  const Rig* rig = nullptr;            // extrinsics are constant, as in the paper
+  const Rig* rig = nullptr;  // extrinsics are constant, as in the paper
   std::vector<SE3> T_rig_world;
-  std::vector<std::uint8_t> pose_free;   // per pose
-  std::vector<Vector3d> points;          // metres, world; all free
-  std::vector<Observation> observations; // sorted by (point, pose, camera)
+  std::vector<std::uint8_t> pose_free;    // per pose
+  std::vector<Vector3d> points;           // metres, world; all free
+  std::vector<Observation> observations;  // sorted by (point, pose, camera)
 };
 
 struct BundleOptions {
-  int iterations = 10;             // accepted or rejected steps at most
-  double relative_decrease = 1e-4; // of the cost, below which it has converged
-  bool robust = true;              // Huber kernel at the 95 % bound
-  int dense_poses = 150;           // free poses up to which the reduced camera system is solved densely
+  int iterations = 10;              // accepted or rejected steps at most
+  double relative_decrease = 1e-4;  // of the cost, below which it has converged
+  bool robust = true;               // Huber kernel at the 95 % bound
+  int dense_poses = 150;            // free poses up to which the reduced camera system is solved densely
 };
 
 enum class BundleStop { kConverged, kIterations, kStopped, kFailed };
@@ -49,11 +49,11 @@ struct BundleSummary {
 
 // Improves the free poses and all points in place; on kFailed the problem is as it was (also where nothing is left to
 // learn from). At least one pose is fixed; a map up to scale keeps its scale by two fixed poses. `skip` (one per
-// observation, or empty) leaves observations out. So are, for the call, observations that do not project or miss by more
-// than kLostChi2 at the start, and points with fewer than two observations left; the costs do not count them. A stop
-// request ends it after the step in hand, keeping what was gained. Deterministic to the bit.
-BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip = {},
-                     std::stop_token stop = {});
+// observation, or empty) leaves observations out. So are, for the call, observations that do not project or miss by
+// more than kLostChi2 at the start, and points with fewer than two observations left; the costs do not count them. A
+// stop request ends it after the step in hand, keeping what was gained. Deterministic to the bit.
+BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
+                     std::span<const std::uint8_t> skip = {}, std::stop_token stop = {});
 
 // Squared normalised error of each observation at the present values; infinite where it does not project.
 std::vector<double> squared_errors(const ReprojectionProblem& problem);

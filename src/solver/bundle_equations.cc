@@ -86,7 +86,8 @@ BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const V
     const BundleStructure::Term& term = structure_.terms[k];
     const CameraTerms& camera = cameras_[static_cast<std::size_t>(term.camera)];
     const Vector3d p = camera.cam_from_rig.R * point_rig + camera.cam_from_rig.t;
-    const auto projection = std::visit([&](const auto& model) { return model.project_with_jacobian(p); }, *camera.model);
+    const auto projection =
+        std::visit([&](const auto& model) { return model.project_with_jacobian(p); }, *camera.model);
     Vector2d e = Vector2d::Zero();
     double chi2 = kLostChi2;
     if (projection) {

@@ -53,7 +53,7 @@ class BundleEquations {
     Vector6d b;
   };
   struct PointBlock {
-    Matrix3d V;   // symmetric
+    Matrix3d V;  // symmetric
     Vector3d b;
   };
   // What the terms of one group say about their point in the rig frame.
@@ -77,12 +77,12 @@ class BundleEquations {
   std::vector<Rigid> poses_;            // R_rig_world, t_rig_world; every pose of the problem
   std::vector<PoseBlock> pose_blocks_;  // per slot
   std::vector<PointBlock> point_blocks_;
-  std::vector<Matrix63d> W_;            // per free group, in order
-  std::vector<std::size_t> first_W_;    // per point and one more
-  std::vector<Matrix3d> L_;             // per point: Cholesky factor of the damped V
-  std::vector<Matrix63d> U_;            // W L^-T of one point
+  std::vector<Matrix63d> W_;          // per free group, in order
+  std::vector<std::size_t> first_W_;  // per point and one more
+  std::vector<Matrix3d> L_;           // per point: Cholesky factor of the damped V
+  std::vector<Matrix63d> U_;          // W L^-T of one point
   ReducedCameraSystem system_;
-  Eigen::VectorXd delta_;               // per slot, six each
+  Eigen::VectorXd delta_;  // per slot, six each
 };
 
 }  // namespace bslam::solver

@@ -15,13 +15,15 @@ void check(const ReprojectionProblem& problem, std::span<const std::uint8_t> ski
   const auto num_points = static_cast<int>(problem.points.size());
   const Observation* last = nullptr;
   for (const Observation& o : problem.observations) {
-    BSLAM_ASSERT(o.pose >= 0 && o.pose < num_poses && o.point >= 0 && o.point < num_points, "an observation refers to "
-                 "a pose and a point of the problem");
-    BSLAM_ASSERT(o.camera.valid() && o.camera.index() < problem.rig->size(), "an observation names a camera of the rig");
+    BSLAM_ASSERT(o.pose >= 0 && o.pose < num_poses && o.point >= 0 && o.point < num_points,
+                 "an observation refers to a pose and a point of the problem");
+    BSLAM_ASSERT(o.camera.valid() && o.camera.index() < problem.rig->size(),
+                 "an observation names a camera of the rig");
     BSLAM_ASSERT(o.sigma > 0, "a standard deviation is positive");
-    BSLAM_ASSERT(last == nullptr || last->point < o.point ||
-                     (last->point == o.point && (last->pose < o.pose || (last->pose == o.pose && last->camera <= o.camera))),
-                 "observations are sorted by point, pose and camera");
+    BSLAM_ASSERT(
+        last == nullptr || last->point < o.point ||
+            (last->point == o.point && (last->pose < o.pose || (last->pose == o.pose && last->camera <= o.camera))),
+        "observations are sorted by point, pose and camera");
     last = &o;
   }
 }

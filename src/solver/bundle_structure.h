@@ -1,4 +1,5 @@
-// What of a ReprojectionProblem takes part in an adjustment, laid out for its loops: terms grouped by pose within points.
+// What of a ReprojectionProblem takes part in an adjustment, laid out for its loops: terms grouped by pose
+// within points.
 #pragma once
 
 #include <span>

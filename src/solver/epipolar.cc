@@ -83,7 +83,8 @@ Equations linearise(const EpipolarPose& pose, const Eigen::Matrix<double, 3, 2>&
 }
 
 EpipolarPose moved(const EpipolarPose& pose, const Eigen::Matrix<double, 3, 2>& basis, const Vector5d& delta) {
-  const Matrix3d R = (geometry::so3_exp(delta.head<3>()) * Eigen::Quaterniond(pose.R_b_a)).normalized().toRotationMatrix();
+  const Matrix3d R =
+      (geometry::so3_exp(delta.head<3>()) * Eigen::Quaterniond(pose.R_b_a)).normalized().toRotationMatrix();
   return {R, (pose.t_b_a + basis * delta.tail<2>()).normalized()};
 }
 

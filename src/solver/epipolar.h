@@ -1,4 +1,5 @@
-// Two-view geometry of bearings on the sphere: valid for any angle, also behind an image plane (docs/math.md, section 6).
+// Two-view geometry of bearings on the sphere: valid for any angle, also behind an image plane (docs/math.md,
+// section 6).
 #pragma once
 
 #include <cstdint>
@@ -24,8 +25,8 @@ bool in_front_of_both(const EpipolarPose& pose, const BearingPair& pair);
 // Midpoint of where the rays come closest, in camera a, in units of the translation.
 Eigen::Vector3d midpoint_in_a(const EpipolarPose& pose, const BearingPair& pair);
 
-// Pose with the least sum of squared Sampson angles over the pairs in `use`, by Levenberg-Marquardt over rotation (3) and
-// direction of translation (2), with a Huber kernel at `knee` radians.
+// Pose with the least sum of squared Sampson angles over the pairs in `use`, by Levenberg-Marquardt over rotation (3)
+// and direction of translation (2), with a Huber kernel at `knee` radians.
 EpipolarPose refine_epipolar(const EpipolarPose& start, std::span<const BearingPair> pairs,
                              const std::vector<std::uint8_t>& use, double knee);
 

@@ -113,9 +113,11 @@ int PoseProblem::select(const SE3& T_rig_world, double bound) {
   const AdmitWithinBound admit{bound, changed, num_in_use_};
   for (std::size_t i = 0; i < rig_->size(); ++i) {
     const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
-    std::visit([&](const auto& model) {
-      for (Item& item : of_camera(i)) admit(item, squared_error(model, pose, item));
-    }, rig_->camera(i).model);
+    std::visit(
+        [&](const auto& model) {
+          for (Item& item : of_camera(i)) admit(item, squared_error(model, pose, item));
+        },
+        rig_->camera(i).model);
   }
   return changed;
 }
@@ -125,9 +127,8 @@ PoseEquations PoseProblem::linearise(const SE3& T_rig_world, Kernel kernel) cons
   for (std::size_t i = 0; i < rig_->size(); ++i) {
     const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
     PoseEquations camera;
-    std::visit([&](const auto& model) {
-      accumulate_camera(model, pose, of_camera(i), kernel, AdmitInUse{}, camera);
-    }, rig_->camera(i).model);
+    std::visit([&](const auto& model) { accumulate_camera(model, pose, of_camera(i), kernel, AdmitInUse{}, camera); },
+               rig_->camera(i).model);
     add_in_rig(rig_->cam_from_rig(i), camera, out);
   }
   return out;
@@ -140,9 +141,8 @@ PoseEquations PoseProblem::reselect_and_linearise(const SE3& T_rig_world, Kernel
   for (std::size_t i = 0; i < rig_->size(); ++i) {
     const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
     PoseEquations camera;
-    std::visit([&](const auto& model) {
-      accumulate_camera(model, pose, of_camera(i), kernel, admit, camera);
-    }, rig_->camera(i).model);
+    std::visit([&](const auto& model) { accumulate_camera(model, pose, of_camera(i), kernel, admit, camera); },
+               rig_->camera(i).model);
     add_in_rig(rig_->cam_from_rig(i), camera, out);
   }
   return out;
@@ -152,13 +152,15 @@ double PoseProblem::truncated_cost(const SE3& T_rig_world, double bound, double 
   double cost = 0.0;
   for (std::size_t i = 0; i < rig_->size() && cost <= limit; ++i) {
     const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
-    std::visit([&](const auto& model) {
-      for (const Item& item : of_camera(i)) {
-        const double chi2 = squared_error(model, pose, item);
-        cost += chi2 < bound ? chi2 : bound;
-        if (cost > limit) return;
-      }
-    }, rig_->camera(i).model);
+    std::visit(
+        [&](const auto& model) {
+          for (const Item& item : of_camera(i)) {
+            const double chi2 = squared_error(model, pose, item);
+            cost += chi2 < bound ? chi2 : bound;
+            if (cost > limit) return;
+          }
+        },
+        rig_->camera(i).model);
   }
   return cost;
 }

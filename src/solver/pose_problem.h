@@ -35,7 +35,7 @@ class PoseProblem {
   int select(const SE3& T_rig_world, double bound);
   int num_in_use() const { return num_in_use_; }
 
-  // Normal equations over the items in use; `reselect` first applies select(T_rig_world, bound) in the same pass.
+  // Normal equations over the items in use; the second applies select(T_rig_world, bound) in the same pass.
   PoseEquations linearise(const SE3& T_rig_world, Kernel kernel) const;
   PoseEquations reselect_and_linearise(const SE3& T_rig_world, Kernel kernel, double bound, int& changed);
 
@@ -54,12 +54,14 @@ class PoseProblem {
   int num_in_use_ = 0;
 };
 
-// At most `iterations` Levenberg-Marquardt steps over the items in use, from `equations` at T_rig_world; ends once a step
-// is shorter than `tolerance` standard deviations of the pose. Returns the pose reached.
+// At most `iterations` Levenberg-Marquardt steps over the items in use, from `equations` at T_rig_world; ends once a
+// step is shorter than `tolerance` standard deviations of the pose. Returns the pose reached.
 SE3 minimise(const PoseProblem& problem, const SE3& T_rig_world, PoseEquations equations, Kernel kernel, int iterations,
              double tolerance);
 
-// Rounds of minimisation and re-classification from a problem whose items in use agree with T_rig_world.
-PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, const PoseSolverOptions& options);
+// Rounds of minimisation and re-classification. The first uses what lies within `first_bound` (squared error) at
+// the start.
+PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double first_bound,
+                          const PoseSolverOptions& options);
 
 }  // namespace bslam::solver

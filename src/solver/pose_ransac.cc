@@ -101,8 +101,7 @@ PoseSolution ransac_pose(const Rig& rig, std::span<const PoseObservation> observ
     problem.select(best, ransac.inlier_chi2);
     needed = samples_needed(problem.num_in_use() / static_cast<double>(observations.size()), ransac.confidence);
   }
-  problem.select(best, ransac.inlier_chi2);
-  return solve_rounds(problem, best, options);
+  return solve_rounds(problem, best, ransac.inlier_chi2, options);
 }
 
 }  // namespace bslam::solver

@@ -12,8 +12,8 @@ namespace {
 using geometry::Matrix6d;
 using geometry::Vector6d;
 
-// Largest standard deviation an acceptable pose may have in any direction: radians, and share of the distance to what is
-// seen. A sound pose of ten points has less than a tenth of it; points along one ray have far more.
+// Largest standard deviation an acceptable pose may have in any direction: radians, and share of the distance to what
+// is seen. A sound pose of ten points has less than a tenth of it; points along one ray have far more.
 constexpr double kMaxDeviation = 0.05;
 
 // Steps shorter than this many standard deviations of the pose decide nothing, between rounds and at the end.
@@ -41,8 +41,7 @@ bool well_conditioned(const Matrix6d& information, double distance) {
 
 PoseSolution report(PoseProblem& problem, const SE3& T_rig_world, const PoseSolverOptions& options) {
   int changed = 0;
-  const PoseEquations equations =
-      problem.reselect_and_linearise(T_rig_world, Kernel::kNone, kChi2TwoDof95, changed);
+  const PoseEquations equations = problem.reselect_and_linearise(T_rig_world, Kernel::kNone, kChi2TwoDof95, changed);
   PoseSolution out;
   out.T_rig_world = T_rig_world;
   out.information = 0.5 * (equations.H + equations.H.transpose());
@@ -61,17 +60,20 @@ PoseSolution report(PoseProblem& problem, const SE3& T_rig_world, const PoseSolv
 
 }  // namespace
 
-PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, const PoseSolverOptions& options) {
+PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double first_bound,
+                          const PoseSolverOptions& options) {
   SE3 T = T_rig_world;
   for (int round = 0; round < options.rounds; ++round) {
-    const bool last = round == options.rounds - 1;
-    const Kernel kernel = last && round > 0 ? Kernel::kNone : Kernel::kHuber;
     int changed = 0;
-    const PoseEquations equations = round == 0
-                                        ? problem.linearise(T, kernel)
-                                        : problem.reselect_and_linearise(T, kernel, kChi2TwoDof95, changed);
+    const PoseEquations equations =
+        problem.reselect_and_linearise(T, Kernel::kHuber, round == 0 ? first_bound : kChi2TwoDof95, changed);
     if (problem.num_in_use() < 3) break;
-    T = minimise(problem, T, equations, kernel, options.iterations, last ? kFinalTolerance : kRoundTolerance);
+    // After a re-classification all that is in use lies inside the kernel's knee: these equations are also those
+    // without it. A round that would change nothing is passed over.
+    const bool last = round > 0 && (round == options.rounds - 1 || changed == 0);
+    T = minimise(problem, T, equations, last ? Kernel::kNone : Kernel::kHuber, options.iterations,
+                 last || options.rounds == 1 ? kFinalTolerance : kRoundTolerance);
+    if (last) break;
   }
   return report(problem, T, options);
 }
@@ -79,8 +81,7 @@ PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, const Po
 PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
                         const PoseSolverOptions& options) {
   PoseProblem problem(rig, observations);
-  problem.select(T_rig_world_guess, kLostChi2);
-  return solve_rounds(problem, T_rig_world_guess, options);
+  return solve_rounds(problem, T_rig_world_guess, kLostChi2, options);
 }
 
 }  // namespace bslam::solver

@@ -18,9 +18,9 @@ struct PoseObservation {
 };
 
 struct PoseSolverOptions {
-  int rounds = 4;          // solves with re-classification of outliers between them; the last one without robust kernel
-  int iterations = 10;     // Gauss-Newton steps a round at most
-  int min_inliers = 10;    // fewer say nothing about a pose
+  int rounds = 4;        // solves with re-classification of outliers between them; the last one without robust kernel
+  int iterations = 10;   // Gauss-Newton steps a round at most
+  int min_inliers = 10;  // fewer say nothing about a pose
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -31,15 +31,18 @@ struct PoseSolverOptions {
 };
 
 struct PoseSolution {
-  bool ok = false;                   // enough inliers and a well-conditioned system
+  bool ok = false;  // enough inliers and a well-conditioned system
   SE3 T_rig_world;
   std::vector<std::uint8_t> inlier;  // per observation
   int num_inliers = 0;
   std::vector<int> inliers_per_camera;
   geometry::Matrix6d information = geometry::Matrix6d::Zero();  // of the left perturbation, at the solution
-  double mean_chi2 = 0.0;            // over the inliers, per observation
+  double mean_chi2 = 0.0;                                       // over the inliers, per observation
 };
 
+// Huber rounds, each from a re-classification of all observations by chi-square (95 %, two degrees of freedom), also
+// back in; the last over the inliers without kernel. Observations in any order; their order within a camera fixes the
+// order of the sums. Deterministic. Not ok: the pose is the best found and nothing to rely on.
 PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
                         const PoseSolverOptions& options);
 

@@ -36,7 +36,7 @@ class ReducedCameraSystem {
   std::vector<geometry::Matrix6d> blocks_;
   Eigen::VectorXd rhs_;
   Eigen::MatrixXd dense_;
-  Eigen::SparseMatrix<double> sparse_;  // lower triangle
+  Eigen::SparseMatrix<double> sparse_;     // lower triangle
   std::vector<std::size_t> column_begin_;  // first block of each block column, and one more
   // Elimination order by approximate minimum degree; Eigen's own code, MPL-2.
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::AMDOrdering<int>> factor_;

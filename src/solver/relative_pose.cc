@@ -71,8 +71,8 @@ void solve_sample(std::span<const BearingPair> pairs, const std::array<std::size
   for (const auto& E : opengv::relative_pose::fivept_nister(adapter)) {
     if (!E.allFinite()) continue;
     for (const EpipolarPose& pose : decompose(E)) {
-      const bool in_front = std::all_of(sample.begin(), sample.end(),
-                                        [&](std::size_t i) { return in_front_of_both(pose, pairs[i]); });
+      const bool in_front =
+          std::all_of(sample.begin(), sample.end(), [&](std::size_t i) { return in_front_of_both(pose, pairs[i]); });
       if (in_front) out.push_back(pose);
     }
   }

@@ -15,15 +15,15 @@ struct BearingPair {
 };
 
 struct RelativePoseOptions {
-  int iterations = 300;             // RANSAC samples at most
-  double inlier_angle = 2e-3;       // radians between a bearing and the epipolar plane of the other
-  double min_parallax = 0.02;       // radians: median angle between the rays of the inliers, below it nothing is started
+  int iterations = 300;        // RANSAC samples at most
+  double inlier_angle = 2e-3;  // radians between a bearing and the epipolar plane of the other
+  double min_parallax = 0.02;  // radians: median angle between the rays of the inliers; below it: nothing
   int min_inliers = 50;
 };
 
 struct RelativePose {
-  geometry::SE3 T_b_a;                  // translation of norm 1
-  std::vector<std::uint8_t> inlier;     // per pair
+  geometry::SE3 T_b_a;                    // translation of norm 1
+  std::vector<std::uint8_t> inlier;       // per pair
   std::vector<Eigen::Vector3d> points_a;  // triangulated in camera a, where inlier
   int num_inliers = 0;
   double median_parallax = 0.0;  // radians
@@ -31,6 +31,7 @@ struct RelativePose {
 
 // Five-point algorithm (Nister, PAMI 2004, by OpenGV) in a seeded RANSAC, refined over all inliers; points behind a
 // camera are no inliers. Empty where support or parallax does not suffice or two solutions fit about equally well.
-std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options, Random random);
+std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
+                                          Random random);
 
 }  // namespace bslam::solver

@@ -8,17 +8,17 @@
 namespace bslam::solver {
 
 using camera::Rig;
-using geometry::SE3;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+using geometry::SE3;
 using Matrix26d = Eigen::Matrix<double, 2, 6>;
 using Matrix23d = Eigen::Matrix<double, 2, 3>;
 
 // e = u - h_i(T_i0 (R_0w P + t_0w)): pixels of the raw image of camera i.
 struct ReprojectionResidual {
-  Vector2d error;       // px
-  Matrix26d J_pose;     // de / d(left perturbation of T_rig_world, rotation first) = -J_h R_i0 [-[P']x  I]
-  Matrix23d J_point;    // de / dP = -J_h R_i0 R_0w
+  Vector2d error;     // px
+  Matrix26d J_pose;   // de / d(left perturbation of T_rig_world, rotation first) = -J_h R_i0 [-[P']x  I]
+  Matrix23d J_point;  // de / dP = -J_h R_i0 R_0w
 
   // Empty where camera i does not project the point.
   static std::optional<ReprojectionResidual> evaluate(const Rig& rig, CameraIndex i, const SE3& T_rig_world,
@@ -30,8 +30,8 @@ struct ReprojectionResidual {
 // chi-square bounds at 95 %.
 constexpr double kChi2OneDof95 = 3.841, kChi2TwoDof95 = 5.991;
 
-// Squared normalised error from which on an observation is lost: it costs as much as at this bound, whether it misses by
-// more or does not project at all, and pulls nowhere. So a step never gains by pushing a point behind a camera.
+// Squared normalised error from which on an observation is lost: it costs as much as at this bound, whether it misses
+// by more or does not project at all, and pulls nowhere. So a step never gains by pushing a point behind a camera.
 constexpr double kLostChi2 = 1e6;
 
 enum class Kernel { kNone, kHuber };

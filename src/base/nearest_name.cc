@@ -1,0 +1,44 @@
+#include "base/nearest_name.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+namespace bslam {
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);  // distances of the prefix of `a` so far to every prefix of `b`
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string nearest_name(std::string_view name, std::span<const std::string> known) {
+  constexpr std::size_t kLongest = 200;  // what is longer is no misspelling, and the cost is quadratic
+  name = name.substr(0, kLongest);
+  std::string nearest;
+  std::size_t least = std::numeric_limits<std::size_t>::max();
+  for (const std::string& candidate : known) {
+    std::size_t distance = edit_distance(name, candidate);
+    const std::size_t dot = candidate.rfind('.');
+    if (dot != std::string::npos && name.find('.') == std::string_view::npos) {
+      distance = std::min(distance, edit_distance(name, std::string_view(candidate).substr(dot + 1)));
+    }
+    if (distance < least) {
+      least = distance;
+      nearest = candidate;
+    }
+  }
+  return nearest;
+}
+
+}  // namespace bslam

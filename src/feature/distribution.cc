@@ -1,0 +1,169 @@
+#include "feature/distribution.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+#include "base/assert.h"
+
+namespace bslam::feature {
+namespace {
+
+// Indices of corners by descending score; stable, so that equal scores stay in reading order.
+void sort_by_score(std::span<const Corner> corners, std::vector<std::uint32_t>& order) {
+  std::array<std::uint32_t, 257> begin{};
+  for (const Corner& c : corners) ++begin[256 - c.score];
+  for (std::size_t s = 1; s < begin.size(); ++s) begin[s] += begin[s - 1];
+  order.resize(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) order[begin[255 - corners[i].score]++] = static_cast<std::uint32_t>(i);
+}
+
+// Smallest number n for which count(n) >= wanted; count rises and reaches `wanted` at `most` at the latest.
+template <class Count>
+std::uint32_t least_sufficient(std::uint32_t most, std::size_t wanted, const Count& count) {
+  std::uint32_t low = 0, high = most;
+  while (low < high) {
+    const std::uint32_t middle = low + (high - low) / 2;
+    if (count(middle) >= wanted) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return low;
+}
+
+}  // namespace
+
+void share_over_levels(std::span<const double> area, std::span<const std::size_t> available, std::size_t wanted,
+                       std::span<std::size_t> share) {
+  BSLAM_ASSERT(area.size() == available.size() && area.size() == share.size(), "one entry per level in each");
+  std::fill(share.begin(), share.end(), 0);
+  std::size_t left = wanted;
+  // Each round gives what is left to the levels that still have corners; a round either fills a level or is the last.
+  for (std::size_t round = 0; round <= area.size() && left > 0; ++round) {
+    double open_area = 0;
+    for (std::size_t l = 0; l < area.size(); ++l) open_area += share[l] < available[l] ? area[l] : 0.0;
+    if (open_area <= 0) return;
+    double owed = 0;  // rounding carried from level to level, so that the shares add up
+    const auto to_give = static_cast<double>(left);
+    for (std::size_t l = 0; l < area.size(); ++l) {
+      if (share[l] >= available[l]) continue;
+      owed += to_give * area[l] / open_area;
+      const double whole = std::floor(owed + 0.5);
+      owed -= whole;
+      const std::size_t part = std::min({static_cast<std::size_t>(whole), available[l] - share[l], left});
+      share[l] += part;
+      left -= part;
+    }
+  }
+}
+
+Distribution::Distribution(std::size_t most_wanted) {
+  taken_.reserve(most_wanted);
+  cells_.reserve(most_wanted);  // more than there are unless a region is very narrow
+}
+
+void Distribution::thin_out(std::span<const Corner> corners, const Region& region, int spacing,
+                            std::vector<std::uint32_t>& ranked) {
+  // No more corners than 2 x 2 blocks: room for a level of this size, whatever it shows.
+  const std::size_t room = static_cast<std::size_t>(region.width / 2 + 1) * static_cast<std::size_t>(region.height / 2 + 1);
+  order_.reserve(room);
+  spare_.reserve(room);
+  ranked.clear();
+  ranked.reserve(room);
+  sort_by_score(corners, order_);
+  const int side = std::max(1, spacing);
+  const int columns = region.width / side + 3;  // a border of empty squares on either side
+  const int rows = region.height / side + 3;
+  occupied_.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0);
+  for (const std::uint32_t i : order_) {
+    const Corner& c = corners[i];
+    // Two corners in one square are closer than `spacing`: a square never holds two that were taken.
+    std::uint32_t* square = occupied_.data() + ((c.y - region.y) / side + 1) * columns + (c.x - region.x) / side + 1;
+    const auto blocks = [&](std::uint32_t other) {
+      return other != 0 && std::abs(corners[other - 1].x - c.x) < side && std::abs(corners[other - 1].y - c.y) < side;
+    };
+    if (*square != 0) continue;
+    if (blocks(square[-1]) || blocks(square[1])) continue;
+    const std::uint32_t *above = square - columns, *below = square + columns;
+    if (blocks(above[-1]) || blocks(above[0]) || blocks(above[1])) continue;
+    if (blocks(below[-1]) || blocks(below[0]) || blocks(below[1])) continue;
+    *square = i + 1;
+    ranked.push_back(i);
+  }
+}
+
+void Distribution::set_limits(std::size_t wanted) {
+  const auto equal_share = static_cast<std::uint32_t>((wanted + cells_.size() - 1) / cells_.size());
+  std::uint32_t most = 0;
+  std::size_t eligible = 0;
+  for (Cell& cell : cells_) {
+    cell.limit = std::max(cell.strong, std::min(cell.total, equal_share));  // eligible before weak ones fill up
+    eligible += cell.limit;
+    most = std::max(most, cell.total);
+  }
+  const auto sum = [&](const auto& of_cell) {
+    std::size_t total = 0;
+    for (const Cell& cell : cells_) total += of_cell(cell);
+    return total;
+  };
+  if (eligible >= wanted) {
+    const auto capped = [](const Cell& c, std::uint32_t n) { return std::min(c.limit, n); };
+    const std::uint32_t n = least_sufficient(most, wanted, [&](std::uint32_t k) {
+      return sum([&](const Cell& c) { return capped(c, k); });
+    });
+    for (Cell& cell : cells_) {
+      cell.sure = n > 0 ? capped(cell, n - 1) : 0;
+      cell.limit = capped(cell, n);
+    }
+  } else {
+    const auto filled = [](const Cell& c, std::uint32_t n) { return std::max(c.limit, std::min(c.total, n)); };
+    const std::uint32_t n = least_sufficient(most, wanted, [&](std::uint32_t k) {
+      return sum([&](const Cell& c) { return filled(c, k); });
+    });
+    for (Cell& cell : cells_) {
+      cell.sure = n > 0 ? filled(cell, n - 1) : cell.limit;
+      cell.limit = filled(cell, n);
+    }
+  }
+}
+
+void Distribution::choose(std::span<const Corner> corners, std::span<const std::uint32_t> ranked, const Region& region,
+                          std::size_t wanted, int strong_score, std::vector<Corner>& chosen) {
+  chosen.clear();
+  if (wanted == 0 || ranked.empty()) return;
+  const double side = std::sqrt(region.area() * kPerCell / static_cast<double>(wanted));
+  const int columns = std::max(1, static_cast<int>(std::lround(region.width / side)));
+  const int rows = std::max(1, static_cast<int>(std::lround(region.height / side)));
+  cells_.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), Cell{});
+  const auto cell_of = [&](const Corner& c) -> Cell& {
+    const int column = (c.x - region.x) * columns / region.width, row = (c.y - region.y) * rows / region.height;
+    return cells_[static_cast<std::size_t>(row * columns + column)];
+  };
+  for (const std::uint32_t i : ranked) {
+    Cell& cell = cell_of(corners[i]);
+    ++cell.total;
+    if (corners[i].score > strong_score) ++cell.strong;
+  }
+  set_limits(wanted);
+  taken_.clear();
+  spare_.clear();
+  for (const std::uint32_t i : ranked) {
+    Cell& cell = cell_of(corners[i]);
+    const std::uint32_t rank = cell.seen++;
+    if (rank < cell.sure) {
+      taken_.push_back(i);
+    } else if (rank < cell.limit) {
+      spare_.push_back(i);
+    }
+  }
+  const std::size_t room = wanted - std::min(wanted, taken_.size());
+  spare_.resize(std::min(room, spare_.size()));
+  taken_.insert(taken_.end(), spare_.begin(), spare_.end());
+  std::sort(taken_.begin(), taken_.end());  // corners stand in reading order
+  for (const std::uint32_t i : taken_) chosen.push_back(corners[i]);
+}
+
+}  // namespace bslam::feature

@@ -1,0 +1,52 @@
+// FAST-9 corners (Rosten & Drummond, ECCV 2006): 9 contiguous pixels of the 16 on a circle of radius 3 are all brighter
+// than the centre by more than a threshold, or all darker.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "image/image.h"
+
+namespace bslam::feature {
+
+// `score` is the largest threshold plus one at which the pixel is a corner: it is a corner at threshold t if score > t.
+struct Corner {
+  std::uint16_t x, y;  // pixel of the level
+  std::uint8_t score;
+};
+
+// What the detector is made of, in one instruction set. All sets give the same bits.
+struct FastKernels {
+  // scores[x] for x in [begin, end) of the image row `row`, 0 where the score is at most `threshold`. Reads the three
+  // rows above and below, and three pixels to either side.
+  void (*score_row)(const std::uint8_t* row, std::ptrdiff_t stride, int begin, int end, int threshold,
+                    std::uint8_t* scores);
+  // The same at threshold 0 and apart by kind: corners darker than the circle in `dark`, brighter ones in `bright`.
+  void (*kinds_row)(const std::uint8_t* row, std::ptrdiff_t stride, int begin, int end, std::uint8_t* dark,
+                    std::uint8_t* bright);
+  // Writes to `out` the x in [begin, end) at which `scores` is positive and the maximum of its 3 x 3 neighbourhood, and the first
+  // in reading order among equals. Reads one entry to either side. Returns how many; `out` has room.
+  std::size_t (*local_maxima)(const std::uint8_t* above, const std::uint8_t* scores, const std::uint8_t* below, int begin,
+                              int end, std::uint16_t* out);
+};
+
+const FastKernels& scalar_fast_kernels();
+const FastKernels& fast_kernels();  // the fastest this processor has
+
+// Detects with 3 x 3 non-maximum suppression; keeps its memory from image to image.
+class FastDetector {
+ public:
+  explicit FastDetector(const FastKernels& kernels = fast_kernels()) : kernels_(&kernels) {}
+
+  // `corners` (cleared first) become those with a score above `threshold` at least `border` (>= 4) pixels inside of
+  // `image`, row by row.
+  void detect(const image::ImageView& image, int border, int threshold, std::vector<Corner>& corners);
+
+ private:
+  const FastKernels* kernels_;
+  std::vector<std::uint8_t> scores_;    // three rows, used in turn
+  std::vector<std::uint16_t> columns_;  // maxima of one row
+};
+
+}  // namespace bslam::feature

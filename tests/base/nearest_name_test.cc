@@ -1,0 +1,26 @@
+#include "base/nearest_name.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace bslam {
+namespace {
+
+TEST(EditDistance, CountsInsertionsDeletionsAndReplacements) {
+  EXPECT_EQ(edit_distance("kitten", "sitting"), 3u);
+  EXPECT_EQ(edit_distance("", "abc"), 3u);
+  EXPECT_EQ(edit_distance("abc", ""), 3u);
+  EXPECT_EQ(edit_distance("same", "same"), 0u);
+}
+
+TEST(NearestName, FindsTheNameThatWasMeant) {
+  const std::vector<std::string> known = {"features.per_image", "features.levels", "pose.rounds"};
+  EXPECT_EQ(nearest_name("features.per_imge", known), "features.per_image");
+  EXPECT_EQ(nearest_name("level", known), "features.levels");
+  EXPECT_EQ(nearest_name("pose.round", known), "pose.rounds");
+  EXPECT_EQ(nearest_name("anything", {}), "");
+}
+
+}  // namespace
+}  // namespace bslam

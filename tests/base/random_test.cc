@@ -1,0 +1,97 @@
+#include "base/random.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <set>
+#include <vector>
+
+namespace bslam {
+namespace {
+
+std::vector<std::uint64_t> draws(Random random, int count) {
+  std::vector<std::uint64_t> out;
+  for (int i = 0; i < count; ++i) out.push_back(random.next());
+  return out;
+}
+
+TEST(Random, RepeatsForEqualSeedStageAndFrame) {
+  EXPECT_EQ(draws(Random(1, "track", 7), 100), draws(Random(1, "track", 7), 100));
+}
+
+TEST(Random, DiffersWhereSeedStageOrFrameDiffers) {
+  std::set<std::uint64_t> first;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    for (const char* stage : {"", "a", "b", "ab", "ba"}) {
+      for (std::uint64_t frame = 0; frame < 10; ++frame) first.insert(Random(seed, stage, frame).next());
+    }
+  }
+  EXPECT_EQ(first.size(), 10u * 5u * 10u);
+}
+
+// Worked out by another implementation of xoshiro256** and splitmix64 (Blackman and Vigna): the numbers that belong to
+// a seed never change between releases, compilers or machines.
+TEST(Random, MatchesTheReferenceGenerator) {
+  Random random(42, "stage", 3);
+  EXPECT_EQ(random.next(), 0x53378ba9305f38f5ull);
+  EXPECT_EQ(random.next(), 0xd912c71c3ef18156ull);
+  EXPECT_EQ(random.next(), 0xd7b8d41f4bd16d68ull);
+}
+
+TEST(Random, UniformFillsTheUnitIntervalEvenly) {
+  Random random(5);
+  constexpr int kDraws = 100000, kBins = 20;
+  std::array<int, kBins> bins{};
+  double sum = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    const double u = random.uniform();
+    ASSERT_GE(u, 0.0);
+    ASSERT_LT(u, 1.0);
+    ++bins[static_cast<std::size_t>(u * kBins)];
+    sum += u;
+  }
+  double chi2 = 0;
+  for (const int n : bins) chi2 += std::pow(n - kDraws / kBins, 2) / (kDraws / kBins);
+  EXPECT_LT(chi2, 43.8);  // 99.9 % of chi-square with 19 degrees of freedom
+  EXPECT_NEAR(sum / kDraws, 0.5, 0.005);
+}
+
+TEST(Random, BelowGivesEveryElementEvenly) {
+  Random random(6);
+  constexpr int kDraws = 70000;
+  std::array<int, 7> counts{};
+  for (int i = 0; i < kDraws; ++i) ++counts.at(random.below(7));
+  double chi2 = 0;
+  for (const int n : counts) chi2 += std::pow(n - kDraws / 7.0, 2) / (kDraws / 7.0);
+  EXPECT_LT(chi2, 22.5);  // 99.9 % with 6 degrees of freedom
+  EXPECT_EQ(random.below(1), 0u);
+}
+
+TEST(Random, UniformStaysWithinItsBounds) {
+  Random random(7);
+  for (int i = 0; i < 1000; ++i) {
+    const double u = random.uniform(-3.0, -1.0);
+    EXPECT_GE(u, -3.0);
+    EXPECT_LT(u, -1.0);
+  }
+}
+
+TEST(Random, NormalHasMeanZeroAndDeviationOne) {
+  Random random(8);
+  constexpr int kDraws = 100000;
+  double sum = 0, squares = 0, fourth = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    const double x = random.normal();
+    ASSERT_TRUE(std::isfinite(x));
+    sum += x;
+    squares += x * x;
+    fourth += x * x * x * x;
+  }
+  EXPECT_NEAR(sum / kDraws, 0.0, 0.015);
+  EXPECT_NEAR(squares / kDraws, 1.0, 0.02);
+  EXPECT_NEAR(fourth / kDraws, 3.0, 0.15);
+}
+
+}  // namespace
+}  // namespace bslam

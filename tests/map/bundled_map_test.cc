@@ -1,0 +1,219 @@
+#include "map/bundled_map.h"
+
+#include <gtest/gtest.h>
+
+#include "feature/hamming.h"
+#include "synthetic_map.h"
+
+namespace bslam::map {
+namespace {
+
+using Matches = std::vector<std::pair<FeatureId, LandmarkId>>;
+using geometry::SE3;
+
+Matches matches(std::size_t from, std::size_t to) {
+  Matches list;
+  for (std::size_t i = from; i < to; ++i) list.emplace_back(FeatureId(i), LandmarkId(i));
+  return list;
+}
+
+// Keyframe 0 sees landmarks 0 ... 39 with the features of the same number, later ones as each test says. Features 0 ...
+// 9 have two keypoints.
+class BundledMapTest : public testing::Test {
+ protected:
+  BundledMapTest() {
+    add({}, {});
+    for (std::size_t i = 0; i < 40; ++i) {
+      const std::vector<Observation> first = {{KeyframeId(0), FeatureId(i)}};
+      map.add_landmark(random_point(random), first);
+    }
+  }
+  KeyframeId add(const Matches& list, KeyframeId fallback) {
+    return map.add_keyframe(synthetic_frame(random, 2, 30, 10), random_pose(random, 0.5), list, fallback);
+  }
+  void expect_sound() { EXPECT_EQ(map.check_invariants().value_or("sound"), "sound"); }
+
+  Random random{7, "bundled map test"};
+  BundledMap map{synthetic_rig(2)};
+};
+
+TEST_F(BundledMapTest, CountsKeypointsAsObservations) {
+  EXPECT_EQ(map.num_observations(), 40u + 10u);
+  EXPECT_EQ(map.num_landmarks(), 40u);
+  map.remove_observation(LandmarkId(0), KeyframeId(0));
+  EXPECT_EQ(map.num_observations(), 48u);
+  EXPECT_EQ(map.num_landmarks(), 39u);
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, HangsAKeyframeBelowTheOneItSharesMostWith) {
+  EXPECT_FALSE(map.keyframe(KeyframeId(0)).parent.valid());
+  const KeyframeId a = add(matches(0, 10), {});
+  EXPECT_EQ(map.keyframe(a).parent, KeyframeId(0));
+  const KeyframeId b = add(matches(5, 10), {});  // five with each: the newer one
+  EXPECT_EQ(map.keyframe(b).parent, a);
+  const KeyframeId c = add(matches(8, 30), {});
+  EXPECT_EQ(map.keyframe(c).parent, KeyframeId(0));
+  const KeyframeId d = add({}, a);
+  EXPECT_EQ(map.keyframe(d).parent, a);
+  const KeyframeId e = add({}, {});
+  EXPECT_EQ(map.keyframe(e).parent, d);
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, OrdersCovisibleKeyframesByWeightThenAge) {
+  const KeyframeId a = add(matches(0, 10), {}), b = add(matches(0, 10), {}), c = add(matches(0, 3), {});
+  const auto best = map.best_covisible(a, 0);
+  ASSERT_EQ(best.size(), 3u);
+  EXPECT_EQ(best[0].keyframe, b);
+  EXPECT_EQ(best[0].weight, 10);
+  EXPECT_EQ(best[1].keyframe, KeyframeId(0));
+  EXPECT_EQ(best[2].keyframe, c);
+  EXPECT_EQ(map.best_covisible(a, 1).size(), 1u);
+  EXPECT_EQ(map.best_covisible(a, 0, 4).size(), 2u);
+}
+
+TEST_F(BundledMapTest, RefusesAnObservationTwiceOrOfATakenFeature) {
+  const KeyframeId a = add(matches(0, 5), {});
+  EXPECT_FALSE(map.add_observation(LandmarkId(0), {a, FeatureId(20)}));
+  EXPECT_FALSE(map.add_observation(LandmarkId(9), {a, FeatureId(4)}));
+  EXPECT_TRUE(map.add_observation(LandmarkId(9), {a, FeatureId(20)}));
+  EXPECT_EQ(map.landmark_of(a, FeatureId(20)), LandmarkId(9));
+  map.remove_landmark(LandmarkId(9));
+  EXPECT_FALSE(map.add_observation(LandmarkId(9), {a, FeatureId(21)}));
+  EXPECT_FALSE(map.landmark_of(a, FeatureId(20)).valid());
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, PassesTheReferenceToTheOldestRemainingObservation) {
+  const KeyframeId a = add(matches(0, 1), {}), b = add(matches(0, 1), {});
+  map.remove_observation(LandmarkId(0), b);
+  EXPECT_EQ(map.landmark(LandmarkId(0)).reference.keyframe, KeyframeId(0));
+  map.remove_observation(LandmarkId(0), KeyframeId(0));
+  const LandmarkReference& reference = map.landmark(LandmarkId(0)).reference;
+  EXPECT_EQ(reference.keyframe, a);
+  EXPECT_EQ(reference.keypoint, map.keyframe(a).frame->bundled.keypoints(FeatureId(0)).front());
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, KeepsANamedReference) {
+  const KeyframeId a = add({}, {});
+  const std::vector<Observation> observations = {{KeyframeId(0), FeatureId(45)}, {a, FeatureId(0)}};
+  const LandmarkReference second_camera{a, {CameraIndex(1), KeypointIndex(0)}};
+  const LandmarkId l = map.add_landmark(random_point(random), observations, second_camera);
+  EXPECT_EQ(map.landmark(l).reference.keypoint, second_camera.keypoint);
+  EXPECT_EQ(map.landmark(l).born, a);
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, MovesObservationsAndCountersWhenMerging) {
+  const KeyframeId a = add({{FeatureId(3), LandmarkId(3)}}, {});
+  const KeyframeId b = add({{FeatureId(3), LandmarkId(3)}, {FeatureId(4), LandmarkId(4)}}, {});
+  map.add_sightings(LandmarkId(3), 5, 3);
+  map.add_sightings(LandmarkId(4), 2, 1);
+  EXPECT_TRUE(map.merge_landmarks(LandmarkId(3), LandmarkId(4)));
+  EXPECT_FALSE(map.alive(LandmarkId(3)));
+  EXPECT_EQ(map.landmark(LandmarkId(4)).expected, 7u);
+  EXPECT_EQ(map.landmark(LandmarkId(4)).found, 4u);
+  EXPECT_EQ(map.landmark_of(a, FeatureId(3)), LandmarkId(4));
+  for (const Observation& o : map.observations(LandmarkId(4))) {
+    EXPECT_EQ(o.aligned, o.feature == FeatureId(4)) << "placed by the patch of the other landmark";
+  }
+  EXPECT_FALSE(map.landmark_of(b, FeatureId(3)).valid());  // b sees landmark 4 with feature 4 already
+  EXPECT_TRUE(map.merge_landmarks(LandmarkId(4), LandmarkId(5)));
+  EXPECT_EQ(map.resolve(LandmarkId(3)), LandmarkId(5));
+  EXPECT_FALSE(map.merge_landmarks(LandmarkId(5), LandmarkId(5)));
+  map.remove_landmark(LandmarkId(5));
+  EXPECT_FALSE(map.resolve(LandmarkId(3)).valid());
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, KeepsATreeWhenAKeyframeIsRemoved) {
+  const KeyframeId a = add(matches(0, 20), {});
+  const KeyframeId b = add(matches(0, 6), a);    // below a; shares 6 with a, 6 with 0: the newer, a
+  const KeyframeId c = add(matches(4, 20), {});  // below a; shares 16 with a and 0, 2 with b
+  const KeyframeId d = add({}, a);               // below a without a link
+  for (const KeyframeId k : {b, c, d}) EXPECT_EQ(map.keyframe(k).parent, a);
+  const std::size_t before = map.num_keyframes();
+  EXPECT_TRUE(map.remove_keyframe(a));
+  EXPECT_EQ(map.num_keyframes(), before - 1);
+  for (const KeyframeId k : {b, c, d}) EXPECT_EQ(map.keyframe(k).parent, KeyframeId(0));
+  EXPECT_FALSE(map.remove_keyframe(a));
+  EXPECT_FALSE(map.remove_keyframe(KeyframeId(0)));  // the root
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, HandsChildrenToASiblingWithTheStrongerLink) {
+  const KeyframeId a = add(matches(0, 20), {});
+  const KeyframeId b = add(matches(0, 15), {}), c = add(matches(0, 14), a);
+  const std::vector<Observation> both = {{b, FeatureId(40)}, {c, FeatureId(40)}};
+  ASSERT_EQ(map.keyframe(b).parent, a);
+  ASSERT_EQ(map.keyframe(c).parent, b);
+  const KeyframeId root_child = add({}, a);
+  const KeyframeId sibling = add({}, a);
+  const std::vector<Observation> link = {{root_child, FeatureId(1)}, {sibling, FeatureId(1)}};
+  map.add_landmark(random_point(random), link);
+  ASSERT_EQ(map.keyframe(sibling).parent, a);
+  map.remove_keyframe(a);
+  EXPECT_EQ(map.keyframe(b).parent, KeyframeId(0));
+  EXPECT_EQ(map.keyframe(root_child).parent, KeyframeId(0));
+  EXPECT_EQ(map.keyframe(sibling).parent, root_child);
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, CarriesRemovedKeyframesByTheirParents) {
+  const KeyframeId a = add(matches(0, 20), {}), b = add(matches(0, 10), {});
+  const SE3 T_b_a = map.keyframe(b).T_rig_world * map.keyframe(a).T_rig_world.inverse();
+  const SE3 T_a_0 = map.keyframe(a).T_rig_world * map.keyframe(KeyframeId(0)).T_rig_world.inverse();
+  ASSERT_EQ(map.keyframe(b).parent, a);
+  map.remove_keyframe(b);
+  map.remove_keyframe(a);
+  const SE3 moved = random_pose(random, 1);
+  map.set_pose(KeyframeId(0), moved);
+  EXPECT_LT((map.resolved_pose(b).inverse() * T_b_a * T_a_0 * moved).log().norm(), 1e-12);
+  EXPECT_LT((map.resolved_pose(a).inverse() * T_a_0 * moved).log().norm(), 1e-12);
+  EXPECT_FALSE(map.keyframe(a).frame);
+}
+
+TEST_F(BundledMapTest, RefreshesWhatALandmarkLooksLike) {
+  const LandmarkId l(2);
+  std::vector<KeyframeId> keyframes = {KeyframeId(0)};
+  for (int i = 0; i < 30; ++i) keyframes.push_back(add({{FeatureId(2), l}}, {}));
+  map.refresh_landmark(l);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::vector<feature::Descriptor> descriptors;
+  for (const KeyframeId k : keyframes) {
+    for (const frame::KeypointRef& r : map.keyframe(k).frame->bundled.keypoints(FeatureId(2))) {
+      const SE3 T_world_cam = (map.rig().cam_from_rig(r.camera) * map.keyframe(k).T_rig_world).inverse();
+      sum += (map.landmark(l).position - T_world_cam.translation()).normalized();
+      descriptors.push_back(map.keypoints(k, r.camera).descriptor[r.keypoint.index()]);
+    }
+  }
+  EXPECT_LT((map.landmark(l).view_direction - sum.normalized()).norm(), 1e-12);
+
+  descriptors.erase(descriptors.begin(), descriptors.end() - 24);
+  int best_median = 257;
+  feature::Descriptor best{};
+  for (std::size_t i = 0; i < descriptors.size(); ++i) {
+    std::vector<int> distances;
+    for (std::size_t j = 0; j < descriptors.size(); ++j) {
+      if (j != i) distances.push_back(feature::hamming(descriptors[i], descriptors[j]));
+    }
+    std::sort(distances.begin(), distances.end());
+    if (distances[11] < best_median) {
+      best_median = distances[11];
+      best = descriptors[i];
+    }
+  }
+  EXPECT_EQ(map.landmark(l).descriptor, best);
+
+  const frame::KeypointRef r = map.landmark(l).reference.keypoint;
+  const SE3 T_cam_world = map.rig().cam_from_rig(r.camera) * map.keyframe(KeyframeId(0)).T_rig_world;
+  const double distance = (T_cam_world * map.landmark(l).position).norm();
+  const int level = map.keypoints(KeyframeId(0), r.camera).level[r.keypoint.index()];
+  EXPECT_NEAR(map.landmark(l).max_distance, distance * std::pow(1.2, level), 1e-5);
+  EXPECT_NEAR(map.landmark(l).min_distance, distance * std::pow(1.2, level - 7), 1e-5);
+}
+
+}  // namespace
+}  // namespace bslam::map

@@ -1,0 +1,83 @@
+#include "map/map_store.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "synthetic_map.h"
+
+namespace bslam::map {
+namespace {
+
+TEST(MapStore, CountsVersionsAndGivesProvisionalIdsWhereNothingCameBetween) {
+  Random random(1);
+  MapStore store{BundledMap(synthetic_rig(1))};
+  EXPECT_EQ(store.snapshot()->version(), MapVersion(0));
+  MapDraft draft("test", store.snapshot());
+  const KeyframeId k = draft.add_keyframe(synthetic_frame(random, 1, 10, 0), {}, {}, {});
+  const LandmarkId l = draft.add_landmark({0, 0, 5}, {{k, FeatureId(3)}});
+  EXPECT_EQ(store.snapshot()->keyframe_slots(), 0u);  // nobody else sees the draft
+  const CommitReport report = store.commit(std::move(draft));
+  EXPECT_FALSE(report.rebased);
+  EXPECT_EQ(report.applied, 2u);
+  EXPECT_EQ(report.keyframes, std::vector{k});
+  EXPECT_EQ(report.landmarks, std::vector{l});
+  EXPECT_EQ(report.published, store.snapshot());
+  EXPECT_EQ(report.published->version(), MapVersion(1));
+  EXPECT_EQ(report.published->landmark_of(k, FeatureId(3)), l);
+}
+
+TEST(MapStore, GivesTheNextIdsWhereOthersWereFaster) {
+  Random random(1);
+  MapStore store{BundledMap(synthetic_rig(1))};
+  MapDraft first("first", store.snapshot()), second("second", store.snapshot());
+  for (MapDraft* draft : {&first, &second}) {
+    const KeyframeId k = draft->add_keyframe(synthetic_frame(random, 1, 10, 0), {}, {}, {});
+    EXPECT_EQ(k, KeyframeId(0));
+    draft->add_landmark({0, 0, 5}, {{k, FeatureId(3)}});
+  }
+  store.commit(std::move(first));
+  const CommitReport report = store.commit(std::move(second));
+  EXPECT_TRUE(report.rebased);
+  EXPECT_EQ(report.keyframes, std::vector{KeyframeId(1)});
+  EXPECT_EQ(report.landmarks, std::vector{LandmarkId(1)});
+  EXPECT_EQ(report.published->version(), MapVersion(2));
+  EXPECT_EQ(report.published->landmark_of(KeyframeId(1), FeatureId(3)), LandmarkId(1));
+  EXPECT_EQ(report.published->keyframe(KeyframeId(1)).parent, KeyframeId(0));
+  EXPECT_EQ(report.published->check_invariants().value_or("sound"), "sound");
+}
+
+TEST(MapStore, ServesReadersWhileTwoThreadsCommit) {
+  constexpr int kCommits = 60;
+  MapStore store{BundledMap(synthetic_rig(2))};
+  std::atomic<int> writers = 2;
+  const auto write = [&](std::uint64_t seed) {
+    RandomEditor editor(seed);
+    for (int i = 0; i < kCommits; ++i) {
+      MapDraft draft("writer", store.snapshot());
+      for (int n = 0; n < 20; ++n) editor.change(draft);
+      store.commit(std::move(draft));
+    }
+    --writers;
+  };
+  std::vector<std::string> broken;
+  MapVersion last = store.snapshot()->version();
+  {
+    std::jthread tracker(write, 1), mapper(write, 2);
+    while (writers > 0) {
+      const MapSnapshot snapshot = store.snapshot();
+      if (snapshot->version() < last) broken.push_back("versions go back");
+      last = snapshot->version();
+      if (const auto rule = snapshot->check_invariants()) broken.push_back(*rule);
+      const BundledMap copy = *snapshot;  // copying while others do
+      if (copy.num_landmarks() != snapshot->num_landmarks()) broken.push_back("a copy differs");
+    }
+  }
+  EXPECT_TRUE(broken.empty()) << broken.front();
+  EXPECT_EQ(store.snapshot()->version(), MapVersion(2 * kCommits));
+  EXPECT_EQ(store.snapshot()->check_invariants().value_or("sound"), "sound");
+}
+
+}  // namespace
+}  // namespace bslam::map

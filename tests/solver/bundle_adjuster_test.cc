@@ -1,0 +1,256 @@
+#include "solver/bundle_adjuster.h"
+
+#include <gtest/gtest.h>
+
+#include "solver/ceres_reference.h"
+#include "solver/scene.h"
+
+namespace bslam::solver {
+namespace {
+
+using scene::BundleSpec;
+using scene::Models;
+
+BundleOptions to_the_end(bool robust) {
+  BundleOptions options;
+  options.iterations = 200;
+  options.relative_decrease = 1e-13;
+  options.robust = robust;
+  return options;
+}
+
+double largest_difference(const ReprojectionProblem& a, const ReprojectionProblem& b) {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < a.T_rig_world.size(); ++i) {
+    largest = std::max(largest, (a.T_rig_world[i].matrix() - b.T_rig_world[i].matrix()).norm());
+  }
+  return largest;
+}
+
+struct CeresCase {
+  std::size_t cameras;
+  Models models;
+  bool robust;
+  double outlier_share;
+};
+class AgainstCeres : public testing::TestWithParam<CeresCase> {};
+
+TEST_P(AgainstCeres, ReachesTheSameMinimum) {
+  const CeresCase c = GetParam();
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Random random(seed, "ceres");
+    BundleSpec spec;
+    spec.cameras = c.cameras;
+    spec.models = c.models;
+    spec.outlier_share = c.outlier_share;
+    spec.farthest = 10;  // farther ones may have their minimum at infinity, which no solver reaches
+    const auto scene = scene::make_bundle_scene(spec, random);
+    ReprojectionProblem ours = scene->problem, theirs = scene->problem;
+    const BundleSummary summary = adjust(ours, to_the_end(c.robust));
+    const double reference = ceres_reference::adjust(theirs, c.robust);
+    ASSERT_TRUE(summary.usable());
+    EXPECT_NEAR(summary.final_cost, reference, 1e-6 * reference) << "seed " << seed;
+    EXPECT_LT(largest_difference(ours, theirs), 1e-4) << "seed " << seed;
+    EXPECT_LT(summary.final_cost, 0.5 * summary.initial_cost);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Rigs, AgainstCeres,
+    testing::Values(CeresCase{1, Models::kPinhole, false, 0.0}, CeresCase{2, Models::kRadTan, false, 0.0},
+                    CeresCase{2, Models::kRadTan, true, 0.1}, CeresCase{3, Models::kFisheye, true, 0.0},
+                    CeresCase{4, Models::kMixed, false, 0.0}, CeresCase{4, Models::kMixed, true, 0.1}));
+
+TEST(BundleAdjuster, RecoversTruthWithoutNoise) {
+  Random random(1);
+  BundleSpec spec;
+  spec.noise = 0.0;
+  const auto scene = scene::make_bundle_scene(spec, random);
+  const BundleSummary summary = adjust(scene->problem, to_the_end(true));
+  // Pixels are stored as float: 1e-5 px.
+  EXPECT_LT(summary.final_cost, 1e-4);
+  for (std::size_t i = 0; i < scene->T_rig_world.size(); ++i) {
+    EXPECT_LT(scene::centre_error(scene->problem.T_rig_world[i], scene->T_rig_world[i]), 1e-4);
+    EXPECT_LT(scene::rotation_error(scene->problem.T_rig_world[i], scene->T_rig_world[i]), 1e-5);
+  }
+}
+
+TEST(BundleAdjuster, NearlyConvergesInFiveIterations) {
+  Random random(2);
+  const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
+  ReprojectionProblem best = scene->problem;
+  const double minimum = adjust(best, to_the_end(true)).final_cost;
+  BundleOptions five;
+  five.iterations = 5;
+  EXPECT_LT(adjust(scene->problem, five).final_cost, 1.01 * minimum);
+}
+
+TEST(BundleAdjuster, DoesNotTouchFixedPoses) {
+  Random random(3);
+  BundleSpec spec;
+  spec.fixed_poses = 3;
+  const auto scene = scene::make_bundle_scene(spec, random);
+  scene->problem.pose_free = {1, 1, 0, 1, 0, 1, 1, 0, 1};
+  const auto before = scene->problem.T_rig_world;
+  EXPECT_TRUE(adjust(scene->problem, {}).usable());
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_EQ(before[i].matrix() == scene->problem.T_rig_world[i].matrix(), scene->problem.pose_free[i] == 0) << i;
+  }
+}
+
+TEST(BundleAdjuster, MovesPointsAloneWhereEveryPoseIsFixed) {
+  Random random(4);
+  BundleSpec spec;
+  spec.free_poses = 0;
+  spec.fixed_poses = 6;
+  spec.noise = 0.0;
+  const auto scene = scene::make_bundle_scene(spec, random);
+  EXPECT_LT(adjust(scene->problem, to_the_end(false)).final_cost, 1e-4);
+}
+
+TEST(BundleAdjuster, StopsWhenAsked) {
+  Random random(5);
+  const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
+  const ReprojectionProblem before = scene->problem;
+  std::stop_source stop;
+  stop.request_stop();
+  const BundleSummary summary = adjust(scene->problem, {}, {}, stop.get_token());
+  EXPECT_EQ(summary.stop, BundleStop::kStopped);
+  EXPECT_TRUE(summary.steps.empty());
+  EXPECT_EQ(largest_difference(before, scene->problem), 0.0);
+}
+
+TEST(BundleAdjuster, RepeatsItselfToTheBit) {
+  for (const int dense_poses : {150, 0}) {
+    Random random(6);
+    const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
+    ReprojectionProblem a = scene->problem, b = scene->problem;
+    BundleOptions options;
+    options.dense_poses = dense_poses;
+    EXPECT_EQ(adjust(a, options).final_cost, adjust(b, options).final_cost);
+    EXPECT_EQ(largest_difference(a, b), 0.0);
+    EXPECT_EQ(a.points, b.points);
+  }
+}
+
+TEST(BundleAdjuster, SparseAndDenseSolutionsAgree) {
+  Random random(7);
+  BundleSpec spec;
+  spec.free_poses = 40;
+  spec.points = 600;
+  const auto scene = scene::make_bundle_scene(spec, random);
+  ReprojectionProblem dense = scene->problem, sparse = scene->problem;
+  BundleOptions options;
+  const BundleSummary a = adjust(dense, options);
+  options.dense_poses = 0;
+  const BundleSummary b = adjust(sparse, options);
+  EXPECT_EQ(a.steps.size(), b.steps.size());
+  EXPECT_NEAR(a.final_cost, b.final_cost, 1e-9 * a.final_cost);
+  EXPECT_LT(largest_difference(dense, sparse), 1e-8);
+}
+
+TEST(BundleAdjuster, LeavesOutWhatIsSkipped) {
+  Random random(8);
+  BundleSpec spec;
+  spec.noise = 0.0;
+  const auto scene = scene::make_bundle_scene(spec, random);
+  std::vector<std::uint8_t> skip(scene->problem.observations.size(), 0);
+  for (std::size_t i = 0; i < skip.size(); i += 7) {
+    scene->problem.observations[i].pixel.array() += 50.0f;
+    skip[i] = 1;
+  }
+  EXPECT_LT(adjust(scene->problem, to_the_end(false), skip).final_cost, 1e-4);
+}
+
+TEST(BundleAdjuster, CostNeverRisesAndMatchesTheErrors) {
+  Random random(9);
+  BundleSpec spec;
+  spec.outlier_share = 0.2;
+  spec.pose_angle = 0.1;
+  spec.pose_distance = 0.5;
+  spec.point_distance = 1.0;
+  const auto scene = scene::make_bundle_scene(spec, random);
+  BundleOptions options;
+  options.iterations = 30;
+  const BundleSummary summary = adjust(scene->problem, options);
+  double last = summary.initial_cost;
+  for (const auto& step : summary.steps) {
+    EXPECT_LE(step.cost, last);
+    last = step.cost;
+  }
+  EXPECT_EQ(last, summary.final_cost);
+}
+
+TEST(BundleAdjuster, FinalCostIsThatOfTheSquaredErrors) {
+  Random random(10);
+  const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
+  const BundleSummary summary = adjust(scene->problem, {});
+  double sum = 0.0;
+  std::vector<int> count(scene->problem.points.size(), 0);
+  for (const auto& o : scene->problem.observations) ++count[static_cast<std::size_t>(o.point)];
+  const std::vector<double> chi2 = squared_errors(scene->problem);
+  for (std::size_t i = 0; i < chi2.size(); ++i) {
+    if (count[static_cast<std::size_t>(scene->problem.observations[i].point)] >= 2) sum += 0.5 * huber_cost(chi2[i]);
+  }
+  EXPECT_NEAR(sum, summary.final_cost, 1e-9 * sum);
+}
+
+TEST(BundleAdjuster, LivesWithPointsOfOneRayAndPointsBehindACamera) {
+  Random random(11);
+  BundleSpec spec;
+  spec.cameras = 1;
+  spec.models = Models::kPinhole;
+  const auto scene = scene::make_bundle_scene(spec, random);
+  ReprojectionProblem problem = scene->problem;
+  auto& observations = problem.observations;
+  // Points 0 to 9 keep one observation; 10 to 19 start behind the cameras; 20 to 29 are a touch in front of a camera.
+  std::vector<std::uint8_t> seen(problem.points.size(), 0);
+  std::erase_if(observations,
+                [&](const auto& o) { return o.point < 10 && seen[static_cast<std::size_t>(o.point)]++ > 0; });
+  for (std::size_t p = 10; p < 20; ++p) problem.points[p] = scene->T_rig_world[0].inverse() * Vector3d(0, 0, -5);
+  for (std::size_t p = 20; p < 30; ++p)
+    problem.points[p] = scene->T_rig_world[7].inverse() * Vector3d(0.01, 0.01, 0.02);
+  const auto before = problem.points;
+  const BundleSummary summary = adjust(problem, to_the_end(true));
+  EXPECT_TRUE(summary.usable());
+  for (std::size_t p = 0; p < 20; ++p) EXPECT_EQ(problem.points[p], before[p]) << p;
+  for (std::size_t i = 0; i < scene->T_rig_world.size(); ++i) {
+    EXPECT_TRUE(problem.T_rig_world[i].translation().allFinite());
+    EXPECT_LT(scene::centre_error(problem.T_rig_world[i], scene->T_rig_world[i]), 0.1) << i;
+  }
+}
+
+TEST(BundleAdjuster, SaysSoWhereThereIsNothingToLearnFrom) {
+  const Rig rig = scene::make_rig(1, Models::kPinhole);
+  ReprojectionProblem problem;
+  problem.rig = &rig;
+  problem.T_rig_world = {SE3(), SE3()};
+  problem.pose_free = {0, 1};
+  EXPECT_EQ(adjust(problem, {}).stop, BundleStop::kFailed);
+}
+
+TEST(BundleAdjusterDeathTest, RefusesAProblemWithoutAFixedPose) {
+  Random random(12);
+  const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
+  scene->problem.pose_free.assign(scene->problem.pose_free.size(), 1);
+  EXPECT_DEATH(adjust(scene->problem, {}), "fixed");
+}
+
+TEST(SquaredErrors, AreNormalisedAndInfiniteBehindTheCamera) {
+  const Rig rig = scene::make_rig(1, Models::kPinhole);
+  ReprojectionProblem problem;
+  problem.rig = &rig;
+  problem.T_rig_world = {SE3()};
+  problem.pose_free = {0};
+  problem.points = {Vector3d(0, 0, 2), Vector3d(0, 0, -2)};
+  const Vector2d centre = *rig.camera(0).project(Vector3d(0, 0, 2));
+  problem.observations = {{0, 0, CameraIndex(0), (centre + Vector2d(3, 4)).cast<float>(), 2.0f},
+                          {0, 1, CameraIndex(0), centre.cast<float>(), 1.0f}};
+  const auto chi2 = squared_errors(problem);
+  ASSERT_EQ(chi2.size(), 2u);
+  EXPECT_NEAR(chi2[0], 25.0 / 4.0, 1e-9);
+  EXPECT_TRUE(std::isinf(chi2[1]));
+}
+
+}  // namespace
+}  // namespace bslam::solver

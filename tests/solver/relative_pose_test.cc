@@ -1,0 +1,167 @@
+#include "solver/relative_pose.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "geometry/triangulation.h"
+#include "solver/epipolar.h"
+#include "solver/scene.h"
+
+namespace bslam::solver {
+namespace {
+
+enum class Shape { kGeneral, kPlane };
+
+struct Views {
+  SE3 T_b_a;
+  std::vector<BearingPair> pairs;
+  std::vector<Vector3d> points_a;
+  std::vector<std::uint8_t> outlier;
+};
+
+struct Spec {
+  Shape shape = Shape::kGeneral;
+  int count = 300;
+  double half_angle = 0.7;  // radians: widest angle off the axis of camera a
+  double baseline = 0.4, angle = 0.1;
+  double noise = 5e-4;  // radians
+  double outlier_share = 0.0;
+};
+
+Views make_views(const Spec& spec, Random& random) {
+  Views out;
+  out.T_b_a = SE3(geometry::so3_exp(spec.angle * scene::random_direction(random)),
+                  spec.baseline * scene::random_direction(random));
+  const Vector3d normal = Vector3d(0.2, 0.1, -1).normalized();
+  while (static_cast<int>(out.pairs.size()) < spec.count) {
+    const Vector3d direction = scene::random_direction(random);
+    if (geometry::angle_between(direction, Vector3d::UnitZ()) > spec.half_angle) continue;
+    const double distance =
+        spec.shape == Shape::kPlane ? -4.0 / normal.dot(direction) : 1.0 / random.uniform(1.0 / 12, 1.0 / 2);
+    const Vector3d point = distance * direction;
+    const auto noisy = [&](const Vector3d& v) {
+      return (v.normalized() + spec.noise * Vector3d(random.normal(), random.normal(), random.normal())).normalized();
+    };
+    const bool outlier = random.uniform() < spec.outlier_share;
+    out.pairs.push_back({noisy(point), outlier ? scene::random_direction(random) : noisy(out.T_b_a * point)});
+    out.points_a.push_back(point);
+    out.outlier.push_back(outlier);
+  }
+  return out;
+}
+
+void expect_right(const Views& views, const RelativePose& found) {
+  EXPECT_LT(scene::rotation_error(found.T_b_a, views.T_b_a), 0.01);
+  EXPECT_NEAR(found.T_b_a.translation().norm(), 1.0, 1e-12);
+  EXPECT_LT(geometry::angle_between(found.T_b_a.translation(), views.T_b_a.translation()), 0.06);
+}
+
+TEST(RelativePose, FindsTheMotionInGeneralScenesWithOutliers) {
+  Random random(1);
+  for (const double outlier_share : {0.0, 0.3}) {
+    for (int trial = 0; trial < 10; ++trial) {
+      Spec spec;
+      spec.outlier_share = outlier_share;
+      const Views views = make_views(spec, random);
+      const auto found = relative_pose(views.pairs, {}, Random(3, "r", static_cast<std::uint64_t>(trial)));
+      ASSERT_TRUE(found) << trial;
+      expect_right(views, *found);
+      EXPECT_GT(found->num_inliers, 0.9 * (1 - outlier_share) * spec.count - 20);
+      EXPECT_EQ(found->num_inliers, std::count(found->inlier.begin(), found->inlier.end(), 1));
+      int near = 0;
+      for (std::size_t i = 0; i < views.pairs.size(); ++i) {
+        if (found->inlier[i] == 0 || views.outlier[i] != 0) continue;
+        const Vector3d point = found->points_a[i] * views.T_b_a.translation().norm();
+        near += (point - views.points_a[i]).norm() < 0.15 * views.points_a[i].norm();
+      }
+      EXPECT_GT(near, 0.8 * (1 - outlier_share) * spec.count - 20);
+    }
+  }
+}
+
+TEST(RelativePose, WorksWithBearingsBehindTheImagePlane) {
+  Random random(2);
+  for (int trial = 0; trial < 10; ++trial) {
+    Spec spec;
+    spec.half_angle = 1.9;
+    spec.outlier_share = 0.2;
+    const Views views = make_views(spec, random);
+    const auto found = relative_pose(views.pairs, {}, Random(4));
+    ASSERT_TRUE(found) << trial;
+    expect_right(views, *found);
+  }
+}
+
+TEST(RelativePose, IsRightOrSilentInPlanarScenes) {
+  Random random(5);
+  int right = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    Spec spec;
+    spec.shape = Shape::kPlane;
+    spec.baseline = 0.8;
+    const Views views = make_views(spec, random);
+    const auto found = relative_pose(views.pairs, {}, Random(6));
+    if (!found) continue;
+    ++right;
+    expect_right(views, *found);
+  }
+  EXPECT_GT(right, 0);
+}
+
+TEST(RelativePose, RefusesPureRotation) {
+  Random random(7);
+  for (int trial = 0; trial < 10; ++trial) {
+    Spec spec;
+    spec.baseline = 1e-9;
+    spec.angle = 0.2;
+    EXPECT_FALSE(relative_pose(make_views(spec, random).pairs, {}, Random(8))) << trial;
+  }
+}
+
+TEST(RelativePose, RefusesLowParallaxAndTooFewPairs) {
+  Random random(9);
+  Spec spec;
+  spec.baseline = 0.02;
+  EXPECT_FALSE(relative_pose(make_views(spec, random).pairs, {}, Random(1)));
+  spec.baseline = 0.4;
+  spec.count = 30;
+  EXPECT_FALSE(relative_pose(make_views(spec, random).pairs, {}, Random(1)));
+  EXPECT_FALSE(relative_pose({}, {}, Random(1)));
+}
+
+TEST(RelativePose, RefusesOutliersAlone) {
+  Random random(10);
+  Spec spec;
+  spec.outlier_share = 1.0;
+  EXPECT_FALSE(relative_pose(make_views(spec, random).pairs, {}, Random(1)));
+}
+
+TEST(RelativePose, RepeatsItselfToTheBit) {
+  Random random(11);
+  Spec spec;
+  spec.outlier_share = 0.3;
+  const Views views = make_views(spec, random);
+  const auto a = relative_pose(views.pairs, {}, Random(12)), b = relative_pose(views.pairs, {}, Random(12));
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->T_b_a.matrix(), b->T_b_a.matrix());
+  EXPECT_EQ(a->inlier, b->inlier);
+}
+
+TEST(Epipolar, RefinementReachesTruthWithoutNoise) {
+  Random random(13);
+  Spec spec;
+  spec.noise = 0.0;
+  spec.half_angle = 1.7;
+  const Views views = make_views(spec, random);
+  EpipolarPose start{(geometry::so3_exp(Vector3d(0.01, -0.02, 0.01)) * views.T_b_a.rotation()).toRotationMatrix(),
+                     (views.T_b_a.translation().normalized() + Vector3d(0.05, -0.04, 0.03)).normalized()};
+  const std::vector<std::uint8_t> all(views.pairs.size(), 1);
+  const EpipolarPose found = refine_epipolar(start, views.pairs, all, 1.0);
+  EXPECT_LT((found.R_b_a - views.T_b_a.matrix3()).norm(), 1e-9);
+  EXPECT_LT((found.t_b_a - views.T_b_a.translation().normalized()).norm(), 1e-8);
+  EXPECT_LT((midpoint_in_a(found, views.pairs[0]) * views.T_b_a.translation().norm() - views.points_a[0]).norm(), 1e-5);
+}
+
+}  // namespace
+}  // namespace bslam::solver
