@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "feature/hamming.h"
 
@@ -44,10 +45,69 @@ double angle_at_second(double from, double distance, double baseline) {
   return std::atan2(distance * std::sin(from), distance * std::cos(from) - baseline);
 }
 
-struct Best {
-  int hamming = 1 << 20, second = 1 << 20;
-  const Polar* polar = nullptr;
+// Keypoints of b in order of their angle about the baseline; those near the seam stand at both ends, so that windows need
+// not wrap around.
+struct SortedView {
+  std::vector<Polar> polar;
+  double max_sigma = 0;
 };
+
+SortedView sorted_view(const EpipolarView& view, const BaselineFrame& frame) {
+  SortedView out{to_polar(view, frame), 0};
+  for (std::size_t i = 0, n = out.polar.size(); i < n; ++i) {
+    out.max_sigma = std::max(out.max_sigma, out.polar[i].sigma);
+    for (const double turn : {-2 * std::numbers::pi, 2 * std::numbers::pi}) {
+      if (std::abs(out.polar[i].about + turn) > std::numbers::pi + kMaxWindow) continue;
+      Polar copy = out.polar[i];
+      copy.about += turn;
+      out.polar.push_back(copy);
+    }
+  }
+  std::sort(out.polar.begin(), out.polar.end(), [](const Polar& p, const Polar& q) {
+    return p.about != q.about ? p.about < q.about : p.keypoint < q.keypoint;
+  });
+  return out;
+}
+
+struct Best {
+  int hamming = 0;
+  std::uint32_t keypoint = 0;
+};
+
+// The keypoint of b that fits keypoint `p` of a best, where it is clearly better than any at another place.
+std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const EpipolarView& b, const SortedView& sorted,
+                               double baseline, const EpipolarOptions& options, std::vector<const Polar*>& candidates) {
+  const double sine = std::sin(p.from);
+  const double window = options.sigmas * std::hypot(p.sigma, sorted.max_sigma) / std::max(sine, 1e-9);
+  if (!(window < kMaxWindow)) return std::nullopt;
+  const double nearest = angle_at_second(p.from, options.near_m, baseline);
+  const double farthest = angle_at_second(p.from, options.far_m, baseline);
+  const feature::Descriptor& descriptor = a.keypoints->descriptor[p.keypoint];
+  const int level = a.keypoints->level[p.keypoint];
+  candidates.clear();
+  int best = options.max_hamming + 1;
+  const Polar* found = nullptr;
+  auto it = std::lower_bound(sorted.polar.begin(), sorted.polar.end(), p.about - window,
+                             [](const Polar& q, double value) { return q.about < value; });
+  for (; it != sorted.polar.end() && it->about <= p.about + window; ++it) {
+    const double slack = options.sigmas * std::hypot(p.sigma, it->sigma);
+    if (std::abs(it->about - p.about) * sine > slack) continue;
+    if (it->from < farthest - slack || it->from > nearest + slack) continue;
+    if (std::abs(b.keypoints->level[it->keypoint] - level) > options.max_level_difference) continue;
+    candidates.push_back(&*it);
+    const int distance = feature::hamming(descriptor, b.keypoints->descriptor[it->keypoint]);
+    if (distance < best) {
+      best = distance;
+      found = &*it;
+    }
+  }
+  if (found == nullptr) return std::nullopt;
+  for (const Polar* other : candidates) {
+    if (std::abs(other->from - found->from) < kSamePlace * std::max(other->sigma, found->sigma)) continue;
+    if (best > options.ratio * feature::hamming(descriptor, b.keypoints->descriptor[other->keypoint])) return std::nullopt;
+  }
+  return Best{best, found->keypoint};
+}
 
 }  // namespace
 
@@ -57,58 +117,20 @@ std::vector<EpipolarMatch> match_epipolar(const EpipolarView& a, const EpipolarV
   const double length = baseline.norm();
   if (!(length > 1e-6) || a.keypoints->empty() || b.keypoints->empty()) return matches;
   const BaselineFrame frame(baseline);
-  const std::vector<Polar> polar_a = to_polar(a, frame);
-  std::vector<Polar> polar_b = to_polar(b, frame);
-  double max_sigma_b = 0;
-  for (std::size_t i = 0, n = polar_b.size(); i < n; ++i) {
-    max_sigma_b = std::max(max_sigma_b, polar_b[i].sigma);
-    for (const double turn : {-2 * std::numbers::pi, 2 * std::numbers::pi}) {  // so that windows need not wrap around
-      if (std::abs(polar_b[i].about + turn) > std::numbers::pi + kMaxWindow) continue;
-      Polar copy = polar_b[i];
-      copy.about += turn;
-      polar_b.push_back(copy);
-    }
-  }
-  std::sort(polar_b.begin(), polar_b.end(), [](const Polar& p, const Polar& q) {
-    return p.about != q.about ? p.about < q.about : p.keypoint < q.keypoint;
-  });
-
-  std::vector<std::pair<int, std::uint32_t>> best_of_b(b.keypoints->size(), {1 << 20, 0});  // (hamming, position in matches)
-  for (const Polar& p : polar_a) {
-    const double sine = std::sin(p.from);
-    const double window = options.sigmas * std::hypot(p.sigma, max_sigma_b) / std::max(sine, 1e-9);
-    if (!(window < kMaxWindow)) continue;
-    const double nearest = angle_at_second(p.from, options.near_m, length);
-    const double farthest = angle_at_second(p.from, options.far_m, length);
-    const feature::Descriptor& descriptor = a.keypoints->descriptor[p.keypoint];
-    const int level = a.keypoints->level[p.keypoint];
-    auto it = std::lower_bound(polar_b.begin(), polar_b.end(), p.about - window,
-                               [](const Polar& q, double value) { return q.about < value; });
-    Best best;
-    const auto first = it;
-    for (; it != polar_b.end() && it->about <= p.about + window; ++it) {
-      const double slack = options.sigmas * std::hypot(p.sigma, it->sigma);
-      if (std::abs(it->about - p.about) * sine > slack) continue;
-      if (it->from < farthest - slack || it->from > nearest + slack) continue;
-      if (std::abs(b.keypoints->level[it->keypoint] - level) > options.max_level_difference) continue;
-      const int distance = feature::hamming(descriptor, b.keypoints->descriptor[it->keypoint]);
-      if (distance < best.hamming) best = {distance, best.second, &*it};
-    }
-    if (best.polar == nullptr || best.hamming > options.max_hamming) continue;
-    for (auto other = first; other != it; ++other) {  // the runner-up at another place
-      const double slack = options.sigmas * std::hypot(p.sigma, other->sigma);
-      if (std::abs(other->from - best.polar->from) < kSamePlace * std::max(other->sigma, best.polar->sigma)) continue;
-      if (std::abs(other->about - p.about) * sine > slack || other->from < farthest - slack || other->from > nearest + slack) continue;
-      best.second = std::min(best.second, feature::hamming(descriptor, b.keypoints->descriptor[other->keypoint]));
-    }
-    if (best.hamming > options.ratio * best.second) continue;
-    auto& [distance, position] = best_of_b[best.polar->keypoint];
-    if (best.hamming >= distance) continue;  // an earlier keypoint of a fits as well or better
-    if (distance < (1 << 20)) matches[position].hamming = -1;
-    distance = best.hamming;
+  const SortedView sorted = sorted_view(b, frame);
+  constexpr int kNone = 1 << 20;
+  std::vector<std::pair<int, std::uint32_t>> owner(b.keypoints->size(), {kNone, 0});  // (hamming, position in matches)
+  std::vector<const Polar*> candidates;
+  for (const Polar& p : to_polar(a, frame)) {
+    const auto best = best_match(p, a, b, sorted, length, options, candidates);
+    if (!best) continue;
+    auto& [distance, position] = owner[best->keypoint];
+    if (best->hamming >= distance) continue;  // an earlier keypoint of a fits as well or better
+    if (distance < kNone) matches[position].hamming = -1;
+    distance = best->hamming;
     position = static_cast<std::uint32_t>(matches.size());
     matches.push_back({KeypointIndex(static_cast<std::int32_t>(p.keypoint)),
-                       KeypointIndex(static_cast<std::int32_t>(best.polar->keypoint)), best.hamming});
+                       KeypointIndex(static_cast<std::int32_t>(best->keypoint)), best->hamming});
   }
   std::erase_if(matches, [](const EpipolarMatch& m) { return m.hamming < 0; });
   return matches;

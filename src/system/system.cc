@@ -19,7 +19,8 @@ System::~System() = default;
 
 void System::begin_map() {
   mapping_.reset();
-  store_ = std::make_unique<map::MapStore>(map::BundledMap(std::make_shared<const camera::Rig>(rig_)));
+  store_ = std::make_unique<map::MapStore>(map::BundledMap(
+      std::make_shared<const camera::Rig>(rig_), {config_.features.scale_factor, config_.features.levels}));
   mapping_ = make_mapping_executor(*store_, config_, [this](KeyframeId k, double ms) {
     const TimeNs time_ns = store_->snapshot()->keyframe(k).frame ? store_->snapshot()->keyframe(k).frame->time_ns : 0;
     const std::lock_guard lock(records_mutex_);
@@ -46,9 +47,11 @@ const FrameRecord& System::process(const image::ImageBundle& images) {
   if (!had_map && !outcome.keyframes.empty()) ++maps_started_;
   const Stopwatch watch;
   for (const KeyframeId k : outcome.keyframes) mapping_->enqueue(k);
-  if (!outcome.keyframes.empty()) outcome.record.stages.push_back({"wait", watch.ms()});
+  if (!outcome.keyframes.empty() && config_.mode == Mode::kParallel) {
+    outcome.record.stages.push_back({"wait", watch.ms()});
+    outcome.record.frame_ms += watch.ms();
+  }
   outcome.record.map_number = maps_started_;
-  outcome.record.frame_ms += config_.mode == Mode::kParallel ? watch.ms() : 0.0;
   frames_.push_back(std::move(outcome.record));
   const bool lost = had_map && frames_.back().result.status == tracking::TrackStatus::kLost;
   if (lost && store_->snapshot()->scale() != map::Scale::kMetric && store_->snapshot()->keyframe_slots() <= kYoungMap) {

@@ -1,0 +1,158 @@
+#include "report/run_plot.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <span>
+
+#include "report/figure.h"
+
+namespace bslam::report {
+
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kBins = 450;  // of time, about one for two pixels
+
+using Points = std::vector<std::array<double, 2>>;
+
+Series time_series(std::string label, Points points, std::string_view colour, double width_px) {
+  Series series;
+  series.label = std::move(label);
+  series.points = std::move(points);
+  series.colour = colour;
+  series.width_px = width_px;
+  return series;
+}
+
+// One of the counts of a camera in every frame; a gap where it has no image.
+Points camera_points(const RunRecord& record, std::size_t camera, int CameraCounts::*count) {
+  Points points;
+  for (const FrameRecord& frame : record.frames) {
+    const bool seen = camera < frame.cameras.size() && frame.cameras[camera].has_image;
+    points.push_back({frame.time_s, seen ? static_cast<double>(frame.cameras[camera].*count) : kNone});
+  }
+  return reduced(points, kBins, Reduction::kMedian);
+}
+
+// What all panels share: the same range of time, and where tracking was lost.
+Panel time_panel(const RunRecord& record, std::string title, std::string y_label) {
+  Panel panel{.title = std::move(title), .x_label = "time [s]", .y_label = std::move(y_label)};
+  panel.floor = AxisFloor::kZero;
+  const double half_interval = record.frames.size() > 1
+                                   ? 0.5 * (record.frames.back().time_s - record.frames.front().time_s) /
+                                         static_cast<double>(record.frames.size() - 1)
+                                   : 0.0;
+  for (const LostInterval& interval : lost_intervals(record)) {
+    panel.bands.push_back({.from = interval.from_s - half_interval, .to = interval.to_s + half_interval});
+  }
+  if (!panel.bands.empty()) panel.extra_legend.push_back({"lost", std::string(kVermilion)});
+  if (!record.frames.empty()) {  // no line, but the range of x
+    panel.series.push_back(time_series("", {{record.frames.front().time_s, 0.0}}, "none", 0.0));
+    panel.series.push_back(time_series("", {{record.frames.back().time_s, 0.0}}, "none", 0.0));
+  }
+  return panel;
+}
+
+std::string camera_name(const RunRecord& record, std::size_t camera) {
+  return camera < record.cameras.size() ? record.cameras[camera].name : fmt::format("camera {}", camera);
+}
+
+std::size_t camera_count(const RunRecord& record) {
+  std::size_t count = record.cameras.size();
+  for (const FrameRecord& frame : record.frames) count = std::max(count, frame.cameras.size());
+  return count;
+}
+
+Panel keypoint_panel(const RunRecord& record) {
+  Panel panel = time_panel(record, "Keypoints by camera", "keypoints");
+  for (std::size_t i = 0; i < camera_count(record); ++i) {
+    panel.series.push_back(
+        time_series(camera_name(record, i), camera_points(record, i, &CameraCounts::keypoints), series_colour(i), 1.5));
+  }
+  return panel;
+}
+
+Panel inlier_panel(const RunRecord& record) {
+  Panel panel = time_panel(record, "Landmarks matched (thin) and inliers (bold) by camera", "landmarks");
+  for (std::size_t i = 0; i < camera_count(record); ++i) {
+    panel.series.push_back(time_series("", camera_points(record, i, &CameraCounts::matched), series_colour(i), 0.7));
+    panel.series.push_back(
+        time_series(camera_name(record, i), camera_points(record, i, &CameraCounts::inliers), series_colour(i), 2.0));
+  }
+  Series keyframes = time_series("keyframe", {}, kBlack, 6.0);
+  keyframes.style = SeriesStyle::kPoints;
+  for (const FrameRecord& frame : record.frames) {
+    if (frame.keyframe) keyframes.points.push_back({frame.time_s, 0.0});
+  }
+  if (!keyframes.points.empty()) panel.series.push_back(std::move(keyframes));
+  for (const PlaceEvent& loop : record.loops) panel.marks.push_back({loop.at_s, std::string(kPurple)});
+  for (const PlaceEvent& event : record.relocalisations) panel.marks.push_back({event.at_s, std::string(kOrange)});
+  if (!record.loops.empty()) panel.extra_legend.push_back({"loop closed", std::string(kPurple)});
+  if (!record.relocalisations.empty()) panel.extra_legend.push_back({"relocalised", std::string(kOrange)});
+  return panel;
+}
+
+Points stage_points(const StageSeries& stage) {
+  Points points;
+  for (const StageSample& sample : stage.samples) points.push_back({sample.time_s, sample.ms});
+  return points;
+}
+
+Panel frame_time_panel(const RunRecord& record) {
+  Panel panel = time_panel(record, "Time for a frame, and its stages", "time [ms]");
+  Points total;
+  for (const FrameRecord& frame : record.frames) {
+    total.push_back({frame.time_s, frame.outcome == FrameOutcome::kDropped ? kNone : frame.frame_ms});
+  }
+  if (total.size() > kBins) {
+    panel.series.push_back(time_series("frame, largest", reduced(total, kBins, Reduction::kMaximum), "#BBBBBB", 1.0));
+  }
+  panel.series.push_back(time_series("frame", reduced(total, kBins, Reduction::kMedian), kBlack, 1.8));
+  std::size_t k = 0;
+  for (const StageSeries& stage : record.stages) {
+    if (stage.place != StagePlace::kFrame) continue;
+    panel.series.push_back(
+        time_series(stage.name, reduced(stage_points(stage), kBins, Reduction::kMedian), series_colour(k++), 1.3));
+  }
+  return panel;
+}
+
+Panel background_panel(const RunRecord& record, std::span<const StageSeries* const> stages) {
+  Panel panel = time_panel(record, "Stages beside the frames, each call", "time [ms]");
+  std::size_t k = 0;
+  for (const StageSeries* stage : stages) {
+    Series series = time_series(stage->name, stage_points(*stage), series_colour(k++), 4.0);
+    series.style = SeriesStyle::kPoints;
+    panel.series.push_back(std::move(series));
+  }
+  return panel;
+}
+
+std::string subtitle_of(const RunRecord& record) {
+  const auto tracked = std::ranges::count(record.frames, FrameOutcome::kTracked, &FrameRecord::outcome);
+  return fmt::format("{}{}; {} of {} frames tracked; {} keyframes, {} landmarks", record.mode,
+                     record.complete ? "" : ", interrupted", tracked, record.frames.size(), record.map.keyframes,
+                     record.map.landmarks);
+}
+
+}  // namespace
+
+std::string run_plot_svg(const RunRecord& record) {
+  Figure figure{.title = record.data.empty() ? "bslam run" : fmt::format("bslam run: {}", record.data),
+                .subtitle = subtitle_of(record)};
+  figure.rows.push_back({.height_px = 230.0, .panels = {keypoint_panel(record)}});
+  figure.rows.push_back({.height_px = 270.0, .panels = {inlier_panel(record)}});
+  figure.rows.push_back({.height_px = 270.0, .panels = {frame_time_panel(record)}});
+  std::vector<const StageSeries*> background;
+  for (const StageSeries& stage : record.stages) {
+    if (stage.place == StagePlace::kBackground && !stage.samples.empty()) background.push_back(&stage);
+  }
+  if (!background.empty())
+    figure.rows.push_back({.height_px = 250.0, .panels = {background_panel(record, background)}});
+  return figure_svg(figure);
+}
+
+}  // namespace bslam::report

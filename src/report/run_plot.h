@@ -1,0 +1,16 @@
+// Plots of a run over time: features and inliers of each camera, time of frames and stages.
+#pragma once
+
+#include <string>
+
+#include "report/run_record.h"
+
+namespace bslam::report {
+
+// SVG, one panel below the other over the same time: keypoints by camera; landmarks matched (thin) and inliers (bold)
+// by camera, keyframes as dots at the foot, loops and relocalisations as lines; the caller's time for a frame with the
+// stages in it; the stages beside it. Stretches in which tracking was lost are shaded. Long runs are drawn as medians
+// (the frame time also as maxima) over equal stretches of time.
+std::string run_plot_svg(const RunRecord& record);
+
+}  // namespace bslam::report

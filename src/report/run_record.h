@@ -1,0 +1,108 @@
+// What happened in a run, as plain numbers: the one source of summary.json and of the run's plots. Whoever drives the
+// system fills it. Times are seconds since the first image of the data set unless a name says otherwise.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace bslam::report {
+
+enum class FrameOutcome {
+  kTracked,
+  kLost,     // handed to the tracker and left without a pose
+  kDropped,  // never handed to the tracker: no time for it
+};
+
+// One camera in one frame.
+struct CameraCounts {
+  bool has_image = false;
+  int keypoints = 0;
+  int matched = 0;  // keypoints matched with landmarks of the map
+  int inliers = 0;  // of them, those the pose agrees with
+};
+
+struct FrameRecord {
+  double time_s = 0.0;
+  FrameOutcome outcome = FrameOutcome::kTracked;
+  std::string lost_reason;  // where lost: why, in a few words
+  bool keyframe = false;
+  std::vector<CameraCounts> cameras;  // one for each camera of the run; empty where dropped
+  int unique_features = 0;            // unique = monocular + matched, of the Bundled table
+  int monocular_features = 0;
+  int matched_features = 0;
+  double frame_ms = 0.0;  // of the caller, from handing over the images to having the pose
+};
+
+// Where a stage runs, for the plots: those of every frame apart from those beside it.
+enum class StagePlace { kFrame, kBackground };
+
+struct StageSample {
+  double time_s = 0.0;  // of the frame it worked on
+  double ms = 0.0;
+};
+
+// Every call of one stage (read, extract, bundle, ...), in order.
+struct StageSeries {
+  std::string name;
+  StagePlace place = StagePlace::kFrame;
+  std::vector<StageSample> samples{};
+};
+
+struct CameraInterval {
+  std::string state;   // ok, degraded, out
+  std::string reason;  // empty, or black, frozen, over-exposed, blurred, no-images, inconsistent, few-features
+  double from_s = 0.0, to_s = 0.0;
+};
+
+struct CameraRecord {
+  std::string name;
+  std::int64_t images = 0;
+  std::int64_t skipped = 0;  // listed in the data set, but not readable or without partners in time
+  std::vector<CameraInterval> states;
+};
+
+struct MapRecord {
+  std::int64_t keyframes = 0, landmarks = 0, observations = 0;
+  std::string scale = "metric";  // metric, up-to-scale, unobservable
+  bool loaded = false;
+};
+
+// A loop closed, or tracking found again: at one time, with the place seen at another.
+struct PlaceEvent {
+  double at_s = 0.0;
+  double with_s = 0.0;
+  int inliers = 0;
+};
+
+struct RunRecord {
+  std::string version, data, mode;
+  bool complete = true;
+  std::uint64_t seed = 1;
+  std::vector<int> cameras_used;
+  std::vector<FrameRecord> frames;    // every input frame, in order of time
+  std::vector<CameraRecord> cameras;  // in the order of cameras_used
+  std::vector<StageSeries> stages;
+  MapRecord map;
+  std::vector<PlaceEvent> loops, relocalisations;
+  int maps_started = 0;
+  double start_up_s = 0.0, wall_s = 0.0;
+  std::optional<double> peak_memory_mb;  // largest resident size of the process; empty where the system does not tell
+};
+
+// Adds a call of a stage, making its series at the first.
+void add_stage_sample(RunRecord& record, std::string_view stage, StagePlace place, StageSample sample);
+
+// Frames lost one after another, as one stretch: from the first to the last of them. Dropped frames among them do not
+// part it. The reason is that of the first: why tracking was lost, not why it was not found again.
+struct LostInterval {
+  double from_s = 0.0, to_s = 0.0;
+  std::string reason;
+};
+
+std::vector<LostInterval> lost_intervals(const RunRecord& record);
+
+}  // namespace bslam::report

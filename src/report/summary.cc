@@ -1,0 +1,153 @@
+#include "report/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bslam::report {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+// So many decimals and no more: beyond them the figures are noise. NaN becomes null.
+ordered_json rounded(double value, int decimals) {
+  if (!std::isfinite(value)) return nullptr;
+  const double unit = std::pow(10.0, decimals);
+  return std::round(value * unit) / unit;
+}
+
+ordered_json seconds(double value_s) { return rounded(value_s, 6); }
+
+double mean_of(double sum, std::size_t count) {
+  return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
+}
+
+ordered_json frames_json(const RunRecord& record) {
+  const auto count = [&](FrameOutcome outcome) {
+    return std::ranges::count(record.frames, outcome, &FrameRecord::outcome);
+  };
+  ordered_json intervals = ordered_json::array();
+  for (const LostInterval& interval : lost_intervals(record)) {
+    intervals.push_back(
+        {{"from", seconds(interval.from_s)}, {"to", seconds(interval.to_s)}, {"reason", interval.reason}});
+  }
+  return {{"input", record.frames.size()},
+          {"tracked", count(FrameOutcome::kTracked)},
+          {"lost", count(FrameOutcome::kLost)},
+          {"dropped", count(FrameOutcome::kDropped)},
+          {"lost_intervals", intervals}};
+}
+
+ordered_json cameras_json(const RunRecord& record) {
+  ordered_json cameras = ordered_json::array();
+  for (const CameraRecord& camera : record.cameras) {
+    ordered_json states = ordered_json::array();
+    for (const CameraInterval& interval : camera.states) {
+      states.push_back({{"state", interval.state},
+                        {"reason", interval.reason},
+                        {"from", seconds(interval.from_s)},
+                        {"to", seconds(interval.to_s)}});
+    }
+    cameras.push_back(
+        {{"name", camera.name}, {"images", camera.images}, {"skipped", camera.skipped}, {"states", states}});
+  }
+  return cameras;
+}
+
+ordered_json features_json(const RunRecord& record) {
+  double keypoints = 0.0, unique = 0.0, monocular = 0.0, matched = 0.0;
+  std::size_t images = 0, frames = 0;
+  for (const FrameRecord& frame : record.frames) {
+    if (frame.outcome == FrameOutcome::kDropped) continue;
+    ++frames;
+    unique += frame.unique_features;
+    monocular += frame.monocular_features;
+    matched += frame.matched_features;
+    for (const CameraCounts& camera : frame.cameras) {
+      images += camera.has_image;
+      keypoints += camera.has_image ? camera.keypoints : 0;
+    }
+  }
+  return {{"keypoints_per_image", rounded(mean_of(keypoints, images), 2)},
+          {"unique", rounded(mean_of(unique, frames), 2)},
+          {"monocular", rounded(mean_of(monocular, frames), 2)},
+          {"matched", rounded(mean_of(matched, frames), 2)}};
+}
+
+ordered_json events_json(const std::vector<PlaceEvent>& events) {
+  ordered_json list = ordered_json::array();
+  for (const PlaceEvent& event : events) {
+    list.push_back({{"at", seconds(event.at_s)}, {"with", seconds(event.with_s)}, {"inliers", event.inliers}});
+  }
+  return list;
+}
+
+ordered_json durations_json(const std::vector<double>& durations_ms) {
+  const DurationStatistics s = duration_statistics(durations_ms);
+  return {{"median", rounded(s.median, 3)}, {"p95", rounded(s.p95, 3)}, {"max", rounded(s.max, 3)}};
+}
+
+ordered_json time_json(const RunRecord& record) {
+  std::vector<double> frame_ms;
+  for (const FrameRecord& frame : record.frames) {
+    if (frame.outcome != FrameOutcome::kDropped) frame_ms.push_back(frame.frame_ms);
+  }
+  ordered_json stages = ordered_json::object();
+  for (const StageSeries& series : record.stages) {
+    std::vector<double> durations;
+    for (const StageSample& sample : series.samples) durations.push_back(sample.ms);
+    stages[series.name] = durations_json(durations);
+    stages[series.name]["count"] = durations.size();
+  }
+  return {{"start_up_s", rounded(record.start_up_s, 3)},
+          {"wall_s", rounded(record.wall_s, 3)},
+          {"frame_ms", durations_json(frame_ms)},
+          {"stages_ms", stages}};
+}
+
+}  // namespace
+
+DurationStatistics duration_statistics(std::vector<double> durations_ms) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (durations_ms.empty()) return {kNone, kNone, kNone, 0};
+  std::ranges::sort(durations_ms);
+  const auto quantile = [&](double share) {
+    const double position = share * static_cast<double>(durations_ms.size() - 1);
+    const auto below = static_cast<std::size_t>(position);
+    const std::size_t above = std::min(below + 1, durations_ms.size() - 1);
+    return std::lerp(durations_ms[below], durations_ms[above], position - static_cast<double>(below));
+  };
+  return {quantile(0.5), quantile(0.95), durations_ms.back(), durations_ms.size()};
+}
+
+ordered_json summary_json(const RunRecord& record) {
+  return {
+      {"schema", 1},
+      {"version", record.version},
+      {"complete", record.complete},
+      {"data", record.data},
+      {"mode", record.mode},
+      {"seed", record.seed},
+      {"cameras_used", record.cameras_used},
+      {"frames", frames_json(record)},
+      {"cameras", cameras_json(record)},
+      {"features", features_json(record)},
+      {"map",
+       {{"keyframes", record.map.keyframes},
+        {"landmarks", record.map.landmarks},
+        {"observations", record.map.observations},
+        {"scale", record.map.scale},
+        {"loaded", record.map.loaded}}},
+      {"loops", events_json(record.loops)},
+      {"relocalisations", events_json(record.relocalisations)},
+      {"maps_started", record.maps_started},
+      {"time", time_json(record)},
+      {"memory", {{"peak_mb", record.peak_memory_mb ? rounded(*record.peak_memory_mb, 1) : ordered_json(nullptr)}}}};
+}
+
+std::string summary_text(const RunRecord& record) {
+  return summary_json(record).dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace bslam::report

@@ -1,0 +1,141 @@
+#include "report/trajectory_plot.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "evaluation/association.h"
+#include "report/figure.h"
+
+namespace bslam::report {
+
+namespace {
+
+using evaluation::Trajectory;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr TimeNs kGapIntervals = 3;  // median intervals between poses that count as a gap
+constexpr std::array<const char*, 3> kAxisNames = {"x", "y", "z"};
+
+// Axes of the two views: across and along, and the one that is up.
+struct ViewAxes {
+  int right = 0, forward = 1, up = 2;
+};
+
+Eigen::Vector3d extent_of(const Trajectory& trajectory) {
+  Eigen::AlignedBox3d box;
+  for (const auto& pose : trajectory) box.extend(pose.T_world_frame.translation());
+  return box.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(box.sizes());
+}
+
+ViewAxes view_axes(const Trajectory& trajectory) {
+  const Eigen::Vector3d extent = extent_of(trajectory);
+  if (extent.y() < 0.5 * extent.z()) return {.right = 0, .forward = 2, .up = 1};
+  return {};
+}
+
+Series path_series(const Trajectory& trajectory, int horizontal, int vertical) {
+  Series series;
+  const TimeNs gap = kGapIntervals * evaluation::median_interval_ns(trajectory);
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    if (i > 0 && trajectory[i].time_ns - trajectory[i - 1].time_ns > gap) series.points.push_back({kNone, kNone});
+    const Eigen::Vector3d& p = trajectory[i].T_world_frame.translation();
+    series.points.push_back({p[horizontal], p[vertical]});
+  }
+  return series;
+}
+
+Panel view_panel(const TrajectoryPlotInput& input, std::string title, int horizontal, int vertical) {
+  Panel panel{.title = std::move(title),
+              .x_label = fmt::format("{} [m]", kAxisNames[static_cast<std::size_t>(horizontal)]),
+              .y_label = fmt::format("{} [m]", kAxisNames[static_cast<std::size_t>(vertical)]),
+              .scale = AxisScale::kEqual};
+  if (!input.ground_truth.empty()) {
+    Series truth = path_series(input.ground_truth, horizontal, vertical);
+    truth.label = "ground truth";
+    truth.colour = kGrey;
+    truth.width_px = 3.2;
+    panel.series.push_back(std::move(truth));
+  }
+  Series estimate = path_series(input.estimate, horizontal, vertical);
+  estimate.label = "estimate";
+  const auto ends = std::array{estimate.points.empty() ? std::array{kNone, kNone} : estimate.points.front(),
+                               estimate.points.empty() ? std::array{kNone, kNone} : estimate.points.back()};
+  panel.series.push_back(std::move(estimate));
+  const auto end_point = [&](const char* label, std::string_view colour, const std::array<double, 2>& point) {
+    Series series;
+    series.label = label;
+    series.points = {point};
+    series.colour = colour;
+    series.style = SeriesStyle::kPoints;
+    series.width_px = 9;
+    panel.series.push_back(std::move(series));
+  };
+  end_point("start", kGreen, ends[0]);
+  end_point("end", kVermilion, ends[1]);
+  return panel;
+}
+
+Panel error_panel(const TrajectoryPlotInput& input) {
+  Panel panel{.title = "Position error after alignment", .x_label = "time [s]", .y_label = "error [m]"};
+  panel.floor = AxisFloor::kZero;
+  Series error;
+  error.label = "error";
+  error.width_px = 1.4;
+  Trajectory times;  // for the median interval
+  std::vector<double> values;
+  for (const auto& e : input.errors) {
+    times.push_back({e.time_ns, {}});
+    values.push_back(e.position_m);
+  }
+  const TimeNs begin = input.errors.front().time_ns, gap = kGapIntervals * evaluation::median_interval_ns(times);
+  for (std::size_t i = 0; i < input.errors.size(); ++i) {
+    if (i > 0 && times[i].time_ns - times[i - 1].time_ns > gap) error.points.push_back({kNone, kNone});
+    error.points.push_back({to_seconds(times[i].time_ns - begin), values[i]});
+  }
+  const double end_s = to_seconds(input.errors.back().time_ns - begin);
+  const double rmse = evaluation::statistics_of(std::move(values)).rmse;
+  Series mean;
+  mean.label = fmt::format("rmse {:.4g} m", rmse);
+  mean.points = {{0.0, rmse}, {end_s, rmse}};
+  mean.colour = kVermilion;
+  mean.style = SeriesStyle::kDashed;
+  panel.series = {std::move(error), std::move(mean)};
+  return panel;
+}
+
+}  // namespace
+
+TrajectoryPlotInput evaluation_plot_input(const evaluation::TrajectoryEvaluation& evaluation,
+                                          const Trajectory& ground_truth, std::string title) {
+  const auto& ate = evaluation.ate;
+  return {.title = std::move(title),
+          .subtitle = fmt::format("ATE rmse {:.4g} m, median {:.4g} m, max {:.4g} m over {} poses; coverage {:.1f} %; "
+                                  "path {:.1f} m",
+                                  ate.rmse, ate.median, ate.max, ate.count, 100.0 * evaluation.coverage,
+                                  evaluation.gt_length_m),
+          .estimate = evaluation.aligned_estimate,
+          .ground_truth = ground_truth,
+          .errors = evaluation.errors};
+}
+
+std::string trajectory_plot_svg(const TrajectoryPlotInput& input) {
+  const ViewAxes axes = view_axes(input.ground_truth.empty() ? input.estimate : input.ground_truth);
+  const auto title = [&](const char* name, int along) {
+    return fmt::format("{} (along {})", name, kAxisNames[static_cast<std::size_t>(along)]);
+  };
+  const Eigen::Vector3d extent = extent_of(input.ground_truth.empty() ? input.estimate : input.ground_truth);
+  const bool wide = extent[axes.right] >= extent[axes.forward];  // the side view shows the longer way
+  Figure figure{.title = input.title, .subtitle = input.subtitle};
+  PanelRow views{.height_px = 480.0};
+  views.panels.push_back(view_panel(input, title("Top view", axes.up), axes.right, axes.forward));
+  views.panels.push_back(view_panel(input, title("Side view", wide ? axes.forward : axes.right),
+                                    wide ? axes.right : axes.forward, axes.up));
+  figure.rows.push_back(std::move(views));
+  if (!input.errors.empty()) figure.rows.push_back({.height_px = 250.0, .panels = {error_panel(input)}});
+  return figure_svg(figure);
+}
+
+}  // namespace bslam::report

@@ -1,0 +1,130 @@
+#include "report/summary.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace bslam::report {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::vector<std::string> keys(const ordered_json& json) {
+  std::vector<std::string> names;
+  for (const auto& item : json.items()) names.push_back(item.key());
+  return names;
+}
+
+FrameRecord frame(double time_s, FrameOutcome outcome, std::string reason = {}) {
+  FrameRecord record;
+  record.time_s = time_s;
+  record.outcome = outcome;
+  record.lost_reason = std::move(reason);
+  return record;
+}
+
+TEST(Summary, HasTheKeysOfTheContractInTheirOrder) {
+  RunRecord record;
+  record.cameras = {{"cam0", 400, 1, {{"degraded", "blurred", 0.0, 1.5}}}};
+  record.loops = {{43.1, 1.2, 83}};
+  record.relocalisations = {{12.4, 3.15, 60}};
+  record.frames = {frame(1.25, FrameOutcome::kLost, "too few matches")};
+  add_stage_sample(record, "extract", StagePlace::kFrame, {0.0, 9.1});
+  const ordered_json json = summary_json(record);
+  EXPECT_EQ(keys(json), (std::vector<std::string>{"schema", "version", "complete", "data", "mode", "seed",
+                                                  "cameras_used", "frames", "cameras", "features", "map", "loops",
+                                                  "relocalisations", "maps_started", "time", "memory"}));
+  EXPECT_EQ(keys(json["frames"]), (std::vector<std::string>{"input", "tracked", "lost", "dropped", "lost_intervals"}));
+  EXPECT_EQ(json["frames"]["lost_intervals"].dump(), R"([{"from":1.25,"to":1.25,"reason":"too few matches"}])");
+  EXPECT_EQ(json["cameras"].dump(), R"([{"name":"cam0","images":400,"skipped":1,)"
+                                    R"("states":[{"state":"degraded","reason":"blurred","from":0.0,"to":1.5}]}])");
+  EXPECT_EQ(keys(json["features"]),
+            (std::vector<std::string>{"keypoints_per_image", "unique", "monocular", "matched"}));
+  EXPECT_EQ(json["map"].dump(), R"({"keyframes":0,"landmarks":0,"observations":0,"scale":"metric","loaded":false})");
+  EXPECT_EQ(json["loops"].dump(), R"([{"at":43.1,"with":1.2,"inliers":83}])");
+  EXPECT_EQ(json["relocalisations"].dump(), R"([{"at":12.4,"with":3.15,"inliers":60}])");
+  EXPECT_EQ(keys(json["time"]), (std::vector<std::string>{"start_up_s", "wall_s", "frame_ms", "stages_ms"}));
+  EXPECT_EQ(json["time"]["stages_ms"].dump(), R"({"extract":{"median":9.1,"p95":9.1,"max":9.1,"count":1}})");
+  EXPECT_EQ(json["schema"], 1);
+  EXPECT_TRUE(json["memory"]["peak_mb"].is_null());
+}
+
+TEST(Summary, CountsFramesByOutcome) {
+  RunRecord record;
+  record.frames = {frame(0, FrameOutcome::kTracked), frame(1, FrameOutcome::kTracked), frame(2, FrameOutcome::kDropped),
+                   frame(3, FrameOutcome::kLost, "blur")};
+  const ordered_json json = summary_json(record)["frames"];
+  EXPECT_EQ(json["input"], 4);
+  EXPECT_EQ(json["tracked"], 2);
+  EXPECT_EQ(json["lost"], 1);
+  EXPECT_EQ(json["dropped"], 1);
+}
+
+TEST(LostIntervals, JoinConsecutiveLostFrames) {
+  using enum FrameOutcome;
+  RunRecord record;
+  record.frames = {frame(0.0, kLost, "starting"),
+                   frame(0.1, kTracked),
+                   frame(0.2, kLost, "too few matches"),
+                   frame(0.3, kDropped),
+                   frame(0.4, kLost, "no place recognised"),
+                   frame(0.5, kTracked),
+                   frame(0.6, kDropped),
+                   frame(0.7, kLost, "black")};
+  const auto intervals = lost_intervals(record);
+  ASSERT_EQ(intervals.size(), 3u);
+  EXPECT_EQ(intervals[0].to_s, 0.0);
+  EXPECT_EQ(intervals[1].from_s, 0.2);
+  EXPECT_EQ(intervals[1].to_s, 0.4);
+  EXPECT_EQ(intervals[1].reason, "too few matches");
+  EXPECT_EQ(intervals[2].from_s, 0.7);
+  EXPECT_TRUE(lost_intervals({}).empty());
+}
+
+TEST(Summary, MeansFeaturesOverFramesAndImages) {
+  RunRecord record;
+  FrameRecord first = frame(0, FrameOutcome::kTracked), second = frame(1, FrameOutcome::kLost);
+  first.cameras = {{true, 1000, 0, 0}, {true, 600, 0, 0}};
+  first.unique_features = 1500;
+  first.monocular_features = 1400;
+  first.matched_features = 100;
+  second.cameras = {{true, 500, 0, 0}, {false, 0, 0, 0}};
+  second.unique_features = second.monocular_features = 500;
+  record.frames = {first, second, frame(2, FrameOutcome::kDropped)};
+  EXPECT_EQ(summary_json(record)["features"].dump(),
+            R"({"keypoints_per_image":700.0,"unique":1000.0,"monocular":950.0,"matched":50.0})");
+}
+
+TEST(DurationStatistics, AreThoseOfNumpyPercentile) {
+  std::vector<double> values;
+  for (int i = 20; i >= 1; --i) values.push_back(i);
+  const DurationStatistics s = duration_statistics(values);
+  EXPECT_DOUBLE_EQ(s.median, 10.5);
+  EXPECT_DOUBLE_EQ(s.p95, 19.05);
+  EXPECT_DOUBLE_EQ(s.max, 20.0);
+  EXPECT_EQ(s.count, 20u);
+  EXPECT_TRUE(std::isnan(duration_statistics({}).median));
+}
+
+TEST(Summary, IsNullWhereNothingWasMeasured) {
+  const ordered_json json = summary_json({});
+  EXPECT_TRUE(json["time"]["frame_ms"]["median"].is_null());
+  EXPECT_TRUE(json["features"]["unique"].is_null());
+  EXPECT_EQ(json["frames"]["lost_intervals"], ordered_json::array());
+  EXPECT_EQ(json["time"]["stages_ms"], ordered_json::object());
+}
+
+TEST(Summary, WritesTextThatParsesWhateverTheName) {
+  RunRecord record;
+  record.data = "bad \xFF name \"quoted\"";
+  record.peak_memory_mb = 210.44;
+  record.wall_s = 0.1 + 0.2;
+  const std::string text = summary_text(record);
+  EXPECT_EQ(text.back(), '\n');
+  const ordered_json json = ordered_json::parse(text);
+  EXPECT_EQ(json["memory"]["peak_mb"], 210.4);
+  EXPECT_EQ(json["time"]["wall_s"], 0.3);
+}
+
+}  // namespace
+}  // namespace bslam::report
