@@ -16,7 +16,8 @@ void sort_by_score(std::span<const Corner> corners, std::vector<std::uint32_t>& 
   for (const Corner& c : corners) ++begin[256 - c.score];
   for (std::size_t s = 1; s < begin.size(); ++s) begin[s] += begin[s - 1];
   order.resize(corners.size());
-  for (std::size_t i = 0; i < corners.size(); ++i) order[begin[255 - corners[i].score]++] = static_cast<std::uint32_t>(i);
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    order[begin[255 - corners[i].score]++] = static_cast<std::uint32_t>(i);
 }
 
 // Smallest number n for which count(n) >= wanted; count rises and reaches `wanted` at `most` at the latest.
@@ -68,7 +69,8 @@ Distribution::Distribution(std::size_t most_wanted) {
 void Distribution::thin_out(std::span<const Corner> corners, const Region& region, int spacing,
                             std::vector<std::uint32_t>& ranked) {
   // No more corners than 2 x 2 blocks: room for a level of this size, whatever it shows.
-  const std::size_t room = static_cast<std::size_t>(region.width / 2 + 1) * static_cast<std::size_t>(region.height / 2 + 1);
+  const std::size_t room =
+      static_cast<std::size_t>(region.width / 2 + 1) * static_cast<std::size_t>(region.height / 2 + 1);
   order_.reserve(room);
   spare_.reserve(room);
   ranked.clear();
@@ -111,18 +113,16 @@ void Distribution::set_limits(std::size_t wanted) {
   };
   if (eligible >= wanted) {
     const auto capped = [](const Cell& c, std::uint32_t n) { return std::min(c.limit, n); };
-    const std::uint32_t n = least_sufficient(most, wanted, [&](std::uint32_t k) {
-      return sum([&](const Cell& c) { return capped(c, k); });
-    });
+    const std::uint32_t n = least_sufficient(
+        most, wanted, [&](std::uint32_t k) { return sum([&](const Cell& c) { return capped(c, k); }); });
     for (Cell& cell : cells_) {
       cell.sure = n > 0 ? capped(cell, n - 1) : 0;
       cell.limit = capped(cell, n);
     }
   } else {
     const auto filled = [](const Cell& c, std::uint32_t n) { return std::max(c.limit, std::min(c.total, n)); };
-    const std::uint32_t n = least_sufficient(most, wanted, [&](std::uint32_t k) {
-      return sum([&](const Cell& c) { return filled(c, k); });
-    });
+    const std::uint32_t n = least_sufficient(
+        most, wanted, [&](std::uint32_t k) { return sum([&](const Cell& c) { return filled(c, k); }); });
     for (Cell& cell : cells_) {
       cell.sure = n > 0 ? filled(cell, n - 1) : cell.limit;
       cell.limit = filled(cell, n);

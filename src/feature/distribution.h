@@ -32,11 +32,11 @@ class Distribution {
   // both axes: the greedy form of adaptive non-maximal suppression (Brown et al., CVPR 2005; Bailo et al., PRL 2018).
   void thin_out(std::span<const Corner> corners, const Region& region, int spacing, std::vector<std::uint32_t>& ranked);
 
-  // Chooses at most `wanted` (no more than the constructor was told) of the `ranked` corners and writes them to `chosen` in the order of `corners`. The region is
-  // divided into square cells of about kPerCell wanted corners each. Every cell takes its best: those with a score above
-  // `strong_score`, and weaker ones only up to its equal share, which is the adaptive threshold: it drops where a cell
-  // has too few strong corners. Where cells have fewer, the others take more, all up to the same number; weak corners
-  // beyond the equal share are taken last.
+  // Chooses at most `wanted` (no more than the constructor was told) of the `ranked` corners and writes them to
+  // `chosen` in the order of `corners`. The region is divided into square cells of about kPerCell wanted corners each.
+  // Every cell takes its best: those with a score above `strong_score`, and weaker ones only up to its equal share,
+  // which is the adaptive threshold: it drops where a cell has too few strong corners. Where cells have fewer, the
+  // others take more, all up to the same number; weak corners beyond the equal share are taken last.
   void choose(std::span<const Corner> corners, std::span<const std::uint32_t> ranked, const Region& region,
               std::size_t wanted, int strong_score, std::vector<Corner>& chosen);
 

@@ -15,8 +15,8 @@
 namespace bslam::feature {
 namespace {
 
-// The order of things follows measurements on views under known warps (tests/feature/repeatability_test.cc and frames of
-// EuRoC and of a synthetic data set; mean over 12 kinds of change, least to most textured scene):
+// The order of things follows measurements on views under known warps (tests/feature/repeatability_test.cc and frames
+// of EuRoC and of a synthetic data set; mean over 12 kinds of change, least to most textured scene):
 // - corners detected on the softened instead of the plain level: recall of matches 0.44 -> 0.47, 0.54 -> 0.57,
 //   0.64 -> 0.65, precision 0.83 -> 0.86, 0.91 -> 0.92, 0.95 -> 0.96;
 // - orientation and tests sampled at the refined position instead of the nearest pixel: recall 0.47 -> 0.50,

@@ -125,7 +125,8 @@ __m128i score_block(const std::uint8_t* pixel, const CircleOffsets& offsets, __m
   return _mm_andnot_si128(weak, score);
 }
 
-// Calls block(x) for blocks of kLanes pixels that cover [begin, end), at least one wide; the last overlaps the one before.
+// Calls block(x) for blocks of kLanes pixels that cover [begin, end), at least one wide; the last overlaps the one
+// before.
 template <class Block>
 void for_blocks(int begin, int end, const Block& block) {
   for (int x = begin; x + kLanes < end; x += kLanes) block(x);
@@ -153,17 +154,17 @@ void kinds_row_sse2(const std::uint8_t* row, std::ptrdiff_t stride, int begin, i
   });
 }
 
-std::size_t local_maxima_sse2(const std::uint8_t* above, const std::uint8_t* scores, const std::uint8_t* below, int begin,
-                              int end, std::uint16_t* out) {
+std::size_t local_maxima_sse2(const std::uint8_t* above, const std::uint8_t* scores, const std::uint8_t* below,
+                              int begin, int end, std::uint16_t* out) {
   std::size_t count = 0;
   int x = begin;
   for (; x + kLanes <= end; x += kLanes) {
     const __m128i s = load(scores + x);
     if (all_zero(s)) continue;
-    const __m128i before = high_of(high_of(load(above + x - 1), load(above + x)),
-                                   high_of(load(above + x + 1), load(scores + x - 1)));
-    const __m128i after = high_of(high_of(load(below + x - 1), load(below + x)),
-                                  high_of(load(below + x + 1), load(scores + x + 1)));
+    const __m128i before =
+        high_of(high_of(load(above + x - 1), load(above + x)), high_of(load(above + x + 1), load(scores + x - 1)));
+    const __m128i after =
+        high_of(high_of(load(below + x - 1), load(below + x)), high_of(load(below + x + 1), load(scores + x + 1)));
     const __m128i not_above = _mm_cmpeq_epi8(_mm_subs_epu8(s, before), _mm_setzero_si128());
     const __m128i not_below = _mm_cmpeq_epi8(high_of(s, after), s);
     auto bits = static_cast<unsigned>(_mm_movemask_epi8(_mm_andnot_si128(not_above, not_below)));

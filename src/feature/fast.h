@@ -25,10 +25,10 @@ struct FastKernels {
   // The same at threshold 0 and apart by kind: corners darker than the circle in `dark`, brighter ones in `bright`.
   void (*kinds_row)(const std::uint8_t* row, std::ptrdiff_t stride, int begin, int end, std::uint8_t* dark,
                     std::uint8_t* bright);
-  // Writes to `out` the x in [begin, end) at which `scores` is positive and the maximum of its 3 x 3 neighbourhood, and the first
-  // in reading order among equals. Reads one entry to either side. Returns how many; `out` has room.
-  std::size_t (*local_maxima)(const std::uint8_t* above, const std::uint8_t* scores, const std::uint8_t* below, int begin,
-                              int end, std::uint16_t* out);
+  // Writes to `out` the x in [begin, end) at which `scores` is positive and the maximum of its 3 x 3 neighbourhood, and
+  // the first in reading order among equals. Reads one entry to either side. Returns how many; `out` has room.
+  std::size_t (*local_maxima)(const std::uint8_t* above, const std::uint8_t* scores, const std::uint8_t* below,
+                              int begin, int end, std::uint16_t* out);
 };
 
 const FastKernels& scalar_fast_kernels();

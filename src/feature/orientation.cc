@@ -10,7 +10,6 @@
 namespace bslam::feature {
 namespace {
 
-
 // Weights of a row: x offset, and all ones, 0 outside of the disc and in the column that is not part of the window.
 struct DiscRow {
   alignas(16) std::array<std::int16_t, kWindowStride> x;
@@ -73,9 +72,7 @@ Moments intensity_moments(const Window& window) {
   return {total(mx), total(my)};
 }
 #else
-Moments intensity_moments(const Window& window) {
-  return intensity_moments_scalar(window);
-}
+Moments intensity_moments(const Window& window) { return intensity_moments_scalar(window); }
 #endif
 
 float orientation(const Moments& moments) {

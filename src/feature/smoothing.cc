@@ -6,7 +6,8 @@
 namespace bslam::feature {
 namespace {
 
-// Each kernel sums 2 * kHalf + 1 samples s[0], s[step], ... of 8 or (after the first pass) 12 bits; 16 bits hold every sum.
+// Each kernel sums 2 * kHalf + 1 samples s[0], s[step], ... of 8 or (after the first pass) 12 bits; 16 bits hold every
+// sum.
 struct Soften {
   static constexpr int kHalf = 1, kShift = 4;  // weights add up to 4 in either axis
   template <class Sample>
@@ -50,6 +51,7 @@ void Smoother::filter(const image::ImageView& in, image::Image& out) {
   constexpr int kHalf = Kernel::kHalf;
   if (out.width() != in.width || out.height() != in.height) out.resize(in.width, in.height);
   if (in.empty()) return;
+  row_.reserve(static_cast<std::size_t>(in.width + 2 * Smooth::kHalf));  // the wider kernel may be the next
   row_.resize(static_cast<std::size_t>(in.width + 2 * kHalf));
   for (int y = 0; y < in.height; ++y) {
     Rows<Kernel> rows;

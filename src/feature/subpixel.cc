@@ -9,8 +9,8 @@ namespace {
 constexpr int kHalf = 2, kSide = 2 * kHalf + 1;
 constexpr float kLargest = 1.0f;  // pixels
 
-// Weights exp(-d^2 / (2 * 1.2^2)) keep neighbouring corners out, but draw the centroid towards the middle of the window;
-// the gain undoes that for a score that falls off like a Gaussian of sigma 0.85: 1 + 0.85^2 / 1.2^2.
+// Weights exp(-d^2 / (2 * 1.2^2)) keep neighbouring corners out, but draw the centroid towards the middle of the
+// window; the gain undoes that for a score that falls off like a Gaussian of sigma 0.85: 1 + 0.85^2 / 1.2^2.
 constexpr float kGain = 1.5f;
 constexpr std::array<float, kSide> kWeight{0.2494f, 0.7066f, 1.0f, 0.7066f, 0.2494f};
 
@@ -21,7 +21,8 @@ Eigen::Vector2f refine(const image::ImageView& level, int x, int y, const FastKe
   using Rows = std::array<std::array<std::uint8_t, kBlock>, kSide>;
   Rows dark, bright;
   for (int j = 0; j < kSide; ++j) {
-    kernels.kinds_row(level.row(y + j - kHalf) + x - kBefore, level.stride, 0, kBlock, dark[j].data(), bright[j].data());
+    kernels.kinds_row(level.row(y + j - kHalf) + x - kBefore, level.stride, 0, kBlock, dark[j].data(),
+                      bright[j].data());
   }
   const Rows& scores = dark[kHalf][kBefore] >= bright[kHalf][kBefore] ? dark : bright;
   float total = 0, sum_x = 0, sum_y = 0;

@@ -12,10 +12,9 @@ namespace bslam::feature {
 // corner's own kind: dark or bright) of the 5 x 5 pixels around it, within +-1 in each axis; zero if it lies beyond.
 //
 // Why this and not the usual: on views of one scene under known warps (tests/feature/subpixel_test.cc) the median error
-// of a pair's positions falls from 0.71 px for whole pixels to 0.28-0.29 px, against 0.34-0.42 for a quadratic fit to the
-// 3 x 3 scores, 0.32-0.50 for one to a difference of Gaussians, and 0.71 for Foerstner's gradient method or a fit to the
-// Harris response: FAST fires at a
-// small distance from the place that those look for.
+// of a pair's positions falls from 0.71 px for whole pixels to 0.28-0.29 px, against 0.34-0.42 for a quadratic fit to
+// the 3 x 3 scores, 0.32-0.50 for one to a difference of Gaussians, and 0.71 for Foerstner's gradient method or a fit
+// to the Harris response: FAST fires at a small distance from the place that those look for.
 //
 // `x`, `y` lie at least 11 pixels inside of `level`.
 Eigen::Vector2f refine(const image::ImageView& level, int x, int y, const FastKernels& kernels = fast_kernels());

@@ -1,4 +1,5 @@
-// Windows of a level around a sub-pixel position: what orientation and binary tests read, and the patch a keypoint keeps.
+// Windows of a level around a sub-pixel position: what orientation and binary tests read, and the patch a keypoint
+// keeps.
 #pragma once
 
 #include <array>
@@ -9,9 +10,9 @@
 
 namespace bslam::feature {
 
-constexpr int kWindowRadius = 15;               // pixels of the level, to all sides of the keypoint
+constexpr int kWindowRadius = 15;  // pixels of the level, to all sides of the keypoint
 constexpr int kWindowRows = 2 * kWindowRadius + 1;
-constexpr int kWindowStride = 32;               // bytes of a row; the last column is not part of the window
+constexpr int kWindowStride = 32;  // bytes of a row; the last column is not part of the window
 
 // Row-major, the keypoint in row and column kWindowRadius.
 using Window = std::array<std::uint8_t, kWindowRows * kWindowStride>;

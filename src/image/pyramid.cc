@@ -1,0 +1,156 @@
+#include "image/pyramid.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+#include "base/assert.h"
+
+namespace bslam::image {
+namespace {
+
+constexpr int kSmallestSide = 32;
+constexpr int kTaps = 4;               // covers a tent of half-width 2: ratios up to 2
+constexpr int kStrip = 512;            // output columns worked on at a time, so that all scratch fits the stack and L1
+constexpr int kRowWeightSum = 1 << 8;  // of the vertical pass: a sum of bytes stays within 16 bits
+constexpr int kColumnWeightSum = 1 << 14;  // of the horizontal pass
+constexpr int kShift = 21;                 // of both passes together: 8 + 14 bits, less the one dropped between them
+
+// Weights of the four input samples `first` ... `first` + 3 that make output sample `i`.
+struct Taps {
+  int first;
+  std::array<int, kTaps> weight;  // they add up to the sum asked for
+};
+
+// A tent as wide as the output pixel is (half-width = ratio) is what keeps detail finer than the output grid from
+// aliasing; it is bilinear interpolation where the ratio is 1. Samples beyond the edge repeat the last one.
+Taps make_taps(int i, int inputs, int outputs, int weight_sum) {
+  const double ratio = static_cast<double>(inputs) / outputs;
+  const double centre = (i + 0.5) * ratio - 0.5;
+  const int begin = static_cast<int>(std::floor(centre)) - 1;
+  Taps taps{std::clamp(begin, 0, inputs - kTaps), {}};
+  std::array<double, kTaps> exact{};
+  double total = 0;
+  for (int k = 0; k < kTaps; ++k) {
+    const double w = std::max(0.0, 1.0 - std::abs(begin + k - centre) / std::max(1.0, ratio));
+    exact[std::clamp(begin + k, taps.first, taps.first + kTaps - 1) - taps.first] += w;
+    total += w;
+  }
+  int rest = weight_sum;
+  for (int k = 0; k < kTaps; ++k) {
+    taps.weight[k] = static_cast<int>(std::lround(exact[k] / total * weight_sum));
+    rest -= taps.weight[k];
+  }
+  *std::max_element(taps.weight.begin(), taps.weight.end()) += rest;
+  return taps;
+}
+
+// One strip of output columns: where each takes its samples from, relative to the strip's first input column.
+struct Strip {
+  int input_begin = 0, input_count = 0, outputs = 0;
+  std::array<std::int32_t, kStrip> first;
+  alignas(16) std::array<std::int16_t, kStrip * kTaps> weight;
+};
+
+void make_strip(int begin, int end, int inputs, int outputs, Strip& strip) {
+  strip.outputs = end - begin;
+  for (int i = begin; i < end; ++i) {
+    const Taps taps = make_taps(i, inputs, outputs, kColumnWeightSum);
+    if (i == begin) strip.input_begin = taps.first;
+    strip.first[i - begin] = taps.first - strip.input_begin;
+    for (int k = 0; k < kTaps; ++k) strip.weight[(i - begin) * kTaps + k] = static_cast<std::int16_t>(taps.weight[k]);
+    strip.input_count = taps.first + kTaps - strip.input_begin;
+  }
+}
+
+// Vertical pass: `out` = half the weighted sum of four rows, 15 bits.
+void blend_rows(const std::array<const std::uint8_t*, kTaps>& rows, const std::array<int, kTaps>& weight, int count,
+                std::int16_t* __restrict out) {
+  const auto *r0 = rows[0], *r1 = rows[1], *r2 = rows[2], *r3 = rows[3];
+  const auto w0 = static_cast<std::uint16_t>(weight[0]), w1 = static_cast<std::uint16_t>(weight[1]);
+  const auto w2 = static_cast<std::uint16_t>(weight[2]), w3 = static_cast<std::uint16_t>(weight[3]);
+  for (int x = 0; x < count; ++x) {
+    const auto sum = static_cast<std::uint16_t>(w0 * r0[x] + w1 * r1[x] + w2 * r2[x] + w3 * r3[x]);
+    out[x] = static_cast<std::int16_t>(sum >> 1);
+  }
+}
+
+// Horizontal pass from `in` (15 bits) to grey values.
+void blend_columns(const Strip& strip, const std::int16_t* in, std::uint8_t* out) {
+  int i = 0;
+#if defined(__SSE2__)
+  const __m128i half = _mm_set1_epi32(1 << (kShift - 1));
+  const auto samples = [&](int k) { return reinterpret_cast<const double*>(in + strip.first[k]); };
+  const auto pair = [&](int k) {  // two output pixels, each in two partial sums
+    const __m128d low = _mm_loadl_pd(_mm_setzero_pd(), samples(k));
+    const __m128i both = _mm_castpd_si128(_mm_loadh_pd(low, samples(k + 1)));
+    return _mm_castsi128_ps(
+        _mm_madd_epi16(both, _mm_load_si128(reinterpret_cast<const __m128i*>(strip.weight.data() + k * kTaps))));
+  };
+  for (; i + 4 <= strip.outputs; i += 4) {
+    const __m128 a = pair(i), b = pair(i + 2);
+    const __m128i even = _mm_castps_si128(_mm_shuffle_ps(a, b, _MM_SHUFFLE(2, 0, 2, 0)));
+    const __m128i odd = _mm_castps_si128(_mm_shuffle_ps(a, b, _MM_SHUFFLE(3, 1, 3, 1)));
+    const __m128i sum = _mm_srai_epi32(_mm_add_epi32(_mm_add_epi32(even, odd), half), kShift);
+    const __m128i packed = _mm_packs_epi32(sum, sum);
+    const int four = _mm_cvtsi128_si32(_mm_packus_epi16(packed, packed));
+    std::memcpy(out + i, &four, 4);
+  }
+#endif
+  for (; i < strip.outputs; ++i) {
+    int sum = 1 << (kShift - 1);
+    for (int k = 0; k < kTaps; ++k) sum += in[strip.first[i] + k] * strip.weight[i * kTaps + k];
+    out[i] = static_cast<std::uint8_t>(sum >> kShift);
+  }
+}
+
+void shrink(const Image& in, Image& out) {
+  // A strip spans at most kStrip times the ratio of input columns; ratios reach a little over 2 by rounding of sizes.
+  alignas(16) std::array<std::int16_t, kStrip * 9 / 4 + kTaps> row;
+  Strip strip;
+  for (int begin = 0; begin < out.width(); begin += kStrip) {
+    make_strip(begin, std::min(begin + kStrip, out.width()), in.width(), out.width(), strip);
+    BSLAM_ASSERT(strip.input_count <= static_cast<int>(row.size()), "ratio of pyramid levels beyond 2");
+    for (int y = 0; y < out.height(); ++y) {
+      const Taps taps = make_taps(y, in.height(), out.height(), kRowWeightSum);
+      std::array<const std::uint8_t*, kTaps> rows;
+      for (int k = 0; k < kTaps; ++k) rows[k] = in.row(taps.first + k) + strip.input_begin;
+      blend_rows(rows, taps.weight, strip.input_count, row.data());
+      blend_columns(strip, row.data(), out.row(y) + begin);
+    }
+  }
+}
+
+}  // namespace
+
+void build_pyramid(const ImageView& base, int levels, double factor, Pyramid& pyramid) {
+  BSLAM_ASSERT(factor > 1.0 && factor <= 2.0, "ratio of pyramid levels outside of (1, 2]");
+  pyramid.scale_x.clear();
+  pyramid.scale_y.clear();
+  double scale = 1.0;
+  int count = 0;
+  for (; !base.empty() && count < levels; ++count, scale *= factor) {
+    const int width = static_cast<int>(std::lround(base.width / scale));
+    const int height = static_cast<int>(std::lround(base.height / scale));
+    if (count > 0 && std::min(width, height) < kSmallestSide) break;
+    if (static_cast<int>(pyramid.levels.size()) <= count) pyramid.levels.emplace_back();
+    Image& level = pyramid.levels[count];
+    if (level.width() != width || level.height() != height) level.resize(width, height);
+    pyramid.scale_x.push_back(static_cast<double>(base.width) / width);
+    pyramid.scale_y.push_back(static_cast<double>(base.height) / height);
+    if (count > 0) {
+      shrink(pyramid.levels[count - 1], level);
+    } else {
+      for (int y = 0; y < height; ++y) std::memcpy(level.row(y), base.row(y), static_cast<std::size_t>(width));
+    }
+  }
+  pyramid.levels.resize(count);
+}
+
+}  // namespace bslam::image

@@ -1,0 +1,47 @@
+// Counts what extraction allocates: once warm, nothing.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "feature/extractor.h"
+#include "synthetic_scene.h"
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+// Not inlined: the compiler would see free() meet what it takes for the library's operator new.
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size > 0 ? size : 1)) return p;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* p) noexcept { std::free(p); }
+[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+
+namespace bslam::feature {
+namespace {
+
+TEST(Extractor, AllocatesNothingOnceWarm) {
+  const cv::Mat scene = testing::make_scene(1500, 1000, 2);
+  const cv::Size size(640, 480);
+  Extractor extractor{FeatureOptions{}};
+  image::Pyramid pyramid;
+  Keypoints keypoints;
+  const camera::Camera camera = testing::pinhole_camera(size);
+  const auto run = [&](const cv::Mat& view) {
+    const long before = allocations;
+    extractor.extract(testing::view_of(view), {}, camera, pyramid, keypoints);
+    return allocations - before;
+  };
+  EXPECT_GT(run(cv::Mat(size, CV_8U, cv::Scalar(50))), 0);  // the first frame: even a blank one makes all room
+  EXPECT_EQ(run(testing::render(scene, {0, 1, 0, 0, size}, 0, 0.3, 0, 2)), 0);
+  EXPECT_EQ(run(testing::render(scene, {0, 1, 0, 0, size}, 0, 1, 0, 2)), 0);
+  EXPECT_EQ(run(testing::render(scene, {1, 1, 5, 5, size}, 0, 1, 0, 30)), 0);
+  EXPECT_FALSE(keypoints.empty());
+}
+
+}  // namespace
+}  // namespace bslam::feature

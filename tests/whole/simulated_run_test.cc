@@ -1,0 +1,116 @@
+// From rendered pictures on disk to a trajectory, for every number of cameras.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "evaluation/trajectory_error.h"
+#include "io/simulation_writer.h"
+#include "io/trajectory_file.h"
+#include "session/run_session.h"
+#include "simulation/rigs.h"
+
+namespace bslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kCameras = 8, kWidth = 376;
+constexpr double kDuration_s = 3.0, kRate_hz = 12.0;
+
+// A short recording through eight small cameras, rendered once for all tests of this program.
+class SimulatedRun : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::temp_directory_path() / ("bslam_whole_" + std::to_string(::getpid()));
+    io::SimulationRequest request{.folder = folder_,
+                                  .rig = simulation::ring_rig(kCameras, kWidth),
+                                  .recording = {.duration_s = kDuration_s, .rate_hz = kRate_hz},
+                                  .tour = {},
+                                  .imaging = {},
+                                  .world = {}};
+    ThreadPool pool(2);
+    const auto written = io::write_simulation(request, pool);
+    ASSERT_TRUE(written) << written.error().message();
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  static io::Dataset open(int cameras) {
+    std::vector<int> used;
+    for (int c = 0; c < cameras; ++c) used.push_back(c);
+    auto dataset = io::open_dataset({.path = folder_, .cameras = used});
+    EXPECT_TRUE(dataset) << dataset.error().message();
+    return std::move(*dataset);
+  }
+
+  static session::SessionResult run(const io::Dataset& dataset, system::Mode mode = system::Mode::kSequential) {
+    session::SessionOptions options;
+    options.config.mode = mode;
+    options.config.features.per_image = 600;  // small images
+    auto result = session::run_session(dataset, options);
+    EXPECT_TRUE(result) << result.error().message();
+    return std::move(*result);
+  }
+
+  static evaluation::TrajectoryEvaluation evaluate(const evaluation::Trajectory& estimate, evaluation::AlignMode align) {
+    const auto truth = io::read_trajectory(folder_ / "groundtruth_cam0.tum");
+    EXPECT_TRUE(truth);
+    auto evaluated = evaluation::evaluate(estimate, *truth, {.align = align});
+    EXPECT_TRUE(evaluated) << evaluated.error().message();
+    return std::move(*evaluated);
+  }
+
+  static inline fs::path folder_;
+};
+
+TEST_F(SimulatedRun, TracksWithEveryNumberOfCamerasFromTwoUp) {
+  for (const int cameras : {2, 3, 4, 5, 6, 7, 8}) {
+    const io::Dataset dataset = open(cameras);
+    const session::SessionResult result = run(dataset);
+    EXPECT_EQ(result.trajectory.size(), dataset.frames.size()) << cameras << " cameras";
+    EXPECT_EQ(result.record.map.scale, "metric") << cameras << " cameras";
+    EXPECT_LT(evaluate(result.trajectory, evaluation::AlignMode::kSe3).ate.rmse, 0.02) << cameras << " cameras";
+  }
+}
+
+TEST_F(SimulatedRun, OneCameraTracksUpToScaleAndSaysSo) {
+  const io::Dataset dataset = open(1);
+  const session::SessionResult result = run(dataset);
+  EXPECT_EQ(result.record.map.scale, "up-to-scale");
+  EXPECT_GT(result.trajectory.size(), dataset.frames.size() / 2);
+  EXPECT_EQ(result.record.frames.size(), dataset.frames.size());
+  EXPECT_LT(evaluate(result.trajectory, evaluation::AlignMode::kSim3).ate.rmse, 0.03);
+}
+
+TEST_F(SimulatedRun, SequentialRunsGiveTheSameBytes) {
+  const io::Dataset dataset = open(4);
+  const session::SessionResult first = run(dataset), second = run(dataset);
+  EXPECT_EQ(io::tum_text(first.trajectory, ""), io::tum_text(second.trajectory, ""));
+  EXPECT_EQ(io::tum_text(first.live, ""), io::tum_text(second.live, ""));
+}
+
+TEST_F(SimulatedRun, ParallelRunIsAboutAsAccurate) {
+  const io::Dataset dataset = open(4);
+  const session::SessionResult result = run(dataset, system::Mode::kParallel);
+  EXPECT_EQ(result.trajectory.size(), dataset.frames.size());
+  EXPECT_LT(evaluate(result.trajectory, evaluation::AlignMode::kSe3).ate.rmse, 0.02);
+}
+
+TEST_F(SimulatedRun, DamagedImageIsSkippedForItsCameraAndCounted) {
+  const fs::path copy = folder_.string() + "_damaged";
+  fs::copy(folder_, copy, fs::copy_options::recursive);
+  auto dataset = io::open_dataset({.path = copy, .cameras = {0, 1, 2, 3}});
+  ASSERT_TRUE(dataset);
+  fs::resize_file(dataset->frames[10].images[0]->path, 500);
+  std::ofstream(dataset->frames[20].images[2]->path) << "no image";
+  const session::SessionResult result = run(*dataset);
+  EXPECT_EQ(result.trajectory.size(), dataset->frames.size());
+  EXPECT_EQ(result.record.cameras[0].skipped, 1);
+  EXPECT_EQ(result.record.cameras[1].skipped, 0);
+  EXPECT_EQ(result.record.cameras[2].skipped, 1);
+  fs::remove_all(copy);
+}
+
+}  // namespace
+}  // namespace bslam
