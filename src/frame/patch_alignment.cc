@@ -177,21 +177,4 @@ std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Ei
   return out;
 }
 
-feature::Patch sample_patch(const image::Pyramid& pyramid, std::size_t level, const Eigen::Vector2d& pixel) {
-  const image::Image& image = pyramid.levels[level];
-  const float x0 = static_cast<float>(pyramid.from_base_x(level, pixel.x())) - 0.5f * (feature::kPatchSize - 1);
-  const float y0 = static_cast<float>(pyramid.from_base_y(level, pixel.y())) - 0.5f * (feature::kPatchSize - 1);
-  const float last_x = static_cast<float>(image.width()) - 1.001f, last_y = static_cast<float>(image.height()) - 1.001f;
-  feature::Patch patch;
-  std::size_t i = 0;
-  for (int r = 0; r < feature::kPatchSize; ++r) {
-    for (int c = 0; c < feature::kPatchSize; ++c, ++i) {
-      const float x = std::clamp(x0 + static_cast<float>(c), 0.0f, last_x);
-      const float y = std::clamp(y0 + static_cast<float>(r), 0.0f, last_y);
-      patch[i] = static_cast<std::uint8_t>(bilinear(image, x, y) + 0.5f);
-    }
-  }
-  return patch;
-}
-
 }  // namespace bslam::frame

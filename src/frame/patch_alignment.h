@@ -58,7 +58,4 @@ std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Ei
                                            const image::Pyramid& target, const Eigen::Vector2d& guess,
                                            const AlignmentOptions& options);
 
-// The patch of kPatchSize x kPatchSize around a level-0 pixel, sampled on `level`; samples outside repeat the border.
-feature::Patch sample_patch(const image::Pyramid& pyramid, std::size_t level, const Eigen::Vector2d& pixel);
-
 }  // namespace bslam::frame

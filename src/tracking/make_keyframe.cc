@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "feature/window.h"
 #include "frame/bundling.h"
 
 namespace bslam::tracking {
@@ -76,6 +77,16 @@ Groups regroup(const BundledFrame& frame, const LandmarkTable& table) {
   return groups;
 }
 
+// Takes the patch of a keypoint afresh at its present place, where that lies well inside its level.
+void follow_with_patch(const image::Pyramid& pyramid, feature::Keypoints& keypoints, std::size_t k) {
+  constexpr double kMargin = feature::kPatchSize / 2 + 1;
+  const std::size_t level = keypoints.level[k];
+  const image::Image& image = pyramid.levels[level];
+  const double x = pyramid.from_base_x(level, keypoints.pixel[k].x()), y = pyramid.from_base_y(level, keypoints.pixel[k].y());
+  if (x < kMargin || y < kMargin || x > image.width() - 1 - kMargin || y > image.height() - 1 - kMargin) return;
+  keypoints.patch[k] = feature::sample_patch(image.view(), static_cast<float>(x), static_cast<float>(y));
+}
+
 std::shared_ptr<BundledFrame> regrouped_frame(const BundledFrame& frame, const Groups& groups, const camera::Rig& rig,
                                               std::span<const image::Pyramid> pyramids) {
   auto out = std::make_shared<BundledFrame>(frame);
@@ -83,8 +94,7 @@ std::shared_ptr<BundledFrame> regrouped_frame(const BundledFrame& frame, const G
     frame::CameraFrame& camera = out->cameras[c];
     if (camera.keypoints.empty()) continue;
     for (std::size_t k = 0; k < camera.keypoints.size(); ++k) {  // alignment moved keypoints: their patches follow
-      camera.keypoints.patch[k] =
-          frame::sample_patch(pyramids[c], camera.keypoints.level[k], camera.keypoints.pixel[k].cast<double>());
+      follow_with_patch(pyramids[c], camera.keypoints, k);
     }
     camera.grid = frame::FeatureGrid(camera.keypoints, rig.camera(c).width, rig.camera(c).height);
   }
