@@ -48,7 +48,8 @@ void add_rig(CLI::App& app, int& exit_status) {
 
   CLI::App* convert = rig->add_subcommand("convert", "write a calibration in another format");
   convert->add_option("IN", arguments->in, formats)->required();
-  convert->add_option("OUT", arguments->out, "a file (bslam rig file), or a folder (EuRoC: mav0/camN/sensor.yaml)")->required();
+  convert->add_option("OUT", arguments->out, "a file (bslam rig file), or a folder (EuRoC: mav0/camN/sensor.yaml)")
+      ->required();
   convert->callback([arguments, &exit_status] { exit_status = rig_convert(arguments->in, arguments->out); });
 }
 

@@ -33,7 +33,8 @@ std::string compiler() {
 std::string version_number() { return BSLAM_VERSION; }
 
 std::string version_text() {
-  std::string text = fmt::format("bslam {}\nrevision {}\ncompiler {}\n", version_number(), BSLAM_GIT_REVISION, compiler());
+  std::string text =
+      fmt::format("bslam {}\nrevision {}\ncompiler {}\n", version_number(), BSLAM_GIT_REVISION, compiler());
   text += fmt::format("Eigen {}.{}.{}\n", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION);
   text += fmt::format("OpenCV {}\n", CV_VERSION);
 #ifdef BSLAM_YAML_CPP_VERSION  // its headers do not tell
