@@ -1,5 +1,7 @@
 // bslam: the command line. Verbs are in files of their own; this one only puts them together.
+#include <algorithm>
 #include <cstdio>
+#include <string>
 
 #include "cli/verbs.h"
 #include "cli/version.h"
@@ -19,7 +21,10 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // help and version
-    return report_error({.file = "command line", .key = e.get_name(), .found = e.what(), .expected = "see bslam --help"});
+    std::string what = e.what();
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    std::fprintf(stderr, "bslam: command line: %s (see bslam --help)\n", what.c_str());
+    return kExitBadInput;
   }
   return exit_status;
 }

@@ -24,7 +24,7 @@ void ProgressBar::show(std::size_t done, std::size_t all) {
 }
 
 void ProgressBar::finish() {
-  if (active_) std::fputc('\n', stderr);
+  if (active_ && drawn_ != Clock::time_point()) std::fputc('\n', stderr);
   active_ = false;
 }
 

@@ -1,7 +1,5 @@
 // bslam simulate: renders the built-in world through a rig.
 #include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <csignal>
@@ -11,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "cli/progress_bar.h"
 #include "cli/verbs.h"
 #include "io/fault_file.h"
 #include "io/rig_file.h"
@@ -64,33 +63,6 @@ Result<io::SimulationRequest> make_request(const SimulateArguments& arguments) {
   return request;
 }
 
-// A bar on stderr, redrawn when its percentage changes.
-class Bar {
- public:
-  explicit Bar(bool shown) : shown_(shown) {}
-  ~Bar() {
-    if (drawn_ >= 0) std::fputc('\n', stderr);
-  }
-  Bar(const Bar&) = delete;
-  Bar& operator=(const Bar&) = delete;
-
-  void show(std::size_t done, std::size_t total) {
-    const int percent = static_cast<int>(100 * done / total);
-    if (!shown_ || percent == drawn_) return;
-    drawn_ = percent;
-    constexpr int kWidth = 40;
-    const int filled = kWidth * percent / 100;
-    const std::string line =
-        fmt::format("\rsimulate [{:#<{}}{:.<{}}] {}/{} images", "", filled, "", kWidth - filled, done, total);
-    std::fputs(line.c_str(), stderr);
-    std::fflush(stderr);
-  }
-
- private:
-  bool shown_;
-  int drawn_ = -1;  // percentage that stands there
-};
-
 int run_simulate(const SimulateArguments& arguments) {
   const auto request = make_request(arguments);
   if (!request) return report_error(request.error());
@@ -98,13 +70,12 @@ int run_simulate(const SimulateArguments& arguments) {
   ThreadPool pool(arguments.threads > 0 ? arguments.threads : std::max(1, cores));
   std::signal(SIGINT, [](int) { interrupted = true; });
   std::signal(SIGTERM, [](int) { interrupted = true; });
-  const auto outcome = [&] {
-    Bar bar(arguments.progress == "auto" && ::isatty(STDERR_FILENO) != 0);
-    return io::write_simulation(*request, pool, [&](std::size_t done, std::size_t total) {
-      bar.show(done, total);
-      return !interrupted;
-    });
-  }();
+  ProgressBar bar(arguments.progress == "auto", "pictures");
+  const auto outcome = io::write_simulation(*request, pool, [&](std::size_t done, std::size_t total) {
+    bar.show(done, total);
+    return !interrupted;
+  });
+  bar.finish();
   if (!outcome) {
     Error error = outcome.error();
     if (error.file.empty()) {  // a value out of range, named as the request names it

@@ -17,7 +17,7 @@ struct FeatureOptions {
   double scale_factor = 1.2;  // ratio of one level to the next
   int fast_threshold = 20;    // grey levels: what counts as a corner in a well lit image
   int fast_threshold_min = 5; // the least it adapts to in dark or blurred regions
-  double sigma_px = 0.7;      // standard deviation of a keypoint on its level before sub-pixel alignment
+  double sigma_px = 0.4;      // standard deviation of a keypoint on its level before sub-pixel alignment (measured: 0.25 - 0.35)
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

@@ -36,7 +36,7 @@ struct BundlingOptions {
 
 // Standard deviation of a detected, not aligned keypoint: `sigma_px` on its level, in level-0 pixels.
 struct DetectionNoise {
-  double sigma_px = 0.7;
+  double sigma_px = 0.4;
 };
 
 // Matches the cameras of every overlapping pair, aligns the second keypoint of a match to the patch of the first

@@ -97,7 +97,7 @@ struct MappingOptions {
 
 // What mapping must know of the features.
 struct FeatureModel {
-  double sigma_px = 0.7;      // standard deviation of a keypoint on its level, not aligned
+  double sigma_px = 0.4;      // standard deviation of a keypoint on its level, not aligned
   double scale_factor = 1.2;  // of the pyramid
 };
 

@@ -1,7 +1,5 @@
 #include "simulation/world.h"
 
-#include <embree3/rtcore.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <bit>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "base/assert.h"
+#include "simulation/embree.h"
 
 namespace bslam::simulation {
 namespace {
@@ -247,9 +246,7 @@ float World::light_at(const Vector3d& point, const Vector3d& n, int ambient_rays
 
 bool World::blocked(const Vector3d& from, const Vector3d& to) const {
   RTCRay ray = make_ray(from, to - from, 0.0, 1.0);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(scene_->scene, &context, &ray);
+  occluded(scene_->scene, ray);
   return ray.tfar < 0;
 }
 
@@ -257,9 +254,7 @@ std::optional<Hit> World::cast(const Vector3d& origin, const Vector3d& direction
   RTCRayHit query{};
   query.ray = make_ray(origin, direction, 0.0, 1e6);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(scene_->scene, &context, &query);
+  intersect(scene_->scene, query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   // Embree works in floats; place and distance follow in doubles from the surface's plane.
   const Surface& s = building_.surfaces[query.hit.primID];
@@ -320,11 +315,8 @@ void World::radiance(const Eigen::Vector3f& origin, const RayPacket& rays, float
     query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   alignas(32) static constexpr auto& valid = kAllValid;
-  rtcIntersect8(valid, scene_->scene, &context, &query);
+  intersect_coherent(valid, scene_->scene, query);
   const float scale = spread * std::exp2(detail);
   for (int i = 0; i < kN; ++i) {
     if (query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
