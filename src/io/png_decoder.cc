@@ -9,9 +9,7 @@
 #include <string>
 #include <vector>
 
-#ifdef BSLAM_HAVE_LIBDEFLATE
 #include <libdeflate.h>
-#endif
 
 namespace bslam::io {
 namespace {
@@ -40,14 +38,9 @@ std::optional<Chunk> next_chunk(std::string_view& rest) {
 }
 
 bool checksum_holds([[maybe_unused]] const Chunk& chunk) {
-#ifdef BSLAM_HAVE_LIBDEFLATE
   return libdeflate_crc32(0, chunk.type.data(), chunk.type.size() + chunk.data.size()) == chunk.checksum;
-#else
-  return true;
-#endif
 }
 
-#ifdef BSLAM_HAVE_LIBDEFLATE
 
 constexpr std::uint32_t kMaxSidePx = 20000;
 
@@ -77,10 +70,11 @@ std::string join_data(std::string_view chunks) {
 
 // Of left, above and above-left, the one nearest to left + above - corner; ties in this order.
 int paeth(int left, int above, int corner) {
-  const int to_left = std::abs(above - corner), to_above = std::abs(left - corner);
-  const int to_corner = std::abs(above - corner + left - corner);
+  const int a = above - corner, b = left - corner;
+  const int to_left = std::abs(a), to_above = std::abs(b), to_corner = std::abs(a + b);
   const int best = to_above < to_left ? above : left;
-  return to_corner < std::min(to_left, to_above) ? corner : best;
+  const int least = to_above < to_left ? to_above : to_left;
+  return to_corner < least ? corner : best;
 }
 
 // Undoes the filter of one row (ISO/IEC 15948, section 9.2); `above` is the row before it, zeros for the first.
@@ -113,7 +107,6 @@ bool unfilter(int filter, const std::uint8_t* in, const std::uint8_t* above, std
   }
 }
 
-#endif
 
 }  // namespace
 
@@ -128,7 +121,6 @@ bool is_whole_png(std::string_view bytes) {
 }
 
 std::optional<image::Image> decode_grey_png([[maybe_unused]] std::string_view bytes) {
-#ifdef BSLAM_HAVE_LIBDEFLATE
   bytes.remove_prefix(kSignature.size());
   const auto first = next_chunk(bytes);
   const auto header = first ? read_header(*first) : std::nullopt;
@@ -153,9 +145,6 @@ std::optional<image::Image> decode_grey_png([[maybe_unused]] std::string_view by
     above = out;
   }
   return image;
-#else
-  return std::nullopt;
-#endif
 }
 
 }  // namespace bslam::io

@@ -57,7 +57,7 @@ TEST(Extractor, FillsWhatKeypointsPromise) {
   for (std::size_t i = 0; i < k.size(); ++i) {
     const std::size_t level = k.level[i];
     ASSERT_LT(level, pyramid.size());
-    EXPECT_FLOAT_EQ(k.sigma[i], static_cast<float>(0.7 * std::sqrt(pyramid.scale_x[level] * pyramid.scale_y[level])));
+    EXPECT_FLOAT_EQ(k.sigma[i], static_cast<float>(FeatureOptions().sigma_px * std::sqrt(pyramid.scale_x[level] * pyramid.scale_y[level])));
     const auto pixel = camera.project(3.0 * k.bearing[i]);
     ASSERT_TRUE(pixel.has_value());
     EXPECT_LT((*pixel - k.pixel[i].cast<double>()).norm(), 1e-3);

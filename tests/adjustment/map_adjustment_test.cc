@@ -1,0 +1,174 @@
+#include "adjustment/map_adjustment.h"
+
+#include <gtest/gtest.h>
+
+#include "mapping/simulated_map.h"
+
+namespace bslam::adjustment {
+namespace {
+
+using geometry::SE3;
+
+constexpr double kSigmaPx = 0.7, kScaleFactor = 1.2;
+
+map::SimulatedMap true_map(camera::Rig rig, int keyframes) {
+  simulation::FeatureSimulatorOptions options;
+  options.landmarks = 2500;
+  options.max_keypoints = 500;
+  options.sigma_px = kSigmaPx;
+  map::SimulatedMap out(simulation::FeatureSimulator(std::move(rig), simulation::make_orbit({}), options));
+  for (int i = 0; i < keyframes; ++i) out.add_keyframe(FrameId(i), 0.25 * i);
+  return out;
+}
+
+// All keyframes free but the first `fixed`, all landmarks.
+Selection everything(const map::BundledMap& map, int fixed) {
+  Selection s;
+  for (const KeyframeId k : map.keyframe_ids()) (k.value() < fixed ? s.fixed_keyframes : s.free_keyframes).push_back(k);
+  s.landmarks = map.landmark_ids();
+  return s;
+}
+
+// Moves free keyframes by about five centimetres and one degree, landmarks by about half a metre.
+void perturb(const Selection& selection, map::BundledMap& map) {
+  Random random(5, "perturb");
+  const auto noise = [&](double size) -> Eigen::Vector3d { return size * Eigen::Vector3d(random.normal(), random.normal(), random.normal()); };
+  for (const KeyframeId k : selection.free_keyframes) {
+    geometry::Vector6d delta;
+    delta << noise(0.01), noise(0.03);
+    map.set_pose(k, map.keyframe(k).T_rig_world.perturbed(delta));
+  }
+  for (const LandmarkId l : selection.landmarks) map.set_position(l, map.landmark(l).position + noise(0.3));
+}
+
+double mean_pose_error_m(const map::SimulatedMap& world, const map::BundledMap& map) {
+  double sum = 0;
+  for (const KeyframeId k : map.keyframe_ids()) sum += map::distance_m(map.keyframe(k).T_rig_world, world.true_pose(k));
+  return sum / static_cast<double>(map.num_keyframes());
+}
+
+// Of landmarks that at least three keyframes see.
+double median_point_error_m(const map::SimulatedMap& world, const map::BundledMap& map) {
+  std::vector<double> errors;
+  for (const LandmarkId l : map.landmark_ids()) {
+    if (map.observations(l).size() < 3) continue;
+    errors.push_back((map.landmark(l).position - world.truth_of(world.truth_of_landmark.at(l.value()))).norm());
+  }
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  return *middle;
+}
+
+TEST(AdjustMap, BringsPerturbedPosesAndPointsNearTheTruth) {
+  for (const int cameras : {1, 2, 4}) {
+    map::SimulatedMap world = true_map(simulation::ring_rig(cameras), 5);
+    const Selection selection = everything(world.map, cameras == 1 ? 2 : 1);
+    map::BundledMap start = world.map;
+    perturb(selection, start);
+    map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
+    const AdjustmentReport report = adjust_map(selection, {.robust_iterations = 10, .final_iterations = 10}, kSigmaPx, kScaleFactor, draft);
+    ASSERT_TRUE(report.done) << cameras << " cameras";
+    EXPECT_LT(report.final_cost, report.initial_cost);
+    EXPECT_LT(mean_pose_error_m(world, draft.map()), 0.4 * mean_pose_error_m(world, start)) << cameras << " cameras";
+    EXPECT_LT(mean_pose_error_m(world, draft.map()), 0.012) << cameras << " cameras";
+    EXPECT_LT(median_point_error_m(world, draft.map()), 0.7 * median_point_error_m(world, start)) << cameras << " cameras";
+    // 5 % of all observations lie beyond the 95 % bound by their noise alone.
+    EXPECT_LT(static_cast<double>(report.outliers), 0.08 * static_cast<double>(report.observations));
+    EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+  }
+}
+
+TEST(AdjustMap, LeavesAloneWhatIsFixedOrNotSelected) {
+  map::SimulatedMap world = true_map(simulation::ring_rig(2), 5);
+  Selection selection;
+  selection.free_keyframes = {KeyframeId(2), KeyframeId(3)};
+  selection.fixed_keyframes = {KeyframeId(0), KeyframeId(1)};
+  for (const LandmarkId l : world.map.landmark_ids()) {
+    if (l.value() % 2 == 0) selection.landmarks.push_back(l);
+  }
+  map::BundledMap start = world.map;
+  perturb(selection, start);
+  map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
+  ASSERT_TRUE(adjust_map(selection, {}, kSigmaPx, kScaleFactor, draft).done);
+  for (const int k : {0, 1, 4}) {
+    const SE3 &before = start.keyframe(KeyframeId(k)).T_rig_world, &after = draft.map().keyframe(KeyframeId(k)).T_rig_world;
+    EXPECT_EQ(before.translation(), after.translation());
+    EXPECT_EQ(before.rotation().coeffs(), after.rotation().coeffs());
+  }
+  for (const int k : {2, 3}) {
+    EXPECT_LT(map::distance_m(draft.map().keyframe(KeyframeId(k)).T_rig_world, world.true_pose(KeyframeId(k))),
+              map::distance_m(start.keyframe(KeyframeId(k)).T_rig_world, world.true_pose(KeyframeId(k))));
+  }
+  for (const LandmarkId l : start.landmark_ids()) {
+    if (l.value() % 2 == 0) continue;
+    EXPECT_EQ(start.landmark(l).position, draft.map().landmark(l).position);
+    EXPECT_EQ(start.observations(l).size(), draft.map().observations(l).size());
+  }
+}
+
+TEST(AdjustMap, RemovesPlantedOutliers) {
+  map::SimulatedMap world = true_map(simulation::ring_rig(2), 5);
+  const KeyframeId last(4);
+  std::vector<LandmarkId> planted;  // landmarks seen by four keyframes and, wrongly, by an outlier's feature of the last
+  const frame::BundledFrame& frame = *world.map.keyframe(last).frame;
+  std::vector<FeatureId> free;
+  for (std::size_t f = 0; f < frame.bundled.size(); ++f) {
+    if (!world.map.landmark_of(last, FeatureId(f)).valid()) free.emplace_back(f);
+  }
+  for (const LandmarkId l : world.map.landmark_ids()) {
+    if (planted.size() == free.size() || planted.size() == 20) break;
+    if (world.map.observations(l).size() < 3 || world.map.observations(l).back().keyframe == last) continue;
+    ASSERT_TRUE(world.map.add_observation(l, {last, free[planted.size()]}));
+    planted.push_back(l);
+  }
+  ASSERT_GT(planted.size(), 10u);
+  map::MapDraft draft = world.draft();
+  const AdjustmentReport report = adjust_map(everything(world.map, 1), {}, kSigmaPx, kScaleFactor, draft);
+  ASSERT_TRUE(report.done);
+  EXPECT_GE(report.outliers, planted.size());
+  std::size_t left = 0;
+  for (const LandmarkId l : planted) {
+    for (const map::Observation& o : draft.map().observations(l)) left += o.keyframe == last;
+  }
+  EXPECT_EQ(left, 0u);
+  EXPECT_LT(map::distance_m(draft.map().keyframe(last).T_rig_world, world.true_pose(last)), 0.015);
+  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+}
+
+TEST(AdjustMap, DoesNothingWithoutAFixedOrAFreeKeyframe) {
+  map::SimulatedMap world = true_map(simulation::ring_rig(2), 3);
+  for (const int fixed : {0, 3}) {
+    map::MapDraft draft = world.draft();
+    EXPECT_FALSE(adjust_map(everything(world.map, fixed), {}, kSigmaPx, kScaleFactor, draft).done);
+    EXPECT_TRUE(std::move(draft).finish().edit.operations.empty());
+  }
+  Selection nothing = everything(world.map, 1);
+  nothing.landmarks.clear();
+  map::MapDraft draft = world.draft();
+  EXPECT_FALSE(adjust_map(nothing, {}, kSigmaPx, kScaleFactor, draft).done);
+}
+
+TEST(AdjustMap, AskedToStopItKeepsTheMapSound) {
+  map::SimulatedMap world = true_map(simulation::ring_rig(2), 4);
+  std::stop_source stop;
+  stop.request_stop();
+  map::MapDraft draft = world.draft();
+  adjust_map(everything(world.map, 1), {}, kSigmaPx, kScaleFactor, draft, stop.get_token());
+  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+  EXPECT_LT(mean_pose_error_m(world, draft.map()), 0.02);
+}
+
+TEST(AdjustMap, IsDeterministic) {
+  map::SimulatedMap world = true_map(simulation::ring_rig(3), 4);
+  const Selection selection = everything(world.map, 1);
+  map::MapDraft a = world.draft(), b = world.draft();
+  adjust_map(selection, {}, kSigmaPx, kScaleFactor, a);
+  adjust_map(selection, {}, kSigmaPx, kScaleFactor, b);
+  for (const KeyframeId k : world.map.keyframe_ids()) {
+    EXPECT_EQ(a.map().keyframe(k).T_rig_world.translation(), b.map().keyframe(k).T_rig_world.translation());
+  }
+  EXPECT_EQ(a.map().num_observations(), b.map().num_observations());
+}
+
+}  // namespace
+}  // namespace bslam::adjustment

@@ -1,0 +1,193 @@
+#include "camera/camera_model.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "base/random.h"
+#include "camera/test_cameras.h"
+
+namespace bslam::camera {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+class CameraModelOf : public testing::TestWithParam<Camera> {};
+INSTANTIATE_TEST_SUITE_P(Models, CameraModelOf, testing::ValuesIn(test_cameras()),
+                         [](const auto& instance) { return instance.param.name; });
+
+std::vector<Vector2d> pixels_of(const Camera& camera) {
+  std::vector<Vector2d> pixels;
+  for (int r = 0; r <= 20; ++r) {
+    for (int c = 0; c <= 20; ++c) pixels.emplace_back(c * (camera.width - 1) / 20.0, r * (camera.height - 1) / 20.0);
+  }
+  return pixels;
+}
+
+// Points within the model's domain, at depths near and far, some of them behind the plane of a wide lens.
+std::vector<Vector3d> points_of(const Camera& camera, Random random) {
+  std::vector<Vector3d> points;
+  while (points.size() < 300) {
+    const Vector3d direction = Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+    const Vector3d point = std::exp(random.uniform(-2.0, 4.0)) * direction;
+    const auto pixel = camera.project(point);
+    if (pixel && camera.contains(*pixel)) points.push_back(point);
+  }
+  return points;
+}
+
+TEST_P(CameraModelOf, PixelsComeBackFromTheirBearing) {
+  int answered = 0;
+  for (const Vector2d& pixel : pixels_of(GetParam())) {
+    const auto bearing = GetParam().unproject(pixel);
+    if (!bearing) continue;
+    ++answered;
+    EXPECT_NEAR(bearing->norm(), 1.0, 1e-12);
+    const auto again = GetParam().project(3.7 * *bearing);
+    ASSERT_TRUE(again) << pixel.transpose();
+    EXPECT_LT((*again - pixel).norm(), 1e-6) << pixel.transpose();
+  }
+  EXPECT_GT(answered, 400);  // of 441: at most the corners of a fisheye are dark
+}
+
+TEST_P(CameraModelOf, PointsComeBackUpToTheirDistance) {
+  for (const Vector3d& point : points_of(GetParam(), Random(1))) {
+    const auto bearing = GetParam().unproject(GetParam().project(point).value());
+    ASSERT_TRUE(bearing) << point.transpose();
+    EXPECT_LT((*bearing - point.normalized()).norm(), 1e-7) << point.transpose();
+  }
+}
+
+TEST_P(CameraModelOf, JacobianIsThatOfTheProjection) {
+  for (const Vector3d& point : points_of(GetParam(), Random(2))) {
+    const auto projection = GetParam().project_with_jacobian(point);
+    ASSERT_TRUE(projection);
+    EXPECT_LT((projection->pixel - GetParam().project(point).value()).norm(), 1e-9);
+    const double step = 1e-6 * point.norm();
+    Matrix23d numeric;
+    bool inside = true;
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d e = step * Vector3d::Unit(k);
+      const auto plus = GetParam().project(point + e), minus = GetParam().project(point - e);
+      inside = inside && plus && minus;
+      if (inside) numeric.col(k) = (*plus - *minus) / (2 * step);
+    }
+    if (!inside) continue;
+    EXPECT_LT((projection->jacobian - numeric).norm(), 1e-5 * (1.0 + numeric.norm())) << point.transpose();
+  }
+}
+
+TEST_P(CameraModelOf, JacobianHoldsOnTheOpticalAxis) {
+  const auto projection = GetParam().project_with_jacobian({0, 0, 2.0});
+  ASSERT_TRUE(projection);
+  const Intrinsics& k = intrinsics(GetParam().model);
+  EXPECT_LT((projection->pixel - Vector2d(k.cx, k.cy)).norm(), 1e-9);
+  Matrix23d expected;
+  expected << k.fx / 2, 0, 0, 0, k.fy / 2, 0;
+  EXPECT_LT((projection->jacobian - expected).norm(), 1e-9);
+}
+
+TEST_P(CameraModelOf, ProjectionDependsOnDirectionOnly) {
+  for (const Vector3d& point : points_of(GetParam(), Random(3))) {
+    EXPECT_LT((GetParam().project(point).value() - GetParam().project(7.0 * point).value()).norm(), 1e-8);
+  }
+}
+
+TEST_P(CameraModelOf, AnswersNothingForNonsense) {
+  const double nan = std::nan("");
+  EXPECT_FALSE(GetParam().project({nan, 0, 1}));
+  EXPECT_FALSE(GetParam().project({0, 0, nan}));
+  EXPECT_FALSE(GetParam().project({0, 0, 0}));
+  EXPECT_FALSE(GetParam().project_with_jacobian({0, nan, 1}));
+  EXPECT_FALSE(GetParam().project_with_jacobian({0, 0, 0}));
+  EXPECT_FALSE(GetParam().unproject({nan, 0}));
+  EXPECT_FALSE(GetParam().project({0, 0, -1}));
+  EXPECT_FALSE(GetParam().project_with_jacobian({0, 0, -1}));
+}
+
+// What two directions share a pixel, only one of them may be answered.
+TEST_P(CameraModelOf, NoTwoDirectionsShareAPixel) {
+  Random random(4);
+  for (int i = 0; i < 2000; ++i) {
+    const Vector3d direction = Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+    const auto pixel = GetParam().project(direction);
+    if (!pixel || !GetParam().contains(*pixel)) continue;
+    const auto bearing = GetParam().unproject(*pixel);
+    ASSERT_TRUE(bearing) << direction.transpose();
+    EXPECT_LT((*bearing - direction).norm(), 1e-6) << direction.transpose();
+  }
+}
+
+TEST(Pinhole, SeesNothingOnOrBehindItsPlane) {
+  const Pinhole camera({400, 400, 320, 240});
+  EXPECT_FALSE(camera.project({1, 0, 0}));
+  EXPECT_FALSE(camera.project({0.1, 0, -1}));
+  EXPECT_FALSE(camera.project_with_jacobian({0.1, 0, -1}));
+  EXPECT_TRUE(camera.project({5, 0, 0.01}));
+}
+
+TEST(PinholeRadTan, EndsWhereTheDistortedRadiusTurnsBack) {
+  const PinholeRadTan camera({458.654, 457.296, 367.215, 248.375}, {-0.28340811, 0.07395907, 0, 0});
+  // r (1 + k1 r^2 + k2 r^4): 1 + 3 k1 r^2 + 5 k2 r^4 has no root here, so the lens never turns back.
+  EXPECT_TRUE(std::isinf(camera.max_radius()));
+  const PinholeRadTan barrel({458, 457, 367, 248}, {-0.28, 0, 0, 0});
+  EXPECT_NEAR(barrel.max_radius(), std::sqrt(1 / (3 * 0.28)), 0.003);
+  EXPECT_TRUE(barrel.project({1.0, 0, 1}));
+  EXPECT_FALSE(barrel.project({1.2, 0, 1}));
+  EXPECT_FALSE(barrel.project_with_jacobian({1.2, 0, 1}));
+  EXPECT_FALSE(barrel.unproject({367 + 458 * 0.8, 248}));  // beyond the largest radius the lens reaches, 0.727
+}
+
+TEST(PinholeRadTan, KeepsItsCoefficients) {
+  for (const std::vector<double>& d :
+       {std::vector<double>{0.1, 0.2, 0.3, 0.4}, {0.1, 0.2, 0.3, 0.4, 0.5}, {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8}}) {
+    EXPECT_EQ(PinholeRadTan({1, 1, 0, 0}, d).distortion(), d);
+  }
+}
+
+TEST(KannalaBrandt, SeesBehindItsPlane) {
+  const KannalaBrandt camera({130, 130, 320, 240}, {0, 0, 0, 0});
+  EXPECT_EQ(camera.max_theta(), kPi);
+  for (const double theta : {0.5 * kPi, 0.6 * kPi, 0.9 * kPi}) {
+    const Vector3d direction(std::sin(theta), 0, std::cos(theta));
+    EXPECT_LT((camera.project(direction).value() - Vector2d(320 + 130 * theta, 240)).norm(), 1e-9);
+    EXPECT_LT((camera.unproject({320 + 130 * theta, 240}).value() - direction).norm(), 1e-9);
+  }
+}
+
+TEST(KannalaBrandt, EndsWhereTheRadiusTurnsBack) {
+  const KannalaBrandt camera({130, 130, 320, 240}, {-0.1, 0, 0, 0});  // 1 - 0.3 theta^2 = 0
+  const double end = std::sqrt(1 / 0.3);
+  EXPECT_NEAR(camera.max_theta(), end, 0.0011);
+  const auto at = [](double theta) { return Vector3d(std::sin(theta), 0, std::cos(theta)); };
+  EXPECT_TRUE(camera.project(at(end - 0.01)));
+  EXPECT_FALSE(camera.project(at(end + 0.01)));
+  EXPECT_FALSE(camera.project_with_jacobian(at(end + 0.01)));
+  EXPECT_FALSE(camera.unproject({320 + 130 * (end - 0.1 * std::pow(end, 3)) + 1, 240}));
+}
+
+TEST(KannalaBrandt, IsSmoothAcrossTheAxis) {
+  const KannalaBrandt camera({245, 245, 256, 256}, {0.0158, 0.0269, -0.0457, 0.0072});
+  for (const double x : {0.0, 1e-15, 1e-12, 1e-10, 1e-9, 1e-8, 1e-6}) {
+    const auto projection = camera.project_with_jacobian({x, -x, 1.5});
+    ASSERT_TRUE(projection);
+    EXPECT_NEAR(projection->pixel.x(), 256 + 245 * x / 1.5, 1e-9);
+    EXPECT_NEAR(camera.project({x, -x, 1.5}).value().y(), 256 - 245 * x / 1.5, 1e-9);
+    EXPECT_NEAR(projection->jacobian(0, 0), 245 / 1.5, 1e-6);
+    EXPECT_NEAR(projection->jacobian(0, 2), 0.0, 1e-3);
+  }
+}
+
+TEST(CameraModel, KnowsItsNameAndNumbers) {
+  const auto cameras = test_cameras();
+  EXPECT_EQ(model_name(cameras[0].model), "pinhole");
+  EXPECT_EQ(model_name(cameras[1].model), "pinhole-radtan");
+  EXPECT_EQ(model_name(cameras[5].model), "kannala-brandt");
+  EXPECT_TRUE(distortion(cameras[0].model).empty());
+  EXPECT_EQ(distortion(cameras[5].model).size(), 4u);
+  EXPECT_EQ(intrinsics(cameras[0].model).fx, 707.0912);
+}
+
+}  // namespace
+}  // namespace bslam::camera

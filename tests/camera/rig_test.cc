@@ -1,0 +1,120 @@
+#include "camera/rig.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <numbers>
+
+#include "base/random.h"
+#include "camera/test_cameras.h"
+
+namespace bslam::camera {
+namespace {
+
+using geometry::SE3;
+
+constexpr double kPi = std::numbers::pi;
+
+Camera pinhole(const std::string& name) { return {name, Pinhole({300, 300, 319.5, 239.5}), 640, 480, 0, ""}; }
+
+SE3 turned(double yaw, const Vector3d& position) { return SE3(geometry::so3_exp({0, yaw, 0}), position); }
+
+double difference(const SE3& a, const SE3& b) { return (a.inverse() * b).log().norm(); }
+
+// Stereo ahead and one camera behind, with a body frame of its own.
+Rig three_cameras() {
+  const SE3 T_body_rig(geometry::so3_exp({0.3, -1.2, 0.5}), {0.1, 0.2, 0.3});
+  return Rig({{pinhole("left"), T_body_rig},
+              {pinhole("right"), T_body_rig * turned(0, {0.11, 0, 0})},
+              {pinhole("back"), T_body_rig * turned(kPi, {0, 0, -0.2})}});
+}
+
+TEST(Rig, ComposesCameraPoses) {
+  const Rig rig = three_cameras();
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    EXPECT_LT(difference(rig.body_from_cam(i), rig.body_from_cam(0) * rig.rig_from_cam(i)), 1e-13);
+    EXPECT_LT(difference(rig.cam_from_rig(i).inverse(), rig.rig_from_cam(i)), 1e-13);
+    EXPECT_EQ(&rig.cam_from_rig(i), &rig.cam_from_rig(CameraIndex(i)));
+  }
+  EXPECT_LT((rig.rig_from_cam(1).translation() - Vector3d(0.11, 0, 0)).norm(), 1e-13);
+  // A point ahead of camera 0 is behind the one that looks back.
+  EXPECT_LT(((rig.cam_from_rig(2) * Vector3d(0, 0, 1)) - Vector3d(0, 0, -1.2)).norm(), 1e-12);
+}
+
+TEST(Rig, Camera0IsTheRigFrameExactly) {
+  const Rig rig = three_cameras();
+  EXPECT_EQ(rig.cam_from_rig(std::size_t{0}).matrix(), Eigen::Matrix4d::Identity());
+  EXPECT_EQ(rig.rig_from_cam(0).matrix(), Eigen::Matrix4d::Identity());
+}
+
+TEST(Rig, MeasuresOverlapOfStereo) {
+  const Rig rig = three_cameras();
+  EXPECT_TRUE(rig.overlap(0, 1));
+  EXPECT_TRUE(rig.overlap(1, 0));
+  EXPECT_GT(rig.overlap_share(0, 1), 0.95);
+  EXPECT_TRUE(rig.any_overlap());
+}
+
+TEST(Rig, OppositeCamerasDoNotOverlap) {
+  const Rig rig = three_cameras();
+  for (const std::size_t front : {0u, 1u}) {
+    EXPECT_FALSE(rig.overlap(front, 2));
+    EXPECT_FALSE(rig.overlap(2, front));
+  }
+  const std::array apart = {0, 2};
+  EXPECT_FALSE(rig.subset(apart).any_overlap());
+}
+
+// Two cameras side by side turned apart by an angle share what their fields of view, 93.7 degrees wide, have in common.
+TEST(Rig, OverlapShrinksWithTheAngleBetweenCameras) {
+  double last = 1.1;
+  for (const double degrees : {0.0, 30.0, 60.0, 85.0, 120.0}) {
+    const Rig rig({{pinhole("a"), SE3()}, {pinhole("b"), turned(degrees * kPi / 180, {0, 0, 0})}});
+    EXPECT_LT(rig.overlap_share(0, 1), last);
+    last = rig.overlap_share(0, 1);
+    EXPECT_EQ(rig.overlap(0, 1), degrees < 90) << degrees;
+  }
+  EXPECT_EQ(last, 0.0);
+}
+
+TEST(Rig, WideFisheyesOverlapSideways) {
+  const Camera fisheye = test_cameras().back();
+  const Rig rig({{fisheye, SE3()}, {fisheye, turned(kPi / 2, {0.05, 0, 0})}, {fisheye, turned(kPi, {0, 0, -0.1})}});
+  EXPECT_TRUE(rig.overlap(0, 1));
+  EXPECT_TRUE(rig.overlap(0, 2));  // 220 degrees each, back to back: they share a ring
+}
+
+TEST(Rig, SubsetKeepsTheOrderAndMovesTheRigFrame) {
+  const Rig rig = three_cameras();
+  const std::array order = {2, 0};
+  const Rig chosen = rig.subset(order);
+  ASSERT_EQ(chosen.size(), 2u);
+  EXPECT_EQ(chosen.camera(std::size_t{0}).name, "back");
+  EXPECT_EQ(chosen.camera(CameraIndex(1)).name, "left");
+  EXPECT_LT(difference(chosen.cam_from_rig(std::size_t{1}), rig.cam_from_rig(std::size_t{0}) * rig.rig_from_cam(2)),
+            1e-13);
+  EXPECT_LT(difference(chosen.body_from_cam(0), rig.body_from_cam(2)), 1e-15);
+}
+
+TEST(Rig, OneCameraOverlapsNothing) {
+  const Rig rig({{pinhole("only"), SE3()}});
+  EXPECT_EQ(rig.size(), 1u);
+  EXPECT_FALSE(rig.any_overlap());
+}
+
+TEST(RigDeathTest, HasAtLeastOneCamera) { EXPECT_DEATH(Rig({}), "at least one camera"); }
+
+TEST(Camera, ContainsPixelsUpToItsMargin) {
+  const Camera camera = pinhole("c");
+  EXPECT_TRUE(camera.contains({0, 0}));
+  EXPECT_TRUE(camera.contains({639, 479}));
+  EXPECT_FALSE(camera.contains({639.01, 479}));
+  EXPECT_FALSE(camera.contains({-0.01, 5}));
+  EXPECT_FALSE(camera.contains({5, 5}, 6));
+  EXPECT_FALSE(camera.contains({std::nan(""), 5}));
+}
+
+TEST(Camera, PixelsSpanTheInverseOfTheFocalLength) { EXPECT_DOUBLE_EQ(pinhole("c").radians_per_pixel(), 1.0 / 300); }
+
+}  // namespace
+}  // namespace bslam::camera

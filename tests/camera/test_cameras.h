@@ -1,0 +1,41 @@
+// Cameras of every model for tests: real calibrations and extreme lenses.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "camera/camera.h"
+
+namespace bslam::camera {
+
+inline std::vector<Camera> test_cameras() {
+  const auto camera = [](std::string name, CameraModel model, int width, int height) {
+    return Camera{std::move(name), std::move(model), width, height, 0, ""};
+  };
+  return {
+      camera("pinhole", Pinhole({707.0912, 700.5, 601.8873, 183.1104}), 1226, 370),
+      camera("radtan4_euroc",
+             PinholeRadTan({458.654, 457.296, 367.215, 248.375}, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05}),
+             752, 480),
+      camera("radtan5_kitti",
+             PinholeRadTan({984.2439, 980.8141, 690.0, 233.1966},
+                           {-0.3728755, 0.2037299, 0.002219027, 0.001383707, -0.07233722}),
+             1392, 512),
+      camera("radtan8_rational",
+             PinholeRadTan({610.2, 611.4, 640.3, 362.9}, {0.38, -2.6, 0.0004, -0.0003, 1.5, 0.26, -2.4, 1.43}), 1280,
+             720),
+      camera("radtan_pincushion", PinholeRadTan({400, 400, 320, 240}, {0.2, 0.05, 0.001, -0.002}), 640, 480),
+      camera("fisheye_aria",
+             KannalaBrandt({245.445231, 245.439242, 254.256944, 259.183324},
+                           {0.015783166, 0.026943495, -0.04571934, 0.007215107}),
+             512, 512),
+      camera("fisheye_tumvi",
+             KannalaBrandt({190.978, 190.973, 254.932, 256.897},
+                           {0.0034823894, 0.0007150348, -0.0020532361, 0.00020293673}),
+             512, 512),
+      // 220 degrees across: it sees behind its plane.
+      camera("fisheye_wide", KannalaBrandt({130.0, 131.0, 319.5, 239.5}, {-0.01, 0.002, -0.0003, 0.00001}), 640, 480),
+  };
+}
+
+}  // namespace bslam::camera

@@ -1,0 +1,120 @@
+#include "mapping/cull.h"
+
+#include <gtest/gtest.h>
+
+#include "map/synthetic_map.h"
+
+namespace bslam::mapping {
+namespace {
+
+// Keyframes of two cameras with `matched` two-camera features, then monocular ones; no geometry.
+class Cull : public ::testing::Test {
+ protected:
+  static constexpr std::size_t kKeypoints = 60, kMatched = 20;
+  Cull() : map(map::synthetic_rig(2)) {}
+  KeyframeId add_keyframe() {
+    return map.add_keyframe(map::synthetic_frame(random, 2, kKeypoints, kMatched), map::random_pose(random, 0.5), {}, map.newest_keyframe());
+  }
+  LandmarkId add_landmark(const std::vector<map::Observation>& observations) {
+    return map.add_landmark(map::random_point(random), observations);
+  }
+  map::MapDraft draft() const { return map::MapDraft("test", std::make_shared<const map::BundledMap>(map)); }
+  static FeatureId monocular(int i) { return FeatureId(static_cast<std::int32_t>(kMatched) + i); }
+
+  Random random{1, "cull"};
+  map::BundledMap map;
+  const CullingOptions options;
+};
+
+TEST_F(Cull, LandmarksThatTrackingDoesNotFindAgainGo) {
+  const KeyframeId k = add_keyframe();
+  const LandmarkId found = add_landmark({{k, FeatureId(0)}}), missed = add_landmark({{k, FeatureId(1)}}),
+                   hardly_tried = add_landmark({{k, FeatureId(2)}});
+  map.add_sightings(found, 8, 2);
+  map.add_sightings(missed, 8, 1);
+  map.add_sightings(hardly_tried, 3, 0);
+  map::MapDraft d = draft();
+  EXPECT_EQ(cull_landmarks(k, options, d), 1);
+  EXPECT_TRUE(d.map().alive(found) && d.map().alive(hardly_tried));
+  EXPECT_FALSE(d.map().alive(missed));
+}
+
+TEST_F(Cull, AfterItsProbationALandmarkNeedsThreeKeypoints) {
+  const KeyframeId k0 = add_keyframe();
+  const LandmarkId two = add_landmark({{k0, FeatureId(0)}}), one = add_landmark({{k0, monocular(0)}});
+  const KeyframeId k1 = add_keyframe();
+  map.add_observation(two, {k1, monocular(1)});  // three keypoints now
+  for (int age = 1; age <= 3; ++age) {
+    map::MapDraft d = draft();
+    const KeyframeId newest = map.newest_keyframe();
+    const int culled = cull_landmarks(newest, options, d);
+    EXPECT_EQ(culled, newest.value() >= options.probation ? 1 : 0);
+    EXPECT_EQ(d.map().alive(one), newest.value() < options.probation);
+    EXPECT_TRUE(d.map().alive(two));
+    add_keyframe();
+  }
+}
+
+TEST_F(Cull, OldLandmarksStay) {
+  const KeyframeId k = add_keyframe();
+  const LandmarkId old = add_landmark({{k, monocular(0)}});
+  map.add_sightings(old, 100, 0);
+  for (int i = 0; i < 5; ++i) add_keyframe();
+  map::MapDraft d = draft();
+  EXPECT_EQ(cull_landmarks(map.newest_keyframe(), options, d), 0);
+  EXPECT_TRUE(d.map().alive(old));
+}
+
+// Keyframes 0 ... 5 all see the same landmarks, on equal levels.
+class CullKeyframes : public Cull {
+ protected:
+  CullKeyframes() {
+    for (int k = 0; k < 6; ++k) {
+      auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
+      for (frame::CameraFrame& c : frame->cameras) std::fill(c.keypoints.level.begin(), c.keypoints.level.end(), std::uint8_t{2});
+      map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
+    }
+    for (int l = 0; l < 40; ++l) {
+      std::vector<map::Observation> observations;
+      for (int k = 0; k < 6; ++k) observations.push_back({KeyframeId(k), FeatureId(l)});
+      add_landmark(observations);
+    }
+  }
+  std::vector<int> culled(const CullingOptions& o) const {
+    map::MapDraft d = draft();
+    const int n = cull_keyframes(KeyframeId(5), o, d);
+    std::vector<int> gone;
+    for (int k = 0; k < 6; ++k) {
+      if (!d.map().alive(KeyframeId(k))) gone.push_back(k);
+    }
+    EXPECT_EQ(n, static_cast<int>(gone.size()));
+    EXPECT_EQ(d.map().check_invariants(), std::nullopt);
+    return gone;
+  }
+};
+
+TEST_F(CullKeyframes, RedundantOnesGoButNotTheRootNorTheNewest) { EXPECT_EQ(culled(options), (std::vector<int>{1, 2})); }
+
+TEST_F(CullKeyframes, StopsWhereOthersAreNeeded) {
+  CullingOptions five;
+  five.redundant_views = 5;  // once one is gone, no landmark is seen by five others
+  EXPECT_EQ(culled(five), (std::vector<int>{1}));
+}
+
+TEST_F(CullKeyframes, OneWithLandmarksOfItsOwnStays) {
+  for (int l = 0; l < 6; ++l) add_landmark({{KeyframeId(1), FeatureId(50 + l)}});  // 40 of 46 are seen elsewhere: 87 %
+  EXPECT_EQ(culled(options), (std::vector<int>{2}));
+}
+
+TEST_F(CullKeyframes, ViewsFromFarAwayDoNotReplaceANearOne) {
+  const auto coarse = [&](int k) {
+    for (frame::CameraFrame& c : const_cast<frame::BundledFrame&>(*map.keyframe(KeyframeId(k)).frame).cameras) {
+      std::fill(c.keypoints.level.begin(), c.keypoints.level.end(), std::uint8_t{6});
+    }
+  };
+  for (const int k : {2, 3, 4, 5}) coarse(k);
+  EXPECT_EQ(culled(options), (std::vector<int>{2}));  // 1 sees all on level 2, only the root does as well
+}
+
+}  // namespace
+}  // namespace bslam::mapping

@@ -1,0 +1,93 @@
+// Maps made of simulated frames with the truth beside them: poses, places of landmarks and who sees what.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "image/pyramid.h"
+#include "map/map_store.h"
+#include "simulation/feature_simulator.h"
+#include "simulation/rigs.h"
+
+namespace bslam::map {
+
+using simulation::FeatureSimulator;
+using simulation::SimulatedFrame;
+
+// The simulator's landmark that a feature shows, or -1.
+inline int shown_by(const SimulatedFrame& frame, FeatureId f) {
+  const frame::KeypointRef r = frame.frame.bundled.keypoints(f).front();
+  return frame.landmark[r.camera.index()][r.keypoint.index()];
+}
+
+// What sub-pixel alignment sees of a simulated frame: images without any texture, so that nothing aligns.
+inline std::vector<image::Pyramid> flat_pyramids(std::size_t cameras) {
+  image::Pyramid pyramid;
+  for (int l = 0; l < 8; ++l) {
+    image::Image level(32, 32);
+    for (int y = 0; y < 32; ++y) std::fill(level.row(y), level.row(y) + 32, std::uint8_t{0});
+    pyramid.levels.push_back(std::move(level));
+    pyramid.scale_x.push_back(std::pow(1.2, l));
+    pyramid.scale_y.push_back(std::pow(1.2, l));
+  }
+  return std::vector<image::Pyramid>(cameras, pyramid);
+}
+
+class SimulatedMap {
+ public:
+  explicit SimulatedMap(FeatureSimulator simulator)
+      : sim(std::move(simulator)), map(std::make_shared<const camera::Rig>(sim.rig())) {}
+
+  // A keyframe of what the rig sees at `time_s`, at its true pose, with landmarks at their true places for every feature
+  // that shows one, or only for those of matched features with a point (`all` false: the others stay without).
+  KeyframeId add_keyframe(FrameId id, double time_s, bool all = true) {
+    const SimulatedFrame& seen = frames.emplace_back(sim.frame(id, time_s));
+    const auto stored = std::make_shared<const frame::BundledFrame>(seen.frame);
+    std::vector<std::pair<FeatureId, LandmarkId>> known;
+    std::vector<std::pair<FeatureId, int>> unknown;
+    std::vector<std::uint8_t> taken(sim.landmarks().size(), 0);
+    for (std::size_t f = 0; f < stored->bundled.size(); ++f) {
+      const int truth = shown_by(seen, FeatureId(f));
+      if (truth < 0 || std::exchange(taken[static_cast<std::size_t>(truth)], std::uint8_t{1})) continue;
+      const auto at = landmark_of.find(truth);
+      if (at != landmark_of.end()) {
+        known.emplace_back(f, at->second);
+      } else if (all || stored->bundled.point(FeatureId(f))) {
+        unknown.emplace_back(f, truth);
+      }
+    }
+    const KeyframeId k = map.add_keyframe(stored, seen.T_world_rig.inverse(), known, map.newest_keyframe());
+    for (const auto& [f, truth] : unknown) {
+      const Observation observation{k, f};
+      const LandmarkId l = map.add_landmark(truth_of(truth), std::span(&observation, 1));
+      landmark_of[truth] = l;
+      truth_of_landmark[l.value()] = truth;
+    }
+    for (const auto& [f, l] : known) map.refresh_landmark(l);
+    return k;
+  }
+
+  const Eigen::Vector3d& truth_of(int landmark) const { return sim.landmarks()[static_cast<std::size_t>(landmark)].position; }
+  geometry::SE3 true_pose(KeyframeId k) const { return frames[k.index()].T_world_rig.inverse(); }
+  MapSnapshot snapshot() const { return std::make_shared<const BundledMap>(map); }
+  MapDraft draft() const { return MapDraft("test", snapshot()); }
+
+  FeatureSimulator sim;
+  BundledMap map;
+  std::vector<SimulatedFrame> frames;  // one per keyframe
+  std::unordered_map<int, LandmarkId> landmark_of;
+  std::unordered_map<int, int> truth_of_landmark;  // by id
+};
+
+// Metres between the centres and radians between the orientations of two poses T_rig_world.
+inline double distance_m(const geometry::SE3& a, const geometry::SE3& b) {
+  return (a.inverse().translation() - b.inverse().translation()).norm();
+}
+inline double angle_rad(const geometry::SE3& a, const geometry::SE3& b) { return a.rotation().angularDistance(b.rotation()); }
+
+}  // namespace bslam::map

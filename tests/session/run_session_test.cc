@@ -1,0 +1,160 @@
+#include "session/run_session.h"
+
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <fstream>
+
+#include "io/simulation_writer.h"
+#include "session/frame_source.h"
+#include "simulation/rigs.h"
+
+namespace bslam::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Eight frames of two cameras on disk, written once per process.
+class Session : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder() = fs::temp_directory_path() / ("bslam_session_test_" + std::to_string(::getpid()));
+    ThreadPool pool(2);
+    const io::SimulationRequest request{.folder = folder() / "data",
+                                        .rig = simulation::ring_rig(2, 240),
+                                        .recording = {.duration_s = 0.8, .rate_hz = 10},
+                                        .tour = {.duration_s = 0.8},
+                                        .imaging = {},
+                                        .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
+    const auto outcome = io::write_simulation(request, pool);
+    ASSERT_TRUE(outcome.ok()) << outcome.error().message();
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder()); }
+  static fs::path& folder() {
+    static fs::path path;
+    return path;
+  }
+  static io::Dataset dataset() {
+    auto opened = io::open_dataset({.path = folder() / "data"});
+    EXPECT_TRUE(opened.ok());
+    return std::move(*opened);
+  }
+  static SessionOptions options() {
+    SessionOptions o;
+    o.config.mode = system::Mode::kSequential;
+    o.config.features.per_image = 400;
+    return o;
+  }
+};
+
+TEST_F(Session, ReadsFramesInOrder) {
+  const io::Dataset data = dataset();
+  FrameSource source(data, 2);
+  for (std::size_t i = 0; i < data.frames.size(); ++i) {
+    const auto item = source.next();
+    ASSERT_TRUE(item.has_value());
+    EXPECT_EQ(item->images.id, FrameId(i));
+    EXPECT_EQ(item->images.time_ns, data.frames[i].time_ns);
+    ASSERT_EQ(item->images.images.size(), 2u);
+    for (const image::CameraImage& image : item->images.images) EXPECT_EQ(image.state, image::ImageState::kPresent);
+  }
+  EXPECT_FALSE(source.next().has_value());
+  EXPECT_FALSE(source.next().has_value());
+}
+
+TEST_F(Session, StopsReadingCleanlyWhereNobodyWantsMoreParallel) {
+  const io::Dataset data = dataset();
+  for (std::size_t taken = 0; taken <= data.frames.size(); ++taken) {
+    FrameSource source(data, 1 + taken % 3);
+    for (std::size_t i = 0; i < taken; ++i) EXPECT_TRUE(source.next().has_value());
+  }
+}
+
+TEST_F(Session, WritesAllItsFiles) {
+  const io::Dataset data = dataset();
+  SessionOptions o = options();
+  std::vector<std::size_t> progress;
+  o.progress = [&](std::size_t done, std::size_t all) {
+    EXPECT_EQ(all, 8u);
+    progress.push_back(done);
+  };
+  const auto result = run_session(data, o);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(progress, (std::vector<std::size_t>{1, 2, 3, 4, 5, 6, 7, 8}));
+  EXPECT_TRUE(result->record.complete);
+  EXPECT_EQ(result->record.frames.size(), 8u);
+  EXPECT_EQ(result->trajectory.size(), 8u);
+  EXPECT_EQ(result->live.size(), 8u);
+  EXPECT_EQ(result->record.mode, "sequential");
+  EXPECT_EQ(result->record.map.scale, "metric");
+  EXPECT_EQ(result->record.maps_started, 1);
+  for (const report::CameraRecord& c : result->record.cameras) EXPECT_EQ(c.images, 8);
+
+  const fs::path out = folder() / "out";
+  EXPECT_FALSE(write_outputs(*result, o.config, out).ok());  // the folder is the caller's
+  fs::create_directory(out);
+  ASSERT_TRUE(write_outputs(*result, o.config, out).ok());
+  for (const char* name : {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg", "run.svg"}) {
+    EXPECT_GT(fs::file_size(out / name), 50u) << name;
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 6);  // and nothing half-written
+}
+
+TEST_F(Session, TracksTheSameInParallel) {
+  SessionOptions o = options();
+  o.config.mode = system::Mode::kParallel;
+  const auto result = run_session(dataset(), o);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->trajectory.size(), 8u);
+  EXPECT_EQ(result->record.mode, "parallel");
+}
+
+TEST_F(Session, EndsWhereInterrupted) {
+  std::atomic<bool> interrupted = false;
+  SessionOptions o = options();
+  o.interrupted = &interrupted;
+  o.progress = [&](std::size_t done, std::size_t) { interrupted = done == 3; };
+  const auto result = run_session(dataset(), o);
+  ASSERT_TRUE(result.ok());
+  EXPECT_FALSE(result->record.complete);
+  EXPECT_EQ(result->record.frames.size(), 3u);
+  EXPECT_EQ(result->trajectory.size(), 3u);
+  interrupted = true;
+  const auto nothing = run_session(dataset(), o);
+  ASSERT_TRUE(nothing.ok());
+  EXPECT_FALSE(nothing->record.complete);
+  EXPECT_TRUE(nothing->record.frames.empty());
+  fs::create_directory(folder() / "nothing");
+  EXPECT_TRUE(write_outputs(*nothing, o.config, folder() / "nothing").ok());
+}
+
+TEST_F(Session, CountsADamagedImageAsSkippedAndGoesOn) {
+  const io::Dataset data = dataset();
+  const fs::path victim = data.frames[4].images[1]->path, kept = folder() / "kept.png";
+  fs::rename(victim, kept);
+  std::ofstream(victim) << "no image";
+  const auto result = run_session(data, options());
+  fs::rename(kept, victim);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->record.cameras[0].skipped, 0);
+  EXPECT_EQ(result->record.cameras[1].skipped, 1);
+  EXPECT_EQ(result->record.cameras[1].images, 7);
+  ASSERT_EQ(result->record.frames.size(), 8u);
+  EXPECT_FALSE(result->record.frames[4].cameras[1].has_image);
+  for (const report::FrameRecord& f : result->record.frames) EXPECT_EQ(f.outcome, report::FrameOutcome::kTracked);
+}
+
+TEST_F(Session, ReportsAMaskThatCannotBeRead) {
+  io::Dataset data = dataset();
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < data.rig.size(); ++c) cameras.push_back({data.rig.camera(c), data.rig.body_from_cam(c)});
+  cameras[1].camera.mask_file = (folder() / "no_such_mask.png").string();
+  data.rig = camera::Rig(cameras);
+  const auto result = run_session(data, options());
+  ASSERT_FALSE(result.ok());
+  EXPECT_NE(result.error().message().find("no_such_mask.png"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace bslam::session

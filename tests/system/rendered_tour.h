@@ -1,0 +1,126 @@
+// A short tour through the built-in world, rendered small: what the tests of the system see. One ring of eight cameras;
+// rigs of fewer are its first ones, of which the first two look ahead side by side.
+#pragma once
+
+#include <numeric>
+#include <vector>
+
+#include "evaluation/trajectory_error.h"
+#include "image/image_bundle.h"
+#include "simulation/recorder.h"
+#include "simulation/rigs.h"
+#include "system/system.h"
+
+namespace bslam::system {
+
+class RenderedTour {
+ public:
+  RenderedTour(int cameras, std::size_t frames) : pool_(2), rig_(first_cameras(cameras)) {
+    const simulation::World world(simulation::make_building(3), {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2}, pool_);
+    const simulation::RecordingOptions options{.duration_s = static_cast<double>(frames) / kRateHz, .rate_hz = kRateHz};
+    const auto tour = simulation::make_tour(world.building(), {.duration_s = options.duration_s, .seed = 3});
+    const simulation::Recorder recorder(world, rig_, tour, {}, 0.002, pool_);
+    const std::vector<simulation::Shot> shots = simulation::plan_shots(rig_, options);
+    frames_.resize(frames);
+    for (std::size_t k = 0; k < frames; ++k) {
+      frames_[k].id = FrameId(k);
+      frames_[k].time_ns = simulation::frame_stamp(options, k);
+      frames_[k].images.resize(rig_.size());
+    }
+    pool_.for_each(shots.size(), [&](std::size_t i) {
+      const simulation::Shot& shot = shots[i];
+      frames_[shot.frame].images[shot.camera] = {image::ImageState::kPresent, shot.stamp_ns, recorder.picture(shot)};
+    });
+    for (const simulation::Shot& shot : shots) {
+      if (shot.camera == 0) truth_.push_back({shot.stamp_ns, recorder.T_world_cam(0, shot.scene_time_s)});
+    }
+  }
+
+  const camera::Rig& rig() const { return rig_; }
+  const std::vector<image::ImageBundle>& frames() const { return frames_; }
+  const evaluation::Trajectory& truth() const { return truth_; }  // of camera 0
+
+  // The same recording with fewer cameras.
+  camera::Rig rig_of(int cameras) const { return rig_.subset(camera_list(cameras)); }
+  image::ImageBundle frame_of(std::size_t k, int cameras) const {
+    image::ImageBundle out = frames_[k];
+    out.images.resize(static_cast<std::size_t>(cameras));
+    return out;
+  }
+
+  // The recording played once more as frames number `first_id` and on: frame k, and the truth of all.
+  image::ImageBundle replayed(std::size_t k, std::size_t first_id) const {
+    image::ImageBundle out = frames_[k];
+    out.id = FrameId(first_id + k);
+    out.time_ns += shift_ns(first_id);
+    for (image::CameraImage& i : out.images) i.time_ns += shift_ns(first_id);
+    return out;
+  }
+  evaluation::Trajectory replayed_truth(std::size_t first_id) const {
+    evaluation::Trajectory out = truth_;
+    for (evaluation::TimedPose& p : out) p.time_ns += shift_ns(first_id);
+    return out;
+  }
+
+  static constexpr double kRateHz = 15;
+
+ private:
+  static TimeNs shift_ns(std::size_t frames) { return from_seconds(static_cast<double>(frames) / kRateHz); }
+  static std::vector<int> camera_list(int cameras) {
+    std::vector<int> list(static_cast<std::size_t>(cameras));
+    std::iota(list.begin(), list.end(), 0);
+    return list;
+  }
+  static camera::Rig first_cameras(int cameras) { return simulation::ring_rig(8, 320).subset(camera_list(cameras)); }
+
+  ThreadPool pool_;
+  camera::Rig rig_;
+  std::vector<image::ImageBundle> frames_;
+  evaluation::Trajectory truth_;
+};
+
+inline void blacken(image::CameraImage& input) {
+  for (int y = 0; y < input.image.height(); ++y) {
+    std::fill(input.image.row(y), input.image.row(y) + input.image.width(), std::uint8_t{0});
+  }
+}
+
+inline void make_absent(image::CameraImage& input, image::ImageState state) {
+  input.state = state;
+  input.image = {};
+}
+
+// Settings for pictures of 320 x 204.
+inline Config small_config(Mode mode, int threads = 2) {
+  Config config;
+  config.mode = mode;
+  config.execution.threads = threads;
+  config.features.per_image = 500;
+  return config;
+}
+
+inline std::size_t tracked_frames(const System& system) {
+  std::size_t n = 0;
+  for (const FrameRecord& r : system.frames()) n += r.result.status == tracking::TrackStatus::kTracking;
+  return n;
+}
+
+// Root mean square position error in metres after alignment.
+inline double ate_m(const evaluation::Trajectory& estimate, const evaluation::Trajectory& truth,
+                    evaluation::AlignMode align = evaluation::AlignMode::kSe3) {
+  const auto result = evaluation::evaluate(estimate, truth, {.align = align});
+  return result ? result->ate.rmse : std::numeric_limits<double>::infinity();
+}
+
+inline bool identical(const evaluation::Trajectory& a, const evaluation::Trajectory& b) {
+  if (a.size() != b.size()) return false;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (a[i].time_ns != b[i].time_ns || a[i].T_world_frame.translation() != b[i].T_world_frame.translation() ||
+        a[i].T_world_frame.rotation().coeffs() != b[i].T_world_frame.rotation().coeffs()) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace bslam::system

@@ -1,0 +1,200 @@
+#include <gtest/gtest.h>
+
+#include "system/rendered_tour.h"
+
+namespace bslam::system {
+namespace {
+
+using image::ImageState;
+using tracking::LostReason;
+using tracking::TrackStatus;
+
+struct Outcome {
+  evaluation::Trajectory final, live;
+  std::size_t landmarks = 0, observations = 0;
+};
+
+Outcome run(const RenderedTour& tour, const Config& config) {
+  System system(tour.rig(), config);
+  for (const image::ImageBundle& images : tour.frames()) system.process(images);
+  system.finish();
+  return {system.trajectory(), system.live_trajectory(), system.snapshot()->num_landmarks(), system.snapshot()->num_observations()};
+}
+
+TEST(SystemSequential, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
+  const RenderedTour tour(4, 16);
+  const Outcome first = run(tour, small_config(Mode::kSequential, 1));
+  EXPECT_EQ(first.final.size(), tour.frames().size());
+  for (const int threads : {1, 2, 4}) {
+    const Outcome again = run(tour, small_config(Mode::kSequential, threads));
+    EXPECT_TRUE(identical(first.final, again.final)) << threads << " threads";
+    EXPECT_TRUE(identical(first.live, again.live)) << threads << " threads";
+    EXPECT_EQ(first.landmarks, again.landmarks);
+    EXPECT_EQ(first.observations, again.observations);
+  }
+}
+
+TEST(SystemSequential, TracksWithOneToEightCameras) {
+  const std::size_t count = 20;
+  const RenderedTour tour(8, count);
+  for (int n = 1; n <= 8; ++n) {
+    System system(tour.rig_of(n), small_config(Mode::kSequential));
+    for (std::size_t k = 0; k < count; ++k) system.process(tour.frame_of(k, n));
+    system.finish();
+    const auto align = n == 1 ? evaluation::AlignMode::kSim3 : evaluation::AlignMode::kSe3;
+    EXPECT_EQ(system.snapshot()->scale(), n == 1 ? map::Scale::kUpToScale : map::Scale::kMetric) << n << " cameras";
+    EXPECT_GE(tracked_frames(system), n == 1 ? count - 5 : count) << n << " cameras";  // two views must first differ
+    EXPECT_LT(ate_m(system.trajectory(), tour.truth(), align), 0.01) << n << " cameras";
+    EXPECT_LT(ate_m(system.live_trajectory(), tour.truth(), align), 0.015) << n << " cameras";
+    EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt) << n << " cameras";
+  }
+}
+
+TEST(SystemSequential, KnowsTheTruePathLengthWithTwoCameras) {
+  const RenderedTour tour(2, 24);
+  const Outcome outcome = run(tour, small_config(Mode::kSequential));
+  const double truth_m = evaluation::path_length_m(tour.truth());
+  EXPECT_NEAR(evaluation::path_length_m(outcome.final), truth_m, 0.03 * truth_m);
+}
+
+TEST(SystemSequential, ADamagedOrMissingImageCostsOnlyItsCamera) {
+  const RenderedTour tour(4, 16);
+  std::vector<image::ImageBundle> frames = tour.frames();
+  make_absent(frames[6].images[1], ImageState::kDamaged);
+  for (const std::size_t k : {8u, 9u}) make_absent(frames[k].images[0], ImageState::kMissing);
+  make_absent(frames[11].images[0], ImageState::kDamaged);
+  make_absent(frames[11].images[1], ImageState::kDamaged);
+  System system(tour.rig(), small_config(Mode::kSequential));
+  for (const image::ImageBundle& images : frames) {
+    const FrameRecord& record = system.process(images);
+    EXPECT_EQ(record.result.status, TrackStatus::kTracking) << "frame " << images.id.value();
+    for (std::size_t c = 0; c < 4; ++c) {
+      const bool present = images.images[c].state == ImageState::kPresent;
+      EXPECT_EQ(record.images[c], images.images[c].state);
+      EXPECT_EQ(record.result.cameras[c].keypoints > 0, present);
+      EXPECT_EQ(record.result.cameras[c].inliers > 0, present && images.id.value() > 0) << "frame " << images.id.value();
+    }
+  }
+  system.finish();
+  EXPECT_LT(ate_m(system.trajectory(), tour.truth()), 0.01);
+  EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
+}
+
+TEST(SystemSequential, IsLostInTheDarkAndRecovers) {
+  const RenderedTour tour(2, 20);
+  std::vector<image::ImageBundle> frames = tour.frames();
+  for (const std::size_t k : {8u, 9u}) {
+    for (image::CameraImage& i : frames[k].images) blacken(i);
+  }
+  System system(tour.rig(), small_config(Mode::kSequential));
+  for (const image::ImageBundle& images : frames) {
+    const FrameRecord& record = system.process(images);
+    const bool dark = images.id.value() == 8 || images.id.value() == 9;
+    EXPECT_EQ(record.result.status, dark ? TrackStatus::kLost : TrackStatus::kTracking) << "frame " << images.id.value();
+    EXPECT_EQ(record.result.reason, dark ? LostReason::kFewFeatures : LostReason::kNone);
+  }
+  system.finish();
+  EXPECT_EQ(system.trajectory().size(), frames.size() - 2);
+  EXPECT_LT(ate_m(system.trajectory(), tour.truth()), 0.01);
+  EXPECT_EQ(system.maps_started(), 1);
+}
+
+TEST(SystemSequential, RecordsEveryInputFrame) {
+  const RenderedTour tour(2, 10);
+  std::vector<image::ImageBundle> frames = tour.frames();
+  for (const std::size_t k : {0u, 6u}) {
+    for (image::CameraImage& i : frames[k].images) make_absent(i, ImageState::kMissing);
+  }
+  System system(tour.rig(), small_config(Mode::kSequential));
+  for (const image::ImageBundle& images : frames) system.process(images);
+  system.finish();
+  ASSERT_EQ(system.frames().size(), frames.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const FrameRecord& record = system.frames()[k];
+    EXPECT_EQ(record.result.frame, frames[k].id);
+    EXPECT_EQ(record.result.time_ns, frames[k].time_ns);
+    EXPECT_EQ(record.images.size(), 2u);
+    EXPECT_EQ(record.result.cameras.size(), 2u);
+    EXPECT_EQ(record.unique, record.monocular + record.matched);
+    EXPECT_EQ(record.result.status == TrackStatus::kTracking, record.result.reason == LostReason::kNone);
+    int inliers = 0;
+    for (const tracking::CameraCounts& c : record.result.cameras) {
+      EXPECT_LE(c.inliers, c.matched);
+      EXPECT_LE(c.matched, c.keypoints);
+      inliers += c.inliers;
+    }
+    if (k > 1 && k != 6) {
+      EXPECT_GE(inliers, 30) << "frame " << k;
+    }
+  }
+  EXPECT_EQ(system.frames()[0].result.reason, LostReason::kNotStarted);
+  EXPECT_EQ(system.frames()[6].result.reason, LostReason::kNoImages);
+  EXPECT_TRUE(system.frames()[1].keyframe);
+  EXPECT_EQ(system.mapping_runs().size(), static_cast<std::size_t>(std::count_if(
+                                              system.frames().begin(), system.frames().end(),
+                                              [](const FrameRecord& r) { return r.keyframe; })));
+}
+
+TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {
+  const RenderedTour tour(2, 4);
+  image::Image nothing(tour.rig().camera(1).width, tour.rig().camera(1).height);
+  image::CameraImage black{ImageState::kPresent, 0, nothing};
+  blacken(black);
+  System system(tour.rig(), small_config(Mode::kSequential), {image::Image(), black.image});
+  for (const image::ImageBundle& images : tour.frames()) {
+    const FrameRecord& record = system.process(images);
+    EXPECT_GT(record.result.cameras[0].keypoints, 100);
+    EXPECT_EQ(record.result.cameras[1].keypoints, 0);
+    EXPECT_EQ(record.result.reason, LostReason::kNotStarted);  // no matched features, no metric start
+  }
+  EXPECT_TRUE(system.trajectory().empty());
+}
+
+TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
+  const RenderedTour tour(1, 16);
+  System system(tour.rig(), small_config(Mode::kSequential));
+  std::size_t k = 0;
+  while (k < 8 && tracked_frames(system) == 0) system.process(tour.frames()[k++]);
+  ASSERT_GT(tracked_frames(system), 0u);
+  image::ImageBundle dark = tour.frames()[k++];
+  blacken(dark.images[0]);
+  system.process(dark);
+  EXPECT_EQ(tracked_frames(system), 0u);
+  EXPECT_TRUE(system.trajectory().empty() && system.live_trajectory().empty());
+  EXPECT_EQ(system.snapshot()->num_keyframes(), 0u);
+
+  for (std::size_t i = 0; i < tour.frames().size(); ++i) system.process(tour.replayed(i, k));
+  system.finish();
+  EXPECT_EQ(system.maps_started(), 2);
+  EXPECT_GT(system.trajectory().size(), 8u);
+  EXPECT_LT(ate_m(system.trajectory(), tour.replayed_truth(k), evaluation::AlignMode::kSim3), 0.01);
+}
+
+// Fails: the first frame of all becomes what later ones are compared with, also where it shows nothing, and stays that
+// for 40 frames (Pipeline::start).
+TEST(SystemSequential, DISABLED_StartsUpToScaleSoonAfterADarkFirstFrame) {
+  const RenderedTour tour(1, 16);
+  System system(tour.rig(), small_config(Mode::kSequential));
+  image::ImageBundle dark = tour.frames()[0];
+  blacken(dark.images[0]);
+  system.process(dark);
+  for (std::size_t i = 0; i < tour.frames().size(); ++i) system.process(tour.replayed(i, 1));
+  EXPECT_GT(tracked_frames(system), 8u);
+}
+
+TEST(SystemSequential, AdjustsTheWholeMapAtTheEndOnlyWhereConfigured) {
+  const RenderedTour tour(2, 8);
+  for (const bool wanted : {false, true}) {
+    Config config = small_config(Mode::kSequential);
+    config.final_adjustment = wanted;
+    System system(tour.rig(), config);
+    for (const image::ImageBundle& images : tour.frames()) system.process(images);
+    const MapVersion before = system.snapshot()->version();
+    system.finish();
+    EXPECT_EQ(system.snapshot()->version() > before, wanted);
+    EXPECT_EQ(system.final_adjustment_ms() > 0, wanted);
+  }
+}
+
+}  // namespace
+}  // namespace bslam::system

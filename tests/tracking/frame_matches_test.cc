@@ -1,0 +1,104 @@
+#include "tracking/frame_matches.h"
+
+#include <gtest/gtest.h>
+
+#include "tracking/simulated_tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+class FindLandmarks : public ::testing::Test {
+ protected:
+  static constexpr double kRadius = 0.02;  // radians
+  map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 0.0, 1.0);
+  simulation::SimulatedFrame seen = world.sim.frame(FrameId(1), 0.1);
+  std::vector<LandmarkId> all = world.map.landmark_ids();
+  ThreadPool pool{2};
+  MatchSearch find(const FrameMatches& known) {
+    return find_landmarks(world.map, seen.frame, seen.T_world_rig.inverse(), all, known, {.radius = kRadius}, pool);
+  }
+  // Of keypoints that show a landmark of the map: how many matches are right, and how many could have been.
+  std::pair<std::size_t, std::size_t> right(const FrameMatches& found) const {
+    std::size_t right = 0, possible = 0;
+    for (std::size_t c = 0; c < found.size(); ++c) {
+      for (const Match& m : found[c]) right += world.truth_of_landmark.at(m.landmark.value()) == seen.landmark[c][m.keypoint.index()];
+      for (const int truth : seen.landmark[c]) possible += truth >= 0 && world.landmark_of.contains(truth);
+    }
+    return {right, possible};
+  }
+};
+
+TEST_F(FindLandmarks, FindsNearlyAllAndHardlyAnyWrong) {
+  const MatchSearch search = find({});
+  ASSERT_EQ(search.found.size(), 4u);
+  const auto [good, possible] = right(search.found);
+  EXPECT_GT(static_cast<double>(good), 0.9 * static_cast<double>(possible));
+  EXPECT_LE(count(search.found) - good, count(search.found) / 100);
+}
+
+TEST_F(FindLandmarks, ListsEachExpectedLandmarkOnceAndInOrder) {
+  const MatchSearch search = find({});
+  EXPECT_TRUE(std::is_sorted(search.visible.begin(), search.visible.end()));
+  EXPECT_EQ(std::adjacent_find(search.visible.begin(), search.visible.end()), search.visible.end());
+  for (const LandmarkId l : landmarks_of(search.found)) EXPECT_TRUE(std::binary_search(search.visible.begin(), search.visible.end(), l));
+}
+
+TEST_F(FindLandmarks, LeavesOutWhatIsKnownCameraByCamera) {
+  const MatchSearch first = find({});
+  FrameMatches known = first.found;
+  known[1].clear();
+  const MatchSearch again = find(known);
+  EXPECT_EQ(again.found[1].size(), first.found[1].size());
+  for (const std::size_t c : {0u, 2u, 3u}) {
+    for (const Match& m : again.found[c]) {
+      for (const Match& k : known[c]) EXPECT_TRUE(m.keypoint != k.keypoint && m.landmark != k.landmark);
+    }
+  }
+  const FrameMatches both = merge(known, again.found);
+  EXPECT_EQ(count(both), count(known) + count(again.found));
+  for (const auto& camera : both) {
+    EXPECT_TRUE(std::is_sorted(camera.begin(), camera.end(), [](const Match& a, const Match& b) { return a.keypoint < b.keypoint; }));
+  }
+}
+
+TEST_F(FindLandmarks, ACameraWithoutImageFindsNothing) {
+  const std::vector<int> missing = {2};
+  seen = world.sim.frame(FrameId(1), 0.1, missing);
+  const MatchSearch search = find({});
+  EXPECT_TRUE(search.found[2].empty());
+  EXPECT_FALSE(search.found[0].empty());
+}
+
+TEST_F(FindLandmarks, WhatDoesNotAlignKeepsItsPlaceWithTheDetectorsNoise) {
+  const MatchSearch search = find({});
+  frame::BundledFrame frame = seen.frame;
+  for (auto& s : frame.cameras[0].keypoints.sigma) s = 0.01f;
+  align_matches(world.map, seen.T_world_rig.inverse(), search.found, map::flat_pyramids(4), {}, {.sigma_px = 0.9}, frame, pool);
+  for (const Match& m : search.found[0]) {
+    const std::size_t k = m.keypoint.index();
+    EXPECT_EQ(frame.cameras[0].keypoints.pixel[k], seen.frame.cameras[0].keypoints.pixel[k]);
+    EXPECT_NEAR(frame.cameras[0].keypoints.sigma[k], 0.9 * std::pow(1.2, frame.cameras[0].keypoints.level[k]), 1e-4);
+  }
+}
+
+TEST_F(FindLandmarks, ObservationsFollowTheOrderOfTheMatches) {
+  const MatchSearch search = find({});
+  const auto observations = pose_observations(world.map, seen.frame, search.found);
+  ASSERT_EQ(observations.size(), count(search.found));
+  std::size_t i = 0;
+  std::vector<std::uint8_t> every_third;
+  for (std::size_t c = 0; c < search.found.size(); ++c) {
+    for (const Match& m : search.found[c]) {
+      EXPECT_EQ(observations[i].camera, CameraIndex(c));
+      EXPECT_EQ(observations[i].point_world, world.map.landmark(m.landmark).position);
+      EXPECT_EQ(observations[i].pixel, seen.frame.cameras[c].keypoints.pixel[m.keypoint.index()].cast<double>());
+      every_third.push_back(i++ % 3 == 0);
+    }
+  }
+  const FrameMatches kept = keep_inliers(search.found, every_third);
+  EXPECT_EQ(count(kept), (observations.size() + 2) / 3);
+  EXPECT_EQ(kept[0][1].keypoint, search.found[0][3].keypoint);
+}
+
+}  // namespace
+}  // namespace bslam::tracking

@@ -1,0 +1,138 @@
+#include "tracking/keyframe_decision.h"
+
+#include <gtest/gtest.h>
+
+#include "tracking/simulated_tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+// A rig in motion with plenty in common with its reference: nothing asks for a keyframe.
+KeyframeEvidence calm() {
+  KeyframeEvidence e;
+  e.frames_since_keyframe = 10;
+  e.overlap = 95;
+  e.best_overlap = 100;
+  e.parallax = 0.03;
+  return e;
+}
+const KeyframeOptions kOptions;
+
+TEST(KeyframeDecision, NothingAsksForOneInCalmMotion) { EXPECT_FALSE(keyframe_due(calm(), kOptions)); }
+
+TEST(KeyframeDecision, OverlapBelowItsShareOfTheBestAsksForOne) {
+  KeyframeEvidence e = calm();
+  e.overlap = 76;
+  EXPECT_FALSE(keyframe_due(e, kOptions));
+  e.overlap = 74;
+  EXPECT_TRUE(keyframe_due(e, kOptions));
+  e.best_overlap = 80;
+  EXPECT_FALSE(keyframe_due(e, kOptions));
+}
+
+TEST(KeyframeDecision, ParallaxAsksForOne) {
+  KeyframeEvidence e = calm();
+  e.parallax = 0.061;
+  EXPECT_TRUE(keyframe_due(e, kOptions));
+}
+
+TEST(KeyframeDecision, FreshDepthAsksForOne) {
+  KeyframeEvidence e = calm();
+  e.fresh_depth = true;
+  EXPECT_TRUE(keyframe_due(e, kOptions));
+}
+
+TEST(KeyframeDecision, NothingHurriesTheLeastInterval) {
+  KeyframeEvidence e;
+  e.parallax = 1;
+  e.fresh_depth = e.starved = true;
+  e.best_overlap = 100;
+  e.frames_since_keyframe = kOptions.min_interval - 1;
+  EXPECT_FALSE(keyframe_due(e, kOptions));
+  e.frames_since_keyframe = kOptions.min_interval;
+  EXPECT_TRUE(keyframe_due(e, kOptions));
+}
+
+TEST(KeyframeDecision, TheLongestIntervalEndsUnlessTheRigRests) {
+  KeyframeEvidence e = calm();
+  e.frames_since_keyframe = kOptions.max_interval - 1;
+  EXPECT_FALSE(keyframe_due(e, kOptions));
+  e.frames_since_keyframe = kOptions.max_interval;
+  EXPECT_TRUE(keyframe_due(e, kOptions));
+  e.parallax = 0.001;
+  e.overlap = 99;
+  EXPECT_FALSE(keyframe_due(e, kOptions));
+}
+
+TEST(KeyframeDecision, AStarvedCameraAsksForOneNowAndThenUnlessTheRigRests) {
+  KeyframeEvidence e = calm();
+  e.starved = true;
+  e.frames_since_keyframe = 4;
+  EXPECT_FALSE(keyframe_due(e, kOptions));
+  e.frames_since_keyframe = 8;
+  EXPECT_TRUE(keyframe_due(e, kOptions));
+  e.parallax = 0.001;
+  e.overlap = 99;
+  EXPECT_FALSE(keyframe_due(e, kOptions));
+}
+
+class KeyframeEvidenceTest : public ::testing::Test {
+ protected:
+  static const map::SimulatedMap& world() {
+    static const map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 0.0, 1.0);
+    return world;
+  }
+  // Every keypoint that shows a landmark of the map, in the cameras asked for.
+  static FrameMatches true_matches(const simulation::SimulatedFrame& frame, const std::vector<int>& cameras) {
+    FrameMatches matches(frame.frame.cameras.size());
+    for (const int c : cameras) {
+      const auto& shown = frame.landmark[static_cast<std::size_t>(c)];
+      for (std::size_t k = 0; k < shown.size(); ++k) {
+        const auto at = world().landmark_of.find(shown[k]);
+        if (shown[k] >= 0 && at != world().landmark_of.end()) matches[static_cast<std::size_t>(c)].push_back({KeypointIndex(k), at->second});
+      }
+    }
+    return matches;
+  }
+};
+
+TEST_F(KeyframeEvidenceTest, CountsTheLandmarksOfTheReferenceOnce) {
+  const auto frame = world().sim.frame(FrameId(1), 0.1);
+  const FrameMatches matches = true_matches(frame, {0, 1, 2, 3});
+  const KeyframeEvidence e = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), frame.T_world_rig.inverse(), kOptions);
+  EXPECT_EQ(e.overlap, static_cast<int>(landmarks_of(matches).size()));  // the map is one keyframe
+  EXPECT_FALSE(e.starved);
+  EXPECT_FALSE(e.fresh_depth);
+}
+
+TEST_F(KeyframeEvidenceTest, MeasuresParallaxAtTheLandmarks) {
+  const auto frame = world().sim.frame(FrameId(1), 0.0);
+  const FrameMatches matches = true_matches(frame, {0, 1, 2, 3});
+  const geometry::SE3 here = world().true_pose(KeyframeId(0));
+  EXPECT_NEAR(keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), here, kOptions).parallax, 0.0, 1e-9);
+  const geometry::SE3 turned = geometry::SE3::exp((geometry::Vector6d() << 0.1, 0.2, 0, 0, 0, 0).finished()) * here;
+  EXPECT_NEAR(keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), turned, kOptions).parallax, 0.0, 1e-9);
+  const geometry::SE3 moved(here.rotation(), here.translation() + Eigen::Vector3d(0, 0.2, 0));
+  const double parallax = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), moved, kOptions).parallax;
+  EXPECT_GT(parallax, 0.2 / 10);  // the room is ten metres long
+  EXPECT_LT(parallax, 0.2 / 1.5);
+}
+
+TEST_F(KeyframeEvidenceTest, NoticesACameraThatFindsNothing) {
+  const auto frame = world().sim.frame(FrameId(1), 0.1);
+  const geometry::SE3 pose = frame.T_world_rig.inverse();
+  EXPECT_TRUE(keyframe_evidence(world().map, frame.frame, true_matches(frame, {0, 1, 2}), KeyframeId(0), pose, kOptions).starved);
+  const std::vector<int> missing = {3};  // a camera without keypoints does not starve
+  const auto three = world().sim.frame(FrameId(1), 0.1, missing);
+  EXPECT_FALSE(keyframe_evidence(world().map, three.frame, true_matches(three, {0, 1, 2}), KeyframeId(0), pose, kOptions).starved);
+}
+
+TEST_F(KeyframeEvidenceTest, NoticesMatchedFeaturesThatNobodyTracks) {
+  const auto frame = world().sim.frame(FrameId(1), 0.1);
+  FrameMatches matches = true_matches(frame, {2, 3});  // the two in front, which overlap, have nothing
+  const KeyframeEvidence e = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), frame.T_world_rig.inverse(), kOptions);
+  EXPECT_TRUE(e.fresh_depth);
+}
+
+}  // namespace
+}  // namespace bslam::tracking
