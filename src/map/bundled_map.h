@@ -62,7 +62,7 @@ class BundledMap {
   // T_rig_world of a keyframe, alive or removed (then carried by its parent).
   geometry::SE3 resolved_pose(KeyframeId k) const;
 
-  // Covisible keyframes by falling weight (ties: newer first), at most `limit` (0 = all) with at least `min_weight`.
+  // Covisible keyframes by falling weight (ties: newer first), at most `limit` with at least `min_weight`.
   std::vector<Covisible> best_covisible(KeyframeId k, std::size_t limit, int min_weight = 1) const;
 
   // Pixel, level and patch owner of one keypoint of a keyframe.

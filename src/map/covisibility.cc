@@ -18,7 +18,7 @@ std::vector<Covisible> BundledMap::best_covisible(KeyframeId k, std::size_t limi
   for (const Covisible& c : keyframe(k).covisible) {
     if (c.weight >= min_weight) best.push_back(c);
   }
-  const std::size_t count = limit == 0 ? best.size() : std::min(limit, best.size());
+  const std::size_t count = std::min(limit, best.size());
   std::partial_sort(best.begin(), best.begin() + static_cast<std::ptrdiff_t>(count), best.end(), better);
   best.resize(count);
   return best;

@@ -9,6 +9,13 @@ MapSnapshot MapStore::snapshot() const {
   return current_;
 }
 
+void MapStore::restart(BundledMap initial) {
+  const std::lock_guard writer(commit_mutex_);
+  auto fresh = std::make_shared<const BundledMap>(std::move(initial));
+  const std::lock_guard lock(mutex_);
+  current_.swap(fresh);
+}
+
 CommitReport MapStore::commit(MapDraft draft) {
   const std::lock_guard writer(commit_mutex_);
   MapSnapshot current = snapshot();

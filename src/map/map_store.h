@@ -24,6 +24,9 @@ class MapStore {
   // The newest version; from any thread.
   MapSnapshot snapshot() const;
 
+  // Leaves all behind and publishes `initial`. No draft of an earlier version may be committed afterwards.
+  void restart(BundledMap initial);
+
   // Publishes the draft as the next version: its working copy as it is where its base is still the newest, with the
   // provisional ids as given; else its operations, applied to the newest by the rebase rules of map_edit.h. From any
   // thread; commits are one after the other.

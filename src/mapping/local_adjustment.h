@@ -7,7 +7,7 @@
 namespace bslam::mapping {
 
 // B_L: `keyframe` and its best covisible keyframes, free; P_L: the landmarks they see; B_F: further keyframes that see
-// them, fixed. The root is always fixed; where the scale is not observable and nothing else holds it, so is one more.
+// them, fixed. The root is always fixed; a map of one camera, up to scale, needs a second pose held so that its scale cannot wander.
 adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyframe, const LocalWindowOptions& options);
 
 // All keyframes but the root, all landmarks.

@@ -130,12 +130,20 @@ void Pipeline::start(BundledFrame frame, map::MapStore& store, Outcome& outcome)
     outcome.keyframes = report.keyframes;
     outcome.record.keyframe = true;
     candidate_.reset();
-  } else if (!rig_.any_overlap() && (!candidate_ || frame.id.value() - candidate_->frame->id.value() > kMaxStartAge)) {
-    const auto pyramids = builder_.pyramids();
-    candidate_ = tracking::StartCandidate{std::make_shared<const BundledFrame>(std::move(frame)),
-                                          {pyramids.begin(), pyramids.end()}};
+  } else if (!rig_.any_overlap()) {
+    keep_candidate(std::move(frame));
   }
   outcome.record.stages.push_back({"start", watch.ms()});
+}
+
+// The frame later ones are compared with is given up when it is old or its view is gone.
+void Pipeline::keep_candidate(BundledFrame frame) {
+  const auto& options = config_.tracking.initialisation;
+  const bool good = candidate_ && frame.id.value() - candidate_->frame->id.value() <= kMaxStartAge &&
+                    tracking::comparable(*candidate_->frame, frame, options);
+  if (good) return;
+  const auto pyramids = builder_.pyramids();
+  candidate_ = tracking::StartCandidate{std::make_shared<const BundledFrame>(std::move(frame)), {pyramids.begin(), pyramids.end()}};
 }
 
 void Pipeline::track(BundledFrame frame, map::MapStore& store, Outcome& outcome) {

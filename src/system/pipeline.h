@@ -36,6 +36,7 @@ class Pipeline {
 
  private:
   void start(frame::BundledFrame frame, map::MapStore& store, Outcome& outcome);
+  void keep_candidate(frame::BundledFrame frame);
   void track(frame::BundledFrame frame, map::MapStore& store, Outcome& outcome);
   void add_keyframe(const frame::BundledFrame& frame, const tracking::TrackOutput& output, map::MapSnapshot base,
                     map::MapStore& store, Outcome& outcome);

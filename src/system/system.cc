@@ -8,25 +8,23 @@ namespace {
 
 constexpr std::size_t kYoungMap = 4;  // keyframes: a map lost before it has grown beyond them was no good start
 
+map::BundledMap empty_map(const camera::Rig& rig, const Config& config) {
+  return map::BundledMap(std::make_shared<const camera::Rig>(rig), {config.features.scale_factor, config.features.levels});
+}
+
 }  // namespace
 
 System::System(camera::Rig rig, Config config, std::vector<image::Image> masks)
-    : rig_(std::move(rig)), config_(std::move(config)), pipeline_(rig_, config_, std::move(masks)) {
-  begin_map();
+    : rig_(std::move(rig)), config_(std::move(config)), pipeline_(rig_, config_, std::move(masks)),
+      store_(empty_map(rig_, config_)) {
+  mapping_ = make_mapping_executor(store_, config_, [this](KeyframeId k, double ms) {
+    const auto frame = store_.snapshot()->keyframe(k).frame;  // gone where the keyframe was culled at once
+    const std::lock_guard lock(records_mutex_);
+    mapping_runs_.push_back({k, frame ? frame->time_ns : 0, ms});
+  });
 }
 
 System::~System() = default;
-
-void System::begin_map() {
-  mapping_.reset();
-  store_ = std::make_unique<map::MapStore>(map::BundledMap(
-      std::make_shared<const camera::Rig>(rig_), {config_.features.scale_factor, config_.features.levels}));
-  mapping_ = make_mapping_executor(*store_, config_, [this](KeyframeId k, double ms) {
-    const TimeNs time_ns = store_->snapshot()->keyframe(k).frame ? store_->snapshot()->keyframe(k).frame->time_ns : 0;
-    const std::lock_guard lock(records_mutex_);
-    mapping_runs_.push_back({k, time_ns, ms});
-  });
-}
 
 // A start up to scale can be wrong and shows it at once: the next frames find nothing. What it told is withdrawn.
 void System::give_up_young_map() {
@@ -38,12 +36,12 @@ void System::give_up_young_map() {
     record.keyframe = false;
   }
   pipeline_.restart();
-  begin_map();
+  store_.restart(empty_map(rig_, config_));
 }
 
 const FrameRecord& System::process(const image::ImageBundle& images) {
   const bool had_map = pipeline_.state().status != tracking::TrackStatus::kNotStarted;
-  Pipeline::Outcome outcome = pipeline_.process(images, *store_);
+  Pipeline::Outcome outcome = pipeline_.process(images, store_);
   if (!had_map && !outcome.keyframes.empty()) ++maps_started_;
   const Stopwatch watch;
   for (const KeyframeId k : outcome.keyframes) mapping_->enqueue(k);
@@ -54,7 +52,7 @@ const FrameRecord& System::process(const image::ImageBundle& images) {
   outcome.record.map_number = maps_started_;
   frames_.push_back(std::move(outcome.record));
   const bool lost = had_map && frames_.back().result.status == tracking::TrackStatus::kLost;
-  if (lost && store_->snapshot()->scale() != map::Scale::kMetric && store_->snapshot()->keyframe_slots() <= kYoungMap) {
+  if (lost && store_.snapshot()->scale() != map::Scale::kMetric && store_.snapshot()->keyframe_slots() <= kYoungMap) {
     give_up_young_map();
   }
   return frames_.back();
@@ -64,9 +62,9 @@ void System::finish() {
   mapping_->drain();
   if (!config_.final_adjustment) return;
   const Stopwatch watch;
-  map::MapDraft draft("global adjustment", store_->snapshot());
+  map::MapDraft draft("global adjustment", store_.snapshot());
   mapping::adjust_globally(config_.mapping, config_.feature_model(), draft);
-  store_->commit(std::move(draft));
+  store_.commit(std::move(draft));
   final_adjustment_ms_ = watch.ms();
 }
 
@@ -76,7 +74,7 @@ std::vector<MappingRecord> System::mapping_runs() const {
 }
 
 evaluation::Trajectory System::trajectory() const {
-  const map::MapSnapshot map = store_->snapshot();
+  const map::MapSnapshot map = store_.snapshot();
   evaluation::Trajectory out;
   for (const FrameRecord& record : frames_) {
     const tracking::TrackResult& r = record.result;

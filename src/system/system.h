@@ -33,7 +33,7 @@ class System {
   // Waits for the stages and, where configured, adjusts the whole map. Call once, after the last frame.
   void finish();
 
-  map::MapSnapshot snapshot() const { return store_->snapshot(); }
+  map::MapSnapshot snapshot() const { return store_.snapshot(); }
   const std::vector<FrameRecord>& frames() const { return frames_; }
   std::vector<MappingRecord> mapping_runs() const;
   double final_adjustment_ms() const { return final_adjustment_ms_; }
@@ -45,7 +45,6 @@ class System {
   evaluation::Trajectory live_trajectory() const;
 
  private:
-  void begin_map();
   void give_up_young_map();
 
   const camera::Rig rig_;
@@ -56,7 +55,7 @@ class System {
   std::vector<MappingRecord> mapping_runs_;  // guarded by records_mutex_
   double final_adjustment_ms_ = 0;
   int maps_started_ = 0;
-  std::unique_ptr<map::MapStore> store_;
+  map::MapStore store_;
   std::unique_ptr<MappingExecutor> mapping_;  // last: its thread stops before the rest goes
 };
 

@@ -82,10 +82,18 @@ std::optional<TwoView> best_two_view(const BundledFrame& first, const BundledFra
 
 }  // namespace
 
+bool comparable(const BundledFrame& first, const BundledFrame& second, const InitialisationOptions& options) {
+  for (std::size_t c = 0; c < first.cameras.size(); ++c) {
+    const auto pairs = match_frames(first.cameras[c].keypoints, second.cameras[c].keypoints);
+    if (pairs.size() >= static_cast<std::size_t>(options.min_monocular)) return true;
+  }
+  return false;
+}
+
 std::optional<StartedMap> start_metric(const BundledFrame& frame, std::span<const image::Pyramid> pyramids,
                                        const InitialisationOptions& options, map::MapDraft& draft) {
   int metric = 0;
-  for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) metric += frame.bundled.point(FeatureId(f)).has_value();
+  for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) metric += has_sound_depth(frame.bundled.point(FeatureId(f)), options);
   if (metric < options.min_matched) return std::nullopt;
   StartedMap out;
   out.keyframes.push_back(make_keyframe(frame, {}, SE3(), pyramids, KeyframeId(), options, draft));

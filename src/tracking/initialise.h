@@ -24,6 +24,9 @@ struct StartedMap {
 std::optional<StartedMap> start_metric(const frame::BundledFrame& frame, std::span<const image::Pyramid> pyramids,
                                        const InitialisationOptions& options, map::MapDraft& draft);
 
+// Do the two frames share enough matches in some camera for a start up to scale to be tried?
+bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& second, const InitialisationOptions& options);
+
 // Writes two keyframes where some camera sees enough parallax between `first` and `frame`: the first at the origin, the
 // median depth of the points in the first is 1. For rigs whose cameras do not overlap the scale stays unknown.
 std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const frame::BundledFrame& frame,

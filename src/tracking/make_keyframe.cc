@@ -102,13 +102,13 @@ std::shared_ptr<BundledFrame> regrouped_frame(const BundledFrame& frame, const G
   return out;
 }
 
-// Standard deviation of the distance from the rig, relative to it.
-double relative_depth_error(const frame::BundledPoint& p) {
-  const Eigen::Vector3d ray = p.point_rig.normalized();
-  return std::sqrt(ray.dot(p.covariance * ray)) / p.point_rig.norm();
-}
-
 }  // namespace
+
+bool has_sound_depth(const std::optional<frame::BundledPoint>& point, const InitialisationOptions& options) {
+  if (!point) return false;
+  const Eigen::Vector3d ray = point->point_rig.normalized();
+  return std::sqrt(ray.dot(point->covariance * ray)) <= options.max_depth_error * point->point_rig.norm();
+}
 
 NewKeyframe make_keyframe(const BundledFrame& frame, const FrameMatches& matches, const geometry::SE3& T_rig_world,
                           std::span<const image::Pyramid> pyramids, KeyframeId reference,
@@ -135,7 +135,7 @@ NewKeyframe make_keyframe(const BundledFrame& frame, const FrameMatches& matches
   for (std::size_t f = 0; f < stored->bundled.num_matched(); ++f) {
     const FeatureId feature(f);
     const auto& point = stored->bundled.point(feature);
-    if (has_landmark[f] || !point || relative_depth_error(*point) > options.max_depth_error) continue;
+    if (has_landmark[f] || !has_sound_depth(point, options)) continue;
     const KeypointRef first = stored->bundled.keypoints(feature).front();
     out.landmarks.push_back(draft.add_landmark(T_world_rig * point->point_rig, {{out.keyframe, feature}}, {out.keyframe, first}));
   }

@@ -3,11 +3,15 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "map/map_edit.h"
 #include "tracking/frame_matches.h"
 
 namespace bslam::tracking {
+
+// May a matched feature with this point become a landmark at once? The standard deviation of its distance decides.
+bool has_sound_depth(const std::optional<frame::BundledPoint>& point, const InitialisationOptions& options);
 
 struct NewKeyframe {
   KeyframeId keyframe;                 // provisional, as in the draft

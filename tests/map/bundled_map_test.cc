@@ -63,14 +63,14 @@ TEST_F(BundledMapTest, HangsAKeyframeBelowTheOneItSharesMostWith) {
 
 TEST_F(BundledMapTest, OrdersCovisibleKeyframesByWeightThenAge) {
   const KeyframeId a = add(matches(0, 10), {}), b = add(matches(0, 10), {}), c = add(matches(0, 3), {});
-  const auto best = map.best_covisible(a, 0);
+  const auto best = map.best_covisible(a, 100);
   ASSERT_EQ(best.size(), 3u);
   EXPECT_EQ(best[0].keyframe, b);
   EXPECT_EQ(best[0].weight, 10);
   EXPECT_EQ(best[1].keyframe, KeyframeId(0));
   EXPECT_EQ(best[2].keyframe, c);
   EXPECT_EQ(map.best_covisible(a, 1).size(), 1u);
-  EXPECT_EQ(map.best_covisible(a, 0, 4).size(), 2u);
+  EXPECT_EQ(map.best_covisible(a, 100, 4).size(), 2u);
 }
 
 TEST_F(BundledMapTest, RefusesAnObservationTwiceOrOfATakenFeature) {

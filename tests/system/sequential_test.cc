@@ -170,9 +170,7 @@ TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
   EXPECT_LT(ate_m(system.trajectory(), tour.replayed_truth(k), evaluation::AlignMode::kSim3), 0.01);
 }
 
-// Fails: the first frame of all becomes what later ones are compared with, also where it shows nothing, and stays that
-// for 40 frames (Pipeline::start).
-TEST(SystemSequential, DISABLED_StartsUpToScaleSoonAfterADarkFirstFrame) {
+TEST(SystemSequential, StartsUpToScaleSoonAfterADarkFirstFrame) {
   const RenderedTour tour(1, 16);
   System system(tour.rig(), small_config(Mode::kSequential));
   image::ImageBundle dark = tour.frames()[0];

@@ -43,9 +43,7 @@ TEST(StartMetric, WaitsForEnoughMatchedFeatures) {
   EXPECT_EQ(draft.map().num_keyframes(), 0u);
 }
 
-// Fails: points are counted whatever their depth error, though only those of sound depth become landmarks, so that a map
-// can start with next to none and is lost for good (start_metric).
-TEST(StartMetric, DISABLED_WaitsWhereNothingIsNearEnoughForDepth) {
+TEST(StartMetric, WaitsWhereNothingIsNearEnoughForDepth) {
   simulation::FeatureSimulatorOptions options = room();
   options.room_low = {-60, -60, -60};
   options.room_high = {60, 60, 60};
