@@ -21,6 +21,9 @@ struct Polar {
   std::uint32_t keypoint = 0;
 };
 
+// Standard deviation of a difference.
+double both(double sigma_a, double sigma_b) { return std::sqrt(sigma_a * sigma_a + sigma_b * sigma_b); }
+
 struct BaselineFrame {
   Vector3d e, x, y;
   explicit BaselineFrame(const Vector3d& baseline) : e(baseline.normalized()), x(e.unitOrthogonal()), y(e.cross(x)) {}
@@ -78,7 +81,7 @@ struct Best {
 std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const EpipolarView& b, const SortedView& sorted,
                                double baseline, const EpipolarOptions& options, std::vector<const Polar*>& candidates) {
   const double sine = std::sin(p.from);
-  const double window = options.sigmas * std::hypot(p.sigma, sorted.max_sigma) / std::max(sine, 1e-9);
+  const double window = options.sigmas * both(p.sigma, sorted.max_sigma) / std::max(sine, 1e-9);
   if (!(window < kMaxWindow)) return std::nullopt;
   const double nearest = angle_at_second(p.from, options.near_m, baseline);
   const double farthest = angle_at_second(p.from, options.far_m, baseline);
@@ -90,7 +93,7 @@ std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const Epip
   auto it = std::lower_bound(sorted.polar.begin(), sorted.polar.end(), p.about - window,
                              [](const Polar& q, double value) { return q.about < value; });
   for (; it != sorted.polar.end() && it->about <= p.about + window; ++it) {
-    const double slack = options.sigmas * std::hypot(p.sigma, it->sigma);
+    const double slack = options.sigmas * both(p.sigma, it->sigma);
     if (std::abs(it->about - p.about) * sine > slack) continue;
     if (it->from < farthest - slack || it->from > nearest + slack) continue;
     if (std::abs(b.keypoints->level[it->keypoint] - level) > options.max_level_difference) continue;

@@ -68,27 +68,30 @@ float bilinear(const image::Image& image, float x, float y) {
 
 // Level whose pixels are closest in size to the patch's when seen through the warp.
 std::size_t best_level(const image::Pyramid& pyramid, double scale) {
+  const auto ratio = [&](std::size_t l) { return std::max(pyramid.scale_x[l] / scale, scale / pyramid.scale_x[l]); };
   std::size_t best = 0;
   for (std::size_t l = 1; l < pyramid.size(); ++l) {
-    if (std::abs(std::log(pyramid.scale_x[l] / scale)) < std::abs(std::log(pyramid.scale_x[best] / scale))) best = l;
+    if (ratio(l) < ratio(best)) best = l;
   }
   return best;
 }
 
 // Samples of the target at the warped patch positions around (x, y), pixels of the level. False outside the image.
 bool sample_target(const image::Image& image, const Eigen::Matrix2f& A, float x, float y, std::array<float, kSamples>& out) {
-  constexpr float kHalf = 0.5f * (kInner - 1);
+  constexpr float kHalf = 0.5f * (kInner - 1), kRounding = 0.01f;
   const float reach_x = kHalf * (std::abs(A(0, 0)) + std::abs(A(0, 1)));
   const float reach_y = kHalf * (std::abs(A(1, 0)) + std::abs(A(1, 1)));
-  if (!(x - reach_x >= 0 && y - reach_y >= 0 && x + reach_x < static_cast<float>(image.width() - 1) &&
-        y + reach_y < static_cast<float>(image.height() - 1))) {
+  if (!(x - reach_x >= 0 && y - reach_y >= 0 && x + reach_x < static_cast<float>(image.width() - 1) - kRounding &&
+        y + reach_y < static_cast<float>(image.height() - 1) - kRounding)) {
     return false;
   }
   std::size_t i = 0;
   for (int r = 0; r < kInner; ++r) {
     const float dy = static_cast<float>(r) - kHalf;
     float px = x - A(0, 0) * kHalf + A(0, 1) * dy, py = y - A(1, 0) * kHalf + A(1, 1) * dy;
-    for (int c = 0; c < kInner; ++c, ++i, px += A(0, 0), py += A(1, 0)) out[i] = bilinear(image, std::max(px, 0.0f), std::max(py, 0.0f));
+    for (int c = 0; c < kInner; ++c, ++i, px += A(0, 0), py += A(1, 0)) {
+      out[i] = bilinear(image, std::max(px, 0.0f), std::max(py, 0.0f));
+    }
   }
   return true;
 }
