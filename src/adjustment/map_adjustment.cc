@@ -80,10 +80,49 @@ std::vector<std::uint8_t> outliers(const ReprojectionProblem& problem, double ma
   return out;
 }
 
-map::SetPoses poses_of(const FlatProblem& flat) {
+// Bound of a sum over `keypoints` keypoints that is as improbable as `bound` is for one (Wilson and Hilferty's cube root,
+// scaled so that one keypoint has the bound itself).
+double sum_bound(double bound, int keypoints) {
+  const auto quantile = [](double degrees) {
+    const double v = 2.0 / (9.0 * degrees);
+    return degrees * std::pow(1.0 - v + 1.645 * std::sqrt(v), 3);
+  };
+  return bound * quantile(2.0 * keypoints) / quantile(2.0);
+}
+
+// An observation is a feature with all its keypoints, and is judged as a whole: the more cameras, the likelier it is that
+// chance alone takes one of them over its own bound.
+std::vector<Source> bad_observations(const FlatProblem& flat, double bound) {
+  const std::vector<double> chi2 = solver::squared_errors(flat.problem);
+  std::vector<Source> bad;
+  for (std::size_t i = 0; i < chi2.size();) {
+    const Source source = flat.sources[i];
+    double sum = 0;
+    int keypoints = 0;
+    for (; i < chi2.size() && flat.sources[i].landmark == source.landmark && flat.sources[i].keyframe == source.keyframe; ++i) {
+      sum += chi2[i];
+      ++keypoints;
+    }
+    if (!(sum <= sum_bound(bound, keypoints))) bad.push_back(source);
+  }
+  return bad;
+}
+
+// Landmarks that one keyframe alone sees are no part of the problem: they keep their place in that keyframe.
+void carry_single_views(const map::BundledMap& map, KeyframeId k, const geometry::SE3& T_rig_world, map::SetPoses& poses) {
+  const geometry::SE3 T_new_old = T_rig_world.inverse() * map.keyframe(k).T_rig_world;
+  for (const LandmarkId l : map.keyframe(k).landmarks) {
+    if (!l.valid() || map.observations(l).size() != 1) continue;
+    poses.landmarks.emplace_back(l, T_new_old * map.landmark(l).position);
+  }
+}
+
+map::SetPoses poses_of(const map::BundledMap& map, const FlatProblem& flat) {
   map::SetPoses poses;
   for (std::size_t i = 0; i < flat.keyframes.size(); ++i) {
-    if (flat.problem.pose_free[i]) poses.keyframes.emplace_back(flat.keyframes[i], flat.problem.T_rig_world[i]);
+    if (!flat.problem.pose_free[i]) continue;
+    poses.keyframes.emplace_back(flat.keyframes[i], flat.problem.T_rig_world[i]);
+    carry_single_views(map, flat.keyframes[i], flat.problem.T_rig_world[i], poses);
   }
   for (std::size_t i = 0; i < flat.landmarks.size(); ++i) {
     if (flat.problem.points[i].allFinite()) poses.landmarks.emplace_back(flat.landmarks[i], flat.problem.points[i]);
@@ -110,16 +149,17 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
     const auto last = solver::adjust(flat.problem, {.iterations = options.final_iterations, .robust = false}, skip, stop);
     if (last.usable()) report.final_cost = last.final_cost;
   }
-  const auto bad = outliers(flat.problem, options.outlier_chi2);
-  draft.set_poses(poses_of(flat));
-  for (std::size_t i = 0; i < bad.size(); ++i) {
-    if (!bad[i]) continue;
-    ++report.outliers;
-    const Source& s = flat.sources[i];
+  const std::vector<Source> bad = bad_observations(flat, options.outlier_chi2);
+  map::SetPoses poses = poses_of(draft.map(), flat);
+  std::vector<LandmarkId> touched;
+  for (const auto& [landmark, position] : poses.landmarks) touched.push_back(landmark);
+  draft.set_poses(std::move(poses));
+  report.outliers = bad.size();
+  for (const Source& s : bad) {
     if (draft.map().alive(s.landmark)) draft.remove_observation(s.landmark, s.keyframe);
   }
   std::vector<LandmarkId> moved;
-  for (const LandmarkId l : flat.landmarks) {
+  for (const LandmarkId l : touched) {
     if (draft.map().alive(l)) moved.push_back(l);
   }
   draft.refresh_landmarks(std::move(moved));

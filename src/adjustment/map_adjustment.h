@@ -33,8 +33,9 @@ struct Selection {
 
 struct AdjustmentReport {
   bool done = false;            // false: nothing to adjust, or the solver failed; the draft is as it was
-  std::size_t observations = 0, outliers = 0;
-  double initial_cost = 0, final_cost = 0;  // of the last round
+  std::size_t observations = 0;             // keypoints
+  std::size_t outliers = 0;                 // features removed from their landmark
+  double initial_cost = 0, final_cost = 0;  // robust at the start, plain over what agrees at the end
 };
 
 // Adjusts the free keyframes and the landmarks with all cameras' observations, two rounds, and writes poses, positions and

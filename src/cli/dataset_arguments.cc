@@ -8,7 +8,7 @@ namespace {
 
 Result<std::vector<int>> parse_cameras(const std::string& text) {
   std::vector<int> cameras;
-  std::istringstream parts(text);
+  std::istringstream parts(text + ",");  // an empty last number is found as well
   for (std::string part; std::getline(parts, part, ',');) {
     int value = -1;
     const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
@@ -40,9 +40,11 @@ Result<io::DatasetRequest> dataset_request(const DatasetArguments& a, double syn
   if (a.format == "kitti") request.format = io::DatasetFormat::kKitti;
   if (a.format == "folder") request.format = io::DatasetFormat::kFolder;
   if (!a.rig.empty()) request.rig_file = a.rig;
-  auto cameras = parse_cameras(a.cameras);
-  if (!cameras) return cameras.error();
-  request.cameras = std::move(*cameras);
+  if (a.cameras) {
+    auto cameras = parse_cameras(*a.cameras);
+    if (!cameras) return cameras.error();
+    request.cameras = std::move(*cameras);
+  }
   request.sync_tolerance_s = sync_tolerance_s;
   request.begin_s = a.begin_s;
   request.end_s = a.end_s;

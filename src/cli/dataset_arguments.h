@@ -10,7 +10,8 @@
 namespace bslam::cli {
 
 struct DatasetArguments {
-  std::string path, format = "auto", rig, cameras;
+  std::string path, format = "auto", rig;
+  std::optional<std::string> cameras;  // absent: all
   std::optional<double> begin_s, end_s;
 };
 

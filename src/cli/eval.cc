@@ -111,6 +111,9 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
   if (!read) return read.error();
   const auto ground_truth = io::read_trajectory(arguments.ground_truth, arguments.times);
   if (!ground_truth) return ground_truth.error();
+  if (arguments.gt_frame == "cam0" && std::filesystem::path(arguments.ground_truth).extension() == ".csv") {
+    std::fprintf(stderr, "note: EuRoC ground truth is that of the body; to compare with a camera give --gt-frame body --rig FILE\n");
+  }
   const auto estimate = in_frame_of_truth(std::move(read).value(), arguments);
   if (!estimate) return estimate.error();
   const evaluation::EvaluationOptions options{.align = align_mode(arguments.align),

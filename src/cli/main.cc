@@ -1,6 +1,7 @@
 // bslam: the command line. Verbs are in files of their own; this one only puts them together.
 #include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <string>
 
 #include "cli/verbs.h"
@@ -25,6 +26,9 @@ int main(int argc, char** argv) {
     std::replace(what.begin(), what.end(), '\n', ' ');
     std::fprintf(stderr, "bslam: command line: %s (see bslam --help)\n", what.c_str());
     return kExitBadInput;
+  } catch (const std::exception& e) {  // out of memory, a thread that cannot be made: nothing the user asked wrongly
+    std::fprintf(stderr, "bslam: %s\n", e.what());
+    return kExitFailed;
   }
   return exit_status;
 }

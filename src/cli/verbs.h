@@ -9,6 +9,7 @@
 namespace bslam::cli {
 
 constexpr int kExitOk = 0, kExitBadInput = 2, kExitNothingTracked = 3, kExitInterrupted = 130;
+constexpr int kExitFailed = 1;  // the program, not the request, is at fault
 
 void add_run(CLI::App& app, int& exit_status);
 void add_eval(CLI::App& app, int& exit_status);

@@ -67,8 +67,8 @@ bool align_edge(const camera::Rig& rig, std::span<const CameraFrame> cameras, st
 std::vector<Edge> match_pair(const camera::Rig& rig, std::span<const CameraFrame> cameras,
                              std::span<const image::Pyramid> pyramids, CameraPair pair, const BundlingOptions& options,
                              const AlignmentOptions& alignment) {
-  const EpipolarView a{&rig.camera(pair.a), &cameras[pair.a.index()].keypoints, rig.rig_from_cam(pair.a.index()), {}};
-  const EpipolarView b{&rig.camera(pair.b), &cameras[pair.b.index()].keypoints, rig.rig_from_cam(pair.b.index()), {}};
+  const EpipolarView a{&rig.camera(pair.a), &cameras[pair.a.index()].keypoints, rig.rig_from_cam(pair.a.index()), {}, 0, 0};
+  const EpipolarView b{&rig.camera(pair.b), &cameras[pair.b.index()].keypoints, rig.rig_from_cam(pair.b.index()), {}, 0, 0};
   const EpipolarOptions search{.near_m = options.near_m,
                                .sigmas = options.sigmas,
                                .max_hamming = options.max_hamming,
@@ -126,17 +126,76 @@ class Grouping {
   std::vector<std::vector<KeypointRef>> groups_;
 };
 
-// Moves the second keypoint of an edge to its aligned place; the first defines the feature, so its own place is exact.
-void place_keypoints(std::span<CameraFrame> cameras, std::span<const image::Pyramid> pyramids, const Edge& edge,
-                     const AlignmentOptions& alignment) {
-  feature::Keypoints& ka = cameras[edge.a.camera.index()].keypoints;
-  feature::Keypoints& kb = cameras[edge.b.camera.index()].keypoints;
-  const std::size_t ia = edge.a.keypoint.index(), ib = edge.b.keypoint.index();
-  const double scale_a = pyramids[edge.a.camera.index()].scale_x[ka.level[ia]];
-  ka.sigma[ia] = std::min(ka.sigma[ia], static_cast<float>(alignment.sigma(0.0, scale_a)));
-  kb.pixel[ib] = edge.aligned.pixel.cast<float>();
-  kb.bearing[ib] = edge.bearing;
-  kb.sigma[ib] = static_cast<float>(edge.aligned.sigma);
+// Keypoints as aligned to one another, and the way back for those that turn out to belong to nothing.
+class Placement {
+ public:
+  explicit Placement(std::span<CameraFrame> cameras) : cameras_(cameras) {
+    for (const CameraFrame& c : cameras) state_.emplace_back(c.keypoints.size(), kAsDetected);
+  }
+
+  // Moves the second keypoint of an edge to where the patch of the first is seen; the first defines the feature, so its own
+  // place is exact. An edge whose first keypoint was moved itself would lead to where that no longer is.
+  void apply(const Edge& edge, std::span<const image::Pyramid> pyramids, const AlignmentOptions& alignment) {
+    if (state(edge.a) == kMoved || state(edge.b) != kAsDetected) return;
+    feature::Keypoints& ka = cameras_[edge.a.camera.index()].keypoints;
+    feature::Keypoints& kb = cameras_[edge.b.camera.index()].keypoints;
+    const std::size_t ia = edge.a.keypoint.index(), ib = edge.b.keypoint.index();
+    if (state(edge.a) == kAsDetected) remember(edge.a);
+    remember(edge.b);
+    state(edge.a) = kReference;
+    state(edge.b) = kMoved;
+    const double scale_a = pyramids[edge.a.camera.index()].scale_x[ka.level[ia]];
+    ka.sigma[ia] = std::min(ka.sigma[ia], static_cast<float>(alignment.sigma(0.0, scale_a)));
+    kb.pixel[ib] = edge.aligned.pixel.cast<float>();
+    kb.bearing[ib] = edge.bearing;
+    kb.sigma[ib] = static_cast<float>(edge.aligned.sigma);
+  }
+
+  void restore_all_but(std::span<const std::vector<KeypointRef>> groups) {
+    for (const auto& group : groups) {
+      for (const KeypointRef r : group) state(r) = kAsDetected;  // nothing to restore
+    }
+    for (const Before& b : before_) {
+      if (state(b.ref) == kAsDetected) continue;
+      feature::Keypoints& k = cameras_[b.ref.camera.index()].keypoints;
+      const std::size_t i = b.ref.keypoint.index();
+      k.pixel[i] = b.pixel;
+      k.bearing[i] = b.bearing;
+      k.sigma[i] = b.sigma;
+    }
+  }
+
+ private:
+  enum State : std::uint8_t { kAsDetected, kReference, kMoved };
+  struct Before {
+    KeypointRef ref;
+    Eigen::Vector2f pixel;
+    Vector3d bearing;
+    float sigma;
+  };
+  std::uint8_t& state(KeypointRef r) { return state_[r.camera.index()][r.keypoint.index()]; }
+  void remember(KeypointRef r) {
+    const feature::Keypoints& k = cameras_[r.camera.index()].keypoints;
+    const std::size_t i = r.keypoint.index();
+    before_.push_back({r, k.pixel[i], k.bearing[i], k.sigma[i]});
+  }
+  std::span<CameraFrame> cameras_;
+  std::vector<std::vector<std::uint8_t>> state_;
+  std::vector<Before> before_;
+};
+
+// Keypoints that do not meet in one point are no feature: the worst goes until the rest agrees. False where less than two
+// are left.
+bool keep_agreeing(const camera::Rig& rig, std::span<const CameraFrame> cameras, double max_chi2, std::vector<KeypointRef>& group) {
+  while (group.size() >= 2) {
+    std::vector<PointObservation> observations;
+    for (const KeypointRef ref : group) observations.push_back(observation(rig, cameras, ref));
+    const auto estimated = estimate_point(observations, 0.0);
+    if (!estimated) return false;
+    if (estimated->worst_chi2 <= max_chi2) return true;
+    group.erase(group.begin() + static_cast<std::ptrdiff_t>(estimated->worst));
+  }
+  return false;
 }
 
 }  // namespace
@@ -151,9 +210,9 @@ std::optional<BundledPoint> triangulate_group(const camera::Rig& rig, std::span<
 }
 
 Bundled make_bundled(const camera::Rig& rig, std::span<const CameraFrame> cameras,
-                     std::span<const std::vector<KeypointRef>> matched, double min_parallax) {
+                     std::span<const std::vector<KeypointRef>> matched, double min_parallax, double max_chi2) {
   std::vector<std::optional<BundledPoint>> points;
-  for (const auto& group : matched) points.push_back(triangulate_group(rig, cameras, group, min_parallax));
+  for (const auto& group : matched) points.push_back(triangulate_group(rig, cameras, group, min_parallax, max_chi2));
   std::vector<std::size_t> counts;
   for (const CameraFrame& c : cameras) counts.push_back(c.keypoints.size());
   return Bundled(counts, matched, points);
@@ -171,35 +230,17 @@ Bundled bundle(const camera::Rig& rig, std::span<CameraFrame> cameras, std::span
   std::stable_sort(edges.begin(), edges.end(), [](const Edge& p, const Edge& q) { return p.hamming < q.hamming; });
 
   Grouping grouping(cameras);
-  std::vector<std::vector<std::uint8_t>> placed;  // a keypoint is moved by its strongest edge only
-  for (const CameraFrame& c : cameras) placed.emplace_back(c.keypoints.size(), 0);
+  Placement placement(cameras);
   for (const Edge& e : edges) {
-    if (!grouping.join(e.a, e.b)) continue;
-    std::uint8_t& done = placed[e.b.camera.index()][e.b.keypoint.index()];
-    if (!done) place_keypoints(cameras, pyramids, e, alignment);
-    done = placed[e.a.camera.index()][e.a.keypoint.index()] = 1;
+    if (grouping.join(e.a, e.b)) placement.apply(e, pyramids, alignment);
   }
-
-  // Keypoints that do not meet in one point are no feature: the worst goes until the rest agrees.
-  std::vector<std::vector<KeypointRef>> groups = grouping.take();
   std::vector<std::vector<KeypointRef>> kept;
-  for (std::vector<KeypointRef>& group : groups) {
-    while (group.size() >= 2) {
-      std::vector<PointObservation> observations;
-      for (const KeypointRef ref : group) observations.push_back(observation(rig, cameras, ref));
-      const auto estimated = estimate_point(observations, 0.0);
-      if (!estimated) {
-        group.clear();
-      } else if (estimated->worst_chi2 > options.max_chi2) {
-        group.erase(group.begin() + static_cast<std::ptrdiff_t>(estimated->worst));
-      } else {
-        break;
-      }
-    }
-    if (group.size() >= 2) kept.push_back(std::move(group));
+  for (std::vector<KeypointRef>& group : grouping.take()) {
+    if (keep_agreeing(rig, cameras, options.max_chi2, group)) kept.push_back(std::move(group));
   }
+  placement.restore_all_but(kept);
   std::sort(kept.begin(), kept.end());
-  return make_bundled(rig, cameras, kept, options.min_parallax);
+  return make_bundled(rig, cameras, kept, options.min_parallax, options.max_chi2);
 }
 
 }  // namespace bslam::frame

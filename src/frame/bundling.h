@@ -20,7 +20,7 @@ struct BundlingOptions {
   int max_hamming = 64;      // descriptor distance of a match, of 256 bits
   double ratio = 0.9;        // best to second best descriptor distance elsewhere on the epipolar curve
   double sigmas = 3.0;       // distance from the epipolar curve before alignment, in standard deviations
-  double max_chi2 = 7.81;    // squared normalised error of an aligned keypoint against its feature's point (95 %, 3 dof)
+  double max_chi2 = 7.81;    // squared normalised error of an aligned keypoint against its feature's point (worst keypoint of a feature)
   double min_parallax = 5e-4;  // radians: below it a matched feature has no point (about a quarter pixel)
 
   template <class Self, class Visitor>
@@ -46,13 +46,13 @@ Bundled bundle(const camera::Rig& rig, std::span<CameraFrame> cameras, std::span
                const BundlingOptions& options, const AlignmentOptions& alignment, ThreadPool& pool);
 
 // The Bundled table for given groups of keypoints of the same thing (each with at most one keypoint per camera, in order
-// of camera): triangulates each where its rays allow. `T` as Bundled's constructor.
+// of camera): each gets its point where the rays allow and none of its keypoints misses it by more than `max_chi2`.
 Bundled make_bundled(const camera::Rig& rig, std::span<const CameraFrame> cameras,
-                     std::span<const std::vector<KeypointRef>> matched, double min_parallax);
+                     std::span<const std::vector<KeypointRef>> matched, double min_parallax, double max_chi2);
 
 // Point of one group of keypoints of a frame, in the rig frame; see estimate_point.
 std::optional<BundledPoint> triangulate_group(const camera::Rig& rig, std::span<const CameraFrame> cameras,
                                               std::span<const KeypointRef> group, double min_parallax,
-                                              double max_chi2 = std::numeric_limits<double>::infinity());
+                                              double max_chi2);
 
 }  // namespace bslam::frame

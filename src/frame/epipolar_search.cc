@@ -29,6 +29,11 @@ struct BaselineFrame {
   explicit BaselineFrame(const Vector3d& baseline) : e(baseline.normalized()), x(e.unitOrthogonal()), y(e.cross(x)) {}
 };
 
+double sigma_px(const EpipolarView& view, std::size_t k) {
+  if (view.detector_sigma_px <= 0) return view.keypoints->sigma[k];
+  return view.detector_sigma_px * std::pow(view.scale_factor, view.keypoints->level[k]);
+}
+
 std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame) {
   std::vector<Polar> out;
   out.reserve(view.keypoints->size());
@@ -38,7 +43,7 @@ std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame
     const Vector3d d = view.T_common_cam.rotation() * view.keypoints->bearing[k];
     const double u = d.dot(frame.x), v = d.dot(frame.y);
     out.push_back({std::atan2(v, u), std::atan2(std::hypot(u, v), d.dot(frame.e)),
-                   view.keypoints->sigma[k] * radians_per_px, static_cast<std::uint32_t>(k)});
+                   sigma_px(view, k) * radians_per_px, static_cast<std::uint32_t>(k)});
   }
   return out;
 }

@@ -18,6 +18,8 @@ struct EpipolarView {
   const feature::Keypoints* keypoints = nullptr;
   geometry::SE3 T_common_cam;
   std::span<const std::uint8_t> usable;  // per keypoint, 0 = leave out; empty = all
+  double detector_sigma_px = 0;          // on a keypoint's level; 0 = take each keypoint's own, which holds within a frame
+  double scale_factor = 1.2;             // of the pyramid
 };
 
 struct EpipolarOptions {

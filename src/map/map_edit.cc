@@ -60,6 +60,7 @@ void MapDraft::set_poses(SetPoses poses) {
 }
 
 void MapDraft::add_sightings(std::vector<Sighting> sightings) {
+  for (Sighting& s : sightings) s.landmark = working_.resolve(s.landmark);  // noted over several versions
   std::erase_if(sightings, [&](const Sighting& s) { return !working_.add_sightings(s.landmark, s.expected, s.found); });
   if (sightings.empty()) return;
   edit_.operations.emplace_back(AddSightings{std::move(sightings)});

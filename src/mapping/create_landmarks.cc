@@ -105,9 +105,11 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
   const std::vector<std::uint8_t> free_a = free_keypoints(map.keyframe(a.keyframe), a.camera);
   const std::vector<std::uint8_t> free_b = free_keypoints(map.keyframe(b.keyframe), b.camera);
   const frame::EpipolarView view_a{&map.rig().camera(a.camera), &map.keypoints(a.keyframe, a.camera),
-                                   cam_from_world(map, a).inverse(), free_a};
+                                   cam_from_world(map, a).inverse(), free_a,
+                                   features.sigma_px, features.scale_factor};
   const frame::EpipolarView view_b{&map.rig().camera(b.camera), &map.keypoints(b.keyframe, b.camera),
-                                   cam_from_world(map, b).inverse(), free_b};
+                                   cam_from_world(map, b).inverse(), free_b,
+                                   features.sigma_px, features.scale_factor};
   const frame::EpipolarOptions search{.near_m = 0.05 * depth,
                                       .sigmas = 2.0,
                                       .max_hamming = options.max_hamming,

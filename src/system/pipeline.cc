@@ -139,6 +139,7 @@ void Pipeline::start(BundledFrame frame, map::MapStore& store, Outcome& outcome)
 // The frame later ones are compared with is given up when it is old or its view is gone.
 void Pipeline::keep_candidate(BundledFrame frame) {
   const auto& options = config_.tracking.initialisation;
+  if (candidate_ && frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular)) return;  // nothing to go by
   const bool good = candidate_ && frame.id.value() - candidate_->frame->id.value() <= kMaxStartAge &&
                     tracking::comparable(*candidate_->frame, frame, options);
   if (good) return;

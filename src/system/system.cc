@@ -8,6 +8,13 @@ namespace {
 
 constexpr std::size_t kYoungMap = 4;  // keyframes: a map lost before it has grown beyond them was no good start
 
+// Lost although there was something to see: the map, not the images, is in doubt.
+bool disowns_map(const tracking::TrackResult& result) {
+  using tracking::LostReason;
+  return result.reason == LostReason::kFewMatches || result.reason == LostReason::kFewInliers ||
+         result.reason == LostReason::kUnstablePose;
+}
+
 map::BundledMap empty_map(const camera::Rig& rig, const Config& config) {
   return map::BundledMap(std::make_shared<const camera::Rig>(rig), {config.features.scale_factor, config.features.levels});
 }
@@ -51,8 +58,8 @@ const FrameRecord& System::process(const image::ImageBundle& images) {
   }
   outcome.record.map_number = maps_started_;
   frames_.push_back(std::move(outcome.record));
-  const bool lost = had_map && frames_.back().result.status == tracking::TrackStatus::kLost;
-  if (lost && store_.snapshot()->scale() != map::Scale::kMetric && store_.snapshot()->keyframe_slots() <= kYoungMap) {
+  const bool failed = had_map && disowns_map(frames_.back().result);
+  if (failed && store_.snapshot()->scale() != map::Scale::kMetric && store_.snapshot()->keyframe_slots() <= kYoungMap) {
     give_up_young_map();
   }
   return frames_.back();

@@ -1,6 +1,7 @@
 #include "tracking/frame_matches.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace bslam::tracking {
 
@@ -114,17 +115,50 @@ void align_matches(const map::BundledMap& map, const SE3& T_rig_world, const Fra
 }
 
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
-                                                       const FrameMatches& matches) {
+                                                       const FrameMatches& matches,
+                                                       std::optional<frame::DetectionNoise> unaligned) {
   std::vector<solver::PoseObservation> out;
   out.reserve(count(matches));
   for (std::size_t c = 0; c < matches.size(); ++c) {
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     for (const Match& m : matches[c]) {
       const std::size_t k = m.keypoint.index();
-      out.push_back({CameraIndex(c), map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>(), keypoints.sigma[k]});
+      const double sigma =
+          unaligned ? unaligned->sigma_px * std::pow(map.pyramid().scale_factor, keypoints.level[k]) : keypoints.sigma[k];
+      out.push_back({CameraIndex(c), map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>(), sigma});
     }
   }
   return out;
+}
+
+std::vector<KeypointPlace> places(const frame::BundledFrame& frame, const FrameMatches& matches) {
+  std::vector<KeypointPlace> out;
+  out.reserve(count(matches));
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
+    for (const Match& m : matches[c]) {
+      const std::size_t k = m.keypoint.index();
+      out.push_back({keypoints.pixel[k], keypoints.bearing[k], keypoints.sigma[k]});
+    }
+  }
+  return out;
+}
+
+void restore_outliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier, std::span<const KeypointPlace> before,
+                      frame::BundledFrame& frame) {
+  std::size_t i = 0;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    feature::Keypoints& keypoints = frame.cameras[c].keypoints;
+    for (const Match& m : matches[c]) {
+      const std::size_t k = m.keypoint.index();
+      if (!inlier[i]) {
+        keypoints.pixel[k] = before[i].pixel;
+        keypoints.bearing[k] = before[i].bearing;
+        keypoints.sigma[k] = before[i].sigma;
+      }
+      ++i;
+    }
+  }
 }
 
 FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier) {

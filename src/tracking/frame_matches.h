@@ -1,6 +1,7 @@
 // Which keypoints of a frame show which landmarks.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -49,9 +50,23 @@ void align_matches(const map::BundledMap& map, const geometry::SE3& T_rig_world,
                    std::span<const image::Pyramid> pyramids, const frame::AlignmentOptions& options,
                    const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool);
 
-// Observations for the pose solver, camera by camera in the order of `matches`.
+// Observations for the pose solver, camera by camera in the order of `matches`. Before alignment a keypoint's own standard
+// deviation is that between cameras of one frame; against the map it has the detector's: `unaligned`.
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
-                                                       const FrameMatches& matches);
+                                                       const FrameMatches& matches,
+                                                       std::optional<frame::DetectionNoise> unaligned = {});
+
+// Where keypoints were before alignment.
+struct KeypointPlace {
+  Eigen::Vector2f pixel;
+  Eigen::Vector3d bearing;
+  float sigma = 0;
+};
+
+// The places of the matched keypoints, in the order of `matches`; and back to them where they turned out to be outliers.
+std::vector<KeypointPlace> places(const frame::BundledFrame& frame, const FrameMatches& matches);
+void restore_outliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier, std::span<const KeypointPlace> before,
+                      frame::BundledFrame& frame);
 
 // The matches whose observation is an inlier.
 FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier);

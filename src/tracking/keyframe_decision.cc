@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "geometry/triangulation.h"
+#include "tracking/make_keyframe.h"
 
 namespace bslam::tracking {
 namespace {
@@ -12,14 +13,14 @@ constexpr double kStillParallax = 0.01;                         // radians: less
 constexpr double kStillOverlap = 0.95;
 constexpr int kStarvedInterval = 8;  // frames: a camera that sees nothing new may not ask all the time
 
-bool fresh_depth(const frame::BundledFrame& frame, const FrameMatches& inliers) {
+bool fresh_depth(const frame::BundledFrame& frame, const FrameMatches& inliers, const InitialisationOptions& options) {
   std::vector<std::uint8_t> tracked(frame.bundled.size(), 0);
   for (std::size_t c = 0; c < inliers.size(); ++c) {
     for (const Match& m : inliers[c]) tracked[frame.bundled.feature(CameraIndex(c), m.keypoint).index()] = 1;
   }
   int with = 0, without = 0;
   for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) {
-    if (!frame.bundled.point(FeatureId(f))) continue;
+    if (!has_sound_depth(frame.bundled.point(FeatureId(f)), options)) continue;
     ++(tracked[f] ? with : without);
   }
   return with < kFewMatchedTracked && without > kManyMatchedFree;
@@ -28,7 +29,7 @@ bool fresh_depth(const frame::BundledFrame& frame, const FrameMatches& inliers) 
 }  // namespace
 
 KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::BundledFrame& frame, const FrameMatches& inliers,
-                                   KeyframeId reference, const geometry::SE3& T_rig_world, const KeyframeOptions& options) {
+                                   KeyframeId reference, const geometry::SE3& T_rig_world, const TrackingOptions& options) {
   KeyframeEvidence evidence;
   const Eigen::Vector3d centre_now = T_rig_world.inverse().translation();
   const Eigen::Vector3d centre_then = map.resolved_pose(reference).inverse().translation();
@@ -50,9 +51,9 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
   for (std::size_t c = 0; c < inliers.size(); ++c) {
     const auto keypoints = static_cast<double>(frame.cameras[c].keypoints.size());
     const auto found = static_cast<double>(inliers[c].size());
-    evidence.starved |= found < options.starved_camera && found < options.starved_share * keypoints;
+    evidence.starved |= found < options.keyframe.starved_camera && found < options.keyframe.starved_share * keypoints;
   }
-  evidence.fresh_depth = fresh_depth(frame, inliers);
+  evidence.fresh_depth = fresh_depth(frame, inliers, options.initialisation);
   return evidence;
 }
 

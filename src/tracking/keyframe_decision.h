@@ -16,7 +16,7 @@ struct KeyframeEvidence {
 };
 
 KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::BundledFrame& frame, const FrameMatches& inliers,
-                                   KeyframeId reference, const geometry::SE3& T_rig_world, const KeyframeOptions& options);
+                                   KeyframeId reference, const geometry::SE3& T_rig_world, const TrackingOptions& options);
 
 bool keyframe_due(const KeyframeEvidence& evidence, const KeyframeOptions& options);
 

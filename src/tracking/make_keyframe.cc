@@ -12,8 +12,6 @@ namespace {
 using frame::BundledFrame;
 using frame::KeypointRef;
 
-constexpr double kMinParallax = 5e-4;  // radians, as BundlingOptions::min_parallax
-
 // Landmark of every keypoint of every camera; invalid = none.
 using LandmarkTable = std::vector<std::vector<LandmarkId>>;
 
@@ -36,8 +34,15 @@ struct Groups {
 };
 
 // Keypoints that show one landmark are one feature; bundled keypoints without a landmark join the feature they were
-// bundled with, as far as its landmark has none in their camera.
-Groups regroup(const BundledFrame& frame, const LandmarkTable& table) {
+// bundled with, as far as its landmark has none in their camera and they see it where it is.
+Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const map::BundledMap& map, const geometry::SE3& T_rig_world) {
+  const auto agrees = [&](KeypointRef r, LandmarkId l) {
+    const feature::Keypoints& keypoints = frame.keypoints(r.camera);
+    const std::size_t k = r.keypoint.index();
+    const auto error = solver::ReprojectionResidual::error_only(map.rig(), r.camera, T_rig_world, map.landmark(l).position,
+                                                                keypoints.pixel[k].cast<double>());
+    return error && error->squaredNorm() <= solver::kChi2TwoDof95 * keypoints.sigma[k] * keypoints.sigma[k];
+  };
   std::map<LandmarkId, std::vector<KeypointRef>> by_landmark;
   for (std::size_t c = 0; c < table.size(); ++c) {
     for (std::size_t k = 0; k < table[c].size(); ++k) {
@@ -64,7 +69,7 @@ Groups regroup(const BundledFrame& frame, const LandmarkTable& table) {
       groups.landmark.push_back(LandmarkId());
     } else if (owner.valid() && !disputed) {
       for (const KeypointRef r : free) {
-        if (!has_camera(by_landmark[owner], r.camera)) by_landmark[owner].push_back(r);
+        if (!has_camera(by_landmark[owner], r.camera) && agrees(r, owner)) by_landmark[owner].push_back(r);
       }
     }
   }
@@ -88,7 +93,8 @@ void follow_with_patch(const image::Pyramid& pyramid, feature::Keypoints& keypoi
 }
 
 std::shared_ptr<BundledFrame> regrouped_frame(const BundledFrame& frame, const Groups& groups, const camera::Rig& rig,
-                                              std::span<const image::Pyramid> pyramids) {
+                                              std::span<const image::Pyramid> pyramids,
+                                              const InitialisationOptions& options) {
   auto out = std::make_shared<BundledFrame>(frame);
   for (std::size_t c = 0; c < out->cameras.size(); ++c) {
     frame::CameraFrame& camera = out->cameras[c];
@@ -98,7 +104,7 @@ std::shared_ptr<BundledFrame> regrouped_frame(const BundledFrame& frame, const G
     }
     camera.grid = frame::FeatureGrid(camera.keypoints, rig.camera(c).width, rig.camera(c).height);
   }
-  out->bundled = frame::make_bundled(rig, out->cameras, groups.matched, kMinParallax);
+  out->bundled = frame::make_bundled(rig, out->cameras, groups.matched, options.min_parallax, options.max_chi2);
   return out;
 }
 
@@ -114,8 +120,8 @@ NewKeyframe make_keyframe(const BundledFrame& frame, const FrameMatches& matches
                           std::span<const image::Pyramid> pyramids, KeyframeId reference,
                           const InitialisationOptions& options, map::MapDraft& draft) {
   const LandmarkTable table = landmark_table(frame, matches);
-  const Groups groups = regroup(frame, table);
-  const std::shared_ptr<const BundledFrame> stored = regrouped_frame(frame, groups, draft.map().rig(), pyramids);
+  const Groups groups = regroup(frame, table, draft.map(), T_rig_world);
+  const std::shared_ptr<const BundledFrame> stored = regrouped_frame(frame, groups, draft.map().rig(), pyramids, options);
 
   std::vector<std::pair<FeatureId, LandmarkId>> observed;
   std::vector<std::uint8_t> has_landmark(stored->bundled.size(), 0);

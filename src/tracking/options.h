@@ -47,6 +47,8 @@ struct KeyframeOptions {
 struct InitialisationOptions {
   int min_matched = 60;          // features with a metric point that start a map at once
   double max_depth_error = 0.15; // relative standard deviation of the depth of a point that becomes a landmark
+  double min_parallax = 5e-4;    // rad: below it a matched feature has no point
+  double max_chi2 = 7.81;        // squared normalised error of a keypoint against its feature's point
   int min_monocular = 80;        // matches between two frames that start a map up to scale
   int min_monocular_points = 50; // points it needs
 
@@ -54,6 +56,8 @@ struct InitialisationOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("min_matched", self.min_matched, Range{10, 10000}, "", "features with a metric point that start a map at once");
     visitor("max_depth_error", self.max_depth_error, Range{0.001, 10}, "", "relative depth error of a point that becomes a landmark");
+    visitor("min_parallax", self.min_parallax, Range{0, 1}, "rad", "least parallax of a feature that gets a point");
+    visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "", "squared normalised error of a keypoint against its feature's point");
     visitor("min_monocular", self.min_monocular, Range{10, 10000}, "", "matches between two frames that start a map up to scale");
     visitor("min_monocular_points", self.min_monocular_points, Range{10, 10000}, "", "points such a start needs");
   }

@@ -59,7 +59,7 @@ Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& fram
   if (input.state.status == TrackStatus::kTracking) {
     const MatchSearch search = find_landmarks(map, frame, predicted, landmarks, {},
                                               search_options(input, options.matching, options.matching.predicted_radius), pool);
-    const auto observations = pose_observations(map, frame, search.found);
+    const auto observations = pose_observations(map, frame, search.found, input.noise);
     if (count(search.found) >= static_cast<std::size_t>(options.min_inliers)) {
       const auto solution = solver::solve_pose(map.rig(), observations, predicted, options.pose);
       if (supported(solution, observations.size(), options.min_inliers, options)) {
@@ -73,7 +73,7 @@ Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& fram
   wide.ratio = 0.8 * options.matching.ratio;
   const MatchSearch search = find_landmarks(map, frame, predicted, view.landmarks, {}, wide, pool);
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return out;
-  const auto observations = pose_observations(map, frame, search.found);
+  const auto observations = pose_observations(map, frame, search.found, input.noise);
   const auto solution = solver::ransac_pose(map.rig(), observations, predicted, options.pose, {},
                                             Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
   out.reason = LostReason::kFewInliers;
@@ -98,8 +98,10 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::Bund
   Fine out;
   out.matches = merge(coarse.matches, search.found);
   out.visible = std::move(search.visible);
+  const std::vector<KeypointPlace> before = places(frame, out.matches);
   align_matches(map, coarse.T_rig_world, out.matches, input.pyramids, options.alignment, input.noise, frame, pool);
   out.solution = solver::solve_pose(map.rig(), pose_observations(map, frame, out.matches), coarse.T_rig_world, options.pose);
+  restore_outliers(out.matches, out.solution.inlier, before, frame);
   return out;
 }
 
@@ -164,7 +166,7 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, F
   note_sightings(fine.visible, state.landmarks, state);
 
   ++state.frames_since_keyframe;
-  KeyframeEvidence evidence = keyframe_evidence(map, frame, out.matches, state.reference, result.T_rig_world, options.keyframe);
+  KeyframeEvidence evidence = keyframe_evidence(map, frame, out.matches, state.reference, result.T_rig_world, options);
   state.best_overlap = std::max(state.best_overlap, evidence.overlap);
   evidence.best_overlap = state.best_overlap;
   evidence.frames_since_keyframe = state.frames_since_keyframe;

@@ -230,7 +230,7 @@ TEST(MapKeyframe, GrowsAnAccurateMapKeyframeByKeyframe) {
       for (auto& [truth, l] : world.landmark_of) l = world.map.resolve(l);
       std::erase_if(world.landmark_of, [](const auto& entry) { return !entry.second.valid(); });
     }
-    EXPECT_GT(created, 300);
+    EXPECT_GT(created, 200);  // of some 600 features a camera and keyframe, most of which show landmarks already
     for (const KeyframeId k : world.map.keyframe_ids()) {
       EXPECT_LT(map::distance_m(world.map.keyframe(k).T_rig_world, world.true_pose(k)), 0.02) << "keyframe " << k.value();
     }

@@ -2,6 +2,7 @@
 // rigs of fewer are its first ones, of which the first two look ahead side by side.
 #pragma once
 
+#include <algorithm>
 #include <numeric>
 #include <vector>
 
@@ -78,6 +79,11 @@ class RenderedTour {
   std::vector<image::ImageBundle> frames_;
   evaluation::Trajectory truth_;
 };
+
+// Another place with as much to see: left and right exchanged.
+inline void mirror(image::CameraImage& image) {
+  for (int y = 0; y < image.image.height(); ++y) std::reverse(image.image.row(y), image.image.row(y) + image.image.width());
+}
 
 inline void blacken(image::CameraImage& input) {
   for (int y = 0; y < input.image.height(); ++y) {

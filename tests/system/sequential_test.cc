@@ -156,9 +156,9 @@ TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) system.process(tour.frames()[k++]);
   ASSERT_GT(tracked_frames(system), 0u);
-  image::ImageBundle dark = tour.frames()[k++];
-  blacken(dark.images[0]);
-  system.process(dark);
+  image::ImageBundle elsewhere = tour.frames()[k++];
+  mirror(elsewhere.images[0]);
+  system.process(elsewhere);
   EXPECT_EQ(tracked_frames(system), 0u);
   EXPECT_TRUE(system.trajectory().empty() && system.live_trajectory().empty());
   EXPECT_EQ(system.snapshot()->num_keyframes(), 0u);
@@ -168,6 +168,22 @@ TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
   EXPECT_EQ(system.maps_started(), 2);
   EXPECT_GT(system.trajectory().size(), 8u);
   EXPECT_LT(ate_m(system.trajectory(), tour.replayed_truth(k), evaluation::AlignMode::kSim3), 0.01);
+}
+
+TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {
+  const RenderedTour tour(1, 16);
+  System system(tour.rig(), small_config(Mode::kSequential));
+  std::size_t k = 0;
+  while (k < 8 && tracked_frames(system) == 0) system.process(tour.frames()[k++]);
+  const std::size_t before = tracked_frames(system);
+  ASSERT_GT(before, 0u);
+  image::ImageBundle dark = tour.frames()[k++];
+  blacken(dark.images[0]);
+  EXPECT_EQ(system.process(dark).result.reason, LostReason::kFewFeatures);
+  EXPECT_EQ(tracked_frames(system), before);
+  while (k < tour.frames().size()) system.process(tour.frames()[k++]);
+  EXPECT_EQ(system.maps_started(), 1);
+  EXPECT_GT(tracked_frames(system), before + 4);
 }
 
 TEST(SystemSequential, StartsUpToScaleSoonAfterADarkFirstFrame) {

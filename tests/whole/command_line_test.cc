@@ -70,7 +70,7 @@ TEST_F(CommandLine, TellsItsVersionAndHelpOnEveryVerb) {
 TEST_F(CommandLine, RefusesWhatMakesNoSense) {
   const std::string base = "run " + data() + " --out " + out("refused") + " --progress never ";
   for (const char* more : {"--set no.such.key=1", "--set features.per_image=-5", "--set features.per_image=many", "--set seed",
-                           "--cameras 0,9", "--cameras 0,0", "--cameras a", "--mode sideways", "--begin 5 --end 1", "--begin 99",
+                           "--cameras 0,9", "--cameras 0,0", "--cameras a", "--cameras 0,", "--cameras ''", "--mode sideways", "--begin 5 --end 1", "--begin 99",
                            "--format bag", "--pace slow", "--seed -1", "--config /no/such/file", "--rig /no/such/file", "--bogus"}) {
     expect_refused(base + more);
   }
