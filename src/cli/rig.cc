@@ -14,6 +14,7 @@ namespace {
 
 struct RigArguments {
   std::string in, out;
+  bool overwrite = false;
 };
 
 int rig_info(const std::string& file) {
@@ -24,14 +25,19 @@ int rig_info(const std::string& file) {
 }
 
 // A folder, or a name that ends like one, is written in EuRoC's layout; anything else is our YAML.
-int rig_convert(const std::string& in, const std::string& out) {
+int rig_convert(const RigArguments& arguments) {
   constexpr double kRateHz = 20.0;  // EuRoC's files carry one; nothing reads it
-  const auto rig = io::read_rig(in);
+  const std::string& out = arguments.out;
+  const auto rig = io::read_rig(arguments.in);
   if (!rig) return report_error(rig.error());
   std::error_code error;
   const bool folder = out.ends_with('/') || std::filesystem::is_directory(out, error);
+  const bool there = folder ? std::filesystem::exists(std::filesystem::path(out) / "mav0", error) : std::filesystem::exists(out, error);
+  if (there && !arguments.overwrite) return report_error({out, "OUT", "a calibration there already", "a new name, or --overwrite"});
   const Status status = folder ? io::write_euroc_sensors(*rig, out, kRateHz) : io::write_rig(*rig, out);
-  return status ? kExitOk : report_error(status.error());
+  if (!status) return report_error(status.error());
+  std::printf("%s: %zu cameras as %s\n", out.c_str(), rig->size(), folder ? "EuRoC sensor files" : "a bslam rig file");
+  return kExitOk;
 }
 
 }  // namespace
@@ -48,9 +54,10 @@ void add_rig(CLI::App& app, int& exit_status) {
 
   CLI::App* convert = rig->add_subcommand("convert", "write a calibration in another format");
   convert->add_option("IN", arguments->in, formats)->required();
-  convert->add_option("OUT", arguments->out, "a file (bslam rig file), or a folder (EuRoC: mav0/camN/sensor.yaml)")
+  convert->add_option("OUT", arguments->out, "a file (bslam rig file), or a folder, ending in / where it is new (EuRoC: mav0/camN/sensor.yaml)")
       ->required();
-  convert->callback([arguments, &exit_status] { exit_status = rig_convert(arguments->in, arguments->out); });
+  convert->add_flag("--overwrite", arguments->overwrite, "OUT may exist");
+  convert->callback([arguments, &exit_status] { exit_status = rig_convert(*arguments); });
 }
 
 }  // namespace bslam::cli

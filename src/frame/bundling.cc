@@ -184,6 +184,19 @@ class Placement {
   std::vector<Before> before_;
 };
 
+// All keypoints of the group look the same way, as far as their noise tells: a feature too far for a point.
+bool agrees_at_infinity(const camera::Rig& rig, std::span<const CameraFrame> cameras, double max_chi2,
+                        std::span<const KeypointRef> group) {
+  constexpr double kFar_m = 1e5;
+  const PointObservation first = observation(rig, cameras, group.front());
+  const Vector3d point_rig = rig.rig_from_cam(group.front().camera.index()) * (kFar_m * first.bearing);
+  return std::all_of(group.begin() + 1, group.end(), [&](KeypointRef ref) {
+    const PointObservation o = observation(rig, cameras, ref);
+    const auto pixel = o.camera->project(o.T_cam_common * point_rig);
+    return pixel && (*pixel - o.pixel).squaredNorm() <= max_chi2 * (o.sigma * o.sigma + first.sigma * first.sigma);
+  });
+}
+
 // Keypoints that do not meet in one point are no feature: the worst goes until the rest agrees. False where less than two
 // are left.
 bool keep_agreeing(const camera::Rig& rig, std::span<const CameraFrame> cameras, double max_chi2, std::vector<KeypointRef>& group) {
@@ -191,7 +204,7 @@ bool keep_agreeing(const camera::Rig& rig, std::span<const CameraFrame> cameras,
     std::vector<PointObservation> observations;
     for (const KeypointRef ref : group) observations.push_back(observation(rig, cameras, ref));
     const auto estimated = estimate_point(observations, 0.0);
-    if (!estimated) return false;
+    if (!estimated) return agrees_at_infinity(rig, cameras, max_chi2, group);  // rays that diverge by their noise
     if (estimated->worst_chi2 <= max_chi2) return true;
     group.erase(group.begin() + static_cast<std::ptrdiff_t>(estimated->worst));
   }
