@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
 #include "cli/verbs.h"
 #include "io/atomic_file.h"
-#include "io/config_file.h"
 #include "io/frame_reader.h"
 #include "io/image_file.h"
 #include "system/pipeline.h"
@@ -17,8 +17,8 @@ namespace {
 
 struct InspectArguments {
   DatasetArguments data;
-  std::string out, config_file;
-  std::vector<std::string> settings;
+  ConfigArguments config;
+  std::string out;
   int frame = 0;
 };
 
@@ -46,20 +46,8 @@ nlohmann::ordered_json to_json(const frame::BundledFrame& frame, const io::Datas
   return {{"time", to_seconds(frame.time_ns)}, {"cameras", std::move(cameras)}, {"features", std::move(features)}};
 }
 
-Result<system::Config> resolve_config(const InspectArguments& arguments) {
-  system::Config config;
-  OptionTable table(config);
-  if (!arguments.config_file.empty()) {
-    if (const Status s = io::apply_config_file(table, arguments.config_file); !s) return s.error();
-  }
-  for (const std::string& setting : arguments.settings) {
-    if (const Status s = io::apply_setting(table, setting); !s) return s.error();
-  }
-  return config;
-}
-
 int inspect(const InspectArguments& arguments) {
-  const auto config = resolve_config(arguments);
+  const auto config = resolve_config(arguments.config);
   if (!config) return report_error(config.error());
   const auto request = dataset_request(arguments.data, config->io.sync_tolerance);
   if (!request) return report_error(request.error());
@@ -69,13 +57,9 @@ int inspect(const InspectArguments& arguments) {
     return report_error({arguments.data.path, "--frame", std::to_string(arguments.frame),
                          "0 to " + std::to_string(dataset->frames.size() - 1)});
   }
-  std::vector<image::Image> masks;
-  for (std::size_t c = 0; c < dataset->rig.size(); ++c) {
-    auto mask = io::read_mask(dataset->rig.camera(c));
-    if (!mask) return report_error(mask.error());
-    masks.push_back(std::move(*mask));
-  }
-  system::Pipeline pipeline(dataset->rig, *config, std::move(masks));
+  auto masks = io::read_masks(dataset->rig);
+  if (!masks) return report_error(masks.error());
+  system::Pipeline pipeline(dataset->rig, *config, std::move(*masks));
   std::vector<system::StageTime> stages;
   const auto frame = pipeline.make_frame(io::read_frame(*dataset, static_cast<std::size_t>(arguments.frame)), stages);
   const Status written = io::write_atomically(arguments.out, to_json(frame, *dataset).dump(1) + "\n");
@@ -93,8 +77,7 @@ void add_inspect(CLI::App& app, int& exit_status) {
   add_dataset_options(*verb, a->data);
   verb->add_option("--frame", a->frame, "number of the input frame, from 0")->required();
   verb->add_option("--out", a->out, "JSON file to write")->required();
-  verb->add_option("--config", a->config_file, "settings in YAML");
-  verb->add_option("--set", a->settings, "key=value, over the file; repeats")->expected(1)->take_all();
+  add_config_options(*verb, a->config);
   verb->callback([a, &exit_status] { exit_status = inspect(*a); });
 }
 

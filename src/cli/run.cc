@@ -1,18 +1,19 @@
 // bslam run: SLAM over a recorded data set.
-#include <unistd.h>
-
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "base/option_table.h"
+#include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
-#include "io/config_file.h"
 #include "session/run_session.h"
 
 namespace bslam::cli {
@@ -27,28 +28,23 @@ const auto g_program_start = std::chrono::steady_clock::now();
 
 struct RunArguments {
   DatasetArguments data;
-  std::string out, config_file, mode, pace = "fast", late = "block", progress = "auto";
-  std::vector<std::string> settings;
+  ConfigArguments config;
+  std::string out, mode, pace = "fast", late = "block", progress = "auto";
   std::optional<int> seed;
   bool no_loop = false, no_final_ba = false, overwrite = false;
 };
 
-// File first, then single settings, then the options of the command line.
-Result<system::Config> resolve_config(const RunArguments& arguments) {
-  system::Config config;
-  OptionTable table(config);
-  if (!arguments.config_file.empty()) {
-    if (const Status s = io::apply_config_file(table, arguments.config_file); !s) return s.error();
-  }
-  for (const std::string& setting : arguments.settings) {
-    if (const Status s = io::apply_setting(table, setting); !s) return s.error();
-  }
+// The options of the command line win over file and single settings.
+Result<system::Config> resolve_run_config(const RunArguments& arguments) {
+  auto resolved = resolve_config(arguments.config);
+  if (!resolved) return resolved;
+  system::Config& config = *resolved;
   if (!arguments.mode.empty()) {
-    if (const Status s = table.set("mode", arguments.mode); !s) return s.error();
+    if (const Status s = OptionTable(config).set("mode", arguments.mode); !s) return s.error();
   }
   if (arguments.seed) config.seed = *arguments.seed;
   if (arguments.no_final_ba) config.final_adjustment = false;
-  return config;
+  return resolved;
 }
 
 // Makes the folder; an existing one must be empty or given up for overwriting, and then loses the files of an earlier run.
@@ -79,7 +75,7 @@ void print_result(const report::RunRecord& record, const std::string& out) {
 }
 
 int run(const RunArguments& arguments) {
-  const auto config = resolve_config(arguments);
+  const auto config = resolve_run_config(arguments);
   if (!config) return report_error(config.error());
   const auto request = dataset_request(arguments.data, config->io.sync_tolerance);
   if (!request) return report_error(request.error());
@@ -114,8 +110,7 @@ void add_run(CLI::App& app, int& exit_status) {
   CLI::App* verb = app.add_subcommand("run", "SLAM over a recorded data set");
   add_dataset_options(*verb, a->data);
   verb->add_option("--out", a->out, "folder for trajectory, summary, configuration and plots")->required();
-  verb->add_option("--config", a->config_file, "settings in YAML, as config.yaml of an earlier run");
-  verb->add_option("--set", a->settings, "key=value, over the file; repeats")->expected(1)->take_all();
+  add_config_options(*verb, a->config);
   verb->add_option("--mode", a->mode, "sequential (identical bytes on every run) or parallel; default parallel");
   verb->add_option("--pace", a->pace, "fast, or realtime: images at their recorded pace")
       ->check(CLI::IsMember({"fast", "realtime"}))

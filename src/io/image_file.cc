@@ -66,4 +66,14 @@ Result<image::Image> read_mask(const camera::Camera& camera) {
   return mask;
 }
 
+Result<std::vector<image::Image>> read_masks(const camera::Rig& rig) {
+  std::vector<image::Image> masks;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    auto mask = read_mask(rig.camera(c));
+    if (!mask) return mask.error();
+    masks.push_back(std::move(*mask));
+  }
+  return masks;
+}
+
 }  // namespace bslam::io

@@ -4,9 +4,10 @@
 #include <filesystem>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "base/result.h"
-#include "camera/camera.h"
+#include "camera/rig.h"
 #include "image/image.h"
 
 namespace bslam::io {
@@ -22,5 +23,8 @@ Result<image::Image> read_image(const std::filesystem::path& file);
 // The mask of a camera, 0 = ignore; an empty image where it has none. Errors: not readable, not the camera's
 // resolution.
 Result<image::Image> read_mask(const camera::Camera& camera);
+
+// The masks of all cameras of a rig, in order; errors as read_mask.
+Result<std::vector<image::Image>> read_masks(const camera::Rig& rig);
 
 }  // namespace bslam::io

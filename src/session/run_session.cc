@@ -36,16 +36,6 @@ class Metronome {
 
 bool interrupted(const SessionOptions& options) { return options.interrupted != nullptr && options.interrupted->load(); }
 
-Result<std::vector<image::Image>> read_masks(const camera::Rig& rig) {
-  std::vector<image::Image> masks;
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    auto mask = io::read_mask(rig.camera(c));
-    if (!mask) return mask.error();
-    masks.push_back(std::move(*mask));
-  }
-  return masks;
-}
-
 // Feeds the frames one after the other; returns what was fed. Stops early where asked to.
 std::vector<InputFrame> feed(const io::Dataset& dataset, const SessionOptions& options, system::System& system) {
   std::vector<InputFrame> inputs;
@@ -68,7 +58,7 @@ std::vector<InputFrame> feed(const io::Dataset& dataset, const SessionOptions& o
 
 Result<SessionResult> run_session(const io::Dataset& dataset, const SessionOptions& options) {
   const system::Stopwatch start_up;
-  auto masks = read_masks(dataset.rig);
+  auto masks = io::read_masks(dataset.rig);
   if (!masks) return masks.error();
   system::System system(dataset.rig, options.config, std::move(*masks));
   const double start_up_s = options.start_up_s + 1e-3 * start_up.ms();

@@ -1,0 +1,24 @@
+#include "cli/config_arguments.h"
+
+#include "io/config_file.h"
+
+namespace bslam::cli {
+
+void add_config_options(CLI::App& verb, ConfigArguments& arguments) {
+  verb.add_option("--config", arguments.file, "settings in YAML, as config.yaml of an earlier run");
+  verb.add_option("--set", arguments.settings, "key=value, over the file; repeats")->expected(1)->take_all();
+}
+
+Result<system::Config> resolve_config(const ConfigArguments& arguments) {
+  system::Config config;
+  OptionTable table(config);
+  if (!arguments.file.empty()) {
+    if (const Status s = io::apply_config_file(table, arguments.file); !s) return s.error();
+  }
+  for (const std::string& setting : arguments.settings) {
+    if (const Status s = io::apply_setting(table, setting); !s) return s.error();
+  }
+  return config;
+}
+
+}  // namespace bslam::cli
