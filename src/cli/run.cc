@@ -75,6 +75,9 @@ void print_result(const report::RunRecord& record, const std::string& out) {
 }
 
 int run(const RunArguments& arguments) {
+  // Before anything is made: whoever sees the folder can rely on an interruption being answered in order.
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
   const auto config = resolve_run_config(arguments);
   if (!config) return report_error(config.error());
   const auto request = dataset_request(arguments.data, config->io.sync_tolerance);
@@ -84,8 +87,6 @@ int run(const RunArguments& arguments) {
   if (const Status s = prepare_folder(arguments.out, arguments.overwrite); !s) return report_error(s.error());
   for (const std::string& warning : dataset->warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
 
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
   ProgressBar bar(arguments.progress == "auto", "frames");
   session::SessionOptions options;
   options.config = *config;
