@@ -151,6 +151,7 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
   }
   const std::vector<Source> bad = bad_observations(flat, options.outlier_chi2);
   map::SetPoses poses = poses_of(draft.map(), flat);
+  poses.correction = selection.whole_map;
   std::vector<LandmarkId> touched;
   for (const auto& [landmark, position] : poses.landmarks) touched.push_back(landmark);
   draft.set_poses(std::move(poses));

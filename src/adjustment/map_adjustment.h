@@ -29,6 +29,7 @@ struct AdjustmentOptions {
 struct Selection {
   std::vector<KeyframeId> free_keyframes, fixed_keyframes;
   std::vector<LandmarkId> landmarks;
+  bool whole_map = false;  // the result is a correction of the map, which nothing begun before it may undo
 };
 
 struct AdjustmentReport {

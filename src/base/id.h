@@ -32,6 +32,7 @@ using FeatureId = Id<struct FeatureTag>;       // unique feature within one Bund
 using FrameId = Id<struct FrameTag>;           // input frame, in order of time
 using KeyframeId = Id<struct KeyframeTag>;     // given by MapStore at commit
 using LandmarkId = Id<struct LandmarkTag>;     // given by MapStore at commit
+using WordId = Id<struct WordTag>;             // word of the place-recognition vocabulary
 using MapVersion = Id<struct MapVersionTag>;   // one more with every commit
 
 }  // namespace bslam

@@ -18,6 +18,7 @@ struct CameraFrame {
   TimeNs time_ns = 0;             // its own capture time
   feature::Keypoints keypoints;   // empty where the image is missing or damaged
   FeatureGrid grid;
+  std::vector<WordId> words;      // per keypoint, of the vocabulary of the run; empty until somebody asks for them
 };
 
 struct BundledFrame {

@@ -31,6 +31,24 @@ KeyframeId BundledMap::newest_keyframe() const {
   return {};
 }
 
+std::vector<KeyframeId> BundledMap::roots() const {
+  std::vector<KeyframeId> out;
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    if (keyframes_[i].alive && !keyframes_[i].parent.valid()) out.emplace_back(i);
+  }
+  return out;
+}
+
+KeyframeId BundledMap::root_of(KeyframeId k) const {
+  while (keyframe(k).parent.valid()) k = keyframe(k).parent;
+  return k;
+}
+
+KeyframeId BundledMap::surviving(KeyframeId k) const {
+  while (k.valid() && !keyframe(k).alive) k = keyframe(k).parent;
+  return k;
+}
+
 LandmarkId BundledMap::resolve(LandmarkId l) const {
   while (l.valid() && l.index() < landmarks_.size()) {
     const Landmark& entry = landmark(l);
@@ -44,7 +62,7 @@ geometry::SE3 BundledMap::resolved_pose(KeyframeId k) const {
   const BundledKeyframe* entry = &keyframe(k);
   if (entry->alive) return entry->T_rig_world;
   geometry::SE3 T_rig_ancestor;
-  for (; !entry->alive; entry = &keyframe(entry->parent)) T_rig_ancestor = T_rig_ancestor * entry->T_rig_parent;
+  for (; !entry->alive && entry->parent.valid(); entry = &keyframe(entry->parent)) T_rig_ancestor = T_rig_ancestor * entry->T_rig_parent;
   return T_rig_ancestor * entry->T_rig_world;
 }
 
@@ -52,7 +70,7 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
                                     std::span<const std::pair<FeatureId, LandmarkId>> matches,
                                     KeyframeId fallback_parent) {
   const KeyframeId k(keyframes_.size());
-  if (!alive(fallback_parent)) fallback_parent = newest_keyframe();
+  if (!alive(fallback_parent)) fallback_parent = KeyframeId();
   std::vector<LandmarkId> table(frame->bundled.size());
   BundledKeyframe entry;
   entry.frame = std::move(frame);
@@ -78,12 +96,12 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
 }
 
 LandmarkId BundledMap::add_landmark(const Eigen::Vector3d& position, std::span<const Observation> observations,
-                                    const LandmarkReference& reference) {
+                                    const LandmarkReference& reference, KeyframeId born) {
   BSLAM_ASSERT(!observations.empty(), "a landmark has an observation");
   const LandmarkId l(landmarks_.size());
   Landmark entry;
   entry.position = position;
-  entry.born = newest_keyframe();
+  entry.born = born.valid() ? born : newest_keyframe();
   entry.alive = true;
   entry.reference = reference;
   if (!reference.keyframe.valid()) {
@@ -156,11 +174,30 @@ bool BundledMap::remove_keyframe(KeyframeId k) {
   BundledKeyframe& entry = edit(k);
   const geometry::SE3& T_parent_world = keyframe(entry.parent).T_rig_world;
   entry.T_rig_parent = entry.T_rig_world * T_parent_world.inverse();
-  entry.frame.reset();
-  entry.landmarks.clear();
-  entry.covisible.clear();
-  entry.alive = false;
-  --alive_keyframes_;
+  let_go(k);
+  return true;
+}
+
+bool BundledMap::join_parts(KeyframeId child, KeyframeId parent) {
+  if (!alive(child) || !alive(parent) || root_of(child) == root_of(parent)) return false;
+  make_root(child);
+  attach(child, parent);
+  return true;
+}
+
+bool BundledMap::remove_part(KeyframeId root) {
+  if (!alive(root) || keyframe(root).parent.valid()) return false;
+  std::vector<KeyframeId> part = {root};
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    const std::vector<KeyframeId>& children = keyframe(part[i]).children;
+    part.insert(part.end(), children.begin(), children.end());
+  }
+  for (std::size_t i = part.size(); i-- > 1;) remove_keyframe(part[i]);  // leaves first
+  const CowArray<LandmarkId> table = keyframe(root).landmarks;
+  for (const LandmarkId l : table) {
+    if (l.valid()) remove_observation(l, root);
+  }
+  let_go(root);
   return true;
 }
 
@@ -196,6 +233,15 @@ void BundledMap::unlink(LandmarkId l, Observation o) {
   edit(o.keyframe).landmarks.mutate(owner_.tag())[o.feature.index()] = LandmarkId();
   observations_total_ -= num_keypoints(o);
   for (const Observation& other : observations(l)) change_weight(o.keyframe, other.keyframe, -1);
+}
+
+void BundledMap::let_go(KeyframeId k) {
+  BundledKeyframe& entry = edit(k);
+  entry.frame.reset();
+  entry.landmarks.clear();
+  entry.covisible.clear();
+  entry.alive = false;
+  --alive_keyframes_;
 }
 
 void BundledMap::bury(LandmarkId l, LandmarkId merged_into) {

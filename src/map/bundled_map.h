@@ -1,4 +1,5 @@
-// The paper's BundledMap: keyframes, landmarks, covisibility graph and spanning tree. A value: copying it shares all
+// The paper's BundledMap: keyframes, landmarks, covisibility graph and spanning trees: one for every part that no place
+// seen twice has joined to another yet. A value: copying it shares all
 // chunks and costs microseconds; changing a copy detaches only the chunks it touches. Published versions are const, so
 // a reader may keep one for as long as it likes. ARCHITECTURE.md tells who may change what. References and spans into a
 // copy that is being changed are valid until its next change.
@@ -37,6 +38,8 @@ class BundledMap {
   const PyramidShape& pyramid() const { return pyramid_; }
   MapVersion version() const { return version_; }
   Scale scale() const { return scale_; }
+  // Counts corrections (loops closed, global adjustments): positions of different epochs do not mix.
+  int gauge_epoch() const { return gauge_epoch_; }
 
   // Slots include removed ones; ids are slot numbers and never reused.
   std::size_t keyframe_slots() const { return keyframes_.size(); }
@@ -56,6 +59,11 @@ class BundledMap {
   std::vector<KeyframeId> keyframe_ids() const;
   std::vector<LandmarkId> landmark_ids() const;
   KeyframeId newest_keyframe() const;  // invalid in an empty map
+  // Roots of the parts of the map, in ascending order; and that of the part an alive keyframe belongs to.
+  std::vector<KeyframeId> roots() const;
+  KeyframeId root_of(KeyframeId k) const;
+  // The keyframe or, where it was removed, the nearest ancestor that is alive; invalid where its part was removed.
+  KeyframeId surviving(KeyframeId k) const;
 
   // Follows merges; invalid where the landmark was removed.
   LandmarkId resolve(LandmarkId l) const;
@@ -70,24 +78,26 @@ class BundledMap {
 
   // First broken rule in words, or nothing. Rules: observations and keyframes' landmark tables mirror one another; no
   // alive landmark without observations or observed by a removed keyframe, no feature twice; the reference is one of the
-  // landmark's observations; covisibility is symmetric, its weights are the shared landmarks; the spanning tree is a tree
-  // over all alive keyframes, parents alive or root; counters are right.
+  // landmark's observations; covisibility is symmetric, its weights are the shared landmarks; the spanning trees hold all alive
+  // keyframes, parents alive or root; counters are right.
   std::optional<std::string> check_invariants() const;
 
   // ---- changing (on a private copy only). Functions that return bool change nothing and return false where the landmark
   // or keyframe they name is not alive, or for the reason they give.
   void set_scale(Scale scale) { scale_ = scale; }
   void set_version(MapVersion v) { version_ = v; }
+  void begin_gauge_epoch() { ++gauge_epoch_; }
 
   // Appends a keyframe observing the given landmarks (alive, distinct features, distinct landmarks); its parent becomes
-  // the keyframe with which it shares most (ties: newer), else `fallback_parent`, else (not alive) the newest keyframe.
-  // The first keyframe is the root.
+  // the keyframe with which it shares most (ties: newer), else `fallback_parent`; where that is not alive it becomes the
+  // root of a new part.
   KeyframeId add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                           std::span<const std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent);
   // Appends a landmark with one or more observations (keyframes distinct and alive, features free); the first keypoint of
-  // the first is the reference unless another is named (keyframe valid). Calls refresh_landmark.
+  // the first is the reference unless another is named (keyframe valid). It is born with the newest keyframe unless another
+  // is named. Calls refresh_landmark.
   LandmarkId add_landmark(const Eigen::Vector3d& position, std::span<const Observation> observations,
-                          const LandmarkReference& reference = {});
+                          const LandmarkReference& reference = {}, KeyframeId born = {});
   // False also where the keyframe observes the landmark already or the feature is taken.
   bool add_observation(LandmarkId l, Observation o);
   // Where the last observation goes, the landmark goes; where the reference goes, the first keypoint of the oldest
@@ -100,6 +110,11 @@ class BundledMap {
   // Its observations go, children get the best of their covisible keyframes as parent that keeps a tree. False also for
   // the root.
   bool remove_keyframe(KeyframeId k);
+  // Hangs the part of `child` under `parent`, `child` becoming the root of its part first. False also where both are of one
+  // part already.
+  bool join_parts(KeyframeId child, KeyframeId parent);
+  // All keyframes and landmarks of a part go. False where `root` is none.
+  bool remove_part(KeyframeId root);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
   bool set_position(LandmarkId l, const Eigen::Vector3d& position);
   bool add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
@@ -114,6 +129,7 @@ class BundledMap {
   // bundled_map.cc. `link` and `unlink` keep list, table, counter and covisibility in step; nothing else does.
   void link(LandmarkId l, Observation o);
   void unlink(LandmarkId l, Observation o);
+  void let_go(KeyframeId k);  // without observations and children left
   void bury(LandmarkId l, LandmarkId merged_into);  // without observations left
 
   // covisibility.cc
@@ -123,11 +139,13 @@ class BundledMap {
   KeyframeId choose_parent(KeyframeId k, KeyframeId fallback) const;
   void attach(KeyframeId child, KeyframeId parent);
   void hand_over_children(KeyframeId removed);
+  void make_root(KeyframeId k);  // of its part
 
   std::shared_ptr<const camera::Rig> rig_;
   PyramidShape pyramid_;
   MapVersion version_{0};
   Scale scale_ = Scale::kMetric;
+  int gauge_epoch_ = 0;
   CowOwner owner_;
   CowVector<BundledKeyframe, 1> keyframes_;
   CowVector<Landmark, 16> landmarks_;

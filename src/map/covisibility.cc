@@ -1,4 +1,4 @@
-// The covisibility graph and the spanning tree of a map.
+// The covisibility graph and the spanning trees of a map.
 #include <algorithm>
 
 #include "map/bundled_map.h"
@@ -66,6 +66,19 @@ void BundledMap::attach(KeyframeId child, KeyframeId parent) {
   edit(child).parent = parent;
   std::vector<KeyframeId>& children = edit(parent).children;
   children.insert(std::ranges::lower_bound(children, child), child);
+}
+
+// Turns the links round on the way up from `k`.
+void BundledMap::make_root(KeyframeId k) {
+  KeyframeId child = k, parent = keyframe(k).parent;
+  edit(k).parent = KeyframeId();
+  while (parent.valid()) {
+    const KeyframeId next = keyframe(parent).parent;
+    std::erase(edit(parent).children, child);
+    attach(parent, child);
+    child = parent;
+    parent = next;
+  }
 }
 
 // The children are attached one after the other to the removed keyframe's parent or to a child attached before, always

@@ -11,7 +11,7 @@ KeyframeId MapDraft::add_keyframe(std::shared_ptr<const frame::BundledFrame> fra
   matches = usable_matches(working_, matches);
   const KeyframeId k = working_.add_keyframe(frame, T_rig_world, matches, fallback_parent);
   edit_.operations.emplace_back(
-      AddKeyframe{k, std::move(frame), T_rig_world, std::move(matches), fallback_parent, working_.keyframe(k).parent});
+      AddKeyframe{k, std::move(frame), T_rig_world, std::move(matches), working_.keyframe(k).parent});
   return k;
 }
 
@@ -52,10 +52,23 @@ bool MapDraft::remove_keyframe(KeyframeId k) {
   return true;
 }
 
+bool MapDraft::join_parts(KeyframeId child, KeyframeId parent) {
+  if (!working_.join_parts(child, parent)) return false;
+  edit_.operations.emplace_back(JoinParts{child, parent});
+  return true;
+}
+
+bool MapDraft::remove_part(KeyframeId root) {
+  if (!working_.remove_part(root)) return false;
+  edit_.operations.emplace_back(RemovePart{root});
+  return true;
+}
+
 void MapDraft::set_poses(SetPoses poses) {
   std::erase_if(poses.keyframes, [&](const auto& entry) { return !working_.set_pose(entry.first, entry.second); });
   std::erase_if(poses.landmarks, [&](const auto& entry) { return !working_.set_position(entry.first, entry.second); });
   if (poses.keyframes.empty() && poses.landmarks.empty()) return;
+  if (poses.correction) working_.begin_gauge_epoch();
   edit_.operations.emplace_back(std::move(poses));
 }
 

@@ -3,7 +3,8 @@
 // Rebase rules, where other edits were committed between the edit's base and its commit (`newer` = made by those others):
 // | operation         | rule                                                                                         |
 // | AddKeyframe       | gets the next id; matches to removed landmarks are dropped, to merged ones are forwarded;    |
-// |                   | where its parent was moved since the base, it moves along                                    |
+// |                   | where its parent was moved since the base, it moves along; where the part of its parent was  |
+// |                   | removed, it begins one                                                                       |
 // | AddLandmark       | gets the next id; observations in removed keyframes or taken features are dropped; with none |
 // |                   | left the landmark is dropped; where the keyframe of its reference was moved since the base,  |
 // |                   | it moves along                                                                               |
@@ -13,9 +14,12 @@
 // | RemoveLandmark    | dropped where it is gone already, also by a merge; and where a newer keyframe observes it    |
 // | MergeLandmarks    | both ends forwarded; dropped where they are one already or one is gone                       |
 // | RemoveKeyframe    | dropped where it is gone already or is the root                                              |
-// | SetPoses          | entries of removed keyframes and of removed or merged landmarks are dropped; newer keyframes |
+// | SetPoses          | dropped where a correction was committed since the base: the next adjustment starts from it;  |
+// |                   | entries of removed keyframes and of removed or merged landmarks are dropped; newer keyframes |
 // |                   | move with their parent (chains with the nearest older ancestor), newer landmarks with the    |
 // |                   | keyframe of their reference                                                                  |
+// | JoinParts         | dropped where one is gone or they are of one part already                                    |
+// | RemovePart        | dropped where it is gone already or has become part of another                               |
 // | AddSightings      | forwarded along merges, entries dropped where gone                                           |
 // | RefreshLandmarks  | forwarded along merges, entries dropped where gone                                           |
 // | SetScale          | the later one holds                                                                          |
@@ -40,8 +44,7 @@ struct AddKeyframe {
   std::shared_ptr<const frame::BundledFrame> frame;
   geometry::SE3 T_rig_world;
   std::vector<std::pair<FeatureId, LandmarkId>> matches;
-  KeyframeId fallback_parent;
-  KeyframeId parent;  // in the draft; invalid for the root
+  KeyframeId parent;  // in the draft; invalid for the root of a part
 };
 struct AddLandmark {
   LandmarkId provisional;
@@ -66,9 +69,16 @@ struct MergeLandmarks {
 struct RemoveKeyframe {
   KeyframeId keyframe;
 };
+struct JoinParts {
+  KeyframeId child, parent;
+};
+struct RemovePart {
+  KeyframeId root;
+};
 struct SetPoses {
   std::vector<std::pair<KeyframeId, geometry::SE3>> keyframes;        // T_rig_world
   std::vector<std::pair<LandmarkId, Eigen::Vector3d>> landmarks;
+  bool correction = false;  // moves the map as a whole: begins a gauge epoch
 };
 struct Sighting {
   LandmarkId landmark;
@@ -85,7 +95,7 @@ struct SetScale {
 };
 
 using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark, MergeLandmarks,
-                               RemoveKeyframe, SetPoses, AddSightings, RefreshLandmarks, SetScale>;
+                               RemoveKeyframe, JoinParts, RemovePart, SetPoses, AddSightings, RefreshLandmarks, SetScale>;
 
 struct MapEdit {
   std::string_view stage;  // a literal
@@ -113,6 +123,8 @@ class MapDraft {
   bool remove_landmark(LandmarkId l);
   bool merge_landmarks(LandmarkId from, LandmarkId into);
   bool remove_keyframe(KeyframeId k);
+  bool join_parts(KeyframeId child, KeyframeId parent);
+  bool remove_part(KeyframeId root);
   // Entries of what is not alive are left out.
   void set_poses(SetPoses poses);
   void add_sightings(std::vector<Sighting> sightings);

@@ -26,7 +26,8 @@ class Rebase {
       : base_(*edit.base),
         map_(map),
         others_keyframes_end_(map.keyframe_slots()),
-        others_landmarks_end_(map.landmark_slots()) {}
+        others_landmarks_end_(map.landmark_slots()),
+        same_epoch_(edit.base->gauge_epoch() == map.gauge_epoch()) {}
 
   // Each applies one operation; false where it is dropped.
   bool operator()(const AddKeyframe& op);
@@ -40,6 +41,8 @@ class Rebase {
   bool operator()(const RemoveLandmark& op);
   bool operator()(const MergeLandmarks& op) { return map_.merge_landmarks(forward(op.from), forward(op.into)); }
   bool operator()(const RemoveKeyframe& op) { return map_.remove_keyframe(here(op.keyframe)); }
+  bool operator()(const JoinParts& op) { return map_.join_parts(here(op.child), here(op.parent)); }
+  bool operator()(const RemovePart& op) { return map_.remove_part(here(op.root)); }
   bool operator()(const SetPoses& op);
   bool operator()(const AddSightings& op);
   bool operator()(const RefreshLandmarks& op);
@@ -66,6 +69,7 @@ class Rebase {
   const BundledMap& base_;
   BundledMap& map_;
   const std::size_t others_keyframes_end_, others_landmarks_end_;  // slots; newer ones are the edit's own
+  const bool same_epoch_;  // no correction by others since the base
   std::vector<Motion> own_motions_;                                // per keyframe the edit added, when it was
   std::unordered_set<KeyframeId> written_;                         // keyframes the edit has set; ids of the edit
   RebaseReport report_;
@@ -84,9 +88,8 @@ bool Rebase::operator()(const AddKeyframe& op) {
   for (auto& [feature, l] : matches) l = here(l);
   const Motion motion = motion_since_base(op.parent);
   const SE3 T_rig_world = motion ? op.T_rig_world * *motion : op.T_rig_world;
-  KeyframeId fallback = here(op.fallback_parent.valid() ? op.fallback_parent : op.parent);
-  while (fallback.valid() && !map_.alive(fallback)) fallback = map_.keyframe(fallback).parent;
-  report_.keyframes.push_back(map_.add_keyframe(op.frame, T_rig_world, usable_matches(map_, matches), fallback));
+  const KeyframeId parent = map_.surviving(here(op.parent));
+  report_.keyframes.push_back(map_.add_keyframe(op.frame, T_rig_world, usable_matches(map_, matches), parent));
   own_motions_.push_back(motion);
   return true;
 }
@@ -121,6 +124,7 @@ bool Rebase::operator()(const RemoveLandmark& op) {
 }
 
 bool Rebase::operator()(const SetPoses& op) {
+  if (!same_epoch_) return false;
   bool any = false;
   std::unordered_map<KeyframeId, Motion> motions;  // ids of the map
   for (const auto& [edit_id, T_rig_world] : op.keyframes) {
@@ -131,6 +135,7 @@ bool Rebase::operator()(const SetPoses& op) {
     any |= map_.set_pose(k, T_rig_world);
   }
   for (const auto& [edit_id, position] : op.landmarks) any |= map_.set_position(here(edit_id), position);
+  if (op.correction && any) map_.begin_gauge_epoch();
   carry_along(motions);
   return any;
 }

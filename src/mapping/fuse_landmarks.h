@@ -7,10 +7,7 @@
 
 namespace bslam::mapping {
 
-struct FusionReport {
-  int added = 0;   // observations
-  int merged = 0;  // landmarks
-};
+using adjustment::FusionReport;
 
 FusionReport fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, const FeatureModel& features, map::MapDraft& draft);
 

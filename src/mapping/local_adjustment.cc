@@ -79,6 +79,7 @@ adjustment::Selection select_all(const map::BundledMap& map) {
     (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
   }
   selection.landmarks = map.landmark_ids();
+  selection.whole_map = true;
   fix_gauge(map, selection);
   return selection;
 }

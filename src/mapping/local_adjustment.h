@@ -10,7 +10,7 @@ namespace bslam::mapping {
 // them, fixed. The root is always fixed; a map of one camera, up to scale, needs a second pose held so that its scale cannot wander.
 adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyframe, const LocalWindowOptions& options);
 
-// All keyframes but the root, all landmarks.
+// All keyframes but the roots, all landmarks.
 adjustment::Selection select_all(const map::BundledMap& map);
 
 }  // namespace bslam::mapping

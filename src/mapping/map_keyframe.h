@@ -20,7 +20,7 @@ struct MappingReport {
 MappingReport map_keyframe(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
                            map::MapDraft& draft, std::stop_token stop = {});
 
-// Global bundle adjustment: all keyframes but the root, all landmarks.
+// Global bundle adjustment: all keyframes but the roots, all landmarks.
 adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features, map::MapDraft& draft,
                                              std::stop_token stop = {});
 

@@ -1,6 +1,7 @@
 // What steers local mapping; gathered in system::Config.
 #pragma once
 
+#include "adjustment/landmark_fusion.h"
 #include "adjustment/map_adjustment.h"
 #include "base/options.h"
 
@@ -31,18 +32,14 @@ struct FusionOptions {
   int neighbours = 10;       // covisible keyframes, and ...
   int second_neighbours = 3; // ... of each of these as many again
   int max_targets = 20;
-  double radius = 0.006;     // rad about the projection
-  int max_hamming = 50;      // bits
-  double max_chi2 = 5.991;   // squared normalised error of the keypoint against the landmark
+  adjustment::LandmarkFusionOptions search;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes searched for duplicates");
     visitor("second_neighbours", self.second_neighbours, Range{0, 100}, "", "of each of these as many again");
     visitor("max_targets", self.max_targets, Range{0, 1000}, "", "keyframes searched at most");
-    visitor("radius", self.radius, Range{1e-4, 1}, "rad", "search radius about the projection");
-    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "largest descriptor distance");
-    visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "", "squared normalised error against the landmark");
+    adjustment::LandmarkFusionOptions::visit(self.search, visitor);
   }
 };
 
@@ -95,10 +92,6 @@ struct MappingOptions {
   }
 };
 
-// What mapping must know of the features.
-struct FeatureModel {
-  double sigma_px = 0.4;      // standard deviation of a keypoint on its level, not aligned
-  double scale_factor = 1.2;  // of the pyramid
-};
+using map::FeatureModel;
 
 }  // namespace bslam::mapping

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "map/search_points.h"
+
 namespace bslam::tracking {
 
 using geometry::SE3;
@@ -13,20 +15,11 @@ std::size_t count(const FrameMatches& matches) {
   return n;
 }
 
-std::vector<frame::SearchPoint> search_points(const map::BundledMap& map, std::span<const LandmarkId> landmarks) {
-  std::vector<frame::SearchPoint> points(landmarks.size());
-  for (std::size_t i = 0; i < landmarks.size(); ++i) {
-    const map::Landmark& l = map.landmark(landmarks[i]);
-    points[i] = {l.position, l.view_direction, l.min_distance, l.max_distance, &l.descriptor, 0};
-  }
-  return points;
-}
-
 MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
                            std::span<const LandmarkId> landmarks, const FrameMatches& known,
                            const frame::ProjectionSearchOptions& options, ThreadPool& pool) {
   const camera::Rig& rig = map.rig();
-  const std::vector<frame::SearchPoint> points = search_points(map, landmarks);
+  const std::vector<frame::SearchPoint> points = map::search_points(map, landmarks);
   std::vector<std::uint32_t> place_of(map.landmark_slots(), 0);  // position in `points` + 1
   for (std::size_t i = 0; i < landmarks.size(); ++i) place_of[landmarks[i].index()] = static_cast<std::uint32_t>(i + 1);
 

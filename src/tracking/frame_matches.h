@@ -27,9 +27,6 @@ using FrameMatches = std::vector<std::vector<Match>>;
 
 std::size_t count(const FrameMatches& matches);
 
-// The points of landmarks as projection_search wants them. Descriptors point into `map`.
-std::vector<frame::SearchPoint> search_points(const map::BundledMap& map, std::span<const LandmarkId> landmarks);
-
 struct MatchSearch {
   FrameMatches found;
   std::vector<LandmarkId> visible;  // expected in some camera, each once, in order of the input

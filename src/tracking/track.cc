@@ -150,7 +150,7 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, F
 
   TrackerState& state = out.state;
   state = input.state;
-  state.reference = map.alive(state.reference) ? state.reference : map.newest_keyframe();
+  state.reference = map.surviving(state.reference);
   const SE3 T_ref_world = map.resolved_pose(state.reference);
   state.T_rig_reference = result.T_rig_world * T_ref_world.inverse();
   result.reference = state.reference;

@@ -1,0 +1,190 @@
+#include "looping/locate.h"
+
+#include <algorithm>
+
+#include "feature/hamming.h"
+#include "frame/projection_search.h"
+#include "map/search_points.h"
+#include "solver/pose_solver.h"
+
+namespace bslam::looping {
+namespace {
+
+using frame::KeypointRef;
+using geometry::SE3;
+
+struct KeypointMatch {
+  KeypointRef keypoint;
+  LandmarkId landmark;
+};
+
+// Descriptors of a frame's unique features: of the first keypoint of each.
+std::vector<feature::Descriptor> feature_descriptors(const frame::BundledFrame& frame) {
+  std::vector<feature::Descriptor> out(frame.bundled.size());
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    const KeypointRef r = frame.bundled.keypoints(FeatureId(f)).front();
+    out[f] = frame.keypoints(r.camera).descriptor[r.keypoint.index()];
+  }
+  return out;
+}
+
+struct Nearest {
+  std::size_t index = 0;
+  int distance = 257, second = 257;
+};
+
+Nearest nearest(const feature::Descriptor& descriptor, const std::vector<feature::Descriptor>& among) {
+  Nearest out;
+  for (std::size_t i = 0; i < among.size(); ++i) {
+    const int distance = feature::hamming(descriptor, among[i]);
+    if (distance < out.distance) {
+      out.second = out.distance;
+      out.distance = distance;
+      out.index = i;
+    } else if (distance < out.second) {
+      out.second = distance;
+    }
+  }
+  return out;
+}
+
+// Matches by appearance alone: clear ones, and of several landmarks that choose one feature the nearest.
+std::vector<KeypointMatch> match_descriptors(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                             const std::vector<LandmarkId>& landmarks, const VerificationOptions& options) {
+  const std::vector<feature::Descriptor> descriptors = feature_descriptors(frame);
+  struct Choice {
+    LandmarkId landmark;
+    int distance = 257;
+  };
+  std::vector<Choice> of_feature(descriptors.size());
+  for (const LandmarkId l : landmarks) {
+    const Nearest n = nearest(map.landmark(l).descriptor, descriptors);
+    if (n.distance > options.max_hamming || n.distance >= options.ratio * n.second) continue;
+    if (n.distance < of_feature[n.index].distance) of_feature[n.index] = {l, n.distance};
+  }
+  std::vector<KeypointMatch> out;
+  for (std::size_t f = 0; f < of_feature.size(); ++f) {
+    if (!of_feature[f].landmark.valid()) continue;
+    for (const KeypointRef r : frame.bundled.keypoints(FeatureId(f))) out.push_back({r, of_feature[f].landmark});
+  }
+  return out;
+}
+
+std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                                     const std::vector<KeypointMatch>& matches,
+                                                     const map::FeatureModel& features) {
+  std::vector<solver::PoseObservation> out;
+  out.reserve(matches.size());
+  for (const KeypointMatch& m : matches) {
+    const feature::Keypoints& keypoints = frame.keypoints(m.keypoint.camera);
+    const std::size_t k = m.keypoint.keypoint.index();
+    out.push_back({m.keypoint.camera, map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>(),
+                   features.sigma(keypoints.level[k])});
+  }
+  return out;
+}
+
+struct Guided {
+  std::vector<KeypointMatch> matches;
+  int visible = 0;  // landmarks that should be seen by some camera
+};
+
+// All landmarks looked for where the pose puts them.
+Guided search_at(const map::BundledMap& map, const frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
+                 const SE3& T_rig_world, double radius, const VerificationOptions& options, const map::FeatureModel& features) {
+  const std::vector<frame::SearchPoint> points = map::search_points(map, landmarks);
+  const frame::ProjectionSearchOptions search{.radius = radius,
+                                              .max_hamming = options.max_hamming,
+                                              .ratio = 1.0,
+                                              .level_slack = 2,
+                                              .scale_factor = features.scale_factor};
+  const camera::Rig& rig = map.rig();
+  std::vector<std::uint8_t> visible(landmarks.size(), 0);
+  Guided out;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    if (frame.cameras[c].keypoints.empty()) continue;
+    const auto found =
+        frame::search_by_projection(rig.camera(c), frame.cameras[c], rig.cam_from_rig(c) * T_rig_world, points, {}, search);
+    for (const std::uint32_t i : found.visible) visible[i] = 1;
+    for (const frame::ProjectionMatch& m : found.matches) out.matches.push_back({{CameraIndex(c), m.keypoint}, landmarks[m.point]});
+  }
+  out.visible = static_cast<int>(std::count(visible.begin(), visible.end(), 1));
+  return out;
+}
+
+// Inliers by feature; where cameras disagree about the landmark of a feature, the first in order of camera holds.
+std::vector<std::pair<FeatureId, LandmarkId>> by_feature(const frame::BundledFrame& frame, const std::vector<KeypointMatch>& matches,
+                                                         const std::vector<std::uint8_t>& inlier) {
+  std::vector<std::pair<FeatureId, LandmarkId>> all;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (inlier[i]) all.emplace_back(frame.bundled.feature(matches[i].keypoint), matches[i].landmark);
+  }
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<LandmarkId> taken;
+  std::vector<std::pair<FeatureId, LandmarkId>> out;
+  for (const auto& m : all) {
+    if (!out.empty() && out.back().first == m.first) continue;
+    const auto at = std::lower_bound(taken.begin(), taken.end(), m.second);
+    if (at != taken.end() && *at == m.second) continue;
+    taken.insert(at, m.second);
+    out.push_back(m);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<LandmarkId> landmarks_about(const map::BundledMap& map, KeyframeId keyframe, int neighbours, int limit) {
+  std::vector<KeyframeId> keyframes = {keyframe};
+  for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(neighbours))) keyframes.push_back(c.keyframe);
+  std::vector<LandmarkId> out;
+  for (const KeyframeId k : keyframes) {
+    for (const LandmarkId l : map.keyframe(k).landmarks) {
+      if (l.valid()) out.push_back(l);
+    }
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  std::stable_sort(out.begin(), out.end(), [&](LandmarkId a, LandmarkId b) {
+    return map.observations(a).size() > map.observations(b).size();
+  });
+  if (out.size() > static_cast<std::size_t>(limit)) out.resize(static_cast<std::size_t>(limit));
+  return out;
+}
+
+std::optional<Location> locate(const map::BundledMap& map, const frame::BundledFrame& frame, KeyframeId candidate,
+                               const VerificationOptions& options, const map::FeatureModel& features, Random random,
+                               LocateReport* report) {
+  LocateReport unused;
+  LocateReport& out = report != nullptr ? *report : unused;
+  const auto rejected = [&](Rejection why) {
+    out.rejection = why;
+    return std::nullopt;
+  };
+  const std::vector<LandmarkId> landmarks = landmarks_about(map, candidate, options.neighbours, options.max_landmarks);
+  const std::vector<KeypointMatch> matches = match_descriptors(map, frame, landmarks, options);
+  out.matches = static_cast<int>(matches.size());
+  if (out.matches < options.consensus.min_inliers) return rejected(Rejection::kFewMatches);
+
+  const solver::PoseSolverOptions pose_options;
+  solver::PoseSolution solution = solver::absolute_pose(map.rig(), observations_of(map, frame, matches, features), pose_options,
+                                                        options.consensus, random);
+  out.inliers = solution.num_inliers;
+  if (!solution.ok) return rejected(Rejection::kNoConsensus);
+
+  // Twice: what the consensus alone gives is good to a few pixels, what the guided search gives to less than one.
+  Guided guided;
+  for (const double radius : {options.radius, 0.5 * options.radius}) {
+    guided = search_at(map, frame, landmarks, solution.T_rig_world, radius, options, features);
+    solution = solver::solve_pose(map.rig(), observations_of(map, frame, guided.matches, features), solution.T_rig_world, pose_options);
+    if (!solution.ok) return rejected(Rejection::kNoConsensus);
+  }
+  out.inliers = solution.num_inliers;
+  out.visible = guided.visible;
+  if (solution.num_inliers < options.min_inliers) return rejected(Rejection::kFewInliers);
+  Location location{candidate, solution.T_rig_world, by_feature(frame, guided.matches, solution.inlier), solution.num_inliers};
+  if (static_cast<double>(location.matches.size()) < options.min_found_share * guided.visible) return rejected(Rejection::kFewFound);
+  return location;
+}
+
+}  // namespace bslam::looping

@@ -1,0 +1,39 @@
+// Geometric verification: is this frame where a keyframe of the map was taken, and what is its pose then? Landmarks seen
+// by any camera then are matched to keypoints of any camera now. Loop closing and relocalisation are this one step with
+// different triggers.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "base/random.h"
+#include "looping/options.h"
+#include "map/bundled_map.h"
+#include "map/feature_model.h"
+
+namespace bslam::looping {
+
+struct Location {
+  KeyframeId with;                       // the candidate
+  geometry::SE3 T_rig_world;             // of the frame
+  std::vector<std::pair<FeatureId, LandmarkId>> matches;  // inliers, in order of feature; features and landmarks distinct
+  int inliers = 0;                       // keypoints
+};
+
+// Why a candidate is no place the frame was taken at.
+enum class Rejection { kNone, kFewMatches, kNoConsensus, kFewInliers, kFewFound };
+
+struct LocateReport {
+  Rejection rejection = Rejection::kNone;
+  int matches = 0, inliers = 0, visible = 0;
+};
+
+// Empty where geometry does not confirm the candidate (alive in `map`). Deterministic for a seed.
+std::optional<Location> locate(const map::BundledMap& map, const frame::BundledFrame& frame, KeyframeId candidate,
+                               const VerificationOptions& options, const map::FeatureModel& features, Random random,
+                               LocateReport* report = nullptr);
+
+// The landmarks of a keyframe and its best covisible keyframes, those seen most often first, at most `limit`.
+std::vector<LandmarkId> landmarks_about(const map::BundledMap& map, KeyframeId keyframe, int neighbours, int limit);
+
+}  // namespace bslam::looping

@@ -1,0 +1,36 @@
+#include "looping/loop_closer.h"
+
+#include "looping/loop_correction.h"
+
+namespace bslam::looping {
+
+LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options, const map::FeatureModel& features,
+                       std::uint64_t seed)
+    : recogniser_(std::move(recogniser)), options_(options), features_(features), seed_(seed) {}
+
+std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map) {
+  const std::vector<Candidate> candidates =
+      consistent_candidates(map, keyframe, recogniser_->revisited(map, keyframe), options_.loop, history_);
+  for (const Candidate& candidate : candidates) {
+    const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
+    const auto location =
+        locate(map, *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
+    if (location && plausible(map, measure(map, keyframe, *location), options_.loop)) return location;
+  }
+  return std::nullopt;
+}
+
+std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft& draft) {
+  const auto location = find(keyframe, draft.map());
+  if (!location) return std::nullopt;
+  const LoopClosure closure = measure(draft.map(), keyframe, *location);
+  if (!closure.joined) {
+    close_loop(closure, *location, options_.loop, features_, draft);
+  } else if (!join_parts(closure, *location, options_.loop, features_, draft)) {
+    return std::nullopt;
+  }
+  history_ = {};
+  return closure;
+}
+
+}  // namespace bslam::looping

@@ -1,0 +1,42 @@
+// Loop closing: a keyframe recognises a place seen before, geometry confirms it, and the map is bent so that both agree.
+// The same step joins two parts of the map.
+#pragma once
+
+#include <optional>
+
+#include "looping/consistency.h"
+#include "looping/locate.h"
+#include "map/map_edit.h"
+
+namespace bslam::looping {
+
+struct LoopClosure {
+  KeyframeId keyframe, with;
+  int inliers = 0;          // keypoints that support the relative pose
+  double moved = 0;         // map units the keyframe's centre moved
+  double turned = 0;        // rad
+  double scaled = 1;        // other than 1 only where the scale is not observable
+  bool joined = false;      // two parts of the map became one
+};
+
+// The loop stage: its options, its recogniser and what recognition remembers from one keyframe to the next.
+class LoopCloser {
+ public:
+  LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options, const map::FeatureModel& features,
+             std::uint64_t seed);
+
+  // Writes the correction to the draft where `keyframe` (alive) closes a loop; the draft is untouched else. Keyframes come
+  // in order.
+  std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft);
+
+ private:
+  std::optional<Location> find(KeyframeId keyframe, const map::BundledMap& map);
+
+  const std::unique_ptr<PlaceRecogniser> recogniser_;
+  const LoopingOptions options_;
+  const map::FeatureModel features_;
+  const std::uint64_t seed_;
+  RecognitionHistory history_;
+};
+
+}  // namespace bslam::looping

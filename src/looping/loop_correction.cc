@@ -1,0 +1,220 @@
+#include "looping/loop_correction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "looping/essential_graph.h"
+
+namespace bslam::looping {
+namespace {
+
+using Eigen::Vector3d;
+using geometry::SE3;
+using geometry::Sim3;
+
+constexpr std::size_t kMinScalePairs = 10;            // landmarks seen from both ends, for a scale
+constexpr double kMaxTurn = 20 * std::numbers::pi / 180;  // rad: no drift turns a rig by more
+
+Vector3d centre(const SE3& T_rig_world) { return T_rig_world.inverse().translation(); }
+
+// The rigid pose in world units that a vertex of the graph stands for.
+SE3 pose_of(const Sim3& S_rig_world) {
+  return SE3(S_rig_world.rotation(), S_rig_world.translation() / S_rig_world.scale());
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Units of the place per unit of the map about the keyframe: how far landmarks are by the one and by the other.
+double relative_scale(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
+  if (map.scale() == map::Scale::kMetric) return 1.0;
+  std::vector<double> ratios;
+  for (const auto& [feature, there] : location.matches) {
+    const LandmarkId here = map.landmark_of(keyframe, feature);
+    if (!here.valid()) continue;
+    const double distance_here = (map.keyframe(keyframe).T_rig_world * map.landmark(here).position).norm();
+    ratios.push_back((location.T_rig_world * map.landmark(there).position).norm() / distance_here);
+  }
+  return ratios.size() < kMinScalePairs ? 1.0 : median(std::move(ratios));
+}
+
+// Length of the way from one keyframe to the other, through all keyframes of their part made between them.
+double way_between(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
+  const KeyframeId root = map.root_of(to);
+  double length = 0;
+  Vector3d last = centre(map.keyframe(from).T_rig_world);
+  for (std::size_t i = from.index() + 1; i <= to.index(); ++i) {
+    const KeyframeId k(i);
+    if (!map.alive(k) || map.root_of(k) != root) continue;
+    const Vector3d next = centre(map.keyframe(k).T_rig_world);
+    length += (next - last).norm();
+    last = next;
+  }
+  return length;
+}
+
+double median_depth(const map::BundledMap& map, KeyframeId k) {
+  std::vector<double> depths;
+  for (const LandmarkId l : map.keyframe(k).landmarks) {
+    if (l.valid()) depths.push_back((map.keyframe(k).T_rig_world * map.landmark(l).position).norm());
+  }
+  return depths.empty() ? 0.0 : median(std::move(depths));
+}
+
+// The keyframe and its best covisible ones: what is moved at once and fused with the place.
+std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyframe, int size) {
+  std::vector<KeyframeId> window = {keyframe};
+  for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(size))) window.push_back(c.keyframe);
+  std::sort(window.begin(), window.end());
+  return window;
+}
+
+// What the keyframe was found to see becomes its own, then what its window sees as well.
+void fuse(const std::vector<KeyframeId>& window, const LoopClosure& closure, const Location& location, const LoopOptions& options,
+          const map::FeatureModel& features, map::MapDraft& draft) {
+  const std::vector<LandmarkId> place =
+      landmarks_about(draft.map(), closure.with, options.window, static_cast<int>(draft.map().num_landmarks()));
+  for (const auto& [feature, there] : location.matches) {
+    const LandmarkId here = draft.map().landmark_of(closure.keyframe, feature);
+    const LandmarkId now = draft.map().resolve(there);
+    if (!now.valid() || here == now) continue;
+    if (here.valid()) {
+      draft.merge_landmarks(here, now);
+    } else {
+      draft.add_observation(now, {closure.keyframe, feature, false});
+    }
+  }
+  for (const KeyframeId k : window) {
+    adjustment::fuse_into(k, place, adjustment::Keep::kSearched, options.fusion, features, draft);
+    draft.refresh_landmarks(adjustment::landmarks_of(draft.map(), k));
+  }
+}
+
+// Poses of the window as the place has it, and the landmarks that hang on them.
+void move_window(const std::vector<KeyframeId>& window, const EssentialGraph& graph, const std::vector<Sim3>& before,
+                 map::MapDraft& draft) {
+  map::SetPoses poses;
+  for (const KeyframeId k : window) {
+    const auto v = static_cast<std::size_t>(graph.vertex(k));
+    poses.keyframes.emplace_back(k, pose_of(graph.problem.S_world[v]));
+    for (const LandmarkId l : adjustment::landmarks_of(draft.map(), k)) {
+      const map::Landmark& landmark = draft.map().landmark(l);
+      if (landmark.reference.keyframe != k) continue;
+      poses.landmarks.emplace_back(l, graph.problem.S_world[v].inverse() * (before[v] * landmark.position));
+    }
+  }
+  draft.set_poses(std::move(poses));
+}
+
+// One edge between each keyframe of the window and each it sees landmarks of since the fusion.
+void add_loop_edges(const map::BundledMap& before, const map::BundledMap& fused, const std::vector<KeyframeId>& window,
+                    const LoopClosure& closure, EssentialGraph& graph) {
+  constexpr int kMinShared = 15;
+  for (const KeyframeId k : window) {
+    for (const map::Covisible& c : fused.keyframe(k).covisible) {
+      if (std::binary_search(window.begin(), window.end(), c.keyframe)) continue;
+      const auto& old = before.keyframe(k).covisible;
+      const bool linked = std::ranges::binary_search(old, c.keyframe, {}, &map::Covisible::keyframe);
+      const bool the_loop = k == closure.keyframe && c.keyframe == closure.with;
+      const int a = graph.vertex(k), b = graph.vertex(c.keyframe);
+      if (linked || b < 0 || (c.weight < kMinShared && !the_loop)) continue;
+      const auto& S = graph.problem.S_world;
+      graph.problem.edges.push_back({a, b, S[static_cast<std::size_t>(a)] * S[static_cast<std::size_t>(b)].inverse(), 1.0});
+    }
+  }
+}
+
+// Every keyframe of the graph where the optimisation put it, every landmark moved with the keyframe of its reference.
+map::SetPoses corrected(const map::BundledMap& map, const EssentialGraph& graph, const std::vector<Sim3>& before) {
+  map::SetPoses poses;
+  poses.correction = true;
+  for (std::size_t v = 0; v < graph.keyframes.size(); ++v) {
+    poses.keyframes.emplace_back(graph.keyframes[v], pose_of(graph.problem.S_world[v]));
+  }
+  for (const LandmarkId l : map.landmark_ids()) {
+    const int v = graph.vertex(map.landmark(l).reference.keyframe);
+    if (v < 0) continue;
+    const auto i = static_cast<std::size_t>(v);
+    poses.landmarks.emplace_back(l, graph.problem.S_world[i].inverse() * (before[i] * map.landmark(l).position));
+  }
+  return poses;
+}
+
+}  // namespace
+
+LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
+  LoopClosure out{.keyframe = keyframe, .with = location.with, .inliers = location.inliers};
+  const SE3& now = map.keyframe(keyframe).T_rig_world;
+  out.moved = (centre(now) - centre(location.T_rig_world)).norm();
+  out.turned = (now.rotation() * location.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
+  out.scaled = relative_scale(map, keyframe, location);
+  out.joined = map.root_of(keyframe) != map.root_of(location.with);
+  return out;
+}
+
+bool plausible(const map::BundledMap& map, const LoopClosure& closure, const LoopOptions& options) {
+  if (closure.joined) return true;
+  const auto [first, last] = std::minmax(closure.keyframe, closure.with);
+  const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
+  const double way = way_between(map, first, last) + median_depth(map, closure.keyframe);
+  return closure.moved <= share * way && closure.turned <= kMaxTurn;
+}
+
+bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
+                map::MapDraft& draft) {
+  const map::BundledMap& map = draft.map();
+  if (map.scale() != map::Scale::kMetric) return false;
+  const KeyframeId here = map.root_of(closure.keyframe), there = map.root_of(closure.with);
+  const bool here_moves = there < here;  // the older part stays
+  const KeyframeId moving = here_moves ? here : there;
+  const SE3 T_there_here = location.T_rig_world.inverse() * map.keyframe(closure.keyframe).T_rig_world;
+  const SE3 motion = here_moves ? T_there_here : T_there_here.inverse();
+
+  map::SetPoses poses;
+  poses.correction = true;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    if (map.root_of(k) == moving) poses.keyframes.emplace_back(k, map.keyframe(k).T_rig_world * motion.inverse());
+  }
+  for (const LandmarkId l : map.landmark_ids()) {
+    if (map.root_of(map.landmark(l).reference.keyframe) == moving) poses.landmarks.emplace_back(l, motion * map.landmark(l).position);
+  }
+  const std::vector<KeyframeId> window = window_of(map, closure.keyframe, options.window);
+  std::vector<LandmarkId> moved;
+  for (const auto& [l, position] : poses.landmarks) moved.push_back(l);
+  draft.set_poses(std::move(poses));
+  draft.refresh_landmarks(std::move(moved));
+  draft.join_parts(here_moves ? closure.keyframe : closure.with, here_moves ? closure.with : closure.keyframe);
+  fuse(window, closure, location, options, features, draft);
+  return true;
+}
+
+void close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
+                map::MapDraft& draft) {
+  const map::BundledMap before = draft.map();
+  EssentialGraph graph = essential_graph(before, before.root_of(closure.keyframe), options.edge_weight);
+  std::vector<KeyframeId> window = window_of(before, closure.keyframe, options.window);
+  std::erase_if(window, [&](KeyframeId k) { return graph.vertex(k) < 0; });
+
+  // The window where the place says it is. S_i' = T_i T_k^-1 S_k', in the units of the window.
+  const std::vector<Sim3> S_before = graph.problem.S_world;
+  const double unit = 1.0 / closure.scaled;
+  const Sim3 S_keyframe(unit, location.T_rig_world.rotation(), unit * location.T_rig_world.translation());
+  const Sim3 S_keyframe_before(before.keyframe(closure.keyframe).T_rig_world);
+  for (const KeyframeId k : window) {
+    const auto v = static_cast<std::size_t>(graph.vertex(k));
+    graph.problem.S_world[v] = S_before[v] * S_keyframe_before.inverse() * S_keyframe;
+  }
+  move_window(window, graph, S_before, draft);
+  fuse(window, closure, location, options, features, draft);
+  add_loop_edges(before, draft.map(), window, closure, graph);
+
+  const std::vector<Sim3> S_fused = graph.problem.S_world;
+  solver::optimise(graph.problem, options.pose_graph);
+  draft.set_poses(corrected(draft.map(), graph, S_fused));
+}
+
+}  // namespace bslam::looping

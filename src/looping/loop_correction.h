@@ -1,0 +1,27 @@
+// What a recognised place changes in the map.
+#pragma once
+
+#include <optional>
+
+#include "looping/locate.h"
+#include "looping/loop_closer.h"
+
+namespace bslam::looping {
+
+// By how much the world about `keyframe` is off, if the location is right.
+LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Location& location);
+
+// Could the error have grown to that on the way from the place to the keyframe? What looks the same but is somewhere else
+// asks for corrections far beyond drift. Parts that are not joined yet can be anywhere.
+bool plausible(const map::BundledMap& map, const LoopClosure& closure, const LoopOptions& options);
+
+// Moves the part of one to where the other's says it is, and hangs it below. False, with nothing changed, where scales are
+// not metric: parts then have units of their own.
+bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
+                map::MapDraft& draft);
+
+// Spreads the error over the loop by pose-graph optimisation and fuses what is seen on both of its ends.
+void close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
+                map::MapDraft& draft);
+
+}  // namespace bslam::looping

@@ -1,0 +1,89 @@
+// What steers place recognition, loop closing and relocalisation; gathered in system::Config.
+#pragma once
+
+#include "adjustment/landmark_fusion.h"
+#include "base/options.h"
+#include "solver/absolute_pose.h"
+#include "solver/pose_graph.h"
+
+namespace bslam::looping {
+
+struct RecognitionOptions {
+  double common_share = 0.6;    // of the most common words any keyframe has: fewer, and it is no candidate
+  double group_share = 0.75;    // of the best group's score that another group must reach
+  int group = 10;               // covisible keyframes whose scores add up
+  int neighbour_weight = 30;    // shared landmarks that make a keyframe one whose score counts for s_min
+  int max_candidates = 5;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("common_share", self.common_share, Range{0, 1}, "", "of the most common words, that a candidate must share");
+    visitor("group_share", self.group_share, Range{0, 1}, "", "of the best group's score, that a candidate's must reach");
+    visitor("group", self.group, Range{1, 100}, "", "covisible keyframes whose scores add up");
+    visitor("neighbour_weight", self.neighbour_weight, Range{1, 10000}, "", "shared landmarks of a neighbour that counts for the lowest score");
+    visitor("max_candidates", self.max_candidates, Range{1, 100}, "", "places looked at closely");
+  }
+};
+
+struct VerificationOptions {
+  int neighbours = 10;           // covisible keyframes whose landmarks are looked for with the candidate's
+  int max_landmarks = 3000;
+  int max_hamming = 60;          // bits
+  double ratio = 0.85;           // best to second best feature of the frame
+  double radius = 0.02;          // rad: guided search at the pose found
+  int min_inliers = 50;          // keypoints that must support the pose in the end
+  double min_found_share = 0.2;  // of the landmarks that should be visible then: fewer agree where two places look alike in part
+  solver::AbsolutePoseOptions consensus;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes whose landmarks are looked for as well");
+    visitor("max_landmarks", self.max_landmarks, Range{10, 100000}, "", "landmarks looked for at most");
+    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "largest descriptor distance of a match");
+    visitor("ratio", self.ratio, Range{0.1, 1}, "", "best to second best feature of the frame");
+    visitor("radius", self.radius, Range{1e-4, 1}, "rad", "guided search at the pose found");
+    visitor("min_inliers", self.min_inliers, Range{6, 10000}, "", "keypoints that must support the pose in the end");
+    visitor("min_found_share", self.min_found_share, Range{0, 1}, "", "of the landmarks that should be visible, that must be found");
+    visitor.section("consensus", self.consensus);
+  }
+};
+
+struct LoopOptions {
+  bool enabled = true;
+  int consistent_keyframes = 2;   // keyframes in a row that must recognise one place
+  int max_keyframe_gap = 3;       // keyframes between two of them
+  double max_drift = 0.05;        // of the way since the place was last seen: a larger correction is no drift but a mistake
+  double max_drift_free = 0.3;    // the same where the scale is not observable
+  int edge_weight = 60;           // shared landmarks that make two keyframes neighbours in the pose graph
+  int window = 10;                // covisible keyframes of the newest that are fused with the place
+  adjustment::LandmarkFusionOptions fusion{.radius = 0.01, .max_hamming = 60, .max_chi2 = 16.0};
+  solver::PoseGraphOptions pose_graph;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("enabled", self.enabled, Range{}, "", "loop closing and the joining of parts");
+    visitor("consistent_keyframes", self.consistent_keyframes, Range{1, 100}, "", "keyframes in a row that must recognise one place");
+    visitor("max_keyframe_gap", self.max_keyframe_gap, Range{1, 100}, "", "keyframes between two of them at most");
+    visitor("max_drift", self.max_drift, Range{0, 10}, "", "of the way since the place was seen, that a correction may be");
+    visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "the same where the scale is not observable");
+    visitor("edge_weight", self.edge_weight, Range{1, 10000}, "", "shared landmarks of neighbours in the pose graph");
+    visitor("window", self.window, Range{0, 100}, "", "covisible keyframes that are fused with the place");
+    visitor.section("fusion", self.fusion);
+    visitor.section("pose_graph", self.pose_graph);
+  }
+};
+
+struct LoopingOptions {
+  RecognitionOptions recognition;
+  VerificationOptions verification;
+  LoopOptions loop;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor.section("recognition", self.recognition);
+    visitor.section("verification", self.verification);
+    visitor.section("loop", self.loop);
+  }
+};
+
+}  // namespace bslam::looping

@@ -1,0 +1,121 @@
+#include "looping/place_recogniser.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace bslam::looping {
+namespace {
+
+struct Scored {
+  KeyframeId keyframe;
+  double score = 0;
+};
+
+bool better(const Candidate& a, const Candidate& b) { return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe; }
+
+bool same_place(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
+  const std::vector<map::Covisible>& neighbours = map.keyframe(a).covisible;
+  return a == b || std::ranges::binary_search(neighbours, b, {}, &map::Covisible::keyframe);
+}
+
+// Score of `at` with those of its best covisible keyframes among `scored` (in order of id), under the name of the one that
+// scores most.
+Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vector<Scored>& scored, int size) {
+  Candidate group{at.keyframe, at.score};
+  double best = at.score;
+  for (const map::Covisible& c : map.best_covisible(at.keyframe, static_cast<std::size_t>(size))) {
+    const auto entry = std::ranges::lower_bound(scored, c.keyframe, {}, &Scored::keyframe);
+    if (entry == scored.end() || entry->keyframe != c.keyframe) continue;
+    group.score += entry->score;
+    if (entry->score > best) {
+      best = entry->score;
+      group.keyframe = entry->keyframe;
+    }
+  }
+  return group;
+}
+
+}  // namespace
+
+BagOfWordsRecogniser::BagOfWordsRecogniser(place::VocabularyPtr vocabulary, const RecognitionOptions& options)
+    : vocabulary_(std::move(vocabulary)), options_(options) {}
+
+void BagOfWordsRecogniser::describe(frame::BundledFrame& frame) const {
+  for (frame::CameraFrame& c : frame.cameras) {
+    c.words.resize(c.keypoints.size());
+    vocabulary_->words(c.keypoints.descriptor, c.words);
+  }
+}
+
+BagOfWordsRecogniser::Words BagOfWordsRecogniser::words_of(const frame::BundledFrame& frame) const {
+  std::vector<WordId> words;  // one per unique feature: that of its first keypoint
+  words.reserve(frame.bundled.size());
+  for (std::size_t f = 0; f < frame.bundled.size(); ++f) {
+    const frame::KeypointRef first = frame.bundled.keypoints(FeatureId(f)).front();
+    const std::vector<WordId>& of_camera = frame.cameras[first.camera.index()].words;
+    if (!of_camera.empty()) words.push_back(of_camera[first.keypoint.index()]);
+  }
+  return std::make_shared<const place::WordVector>(*vocabulary_, words);
+}
+
+// Afterwards the index holds exactly the keyframes of `map`, whichever maps came before.
+void BagOfWordsRecogniser::sync(const map::BundledMap& map) {
+  known_.resize(std::max(known_.size(), map.keyframe_slots()));
+  for (std::size_t i = 0; i < known_.size(); ++i) {
+    const KeyframeId k(i);
+    const auto frame = map.alive(k) ? map.keyframe(k).frame : nullptr;
+    if (frame == known_[i]) continue;
+    if (known_[i]) index_.remove(k);
+    if (frame) index_.add(k, words_of(*frame));
+    known_[i] = frame;
+  }
+}
+
+std::vector<Candidate> BagOfWordsRecogniser::revisited(const map::BundledMap& map, KeyframeId keyframe) {
+  sync(map);
+  const Words words = index_.words_of(keyframe);
+  std::vector<std::uint8_t> excluded(map.keyframe_slots(), 0);
+  excluded[keyframe.index()] = 1;
+  // The paper's s_min: a place is recognised only where it looks more like here than the least alike of the neighbours.
+  double min_score = 0;
+  bool any = false;
+  for (const map::Covisible& c : map.keyframe(keyframe).covisible) {
+    excluded[c.keyframe.index()] = 1;
+    if (c.weight < options_.neighbour_weight) continue;
+    const double score = place::l1_score(*words, *index_.words_of(c.keyframe));
+    min_score = any ? std::min(min_score, score) : score;
+    any = true;
+  }
+  return rank(map, *words, excluded, min_score);
+}
+
+std::vector<Candidate> BagOfWordsRecogniser::recognised(const map::BundledMap& map, const frame::BundledFrame& frame) {
+  sync(map);
+  return rank(map, *words_of(frame), {}, 0.0);
+}
+
+std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, const place::WordVector& words,
+                                                  const std::vector<std::uint8_t>& excluded, double min_score) const {
+  std::vector<place::CommonWords> sharing = index_.query(words);
+  std::erase_if(sharing, [&](const place::CommonWords& c) { return !excluded.empty() && excluded[c.keyframe.index()]; });
+  int most = 0;
+  for (const place::CommonWords& c : sharing) most = std::max(most, c.count);
+  std::vector<Scored> scored;
+  for (const place::CommonWords& c : sharing) {
+    if (c.count < options_.common_share * most) continue;
+    const double score = place::l1_score(words, *index_.words_of(c.keyframe));
+    if (score >= min_score) scored.push_back({c.keyframe, score});
+  }
+  std::vector<Candidate> groups;
+  for (const Scored& s : scored) groups.push_back(group_of(map, s, scored, options_.group));
+  std::sort(groups.begin(), groups.end(), better);
+  std::vector<Candidate> out;
+  for (const Candidate& g : groups) {
+    if (out.size() == static_cast<std::size_t>(options_.max_candidates) || g.score < options_.group_share * groups.front().score) break;
+    const bool twice = std::ranges::any_of(out, [&](const Candidate& c) { return same_place(map, c.keyframe, g.keyframe); });
+    if (!twice) out.push_back(g);
+  }
+  return out;
+}
+
+}  // namespace bslam::looping

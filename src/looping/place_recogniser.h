@@ -1,0 +1,57 @@
+// Where in the map might this frame have been taken? Appearance alone; geometry decides afterwards (looping/locate.h).
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "frame/bundled_frame.h"
+#include "looping/options.h"
+#include "map/bundled_map.h"
+#include "place/inverted_index.h"
+#include "place/vocabulary.h"
+
+namespace bslam::looping {
+
+struct Candidate {
+  KeyframeId keyframe;
+  double score = 0;  // of its group, falling
+};
+
+// An interface, so that another detector can stand in. Answers depend on the arguments alone, never on earlier calls.
+class PlaceRecogniser {
+ public:
+  virtual ~PlaceRecogniser() = default;
+
+  // Prepares a frame to be asked about or to become a keyframe; once per frame.
+  virtual void describe(frame::BundledFrame& frame) const = 0;
+
+  // Keyframes of `map` that may show the place of `keyframe`, but for those covisible with it.
+  virtual std::vector<Candidate> revisited(const map::BundledMap& map, KeyframeId keyframe) = 0;
+
+  // Keyframes of `map` that may show the place of a described frame.
+  virtual std::vector<Candidate> recognised(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
+};
+
+// Bag of words: every unique feature of every camera votes with its word.
+class BagOfWordsRecogniser : public PlaceRecogniser {
+ public:
+  BagOfWordsRecogniser(place::VocabularyPtr vocabulary, const RecognitionOptions& options);
+
+  void describe(frame::BundledFrame& frame) const override;
+  std::vector<Candidate> revisited(const map::BundledMap& map, KeyframeId keyframe) override;
+  std::vector<Candidate> recognised(const map::BundledMap& map, const frame::BundledFrame& frame) override;
+
+ private:
+  using Words = std::shared_ptr<const place::WordVector>;
+  void sync(const map::BundledMap& map);
+  Words words_of(const frame::BundledFrame& frame) const;
+  std::vector<Candidate> rank(const map::BundledMap& map, const place::WordVector& words, const std::vector<std::uint8_t>& excluded,
+                              double min_score) const;
+
+  const place::VocabularyPtr vocabulary_;
+  const RecognitionOptions options_;
+  place::InvertedIndex index_;
+  std::vector<std::shared_ptr<const frame::BundledFrame>> known_;  // per keyframe slot of the index; null = none
+};
+
+}  // namespace bslam::looping
