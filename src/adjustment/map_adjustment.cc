@@ -140,13 +140,17 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
   const bool any_fixed = std::any_of(flat.problem.pose_free.begin(), flat.problem.pose_free.end(), [](std::uint8_t f) { return !f; });
   if (selection.free_keyframes.empty() || !any_fixed || flat.problem.observations.empty()) return report;
 
-  const auto robust = solver::adjust(flat.problem, {.iterations = options.robust_iterations, .robust = true}, {}, stop);
+  solver::BundleOptions solve{
+      .iterations = options.robust_iterations, .relative_decrease = options.relative_decrease, .robust = true};
+  const auto robust = solver::adjust(flat.problem, solve, {}, stop);
   if (!robust.usable()) return report;
   report.initial_cost = robust.initial_cost;
   report.final_cost = robust.final_cost;
   if (!stop.stop_requested() && options.final_iterations > 0) {
     const auto skip = outliers(flat.problem, options.outlier_chi2);
-    const auto last = solver::adjust(flat.problem, {.iterations = options.final_iterations, .robust = false}, skip, stop);
+    solve.iterations = options.final_iterations;
+    solve.robust = false;
+    const auto last = solver::adjust(flat.problem, solve, skip, stop);
     if (last.usable()) report.final_cost = last.final_cost;
   }
   const std::vector<Source> bad = bad_observations(flat, options.outlier_chi2);

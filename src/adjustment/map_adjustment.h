@@ -15,12 +15,14 @@ namespace bslam::adjustment {
 struct AdjustmentOptions {
   int robust_iterations = 5;   // with Huber kernel, before observations are judged
   int final_iterations = 5;    // without it, on those that agree
+  double relative_decrease = 1e-4;  // of the cost, below which it has converged
   double outlier_chi2 = solver::kChi2TwoDof95;  // squared normalised error above which an observation is removed
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("robust_iterations", self.robust_iterations, Range{0, 200}, "", "steps with Huber kernel");
     visitor("final_iterations", self.final_iterations, Range{0, 200}, "", "steps without it on the observations that agree");
+    visitor("relative_decrease", self.relative_decrease, Range{0, 0.1}, "", "of the cost, below which it has converged");
     visitor("outlier_chi2", self.outlier_chi2, Range{0.1, 1e6}, "", "squared normalised error above which an observation goes");
   }
 };

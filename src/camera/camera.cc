@@ -1,5 +1,7 @@
 #include "camera/camera.h"
 
+#include "base/assert.h"
+
 namespace bslam::camera {
 
 std::optional<Vector2d> Camera::project(const Vector3d& point_cam) const {
@@ -15,8 +17,10 @@ std::optional<Vector3d> Camera::unproject(const Vector2d& pixel) const {
 }
 
 double Camera::radians_per_pixel() const {
-  const Intrinsics& k = intrinsics(model);
-  return 2.0 / (k.fx + k.fy);
+  // Not from fx and fy: what these mean at the axis is the model's affair.
+  const auto axis = project_with_jacobian(Vector3d::UnitZ());
+  BSLAM_ASSERT(axis, "a camera sees along its optical axis");
+  return 2.0 / (axis->jacobian(0, 0) + axis->jacobian(1, 1));
 }
 
 }  // namespace bslam::camera

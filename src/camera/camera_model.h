@@ -89,11 +89,65 @@ class KannalaBrandt {
   double max_theta_ = 0, max_r_ = 0;
 };
 
-using CameraModel = std::variant<Pinhole, PinholeRadTan, KannalaBrandt>;
+// Unified camera model (Geyer, Daniilidis 2000; Mei, Rives 2007, in the form of Usenko et al., 3DV 2018): a point goes to
+// the unit sphere and from there, through a centre behind it, to the plane: m = (x, y) / (alpha |p| + (1 - alpha) z) with
+// alpha in [0, 1]. alpha = 0 is a pinhole; Mei's xi is alpha / (1 - alpha), his focal length f (1 + xi). Domain: where
+// the projection is one to one, section 8 of docs/math.md; for alpha > 0 it sees behind its plane.
+class Unified {
+ public:
+  Unified(const Intrinsics& k, double alpha);
+  std::optional<Vector2d> project(const Vector3d& point) const;
+  std::optional<Projection> project_with_jacobian(const Vector3d& point) const;
+  std::optional<Vector3d> unproject(const Vector2d& pixel) const;
+  const Intrinsics& intrinsics() const { return k_; }
+  std::vector<double> distortion() const { return {alpha_}; }
+  static constexpr std::string_view kName = "ucm";
+
+ private:
+  Intrinsics k_;
+  double alpha_ = 0;
+};
+
+// Extended unified camera model (Khomutenko, Garcia, Martinet, RA-L 2016): the sphere becomes an ellipsoid,
+// m = (x, y) / (alpha sqrt(beta (x^2 + y^2) + z^2) + (1 - alpha) z) with alpha in [0, 1], beta > 0.
+class ExtendedUnified {
+ public:
+  ExtendedUnified(const Intrinsics& k, double alpha, double beta);
+  std::optional<Vector2d> project(const Vector3d& point) const;
+  std::optional<Projection> project_with_jacobian(const Vector3d& point) const;
+  std::optional<Vector3d> unproject(const Vector2d& pixel) const;
+  const Intrinsics& intrinsics() const { return k_; }
+  std::vector<double> distortion() const { return {alpha_, beta_}; }
+  static constexpr std::string_view kName = "eucm";
+
+ private:
+  Intrinsics k_;
+  double alpha_ = 0, beta_ = 1;
+};
+
+// Double sphere model (Usenko, Demmel, Cremers, 3DV 2018): two unit spheres whose centres are xi apart, then the plane of
+// the unified model. xi in (-1, 1], alpha in [0, 1]. At the optical axis a focal length of f / (1 + xi).
+class DoubleSphere {
+ public:
+  DoubleSphere(const Intrinsics& k, double xi, double alpha);
+  std::optional<Vector2d> project(const Vector3d& point) const;
+  std::optional<Projection> project_with_jacobian(const Vector3d& point) const;
+  std::optional<Vector3d> unproject(const Vector2d& pixel) const;
+  const Intrinsics& intrinsics() const { return k_; }
+  std::vector<double> distortion() const { return {xi_, alpha_}; }
+  static constexpr std::string_view kName = "double-sphere";
+
+ private:
+  Intrinsics k_;
+  double xi_ = 0, alpha_ = 0;
+};
+
+using CameraModel = std::variant<Pinhole, PinholeRadTan, KannalaBrandt, Unified, ExtendedUnified, DoubleSphere>;
 
 // Name as written in rig files.
 std::string_view model_name(const CameraModel& model);
 const Intrinsics& intrinsics(const CameraModel& model);
+// The numbers beside fx fy cx cy, in the order of rig files: coefficients, or the shape of the sphere models.
 std::vector<double> distortion(const CameraModel& model);
 
 }  // namespace bslam::camera

@@ -18,6 +18,8 @@ int main(int argc, char** argv) {
   add_simulate(app, exit_status);
   add_inspect(app, exit_status);
   add_rig(app, exit_status);
+  add_vocab(app, exit_status);
+  add_map(app, exit_status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -1,63 +1,106 @@
 // bslam rig: describe, check and convert a rig calibration.
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "cli/verbs.h"
-#include "io/euroc_sensor.h"
-#include "io/rig_description.h"
 #include "io/rig_file.h"
+#include "session/rig_report.h"
 
 namespace bslam::cli {
 namespace {
 
-struct RigArguments {
-  std::string in, out;
+struct ConvertArguments {
+  std::string in, out, to;
+  std::vector<std::string> drop;
   bool overwrite = false;
 };
 
-int rig_info(const std::string& file) {
-  const auto rig = io::read_rig(file);
-  if (!rig) return report_error(rig.error());
-  std::fputs(io::describe_rig(*rig).c_str(), stdout);
+std::string joined_formats() {
+  std::string names;
+  for (const io::RigFormat format : io::writable_formats())
+    names += (names.empty() ? "" : ", ") + std::string(io::format_name(format));
+  return names;
+}
+
+Result<camera::Rig> with_drops(camera::Rig rig, const std::vector<std::string>& drops) {
+  static const std::map<std::string, io::Droppable> kDroppable = {{"body", io::Droppable::kBodyFrame},
+                                                                  {"mask", io::Droppable::kMasks},
+                                                                  {"time-offset", io::Droppable::kTimeOffsets}};
+  for (const std::string& drop : drops) {
+    const auto what = kDroppable.find(drop);
+    if (what == kDroppable.end()) return Error{"--drop", "", drop, "body, mask or time-offset"};
+    rig = io::without(rig, what->second);
+  }
+  return rig;
+}
+
+int rig_info(const session::RigReportRequest& request) {
+  const auto report = session::report_rig(request);
+  if (!report) return report_error(report.error());
+  std::fputs(report->c_str(), stdout);
   return kExitOk;
 }
 
-// A folder, or a name that ends like one, is written in EuRoC's layout; anything else is our YAML.
-int rig_convert(const RigArguments& arguments) {
-  constexpr double kRateHz = 20.0;  // EuRoC's files carry one; nothing reads it
-  const std::string& out = arguments.out;
-  const auto rig = io::read_rig(arguments.in);
+int rig_convert(const ConvertArguments& arguments) {
+  auto in = io::read_rig_file(arguments.in);
+  if (!in) return report_error(in.error());
+  io::RigFormat format = io::format_of_output(arguments.out);
+  if (!arguments.to.empty()) {
+    const auto named = io::writable_format(arguments.to);
+    if (!named) return report_error({"--to", "", arguments.to, "one of: " + joined_formats()});
+    format = *named;
+  }
+  const auto rig = with_drops(std::move(in->rig), arguments.drop);
   if (!rig) return report_error(rig.error());
-  std::error_code error;
-  const bool folder = out.ends_with('/') || std::filesystem::is_directory(out, error);
-  const bool there = folder ? std::filesystem::exists(std::filesystem::path(out) / "mav0", error) : std::filesystem::exists(out, error);
-  if (there && !arguments.overwrite) return report_error({out, "OUT", "a calibration there already", "a new name, or --overwrite"});
-  const Status status = folder ? io::write_euroc_sensors(*rig, out, kRateHz) : io::write_rig(*rig, out);
-  if (!status) return report_error(status.error());
-  std::printf("%s: %zu cameras as %s\n", out.c_str(), rig->size(), folder ? "EuRoC sensor files" : "a bslam rig file");
+  const auto there = io::files_in_the_way(format, arguments.out);
+  if (!there.empty() && !arguments.overwrite) {
+    return report_error({there.front().string(), "", "a calibration there already", "a new name, or --overwrite"});
+  }
+  const auto notes = io::write_rig_as(*rig, format, arguments.out);
+  if (!notes) return report_error(notes.error());
+  for (const std::string& note : in->notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  for (const std::string& note : *notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  std::printf("%s: %zu camera%s as %s\n", arguments.out.c_str(), rig->size(), rig->size() == 1 ? "" : "s",
+              std::string(io::format_name(format)).c_str());
   return kExitOk;
+}
+
+void add_info(CLI::App& rig, int& exit_status) {
+  const auto request = std::make_shared<session::RigReportRequest>();
+  CLI::App* info =
+      rig.add_subcommand("info", "cameras, fields of view, baselines, overlap, and what is probably wrong");
+  info->add_option("FILE", request->file, "a calibration, or the folder of a data set")->required();
+  info->add_flag("--json", request->json, "as JSON");
+  info->add_option("--svg", request->svg, "draw the rig from above and from the side into this file");
+  info->add_option("--images", request->images, "a data set: test the extrinsics against its first images");
+  info->callback([request, &exit_status] { exit_status = rig_info(*request); });
+}
+
+void add_convert(CLI::App& rig, int& exit_status) {
+  const auto arguments = std::make_shared<ConvertArguments>();
+  CLI::App* convert = rig.add_subcommand("convert", "write a calibration in another format");
+  convert->add_option("IN", arguments->in, "a calibration, or the folder of a data set")->required();
+  convert
+      ->add_option("OUT", arguments->out,
+                   "a file (bslam; .json: basalt), or a folder, ending in / where it is new (euroc)")
+      ->required();
+  convert->add_option("--to", arguments->to, "format of OUT: " + joined_formats());
+  convert->add_option("--drop", arguments->drop, "give up what the format cannot hold: body, mask, time-offset");
+  convert->add_flag("--overwrite", arguments->overwrite, "OUT may exist");
+  convert->callback([arguments, &exit_status] { exit_status = rig_convert(*arguments); });
 }
 
 }  // namespace
 
 void add_rig(CLI::App& app, int& exit_status) {
-  const auto arguments = std::make_shared<RigArguments>();
   CLI::App* rig = app.add_subcommand("rig", "describe, check and convert a rig calibration");
   rig->require_subcommand(1);
-  const std::string formats = "bslam rig file, EuRoC sensor.yaml or data folder, KITTI calib.txt or data folder";
-
-  CLI::App* info = rig->add_subcommand("info", "cameras, fields of view, baselines and overlap");
-  info->add_option("FILE", arguments->in, formats)->required();
-  info->callback([arguments, &exit_status] { exit_status = rig_info(arguments->in); });
-
-  CLI::App* convert = rig->add_subcommand("convert", "write a calibration in another format");
-  convert->add_option("IN", arguments->in, formats)->required();
-  convert->add_option("OUT", arguments->out, "a file (bslam rig file), or a folder, ending in / where it is new (EuRoC: mav0/camN/sensor.yaml)")
-      ->required();
-  convert->add_flag("--overwrite", arguments->overwrite, "OUT may exist");
-  convert->callback([arguments, &exit_status] { exit_status = rig_convert(*arguments); });
+  add_info(*rig, exit_status);
+  add_convert(*rig, exit_status);
 }
 
 }  // namespace bslam::cli

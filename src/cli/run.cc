@@ -1,8 +1,6 @@
 // bslam run: SLAM over a recorded data set.
 #include <algorithm>
-#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -12,26 +10,29 @@
 #include "base/option_table.h"
 #include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
+#include "cli/interruption.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
+#include "io/atomic_file.h"
+#include "io/map_file.h"
+#include "io/vocabulary_file.h"
+#include "place/shipped_vocabulary.h"
+#include "session/record_builder.h"
 #include "session/run_session.h"
 
 namespace bslam::cli {
 namespace {
 
-std::atomic<bool> g_interrupted{false};  // a signal handler can reach nothing else
-static_assert(std::atomic<bool>::is_always_lock_free);
-
-void on_signal(int) { g_interrupted.store(true); }
+constexpr std::size_t kMaxJournalBytes = std::size_t{1} << 30;  // some weeks of frames
 
 const auto g_program_start = std::chrono::steady_clock::now();
 
 struct RunArguments {
   DatasetArguments data;
   ConfigArguments config;
-  std::string out, mode, pace = "fast", late = "block", progress = "auto";
+  std::string out, mode, journal, replay, vocabulary, save_map, load_map, pace = "fast", late = "block", progress = "auto";
   std::optional<int> seed;
-  bool no_loop = false, no_final_ba = false, overwrite = false;
+  bool no_loop = false, localize_only = false, no_final_ba = false, overwrite = false;
 };
 
 // The options of the command line win over file and single settings.
@@ -44,6 +45,11 @@ Result<system::Config> resolve_run_config(const RunArguments& arguments) {
   }
   if (arguments.seed) config.seed = *arguments.seed;
   if (arguments.no_final_ba) config.final_adjustment = false;
+  if (arguments.no_loop) config.looping.loop.enabled = false;
+  if (arguments.localize_only) config.localize_only = true;
+  if (config.localize_only && arguments.load_map.empty()) {
+    return Error{"", "--localize-only", "no --load-map", "a map to localise in"};
+  }
   return resolved;
 }
 
@@ -59,10 +65,47 @@ Status prepare_folder(const std::filesystem::path& folder, bool overwrite) {
   }
   std::filesystem::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be made"};
-  for (const char* name : {"trajectory.tum", "trajectory_live.tum", "config.yaml", "summary.json", "trajectory.svg", "run.svg"}) {
-    std::filesystem::remove(folder / name, error);
+  for (const char* name : {"config.yaml", "summary.json", "trajectory.svg", "run.svg"}) std::filesystem::remove(folder / name, error);
+  for (const char* stem : {"trajectory", "trajectory_live"}) {
+    for (std::size_t part = 0; std::filesystem::remove(folder / session::trajectory_file(stem, part), error); ++part) {
+    }
   }
   return {};
+}
+
+Result<std::optional<system::Journal>> read_journal(const std::string& file) {
+  if (file.empty()) return std::optional<system::Journal>();
+  const auto text = io::read_file(file, kMaxJournalBytes);
+  if (!text) return text.error();
+  auto journal = system::parse_journal(*text, file);
+  if (!journal) return journal.error();
+  return std::optional(std::move(*journal));
+}
+
+Result<place::VocabularyPtr> read_vocabulary(const std::string& file) {
+  return file.empty() ? place::shipped_vocabulary() : io::read_vocabulary(file);
+}
+
+// The map of an earlier run, if one is asked for, and whether this one can go on with it.
+Result<std::optional<map::BundledMap>> read_map(const std::string& file, const camera::Rig& rig, const place::Vocabulary& vocabulary) {
+  if (file.empty()) return std::optional<map::BundledMap>();
+  auto saved = io::read_map(file);
+  if (!saved) return saved.error();
+  if (const Status s = io::fits(*saved, rig, &vocabulary); !s) return s.error();
+  return std::optional(std::move(saved->map));
+}
+
+Status write_files(const session::SessionResult& result, const system::Config& config, const RunArguments& arguments,
+                   const place::Vocabulary& vocabulary) {
+  if (!arguments.journal.empty()) {
+    const Status status = io::write_atomically(arguments.journal, system::journal_text(result.journal));
+    if (!status) return status;
+  }
+  if (!arguments.save_map.empty()) {
+    const io::MapFileInfo info{vocabulary.id(), result.record.version, result.record.data};
+    if (const Status status = io::write_map(*result.map, info, arguments.save_map); !status) return status;
+  }
+  return session::write_outputs(result, config, arguments.out);
 }
 
 void print_result(const report::RunRecord& record, const std::string& out) {
@@ -76,14 +119,19 @@ void print_result(const report::RunRecord& record, const std::string& out) {
 
 int run(const RunArguments& arguments) {
   // Before anything is made: whoever sees the folder can rely on an interruption being answered in order.
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  const Interruption interruption;
   const auto config = resolve_run_config(arguments);
   if (!config) return report_error(config.error());
+  auto replay = read_journal(arguments.replay);
+  if (!replay) return report_error(replay.error());
   const auto request = dataset_request(arguments.data, config->io.sync_tolerance);
   if (!request) return report_error(request.error());
   const auto dataset = io::open_dataset(*request);
   if (!dataset) return report_error(dataset.error());
+  const auto vocabulary = read_vocabulary(arguments.vocabulary);
+  if (!vocabulary) return report_error(vocabulary.error());
+  auto map = read_map(arguments.load_map, dataset->rig, **vocabulary);
+  if (!map) return report_error(map.error());
   if (const Status s = prepare_folder(arguments.out, arguments.overwrite); !s) return report_error(s.error());
   for (const std::string& warning : dataset->warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
 
@@ -93,12 +141,15 @@ int run(const RunArguments& arguments) {
   options.pace = arguments.pace == "realtime" ? session::Pace::kRealtime : session::Pace::kFast;
   options.late = arguments.late == "drop" ? session::Late::kDrop : session::Late::kBlock;
   options.start_up_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - g_program_start).count();
-  options.interrupted = &g_interrupted;
+  options.interrupted = interruption.token();
+  options.replay = std::move(*replay);
+  options.vocabulary = *vocabulary;
+  options.map = std::move(*map);
   options.progress = [&bar](std::size_t done, std::size_t all) { bar.show(done, all); };
   const auto result = session::run_session(*dataset, options);
   bar.finish();
   if (!result) return report_error(result.error());
-  if (const Status s = session::write_outputs(*result, *config, arguments.out); !s) return report_error(s.error());
+  if (const Status s = write_files(*result, *config, arguments, **vocabulary); !s) return report_error(s.error());
   print_result(result->record, arguments.out);
   if (!result->record.complete) return kExitInterrupted;
   return result->live.empty() ? kExitNothingTracked : kExitOk;
@@ -112,14 +163,20 @@ void add_run(CLI::App& app, int& exit_status) {
   add_dataset_options(*verb, a->data);
   verb->add_option("--out", a->out, "folder for trajectory, summary, configuration and plots")->required();
   add_config_options(*verb, a->config);
-  verb->add_option("--mode", a->mode, "sequential (identical bytes on every run) or parallel; default parallel");
+  verb->add_option("--mode", a->mode, "sequential or lagged (identical bytes on every run), or parallel; default parallel");
+  verb->add_option("--journal", a->journal, "file to write: which stage worked on and made which version of the map");
+  verb->add_option("--replay", a->replay, "a journal: the run it was written by is repeated, whatever its mode was");
   verb->add_option("--pace", a->pace, "fast, or realtime: images at their recorded pace")
       ->check(CLI::IsMember({"fast", "realtime"}))
       ->capture_default_str();
   verb->add_option("--late", a->late, "at the recorded pace: block keeps every frame, drop leaves out those there is no time for")
       ->check(CLI::IsMember({"block", "drop"}))
       ->capture_default_str();
-  verb->add_flag("--no-loop", a->no_loop, "loop closing off (there is none yet)");
+  verb->add_flag("--no-loop", a->no_loop, "loop closing off; a lost rig is still looked for all over the map");
+  verb->add_option("--save-map", a->save_map, "file for the map at the end");
+  verb->add_option("--load-map", a->load_map, "a saved map: the run goes on in it once it finds its place there");
+  verb->add_flag("--localize-only", a->localize_only, "poses in the loaded map, which stays as it is");
+  verb->add_option("--vocabulary", a->vocabulary, "for place recognition, ours or DBoW2's text; default: the one of the program");
   verb->add_flag("--no-final-ba", a->no_final_ba, "no global bundle adjustment at the end");
   verb->add_option("--seed", a->seed, "of all randomness; default 1")->check(CLI::NonNegativeNumber);
   verb->add_option("--progress", a->progress, "auto: a bar when stderr is a terminal; never")

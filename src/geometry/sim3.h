@@ -1,9 +1,12 @@
-// Similarity transforms Sim(3): p_a = s R p_b + t, with T_a_b read as for SE3.
+// Similarity transforms Sim(3): p_a = s R p_b + t, with T_a_b read as for SE3. Equations: docs/math.md, section 1.
 #pragma once
 
 #include "geometry/se3.h"
 
 namespace bslam::geometry {
+
+using Vector7d = Eigen::Matrix<double, 7, 1>;
+using Matrix7d = Eigen::Matrix<double, 7, 7>;
 
 class Sim3 {
  public:
@@ -19,6 +22,16 @@ class Sim3 {
   Sim3 inverse() const;
   Sim3 operator*(const Sim3& other) const;
   Vector3d operator*(const Vector3d& point) const { return scale_ * (rotation_ * point) + translation_; }
+
+  // Tangent vectors are [omega, v, log scale]. Perturbation is on the left: S <- exp(delta) * S. exp and log are exact
+  // to rounding for scales between 1/100 and 100 per step; with a log scale of 0 they are those of SE3 and the scale
+  // is 1.
+  static Sim3 exp(const Vector7d& xi);
+  Vector7d log() const;
+  Sim3 perturbed(const Vector7d& delta) const { return exp(delta) * *this; }
+
+  // Ad with S exp(xi) S^-1 = exp(Ad xi).
+  Matrix7d adjoint() const;
 
   // The rigid pose of a frame after the similarity moved the world around it: rotation and position, no scale.
   SE3 apply_to_pose(const SE3& T_b_frame) const {

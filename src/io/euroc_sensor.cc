@@ -11,6 +11,7 @@
 #include "base/number_text.h"
 #include "io/atomic_file.h"
 #include "io/camera_description.h"
+#include "io/rig_limits.h"
 #include "io/yaml_map.h"
 
 namespace bslam::io {
@@ -56,18 +57,6 @@ Status read_model(const YamlMap& yaml, CameraDescription& out) {
   return {};
 }
 
-Result<std::vector<std::int64_t>> read_resolution(const YamlMap& yaml) {
-  const auto numbers = yaml.numbers("resolution");
-  if (!numbers) return numbers.error();
-  std::vector<std::int64_t> sides;
-  for (const double value : *numbers) {
-    const auto side = static_cast<std::int64_t>(std::clamp(value, -1.0, 1e9));
-    if (static_cast<double>(side) != value) return yaml.error("resolution", format_double(value), "whole pixels");
-    sides.push_back(side);
-  }
-  return sides;
-}
-
 std::string row_text(const Eigen::Matrix4d& T, int row) {
   return fmt::format("{}, {}, {}, {}", format_double(T(row, 0)), format_double(T(row, 1)), format_double(T(row, 2)),
                      format_double(T(row, 3)));
@@ -83,7 +72,9 @@ Result<camera::RigCamera> read_euroc_sensor(const fs::path& file, const std::str
   CameraDescription d;
   d.name = name;
   if (const Status status = read_model(*yaml, d); !status) return status.error();
-  auto resolution = read_resolution(*yaml);
+  const auto sides = yaml->numbers("resolution");
+  if (!sides) return sides.error();
+  auto resolution = whole_pixels(*sides, yaml->file(), yaml->key_path("resolution"));
   if (!resolution) return resolution.error();
   d.resolution = *std::move(resolution);
   auto intrinsics = yaml->numbers("intrinsics");
@@ -152,12 +143,9 @@ std::string euroc_sensor_yaml(const camera::RigCamera& rig_camera, double rate_h
 }
 
 Status write_euroc_sensors(const camera::Rig& rig, const fs::path& folder, double rate_hz) {
-  for (std::size_t i = 0; i < rig.size(); ++i) {
-    const camera::Camera& camera = rig.camera(i);
-    if (camera.time_offset_ns != 0 || !camera.mask_file.empty()) {
-      return Error{folder.string(), camera.name, "a time offset or a mask", "a camera without, to be written as EuRoC"};
-    }
-  }
+  const RigLimits limits{.format = "EuRoC sensor files",
+                         .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName}};
+  if (const Status status = check_limits(rig, folder.string(), limits); !status) return status;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const fs::path camera_folder = folder / "mav0" / fmt::format("cam{}", i);
     std::error_code error;

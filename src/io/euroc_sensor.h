@@ -24,7 +24,7 @@ std::filesystem::path euroc_root(const std::filesystem::path& data);
 std::string euroc_sensor_yaml(const camera::RigCamera& camera, double rate_hz);
 
 // Writes FOLDER/mav0/camN/sensor.yaml for every camera, making the folders. Errors: a camera with a time offset or a
-// mask, which the format cannot hold; a folder or file that cannot be written.
+// mask, or of a model that the format cannot hold; a folder or file that cannot be written.
 Status write_euroc_sensors(const camera::Rig& rig, const std::filesystem::path& folder, double rate_hz);
 
 }  // namespace bslam::io

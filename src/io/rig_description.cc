@@ -10,6 +10,7 @@
 
 #include "base/timestamp.h"
 #include "geometry/triangulation.h"
+#include "io/rig_warnings.h"
 
 namespace bslam::io {
 namespace {
@@ -17,8 +18,6 @@ namespace {
 using geometry::SE3;
 using geometry::Vector2d;
 using geometry::Vector3d;
-
-constexpr double kLeastBaseline = 1e-3, kLargestBaseline = 5.0;  // metres
 
 double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
 
@@ -36,13 +35,6 @@ double angle_towards(const camera::Camera& camera, const Vector2d& pixel) {
 
 double span(const camera::Camera& camera, const Vector2d& from, const Vector2d& to) {
   return angle_towards(camera, from) + angle_towards(camera, to);
-}
-
-// "1.20 m", "11.0 cm", "0.4 mm"
-std::string length_text(double metres) {
-  if (metres >= 1.0) return fmt::format("{:.2f} m", metres);
-  if (metres >= 0.01) return fmt::format("{:.1f} cm", 100 * metres);
-  return fmt::format("{:.1f} mm", 1000 * metres);
 }
 
 std::string vector_text(const Vector3d& v) {
@@ -126,23 +118,9 @@ std::string displacement_in_words(const Vector3d& displacement) {
   std::vector<std::string> words;
   for (const Axis& axis : axes) {
     if (std::abs(axis.along) < least) continue;
-    words.push_back(length_text(std::abs(axis.along)) + " " + (axis.along > 0 ? axis.positive : axis.negative));
+    words.push_back(length_in_words(std::abs(axis.along)) + " " + (axis.along > 0 ? axis.positive : axis.negative));
   }
   return words.empty() ? "at the same place" : fmt::format("{}", fmt::join(words, ", "));
-}
-
-std::vector<std::string> rig_warnings(const camera::Rig& rig) {
-  std::vector<std::string> warnings;
-  for (std::size_t i = 0; i < rig.size(); ++i) {
-    for (std::size_t j = i + 1; j < rig.size(); ++j) {
-      const double length = baseline(rig, i, j);
-      if (length >= kLeastBaseline && length <= kLargestBaseline) continue;
-      warnings.push_back(
-          fmt::format("cameras {} and {} are {} apart: {}", i, j, length_text(length),
-                      length < kLeastBaseline ? "is their transform missing?" : "are the units metres?"));
-    }
-  }
-  return warnings;
 }
 
 std::string describe_rig(const camera::Rig& rig) {
@@ -152,12 +130,10 @@ std::string describe_rig(const camera::Rig& rig) {
   text += "baselines:\n";
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
-      text += fmt::format("  {} to {}: {}\n", i, j, length_text(baseline(rig, i, j)));
+      text += fmt::format("  {} to {}: {}\n", i, j, length_in_words(baseline(rig, i, j)));
     }
   }
-  text += overlap_table(rig);
-  for (const std::string& warning : rig_warnings(rig)) text += "warning: " + warning + "\n";
-  return text;
+  return text + overlap_table(rig);
 }
 
 }  // namespace bslam::io

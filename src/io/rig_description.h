@@ -18,10 +18,7 @@ FieldOfView field_of_view(const camera::Camera& camera);
 // "11.0 cm to the right, 2.0 cm below": a displacement in the frame of camera 0 (x right, y down, z forward), metres.
 std::string displacement_in_words(const geometry::Vector3d& displacement);
 
-// Baselines that are hardly meant: below 1 mm or above 5 m.
-std::vector<std::string> rig_warnings(const camera::Rig& rig);
-
-// Several lines: each camera with its model, resolution, fields of view and place; baselines; overlap; warnings.
+// Several lines: each camera with its model, resolution, fields of view and place; baselines; overlap.
 std::string describe_rig(const camera::Rig& rig);
 
 }  // namespace bslam::io

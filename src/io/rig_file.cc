@@ -1,21 +1,21 @@
 #include "io/rig_file.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
-#include <set>
-#include <string_view>
+#include <cctype>
 #include <utility>
-#include <vector>
 
-#include "base/number_text.h"
-#include "base/timestamp.h"
 #include "io/atomic_file.h"
+#include "io/basalt_rig.h"
 #include "io/camera_description.h"
+#include "io/colmap_rig.h"
 #include "io/euroc_sensor.h"
+#include "io/kalibr_rig.h"
 #include "io/kitti_calib.h"
+#include "io/kitti_raw_rig.h"
+#include "io/orbslam_rig.h"
 #include "io/yaml_map.h"
 
 namespace bslam::io {
@@ -24,101 +24,22 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxRigBytes = std::size_t{1} << 22;
-constexpr int kRigVersion = 1;
 
-// ---- our YAML
-
-Status read_time_and_mask(const YamlMap& yaml, CameraDescription& d) {
-  if (yaml.has("time_offset_s")) {
-    const auto offset = yaml.number("time_offset_s");
-    if (!offset) return offset.error();
-    d.time_offset_s = *offset;
-  }
-  if (yaml.has("mask")) {
-    const auto mask = yaml.text("mask");
-    if (!mask) return mask.error();
-    // Relative to the rig file, and absolute from here on, so that the rig may be written elsewhere.
-    d.mask_file = (fs::absolute(yaml.file()).parent_path() / *mask).lexically_normal().string();
-  }
-  return {};
-}
-
-Result<camera::RigCamera> read_camera(const YamlMap& yaml, std::size_t index) {
-  const Status known = yaml.allow_only(
-      {"name", "model", "resolution", "intrinsics", "distortion", "T_body_cam", "time_offset_s", "mask"});
-  if (!known) return known.error();
-  CameraDescription d;
-  d.name = fmt::format("cam{}", index);
-  if (yaml.has("name")) {
-    auto name = yaml.text("name");
-    if (!name) return name.error();
-    d.name = *std::move(name);
-  }
-  auto model = yaml.text("model");
-  if (!model) return model.error();
-  d.model = *std::move(model);
-  const auto resolution = yaml.numbers("resolution");
-  if (!resolution) return resolution.error();
-  for (const double side : *resolution) {
-    const auto whole = static_cast<std::int64_t>(std::clamp(side, -1.0, 1e9));
-    if (static_cast<double>(whole) != side) return yaml.error("resolution", format_double(side), "whole pixels");
-    d.resolution.push_back(whole);
-  }
-  auto intrinsics = yaml.numbers("intrinsics");
-  if (!intrinsics) return intrinsics.error();
-  d.intrinsics = *std::move(intrinsics);
-  if (yaml.has("distortion") || d.model != camera::Pinhole::kName) {
-    auto distortion = yaml.numbers("distortion");
-    if (!distortion) return distortion.error();
-    d.distortion = *std::move(distortion);
-  }
-  auto T_body_cam = yaml.rows("T_body_cam", 4);
-  if (!T_body_cam) return T_body_cam.error();
-  d.T_body_cam = *std::move(T_body_cam);
-  if (const Status status = read_time_and_mask(yaml, d); !status) return status.error();
-  return make_camera(d, {yaml.file(), yaml.key_path("model"), yaml.key_path("resolution"), yaml.key_path("intrinsics"),
-                         yaml.key_path("distortion"), yaml.key_path("T_body_cam"), yaml.key_path("time_offset_s")});
-}
-
-Result<camera::Rig> read_own(const YamlMap& yaml) {
-  if (const Status known = yaml.allow_only({"bslam_rig", "cameras"}); !known) return known.error();
-  const auto version = yaml.integer("bslam_rig");
-  if (!version) return version.error();
-  if (*version != kRigVersion) return yaml.error("bslam_rig", std::to_string(*version), std::to_string(kRigVersion));
-  const auto maps = yaml.maps("cameras");
-  if (!maps) return maps.error();
-  std::vector<camera::RigCamera> cameras;
-  std::set<std::string> names;
-  for (const YamlMap& map : *maps) {
-    auto camera = read_camera(map, cameras.size());
-    if (!camera) return camera.error();
-    if (!names.insert(camera->camera.name).second) {
-      return map.error("name", camera->camera.name + " for a second camera", "a name of its own for every camera");
-    }
-    cameras.push_back(*std::move(camera));
-  }
-  return camera::Rig(std::move(cameras));
-}
-
-// ---- the closed list of formats a single file may have
-
-Result<camera::Rig> read_own_file(const fs::path& file, const std::string& text) {
-  const auto yaml = YamlMap::parse(file, text);
-  if (!yaml) return yaml.error();
-  return read_own(*yaml);
-}
-
-Result<camera::Rig> read_euroc_file(const fs::path& file, const std::string&) {
+Result<RigReading> read_euroc_file(const fs::path& file, const std::string&) {
   const std::string folder = fs::absolute(file).parent_path().filename().string();
   auto camera = read_euroc_sensor(file, folder.starts_with("cam") ? folder : "cam0");
   if (!camera) return camera.error();
-  return camera::Rig({*std::move(camera)});
+  return RigReading{{*std::move(camera)}, {}};
 }
 
-Result<camera::Rig> read_kitti_file(const fs::path& file, const std::string&) {
+Result<RigReading> read_kitti_file(const fs::path& file, const std::string&) {
   auto cameras = read_kitti_cameras(file);
   if (!cameras) return cameras.error();
-  return camera::Rig(*std::move(cameras));
+  return RigReading{*std::move(cameras), {}};
+}
+
+Result<RigReading> read_colmap_file(const fs::path& file, const std::string&) {
+  return read_colmap_rig(fs::absolute(file).parent_path());
 }
 
 // True where some line begins with `key` and a colon.
@@ -127,77 +48,211 @@ bool has_line(std::string_view text, std::string_view key) {
   return text.starts_with(start) || text.find("\n" + start) != std::string_view::npos;
 }
 
-struct RigFormat {
-  std::string_view name;
+bool has(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
+
+bool is_upper_word(std::string_view word) {
+  return !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
+    return std::isupper(c) != 0 || std::isdigit(c) != 0 || c == '_';
+  });
+}
+
+// The first line that is no comment: "ID MODEL ..." of cameras.txt, "ID COUNT CAMERA ..." of rigs.txt.
+bool is_colmap_text(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (line.empty() || line.front() == '#') continue;
+    if (std::isdigit(static_cast<unsigned char>(line.front())) == 0) return false;
+    const std::size_t space = line.find(' ');
+    if (space == std::string_view::npos) return false;
+    const std::string_view rest = line.substr(space + 1), word = rest.substr(0, rest.find(' '));
+    return has(rest, "CAMERA ") || (is_upper_word(word) && std::isupper(static_cast<unsigned char>(word[0])) != 0);
+  }
+  return false;
+}
+
+struct FormatEntry {
+  RigFormat format;
+  std::string_view name, description;
   bool (*recognises)(std::string_view text);
-  Result<camera::Rig> (*read)(const fs::path& file, const std::string& text);
+  Result<RigReading> (*read)(const fs::path& file, const std::string& text);
 };
 
-// The first that recognises a file reads it, so that an error speaks of the format that was meant.
-constexpr std::array<RigFormat, 3> kFormats = {{
-    {"a bslam rig (bslam_rig: 1)", [](std::string_view t) { return has_line(t, "bslam_rig"); }, read_own_file},
-    {"an EuRoC sensor.yaml", [](std::string_view t) { return has_line(t, "T_BS") || has_line(t, "camera_model"); },
-     read_euroc_file},
-    {"a KITTI calib.txt", [](std::string_view t) { return has_line(t, "P0") || has_line(t, "P1"); }, read_kitti_file},
+// The first that recognises a file reads it, so that an error speaks of the format that was meant. OpenVINS's variant
+// is read as Kalibr's.
+constexpr std::array<FormatEntry, 9> kFormats = {{
+    {RigFormat::kBslam, "bslam", "a bslam rig (bslam_rig: 1)",
+     [](std::string_view t) { return has_line(t, "bslam_rig"); }, read_bslam_rig},
+    {RigFormat::kBasalt, "basalt", "a Basalt calibration (value0: T_imu_cam)",
+     [](std::string_view t) { return has(t, "\"T_imu_cam\"") || has(t, "\"value0\""); }, read_basalt_rig},
+    {RigFormat::kColmap, "colmap", "a COLMAP rig (cameras.txt with rigs.txt or rig_config.json)",
+     [](std::string_view t) { return has(t, "\"image_prefix\"") || has(t, "\"ref_sensor\"") || is_colmap_text(t); },
+     read_colmap_file},
+    {RigFormat::kOpenvins, "openvins", "an OpenVINS camera chain (cam0: T_imu_cam)",
+     [](std::string_view t) { return has_line(t, "cam0") && has(t, "T_imu_cam:"); }, read_kalibr_rig},
+    {RigFormat::kKalibr, "kalibr", "a Kalibr camchain (cam0: camera_model)",
+     [](std::string_view t) { return has_line(t, "cam0"); }, read_kalibr_rig},
+    {RigFormat::kOrbslam3, "orbslam3", "an ORB-SLAM3 settings file (Camera.type, Camera1.fx)",
+     [](std::string_view t) {
+       return has_line(t, "Camera.type") || has_line(t, "Camera.fx") || has_line(t, "Camera1.fx");
+     },
+     read_orbslam_rig},
+    {RigFormat::kEuroc, "euroc", "an EuRoC sensor.yaml",
+     [](std::string_view t) { return has_line(t, "T_BS") || has_line(t, "camera_model"); }, read_euroc_file},
+    {RigFormat::kKittiRaw, "kitti-raw", "a KITTI calib_cam_to_cam.txt",
+     [](std::string_view t) { return has_line(t, "P_rect_00") || has_line(t, "K_00"); }, read_kitti_raw_rig},
+    {RigFormat::kKitti, "kitti", "a KITTI calib.txt",
+     [](std::string_view t) { return has_line(t, "P0") || has_line(t, "P1"); }, read_kitti_file},
 }};
 
-Result<camera::Rig> read_folder(const fs::path& folder) {
-  std::vector<camera::RigCamera> cameras;
+constexpr std::array kWritable = {RigFormat::kBslam,    RigFormat::kEuroc,  RigFormat::kKalibr, RigFormat::kOpenvins,
+                                  RigFormat::kOrbslam3, RigFormat::kBasalt, RigFormat::kColmap};
+
+Result<RigFile> as_file(Result<RigReading> reading, RigFormat format) {
+  if (!reading) return reading.error();
+  return RigFile{camera::Rig(std::move(reading->cameras)), format, std::move(reading->notes)};
+}
+
+Result<RigFile> read_folder(const fs::path& folder) {
+  RigReading reading;
   for (const fs::path& camera_folder : camera_folders(euroc_root(folder), "sensor.yaml")) {
     auto camera = read_euroc_sensor(camera_folder / "sensor.yaml", camera_folder.filename().string());
     if (!camera) return camera.error();
-    cameras.push_back(*std::move(camera));
+    reading.cameras.push_back(*std::move(camera));
   }
-  if (!cameras.empty()) return camera::Rig(std::move(cameras));
+  if (!reading.cameras.empty()) return as_file(std::move(reading), RigFormat::kEuroc);
   std::error_code error;
-  if (fs::exists(folder / "calib.txt", error)) return read_kitti_file(folder / "calib.txt", "");
-  return Error{folder.string(), "", "a folder without calibration", "mav0/camN/sensor.yaml or calib.txt in it"};
+  if (fs::exists(folder / "calib.txt", error)) {
+    return as_file(read_kitti_file(folder / "calib.txt", ""), RigFormat::kKitti);
+  }
+  if (fs::exists(folder / "cameras.txt", error)) return as_file(read_colmap_rig(folder), RigFormat::kColmap);
+  if (fs::exists(folder / "calib_cam_to_cam.txt", error)) return read_rig_file(folder / "calib_cam_to_cam.txt");
+  return Error{folder.string(), "", "a folder without calibration",
+               "mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt or cameras.txt in it"};
 }
 
-// ---- out
-
-std::string list_text(const std::vector<double>& values) {
-  std::vector<std::string> texts;
-  for (const double value : values) texts.push_back(format_double(value));
-  return fmt::format("[{}]", fmt::join(texts, ", "));
+Status make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return Error{folder.string(), "", error.message(), "a folder that can be made"};
+  return {};
 }
 
-std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_body_cam) {
-  const camera::Intrinsics& k = camera::intrinsics(camera.model);
-  std::string yaml = fmt::format("  - name: {}\n    model: {}\n    resolution: [{}, {}]\n", yaml_quoted(camera.name),
-                                 camera::model_name(camera.model), camera.width, camera.height);
-  yaml += fmt::format("    intrinsics: {}  # fx fy cx cy\n", list_text({k.fx, k.fy, k.cx, k.cy}));
-  yaml += fmt::format("    distortion: {}\n    T_body_cam:\n", list_text(camera::distortion(camera.model)));
-  const Eigen::Matrix4d T = T_body_cam.matrix();
-  for (int r = 0; r < 4; ++r) yaml += fmt::format("      - {}\n", list_text({T(r, 0), T(r, 1), T(r, 2), T(r, 3)}));
-  // Divided, not multiplied by 1e-9: the quotient is the double nearest to the decimal, so its text is short and exact.
-  yaml += fmt::format("    time_offset_s: {}\n", format_double(static_cast<double>(camera.time_offset_ns) / 1e9));
-  return yaml + fmt::format("    mask: {}\n", camera.mask_file.empty() ? "null" : yaml_quoted(camera.mask_file));
+Status write_text(const Result<std::string>& text, const fs::path& file) {
+  if (!text) return text.error();
+  return write_atomically(file, *text);
+}
+
+Status write_colmap(const camera::Rig& rig, const fs::path& folder) {
+  const auto texts = colmap_rig_texts(rig, folder.string());
+  if (!texts) return texts.error();
+  if (const Status status = make_folder(folder); !status) return status;
+  for (const auto& [name, text] : *texts) {
+    if (const Status status = write_atomically(folder / name, text); !status) return status;
+  }
+  return {};
+}
+
+Status write_as(const camera::Rig& rig, RigFormat format, const fs::path& out) {
+  constexpr double kRateHz = 20.0;  // EuRoC's files carry one; nothing reads it
+  switch (format) {
+    case RigFormat::kEuroc:
+      return write_euroc_sensors(rig, out, kRateHz);
+    case RigFormat::kKalibr:
+      return write_text(kalibr_rig_text(rig, out.string()), out);
+    case RigFormat::kOpenvins:
+      return write_text(openvins_rig_text(rig, out.string()), out);
+    case RigFormat::kOrbslam3:
+      return write_text(orbslam_rig_text(rig, out.string()), out);
+    case RigFormat::kBasalt:
+      return write_text(basalt_rig_text(rig, out.string()), out);
+    case RigFormat::kColmap:
+      return write_colmap(rig, out);
+    case RigFormat::kBslam:
+      return write_rig(rig, out);
+    case RigFormat::kKitti:
+    case RigFormat::kKittiRaw:
+      break;
+  }
+  return Error{out.string(), "", std::string(format_name(format)), "a format that can be written"};
 }
 
 }  // namespace
 
-Result<camera::Rig> read_rig(const fs::path& path) {
+std::string_view format_name(RigFormat format) {
+  return std::find_if(kFormats.begin(), kFormats.end(), [&](const FormatEntry& f) { return f.format == format; })->name;
+}
+
+std::span<const RigFormat> writable_formats() { return kWritable; }
+
+std::optional<RigFormat> writable_format(std::string_view name) {
+  const auto* format = std::find_if(kWritable.begin(), kWritable.end(),
+                                    [&](RigFormat candidate) { return format_name(candidate) == name; });
+  return format == kWritable.end() ? std::nullopt : std::optional(*format);
+}
+
+RigFormat format_of_output(const fs::path& out) {
+  std::error_code error;
+  if (out.filename().empty() || fs::is_directory(out, error)) return RigFormat::kEuroc;
+  return out.extension() == ".json" ? RigFormat::kBasalt : RigFormat::kBslam;
+}
+
+Result<RigFile> read_rig_file(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) return read_folder(path);
-  const auto text = read_file(path, kMaxRigBytes);
+  auto text = read_file(path, kMaxRigBytes);
   if (!text) return text.error();
   std::string names;
-  for (const RigFormat& format : kFormats) {
-    if (format.recognises(*text)) return format.read(path, *text);
-    names += (names.empty() ? "" : ", ") + std::string(format.name);
+  for (const FormatEntry& format : kFormats) {
+    if (format.recognises(*text)) return as_file(format.read(path, *text), format.format);
+    names += (names.empty() ? "" : ", ") + std::string(format.description);
   }
   // Broken YAML is more worth saying than an unknown format.
   if (const auto yaml = YamlMap::parse(path, *text); !yaml && !yaml.error().key.empty()) return yaml.error();
   return Error{path.string(), "", "no rig of a known format", "one of: " + names};
 }
 
-std::string rig_to_yaml(const camera::Rig& rig) {
-  std::string yaml = fmt::format("bslam_rig: {}\ncameras:\n", kRigVersion);
-  for (std::size_t i = 0; i < rig.size(); ++i) yaml += camera_to_yaml(rig.camera(i), rig.body_from_cam(i));
-  return yaml;
+Result<camera::Rig> read_rig(const fs::path& path) {
+  auto file = read_rig_file(path);
+  if (!file) return file.error();
+  return std::move(file->rig);
 }
 
 Status write_rig(const camera::Rig& rig, const fs::path& file) { return write_atomically(file, rig_to_yaml(rig)); }
+
+Result<std::vector<std::string>> write_rig_as(const camera::Rig& rig, RigFormat format, const fs::path& out) {
+  if (const Status status = write_as(rig, format, out); !status) return status.error();
+  std::vector<std::string> notes;
+  const bool keeps_names = format == RigFormat::kBslam || format == RigFormat::kColmap;
+  for (std::size_t i = 0; i < rig.size() && !keeps_names; ++i) {
+    const std::string name = fmt::format("cam{}", i);
+    if (rig.camera(i).name == name) continue;
+    notes.push_back(fmt::format("{} holds no names: {} becomes {}", format_name(format), rig.camera(i).name, name));
+  }
+  return notes;
+}
+
+std::vector<fs::path> files_in_the_way(RigFormat format, const fs::path& out) {
+  std::vector<fs::path> candidates = {out};
+  if (format == RigFormat::kEuroc) candidates = {out / "mav0"};
+  if (format == RigFormat::kColmap) candidates = {out / "cameras.txt", out / "rigs.txt", out / "rig_config.json"};
+  std::erase_if(candidates, [](const fs::path& path) {
+    std::error_code error;
+    return !fs::exists(path, error);
+  });
+  return candidates;
+}
+
+camera::Rig without(const camera::Rig& rig, Droppable what) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    camera::RigCamera c{rig.camera(i), what == Droppable::kBodyFrame ? rig.rig_from_cam(i) : rig.body_from_cam(i)};
+    if (what == Droppable::kMasks) c.camera.mask_file.clear();
+    if (what == Droppable::kTimeOffsets) c.camera.time_offset_ns = 0;
+    cameras.push_back(std::move(c));
+  }
+  return camera::Rig(std::move(cameras));
+}
 
 }  // namespace bslam::io

@@ -1,8 +1,23 @@
 #include "looping/loop_closer.h"
 
+#include <algorithm>
+
 #include "looping/loop_correction.h"
 
 namespace bslam::looping {
+namespace {
+
+// On an unbroken walk a candidate is joined to the keyframe by those between them, and what is found of it is what the
+// keyframe observes anyway. A place seen again shows landmarks that the keyframe does not know.
+bool shows_news(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
+  const auto known = std::ranges::count_if(location.matches, [&](const auto& match) {
+    const std::span<const map::Observation> list = map.observations(match.second);
+    return std::ranges::find(list, keyframe, &map::Observation::keyframe) != list.end();
+  });
+  return 2 * static_cast<std::size_t>(known) < location.matches.size();
+}
+
+}  // namespace
 
 LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options, const map::FeatureModel& features,
                        std::uint64_t seed)
@@ -15,7 +30,8 @@ std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::Bundled
     const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
     const auto location =
         locate(map, *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
-    if (location && plausible(map, measure(map, keyframe, *location), options_.loop)) return location;
+    if (!location || !shows_news(map, keyframe, *location)) continue;
+    if (plausible(map, measure(map, keyframe, *location), options_.loop)) return location;
   }
   return std::nullopt;
 }

@@ -144,6 +144,15 @@ map::SetPoses corrected(const map::BundledMap& map, const EssentialGraph& graph,
   return poses;
 }
 
+// Moved landmarks are seen from other directions and, where the scale has changed, from other distances.
+void move_map(map::SetPoses poses, map::MapDraft& draft) {
+  std::vector<LandmarkId> moved;
+  moved.reserve(poses.landmarks.size());
+  for (const auto& [l, position] : poses.landmarks) moved.push_back(l);
+  draft.set_poses(std::move(poses));
+  draft.refresh_landmarks(std::move(moved));
+}
+
 }  // namespace
 
 LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
@@ -157,7 +166,7 @@ LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Locat
 }
 
 bool plausible(const map::BundledMap& map, const LoopClosure& closure, const LoopOptions& options) {
-  if (closure.joined) return true;
+  if (closure.joined) return map.scale() == map::Scale::kMetric;
   const auto [first, last] = std::minmax(closure.keyframe, closure.with);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
   const double way = way_between(map, first, last) + median_depth(map, closure.keyframe);
@@ -183,10 +192,7 @@ bool join_parts(const LoopClosure& closure, const Location& location, const Loop
     if (map.root_of(map.landmark(l).reference.keyframe) == moving) poses.landmarks.emplace_back(l, motion * map.landmark(l).position);
   }
   const std::vector<KeyframeId> window = window_of(map, closure.keyframe, options.window);
-  std::vector<LandmarkId> moved;
-  for (const auto& [l, position] : poses.landmarks) moved.push_back(l);
-  draft.set_poses(std::move(poses));
-  draft.refresh_landmarks(std::move(moved));
+  move_map(std::move(poses), draft);
   draft.join_parts(here_moves ? closure.keyframe : closure.with, here_moves ? closure.with : closure.keyframe);
   fuse(window, closure, location, options, features, draft);
   return true;
@@ -214,7 +220,7 @@ void close_loop(const LoopClosure& closure, const Location& location, const Loop
 
   const std::vector<Sim3> S_fused = graph.problem.S_world;
   solver::optimise(graph.problem, options.pose_graph);
-  draft.set_poses(corrected(draft.map(), graph, S_fused));
+  move_map(corrected(draft.map(), graph, S_fused), draft);
 }
 
 }  // namespace bslam::looping

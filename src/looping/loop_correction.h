@@ -12,7 +12,8 @@ namespace bslam::looping {
 LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Location& location);
 
 // Could the error have grown to that on the way from the place to the keyframe? What looks the same but is somewhere else
-// asks for corrections far beyond drift. Parts that are not joined yet can be anywhere.
+// asks for corrections far beyond drift. Parts that are not joined yet can be anywhere, but without a metric scale they
+// cannot be joined.
 bool plausible(const map::BundledMap& map, const LoopClosure& closure, const LoopOptions& options);
 
 // Moves the part of one to where the other's says it is, and hangs it below. False, with nothing changed, where scales are

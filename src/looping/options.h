@@ -11,6 +11,7 @@ namespace bslam::looping {
 struct RecognitionOptions {
   double common_share = 0.6;    // of the most common words any keyframe has: fewer, and it is no candidate
   double group_share = 0.75;    // of the best group's score that another group must reach
+  double rival_share = 0.5;     // of both where nothing is known of a frame: what looks the same elsewhere must come up as well
   int group = 10;               // covisible keyframes whose scores add up
   int neighbour_weight = 30;    // shared landmarks that make a keyframe one whose score counts for s_min
   int max_candidates = 5;
@@ -19,6 +20,7 @@ struct RecognitionOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("common_share", self.common_share, Range{0, 1}, "", "of the most common words, that a candidate must share");
     visitor("group_share", self.group_share, Range{0, 1}, "", "of the best group's score, that a candidate's must reach");
+    visitor("rival_share", self.rival_share, Range{0, 1}, "", "of both shares, where a frame may be anywhere");
     visitor("group", self.group, Range{1, 100}, "", "covisible keyframes whose scores add up");
     visitor("neighbour_weight", self.neighbour_weight, Range{1, 10000}, "", "shared landmarks of a neighbour that counts for the lowest score");
     visitor("max_candidates", self.max_candidates, Range{1, 100}, "", "places looked at closely");
@@ -51,7 +53,7 @@ struct VerificationOptions {
 struct LoopOptions {
   bool enabled = true;
   int consistent_keyframes = 2;   // keyframes in a row that must recognise one place
-  int max_keyframe_gap = 3;       // keyframes between two of them
+  int max_keyframe_gap = 3;       // from one of them to the next, in keyframes
   double max_drift = 0.05;        // of the way since the place was last seen: a larger correction is no drift but a mistake
   double max_drift_free = 0.3;    // the same where the scale is not observable
   int edge_weight = 60;           // shared landmarks that make two keyframes neighbours in the pose graph
@@ -63,7 +65,7 @@ struct LoopOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("enabled", self.enabled, Range{}, "", "loop closing and the joining of parts");
     visitor("consistent_keyframes", self.consistent_keyframes, Range{1, 100}, "", "keyframes in a row that must recognise one place");
-    visitor("max_keyframe_gap", self.max_keyframe_gap, Range{1, 100}, "", "keyframes between two of them at most");
+    visitor("max_keyframe_gap", self.max_keyframe_gap, Range{1, 100}, "", "keyframes from one of them to the next at most");
     visitor("max_drift", self.max_drift, Range{0, 10}, "", "of the way since the place was seen, that a correction may be");
     visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "the same where the scale is not observable");
     visitor("edge_weight", self.edge_weight, Range{1, 10000}, "", "shared landmarks of neighbours in the pose graph");
@@ -73,16 +75,28 @@ struct LoopOptions {
   }
 };
 
+struct RecoveryOptions {
+  int new_part_after = 50;  // frames with something to see but without a pose, after which a new part of the map is begun
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("new_part_after", self.new_part_after, Range{1, 1000000}, "frames",
+            "with something to see but without a pose, after which a new part of the map is begun");
+  }
+};
+
 struct LoopingOptions {
   RecognitionOptions recognition;
   VerificationOptions verification;
   LoopOptions loop;
+  RecoveryOptions recovery;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor.section("recognition", self.recognition);
     visitor.section("verification", self.verification);
     visitor.section("loop", self.loop);
+    visitor.section("recovery", self.recovery);
   }
 };
 

@@ -42,6 +42,7 @@ BagOfWordsRecogniser::BagOfWordsRecogniser(place::VocabularyPtr vocabulary, cons
 
 void BagOfWordsRecogniser::describe(frame::BundledFrame& frame) const {
   for (frame::CameraFrame& c : frame.cameras) {
+    if (c.words.size() == c.keypoints.size()) continue;  // already
     c.words.resize(c.keypoints.size());
     vocabulary_->words(c.keypoints.descriptor, c.words);
   }
@@ -86,32 +87,32 @@ std::vector<Candidate> BagOfWordsRecogniser::revisited(const map::BundledMap& ma
     min_score = any ? std::min(min_score, score) : score;
     any = true;
   }
-  return rank(map, *words, excluded, min_score);
+  return rank(map, *words, excluded, {options_.common_share, options_.group_share, min_score});
 }
 
 std::vector<Candidate> BagOfWordsRecogniser::recognised(const map::BundledMap& map, const frame::BundledFrame& frame) {
   sync(map);
-  return rank(map, *words_of(frame), {}, 0.0);
+  return rank(map, *words_of(frame), {}, {options_.rival_share * options_.common_share, options_.rival_share * options_.group_share});
 }
 
 std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, const place::WordVector& words,
-                                                  const std::vector<std::uint8_t>& excluded, double min_score) const {
+                                                  const std::vector<std::uint8_t>& excluded, const Bounds& bounds) const {
   std::vector<place::CommonWords> sharing = index_.query(words);
   std::erase_if(sharing, [&](const place::CommonWords& c) { return !excluded.empty() && excluded[c.keyframe.index()]; });
   int most = 0;
   for (const place::CommonWords& c : sharing) most = std::max(most, c.count);
   std::vector<Scored> scored;
   for (const place::CommonWords& c : sharing) {
-    if (c.count < options_.common_share * most) continue;
+    if (c.count < bounds.common_share * most) continue;
     const double score = place::l1_score(words, *index_.words_of(c.keyframe));
-    if (score >= min_score) scored.push_back({c.keyframe, score});
+    if (score >= bounds.min_score) scored.push_back({c.keyframe, score});
   }
   std::vector<Candidate> groups;
   for (const Scored& s : scored) groups.push_back(group_of(map, s, scored, options_.group));
   std::sort(groups.begin(), groups.end(), better);
   std::vector<Candidate> out;
   for (const Candidate& g : groups) {
-    if (out.size() == static_cast<std::size_t>(options_.max_candidates) || g.score < options_.group_share * groups.front().score) break;
+    if (out.size() == static_cast<std::size_t>(options_.max_candidates) || g.score < bounds.group_share * groups.front().score) break;
     const bool twice = std::ranges::any_of(out, [&](const Candidate& c) { return same_place(map, c.keyframe, g.keyframe); });
     if (!twice) out.push_back(g);
   }

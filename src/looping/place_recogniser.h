@@ -22,7 +22,7 @@ class PlaceRecogniser {
  public:
   virtual ~PlaceRecogniser() = default;
 
-  // Prepares a frame to be asked about or to become a keyframe; once per frame.
+  // Prepares a frame to be asked about or to become a keyframe; nothing where that was done already.
   virtual void describe(frame::BundledFrame& frame) const = 0;
 
   // Keyframes of `map` that may show the place of `keyframe`, but for those covisible with it.
@@ -45,8 +45,12 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   using Words = std::shared_ptr<const place::WordVector>;
   void sync(const map::BundledMap& map);
   Words words_of(const frame::BundledFrame& frame) const;
+  struct Bounds {
+    double common_share, group_share;  // as in RecognitionOptions
+    double min_score = 0;              // of one keyframe
+  };
   std::vector<Candidate> rank(const map::BundledMap& map, const place::WordVector& words, const std::vector<std::uint8_t>& excluded,
-                              double min_score) const;
+                              const Bounds& bounds) const;
 
   const place::VocabularyPtr vocabulary_;
   const RecognitionOptions options_;

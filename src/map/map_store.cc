@@ -11,6 +11,7 @@ MapSnapshot MapStore::snapshot() const {
 
 void MapStore::restart(BundledMap initial) {
   const std::lock_guard writer(commit_mutex_);
+  initial.set_version(snapshot()->version().next());
   auto fresh = std::make_shared<const BundledMap>(std::move(initial));
   const std::lock_guard lock(mutex_);
   current_.swap(fresh);

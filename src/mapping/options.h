@@ -79,7 +79,8 @@ struct MappingOptions {
   CullingOptions culling;
   LocalWindowOptions window;
   adjustment::AdjustmentOptions local;
-  adjustment::AdjustmentOptions global{.robust_iterations = 10, .final_iterations = 10};
+  // What a loop leaves to be shared out bends the whole map a little: the cost hardly tells, so it is followed further.
+  adjustment::AdjustmentOptions global{.robust_iterations = 10, .final_iterations = 10, .relative_decrease = 1e-7};
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

@@ -83,6 +83,14 @@ ordered_json events_json(const std::vector<PlaceEvent>& events) {
   return list;
 }
 
+ordered_json parts_json(const std::vector<PartRecord>& parts) {
+  ordered_json list = ordered_json::array();
+  for (const PartRecord& part : parts) {
+    list.push_back({{"frames", part.frames}, {"from", seconds(part.from_s)}, {"to", seconds(part.to_s)}, {"trajectory", part.trajectory}});
+  }
+  return list;
+}
+
 ordered_json durations_json(const std::vector<double>& durations_ms) {
   const DurationStatistics s = duration_statistics(durations_ms);
   return {{"median", rounded(s.median, 3)}, {"p95", rounded(s.p95, 3)}, {"max", rounded(s.max, 3)}};
@@ -142,6 +150,7 @@ ordered_json summary_json(const RunRecord& record) {
       {"loops", events_json(record.loops)},
       {"relocalisations", events_json(record.relocalisations)},
       {"maps_started", record.maps_started},
+      {"parts", parts_json(record.parts)},
       {"time", time_json(record)},
       {"memory", {{"peak_mb", record.peak_memory_mb ? rounded(*record.peak_memory_mb, 1) : ordered_json(nullptr)}}}};
 }

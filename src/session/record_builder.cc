@@ -74,12 +74,30 @@ void add_stages(const RecordInput& input, RunRecord& record) {
     }
     ++next;
   }
-  for (const system::MappingRecord& m : input.system.mapping_runs()) {
-    report::add_stage_sample(record, "map", report::StagePlace::kBackground, {seconds(input, m.time_ns), m.ms});
+  for (const system::StageRecord& s : input.system.stage_runs()) {
+    report::add_stage_sample(record, system::stage_name(s.run.task.stage), report::StagePlace::kBackground,
+                             {seconds(input, s.time_ns), s.run.ms});
   }
   if (input.system.final_adjustment_ms() > 0 && !input.inputs.empty()) {
     report::add_stage_sample(record, "global adjustment", report::StagePlace::kBackground,
                              {seconds(input, input.inputs.back().time_ns), input.system.final_adjustment_ms()});
+  }
+}
+
+void add_places(const RecordInput& input, RunRecord& record) {
+  for (const system::LoopRecord& loop : input.system.loops()) {
+    record.loops.push_back({seconds(input, loop.time_ns), seconds(input, loop.with_time_ns), loop.closure.inliers});
+  }
+  for (const system::FrameRecord& f : input.system.frames()) {
+    if (!f.relocalisation) continue;
+    const TimeNs with_ns = input.system.keyframe_time(f.relocalisation->with);
+    record.relocalisations.push_back({seconds(input, f.result.time_ns), seconds(input, with_ns), f.relocalisation->inliers});
+  }
+  const auto parts = input.system.trajectories();
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const evaluation::Trajectory& poses = parts[i].poses;
+    record.parts.push_back({static_cast<std::int64_t>(poses.size()), seconds(input, poses.front().time_ns),
+                            seconds(input, poses.back().time_ns), trajectory_file("trajectory", i)});
   }
 }
 
@@ -88,6 +106,15 @@ std::string scale_name(map::Scale scale) {
     case map::Scale::kMetric: return "metric";
     case map::Scale::kUpToScale: return "up-to-scale";
     case map::Scale::kUnobservable: return "unobservable";
+  }
+  return "";
+}
+
+// When stages ran.
+std::string mode_name(const RecordInput& input) {
+  if (input.replayed) return "replay";
+  for (const auto& [mode, name] : EnumNames<system::Mode>::kNames) {
+    if (mode == input.config.mode) return std::string(name);
   }
   return "";
 }
@@ -103,11 +130,15 @@ std::optional<double> peak_memory_mb() {
 
 }  // namespace
 
+std::string trajectory_file(const std::string& stem, std::size_t part) {
+  return part == 0 ? stem + ".tum" : stem + "_part" + std::to_string(part + 1) + ".tum";
+}
+
 RunRecord build_record(const RecordInput& input) {
   RunRecord record;
   record.version = BSLAM_VERSION;
   record.data = input.dataset.name;
-  record.mode = input.config.mode == system::Mode::kSequential ? "sequential" : "parallel";
+  record.mode = mode_name(input);
   record.complete = input.complete;
   record.seed = static_cast<std::uint64_t>(input.config.seed);
   record.cameras_used = input.dataset.cameras_used;
@@ -119,8 +150,9 @@ RunRecord build_record(const RecordInput& input) {
   add_stages(input, record);
   const map::MapSnapshot map = input.system.snapshot();
   record.map = {static_cast<std::int64_t>(map->num_keyframes()), static_cast<std::int64_t>(map->num_landmarks()),
-                static_cast<std::int64_t>(map->num_observations()), scale_name(map->scale()), false};
+                static_cast<std::int64_t>(map->num_observations()), scale_name(map->scale()), input.loaded};
   record.maps_started = input.system.maps_started();
+  add_places(input, record);
   record.start_up_s = input.start_up_s;
   record.wall_s = input.wall_s;
   record.peak_memory_mb = peak_memory_mb();

@@ -21,9 +21,14 @@ struct RecordInput {
   const system::Config& config;
   const std::vector<InputFrame>& inputs;  // in order; those not dropped match the frames of `system` one by one
   const system::System& system;
+  bool replayed = false;
+  bool loaded = false;    // the run went on in a saved map
   bool complete = true;
   double start_up_s = 0, wall_s = 0;
 };
+
+// Name of the file of the i-th part's poses: "trajectory.tum", "trajectory_part2.tum".
+std::string trajectory_file(const std::string& stem, std::size_t part);
 
 report::RunRecord build_record(const RecordInput& input);
 

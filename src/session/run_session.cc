@@ -1,5 +1,6 @@
 #include "session/run_session.h"
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -34,19 +35,29 @@ class Metronome {
   Clock::time_point start_;
 };
 
-bool interrupted(const SessionOptions& options) { return options.interrupted != nullptr && options.interrupted->load(); }
+// Frames of the recorded run, in order; an interrupted one has fewer than the data set, one that was late has gaps.
+std::vector<FrameId> recorded_frames(const system::Journal& journal) {
+  std::vector<FrameId> frames;
+  for (const system::JournalEntry& e : journal.entries) {
+    if (e.step == system::JournalStep::kFrame) frames.emplace_back(e.input);
+  }
+  return frames;
+}
 
 // Feeds the frames one after the other; returns what was fed. Stops early where asked to.
 std::vector<InputFrame> feed(const io::Dataset& dataset, const SessionOptions& options, system::System& system) {
   std::vector<InputFrame> inputs;
   FrameSource source(dataset, kReadAhead);
   const Metronome metronome(dataset.frames.front().time_ns);
-  for (std::size_t i = 0; i < dataset.frames.size() && !interrupted(options); ++i) {
+  const std::vector<FrameId> recorded = options.replay ? recorded_frames(*options.replay) : std::vector<FrameId>();
+  for (std::size_t i = 0; i < dataset.frames.size() && !options.interrupted.stop_requested(); ++i) {
+    if (options.replay && (recorded.empty() || recorded.back() < FrameId(i))) break;
     const auto item = source.next();
     if (!item) break;
     if (options.pace == Pace::kRealtime) metronome.wait_for(item->images.time_ns);
     const bool late = i + 1 < dataset.frames.size() && metronome.is_past(dataset.frames[i + 1].time_ns);
-    const bool drop = options.pace == Pace::kRealtime && options.late == Late::kDrop && late;
+    const bool drop = options.replay ? !std::binary_search(recorded.begin(), recorded.end(), FrameId(i))
+                                     : options.pace == Pace::kRealtime && options.late == Late::kDrop && late;
     if (!drop) system.process(item->images);
     inputs.push_back({item->images.time_ns, drop, item->read_ms});
     if (options.progress) options.progress(i + 1, dataset.frames.size());
@@ -60,40 +71,65 @@ Result<SessionResult> run_session(const io::Dataset& dataset, const SessionOptio
   const system::Stopwatch start_up;
   auto masks = io::read_masks(dataset.rig);
   if (!masks) return masks.error();
-  system::System system(dataset.rig, options.config, std::move(*masks));
+  system::System system(dataset.rig, options.config, {std::move(*masks), options.vocabulary, options.map, options.replay});
   const double start_up_s = options.start_up_s + 1e-3 * start_up.ms();
 
   const system::Stopwatch wall;
-  const std::vector<InputFrame> inputs = feed(dataset, options, system);
-  system.finish();
+  std::vector<InputFrame> inputs;
+  try {
+    const std::stop_callback on_interruption(options.interrupted, [&system] { system.interrupt(); });
+    inputs = feed(dataset, options, system);
+    system.finish();
+  } catch (const system::ReplayMismatch& mismatch) {
+    return mismatch.error;
+  }
   SessionResult result;
   result.record = build_record({.dataset = dataset,
                                 .config = options.config,
                                 .inputs = inputs,
                                 .system = system,
+                                .replayed = options.replay.has_value(),
+                                .loaded = options.map.has_value(),
                                 .complete = inputs.size() == dataset.frames.size(),
                                 .start_up_s = start_up_s,
                                 .wall_s = 1e-3 * wall.ms()});
-  result.trajectory = system.trajectory();
-  result.live = system.live_trajectory();
+  result.trajectories = system.trajectories();
+  result.live = system.live_trajectories();
+  result.map = system.snapshot();
+  result.journal = system.journal();
   return result;
 }
+
+namespace {
+
+using Files = std::vector<std::pair<std::string, std::string>>;  // name, bytes
+
+// At least the file of the first part, also where there is none.
+void add_trajectories(const std::vector<system::PartTrajectory>& parts, const std::string& stem, io::PoseState state, Files& files) {
+  const std::string header = io::trajectory_header("cam0", state);
+  for (std::size_t i = 0; i < std::max<std::size_t>(parts.size(), 1); ++i) {
+    const evaluation::Trajectory poses = parts.empty() ? evaluation::Trajectory() : parts[i].poses;
+    files.emplace_back(trajectory_file(stem, i), io::tum_text(poses, header));
+  }
+}
+
+}  // namespace
 
 Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder) {
   system::Config copy = config;
   const OptionTable table(copy);
-  const std::pair<const char*, std::string> files[] = {
-      {"trajectory.tum", io::tum_text(result.trajectory, io::trajectory_header("cam0", io::PoseState::kFinal))},
-      {"trajectory_live.tum", io::tum_text(result.live, io::trajectory_header("cam0", io::PoseState::kLive))},
-      {"config.yaml", io::config_to_yaml(table)},
-      {"trajectory.svg", report::trajectory_plot_svg({.title = result.record.data + ": path of camera 0",
-                                                      .subtitle = {},
-                                                      .estimate = result.trajectory,
-                                                      .ground_truth = {},
-                                                      .errors = {}})},
-      {"run.svg", report::run_plot_svg(result.record)},
-      {"summary.json", report::summary_text(result.record)},  // last: where it is, the rest is
-  };
+  Files files;
+  add_trajectories(result.trajectories, "trajectory", io::PoseState::kFinal, files);
+  add_trajectories(result.live, "trajectory_live", io::PoseState::kLive, files);
+  files.emplace_back("config.yaml", io::config_to_yaml(table));
+  const evaluation::Trajectory path = result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
+  files.emplace_back("trajectory.svg", report::trajectory_plot_svg({.title = result.record.data + ": path of camera 0",
+                                                                    .subtitle = {},
+                                                                    .estimate = path,
+                                                                    .ground_truth = {},
+                                                                    .errors = {}}));
+  files.emplace_back("run.svg", report::run_plot_svg(result.record));
+  files.emplace_back("summary.json", report::summary_text(result.record));  // last: where it is, the rest is
   for (const auto& [name, bytes] : files) {
     if (const Status status = io::write_atomically(folder / name, bytes); !status) return status;
   }

@@ -1,15 +1,17 @@
 // An offline run: a data set through the system, and what comes out of it as a record and as files.
 #pragma once
 
-#include <atomic>
 #include <filesystem>
 #include <functional>
+#include <optional>
+#include <stop_token>
 #include <string>
 
 #include "evaluation/trajectory.h"
 #include "io/dataset.h"
 #include "report/run_record.h"
 #include "system/config.h"
+#include "system/system.h"
 
 namespace bslam::session {
 
@@ -21,19 +23,25 @@ struct SessionOptions {
   Pace pace = Pace::kFast;
   Late late = Late::kBlock;
   double start_up_s = 0;                            // spent before the session, for the record
-  const std::atomic<bool>* interrupted = nullptr;   // looked at before every frame
+  std::stop_token interrupted;                      // ends the run soon, with what exists so far
+  std::optional<system::Journal> replay;            // of a run to be repeated: its frames, and no more than those
+  place::VocabularyPtr vocabulary;                  // null: no place is recognised
+  std::optional<map::BundledMap> map;               // of an earlier run with this rig, to go on in
   std::function<void(std::size_t done, std::size_t all)> progress;  // after every frame; may be empty
 };
 
 struct SessionResult {
   report::RunRecord record;
-  evaluation::Trajectory trajectory, live;  // T_world_cam0
+  std::vector<system::PartTrajectory> trajectories, live;  // the first are those of trajectory.tum and trajectory_live.tum
+  map::MapSnapshot map;
+  system::Journal journal;
 };
 
-// Errors: a mask that cannot be read or has another size than its camera's images.
+// Errors: a mask that cannot be read or has another size than its camera's images; a journal that is not of this run.
 Result<SessionResult> run_session(const io::Dataset& dataset, const SessionOptions& options);
 
-// trajectory.tum, trajectory_live.tum, summary.json, config.yaml, trajectory.svg and run.svg, each whole or not at all.
+// trajectory.tum, trajectory_live.tum (further parts of the map: ..._part2.tum), summary.json, config.yaml, trajectory.svg and
+// run.svg, each whole or not at all.
 Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder);
 
 }  // namespace bslam::session

@@ -1,6 +1,7 @@
 // What became of one input frame.
 #pragma once
 
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -13,12 +14,22 @@ struct StageTime {
   double ms = 0;
 };
 
+// A lost rig found in the map again.
+struct Relocalisation {
+  KeyframeId with;
+  int inliers = 0;
+};
+
 struct FrameRecord {
   tracking::TrackResult result;       // as told to the caller
   std::vector<image::ImageState> images;
+  std::optional<Relocalisation> relocalisation;
+  // The smooth pose: what the motion of the rig alone adds up to. Corrections of the map change T_map_odom and never this;
+  // it stands still while the rig is lost. T_rig_odom = T_rig_world * T_map_odom, with T_rig_world of `result`.
+  geometry::SE3 T_rig_odom, T_map_odom;
   bool keyframe = false;
   int unique = 0, monocular = 0, matched = 0;  // features
-  int map_number = 0;                 // a map that failed at its start is left behind: poses belong to one map
+  KeyframeId root;                    // of the part of the map the pose was told in
   std::vector<StageTime> stages;      // in the caller's thread
   double frame_ms = 0;                // from handing over the images to having the pose
 };

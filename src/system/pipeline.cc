@@ -53,6 +53,13 @@ void count_features(const BundledFrame& frame, FrameRecord& record) {
   record.monocular = static_cast<int>(frame.bundled.num_monocular());
 }
 
+// Was there enough to see for a pose?
+bool saw_something(const tracking::TrackResult& result) {
+  return result.reason != tracking::LostReason::kNoImages && result.reason != tracking::LostReason::kFewFeatures;
+}
+
+bool is_tracking(tracking::TrackStatus status) { return status == tracking::TrackStatus::kTracking; }
+
 std::vector<tracking::CameraCounts> keypoint_counts(const BundledFrame& frame) {
   std::vector<tracking::CameraCounts> counts;
   for (const frame::CameraFrame& c : frame.cameras) counts.push_back({static_cast<int>(c.keypoints.size()), 0, 0});
@@ -61,13 +68,15 @@ std::vector<tracking::CameraCounts> keypoint_counts(const BundledFrame& frame) {
 
 }  // namespace
 
-Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks)
+Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
+                   std::unique_ptr<looping::PlaceRecogniser> recogniser)
     : rig_(rig), config_(config), pool_(thread_count(config.execution.threads, rig.size())),
-      builder_(rig, config.features, std::move(masks)) {}
+      builder_(rig, config.features, std::move(masks)), recogniser_(std::move(recogniser)) {}
 
 void Pipeline::restart() {
   state_ = {};
   candidate_.reset();
+  frames_lost_ = 0;
 }
 
 BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages) {
@@ -84,22 +93,27 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<
   return frame;
 }
 
-Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, map::MapStore& store) {
+Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecutor& executor) {
   const Stopwatch whole;
   Outcome outcome;
   for (const image::CameraImage& i : images.images) outcome.record.images.push_back(i.state);
   BundledFrame frame = make_frame(images, outcome.record.stages);
   count_features(frame, outcome.record);
-  if (state_.status == tracking::TrackStatus::kNotStarted) {
-    start(std::move(frame), store, outcome);
+  const Stopwatch results;
+  outcome.seen = executor.begin_frame(frame.id);
+  if (config_.mode == Mode::kLagged) outcome.record.stages.push_back({"results", results.ms()});
+  if (outcome.seen->num_keyframes() == 0) {
+    start(std::move(frame), executor, outcome);
   } else {
-    track(std::move(frame), store, outcome);
+    track(std::move(frame), executor, outcome);
   }
+  outcome.record.T_rig_odom = T_rig_odom_;
+  outcome.record.T_map_odom = T_map_odom_;
   outcome.record.frame_ms = whole.ms();
   return outcome;
 }
 
-void Pipeline::start(BundledFrame frame, map::MapStore& store, Outcome& outcome) {
+void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outcome) {
   const Stopwatch watch;
   tracking::TrackResult& result = outcome.record.result;
   result.frame = frame.id;
@@ -107,8 +121,8 @@ void Pipeline::start(BundledFrame frame, map::MapStore& store, Outcome& outcome)
   result.status = tracking::TrackStatus::kLost;
   result.reason = tracking::LostReason::kNotStarted;
   result.cameras = keypoint_counts(frame);
-  const map::MapSnapshot base = store.snapshot();
-  map::MapDraft draft("start", base);
+  map::MapDraft draft("start", outcome.seen);
+  if (recogniser_) recogniser_->describe(frame);
   const auto& options = config_.tracking.initialisation;
   std::optional<tracking::StartedMap> started;
   if (rig_.any_overlap()) {
@@ -119,17 +133,21 @@ void Pipeline::start(BundledFrame frame, map::MapStore& store, Outcome& outcome)
   }
   if (started) {
     draft.set_scale(started->scale);
-    const map::CommitReport report = store.commit(std::move(draft));
+    const map::CommitReport report = executor.commit(JournalStep::kStart, std::move(draft));
     const KeyframeId last = report.keyframes.back();
     state_ = tracking::state_at_keyframe({}, frame.time_ns, last,
-                                         committed(started->keyframes.back().landmarks, base->landmark_slots(), report));
+                                         committed(started->keyframes.back().landmarks, outcome.seen->landmark_slots(), report));
     result.status = tracking::TrackStatus::kTracking;
     result.reason = tracking::LostReason::kNone;
     result.T_rig_world = report.published->keyframe(last).T_rig_world;
     result.reference = last;
+    outcome.record.root = report.published->root_of(last);
     outcome.keyframes = report.keyframes;
     outcome.record.keyframe = true;
+    outcome.began_part = true;
     candidate_.reset();
+    frames_lost_ = 0;
+    T_map_odom_ = result.T_rig_world.inverse() * T_rig_odom_;
   } else if (!rig_.any_overlap()) {
     keep_candidate(std::move(frame));
   }
@@ -147,35 +165,95 @@ void Pipeline::keep_candidate(BundledFrame frame) {
   candidate_ = tracking::StartCandidate{std::make_shared<const BundledFrame>(std::move(frame)), {pyramids.begin(), pyramids.end()}};
 }
 
-void Pipeline::track(BundledFrame frame, map::MapStore& store, Outcome& outcome) {
-  const Stopwatch watch;
-  const map::MapSnapshot snapshot = store.snapshot();
-  const tracking::TrackInput input{.map = *snapshot,
+tracking::TrackOutput Pipeline::follow(BundledFrame& frame, const map::BundledMap& map) {
+  if (!map.surviving(state_.reference).valid()) return tracking::lost(state_, frame, tracking::LostReason::kNotStarted);
+  const tracking::TrackInput input{.map = map,
                                    .pyramids = builder_.pyramids(),
                                    .state = state_,
                                    .noise = {config_.features.sigma_px},
                                    .scale_factor = config_.features.scale_factor,
                                    .seed = static_cast<std::uint64_t>(config_.seed)};
-  tracking::TrackOutput output = tracking::track(input, frame, config_.tracking, pool_);
-  state_ = std::move(output.state);
-  outcome.record.result = output.result;
-  outcome.record.stages.push_back({"track", watch.ms()});
-  if (!output.keyframe_due) return;
-  const Stopwatch keyframe_watch;
-  add_keyframe(frame, output, snapshot, store, outcome);
-  outcome.record.stages.push_back({"keyframe", keyframe_watch.ms()});
+  return tracking::track(input, frame, config_.tracking, pool_);
 }
 
-void Pipeline::add_keyframe(const BundledFrame& frame, const tracking::TrackOutput& output, map::MapSnapshot base,
-                            map::MapStore& store, Outcome& outcome) {
-  map::MapDraft draft("track", base);
+void Pipeline::track(BundledFrame frame, StageExecutor& executor, Outcome& outcome) {
+  const Stopwatch watch;
+  const map::BundledMap& map = *outcome.seen;
+  const tracking::TrackerState before = state_;
+  tracking::TrackOutput output = follow(frame, map);
+  outcome.record.stages.push_back({"track", watch.ms()});
+  if (!is_tracking(output.result.status) && saw_something(output.result) && find_again(frame, map, outcome)) {
+    output = follow(frame, map);
+    if (!is_tracking(output.result.status)) outcome.record.relocalisation.reset();
+  }
+  outcome.record.result = output.result;
+  if (!is_tracking(output.result.status)) {
+    state_ = before;
+    state_.status = tracking::TrackStatus::kLost;
+    state_.twist.reset();
+    frames_lost_ += saw_something(output.result);
+    note_motion(map, before, outcome.record);
+    const bool anew = frames_lost_ >= config_.looping.recovery.new_part_after && !config_.localize_only;
+    if (!anew || !saw_something(output.result)) return;
+    start(std::move(frame), executor, outcome);
+    if (!outcome.began_part) outcome.record.result = output.result;
+    return;
+  }
+  frames_lost_ = 0;
+  state_ = std::move(output.state);
+  note_motion(map, before, outcome.record);
+  if (config_.localize_only) {
+    state_.sightings.clear();
+  } else if (output.keyframe_due) {
+    const Stopwatch keyframe_watch;
+    add_keyframe(frame, output, executor, outcome);
+    outcome.record.stages.push_back({"keyframe", keyframe_watch.ms()});
+  }
+}
+
+// Looks for the place of a lost frame all over the map; true where the state is there now, for tracking to confirm.
+bool Pipeline::find_again(BundledFrame& frame, const map::BundledMap& map, Outcome& outcome) {
+  if (!recogniser_) return false;
+  const Stopwatch watch;
+  recogniser_->describe(frame);
+  const Random random(static_cast<std::uint64_t>(config_.seed), "relocalise", static_cast<std::uint64_t>(frame.id.value()));
+  const auto location = looping::relocalise(*recogniser_, map, frame, config_.looping.verification, config_.feature_model(), random);
+  outcome.record.stages.push_back({"relocalise", watch.ms()});
+  if (!location) return false;
+  std::vector<LandmarkId> landmarks;
+  for (const auto& [feature, l] : location->matches) landmarks.push_back(l);
+  std::sort(landmarks.begin(), landmarks.end());
+  state_ = tracking::state_at_keyframe({}, frame.time_ns, location->with, std::move(landmarks));
+  state_.T_rig_reference = location->T_rig_world * map.keyframe(location->with).T_rig_world.inverse();
+  outcome.record.relocalisation = Relocalisation{location->with, location->inliers};
+  return true;
+}
+
+// What moved between the last frame and this one: the rig, or the map below it?
+void Pipeline::note_motion(const map::BundledMap& map, const tracking::TrackerState& before, FrameRecord& record) {
+  const bool continued = is_tracking(before.status) && map.surviving(before.reference).valid();
+  if (continued) T_map_odom_ = (before.T_rig_reference * map.resolved_pose(before.reference)).inverse() * T_rig_odom_;
+  if (is_tracking(record.result.status)) {
+    if (continued && !record.relocalisation) {
+      T_rig_odom_ = record.result.T_rig_world * T_map_odom_;
+    } else {
+      T_map_odom_ = record.result.T_rig_world.inverse() * T_rig_odom_;
+    }
+    record.root = map.root_of(record.result.reference);
+  }
+}
+
+void Pipeline::add_keyframe(BundledFrame& frame, const tracking::TrackOutput& output, StageExecutor& executor,
+                            Outcome& outcome) {
+  map::MapDraft draft("track", outcome.seen);
   draft.add_sightings(folded(std::move(state_.sightings)));
+  if (recogniser_) recogniser_->describe(frame);
   const tracking::NewKeyframe made =
       tracking::make_keyframe(frame, output.matches, output.result.T_rig_world, builder_.pyramids(), output.result.reference,
                               config_.tracking.initialisation, draft);
-  const map::CommitReport report = store.commit(std::move(draft));
+  const map::CommitReport report = executor.commit(JournalStep::kTrack, std::move(draft));
   state_ = tracking::state_at_keyframe(state_, frame.time_ns, report.keyframes.front(),
-                                       committed(made.landmarks, base->landmark_slots(), report));
+                                       committed(made.landmarks, outcome.seen->landmark_slots(), report));
   outcome.record.result.reference = report.keyframes.front();
   outcome.record.result.T_rig_reference = geometry::SE3();
   outcome.record.keyframe = true;

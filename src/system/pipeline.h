@@ -6,9 +6,10 @@
 
 #include "base/thread_pool.h"
 #include "frame/frame_builder.h"
-#include "map/map_store.h"
+#include "looping/relocalise.h"
 #include "system/config.h"
 #include "system/frame_record.h"
+#include "system/stage_executor.h"
 #include "tracking/initialise.h"
 #include "tracking/track.h"
 
@@ -16,15 +17,19 @@ namespace bslam::system {
 
 class Pipeline {
  public:
-  Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks);
+  // `recogniser` may be null: then a lost rig is looked for only where it was lost.
+  Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
+           std::unique_ptr<looping::PlaceRecogniser> recogniser = nullptr);
 
   struct Outcome {
     FrameRecord record;
-    std::vector<KeyframeId> keyframes;  // added to the map, in order: mapping is due for them
+    map::MapSnapshot seen;              // version of the map the frame was tracked in
+    std::vector<KeyframeId> keyframes;  // added to the map, in order: the background stages are due for them
+    bool began_part = false;            // the first of them begins a part of the map
   };
 
-  // Reads the newest version of the map and commits keyframes to it.
-  Outcome process(const image::ImageBundle& images, map::MapStore& store);
+  // Reads the version of the map that `executor` gives the frame and commits keyframes to it.
+  Outcome process(const image::ImageBundle& images, StageExecutor& executor);
 
   // Extraction and bundling alone.
   frame::BundledFrame make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages);
@@ -35,11 +40,14 @@ class Pipeline {
   const tracking::TrackerState& state() const { return state_; }
 
  private:
-  void start(frame::BundledFrame frame, map::MapStore& store, Outcome& outcome);
+  void start(frame::BundledFrame frame, StageExecutor& executor, Outcome& outcome);
   void keep_candidate(frame::BundledFrame frame);
-  void track(frame::BundledFrame frame, map::MapStore& store, Outcome& outcome);
-  void add_keyframe(const frame::BundledFrame& frame, const tracking::TrackOutput& output, map::MapSnapshot base,
-                    map::MapStore& store, Outcome& outcome);
+  void track(frame::BundledFrame frame, StageExecutor& executor, Outcome& outcome);
+  tracking::TrackOutput follow(frame::BundledFrame& frame, const map::BundledMap& map);
+  bool find_again(frame::BundledFrame& frame, const map::BundledMap& map, Outcome& outcome);
+  void note_motion(const map::BundledMap& map, const tracking::TrackerState& before, FrameRecord& record);
+  void add_keyframe(frame::BundledFrame& frame, const tracking::TrackOutput& output, StageExecutor& executor,
+                    Outcome& outcome);
 
   const camera::Rig& rig_;
   const Config& config_;
@@ -47,6 +55,9 @@ class Pipeline {
   frame::FrameBuilder builder_;
   tracking::TrackerState state_;
   std::optional<tracking::StartCandidate> candidate_;
+  const std::unique_ptr<looping::PlaceRecogniser> recogniser_;
+  int frames_lost_ = 0;  // with something to see, one after the other
+  geometry::SE3 T_rig_odom_, T_map_odom_;
 };
 
 }  // namespace bslam::system

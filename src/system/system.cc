@@ -1,6 +1,9 @@
 #include "system/system.h"
 
+#include <algorithm>
+
 #include "mapping/map_keyframe.h"
+#include "system/stages.h"
 #include "system/stopwatch.h"
 
 namespace bslam::system {
@@ -19,84 +22,135 @@ map::BundledMap empty_map(const camera::Rig& rig, const Config& config) {
   return map::BundledMap(std::make_shared<const camera::Rig>(rig), {config.features.scale_factor, config.features.levels});
 }
 
+std::unique_ptr<looping::PlaceRecogniser> recogniser(const place::VocabularyPtr& vocabulary, const Config& config) {
+  if (!vocabulary) return nullptr;
+  return std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition);
+}
+
+void add_pose(std::vector<PartTrajectory>& parts, KeyframeId root, TimeNs time_ns, const geometry::SE3& T_world_cam0) {
+  auto part = std::ranges::find(parts, root, &PartTrajectory::root);
+  if (part == parts.end()) part = parts.insert(parts.end(), {root, {}});
+  part->poses.push_back({time_ns, T_world_cam0});
+}
+
 }  // namespace
 
-System::System(camera::Rig rig, Config config, std::vector<image::Image> masks)
-    : rig_(std::move(rig)), config_(std::move(config)), pipeline_(rig_, config_, std::move(masks)),
-      store_(empty_map(rig_, config_)) {
-  mapping_ = make_mapping_executor(store_, config_, [this](KeyframeId k, double ms) {
-    const auto frame = store_.snapshot()->keyframe(k).frame;  // gone where the keyframe was culled at once
-    const std::lock_guard lock(records_mutex_);
-    mapping_runs_.push_back({k, frame ? frame->time_ns : 0, ms});
-  });
+System::System(camera::Rig rig, Config config, Resources resources)
+    : rig_(std::move(rig)), config_(std::move(config)),
+      pipeline_(rig_, config_, std::move(resources.masks), recogniser(resources.vocabulary, config_)),
+      store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)), gate_(store_) {
+  const map::MapSnapshot map = store_.snapshot();
+  for (const KeyframeId k : map->keyframe_ids()) set_keyframe_time(k, map->keyframe(k).frame->time_ns);
+  ExecutionSetup setup{make_stages(config_, resources.vocabulary, [this](const looping::LoopClosure& c) { note_loop(c); }),
+                       config_.execution, [this](const StageRun& run) {
+                         const std::lock_guard lock(records_mutex_);
+                         stage_runs_.push_back({run, keyframe_time_ns_[run.task.keyframe.index()]});
+                       }};
+  executor_ = resources.replay ? make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
+                               : make_stage_executor(config_.mode, gate_, std::move(setup));
 }
 
 System::~System() = default;
 
 // A start up to scale can be wrong and shows it at once: the next frames find nothing. What it told is withdrawn.
 void System::give_up_young_map() {
-  mapping_->drain();
   for (FrameRecord& record : frames_) {
-    if (record.map_number != maps_started_ || record.result.status != tracking::TrackStatus::kTracking) continue;
+    if (record.result.status != tracking::TrackStatus::kTracking) continue;
     record.result.status = tracking::TrackStatus::kLost;
     record.result.reason = tracking::LostReason::kNotStarted;
     record.keyframe = false;
   }
   pipeline_.restart();
-  store_.restart(empty_map(rig_, config_));
+  executor_->restart(empty_map(rig_, config_));
+}
+
+void System::set_keyframe_time(KeyframeId k, TimeNs time_ns) {
+  const std::lock_guard lock(records_mutex_);
+  if (keyframe_time_ns_.size() <= k.index()) keyframe_time_ns_.resize(k.index() + 1);
+  keyframe_time_ns_[k.index()] = time_ns;
+}
+
+void System::note_loop(const looping::LoopClosure& closure) {
+  const std::lock_guard lock(records_mutex_);
+  loops_.push_back({closure, keyframe_time_ns_[closure.keyframe.index()], keyframe_time_ns_[closure.with.index()]});
 }
 
 const FrameRecord& System::process(const image::ImageBundle& images) {
-  const bool had_map = pipeline_.state().status != tracking::TrackStatus::kNotStarted;
-  Pipeline::Outcome outcome = pipeline_.process(images, store_);
-  if (!had_map && !outcome.keyframes.empty()) ++maps_started_;
+  const bool had_pose = pipeline_.state().status != tracking::TrackStatus::kNotStarted;
+  Pipeline::Outcome outcome = pipeline_.process(images, *executor_);
+  maps_started_ += outcome.began_part;
+  // A start up to scale makes two keyframes, both under the time of the frame that made it.
+  for (const KeyframeId k : outcome.keyframes) set_keyframe_time(k, outcome.record.result.time_ns);
   const Stopwatch watch;
-  for (const KeyframeId k : outcome.keyframes) mapping_->enqueue(k);
-  if (!outcome.keyframes.empty() && config_.mode == Mode::kParallel) {
+  for (const KeyframeId k : outcome.keyframes) executor_->enqueue(k);
+  if (!outcome.keyframes.empty() && config_.mode != Mode::kSequential) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
-  outcome.record.map_number = maps_started_;
   frames_.push_back(std::move(outcome.record));
-  const bool failed = had_map && disowns_map(frames_.back().result);
-  if (failed && store_.snapshot()->scale() != map::Scale::kMetric && store_.snapshot()->keyframe_slots() <= kYoungMap) {
-    give_up_young_map();
-  }
+  const bool failed = had_pose && disowns_map(frames_.back().result);
+  const map::BundledMap& seen = *outcome.seen;
+  if (failed && seen.scale() != map::Scale::kMetric && seen.keyframe_slots() <= kYoungMap) give_up_young_map();
   return frames_.back();
 }
 
 void System::finish() {
-  mapping_->drain();
-  if (!config_.final_adjustment) return;
-  const Stopwatch watch;
-  map::MapDraft draft("global adjustment", store_.snapshot());
-  mapping::adjust_globally(config_.mapping, config_.feature_model(), draft);
-  store_.commit(std::move(draft));
-  final_adjustment_ms_ = watch.ms();
+  executor_->drain();
+  if (config_.final_adjustment && !executor_->over()) {
+    const Stopwatch watch;
+    map::MapDraft draft("final", gate_.newest());
+    mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, interruption_.get_token());
+    if (!interruption_.stop_requested()) executor_->commit(JournalStep::kFinal, std::move(draft));
+    final_adjustment_ms_ = watch.ms();
+  }
+  executor_->end();
 }
 
-std::vector<MappingRecord> System::mapping_runs() const {
+void System::interrupt() {
+  interruption_.request_stop();
+  executor_->interrupt();
+}
+
+std::vector<StageRecord> System::stage_runs() const {
   const std::lock_guard lock(records_mutex_);
-  return mapping_runs_;
+  return stage_runs_;
 }
 
-evaluation::Trajectory System::trajectory() const {
+std::vector<LoopRecord> System::loops() const {
+  const std::lock_guard lock(records_mutex_);
+  return loops_;
+}
+
+TimeNs System::keyframe_time(KeyframeId k) const {
+  const std::lock_guard lock(records_mutex_);
+  return keyframe_time_ns_[k.index()];
+}
+
+std::vector<PartTrajectory> System::trajectories() const {
   const map::MapSnapshot map = store_.snapshot();
-  evaluation::Trajectory out;
+  std::vector<PartTrajectory> out;
   for (const FrameRecord& record : frames_) {
     const tracking::TrackResult& r = record.result;
-    if (r.status != tracking::TrackStatus::kTracking || record.map_number != maps_started_) continue;
-    out.push_back({r.time_ns, (r.T_rig_reference * map->resolved_pose(r.reference)).inverse()});
+    if (r.status != tracking::TrackStatus::kTracking || !map->surviving(r.reference).valid()) continue;
+    add_pose(out, map->root_of(r.reference), r.time_ns, (r.T_rig_reference * map->resolved_pose(r.reference)).inverse());
   }
+  std::stable_sort(out.begin(), out.end(),
+                   [](const PartTrajectory& a, const PartTrajectory& b) { return a.poses.size() > b.poses.size(); });
   return out;
 }
 
-evaluation::Trajectory System::live_trajectory() const {
-  evaluation::Trajectory out;
+std::vector<PartTrajectory> System::live_trajectories() const {
+  std::vector<PartTrajectory> out;
   for (const FrameRecord& record : frames_) {
     if (record.result.status != tracking::TrackStatus::kTracking) continue;
-    out.push_back({record.result.time_ns, record.result.T_rig_world.inverse()});
+    add_pose(out, record.root, record.result.time_ns, record.result.T_rig_world.inverse());
   }
+  const std::vector<PartTrajectory> final = trajectories();
+  const KeyframeId main = final.empty() ? KeyframeId() : final.front().root;
+  std::stable_sort(out.begin(), out.end(), [&](const PartTrajectory& a, const PartTrajectory& b) {
+    if ((a.root == main) != (b.root == main)) return a.root == main;
+    return a.poses.size() > b.poses.size();
+  });
   return out;
 }
 

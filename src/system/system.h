@@ -3,28 +3,51 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "camera/rig.h"
 #include "evaluation/trajectory.h"
+#include "looping/loop_closer.h"
 #include "system/config.h"
 #include "system/frame_record.h"
-#include "system/mapping_executor.h"
+#include "system/map_gate.h"
 #include "system/pipeline.h"
+#include "system/stage_executor.h"
 
 namespace bslam::system {
 
-// One run of the mapping stage, for the timing record.
-struct MappingRecord {
-  KeyframeId keyframe;
-  TimeNs time_ns = 0;  // of the keyframe
-  double ms = 0;
+// One run of a background stage, for the timing record.
+struct StageRecord {
+  StageRun run;
+  TimeNs time_ns = 0;  // of its keyframe
+};
+
+// A loop closed, or two parts of the map joined.
+struct LoopRecord {
+  looping::LoopClosure closure;
+  TimeNs time_ns = 0, with_time_ns = 0;  // of the two keyframes
+};
+
+// What a run may be given besides rig and configuration.
+struct Resources {
+  std::vector<image::Image> masks;       // one per camera of the rig, an empty image = none; or no masks at all
+  place::VocabularyPtr vocabulary;       // null: no place is recognised
+  std::optional<map::BundledMap> map;    // of an earlier run with this rig; the run goes on in it once it finds its place
+  std::optional<Journal> replay;         // its run is repeated whatever the mode
+};
+
+// Poses of one part of the map. Parts that no common place joined have worlds of their own.
+struct PartTrajectory {
+  KeyframeId root;
+  evaluation::Trajectory poses;  // T_world_cam0
 };
 
 class System {
  public:
-  // Masks: one per camera of the rig, empty = none.
-  System(camera::Rig rig, Config config, std::vector<image::Image> masks = {});
+  // Where a journal is given, the frames must be those of the journal, and calls throw ReplayMismatch where it does not fit.
+  System(camera::Rig rig, Config config, Resources resources = {});
   ~System();
 
   // Poses of the frame with these images; frames come in order of time. One thread calls. Throws what a worker threw.
@@ -33,30 +56,46 @@ class System {
   // Waits for the stages and, where configured, adjusts the whole map. Call once, after the last frame.
   void finish();
 
+  // From any thread, at any time: background stages and the adjustment at the end are stopped or left out, so that whatever
+  // the caller's thread is in returns soon. What a stopped one had found does not come into the map.
+  void interrupt();
+
   map::MapSnapshot snapshot() const { return store_.snapshot(); }
   const std::vector<FrameRecord>& frames() const { return frames_; }
-  std::vector<MappingRecord> mapping_runs() const;
+  std::vector<StageRecord> stage_runs() const;
+  Journal journal() const { return gate_.journal(); }  // what a replay needs
   double final_adjustment_ms() const { return final_adjustment_ms_; }
   int maps_started() const { return maps_started_; }
 
-  // T_world_cam0 of every frame that has a pose in the present map, resolved against it.
-  evaluation::Trajectory trajectory() const;
-  // The same as the caller was told at the time, never corrected.
-  evaluation::Trajectory live_trajectory() const;
+  std::vector<LoopRecord> loops() const;
+  TimeNs keyframe_time(KeyframeId k) const;
+
+  // Every frame that has a pose, resolved against the present map: a trajectory for each part of the map that has some, the
+  // longest first.
+  std::vector<PartTrajectory> trajectories() const;
+  // The same as the caller was told at the time, never corrected, by parts as they were then; that of the longest final
+  // trajectory first.
+  std::vector<PartTrajectory> live_trajectories() const;
 
  private:
   void give_up_young_map();
+  void set_keyframe_time(KeyframeId k, TimeNs time_ns);
+  void note_loop(const looping::LoopClosure& closure);
 
   const camera::Rig rig_;
   const Config config_;
   Pipeline pipeline_;
   std::vector<FrameRecord> frames_;
   mutable std::mutex records_mutex_;
-  std::vector<MappingRecord> mapping_runs_;  // guarded by records_mutex_
+  std::vector<StageRecord> stage_runs_;     // guarded by records_mutex_, as the two below
+  std::vector<LoopRecord> loops_;
+  std::vector<TimeNs> keyframe_time_ns_;    // by KeyframeId of the present map
   double final_adjustment_ms_ = 0;
   int maps_started_ = 0;
+  std::stop_source interruption_;
   map::MapStore store_;
-  std::unique_ptr<MappingExecutor> mapping_;  // last: its thread stops before the rest goes
+  MapGate gate_;
+  std::unique_ptr<StageExecutor> executor_;  // last: its threads end before the rest goes
 };
 
 }  // namespace bslam::system

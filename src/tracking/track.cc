@@ -123,18 +123,22 @@ void note_sightings(const std::vector<LandmarkId>& visible, const std::vector<La
   }
 }
 
-TrackOutput lost(const TrackInput& input, const frame::BundledFrame& frame, LostReason reason) {
+}  // namespace
+
+TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, LostReason reason) {
   TrackOutput out;
   out.result.frame = frame.id;
   out.result.time_ns = frame.time_ns;
   out.result.status = TrackStatus::kLost;
   out.result.reason = reason;
   out.result.cameras = camera_counts(frame, {}, {});
-  out.state = input.state;
+  out.state = state;
   out.state.status = TrackStatus::kLost;
   out.state.twist.reset();
   return out;
 }
+
+namespace {
 
 TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, Fine fine, const TrackingOptions& options) {
   const map::BundledMap& map = input.map;
@@ -193,13 +197,13 @@ TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const Tra
   const bool any_image = std::any_of(frame.cameras.begin(), frame.cameras.end(), [](const frame::CameraFrame& c) {
     return c.state == image::ImageState::kPresent;
   });
-  if (!any_image) return lost(input, frame, LostReason::kNoImages);
-  if (frame.num_keypoints() < static_cast<std::size_t>(options.min_inliers)) return lost(input, frame, LostReason::kFewFeatures);
+  if (!any_image) return lost(input.state, frame, LostReason::kNoImages);
+  if (frame.num_keypoints() < static_cast<std::size_t>(options.min_inliers)) return lost(input.state, frame, LostReason::kFewFeatures);
   const Coarse coarse = track_last_frame(input, frame, options, pool);
-  if (coarse.reason != LostReason::kNone) return lost(input, frame, coarse.reason);
+  if (coarse.reason != LostReason::kNone) return lost(input.state, frame, coarse.reason);
   Fine fine = track_local_view(input, coarse, frame, options, pool);
   if (!supported(fine.solution, count(fine.matches), options.min_inliers, options)) {
-    return lost(input, frame, fine.solution.num_inliers < options.min_inliers ? LostReason::kFewInliers : LostReason::kUnstablePose);
+    return lost(input.state, frame, fine.solution.num_inliers < options.min_inliers ? LostReason::kFewInliers : LostReason::kUnstablePose);
   }
   return tracked(input, frame, std::move(fine), options);
 }

@@ -65,6 +65,9 @@ struct TrackInput {
 // Finds the pose of `frame`, moving matched keypoints to their aligned places. The map has at least one keyframe.
 TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options, ThreadPool& pool);
 
+// A frame without a pose, and the state after it.
+TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, LostReason reason);
+
 // The state from which tracking goes on after `keyframe` was made of a frame at `T_rig_world` that shows `landmarks`.
 TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,
                                std::vector<LandmarkId> landmarks);

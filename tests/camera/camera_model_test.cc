@@ -84,7 +84,11 @@ TEST_P(CameraModelOf, JacobianHoldsOnTheOpticalAxis) {
   const Intrinsics& k = intrinsics(GetParam().model);
   EXPECT_LT((projection->pixel - Vector2d(k.cx, k.cy)).norm(), 1e-9);
   Matrix23d expected;
-  expected << k.fx / 2, 0, 0, 0, k.fy / 2, 0;
+  // The double sphere model measures its focal length from the further centre.
+  const auto* sphere = std::get_if<DoubleSphere>(&GetParam().model);
+  const double depth = sphere ? 2 * (1 + sphere->distortion()[0]) : 2;
+  expected << k.fx / depth, 0, 0, 0, k.fy / depth, 0;
+  EXPECT_NEAR(GetParam().radians_per_pixel(), depth / (k.fx + k.fy), 1e-12);
   EXPECT_LT((projection->jacobian - expected).norm(), 1e-9);
 }
 
@@ -179,6 +183,97 @@ TEST(KannalaBrandt, IsSmoothAcrossTheAxis) {
   }
 }
 
+Vector3d at_angle(double theta) { return {std::sin(theta), 0, std::cos(theta)}; }
+
+// Widest angle from the axis at which a model answers, by bisection.
+template <class Model>
+double widest_angle(const Model& model) {
+  double inside = 0.0, outside = kPi;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (inside + outside);
+    (model.project(at_angle(middle)) ? inside : outside) = middle;
+  }
+  return inside;
+}
+
+TEST(Unified, IsMeisModelWithoutDistortion) {
+  const double xi = 1.3, gamma = 540;
+  const Unified camera({gamma / (1 + xi), gamma / (1 + xi), 320, 240}, xi / (1 + xi));
+  Random random(5);
+  for (int i = 0; i < 100; ++i) {
+    const Vector3d p(random.normal(), random.normal(), random.uniform(0, 2));
+    const double divisor = p.z() + xi * p.norm();
+    EXPECT_LT((camera.project(p).value() - Vector2d(320 + gamma * p.x() / divisor, 240 + gamma * p.y() / divisor)).norm(),
+              1e-10);
+  }
+}
+
+TEST(Unified, WithAlphaZeroIsAPinhole) {
+  const Intrinsics k{400, 410, 320, 240};
+  const Unified camera(k, 0.0);
+  const Pinhole pinhole(k);
+  for (const Vector3d& p : {Vector3d(0.3, -0.2, 1), Vector3d(5, 1, 0.5)}) {
+    EXPECT_LT((camera.project(p).value() - pinhole.project(p).value()).norm(), 1e-12);
+    const Vector2d pixel = camera.project(p).value();
+    EXPECT_LT((camera.unproject(pixel).value() - pinhole.unproject(pixel).value()).norm(), 1e-12);
+  }
+  EXPECT_FALSE(camera.project({0.1, 0, 0}));
+}
+
+TEST(ExtendedUnified, WithBetaOneIsTheUnifiedModel) {
+  const Intrinsics k{230, 231, 319, 239};
+  const ExtendedUnified extended(k, 0.6, 1.0);
+  const DoubleSphere sphere(k, 0.0, 0.6);
+  const Unified unified(k, 0.6);
+  for (double theta = 0.01; theta < 1.8; theta += 0.1) {
+    const Vector2d pixel = unified.project(at_angle(theta)).value();
+    EXPECT_LT((extended.project(at_angle(theta)).value() - pixel).norm(), 1e-10);
+    EXPECT_LT((sphere.project(at_angle(theta)).value() - pixel).norm(), 1e-10);
+    EXPECT_LT((sphere.unproject(pixel).value() - unified.unproject(pixel).value()).norm(), 1e-10);
+  }
+}
+
+// Equations 40 to 42 of the paper, written out.
+TEST(DoubleSphere, IsThatOfThePaper) {
+  const double xi = -0.24, alpha = 0.567;
+  const DoubleSphere camera({350, 349, 366, 249}, xi, alpha);
+  Random random(6);
+  for (int i = 0; i < 100; ++i) {
+    const Vector3d p(random.normal(), random.normal(), random.uniform(0.1, 2));
+    const double d1 = std::sqrt(p.x() * p.x() + p.y() * p.y() + p.z() * p.z());
+    const double d2 = std::sqrt(p.x() * p.x() + p.y() * p.y() + std::pow(xi * d1 + p.z(), 2));
+    const double n = alpha * d2 + (1 - alpha) * (xi * d1 + p.z());
+    EXPECT_LT((camera.project(p).value() - Vector2d(350 * p.x() / n + 366, 349 * p.y() / n + 249)).norm(), 1e-10);
+  }
+}
+
+TEST(SphereModels, EndWhereTheirRadiusTurnsBack) {
+  const Intrinsics k{200, 200, 320, 240};
+  const Unified wide(k, 0.7);
+  EXPECT_NEAR(widest_angle(wide), std::acos(-0.3 / 0.7), 1e-9);  // d r / d theta = 0
+  const Unified narrow(k, 0.3);
+  EXPECT_NEAR(widest_angle(narrow), std::acos(-0.3 / 0.7), 1e-9);  // the divisor is 0
+  for (const double xi : {-0.3, 0.0, 0.4}) {
+    for (const double alpha : {0.3, 0.5, 0.65}) {
+      const DoubleSphere sphere(k, xi, alpha);
+      const double end = widest_angle(sphere);
+      double last = 0.0;
+      for (double theta = 0.001; theta < end; theta += 0.001) {  // the radius grows all the way
+        const double r = sphere.project(at_angle(theta)).value().x() - 320;
+        EXPECT_GT(r, last);
+        last = r;
+      }
+      // The paper's bound, -w2, is on the safe side of the true one.
+      const double w1 = alpha > 0.5 ? (1 - alpha) / alpha : alpha / (1 - alpha);
+      const double w2 = (w1 + xi) / std::sqrt(2 * w1 * xi + xi * xi + 1);
+      EXPECT_GT(end, std::acos(-w2) - 1e-6);
+      EXPECT_FALSE(sphere.project_with_jacobian(at_angle(std::min(end + 1e-6, kPi))));
+    }
+  }
+  EXPECT_FALSE(wide.unproject({320 + 200 / std::sqrt(0.4) + 1, 240}));  // r^2 < 1 / (2 alpha - 1)
+  EXPECT_TRUE(wide.unproject({320 + 200 / std::sqrt(0.4) - 1, 240}));
+}
+
 TEST(CameraModel, KnowsItsNameAndNumbers) {
   const auto cameras = test_cameras();
   EXPECT_EQ(model_name(cameras[0].model), "pinhole");
@@ -187,6 +282,12 @@ TEST(CameraModel, KnowsItsNameAndNumbers) {
   EXPECT_TRUE(distortion(cameras[0].model).empty());
   EXPECT_EQ(distortion(cameras[5].model).size(), 4u);
   EXPECT_EQ(intrinsics(cameras[0].model).fx, 707.0912);
+  EXPECT_EQ(model_name(DoubleSphere({1, 1, 0, 0}, 0.1, 0.5)), "double-sphere");
+  EXPECT_EQ(distortion(DoubleSphere({1, 1, 0, 0}, 0.1, 0.5)), (std::vector{0.1, 0.5}));
+  EXPECT_EQ(model_name(Unified({1, 1, 0, 0}, 0.5)), "ucm");
+  EXPECT_EQ(distortion(Unified({1, 1, 0, 0}, 0.5)), (std::vector{0.5}));
+  EXPECT_EQ(model_name(ExtendedUnified({1, 1, 0, 0}, 0.5, 1.5)), "eucm");
+  EXPECT_EQ(distortion(ExtendedUnified({1, 1, 0, 0}, 0.5, 1.5)), (std::vector{0.5, 1.5}));
 }
 
 }  // namespace

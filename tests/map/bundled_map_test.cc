@@ -56,9 +56,91 @@ TEST_F(BundledMapTest, HangsAKeyframeBelowTheOneItSharesMostWith) {
   EXPECT_EQ(map.keyframe(c).parent, KeyframeId(0));
   const KeyframeId d = add({}, a);
   EXPECT_EQ(map.keyframe(d).parent, a);
-  const KeyframeId e = add({}, {});
-  EXPECT_EQ(map.keyframe(e).parent, d);
   expect_sound();
+}
+
+TEST_F(BundledMapTest, BeginsAPartWithAKeyframeThatHangsOnNothing) {
+  const KeyframeId a = add(matches(0, 10), {});
+  const KeyframeId b = add({}, {}), c = add({}, b), d = add({}, KeyframeId(77));
+  EXPECT_EQ(map.roots(), (std::vector{KeyframeId(0), b, d}));
+  EXPECT_EQ(map.root_of(a), KeyframeId(0));
+  EXPECT_EQ(map.root_of(c), b);
+  EXPECT_EQ(map.root_of(d), d);
+  map.remove_keyframe(c);
+  EXPECT_FALSE(map.keyframe(add({}, c)).parent.valid());  // a removed keyframe carries nothing new
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, TurnsTheLinksRoundWhenPartsAreJoined) {
+  const KeyframeId a = add(matches(0, 10), {});
+  const KeyframeId r = add({}, {}), s = add({}, r), t = add({}, s), side = add({}, r), below = add({}, t);
+  std::vector<SE3> poses;
+  for (const KeyframeId k : map.keyframe_ids()) poses.push_back(map.keyframe(k).T_rig_world);
+  EXPECT_TRUE(map.join_parts(t, a));
+  EXPECT_EQ(map.keyframe(t).parent, a);
+  EXPECT_EQ(map.keyframe(s).parent, t);
+  EXPECT_EQ(map.keyframe(r).parent, s);
+  EXPECT_EQ(map.keyframe(side).parent, r);
+  EXPECT_EQ(map.keyframe(below).parent, t);
+  EXPECT_EQ(map.roots(), std::vector{KeyframeId(0)});
+  for (const KeyframeId k : map.keyframe_ids()) {
+    EXPECT_EQ(map.root_of(k), KeyframeId(0));
+    EXPECT_EQ(map.keyframe(k).T_rig_world.translation(), poses[k.index()].translation());
+  }
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, JoinsOnlyWhatIsAliveAndOfTwoParts) {
+  const KeyframeId a = add(matches(0, 10), {}), r = add({}, {}), s = add({}, r);
+  EXPECT_FALSE(map.join_parts(a, KeyframeId(0)));
+  EXPECT_FALSE(map.join_parts(r, s));
+  map.remove_keyframe(s);
+  EXPECT_FALSE(map.join_parts(s, a));
+  EXPECT_FALSE(map.join_parts(a, s));
+  EXPECT_FALSE(map.join_parts(KeyframeId(), a));
+  EXPECT_TRUE(map.join_parts(a, r));  // the larger part may hang below the smaller one
+  EXPECT_EQ(map.roots(), std::vector{r});
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, RemovesAPartAndLeavesTheRestAlone) {
+  const KeyframeId a = add(matches(0, 10), {});
+  const KeyframeId r = add({}, {}), s = add({}, r), t = add({}, s);
+  const LandmarkId own = map.add_landmark(random_point(random), std::vector<Observation>{{r, FeatureId(1)}, {t, FeatureId(1)}});
+  const LandmarkId shared = map.add_landmark(random_point(random), std::vector<Observation>{{a, FeatureId(20)}, {s, FeatureId(2)}});
+  const std::size_t observations = map.num_observations();
+  EXPECT_FALSE(map.remove_part(s));
+  EXPECT_TRUE(map.remove_part(r));
+  for (const KeyframeId k : {r, s, t}) {
+    EXPECT_FALSE(map.alive(k));
+    EXPECT_FALSE(map.surviving(k).valid());
+  }
+  EXPECT_EQ(map.roots(), std::vector{KeyframeId(0)});
+  EXPECT_EQ(map.num_keyframes(), 2u);
+  EXPECT_FALSE(map.alive(own));
+  ASSERT_TRUE(map.alive(shared));  // the other part sees it too
+  EXPECT_EQ(map.observations(shared).size(), 1u);
+  EXPECT_EQ(map.num_observations(), observations - 3 * 2);  // three features of two keypoints each
+  EXPECT_FALSE(map.remove_part(r));
+  EXPECT_FALSE(map.remove_part(KeyframeId()));
+  expect_sound();
+}
+
+TEST_F(BundledMapTest, SurvivesInTheNearestAliveAncestor) {
+  const KeyframeId a = add(matches(0, 20), {}), b = add(matches(0, 10), {}), c = add({}, b);
+  EXPECT_EQ(map.surviving(c), c);
+  map.remove_keyframe(c);
+  EXPECT_EQ(map.surviving(c), b);
+  map.remove_keyframe(b);
+  map.remove_keyframe(a);
+  EXPECT_EQ(map.surviving(c), KeyframeId(0));
+  EXPECT_FALSE(map.surviving(KeyframeId()).valid());
+}
+
+TEST_F(BundledMapTest, KeepsTheAgeALandmarkIsGiven) {
+  const KeyframeId a = add({}, KeyframeId(0)), b = add({}, a);
+  const std::vector<Observation> observations = {{b, FeatureId(3)}};
+  EXPECT_EQ(map.landmark(map.add_landmark(random_point(random), observations, {}, a)).born, a);
 }
 
 TEST_F(BundledMapTest, OrdersCovisibleKeyframesByWeightThenAge) {

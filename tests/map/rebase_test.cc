@@ -35,6 +35,15 @@ class RebaseTest : public testing::Test {
   KeyframeId add_keyframe(MapDraft& draft, Matches list, KeyframeId fallback = {}) {
     return draft.add_keyframe(synthetic_frame(random, 2, 30, 10), random_pose(random, 0.5), std::move(list), fallback);
   }
+  // A part of one keyframe in the version both start from.
+  KeyframeId begin_part() {
+    MapDraft setup("setup", store.snapshot());
+    const KeyframeId root = add_keyframe(setup, {});
+    store.commit(std::move(setup));
+    early.emplace("early", store.snapshot());
+    late.emplace("late", store.snapshot());
+    return root;
+  }
   // Commits both; the report of the late one.
   CommitReport commit() {
     store.commit(*std::move(early));
@@ -80,6 +89,27 @@ TEST_F(RebaseTest, NewKeyframeFallsBackToAnAliveAncestor) {
   add_keyframe(*late, {}, kThird);
   const CommitReport report = commit();
   EXPECT_EQ(report.published->keyframe(report.keyframes.at(0)).parent, kSecond);
+}
+
+TEST_F(RebaseTest, NewKeyframeThatBeganAPartBeginsOne) {
+  MapDraft setup("setup", store.snapshot());
+  setup.remove_keyframe(kThird);
+  store.commit(std::move(setup));
+  early.emplace("early", store.snapshot());
+  late.emplace("late", store.snapshot());
+  add_keyframe(*early, same_numbers(0, 5));
+  const KeyframeId k = add_keyframe(*late, {}, kThird);  // gone before the edit began: nothing to hang on
+  EXPECT_FALSE(late->map().keyframe(k).parent.valid());
+  const CommitReport report = commit();
+  EXPECT_FALSE(report.published->keyframe(report.keyframes.at(0)).parent.valid());
+}
+
+TEST_F(RebaseTest, NewKeyframeOfARemovedPartBeginsOne) {
+  const KeyframeId root = begin_part();
+  early->remove_part(root);
+  add_keyframe(*late, {}, root);
+  const CommitReport report = commit();
+  EXPECT_EQ(report.published->roots(), (std::vector{kRoot, report.keyframes.at(0)}));
 }
 
 TEST_F(RebaseTest, NewKeyframeSeesNewLandmarksOfItsOwnEdit) {
@@ -260,6 +290,128 @@ TEST_F(RebaseTest, PosesCarryNewerKeyframesAndLandmarksAlong) {
   EXPECT_EQ(after->keyframe(elsewhere).T_rig_world.translation(), before.keyframe(elsewhere).T_rig_world.translation());
   EXPECT_EQ(after->landmark(by_elsewhere).position, before.landmark(by_elsewhere).position);
   EXPECT_EQ(after->landmark(LandmarkId(0)).position, before.landmark(LandmarkId(0)).position);
+}
+
+TEST_F(RebaseTest, PosesAreDroppedAfterACorrection) {
+  const SE3 corrected = random_pose(random, 1);
+  early->set_poses({{{kThird, corrected}}, {}, true});
+  const LandmarkId l = late->add_landmark(random_point(random), {{kSecond, FeatureId(40)}});
+  late->set_poses({{{kSecond, random_pose(random, 1)}, {kThird, random_pose(random, 1)}}, {{l, {1, 2, 3}}}});
+  late->add_sightings({{LandmarkId(0), 1, 1}});
+  const MapSnapshot before = store.snapshot();
+  const CommitReport report = commit();
+  expect_near(report.published->keyframe(kThird).T_rig_world, corrected);
+  expect_near(report.published->keyframe(kSecond).T_rig_world, before->keyframe(kSecond).T_rig_world);
+  EXPECT_NE(report.published->landmark(report.landmarks.at(0)).position, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(report.dropped, 1u);  // the rest of the edit holds
+  EXPECT_EQ(report.applied, 2u);
+  EXPECT_EQ(report.published->gauge_epoch(), before->gauge_epoch() + 1);
+}
+
+TEST_F(RebaseTest, OfTwoCorrectionsTheFirstHolds) {
+  const SE3 corrected = random_pose(random, 1);
+  early->set_poses({{{kThird, corrected}}, {}, true});
+  late->set_poses({{{kThird, random_pose(random, 1)}}, {}, true});
+  const CommitReport report = commit();
+  expect_near(report.published->keyframe(kThird).T_rig_world, corrected);
+  EXPECT_EQ(report.dropped, 1u);
+  EXPECT_EQ(report.published->gauge_epoch(), 1);
+}
+
+TEST_F(RebaseTest, ACorrectionBeginsAnEpochAlsoWhereItComesLater) {
+  early->set_poses({{{kSecond, random_pose(random, 1)}}, {}});
+  const KeyframeId child = add_keyframe(*early, {}, kThird);
+  const SE3 T_child_third = early->map().keyframe(child).T_rig_world * early->map().keyframe(kThird).T_rig_world.inverse();
+  const SE3 corrected = random_pose(random, 1);
+  late->set_poses({{{kThird, corrected}}, {}, true});
+  late->set_poses({{{kSecond, corrected}}, {}});  // an edit's own correction does not shut out its later poses
+  const CommitReport report = commit();
+  EXPECT_EQ(report.dropped, 0u);
+  EXPECT_EQ(report.published->gauge_epoch(), 1);
+  expect_near(report.published->keyframe(kThird).T_rig_world, corrected);
+  expect_near(report.published->keyframe(kSecond).T_rig_world, corrected);
+  expect_near(report.published->keyframe(child).T_rig_world, T_child_third * corrected);
+}
+
+TEST_F(RebaseTest, ACorrectionOfNothingThatIsLeftBeginsNoEpoch) {
+  early->remove_keyframe(kThird);
+  late->set_poses({{{kThird, random_pose(random, 1)}}, {}, true});
+  const CommitReport report = commit();
+  EXPECT_EQ(report.dropped, 1u);
+  EXPECT_EQ(report.published->gauge_epoch(), 0);
+}
+
+TEST_F(RebaseTest, PosesWithoutACorrectionStayInTheEpoch) {
+  early->set_poses({{{kThird, random_pose(random, 1)}}, {}});
+  const SE3 pose = random_pose(random, 1);
+  late->set_poses({{{kThird, pose}}, {}});
+  const CommitReport report = commit();
+  expect_near(report.published->keyframe(kThird).T_rig_world, pose);
+  EXPECT_EQ(report.published->gauge_epoch(), 0);
+}
+
+TEST_F(RebaseTest, PartsAreJoinedWhereBothAreStillThereAndApart) {
+  const KeyframeId root = begin_part();
+  const KeyframeId newer = add_keyframe(*early, {}, root);
+  late->join_parts(root, kThird);
+  const CommitReport report = commit();
+  EXPECT_EQ(report.applied, 1u);
+  EXPECT_EQ(report.published->keyframe(root).parent, kThird);
+  EXPECT_EQ(report.published->root_of(newer), kRoot);
+}
+
+TEST_F(RebaseTest, JoiningIsDroppedWhereItHasBeenDone) {
+  const KeyframeId root = begin_part();
+  early->join_parts(root, kSecond);
+  late->join_parts(root, kThird);
+  const CommitReport report = commit();
+  EXPECT_EQ(report.dropped, 1u);
+  EXPECT_EQ(report.published->keyframe(root).parent, kSecond);
+}
+
+TEST_F(RebaseTest, JoiningIsDroppedWhereOneIsGone) {
+  const KeyframeId root = begin_part();
+  early->remove_keyframe(kThird);
+  late->join_parts(root, kThird);
+  EXPECT_EQ(commit().dropped, 1u);
+  early.emplace("early", store.snapshot());
+  late.emplace("late", store.snapshot());
+  early->remove_part(root);
+  late->join_parts(root, kSecond);
+  EXPECT_EQ(commit().dropped, 1u);
+}
+
+TEST_F(RebaseTest, JoiningFollowsTheIdsOfTheEditsOwnKeyframes) {
+  add_keyframe(*early, same_numbers(0, 3));
+  const KeyframeId own = add_keyframe(*late, {});
+  late->join_parts(own, kSecond);
+  const CommitReport report = commit();
+  EXPECT_NE(report.keyframes.at(0), own);
+  EXPECT_EQ(report.published->keyframe(report.keyframes[0]).parent, kSecond);
+  EXPECT_EQ(report.published->roots(), std::vector{kRoot});
+}
+
+TEST_F(RebaseTest, RemovalOfAPartTakesItsNewerKeyframesToo) {
+  const KeyframeId root = begin_part();
+  const KeyframeId newer = add_keyframe(*early, {}, root);
+  late->remove_part(root);
+  const CommitReport report = commit();
+  EXPECT_EQ(report.applied, 1u);
+  EXPECT_FALSE(report.published->alive(root));
+  EXPECT_FALSE(report.published->alive(newer));
+  EXPECT_EQ(report.published->roots(), std::vector{kRoot});
+}
+
+TEST_F(RebaseTest, RemovalOfAPartIsDroppedWhereItIsGoneOrPartOfAnother) {
+  const KeyframeId root = begin_part();
+  early->join_parts(root, kThird);
+  late->remove_part(root);
+  EXPECT_EQ(commit().dropped, 1u);
+  EXPECT_TRUE(store.snapshot()->alive(root));
+  const KeyframeId other = begin_part();
+  early->remove_part(other);
+  late->remove_part(other);
+  EXPECT_EQ(commit().dropped, 1u);
 }
 
 TEST_F(RebaseTest, NewKeyframesEndUpTheSameWhicheverOfTwoEditsComesFirst) {

@@ -73,7 +73,7 @@ class Fingerprint {
  public:
   explicit Fingerprint(const BundledMap& map) {
     add(map.keyframe_slots(), map.landmark_slots(), map.num_keyframes(), map.num_landmarks(), map.num_observations());
-    add(map.scale());
+    add(map.scale(), map.gauge_epoch());
     for (std::size_t i = 0; i < map.keyframe_slots(); ++i) {
       const BundledKeyframe& k = map.keyframe(KeyframeId(i));
       add(reinterpret_cast<std::uintptr_t>(k.frame.get()), k.alive, k.parent.value());
@@ -121,7 +121,7 @@ class RandomEditor {
 
   void change(MapDraft& draft) {
     if (draft.map().num_keyframes() < 3) return add_keyframe(draft);
-    switch (random_.below(16)) {
+    switch (random_.below(18)) {
       case 0:
         return draft.map().num_keyframes() < 25 ? add_keyframe(draft) : remove_keyframe(draft);
       case 1:
@@ -148,6 +148,11 @@ class RandomEditor {
         return;
       case 14:
         return set_poses(draft);
+      case 15:
+        draft.join_parts(keyframe(draft), keyframe(draft));
+        return;
+      case 16:
+        return remove_part(draft);
       default:
         draft.add_sightings({{landmark(draft), 3, 2}, {landmark(draft), 1, 1}});
         draft.refresh_landmarks({landmark(draft), landmark(draft)});
@@ -170,10 +175,18 @@ class RandomEditor {
   void add_keyframe(MapDraft& draft) {
     std::vector<std::pair<FeatureId, LandmarkId>> matches;
     for (int i = 0; i < 20; ++i) matches.emplace_back(feature(), landmark(draft));
-    const KeyframeId fallback = draft.map().newest_keyframe();
+    KeyframeId fallback = draft.map().newest_keyframe();
+    if (random_.below(4) == 0) {  // often the first of a new part; the one to hang on may be removed
+      matches.clear();
+      fallback = random_.below(2) == 0 && fallback.valid() ? keyframe(draft) : KeyframeId();
+    }
     draft.add_keyframe(frames_[random_.below(8)], random_pose(random_, 1), std::move(matches), fallback);
   }
   void remove_keyframe(MapDraft& draft) { draft.remove_keyframe(keyframe(draft)); }
+  void remove_part(MapDraft& draft) {  // the newest, where there are several
+    const std::vector<KeyframeId> roots = draft.map().roots();
+    if (roots.size() > 1) draft.remove_part(roots.back());
+  }
   void add_landmark(MapDraft& draft) {
     std::vector<Observation> observations;
     for (int i = 0; i < 4; ++i) {
@@ -196,6 +209,7 @@ class RandomEditor {
       poses.keyframes.emplace_back(keyframe(draft), random_pose(random_, 1));
       poses.landmarks.emplace_back(landmark(draft), random_point(random_));
     }
+    poses.correction = random_.below(4) == 0;
     draft.set_poses(std::move(poses));
   }
 

@@ -33,7 +33,7 @@ TEST(Summary, HasTheKeysOfTheContractInTheirOrder) {
   const ordered_json json = summary_json(record);
   EXPECT_EQ(keys(json), (std::vector<std::string>{"schema", "version", "complete", "data", "mode", "seed",
                                                   "cameras_used", "frames", "cameras", "features", "map", "loops",
-                                                  "relocalisations", "maps_started", "time", "memory"}));
+                                                  "relocalisations", "maps_started", "parts", "time", "memory"}));
   EXPECT_EQ(keys(json["frames"]), (std::vector<std::string>{"input", "tracked", "lost", "dropped", "lost_intervals"}));
   EXPECT_EQ(json["frames"]["lost_intervals"].dump(), R"([{"from":1.25,"to":1.25,"reason":"too few matches"}])");
   EXPECT_EQ(json["cameras"].dump(), R"([{"name":"cam0","images":400,"skipped":1,)"

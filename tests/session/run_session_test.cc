@@ -111,22 +111,62 @@ TEST_F(Session, TracksTheSameInParallel) {
 }
 
 TEST_F(Session, EndsWhereInterrupted) {
-  std::atomic<bool> interrupted = false;
+  std::stop_source interruption;
   SessionOptions o = options();
-  o.interrupted = &interrupted;
-  o.progress = [&](std::size_t done, std::size_t) { interrupted = done == 3; };
+  o.interrupted = interruption.get_token();
+  o.progress = [&](std::size_t done, std::size_t) {
+    if (done == 3) interruption.request_stop();
+  };
   const auto result = run_session(dataset(), o);
   ASSERT_TRUE(result.ok());
   EXPECT_FALSE(result->record.complete);
   EXPECT_EQ(result->record.frames.size(), 3u);
   EXPECT_EQ(result->trajectory.size(), 3u);
-  interrupted = true;
   const auto nothing = run_session(dataset(), o);
   ASSERT_TRUE(nothing.ok());
   EXPECT_FALSE(nothing->record.complete);
   EXPECT_TRUE(nothing->record.frames.empty());
   fs::create_directory(folder() / "nothing");
   EXPECT_TRUE(write_outputs(*nothing, o.config, folder() / "nothing").ok());
+}
+
+TEST_F(Session, RepeatsARunByItsJournalAlsoAnInterruptedOne) {
+  for (const std::size_t end : {3u, 8u}) {
+    std::stop_source interruption;
+    SessionOptions o = options();
+    o.config.mode = system::Mode::kParallel;
+    o.interrupted = interruption.get_token();
+    o.progress = [&](std::size_t done, std::size_t all) {
+      if (done == end && end < all) interruption.request_stop();
+    };
+    const auto recorded = run_session(dataset(), o);
+    ASSERT_TRUE(recorded.ok());
+    SessionOptions again = options();
+    again.replay = recorded->journal;
+    const auto replayed = run_session(dataset(), again);
+    ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+    EXPECT_EQ(replayed->record.mode, "replay");
+    EXPECT_EQ(replayed->record.complete, end == 8);
+    EXPECT_EQ(replayed->journal.entries, recorded->journal.entries);
+    ASSERT_EQ(replayed->trajectory.size(), end);
+    for (std::size_t i = 0; i < end; ++i) {
+      EXPECT_EQ(replayed->trajectory[i].T_world_frame.translation(), recorded->trajectory[i].T_world_frame.translation());
+      EXPECT_EQ(replayed->live[i].T_world_frame.translation(), recorded->live[i].T_world_frame.translation());
+    }
+  }
+}
+
+TEST_F(Session, RefusesAJournalOfAnotherRun) {
+  SessionOptions o = options();
+  const auto recorded = run_session(dataset(), o);
+  ASSERT_TRUE(recorded.ok());
+  o.replay = recorded->journal;
+  o.replay->name = "other.journal";
+  o.replay->entries[1].input = 5;
+  const auto replayed = run_session(dataset(), o);
+  ASSERT_FALSE(replayed.ok());
+  EXPECT_EQ(replayed.error().file, "other.journal");
+  EXPECT_EQ(replayed.error().key, "entry 1");
 }
 
 TEST_F(Session, CountsADamagedImageAsSkippedAndGoesOn) {

@@ -51,6 +51,8 @@ TEST(Config, ReadsTheModeByName) {
   OptionTable table(config);
   ASSERT_TRUE(table.set("mode", "sequential").ok());
   EXPECT_EQ(config.mode, Mode::kSequential);
+  ASSERT_TRUE(table.set("mode", "lagged").ok());
+  EXPECT_EQ(config.mode, Mode::kLagged);
   ASSERT_TRUE(table.set("mode", "parallel").ok());
   EXPECT_EQ(config.mode, Mode::kParallel);
   EXPECT_FALSE(table.set("mode", "sometimes").ok());

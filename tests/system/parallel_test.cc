@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <stdexcept>
 #include <thread>
 
 #include "system/rendered_tour.h"
@@ -19,8 +18,8 @@ TEST(SystemParallel, TracksAllFramesAsWellAsSequential) {
   EXPECT_LT(ate_m(system.live_trajectory(), tour.truth()), 0.015);
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
   const auto keyframes = std::count_if(system.frames().begin(), system.frames().end(), [](const auto& r) { return r.keyframe; });
-  EXPECT_LE(system.mapping_runs().size(), static_cast<std::size_t>(keyframes));
-  EXPECT_GT(system.mapping_runs().size(), 0u);
+  EXPECT_LE(system.stage_runs().size(), static_cast<std::size_t>(keyframes));
+  EXPECT_GT(system.stage_runs().size(), 0u);
 }
 
 TEST(SystemParallel, MayEndAtAnyFrameWithoutBeingFinished) {
@@ -80,51 +79,6 @@ TEST(SystemParallel, LeavesAYoungMapUpToScaleThatIsLost) {
   system.finish();
   EXPECT_EQ(system.maps_started(), 2);
   EXPECT_EQ(system.frames().size(), k + tour.frames().size());
-}
-
-// A store with one keyframe that shows nothing.
-map::MapStore store_with_keyframe() {
-  const auto rig = std::make_shared<const camera::Rig>(simulation::ring_rig(2, 320));
-  map::BundledMap map(rig);
-  auto frame = std::make_shared<frame::BundledFrame>();
-  frame->cameras.resize(2);
-  map.add_keyframe(std::move(frame), geometry::SE3(), {}, KeyframeId());
-  return map::MapStore(std::move(map));
-}
-
-TEST(MappingExecutorParallel, BringsAWorkersExceptionToTheCaller) {
-  map::MapStore store = store_with_keyframe();
-  const Config config = small_config(Mode::kParallel);
-  const auto executor =
-      make_mapping_executor(store, config, [](KeyframeId, double) { throw std::runtime_error("worker failed"); });
-  EXPECT_NO_THROW(executor->enqueue(KeyframeId(0)));
-  EXPECT_THROW(executor->drain(), std::runtime_error);
-  EXPECT_THROW(executor->enqueue(KeyframeId(0)), std::runtime_error);
-  EXPECT_THROW(executor->drain(), std::runtime_error);
-}
-
-TEST(MappingExecutorParallel, MapsEveryKeyframeInOrderBeforeItIsDrained) {
-  map::MapStore store = store_with_keyframe();
-  Config config = small_config(Mode::kParallel);
-  config.execution.pending_keyframes = 2;
-  std::vector<KeyframeId> seen;  // the observer is called by one thread at a time, and by none after drain
-  const auto executor = make_mapping_executor(store, config, [&](KeyframeId k, double) { seen.push_back(k); });
-  for (int i = 0; i < 20; ++i) executor->enqueue(KeyframeId(0));
-  executor->drain();
-  EXPECT_EQ(seen.size(), 20u);
-  EXPECT_GE(store.snapshot()->version(), MapVersion(20));
-}
-
-TEST(MappingExecutorSequential, ThrowsAtOnceAndIsDoneAtOnce) {
-  map::MapStore store = store_with_keyframe();
-  const Config config = small_config(Mode::kSequential);
-  int runs = 0;
-  const auto executor = make_mapping_executor(store, config, [&](KeyframeId, double) {
-    if (++runs == 2) throw std::runtime_error("failed");
-  });
-  executor->enqueue(KeyframeId(0));
-  EXPECT_EQ(runs, 1);
-  EXPECT_THROW(executor->enqueue(KeyframeId(0)), std::runtime_error);
 }
 
 }  // namespace

@@ -130,7 +130,7 @@ TEST(SystemSequential, RecordsEveryInputFrame) {
   EXPECT_EQ(system.frames()[0].result.reason, LostReason::kNotStarted);
   EXPECT_EQ(system.frames()[6].result.reason, LostReason::kNoImages);
   EXPECT_TRUE(system.frames()[1].keyframe);
-  EXPECT_EQ(system.mapping_runs().size(), static_cast<std::size_t>(std::count_if(
+  EXPECT_EQ(system.stage_runs().size(), static_cast<std::size_t>(std::count_if(
                                               system.frames().begin(), system.frames().end(),
                                               [](const FrameRecord& r) { return r.keyframe; })));
 }

@@ -1,0 +1,102 @@
+// Pose graph, absolute pose and similarity at the sizes of loop closing and relocalisation.
+#include <benchmark/benchmark.h>
+
+#include "../tests/solver/scene.h"
+#include "solver/absolute_pose.h"
+#include "solver/pose_graph.h"
+#include "solver/similarity_ransac.h"
+
+namespace bslam::solver {
+namespace {
+
+using geometry::Sim3;
+
+// range(0) vertices twice around a circle; five edges a vertex: to the four before it and, in the second round, to
+// where it has been before. The start is the chained odometry.
+PoseGraphProblem loop(int count, bool scale_free) {
+  Random random(1);
+  PoseGraphProblem problem;
+  problem.scale_free = scale_free;
+  std::vector<Sim3> truth;
+  for (int i = 0; i < count; ++i) {
+    const double yaw = 4 * std::numbers::pi * i / count;
+    const geometry::Quaterniond R(Eigen::AngleAxisd(yaw, Vector3d::UnitY()));
+    truth.push_back(Sim3(1.0, R, 20 * Vector3d(-std::cos(yaw), 0, std::sin(yaw))).inverse());
+  }
+  const auto link = [&](int a, int b) {
+    geometry::Vector7d off;
+    off << scene::random_twist(random, 0.005, 0.02), scale_free ? 0.005 * random.normal() : 0.0;
+    const auto& S_a_world = truth[static_cast<std::size_t>(a)];
+    problem.edges.push_back({a, b, S_a_world * truth[static_cast<std::size_t>(b)].inverse() * Sim3::exp(off), 1.0});
+  };
+  problem.S_world = {truth[0]};
+  for (int i = 1; i < count; ++i) {
+    for (int k = 1; k <= 4 && k <= i; ++k) {
+      link(i, i - k);
+      if (k == 1) problem.S_world.push_back(problem.edges.back().S_a_b * problem.S_world.back());
+    }
+    link(i, i >= count / 2 ? i - count / 2 : std::max(0, i - 5));
+    if (i < 5) problem.edges.pop_back();
+  }
+  problem.fixed.assign(truth.size(), 0);
+  problem.fixed[0] = 1;
+  return problem;
+}
+
+void pose_graph(benchmark::State& state, bool scale_free) {
+  const PoseGraphProblem start = loop(static_cast<int>(state.range(0)), scale_free);
+  PoseGraphSummary summary;
+  for (auto _ : state) {
+    PoseGraphProblem problem = start;
+    summary = optimise(problem, {});
+    benchmark::DoNotOptimize(problem.S_world.data());
+  }
+  state.counters["edges"] = static_cast<double>(start.edges.size());
+  state.counters["steps"] = summary.iterations;
+}
+BENCHMARK_CAPTURE(pose_graph, rigid, false)->Arg(1000)->Arg(4000)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(pose_graph, scale_free, true)->Arg(1000)->Arg(4000)->Unit(benchmark::kMillisecond);
+
+// 130 observations; range(0): cameras, range(1): per cent of outliers.
+void absolute(benchmark::State& state, scene::Models models) {
+  const Rig rig = scene::make_rig(static_cast<std::size_t>(state.range(0)), models);
+  Random random(2);
+  const auto scene = scene::make_pose_scene(rig, 130, 1.0, 0.01 * static_cast<double>(state.range(1)), random);
+  for (auto _ : state) benchmark::DoNotOptimize(absolute_pose(rig, scene.observations, {}, {}, Random(3)));
+}
+BENCHMARK_CAPTURE(absolute, radtan, scene::Models::kRadTan)
+    ->ArgsProduct({{1, 2, 4}, {30, 70, 100}})
+    ->Unit(benchmark::kMicrosecond)
+    ->Name("absolute_pose/radtan");
+BENCHMARK_CAPTURE(absolute, fisheye, scene::Models::kFisheye)
+    ->ArgsProduct({{1, 2, 4}, {70}})
+    ->Unit(benchmark::kMicrosecond)
+    ->Name("absolute_pose/fisheye");
+
+// 120 matches, scale free; range(0): per cent of outliers.
+void similarity(benchmark::State& state) {
+  const Rig rig = scene::make_rig(1, scene::Models::kRadTan);
+  Random random(4);
+  const Sim3 S_a_b = Sim3(SE3::exp(scene::random_twist(random, 0.2, 0.5))) *
+                     Sim3(1.3, geometry::Quaterniond::Identity(), Vector3d::Zero());
+  std::vector<SimilarityMatch> matches;
+  while (matches.size() < 120) {
+    const Vector3d point_a = scene::random_visible_point(rig, SE3(), random);
+    Vector3d point_b = S_a_b.inverse() * point_a;
+    const auto pixel_a = scene::see(rig, 0, SE3(), point_a);
+    auto pixel_b = scene::see(rig, 0, SE3(), point_b);
+    if (!pixel_a || !pixel_b) continue;
+    if (random.uniform() < 0.01 * static_cast<double>(state.range(0))) {
+      point_b = scene::random_visible_point(rig, SE3(), random);
+      pixel_b = rig.camera(0).project(point_b);
+    }
+    if (pixel_b) matches.push_back({point_a, point_b, CameraIndex(0), CameraIndex(0), *pixel_a, *pixel_b, 1.0, 1.0});
+  }
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(ransac_similarity(rig, matches, geometry::ScaleMode::kFree, {}, Random(5)));
+  }
+}
+BENCHMARK(similarity)->Arg(30)->Arg(60)->Arg(100)->Unit(benchmark::kMicrosecond)->Name("ransac_similarity/outliers");
+
+}  // namespace
+}  // namespace bslam::solver

@@ -1,0 +1,148 @@
+// Runs a target on inputs made from its seeds: for compilers without libFuzzer. Where the program is instrumented, inputs
+// that reach something new are kept to make others from. The same seed and number of runs give the same inputs.
+#include <signal.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "base/random.h"
+#include "coverage.h"
+#include "mutation.h"
+#include "target.h"
+
+#if defined(__SANITIZE_ADDRESS__)
+#include <sanitizer/common_interface_defs.h>
+// An input is at most a megabyte: what asks for two gigabytes believes a number it should not.
+extern "C" const char* __asan_default_options() { return "max_allocation_size_mb=2048:allocator_may_return_null=0"; }
+extern "C" const char* __ubsan_default_options() { return "print_stacktrace=1:halt_on_error=1"; }
+#endif
+
+namespace bslam::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kSlowSeconds = 20;  // an input that takes longer counts as a hang
+constexpr std::size_t kMaxCorpus = 4000;
+
+struct Arguments {
+  long seconds = 60, runs = -1;
+  std::uint64_t seed = 1;
+  fs::path crash = "crash", write_seeds;
+  std::vector<fs::path> inputs;
+};
+
+// What is being run, for the handlers below.
+std::string current;
+std::string crash_file;
+
+void keep_current() {
+  std::ofstream(crash_file, std::ios::binary).write(current.data(), static_cast<std::streamsize>(current.size()));
+  std::fprintf(stderr, "fuzz: the input is in %s\n", crash_file.c_str());
+}
+
+void on_signal(int number) {
+  if (number == SIGALRM) std::fprintf(stderr, "fuzz: an input took over %d s\n", kSlowSeconds);
+  keep_current();
+  ::_exit(1);
+}
+
+std::string slurp(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+Arguments parse(int argc, char** argv) {
+  Arguments a;
+  for (int i = 1; i < argc; ++i) {
+    const std::string name = argv[i];
+    const auto value = [&]() -> std::string { return i + 1 < argc ? argv[++i] : ""; };
+    if (name == "--seconds") {
+      a.seconds = std::atol(value().c_str());
+    } else if (name == "--runs") {
+      a.runs = std::atol(value().c_str());
+    } else if (name == "--seed") {
+      a.seed = std::strtoull(value().c_str(), nullptr, 10);
+    } else if (name == "--crash") {
+      a.crash = value();
+    } else if (name == "--write-seeds") {
+      a.write_seeds = value();
+    } else if (name.starts_with("--")) {
+      std::fprintf(stderr, "usage: %s [--seconds S] [--runs N] [--seed N] [--crash FILE] [--write-seeds DIR] [INPUT...]\n", argv[0]);
+      std::exit(2);
+    } else {
+      a.inputs.emplace_back(name);
+    }
+  }
+  return a;
+}
+
+std::size_t run(const std::string& input) {
+  current = input;
+  ::alarm(kSlowSeconds);
+  begin_coverage();
+  LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
+  const std::size_t fresh = new_places();
+  ::alarm(0);
+  return fresh;
+}
+
+void search(const Arguments& a, std::vector<std::string> corpus) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::chrono::seconds(a.seconds);
+  std::size_t places = 0, longest_ms = 0;
+  long runs = 0;
+  for (const std::string& input : corpus) places += run(input);
+  if (corpus.empty()) corpus.emplace_back();
+  Random random(a.seed, "fuzz");
+  for (; a.runs >= 0 ? runs < a.runs : Clock::now() < end; ++runs) {
+    // The newest are the least tried.
+    const std::size_t n = corpus.size(), newest = std::min<std::size_t>(n, 50);
+    const std::size_t pick = random.below(2) == 0 ? random.below(static_cast<std::uint32_t>(n))
+                                                  : n - 1 - random.below(static_cast<std::uint32_t>(newest));
+    std::string input = mutate(corpus[pick], corpus, random);
+    const auto begin = Clock::now();
+    const std::size_t fresh = run(input);
+    longest_ms = std::max(longest_ms, static_cast<std::size_t>((Clock::now() - begin) / std::chrono::milliseconds(1)));
+    places += fresh;
+    if (fresh > 0 && corpus.size() < kMaxCorpus) corpus.push_back(std::move(input));
+  }
+  std::printf("%ld inputs, %zu kept, %zu places reached, slowest %zu ms\n", runs, corpus.size(), places, longest_ms);
+}
+
+int main_of(int argc, char** argv) {
+  const Arguments a = parse(argc, argv);
+  crash_file = a.crash.string();
+  for (const int number : {SIGABRT, SIGALRM}) ::signal(number, on_signal);
+#if defined(__SANITIZE_ADDRESS__)
+  __sanitizer_set_death_callback(keep_current);
+#endif
+  if (!a.write_seeds.empty()) {
+    fs::create_directories(a.write_seeds);
+    std::size_t n = 0;
+    for (const std::string& s : seeds()) {
+      std::ofstream(a.write_seeds / std::to_string(n++), std::ios::binary).write(s.data(), static_cast<std::streamsize>(s.size()));
+    }
+    return 0;
+  }
+  if (!a.inputs.empty()) {  // these alone, once each
+    for (const fs::path& file : a.inputs) run(slurp(file));
+    return 0;
+  }
+  search(a, seeds());
+  return 0;
+}
+
+}  // namespace
+}  // namespace bslam::fuzz
+
+int main(int argc, char** argv) { return bslam::fuzz::main_of(argc, argv); }

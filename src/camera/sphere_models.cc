@@ -1,0 +1,128 @@
+// The models that project by way of a sphere. All end in the same stage: a point at height `k` over the centre of a
+// sphere, `d` from it, goes to m = (x, y) / (alpha d + (1 - alpha) k). The equations: docs/math.md, section 8.
+#include <cmath>
+
+#include "base/assert.h"
+#include "camera/camera_model.h"
+
+namespace bslam::camera {
+namespace {
+
+Vector2d from_pixel(const Intrinsics& k, const Vector2d& u) { return {(u.x() - k.cx) / k.fx, (u.y() - k.cy) / k.fy}; }
+
+// alpha d + (1 - alpha) k within the domain k > -w d, where the stage is one to one: up to alpha = 1/2 the divisor's
+// positive side, beyond it the angle at which the radius turns back.
+std::optional<double> divisor(double alpha, double k, double d) {
+  const double w = alpha > 0.5 ? (1 - alpha) / alpha : alpha / (1 - alpha);
+  if (!(k > -w * d)) return std::nullopt;
+  const double n = alpha * d + (1 - alpha) * k;
+  return n > 0 ? std::optional(n) : std::nullopt;
+}
+
+// Height of the direction (m_x, m_y, height) that the stage maps to a point at squared radius r2.
+std::optional<double> height(double alpha, double r2) {
+  const double root2 = 1 - (2 * alpha - 1) * r2;
+  if (!(root2 > 0)) return std::nullopt;
+  return (1 - alpha * alpha * r2) / (alpha * std::sqrt(root2) + 1 - alpha);
+}
+
+std::optional<Vector2d> divided(const Intrinsics& intrinsics, const Vector3d& p, const std::optional<double>& n) {
+  if (!n) return std::nullopt;
+  const Vector2d pixel(intrinsics.fx * (p.x() / *n) + intrinsics.cx, intrinsics.fy * (p.y() / *n) + intrinsics.cy);
+  return pixel.allFinite() ? std::optional(pixel) : std::nullopt;
+}
+
+// The same with its derivative; `dn` is that of the divisor.
+std::optional<Projection> divided(const Intrinsics& intrinsics, const Vector3d& p, const std::optional<double>& n,
+                                  const Eigen::RowVector3d& dn) {
+  const auto pixel = divided(intrinsics, p, n);
+  if (!pixel) return std::nullopt;
+  Projection out{*pixel, {}};
+  out.jacobian.row(0) = intrinsics.fx / *n * (Eigen::RowVector3d::UnitX() - p.x() / *n * dn);
+  out.jacobian.row(1) = intrinsics.fy / *n * (Eigen::RowVector3d::UnitY() - p.y() / *n * dn);
+  return out;
+}
+
+double ellipsoid_norm(const Vector3d& p, double beta) {
+  return std::sqrt(beta * p.head<2>().squaredNorm() + p.z() * p.z());
+}
+
+std::optional<Vector2d> project_ellipsoid(const Intrinsics& k, double alpha, double beta, const Vector3d& p) {
+  return divided(k, p, divisor(alpha, p.z(), ellipsoid_norm(p, beta)));
+}
+
+std::optional<Projection> project_ellipsoid_with_jacobian(const Intrinsics& k, double alpha, double beta,
+                                                          const Vector3d& p) {
+  const double d = ellipsoid_norm(p, beta);
+  const Eigen::RowVector3d dd(beta * p.x() / d, beta * p.y() / d, p.z() / d);
+  return divided(k, p, divisor(alpha, p.z(), d), alpha * dd + (1 - alpha) * Eigen::RowVector3d::UnitZ());
+}
+
+std::optional<Vector3d> unproject_ellipsoid(const Intrinsics& k, double alpha, double beta, const Vector2d& pixel) {
+  if (!pixel.allFinite()) return std::nullopt;
+  const Vector2d m = from_pixel(k, pixel);
+  const auto z = height(alpha, beta * m.squaredNorm());
+  if (!z) return std::nullopt;
+  return Vector3d(m.x(), m.y(), *z).normalized();
+}
+
+}  // namespace
+
+Unified::Unified(const Intrinsics& k, double alpha) : k_(k), alpha_(alpha) {
+  BSLAM_ASSERT(alpha >= 0 && alpha <= 1, "alpha lies in [0, 1]");
+}
+
+std::optional<Vector2d> Unified::project(const Vector3d& point) const {
+  return project_ellipsoid(k_, alpha_, 1.0, point);
+}
+std::optional<Projection> Unified::project_with_jacobian(const Vector3d& point) const {
+  return project_ellipsoid_with_jacobian(k_, alpha_, 1.0, point);
+}
+std::optional<Vector3d> Unified::unproject(const Vector2d& pixel) const {
+  return unproject_ellipsoid(k_, alpha_, 1.0, pixel);
+}
+
+ExtendedUnified::ExtendedUnified(const Intrinsics& k, double alpha, double beta) : k_(k), alpha_(alpha), beta_(beta) {
+  BSLAM_ASSERT(alpha >= 0 && alpha <= 1 && beta > 0, "alpha lies in [0, 1], beta above 0");
+}
+
+std::optional<Vector2d> ExtendedUnified::project(const Vector3d& point) const {
+  return project_ellipsoid(k_, alpha_, beta_, point);
+}
+std::optional<Projection> ExtendedUnified::project_with_jacobian(const Vector3d& point) const {
+  return project_ellipsoid_with_jacobian(k_, alpha_, beta_, point);
+}
+std::optional<Vector3d> ExtendedUnified::unproject(const Vector2d& pixel) const {
+  return unproject_ellipsoid(k_, alpha_, beta_, pixel);
+}
+
+DoubleSphere::DoubleSphere(const Intrinsics& k, double xi, double alpha) : k_(k), xi_(xi), alpha_(alpha) {
+  BSLAM_ASSERT(xi > -1 && xi <= 1 && alpha >= 0 && alpha <= 1, "xi lies in (-1, 1], alpha in [0, 1]");
+}
+
+std::optional<Vector2d> DoubleSphere::project(const Vector3d& point) const {
+  const double k = xi_ * point.norm() + point.z();
+  const double d = std::sqrt(point.head<2>().squaredNorm() + k * k);
+  return divided(k_, point, divisor(alpha_, k, d));
+}
+
+std::optional<Projection> DoubleSphere::project_with_jacobian(const Vector3d& point) const {
+  const double norm = point.norm(), k = xi_ * norm + point.z();
+  const double d = std::sqrt(point.head<2>().squaredNorm() + k * k);
+  const Eigen::RowVector3d dk = xi_ / norm * point.transpose() + Eigen::RowVector3d::UnitZ();
+  const Eigen::RowVector3d dd = (Eigen::RowVector3d(point.x(), point.y(), 0) + k * dk) / d;
+  return divided(k_, point, divisor(alpha_, k, d), alpha_ * dd + (1 - alpha_) * dk);
+}
+
+std::optional<Vector3d> DoubleSphere::unproject(const Vector2d& pixel) const {
+  if (!pixel.allFinite()) return std::nullopt;
+  const Vector2d m = from_pixel(k_, pixel);
+  const double r2 = m.squaredNorm();
+  const auto z = height(alpha_, r2);
+  if (!z) return std::nullopt;
+  // From the second sphere along (m, z) back to the first, whose centre is xi further on.
+  const double scale = (*z * xi_ + std::sqrt(*z * *z + (1 - xi_ * xi_) * r2)) / (*z * *z + r2);
+  return Vector3d(scale * m.x(), scale * m.y(), scale * *z - xi_).normalized();
+}
+
+}  // namespace bslam::camera

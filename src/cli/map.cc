@@ -1,0 +1,157 @@
+// bslam map: saved maps described and exported.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/verbs.h"
+#include "io/atomic_file.h"
+#include "io/map_export.h"
+#include "io/map_file.h"
+#include "io/rig_file.h"
+#include "io/trajectory_file.h"
+
+namespace bslam::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MapArguments {
+  std::string file, out;
+  bool json = false, overwrite = false;
+};
+
+std::string scale_name(map::Scale scale) {
+  switch (scale) {
+    case map::Scale::kMetric:
+      return "metric";
+    case map::Scale::kUpToScale:
+      return "up-to-scale";
+    case map::Scale::kUnobservable:
+      break;
+  }
+  return "unobservable";
+}
+
+std::string vocabulary_name(std::uint64_t id) { return id == 0 ? "none" : fmt::format("{:016x}", id); }
+
+nlohmann::ordered_json to_json(const io::SavedMap& saved, std::uintmax_t file_bytes) {
+  const map::BundledMap& map = saved.map;
+  nlohmann::ordered_json cameras = nlohmann::ordered_json::array(), parts = nlohmann::ordered_json::array();
+  for (std::size_t c = 0; c < map.rig().size(); ++c) {
+    const camera::Camera& camera = map.rig().camera(c);
+    cameras.push_back({{"name", camera.name}, {"model", camera::model_name(camera.model)}, {"resolution", {camera.width, camera.height}}});
+  }
+  for (const io::MapPart& p : io::map_parts(map)) {
+    parts.push_back({{"keyframes", p.keyframes.size()},
+                     {"landmarks", p.landmarks},
+                     {"extent_m", {p.extent.x(), p.extent.y(), p.extent.z()}},
+                     {"from", to_seconds(io::first_time(map, p))},
+                     {"to", to_seconds(io::last_time(map, p))}});
+  }
+  return {{"schema", 1},
+          {"version", saved.info.version},
+          {"data", saved.info.data},
+          {"file_bytes", file_bytes},
+          {"cameras", std::move(cameras)},
+          {"keyframes", map.num_keyframes()},
+          {"landmarks", map.num_landmarks()},
+          {"observations", map.num_observations()},
+          {"scale", scale_name(map.scale())},
+          {"vocabulary", vocabulary_name(saved.info.vocabulary)},
+          {"parts", std::move(parts)}};
+}
+
+void print_info(const io::SavedMap& saved, std::uintmax_t file_bytes) {
+  const map::BundledMap& map = saved.map;
+  std::string text = fmt::format("{}: {:.1f} MB, written by bslam {}{}\n", saved.file, static_cast<double>(file_bytes) / 1e6,
+                                 saved.info.version, saved.info.data.empty() ? "" : " from " + saved.info.data);
+  for (std::size_t c = 0; c < map.rig().size(); ++c) {
+    const camera::Camera& camera = map.rig().camera(c);
+    text += fmt::format("camera {} ({}): {}, {}x{}\n", c, camera.name, camera::model_name(camera.model), camera.width, camera.height);
+  }
+  text += fmt::format("{} keyframes, {} landmarks, {} observations; scale {}; vocabulary {}\n", map.num_keyframes(),
+                      map.num_landmarks(), map.num_observations(), scale_name(map.scale()), vocabulary_name(saved.info.vocabulary));
+  const std::string unit = map.scale() == map::Scale::kMetric ? "m" : "units";
+  const std::vector<io::MapPart> parts = io::map_parts(map);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const TimeNs from = io::first_time(map, parts[i]), to = io::last_time(map, parts[i]);
+    text += fmt::format("part {}: {} keyframes over {:.1f} x {:.1f} x {:.1f} {}, {} landmarks, {:.3f} s to {:.3f} s\n", i,
+                        parts[i].keyframes.size(), parts[i].extent.x(), parts[i].extent.y(), parts[i].extent.z(), unit,
+                        parts[i].landmarks, to_seconds(from), to_seconds(to));
+  }
+  std::fputs(text.c_str(), stdout);
+}
+
+int map_info(const MapArguments& arguments) {
+  const auto saved = io::read_map(arguments.file);
+  if (!saved) return report_error(saved.error());
+  std::error_code error;
+  const std::uintmax_t bytes = fs::file_size(arguments.file, error);
+  if (arguments.json) {
+    std::printf("%s\n", to_json(*saved, bytes).dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  } else {
+    print_info(*saved, bytes);
+  }
+  return kExitOk;
+}
+
+Status write_exports(const map::BundledMap& map, const fs::path& folder) {
+  if (Status s = io::write_atomically(folder / "points.ply", io::landmarks_ply(map)); !s) return s;
+  if (Status s = io::write_rig(map.rig(), folder / "rig.yaml"); !s) return s;
+  const std::string header = io::trajectory_header("cam0", io::PoseState::kFinal);
+  const std::vector<io::MapPart> parts = io::map_parts(map);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::string name = parts.size() == 1 ? "keyframes.tum" : fmt::format("keyframes_{}.tum", i);
+    const auto trajectory = io::keyframe_trajectory(map, parts[i]);
+    if (Status s = io::write_trajectory(folder / name, trajectory, io::TrajectoryFormat::kTum, header); !s) return s;
+  }
+  const io::ColmapModel model = io::colmap_model(map);
+  if (Status s = io::write_atomically(folder / "cameras.txt", model.cameras); !s) return s;
+  if (Status s = io::write_atomically(folder / "images.txt", model.images); !s) return s;
+  return io::write_atomically(folder / "points3D.txt", model.points);
+}
+
+int map_export(const MapArguments& arguments) {
+  const auto saved = io::read_map(arguments.file);
+  if (!saved) return report_error(saved.error());
+  std::error_code error;
+  if (fs::exists(arguments.out, error)) {
+    const bool folder = fs::is_directory(arguments.out, error);
+    if (!folder) return report_error({arguments.out, "--out", "a file", "a folder"});
+    if (!fs::is_empty(arguments.out, error) && !arguments.overwrite) {
+      return report_error({arguments.out, "--out", "a folder that is not empty", "a new one, or --overwrite"});
+    }
+  }
+  fs::create_directories(arguments.out, error);
+  if (error) return report_error({arguments.out, "--out", error.message(), "a folder that can be made"});
+  const Status status = write_exports(saved->map, arguments.out);
+  if (!status) return report_error(status.error());
+  std::printf("%s: %zu keyframes, %zu landmarks\n", arguments.out.c_str(), saved->map.num_keyframes(), saved->map.num_landmarks());
+  return kExitOk;
+}
+
+}  // namespace
+
+void add_map(CLI::App& app, int& exit_status) {
+  const auto arguments = std::make_shared<MapArguments>();
+  CLI::App* map = app.add_subcommand("map", "describe and export saved maps");
+  map->require_subcommand(1);
+
+  CLI::App* info = map->add_subcommand("info", "cameras, size, parts, scale, extent and times");
+  info->add_option("FILE", arguments->file, "a saved map")->required();
+  info->add_flag("--json", arguments->json, "as JSON");
+  info->callback([arguments, &exit_status] { exit_status = map_info(*arguments); });
+
+  CLI::App* out = map->add_subcommand("export", "points.ply, keyframes.tum, rig.yaml and a COLMAP text model");
+  out->add_option("FILE", arguments->file, "a saved map")->required();
+  out->add_option("--out", arguments->out, "folder to write to")->required();
+  out->add_flag("--overwrite", arguments->overwrite, "the folder may exist");
+  out->callback([arguments, &exit_status] { exit_status = map_export(*arguments); });
+}
+
+}  // namespace bslam::cli

@@ -1,0 +1,195 @@
+// bslam vocab: the vocabulary of place recognition, its training and its description.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "cli/progress_bar.h"
+#include "cli/verbs.h"
+#include "feature/extractor.h"
+#include "io/training_images.h"
+#include "io/vocabulary_file.h"
+#include "place/shipped_vocabulary.h"
+#include "place/train.h"
+#include "place/vocabulary_bytes.h"
+
+namespace bslam::cli {
+namespace {
+
+struct VocabTrainArguments {
+  std::vector<std::string> images;
+  std::string out, progress = "auto";
+  place::TrainingOptions training;
+  feature::FeatureOptions features;
+  std::uint64_t seed = 1;
+  int max_side = 1024, threads = 0;
+  bool overwrite = false;
+};
+
+// The descriptors of an image; the camera is any that sees all of it, for the extractor wants one.
+std::vector<feature::Descriptor> describe(const image::Image& image, feature::Extractor& extractor) {
+  const double focal = std::max(image.width(), image.height());
+  camera::Camera camera{.name = "any",
+                        .model = camera::Pinhole({focal, focal, 0.5 * image.width(), 0.5 * image.height()}),
+                        .width = image.width(),
+                        .height = image.height(),
+                        .time_offset_ns = 0,
+                        .mask_file = {}};
+  image::Pyramid pyramid;
+  feature::Keypoints keypoints;
+  extractor.extract(image.view(), {}, camera, pyramid, keypoints);
+  return keypoints.descriptor;
+}
+
+struct TrainingSet {
+  std::vector<std::vector<feature::Descriptor>> images;  // those that could be read
+  std::size_t skipped = 0, descriptors = 0;
+};
+
+// Each share of the images has an extractor of its own; results are in the order of the files.
+TrainingSet extract_all(const std::vector<std::filesystem::path>& files, const VocabTrainArguments& a,
+                        ThreadPool& pool) {
+  std::vector<std::optional<std::vector<feature::Descriptor>>> found(files.size());
+  std::vector<std::string> warnings(files.size());
+  ProgressBar bar(a.progress == "auto", "images");
+  std::mutex mutex;
+  std::size_t done = 0;
+  const auto shares = static_cast<std::size_t>(pool.size());
+  pool.for_each(shares, [&](std::size_t share) {
+    feature::Extractor extractor(a.features);
+    for (std::size_t i = share; i < files.size(); i += shares) {
+      const auto image = io::read_training_image(files[i], a.max_side);
+      if (image) {
+        found[i] = describe(*image, extractor);
+      } else {
+        warnings[i] = image.error().message();
+      }
+      const std::lock_guard lock(mutex);
+      bar.show(++done, files.size());
+    }
+  });
+  bar.finish();
+  TrainingSet set;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (found[i]) {
+      set.descriptors += found[i]->size();
+      set.images.push_back(std::move(*found[i]));
+    } else {
+      ++set.skipped;
+      fmt::print(stderr, "bslam: warning: {}: skipped\n", warnings[i]);
+    }
+  }
+  return set;
+}
+
+// What would only be noticed after all the work.
+Status check_output(const VocabTrainArguments& a) {
+  std::error_code error;
+  const std::filesystem::path out(a.out), folder = out.has_parent_path() ? out.parent_path() : ".";
+  if (std::filesystem::is_directory(out, error)) return Error{a.out, "--out", "a folder", "the name of a file"};
+  if (!std::filesystem::is_directory(folder, error))
+    return Error{folder.string(), "--out", "no such folder", "one that exists"};
+  if (std::filesystem::exists(out, error) && !a.overwrite)
+    return Error{a.out, "--out", "a file there already", "a new name, or --overwrite"};
+  return {};
+}
+
+int run_train(const VocabTrainArguments& a) {
+  if (const Status s = check_output(a); !s) return report_error(s.error());
+  const auto files = io::find_images(a.images);
+  if (!files) return report_error(files.error());
+  if (files->empty()) return report_error({a.images.front(), "", "no images", "PNG, JPEG, PGM or WebP images"});
+  ThreadPool pool(a.threads > 0 ? a.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  const TrainingSet set = extract_all(*files, a, pool);
+  if (set.images.empty())
+    return report_error({a.images.front(), "", "no image that can be read", "PNG, JPEG, PGM or WebP images"});
+  Random random(a.seed, "vocabulary");
+  ProgressBar bar(a.progress == "auto", "descriptors");
+  const auto vocabulary = place::train_vocabulary(set.images, a.training, random, pool,
+                                                  [&](std::size_t done, std::size_t all) { bar.show(done, all); });
+  bar.finish();
+  if (!vocabulary) {
+    Error error = vocabulary.error();
+    error.file = a.images.front();
+    return report_error(error);
+  }
+  if (const Status s = io::write_vocabulary(**vocabulary, a.out); !s) return report_error(s.error());
+  fmt::print("{}: {} words from {} descriptors of {} images ({} skipped)\n", a.out, (*vocabulary)->size(),
+             set.descriptors, set.images.size(), set.skipped);
+  return kExitOk;
+}
+
+int run_info(const std::string& file) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto read = file.empty() ? place::shipped_vocabulary() : io::read_vocabulary(file);
+  const std::chrono::duration<double, std::milli> load = std::chrono::steady_clock::now() - start;
+  if (!read) return report_error(read.error());
+  const place::Vocabulary& v = **read;
+  const std::vector<float>& weights = v.content().weight;
+  const auto [least, most] = std::minmax_element(weights.begin(), weights.end());
+  fmt::print("vocabulary   {}\n", file.empty() ? "the one shipped with this program" : file);
+  fmt::print("descriptors  {}\n", v.kind());
+  fmt::print("branching    {}\nlevels       {}\nwords        {}\nnodes        {}\n", v.branching(), v.levels(),
+             v.size(), v.num_nodes());
+  fmt::print("weights      {:.4f} to {:.4f}\n", *least, *most);
+  fmt::print("size         {} bytes\n", place::serialise(v).size());
+  fmt::print("id           {:016x}\n", v.id());
+  fmt::print("load time    {:.1f} ms\n", load.count());
+  if (v.kind() != place::kDescriptorKind) {
+    fmt::print("note         made for other descriptors than this program's ({}): places are told apart less well\n",
+               place::kDescriptorKind);
+  }
+  return kExitOk;
+}
+
+void add_train(CLI::App& vocab, int& exit_status) {
+  const auto arguments = std::make_shared<VocabTrainArguments>();
+  VocabTrainArguments& a = *arguments;
+  CLI::App* verb = vocab.add_subcommand("train", "make a vocabulary from images");
+  verb->add_option("IMAGES", a.images, "PNG, JPEG, PGM or WebP images, or folders with such in them or below")
+      ->required();
+  verb->add_option("--out", a.out, "file to write")->required();
+  verb->add_option("--branching", a.training.branching, "children of a node of the tree")
+      ->check(CLI::Range(2, place::kMaxBranching))
+      ->capture_default_str();
+  verb->add_option("--levels", a.training.levels, "steps from its root to a word")
+      ->check(CLI::Range(1, place::kMaxLevels))
+      ->capture_default_str();
+  verb->add_option("--seed", a.seed, "of the clustering")->capture_default_str();
+  verb->add_option("--features", a.features.per_image, "keypoints wanted in one image")
+      ->check(CLI::Range(50, 20000))
+      ->capture_default_str();
+  verb->add_option("--max-side", a.max_side, "pixels; larger images are shrunk to it; 0: none is")
+      ->check(CLI::Range(0, 100000))
+      ->capture_default_str();
+  verb->add_option("--threads", a.threads, "threads to work with; 0: one a core")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  verb->add_option("--progress", a.progress, "a bar when stderr is a terminal")
+      ->check(CLI::IsMember({"auto", "never"}))
+      ->capture_default_str();
+  verb->add_flag("--overwrite", a.overwrite, "the file may exist");
+  verb->callback([arguments, &exit_status] { exit_status = run_train(*arguments); });
+}
+
+}  // namespace
+
+void add_vocab(CLI::App& app, int& exit_status) {
+  CLI::App* vocab = app.add_subcommand("vocab", "the vocabulary of place recognition: train or describe one");
+  vocab->require_subcommand(1);
+  add_train(*vocab, exit_status);
+  const auto file = std::make_shared<std::string>();
+  CLI::App* info = vocab->add_subcommand("info", "kind, size, id and weights of a vocabulary");
+  info->add_option("FILE", *file, "bslam vocabulary or DBoW2 text file (default: the one shipped with this program)");
+  info->callback([file, &exit_status] { exit_status = run_info(*file); });
+}
+
+}  // namespace bslam::cli

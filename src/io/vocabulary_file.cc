@@ -1,0 +1,36 @@
+#include "io/vocabulary_file.h"
+
+#include <utility>
+
+#include "io/atomic_file.h"
+#include "io/dbow2_text.h"
+#include "place/vocabulary_bytes.h"
+
+namespace bslam::io {
+namespace {
+
+constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
+
+Result<place::VocabularyPtr> parse(std::string_view bytes) {
+  if (place::is_vocabulary(bytes)) return place::deserialise(bytes);
+  if (is_dbow2_text(bytes)) return parse_dbow2_text(bytes);
+  return Error{"", "", "no vocabulary", "a file of bslam vocab train, or DBoW2's text format"};
+}
+
+}  // namespace
+
+Result<place::VocabularyPtr> read_vocabulary(const std::filesystem::path& file) {
+  const auto bytes = read_file(file, kMaxBytes);
+  if (!bytes) return bytes.error();
+  auto vocabulary = parse(*bytes);
+  if (vocabulary) return vocabulary;
+  Error error = vocabulary.error();
+  error.file = file.string();
+  return error;
+}
+
+Status write_vocabulary(const place::Vocabulary& vocabulary, const std::filesystem::path& file) {
+  return write_atomically(file, place::serialise(vocabulary));
+}
+
+}  // namespace bslam::io

@@ -1,0 +1,78 @@
+#include "map/append_map.h"
+
+#include "base/assert.h"
+
+namespace bslam::map {
+namespace {
+
+void append_keyframes(BundledMap& onto, const BundledMap& other, AppendedIds& ids) {
+  const KeyframeId first(onto.keyframe_slots());
+  const std::vector<KeyframeId> sources = other.keyframe_ids();
+  for (const KeyframeId k : sources) {
+    const BundledKeyframe& source = other.keyframe(k);
+    ids.keyframes[k.index()] = onto.add_keyframe(source.frame, source.T_rig_world, {}, {});
+  }
+  std::vector<KeyframeId> parents;
+  for (const KeyframeId k : sources) {
+    const KeyframeId parent = other.keyframe(k).parent;
+    parents.push_back(parent.valid() ? ids.keyframes[parent.index()] : KeyframeId());
+  }
+  const bool hung = hang_keyframes(onto, first, parents);
+  BSLAM_ASSERT(hung, "the links of a map are trees");
+}
+
+// The new id of the newest keyframe that is not newer than `k`, which may be removed; else of the oldest.
+KeyframeId nearest_older(const AppendedIds& ids, KeyframeId k) {
+  for (std::size_t i = k.index() + 1; i-- > 0;) {
+    if (ids.keyframes[i].valid()) return ids.keyframes[i];
+  }
+  for (const KeyframeId id : ids.keyframes) {
+    if (id.valid()) return id;
+  }
+  return {};
+}
+
+}  // namespace
+
+bool hang_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeId> parents) {
+  std::vector<std::size_t> waiting_for(parents.size(), 0);  // children that do not hang yet
+  for (const KeyframeId parent : parents) {
+    if (parent.valid()) ++waiting_for[parent.index() - first.index()];
+  }
+  // From the leaves up: every parent is still a root when its children come, so that finding its root takes one step.
+  std::vector<std::size_t> ready;
+  for (std::size_t i = 0; i < parents.size(); ++i) {
+    if (waiting_for[i] == 0) ready.push_back(i);
+  }
+  for (std::size_t n = 0; n < ready.size(); ++n) {
+    const KeyframeId parent = parents[ready[n]];
+    if (!parent.valid()) continue;
+    map.join_parts(KeyframeId(first.index() + ready[n]), parent);
+    const std::size_t above = parent.index() - first.index();
+    if (--waiting_for[above] == 0) ready.push_back(above);
+  }
+  return ready.size() == parents.size();
+}
+
+AppendedIds append_map(BundledMap& onto, const BundledMap& other) {
+  BSLAM_ASSERT(onto.rig().size() == other.rig().size(), "maps that are put together are of one rig");
+  BSLAM_ASSERT(onto.pyramid().levels == other.pyramid().levels && onto.pyramid().scale_factor == other.pyramid().scale_factor,
+               "maps that are put together are of one pyramid");
+  AppendedIds ids{std::vector<KeyframeId>(other.keyframe_slots()), std::vector<LandmarkId>(other.landmark_slots())};
+  append_keyframes(onto, other, ids);
+  for (const LandmarkId l : other.landmark_ids()) {
+    const Landmark& source = other.landmark(l);
+    std::vector<Observation> observations;
+    for (Observation o : other.observations(l)) {
+      o.keyframe = ids.keyframes[o.keyframe.index()];
+      observations.push_back(o);
+    }
+    const LandmarkReference reference{ids.keyframes[source.reference.keyframe.index()], source.reference.keypoint};
+    const LandmarkId added = onto.add_landmark(source.position, observations, reference, nearest_older(ids, source.born));
+    onto.add_sightings(added, source.expected, source.found);
+    ids.landmarks[l.index()] = added;
+  }
+  return ids;
+}
+
+}  // namespace bslam::map

@@ -1,0 +1,55 @@
+#include "place/inverted_index.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/assert.h"
+
+namespace bslam::place {
+
+void InvertedIndex::add(KeyframeId keyframe, std::shared_ptr<const WordVector> words) {
+  BSLAM_ASSERT(keyframe.valid() && words != nullptr, "a keyframe and its words");
+  BSLAM_ASSERT(!contains(keyframe), "a keyframe is added once");
+  if (!words->empty()) by_word_.resize(std::max(by_word_.size(), words->words().back().word.index() + 1));
+  for (const WeightedWord& w : words->words()) {
+    std::vector<KeyframeId>& list = by_word_[w.word.index()];
+    list.insert(std::upper_bound(list.begin(), list.end(), keyframe), keyframe);
+  }
+  keyframes_.emplace(keyframe, std::move(words));
+}
+
+void InvertedIndex::remove(KeyframeId keyframe) {
+  const auto found = keyframes_.find(keyframe);
+  if (found == keyframes_.end()) return;
+  for (const WeightedWord& w : found->second->words()) {
+    std::vector<KeyframeId>& list = by_word_[w.word.index()];
+    list.erase(std::lower_bound(list.begin(), list.end(), keyframe));
+  }
+  keyframes_.erase(found);
+}
+
+void InvertedIndex::clear() {
+  keyframes_.clear();
+  by_word_.clear();
+}
+
+std::shared_ptr<const WordVector> InvertedIndex::words_of(KeyframeId keyframe) const {
+  const auto found = keyframes_.find(keyframe);
+  return found != keyframes_.end() ? found->second : nullptr;
+}
+
+std::vector<CommonWords> InvertedIndex::query(const WordVector& words) const {
+  std::vector<CommonWords> shared;
+  if (keyframes_.empty()) return shared;
+  std::vector<int> count(keyframes_.rbegin()->first.index() + 1, 0);
+  for (const WeightedWord& w : words.words()) {
+    if (w.word.index() >= by_word_.size()) break;  // sorted: no later word is in the index either
+    for (const KeyframeId keyframe : by_word_[w.word.index()]) ++count[keyframe.index()];
+  }
+  for (std::size_t k = 0; k < count.size(); ++k) {
+    if (count[k] > 0) shared.push_back({KeyframeId(k), count[k]});
+  }
+  return shared;
+}
+
+}  // namespace bslam::place

@@ -1,0 +1,39 @@
+// The bag of words of a frame.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/id.h"
+#include "place/vocabulary.h"
+
+namespace bslam::place {
+
+struct WeightedWord {
+  WordId word;
+  float weight = 0;
+};
+
+// Words with their weights, sorted by word, each once; the weights are positive and sum to 1 (or there are none).
+// Immutable.
+class WordVector {
+ public:
+  WordVector() = default;
+
+  // tf-idf (Sivic and Zisserman, ICCV 2003) of the words of a frame's unique features, in any order; invalid ids and
+  // words of weight 0 are left out.
+  WordVector(const Vocabulary& vocabulary, std::span<const WordId> words);
+
+  std::span<const WeightedWord> words() const { return words_; }
+  std::size_t size() const { return words_.size(); }
+  bool empty() const { return words_.empty(); }
+
+ private:
+  std::vector<WeightedWord> words_;
+};
+
+// Similarity of two frames, 1 - 0.5 |a - b|_1 in [0, 1] (Nister and Stewenius, CVPR 2006): 1 for equal ones, 0 where no
+// word is common or one is empty.
+double l1_score(const WordVector& a, const WordVector& b);
+
+}  // namespace bslam::place

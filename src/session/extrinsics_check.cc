@@ -1,0 +1,201 @@
+#include "session/extrinsics_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "feature/extractor.h"
+#include "feature/hamming.h"
+#include "geometry/triangulation.h"
+#include "io/frame_reader.h"
+#include "solver/epipolar.h"
+
+namespace bslam::session {
+namespace {
+
+using geometry::SE3;
+
+constexpr int kFrames = 6;            // of the data set, spread over it
+constexpr int kFarthest = 60;         // bits between descriptors of one point
+constexpr double kRatio = 0.85;       // to the second best
+constexpr double kTolerancePx = 2.0;  // of a calibration and its features
+constexpr int kLeastAgreeing = 25;
+constexpr double kLeastShare = 0.4;  // of the matches; chance reaches some per cent
+constexpr int kMany = 300;            // matches: enough to expect that some convention fits
+constexpr double kClearly = 1.3;     // times more than as given
+
+// For every descriptor of `a` its best in `b`, or -1.
+std::vector<int> best_matches(const feature::Keypoints& a, const feature::Keypoints& b) {
+  std::vector<int> best(a.size(), -1);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    int least = 257, second = 257;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const int distance = feature::hamming(a.descriptor[i], b.descriptor[j]);
+      if (distance < least) {
+        second = least, least = distance;
+        best[i] = static_cast<int>(j);
+      } else {
+        second = std::min(second, distance);
+      }
+    }
+    if (least > kFarthest || least > kRatio * second) best[i] = -1;
+  }
+  return best;
+}
+
+struct PixelPair {
+  Eigen::Vector2d a, b;
+};
+
+// Mutual best matches, without any geometry: it is what is to be tested.
+std::vector<PixelPair> match(const feature::Keypoints& a, const feature::Keypoints& b) {
+  const std::vector<int> forward = best_matches(a, b), backward = best_matches(b, a);
+  std::vector<PixelPair> pairs;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (forward[i] < 0) continue;
+    const auto j = static_cast<std::size_t>(forward[i]);
+    if (backward[j] == static_cast<int>(i)) pairs.push_back({a.pixel[i].cast<double>(), b.pixel[j].cast<double>()});
+  }
+  return pairs;
+}
+
+// Under a convention: which calibration the first and the second image have, and the transform between them.
+struct Hypothesis {
+  const camera::Camera *first, *second;
+  SE3 T_second_first;
+};
+
+Hypothesis hypothesis_of(Convention convention, const camera::Rig& rig, std::size_t i, std::size_t j) {
+  const camera::Camera &ci = rig.camera(i), &cj = rig.camera(j);
+  const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
+  const SE3 inverse = rig.body_from_cam(j) * rig.body_from_cam(i).inverse();
+  switch (convention) {
+    case Convention::kAsGiven:
+      return {&ci, &cj, given};
+    case Convention::kInverse:
+      return {&ci, &cj, inverse};
+    case Convention::kPairInverse:
+      return {&ci, &cj, given.inverse()};
+    case Convention::kSwapped:
+      return {&cj, &ci, given.inverse()};
+    case Convention::kSwappedInverse:
+      break;
+  }
+  return {&cj, &ci, inverse.inverse()};
+}
+
+int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
+  constexpr double kNoBaseline = 1e-6;  // metres
+  const double tolerance = kTolerancePx * std::max(h.first->radians_per_pixel(), h.second->radians_per_pixel());
+  const Eigen::Vector3d t = h.T_second_first.translation();
+  const bool apart = t.norm() > kNoBaseline;
+  const solver::EpipolarPose pose{h.T_second_first.matrix3(), apart ? Eigen::Vector3d(t.normalized()) : t};
+  int agreeing = 0;
+  for (const PixelPair& pair : pairs) {
+    const auto a = h.first->unproject(pair.a), b = h.second->unproject(pair.b);
+    if (!a || !b) continue;
+    const bool far = geometry::angle_between(pose.R_b_a * *a, *b) < tolerance;  // in front or behind cannot be told
+    agreeing +=
+        far || (apart && solver::epipolar_angle(pose, {*a, *b}) < tolerance && solver::in_front_of_both(pose, {*a, *b}))
+            ? 1
+            : 0;
+  }
+  return agreeing;
+}
+
+std::optional<Convention> verdict_of(const PairEvidence& evidence) {
+  const auto best = std::max_element(evidence.agreeing.begin(), evidence.agreeing.end());  // the first of equals
+  if (*best < kLeastAgreeing || *best < kLeastShare * evidence.matches) return std::nullopt;
+  if (*best < kClearly * evidence.agreeing[0]) return Convention::kAsGiven;
+  return static_cast<Convention>(best - evidence.agreeing.begin());
+}
+
+}  // namespace
+
+std::string_view convention_in_words(Convention convention) {
+  switch (convention) {
+    case Convention::kAsGiven:
+      return "as given";
+    case Convention::kInverse:
+      return "with every transform inverted (T_cam_body is given, T_body_cam meant)";
+    case Convention::kPairInverse:
+      return "with the transform between the two inverted";
+    case Convention::kSwapped:
+      return "with the two cameras exchanged";
+    case Convention::kSwappedInverse:
+      break;
+  }
+  return "with the two cameras exchanged and every transform inverted";
+}
+
+PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Keypoints> of_i,
+                        std::span<const feature::Keypoints> of_j) {
+  PairEvidence evidence{.first = i, .second = j};
+  for (std::size_t frame = 0; frame < std::min(of_i.size(), of_j.size()); ++frame) {
+    const std::vector<PixelPair> pairs = match(of_i[frame], of_j[frame]);
+    evidence.matches += static_cast<int>(pairs.size());
+    for (int c = 0; c < kConventions; ++c) {
+      const Hypothesis hypothesis = hypothesis_of(static_cast<Convention>(c), rig, i, j);
+      evidence.agreeing[static_cast<std::size_t>(c)] += count_agreeing(hypothesis, pairs);
+    }
+  }
+  evidence.verdict = verdict_of(evidence);
+  return evidence;
+}
+
+std::vector<PairEvidence> check_extrinsics(const io::Dataset& dataset) {
+  const camera::Rig& rig = dataset.rig;
+  std::vector<std::vector<feature::Keypoints>> keypoints(rig.size());  // by camera and frame
+  feature::Extractor extractor({});
+  const std::size_t frames = std::min<std::size_t>(kFrames, dataset.frames.size());
+  for (std::size_t k = 0; k < frames; ++k) {
+    const image::ImageBundle bundle = io::read_frame(dataset, (2 * k + 1) * dataset.frames.size() / (2 * frames));
+    for (std::size_t c = 0; c < rig.size(); ++c) {
+      keypoints[c].emplace_back();
+      if (bundle.images[c].state != image::ImageState::kPresent) continue;
+      image::Pyramid pyramid;
+      extractor.extract(bundle.images[c].image.view(), {}, rig.camera(c), pyramid, keypoints[c].back());
+    }
+  }
+  std::vector<PairEvidence> evidence;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    for (std::size_t j = i + 1; j < rig.size(); ++j) {
+      evidence.push_back(judge_pair(rig, i, j, keypoints[i], keypoints[j]));
+    }
+  }
+  return evidence;
+}
+
+std::string describe_evidence(std::span<const PairEvidence> evidence) {
+  std::string text = "against the images:\n";
+  std::map<Convention, int> votes;
+  int disagreeing = 0;
+  for (const PairEvidence& pair : evidence) {
+    const std::string name = fmt::format("  {} and {}: ", pair.first, pair.second);
+    if (!pair.verdict && pair.matches > kMany) {
+      text += fmt::format("{}{} matches, and no convention fits enough of them\n", name, pair.matches);
+      continue;
+    }
+    if (!pair.verdict) {
+      text += fmt::format("{}too little in common to tell ({} matches)\n", name, pair.matches);
+      continue;
+    }
+    ++votes[*pair.verdict];
+    disagreeing += *pair.verdict == Convention::kAsGiven ? 0 : 1;
+    const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
+    text += fmt::format("{}{} of {} matches fit {}", name, agreeing(*pair.verdict), pair.matches,
+                        convention_in_words(*pair.verdict));
+    text +=
+        *pair.verdict == Convention::kAsGiven ? "\n" : fmt::format(", {} as given\n", agreeing(Convention::kAsGiven));
+  }
+  if (votes.empty()) return text + "  nothing can be said of the extrinsics\n";
+  if (disagreeing == 0) return text + "  the extrinsics fit as given\n";
+  const auto most =
+      std::max_element(votes.begin(), votes.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  return text +
+         fmt::format("warning: the images do not fit the extrinsics; they fit {}\n",
+                     convention_in_words(most->first == Convention::kAsGiven ? std::next(most)->first : most->first));
+}
+
+}  // namespace bslam::session

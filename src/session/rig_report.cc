@@ -1,0 +1,110 @@
+#include "session/rig_report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+
+#include "io/atomic_file.h"
+#include "io/rig_description.h"
+#include "io/rig_file.h"
+#include "io/rig_warnings.h"
+#include "report/rig_plot.h"
+#include "session/extrinsics_check.h"
+
+namespace bslam::session {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
+
+Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Json camera_json(const camera::Rig& rig, std::size_t i) {
+  const camera::Camera& camera = rig.camera(i);
+  const camera::Intrinsics& k = camera::intrinsics(camera.model);
+  const io::FieldOfView view = io::field_of_view(camera);
+  const geometry::SE3& T = rig.body_from_cam(i);
+  Json overlaps = Json::array();
+  for (std::size_t j = 0; j < rig.size(); ++j) overlaps.push_back(i == j ? 1.0 : rig.overlap_share(i, j));
+  return {{"name", camera.name},
+          {"model", camera::model_name(camera.model)},
+          {"resolution", {camera.width, camera.height}},
+          {"intrinsics", {k.fx, k.fy, k.cx, k.cy}},
+          {"distortion", camera::distortion(camera.model)},
+          {"field_of_view_deg",
+           {{"horizontal", degrees(view.horizontal)},
+            {"vertical", degrees(view.vertical)},
+            {"diagonal", degrees(view.diagonal)}}},
+          {"position_body", vector_json(T.translation())},
+          {"optical_axis_body", vector_json(T.rotation() * Eigen::Vector3d::UnitZ())},
+          {"position_cam0", vector_json(rig.rig_from_cam(i).translation())},
+          {"optical_axis_cam0", vector_json(rig.rig_from_cam(i).rotation() * Eigen::Vector3d::UnitZ())},
+          {"time_offset_s", static_cast<double>(camera.time_offset_ns) / 1e9},
+          {"mask", camera.mask_file.empty() ? Json() : Json(camera.mask_file)},
+          {"overlaps", std::move(overlaps)}};
+}
+
+Json evidence_json(const std::vector<PairEvidence>& evidence) {
+  Json pairs = Json::array();
+  for (const PairEvidence& pair : evidence) {
+    pairs.push_back({{"cameras", {pair.first, pair.second}},
+                     {"matches", pair.matches},
+                     {"fit_as_given", pair.agreeing[0]},
+                     {"fit_inverted", pair.agreeing[1]},
+                     {"fit_pair_inverted", pair.agreeing[2]},
+                     {"fit_swapped", pair.agreeing[3]},
+                     {"fit_swapped_inverted", pair.agreeing[4]},
+                     {"verdict", pair.verdict ? Json(convention_in_words(*pair.verdict)) : Json()}});
+  }
+  return pairs;
+}
+
+std::string as_json(const io::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
+  const camera::Rig& rig = file.rig;
+  Json cameras = Json::array(), baselines = Json::array();
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    cameras.push_back(camera_json(rig, i));
+    for (std::size_t j = i + 1; j < rig.size(); ++j) {
+      const double length = (rig.rig_from_cam(i).translation() - rig.rig_from_cam(j).translation()).norm();
+      baselines.push_back({{"cameras", {i, j}}, {"length_m", length}});
+    }
+  }
+  Json json = {{"schema", 1},
+               {"format", io::format_name(file.format)},
+               {"cameras", std::move(cameras)},
+               {"baselines", std::move(baselines)},
+               {"notes", file.notes},
+               {"warnings", io::rig_warnings(rig)}};
+  if (evidence) json["images"] = evidence_json(*evidence);
+  return json.dump(1) + "\n";
+}
+
+std::string as_text(const io::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
+  std::string text = fmt::format("format: {}\n", io::format_name(file.format)) + io::describe_rig(file.rig);
+  for (const std::string& note : file.notes) text += "note: " + note + "\n";
+  for (const std::string& warning : io::rig_warnings(file.rig)) text += "warning: " + warning + "\n";
+  return evidence ? text + describe_evidence(*evidence) : text;
+}
+
+}  // namespace
+
+Result<std::string> report_rig(const RigReportRequest& request) {
+  const auto file = io::read_rig_file(request.file);
+  if (!file) return file.error();
+  if (!request.svg.empty()) {
+    const Status written = io::write_atomically(request.svg, report::rig_plot_svg(file->rig));
+    if (!written) return written.error();
+  }
+  std::optional<std::vector<PairEvidence>> evidence;
+  if (!request.images.empty()) {
+    const auto dataset = io::open_dataset({.path = request.images, .rig_file = request.file});
+    if (!dataset) return dataset.error();
+    evidence = check_extrinsics(*dataset);
+  }
+  return request.json ? as_json(*file, evidence) : as_text(*file, evidence);
+}
+
+}  // namespace bslam::session

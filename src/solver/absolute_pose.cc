@@ -1,0 +1,188 @@
+#include "solver/absolute_pose.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/LU>
+
+#include <opengv/absolute_pose/CentralAbsoluteAdapter.hpp>
+#include <opengv/absolute_pose/methods.hpp>
+
+#include "geometry/alignment.h"
+#include "solver/pose_problem.h"
+
+namespace bslam::solver {
+namespace {
+
+using Eigen::Matrix3d;
+
+constexpr int kMinSamples = 30;  // noise makes some samples without outliers poor ones
+constexpr int kRedraws = 10;     // for a sample of three different points
+
+// An observation as a ray in the rig frame.
+struct Ray {
+  Vector3d origin, direction;  // metres; unit
+  Vector3d point_world;
+};
+using Sample = std::array<const Ray*, 3>;
+
+std::vector<Ray> rays_of(const Rig& rig, std::span<const PoseObservation> observations) {
+  std::vector<Ray> out;
+  out.reserve(observations.size());
+  for (const PoseObservation& o : observations) {
+    const auto bearing = rig.camera(o.camera).unproject(o.pixel);
+    const SE3& T_rig_cam = rig.rig_from_cam(o.camera.index());
+    if (bearing) out.push_back({T_rig_cam.translation(), T_rig_cam.rotation() * *bearing, o.point_world});
+  }
+  return out;
+}
+
+bool distinct_points(const Sample& s) {
+  return s[0]->point_world != s[1]->point_world && s[0]->point_world != s[2]->point_world &&
+         s[1]->point_world != s[2]->point_world;
+}
+
+// Three different rays, of different points where a few attempts find such: two cameras' views of one point say less.
+Sample draw(std::span<const Ray> rays, Random& random) {
+  const auto n = static_cast<std::uint32_t>(rays.size());
+  Sample sample{};
+  for (int attempt = 0; attempt < kRedraws; ++attempt) {
+    std::array<std::uint32_t, 3> index{};
+    do {
+      for (std::uint32_t& i : index) i = random.below(n);
+    } while (index[0] == index[1] || index[0] == index[2] || index[1] == index[2]);
+    for (std::size_t k = 0; k < 3; ++k) sample[k] = &rays[index[k]];
+    if (distinct_points(sample)) break;
+  }
+  return sample;
+}
+
+// Newton's method for the distances along the three rays at which the points found have the distances of those in the
+// world (docs/math.md, section 10), from those of a central rig. False where it does not arrive in front of all three.
+bool solve_distances(const Sample& sample, Vector3d& along) {
+  constexpr int kSteps = 8;
+  constexpr double kSolved = 1e-9;  // of the squared distances
+  for (int step = 0; step <= kSteps; ++step) {
+    Vector3d error;
+    Matrix3d J = Matrix3d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      const int l = (k + 1) % 3;
+      const Ray &x = *sample[static_cast<std::size_t>(k)], &y = *sample[static_cast<std::size_t>(l)];
+      const Vector3d between = x.origin + along(k) * x.direction - y.origin - along(l) * y.direction;
+      const double squared = (x.point_world - y.point_world).squaredNorm();
+      error(k) = between.squaredNorm() / squared - 1.0;
+      J(k, k) = 2.0 * between.dot(x.direction) / squared;
+      J(k, l) = -2.0 * between.dot(y.direction) / squared;
+    }
+    if (!error.allFinite()) return false;
+    if (error.cwiseAbs().maxCoeff() < kSolved) return along.minCoeff() > 0.0;
+    along -= J.inverse() * error;
+  }
+  return false;
+}
+
+// Up to four poses of the rig that see the sample's points along its rays.
+void solve_sample(const Sample& sample, std::vector<SE3>& T_rig_world) {
+  T_rig_world.clear();
+  opengv::bearingVectors_t bearings;
+  opengv::points_t points;
+  for (const Ray* ray : sample) {
+    bearings.push_back(ray->direction);
+    points.push_back(ray->point_world);
+  }
+  const opengv::absolute_pose::CentralAbsoluteAdapter adapter(bearings, points);
+  for (const auto& T : opengv::absolute_pose::p3p_kneip(adapter)) {  // world from a central rig; roots may be complex
+    if (!T.allFinite()) continue;
+    Vector3d along;
+    for (int k = 0; k < 3; ++k) {
+      const Ray& ray = *sample[static_cast<std::size_t>(k)];
+      along(k) = (ray.point_world - T.col(3)).dot(T.leftCols<3>() * ray.direction);
+    }
+    if (along.minCoeff() <= 0.0 || !solve_distances(sample, along)) continue;
+    std::array<Vector3d, 3> in_world, in_rig;
+    for (std::size_t k = 0; k < 3; ++k) {
+      in_world[k] = sample[k]->point_world;
+      in_rig[k] = sample[k]->origin + along(static_cast<int>(k)) * sample[k]->direction;
+    }
+    const auto S = geometry::align_points(in_world, in_rig, geometry::ScaleMode::kFixed);
+    if (S) T_rig_world.emplace_back(S->rotation(), S->translation());
+  }
+}
+
+// Samples needed for one without outliers with the confidence asked for, at this share of inliers.
+double samples_needed(double inlier_share, double confidence) {
+  const double all_inliers = std::pow(inlier_share, 3);
+  if (all_inliers >= 1.0) return 1.0;
+  return std::log(1.0 - confidence) / std::log1p(-all_inliers);
+}
+
+// The best pose so far, by what all observations say.
+class Search {
+ public:
+  Search(PoseProblem& problem, double bound)
+      : problem_(problem), bound_(bound), cost_(std::numeric_limits<double>::infinity()) {}
+
+  // True where the pose is better. It is improved over all that agrees with it: its own noise is that of three points.
+  bool offer(const SE3& T_rig_world) {
+    constexpr int kLocalSteps = 4;
+    const double cost = problem_.truncated_cost(T_rig_world, bound_, cost_);
+    if (!(cost < cost_)) return false;
+    take(T_rig_world, cost);
+    problem_.select(best_, bound_);
+    const PoseEquations equations = problem_.linearise(best_, Kernel::kHuber);
+    const SE3 local = minimise(problem_, best_, equations, Kernel::kHuber, kLocalSteps, 0.1);
+    const double local_cost = problem_.truncated_cost(local, bound_, cost_);
+    if (local_cost < cost_) take(local, local_cost);
+    return true;
+  }
+
+  const SE3& best() const { return best_; }
+  double inlier_share() {
+    problem_.select(best_, bound_);
+    return problem_.num_in_use() / static_cast<double>(problem_.items().size());
+  }
+
+ private:
+  void take(const SE3& T_rig_world, double cost) {
+    best_ = T_rig_world;
+    cost_ = cost;
+  }
+
+  PoseProblem& problem_;
+  double bound_, cost_;
+  SE3 best_;
+};
+
+int count_distinct_points(std::span<const PoseObservation> observations, const std::vector<std::uint8_t>& inlier) {
+  std::vector<std::array<double, 3>> points;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const Vector3d& p = observations[i].point_world;
+    if (inlier[i] != 0) points.push_back({p.x(), p.y(), p.z()});
+  }
+  std::sort(points.begin(), points.end());
+  return static_cast<int>(std::unique(points.begin(), points.end()) - points.begin());
+}
+
+}  // namespace
+
+PoseSolution absolute_pose(const Rig& rig, std::span<const PoseObservation> observations,
+                           const PoseSolverOptions& options, const AbsolutePoseOptions& ransac, Random random) {
+  const std::vector<Ray> rays = rays_of(rig, observations);
+  PoseProblem problem(rig, observations);
+  Search search(problem, ransac.inlier_chi2);
+  std::vector<SE3> candidates;
+  double needed = ransac.iterations;
+  for (int i = 0; rays.size() >= 3 && i < ransac.iterations && i < std::max<double>(kMinSamples, needed); ++i) {
+    solve_sample(draw(rays, random), candidates);
+    bool better = false;
+    for (const SE3& T : candidates) better |= search.offer(T);
+    if (better) needed = samples_needed(search.inlier_share(), ransac.confidence);
+  }
+  PoseSolution out = solve_rounds(problem, search.best(), ransac.inlier_chi2, options);
+  out.ok &= count_distinct_points(observations, out.inlier) >= ransac.min_inliers;
+  return out;
+}
+
+}  // namespace bslam::solver

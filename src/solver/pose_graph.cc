@@ -1,0 +1,320 @@
+#include "solver/pose_graph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <Eigen/SparseCholesky>
+
+#include "base/assert.h"
+#include "solver/block_pattern.h"
+
+namespace bslam::solver {
+namespace {
+
+using geometry::Matrix3d;
+using geometry::Sim3;
+using geometry::Vector3d;
+using geometry::Vector7d;
+using Edge = PoseGraphProblem::Edge;
+using Poses = std::vector<Sim3>;
+
+constexpr double kNegligible = 1e-10;  // share of the cost that rounding alone may change, and absolute cost of nothing
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Which vertices do not move: the fixed ones, and the first of every connected part without any.
+std::vector<std::uint8_t> held_vertices(const PoseGraphProblem& problem) {
+  std::vector<int> parent(problem.S_world.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int v) {
+    while (parent[at(v)] != v) v = parent[at(v)] = parent[at(parent[at(v)])];
+    return v;
+  };
+  for (const Edge& edge : problem.edges) {
+    const int a = root(edge.a), b = root(edge.b);
+    parent[at(std::max(a, b))] = std::min(a, b);  // a root is the first vertex of its part
+  }
+  std::vector<std::uint8_t> held = problem.fixed, anchored(parent.size(), 0);
+  for (std::size_t v = 0; v < parent.size(); ++v) anchored[at(root(static_cast<int>(v)))] |= problem.fixed[v] != 0;
+  for (std::size_t v = 0; v < parent.size(); ++v) held[v] |= parent[v] == static_cast<int>(v) && anchored[v] == 0;
+  return held;
+}
+
+// Block column of each vertex in the order of elimination (approximate minimum degree on vertices, which are a sixth or
+// seventh of the unknowns); -1 where it is held.
+std::vector<int> elimination_order(const PoseGraphProblem& problem) {
+  const std::vector<std::uint8_t> held = held_vertices(problem);
+  std::vector<int> column(held.size(), -1);
+  int count = 0;
+  for (std::size_t v = 0; v < held.size(); ++v) {
+    if (held[v] == 0) column[v] = count++;
+  }
+  std::vector<Eigen::Triplet<double>> links;
+  for (int c = 0; c < count; ++c) links.emplace_back(c, c, 1.0);
+  for (const Edge& edge : problem.edges) {
+    const int a = column[at(edge.a)], b = column[at(edge.b)];
+    if (a < 0 || b < 0) continue;
+    links.emplace_back(a, b, 1.0);
+    links.emplace_back(b, a, 1.0);
+  }
+  Eigen::SparseMatrix<double> graph(count, count);
+  graph.setFromTriplets(links.begin(), links.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;  // position -> what stood there before
+  Eigen::AMDOrdering<int>()(graph, order);
+  std::vector<int> position(at(count));
+  for (int k = 0; k < count; ++k) position[at(order.indices()(k))] = k;
+  for (int& c : column) c = c < 0 ? -1 : position[at(c)];
+  return column;
+}
+
+BlockPattern pattern_of(const PoseGraphProblem& problem, const std::vector<int>& column) {
+  const auto count = std::count_if(column.begin(), column.end(), [](int c) { return c >= 0; });
+  BlockPattern pattern(static_cast<int>(count));
+  for (int c = 0; c < pattern.size(); ++c) pattern.mark(c, c);
+  for (const Edge& edge : problem.edges) {
+    const auto [low, high] = std::minmax({column[at(edge.a)], column[at(edge.b)]});
+    if (low >= 0) pattern.mark(high, low);
+  }
+  pattern.number();
+  return pattern;
+}
+
+// The normal equations H delta = b in blocks of N unknowns a vertex: rotation, translation and, where N is 7, log
+// scale.
+template <int N>
+class PoseGraphEquations {
+ public:
+  using Vector = Eigen::Matrix<double, N, 1>;
+  using Matrix = Eigen::Matrix<double, N, N>;
+
+  // `problem` outlives this.
+  PoseGraphEquations(const PoseGraphProblem& problem, const PoseGraphOptions& options)
+      : problem_(problem),
+        column_(elimination_order(problem)),
+        pattern_(pattern_of(problem, column_)),
+        blocks_(pattern_.positions().size()),
+        rhs_(N * pattern_.size()) {
+    inverse_sigma_.template head<3>().setConstant(1.0 / options.sigma_rotation);
+    inverse_sigma_.template segment<3>(3).setConstant(1.0 / options.sigma_translation);
+    if constexpr (N == 7) inverse_sigma_(6) = 1.0 / options.sigma_log_scale;
+    S_b_a_.reserve(problem.edges.size());
+    for (const Edge& edge : problem.edges) S_b_a_.push_back(edge.S_a_b.inverse());
+    lay_out();
+  }
+
+  bool empty() const { return pattern_.size() == 0; }
+
+  double cost(const Poses& S_world) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < S_b_a_.size(); ++k) sum += 0.5 * evaluate(k, S_world).error.squaredNorm();
+    return sum;
+  }
+
+  // Returns the cost.
+  double linearise(const Poses& S_world) {
+    for (Matrix& block : blocks_) block.setZero();
+    rhs_.setZero();
+    double sum = 0.0;
+    for (std::size_t k = 0; k < S_b_a_.size(); ++k) {
+      const Residual r = evaluate(k, S_world);
+      sum += 0.5 * r.error.squaredNorm();
+      add(k, r);
+    }
+    return sum;
+  }
+
+  // Solves (H + damping diag(H)) delta = b. False where that fails; `predicted` is the decrease of the cost.
+  bool solve(double damping, Eigen::VectorXd& delta, double& predicted) {
+    fill(1.0 + damping);
+    factor_.factorize(sparse_);
+    if (factor_.info() != Eigen::Success) return false;
+    delta = factor_.solve(rhs_);
+    predicted = 0.5 * delta.dot(rhs_);
+    for (int c = 0; c < pattern_.size(); ++c) {
+      const auto d = delta.segment<N>(N * c);
+      predicted += 0.5 * damping * d.cwiseAbs2().dot(blocks_[at(pattern_.index(c, c))].diagonal());
+    }
+    return delta.allFinite() && std::isfinite(predicted);
+  }
+
+  void apply(const Eigen::VectorXd& delta, const Poses& S_world, Poses& moved) const {
+    for (std::size_t v = 0; v < S_world.size(); ++v) {
+      Vector7d step = Vector7d::Zero();
+      if (column_[v] >= 0) step.head<N>() = delta.segment<N>(N * column_[v]);
+      moved[v] = column_[v] >= 0 ? S_world[v].perturbed(step) : S_world[v];
+    }
+  }
+
+ private:
+  struct Residual {
+    Vector error;    // normalised
+    Sim3 S_b_b;      // S_b_a(measured) S_a_world S_world_b: identity where the edge is met
+    Vector weights;  // 1 / sigma of each component
+  };
+
+  Residual evaluate(std::size_t k, const Poses& S_world) const {
+    const Edge& edge = problem_.edges[k];
+    Residual out;
+    out.S_b_b = S_b_a_[k] * (S_world[at(edge.a)] * S_world[at(edge.b)].inverse());
+    out.error.template head<3>() = geometry::so3_log(out.S_b_b.rotation());
+    out.error.template segment<3>(3) = out.S_b_b.translation();
+    if constexpr (N == 7) out.error(6) = std::log(out.S_b_b.scale());
+    out.weights = std::sqrt(edge.weight) * inverse_sigma_;
+    out.error = out.error.cwiseProduct(out.weights).eval();
+    return out;
+  }
+
+  // Adds the residual with its Jacobians: docs/math.md, section 9.
+  void add(std::size_t k, const Residual& r) {
+    const Edge& edge = problem_.edges[k];
+    const Sim3& M = S_b_a_[k];
+    const Matrix3d J_log = geometry::so3_left_jacobian_inverse(geometry::so3_log(r.S_b_b.rotation()));
+    const Matrix3d R_m = M.rotation().toRotationMatrix(), R_e = r.S_b_b.rotation().toRotationMatrix();
+    const Vector3d between = M.translation() - r.S_b_b.translation();
+    Matrix J_a = Matrix::Zero(), J_b = Matrix::Zero();
+    J_a.template block<3, 3>(0, 0) = J_log * R_m;
+    J_a.template block<3, 3>(3, 0) = geometry::skew(between) * R_m;
+    J_a.template block<3, 3>(3, 3) = M.scale() * R_m;
+    J_b.template block<3, 3>(0, 0) = -J_log * R_e;
+    J_b.template block<3, 3>(3, 3) = -r.S_b_b.scale() * R_e;
+    if constexpr (N == 7) {
+      J_a.template block<3, 1>(3, 6) = -between;
+      J_a(6, 6) = 1.0;
+      J_b(6, 6) = -1.0;
+    }
+    J_a = (r.weights.asDiagonal() * J_a).eval();
+    J_b = (r.weights.asDiagonal() * J_b).eval();
+    const int a = column_[at(edge.a)], b = column_[at(edge.b)];
+    if (a >= 0) add_vertex(a, J_a, r.error);
+    if (b >= 0) add_vertex(b, J_b, r.error);
+    if (a < 0 || b < 0) return;
+    if (a > b) {
+      blocks_[at(pattern_.index(a, b))].noalias() += J_a.transpose() * J_b;
+    } else {
+      blocks_[at(pattern_.index(b, a))].noalias() += J_b.transpose() * J_a;
+    }
+  }
+
+  void add_vertex(int column, const Matrix& J, const Vector& error) {
+    blocks_[at(pattern_.index(column, column))].noalias() += J.transpose() * J;
+    rhs_.template segment<N>(N * column).noalias() -= J.transpose() * error;
+  }
+
+  // Structure of the lower triangle, compressed by columns; values follow in the same order in fill.
+  void lay_out() {
+    const auto& positions = pattern_.positions();
+    column_begin_.assign(at(pattern_.size()) + 1, 0);
+    for (const auto& p : positions) ++column_begin_[at(p.column) + 1];
+    for (std::size_t c = 1; c < column_begin_.size(); ++c) column_begin_[c] += column_begin_[c - 1];
+    sparse_.resize(rhs_.size(), rhs_.size());
+    sparse_.reserve(static_cast<Eigen::Index>(N * N * positions.size()));
+    for (int column = 0; column < N * pattern_.size(); ++column) {
+      sparse_.startVec(column);
+      for (std::size_t b = column_begin_[at(column / N)]; b < column_begin_[at(column / N) + 1]; ++b) {
+        for (int row = N * positions[b].row; row < N * positions[b].row + N; ++row) {
+          if (row >= column) sparse_.insertBack(row, column) = 0.0;
+        }
+      }
+    }
+    sparse_.finalize();
+    factor_.analyzePattern(sparse_);
+  }
+
+  void fill(double diagonal_factor) {
+    double* value = sparse_.valuePtr();
+    for (std::size_t c = 0; c + 1 < column_begin_.size(); ++c) {
+      for (int k = 0; k < N; ++k) {
+        for (std::size_t b = column_begin_[c]; b < column_begin_[c + 1]; ++b) {
+          const bool diagonal = b == column_begin_[c];  // the first of each column
+          for (int r = diagonal ? k : 0; r < N; ++r) {
+            *value++ = blocks_[b](r, k) * (diagonal && r == k ? diagonal_factor : 1.0);
+          }
+        }
+      }
+    }
+  }
+
+  const PoseGraphProblem& problem_;
+  std::vector<int> column_;  // per vertex, -1: held
+  BlockPattern pattern_;
+  std::vector<Matrix> blocks_;
+  Eigen::VectorXd rhs_;
+  Vector inverse_sigma_;
+  std::vector<Sim3> S_b_a_;  // per edge, the measurement's inverse
+  std::vector<std::size_t> column_begin_;
+  Eigen::SparseMatrix<double> sparse_;
+  // The order of elimination is that of the blocks. Eigen's own code, MPL-2.
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor_;
+};
+
+// Gauss-Newton, damped once a step fails.
+template <int N>
+PoseGraphSummary minimise(const PoseGraphProblem& problem, const PoseGraphOptions& options, const std::stop_token& stop,
+                          Poses& S_world) {
+  constexpr double kFirstDamping = 1e-4, kMaxDamping = 1e12, kMinGain = 1e-3;
+  PoseGraphEquations<N> equations(problem, options);
+  PoseGraphSummary out;
+  double cost = equations.linearise(S_world), damping = 0.0;
+  out.initial_cost = out.final_cost = cost;
+  if (!std::isfinite(cost)) return out;
+  out.stop = equations.empty() ? PoseGraphStop::kConverged : PoseGraphStop::kIterations;
+  bool any_solved = false;
+  Poses trial = S_world;
+  Eigen::VectorXd delta;
+  for (; out.stop == PoseGraphStop::kIterations && out.iterations < options.iterations; ++out.iterations) {
+    if (stop.stop_requested()) {
+      out.stop = PoseGraphStop::kStopped;
+      return out;
+    }
+    double predicted = 0.0, trial_cost = std::numeric_limits<double>::infinity();
+    const bool solved = equations.solve(damping, delta, predicted);
+    any_solved |= solved;
+    if (solved && predicted <= kNegligible * (1.0 + cost)) {
+      out.stop = PoseGraphStop::kConverged;
+      break;
+    }
+    if (solved) {
+      equations.apply(delta, S_world, trial);
+      trial_cost = equations.cost(trial);
+    }
+    if (!(cost - trial_cost > kMinGain * predicted)) {
+      damping = std::max(kFirstDamping, 10.0 * damping);
+      if (damping > kMaxDamping) out.stop = PoseGraphStop::kConverged;
+      continue;
+    }
+    damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
+    std::swap(S_world, trial);
+    if (cost - trial_cost <= options.relative_decrease * cost) out.stop = PoseGraphStop::kConverged;
+    out.final_cost = cost = trial_cost;
+    if (out.stop != PoseGraphStop::kConverged) equations.linearise(S_world);
+  }
+  if (!equations.empty() && !any_solved) out.stop = PoseGraphStop::kFailed;
+  return out;
+}
+
+void check(const PoseGraphProblem& problem) {
+  const auto count = static_cast<int>(problem.S_world.size());
+  BSLAM_ASSERT(problem.fixed.size() == problem.S_world.size(), "every vertex is fixed or not");
+  const auto rigid = [](const Sim3& S) { return !(S.scale() < 1.0) && !(S.scale() > 1.0); };
+  for (const Edge& edge : problem.edges) {
+    BSLAM_ASSERT(edge.a >= 0 && edge.a < count && edge.b >= 0 && edge.b < count, "an edge names vertices of the graph");
+    BSLAM_ASSERT(edge.a != edge.b && edge.weight > 0, "an edge has two ends and a positive weight");
+    BSLAM_ASSERT(problem.scale_free || rigid(edge.S_a_b), "a measured scale only where it is free");
+  }
+  for (const Sim3& S : problem.S_world) BSLAM_ASSERT(problem.scale_free || rigid(S), "scale 1 where it is not free");
+}
+
+}  // namespace
+
+PoseGraphSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop) {
+  check(problem);
+  Poses S_world = problem.S_world;
+  const PoseGraphSummary summary =
+      problem.scale_free ? minimise<7>(problem, options, stop, S_world) : minimise<6>(problem, options, stop, S_world);
+  if (summary.usable()) problem.S_world = std::move(S_world);
+  return summary;
+}
+
+}  // namespace bslam::solver

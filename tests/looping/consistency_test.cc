@@ -1,0 +1,82 @@
+#include "looping/consistency.h"
+
+#include <gtest/gtest.h>
+
+#include "simulated_hall.h"
+
+namespace bslam::looping {
+namespace {
+
+// A walk whose keyframes are covisible with their next neighbours; keyframes 3 to 6 are one place, 20 to 23 another.
+class Consistency : public ::testing::Test {
+ protected:
+  Consistency() {
+    options.consistent_keyframes = 3;
+    options.max_keyframe_gap = 3;
+  }
+  // Those of a keyframe's candidates that are consistent.
+  std::vector<KeyframeId> told(int keyframe, const std::vector<int>& candidates) {
+    std::vector<Candidate> list;
+    for (const int c : candidates) list.push_back({KeyframeId(c), 1.0});
+    std::vector<KeyframeId> out;
+    for (const Candidate& c : consistent_candidates(map_, KeyframeId(keyframe), list, options, history_)) out.push_back(c.keyframe);
+    return out;
+  }
+  static std::vector<KeyframeId> ids(const std::vector<int>& values) { return {values.begin(), values.end()}; }
+
+  LoopOptions options;
+  const map::BundledMap& map_ = exact_walk(1).map;
+  RecognitionHistory history_;
+};
+
+TEST_F(Consistency, APlaceCountsOnceSeveralKeyframesHaveRecognisedIt) {
+  EXPECT_EQ(told(28, {3}), ids({}));
+  EXPECT_EQ(told(29, {4}), ids({}));
+  EXPECT_EQ(told(30, {5}), ids({5}));
+  EXPECT_EQ(told(31, {6}), ids({6}));
+}
+
+TEST_F(Consistency, OneKeyframeSufficesWhereNoMoreAreAskedFor) {
+  options.consistent_keyframes = 1;
+  EXPECT_EQ(told(28, {3, 20}), ids({3, 20}));
+}
+
+TEST_F(Consistency, SeveralCandidatesOfAPlaceInOneKeyframeCountOnce) {
+  EXPECT_EQ(told(28, {3, 4, 5}), ids({}));
+  EXPECT_EQ(told(29, {3, 4, 5}), ids({}));
+  EXPECT_EQ(told(30, {3, 4, 5}), ids({3, 4, 5}));
+}
+
+TEST_F(Consistency, PlacesAreCountedApart) {
+  EXPECT_EQ(told(28, {3}), ids({}));
+  EXPECT_EQ(told(29, {20}), ids({}));
+  EXPECT_EQ(told(30, {21, 4}), ids({}));
+  EXPECT_EQ(told(31, {5, 22}), ids({5, 22}));
+}
+
+TEST_F(Consistency, ItOutlivesKeyframesThatDoNotSeeThePlace) {
+  told(20, {3});
+  told(22, {});
+  EXPECT_EQ(told(23, {4}), ids({}));  // the second
+  EXPECT_EQ(told(26, {5}), ids({5}));
+}
+
+TEST_F(Consistency, ItIsForgottenAfterTooManyOfThem) {
+  told(20, {3});
+  told(21, {4});
+  EXPECT_EQ(told(25, {5}), ids({}));
+  EXPECT_EQ(told(26, {5}), ids({}));
+  EXPECT_EQ(told(27, {5}), ids({5}));
+}
+
+TEST_F(Consistency, NothingIsKeptOfPlacesNotSeenAgain) {
+  told(20, {3, 20});
+  EXPECT_EQ(history_.places.size(), 2u);
+  told(21, {});
+  EXPECT_EQ(history_.places.size(), 2u);
+  told(24, {});
+  EXPECT_TRUE(history_.places.empty());
+}
+
+}  // namespace
+}  // namespace bslam::looping

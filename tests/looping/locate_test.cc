@@ -1,0 +1,161 @@
+// Geometric verification: the right place gives the pose, any other a reason.
+#include "looping/locate.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "simulated_hall.h"
+
+namespace bslam::looping {
+namespace {
+
+constexpr double kFar = 0.006, kTurned = 0.1 * kDegree;  // metres, radians: what noise of 0.7 px on 100 keypoints allows
+
+void expect_true_pose(const Location& location, const SE3& T_rig_world, double metres = kFar) {
+  EXPECT_LT(distance_m(location.T_rig_world, T_rig_world), metres);
+  EXPECT_LT(angle_rad(location.T_rig_world, T_rig_world), kTurned);
+}
+
+class LocateRig : public ::testing::TestWithParam<int> {};
+
+TEST_P(LocateRig, FindsThePoseOfAFrameTakenWhereTheCandidateWas) {
+  const HallMap& world = exact_walk(GetParam());
+  const FeatureSimulator simulator = hall(rig_of(GetParam()));
+  for (const int at : {3, 11, 25}) {
+    const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at + 0.4);
+    LocateReport report;
+    const auto location = locate(world.map, seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
+    ASSERT_TRUE(location) << "rejected for " << static_cast<int>(report.rejection);
+    EXPECT_EQ(report.rejection, Rejection::kNone);
+    EXPECT_EQ(location->with, KeyframeId(at));
+    EXPECT_EQ(location->inliers, report.inliers);
+    EXPECT_GT(location->inliers, 100);
+    expect_true_pose(*location, seen.T_world_rig.inverse());
+  }
+}
+
+TEST_P(LocateRig, ItsMatchesAreDistinctAndTrue) {
+  const HallMap& world = exact_walk(GetParam());
+  const SimulatedFrame seen = hall(rig_of(GetParam())).frame(FrameId(1000), kStepS * 8 + 0.5);
+  const auto location = locate(world.map, seen.frame, KeyframeId(8), {}, kFeatures, seeded(1));
+  ASSERT_TRUE(location);
+  std::set<FeatureId> features;
+  std::set<LandmarkId> landmarks;
+  int wrong = 0;
+  for (const auto& [feature, l] : location->matches) {
+    EXPECT_TRUE(features.insert(feature).second && landmarks.insert(l).second);
+    wrong += map::shown_by(seen, feature) != world.shown_by_landmark[l.index()].second;
+  }
+  EXPECT_TRUE(std::is_sorted(location->matches.begin(), location->matches.end()));
+  EXPECT_LE(wrong, static_cast<int>(location->matches.size() / 100));
+}
+
+TEST_P(LocateRig, SaysTheSameForTheSameSeed) {
+  const HallMap& world = exact_walk(GetParam());
+  const SimulatedFrame seen = hall(rig_of(GetParam())).frame(FrameId(1000), kStepS * 8 + 0.5);
+  const auto a = locate(world.map, seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
+  const auto b = locate(world.map, seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->T_rig_world.translation(), b->T_rig_world.translation());
+  EXPECT_EQ(a->T_rig_world.rotation().coeffs(), b->T_rig_world.rotation().coeffs());
+  EXPECT_EQ(a->matches, b->matches);
+}
+
+// The same geometry with other descriptors.
+TEST_P(LocateRig, AHallThatLooksDifferentIsNeverAccepted) {
+  const HallMap& world = exact_walk(GetParam());
+  const FeatureSimulator simulator = hall(rig_of(GetParam()));
+  for (int at = 0; at < 30; ++at) {
+    const SimulatedFrame other = redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 1.0, static_cast<std::uint64_t>(at));
+    LocateReport report;
+    EXPECT_FALSE(locate(world.map, other.frame, KeyframeId(at), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
+    EXPECT_TRUE(report.rejection == Rejection::kFewMatches || report.rejection == Rejection::kNoConsensus);
+  }
+}
+
+// One landmark in eight is of the kind that stands in every room: the geometry agrees, but too little of what should be
+// there is.
+TEST_P(LocateRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
+  const HallMap& world = exact_walk(GetParam());
+  const FeatureSimulator simulator = hall(rig_of(GetParam()));
+  std::set<Rejection> reasons;
+  for (int at = 0; at < 30; ++at) {
+    const SimulatedFrame other = redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 0.875, static_cast<std::uint64_t>(at));
+    LocateReport report;
+    EXPECT_FALSE(locate(world.map, other.frame, KeyframeId(at), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
+    reasons.insert(report.rejection);
+  }
+  // With fewer inliers asked for, it is the share that decides.
+  VerificationOptions options;
+  options.min_inliers = 15;
+  const SimulatedFrame other = redecorated(simulator.frame(FrameId(2000), kStepS * 8), 0.875, 1);
+  LocateReport report;
+  EXPECT_FALSE(locate(world.map, other.frame, KeyframeId(8), options, kFeatures, seeded(1), &report));
+  EXPECT_EQ(report.rejection, Rejection::kFewFound);
+  EXPECT_LT(report.inliers, report.visible / 4);
+  EXPECT_FALSE(reasons.contains(Rejection::kNone));
+}
+
+TEST_P(LocateRig, AnotherPlaceOfTheHallIsNeverAccepted) {
+  const HallMap& world = exact_walk(GetParam());
+  const FeatureSimulator simulator = hall(rig_of(GetParam()));
+  for (int at = 0; at < 12; ++at) {
+    const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at);
+    LocateReport report;
+    EXPECT_FALSE(locate(world.map, seen.frame, KeyframeId(at + 20), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
+    EXPECT_EQ(report.rejection, Rejection::kFewMatches);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, LocateRig, ::testing::Values(1, 2, 4));
+
+// The rig comes the other way: what the left camera saw is before the right one now.
+TEST(Locate, AnotherCameraThanThenFindsThePlace) {
+  const HallMap& world = exact_walk(4);
+  const FeatureSimulator back = hall(rig_of(4), std::numbers::pi);
+  for (const int at : {5, 14, 22}) {
+    const SimulatedFrame seen = back.frame(FrameId(1000 + at), kStepS * at + 0.3);
+    LocateReport report;
+    const auto location = locate(world.map, seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
+    ASSERT_TRUE(location) << "rejected for " << static_cast<int>(report.rejection);
+    expect_true_pose(*location, seen.T_world_rig.inverse());
+    int by_another = 0;  // matches with landmarks that this camera has never seen
+    for (const auto& [feature, l] : location->matches) {
+      std::set<CameraIndex> then;
+      for (const map::Observation& o : world.map.observations(l)) {
+        for (const frame::KeypointRef r : world.map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature)) then.insert(r.camera);
+      }
+      by_another += !then.contains(seen.frame.bundled.keypoints(feature).front().camera);
+    }
+    EXPECT_GT(by_another, 50);
+  }
+}
+
+TEST(Locate, FisheyesFindThePlaceTurnedRound) {
+  const camera::Rig rig = simulation::fisheye_rig(2);
+  HallMap world(rig);
+  const FeatureSimulator simulator = hall(rig), back = hall(rig, std::numbers::pi);
+  for (int i = 0; i < 6; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
+  const SimulatedFrame seen = back.frame(FrameId(1000), kStepS * 2 + 0.5);
+  const auto location = locate(world.map, seen.frame, KeyframeId(2), {}, kFeatures, seeded(1));
+  ASSERT_TRUE(location);
+  expect_true_pose(*location, seen.T_world_rig.inverse(), 0.015);  // 3 times fewer pixels a radian
+}
+
+TEST(Locate, LandmarksAboutAKeyframeAreThoseSeenMostOften) {
+  const HallMap& world = exact_walk(1);
+  const std::vector<LandmarkId> all = landmarks_about(world.map, KeyframeId(9), 4, 100000), few = landmarks_about(world.map, KeyframeId(9), 4, 50);
+  const std::set<LandmarkId> distinct(all.begin(), all.end());
+  EXPECT_EQ(distinct.size(), all.size());
+  for (const LandmarkId l : world.map.keyframe(KeyframeId(9)).landmarks) EXPECT_TRUE(!l.valid() || distinct.contains(l));
+  for (const map::Covisible& c : world.map.best_covisible(KeyframeId(9), 4)) {
+    for (const LandmarkId l : world.map.keyframe(c.keyframe).landmarks) EXPECT_TRUE(!l.valid() || distinct.contains(l));
+  }
+  ASSERT_EQ(few.size(), 50u);
+  EXPECT_TRUE(std::equal(few.begin(), few.end(), all.begin()));
+  for (std::size_t i = 1; i < all.size(); ++i) EXPECT_GE(world.map.observations(all[i - 1]).size(), world.map.observations(all[i]).size());
+}
+
+}  // namespace
+}  // namespace bslam::looping

@@ -1,0 +1,138 @@
+// The loop stage as a whole, keyframe by keyframe.
+#include "looping/loop_closer.h"
+
+#include <gtest/gtest.h>
+
+#include "map/synthetic_map.h"
+#include "simulated_hall.h"
+
+namespace bslam::looping {
+namespace {
+
+using map::Fingerprint;
+
+// Everything counts as drift.
+LoopingOptions credulous() {
+  LoopingOptions options;
+  options.loop.max_drift = 10;
+  return options;
+}
+
+// The stage beside a map that grows: hands it every keyframe until it closes a loop.
+class Watch {
+ public:
+  explicit Watch(const LoopingOptions& options = {}, std::uint64_t seed = 1) : closer_(recogniser(), options, kFeatures, seed) {}
+
+  // True while nothing was found; the draft is untouched then.
+  bool operator()(const HallMap& world, KeyframeId k) {
+    map::MapDraft draft = world.draft();
+    closure = closer_.close(k, draft);
+    if (closure) {
+      corrected = draft.map();
+    } else {
+      EXPECT_TRUE(std::move(draft).finish().edit.operations.empty());
+    }
+    return !closure;
+  }
+
+  std::optional<LoopClosure> closure;
+  std::optional<map::BundledMap> corrected;
+
+ private:
+  LoopCloser closer_;
+};
+
+class LoopCloserRig : public ::testing::TestWithParam<int> {};
+
+TEST_P(LoopCloserRig, ClosesTheLoopWhereTheEndSeesTheStartAndNotBefore) {
+  Watch watch;
+  const HallMap world = walk(hall(rig_of(GetParam())), 5, rigid_drift(), [&](const HallMap& w, KeyframeId k) { return watch(w, k); });
+  ASSERT_TRUE(watch.closure);
+  const KeyframeId k = watch.closure->keyframe;
+  EXPECT_EQ(k, world.map.newest_keyframe());
+  EXPECT_GT(k.value(), kRound - 12);
+  EXPECT_LT(distance_m(world.truth(k), world.truth(watch.closure->with)), 9.0);  // one may see what the other saw
+  EXPECT_FALSE(watch.closure->joined);
+  const double before = distance_m(world.map.keyframe(k).T_rig_world, world.truth(k));
+  EXPECT_LT(5 * distance_m(watch.corrected->keyframe(k).T_rig_world, world.truth(k)), before);
+  EXPECT_EQ(watch.corrected->check_invariants(), std::nullopt);
+}
+
+TEST_P(LoopCloserRig, SaysTheSameForTheSameSeed) {
+  const auto corrected = [&] {
+    Watch watch;
+    const HallMap& world = drifted_walk(GetParam());
+    watch(world, KeyframeId(kRound));
+    watch(world, KeyframeId(kRound + 1));
+    return watch.corrected;
+  };
+  const auto a = corrected(), b = corrected();
+  ASSERT_TRUE(a && b);
+  EXPECT_TRUE(Fingerprint(*a) == Fingerprint(*b));
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, LoopCloserRig, ::testing::Values(1, 2, 4));
+
+TEST(LoopCloser, AsksForAsManyKeyframesInARowAsToldTo) {
+  const HallMap& world = drifted_walk(2);
+  Watch watch;
+  EXPECT_TRUE(watch(world, KeyframeId(kRound)));
+  EXPECT_FALSE(watch(world, KeyframeId(kRound + 1)));
+  LoopingOptions hasty;
+  hasty.loop.consistent_keyframes = 1;
+  EXPECT_FALSE(Watch(hasty)(world, KeyframeId(kRound)));
+}
+
+TEST(LoopCloser, NothingIsClosedOnAWalkThatComesNowhereBack) {
+  Watch watch;
+  const FeatureSimulator simulator = hall(rig_of(4));
+  HallMap world(simulator.rig());
+  for (int i = 0; i < 2 * kRound / 3; ++i) EXPECT_TRUE(watch(world, world.add(simulator.frame(FrameId(i), kStepS * i))));
+}
+
+// Two rooms that look the same in all, 8 m apart: from the one into the other, what is asked for is no drift.
+void two_rooms(int cameras, Watch& watch) {
+  const FeatureSimulator simulator = hall(rig_of(cameras));
+  HallMap world(simulator.rig());
+  const SE3 next_door(Eigen::Quaterniond::Identity(), {0, 8, 0});
+  for (int i = 0; i < 12; ++i) {
+    const int room = i / 6;
+    if (!watch(world, world.add(simulator.frame(FrameId(i), kStepS * (i % 6)), {}, room, room == 1 ? next_door : SE3()))) return;
+  }
+}
+
+TEST(LoopCloser, RefusesACorrectionThatNoDriftExplains) {
+  for (const int cameras : {1, 2, 4}) {
+    Watch watch, believer(credulous());
+    two_rooms(cameras, watch);
+    EXPECT_FALSE(watch.closure);
+    two_rooms(cameras, believer);
+    ASSERT_TRUE(believer.closure);  // it is the bound alone that refuses
+    EXPECT_NEAR(believer.closure->moved, 8.0, 0.05);
+  }
+}
+
+// After a part begins anew, its first keyframes that know an old place bring both together.
+TEST(LoopCloser, JoinsPartsAtAPlaceBothHaveSeen) {
+  for (const int cameras : {1, 2, 4}) {
+    const FeatureSimulator simulator = hall(rig_of(cameras));
+    const Sim3 elsewhere(Sim3::exp((geometry::Vector7d() << 0.1, 0.3, -1.2, 15, -7, 2, 0).finished()));
+    HallMap world(simulator.rig());
+    Watch watch;
+    for (int i = 0; i < 10; ++i) ASSERT_TRUE(watch(world, world.add(simulator.frame(FrameId(i), kStepS * i))));
+    for (int i = 10; i < 13; ++i) {
+      const KeyframeId k = world.add(simulator.frame(FrameId(i), kStepS * (i - 6) + 0.5), elsewhere, 0, {}, i == 10);
+      if (!watch(world, k)) break;
+    }
+    ASSERT_TRUE(watch.closure);
+    EXPECT_TRUE(watch.closure->joined);
+    EXPECT_EQ(watch.corrected->roots(), std::vector{KeyframeId(0)});
+    EXPECT_EQ(watch.corrected->check_invariants(), std::nullopt);
+    for (const KeyframeId k : watch.corrected->keyframe_ids()) {
+      EXPECT_LT(distance_m(watch.corrected->keyframe(k).T_rig_world, world.truth(k)), 0.02);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bslam::looping

@@ -1,0 +1,279 @@
+// What a recognised place changes in a map that has drifted.
+#include "looping/loop_correction.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "map/synthetic_map.h"
+#include "simulated_hall.h"
+
+namespace bslam::looping {
+namespace {
+
+using Eigen::Vector3d;
+using map::Fingerprint;
+
+constexpr KeyframeId kLast(kRound + 1);
+
+std::optional<Location> locate_last(const HallMap& world) {
+  return locate(world.map, *world.map.keyframe(kLast).frame, KeyframeId(1), {}, kFeatures, seeded(1));
+}
+
+// Metres between where the map has a keyframe and where it was, and the same for the landmarks it observes, in the mean.
+double error_of(const HallMap& world, const map::BundledMap& map, KeyframeId k) {
+  return distance_m(map.keyframe(k).T_rig_world, world.truth(k));
+}
+double landmark_error(const HallMap& world, const map::BundledMap& map, KeyframeId k) {
+  double sum = 0;
+  int count = 0;
+  for (const LandmarkId l : map.keyframe(k).landmarks) {
+    if (!l.valid()) continue;
+    sum += (map.landmark(l).position - world.truth(l)).norm();
+    ++count;
+  }
+  return sum / count;
+}
+double mean_error(const HallMap& world, const map::BundledMap& map) {
+  double sum = 0;
+  for (const KeyframeId k : map.keyframe_ids()) sum += error_of(world, map, k);
+  return sum / static_cast<double>(map.num_keyframes());
+}
+
+int weight_between(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
+  const std::vector<map::Covisible>& list = map.keyframe(a).covisible;
+  const auto at = std::ranges::lower_bound(list, b, {}, &map::Covisible::keyframe);
+  return at != list.end() && at->keyframe == b ? at->weight : 0;
+}
+
+// View directions and distance ranges are those of the present positions.
+void expect_refreshed(const map::BundledMap& map) {
+  map::BundledMap again = map;
+  int stale = 0;
+  for (const LandmarkId l : map.landmark_ids()) {
+    again.refresh_landmark(l);
+    const map::Landmark &ours = map.landmark(l), &anew = again.landmark(l);
+    stale += (ours.view_direction - anew.view_direction).norm() > 1e-6 || std::abs(ours.max_distance / anew.max_distance - 1) > 1e-5;
+  }
+  EXPECT_EQ(stale, 0) << "of " << map.num_landmarks();
+}
+
+class CloseLoopRig : public ::testing::TestWithParam<int> {
+ protected:
+  CloseLoopRig() : world(drifted_walk(GetParam())), location(locate_last(world)), draft(world.draft()) {}
+  void SetUp() override {
+    ASSERT_TRUE(location);
+    closure = measure(world.map, kLast, *location);
+    close_loop(closure, *location, {}, kFeatures, draft);
+  }
+
+  const HallMap& world;
+  const std::optional<Location> location;
+  map::MapDraft draft;
+  LoopClosure closure;
+};
+
+TEST_P(CloseLoopRig, MeasuresTheDrift) {
+  EXPECT_EQ(closure.keyframe, kLast);
+  EXPECT_EQ(closure.with, KeyframeId(1));
+  EXPECT_NEAR(closure.moved, error_of(world, world.map, kLast), 0.05);
+  EXPECT_NEAR(closure.turned, angle_rad(world.map.keyframe(kLast).T_rig_world, world.truth(kLast)), 0.1 * kDegree);
+  EXPECT_EQ(closure.scaled, 1.0);
+  EXPECT_FALSE(closure.joined);
+  EXPECT_GT(closure.inliers, 100);
+  EXPECT_TRUE(plausible(world.map, closure, {}));
+  LoopOptions strict;
+  strict.max_drift = 0.001;
+  EXPECT_FALSE(plausible(world.map, closure, strict));
+}
+
+TEST_P(CloseLoopRig, BringsTheKeyframesBack) {
+  for (const KeyframeId k : {kLast, KeyframeId(kLast.value() - 1), KeyframeId(kLast.value() - 4)}) {
+    EXPECT_LT(5 * error_of(world, draft.map(), k), error_of(world, world.map, k));
+    EXPECT_LT(5 * angle_rad(draft.map().keyframe(k).T_rig_world, world.truth(k)), angle_rad(world.map.keyframe(k).T_rig_world, world.truth(k)));
+  }
+  EXPECT_LT(2 * mean_error(world, draft.map()), mean_error(world, world.map));  // the graph knows both ends only
+  EXPECT_EQ(error_of(world, draft.map(), KeyframeId(0)), error_of(world, world.map, KeyframeId(0)));
+}
+
+TEST_P(CloseLoopRig, LandmarksMoveWithTheirKeyframes) {
+  EXPECT_LT(5 * landmark_error(world, draft.map(), kLast), landmark_error(world, world.map, kLast));
+  int checked = 0;
+  for (const LandmarkId l : draft.map().landmark_ids()) {
+    const map::LandmarkReference& before = world.map.landmark(l).reference;
+    if (draft.map().landmark(l).reference.keyframe != before.keyframe) continue;
+    const Vector3d in_rig = world.map.keyframe(before.keyframe).T_rig_world * world.map.landmark(l).position;
+    const Vector3d now = draft.map().keyframe(before.keyframe).T_rig_world * draft.map().landmark(l).position;
+    ASSERT_LT((in_rig - now).norm(), 1e-9);
+    ++checked;
+  }
+  EXPECT_GT(checked, 1000);
+  expect_refreshed(draft.map());
+}
+
+TEST_P(CloseLoopRig, FusesWhatIsSeenOnBothEnds) {
+  const map::BundledMap& after = draft.map();
+  EXPECT_EQ(weight_between(world.map, kLast, KeyframeId(1)), 0);
+  EXPECT_GT(weight_between(after, kLast, KeyframeId(1)), 60);
+  int merged = 0, wrong = 0;
+  for (const LandmarkId l : world.map.landmark_ids()) {
+    if (after.alive(l) || !after.resolve(l).valid()) continue;
+    ++merged;
+    wrong += world.shown_by_landmark[l.index()] != world.shown_by_landmark[after.resolve(l).index()];
+    EXPECT_LT(after.resolve(l), l);  // the place keeps its landmarks
+  }
+  EXPECT_GT(merged, 100);
+  EXPECT_LE(wrong, merged / 100);
+
+  // Few are left twice in view of the last keyframe and the place.
+  std::set<HallMap::Shown> then;
+  for (const LandmarkId l : landmarks_about(after, KeyframeId(1), 3, 100000)) then.insert(world.shown_by_landmark[l.index()]);
+  int known = 0, twice = 0;
+  for (const LandmarkId l : after.keyframe(kLast).landmarks) {
+    if (!l.valid() || !then.contains(world.shown_by_landmark[l.index()])) continue;
+    ++known;
+    twice += world.map.landmark(l).born > KeyframeId(kRound / 2);
+  }
+  EXPECT_LT(twice, known / 10) << "of " << known;
+}
+
+TEST_P(CloseLoopRig, LeavesAMapInOrder) {
+  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+  EXPECT_EQ(draft.map().gauge_epoch(), world.map.gauge_epoch() + 1);
+  EXPECT_EQ(draft.map().num_keyframes(), world.map.num_keyframes());
+}
+
+TEST_P(CloseLoopRig, GivesTheSameBytesAgain) {
+  map::MapDraft again = world.draft();
+  close_loop(closure, *location, {}, kFeatures, again);
+  EXPECT_TRUE(Fingerprint(draft.map()) == Fingerprint(again.map()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, CloseLoopRig, ::testing::Values(1, 2, 4));
+
+// A keyframe made while the loop was being closed, and its landmarks, come along.
+TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
+  const FeatureSimulator simulator = hall(rig_of(2));
+  HallMap world = drifted_walk(2);
+  const auto location = locate_last(world);
+  ASSERT_TRUE(location);
+  map::MapStore store(world.map);
+  map::MapDraft loop("loop", store.snapshot());
+  close_loop(measure(loop.map(), kLast, *location), *location, {}, kFeatures, loop);
+
+  map::MapDraft tracking("tracking", store.snapshot());
+  const KeyframeId newer = world.add(simulator.frame(FrameId(kRound + 2), kStepS * (kRound + 2)), rigid_drift());  // what it would be
+  std::vector<std::pair<FeatureId, LandmarkId>> matches;
+  std::vector<std::pair<FeatureId, LandmarkId>> own;
+  for (std::size_t f = 0; f < world.map.keyframe(newer).landmarks.size(); ++f) {
+    const LandmarkId l = world.map.landmark_of(newer, FeatureId(f));
+    if (l.valid()) (tracking.map().alive(l) ? matches : own).emplace_back(f, l);
+  }
+  ASSERT_GT(matches.size(), 50u);
+  ASSERT_GT(own.size(), 10u);
+  tracking.add_keyframe(world.map.keyframe(newer).frame, world.map.keyframe(newer).T_rig_world, matches, kLast);
+  for (const auto& [feature, l] : own) tracking.add_landmark(world.map.landmark(l).position, {{newer, feature}});
+  const SE3 T_newer_last = world.map.keyframe(newer).T_rig_world * world.map.keyframe(kLast).T_rig_world.inverse();
+
+  EXPECT_FALSE(store.commit(std::move(tracking)).rebased);
+  const map::CommitReport report = store.commit(std::move(loop));
+  EXPECT_TRUE(report.rebased);
+  const map::BundledMap& after = *report.published;
+  EXPECT_EQ(after.check_invariants(), std::nullopt);
+  EXPECT_EQ(after.gauge_epoch(), world.map.gauge_epoch() + 1);
+  EXPECT_LT(distance_m(after.keyframe(newer).T_rig_world * after.keyframe(kLast).T_rig_world.inverse(), T_newer_last), 1e-9);
+  for (const KeyframeId k : {kLast, newer}) {
+    EXPECT_LT(5 * error_of(world, after, k), error_of(world, world.map, k));
+    EXPECT_LT(5 * landmark_error(world, after, k), landmark_error(world, world.map, k));
+  }
+  EXPECT_GT(weight_between(after, newer, KeyframeId(1)), 30);  // its matches were forwarded along the merges
+}
+
+// One camera does not observe the scale: what it built at the end is a tenth smaller.
+class ScaleDrift : public ::testing::Test {
+ protected:
+  static const HallMap& world() {
+    static const HallMap walked = walk(hall(rig_of(1)), 2, scale_drift());
+    return walked;
+  }
+  // How long the last steps are in the map, of how long they were.
+  static double step_ratio(const map::BundledMap& map) {
+    const KeyframeId a(kLast.value() - 4);
+    return distance_m(map.keyframe(a).T_rig_world, map.keyframe(kLast).T_rig_world) / distance_m(world().truth(a), world().truth(kLast));
+  }
+};
+
+TEST_F(ScaleDrift, IsMeasuredAndRemoved) {
+  const auto location = locate_last(world());
+  ASSERT_TRUE(location);
+  const LoopClosure closure = measure(world().map, kLast, *location);
+  EXPECT_NEAR(closure.scaled, 1 / 0.9, 0.02);
+  EXPECT_TRUE(plausible(world().map, closure, {}));
+  map::MapDraft draft = world().draft();
+  close_loop(closure, *location, {}, kFeatures, draft);
+  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+  EXPECT_NEAR(step_ratio(world().map), 0.9, 0.02);
+  EXPECT_NEAR(step_ratio(draft.map()), 1.0, 0.02);
+  EXPECT_LT(5 * error_of(world(), draft.map(), kLast), error_of(world(), world().map, kLast));
+  EXPECT_LT(5 * landmark_error(world(), draft.map(), kLast), landmark_error(world(), world().map, kLast));
+  EXPECT_LT(2 * mean_error(world(), draft.map()), mean_error(world(), world().map));
+  expect_refreshed(draft.map());
+}
+
+// Two walks along one wall, of which the later began anew somewhere else.
+class JoinParts : public ::testing::TestWithParam<int> {
+ protected:
+  JoinParts() : world(rig_of(GetParam())) {
+    const FeatureSimulator simulator = hall(rig_of(GetParam()));
+    for (int i = 0; i < 8; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
+    const Sim3 elsewhere(Sim3::exp((geometry::Vector7d() << 0.2, -0.3, 1.9, 5, -7, 2, 0).finished()));
+    for (int i = 8; i < 18; ++i) world.add(simulator.frame(FrameId(i), kStepS * (i - 4) + 0.5), elsewhere, 0, {}, i == 8);
+  }
+  std::optional<Location> located(int keyframe, int with) const {
+    return locate(world.map, *world.map.keyframe(KeyframeId(keyframe)).frame, KeyframeId(with), {}, kFeatures, seeded(1));
+  }
+  void expect_joined(int keyframe, int with) {
+    const auto location = located(keyframe, with);
+    ASSERT_TRUE(location);
+    const LoopClosure closure = measure(world.map, KeyframeId(keyframe), *location);
+    EXPECT_TRUE(closure.joined);
+    EXPECT_TRUE(plausible(world.map, closure, {}));
+    map::MapDraft draft = world.draft();
+    ASSERT_TRUE(join_parts(closure, *location, {}, kFeatures, draft));
+    const map::BundledMap& after = draft.map();
+    EXPECT_EQ(after.check_invariants(), std::nullopt);
+    EXPECT_EQ(after.roots(), std::vector{KeyframeId(0)});
+    EXPECT_EQ(after.gauge_epoch(), world.map.gauge_epoch() + 1);
+    for (const KeyframeId k : after.keyframe_ids()) {
+      if (k < KeyframeId(8)) {
+        EXPECT_EQ(after.keyframe(k).T_rig_world.translation(), world.map.keyframe(k).T_rig_world.translation());
+      }
+      EXPECT_LT(error_of(world, after, k), 0.02);
+      EXPECT_LT(angle_rad(after.keyframe(k).T_rig_world, world.truth(k)), 0.15 * kDegree);
+      EXPECT_LT(landmark_error(world, after, k), 0.03);
+    }
+    EXPECT_GT(weight_between(after, KeyframeId(keyframe), KeyframeId(with)), 60);
+    expect_refreshed(after);
+  }
+
+  HallMap world;
+};
+
+TEST_P(JoinParts, TheNewerPartMovesToTheOlder) { expect_joined(10, 6); }
+TEST_P(JoinParts, AlsoWhereTheOlderOneRecognisesIt) { expect_joined(6, 10); }
+
+TEST_P(JoinParts, PartsOfUnknownScaleStayApart) {
+  world.map.set_scale(map::Scale::kUpToScale);
+  const auto location = located(10, 6);
+  ASSERT_TRUE(location);
+  const LoopClosure closure = measure(world.map, KeyframeId(10), *location);
+  EXPECT_FALSE(plausible(world.map, closure, {}));
+  map::MapDraft draft = world.draft();
+  EXPECT_FALSE(join_parts(closure, *location, {}, kFeatures, draft));
+  EXPECT_TRUE(Fingerprint(draft.map()) == Fingerprint(world.map));
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, JoinParts, ::testing::Values(1, 2, 4));
+
+}  // namespace
+}  // namespace bslam::looping

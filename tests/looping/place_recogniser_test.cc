@@ -1,0 +1,127 @@
+#include "looping/place_recogniser.h"
+
+#include <gtest/gtest.h>
+
+#include "simulated_hall.h"
+
+namespace bslam::looping {
+namespace {
+
+// Everything that shares a word.
+const RecognitionOptions kLoose{.common_share = 0, .group_share = 0, .neighbour_weight = 10000, .max_candidates = 100};
+
+void expect_equal(const std::vector<Candidate>& a, const std::vector<Candidate>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].keyframe, b[i].keyframe);
+    EXPECT_EQ(a[i].score, b[i].score);
+  }
+}
+
+class RecogniserRig : public ::testing::TestWithParam<int> {};
+
+TEST_P(RecogniserRig, RanksTheRevisitedPlaceFirst) {
+  const HallMap& world = drifted_walk(GetParam());
+  for (const int again : {kRound, kRound + 1}) {
+    const std::vector<Candidate> candidates = recogniser()->revisited(world.map, KeyframeId(again));
+    ASSERT_FALSE(candidates.empty());
+    EXPECT_LE(std::abs(candidates.front().keyframe.value() - (again - kRound)), 2);
+    for (std::size_t i = 1; i < candidates.size(); ++i) EXPECT_LE(candidates[i].score, candidates[i - 1].score);
+  }
+}
+
+TEST_P(RecogniserRig, RanksTheTrueNeighbourhoodOfAFrameFirst) {
+  const HallMap& world = exact_walk(GetParam());
+  const FeatureSimulator simulator = hall(rig_of(GetParam()));
+  for (const int at : {2, 9, 17, 28}) {
+    const auto frame = described(simulator.frame(FrameId(1000 + at), kStepS * at + 0.5));
+    const std::vector<Candidate> candidates = recogniser()->recognised(world.map, frame);
+    ASSERT_FALSE(candidates.empty());
+    EXPECT_LE(std::abs(candidates.front().keyframe.value() - at), 2);
+  }
+}
+
+TEST_P(RecogniserRig, CovisibleKeyframesAreNeverCandidates) {
+  const HallMap& world = drifted_walk(GetParam());
+  const auto loose = recogniser(kLoose);
+  std::size_t candidates = 0;
+  for (const KeyframeId k : world.map.keyframe_ids()) {
+    for (const Candidate& c : loose->revisited(world.map, k)) {
+      ++candidates;
+      EXPECT_NE(c.keyframe, k);
+      EXPECT_FALSE(std::ranges::binary_search(world.map.keyframe(k).covisible.values(), c.keyframe, {}, &map::Covisible::keyframe));
+    }
+  }
+  EXPECT_GT(candidates, world.map.num_keyframes());
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, RecogniserRig, ::testing::Values(1, 2, 4));
+
+// The place looks other in most parts when it is seen again: less alike than the keyframes about here are to each other.
+TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
+  const FeatureSimulator simulator = hall(rig_of(1));
+  HallMap world(simulator.rig());
+  for (int i = 0; i < 3; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
+  for (int i = 3; i < 6; ++i) world.add(simulator.frame(FrameId(i), 20 + kStepS * i), {}, 1);
+  for (int i = 6; i < 9; ++i) world.add(redecorated(simulator.frame(FrameId(i), kRoundS + 0.3 * (i - 6)), 0.8, 1), {}, 2);
+  const KeyframeId newest(8);
+  ASSERT_GE(world.map.best_covisible(newest, 1).front().weight, RecognitionOptions().neighbour_weight);
+  EXPECT_TRUE(recogniser()->revisited(world.map, newest).empty());
+  const std::vector<Candidate> without = recogniser({.neighbour_weight = 10000})->revisited(world.map, newest);
+  ASSERT_FALSE(without.empty());
+  EXPECT_LT(without.front().keyframe.value(), 3);
+}
+
+TEST(BagOfWordsRecogniser, AnswersDoNotDependOnTheMapsAskedAboutBefore) {
+  const HallMap& world = drifted_walk(1);
+  const HallMap& other = exact_walk(1);
+  const KeyframeId last(kRound + 1);
+  map::MapDraft thinned = world.draft();
+  for (const int k : {3, 7, 30}) thinned.remove_keyframe(KeyframeId(k));
+  const auto frame = described(hall(rig_of(1)).frame(FrameId(1000), 9.5));
+
+  const auto wandering = recogniser();
+  for (int turn = 0; turn < 2; ++turn) {
+    expect_equal(wandering->revisited(world.map, last), recogniser()->revisited(world.map, last));
+    expect_equal(wandering->recognised(other.map, frame), recogniser()->recognised(other.map, frame));
+    expect_equal(wandering->revisited(thinned.map(), last), recogniser()->revisited(thinned.map(), last));
+    expect_equal(wandering->recognised(world.map, frame), recogniser()->recognised(world.map, frame));
+  }
+}
+
+TEST(BagOfWordsRecogniser, RemovedKeyframesVanish) {
+  const HallMap& world = drifted_walk(1);
+  const KeyframeId last(kRound + 1);
+  const auto ours = recogniser(kLoose);
+  const auto found = [&](const std::vector<Candidate>& candidates, KeyframeId k) {
+    return std::ranges::find(candidates, k, &Candidate::keyframe) != candidates.end();
+  };
+  const KeyframeId best = ours->revisited(world.map, last).front().keyframe;
+  map::MapDraft draft = world.draft();
+  if (!draft.remove_keyframe(best)) GTEST_FAIL() << "the best one is the root";
+  const std::vector<Candidate> after = ours->revisited(draft.map(), last);
+  EXPECT_FALSE(after.empty());
+  EXPECT_FALSE(found(after, best));
+}
+
+TEST(BagOfWordsRecogniser, NoticesAMapBegunAnew) {
+  const FeatureSimulator simulator = hall(rig_of(1));
+  HallMap fresh(simulator.rig());  // the same ids show another part of the hall
+  for (int i = 0; i < 8; ++i) fresh.add(simulator.frame(FrameId(i), 24 + kStepS * i));
+  const auto ours = recogniser();
+  const auto frame = described(simulator.frame(FrameId(1000), 26.4));
+  ours->recognised(exact_walk(1).map, frame);
+  const std::vector<Candidate> candidates = ours->recognised(fresh.map, frame);
+  ASSERT_FALSE(candidates.empty());
+  EXPECT_LE(std::abs(candidates.front().keyframe.value() - 2), 1);
+  expect_equal(candidates, recogniser()->recognised(fresh.map, frame));
+}
+
+TEST(BagOfWordsRecogniser, AFrameWithoutImagesIsLikeNothing) {
+  const std::vector<int> all = {0, 1};
+  const auto frame = described(hall(rig_of(2)).frame(FrameId(1000), 3.0, all));
+  EXPECT_TRUE(recogniser()->recognised(exact_walk(2).map, frame).empty());
+}
+
+}  // namespace
+}  // namespace bslam::looping

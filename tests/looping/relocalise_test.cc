@@ -1,0 +1,135 @@
+#include "looping/relocalise.h"
+
+#include <gtest/gtest.h>
+
+#include "simulated_hall.h"
+
+namespace bslam::looping {
+namespace {
+
+std::optional<Location> relocalised(PlaceRecogniser& places, const HallMap& world, const SimulatedFrame& seen, std::uint64_t seed) {
+  return relocalise(places, world.map, described(seen), {}, kFeatures, seeded(seed));
+}
+std::optional<Location> relocalised(const HallMap& world, const SimulatedFrame& seen) {
+  return relocalised(*recogniser(), world, seen, 1);
+}
+
+bool is_true(const Location& location, const SE3& T_rig_world) {
+  return distance_m(location.T_rig_world, T_rig_world) < 0.03 && angle_rad(location.T_rig_world, T_rig_world) < 0.5 * kDegree;
+}
+
+TEST(Relocalise, FindsTheFrameFromAnyOfItsCameras) {
+  const HallMap& world = exact_walk(4);
+  const FeatureSimulator simulator = hall(rig_of(4));
+  for (int present = 1; present < 16; ++present) {
+    std::vector<int> missing;
+    for (int c = 0; c < 4; ++c) {
+      if ((present >> c & 1) == 0) missing.push_back(c);
+    }
+    const SimulatedFrame seen = simulator.frame(FrameId(1000), kStepS * 12 + 0.4, missing);
+    const auto location = relocalised(world, seen);
+    ASSERT_TRUE(location) << "cameras " << present;
+    EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse())) << "cameras " << present;
+  }
+}
+
+TEST(Relocalise, FindsThePlaceTurnedRound) {
+  const HallMap& world = exact_walk(4);
+  const SimulatedFrame seen = hall(rig_of(4), std::numbers::pi).frame(FrameId(1000), kStepS * 12 + 0.4);
+  const auto location = relocalised(world, seen);
+  ASSERT_TRUE(location);
+  EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse()));
+}
+
+// Frames of the hall, and of halls that look other in most or in all; any cameras.
+class RelocaliseRig : public ::testing::TestWithParam<int> {};
+
+TEST_P(RelocaliseRig, IsNeverWrong) {
+  const int cameras = GetParam();
+  const HallMap& world = exact_walk(cameras);
+  const FeatureSimulator simulator = hall(rig_of(cameras));
+  const auto places = recogniser();
+  int found = 0;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Random random(seed, "frames");
+    const double time_s = random.uniform(0, kStepS * (2 * kRound / 3 - 1));
+    std::vector<int> missing;
+    for (int c = 1; c < cameras; ++c) {
+      if (random.uniform() < 0.4) missing.push_back(c);
+    }
+    const SimulatedFrame seen = simulator.frame(FrameId(1000 + static_cast<int>(seed)), time_s, missing);
+    if (const auto location = relocalised(*places, world, seen, seed)) {
+      ++found;
+      EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse())) << "seed " << seed;
+    }
+    EXPECT_FALSE(relocalised(*places, world, redecorated(seen, 1.0, seed), seed)) << "seed " << seed;
+    EXPECT_FALSE(relocalised(*places, world, redecorated(seen, 0.875, seed), seed)) << "seed " << seed;
+  }
+  EXPECT_GE(found, 48);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, RelocaliseRig, ::testing::Values(1, 2, 4));
+
+// A map of two rooms 30 m apart, the second decorated anew by that share.
+HallMap two_rooms(const FeatureSimulator& simulator, double share) {
+  HallMap world(simulator.rig());
+  const SE3 next_door(Eigen::Quaterniond::Identity(), {30, 0, 0});
+  for (int i = 0; i < 8; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
+  for (int i = 8; i < 16; ++i) world.add(redecorated(simulator.frame(FrameId(i), kStepS * (i - 8)), share, 1), {}, 1, next_door);
+  return world;
+}
+
+TEST(Relocalise, CannotTellRoomsApartThatLookTheSame) {
+  for (const int cameras : {1, 2, 4}) {
+    const FeatureSimulator simulator = hall(rig_of(cameras));
+    const HallMap world = two_rooms(simulator, 0.0);
+    const auto places = recogniser();
+    for (int i = 0; i < 10; ++i) {
+      const SimulatedFrame seen = simulator.frame(FrameId(1000 + i), 1 + 0.4 * i);
+      EXPECT_FALSE(relocalised(*places, world, seen, static_cast<std::uint64_t>(i)));
+    }
+  }
+}
+
+TEST(Relocalise, TellsRoomsApartThatDifferInHalfOfWhatIsSeen) {
+  for (const int cameras : {1, 2, 4}) {
+    const FeatureSimulator simulator = hall(rig_of(cameras));
+    const HallMap world = two_rooms(simulator, 0.5);
+    const auto places = recogniser();
+    int found = 0;
+    for (int i = 0; i < 10; ++i) {
+      const SimulatedFrame seen = simulator.frame(FrameId(1000 + i), 1 + 0.4 * i);
+      const auto location = relocalised(*places, world, seen, static_cast<std::uint64_t>(i));
+      if (!location) continue;
+      ++found;
+      EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse()));
+    }
+    EXPECT_GE(found, 8);
+  }
+}
+
+TEST(Relocalise, FindsFramesInEveryPartOfTheMap) {
+  const FeatureSimulator simulator = hall(rig_of(2));
+  HallMap world(simulator.rig());
+  for (int i = 0; i < 6; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
+  for (int i = 6; i < 12; ++i) world.add(simulator.frame(FrameId(i), 20 + kStepS * i), {}, 0, {}, i == 6);
+  for (const double time_s : {2.5, 28.5}) {
+    const SimulatedFrame seen = simulator.frame(FrameId(1000), time_s);
+    const auto location = relocalised(world, seen);
+    ASSERT_TRUE(location);
+    EXPECT_EQ(world.map.root_of(location->with), time_s < 10 ? KeyframeId(0) : KeyframeId(6));
+    EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse()));
+  }
+}
+
+TEST(Relocalise, SaysTheSameForTheSameSeed) {
+  const HallMap& world = exact_walk(2);
+  const SimulatedFrame seen = hall(rig_of(2)).frame(FrameId(1000), 7.3);
+  const auto a = relocalised(world, seen), b = relocalised(world, seen);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->T_rig_world.translation(), b->T_rig_world.translation());
+  EXPECT_EQ(a->matches, b->matches);
+}
+
+}  // namespace
+}  // namespace bslam::looping

@@ -1,0 +1,98 @@
+#include "place/inverted_index.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "place/random_descriptors.h"
+
+namespace bslam::place {
+namespace {
+
+class InvertedIndexTest : public testing::Test {
+ protected:
+  std::shared_ptr<const WordVector> vector_of(std::vector<WordId> words) {
+    return std::make_shared<const WordVector>(*vocabulary_, words);
+  }
+  std::shared_ptr<const WordVector> random_vector(int count) {
+    std::vector<WordId> words;
+    for (int i = 0; i < count; ++i)
+      words.push_back(WordId(std::size_t{random_.below(static_cast<std::uint32_t>(vocabulary_->size()))}));
+    return vector_of(words);
+  }
+
+  // Every keyframe compared with the query, word by word.
+  std::vector<CommonWords> query_by_definition(const WordVector& words) const {
+    std::vector<CommonWords> result;
+    for (const auto& [keyframe, vector] : held_) {
+      std::set<WordId> own;
+      for (const WeightedWord& w : vector->words()) own.insert(w.word);
+      int count = 0;
+      for (const WeightedWord& w : words.words()) count += static_cast<int>(own.count(w.word));
+      if (count > 0) result.push_back({keyframe, count});
+    }
+    return result;
+  }
+
+  Random random_{11};
+  VocabularyPtr vocabulary_ = random_vocabulary(8, 3, random_);
+  std::map<KeyframeId, std::shared_ptr<const WordVector>> held_;
+};
+
+TEST_F(InvertedIndexTest, FindsWhatAComparisonWithAllFinds) {
+  InvertedIndex index;
+  for (int step = 0; step < 300; ++step) {
+    const KeyframeId keyframe(static_cast<int>(random_.below(120)));
+    if (index.contains(keyframe)) {
+      index.remove(keyframe);
+      held_.erase(keyframe);
+    } else {
+      const auto words = random_vector(static_cast<int>(random_.below(25)));
+      index.add(keyframe, words);
+      held_[keyframe] = words;
+      EXPECT_EQ(index.words_of(keyframe), words);
+    }
+    ASSERT_EQ(index.size(), held_.size());
+    const auto query = random_vector(20);
+    ASSERT_EQ(index.query(*query), query_by_definition(*query));
+  }
+}
+
+TEST_F(InvertedIndexTest, DoesNotDependOnTheOrderOfAdding) {
+  InvertedIndex forward, backward;
+  std::vector<std::shared_ptr<const WordVector>> words;
+  for (int i = 0; i < 40; ++i) words.push_back(random_vector(30));
+  for (int i = 0; i < 40; ++i) forward.add(KeyframeId(i), words[static_cast<std::size_t>(i)]);
+  for (int i = 39; i >= 0; --i) backward.add(KeyframeId(i), words[static_cast<std::size_t>(i)]);
+  const auto query = random_vector(40);
+  EXPECT_EQ(forward.query(*query), backward.query(*query));
+}
+
+TEST_F(InvertedIndexTest, ForgetsWhatWasRemoved) {
+  InvertedIndex index;
+  index.add(KeyframeId(3), vector_of({WordId(1), WordId(2)}));
+  index.add(KeyframeId(5), vector_of({WordId(2), WordId(7)}));
+  index.remove(KeyframeId(4));  // not there
+  EXPECT_EQ(index.query(*vector_of({WordId(2)})), (std::vector<CommonWords>{{KeyframeId(3), 1}, {KeyframeId(5), 1}}));
+  index.remove(KeyframeId(3));
+  EXPECT_FALSE(index.contains(KeyframeId(3)));
+  EXPECT_EQ(index.words_of(KeyframeId(3)), nullptr);
+  EXPECT_EQ(index.query(*vector_of({WordId(1), WordId(2), WordId(7)})), (std::vector<CommonWords>{{KeyframeId(5), 2}}));
+  index.clear();
+  EXPECT_EQ(index.size(), 0u);
+  EXPECT_TRUE(index.query(*vector_of({WordId(2), WordId(7)})).empty());
+  index.add(KeyframeId(5), vector_of({WordId(7)}));  // and may come again
+  EXPECT_EQ(index.query(*vector_of({WordId(7)})).size(), 1u);
+}
+
+TEST_F(InvertedIndexTest, TakesWordsNoKeyframeHas) {
+  InvertedIndex index;
+  EXPECT_TRUE(index.query(*vector_of({WordId(0)})).empty());
+  index.add(KeyframeId(0), vector_of({WordId(0)}));
+  index.add(KeyframeId(1), std::make_shared<const WordVector>());
+  EXPECT_TRUE(index.query(*vector_of({WordId(vocabulary_->size() - 1)})).empty());
+  EXPECT_TRUE(index.query(WordVector()).empty());
+}
+
+}  // namespace
+}  // namespace bslam::place

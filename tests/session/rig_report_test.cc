@@ -1,0 +1,144 @@
+#include "session/rig_report.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "base/random.h"
+#include "io/rig_file.h"
+#include "io/rig_warnings.h"
+#include "io/simulation_writer.h"
+#include "session/extrinsics_check.h"
+#include "simulation/rigs.h"
+
+namespace bslam::session {
+namespace {
+
+namespace fs = std::filesystem;
+using geometry::SE3;
+
+camera::Camera pinhole(double f) { return {"p", camera::Pinhole({f, f, 319.5, 239.5}), 640, 480, 0, ""}; }
+
+// A stereo pair in a body frame turned and shifted against it.
+camera::Rig stereo() {
+  const SE3 T_body_cam0(geometry::so3_exp({0.4, -1.0, 0.7}), {0.2, -0.1, 0.3});
+  const SE3 step(geometry::so3_exp({0.02, -0.05, 0.01}), {0.12, 0.01, -0.01});
+  return camera::Rig({{pinhole(300), T_body_cam0}, {pinhole(330), T_body_cam0 * step}});
+}
+
+// Keypoints of points ahead, with a descriptor of its own for each, and as many of one camera alone.
+std::array<feature::Keypoints, 2> views_of(const camera::Rig& rig) {
+  Random random(1);
+  std::array<feature::Keypoints, 2> views;
+  while (views[0].size() < 150) {
+    const Eigen::Vector3d p(random.uniform(-3, 3), random.uniform(-2, 2), random.uniform(1, 5));
+    feature::Descriptor descriptor;
+    for (auto& word : descriptor) word = random.next();
+    std::array<std::optional<Eigen::Vector2d>, 2> pixels;
+    for (std::size_t c = 0; c < 2; ++c) pixels[c] = rig.camera(c).project(rig.cam_from_rig(c) * p);
+    for (std::size_t c = 0; c < 2; ++c) {
+      if (!pixels[0] || !pixels[1] || !rig.camera(0u).contains(*pixels[0]) || !rig.camera(1u).contains(*pixels[1]))
+        continue;
+      views[c].pixel.push_back(pixels[c]->cast<float>());
+      views[c].descriptor.push_back(descriptor);
+    }
+  }
+  return views;
+}
+
+PairEvidence judged(const camera::Rig& calibration, const std::array<feature::Keypoints, 2>& views) {
+  return judge_pair(calibration, 0, 1, std::span(&views[0], 1), std::span(&views[1], 1));
+}
+
+TEST(ExtrinsicsCheck, FindsWhatIsMeant) {
+  const camera::Rig rig = stereo();
+  const auto views = views_of(rig);
+  EXPECT_EQ(judged(rig, views).verdict, Convention::kAsGiven);
+  EXPECT_EQ(judged(rig, views).agreeing[0], 150);
+  EXPECT_EQ(judged(io::with_inverse_extrinsics(rig), views).verdict, Convention::kInverse);
+  const SE3 wrong_step = rig.body_from_cam(0) * rig.rig_from_cam(1).inverse();
+  EXPECT_EQ(judged(camera::Rig({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), wrong_step}}), views).verdict,
+            Convention::kPairInverse);
+  const std::array exchange = {1, 0};
+  const camera::Rig swapped = rig.subset(exchange);
+  EXPECT_EQ(judged(swapped, views).verdict, Convention::kSwapped);
+  EXPECT_EQ(judged(io::with_inverse_extrinsics(swapped), views).verdict, Convention::kSwappedInverse);
+}
+
+TEST(ExtrinsicsCheck, SaysNothingWhereNothingFits) {
+  const camera::Rig rig = stereo();
+  auto views = views_of(rig);
+  EXPECT_FALSE(judged(rig, {views[0], feature::Keypoints()}).verdict);
+  std::rotate(views[1].pixel.begin(), views[1].pixel.begin() + 1, views[1].pixel.end());  // every match is wrong
+  const PairEvidence evidence = judged(rig, views);
+  EXPECT_EQ(evidence.matches, 150);
+  EXPECT_FALSE(evidence.verdict);
+}
+
+TEST(ExtrinsicsCheck, SpeaksOfTheMostFrequentFault) {
+  PairEvidence good{
+      .first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
+  EXPECT_NE(describe_evidence(std::array{good}).find("the extrinsics fit as given"), std::string::npos);
+  PairEvidence bad = good;
+  bad.agreeing = {2, 90, 0, 0, 0};
+  bad.verdict = Convention::kInverse;
+  EXPECT_NE(describe_evidence(std::array{good, bad})
+                .find("warning: the images do not fit the extrinsics; they fit with "
+                      "every transform inverted"),
+            std::string::npos);
+  bad.verdict.reset();
+  EXPECT_NE(describe_evidence(std::array{bad}).find("nothing can be said"), std::string::npos);
+}
+
+class RigReport : public testing::Test {
+ protected:
+  RigReport() : folder_(fs::temp_directory_path() / ("bslam_rig_report_" + std::to_string(::getpid()))) {
+    fs::create_directories(folder_);
+  }
+  ~RigReport() override { fs::remove_all(folder_); }
+  fs::path folder_;
+};
+
+TEST_F(RigReport, IsTextOrJson) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t i = 0; i < 2; ++i) {
+    cameras.push_back({stereo().camera(i), stereo().body_from_cam(i)});
+    cameras.back().camera.name = "eye" + std::to_string(i);
+  }
+  ASSERT_TRUE(io::write_rig(camera::Rig(cameras), folder_ / "rig.yaml"));
+  const auto text = report_rig({.file = (folder_ / "rig.yaml").string()});
+  ASSERT_TRUE(text);
+  EXPECT_NE(text->find("camera 1: eye1"), std::string::npos);
+  const auto json = report_rig({.file = (folder_ / "rig.yaml").string(), .json = true});
+  const auto parsed = nlohmann::json::parse(*json);
+  EXPECT_EQ(parsed["format"], "bslam");
+  EXPECT_EQ(parsed["cameras"][1]["name"], "eye1");
+  EXPECT_NEAR(parsed["cameras"][1]["position_cam0"][0].get<double>(), 0.12, 1e-9);
+  EXPECT_NEAR(parsed["baselines"][0]["length_m"].get<double>(), std::sqrt(0.12 * 0.12 + 2e-4), 1e-9);
+  EXPECT_TRUE(parsed["warnings"].empty());
+  EXPECT_FALSE(report_rig({.file = (folder_ / "none.yaml").string()}));
+}
+
+// The whole way: images, features, verdict.
+TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
+  ThreadPool pool(2);
+  const io::SimulationRequest request{.folder = folder_ / "data",
+                                      .rig = simulation::ring_rig(2, 240),
+                                      .recording = {.duration_s = 0.4, .rate_hz = 10},
+                                      .tour = {.duration_s = 0.4},
+                                      .imaging = {},
+                                      .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
+  ASSERT_TRUE(io::write_simulation(request, pool).ok());
+  const std::string images = (folder_ / "data").string();
+  const auto good = report_rig({.file = images, .images = images});
+  ASSERT_TRUE(good) << good.error().message();
+  EXPECT_NE(good->find("the extrinsics fit as given"), std::string::npos) << *good;
+  const camera::Rig rig = io::read_rig(images).value();
+  ASSERT_TRUE(io::write_rig(io::with_inverse_extrinsics(rig), folder_ / "wrong.yaml"));
+  const auto wrong = report_rig({.file = (folder_ / "wrong.yaml").string(), .images = images});
+  EXPECT_NE(wrong->find("they fit with"), std::string::npos) << *wrong;
+}
+
+}  // namespace
+}  // namespace bslam::session

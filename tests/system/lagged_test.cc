@@ -1,0 +1,40 @@
+#include <gtest/gtest.h>
+
+#include "system/rendered_tour.h"
+
+namespace bslam::system {
+namespace {
+
+TEST(SystemLagged, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
+  const RenderedTour tour(4, 16);
+  evaluation::Trajectory final, live;
+  std::string journal;
+  for (const int threads : {1, 1, 2, 4}) {
+    System system(tour.rig(), small_config(Mode::kLagged, threads));
+    for (const image::ImageBundle& images : tour.frames()) system.process(images);
+    system.finish();
+    EXPECT_LT(ate_m(system.trajectory(), tour.truth()), 0.01);
+    EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
+    if (journal.empty()) {
+      final = system.trajectory();
+      live = system.live_trajectory();
+      journal = journal_text(system.journal());
+      EXPECT_EQ(final.size(), tour.frames().size());
+    }
+    EXPECT_TRUE(identical(final, system.trajectory())) << threads << " threads";
+    EXPECT_TRUE(identical(live, system.live_trajectory())) << threads << " threads";
+    EXPECT_EQ(journal_text(system.journal()), journal) << threads << " threads";
+  }
+}
+
+TEST(SystemLagged, MayEndAtAnyFrameWithoutBeingFinishedParallel) {
+  const RenderedTour tour(2, 12);
+  for (std::size_t end = 0; end <= tour.frames().size(); ++end) {
+    System system(tour.rig(), small_config(Mode::kLagged));
+    for (std::size_t k = 0; k < end; ++k) system.process(tour.frames()[k]);
+    EXPECT_EQ(system.frames().size(), end);
+  }
+}
+
+}  // namespace
+}  // namespace bslam::system

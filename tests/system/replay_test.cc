@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "system/rendered_tour.h"
+
+namespace bslam::system {
+namespace {
+
+void expect_same(const System& a, const System& b) {
+  EXPECT_TRUE(identical(a.trajectory(), b.trajectory()));
+  EXPECT_TRUE(identical(a.live_trajectory(), b.live_trajectory()));
+  EXPECT_EQ(journal_text(a.journal()), journal_text(b.journal()));
+}
+
+// The recorded journal as it would come back from a file.
+Journal reread(const System& system) {
+  auto journal = parse_journal(journal_text(system.journal()), "recorded");
+  EXPECT_TRUE(journal.ok());
+  return std::move(*journal);
+}
+
+TEST(SystemReplay, RepeatsAParallelRunToTheBit) {
+  const RenderedTour tour(2, 14);
+  for (int i = 0; i < 3; ++i) {
+    Config config = small_config(Mode::kParallel);
+    config.tracking.keyframe.min_interval = 1;
+    config.tracking.keyframe.min_overlap = 1.0;  // many keyframes, so that much overlaps
+    System recorded(tour.rig(), config);
+    for (const image::ImageBundle& images : tour.frames()) recorded.process(images);
+    recorded.finish();
+    System replayed(tour.rig(), config, {}, reread(recorded));
+    for (const image::ImageBundle& images : tour.frames()) replayed.process(images);
+    replayed.finish();
+    EXPECT_EQ(tracked_frames(replayed), tour.frames().size());
+    expect_same(recorded, replayed);
+  }
+}
+
+TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
+  const RenderedTour tour(1, 12);
+  std::vector<image::ImageBundle> frames(tour.frames().begin(), tour.frames().begin() + 6);
+  frames.push_back(tour.frames()[6]);
+  mirror(frames.back().images[0]);
+  for (std::size_t i = 0, first = frames.size(); i < tour.frames().size(); ++i) frames.push_back(tour.replayed(i, first));
+  System recorded(tour.rig(), small_config(Mode::kParallel));
+  for (const image::ImageBundle& images : frames) recorded.process(images);
+  recorded.finish();
+  EXPECT_EQ(recorded.maps_started(), 2);
+  System replayed(tour.rig(), small_config(Mode::kParallel), {}, reread(recorded));
+  for (const image::ImageBundle& images : frames) replayed.process(images);
+  replayed.finish();
+  expect_same(recorded, replayed);
+  MapVersion newest{0};
+  for (const JournalEntry& e : recorded.journal().entries) {  // versions go on counting over the maps
+    if (!e.committed) continue;
+    EXPECT_EQ(*e.committed, newest.next());
+    newest = *e.committed;
+  }
+}
+
+TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
+  const RenderedTour tour(2, 10);
+  System recorded(tour.rig(), small_config(Mode::kSequential));
+  for (const image::ImageBundle& images : tour.frames()) recorded.process(images);
+  recorded.finish();
+  Config other = small_config(Mode::kSequential);
+  other.tracking.keyframe.min_interval = 1;
+  other.tracking.keyframe.min_overlap = 1.0;
+  System replayed(tour.rig(), other, {}, reread(recorded));
+  const auto replay = [&] {
+    for (const image::ImageBundle& images : tour.frames()) replayed.process(images);
+    replayed.finish();
+  };
+  EXPECT_THROW(replay(), ReplayMismatch);
+
+  Config without = small_config(Mode::kSequential);
+  without.final_adjustment = false;
+  System shorter(tour.rig(), without, {}, reread(recorded));
+  for (const image::ImageBundle& images : tour.frames()) shorter.process(images);
+  EXPECT_THROW(shorter.finish(), ReplayMismatch);
+}
+
+TEST(SystemReplay, RepeatsAnInterruptedRunParallel) {
+  const RenderedTour tour(2, 10);
+  for (const Mode mode : {Mode::kSequential, Mode::kParallel, Mode::kLagged}) {
+    System recorded(tour.rig(), small_config(mode));
+    for (std::size_t k = 0; k < 7; ++k) recorded.process(tour.frames()[k]);
+    std::jthread([&] { recorded.interrupt(); }).join();
+    recorded.finish();
+    for (const JournalEntry& e : recorded.journal().entries) EXPECT_NE(e.step, JournalStep::kFinal);
+    EXPECT_EQ(recorded.trajectory().size(), 7u);
+    System replayed(tour.rig(), small_config(mode), {}, reread(recorded));
+    for (std::size_t k = 0; k < 7; ++k) replayed.process(tour.frames()[k]);
+    replayed.finish();
+    expect_same(recorded, replayed);
+    EXPECT_THROW(replayed.process(tour.frames()[7]), ReplayMismatch);
+  }
+}
+
+}  // namespace
+}  // namespace bslam::system
