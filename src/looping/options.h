@@ -13,7 +13,8 @@ struct RecognitionOptions {
   double group_share = 0.75;    // of the best group's score that another group must reach
   double rival_share = 0.5;     // of both where nothing is known of a frame: what looks the same elsewhere must come up as well
   int group = 10;               // covisible keyframes whose scores add up
-  int neighbour_weight = 30;    // shared landmarks that make a keyframe one whose score counts for s_min
+  int neighbour_weight = 15;    // shared landmarks, and ...
+  double neighbour_share = 0.05;  // ... of all a keyframe observes, that make another its neighbour: one whose place it knows
   int max_candidates = 5;
 
   template <class Self, class Visitor>
@@ -22,7 +23,8 @@ struct RecognitionOptions {
     visitor("group_share", self.group_share, Range{0, 1}, "", "of the best group's score, that a candidate's must reach");
     visitor("rival_share", self.rival_share, Range{0, 1}, "", "of both shares, where a frame may be anywhere");
     visitor("group", self.group, Range{1, 100}, "", "covisible keyframes whose scores add up");
-    visitor("neighbour_weight", self.neighbour_weight, Range{1, 10000}, "", "shared landmarks of a neighbour that counts for the lowest score");
+    visitor("neighbour_weight", self.neighbour_weight, Range{1, 10000}, "", "shared landmarks that make a keyframe a neighbour, no candidate");
+    visitor("neighbour_share", self.neighbour_share, Range{0, 1}, "", "of all landmarks of a keyframe, likewise");
     visitor("max_candidates", self.max_candidates, Range{1, 100}, "", "places looked at closely");
   }
 };

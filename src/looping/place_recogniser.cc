@@ -80,9 +80,11 @@ std::vector<Candidate> BagOfWordsRecogniser::revisited(const map::BundledMap& ma
   // The paper's s_min: a place is recognised only where it looks more like here than the least alike of the neighbours.
   double min_score = 0;
   bool any = false;
+  const auto landmarks = std::ranges::count_if(map.keyframe(keyframe).landmarks.values(), [](LandmarkId l) { return l.valid(); });
+  const double enough = std::max<double>(options_.neighbour_weight, options_.neighbour_share * static_cast<double>(landmarks));
   for (const map::Covisible& c : map.keyframe(keyframe).covisible) {
+    if (c.weight < enough) continue;
     excluded[c.keyframe.index()] = 1;
-    if (c.weight < options_.neighbour_weight) continue;
     const double score = place::l1_score(*words, *index_.words_of(c.keyframe));
     min_score = any ? std::min(min_score, score) : score;
     any = true;

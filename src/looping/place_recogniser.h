@@ -25,7 +25,7 @@ class PlaceRecogniser {
   // Prepares a frame to be asked about or to become a keyframe; nothing where that was done already.
   virtual void describe(frame::BundledFrame& frame) const = 0;
 
-  // Keyframes of `map` that may show the place of `keyframe`, but for those covisible with it.
+  // Keyframes of `map` that may show the place of `keyframe`, but for its neighbours: those that share much with it.
   virtual std::vector<Candidate> revisited(const map::BundledMap& map, KeyframeId keyframe) = 0;
 
   // Keyframes of `map` that may show the place of a described frame.

@@ -96,7 +96,7 @@ const FrameRecord& System::process(const image::ImageBundle& images) {
 
 void System::finish() {
   executor_->drain();
-  if (config_.final_adjustment && !executor_->over()) {
+  if (config_.final_adjustment && !config_.localize_only && !executor_->over()) {
     const Stopwatch watch;
     map::MapDraft draft("final", gate_.newest());
     mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, interruption_.get_token());
