@@ -20,15 +20,12 @@ struct Trace {
   bool recording = false;
 };
 
-Trace& trace() {
-  static Trace one;
-  return one;
-}
+constinit Trace trace;  // there before anything else runs
 
 }  // namespace
 
 void begin_coverage() {
-  Trace& t = trace();
+  Trace& t = trace;
   for (const std::uint32_t place : t.touched) t.count[place] = 0;
   t.touched.clear();
   t.previous = 0;
@@ -36,7 +33,7 @@ void begin_coverage() {
 }
 
 std::size_t new_places() {
-  Trace& t = trace();
+  Trace& t = trace;
   t.recording = false;
   std::size_t fresh = 0;
   for (const std::uint32_t place : t.touched) {
@@ -50,7 +47,7 @@ std::size_t new_places() {
 }  // namespace bslam::fuzz
 
 extern "C" void __sanitizer_cov_trace_pc() {
-  bslam::fuzz::Trace& t = bslam::fuzz::trace();
+  bslam::fuzz::Trace& t = bslam::fuzz::trace;
   if (!t.recording) return;
   // Relative to a function of the program, so that the numbers are those of every run.
   const std::size_t here = reinterpret_cast<std::uintptr_t>(__builtin_return_address(0)) -

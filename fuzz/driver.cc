@@ -1,13 +1,11 @@
-// Runs a target on inputs made from its seeds: for compilers without libFuzzer. Where the program is instrumented, inputs
-// that reach something new are kept to make others from. The same seed and number of runs give the same inputs.
+// Runs a target on inputs made from its seeds: for compilers without libFuzzer. Where the program is instrumented,
+// inputs that reach something new are kept to make others from. The same seed and number of runs give the same inputs.
 #include <signal.h>
-#include <sys/time.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -19,12 +17,14 @@
 #include "mutation.h"
 #include "target.h"
 
-#if defined(__SANITIZE_ADDRESS__)
-#include <sanitizer/common_interface_defs.h>
+// Of the sanitizers, where the program is built with them; this file is not, as they ask for options before they are
+// ready.
+extern "C" void __sanitizer_set_death_callback(void (*)()) __attribute__((weak));
 // An input is at most a megabyte: what asks for two gigabytes believes a number it should not.
-extern "C" const char* __asan_default_options() { return "max_allocation_size_mb=2048:allocator_may_return_null=0"; }
-extern "C" const char* __ubsan_default_options() { return "print_stacktrace=1:halt_on_error=1"; }
-#endif
+extern "C" const char* __asan_default_options();
+extern "C" const char* __ubsan_default_options();
+const char* __asan_default_options() { return "max_allocation_size_mb=2048:allocator_may_return_null=0"; }
+const char* __ubsan_default_options() { return "print_stacktrace=1:halt_on_error=1"; }
 
 namespace bslam::fuzz {
 namespace {
@@ -77,7 +77,9 @@ Arguments parse(int argc, char** argv) {
     } else if (name == "--write-seeds") {
       a.write_seeds = value();
     } else if (name.starts_with("--")) {
-      std::fprintf(stderr, "usage: %s [--seconds S] [--runs N] [--seed N] [--crash FILE] [--write-seeds DIR] [INPUT...]\n", argv[0]);
+      std::fprintf(stderr,
+                   "usage: %s [--seconds S] [--runs N] [--seed N] [--crash FILE] [--write-seeds DIR] [INPUT...]\n",
+                   argv[0]);
       std::exit(2);
     } else {
       a.inputs.emplace_back(name);
@@ -123,14 +125,13 @@ int main_of(int argc, char** argv) {
   const Arguments a = parse(argc, argv);
   crash_file = a.crash.string();
   for (const int number : {SIGABRT, SIGALRM}) ::signal(number, on_signal);
-#if defined(__SANITIZE_ADDRESS__)
-  __sanitizer_set_death_callback(keep_current);
-#endif
+  if (__sanitizer_set_death_callback != nullptr) __sanitizer_set_death_callback(keep_current);
   if (!a.write_seeds.empty()) {
     fs::create_directories(a.write_seeds);
     std::size_t n = 0;
     for (const std::string& s : seeds()) {
-      std::ofstream(a.write_seeds / std::to_string(n++), std::ios::binary).write(s.data(), static_cast<std::streamsize>(s.size()));
+      std::ofstream(a.write_seeds / std::to_string(n++), std::ios::binary)
+          .write(s.data(), static_cast<std::streamsize>(s.size()));
     }
     return 0;
   }

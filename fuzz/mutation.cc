@@ -23,8 +23,18 @@ void change_bytes(std::string& s, Random& random) {
 
 // A number of 1, 2, 4 or 8 bytes becomes one that is at some border, or a little more or less.
 void change_binary_number(std::string& s, Random& random) {
-  constexpr std::array<std::uint64_t, 12> kBorders = {0, 1, 0x7f, 0xff, 0x7fff, 0xffff, 0x7fffffff, 0x80000000, 0xffffffff,
-                                                      0x7ff0000000000000, 0x7ff8000000000000, 0xffffffffffffffff};
+  constexpr std::array<std::uint64_t, 12> kBorders = {0,
+                                                      1,
+                                                      0x7f,
+                                                      0xff,
+                                                      0x7fff,
+                                                      0xffff,
+                                                      0x7fffffff,
+                                                      0x80000000,
+                                                      0xffffffff,
+                                                      0x7ff0000000000000,
+                                                      0x7ff8000000000000,
+                                                      0xffffffffffffffff};
   const std::size_t size = std::size_t{1} << random.below(4);
   if (s.size() < size) return;
   const std::size_t at = below(s.size() - size + 1, random);
@@ -36,10 +46,29 @@ void change_binary_number(std::string& s, Random& random) {
 
 // A number in text becomes another.
 void change_text_number(std::string& s, Random& random) {
-  constexpr std::array<std::string_view, 20> kNumbers = {"0", "-1", "1", "1e308", "1e-320", "-1e999", "nan", "inf", ".", "", "1e", "0x10",
-                                                         "2147483648", "9223372036854775808", "-9223372036854775809", "99999999999999999999999",
-                                                         "1_000", "20001", "0.000000000000000000001", "3.5"};
-  const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-' || c == 'e'; };
+  constexpr std::array<std::string_view, 20> kNumbers = {"0",
+                                                         "-1",
+                                                         "1",
+                                                         "1e308",
+                                                         "1e-320",
+                                                         "-1e999",
+                                                         "nan",
+                                                         "inf",
+                                                         ".",
+                                                         "",
+                                                         "1e",
+                                                         "0x10",
+                                                         "2147483648",
+                                                         "9223372036854775808",
+                                                         "-9223372036854775809",
+                                                         "99999999999999999999999",
+                                                         "1_000",
+                                                         "20001",
+                                                         "0.000000000000000000001",
+                                                         "3.5"};
+  const auto digit = [](char c) {
+    return std::isdigit(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-' || c == 'e';
+  };
   const std::size_t from = below(s.size(), random);
   const auto first = std::find_if(s.begin() + static_cast<std::ptrdiff_t>(from), s.end(), digit);
   if (first == s.end()) return;
@@ -49,7 +78,9 @@ void change_text_number(std::string& s, Random& random) {
 
 void change_range(std::string& s, Random& random) {
   if (s.empty()) return;
-  const std::size_t from = below(s.size(), random), n = 1 + below(std::min<std::size_t>(s.size() - from, 1 + (std::size_t{1} << random.below(12))), random);
+  const std::size_t from = below(s.size(), random),
+                    n = 1 +
+                        below(std::min<std::size_t>(s.size() - from, 1 + (std::size_t{1} << random.below(12))), random);
   switch (random.below(3)) {
     case 0:
       s.erase(from, n);
@@ -79,8 +110,9 @@ void take_from_another(std::string& s, std::span<const std::string> corpus, Rand
 
 // Lines and separators are what text formats hang on.
 void insert_token(std::string& s, Random& random) {
-  constexpr std::array<std::string_view, 22> kTokens = {"\n", "\r\n", " ", ",", ":", ": ", "- ", "[", "]", "{", "}", "#", "&a ", "*a",
-                                                        "<<: ", "!!binary ", "\"", "'", "|\n", "%YAML:1.0\n", "\xEF\xBB\xBF", "~"};
+  constexpr std::array<std::string_view, 22> kTokens = {
+      "\n",   "\r\n",      " ",  ",", ":",   ": ",          "- ",           "[", "]", "{", "}", "#", "&a ", "*a",
+      "<<: ", "!!binary ", "\"", "'", "|\n", "%YAML:1.0\n", "\xEF\xBB\xBF", "~"};
   s.insert(below(s.size() + 1, random), kTokens[random.below(kTokens.size())]);
 }
 

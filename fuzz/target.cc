@@ -18,7 +18,8 @@ class Folder {
   Folder() {
     std::error_code error;
     const fs::path memory = "/dev/shm";
-    std::string name = ((fs::is_directory(memory, error) ? memory : fs::temp_directory_path()) / "bslam_fuzz_XXXXXX").string();
+    std::string name =
+        ((fs::is_directory(memory, error) ? memory : fs::temp_directory_path()) / "bslam_fuzz_XXXXXX").string();
     require(::mkdtemp(name.data()) != nullptr, "a folder to work in");
     path_ = name;
   }
@@ -44,7 +45,8 @@ const fs::path& scratch_folder() {
 
 fs::path scratch_file(std::string_view name, std::string_view bytes) {
   const fs::path file = scratch_folder() / name;
-  std::ofstream(file, std::ios::binary | std::ios::trunc).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  std::ofstream(file, std::ios::binary | std::ios::trunc)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   return file;
 }
 

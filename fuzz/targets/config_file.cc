@@ -1,5 +1,6 @@
 // Settings in YAML.
 #include "io/config_file.h"
+
 #include "system/config.h"
 #include "target.h"
 
@@ -7,7 +8,8 @@ namespace bslam::fuzz {
 
 std::vector<std::string> seeds() {
   system::Config config;
-  return {io::config_to_yaml(OptionTable(config)), "features.per_image: 700\nmode: sequential\n", "features: {per_image: 700, levels: 6}\nseed: 3\n"};
+  return {io::config_to_yaml(OptionTable(config)), "features.per_image: 700\nmode: sequential\n",
+          "features: {per_image: 700, levels: 6}\nseed: 3\n"};
 }
 
 }  // namespace bslam::fuzz
@@ -22,7 +24,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string yaml = io::config_to_yaml(table);
   system::Config again;
   OptionTable again_table(again);
-  fuzz::require(io::apply_config_file(again_table, fuzz::scratch_file("again.yaml", yaml)).ok() && io::config_to_yaml(again_table) == yaml,
+  fuzz::require(io::apply_config_file(again_table, fuzz::scratch_file("again.yaml", yaml)).ok() &&
+                    io::config_to_yaml(again_table) == yaml,
                 "settings that were written read the same");
   return 0;
 }

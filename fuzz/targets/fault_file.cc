@@ -1,12 +1,15 @@
 // Lists of faults of a simulated recording.
 #include "io/fault_file.h"
+
 #include "target.h"
 
 namespace bslam::fuzz {
 
 std::vector<std::string> seeds() {
-  return {"- {type: black, cameras: [2], from: 3.0, to: 5.0}\n- {type: delayed, cameras: [3, 0], from: 0, to: 20, delay_s: 0.015}\n",
-          "[{\"type\": \"frozen\", \"cameras\": [0], \"from\": 1, \"to\": 2}]"};
+  return {
+      "- {type: black, cameras: [2], from: 3.0, to: 5.0}\n- {type: delayed, cameras: [3, 0], from: 0, to: 20, delay_s: "
+      "0.015}\n",
+      "[{\"type\": \"frozen\", \"cameras\": [0], \"from\": 1, \"to\": 2}]"};
 }
 
 }  // namespace bslam::fuzz
@@ -16,7 +19,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto faults = io::read_faults(fuzz::scratch_file("faults.yaml", fuzz::as_text(data, size)), 4);
   if (!faults) return 0;
   for (const simulation::Fault& f : *faults) {
-    fuzz::require(!f.cameras.empty() && f.from_s >= 0 && f.to_s > f.from_s && f.delay_s >= 0, "a fault with an interval");
+    fuzz::require(!f.cameras.empty() && f.from_s >= 0 && f.to_s > f.from_s && f.delay_s >= 0,
+                  "a fault with an interval");
     for (const int c : f.cameras) fuzz::require(c >= 0 && c < 4, "a camera of the rig");
   }
   return 0;

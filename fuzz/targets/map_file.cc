@@ -1,12 +1,13 @@
 // Saved maps: as they come, and with sizes and checksums made right so that what stands behind them is reached.
+#include "io/map_file.h"
+
+#include <libdeflate.h>
+
 #include <algorithm>
 #include <cstring>
 #include <memory>
 
-#include <libdeflate.h>
-
 #include "base/random.h"
-#include "io/map_file.h"
 #include "target.h"
 
 namespace bslam::fuzz {
@@ -50,7 +51,8 @@ std::shared_ptr<const frame::BundledFrame> small_frame(Random& random, std::size
   for (frame::CameraFrame& c : frame->cameras) {
     c.state = image::ImageState::kPresent;
     for (std::size_t k = 0; k < keypoints; ++k) {
-      c.keypoints.pixel.emplace_back(static_cast<float>(random.uniform(0, 639)), static_cast<float>(random.uniform(0, 479)));
+      c.keypoints.pixel.emplace_back(static_cast<float>(random.uniform(0, 639)),
+                                     static_cast<float>(random.uniform(0, 479)));
       c.keypoints.level.push_back(static_cast<std::uint8_t>(random.below(8)));
       c.keypoints.angle.push_back(0.5f);
       c.keypoints.sigma.push_back(1.0f);
@@ -76,14 +78,17 @@ std::string small_map(std::size_t cameras) {
   Random random(7, "fuzz map", cameras);
   std::vector<camera::RigCamera> list;
   for (std::size_t c = 0; c < cameras; ++c) {
-    const camera::CameraModel model = c % 2 == 0 ? camera::CameraModel(camera::PinholeRadTan({400, 400, 320, 240}, {-0.28, 0.07, 1e-4, 1e-5}))
-                                                 : camera::CameraModel(camera::KannalaBrandt({300, 300, 320, 240}, {0.01, 0.001, 0, 0}));
+    const camera::CameraModel model =
+        c % 2 == 0 ? camera::CameraModel(camera::PinholeRadTan({400, 400, 320, 240}, {-0.28, 0.07, 1e-4, 1e-5}))
+                   : camera::CameraModel(camera::KannalaBrandt({300, 300, 320, 240}, {0.01, 0.001, 0, 0}));
     list.push_back({{"cam" + std::to_string(c), model, 640, 480, 0, {}}, {}});
   }
   map::BundledMap map(std::make_shared<const camera::Rig>(std::move(list)));
-  for (int i = 0; i < 4; ++i) map.add_keyframe(small_frame(random, cameras, 6), {}, {}, i == 3 ? KeyframeId() : map.newest_keyframe());
+  for (int i = 0; i < 4; ++i)
+    map.add_keyframe(small_frame(random, cameras, 6), {}, {}, i == 3 ? KeyframeId() : map.newest_keyframe());
   for (std::size_t f = 0; f < 5; ++f) {
-    const std::vector<map::Observation> seen = {{KeyframeId(0), FeatureId(f)}, {KeyframeId(1), FeatureId(f)}, {KeyframeId(3), FeatureId(f), false}};
+    const std::vector<map::Observation> seen = {
+        {KeyframeId(0), FeatureId(f)}, {KeyframeId(1), FeatureId(f)}, {KeyframeId(3), FeatureId(f), false}};
     map.add_landmark({0, 0, 4}, seen);
   }
   return io::map_to_bytes(map, {1, "0.1.0", "fuzz"});

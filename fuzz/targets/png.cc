@@ -1,4 +1,5 @@
-// Images: our PNG decoder, and the general one behind it; as they come, and with the checksums of PNG chunks made right.
+// Images: our PNG decoder, and the general one behind it; as they come, and with the checksums of PNG chunks made
+// right.
 #include <libdeflate.h>
 
 #include "io/image_file.h"

@@ -1,5 +1,6 @@
 // Rigs of every format that is told by the content of one file.
 #include "io/rig_file.h"
+
 #include "simulation/rigs.h"
 #include "target.h"
 
@@ -9,10 +10,12 @@ std::vector<std::string> seeds() {
   return {io::rig_to_yaml(simulation::mixed_rig()), io::rig_to_yaml(simulation::ring_rig(1)),
           "bslam_rig: 1\ncameras:\n  - model: pinhole\n    resolution: [64, 48]\n    intrinsics: [50, 50, 32, 24]\n"
           "    T_body_cam: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n    mask: a.png\n",
-          "cam0:\n  cam_overlaps: [1]\n  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.01, 0, 0]\n  distortion_model: equidistant\n"
+          "cam0:\n  cam_overlaps: [1]\n  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.01, 0, 0]\n  "
+          "distortion_model: equidistant\n"
           "  intrinsics: [400, 400, 320, 240]\n  resolution: [640, 480]\n  rostopic: /a\n"
           "cam1:\n  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n  camera_model: pinhole\n"
-          "  distortion_coeffs: [0.1, 0.01, 0, 0]\n  distortion_model: radtan\n  intrinsics: [400, 400, 320, 240]\n  resolution: [640, 480]\n"};
+          "  distortion_coeffs: [0.1, 0.01, 0, 0]\n  distortion_model: radtan\n  intrinsics: [400, 400, 320, 240]\n  "
+          "resolution: [640, 480]\n"};
 }
 
 }  // namespace bslam::fuzz

@@ -6,9 +6,13 @@ namespace bslam::fuzz {
 
 // An input is the poses; KITTI's times follow a line "====".
 std::vector<std::string> seeds() {
-  return {"# a comment\n1403636579.763555584 1 2 3 0 0 0 1\n1403636579.813555584 1.1 2 3 0 0 0.1 0.995\n1403636580 1.2 2 -3e-1 0 0 0.2 0.98\n",
-          "#timestamp, p_RS_R_x [m]\n1403636579763555584,4.6,-1.7,0.8,0.53,-0.15,-0.82,-0.08,0.1,0.2\n1403636579813555584,4.6,-1.7,0.8,0.53,-0.15,-0.82,-0.08\n",
-          "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0.5\n====\n0.000000e+00\n1.036224e-01\n"};
+  return {
+      "# a comment\n1403636579.763555584 1 2 3 0 0 0 1\n1403636579.813555584 1.1 2 3 0 0 0.1 0.995\n1403636580 1.2 2 "
+      "-3e-1 0 0 0.2 0.98\n",
+      "#timestamp, p_RS_R_x "
+      "[m]\n1403636579763555584,4.6,-1.7,0.8,0.53,-0.15,-0.82,-0.08,0.1,0.2\n1403636579813555584,4.6,-1.7,0.8,0.53,-0."
+      "15,-0.82,-0.08\n",
+      "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0.5\n====\n0.000000e+00\n1.036224e-01\n"};
 }
 
 }  // namespace bslam::fuzz
@@ -25,7 +29,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (std::size_t i = 0; i < trajectory->size(); ++i) {
     const auto& p = (*trajectory)[i];
     fuzz::require(i == 0 || (*trajectory)[i - 1].time_ns < p.time_ns, "times that increase");
-    fuzz::require(p.T_world_frame.translation().allFinite() && p.T_world_frame.rotation().coeffs().allFinite(), "finite poses");
+    fuzz::require(p.T_world_frame.translation().allFinite() && p.T_world_frame.rotation().coeffs().allFinite(),
+                  "finite poses");
   }
   const auto csv = io::read_trajectory(fuzz::scratch_file("again.csv", io::euroc_csv_text(*trajectory)));
   fuzz::require(csv.ok() && csv->size() == trajectory->size(), "a trajectory that was written can be read");

@@ -12,13 +12,15 @@ std::vector<std::string> seeds() {
   content.branching = 3;
   content.levels = 2;
   content.child_count = {3, 2, 0, 3, 0, 0, 0, 0, 0};
-  for (int i = 0; i < 8; ++i) content.descriptor.push_back({random.next(), random.next(), random.next(), random.next()});
+  for (int i = 0; i < 8; ++i)
+    content.descriptor.push_back({random.next(), random.next(), random.next(), random.next()});
   content.weight = {1, 0.5f, 2, 1, 1, 3};
   const auto vocabulary = place::Vocabulary::make(content);
   require(vocabulary.ok(), "the seed is a vocabulary");
   std::string bytes32;
   for (int i = 0; i < 32; ++i) bytes32 += std::to_string(7 * i % 256) + " ";
-  const std::string text = "3 2 0 0\n0 0 " + bytes32 + "0.5\n1 1 " + bytes32 + "1.5\n1 1 " + bytes32 + "0.25\n0 1 " + bytes32 + "2\n";
+  const std::string text =
+      "3 2 0 0\n0 0 " + bytes32 + "0.5\n1 1 " + bytes32 + "1.5\n1 1 " + bytes32 + "0.25\n0 1 " + bytes32 + "2\n";
   return {place::serialise(**vocabulary), text};
 }
 

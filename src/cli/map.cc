@@ -1,4 +1,4 @@
-// bslam map: saved maps described and exported.
+// bslam map: saved maps described, exported and merged.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -8,12 +8,15 @@
 #include <string>
 #include <vector>
 
+#include "cli/config_arguments.h"
 #include "cli/verbs.h"
 #include "io/atomic_file.h"
 #include "io/map_export.h"
 #include "io/map_file.h"
 #include "io/rig_file.h"
 #include "io/trajectory_file.h"
+#include "io/vocabulary_file.h"
+#include "session/merge_maps.h"
 
 namespace bslam::cli {
 namespace {
@@ -21,7 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct MapArguments {
-  std::string file, out;
+  std::string file, other, out, vocabulary;
+  ConfigArguments config;
   bool json = false, overwrite = false;
 };
 
@@ -44,7 +48,9 @@ nlohmann::ordered_json to_json(const io::SavedMap& saved, std::uintmax_t file_by
   nlohmann::ordered_json cameras = nlohmann::ordered_json::array(), parts = nlohmann::ordered_json::array();
   for (std::size_t c = 0; c < map.rig().size(); ++c) {
     const camera::Camera& camera = map.rig().camera(c);
-    cameras.push_back({{"name", camera.name}, {"model", camera::model_name(camera.model)}, {"resolution", {camera.width, camera.height}}});
+    cameras.push_back({{"name", camera.name},
+                       {"model", camera::model_name(camera.model)},
+                       {"resolution", {camera.width, camera.height}}});
   }
   for (const io::MapPart& p : io::map_parts(map)) {
     parts.push_back({{"keyframes", p.keyframes.size()},
@@ -68,21 +74,24 @@ nlohmann::ordered_json to_json(const io::SavedMap& saved, std::uintmax_t file_by
 
 void print_info(const io::SavedMap& saved, std::uintmax_t file_bytes) {
   const map::BundledMap& map = saved.map;
-  std::string text = fmt::format("{}: {:.1f} MB, written by bslam {}{}\n", saved.file, static_cast<double>(file_bytes) / 1e6,
-                                 saved.info.version, saved.info.data.empty() ? "" : " from " + saved.info.data);
+  std::string text =
+      fmt::format("{}: {:.1f} MB, written by bslam {}{}\n", saved.file, static_cast<double>(file_bytes) / 1e6,
+                  saved.info.version, saved.info.data.empty() ? "" : " from " + saved.info.data);
   for (std::size_t c = 0; c < map.rig().size(); ++c) {
     const camera::Camera& camera = map.rig().camera(c);
-    text += fmt::format("camera {} ({}): {}, {}x{}\n", c, camera.name, camera::model_name(camera.model), camera.width, camera.height);
+    text += fmt::format("camera {} ({}): {}, {}x{}\n", c, camera.name, camera::model_name(camera.model), camera.width,
+                        camera.height);
   }
   text += fmt::format("{} keyframes, {} landmarks, {} observations; scale {}; vocabulary {}\n", map.num_keyframes(),
-                      map.num_landmarks(), map.num_observations(), scale_name(map.scale()), vocabulary_name(saved.info.vocabulary));
+                      map.num_landmarks(), map.num_observations(), scale_name(map.scale()),
+                      vocabulary_name(saved.info.vocabulary));
   const std::string unit = map.scale() == map::Scale::kMetric ? "m" : "units";
   const std::vector<io::MapPart> parts = io::map_parts(map);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const TimeNs from = io::first_time(map, parts[i]), to = io::last_time(map, parts[i]);
-    text += fmt::format("part {}: {} keyframes over {:.1f} x {:.1f} x {:.1f} {}, {} landmarks, {:.3f} s to {:.3f} s\n", i,
-                        parts[i].keyframes.size(), parts[i].extent.x(), parts[i].extent.y(), parts[i].extent.z(), unit,
-                        parts[i].landmarks, to_seconds(from), to_seconds(to));
+    text += fmt::format("part {}: {} keyframes over {:.1f} x {:.1f} x {:.1f} {}, {} landmarks, {:.3f} s to {:.3f} s\n",
+                        i, parts[i].keyframes.size(), parts[i].extent.x(), parts[i].extent.y(), parts[i].extent.z(),
+                        unit, parts[i].landmarks, to_seconds(from), to_seconds(to));
   }
   std::fputs(text.c_str(), stdout);
 }
@@ -131,7 +140,31 @@ int map_export(const MapArguments& arguments) {
   if (error) return report_error({arguments.out, "--out", error.message(), "a folder that can be made"});
   const Status status = write_exports(saved->map, arguments.out);
   if (!status) return report_error(status.error());
-  std::printf("%s: %zu keyframes, %zu landmarks\n", arguments.out.c_str(), saved->map.num_keyframes(), saved->map.num_landmarks());
+  std::printf("%s: %zu keyframes, %zu landmarks\n", arguments.out.c_str(), saved->map.num_keyframes(),
+              saved->map.num_landmarks());
+  return kExitOk;
+}
+
+int map_merge(const MapArguments& arguments) {
+  const auto config = resolve_config(arguments.config);
+  if (!config) return report_error(config.error());
+  const auto vocabulary = io::vocabulary_or_shipped(arguments.vocabulary);
+  if (!vocabulary) return report_error(vocabulary.error());
+  std::error_code error;
+  if (fs::exists(arguments.out, error) && !arguments.overwrite) {
+    return report_error({arguments.out, "--out", "a file that exists", "a new one, or --overwrite"});
+  }
+  const auto a = io::read_map(arguments.file);
+  if (!a) return report_error(a.error());
+  const auto b = io::read_map(arguments.other);
+  if (!b) return report_error(b.error());
+  const auto merged = session::merge_maps(*a, *b, *vocabulary, *config);
+  if (!merged) return report_error(merged.error());
+  const io::MapFileInfo info{(*vocabulary)->id(), a->info.version, fmt::format("{} + {}", a->info.data, b->info.data)};
+  if (const Status s = io::write_map(merged->map, info, arguments.out); !s) return report_error(s.error());
+  std::printf("%zu keyframes, %zu landmarks; %d parts joined, %d more common places, %zu %s\n%s\n",
+              merged->map.num_keyframes(), merged->map.num_landmarks(), merged->joined, merged->loops, merged->parts,
+              merged->parts == 1 ? "part in all" : "parts left apart", arguments.out.c_str());
   return kExitOk;
 }
 
@@ -139,7 +172,7 @@ int map_export(const MapArguments& arguments) {
 
 void add_map(CLI::App& app, int& exit_status) {
   const auto arguments = std::make_shared<MapArguments>();
-  CLI::App* map = app.add_subcommand("map", "describe and export saved maps");
+  CLI::App* map = app.add_subcommand("map", "describe, export and merge saved maps");
   map->require_subcommand(1);
 
   CLI::App* info = map->add_subcommand("info", "cameras, size, parts, scale, extent and times");
@@ -152,6 +185,15 @@ void add_map(CLI::App& app, int& exit_status) {
   out->add_option("--out", arguments->out, "folder to write to")->required();
   out->add_flag("--overwrite", arguments->overwrite, "the folder may exist");
   out->callback([arguments, &exit_status] { exit_status = map_export(*arguments); });
+
+  CLI::App* merge = map->add_subcommand("merge", "maps of separate runs made one over the places they share");
+  merge->add_option("A", arguments->file, "a saved map; the other is moved into its world")->required();
+  merge->add_option("B", arguments->other, "a saved map of the same rig")->required();
+  merge->add_option("--out", arguments->out, "file for both together")->required();
+  merge->add_option("--vocabulary", arguments->vocabulary, "the maps were made with; default: the one of the program");
+  merge->add_flag("--overwrite", arguments->overwrite, "the file may exist");
+  add_config_options(*merge, arguments->config);
+  merge->callback([arguments, &exit_status] { exit_status = map_merge(*arguments); });
 }
 
 }  // namespace bslam::cli

@@ -16,7 +16,6 @@
 #include "io/atomic_file.h"
 #include "io/map_file.h"
 #include "io/vocabulary_file.h"
-#include "place/shipped_vocabulary.h"
 #include "session/record_builder.h"
 #include "session/run_session.h"
 
@@ -82,10 +81,6 @@ Result<std::optional<system::Journal>> read_journal(const std::string& file) {
   return std::optional(std::move(*journal));
 }
 
-Result<place::VocabularyPtr> read_vocabulary(const std::string& file) {
-  return file.empty() ? place::shipped_vocabulary() : io::read_vocabulary(file);
-}
-
 // The map of an earlier run, if one is asked for, and whether this one can go on with it.
 Result<std::optional<map::BundledMap>> read_map(const std::string& file, const camera::Rig& rig, const place::Vocabulary& vocabulary) {
   if (file.empty()) return std::optional<map::BundledMap>();
@@ -128,7 +123,7 @@ int run(const RunArguments& arguments) {
   if (!request) return report_error(request.error());
   const auto dataset = io::open_dataset(*request);
   if (!dataset) return report_error(dataset.error());
-  const auto vocabulary = read_vocabulary(arguments.vocabulary);
+  const auto vocabulary = io::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
   auto map = read_map(arguments.load_map, dataset->rig, **vocabulary);
   if (!map) return report_error(map.error());

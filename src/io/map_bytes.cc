@@ -19,7 +19,8 @@ void ByteWriter::text(std::string_view text) {
 std::size_t ByteReader::count(std::size_t bytes_each) {
   const std::size_t n = number<std::uint32_t>();
   if (ok() && n > rest_.size() / bytes_each) {
-    fail(std::to_string(n) + " things in " + std::to_string(rest_.size()) + " bytes", "as many as the section can hold");
+    fail(std::to_string(n) + " things in " + std::to_string(rest_.size()) + " bytes",
+         "as many as the section can hold");
   }
   return ok() ? n : 0;
 }

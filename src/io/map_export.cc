@@ -42,7 +42,8 @@ struct Images {
     std::size_t next = 1;
     for (const KeyframeId k : map.keyframe_ids()) {
       for (std::size_t c = 0; c < cameras; ++c) {
-        if (map.keyframe(k).frame->cameras[c].state == image::ImageState::kPresent) id[k.index() * cameras + c] = next++;
+        if (map.keyframe(k).frame->cameras[c].state == image::ImageState::kPresent)
+          id[k.index() * cameras + c] = next++;
       }
     }
   }
@@ -59,13 +60,14 @@ void append_image(const BundledMap& map, KeyframeId k, std::size_t c, std::size_
   const geometry::Quaterniond& q = T_cam_world.rotation();
   const geometry::Vector3d& t = T_cam_world.translation();
   const Camera& camera = map.rig().camera(c);
-  fmt::format_to(std::back_inserter(out), "{} {} {} {} {} {} {} {} {} {}/{}.png\n", image, q.w(), q.x(), q.y(), q.z(), t.x(),
-                 t.y(), t.z(), c + 1, camera.name, seen.time_ns - camera.time_offset_ns);
+  fmt::format_to(std::back_inserter(out), "{} {} {} {} {} {} {} {} {} {}/{}.png\n", image, q.w(), q.x(), q.y(), q.z(),
+                 t.x(), t.y(), t.z(), c + 1, camera.name, seen.time_ns - camera.time_offset_ns);
   for (std::size_t i = 0; i < seen.keypoints.size(); ++i) {
     const FeatureId f = keyframe.frame->bundled.feature(CameraIndex(c), KeypointIndex(i));
     const LandmarkId l = keyframe.landmarks[f.index()];
     const Eigen::Vector2f& p = seen.keypoints.pixel[i];
-    fmt::format_to(std::back_inserter(out), "{}{} {} {}", i == 0 ? "" : " ", p.x() + 0.5f, p.y() + 0.5f, l.valid() ? l.value() + 1 : -1);
+    fmt::format_to(std::back_inserter(out), "{}{} {} {}", i == 0 ? "" : " ", p.x() + 0.5f, p.y() + 0.5f,
+                   l.valid() ? l.value() + 1 : -1);
   }
   out += '\n';
 }
@@ -115,8 +117,12 @@ std::vector<MapPart> map_parts(const BundledMap& map) {
   return parts;
 }
 
-TimeNs first_time(const BundledMap& map, const MapPart& part) { return map.keyframe(part.keyframes.front()).frame->time_ns; }
-TimeNs last_time(const BundledMap& map, const MapPart& part) { return map.keyframe(part.keyframes.back()).frame->time_ns; }
+TimeNs first_time(const BundledMap& map, const MapPart& part) {
+  return map.keyframe(part.keyframes.front()).frame->time_ns;
+}
+TimeNs last_time(const BundledMap& map, const MapPart& part) {
+  return map.keyframe(part.keyframes.back()).frame->time_ns;
+}
 
 evaluation::Trajectory keyframe_trajectory(const BundledMap& map, const MapPart& part) {
   evaluation::Trajectory trajectory;
@@ -131,7 +137,8 @@ evaluation::Trajectory keyframe_trajectory(const BundledMap& map, const MapPart&
 std::string landmarks_ply(const BundledMap& map) {
   std::string header = fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment landmarks of a bslam map\nelement vertex {}\nproperty double x\n"
-      "property double y\nproperty double z\nproperty int observations\nend_header\n", map.num_landmarks());
+      "property double y\nproperty double z\nproperty int observations\nend_header\n",
+      map.num_landmarks());
   ByteWriter out;
   for (const LandmarkId l : map.landmark_ids()) {
     std::int32_t keypoints = 0;

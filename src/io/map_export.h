@@ -14,8 +14,8 @@ namespace bslam::io {
 // One part of a map: keyframes that hang together.
 struct MapPart {
   KeyframeId root;
-  std::vector<KeyframeId> keyframes;  // in order of time; of equal times in order of id
-  std::size_t landmarks = 0;          // whose reference is one of them
+  std::vector<KeyframeId> keyframes;                 // in order of time; of equal times in order of id
+  std::size_t landmarks = 0;                         // whose reference is one of them
   Eigen::Vector3d extent = Eigen::Vector3d::Zero();  // metres, map: sides of the box around the keyframes' cameras 0
 };
 
@@ -33,8 +33,8 @@ evaluation::Trajectory keyframe_trajectory(const map::BundledMap& map, const Map
 std::string landmarks_ply(const map::BundledMap& map);
 
 // The text model of COLMAP (cameras.txt, images.txt, points3D.txt): one image for each present camera of each keyframe,
-// named CAMERA/STAMP.png with the stamp of the recording in ns, all its keypoints; every landmark a grey point. COLMAP's
-// pixels begin at the corner of the image, ours at the centre of the first pixel: 0.5 is added.
+// named CAMERA/STAMP.png with the stamp of the recording in ns, all its keypoints; every landmark a grey point.
+// COLMAP's pixels begin at the corner of the image, ours at the centre of the first pixel: 0.5 is added.
 struct ColmapModel {
   std::string cameras, images, points;
 };

@@ -80,7 +80,8 @@ Result<Sections> take_apart(std::string_view bytes) {
   std::string_view rest = bytes.substr(kHeaderBytes);
   for (std::size_t i = 0; i < kTags.size(); ++i) {
     const Entry& e = table[i];
-    if (std::string_view(e.tag.data(), e.tag.size()) != kTags[i]) return damaged("header", "unknown sections", "those of this version");
+    if (std::string_view(e.tag.data(), e.tag.size()) != kTags[i])
+      return damaged("header", "unknown sections", "those of this version");
     if (e.size > rest.size()) return damaged(kNames[i], "a section beyond the end", "one within the file");
     sections[i] = rest.substr(0, e.size);
     rest.remove_prefix(e.size);
@@ -104,7 +105,8 @@ Result<SavedMap> build(const Sections& sections, std::string file) {
   if (!keyframes_in.ok()) return keyframes_in.error();
   take_landmarks(landmarks_in, saved.map);
   if (!landmarks_in.ok()) return landmarks_in.error();
-  if (auto broken = saved.map.check_invariants()) return damaged("", *std::move(broken), "a map without contradictions");
+  if (auto broken = saved.map.check_invariants())
+    return damaged("", *std::move(broken), "a map without contradictions");
   return saved;
 }
 
@@ -127,19 +129,23 @@ Status compare_camera(const SavedMap& saved, const camera::Rig& rig, std::size_t
     return Error{saved.file, fmt::format("camera {} ({}): {}", i, ours.name, field), std::move(found),
                  std::move(expected) + " as the rig of the run has"};
   };
-  const auto compare = [&](std::string_view field, const std::vector<double>& a, const std::vector<double>& b) -> Status {
+  const auto compare = [&](std::string_view field, const std::vector<double>& a,
+                           const std::vector<double>& b) -> Status {
     if (a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), near)) return {};
     return error(field, numbers_text(a), numbers_text(b));
   };
   const auto model = camera::model_name(ours.model), other_model = camera::model_name(other.model);
   if (model != other_model) return error("model", std::string(model), std::string(other_model));
   if (ours.width != other.width || ours.height != other.height) {
-    return error("resolution", fmt::format("{}x{}", ours.width, ours.height), fmt::format("{}x{}", other.width, other.height));
+    return error("resolution", fmt::format("{}x{}", ours.width, ours.height),
+                 fmt::format("{}x{}", other.width, other.height));
   }
   const auto list = [](const camera::Intrinsics& k) { return std::vector<double>{k.fx, k.fy, k.cx, k.cy}; };
-  if (Status s = compare("intrinsics", list(camera::intrinsics(ours.model)), list(camera::intrinsics(other.model))); !s) return s;
+  if (Status s = compare("intrinsics", list(camera::intrinsics(ours.model)), list(camera::intrinsics(other.model))); !s)
+    return s;
   if (Status s = compare("distortion", camera::distortion(ours.model), camera::distortion(other.model)); !s) return s;
-  return compare("place in the rig", transform_numbers(saved.map.rig().cam_from_rig(i)), transform_numbers(rig.cam_from_rig(i)));
+  return compare("place in the rig", transform_numbers(saved.map.rig().cam_from_rig(i)),
+                 transform_numbers(rig.cam_from_rig(i)));
 }
 
 }  // namespace
@@ -178,7 +184,8 @@ Result<SavedMap> map_from_bytes(std::string_view bytes, std::string file) {
 
 Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std::filesystem::path& file) {
   if (map.rig().size() > kMaxCameras) {
-    return Error{file.string(), "rig", std::to_string(map.rig().size()) + " cameras", "at most " + std::to_string(kMaxCameras)};
+    return Error{file.string(), "rig", std::to_string(map.rig().size()) + " cameras",
+                 "at most " + std::to_string(kMaxCameras)};
   }
   return write_atomically(file, map_to_bytes(map, info));
 }

@@ -27,13 +27,14 @@ struct SavedMap {
   std::size_t words_end = 0;  // one more than the highest word its keyframes name
 };
 
-// What is alive in the map, its ids renumbered without gaps in their order. Without a vocabulary the words are left out.
-// The file appears whole or not at all.
+// What is alive in the map, its ids renumbered without gaps in their order. Without a vocabulary the words are left
+// out. The file appears whole or not at all.
 Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std::filesystem::path& file);
 
 // The map as it was, poses to the bit; view direction, distance range and descriptor of landmarks are computed anew.
 // Version and gauge epoch begin at 0. Errors name the file, the section and the keyframe or landmark: not readable, no
-// map file, of another format version or feature kind, cut or damaged (checksums), contents that contradict one another.
+// map file, of another format version or feature kind, cut or damaged (checksums), contents that contradict one
+// another.
 Result<SavedMap> read_map(const std::filesystem::path& file);
 
 // Whether a run with this rig and vocabulary (null = none) can go on with the map: as many cameras, of the same models,
@@ -41,8 +42,8 @@ Result<SavedMap> read_map(const std::filesystem::path& file);
 // vocabulary, where both have some. The Error names the camera and what differs of it.
 Status fits(const SavedMap& saved, const camera::Rig& rig, const place::Vocabulary* vocabulary);
 
-// The bytes of a file, and back; `file` is for errors. Nothing is trusted: counts are checked against the bytes that are
-// there before room is made for them.
+// The bytes of a file, and back; `file` is for errors. Nothing is trusted: counts are checked against the bytes that
+// are there before room is made for them.
 std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info);
 Result<SavedMap> map_from_bytes(std::string_view bytes, std::string file);
 

@@ -21,7 +21,8 @@ constexpr TimeNs kMaxTime = TimeNs{1} << 62;  // so that differences do not over
 
 // Arrays of these are read and written as the numbers they consist of.
 static_assert(sizeof(Eigen::Vector2f) == 2 * sizeof(float) && sizeof(Eigen::Vector3d) == 3 * sizeof(double));
-static_assert(sizeof(Descriptor) == 4 * sizeof(std::uint64_t) && sizeof(Patch) == feature::kPatchSize * feature::kPatchSize);
+static_assert(sizeof(Descriptor) == 4 * sizeof(std::uint64_t) &&
+              sizeof(Patch) == feature::kPatchSize * feature::kPatchSize);
 
 void put_camera(const frame::CameraFrame& camera, bool with_words, ByteWriter& out) {
   const Keypoints& k = camera.keypoints;
@@ -84,7 +85,8 @@ void take_words(ByteReader& in, frame::CameraFrame& camera, bool with_words, std
   if (!in.require(has_words <= 1, "neither 0 nor 1", "whether words follow")) return;
   if (has_words == 0 || !in.require(with_words, "words", "none, as the map names no vocabulary")) return;
   const std::size_t n = camera.keypoints.size();
-  if (!in.require(n <= in.remaining() / sizeof(std::int32_t), "the end of the section", "a word for each keypoint")) return;
+  if (!in.require(n <= in.remaining() / sizeof(std::int32_t), "the end of the section", "a word for each keypoint"))
+    return;
   camera.words.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
     const WordId word(in.number<std::int32_t>());
@@ -97,7 +99,8 @@ void take_words(ByteReader& in, frame::CameraFrame& camera, bool with_words, std
 void take_camera(ByteReader& in, const camera::Camera& calibration, int levels, bool with_words, std::size_t& words_end,
                  frame::CameraFrame& camera) {
   const auto state = in.number<std::uint8_t>();
-  if (!in.require(state <= static_cast<int>(image::ImageState::kDamaged), "an unknown state", "that of an image")) return;
+  if (!in.require(state <= static_cast<int>(image::ImageState::kDamaged), "an unknown state", "that of an image"))
+    return;
   camera.state = static_cast<image::ImageState>(state);
   camera.time_ns = in.number<TimeNs>();
   if (!in.require(std::abs(camera.time_ns / 2) < kMaxTime / 2, "a time beyond all times", "nanoseconds")) return;
@@ -131,7 +134,7 @@ std::vector<KeypointRef> take_group(ByteReader& in, const frame::BundledFrame& f
                                     std::vector<std::vector<std::uint8_t>>& taken) {
   const std::size_t size = in.number<std::uint8_t>();
   std::vector<KeypointRef> group;
-  if (!in.require(size >= 2 && size <= frame.cameras.size(), std::to_string(size) + " keypoints in a matched feature",
+  if (!in.require(size >= 2 && size <= frame.cameras.size(), "a matched feature of too few or too many keypoints",
                   "two or more, at most one for each camera")) {
     return group;
   }
@@ -139,7 +142,8 @@ std::vector<KeypointRef> take_group(ByteReader& in, const frame::BundledFrame& f
     const std::size_t c = in.number<std::uint16_t>(), k = in.number<std::uint32_t>();
     if (!in.require(c < frame.cameras.size() && k < frame.cameras[c].keypoints.size(), "a keypoint that does not exist",
                     "one of the frame") ||
-        !in.require(group.empty() || group.back().camera.index() < c, "cameras out of order or twice", "one keypoint a camera") ||
+        !in.require(group.empty() || group.back().camera.index() < c, "cameras out of order or twice",
+                    "one keypoint a camera") ||
         !in.require(!std::exchange(taken[c][k], std::uint8_t{1}), "a keypoint of two features", "one feature each")) {
       break;
     }
@@ -188,8 +192,8 @@ void put_frame(const frame::BundledFrame& frame, bool with_words, ByteWriter& ou
   put_bundled(frame.bundled, out);
 }
 
-frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map::PyramidShape& pyramid, bool with_words,
-                               std::size_t& words_end) {
+frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map::PyramidShape& pyramid,
+                               bool with_words, std::size_t& words_end) {
   frame::BundledFrame frame;
   frame.id = FrameId(in.number<std::int32_t>());
   frame.time_ns = in.number<TimeNs>();

@@ -20,9 +20,9 @@ constexpr std::size_t kCameraBytes = 3 * 4 + 2 * 4 + 4 * 8 + kTransformBytes + 8
 constexpr std::size_t kObservationBytes = 4 + 4 + 1;
 constexpr std::size_t kLandmarkBytes = 3 * 8 + 4 + 2 + 4 + 3 * 4 + 4 + kObservationBytes;
 
-// SE3 normalises what it is made of, and that may change the last bits of a quaternion normalised before. But `q` came out
-// of a normalisation once, so that multiples of it differ only in how they are rounded, and one of the first few becomes
-// `q` again; where none does it was no SE3's, and is normalised.
+// SE3 normalises what it is made of, and that may change the last bits of a quaternion normalised before. But `q` came
+// out of a normalisation once, so that multiples of it differ only in how they are rounded, and one of the first few
+// becomes `q` again; where none does it was no SE3's, and is normalised.
 SE3 with_exact_rotation(const Quaterniond& q, const Vector3d& translation) {
   constexpr int kTries = 1 << 14;
   for (int i = 0; i < kTries; ++i) {
@@ -77,11 +77,14 @@ std::vector<map::Observation> take_observations(ByteReader& in, const map::Bundl
   for (std::size_t i = 0; i < n; ++i) {
     const auto k = in.number<std::int32_t>(), f = in.number<std::int32_t>();
     const auto aligned = in.number<std::uint8_t>();
-    if (!in.require(in_range(k, map.keyframe_slots()), "observation by a keyframe that does not exist", "one of the map") ||
-        !in.require(i == 0 || observations.back().keyframe.value() < k, "observations out of order", "keyframes in order, each once") ||
-        !in.require(in_range(f, map.keyframe(KeyframeId(k)).landmarks.size()), "observation by a feature that does not exist",
-                    "one of the keyframe") ||
-        !in.require(!map.landmark_of(KeyframeId(k), FeatureId(f)).valid(), "a feature of two landmarks", "one landmark each") ||
+    if (!in.require(in_range(k, map.keyframe_slots()), "observation by a keyframe that does not exist",
+                    "one of the map") ||
+        !in.require(i == 0 || observations.back().keyframe.value() < k, "observations out of order",
+                    "keyframes in order, each once") ||
+        !in.require(in_range(f, map.keyframe(KeyframeId(k)).landmarks.size()),
+                    "observation by a feature that does not exist", "one of the keyframe") ||
+        !in.require(!map.landmark_of(KeyframeId(k), FeatureId(f)).valid(), "a feature of two landmarks",
+                    "one landmark each") ||
         !in.require(aligned <= 1, "neither 0 nor 1", "whether the observation is aligned")) {
       break;
     }
@@ -112,7 +115,8 @@ void take_landmark(ByteReader& in, map::BundledMap& map) {
   const std::vector<map::Observation> observations = take_observations(in, map);
   if (!in.ok() || !in.require(is_plausible(position), "a position that cannot be", "finite coordinates") ||
       !in.require(in_range(born, map.keyframe_slots()), "born with a keyframe that does not exist", "one of the map") ||
-      !in.require(is_among(reference, observations, map), "a reference that is none of its observations", "one of them")) {
+      !in.require(is_among(reference, observations, map), "a reference that is none of its observations",
+                  "one of them")) {
     return;
   }
   const LandmarkId l = map.add_landmark(position, observations, reference, KeyframeId(born));
@@ -145,7 +149,8 @@ SE3 take_transform(ByteReader& in) {
   Vector3d translation;
   in.numbers(xyzw.data(), 4);
   in.numbers(translation.data(), 3);
-  if (!in.ok() || !in.require(std::abs(xyzw.squaredNorm() - 1) <= kUnitTolerance, "a rotation that is no unit quaternion", "one") ||
+  if (!in.ok() ||
+      !in.require(std::abs(xyzw.squaredNorm() - 1) <= kUnitTolerance, "a rotation that is no unit quaternion", "one") ||
       !in.require(is_plausible(translation), "a translation that cannot be", "finite coordinates")) {
     return {};
   }
@@ -202,10 +207,11 @@ InfoSection take_info(ByteReader& in) {
   const std::string kind = in.text();
   section.info = {in.number<std::uint64_t>(), in.text(), in.text()};
   section.scale = static_cast<map::Scale>(scale);
-  const bool pyramid = section.pyramid.scale_factor > 1 && section.pyramid.scale_factor <= 4 && section.pyramid.levels >= 1 &&
-                       section.pyramid.levels <= kMaxLevels;
+  const bool pyramid = section.pyramid.scale_factor > 1 && section.pyramid.scale_factor <= 4 &&
+                       section.pyramid.levels >= 1 && section.pyramid.levels <= kMaxLevels;
   in.require(pyramid, "a pyramid that cannot be", "levels in [1, 32] of a scale in (1, 4]");
-  in.require(scale <= static_cast<int>(map::Scale::kUnobservable), "an unknown scale", "metric, up to scale or unobservable");
+  in.require(scale <= static_cast<int>(map::Scale::kUnobservable), "an unknown scale",
+             "metric, up to scale or unobservable");
   in.require(kind == place::kDescriptorKind, "features of kind " + kind, std::string(place::kDescriptorKind));
   in.finish();
   return section;

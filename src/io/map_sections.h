@@ -48,8 +48,8 @@ void take_landmarks(ByteReader& in, map::BundledMap& map);
 
 // One BundledFrame, as part of a keyframe; map_frame_bytes.cc.
 void put_frame(const frame::BundledFrame& frame, bool with_words, ByteWriter& out);
-frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map::PyramidShape& pyramid, bool with_words,
-                               std::size_t& words_end);
+frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map::PyramidShape& pyramid,
+                               bool with_words, std::size_t& words_end);
 
 // A transform as seven numbers: quaternion x y z w, translation; to the bit.
 void put_transform(const geometry::SE3& transform, ByteWriter& out);

@@ -4,6 +4,7 @@
 
 #include "io/atomic_file.h"
 #include "io/dbow2_text.h"
+#include "place/shipped_vocabulary.h"
 #include "place/vocabulary_bytes.h"
 
 namespace bslam::io {
@@ -27,6 +28,10 @@ Result<place::VocabularyPtr> read_vocabulary(const std::filesystem::path& file) 
   Error error = vocabulary.error();
   error.file = file.string();
   return error;
+}
+
+Result<place::VocabularyPtr> vocabulary_or_shipped(const std::string& file) {
+  return file.empty() ? place::shipped_vocabulary() : read_vocabulary(file);
 }
 
 Status write_vocabulary(const place::Vocabulary& vocabulary, const std::filesystem::path& file) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 #include "base/result.h"
@@ -19,6 +20,9 @@ constexpr std::string_view kDbow2Kind = "orb256-dbow2";
 // length, a parent that does not stand before its child or is a leaf, more children than k or levels than L, an inner
 // node without children, values out of range.
 Result<place::VocabularyPtr> read_vocabulary(const std::filesystem::path& file);
+
+// The one of the file, or where none is named the one the program carries.
+Result<place::VocabularyPtr> vocabulary_or_shipped(const std::string& file);
 
 // Writes our binary format; the file appears whole or not at all.
 Status write_vocabulary(const place::Vocabulary& vocabulary, const std::filesystem::path& file);

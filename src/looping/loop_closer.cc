@@ -37,6 +37,8 @@ std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::Bundled
 }
 
 std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft& draft) {
+  if (last_.valid() && keyframe <= last_) history_ = {};
+  last_ = keyframe;
   const auto location = find(keyframe, draft.map());
   if (!location) return std::nullopt;
   const LoopClosure closure = measure(draft.map(), keyframe, *location);

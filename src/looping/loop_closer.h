@@ -13,6 +13,7 @@ namespace bslam::looping {
 struct LoopClosure {
   KeyframeId keyframe, with;
   int inliers = 0;          // keypoints that support the relative pose
+  double off_px = 0;        // median error of what the keyframe sees of the place, at its pose before
   double moved = 0;         // map units the keyframe's centre moved
   double turned = 0;        // rad
   double scaled = 1;        // other than 1 only where the scale is not observable
@@ -26,7 +27,7 @@ class LoopCloser {
              std::uint64_t seed);
 
   // Writes the correction to the draft where `keyframe` (alive) closes a loop; the draft is untouched else. Keyframes come
-  // in order.
+  // in order: one that does not come after the last is of another map, and nothing is remembered then.
   std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft);
 
  private:
@@ -37,6 +38,7 @@ class LoopCloser {
   const map::FeatureModel features_;
   const std::uint64_t seed_;
   RecognitionHistory history_;
+  KeyframeId last_;  // asked about
 };
 
 }  // namespace bslam::looping

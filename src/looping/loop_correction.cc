@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "looping/essential_graph.h"
+#include "solver/reprojection.h"
 
 namespace bslam::looping {
 namespace {
@@ -40,6 +42,19 @@ double relative_scale(const map::BundledMap& map, KeyframeId keyframe, const Loc
     ratios.push_back((location.T_rig_world * map.landmark(there).position).norm() / distance_here);
   }
   return ratios.size() < kMinScalePairs ? 1.0 : median(std::move(ratios));
+}
+
+// Median error, in pixels, of what the keyframe sees of the place at the pose it has in the map.
+double error_px(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
+  const map::BundledKeyframe& entry = map.keyframe(keyframe);
+  std::vector<double> errors;
+  for (const auto& [feature, l] : location.matches) {
+    const frame::KeypointRef r = entry.frame->bundled.keypoints(feature).front();
+    const Eigen::Vector2d pixel = entry.frame->keypoints(r.camera).pixel[r.keypoint.index()].cast<double>();
+    const auto error = solver::ReprojectionResidual::error_only(map.rig(), r.camera, entry.T_rig_world, map.landmark(l).position, pixel);
+    errors.push_back(error ? error->norm() : std::numeric_limits<double>::infinity());
+  }
+  return errors.empty() ? 0.0 : median(std::move(errors));
 }
 
 // Length of the way from one keyframe to the other, through all keyframes of their part made between them.
@@ -110,6 +125,18 @@ void move_window(const std::vector<KeyframeId>& window, const EssentialGraph& gr
   draft.set_poses(std::move(poses));
 }
 
+// Poses and landmarks of the window as they are in `map`, as far as they are there still.
+map::SetPoses poses_in(const map::BundledMap& map, const std::vector<KeyframeId>& window) {
+  map::SetPoses poses;
+  for (const KeyframeId k : window) {
+    poses.keyframes.emplace_back(k, map.keyframe(k).T_rig_world);
+    for (const LandmarkId l : adjustment::landmarks_of(map, k)) {
+      if (map.landmark(l).reference.keyframe == k) poses.landmarks.emplace_back(l, map.landmark(l).position);
+    }
+  }
+  return poses;
+}
+
 // One edge between each keyframe of the window and each it sees landmarks of since the fusion.
 void add_loop_edges(const map::BundledMap& before, const map::BundledMap& fused, const std::vector<KeyframeId>& window,
                     const LoopClosure& closure, EssentialGraph& graph) {
@@ -160,6 +187,7 @@ LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Locat
   const SE3& now = map.keyframe(keyframe).T_rig_world;
   out.moved = (centre(now) - centre(location.T_rig_world)).norm();
   out.turned = (now.rotation() * location.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
+  out.off_px = error_px(map, keyframe, location);
   out.scaled = relative_scale(map, keyframe, location);
   out.joined = map.root_of(keyframe) != map.root_of(location.with);
   return out;
@@ -216,6 +244,12 @@ void close_loop(const LoopClosure& closure, const Location& location, const Loop
   }
   move_window(window, graph, S_before, draft);
   fuse(window, closure, location, options, features, draft);
+  if (closure.off_px <= options.near_px && !graph.problem.scale_free) {
+    // One keyframe places itself by what it sees of the place no better than the map does by all it holds: bundle adjustment
+    // weighs them, from where the map is.
+    draft.set_poses(poses_in(before, window));
+    return;
+  }
   add_loop_edges(before, draft.map(), window, closure, graph);
 
   const std::vector<Sim3> S_fused = graph.problem.S_world;

@@ -21,7 +21,8 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
 bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
                 map::MapDraft& draft);
 
-// Spreads the error over the loop by pose-graph optimisation and fuses what is seen on both of its ends.
+// Fuses what is seen on both ends of the loop and, where the map is off by more than bundle adjustment mends by itself,
+// spreads the error over the loop by pose-graph optimisation.
 void close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
                 map::MapDraft& draft);
 

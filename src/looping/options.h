@@ -58,6 +58,7 @@ struct LoopOptions {
   int max_keyframe_gap = 3;       // from one of them to the next, in keyframes
   double max_drift = 0.05;        // of the way since the place was last seen: a larger correction is no drift but a mistake
   double max_drift_free = 0.3;    // the same where the scale is not observable
+  double near_px = 4.0;           // error of what is seen of the place, up to which bundle adjustment needs no help
   int edge_weight = 60;           // shared landmarks that make two keyframes neighbours in the pose graph
   int window = 10;                // covisible keyframes of the newest that are fused with the place
   adjustment::LandmarkFusionOptions fusion{.radius = 0.01, .max_hamming = 60, .max_chi2 = 16.0};
@@ -70,6 +71,7 @@ struct LoopOptions {
     visitor("max_keyframe_gap", self.max_keyframe_gap, Range{1, 100}, "", "keyframes from one of them to the next at most");
     visitor("max_drift", self.max_drift, Range{0, 10}, "", "of the way since the place was seen, that a correction may be");
     visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "the same where the scale is not observable");
+    visitor("near_px", self.near_px, Range{0, 1000}, "px", "error of what is seen of the place, up to which bundle adjustment needs no help");
     visitor("edge_weight", self.edge_weight, Range{1, 10000}, "", "shared landmarks of neighbours in the pose graph");
     visitor("window", self.window, Range{0, 100}, "", "covisible keyframes that are fused with the place");
     visitor.section("fusion", self.fusion);

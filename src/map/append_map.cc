@@ -56,8 +56,9 @@ bool hang_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeI
 
 AppendedIds append_map(BundledMap& onto, const BundledMap& other) {
   BSLAM_ASSERT(onto.rig().size() == other.rig().size(), "maps that are put together are of one rig");
-  BSLAM_ASSERT(onto.pyramid().levels == other.pyramid().levels && onto.pyramid().scale_factor == other.pyramid().scale_factor,
-               "maps that are put together are of one pyramid");
+  BSLAM_ASSERT(
+      onto.pyramid().levels == other.pyramid().levels && onto.pyramid().scale_factor == other.pyramid().scale_factor,
+      "maps that are put together are of one pyramid");
   AppendedIds ids{std::vector<KeyframeId>(other.keyframe_slots()), std::vector<LandmarkId>(other.landmark_slots())};
   append_keyframes(onto, other, ids);
   for (const LandmarkId l : other.landmark_ids()) {
@@ -68,7 +69,8 @@ AppendedIds append_map(BundledMap& onto, const BundledMap& other) {
       observations.push_back(o);
     }
     const LandmarkReference reference{ids.keyframes[source.reference.keyframe.index()], source.reference.keypoint};
-    const LandmarkId added = onto.add_landmark(source.position, observations, reference, nearest_older(ids, source.born));
+    const LandmarkId added =
+        onto.add_landmark(source.position, observations, reference, nearest_older(ids, source.born));
     onto.add_sightings(added, source.expected, source.found);
     ids.landmarks[l.index()] = added;
   }

@@ -17,7 +17,9 @@ StageResult close_loop(looping::LoopCloser& closer, const LoopObserver& observer
   map::MapDraft draft("loop", base);
   const auto closure = closer.close(task.keyframe, draft);
   if (!closure) return {};
-  return {std::move(draft), [observer, closure](const map::CommitReport&) { observer(*closure); }};
+  const auto time_of = [&](KeyframeId k) { return base->keyframe(k).frame->time_ns; };
+  const LoopRecord record{*closure, time_of(closure->keyframe), time_of(closure->with)};
+  return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }};
 }
 
 StageResult adjust_globally(const Config& config, const map::MapSnapshot& base, std::stop_token stop) {

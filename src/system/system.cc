@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "mapping/map_keyframe.h"
-#include "system/stages.h"
 #include "system/stopwatch.h"
 
 namespace bslam::system {
@@ -41,11 +40,15 @@ System::System(camera::Rig rig, Config config, Resources resources)
       store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)), gate_(store_) {
   const map::MapSnapshot map = store_.snapshot();
   for (const KeyframeId k : map->keyframe_ids()) set_keyframe_time(k, map->keyframe(k).frame->time_ns);
-  ExecutionSetup setup{make_stages(config_, resources.vocabulary, [this](const looping::LoopClosure& c) { note_loop(c); }),
-                       config_.execution, [this](const StageRun& run) {
-                         const std::lock_guard lock(records_mutex_);
-                         stage_runs_.push_back({run, keyframe_time_ns_[run.task.keyframe.index()]});
-                       }};
+  const auto note_loop = [this](const LoopRecord& loop) {
+    const std::lock_guard lock(records_mutex_);
+    loops_.push_back(loop);
+  };
+  const auto note_run = [this](const StageRun& run) {
+    const std::lock_guard lock(records_mutex_);
+    stage_runs_.push_back({run, keyframe_time_ns_[run.task.keyframe.index()]});
+  };
+  ExecutionSetup setup{make_stages(config_, resources.vocabulary, note_loop), config_.execution, note_run};
   executor_ = resources.replay ? make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
                                : make_stage_executor(config_.mode, gate_, std::move(setup));
 }
@@ -68,11 +71,6 @@ void System::set_keyframe_time(KeyframeId k, TimeNs time_ns) {
   const std::lock_guard lock(records_mutex_);
   if (keyframe_time_ns_.size() <= k.index()) keyframe_time_ns_.resize(k.index() + 1);
   keyframe_time_ns_[k.index()] = time_ns;
-}
-
-void System::note_loop(const looping::LoopClosure& closure) {
-  const std::lock_guard lock(records_mutex_);
-  loops_.push_back({closure, keyframe_time_ns_[closure.keyframe.index()], keyframe_time_ns_[closure.with.index()]});
 }
 
 const FrameRecord& System::process(const image::ImageBundle& images) {

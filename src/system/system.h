@@ -9,12 +9,12 @@
 
 #include "camera/rig.h"
 #include "evaluation/trajectory.h"
-#include "looping/loop_closer.h"
 #include "system/config.h"
 #include "system/frame_record.h"
 #include "system/map_gate.h"
 #include "system/pipeline.h"
 #include "system/stage_executor.h"
+#include "system/stages.h"
 
 namespace bslam::system {
 
@@ -24,18 +24,12 @@ struct StageRecord {
   TimeNs time_ns = 0;  // of its keyframe
 };
 
-// A loop closed, or two parts of the map joined.
-struct LoopRecord {
-  looping::LoopClosure closure;
-  TimeNs time_ns = 0, with_time_ns = 0;  // of the two keyframes
-};
-
 // What a run may be given besides rig and configuration.
 struct Resources {
-  std::vector<image::Image> masks;       // one per camera of the rig, an empty image = none; or no masks at all
-  place::VocabularyPtr vocabulary;       // null: no place is recognised
-  std::optional<map::BundledMap> map;    // of an earlier run with this rig; the run goes on in it once it finds its place
-  std::optional<Journal> replay;         // its run is repeated whatever the mode
+  std::vector<image::Image> masks = {};      // one per camera of the rig, an empty image = none; or no masks at all
+  place::VocabularyPtr vocabulary = {};      // null: no place is recognised
+  std::optional<map::BundledMap> map = {};   // of an earlier run with this rig; the run goes on in it once it finds its place
+  std::optional<Journal> replay = {};        // its run is repeated whatever the mode
 };
 
 // Poses of one part of the map. Parts that no common place joined have worlds of their own.
@@ -80,7 +74,6 @@ class System {
  private:
   void give_up_young_map();
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
-  void note_loop(const looping::LoopClosure& closure);
 
   const camera::Rig rig_;
   const Config config_;

@@ -1,4 +1,5 @@
-// A thousand damaged map files: every one is refused or gives a sound map, and none makes the reader ask for much memory.
+// A thousand damaged map files: every one is refused or gives a sound map, and none makes the reader ask for much
+// memory.
 #include <gtest/gtest.h>
 #include <libdeflate.h>
 #include <malloc.h>
@@ -47,9 +48,12 @@ void set_number(std::string& bytes, std::size_t at, T value) {
   std::memcpy(bytes.data() + at, &value, sizeof(T));
 }
 
-std::size_t section_size(const std::string& bytes, std::size_t i) { return number_at<std::uint64_t>(bytes, kTable + i * kEntry + 8); }
+std::size_t section_size(const std::string& bytes, std::size_t i) {
+  return number_at<std::uint64_t>(bytes, kTable + i * kEntry + 8);
+}
 
-// Makes sizes and checksums those of a file that was written like this; the last section takes what is missing or too much.
+// Makes sizes and checksums those of a file that was written like this; the last section takes what is missing or too
+// much.
 void repair(std::string& bytes) {
   if (bytes.size() < kHeader) bytes.resize(kHeader, '\0');
   set_number(bytes, kTotal, std::uint64_t{bytes.size()});
@@ -87,18 +91,21 @@ std::string damage(const std::string& whole, Random& random) {
   const std::size_t at = place_in(whole, random);
   switch (random.below(4)) {
     case 0:
-      for (std::uint32_t n = 1 + random.below(3); n > 0; --n) bytes[place_in(whole, random)] ^= static_cast<char>(1 + random.below(255));
+      for (std::uint32_t n = 1 + random.below(3); n > 0; --n)
+        bytes[place_in(whole, random)] ^= static_cast<char>(1 + random.below(255));
       break;
     case 1:
       bytes.resize(at);
       break;
     case 2: {
-      constexpr std::array<std::uint32_t, 6> kLarge = {0xffffffffu, 0x7fffffffu, 0x80000000u, 0x01000000u, 0x00010000u, 0x0000ffffu};
+      constexpr std::array<std::uint32_t, 6> kLarge = {0xffffffffu, 0x7fffffffu, 0x80000000u,
+                                                       0x01000000u, 0x00010000u, 0x0000ffffu};
       if (at + 4 <= bytes.size()) set_number(bytes, at, kLarge[random.below(kLarge.size())]);
       break;
     }
     default: {
-      const std::size_t from = place_in(whole, random), n = std::min<std::size_t>(1 + random.below(64), bytes.size() - std::max(at, from));
+      const std::size_t from = place_in(whole, random),
+                        n = std::min<std::size_t>(1 + random.below(64), bytes.size() - std::max(at, from));
       bytes.replace(at, n, bytes.substr(from, n));
     }
   }
@@ -106,7 +113,8 @@ std::string damage(const std::string& whole, Random& random) {
 }
 
 TEST(DamagedMaps, AreRefusedOrSoundAndCostLittleMemory) {
-  const std::string whole = map_to_bytes(small_map(simulation::mixed_rig(), {.keyframes = 6, .max_keypoints = 30, .landmarks = 800}), small_info());
+  const std::string whole = map_to_bytes(
+      small_map(simulation::mixed_rig(), {.keyframes = 6, .max_keypoints = 30, .landmarks = 800}), small_info());
   ASSERT_TRUE(map_from_bytes(whole, "whole"));
   Random random(2, "damage");
   int repaired_and_sound = 0, repaired_and_refused = 0;
@@ -140,10 +148,11 @@ TEST(DamagedMaps, AreRefusedOrSoundAndCostLittleMemory) {
   RecordProperty("worst_bytes", static_cast<int>(worst));
 }
 
-// Counts that promise more than the file holds, wherever a count may stand: all places near the beginning of sections, and
-// others.
+// Counts that promise more than the file holds, wherever a count may stand: all places near the beginning of sections,
+// and others.
 TEST(DamagedMaps, PromiseMoreThanTheyHold) {
-  const std::string whole = map_to_bytes(small_map(simulation::ring_rig(2), {.keyframes = 3, .max_keypoints = 8, .landmarks = 300}), small_info());
+  const std::string whole = map_to_bytes(
+      small_map(simulation::ring_rig(2), {.keyframes = 3, .max_keypoints = 8, .landmarks = 300}), small_info());
   std::vector<std::size_t> places;
   std::size_t begin = kHeader;
   for (std::size_t i = 0; i < kSections; begin += section_size(whole, i++)) {

@@ -23,11 +23,14 @@ TEST(MapParts, AreTheTreesInOrderOfTime) {
     ASSERT_EQ(trajectory.size(), part.keyframes.size());
     for (std::size_t i = 0; i < trajectory.size(); ++i) {
       EXPECT_EQ(map.root_of(part.keyframes[i]), part.root);
-      if (i > 0) { EXPECT_LT(trajectory[i - 1].time_ns, trajectory[i].time_ns); }
+      if (i > 0) {
+        EXPECT_LT(trajectory[i - 1].time_ns, trajectory[i].time_ns);
+      }
       const geometry::SE3 round = trajectory[i].T_world_frame * map.keyframe(part.keyframes[i]).T_rig_world;
       EXPECT_LT(round.log().norm(), 1e-12);
-      EXPECT_LE((trajectory[i].T_world_frame.translation() - trajectory[0].T_world_frame.translation()).cwiseAbs().maxCoeff(),
-                part.extent.maxCoeff() + 1e-12);
+      EXPECT_LE(
+          (trajectory[i].T_world_frame.translation() - trajectory[0].T_world_frame.translation()).cwiseAbs().maxCoeff(),
+          part.extent.maxCoeff() + 1e-12);
     }
   }
 }
@@ -98,7 +101,8 @@ TEST(ColmapModel, ProjectsItsPointsOntoItsImages) {
       const camera::PinholeRadTan lens({k[0], k[1], k[2] - 0.5, k[3] - 0.5}, {k[4], k[5], k[6], k[7]});
       const auto pixel = lens.project(seen.T_cam_world * p);
       ++checked;
-      close += pixel && (*pixel - seen.points[static_cast<std::size_t>(index)].first + Eigen::Vector2d(0.5, 0.5)).norm() < 8;
+      close +=
+          pixel && (*pixel - seen.points[static_cast<std::size_t>(index)].first + Eigen::Vector2d(0.5, 0.5)).norm() < 8;
     }
   }
   EXPECT_EQ(checked, map.num_observations());

@@ -60,7 +60,9 @@ void expect_same_frame(const frame::BundledFrame& a, const frame::BundledFrame& 
 void expect_same_map(const map::BundledMap& a, const map::BundledMap& b, bool with_words = true) {
   const std::vector<KeyframeId> keyframes = a.keyframe_ids();
   const std::vector<LandmarkId> landmarks = a.landmark_ids();
-  const auto number = [&](KeyframeId k) { return KeyframeId(std::ranges::find(keyframes, k) - keyframes.begin() + std::size_t{0}); };
+  const auto number = [&](KeyframeId k) {
+    return KeyframeId(std::ranges::find(keyframes, k) - keyframes.begin() + std::size_t{0});
+  };
   ASSERT_EQ(b.keyframe_slots(), keyframes.size());
   ASSERT_EQ(b.landmark_slots(), landmarks.size());
   EXPECT_EQ(a.num_observations(), b.num_observations());
@@ -84,12 +86,15 @@ void expect_same_map(const map::BundledMap& a, const map::BundledMap& b, bool wi
     EXPECT_EQ(la.descriptor, lb.descriptor);
     EXPECT_EQ(number(la.reference.keyframe), lb.reference.keyframe);
     EXPECT_EQ(la.reference.keypoint, lb.reference.keypoint);
-    if (a.alive(la.born)) { EXPECT_EQ(number(la.born), lb.born); }
+    if (a.alive(la.born)) {
+      EXPECT_EQ(number(la.born), lb.born);
+    }
     EXPECT_EQ(la.expected, lb.expected);
     EXPECT_EQ(la.found, lb.found);
     const auto oa = a.observations(landmarks[i]), ob = b.observations(LandmarkId(i));
     ASSERT_EQ(oa.size(), ob.size());
-    for (std::size_t n = 0; n < oa.size(); ++n) EXPECT_EQ((map::Observation{number(oa[n].keyframe), oa[n].feature, oa[n].aligned}), ob[n]);
+    for (std::size_t n = 0; n < oa.size(); ++n)
+      EXPECT_EQ((map::Observation{number(oa[n].keyframe), oa[n].feature, oa[n].aligned}), ob[n]);
   }
 }
 
@@ -104,7 +109,8 @@ std::size_t words_end(const map::BundledMap& map) {
 }
 
 TEST(MapFile, GivesBackTheMapToTheBit) {
-  for (const camera::Rig& rig : {simulation::default_rig(), simulation::mixed_rig(), simulation::ring_rig(1), simulation::fisheye_rig(3)}) {
+  for (const camera::Rig& rig :
+       {simulation::default_rig(), simulation::mixed_rig(), simulation::ring_rig(1), simulation::fisheye_rig(3)}) {
     const map::BundledMap map = small_map(rig);
     ASSERT_GT(map.keyframe_slots(), map.num_keyframes());
     ASSERT_GT(map.landmark_slots(), map.num_landmarks());
@@ -148,7 +154,8 @@ TEST(MapFile, KeepsPosesToTheBitThatNormalisingAgainWouldChange) {
   }
   ASSERT_GT(changeable, 20u);
   const SavedMap saved = read_back(map);
-  for (const KeyframeId k : map.keyframe_ids()) expect_same_bits(saved.map.keyframe(k).T_rig_world, map.keyframe(k).T_rig_world);
+  for (const KeyframeId k : map.keyframe_ids())
+    expect_same_bits(saved.map.keyframe(k).T_rig_world, map.keyframe(k).T_rig_world);
 }
 
 TEST(MapFile, IsTheSameBytesWhenWrittenAgain) {
@@ -238,11 +245,20 @@ TEST(MapFits, NamesTheCameraAndWhatDiffersOfIt) {
   const std::vector<double> d = camera::distortion(rig.camera(1).model);
   EXPECT_EQ(key(1, [](camera::RigCamera& c) { c.camera.width += 1; }), second + "resolution");
   EXPECT_EQ(key(1, [&](camera::RigCamera& c) { c.camera.model = camera::Pinhole(k); }), second + "model");
-  EXPECT_EQ(key(1, [&](camera::RigCamera& c) { c.camera.model = camera::PinholeRadTan({k.fx + 1e-4, k.fy, k.cx, k.cy}, d); }),
+  EXPECT_EQ(key(1,
+                [&](camera::RigCamera& c) {
+                  c.camera.model = camera::PinholeRadTan({k.fx + 1e-4, k.fy, k.cx, k.cy}, d);
+                }),
             second + "intrinsics");
-  EXPECT_EQ(key(1, [&](camera::RigCamera& c) { c.camera.model = camera::PinholeRadTan(k, {d[0], d[1], d[2], d[3] + 1e-6}); }),
+  EXPECT_EQ(key(1,
+                [&](camera::RigCamera& c) {
+                  c.camera.model = camera::PinholeRadTan(k, {d[0], d[1], d[2], d[3] + 1e-6});
+                }),
             second + "distortion");
-  EXPECT_EQ(key(1, [](camera::RigCamera& c) { c.T_body_cam = geometry::SE3(c.T_body_cam.rotation(), c.T_body_cam.translation() * 1.001); }),
+  EXPECT_EQ(key(1,
+                [](camera::RigCamera& c) {
+                  c.T_body_cam = geometry::SE3(c.T_body_cam.rotation(), c.T_body_cam.translation() * 1.001);
+                }),
             second + "place in the rig");
   const std::vector<int> fewer = {0, 1};
   EXPECT_EQ(fits(saved, rig.subset(fewer), nullptr).error().key, "rig");

@@ -46,7 +46,9 @@ inline map::BundledMap small_map(camera::Rig rig, const SmallMapOptions& options
   map.remove_keyframe(KeyframeId(2));
 
   const std::vector<int> missing = {1};
-  const auto alone = [&](int i) { return world.sim.frame(FrameId(100 + i), 6.0 + i, std::span(missing).first(map.rig().size() > 1)); };
+  const auto alone = [&](int i) {
+    return world.sim.frame(FrameId(100 + i), 6.0 + i, std::span(missing).first(map.rig().size() > 1));
+  };
   const simulation::SimulatedFrame first = alone(0), second = alone(1);
   const KeyframeId root = map.add_keyframe(with_words(first.frame), first.T_world_rig.inverse(), {}, {});
   const KeyframeId child = map.add_keyframe(with_words(second.frame), second.T_world_rig.inverse(), {}, root);

@@ -8,7 +8,7 @@ namespace bslam::looping {
 namespace {
 
 // Everything that shares a word.
-const RecognitionOptions kLoose{.common_share = 0, .group_share = 0, .neighbour_weight = 10000, .max_candidates = 100};
+const RecognitionOptions kLoose{.common_share = 0, .group_share = 0, .max_candidates = 100};
 
 void expect_equal(const std::vector<Candidate>& a, const std::vector<Candidate>& b) {
   ASSERT_EQ(a.size(), b.size());
@@ -41,18 +41,24 @@ TEST_P(RecogniserRig, RanksTheTrueNeighbourhoodOfAFrameFirst) {
   }
 }
 
-TEST_P(RecogniserRig, CovisibleKeyframesAreNeverCandidates) {
+TEST_P(RecogniserRig, NeighboursAreNeverCandidates) {
   const HallMap& world = drifted_walk(GetParam());
   const auto loose = recogniser(kLoose);
   std::size_t candidates = 0;
   for (const KeyframeId k : world.map.keyframe_ids()) {
+    const auto& table = world.map.keyframe(k).landmarks.values();
+    const auto landmarks = std::ranges::count_if(table, [](LandmarkId l) { return l.valid(); });
     for (const Candidate& c : loose->revisited(world.map, k)) {
       ++candidates;
       EXPECT_NE(c.keyframe, k);
-      EXPECT_FALSE(std::ranges::binary_search(world.map.keyframe(k).covisible.values(), c.keyframe, {}, &map::Covisible::keyframe));
+      for (const map::Covisible& n : world.map.keyframe(k).covisible) {
+        if (n.keyframe == c.keyframe) {
+          EXPECT_LT(n.weight, std::max(15.0, 0.05 * static_cast<double>(landmarks)));
+        }
+      }
     }
   }
-  EXPECT_GT(candidates, world.map.num_keyframes());
+  EXPECT_GT(candidates, 5u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, RecogniserRig, ::testing::Values(1, 2, 4));
@@ -67,9 +73,10 @@ TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
   const KeyframeId newest(8);
   ASSERT_GE(world.map.best_covisible(newest, 1).front().weight, RecognitionOptions().neighbour_weight);
   EXPECT_TRUE(recogniser()->revisited(world.map, newest).empty());
-  const std::vector<Candidate> without = recogniser({.neighbour_weight = 10000})->revisited(world.map, newest);
-  ASSERT_FALSE(without.empty());
-  EXPECT_LT(without.front().keyframe.value(), 3);
+  // Without neighbours there is no such bound: the place comes up, behind those that were the neighbours.
+  const RecognitionOptions unbound{.common_share = 0, .group_share = 0, .neighbour_weight = 10000};
+  const std::vector<Candidate> without = recogniser(unbound)->revisited(world.map, newest);
+  EXPECT_TRUE(std::ranges::any_of(without, [](const Candidate& c) { return c.keyframe.value() < 3; }));
 }
 
 TEST(BagOfWordsRecogniser, AnswersDoNotDependOnTheMapsAskedAboutBefore) {

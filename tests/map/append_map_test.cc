@@ -64,7 +64,9 @@ TEST(AppendMap, KeepsWhatIsKnownOfLandmarks) {
     EXPECT_EQ(added.reference.keyframe, ids.keyframes[source.reference.keyframe.index()]);
     EXPECT_EQ(added.expected, source.expected);
     EXPECT_EQ(added.found, source.found);
-    if (other.alive(source.born)) { EXPECT_EQ(added.born, ids.keyframes[source.born.index()]); }
+    if (other.alive(source.born)) {
+      EXPECT_EQ(added.born, ids.keyframes[source.born.index()]);
+    }
     const auto a = map.observations(ids.landmarks[i]), b = other.observations(LandmarkId(i));
     ASSERT_EQ(a.size(), b.size());
     for (std::size_t n = 0; n < a.size(); ++n) {

@@ -84,8 +84,8 @@ TEST_F(Session, WritesAllItsFiles) {
   EXPECT_EQ(progress, (std::vector<std::size_t>{1, 2, 3, 4, 5, 6, 7, 8}));
   EXPECT_TRUE(result->record.complete);
   EXPECT_EQ(result->record.frames.size(), 8u);
-  EXPECT_EQ(result->trajectory.size(), 8u);
-  EXPECT_EQ(result->live.size(), 8u);
+  EXPECT_EQ(result->trajectories.front().poses.size(), 8u);
+  EXPECT_EQ(result->live.front().poses.size(), 8u);
   EXPECT_EQ(result->record.mode, "sequential");
   EXPECT_EQ(result->record.map.scale, "metric");
   EXPECT_EQ(result->record.maps_started, 1);
@@ -106,7 +106,7 @@ TEST_F(Session, TracksTheSameInParallel) {
   o.config.mode = system::Mode::kParallel;
   const auto result = run_session(dataset(), o);
   ASSERT_TRUE(result.ok());
-  EXPECT_EQ(result->trajectory.size(), 8u);
+  EXPECT_EQ(result->trajectories.front().poses.size(), 8u);
   EXPECT_EQ(result->record.mode, "parallel");
 }
 
@@ -121,7 +121,7 @@ TEST_F(Session, EndsWhereInterrupted) {
   ASSERT_TRUE(result.ok());
   EXPECT_FALSE(result->record.complete);
   EXPECT_EQ(result->record.frames.size(), 3u);
-  EXPECT_EQ(result->trajectory.size(), 3u);
+  EXPECT_EQ(result->trajectories.front().poses.size(), 3u);
   const auto nothing = run_session(dataset(), o);
   ASSERT_TRUE(nothing.ok());
   EXPECT_FALSE(nothing->record.complete);
@@ -148,10 +148,10 @@ TEST_F(Session, RepeatsARunByItsJournalAlsoAnInterruptedOne) {
     EXPECT_EQ(replayed->record.mode, "replay");
     EXPECT_EQ(replayed->record.complete, end == 8);
     EXPECT_EQ(replayed->journal.entries, recorded->journal.entries);
-    ASSERT_EQ(replayed->trajectory.size(), end);
+    ASSERT_EQ(replayed->trajectories.front().poses.size(), end);
     for (std::size_t i = 0; i < end; ++i) {
-      EXPECT_EQ(replayed->trajectory[i].T_world_frame.translation(), recorded->trajectory[i].T_world_frame.translation());
-      EXPECT_EQ(replayed->live[i].T_world_frame.translation(), recorded->live[i].T_world_frame.translation());
+      EXPECT_EQ(replayed->trajectories.front().poses[i].T_world_frame.translation(), recorded->trajectories.front().poses[i].T_world_frame.translation());
+      EXPECT_EQ(replayed->live.front().poses[i].T_world_frame.translation(), recorded->live.front().poses[i].T_world_frame.translation());
     }
   }
 }

@@ -13,16 +13,16 @@ TEST(SystemLagged, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
     System system(tour.rig(), small_config(Mode::kLagged, threads));
     for (const image::ImageBundle& images : tour.frames()) system.process(images);
     system.finish();
-    EXPECT_LT(ate_m(system.trajectory(), tour.truth()), 0.01);
+    EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
     EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
     if (journal.empty()) {
-      final = system.trajectory();
-      live = system.live_trajectory();
+      final = final_poses(system);
+      live = live_poses(system);
       journal = journal_text(system.journal());
       EXPECT_EQ(final.size(), tour.frames().size());
     }
-    EXPECT_TRUE(identical(final, system.trajectory())) << threads << " threads";
-    EXPECT_TRUE(identical(live, system.live_trajectory())) << threads << " threads";
+    EXPECT_TRUE(identical(final, final_poses(system))) << threads << " threads";
+    EXPECT_TRUE(identical(live, live_poses(system))) << threads << " threads";
     EXPECT_EQ(journal_text(system.journal()), journal) << threads << " threads";
   }
 }

@@ -14,8 +14,8 @@ TEST(SystemParallel, TracksAllFramesAsWellAsSequential) {
   for (const image::ImageBundle& images : tour.frames()) system.process(images);
   system.finish();
   EXPECT_EQ(tracked_frames(system), tour.frames().size());
-  EXPECT_LT(ate_m(system.trajectory(), tour.truth()), 0.01);
-  EXPECT_LT(ate_m(system.live_trajectory(), tour.truth()), 0.015);
+  EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
+  EXPECT_LT(ate_m(live_poses(system), tour.truth()), 0.015);
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
   const auto keyframes = std::count_if(system.frames().begin(), system.frames().end(), [](const auto& r) { return r.keyframe; });
   EXPECT_LE(system.stage_runs().size(), static_cast<std::size_t>(keyframes));

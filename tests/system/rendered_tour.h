@@ -3,6 +3,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
 #include <numeric>
 #include <vector>
 
@@ -16,11 +19,16 @@ namespace bslam::system {
 
 class RenderedTour {
  public:
-  RenderedTour(int cameras, std::size_t frames) : pool_(2), rig_(first_cameras(cameras)) {
+  using Motion = std::function<simulation::Trajectory(const simulation::Building&, double duration_s)>;
+
+  RenderedTour(int cameras, std::size_t frames) : RenderedTour(cameras, frames, [](const auto& building, double duration_s) {
+    return simulation::make_tour(building, {.duration_s = duration_s, .seed = 3});
+  }) {}
+
+  RenderedTour(int cameras, std::size_t frames, const Motion& motion) : pool_(2), rig_(first_cameras(cameras)) {
     const simulation::World world(simulation::make_building(3), {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2}, pool_);
     const simulation::RecordingOptions options{.duration_s = static_cast<double>(frames) / kRateHz, .rate_hz = kRateHz};
-    const auto tour = simulation::make_tour(world.building(), {.duration_s = options.duration_s, .seed = 3});
-    const simulation::Recorder recorder(world, rig_, tour, {}, 0.002, pool_);
+    const simulation::Recorder recorder(world, rig_, motion(world.building(), options.duration_s), {}, 0.002, pool_);
     const std::vector<simulation::Shot> shots = simulation::plan_shots(rig_, options);
     frames_.resize(frames);
     for (std::size_t k = 0; k < frames; ++k) {
@@ -118,6 +126,16 @@ inline double ate_m(const evaluation::Trajectory& estimate, const evaluation::Tr
   return result ? result->ate.rmse : std::numeric_limits<double>::infinity();
 }
 
+// Poses of the longest part of the map, final and as told at the time.
+inline evaluation::Trajectory final_poses(const System& system) {
+  const std::vector<PartTrajectory> parts = system.trajectories();
+  return parts.empty() ? evaluation::Trajectory() : parts.front().poses;
+}
+inline evaluation::Trajectory live_poses(const System& system) {
+  const std::vector<PartTrajectory> parts = system.live_trajectories();
+  return parts.empty() ? evaluation::Trajectory() : parts.front().poses;
+}
+
 inline bool identical(const evaluation::Trajectory& a, const evaluation::Trajectory& b) {
   if (a.size() != b.size()) return false;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -127,6 +145,12 @@ inline bool identical(const evaluation::Trajectory& a, const evaluation::Traject
     }
   }
   return true;
+}
+
+inline bool identical(const std::vector<PartTrajectory>& a, const std::vector<PartTrajectory>& b) {
+  return std::ranges::equal(a, b, [](const PartTrajectory& x, const PartTrajectory& y) {
+    return x.root == y.root && identical(x.poses, y.poses);
+  });
 }
 
 }  // namespace bslam::system

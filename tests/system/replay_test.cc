@@ -8,8 +8,8 @@ namespace bslam::system {
 namespace {
 
 void expect_same(const System& a, const System& b) {
-  EXPECT_TRUE(identical(a.trajectory(), b.trajectory()));
-  EXPECT_TRUE(identical(a.live_trajectory(), b.live_trajectory()));
+  EXPECT_TRUE(identical(a.trajectories(), b.trajectories()));
+  EXPECT_TRUE(identical(a.live_trajectories(), b.live_trajectories()));
   EXPECT_EQ(journal_text(a.journal()), journal_text(b.journal()));
 }
 
@@ -29,7 +29,7 @@ TEST(SystemReplay, RepeatsAParallelRunToTheBit) {
     System recorded(tour.rig(), config);
     for (const image::ImageBundle& images : tour.frames()) recorded.process(images);
     recorded.finish();
-    System replayed(tour.rig(), config, {}, reread(recorded));
+    System replayed(tour.rig(), config, {.replay = reread(recorded)});
     for (const image::ImageBundle& images : tour.frames()) replayed.process(images);
     replayed.finish();
     EXPECT_EQ(tracked_frames(replayed), tour.frames().size());
@@ -47,7 +47,7 @@ TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
   for (const image::ImageBundle& images : frames) recorded.process(images);
   recorded.finish();
   EXPECT_EQ(recorded.maps_started(), 2);
-  System replayed(tour.rig(), small_config(Mode::kParallel), {}, reread(recorded));
+  System replayed(tour.rig(), small_config(Mode::kParallel), {.replay = reread(recorded)});
   for (const image::ImageBundle& images : frames) replayed.process(images);
   replayed.finish();
   expect_same(recorded, replayed);
@@ -67,7 +67,7 @@ TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
   Config other = small_config(Mode::kSequential);
   other.tracking.keyframe.min_interval = 1;
   other.tracking.keyframe.min_overlap = 1.0;
-  System replayed(tour.rig(), other, {}, reread(recorded));
+  System replayed(tour.rig(), other, {.replay = reread(recorded)});
   const auto replay = [&] {
     for (const image::ImageBundle& images : tour.frames()) replayed.process(images);
     replayed.finish();
@@ -76,7 +76,7 @@ TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
 
   Config without = small_config(Mode::kSequential);
   without.final_adjustment = false;
-  System shorter(tour.rig(), without, {}, reread(recorded));
+  System shorter(tour.rig(), without, {.replay = reread(recorded)});
   for (const image::ImageBundle& images : tour.frames()) shorter.process(images);
   EXPECT_THROW(shorter.finish(), ReplayMismatch);
 }
@@ -89,8 +89,8 @@ TEST(SystemReplay, RepeatsAnInterruptedRunParallel) {
     std::jthread([&] { recorded.interrupt(); }).join();
     recorded.finish();
     for (const JournalEntry& e : recorded.journal().entries) EXPECT_NE(e.step, JournalStep::kFinal);
-    EXPECT_EQ(recorded.trajectory().size(), 7u);
-    System replayed(tour.rig(), small_config(mode), {}, reread(recorded));
+    EXPECT_EQ(final_poses(recorded).size(), 7u);
+    System replayed(tour.rig(), small_config(mode), {.replay = reread(recorded)});
     for (std::size_t k = 0; k < 7; ++k) replayed.process(tour.frames()[k]);
     replayed.finish();
     expect_same(recorded, replayed);

@@ -18,7 +18,7 @@ Outcome run(const RenderedTour& tour, const Config& config) {
   System system(tour.rig(), config);
   for (const image::ImageBundle& images : tour.frames()) system.process(images);
   system.finish();
-  return {system.trajectory(), system.live_trajectory(), system.snapshot()->num_landmarks(), system.snapshot()->num_observations()};
+  return {final_poses(system), live_poses(system), system.snapshot()->num_landmarks(), system.snapshot()->num_observations()};
 }
 
 TEST(SystemSequential, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
@@ -44,8 +44,8 @@ TEST(SystemSequential, TracksWithOneToEightCameras) {
     const auto align = n == 1 ? evaluation::AlignMode::kSim3 : evaluation::AlignMode::kSe3;
     EXPECT_EQ(system.snapshot()->scale(), n == 1 ? map::Scale::kUpToScale : map::Scale::kMetric) << n << " cameras";
     EXPECT_GE(tracked_frames(system), n == 1 ? count - 5 : count) << n << " cameras";  // two views must first differ
-    EXPECT_LT(ate_m(system.trajectory(), tour.truth(), align), 0.01) << n << " cameras";
-    EXPECT_LT(ate_m(system.live_trajectory(), tour.truth(), align), 0.015) << n << " cameras";
+    EXPECT_LT(ate_m(final_poses(system), tour.truth(), align), 0.01) << n << " cameras";
+    EXPECT_LT(ate_m(live_poses(system), tour.truth(), align), 0.015) << n << " cameras";
     EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt) << n << " cameras";
   }
 }
@@ -76,7 +76,7 @@ TEST(SystemSequential, ADamagedOrMissingImageCostsOnlyItsCamera) {
     }
   }
   system.finish();
-  EXPECT_LT(ate_m(system.trajectory(), tour.truth()), 0.01);
+  EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 }
 
@@ -94,8 +94,8 @@ TEST(SystemSequential, IsLostInTheDarkAndRecovers) {
     EXPECT_EQ(record.result.reason, dark ? LostReason::kFewFeatures : LostReason::kNone);
   }
   system.finish();
-  EXPECT_EQ(system.trajectory().size(), frames.size() - 2);
-  EXPECT_LT(ate_m(system.trajectory(), tour.truth()), 0.01);
+  EXPECT_EQ(final_poses(system).size(), frames.size() - 2);
+  EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
   EXPECT_EQ(system.maps_started(), 1);
 }
 
@@ -140,14 +140,14 @@ TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {
   image::Image nothing(tour.rig().camera(1).width, tour.rig().camera(1).height);
   image::CameraImage black{ImageState::kPresent, 0, nothing};
   blacken(black);
-  System system(tour.rig(), small_config(Mode::kSequential), {image::Image(), black.image});
+  System system(tour.rig(), small_config(Mode::kSequential), {.masks = {image::Image(), black.image}});
   for (const image::ImageBundle& images : tour.frames()) {
     const FrameRecord& record = system.process(images);
     EXPECT_GT(record.result.cameras[0].keypoints, 100);
     EXPECT_EQ(record.result.cameras[1].keypoints, 0);
     EXPECT_EQ(record.result.reason, LostReason::kNotStarted);  // no matched features, no metric start
   }
-  EXPECT_TRUE(system.trajectory().empty());
+  EXPECT_TRUE(final_poses(system).empty());
 }
 
 TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
@@ -160,14 +160,14 @@ TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
   mirror(elsewhere.images[0]);
   system.process(elsewhere);
   EXPECT_EQ(tracked_frames(system), 0u);
-  EXPECT_TRUE(system.trajectory().empty() && system.live_trajectory().empty());
+  EXPECT_TRUE(final_poses(system).empty() && live_poses(system).empty());
   EXPECT_EQ(system.snapshot()->num_keyframes(), 0u);
 
   for (std::size_t i = 0; i < tour.frames().size(); ++i) system.process(tour.replayed(i, k));
   system.finish();
   EXPECT_EQ(system.maps_started(), 2);
-  EXPECT_GT(system.trajectory().size(), 8u);
-  EXPECT_LT(ate_m(system.trajectory(), tour.replayed_truth(k), evaluation::AlignMode::kSim3), 0.01);
+  EXPECT_GT(final_poses(system).size(), 8u);
+  EXPECT_LT(ate_m(final_poses(system), tour.replayed_truth(k), evaluation::AlignMode::kSim3), 0.01);
 }
 
 TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {

@@ -68,9 +68,9 @@ TEST_F(SimulatedRun, TracksWithEveryNumberOfCamerasFromTwoUp) {
   for (const int cameras : {2, 3, 4, 5, 6, 7, 8}) {
     const io::Dataset dataset = open(cameras);
     const session::SessionResult result = run(dataset);
-    EXPECT_EQ(result.trajectory.size(), dataset.frames.size()) << cameras << " cameras";
+    EXPECT_EQ(result.trajectories.front().poses.size(), dataset.frames.size()) << cameras << " cameras";
     EXPECT_EQ(result.record.map.scale, "metric") << cameras << " cameras";
-    EXPECT_LT(evaluate(result.trajectory, evaluation::AlignMode::kSe3).ate.rmse, 0.02) << cameras << " cameras";
+    EXPECT_LT(evaluate(result.trajectories.front().poses, evaluation::AlignMode::kSe3).ate.rmse, 0.02) << cameras << " cameras";
   }
 }
 
@@ -78,23 +78,23 @@ TEST_F(SimulatedRun, OneCameraTracksUpToScaleAndSaysSo) {
   const io::Dataset dataset = open(1);
   const session::SessionResult result = run(dataset);
   EXPECT_EQ(result.record.map.scale, "up-to-scale");
-  EXPECT_GT(result.trajectory.size(), dataset.frames.size() / 2);
+  EXPECT_GT(result.trajectories.front().poses.size(), dataset.frames.size() / 2);
   EXPECT_EQ(result.record.frames.size(), dataset.frames.size());
-  EXPECT_LT(evaluate(result.trajectory, evaluation::AlignMode::kSim3).ate.rmse, 0.03);
+  EXPECT_LT(evaluate(result.trajectories.front().poses, evaluation::AlignMode::kSim3).ate.rmse, 0.03);
 }
 
 TEST_F(SimulatedRun, SequentialRunsGiveTheSameBytes) {
   const io::Dataset dataset = open(4);
   const session::SessionResult first = run(dataset), second = run(dataset);
-  EXPECT_EQ(io::tum_text(first.trajectory, ""), io::tum_text(second.trajectory, ""));
-  EXPECT_EQ(io::tum_text(first.live, ""), io::tum_text(second.live, ""));
+  EXPECT_EQ(io::tum_text(first.trajectories.front().poses, ""), io::tum_text(second.trajectories.front().poses, ""));
+  EXPECT_EQ(io::tum_text(first.live.front().poses, ""), io::tum_text(second.live.front().poses, ""));
 }
 
 TEST_F(SimulatedRun, ParallelRunIsAboutAsAccurate) {
   const io::Dataset dataset = open(4);
   const session::SessionResult result = run(dataset, system::Mode::kParallel);
-  EXPECT_EQ(result.trajectory.size(), dataset.frames.size());
-  EXPECT_LT(evaluate(result.trajectory, evaluation::AlignMode::kSe3).ate.rmse, 0.02);
+  EXPECT_EQ(result.trajectories.front().poses.size(), dataset.frames.size());
+  EXPECT_LT(evaluate(result.trajectories.front().poses, evaluation::AlignMode::kSe3).ate.rmse, 0.02);
 }
 
 TEST_F(SimulatedRun, DamagedImageIsSkippedForItsCameraAndCounted) {
@@ -105,7 +105,7 @@ TEST_F(SimulatedRun, DamagedImageIsSkippedForItsCameraAndCounted) {
   fs::resize_file(dataset->frames[10].images[0]->path, 500);
   std::ofstream(dataset->frames[20].images[2]->path) << "no image";
   const session::SessionResult result = run(*dataset);
-  EXPECT_EQ(result.trajectory.size(), dataset->frames.size());
+  EXPECT_EQ(result.trajectories.front().poses.size(), dataset->frames.size());
   EXPECT_EQ(result.record.cameras[0].skipped, 1);
   EXPECT_EQ(result.record.cameras[1].skipped, 0);
   EXPECT_EQ(result.record.cameras[2].skipped, 1);

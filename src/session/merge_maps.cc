@@ -1,0 +1,40 @@
+#include "session/merge_maps.h"
+
+#include <memory>
+
+#include "looping/loop_closer.h"
+#include "map/append_map.h"
+#include "map/map_store.h"
+#include "mapping/map_keyframe.h"
+
+namespace bslam::session {
+
+Result<MergeResult> merge_maps(const io::SavedMap& a, const io::SavedMap& b, const place::VocabularyPtr& vocabulary,
+                               const system::Config& config) {
+  for (const io::SavedMap* saved : {&a, &b}) {
+    if (saved->map.scale() != map::Scale::kMetric) return Error{saved->file, "scale", "not metric", "maps of one unit"};
+    if (const Status s = io::fits(*saved, a.map.rig(), vocabulary.get()); !s) return s.error();
+  }
+  map::BundledMap both = a.map;
+  const map::AppendedIds ids = map::append_map(both, b.map);
+  map::MapStore store(std::move(both));
+  MergeResult result{.map = a.map};
+  looping::LoopCloser closer(std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition), config.looping,
+                             config.feature_model(), static_cast<std::uint64_t>(config.seed));
+  for (const KeyframeId k : ids.keyframes) {
+    if (!store.snapshot()->alive(k)) continue;
+    map::MapDraft draft("loop", store.snapshot());
+    const auto closure = closer.close(k, draft);
+    if (!closure) continue;
+    store.commit(std::move(draft));
+    ++(closure->joined ? result.joined : result.loops);
+  }
+  map::MapDraft draft("final", store.snapshot());
+  mapping::adjust_globally(config.mapping, config.feature_model(), draft);
+  store.commit(std::move(draft));
+  result.map = *store.snapshot();
+  result.parts = result.map.roots().size();
+  return result;
+}
+
+}  // namespace bslam::session
