@@ -1,10 +1,9 @@
-// Pose graph, absolute pose and similarity at the sizes of loop closing and relocalisation.
+// Pose graph and absolute pose at the sizes of loop closing and relocalisation.
 #include <benchmark/benchmark.h>
 
 #include "../tests/solver/scene.h"
 #include "solver/absolute_pose.h"
 #include "solver/pose_graph.h"
-#include "solver/similarity_ransac.h"
 
 namespace bslam::solver {
 namespace {
@@ -74,29 +73,7 @@ BENCHMARK_CAPTURE(absolute, fisheye, scene::Models::kFisheye)
     ->Name("absolute_pose/fisheye");
 
 // 120 matches, scale free; range(0): per cent of outliers.
-void similarity(benchmark::State& state) {
-  const Rig rig = scene::make_rig(1, scene::Models::kRadTan);
-  Random random(4);
-  const Sim3 S_a_b = Sim3(SE3::exp(scene::random_twist(random, 0.2, 0.5))) *
-                     Sim3(1.3, geometry::Quaterniond::Identity(), Vector3d::Zero());
-  std::vector<SimilarityMatch> matches;
-  while (matches.size() < 120) {
-    const Vector3d point_a = scene::random_visible_point(rig, SE3(), random);
-    Vector3d point_b = S_a_b.inverse() * point_a;
-    const auto pixel_a = scene::see(rig, 0, SE3(), point_a);
-    auto pixel_b = scene::see(rig, 0, SE3(), point_b);
-    if (!pixel_a || !pixel_b) continue;
-    if (random.uniform() < 0.01 * static_cast<double>(state.range(0))) {
-      point_b = scene::random_visible_point(rig, SE3(), random);
-      pixel_b = rig.camera(0).project(point_b);
-    }
-    if (pixel_b) matches.push_back({point_a, point_b, CameraIndex(0), CameraIndex(0), *pixel_a, *pixel_b, 1.0, 1.0});
-  }
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(ransac_similarity(rig, matches, geometry::ScaleMode::kFree, {}, Random(5)));
-  }
-}
-BENCHMARK(similarity)->Arg(30)->Arg(60)->Arg(100)->Unit(benchmark::kMicrosecond)->Name("ransac_similarity/outliers");
+
 
 }  // namespace
 }  // namespace bslam::solver

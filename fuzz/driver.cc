@@ -1,11 +1,14 @@
 // Runs a target on inputs made from its seeds: for compilers without libFuzzer. Where the program is instrumented,
 // inputs that reach something new are kept to make others from. The same seed and number of runs give the same inputs.
 #include <signal.h>
+#include <sys/time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -51,7 +54,7 @@ void keep_current() {
 }
 
 void on_signal(int number) {
-  if (number == SIGALRM) std::fprintf(stderr, "fuzz: an input took over %d s\n", kSlowSeconds);
+  if (number == SIGPROF) std::fprintf(stderr, "fuzz: an input took over %d s\n", kSlowSeconds);
   keep_current();
   ::_exit(1);
 }
@@ -88,20 +91,28 @@ Arguments parse(int argc, char** argv) {
   return a;
 }
 
+// Of the processor: a busy machine is no hang. 0 = no limit.
+void limit_time(int seconds) {
+  itimerval limit{};
+  limit.it_value.tv_sec = seconds;
+  ::setitimer(ITIMER_PROF, &limit, nullptr);
+}
+
 std::size_t run(const std::string& input) {
   current = input;
-  ::alarm(kSlowSeconds);
+  limit_time(kSlowSeconds);
   begin_coverage();
   LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
   const std::size_t fresh = new_places();
-  ::alarm(0);
+  limit_time(0);
   return fresh;
 }
 
 void search(const Arguments& a, std::vector<std::string> corpus) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::seconds(a.seconds);
-  std::size_t places = 0, longest_ms = 0;
+  std::size_t places = 0;
+  double longest_ms = 0;
   long runs = 0;
   for (const std::string& input : corpus) places += run(input);
   if (corpus.empty()) corpus.emplace_back();
@@ -112,19 +123,19 @@ void search(const Arguments& a, std::vector<std::string> corpus) {
     const std::size_t pick = random.below(2) == 0 ? random.below(static_cast<std::uint32_t>(n))
                                                   : n - 1 - random.below(static_cast<std::uint32_t>(newest));
     std::string input = mutate(corpus[pick], corpus, random);
-    const auto begin = Clock::now();
+    const std::clock_t begin = std::clock();
     const std::size_t fresh = run(input);
-    longest_ms = std::max(longest_ms, static_cast<std::size_t>((Clock::now() - begin) / std::chrono::milliseconds(1)));
+    longest_ms = std::max(longest_ms, 1000.0 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
     places += fresh;
     if (fresh > 0 && corpus.size() < kMaxCorpus) corpus.push_back(std::move(input));
   }
-  std::printf("%ld inputs, %zu kept, %zu places reached, slowest %zu ms\n", runs, corpus.size(), places, longest_ms);
+  std::printf("%ld inputs, %zu kept, %zu places reached, slowest %.0f ms\n", runs, corpus.size(), places, longest_ms);
 }
 
 int main_of(int argc, char** argv) {
   const Arguments a = parse(argc, argv);
   crash_file = a.crash.string();
-  for (const int number : {SIGABRT, SIGALRM}) ::signal(number, on_signal);
+  for (const int number : {SIGABRT, SIGPROF}) ::signal(number, on_signal);
   if (__sanitizer_set_death_callback != nullptr) __sanitizer_set_death_callback(keep_current);
   if (!a.write_seeds.empty()) {
     fs::create_directories(a.write_seeds);

@@ -119,10 +119,14 @@ Status write_exports(const map::BundledMap& map, const fs::path& folder) {
     const auto trajectory = io::keyframe_trajectory(map, parts[i]);
     if (Status s = io::write_trajectory(folder / name, trajectory, io::TrajectoryFormat::kTum, header); !s) return s;
   }
-  const io::ColmapModel model = io::colmap_model(map);
-  if (Status s = io::write_atomically(folder / "cameras.txt", model.cameras); !s) return s;
-  if (Status s = io::write_atomically(folder / "images.txt", model.images); !s) return s;
-  return io::write_atomically(folder / "points3D.txt", model.points);
+  const auto model = io::colmap_model(map);
+  if (!model) {  // the rest is worth having
+    std::fprintf(stderr, "bslam: no COLMAP model: %s\n", model.error().message().c_str());
+    return {};
+  }
+  if (Status s = io::write_atomically(folder / "cameras.txt", model->cameras); !s) return s;
+  if (Status s = io::write_atomically(folder / "images.txt", model->images); !s) return s;
+  return io::write_atomically(folder / "points3D.txt", model->points);
 }
 
 int map_export(const MapArguments& arguments) {

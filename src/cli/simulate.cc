@@ -1,9 +1,10 @@
-// bslam simulate: renders the built-in world through a rig.
+// bslam simulate: renders a built-in world through a rig.
 #include <fmt/format.h>
 #include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,7 +21,7 @@ namespace bslam::cli {
 namespace {
 
 struct SimulateArguments {
-  std::string folder, progress = "auto";
+  std::string folder, world = "building", progress = "auto";
   std::optional<std::string> rig, faults;
   double duration_s = 20.0, rate_hz = 20.0, exposure_ms = 5.0, noise = 1.0, speed_mps = 0.0;
   std::uint64_t seed = 1;
@@ -30,6 +31,10 @@ struct SimulateArguments {
 
 std::atomic<bool> interrupted = false;
 static_assert(std::atomic<bool>::is_always_lock_free, "may be set in a signal handler");
+
+const std::map<std::string, simulation::WorldKind> kWorlds = {{"building", simulation::WorldKind::kBuilding},
+                                                              {"corridor", simulation::WorldKind::kCorridor},
+                                                              {"twin-rooms", simulation::WorldKind::kTwinRooms}};
 
 Result<io::SimulationRequest> make_request(const SimulateArguments& arguments) {
   std::optional<camera::Rig> rig;
@@ -46,6 +51,7 @@ Result<io::SimulationRequest> make_request(const SimulateArguments& arguments) {
                                 .tour = {},
                                 .imaging = {},
                                 .world = {},
+                                .kind = kWorlds.at(arguments.world),
                                 .seed = arguments.seed,
                                 .overwrite = arguments.overwrite};
   request.recording.duration_s = arguments.duration_s;
@@ -105,9 +111,12 @@ void add_simulate(CLI::App& app, int& exit_status) {
   const auto arguments = std::make_shared<SimulateArguments>();
   SimulateArguments& a = *arguments;
   CLI::App* verb =
-      app.add_subcommand("simulate", "render the built-in world through a rig, in EuRoC layout with ground truth");
+      app.add_subcommand("simulate", "render a built-in world through a rig, in EuRoC layout with ground truth");
   verb->add_option("--out", a.folder, "folder to write into")->required();
   verb->add_option("--rig", a.rig, "calibration of the rig (default: four cameras, two of them in front)");
+  verb->add_option("--world", a.world, "building: rooms that differ; corridor, twin-rooms: places that look exactly alike")
+      ->check(CLI::IsMember({"building", "corridor", "twin-rooms"}))
+      ->capture_default_str();
   verb->add_option("--duration", a.duration_s, "seconds")->capture_default_str();
   verb->add_option("--rate", a.rate_hz, "images a second of each camera")->capture_default_str();
   verb->add_option("--seed", a.seed, "of the world, the motion and the noise")->capture_default_str();

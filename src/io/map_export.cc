@@ -15,22 +15,23 @@ using camera::Camera;
 using map::BundledKeyframe;
 using map::BundledMap;
 
-// The camera in COLMAP's words: model, size, parameters.
+// COLMAP's name of a model; empty where it has none.
+std::string_view colmap_name(const camera::CameraModel& model) {
+  if (std::holds_alternative<camera::Pinhole>(model)) return "PINHOLE";
+  if (std::holds_alternative<camera::KannalaBrandt>(model)) return "OPENCV_FISHEYE";
+  if (!std::holds_alternative<camera::PinholeRadTan>(model)) return "";
+  return camera::distortion(model).size() == 4 ? "OPENCV" : "FULL_OPENCV";
+}
+
+// Model, size and parameters.
 std::string colmap_camera(const Camera& camera) {
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   const std::vector<double> d = camera::distortion(camera.model);
-  std::string model = "PINHOLE";
+  const std::string_view name = colmap_name(camera.model);
   std::vector<double> parameters = {k.fx, k.fy, k.cx + 0.5, k.cy + 0.5};
   parameters.insert(parameters.end(), d.begin(), d.end());
-  if (std::holds_alternative<camera::KannalaBrandt>(camera.model)) {
-    model = "OPENCV_FISHEYE";
-  } else if (d.size() == 4) {
-    model = "OPENCV";
-  } else if (!d.empty()) {
-    model = "FULL_OPENCV";  // k1 k2 p1 p2 k3 k4 k5 k6
-    parameters.resize(12, 0.0);
-  }
-  std::string line = fmt::format("{} {} {}", model, camera.width, camera.height);
+  if (name == "FULL_OPENCV") parameters.resize(12, 0.0);  // k1 k2 p1 p2 k3 k4 k5 k6
+  std::string line = fmt::format("{} {} {}", name, camera.width, camera.height);
   for (const double p : parameters) fmt::format_to(std::back_inserter(line), " {}", p);
   return line;
 }
@@ -151,12 +152,16 @@ std::string landmarks_ply(const BundledMap& map) {
   return std::move(header) + std::move(out).take();
 }
 
-ColmapModel colmap_model(const BundledMap& map) {
+Result<ColmapModel> colmap_model(const BundledMap& map) {
   ColmapModel model{"# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n",
                     "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n",
                     "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n"};
   for (std::size_t c = 0; c < map.rig().size(); ++c) {
-    model.cameras += fmt::format("{} {}\n", c + 1, colmap_camera(map.rig().camera(c)));
+    const Camera& camera = map.rig().camera(c);
+    if (colmap_name(camera.model).empty()) {
+      return Error{"", camera.name, std::string(camera::model_name(camera.model)), "a model that COLMAP has"};
+    }
+    model.cameras += fmt::format("{} {}\n", c + 1, colmap_camera(camera));
   }
   const Images images(map);
   for (const KeyframeId k : map.keyframe_ids()) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/result.h"
 #include "base/timestamp.h"
 #include "evaluation/trajectory.h"
 #include "map/bundled_map.h"
@@ -34,10 +35,11 @@ std::string landmarks_ply(const map::BundledMap& map);
 
 // The text model of COLMAP (cameras.txt, images.txt, points3D.txt): one image for each present camera of each keyframe,
 // named CAMERA/STAMP.png with the stamp of the recording in ns, all its keypoints; every landmark a grey point.
-// COLMAP's pixels begin at the corner of the image, ours at the centre of the first pixel: 0.5 is added.
+// COLMAP's pixels begin at the corner of the image, ours at the centre of the first pixel: 0.5 is added. Error (file
+// left empty) where a camera has a model that COLMAP has not.
 struct ColmapModel {
   std::string cameras, images, points;
 };
-ColmapModel colmap_model(const map::BundledMap& map);
+Result<ColmapModel> colmap_model(const map::BundledMap& map);
 
 }  // namespace bslam::io

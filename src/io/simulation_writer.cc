@@ -209,6 +209,7 @@ std::string simulation_digest(const SimulationRequest& r) {
     for (const int camera : f.cameras) text += fmt::format(" {}", camera);
     text += '\n';
   }
+  if (r.kind != simulation::WorldKind::kBuilding) text += fmt::format("world {}\n", static_cast<int>(r.kind));
   text += rig_to_yaml(r.rig);
   std::uint64_t digest = 0xcbf29ce484222325ull;  // FNV-1a
   for (const char c : text) digest = (digest ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
@@ -225,7 +226,7 @@ Result<SimulationOutcome> write_simulation(const SimulationRequest& request, Thr
   for (std::size_t c = 0; c < request.rig.size(); ++c) {
     if (const Status s = make_folder(camera_folder(request.folder, c) / "data"); !s) return s.error();
   }
-  const simulation::Building building = simulation::make_building(request.seed);
+  const simulation::Building building = simulation::make_building(request.kind, request.seed);
   simulation::TourOptions tour = request.tour;
   tour.duration_s = request.recording.duration_s;
   const simulation::World world(building, request.world, pool);

@@ -17,6 +17,7 @@ struct SimulationRequest {
   simulation::TourOptions tour;  // its duration is the recording's
   simulation::ImagingOptions imaging;
   simulation::WorldOptions world;
+  simulation::WorldKind kind = simulation::WorldKind::kBuilding;
   std::uint64_t seed = 1;  // of the world
   bool overwrite = false;
 };
@@ -30,7 +31,7 @@ enum class SimulationOutcome {
 // Called after each picture, from any thread but one at a time: how many of all are there. False asks to stop.
 using SimulationProgress = std::function<bool(std::size_t done, std::size_t total)>;
 
-// Renders the tour through the built-in world and writes into request.folder, making it:
+// Renders the tour through a built-in world and writes into request.folder, making it:
 //   mav0/camN/data/STAMP.png, mav0/camN/data.csv, mav0/camN/sensor.yaml
 //   mav0/state_groundtruth_estimate0/data.csv    the body at 200 Hz
 //   groundtruth_cam0.tum                         T_world_cam0 at camera 0's images

@@ -18,6 +18,7 @@ struct Location {
   geometry::SE3 T_rig_world;             // of the frame
   std::vector<std::pair<FeatureId, LandmarkId>> matches;  // inliers, in order of feature; features and landmarks distinct
   int inliers = 0;                       // keypoints
+  double scale = 1;                      // of the place relative to the map about the frame (looping/relative_scale.h)
 };
 
 // Why a candidate is no place the frame was taken at.

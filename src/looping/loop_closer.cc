@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "looping/loop_correction.h"
+#include "looping/relative_scale.h"
 
 namespace bslam::looping {
 namespace {
@@ -28,9 +29,11 @@ std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::Bundled
       consistent_candidates(map, keyframe, recogniser_->revisited(map, keyframe), options_.loop, history_);
   for (const Candidate& candidate : candidates) {
     const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
-    const auto location =
-        locate(map, *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
+    auto location = locate(map, *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
     if (!location || !shows_news(map, keyframe, *location)) continue;
+    const auto scale = relative_scale(map, keyframe, *location);
+    if (!scale) continue;
+    location->scale = *scale;
     if (plausible(map, measure(map, keyframe, *location), options_.loop)) return location;
   }
   return std::nullopt;

@@ -15,7 +15,6 @@ using Eigen::Vector3d;
 using geometry::SE3;
 using geometry::Sim3;
 
-constexpr std::size_t kMinScalePairs = 10;            // landmarks seen from both ends, for a scale
 constexpr double kMaxTurn = 20 * std::numbers::pi / 180;  // rad: no drift turns a rig by more
 
 Vector3d centre(const SE3& T_rig_world) { return T_rig_world.inverse().translation(); }
@@ -29,19 +28,6 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
-}
-
-// Units of the place per unit of the map about the keyframe: how far landmarks are by the one and by the other.
-double relative_scale(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
-  if (map.scale() == map::Scale::kMetric) return 1.0;
-  std::vector<double> ratios;
-  for (const auto& [feature, there] : location.matches) {
-    const LandmarkId here = map.landmark_of(keyframe, feature);
-    if (!here.valid()) continue;
-    const double distance_here = (map.keyframe(keyframe).T_rig_world * map.landmark(here).position).norm();
-    ratios.push_back((location.T_rig_world * map.landmark(there).position).norm() / distance_here);
-  }
-  return ratios.size() < kMinScalePairs ? 1.0 : median(std::move(ratios));
 }
 
 // Median error, in pixels, of what the keyframe sees of the place at the pose it has in the map.
@@ -188,7 +174,7 @@ LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Locat
   out.moved = (centre(now) - centre(location.T_rig_world)).norm();
   out.turned = (now.rotation() * location.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
   out.off_px = error_px(map, keyframe, location);
-  out.scaled = relative_scale(map, keyframe, location);
+  out.scaled = location.scale;
   out.joined = map.root_of(keyframe) != map.root_of(location.with);
   return out;
 }

@@ -36,4 +36,8 @@ struct Building {
 // Rooms, doors and tour are the same for every seed; materials, furniture and pictures follow from it.
 Building make_building(std::uint64_t seed);
 
+// The worlds there are: this building, and those of simulation/repeated_world.h.
+enum class WorldKind { kBuilding, kCorridor, kTwinRooms };
+Building make_building(WorldKind kind, std::uint64_t seed);
+
 }  // namespace bslam::simulation

@@ -50,7 +50,7 @@ TEST(MapPly, HasEveryLandmark) {
 // What a reader of the model makes of it: every observation of a point lies where its camera projects the point.
 TEST(ColmapModel, ProjectsItsPointsOntoItsImages) {
   const map::BundledMap map = small_map(simulation::ring_rig(3));
-  const ColmapModel model = colmap_model(map);
+  const ColmapModel model = colmap_model(map).value();
   std::map<int, std::array<double, 8>> cameras;  // fx fy cx cy k1 k2 p1 p2
   std::istringstream in(model.cameras);
   for (std::string line; std::getline(in, line);) {
@@ -109,9 +109,19 @@ TEST(ColmapModel, ProjectsItsPointsOntoItsImages) {
   EXPECT_GT(close, checked / 2);  // the part without true places is off
 }
 
+TEST(ColmapModel, HasNoneForModelsUnknownToColmap) {
+  const camera::Rig ring = simulation::ring_rig(2);
+  std::vector<camera::RigCamera> cameras = {{ring.camera(0), ring.body_from_cam(0)},
+                                            {ring.camera(1), ring.body_from_cam(1)}};
+  cameras[1].camera.model = camera::DoubleSphere(camera::intrinsics(ring.camera(1).model), 0.1, 0.55);
+  const auto model = colmap_model(map::BundledMap(std::make_shared<const camera::Rig>(std::move(cameras))));
+  ASSERT_FALSE(model);
+  EXPECT_EQ(model.error().key, ring.camera(1).name);
+}
+
 TEST(ColmapModel, HasNoImageOfACameraThatGaveNone) {
   const map::BundledMap map = small_map(simulation::ring_rig(3));
-  const ColmapModel model = colmap_model(map);
+  const ColmapModel model = colmap_model(map).value();
   const auto lines = static_cast<std::size_t>(std::ranges::count(model.images, '\n'));
   EXPECT_EQ(lines, 2 + 2 * (map.num_keyframes() * 3 - 2));  // camera 1 was missing twice
 }

@@ -124,8 +124,19 @@ TEST(MapFile, GivesBackTheMapToTheBit) {
   }
 }
 
+camera::Rig changed(const camera::Rig& rig, std::size_t i, const std::function<void(camera::RigCamera&)>& change) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+  change(cameras[i]);
+  return camera::Rig(std::move(cameras));
+}
+
 TEST(MapFile, GivesBackTheRigToTheBit) {
-  camera::Rig rig = simulation::mixed_rig();
+  camera::Rig rig = changed(simulation::mixed_rig(), 1, [](camera::RigCamera& c) {
+    c.camera.model = camera::DoubleSphere(camera::intrinsics(c.camera.model), -0.2, 0.6);
+    c.camera.time_offset_ns = -1'234'567;
+    c.camera.mask_file = "/masks/b.png";
+  });
   const SavedMap saved = read_back(small_map(rig));
   const camera::Rig& back = saved.map.rig();
   ASSERT_EQ(back.size(), rig.size());
@@ -133,6 +144,9 @@ TEST(MapFile, GivesBackTheRigToTheBit) {
     expect_same_bits(back.body_from_cam(i), rig.body_from_cam(i));
     expect_same_bits(back.cam_from_rig(i), rig.cam_from_rig(i));
     EXPECT_EQ(back.camera(i).name, rig.camera(i).name);
+    EXPECT_EQ(back.camera(i).time_offset_ns, rig.camera(i).time_offset_ns);
+    EXPECT_EQ(back.camera(i).mask_file, rig.camera(i).mask_file);
+    EXPECT_EQ(camera::model_name(back.camera(i).model), camera::model_name(rig.camera(i).model));
     EXPECT_EQ(camera::distortion(back.camera(i).model), camera::distortion(rig.camera(i).model));
     EXPECT_EQ(camera::intrinsics(back.camera(i).model).fx, camera::intrinsics(rig.camera(i).model).fx);
     EXPECT_EQ(back.camera(i).unproject({100, 50}), rig.camera(i).unproject({100, 50}));
@@ -213,13 +227,6 @@ TEST(MapFile, IsWholeOrNotThere) {
 }
 
 // ---- fits
-
-camera::Rig changed(const camera::Rig& rig, std::size_t i, const std::function<void(camera::RigCamera&)>& change) {
-  std::vector<camera::RigCamera> cameras;
-  for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
-  change(cameras[i]);
-  return camera::Rig(std::move(cameras));
-}
 
 TEST(MapFits, TheSameRigWhereverItsBodyFrameIs) {
   const camera::Rig rig = simulation::default_rig();

@@ -1,5 +1,6 @@
 // What a recognised place changes in a map that has drifted.
 #include "looping/loop_correction.h"
+#include "looping/relative_scale.h"
 
 #include <gtest/gtest.h>
 
@@ -204,8 +205,11 @@ class ScaleDrift : public ::testing::Test {
 };
 
 TEST_F(ScaleDrift, IsMeasuredAndRemoved) {
-  const auto location = locate_last(world());
+  auto location = locate_last(world());
   ASSERT_TRUE(location);
+  const auto scale = relative_scale(world().map, kLast, *location);
+  ASSERT_TRUE(scale);
+  location->scale = *scale;
   const LoopClosure closure = measure(world().map, kLast, *location);
   EXPECT_NEAR(closure.scaled, 1 / 0.9, 0.02);
   EXPECT_TRUE(plausible(world().map, closure, {}));

@@ -1,0 +1,28 @@
+#include "looping/relative_scale.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace bslam::looping {
+namespace {
+
+constexpr std::size_t kMinPairs = 10;
+
+}  // namespace
+
+std::optional<double> relative_scale(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
+  if (map.scale() == map::Scale::kMetric) return 1.0;
+  std::vector<double> ratios;
+  for (const auto& [feature, there] : location.matches) {
+    const LandmarkId here = map.landmark_of(keyframe, feature);
+    if (!here.valid()) continue;
+    const double distance_here = (map.keyframe(keyframe).T_rig_world * map.landmark(here).position).norm();
+    ratios.push_back((location.T_rig_world * map.landmark(there).position).norm() / distance_here);
+  }
+  if (ratios.size() < kMinPairs) return std::nullopt;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
+}
+
+}  // namespace bslam::looping

@@ -1,0 +1,183 @@
+// Loops, and the parts of a map that a place seen by both of them joins.
+#include <gtest/gtest.h>
+
+#include "system/closed_walk.h"
+
+namespace bslam::system {
+namespace {
+
+// A loop between the last frames of the walk and its first.
+void expect_loop(const System& system) {
+  const auto& frames = closed_walk().frames();
+  ASSERT_FALSE(system.loops().empty());
+  const LoopRecord loop = system.loops().front();
+  EXPECT_GE(loop.time_ns, frames[kRound - 12].time_ns);
+  EXPECT_LE(loop.with_time_ns, frames[12].time_ns);
+  EXPECT_FALSE(loop.closure.joined);
+  EXPECT_GE(loop.closure.inliers, 50);
+  EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
+}
+
+TEST(SystemLoopSequential, WhereTheWalkIsBackTheMapIsClosedAndTheErrorGone) {
+  Config config = small_config(Mode::kSequential);
+  config.final_adjustment = false;
+  Config off = config;
+  off.looping.loop.enabled = false;
+  System system(closed_walk().rig(), config, with_vocabulary());
+  System open(closed_walk().rig(), off, with_vocabulary());
+  System blind(closed_walk().rig(), config);
+  for (System* s : {&system, &open, &blind}) {
+    process_all(*s, closed_walk().frames());
+    s->finish();
+    EXPECT_EQ(tracked_frames(*s), kWalk);
+    EXPECT_EQ(s->trajectories().size(), 1u);
+    expect_smooth(*s, closed_walk().truth());
+  }
+  expect_loop(system);
+  EXPECT_TRUE(open.loops().empty());
+  EXPECT_TRUE(blind.loops().empty());
+  EXPECT_TRUE(identical(open.trajectories(), blind.trajectories()));
+  EXPECT_LT(2 * ate_m(final_poses(system), closed_walk().truth()), ate_m(final_poses(open), closed_walk().truth()));
+  const map::BundledMap &closed_map = *system.snapshot(), &open_map = *open.snapshot();
+  EXPECT_LT(closed_map.num_landmarks(), open_map.num_landmarks());  // what was there twice is there once
+}
+
+// Carried away with its eyes shut the rig begins anew, comes back to where it began first, and has one map then.
+class SystemLoopParts : public ::testing::Test {
+ protected:
+  static constexpr std::size_t kFirst = 16, kAfter = 3;  // frames of the first part; frames lost before the second
+  static Playback carried() { return play(closed_walk(), {{0, kFirst}, {36, kWalk}}); }
+  static Config config() {
+    Config out = small_config(Mode::kSequential);
+    out.looping.recovery.new_part_after = static_cast<int>(kAfter);
+    return out;
+  }
+};
+
+TEST_F(SystemLoopParts, APartBeganInANewPlaceIsJoinedWhereItComesToAnOldOne) {
+  const Playback walk = carried();
+  System system(closed_walk().rig(), config(), with_vocabulary());
+  std::size_t two = 0;
+  for (std::size_t k = 0; k < walk.frames.size(); ++k) {
+    const FrameRecord& record = system.process(walk.frames[k]);
+    const bool lost = k >= kFirst && k < kFirst + kAfter - 1;
+    EXPECT_EQ(is_tracked(record), !lost) << "frame " << k;
+    const std::vector<PartTrajectory> parts = system.trajectories();
+    two += parts.size() == 2;
+    EXPECT_EQ(parts.size(), system.loops().empty() && k >= kFirst + kAfter - 1 ? 2u : 1u) << "frame " << k;
+    EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt) << "frame " << k;
+  }
+  EXPECT_GT(two, 10u);
+  system.finish();
+  EXPECT_EQ(system.maps_started(), 2);
+  ASSERT_EQ(system.loops().size(), 1u);
+  EXPECT_TRUE(system.loops().front().closure.joined);
+  ASSERT_EQ(system.trajectories().size(), 1u);
+  EXPECT_EQ(final_poses(system).size(), walk.frames.size() - (kAfter - 1));
+  EXPECT_LT(ate_m(final_poses(system), walk.truth), 0.01);
+  EXPECT_EQ(system.live_trajectories().size(), 2u);  // as it was told then
+}
+
+TEST_F(SystemLoopParts, TheLivePoseNeverJumpsWhereTheMapDoes) {
+  const Playback walk = carried();
+  System system(closed_walk().rig(), config(), with_vocabulary());
+  process_all(system, walk.frames);
+  system.finish();
+  expect_smooth(system, walk.truth);
+  const std::vector<FrameRecord>& frames = system.frames();
+  for (std::size_t k = kFirst; k < kFirst + kAfter; ++k) {  // nobody knows how the rig moved meanwhile
+    EXPECT_EQ(frames[k].T_rig_odom.translation(), frames[kFirst - 1].T_rig_odom.translation()) << "frame " << k;
+  }
+  double jump = 0;
+  for (std::size_t k = kFirst + kAfter; k < frames.size(); ++k) {
+    jump = std::max(jump, (frames[k].T_map_odom * frames[k - 1].T_map_odom.inverse()).translation().norm());
+  }
+  EXPECT_GT(jump, 0.2);  // metres: from the world of one part to that of the other
+}
+
+TEST(SystemLoopParallel, ClosesTheLoopWithinTheRun) {
+  System system(closed_walk().rig(), small_config(Mode::kParallel), with_vocabulary());
+  process_all(system, closed_walk().frames());
+  system.finish();
+  EXPECT_EQ(tracked_frames(system), kWalk);
+  expect_loop(system);
+  expect_smooth(system, closed_walk().truth());
+  EXPECT_EQ(system.trajectories().size(), 1u);
+  EXPECT_LT(ate_m(final_poses(system), closed_walk().truth()), 0.005);
+}
+
+TEST(SystemLoopLagged, GivesTheSameMapWithAnyNumberOfThreads) {
+  std::vector<PartTrajectory> final, live;
+  map::MapSnapshot map;
+  for (const int threads : {1, 2, 4}) {
+    System system(closed_walk().rig(), small_config(Mode::kLagged, threads), with_vocabulary());
+    process_all(system, closed_walk().frames());
+    system.finish();
+    expect_loop(system);
+    if (!map) {
+      map = system.snapshot();
+      final = system.trajectories();
+      live = system.live_trajectories();
+      EXPECT_EQ(final_poses(system).size(), kWalk);
+    }
+    EXPECT_TRUE(identical(*map, *system.snapshot())) << threads << " threads";
+    EXPECT_TRUE(identical(final, system.trajectories())) << threads << " threads";
+    EXPECT_TRUE(identical(live, system.live_trajectories())) << threads << " threads";
+  }
+}
+
+TEST(SystemLoopReplay, RepeatsAParallelRunWithLoopsToTheBit) {
+  const Playback walk = play(closed_walk(), {{0, 16}, {36, kWalk}});  // joined, then closed
+  Config config = small_config(Mode::kParallel);
+  config.looping.recovery.new_part_after = 3;
+  for (int i = 0; i < 2; ++i) {
+    System recorded(closed_walk().rig(), config, with_vocabulary());
+    process_all(recorded, walk.frames);
+    recorded.finish();
+    EXPECT_FALSE(recorded.loops().empty());
+    auto journal = parse_journal(journal_text(recorded.journal()), "recorded");
+    ASSERT_TRUE(journal.ok());
+    Resources resources = with_vocabulary();
+    resources.replay = std::move(*journal);
+    System replayed(closed_walk().rig(), config, std::move(resources));
+    process_all(replayed, walk.frames);
+    replayed.finish();
+    EXPECT_TRUE(identical(*recorded.snapshot(), *replayed.snapshot()));
+    EXPECT_TRUE(identical(recorded.trajectories(), replayed.trajectories()));
+    EXPECT_TRUE(identical(recorded.live_trajectories(), replayed.live_trajectories()));
+    EXPECT_EQ(recorded.loops().size(), replayed.loops().size());
+  }
+}
+
+// The runs go on in the map of the walk until shortly before its end, so that each of them comes to the loop at once.
+TEST(SystemLoopParallel, MayEndAtAnyFrameGoneOrInterrupted) {
+  const Playback end = play(closed_walk(), {{48, 66}});
+  Config before = small_config(Mode::kSequential);
+  before.final_adjustment = false;
+  System open(closed_walk().rig(), before, with_vocabulary());
+  process_all(open, play(closed_walk(), {{0, 52}}).frames);
+  ASSERT_TRUE(open.loops().empty());
+  Random random(7, "early end");
+  std::size_t closed = 0;
+  for (int i = 0; i < 50; ++i) {
+    Config config = small_config(i % 2 == 0 ? Mode::kParallel : Mode::kLagged);
+    config.execution.lag_map = config.execution.lag_loop = 1;
+    Resources resources = with_vocabulary();
+    resources.map = *open.snapshot();
+    System system(closed_walk().rig(), config, std::move(resources));
+    const std::size_t frames = random.below(static_cast<std::uint32_t>(end.frames.size() + 1));
+    for (std::size_t k = 0; k < frames; ++k) system.process(end.frames[k]);
+    closed += !system.loops().empty();
+    if (i % 3 == 0) continue;  // gone
+    system.interrupt();
+    if (i % 3 == 1) continue;
+    system.finish();
+    EXPECT_EQ(system.frames().size(), frames);
+    EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
+  }
+  EXPECT_GT(closed, 5u);  // ends before the loop, in it and after it
+  EXPECT_LT(closed, 45u);
+}
+
+}  // namespace
+}  // namespace bslam::system

@@ -1,0 +1,136 @@
+// A lost rig is found again anywhere in the map, also in one of an earlier run, and nowhere else.
+#include <gtest/gtest.h>
+
+#include "system/closed_walk.h"
+
+namespace bslam::system {
+namespace {
+
+TEST(SystemRelocalisation, CarriedInTheDarkTheRigIsFoundWhereItHasBeen) {
+  constexpr std::size_t kDark = 30, kLight = 33;
+  Playback walk = play(closed_walk(), {{0, kLight}, {8, 24}});
+  for (std::size_t k = kDark; k < kLight; ++k) {
+    for (image::CameraImage& i : walk.frames[k].images) blacken(i);
+  }
+  System system(closed_walk().rig(), small_config(Mode::kSequential), with_vocabulary());
+  System blind(closed_walk().rig(), small_config(Mode::kSequential));
+  process_all(system, walk.frames);
+  process_all(blind, walk.frames);
+  for (const FrameRecord& record : system.frames()) {
+    const std::size_t k = record.result.frame.index();
+    EXPECT_EQ(is_tracked(record), k < kDark || k >= kLight) << "frame " << k;
+    EXPECT_EQ(record.relocalisation.has_value(), k == kLight) << "frame " << k;
+    EXPECT_EQ(is_tracked(blind.frames()[k]), k < kDark) << "frame " << k;  // nothing but the vocabulary finds it
+  }
+  ASSERT_TRUE(system.frames()[kLight].relocalisation);
+  EXPECT_LE(system.keyframe_time(system.frames()[kLight].relocalisation->with), walk.frames[24].time_ns);
+  EXPECT_GE(system.frames()[kLight].relocalisation->inliers, 50);
+  expect_told_where_it_is(system, walk.truth, walk.truth.front().T_world_frame);
+  expect_smooth(system, walk.truth);
+  system.finish();
+  EXPECT_EQ(system.maps_started(), 1);
+  EXPECT_EQ(system.trajectories().size(), 1u);
+  EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
+}
+
+TEST(SystemRelocalisation, WhereItHasNeverBeenThereIsNoPose) {
+  const Playback walk = play(closed_walk(), {{0, 16}, {36, 46}});
+  System system(closed_walk().rig(), small_config(Mode::kSequential), with_vocabulary());
+  process_all(system, walk.frames);
+  for (const FrameRecord& record : system.frames()) {
+    EXPECT_EQ(is_tracked(record), record.result.frame.index() < 16) << "frame " << record.result.frame.value();
+    EXPECT_FALSE(record.relocalisation);
+  }
+  system.finish();
+  EXPECT_EQ(system.maps_started(), 1);
+}
+
+// Another walk beside the first, in the map of that.
+class SystemSavedMap : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    System first(closed_walk().rig(), small_config(Mode::kSequential), with_vocabulary());
+    process_all(first, closed_walk().frames());
+    first.finish();
+    saved_ = first.snapshot();
+  }
+  static void TearDownTestSuite() { saved_.reset(); }
+
+  static Resources resources() {
+    Resources out = with_vocabulary();
+    out.map = *saved_;
+    return out;
+  }
+  static const RenderedTour& beside() {
+    static const RenderedTour walk(2, 20, [](const auto& building, double duration_s) {
+      return round_and_home(building, duration_s, 0.08);
+    });
+    return walk;
+  }
+  // Where the world of the map stands.
+  static geometry::SE3 origin() { return closed_walk().truth().front().T_world_frame; }
+
+  static inline map::MapSnapshot saved_;
+};
+
+TEST_F(SystemSavedMap, LocalisingLeavesItAsItIs) {
+  for (const Mode mode : {Mode::kSequential, Mode::kParallel, Mode::kLagged}) {
+    Config config = small_config(mode);
+    config.localize_only = true;
+    config.looping.recovery.new_part_after = 1;
+    System system(beside().rig(), config, resources());
+    process_all(system, beside().frames());
+    system.finish();
+    EXPECT_EQ(tracked_frames(system), beside().frames().size());
+    EXPECT_TRUE(system.frames().front().relocalisation);
+    expect_told_where_it_is(system, beside().truth(), origin());
+    expect_smooth(system, beside().truth());
+    EXPECT_EQ(system.snapshot()->version(), saved_->version());
+    EXPECT_TRUE(identical(*system.snapshot(), *saved_));
+    EXPECT_EQ(system.maps_started(), 0);
+    EXPECT_EQ(final_poses(system).size(), beside().frames().size());
+    for (const FrameRecord& record : system.frames()) EXPECT_FALSE(record.keyframe);
+  }
+}
+
+TEST_F(SystemSavedMap, WhereThePlaceIsNotInItLocalisingHasNoPose) {
+  System part(closed_walk().rig(), small_config(Mode::kSequential), with_vocabulary());
+  process_all(part, play(closed_walk(), {{0, 16}}).frames);
+  Config config = small_config(Mode::kSequential);
+  config.localize_only = true;
+  config.looping.recovery.new_part_after = 1;
+  Resources of_part = with_vocabulary();
+  of_part.map = *part.snapshot();
+  System system(closed_walk().rig(), config, std::move(of_part));
+  process_all(system, play(closed_walk(), {{36, 46}}).frames);
+  system.finish();
+  EXPECT_EQ(tracked_frames(system), 0u);
+  EXPECT_EQ(system.snapshot()->version(), part.snapshot()->version());
+}
+
+TEST_F(SystemSavedMap, ARunGoesOnInItAndCanBeRepeated) {
+  System system(beside().rig(), small_config(Mode::kParallel), resources());
+  process_all(system, beside().frames());
+  system.finish();
+  EXPECT_EQ(tracked_frames(system), beside().frames().size());
+  EXPECT_TRUE(system.frames().front().relocalisation);
+  expect_told_where_it_is(system, beside().truth(), origin());
+  EXPECT_EQ(system.maps_started(), 0);
+  EXPECT_GT(system.snapshot()->version(), saved_->version());
+  EXPECT_GT(system.snapshot()->newest_keyframe(), saved_->newest_keyframe());
+  EXPECT_EQ(system.snapshot()->roots(), saved_->roots());
+  EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
+
+  auto journal = parse_journal(journal_text(system.journal()), "recorded");
+  ASSERT_TRUE(journal.ok());
+  Resources again = resources();
+  again.replay = std::move(*journal);
+  System replayed(beside().rig(), small_config(Mode::kSequential), std::move(again));
+  process_all(replayed, beside().frames());
+  replayed.finish();
+  EXPECT_TRUE(identical(*system.snapshot(), *replayed.snapshot()));
+  EXPECT_TRUE(identical(system.live_trajectories(), replayed.live_trajectories()));
+}
+
+}  // namespace
+}  // namespace bslam::system
