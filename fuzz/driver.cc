@@ -23,10 +23,10 @@
 // Of the sanitizers, where the program is built with them; this file is not, as they ask for options before they are
 // ready.
 extern "C" void __sanitizer_set_death_callback(void (*)()) __attribute__((weak));
-// An input is at most a megabyte: what asks for two gigabytes believes a number it should not.
+// An input is at most 64 KB: what asks for a gigabyte believes a number it should not.
 extern "C" const char* __asan_default_options();
 extern "C" const char* __ubsan_default_options();
-const char* __asan_default_options() { return "max_allocation_size_mb=2048:allocator_may_return_null=0"; }
+const char* __asan_default_options() { return "max_allocation_size_mb=1024:allocator_may_return_null=0"; }
 const char* __ubsan_default_options() { return "print_stacktrace=1:halt_on_error=1"; }
 
 namespace bslam::fuzz {

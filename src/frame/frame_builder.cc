@@ -12,7 +12,7 @@ FrameBuilder::FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions
   for (std::size_t i = 0; i < rig.size(); ++i) extractors_.emplace_back(options);
 }
 
-BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool& pool) {
+BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool& pool, std::span<const std::uint8_t> left_out) {
   BSLAM_ASSERT(images.images.size() == rig_.size(), "one image slot per camera of the rig");
   BundledFrame frame;
   frame.id = images.id;
@@ -21,9 +21,9 @@ BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool&
   pool.for_each(rig_.size(), [&](std::size_t i) {
     const image::CameraImage& input = images.images[i];
     CameraFrame& camera = frame.cameras[i];
-    camera.state = input.state;
+    camera.state = !left_out.empty() && left_out[i] ? image::ImageState::kMissing : input.state;
     camera.time_ns = input.time_ns;
-    if (input.state == image::ImageState::kPresent) {
+    if (camera.state == image::ImageState::kPresent) {
       extractors_[i].extract(input.image.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], camera.keypoints);
     } else {
       pyramids_[i].levels.clear();

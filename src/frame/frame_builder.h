@@ -17,8 +17,9 @@ class FrameBuilder {
  public:
   FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions& options, std::vector<image::Image> masks);
 
-  // Keypoints of every present image; the Bundled table is still empty.
-  BundledFrame extract(const image::ImageBundle& images, ThreadPool& pool);
+  // Keypoints of every present image; the Bundled table is still empty. Cameras with left_out[i] != 0 (or none where it is
+  // empty) are taken as without an image.
+  BundledFrame extract(const image::ImageBundle& images, ThreadPool& pool, std::span<const std::uint8_t> left_out = {});
 
   // Of the frame extracted last; empty for cameras without an image.
   std::span<const image::Pyramid> pyramids() const { return pyramids_; }

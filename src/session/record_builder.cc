@@ -36,8 +36,8 @@ report::FrameRecord frame_record(const RecordInput& input, const InputFrame& in,
 }
 
 // State of a camera in one frame, from what it delivered.
-report::CameraInterval camera_state(const report::FrameRecord& frame, std::size_t c) {
-  if (!frame.cameras[c].has_image) return {"out", "no-images", frame.time_s, frame.time_s};
+report::CameraInterval camera_state(const report::FrameRecord& frame, system::Outage outage, std::size_t c) {
+  if (outage != system::Outage::kNone) return {"out", std::string(system::describe(outage)), frame.time_s, frame.time_s};
   if (frame.cameras[c].keypoints < kFewKeypoints) return {"degraded", "few-features", frame.time_s, frame.time_s};
   return {"ok", "", frame.time_s, frame.time_s};
 }
@@ -51,9 +51,10 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
       camera.images += f.images[c] == image::ImageState::kPresent;
       camera.skipped += f.images[c] == image::ImageState::kDamaged;
     }
+    auto seen = frames.begin();
     for (const report::FrameRecord& f : record.frames) {
-      if (f.cameras.empty()) continue;
-      const report::CameraInterval state = camera_state(f, c);
+      if (f.cameras.empty()) continue;  // dropped: the system never saw it
+      const report::CameraInterval state = camera_state(f, (seen++)->outages[c], c);
       if (camera.states.empty() || camera.states.back().state != state.state || camera.states.back().reason != state.reason) {
         camera.states.push_back(state);
       }

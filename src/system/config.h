@@ -6,6 +6,7 @@
 #include "frame/bundling.h"
 #include "looping/options.h"
 #include "mapping/options.h"
+#include "system/camera_health.h"
 #include "tracking/options.h"
 
 namespace bslam::system {
@@ -50,6 +51,7 @@ struct Config {
   Mode mode = Mode::kParallel;
   IoOptions io;
   ExecutionOptions execution;
+  HealthOptions health;
   feature::FeatureOptions features;
   frame::BundlingOptions bundling;
   tracking::TrackingOptions tracking;
@@ -66,6 +68,7 @@ struct Config {
     visitor("mode", self.mode, Range{}, "", "when stages run");
     visitor.section("io", self.io);
     visitor.section("execution", self.execution);
+    visitor.section("health", self.health);
     visitor.section("features", self.features);
     visitor.section("bundling", self.bundling);
     visitor.section("tracking", self.tracking);

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "system/camera_health.h"
 #include "tracking/track.h"
 
 namespace bslam::system {
@@ -23,6 +24,7 @@ struct Relocalisation {
 struct FrameRecord {
   tracking::TrackResult result;       // as told to the caller
   std::vector<image::ImageState> images;
+  std::vector<Outage> outages;        // per camera: why its picture was not used
   std::optional<Relocalisation> relocalisation;
   // The smooth pose: what the motion of the rig alone adds up to. Corrections of the map change T_map_odom and never this;
   // it stands still while the rig is lost. T_rig_odom = T_rig_world * T_map_odom, with T_rig_world of `result`.

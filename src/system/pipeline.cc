@@ -71,7 +71,7 @@ std::vector<tracking::CameraCounts> keypoint_counts(const BundledFrame& frame) {
 Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
                    std::unique_ptr<looping::PlaceRecogniser> recogniser)
     : rig_(rig), config_(config), pool_(thread_count(config.execution.threads, rig.size())),
-      builder_(rig, config.features, std::move(masks)), recogniser_(std::move(recogniser)) {}
+      monitor_(rig.size(), config.health), builder_(rig, config.features, std::move(masks)), recogniser_(std::move(recogniser)) {}
 
 void Pipeline::restart() {
   state_ = {};
@@ -79,9 +79,12 @@ void Pipeline::restart() {
   frames_lost_ = 0;
 }
 
-BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages) {
+BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages,
+                                  const std::vector<Outage>& outages) {
   const Stopwatch extraction;
-  BundledFrame frame = builder_.extract(images, pool_);
+  std::vector<std::uint8_t> left_out;
+  for (const Outage o : outages) left_out.push_back(o != Outage::kNone);
+  BundledFrame frame = builder_.extract(images, pool_, left_out);
   stages.push_back({"extract", extraction.ms()});
   const Stopwatch bundling;
   frame.bundled =
@@ -97,7 +100,8 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecu
   const Stopwatch whole;
   Outcome outcome;
   for (const image::CameraImage& i : images.images) outcome.record.images.push_back(i.state);
-  BundledFrame frame = make_frame(images, outcome.record.stages);
+  outcome.record.outages = monitor_.judge(images);
+  BundledFrame frame = make_frame(images, outcome.record.stages, outcome.record.outages);
   count_features(frame, outcome.record);
   const Stopwatch results;
   outcome.seen = executor.begin_frame(frame.id);

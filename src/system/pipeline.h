@@ -32,7 +32,8 @@ class Pipeline {
   Outcome process(const image::ImageBundle& images, StageExecutor& executor);
 
   // Extraction and bundling alone.
-  frame::BundledFrame make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages);
+  frame::BundledFrame make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages,
+                                 const std::vector<Outage>& outages = {});
 
   // Forgets the map that was tracked; the next frames start another.
   void restart();
@@ -52,6 +53,7 @@ class Pipeline {
   const camera::Rig& rig_;
   const Config& config_;
   ThreadPool pool_;
+  CameraMonitor monitor_;
   frame::FrameBuilder builder_;
   tracking::TrackerState state_;
   std::optional<tracking::StartCandidate> candidate_;

@@ -83,6 +83,14 @@ TEST(LoopCloser, AsksForAsManyKeyframesInARowAsToldTo) {
   EXPECT_FALSE(Watch(hasty)(world, KeyframeId(kRound)));
 }
 
+TEST(LoopCloser, RemembersNothingOfAMapThatWasLeftForAnother) {
+  const HallMap& world = drifted_walk(2);
+  Watch watch;
+  EXPECT_TRUE(watch(world, KeyframeId(kRound)));
+  EXPECT_TRUE(watch(world, KeyframeId(kRound)));  // its ids do not go on, so it is another map, and this the first time there
+  EXPECT_FALSE(watch(world, KeyframeId(kRound + 1)));
+}
+
 TEST(LoopCloser, NothingIsClosedOnAWalkThatComesNowhereBack) {
   Watch watch;
   const FeatureSimulator simulator = hall(rig_of(4));

@@ -49,6 +49,19 @@ TEST(Summary, HasTheKeysOfTheContractInTheirOrder) {
   EXPECT_TRUE(json["memory"]["peak_mb"].is_null());
 }
 
+TEST(Summary, TellsTheFramesTimesAndFileOfEveryPart) {
+  RunRecord record;
+  EXPECT_EQ(summary_json(record)["parts"], ordered_json::array());
+  record.map.loaded = true;
+  record.maps_started = 2;
+  record.parts = {{60, 0.05, 7.5, "trajectory.tum"}, {12, 4.0, 5.25, "trajectory_part2.tum"}};
+  const ordered_json json = summary_json(record);
+  EXPECT_EQ(json["map"]["loaded"], true);
+  EXPECT_EQ(json["maps_started"], 2);
+  EXPECT_EQ(json["parts"].dump(), R"([{"frames":60,"from":0.05,"to":7.5,"trajectory":"trajectory.tum"},)"
+                                  R"({"frames":12,"from":4.0,"to":5.25,"trajectory":"trajectory_part2.tum"}])");
+}
+
 TEST(Summary, CountsFramesByOutcome) {
   RunRecord record;
   record.frames = {frame(0, FrameOutcome::kTracked), frame(1, FrameOutcome::kTracked), frame(2, FrameOutcome::kDropped),

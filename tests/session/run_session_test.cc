@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "io/simulation_writer.h"
+#include "place/shipped_vocabulary.h"
 #include "session/frame_source.h"
 #include "simulation/rigs.h"
 
@@ -99,6 +100,49 @@ TEST_F(Session, WritesAllItsFiles) {
     EXPECT_GT(fs::file_size(out / name), 50u) << name;
   }
   EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 6);  // and nothing half-written
+}
+
+TEST_F(Session, EveryPartOfTheMapHasFilesOfItsOwn) {
+  SessionOptions o = options();
+  auto result = run_session(dataset(), o);
+  ASSERT_TRUE(result.ok());
+  result->trajectories.push_back({KeyframeId(7), {result->trajectories.front().poses.begin() + 5, result->trajectories.front().poses.end()}});
+  const fs::path out = folder() / "parts";
+  fs::create_directory(out);
+  ASSERT_TRUE(write_outputs(*result, o.config, out).ok());
+  const auto lines = [&](const char* name) {
+    std::ifstream file(out / name);
+    return std::count(std::istreambuf_iterator<char>(file), {}, '\n');
+  };
+  EXPECT_EQ(lines("trajectory.tum"), 1 + 8);  // after the header
+  EXPECT_EQ(lines("trajectory_part2.tum"), 1 + 3);
+  EXPECT_EQ(lines("trajectory_live.tum"), 1 + 8);
+  EXPECT_FALSE(fs::exists(out / "trajectory_live_part2.tum"));
+}
+
+TEST_F(Session, GoesOnInAMapOfAnEarlierRun) {
+  SessionOptions o = options();
+  o.vocabulary = place::shipped_vocabulary().value();
+  const auto first = run_session(dataset(), o);
+  ASSERT_TRUE(first.ok());
+  EXPECT_FALSE(first->record.map.loaded);
+  EXPECT_TRUE(first->record.relocalisations.empty());
+  ASSERT_EQ(first->record.parts.size(), 1u);
+  EXPECT_EQ(first->record.parts.front().frames, 8);
+  EXPECT_EQ(first->record.parts.front().trajectory, "trajectory.tum");
+  o.map = *first->map;
+  o.config.localize_only = true;
+  const auto second = run_session(dataset(), o);
+  ASSERT_TRUE(second.ok());
+  EXPECT_TRUE(second->record.map.loaded);
+  EXPECT_EQ(second->record.maps_started, 0);
+  EXPECT_EQ(second->record.map.keyframes, first->record.map.keyframes);
+  EXPECT_EQ(second->map->version(), first->map->version());
+  ASSERT_EQ(second->trajectories.size(), 1u);
+  EXPECT_EQ(second->trajectories.front().poses.size(), 8u);
+  ASSERT_EQ(second->record.relocalisations.size(), 1u);
+  EXPECT_EQ(second->record.relocalisations.front().at_s, 0.0);
+  EXPECT_GE(second->record.relocalisations.front().inliers, 50);
 }
 
 TEST_F(Session, TracksTheSameInParallel) {

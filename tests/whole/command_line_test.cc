@@ -13,6 +13,9 @@
 #include <string>
 #include <thread>
 
+#include "io/simulation_writer.h"
+#include "simulation/rigs.h"
+
 namespace bslam {
 namespace {
 
@@ -34,8 +37,15 @@ class CommandLine : public testing::Test {
   static void SetUpTestSuite() {
     folder_ = fs::temp_directory_path() / ("bslam_cli_" + std::to_string(::getpid()));
     fs::create_directories(folder_);
-    const Ran made = run("simulate --out " + data() + " --duration 1.5 --rate 10 --progress never");
-    ASSERT_EQ(made.status, 0) << made.err;
+    const io::SimulationRequest request{.folder = data(),
+                                        .rig = simulation::ring_rig(4, 376),
+                                        .recording = {.duration_s = 1.5, .rate_hz = 10},
+                                        .tour = {},
+                                        .imaging = {},
+                                        .world = {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2}};
+    ThreadPool pool(2);
+    const auto made = io::write_simulation(request, pool);
+    ASSERT_TRUE(made.ok()) << made.error().message();
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
@@ -56,13 +66,28 @@ class CommandLine : public testing::Test {
     EXPECT_FALSE(fs::exists(folder_ / "refused/trajectory.tum")) << arguments;
   }
 
+  // A run over the recording, with fewer features for small images; its files are in out(name).
+  static nlohmann::json summary_of(const std::string& name, const std::string& more) {
+    const Ran ran = run("run " + data() + " --out " + out(name) + " --set features.per_image=500 --progress never " + more);
+    EXPECT_EQ(ran.status, 0) << more << ": " << ran.err;
+    return nlohmann::json::parse(slurp(out(name) + "/summary.json"), nullptr, false);
+  }
+
+  static void expect_same_trajectories(const std::string& a, const std::string& b) {
+    for (const char* file : {"/trajectory.tum", "/trajectory_live.tum"}) {
+      EXPECT_GT(slurp(out(a) + file).size(), 1000u);
+      EXPECT_EQ(slurp(out(a) + file), slurp(out(b) + file)) << file;
+    }
+  }
+
   static inline fs::path folder_;
 };
 
 TEST_F(CommandLine, TellsItsVersionAndHelpOnEveryVerb) {
   EXPECT_EQ(run("--version").status, 0);
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
-  for (const char* verb : {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert"}) {
+  for (const char* verb : {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "map", "map info", "map export", "map merge",
+                           "vocab", "vocab info", "vocab train"}) {
     EXPECT_EQ(run(std::string(verb) + " --help").status, 0) << verb;
   }
 }
@@ -71,7 +96,8 @@ TEST_F(CommandLine, RefusesWhatMakesNoSense) {
   const std::string base = "run " + data() + " --out " + out("refused") + " --progress never ";
   for (const char* more : {"--set no.such.key=1", "--set features.per_image=-5", "--set features.per_image=many", "--set seed",
                            "--cameras 0,9", "--cameras 0,0", "--cameras a", "--cameras 0,", "--cameras ''", "--mode sideways", "--begin 5 --end 1", "--begin 99",
-                           "--format bag", "--pace slow", "--seed -1", "--config /no/such/file", "--rig /no/such/file", "--bogus"}) {
+                           "--format bag", "--pace slow", "--seed -1", "--config /no/such/file", "--rig /no/such/file", "--bogus",
+                           "--localize-only", "--load-map /no/such/file", "--vocabulary /no/such/file", "--replay /no/such/file"}) {
     expect_refused(base + more);
   }
   expect_refused("run /no/such/folder --out " + out("refused"));
@@ -81,6 +107,11 @@ TEST_F(CommandLine, RefusesWhatMakesNoSense) {
   expect_refused("eval /no/such/file " + data() + "/groundtruth_cam0.tum");
   expect_refused("inspect " + data() + " --frame 999 --out " + out("frame.json"));
   expect_refused("rig info /no/such/file");
+  expect_refused("map info /no/such/file");
+  expect_refused("map info " + data() + "/groundtruth_cam0.tum");
+  expect_refused("map export /no/such/file --out " + out("refused"));
+  expect_refused("vocab info " + data() + "/groundtruth_cam0.tum");
+  expect_refused("vocab train /no/such/folder --out " + out("never.bvoc"));
   expect_refused("simulate --out " + out("never") + " --duration -1");
 }
 
@@ -102,6 +133,84 @@ TEST_F(CommandLine, RunWritesItsFilesAndRepeatsFromItsConfiguration) {
   ASSERT_EQ(again.status, 0) << again.err;
   EXPECT_EQ(slurp(folder_ / "first/trajectory.tum"), slurp(folder_ / "again/trajectory.tum"));
   expect_refused("run " + data() + " --out " + out("again"));  // it is there, and --overwrite was not given
+}
+
+TEST_F(CommandLine, ASavedMapIsDescribedExportedAndGoneOnIn) {
+  const auto saved = summary_of("saved", "--mode sequential --cameras 0,1 --save-map " + out("saved.map"));
+  EXPECT_EQ(saved["map"]["loaded"], false);
+  EXPECT_EQ(saved["maps_started"], 1);
+  ASSERT_EQ(saved["parts"].size(), 1u);
+  EXPECT_EQ(saved["parts"][0]["trajectory"], "trajectory.tum");
+
+  const Ran info = run("map info --json " + out("saved.map"));
+  ASSERT_EQ(info.status, 0) << info.err;
+  const auto told = nlohmann::json::parse(info.out);
+  EXPECT_EQ(told["keyframes"], saved["map"]["keyframes"]);
+  EXPECT_EQ(told["landmarks"], saved["map"]["landmarks"]);
+  EXPECT_EQ(told["cameras"].size(), 2u);
+  EXPECT_EQ(told["parts"].size(), 1u);
+  EXPECT_NE(run("map info " + out("saved.map")).out.find("scale metric"), std::string::npos);
+
+  ASSERT_EQ(run("map export " + out("saved.map") + " --out " + out("exported")).status, 0);
+  for (const char* file : {"points.ply", "keyframes.tum", "rig.yaml", "cameras.txt", "images.txt", "points3D.txt"}) {
+    EXPECT_GT(fs::file_size(folder_ / "exported" / file), 50u) << file;
+  }
+  const std::string poses = slurp(folder_ / "exported/keyframes.tum");
+  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 1 + told["keyframes"].get<int>());
+  expect_refused("map export " + out("saved.map") + " --out " + out("exported"));
+  EXPECT_EQ(run("map export " + out("saved.map") + " --overwrite --out " + out("exported")).status, 0);
+
+  const auto localised = summary_of("localised", "--cameras 0,1 --localize-only --load-map " + out("saved.map"));
+  EXPECT_EQ(localised["map"]["loaded"], true);
+  EXPECT_EQ(localised["frames"]["tracked"], 15);
+  EXPECT_EQ(localised["map"]["keyframes"], saved["map"]["keyframes"]);
+  EXPECT_EQ(localised["maps_started"], 0);
+  ASSERT_EQ(localised["relocalisations"].size(), 1u);
+  EXPECT_EQ(localised["relocalisations"][0]["at"], 0.0);
+  const auto grown =
+      summary_of("grown", "--cameras 0,1 --load-map " + out("saved.map") + " --save-map " + out("grown.map"));
+  EXPECT_EQ(grown["frames"]["tracked"], 15);
+  EXPECT_EQ(run("map info " + out("grown.map")).status, 0);
+  expect_refused("run " + data() + " --out " + out("refused") + " --cameras 2,3 --load-map " + out("saved.map"));
+}
+
+TEST_F(CommandLine, AVocabularyIsTrainedDescribedAndUsed) {
+  EXPECT_NE(run("vocab info").out.find("orb256-bslam"), std::string::npos);
+  const std::string train = "vocab train " + data() + "/mav0/cam0/data " + data() +
+                            "/mav0/cam2/data --branching 6 --levels 3 --features 300 --progress never ";
+  ASSERT_EQ(run(train + "--threads 1 --out " + out("one.bvoc")).status, 0);
+  ASSERT_EQ(run(train + "--threads 2 --out " + out("two.bvoc")).status, 0);
+  EXPECT_EQ(slurp(out("one.bvoc")), slurp(out("two.bvoc")));
+  expect_refused(train + "--out " + out("one.bvoc"));  // it is there, and --overwrite was not given
+  const Ran info = run("vocab info " + out("one.bvoc"));
+  EXPECT_NE(info.out.find("branching    6\nlevels       3\nwords        216\n"), std::string::npos) << info.out;
+
+  summary_of("worded", "--cameras 0,1 --vocabulary " + out("one.bvoc") + " --save-map " + out("worded.map"));
+  expect_refused("run " + data() + " --out " + out("refused") + " --cameras 0,1 --load-map " + out("worded.map"));  // other words
+  const std::string same = "--cameras 0,1 --vocabulary " + out("one.bvoc") + " --localize-only --load-map " + out("worded.map");
+  EXPECT_EQ(summary_of("worded_again", same)["frames"]["tracked"], 15);
+}
+
+TEST_F(CommandLine, AJournalRepeatsItsRun) {
+  EXPECT_EQ(summary_of("recorded", "--cameras 0,1 --mode parallel --journal " + out("run.journal"))["mode"], "parallel");
+  EXPECT_EQ(summary_of("replayed", "--cameras 0,1 --mode parallel --replay " + out("run.journal"))["mode"], "replay");
+  expect_same_trajectories("recorded", "replayed");
+  expect_refused("run " + data() + " --out " + out("other") + " --cameras 0,1 --set features.per_image=300 --progress never" +
+                 " --replay " + out("run.journal"));
+}
+
+TEST_F(CommandLine, LaggedRunsGiveTheSameBytes) {
+  EXPECT_EQ(summary_of("lagged", "--mode lagged --set execution.threads=1")["mode"], "lagged");
+  EXPECT_EQ(summary_of("lagged_again", "--mode lagged --set execution.threads=3")["mode"], "lagged");
+  expect_same_trajectories("lagged", "lagged_again");
+}
+
+TEST_F(CommandLine, SimulateWritesARecordingThatRuns) {
+  const Ran made = run("simulate --out " + out("simulated") + " --duration 0.5 --rate 10 --progress never");
+  ASSERT_EQ(made.status, 0) << made.err;
+  const Ran ran = run("run " + out("simulated") + " --out " + out("of_simulated") + " --progress never");
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_EQ(nlohmann::json::parse(slurp(out("of_simulated") + "/summary.json"))["frames"]["tracked"], 5);
 }
 
 TEST_F(CommandLine, InspectShowsABundledTableThatHoldsTogether) {

@@ -1,0 +1,232 @@
+// Precision and recall of place recognition, apart from the system: a map that was made without closing loops is gone
+// through as it grew, and every keyframe is asked which older place it shows.
+//   bslam_place_recall MAP.bmap TRUTH.tum [--older S] [--set key=value ...]
+// TRUTH: T_world_cam0 at the keyframes' times. Prints a line of a table.
+//
+// A right place exists where, by the true poses, a keyframe more than S seconds older shows what this one shows: at least
+// kSharedShare of its landmarks lie in an image of this one, not hidden, at about the distance (within kZoom) and from
+// about the direction (within kTurn) they were seen from then; descriptors cannot be compared beyond. An answer is right
+// where the pose that verification gives is the true one.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <numbers>
+
+#include "cli/config_arguments.h"
+#include "io/map_file.h"
+#include "io/trajectory_file.h"
+#include "io/vocabulary_file.h"
+#include "looping/locate.h"
+#include "looping/place_recogniser.h"
+#include "map/map_edit.h"
+
+namespace bslam {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using geometry::SE3;
+
+constexpr double kSharedShare = 0.3;
+constexpr double kZoom = 1.5;
+constexpr double kTurn = std::numbers::pi / 6;                   // rad
+constexpr double kMaxOff = 0.1, kMaxTurnOff = 0.05;              // a right pose: of the median depth; rad
+
+struct Arguments {
+  std::string map, truth;
+  double older_s = 8;
+  bool detail = false;
+  cli::ConfigArguments config;
+};
+
+// What a keyframe sees, in camera 0's frame of its time: true up to the error of the local map.
+struct View {
+  KeyframeId keyframe;
+  TimeNs time_ns = 0;
+  SE3 T_world_rig;                               // the truth
+  std::vector<Vector3d> points;                  // of its landmarks
+  std::vector<std::vector<Vector3d>> by_camera;  // u, v, depth of its keypoints that show landmarks
+  double median_depth = 0;
+};
+
+View view_of(const map::BundledMap& map, KeyframeId k, const SE3& T_world_rig) {
+  const map::BundledKeyframe& keyframe = map.keyframe(k);
+  View view;
+  view.keyframe = k;
+  view.time_ns = keyframe.frame->time_ns;
+  view.T_world_rig = T_world_rig;
+  view.by_camera.resize(map.rig().size());
+  std::vector<double> depths;
+  for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f) {
+    const LandmarkId l = keyframe.landmarks[f];
+    if (!l.valid()) continue;
+    view.points.push_back(keyframe.T_rig_world * map.landmark(l).position);
+    depths.push_back(view.points.back().norm());
+    for (const frame::KeypointRef r : keyframe.frame->bundled.keypoints(FeatureId(f))) {
+      const Eigen::Vector2f pixel = keyframe.frame->keypoints(r.camera).pixel[r.keypoint.index()];
+      view.by_camera[r.camera.index()].emplace_back(pixel.x(), pixel.y(), depths.back());
+    }
+  }
+  std::sort(depths.begin(), depths.end());
+  view.median_depth = depths.empty() ? 0 : depths[depths.size() / 2];
+  return view;
+}
+
+// Whether the view shows a point that was seen from `seen_from` (both in its frame): its nearest known point in the image
+// is about as far away, so that nothing stands between.
+bool shows(const camera::Rig& rig, const View& view, const Vector3d& point, const Vector3d& seen_from) {
+  const double depth = point.norm(), depth_then = (point - seen_from).norm();
+  if (depth > kZoom * depth_then || depth_then > kZoom * depth) return false;
+  if (point.dot(point - seen_from) < std::cos(kTurn) * depth * depth_then) return false;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const auto pixel = rig.camera(c).project(rig.cam_from_rig(c) * point);
+    if (!pixel || !rig.camera(c).contains(*pixel)) continue;
+    double nearest = std::numeric_limits<double>::infinity(), there = 0;
+    for (const Vector3d& known : view.by_camera[c]) {
+      const double distance = (known.head<2>() - *pixel).squaredNorm();
+      if (distance < nearest) {
+        nearest = distance;
+        there = known.z();
+      }
+    }
+    if (there > 0.8 * depth && there < 1.25 * depth) return true;
+  }
+  return false;
+}
+
+// Of the landmarks of `old`, the share that `now` shows.
+double shared_share(const camera::Rig& rig, const View& now, const View& old) {
+  const SE3 T_now_old = now.T_world_rig.inverse() * old.T_world_rig;
+  if (T_now_old.translation().norm() > 2 * std::max(now.median_depth, old.median_depth)) return 0;
+  int shared = 0;
+  for (const Vector3d& p : old.points) shared += shows(rig, now, T_now_old * p, T_now_old.translation());
+  return old.points.empty() ? 0 : static_cast<double>(shared) / static_cast<double>(old.points.size());
+}
+
+enum class Outcome { kRight, kWrong, kNoCandidate, kOtherCandidates, kRejected };
+constexpr std::array kOutcomes = {"right", "wrong", "no candidate", "other candidates", "rejected"};
+
+class Recall {
+ public:
+  Recall(map::BundledMap map, const evaluation::Trajectory& truth, place::VocabularyPtr vocabulary, const system::Config& config,
+         const Arguments& arguments)
+      : map_(std::move(map)), recogniser_(std::move(vocabulary), config.looping.recognition), config_(config), arguments_(arguments) {
+    for (const KeyframeId k : map_.keyframe_ids()) {
+      const TimeNs time_ns = map_.keyframe(k).frame->time_ns;
+      const auto pose = std::ranges::lower_bound(truth, time_ns - 1'000'000, {}, &evaluation::TimedPose::time_ns);
+      if (pose == truth.end() || pose->time_ns > time_ns + 1'000'000) continue;
+      views_.push_back(view_of(map_, k, pose->T_world_frame));
+    }
+  }
+
+  // From the newest keyframe to the oldest, each in the map that ends with it.
+  void run() {
+    for (std::size_t i = views_.size(); i-- > 0;) {
+      ask(i);
+      map_.remove_keyframe(views_[i].keyframe);
+    }
+  }
+
+  void print(const std::string& name) const {
+    const int right = count_[0], wrong = count_[1];
+    fmt::print("| {} | {} | {} | {} | {} | {:.3f} | {:.3f} |", name, views_.size(), revisits_, revisits_right_, right + wrong,
+               right + wrong > 0 ? static_cast<double>(right) / (right + wrong) : 1.0,
+               revisits_ > 0 ? static_cast<double>(revisits_right_) / revisits_ : 1.0);
+    for (std::size_t o = 2; o < kOutcomes.size(); ++o) fmt::print(" {} {};", kOutcomes[o], missed_[o]);
+    fmt::print(" |\n");
+  }
+
+ private:
+  void ask(std::size_t i) {
+    const View& now = views_[i];
+    std::vector<KeyframeId> places;  // right ones
+    double best = 0;
+    for (std::size_t j = 0; j < i && old_enough(now, views_[j].time_ns); ++j) {
+      const double share = shared_share(map_.rig(), now, views_[j]);
+      if (share >= kSharedShare) places.push_back(views_[j].keyframe);
+      best = std::max(best, share);
+    }
+    const Outcome outcome = answer(now, places);
+    ++count_[static_cast<std::size_t>(outcome)];
+    if (!places.empty()) {
+      ++revisits_;
+      revisits_right_ += outcome == Outcome::kRight;
+      ++missed_[static_cast<std::size_t>(outcome)];
+    }
+    if (arguments_.detail) {
+      fmt::print("{} at {:.2f} s: {} right places, overlap {:.2f}: {} ({})\n", now.keyframe.value(), 1e-9 * static_cast<double>(now.time_ns),
+                 places.size(), best, kOutcomes[static_cast<std::size_t>(outcome)], note_);
+    }
+  }
+
+  bool old_enough(const View& now, TimeNs then_ns) const { return static_cast<double>(now.time_ns - then_ns) > 1e9 * arguments_.older_s; }
+
+  Outcome answer(const View& now, const std::vector<KeyframeId>& places) {
+    Outcome outcome = Outcome::kNoCandidate;
+    note_.clear();
+    for (const looping::Candidate& candidate : recogniser_.revisited(map_, now.keyframe)) {
+      const auto old = std::ranges::find(views_, candidate.keyframe, &View::keyframe);
+      if (old == views_.end() || !old_enough(now, old->time_ns)) continue;
+      const bool right_place = std::ranges::find(places, candidate.keyframe) != places.end();
+      if (outcome != Outcome::kRejected) outcome = right_place ? Outcome::kRejected : Outcome::kOtherCandidates;
+      looping::LocateReport report;
+      const Random random(static_cast<std::uint64_t>(config_.seed), "loop", static_cast<std::uint64_t>(now.keyframe.value()));
+      const auto location = looping::locate(map_, *map_.keyframe(now.keyframe).frame, candidate.keyframe, config_.looping.verification,
+                                            config_.feature_model(), random, &report);
+      note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} visible {}; ", candidate.keyframe.value(), candidate.score,
+                           static_cast<int>(report.rejection), report.matches, report.inliers, report.visible);
+      if (location) return is_right(now, *old, *location) ? Outcome::kRight : Outcome::kWrong;
+    }
+    return outcome;
+  }
+
+  bool is_right(const View& now, const View& old, const looping::Location& location) const {
+    const SE3 T_old_now = map_.keyframe(old.keyframe).T_rig_world * location.T_rig_world.inverse();
+    const SE3 error = (old.T_world_rig.inverse() * now.T_world_rig).inverse() * T_old_now;
+    return error.translation().norm() < kMaxOff * now.median_depth &&
+           error.rotation().angularDistance(Eigen::Quaterniond::Identity()) < kMaxTurnOff;
+  }
+
+  map::BundledMap map_;
+  looping::BagOfWordsRecogniser recogniser_;
+  const system::Config& config_;
+  const Arguments& arguments_;
+  std::vector<View> views_;  // in order of time
+  std::array<int, 5> count_{}, missed_{};
+  int revisits_ = 0, revisits_right_ = 0;
+  std::string note_;
+};
+
+Status measure(const Arguments& arguments) {
+  const auto config = cli::resolve_config(arguments.config);
+  if (!config) return config.error();
+  const auto saved = io::read_map(arguments.map);
+  if (!saved) return saved.error();
+  const auto truth = io::read_trajectory(arguments.truth);
+  if (!truth) return truth.error();
+  const auto vocabulary = io::vocabulary_or_shipped("");
+  if (!vocabulary) return vocabulary.error();
+  Recall recall(saved->map, *truth, *vocabulary, *config, arguments);
+  recall.run();
+  recall.print(arguments.map);
+  return {};
+}
+
+}  // namespace
+}  // namespace bslam
+
+int main(int argc, char** argv) {
+  CLI::App app("precision and recall of place recognition over a map made without loop closing");
+  bslam::Arguments arguments;
+  app.add_option("map", arguments.map, "as `bslam run --no-loop --save-map` writes it")->required();
+  app.add_option("truth", arguments.truth, "true poses of camera 0, TUM")->required();
+  app.add_option("--older", arguments.older_s, "seconds that a place was seen before")->capture_default_str();
+  app.add_flag("--detail", arguments.detail, "a line for each keyframe");
+  bslam::cli::add_config_options(app, arguments.config);
+  CLI11_PARSE(app, argc, argv);
+  const bslam::Status status = bslam::measure(arguments);
+  if (!status) fmt::print(stderr, "{}\n", status.error().message());
+  return status ? 0 : 2;
+}

@@ -1,0 +1,55 @@
+// Which cameras deliver pictures worth looking at. Judged before anything is extracted, from the pictures alone.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "base/options.h"
+#include "image/image_bundle.h"
+
+namespace bslam::system {
+
+struct HealthOptions {
+  int dark_level = 16;           // grey value; a picture with hardly anything above it is black
+  int bright_level = 250;        // grey value; a picture mostly above it is over-exposed
+  double dark_share = 0.995;     // of the pixels
+  double bright_share = 0.6;
+  int readmit_after = 3;         // good pictures in a row before a camera that was out counts again
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("dark_level", self.dark_level, Range{0, 255}, "", "grey value: a picture with hardly anything above it is black");
+    visitor("bright_level", self.bright_level, Range{0, 255}, "", "grey value: a picture mostly above it is over-exposed");
+    visitor("dark_share", self.dark_share, Range{0, 1}, "", "of the pixels, that makes a picture black");
+    visitor("bright_share", self.bright_share, Range{0, 1}, "", "of the pixels, that makes a picture over-exposed");
+    visitor("readmit_after", self.readmit_after, Range{1, 1000}, "", "good pictures in a row before a camera that was out counts again");
+  }
+};
+
+// Why a camera is out; kNone = it is not.
+enum class Outage : std::uint8_t { kNone, kNoImage, kBlack, kOverExposed, kFrozen };
+
+std::string_view describe(Outage outage);  // as in the summary: "", "no-images", "black", ...
+
+class CameraMonitor {
+ public:
+  CameraMonitor(std::size_t cameras, const HealthOptions& options);
+
+  // One per camera, for the pictures of the next frame. A picture is frozen where it is to the byte the last one of its
+  // camera while another camera's has changed: a rig that stands still freezes nobody, and one camera alone cannot tell.
+  // A camera without a picture is out for that frame and counts again with its next.
+  std::vector<Outage> judge(const image::ImageBundle& images);
+
+ private:
+  struct Camera {
+    std::optional<std::uint64_t> last;  // content of its last picture
+    Outage outage = Outage::kNone;      // why it was out
+    int good = 0;                       // pictures since
+  };
+  const HealthOptions options_;
+  std::vector<Camera> cameras_;
+};
+
+}  // namespace bslam::system

@@ -1,0 +1,93 @@
+#include "system/camera_health.h"
+
+#include <gtest/gtest.h>
+
+#include "base/random.h"
+
+namespace bslam::system {
+namespace {
+
+constexpr int kWidth = 101, kHeight = 40;  // rows do not end on a word
+
+// Grey values within [low, high], different for every seed.
+image::Image picture(std::uint64_t seed, int low, int high) {
+  Random random(seed);
+  image::Image image(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      image.row(y)[x] = static_cast<std::uint8_t>(low + static_cast<int>(random.below(static_cast<std::uint32_t>(high - low + 1))));
+    }
+  }
+  return image;
+}
+
+image::Image good(std::uint64_t seed) { return picture(seed, 20, 200); }
+
+image::ImageBundle frame(std::vector<image::Image> images) {
+  image::ImageBundle bundle;
+  for (image::Image& i : images) {
+    const auto state = i.empty() ? image::ImageState::kMissing : image::ImageState::kPresent;
+    bundle.images.push_back({state, 0, std::move(i)});
+  }
+  return bundle;
+}
+
+using Outages = std::vector<Outage>;
+
+TEST(CameraMonitor, PassesOrdinaryPictures) {
+  CameraMonitor monitor(2, {});
+  for (std::uint64_t k = 0; k < 5; ++k) {
+    EXPECT_EQ(monitor.judge(frame({good(2 * k), good(2 * k + 1)})), (Outages{Outage::kNone, Outage::kNone}));
+  }
+}
+
+TEST(CameraMonitor, TellsBlackOverExposedAndMissingApart) {
+  CameraMonitor monitor(3, {});
+  EXPECT_EQ(monitor.judge(frame({picture(1, 0, 12), picture(2, 251, 255), {}})),
+            (Outages{Outage::kBlack, Outage::kOverExposed, Outage::kNoImage}));
+}
+
+TEST(CameraMonitor, ANightSceneWithLampsIsNotBlack) {
+  image::Image night = picture(1, 0, 10);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < 8; ++x) night.row(y)[x] = 180;
+  }
+  CameraMonitor monitor(1, {});
+  EXPECT_EQ(monitor.judge(frame({night})), Outages{Outage::kNone});
+}
+
+TEST(CameraMonitor, FindsTheFrozenCameraAndNotARigThatStandsStill) {
+  CameraMonitor monitor(2, {});
+  monitor.judge(frame({good(1), good(2)}));
+  EXPECT_EQ(monitor.judge(frame({good(1), good(2)})), (Outages{Outage::kNone, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
+}
+
+TEST(CameraMonitor, OnePixelIsChangeEnough) {
+  CameraMonitor monitor(2, {});
+  image::Image almost = good(2);
+  monitor.judge(frame({good(1), good(2)}));
+  almost.row(kHeight - 1)[kWidth - 1] ^= 1;
+  EXPECT_EQ(monitor.judge(frame({good(3), almost})), (Outages{Outage::kNone, Outage::kNone}));
+}
+
+TEST(CameraMonitor, ReadmitsAfterGoodPicturesInARow) {
+  CameraMonitor monitor(1, {.readmit_after = 3});
+  monitor.judge(frame({picture(1, 0, 5)}));
+  EXPECT_EQ(monitor.judge(frame({good(1)})), Outages{Outage::kBlack});
+  EXPECT_EQ(monitor.judge(frame({good(2)})), Outages{Outage::kBlack});
+  EXPECT_EQ(monitor.judge(frame({picture(2, 0, 5)})), Outages{Outage::kBlack});
+  EXPECT_EQ(monitor.judge(frame({good(3)})), Outages{Outage::kBlack});
+  EXPECT_EQ(monitor.judge(frame({good(4)})), Outages{Outage::kBlack});
+  EXPECT_EQ(monitor.judge(frame({good(5)})), Outages{Outage::kNone});
+}
+
+TEST(CameraMonitor, ACameraThatComesNowAndThenIsTakenAsItComes) {
+  CameraMonitor monitor(2, {});
+  monitor.judge(frame({good(1), good(2)}));
+  EXPECT_EQ(monitor.judge(frame({good(3), {}})), (Outages{Outage::kNone, Outage::kNoImage}));
+  EXPECT_EQ(monitor.judge(frame({good(4), good(5)})), (Outages{Outage::kNone, Outage::kNone}));
+}
+
+}  // namespace
+}  // namespace bslam::system
