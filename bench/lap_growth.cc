@@ -1,6 +1,6 @@
 // Does a map stop growing once the place is known? Plays a recording of laps that ends where it begins over and over, and
 // prints for each lap what the map holds by then and what the lap's frames took.
-//   bslam_lap_growth DATA --laps 5 --times 4 [--set key=value ...]
+//   bslam_lap_growth DATA --laps 5 --times 4 [--cameras 0,1] [--set key=value ...]
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -20,6 +20,7 @@ namespace {
 struct Arguments {
   std::string data;
   int laps = 5, times = 4;
+  std::vector<int> cameras;
   cli::ConfigArguments config;
 };
 
@@ -62,7 +63,7 @@ Status play(const Arguments& arguments) {
   auto config = cli::resolve_config(arguments.config);
   if (!config) return config.error();
   config->mode = system::Mode::kSequential;
-  const auto dataset = io::open_dataset({.path = arguments.data});
+  const auto dataset = io::open_dataset({.path = arguments.data, .cameras = arguments.cameras});
   if (!dataset) return dataset.error();
   const auto vocabulary = io::vocabulary_or_shipped("");
   if (!vocabulary) return vocabulary.error();
@@ -94,6 +95,7 @@ int main(int argc, char** argv) {
   app.add_option("data", arguments.data, "recording of whole laps")->required();
   app.add_option("--laps", arguments.laps, "laps it holds")->capture_default_str()->check(CLI::PositiveNumber);
   app.add_option("--times", arguments.times, "it is played")->capture_default_str()->check(CLI::PositiveNumber);
+  app.add_option("--cameras", arguments.cameras, "of the rig, as for `bslam run` (default: all)")->delimiter(',');
   bslam::cli::add_config_options(app, arguments.config);
   CLI11_PARSE(app, argc, argv);
   const bslam::Status status = bslam::play(arguments);

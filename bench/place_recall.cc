@@ -1,12 +1,12 @@
 // Precision and recall of place recognition, apart from the system: a map that was made without closing loops is gone
 // through as it grew, and every keyframe is asked which older place it shows.
-//   bslam_place_recall MAP.bmap TRUTH.tum [--older S] [--set key=value ...]
+//   bslam_place_recall MAP.bmap TRUTH.tum [--older S] [--overlap SHARE] [--set key=value ...]
 // TRUTH: T_world_cam0 at the keyframes' times. Prints a line of a table.
 //
-// A right place exists where, by the true poses, a keyframe more than S seconds older shows what this one shows: at least
-// kSharedShare of its landmarks lie in an image of this one, not hidden, at about the distance (within kZoom) and from
-// about the direction (within kTurn) they were seen from then; descriptors cannot be compared beyond. An answer is right
-// where the pose that verification gives is the true one.
+// A right place exists where, by the true poses, a keyframe more than S seconds older that is no neighbour shows what this
+// one shows: at least SHARE of its landmarks lie in an image of this one, not hidden, at about the distance (within kZoom)
+// and from about the direction (within kTurn) they were seen from then; descriptors cannot be compared beyond. An answer
+// is right where the pose that verification gives is the true one.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -29,14 +29,13 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using geometry::SE3;
 
-constexpr double kSharedShare = 0.3;
 constexpr double kZoom = 1.5;
 constexpr double kTurn = std::numbers::pi / 6;                   // rad
 constexpr double kMaxOff = 0.1, kMaxTurnOff = 0.05;              // a right pose: of the median depth; rad
 
 struct Arguments {
   std::string map, truth;
-  double older_s = 8;
+  double older_s = 8, overlap = 0.3;
   bool detail = false;
   cli::ConfigArguments config;
 };
@@ -144,8 +143,9 @@ class Recall {
     std::vector<KeyframeId> places;  // right ones
     double best = 0;
     for (std::size_t j = 0; j < i && old_enough(now, views_[j].time_ns); ++j) {
+      if (neighbours(now.keyframe, views_[j].keyframe)) continue;  // never lost sight of
       const double share = shared_share(map_.rig(), now, views_[j]);
-      if (share >= kSharedShare) places.push_back(views_[j].keyframe);
+      if (share >= arguments_.overlap) places.push_back(views_[j].keyframe);
       best = std::max(best, share);
     }
     const Outcome outcome = answer(now, places);
@@ -161,6 +161,15 @@ class Recall {
     }
   }
 
+  // As recognition has it: neighbours are no candidates.
+  bool neighbours(KeyframeId a, KeyframeId b) const {
+    const looping::RecognitionOptions& options = config_.looping.recognition;
+    const map::BundledKeyframe& keyframe = map_.keyframe(a);
+    const auto landmarks = std::ranges::count_if(keyframe.landmarks.values(), [](LandmarkId l) { return l.valid(); });
+    const auto at = std::ranges::lower_bound(keyframe.covisible.values(), b, {}, &map::Covisible::keyframe);
+    return at != keyframe.covisible.end() && at->keyframe == b && at->weight >= options.neighbour_weight &&
+           at->weight >= options.neighbour_share * static_cast<double>(landmarks);
+  }
   bool old_enough(const View& now, TimeNs then_ns) const { return static_cast<double>(now.time_ns - then_ns) > 1e9 * arguments_.older_s; }
 
   Outcome answer(const View& now, const std::vector<KeyframeId>& places) {
@@ -223,6 +232,7 @@ int main(int argc, char** argv) {
   app.add_option("map", arguments.map, "as `bslam run --no-loop --save-map` writes it")->required();
   app.add_option("truth", arguments.truth, "true poses of camera 0, TUM")->required();
   app.add_option("--older", arguments.older_s, "seconds that a place was seen before")->capture_default_str();
+  app.add_option("--overlap", arguments.overlap, "share of its landmarks that is seen again where a place is")->capture_default_str();
   app.add_flag("--detail", arguments.detail, "a line for each keyframe");
   bslam::cli::add_config_options(app, arguments.config);
   CLI11_PARSE(app, argc, argv);

@@ -36,7 +36,10 @@ struct FusionReport {
 // Which of two landmarks found to be one keeps its place.
 enum class Keep { kMoreObserved, kSearched };
 
-// Looks for `landmarks` in every camera of `target` at its pose in the draft. Those it observes already are left out.
+// Looks for `landmarks` in every camera of `target` as if that were at `T_rig_world`. Those it observes already are left out.
+FusionReport fuse_into(KeyframeId target, const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& landmarks, Keep keep,
+                       const LandmarkFusionOptions& options, const map::FeatureModel& features, map::MapDraft& draft);
+// The same at its pose in the draft.
 FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep, const LandmarkFusionOptions& options,
                        const map::FeatureModel& features, map::MapDraft& draft);
 

@@ -10,6 +10,7 @@
 
 #include "cli/config_arguments.h"
 #include "cli/verbs.h"
+#include "cli/version.h"
 #include "io/atomic_file.h"
 #include "io/map_export.h"
 #include "io/map_file.h"
@@ -164,7 +165,7 @@ int map_merge(const MapArguments& arguments) {
   if (!b) return report_error(b.error());
   const auto merged = session::merge_maps(*a, *b, *vocabulary, *config);
   if (!merged) return report_error(merged.error());
-  const io::MapFileInfo info{(*vocabulary)->id(), a->info.version, fmt::format("{} + {}", a->info.data, b->info.data)};
+  const io::MapFileInfo info{(*vocabulary)->id(), version_number(), fmt::format("{} + {}", a->info.data, b->info.data)};
   if (const Status s = io::write_map(merged->map, info, arguments.out); !s) return report_error(s.error());
   std::printf("%zu keyframes, %zu landmarks; %d parts joined, %d more common places, %zu %s\n%s\n",
               merged->map.num_keyframes(), merged->map.num_landmarks(), merged->joined, merged->loops, merged->parts,

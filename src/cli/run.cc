@@ -72,6 +72,16 @@ Status prepare_folder(const std::filesystem::path& folder, bool overwrite) {
   return {};
 }
 
+// Before hours of work, not after: can a file be made there? An existing one is replaced.
+Status check_output_file(const std::string& file, const char* option) {
+  if (file.empty()) return {};
+  std::error_code error;
+  const std::filesystem::path path(file), folder = path.has_parent_path() ? path.parent_path() : ".";
+  if (std::filesystem::is_directory(path, error)) return Error{file, option, "a folder", "the name of a file"};
+  if (!std::filesystem::is_directory(folder, error)) return Error{folder.string(), option, "no such folder", "one that exists"};
+  return {};
+}
+
 Result<std::optional<system::Journal>> read_journal(const std::string& file) {
   if (file.empty()) return std::optional<system::Journal>();
   const auto text = io::read_file(file, kMaxJournalBytes);
@@ -82,25 +92,25 @@ Result<std::optional<system::Journal>> read_journal(const std::string& file) {
 }
 
 // The map of an earlier run, if one is asked for, and whether this one can go on with it.
-Result<std::optional<map::BundledMap>> read_map(const std::string& file, const camera::Rig& rig, const place::Vocabulary& vocabulary) {
+Result<std::optional<map::BundledMap>> read_map(const std::string& file, const camera::Rig& rig, const system::Config& config,
+                                                const place::Vocabulary& vocabulary) {
   if (file.empty()) return std::optional<map::BundledMap>();
   auto saved = io::read_map(file);
   if (!saved) return saved.error();
-  if (const Status s = io::fits(*saved, rig, &vocabulary); !s) return s.error();
+  if (const Status s = io::fits(*saved, rig, {config.features.scale_factor, config.features.levels}, &vocabulary); !s) return s.error();
+  if (saved->map.num_keyframes() == 0) return Error{file, "keyframes", "none", "a map of something"};
   return std::optional(std::move(saved->map));
 }
 
 Status write_files(const session::SessionResult& result, const system::Config& config, const RunArguments& arguments,
                    const place::Vocabulary& vocabulary) {
+  if (const Status status = session::write_outputs(result, config, arguments.out); !status) return status;
   if (!arguments.journal.empty()) {
     const Status status = io::write_atomically(arguments.journal, system::journal_text(result.journal));
     if (!status) return status;
   }
-  if (!arguments.save_map.empty()) {
-    const io::MapFileInfo info{vocabulary.id(), result.record.version, result.record.data};
-    if (const Status status = io::write_map(*result.map, info, arguments.save_map); !status) return status;
-  }
-  return session::write_outputs(result, config, arguments.out);
+  if (arguments.save_map.empty()) return {};
+  return io::write_map(*result.map, {vocabulary.id(), result.record.version, result.record.data}, arguments.save_map);
 }
 
 void print_result(const report::RunRecord& record, const std::string& out) {
@@ -125,8 +135,11 @@ int run(const RunArguments& arguments) {
   if (!dataset) return report_error(dataset.error());
   const auto vocabulary = io::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
-  auto map = read_map(arguments.load_map, dataset->rig, **vocabulary);
+  auto map = read_map(arguments.load_map, dataset->rig, *config, **vocabulary);
   if (!map) return report_error(map.error());
+  for (const auto& [option, file] : {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
+    if (const Status s = check_output_file(file, option); !s) return report_error(s.error());
+  }
   if (const Status s = prepare_folder(arguments.out, arguments.overwrite); !s) return report_error(s.error());
   for (const std::string& warning : dataset->warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
 

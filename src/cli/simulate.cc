@@ -26,7 +26,7 @@ struct SimulateArguments {
   double duration_s = 20.0, rate_hz = 20.0, exposure_ms = 5.0, noise = 1.0, speed_mps = 0.0;
   std::uint64_t seed = 1;
   int laps = 0, threads = 0;
-  bool overwrite = false;
+  bool back = false, overwrite = false;
 };
 
 std::atomic<bool> interrupted = false;
@@ -61,6 +61,7 @@ Result<io::SimulationRequest> make_request(const SimulateArguments& arguments) {
   request.imaging.seed = request.tour.seed = arguments.seed;
   request.tour.laps = arguments.laps;
   request.tour.speed_mps = arguments.speed_mps;
+  request.tour.back = arguments.back;
   if (arguments.faults) {
     auto faults = io::read_faults(*arguments.faults, rig->size());
     if (!faults) return faults.error();
@@ -123,6 +124,7 @@ void add_simulate(CLI::App& app, int& exit_status) {
   verb->add_option("--laps", a.laps, "rounds of the tour within the duration; 0: as many as suit a walking pace")
       ->capture_default_str();
   verb->add_option("--speed", a.speed_mps, "metres a second; 0: follows from duration and laps")->capture_default_str();
+  verb->add_flag("--back", a.back, "after half of the time turn round and walk the same way back");
   verb->add_option("--exposure-ms", a.exposure_ms, "exposure, which blurs motion")->capture_default_str();
   verb->add_option("--noise", a.noise, "factor on the sensor's noise")->capture_default_str();
   verb->add_option("--faults", a.faults,

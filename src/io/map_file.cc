@@ -196,13 +196,18 @@ Result<SavedMap> read_map(const std::filesystem::path& file) {
   return map_from_bytes(*bytes, file.string());
 }
 
-Status fits(const SavedMap& saved, const camera::Rig& rig, const place::Vocabulary* vocabulary) {
+Status fits(const SavedMap& saved, const camera::Rig& rig, const map::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {
   if (saved.map.rig().size() != rig.size()) {
     return Error{saved.file, "rig", fmt::format("{} cameras", saved.map.rig().size()),
                  fmt::format("{} as the rig of the run has", rig.size())};
   }
   for (std::size_t i = 0; i < rig.size(); ++i) {
     if (Status status = compare_camera(saved, rig, i); !status) return status;
+  }
+  const map::PyramidShape& own = saved.map.pyramid();
+  if (own.levels != pyramid.levels || own.scale_factor != pyramid.scale_factor) {
+    return Error{saved.file, "pyramid", fmt::format("{} levels, factor {}", own.levels, own.scale_factor),
+                 fmt::format("{} levels, factor {} as features.levels and features.scale_factor say", pyramid.levels, pyramid.scale_factor)};
   }
   if (vocabulary == nullptr || saved.info.vocabulary == 0) return {};
   if (saved.info.vocabulary != vocabulary->id() || saved.words_end > vocabulary->size()) {

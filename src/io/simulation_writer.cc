@@ -210,6 +210,7 @@ std::string simulation_digest(const SimulationRequest& r) {
     text += '\n';
   }
   if (r.kind != simulation::WorldKind::kBuilding) text += fmt::format("world {}\n", static_cast<int>(r.kind));
+  if (r.tour.back) text += "back\n";
   text += rig_to_yaml(r.rig);
   std::uint64_t digest = 0xcbf29ce484222325ull;  // FNV-1a
   for (const char c : text) digest = (digest ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;

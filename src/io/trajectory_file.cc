@@ -275,7 +275,7 @@ std::optional<TimeNs> parse_seconds(std::string_view text) {
     if (power.starts_with('+')) power.remove_prefix(1);
     int value = 0;
     const auto [end, error] = std::from_chars(power.data(), power.data() + power.size(), value);
-    if (error != std::errc() || end != power.data() + power.size() || std::abs(value) > 100) return std::nullopt;
+    if (error != std::errc() || end != power.data() + power.size() || (value < -100 || value > 100)) return std::nullopt;
     exponent += value;
     text = text.substr(0, e);
   }

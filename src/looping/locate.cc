@@ -187,4 +187,17 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
   return location;
 }
 
+bool disputes(const map::BundledMap& map, const Location& best, const Location& other) {
+  constexpr double kRival = 0.6;        // of the best one's inliers: as good an answer
+  constexpr double kSameCentre = 0.05;  // of the distance to what is seen
+  constexpr double kSameTurn = 0.05;    // rad
+  if (other.inliers <= kRival * best.inliers || map.root_of(best.with) != map.root_of(other.with)) return false;
+  const Eigen::Vector3d centre = best.T_rig_world.inverse().translation(), rival = other.T_rig_world.inverse().translation();
+  double distance = 0;
+  for (const auto& [feature, l] : best.matches) distance += (map.landmark(l).position - centre).norm();
+  distance /= static_cast<double>(best.matches.size());
+  const double turn = best.T_rig_world.rotation().angularDistance(other.T_rig_world.rotation());
+  return (centre - rival).norm() > kSameCentre * distance || turn > kSameTurn;
+}
+
 }  // namespace bslam::looping

@@ -34,6 +34,10 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
                                const VerificationOptions& options, const map::FeatureModel& features, Random random,
                                LocateReport* report = nullptr);
 
+// Is `other` as good an answer as `best`, and cannot both be true? In one part of the map they are then two places that look
+// alike.
+bool disputes(const map::BundledMap& map, const Location& best, const Location& other);
+
 // The landmarks of a keyframe and its best covisible keyframes, those seen most often first, at most `limit`.
 std::vector<LandmarkId> landmarks_about(const map::BundledMap& map, KeyframeId keyframe, int neighbours, int limit);
 

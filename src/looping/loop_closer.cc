@@ -10,12 +10,27 @@ namespace {
 
 // On an unbroken walk a candidate is joined to the keyframe by those between them, and what is found of it is what the
 // keyframe observes anyway. A place seen again shows landmarks that the keyframe does not know.
-bool shows_news(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
+bool shows_news(const map::BundledMap& map, KeyframeId keyframe, const Location& location, const LoopOptions& options) {
   const auto known = std::ranges::count_if(location.matches, [&](const auto& match) {
     const std::span<const map::Observation> list = map.observations(match.second);
     return std::ranges::find(list, keyframe, &map::Observation::keyframe) != list.end();
   });
-  return 2 * static_cast<std::size_t>(known) < location.matches.size();
+  const auto all = static_cast<double>(location.matches.size());
+  return all - static_cast<double>(known) >= options.min_news * all;
+}
+
+// Of the candidate and its best covisible keyframes, but for the keyframe's own neighbours, the one taken nearest to where
+// the keyframe is found to be.
+KeyframeId nearest_of_place(const map::BundledMap& map, KeyframeId keyframe, const Location& location, const LoopingOptions& options) {
+  const Eigen::Vector3d here = location.T_rig_world.inverse().translation();
+  const auto distance = [&](KeyframeId k) { return (map.keyframe(k).T_rig_world.inverse().translation() - here).norm(); };
+  const auto own = neighbours_of(map, keyframe, options.recognition);
+  KeyframeId best = location.with;
+  for (const map::Covisible& c : map.best_covisible(location.with, static_cast<std::size_t>(options.verification.neighbours))) {
+    const bool known = c.keyframe == keyframe || std::ranges::binary_search(own, c.keyframe, {}, &map::Covisible::keyframe);
+    if (!known && distance(c.keyframe) < distance(best)) best = c.keyframe;
+  }
+  return best;
 }
 
 }  // namespace
@@ -24,17 +39,33 @@ LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const Loopin
                        std::uint64_t seed)
     : recogniser_(std::move(recogniser)), options_(options), features_(features), seed_(seed) {}
 
+std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const {
+  const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
+  return locate(map, *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
+}
+
+// Parts may lie anywhere, so that nothing but the pictures speaks against a wrong place: no other may look as right.
+bool LoopCloser::undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location,
+                            const std::vector<Candidate>& candidates) const {
+  return std::ranges::none_of(candidates, [&](const Candidate& candidate) {
+    if (candidate.keyframe == location.with) return false;
+    const auto other = verify(keyframe, map, candidate);
+    return other && disputes(map, location, *other);
+  });
+}
+
 std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map) {
-  const std::vector<Candidate> candidates =
-      consistent_candidates(map, keyframe, recogniser_->revisited(map, keyframe), options_.loop, history_);
-  for (const Candidate& candidate : candidates) {
-    const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
-    auto location = locate(map, *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
-    if (!location || !shows_news(map, keyframe, *location)) continue;
+  const std::vector<Candidate> all = recogniser_->revisited(map, keyframe);
+  for (const Candidate& candidate : consistent_candidates(map, keyframe, all, options_.loop, history_)) {
+    auto location = verify(keyframe, map, candidate);
+    if (!location || !shows_news(map, keyframe, *location, options_.loop)) continue;
     const auto scale = relative_scale(map, keyframe, *location);
     if (!scale) continue;
     location->scale = *scale;
-    if (plausible(map, measure(map, keyframe, *location), options_.loop)) return location;
+    location->with = nearest_of_place(map, keyframe, *location, options_);
+    const LoopClosure closure = measure(map, keyframe, *location);
+    if (!plausible(map, closure, options_.loop)) continue;
+    if (!closure.joined || undisputed(keyframe, map, *location, all)) return location;
   }
   return std::nullopt;
 }
@@ -45,11 +76,11 @@ std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft&
   const auto location = find(keyframe, draft.map());
   if (!location) return std::nullopt;
   const LoopClosure closure = measure(draft.map(), keyframe, *location);
-  if (!closure.joined) {
-    close_loop(closure, *location, options_.loop, features_, draft);
-  } else if (!join_parts(closure, *location, options_.loop, features_, draft)) {
-    return std::nullopt;
-  }
+  map::MapDraft attempt = draft;
+  const bool done = closure.joined ? join_parts(closure, *location, options_.loop, features_, attempt)
+                                   : close_loop(closure, *location, options_.loop, features_, attempt);
+  if (!done) return std::nullopt;
+  draft = std::move(attempt);
   history_ = {};
   return closure;
 }

@@ -14,6 +14,7 @@ struct LoopClosure {
   KeyframeId keyframe, with;
   int inliers = 0;          // keypoints that support the relative pose
   double off_px = 0;        // median error of what the keyframe sees of the place, at its pose before
+  double apart = 0;         // distance to the place, of that to what is seen of it
   double moved = 0;         // map units the keyframe's centre moved
   double turned = 0;        // rad
   double scaled = 1;        // other than 1 only where the scale is not observable
@@ -31,6 +32,9 @@ class LoopCloser {
   std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft);
 
  private:
+  std::optional<Location> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const;
+  bool undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location,
+                  const std::vector<Candidate>& candidates) const;
   std::optional<Location> find(KeyframeId keyframe, const map::BundledMap& map);
 
   const std::unique_ptr<PlaceRecogniser> recogniser_;

@@ -43,6 +43,15 @@ double error_px(const map::BundledMap& map, KeyframeId keyframe, const Location&
   return errors.empty() ? 0.0 : median(std::move(errors));
 }
 
+// How far the frame is from the keyframe it is located with, of the distance to what both see.
+double apart(const map::BundledMap& map, const Location& location) {
+  const Vector3d here = centre(location.T_rig_world);
+  std::vector<double> distances;
+  for (const auto& [feature, l] : location.matches) distances.push_back((map.landmark(l).position - here).norm());
+  if (distances.empty()) return std::numeric_limits<double>::infinity();
+  return (here - centre(map.keyframe(location.with).T_rig_world)).norm() / median(std::move(distances));
+}
+
 // Length of the way from one keyframe to the other, through all keyframes of their part made between them.
 double way_between(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
   const KeyframeId root = map.root_of(to);
@@ -74,8 +83,8 @@ std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyfram
   return window;
 }
 
-// What the keyframe was found to see becomes its own, then what its window sees as well.
-void fuse(const std::vector<KeyframeId>& window, const LoopClosure& closure, const Location& location, const LoopOptions& options,
+// What the keyframe was found to see becomes its own, then what its window sees as well, looked for at the poses given.
+void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_world, const LoopClosure& closure, const Location& location, const LoopOptions& options,
           const map::FeatureModel& features, map::MapDraft& draft) {
   const std::vector<LandmarkId> place =
       landmarks_about(draft.map(), closure.with, options.window, static_cast<int>(draft.map().num_landmarks()));
@@ -89,9 +98,9 @@ void fuse(const std::vector<KeyframeId>& window, const LoopClosure& closure, con
       draft.add_observation(now, {closure.keyframe, feature, false});
     }
   }
-  for (const KeyframeId k : window) {
-    adjustment::fuse_into(k, place, adjustment::Keep::kSearched, options.fusion, features, draft);
-    draft.refresh_landmarks(adjustment::landmarks_of(draft.map(), k));
+  for (std::size_t i = 0; i < window.size(); ++i) {
+    adjustment::fuse_into(window[i], T_rig_world[i], place, adjustment::Keep::kSearched, options.fusion, features, draft);
+    draft.refresh_landmarks(adjustment::landmarks_of(draft.map(), window[i]));
   }
 }
 
@@ -111,30 +120,20 @@ void move_window(const std::vector<KeyframeId>& window, const EssentialGraph& gr
   draft.set_poses(std::move(poses));
 }
 
-// Poses and landmarks of the window as they are in `map`, as far as they are there still.
-map::SetPoses poses_in(const map::BundledMap& map, const std::vector<KeyframeId>& window) {
-  map::SetPoses poses;
-  for (const KeyframeId k : window) {
-    poses.keyframes.emplace_back(k, map.keyframe(k).T_rig_world);
-    for (const LandmarkId l : adjustment::landmarks_of(map, k)) {
-      if (map.landmark(l).reference.keyframe == k) poses.landmarks.emplace_back(l, map.landmark(l).position);
-    }
-  }
-  return poses;
-}
-
-// One edge between each keyframe of the window and each it sees landmarks of since the fusion.
+// One edge between each keyframe of the window and each with which the fusion gave it landmarks to share.
 void add_loop_edges(const map::BundledMap& before, const map::BundledMap& fused, const std::vector<KeyframeId>& window,
                     const LoopClosure& closure, EssentialGraph& graph) {
-  constexpr int kMinShared = 15;
+  constexpr int kMinGained = 15;
   for (const KeyframeId k : window) {
+    const auto& old = before.keyframe(k).covisible;
     for (const map::Covisible& c : fused.keyframe(k).covisible) {
-      if (std::binary_search(window.begin(), window.end(), c.keyframe)) continue;
-      const auto& old = before.keyframe(k).covisible;
-      const bool linked = std::ranges::binary_search(old, c.keyframe, {}, &map::Covisible::keyframe);
+      const int b = graph.vertex(c.keyframe);
+      if (b < 0 || std::binary_search(window.begin(), window.end(), c.keyframe)) continue;
+      const auto known = std::ranges::find(old, c.keyframe, &map::Covisible::keyframe);
+      const int gained = c.weight - (known == old.end() ? 0 : known->weight);
       const bool the_loop = k == closure.keyframe && c.keyframe == closure.with;
-      const int a = graph.vertex(k), b = graph.vertex(c.keyframe);
-      if (linked || b < 0 || (c.weight < kMinShared && !the_loop)) continue;
+      if (gained < kMinGained && !the_loop) continue;
+      const int a = graph.vertex(k);
       const auto& S = graph.problem.S_world;
       graph.problem.edges.push_back({a, b, S[static_cast<std::size_t>(a)] * S[static_cast<std::size_t>(b)].inverse(), 1.0});
     }
@@ -175,6 +174,7 @@ LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Locat
   out.turned = (now.rotation() * location.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
   out.off_px = error_px(map, keyframe, location);
   out.scaled = location.scale;
+  out.apart = apart(map, location);
   out.joined = map.root_of(keyframe) != map.root_of(location.with);
   return out;
 }
@@ -184,7 +184,7 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
   const auto [first, last] = std::minmax(closure.keyframe, closure.with);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
   const double way = way_between(map, first, last) + median_depth(map, closure.keyframe);
-  return closure.moved <= share * way && closure.turned <= kMaxTurn;
+  return closure.apart <= options.max_apart && closure.moved <= share * way && closure.turned <= kMaxTurn;
 }
 
 bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
@@ -208,11 +208,13 @@ bool join_parts(const LoopClosure& closure, const Location& location, const Loop
   const std::vector<KeyframeId> window = window_of(map, closure.keyframe, options.window);
   move_map(std::move(poses), draft);
   draft.join_parts(here_moves ? closure.keyframe : closure.with, here_moves ? closure.with : closure.keyframe);
-  fuse(window, closure, location, options, features, draft);
+  std::vector<SE3> T_window;
+  for (const KeyframeId k : window) T_window.push_back(draft.map().keyframe(k).T_rig_world);
+  fuse(window, T_window, closure, location, options, features, draft);
   return true;
 }
 
-void close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
+bool close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
                 map::MapDraft& draft) {
   const map::BundledMap before = draft.map();
   EssentialGraph graph = essential_graph(before, before.root_of(closure.keyframe), options.edge_weight);
@@ -228,19 +230,22 @@ void close_loop(const LoopClosure& closure, const Location& location, const Loop
     const auto v = static_cast<std::size_t>(graph.vertex(k));
     graph.problem.S_world[v] = S_before[v] * S_keyframe_before.inverse() * S_keyframe;
   }
-  move_window(window, graph, S_before, draft);
-  fuse(window, closure, location, options, features, draft);
+  std::vector<SE3> T_window;
+  for (const KeyframeId k : window) T_window.push_back(pose_of(graph.problem.S_world[static_cast<std::size_t>(graph.vertex(k))]));
   if (closure.off_px <= options.near_px && !graph.problem.scale_free) {
     // One keyframe places itself by what it sees of the place no better than the map does by all it holds: bundle adjustment
     // weighs them, from where the map is.
-    draft.set_poses(poses_in(before, window));
-    return;
+    fuse(window, T_window, closure, location, options, features, draft);
+    return true;
   }
+  move_window(window, graph, S_before, draft);
+  fuse(window, T_window, closure, location, options, features, draft);
   add_loop_edges(before, draft.map(), window, closure, graph);
 
   const std::vector<Sim3> S_fused = graph.problem.S_world;
-  solver::optimise(graph.problem, options.pose_graph);
+  if (!solver::optimise(graph.problem, options.pose_graph).usable()) return false;
   move_map(corrected(draft.map(), graph, S_fused), draft);
+  return true;
 }
 
 }  // namespace bslam::looping

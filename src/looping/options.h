@@ -56,6 +56,8 @@ struct LoopOptions {
   bool enabled = true;
   int consistent_keyframes = 2;   // keyframes in a row that must recognise one place
   int max_keyframe_gap = 3;       // from one of them to the next, in keyframes
+  double min_news = 0.25;         // of what is seen of the place, that the keyframe must not know yet
+  double max_apart = 0.15;        // distance to the place, of that to what is seen of it: from farther off it is no return
   double max_drift = 0.05;        // of the way since the place was last seen: a larger correction is no drift but a mistake
   double max_drift_free = 0.3;    // the same where the scale is not observable
   double near_px = 4.0;           // error of what is seen of the place, up to which bundle adjustment needs no help
@@ -69,6 +71,8 @@ struct LoopOptions {
     visitor("enabled", self.enabled, Range{}, "", "loop closing and the joining of parts");
     visitor("consistent_keyframes", self.consistent_keyframes, Range{1, 100}, "", "keyframes in a row that must recognise one place");
     visitor("max_keyframe_gap", self.max_keyframe_gap, Range{1, 100}, "", "keyframes from one of them to the next at most");
+    visitor("min_news", self.min_news, Range{0, 1}, "", "of what is seen of the place, that the keyframe must not know yet");
+    visitor("max_apart", self.max_apart, Range{0, 100}, "", "distance to the place, of that to what is seen of it");
     visitor("max_drift", self.max_drift, Range{0, 10}, "", "of the way since the place was seen, that a correction may be");
     visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "the same where the scale is not observable");
     visitor("near_px", self.near_px, Range{0, 1000}, "px", "error of what is seen of the place, up to which bundle adjustment needs no help");

@@ -37,6 +37,16 @@ Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vect
 
 }  // namespace
 
+std::vector<map::Covisible> neighbours_of(const map::BundledMap& map, KeyframeId keyframe, const RecognitionOptions& options) {
+  const auto landmarks = std::ranges::count_if(map.keyframe(keyframe).landmarks.values(), [](LandmarkId l) { return l.valid(); });
+  const double enough = std::max<double>(options.neighbour_weight, options.neighbour_share * static_cast<double>(landmarks));
+  std::vector<map::Covisible> out;
+  for (const map::Covisible& c : map.keyframe(keyframe).covisible) {
+    if (c.weight >= enough) out.push_back(c);
+  }
+  return out;
+}
+
 BagOfWordsRecogniser::BagOfWordsRecogniser(place::VocabularyPtr vocabulary, const RecognitionOptions& options)
     : vocabulary_(std::move(vocabulary)), options_(options) {}
 
@@ -80,10 +90,7 @@ std::vector<Candidate> BagOfWordsRecogniser::revisited(const map::BundledMap& ma
   // The paper's s_min: a place is recognised only where it looks more like here than the least alike of the neighbours.
   double min_score = 0;
   bool any = false;
-  const auto landmarks = std::ranges::count_if(map.keyframe(keyframe).landmarks.values(), [](LandmarkId l) { return l.valid(); });
-  const double enough = std::max<double>(options_.neighbour_weight, options_.neighbour_share * static_cast<double>(landmarks));
-  for (const map::Covisible& c : map.keyframe(keyframe).covisible) {
-    if (c.weight < enough) continue;
+  for (const map::Covisible& c : neighbours_of(map, keyframe, options_)) {
     excluded[c.keyframe.index()] = 1;
     const double score = place::l1_score(*words, *index_.words_of(c.keyframe));
     min_score = any ? std::min(min_score, score) : score;

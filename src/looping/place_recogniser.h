@@ -17,6 +17,9 @@ struct Candidate {
   double score = 0;  // of its group, falling
 };
 
+// The neighbours of a keyframe, those that share much with it and whose place it therefore knows, in order of id.
+std::vector<map::Covisible> neighbours_of(const map::BundledMap& map, KeyframeId keyframe, const RecognitionOptions& options);
+
 // An interface, so that another detector can stand in. Answers depend on the arguments alone, never on earlier calls.
 class PlaceRecogniser {
  public:

@@ -18,11 +18,13 @@
 // |                   | entries of removed keyframes and of removed or merged landmarks are dropped; newer keyframes |
 // |                   | move with their parent (chains with the nearest older ancestor), newer landmarks with the    |
 // |                   | keyframe of their reference                                                                  |
-// | JoinParts         | dropped where one is gone or they are of one part already                                    |
+// | JoinParts         | a removed keyframe stands for its nearest ancestor; dropped where they are of one part       |
 // | RemovePart        | dropped where it is gone already or has become part of another                               |
 // | AddSightings      | forwarded along merges, entries dropped where gone                                           |
 // | RefreshLandmarks  | forwarded along merges, entries dropped where gone                                           |
 // | SetScale          | the later one holds                                                                          |
+// An edit that corrects the map (SetPoses::correction) is refused as a whole where another correction was committed since
+// its base: half of it, landmarks merged and parts hung together that were not moved, would tear the map.
 // So the order in which a new keyframe and a correction of its surroundings are committed does not change where it ends
 // up. An operation of several entries counts as dropped where all of them are. An operation on something the edit itself
 // added is dropped where that was.
@@ -111,6 +113,9 @@ class MapDraft {
   MapDraft(std::string_view stage, MapSnapshot base);
 
   const BundledMap& map() const { return working_; }  // the base with all that was written so far
+  bool corrects() const { return working_.gauge_epoch() != edit_.base->gauge_epoch(); }
+  // A correction that newer ones have overtaken, `newest` being the newest version: committing it is refused.
+  bool overtaken(const BundledMap& newest) const { return corrects() && edit_.base->gauge_epoch() != newest.gauge_epoch(); }
 
   // Matches may stem from an older version: those to merged landmarks are forwarded; those to removed ones, and later ones
   // of a feature or landmark that occurs twice, are dropped.

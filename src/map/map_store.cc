@@ -20,6 +20,12 @@ void MapStore::restart(BundledMap initial) {
 CommitReport MapStore::commit(MapDraft draft) {
   const std::lock_guard writer(commit_mutex_);
   MapSnapshot current = snapshot();
+  if (draft.overtaken(*current)) {
+    CommitReport refused;
+    refused.refused = true;
+    refused.published = std::move(current);
+    return refused;
+  }
   auto [edit, result] = std::move(draft).finish();
   CommitReport report;
   report.rebased = edit.base != current;

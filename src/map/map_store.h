@@ -13,6 +13,7 @@ namespace bslam::map {
 struct CommitReport : RebaseReport {
   MapSnapshot published;
   bool rebased = false;  // other edits had been committed since its base
+  bool refused = false;  // a correction that another one overtook: nothing of it was applied, nothing published
 };
 
 // Versions it hands out are const and are never changed, nor is anything that could change them handed out: a draft works

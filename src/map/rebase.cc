@@ -41,7 +41,7 @@ class Rebase {
   bool operator()(const RemoveLandmark& op);
   bool operator()(const MergeLandmarks& op) { return map_.merge_landmarks(forward(op.from), forward(op.into)); }
   bool operator()(const RemoveKeyframe& op) { return map_.remove_keyframe(here(op.keyframe)); }
-  bool operator()(const JoinParts& op) { return map_.join_parts(here(op.child), here(op.parent)); }
+  bool operator()(const JoinParts& op) { return map_.join_parts(map_.surviving(here(op.child)), map_.surviving(here(op.parent))); }
   bool operator()(const RemovePart& op) { return map_.remove_part(here(op.root)); }
   bool operator()(const SetPoses& op);
   bool operator()(const AddSightings& op);

@@ -11,16 +11,18 @@ namespace bslam::session {
 
 Result<MergeResult> merge_maps(const io::SavedMap& a, const io::SavedMap& b, const place::VocabularyPtr& vocabulary,
                                const system::Config& config) {
+  map::FeatureModel features = config.feature_model();
+  features.scale_factor = a.map.pyramid().scale_factor;
   for (const io::SavedMap* saved : {&a, &b}) {
     if (saved->map.scale() != map::Scale::kMetric) return Error{saved->file, "scale", "not metric", "maps of one unit"};
-    if (const Status s = io::fits(*saved, a.map.rig(), vocabulary.get()); !s) return s.error();
+    if (const Status s = io::fits(*saved, a.map.rig(), a.map.pyramid(), vocabulary.get()); !s) return s.error();
   }
   map::BundledMap both = a.map;
   const map::AppendedIds ids = map::append_map(both, b.map);
   map::MapStore store(std::move(both));
   MergeResult result{.map = a.map};
   looping::LoopCloser closer(std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition), config.looping,
-                             config.feature_model(), static_cast<std::uint64_t>(config.seed));
+                             features, static_cast<std::uint64_t>(config.seed));
   for (const KeyframeId k : ids.keyframes) {
     if (!store.snapshot()->alive(k)) continue;
     map::MapDraft draft("loop", store.snapshot());
@@ -30,7 +32,7 @@ Result<MergeResult> merge_maps(const io::SavedMap& a, const io::SavedMap& b, con
     ++(closure->joined ? result.joined : result.loops);
   }
   map::MapDraft draft("final", store.snapshot());
-  mapping::adjust_globally(config.mapping, config.feature_model(), draft);
+  mapping::adjust_globally(config.mapping, features, draft);
   store.commit(std::move(draft));
   result.map = *store.snapshot();
   result.parts = result.map.roots().size();

@@ -90,7 +90,7 @@ Result<SessionResult> run_session(const io::Dataset& dataset, const SessionOptio
                                 .system = system,
                                 .replayed = options.replay.has_value(),
                                 .loaded = options.map.has_value(),
-                                .complete = inputs.size() == dataset.frames.size(),
+                                .complete = inputs.size() == dataset.frames.size() && !options.interrupted.stop_requested(),
                                 .start_up_s = start_up_s,
                                 .wall_s = 1e-3 * wall.ms()});
   result.trajectories = system.trajectories();

@@ -16,6 +16,7 @@ using std::numbers::pi;
 constexpr double kKnotSpacing = 0.1;  // seconds: fine enough for the rhythm of steps
 constexpr double kWalkingPace = 1.2;  // metres per second
 constexpr double kFastestPace = 1.5;
+constexpr double kTurnRound_s = 4.0, kHalt_s = 1.0;  // seconds: of turning on the spot; of halting before
 constexpr double kTangentReach = 0.4;  // metres of path on either side that give the direction of looking
 
 // A few sine waves with random phases, mean 0, at most 1 in size, over a phase in laps; whole numbers of waves a lap.
@@ -91,12 +92,30 @@ class Loop {
   std::vector<double> at_;  // arc length at each point, and the whole
 };
 
+// Seconds of walking one way.
+double walking_s(const TourOptions& o) { return o.back ? std::max(0.1, 0.5 * (o.duration_s - kTurnRound_s)) : o.duration_s; }
+
 double laps_of(const TourOptions& o, double length) {
   if (o.laps > 0) return o.laps;
-  if (o.speed_mps > 0) return o.speed_mps * o.duration_s / length;
-  const double wanted = kWalkingPace * o.duration_s / length;
-  const double most = std::floor(kFastestPace * o.duration_s / length);
+  if (o.speed_mps > 0) return o.speed_mps * walking_s(o) / length;
+  const double wanted = kWalkingPace * walking_s(o) / length;
+  const double most = std::floor(kFastestPace * walking_s(o) / length);
   return most < 1 ? wanted : std::clamp(std::round(wanted), 1.0, most);
+}
+
+// Where a tour is at a time: in laps walked, and how far it has turned round.
+struct Progress {
+  double laps = 0, turned = 0;  // turned: radians
+};
+
+Progress there_and_back(const TourOptions& o, double laps, double time_s) {
+  const double walk = walking_s(o);
+  const double turning = std::clamp((time_s - walk) / kTurnRound_s, 0.0, 1.0);
+  // A walker comes to a halt within kHalt_s, and gets going the same way.
+  const double away = walk - std::clamp(std::abs(time_s - 0.5 * o.duration_s) - 0.5 * kTurnRound_s, 0.0, 2 * walk);
+  const double halt = std::min(kHalt_s, walk), left = walk - away;
+  const double eased = left < halt ? 0.5 * left * left / halt : left - 0.5 * halt;
+  return {laps * (1 - eased / (walk - 0.5 * halt)), pi * turning * turning * (3 - 2 * turning)};
 }
 
 }  // namespace
@@ -154,8 +173,10 @@ Trajectory make_tour(const Building& building, const TourOptions& options) {
   std::vector<ControlPose> control;
   double last_yaw = 0;
   for (std::size_t i = 0; i < pieces + 3; ++i) {
-    const double progress = laps * (static_cast<double>(i) - 1) / static_cast<double>(pieces);  // in laps
-    const double lap = std::floor(progress), phase = progress - lap;
+    const double step = static_cast<double>(i) - 1;
+    const Progress progress = options.back ? there_and_back(options, laps, spacing * step)
+                                           : Progress{laps * step / static_cast<double>(pieces), 0};
+    const double lap = std::floor(progress.laps), phase = progress.laps - lap;
     const Offsets o = offsets_at(base, own[static_cast<std::size_t>(lap + 1)], phase);
     // The pace swells and ebbs by a tenth, the same way in every lap.
     const double arc = loop.length() * (phase + 0.1 / (6 * pi) * std::sin(6 * pi * phase));
@@ -163,7 +184,7 @@ Trajectory make_tour(const Building& building, const TourOptions& options) {
     double yaw = std::atan2(tangent.y(), tangent.x());
     yaw += 2 * pi * std::round((last_yaw - yaw) / (2 * pi));
     last_yaw = yaw;
-    control.push_back({{place.x(), place.y(), 1.5 + o.up}, yaw + o.yaw, o.pitch, o.roll});
+    control.push_back({{place.x(), place.y(), 1.5 + o.up}, yaw + progress.turned + o.yaw, o.pitch, o.roll});
   }
   return Trajectory(std::move(control), spacing);
 }

@@ -82,6 +82,11 @@ std::vector<Outage> CameraMonitor::judge(const image::ImageBundle& images) {
       camera.outage = Outage::kNone;
     }
   }
+  if (std::ranges::find(found, Outage::kNone) != found.end()) return found;
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {  // better than nothing
+    if (found[c] == Outage::kNoImage || cameras_[c].good == 0) continue;
+    found[c] = cameras_[c].outage = Outage::kNone;
+  }
   return found;
 }
 

@@ -16,7 +16,7 @@ struct HealthOptions {
   int bright_level = 250;        // grey value; a picture mostly above it is over-exposed
   double dark_share = 0.995;     // of the pixels
   double bright_share = 0.6;
-  int readmit_after = 3;         // good pictures in a row before a camera that was out counts again
+  int readmit_after = 3;         // good pictures in a row before a camera that was out counts again, while there are others
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -39,7 +39,8 @@ class CameraMonitor {
 
   // One per camera, for the pictures of the next frame. A picture is frozen where it is to the byte the last one of its
   // camera while another camera's has changed: a rig that stands still freezes nobody, and one camera alone cannot tell.
-  // A camera without a picture is out for that frame and counts again with its next.
+  // A camera without a picture is out for that frame and counts again with its next. Where all others are out as well, one
+  // with a good picture counts at once.
   std::vector<Outage> judge(const image::ImageBundle& images);
 
  private:

@@ -143,7 +143,7 @@ class LaggedExecutor : public StageExecutor {
       failure_ = job->failure;
       rethrow();
     }
-    if (stage == Stage::kLoop && job->result.draft) supersede_global();
+    if (stage == Stage::kLoop && job->result.draft && !job->result.draft->overtaken(*gate_.newest())) supersede_global();
     const bool committed = gate_.settle(job->task, job->base->version(), std::move(job->result), job->stop.get_token());
     observe(setup_, {job->task, job->ms, committed});
     if (const auto next = following(job->task, setup_.functions); committed && next) push(*next);

@@ -170,7 +170,10 @@ void Pipeline::keep_candidate(BundledFrame frame) {
 }
 
 tracking::TrackOutput Pipeline::follow(BundledFrame& frame, const map::BundledMap& map) {
-  if (!map.surviving(state_.reference).valid()) return tracking::lost(state_, frame, tracking::LostReason::kNotStarted);
+  if (!map.surviving(state_.reference).valid()) {  // no pose in this map so far
+    const bool blind = frame.num_keypoints() < static_cast<std::size_t>(config_.tracking.min_inliers);
+    return tracking::lost(state_, frame, blind ? tracking::LostReason::kFewFeatures : tracking::LostReason::kNotFound);
+  }
   const tracking::TrackInput input{.map = map,
                                    .pyramids = builder_.pyramids(),
                                    .state = state_,

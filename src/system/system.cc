@@ -36,7 +36,7 @@ void add_pose(std::vector<PartTrajectory>& parts, KeyframeId root, TimeNs time_n
 
 System::System(camera::Rig rig, Config config, Resources resources)
     : rig_(std::move(rig)), config_(std::move(config)),
-      pipeline_(rig_, config_, std::move(resources.masks), recogniser(resources.vocabulary, config_)),
+      loaded_(resources.map.has_value()), pipeline_(rig_, config_, std::move(resources.masks), recogniser(resources.vocabulary, config_)),
       store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)), gate_(store_) {
   const map::MapSnapshot map = store_.snapshot();
   for (const KeyframeId k : map->keyframe_ids()) set_keyframe_time(k, map->keyframe(k).frame->time_ns);
@@ -88,7 +88,7 @@ const FrameRecord& System::process(const image::ImageBundle& images) {
   frames_.push_back(std::move(outcome.record));
   const bool failed = had_pose && disowns_map(frames_.back().result);
   const map::BundledMap& seen = *outcome.seen;
-  if (failed && seen.scale() != map::Scale::kMetric && seen.keyframe_slots() <= kYoungMap) give_up_young_map();
+  if (failed && !loaded_ && seen.scale() != map::Scale::kMetric && seen.keyframe_slots() <= kYoungMap) give_up_young_map();
   return frames_.back();
 }
 

@@ -77,6 +77,7 @@ class System {
 
   const camera::Rig rig_;
   const Config config_;
+  const bool loaded_;  // a map of an earlier run
   Pipeline pipeline_;
   std::vector<FrameRecord> frames_;
   mutable std::mutex records_mutex_;

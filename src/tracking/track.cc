@@ -189,6 +189,7 @@ std::string_view describe(LostReason reason) {
     case LostReason::kFewMatches: return "too few matches";
     case LostReason::kFewInliers: return "too few matches agree";
     case LostReason::kUnstablePose: return "pose not supported";
+    case LostReason::kNotFound: return "place not found in the map";
   }
   return "";
 }

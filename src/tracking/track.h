@@ -14,7 +14,7 @@ namespace bslam::tracking {
 enum class TrackStatus { kNotStarted, kTracking, kLost };
 
 // Why a frame has no pose. A frame whose pose is not supported is lost, never guessed.
-enum class LostReason { kNone, kNotStarted, kNoImages, kFewFeatures, kFewMatches, kFewInliers, kUnstablePose };
+enum class LostReason { kNone, kNotStarted, kNoImages, kFewFeatures, kFewMatches, kFewInliers, kUnstablePose, kNotFound };
 
 std::string_view describe(LostReason reason);
 

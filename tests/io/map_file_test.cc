@@ -231,18 +231,18 @@ TEST(MapFile, IsWholeOrNotThere) {
 TEST(MapFits, TheSameRigWhereverItsBodyFrameIs) {
   const camera::Rig rig = simulation::default_rig();
   const SavedMap saved = read_back(small_map(rig));
-  EXPECT_TRUE(fits(saved, rig, nullptr));
+  EXPECT_TRUE(fits(saved, rig, saved.map.pyramid(), nullptr));
   std::vector<camera::RigCamera> cameras;
   const geometry::SE3 T_new_body(Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {1, 2, 3});
   for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), T_new_body * rig.body_from_cam(c)});
-  EXPECT_TRUE(fits(saved, camera::Rig(std::move(cameras)), nullptr));
+  EXPECT_TRUE(fits(saved, camera::Rig(std::move(cameras)), saved.map.pyramid(), nullptr));
 }
 
 TEST(MapFits, NamesTheCameraAndWhatDiffersOfIt) {
   const camera::Rig rig = simulation::default_rig();
   const SavedMap saved = read_back(small_map(rig));
   const auto key = [&](std::size_t i, const std::function<void(camera::RigCamera&)>& change) {
-    const Status status = fits(saved, changed(rig, i, change), nullptr);
+    const Status status = fits(saved, changed(rig, i, change), saved.map.pyramid(), nullptr);
     EXPECT_FALSE(status);
     EXPECT_EQ(status.error().file, "test");
     return status.error().key;
@@ -268,7 +268,7 @@ TEST(MapFits, NamesTheCameraAndWhatDiffersOfIt) {
                 }),
             second + "place in the rig");
   const std::vector<int> fewer = {0, 1};
-  EXPECT_EQ(fits(saved, rig.subset(fewer), nullptr).error().key, "rig");
+  EXPECT_EQ(fits(saved, rig.subset(fewer), saved.map.pyramid(), nullptr).error().key, "rig");
 }
 
 TEST(MapFits, OnlyTheVocabularyOfItsWords) {
@@ -282,10 +282,10 @@ TEST(MapFits, OnlyTheVocabularyOfItsWords) {
   const auto vocabulary = place::Vocabulary::make(content);
   ASSERT_TRUE(vocabulary);
   const map::BundledMap map = small_map(rig);
-  EXPECT_EQ(fits(read_back(map), rig, vocabulary->get()).error().key, "vocabulary");
-  EXPECT_TRUE(fits(read_back(map, {0, "", ""}), rig, vocabulary->get()));
+  EXPECT_EQ(fits(read_back(map), rig, map.pyramid(), vocabulary->get()).error().key, "vocabulary");
+  EXPECT_TRUE(fits(read_back(map, {0, "", ""}), rig, map.pyramid(), vocabulary->get()));
   // The right name does not make up for words it does not have.
-  EXPECT_EQ(fits(read_back(map, {(*vocabulary)->id(), "", ""}), rig, vocabulary->get()).error().key, "vocabulary");
+  EXPECT_EQ(fits(read_back(map, {(*vocabulary)->id(), "", ""}), rig, map.pyramid(), vocabulary->get()).error().key, "vocabulary");
 }
 
 }  // namespace

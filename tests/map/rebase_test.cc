@@ -308,13 +308,16 @@ TEST_F(RebaseTest, PosesAreDroppedAfterACorrection) {
   EXPECT_EQ(report.published->gauge_epoch(), before->gauge_epoch() + 1);
 }
 
-TEST_F(RebaseTest, OfTwoCorrectionsTheFirstHolds) {
+TEST_F(RebaseTest, OfTwoCorrectionsTheFirstHoldsAndNothingOfTheOther) {
   const SE3 corrected = random_pose(random, 1);
   early->set_poses({{{kThird, corrected}}, {}, true});
   late->set_poses({{{kThird, random_pose(random, 1)}}, {}, true});
+  ASSERT_TRUE(late->merge_landmarks(LandmarkId(0), LandmarkId(1)));
   const CommitReport report = commit();
+  EXPECT_TRUE(report.refused);
+  EXPECT_EQ(report.published, store.snapshot());
+  EXPECT_TRUE(report.published->alive(LandmarkId(0)));
   expect_near(report.published->keyframe(kThird).T_rig_world, corrected);
-  EXPECT_EQ(report.dropped, 1u);
   EXPECT_EQ(report.published->gauge_epoch(), 1);
 }
 

@@ -68,6 +68,21 @@ TEST(Tour, KeepsClearOfWallsAndFurniture) {
   }
 }
 
+TEST(Tour, ComesBackTheWayItWent) {
+  constexpr double kDuration = 30;
+  const Trajectory t = make_tour(make_building(1), {.duration_s = kDuration, .laps = 1, .back = true});
+  for (double time = 0; time < 0.5 * kDuration - 2; time += 0.2) {
+    const geometry::SE3 there = t.T_world_body(time), back = t.T_world_body(kDuration - time);
+    EXPECT_LT((there.translation() - back.translation()).norm(), 0.01) << time;
+    const double turn = angle_between(there, back);
+    EXPECT_GT(turn, 160 * std::numbers::pi / 180) << time;  // it leans and nods the other way
+  }
+  for (double time = 0; time < kDuration; time += 0.02) {
+    EXPECT_LT(t.velocity(time).norm(), 2.5);
+    EXPECT_LT(std::abs(t.yaw_rate(time)), 110 * std::numbers::pi / 180) << time;
+  }
+}
+
 TEST(Tour, SwaysDifferentlyInEachLap) {
   const Trajectory t = make_tour(make_building(1), {.duration_s = 40, .laps = 2});
   double apart = 0;

@@ -72,14 +72,22 @@ TEST(CameraMonitor, OnePixelIsChangeEnough) {
 }
 
 TEST(CameraMonitor, ReadmitsAfterGoodPicturesInARow) {
-  CameraMonitor monitor(1, {.readmit_after = 3});
-  monitor.judge(frame({picture(1, 0, 5)}));
-  EXPECT_EQ(monitor.judge(frame({good(1)})), Outages{Outage::kBlack});
-  EXPECT_EQ(monitor.judge(frame({good(2)})), Outages{Outage::kBlack});
-  EXPECT_EQ(monitor.judge(frame({picture(2, 0, 5)})), Outages{Outage::kBlack});
-  EXPECT_EQ(monitor.judge(frame({good(3)})), Outages{Outage::kBlack});
-  EXPECT_EQ(monitor.judge(frame({good(4)})), Outages{Outage::kBlack});
-  EXPECT_EQ(monitor.judge(frame({good(5)})), Outages{Outage::kNone});
+  CameraMonitor monitor(2, {.readmit_after = 3});
+  monitor.judge(frame({picture(1, 0, 5), good(11)}));
+  EXPECT_EQ(monitor.judge(frame({good(1), good(12)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(2), good(13)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({picture(2, 0, 5), good(14)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(3), good(15)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(4), good(16)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(5), good(17)})), (Outages{Outage::kNone, Outage::kNone}));
+}
+
+TEST(CameraMonitor, ReadmitsAtOnceWhereNoOtherIsLeft) {
+  CameraMonitor monitor(3, {.readmit_after = 3});
+  const Outages dark(3, Outage::kBlack);
+  EXPECT_EQ(monitor.judge(frame({picture(1, 0, 5), picture(2, 0, 5), picture(3, 0, 5)})), dark);
+  EXPECT_EQ(monitor.judge(frame({picture(4, 0, 5), good(1), {}})), (Outages{Outage::kBlack, Outage::kNone, Outage::kNoImage}));
+  EXPECT_EQ(monitor.judge(frame({good(2), good(3), good(4)})), (Outages{Outage::kBlack, Outage::kNone, Outage::kBlack}));
 }
 
 TEST(CameraMonitor, ACameraThatComesNowAndThenIsTakenAsItComes) {

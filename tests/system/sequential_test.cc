@@ -91,7 +91,8 @@ TEST(SystemSequential, IsLostInTheDarkAndRecovers) {
     const FrameRecord& record = system.process(images);
     const bool dark = images.id.value() == 8 || images.id.value() == 9;
     EXPECT_EQ(record.result.status, dark ? TrackStatus::kLost : TrackStatus::kTracking) << "frame " << images.id.value();
-    EXPECT_EQ(record.result.reason, dark ? LostReason::kFewFeatures : LostReason::kNone);
+    EXPECT_EQ(record.result.reason, dark ? LostReason::kNoImages : LostReason::kNone);
+    EXPECT_EQ(record.outages, std::vector<Outage>(2, dark ? Outage::kBlack : Outage::kNone)) << "frame " << images.id.value();
   }
   system.finish();
   EXPECT_EQ(final_poses(system).size(), frames.size() - 2);
@@ -179,7 +180,7 @@ TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {
   ASSERT_GT(before, 0u);
   image::ImageBundle dark = tour.frames()[k++];
   blacken(dark.images[0]);
-  EXPECT_EQ(system.process(dark).result.reason, LostReason::kFewFeatures);
+  EXPECT_EQ(system.process(dark).result.reason, LostReason::kNoImages);
   EXPECT_EQ(tracked_frames(system), before);
   while (k < tour.frames().size()) system.process(tour.frames()[k++]);
   EXPECT_EQ(system.maps_started(), 1);
