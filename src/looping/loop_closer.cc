@@ -44,19 +44,23 @@ std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::Bundl
   return locate(map, *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
 }
 
-// Parts may lie anywhere, so that nothing but the pictures speaks against a wrong place: no other may look as right.
-bool LoopCloser::undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location,
-                            const std::vector<Candidate>& candidates) const {
-  return std::ranges::none_of(candidates, [&](const Candidate& candidate) {
-    if (candidate.keyframe == location.with) return false;
-    const auto other = verify(keyframe, map, candidate);
-    return other && disputes(map, location, *other);
+// Parts may lie anywhere, so that nothing but the pictures speaks against a wrong place: no other of the rest of the map may
+// look as right. A twin that fewer keyframes show is no candidate beside the place itself: it is asked for as a frame is
+// that nothing is known of.
+bool LoopCloser::undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const {
+  const std::shared_ptr<const frame::BundledFrame> frame = map.keyframe(keyframe).frame;
+  map::BundledMap rest = map;
+  rest.remove_part(map.root_of(keyframe));
+  const Random random(seed_, "rival", static_cast<std::uint64_t>(keyframe.value()));
+  return std::ranges::none_of(recogniser_->recognised(rest, *frame), [&](const Candidate& candidate) {
+    const auto other = locate(rest, *frame, candidate.keyframe, options_.verification, features_, random);
+    return other && disputes(rest, location, *other);
   });
 }
 
 std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map) {
-  const std::vector<Candidate> all = recogniser_->revisited(map, keyframe);
-  for (const Candidate& candidate : consistent_candidates(map, keyframe, all, options_.loop, history_)) {
+  const std::vector<Candidate> candidates = recogniser_->revisited(map, keyframe);
+  for (const Candidate& candidate : consistent_candidates(map, keyframe, candidates, options_.loop, history_)) {
     auto location = verify(keyframe, map, candidate);
     if (!location || !shows_news(map, keyframe, *location, options_.loop)) continue;
     const auto scale = relative_scale(map, keyframe, *location);
@@ -65,7 +69,7 @@ std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::Bundled
     location->with = nearest_of_place(map, keyframe, *location, options_);
     const LoopClosure closure = measure(map, keyframe, *location);
     if (!plausible(map, closure, options_.loop)) continue;
-    if (!closure.joined || undisputed(keyframe, map, *location, all)) return location;
+    if (!closure.joined || undisputed(keyframe, map, *location)) return location;
   }
   return std::nullopt;
 }

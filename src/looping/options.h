@@ -11,7 +11,8 @@ namespace bslam::looping {
 struct RecognitionOptions {
   double common_share = 0.6;    // of the most common words any keyframe has: fewer, and it is no candidate
   double group_share = 0.75;    // of the best group's score that another group must reach
-  double rival_share = 0.5;     // of both where nothing is known of a frame: what looks the same elsewhere must come up as well
+  double rival_share = 0.25;    // of both where nothing is known of a frame: what looks the same elsewhere must come up as well, also
+                                // where fewer keyframes show it
   int group = 10;               // covisible keyframes whose scores add up
   int neighbour_weight = 15;    // shared landmarks, and ...
   double neighbour_share = 0.05;  // ... of all a keyframe observes, that make another its neighbour: one whose place it knows
@@ -57,7 +58,7 @@ struct LoopOptions {
   int consistent_keyframes = 2;   // keyframes in a row that must recognise one place
   int max_keyframe_gap = 3;       // from one of them to the next, in keyframes
   double min_news = 0.25;         // of what is seen of the place, that the keyframe must not know yet
-  double max_apart = 0.15;        // distance to the place, of that to what is seen of it: from farther off it is no return
+  double max_apart = 0.2;         // distance to the place, of that to what is seen of it: from farther off it is no return
   double max_drift = 0.05;        // of the way since the place was last seen: a larger correction is no drift but a mistake
   double max_drift_free = 0.3;    // the same where the scale is not observable
   double near_px = 4.0;           // error of what is seen of the place, up to which bundle adjustment needs no help
