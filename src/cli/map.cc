@@ -18,6 +18,7 @@
 #include "io/trajectory_file.h"
 #include "io/vocabulary_file.h"
 #include "session/merge_maps.h"
+#include "session/record_builder.h"
 
 namespace bslam::cli {
 namespace {
@@ -29,18 +30,6 @@ struct MapArguments {
   ConfigArguments config;
   bool json = false, overwrite = false;
 };
-
-std::string scale_name(map::Scale scale) {
-  switch (scale) {
-    case map::Scale::kMetric:
-      return "metric";
-    case map::Scale::kUpToScale:
-      return "up-to-scale";
-    case map::Scale::kUnobservable:
-      break;
-  }
-  return "unobservable";
-}
 
 std::string vocabulary_name(std::uint64_t id) { return id == 0 ? "none" : fmt::format("{:016x}", id); }
 
@@ -68,7 +57,7 @@ nlohmann::ordered_json to_json(const io::SavedMap& saved, std::uintmax_t file_by
           {"keyframes", map.num_keyframes()},
           {"landmarks", map.num_landmarks()},
           {"observations", map.num_observations()},
-          {"scale", scale_name(map.scale())},
+          {"scale", session::scale_name(map.scale())},
           {"vocabulary", vocabulary_name(saved.info.vocabulary)},
           {"parts", std::move(parts)}};
 }
@@ -84,7 +73,7 @@ void print_info(const io::SavedMap& saved, std::uintmax_t file_bytes) {
                         camera.height);
   }
   text += fmt::format("{} keyframes, {} landmarks, {} observations; scale {}; vocabulary {}\n", map.num_keyframes(),
-                      map.num_landmarks(), map.num_observations(), scale_name(map.scale()),
+                      map.num_landmarks(), map.num_observations(), session::scale_name(map.scale()),
                       vocabulary_name(saved.info.vocabulary));
   const std::string unit = map.scale() == map::Scale::kMetric ? "m" : "units";
   const std::vector<io::MapPart> parts = io::map_parts(map);

@@ -102,15 +102,6 @@ void add_places(const RecordInput& input, RunRecord& record) {
   }
 }
 
-std::string scale_name(map::Scale scale) {
-  switch (scale) {
-    case map::Scale::kMetric: return "metric";
-    case map::Scale::kUpToScale: return "up-to-scale";
-    case map::Scale::kUnobservable: return "unobservable";
-  }
-  return "";
-}
-
 // When stages ran.
 std::string mode_name(const RecordInput& input) {
   if (input.replayed) return "replay";
@@ -130,6 +121,15 @@ std::optional<double> peak_memory_mb() {
 }
 
 }  // namespace
+
+std::string scale_name(map::Scale scale) {
+  switch (scale) {
+    case map::Scale::kMetric: return "metric";
+    case map::Scale::kUpToScale: return "up-to-scale";
+    case map::Scale::kUnobservable: return "unobservable";
+  }
+  return "";
+}
 
 std::string trajectory_file(const std::string& stem, std::size_t part) {
   return part == 0 ? stem + ".tum" : stem + "_part" + std::to_string(part + 1) + ".tum";

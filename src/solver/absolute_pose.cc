@@ -111,13 +111,6 @@ void solve_sample(const Sample& sample, std::vector<SE3>& T_rig_world) {
   }
 }
 
-// Samples needed for one without outliers with the confidence asked for, at this share of inliers.
-double samples_needed(double inlier_share, double confidence) {
-  const double all_inliers = std::pow(inlier_share, 3);
-  if (all_inliers >= 1.0) return 1.0;
-  return std::log(1.0 - confidence) / std::log1p(-all_inliers);
-}
-
 // The best pose so far, by what all observations say.
 class Search {
  public:

@@ -64,4 +64,7 @@ SE3 minimise(const PoseProblem& problem, const SE3& T_rig_world, PoseEquations e
 PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double first_bound,
                           const PoseSolverOptions& options);
 
+// Samples of three needed for one without outliers with the confidence asked for, at this share of inliers.
+double samples_needed(double inlier_share, double confidence);
+
 }  // namespace bslam::solver

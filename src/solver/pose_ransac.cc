@@ -69,14 +69,13 @@ Sample draw(std::span<const PoseProblem::Item* const> candidates, Random& random
   return {candidates[index[0]], candidates[index[1]], candidates[index[2]]};
 }
 
-// Samples needed for one without outliers with the confidence asked for, at this share of inliers.
+}  // namespace
+
 double samples_needed(double inlier_share, double confidence) {
   const double all_inliers = std::pow(inlier_share, 3);
   if (all_inliers >= 1.0) return 1.0;
   return std::log(1.0 - confidence) / std::log1p(-all_inliers);
 }
-
-}  // namespace
 
 PoseSolution ransac_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
                          const PoseSolverOptions& options, const PoseRansacOptions& ransac, Random random) {
