@@ -8,71 +8,6 @@ namespace {
 
 using solver::ReprojectionProblem;
 
-// Where each observation of the problem comes from in the map.
-struct Source {
-  LandmarkId landmark;
-  KeyframeId keyframe;
-};
-
-struct FlatProblem {
-  ReprojectionProblem problem;
-  std::vector<KeyframeId> keyframes;  // per pose
-  std::vector<LandmarkId> landmarks;  // per point
-  std::vector<Source> sources;        // per observation
-};
-
-constexpr int kAbsent = -1;
-
-// Position of each keyframe among the poses, or kAbsent.
-std::vector<int> pose_positions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
-  std::vector<int> position(map.keyframe_slots(), kAbsent);
-  for (std::size_t i = 0; i < keyframes.size(); ++i) position[keyframes[i].index()] = static_cast<int>(i);
-  return position;
-}
-
-// Adds the observations of one landmark; true where two or more keyframes of the problem see it: a landmark in one alone
-// says nothing about poses.
-bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& position, double sigma_px,
-                  double scale_factor, FlatProblem& flat) {
-  const auto observations = map.observations(id);
-  const auto seen = std::count_if(observations.begin(), observations.end(), [&](const map::Observation& o) {
-    return position[o.keyframe.index()] != kAbsent;
-  });
-  if (seen < 2) return false;
-  const int point = static_cast<int>(flat.landmarks.size());
-  for (const map::Observation& o : observations) {
-    const int pose = position[o.keyframe.index()];
-    if (pose == kAbsent) continue;
-    const frame::BundledFrame& frame = *map.keyframe(o.keyframe).frame;
-    for (const frame::KeypointRef r : frame.bundled.keypoints(o.feature)) {
-      const feature::Keypoints& keypoints = frame.keypoints(r.camera);
-      const std::size_t k = r.keypoint.index();
-      const double detected = sigma_px * std::pow(scale_factor, keypoints.level[k]);
-      const float sigma = o.aligned ? keypoints.sigma[k] : static_cast<float>(detected);
-      flat.problem.observations.push_back({pose, point, r.camera, keypoints.pixel[k], sigma});
-      flat.sources.push_back({id, o.keyframe});
-    }
-  }
-  flat.landmarks.push_back(id);
-  flat.problem.points.push_back(map.landmark(id).position);
-  return true;
-}
-
-FlatProblem build(const map::BundledMap& map, const Selection& selection, double sigma_px, double scale_factor) {
-  FlatProblem flat;
-  flat.problem.rig = &map.rig();
-  flat.keyframes = selection.free_keyframes;
-  flat.keyframes.insert(flat.keyframes.end(), selection.fixed_keyframes.begin(), selection.fixed_keyframes.end());
-  std::sort(flat.keyframes.begin(), flat.keyframes.end());
-  for (const KeyframeId k : flat.keyframes) {
-    flat.problem.T_rig_world.push_back(map.keyframe(k).T_rig_world);
-    flat.problem.pose_free.push_back(std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), k));
-  }
-  const std::vector<int> position = pose_positions(map, flat.keyframes);
-  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, position, sigma_px, scale_factor, flat);
-  return flat;
-}
-
 std::vector<std::uint8_t> outliers(const ReprojectionProblem& problem, double max_chi2) {
   const std::vector<double> chi2 = solver::squared_errors(problem);
   std::vector<std::uint8_t> out(chi2.size());
@@ -92,11 +27,11 @@ double sum_bound(double bound, int keypoints) {
 
 // An observation is a feature with all its keypoints, and is judged as a whole: the more cameras, the likelier it is that
 // chance alone takes one of them over its own bound.
-std::vector<Source> bad_observations(const FlatProblem& flat, double bound) {
+std::vector<ObservationSource> bad_observations(const FlatProblem& flat, double bound) {
   const std::vector<double> chi2 = solver::squared_errors(flat.problem);
-  std::vector<Source> bad;
+  std::vector<ObservationSource> bad;
   for (std::size_t i = 0; i < chi2.size();) {
-    const Source source = flat.sources[i];
+    const ObservationSource source = flat.sources[i];
     double sum = 0;
     int keypoints = 0;
     for (; i < chi2.size() && flat.sources[i].landmark == source.landmark && flat.sources[i].keyframe == source.keyframe; ++i) {
@@ -135,7 +70,7 @@ map::SetPoses poses_of(const map::BundledMap& map, const FlatProblem& flat) {
 AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options, double sigma_px, double scale_factor,
                             map::MapDraft& draft, std::stop_token stop) {
   AdjustmentReport report;
-  FlatProblem flat = build(draft.map(), selection, sigma_px, scale_factor);
+  FlatProblem flat = flatten(draft.map(), selection, sigma_px, scale_factor);
   report.observations = flat.problem.observations.size();
   const bool any_fixed = std::any_of(flat.problem.pose_free.begin(), flat.problem.pose_free.end(), [](std::uint8_t f) { return !f; });
   if (selection.free_keyframes.empty() || !any_fixed || flat.problem.observations.empty()) return report;
@@ -153,14 +88,14 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
     const auto last = solver::adjust(flat.problem, solve, skip, stop);
     if (last.usable()) report.final_cost = last.final_cost;
   }
-  const std::vector<Source> bad = bad_observations(flat, options.outlier_chi2);
+  const std::vector<ObservationSource> bad = bad_observations(flat, options.outlier_chi2);
   map::SetPoses poses = poses_of(draft.map(), flat);
   poses.correction = selection.whole_map;
   std::vector<LandmarkId> touched;
   for (const auto& [landmark, position] : poses.landmarks) touched.push_back(landmark);
   draft.set_poses(std::move(poses));
   report.outliers = bad.size();
-  for (const Source& s : bad) {
+  for (const ObservationSource& s : bad) {
     if (draft.map().alive(s.landmark)) draft.remove_observation(s.landmark, s.keyframe);
   }
   std::vector<LandmarkId> moved;

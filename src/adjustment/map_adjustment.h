@@ -2,13 +2,11 @@
 // operations of a draft. Local and global adjustment differ in what they choose.
 #pragma once
 
-#include <span>
 #include <stop_token>
-#include <vector>
 
+#include "adjustment/flat_problem.h"
 #include "base/options.h"
 #include "map/map_edit.h"
-#include "solver/bundle_adjuster.h"
 
 namespace bslam::adjustment {
 
@@ -25,13 +23,6 @@ struct AdjustmentOptions {
     visitor("relative_decrease", self.relative_decrease, Range{0, 0.1}, "", "of the cost, below which it has converged");
     visitor("outlier_chi2", self.outlier_chi2, Range{0.1, 1e6}, "", "squared normalised error above which an observation goes");
   }
-};
-
-// What takes part; ids alive, distinct, in ascending order. Observations by other keyframes are left out.
-struct Selection {
-  std::vector<KeyframeId> free_keyframes, fixed_keyframes;
-  std::vector<LandmarkId> landmarks;
-  bool whole_map = false;  // the result is a correction of the map, which nothing begun before it may undo
 };
 
 struct AdjustmentReport {

@@ -10,26 +10,27 @@ namespace bslam::camera {
 
 using geometry::SE3;
 
-Rig::Rig(std::vector<RigCamera> cameras) : cameras_(std::move(cameras)) {
-  BSLAM_ASSERT(!cameras_.empty(), "a rig has at least one camera");
-  for (const RigCamera& c : cameras_) {
-    T_cam_rig_.push_back(c.T_body_cam.inverse() * cameras_.front().T_body_cam);
+Rig::Rig(std::vector<RigCamera> cameras) {
+  BSLAM_ASSERT(!cameras.empty(), "a rig has at least one camera");
+  for (const RigCamera& c : cameras) {
+    T_cam_rig_.push_back(c.T_body_cam.inverse() * cameras.front().T_body_cam);
     T_rig_cam_.push_back(T_cam_rig_.back().inverse());
   }
   T_cam_rig_.front() = T_rig_cam_.front() = SE3();
-  measure_overlap();
+  std::vector<double> overlap = measured_overlap(cameras);
+  calibration_ = std::make_shared<const Calibration>(Calibration{std::move(cameras), std::move(overlap)});
 }
 
-void Rig::measure_overlap() {
+std::vector<double> Rig::measured_overlap(const std::vector<RigCamera>& cameras) const {
   constexpr int kColumns = 24, kRows = 16;
   constexpr std::array kDepths = {0.5, 2.0, 10.0, 100.0};  // metres, near to far
-  overlap_.assign(size() * size(), 0.0);
+  std::vector<double> overlap(size() * size(), 0.0);
   for (std::size_t i = 0; i < size(); ++i) {
     std::vector<Vector3d> bearings;
     for (int r = 0; r < kRows; ++r) {
       for (int c = 0; c < kColumns; ++c) {
-        const Vector2d pixel((c + 0.5) * camera(i).width / kColumns - 0.5, (r + 0.5) * camera(i).height / kRows - 0.5);
-        if (const auto bearing = camera(i).unproject(pixel)) bearings.push_back(*bearing);
+        const Vector2d pixel((c + 0.5) * cameras[i].camera.width / kColumns - 0.5, (r + 0.5) * cameras[i].camera.height / kRows - 0.5);
+        if (const auto bearing = cameras[i].camera.unproject(pixel)) bearings.push_back(*bearing);
       }
     }
     for (std::size_t j = 0; j < size(); ++j) {
@@ -37,14 +38,15 @@ void Rig::measure_overlap() {
       const SE3 T_j_i = T_cam_rig_[j] * T_rig_cam_[i];
       for (const double depth : kDepths) {
         const auto seen = std::count_if(bearings.begin(), bearings.end(), [&](const Vector3d& b) {
-          const auto pixel = camera(j).project(T_j_i * (depth * b));
-          return pixel && camera(j).contains(*pixel);
+          const auto pixel = cameras[j].camera.project(T_j_i * (depth * b));
+          return pixel && cameras[j].camera.contains(*pixel);
         });
-        double& share = overlap_[i * size() + j];
+        double& share = overlap[i * size() + j];
         share = std::max(share, static_cast<double>(seen) / (kColumns * kRows));
       }
     }
   }
+  return overlap;
 }
 
 bool Rig::any_overlap() const {
@@ -60,9 +62,20 @@ Rig Rig::subset(std::span<const int> indices) const {
   std::vector<RigCamera> chosen;
   for (const int i : indices) {
     BSLAM_ASSERT(i >= 0 && static_cast<std::size_t>(i) < size(), "camera index within the rig");
-    chosen.push_back(cameras_[static_cast<std::size_t>(i)]);
+    chosen.push_back(calibration_->cameras[static_cast<std::size_t>(i)]);
   }
   return Rig(std::move(chosen));
+}
+
+Rig Rig::moving(std::span<const double> delay_s, const geometry::Vector6d& twist) const {
+  BSLAM_ASSERT(delay_s.size() == size(), "one delay per camera");
+  Rig out = *this;
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (delay_s[i] == 0.0) continue;
+    out.T_cam_rig_[i] = T_cam_rig_[i] * SE3::exp(delay_s[i] * twist);
+    out.T_rig_cam_[i] = out.T_cam_rig_[i].inverse();
+  }
+  return out;
 }
 
 }  // namespace bslam::camera

@@ -10,14 +10,24 @@
 namespace bslam::feature {
 namespace {
 
-// Indices of corners by descending score; stable, so that equal scores stay in reading order.
-void sort_by_score(std::span<const Corner> corners, std::vector<std::uint32_t>& order) {
+// A pixel in one number that is not 0.
+std::uint32_t packed(const Corner& c) { return (static_cast<std::uint32_t>(c.y) << 16) + c.x + 1; }
+int x_of(std::uint32_t pixel) { return static_cast<int>((pixel - 1) & 0xFFFF); }
+int y_of(std::uint32_t pixel) { return static_cast<int>((pixel - 1) >> 16); }
+
+// Begins of the runs of equal score where corners stand by descending score: [255 - score] is that of `score`.
+std::array<std::uint32_t, 257> score_runs(std::span<const Corner> corners) {
   std::array<std::uint32_t, 257> begin{};
   for (const Corner& c : corners) ++begin[256 - c.score];
   for (std::size_t s = 1; s < begin.size(); ++s) begin[s] += begin[s - 1];
-  order.resize(corners.size());
-  for (std::size_t i = 0; i < corners.size(); ++i)
-    order[begin[255 - corners[i].score]++] = static_cast<std::uint32_t>(i);
+  return begin;
+}
+
+// of[i] = index(i) for the `length` pixels of an axis: a table, as every corner would divide otherwise.
+template <class Index>
+void tabulate(int length, const Index& index, std::vector<std::uint32_t>& of) {
+  of.resize(static_cast<std::size_t>(std::max(length, 0)));
+  for (int i = 0; i < length; ++i) of[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(index(i));
 }
 
 // Smallest number n for which count(n) >= wanted; count rises and reaches `wanted` at `most` at the latest.
@@ -75,25 +85,31 @@ void Distribution::thin_out(std::span<const Corner> corners, const Region& regio
   spare_.reserve(room);
   ranked.clear();
   ranked.reserve(room);
-  sort_by_score(corners, order_);
+  std::array<std::uint32_t, 257> next = score_runs(corners);
+  order_.resize(corners.size());
+  // In reading order, which equal scores keep.
+  for (std::uint32_t i = 0; i < corners.size(); ++i) order_[next[255 - corners[i].score]++] = {packed(corners[i]), i};
   const int side = std::max(1, spacing);
   const int columns = region.width / side + 3;  // a border of empty squares on either side
   const int rows = region.height / side + 3;
   occupied_.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0);
-  for (const std::uint32_t i : order_) {
-    const Corner& c = corners[i];
+  tabulate(region.width, [&](int x) { return x / side + 1; }, column_of_);
+  tabulate(region.height, [&](int y) { return (y / side + 1) * columns; }, row_of_);
+  for (const Entry& entry : order_) {
+    const int x = x_of(entry.pixel), y = y_of(entry.pixel);
     // Two corners in one square are closer than `spacing`: a square never holds two that were taken.
-    std::uint32_t* square = occupied_.data() + ((c.y - region.y) / side + 1) * columns + (c.x - region.x) / side + 1;
+    std::uint32_t* square = occupied_.data() + row_of_[y - region.y] + column_of_[x - region.x];
     const auto blocks = [&](std::uint32_t other) {
-      return other != 0 && std::abs(corners[other - 1].x - c.x) < side && std::abs(corners[other - 1].y - c.y) < side;
+      return (other != 0) & (std::abs(x_of(other) - x) < side) & (std::abs(y_of(other) - y) < side);
     };
     if (*square != 0) continue;
-    if (blocks(square[-1]) || blocks(square[1])) continue;
     const std::uint32_t *above = square - columns, *below = square + columns;
-    if (blocks(above[-1]) || blocks(above[0]) || blocks(above[1])) continue;
-    if (blocks(below[-1]) || blocks(below[0]) || blocks(below[1])) continue;
-    *square = i + 1;
-    ranked.push_back(i);
+    // Without short cuts: eight branches nobody can predict cost more than eight comparisons.
+    bool blocked = blocks(square[-1]) | blocks(square[1]);
+    for (int k = -1; k <= 1; ++k) blocked |= blocks(above[k]) | blocks(below[k]);
+    if (blocked) continue;
+    *square = entry.pixel;
+    ranked.push_back(entry.index);
   }
 }
 
@@ -138,10 +154,9 @@ void Distribution::choose(std::span<const Corner> corners, std::span<const std::
   const int columns = std::max(1, static_cast<int>(std::lround(region.width / side)));
   const int rows = std::max(1, static_cast<int>(std::lround(region.height / side)));
   cells_.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), Cell{});
-  const auto cell_of = [&](const Corner& c) -> Cell& {
-    const int column = (c.x - region.x) * columns / region.width, row = (c.y - region.y) * rows / region.height;
-    return cells_[static_cast<std::size_t>(row * columns + column)];
-  };
+  tabulate(region.width, [&](int x) { return x * columns / region.width; }, column_of_);
+  tabulate(region.height, [&](int y) { return y * rows / region.height * columns; }, row_of_);
+  const auto cell_of = [&](const Corner& c) -> Cell& { return cells_[row_of_[c.y - region.y] + column_of_[c.x - region.x]]; };
   for (const std::uint32_t i : ranked) {
     Cell& cell = cell_of(corners[i]);
     ++cell.total;

@@ -52,8 +52,12 @@ class Distribution {
   void set_limits(std::size_t wanted);
 
   std::vector<Cell> cells_;
-  std::vector<std::uint32_t> order_;
-  std::vector<std::uint32_t> occupied_;  // per square of side `spacing`: index of the corner in it plus one, or 0
+  struct Entry {
+    std::uint32_t pixel, index;  // of a corner: its pixel, packed and not 0
+  };
+  std::vector<Entry> order_;  // by score; holds the pixels so that they are read in a row
+  std::vector<std::uint32_t> occupied_;  // per square of side `spacing`: the pixel of the corner in it, or 0
+  std::vector<std::uint32_t> column_of_, row_of_;  // per pixel of the region's axes: its square's or cell's column, row's begin
   std::vector<std::uint32_t> taken_, spare_;
 };
 

@@ -50,7 +50,7 @@ struct Extractor::Scratch {
   std::vector<double> area;
   std::vector<std::size_t> available, share;
 
-  void detect(const image::Pyramid& pyramid, const image::ImageView& mask, const FeatureOptions& options);
+  void detect(const image::Pyramid& pyramid, const image::ImageView& mask, int wanted, const FeatureOptions& options);
   void describe(const image::Pyramid& pyramid, std::size_t level, const image::ImageView& mask,
                 const camera::Camera& camera, double sigma_px, Keypoints& keypoints);
 };
@@ -72,7 +72,7 @@ Region inner_region(const image::Image& level) {
 }  // namespace
 
 // Corners of all levels, thinned out, and how many keypoints each level is to give.
-void Extractor::Scratch::detect(const image::Pyramid& pyramid, const image::ImageView& mask,
+void Extractor::Scratch::detect(const image::Pyramid& pyramid, const image::ImageView& mask, int wanted,
                                 const FeatureOptions& options) {
   const std::size_t count = pyramid.size();
   levels.resize(std::max(levels.size(), count));
@@ -86,7 +86,7 @@ void Extractor::Scratch::detect(const image::Pyramid& pyramid, const image::Imag
     total_area += area[l];
   }
   // Levels are shares of one density, so the distance between keypoints is the same on all, in pixels of the level.
-  const int spacing = static_cast<int>(std::lround(kSpacing * std::sqrt(total_area / options.per_image)));
+  const int spacing = static_cast<int>(std::lround(kSpacing * std::sqrt(total_area / wanted)));
   const int threshold = std::min(options.fast_threshold_min, options.fast_threshold);
   for (std::size_t l = 0; l < count; ++l) {
     LevelCorners& level = levels[l];
@@ -100,7 +100,7 @@ void Extractor::Scratch::detect(const image::Pyramid& pyramid, const image::Imag
     distribution.thin_out(level.corners, level.region, spacing, level.ranked);
     available[l] = level.ranked.size();
   }
-  share_over_levels(area, available, static_cast<std::size_t>(options.per_image), share);
+  share_over_levels(area, available, static_cast<std::size_t>(wanted), share);
 }
 
 // Turns the chosen corners of a level into keypoints.
@@ -136,14 +136,15 @@ Extractor::Extractor(Extractor&&) noexcept = default;
 Extractor& Extractor::operator=(Extractor&&) noexcept = default;
 
 void Extractor::extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
-                        image::Pyramid& pyramid, Keypoints& keypoints) {
+                        image::Pyramid& pyramid, Keypoints& keypoints, int budget) {
   BSLAM_ASSERT(mask.empty() || (mask.width == image.width && mask.height == image.height),
                "mask and image differ in size");
+  const int wanted = std::clamp(budget, 1, options_.per_image);
   keypoints.clear();
   keypoints.reserve(static_cast<std::size_t>(options_.per_image));
   image::build_pyramid(image, options_.levels, options_.scale_factor, pyramid);
   scratch_->smoothed.resize(image.width, image.height);  // room for all levels, also if this image has no keypoint
-  scratch_->detect(pyramid, mask, options_);
+  scratch_->detect(pyramid, mask, wanted, options_);
   for (std::size_t l = 0; l < pyramid.size(); ++l) {
     const LevelCorners& level = scratch_->levels[l];
     scratch_->distribution.choose(level.corners, level.ranked, level.region, scratch_->share[l],

@@ -8,4 +8,17 @@ std::size_t BundledFrame::num_keypoints() const {
   return n;
 }
 
+double BundledFrame::delay_s(std::size_t c) const {
+  const CameraFrame& camera = cameras[c];
+  return camera.state == image::ImageState::kPresent ? to_seconds(camera.time_ns - time_ns) : 0.0;
+}
+
+std::vector<double> delays_of(const BundledFrame& frame) {
+  std::vector<double> delays(frame.cameras.size());
+  for (std::size_t c = 0; c < delays.size(); ++c) delays[c] = frame.delay_s(c);
+  return delays;
+}
+
+camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame) { return rig.moving(delays_of(frame), frame.twist); }
+
 }  // namespace bslam::frame

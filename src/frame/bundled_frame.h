@@ -5,6 +5,7 @@
 
 #include "base/id.h"
 #include "base/timestamp.h"
+#include "camera/rig.h"
 #include "feature/keypoints.h"
 #include "frame/bundled.h"
 #include "frame/feature_grid.h"
@@ -26,9 +27,19 @@ struct BundledFrame {
   TimeNs time_ns = 0;
   std::vector<CameraFrame> cameras;  // one per camera of the rig
   Bundled bundled;
+  // Motion of the rig while its cameras fired, rad/s and m/s (see camera::Rig::moving); zero as long as nothing is known.
+  geometry::Vector6d twist = geometry::Vector6d::Zero();
 
   const feature::Keypoints& keypoints(CameraIndex c) const { return cameras[c.index()].keypoints; }
   std::size_t num_keypoints() const;
+  // Time of camera c's image after that of the frame, in seconds; 0 where it has none.
+  double delay_s(std::size_t c) const;
 };
+
+// Per camera.
+std::vector<double> delays_of(const BundledFrame& frame);
+
+// The rig as it stood while the frame was taken.
+camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame);
 
 }  // namespace bslam::frame

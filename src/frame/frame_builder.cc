@@ -1,5 +1,6 @@
 #include "frame/frame_builder.h"
 
+#include <limits>
 #include <utility>
 
 #include "base/assert.h"
@@ -12,8 +13,10 @@ FrameBuilder::FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions
   for (std::size_t i = 0; i < rig.size(); ++i) extractors_.emplace_back(options);
 }
 
-BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool& pool, std::span<const std::uint8_t> left_out) {
+BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool& pool, std::span<const std::uint8_t> left_out,
+                                   std::span<const int> budgets) {
   BSLAM_ASSERT(images.images.size() == rig_.size(), "one image slot per camera of the rig");
+  BSLAM_ASSERT(budgets.empty() || budgets.size() == rig_.size(), "one budget per camera of the rig");
   BundledFrame frame;
   frame.id = images.id;
   frame.time_ns = images.time_ns;
@@ -24,7 +27,8 @@ BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool&
     camera.state = !left_out.empty() && left_out[i] ? image::ImageState::kMissing : input.state;
     camera.time_ns = input.time_ns;
     if (camera.state == image::ImageState::kPresent) {
-      extractors_[i].extract(input.image.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], camera.keypoints);
+      const int budget = budgets.empty() ? std::numeric_limits<int>::max() : budgets[i];
+      extractors_[i].extract(input.image.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], camera.keypoints, budget);
     } else {
       pyramids_[i].levels.clear();
     }

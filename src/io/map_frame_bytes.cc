@@ -17,6 +17,7 @@ using frame::KeypointRef;
 constexpr std::size_t kKeypointBytes = 8 + 1 + 4 + 4 + 24 + 32 + sizeof(Patch);
 constexpr std::size_t kMatchedBytes = 1 + 2 * (2 + 4) + 1;  // at the least
 constexpr double kUnitTolerance = 1e-6;
+constexpr double kMaxTwist = 1e6;  // rad/s, m/s
 constexpr TimeNs kMaxTime = TimeNs{1} << 62;  // so that differences do not overflow
 
 // Arrays of these are read and written as the numbers they consist of.
@@ -188,6 +189,7 @@ void take_bundled(ByteReader& in, frame::BundledFrame& frame) {
 void put_frame(const frame::BundledFrame& frame, bool with_words, ByteWriter& out) {
   out.number(frame.id.value());
   out.number(frame.time_ns);
+  out.numbers(frame.twist.data(), 6);
   for (const frame::CameraFrame& c : frame.cameras) put_camera(c, with_words, out);
   put_bundled(frame.bundled, out);
 }
@@ -198,6 +200,9 @@ frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map
   frame.id = FrameId(in.number<std::int32_t>());
   frame.time_ns = in.number<TimeNs>();
   if (!in.require(std::abs(frame.time_ns / 2) < kMaxTime / 2, "a time beyond all times", "nanoseconds")) return frame;
+  in.numbers(frame.twist.data(), 6);
+  if (!in.require(frame.twist.allFinite() && frame.twist.cwiseAbs().maxCoeff() < kMaxTwist, "a motion that cannot be", "rad/s and m/s"))
+    return frame;
   frame.cameras.resize(rig.size());
   for (std::size_t c = 0; c < rig.size() && in.ok(); ++c) {
     in.enter("camera", c);

@@ -98,7 +98,7 @@ Guided search_at(const map::BundledMap& map, const frame::BundledFrame& frame, c
                                               .ratio = 1.0,
                                               .level_slack = 2,
                                               .scale_factor = features.scale_factor};
-  const camera::Rig& rig = map.rig();
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   std::vector<std::uint8_t> visible(landmarks.size(), 0);
   Guided out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
@@ -166,8 +166,9 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
   out.matches = static_cast<int>(matches.size());
   if (out.matches < options.consensus.min_inliers) return rejected(Rejection::kFewMatches);
 
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   const solver::PoseSolverOptions pose_options;
-  solver::PoseSolution solution = solver::absolute_pose(map.rig(), observations_of(map, frame, matches, features), pose_options,
+  solver::PoseSolution solution = solver::absolute_pose(rig, observations_of(map, frame, matches, features), pose_options,
                                                         options.consensus, random);
   out.inliers = solution.num_inliers;
   if (!solution.ok) return rejected(Rejection::kNoConsensus);
@@ -176,7 +177,7 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
   Guided guided;
   for (const double radius : {options.radius, 0.5 * options.radius}) {
     guided = search_at(map, frame, landmarks, solution.T_rig_world, radius, options, features);
-    solution = solver::solve_pose(map.rig(), observations_of(map, frame, guided.matches, features), solution.T_rig_world, pose_options);
+    solution = solver::solve_pose(rig, observations_of(map, frame, guided.matches, features), solution.T_rig_world, pose_options);
     if (!solution.ok) return rejected(Rejection::kNoConsensus);
   }
   out.inliers = solution.num_inliers;

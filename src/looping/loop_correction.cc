@@ -33,11 +33,12 @@ double median(std::vector<double> values) {
 // Median error, in pixels, of what the keyframe sees of the place at the pose it has in the map.
 double error_px(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
   const map::BundledKeyframe& entry = map.keyframe(keyframe);
+  const camera::Rig rig = frame::rig_of(map.rig(), *entry.frame);
   std::vector<double> errors;
   for (const auto& [feature, l] : location.matches) {
     const frame::KeypointRef r = entry.frame->bundled.keypoints(feature).front();
     const Eigen::Vector2d pixel = entry.frame->keypoints(r.camera).pixel[r.keypoint.index()].cast<double>();
-    const auto error = solver::ReprojectionResidual::error_only(map.rig(), r.camera, entry.T_rig_world, map.landmark(l).position, pixel);
+    const auto error = solver::ReprojectionResidual::error_only(rig, r.camera, entry.T_rig_world, map.landmark(l).position, pixel);
     errors.push_back(error ? error->norm() : std::numeric_limits<double>::infinity());
   }
   return errors.empty() ? 0.0 : median(std::move(errors));

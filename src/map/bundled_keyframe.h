@@ -28,6 +28,7 @@ struct BundledKeyframe {
   std::vector<KeyframeId> children;                  // in order of id
   geometry::SE3 T_rig_parent;                        // once removed: its pose relative to `parent`
   bool alive = false;
+  double unit = 1.0;  // by how much its part was scaled since it was added: what was measured against it then grows along
 };
 
 }  // namespace bslam::map

@@ -66,6 +66,20 @@ geometry::SE3 BundledMap::resolved_pose(KeyframeId k) const {
   return T_rig_ancestor * entry->T_rig_world;
 }
 
+geometry::SE3 BundledMap::rig_from_cam(const BundledKeyframe& k, CameraIndex c) const {
+  const double delay_s = k.frame->delay_s(c.index());
+  const geometry::SE3& T_rig_cam = rig_->rig_from_cam(c.index());
+  return delay_s == 0.0 ? T_rig_cam : geometry::SE3::exp(-delay_s * k.frame->twist) * T_rig_cam;
+}
+
+geometry::SE3 BundledMap::cam_from_world(KeyframeId k, CameraIndex c) const {
+  const BundledKeyframe& entry = keyframe(k);
+  const double delay_s = entry.frame->delay_s(c.index());
+  const geometry::SE3& T_cam_rig = rig_->cam_from_rig(c);
+  if (delay_s == 0.0) return T_cam_rig * entry.T_rig_world;
+  return T_cam_rig * geometry::SE3::exp(delay_s * entry.frame->twist) * entry.T_rig_world;
+}
+
 KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                                     std::span<const std::pair<FeatureId, LandmarkId>> matches,
                                     KeyframeId fallback_parent) {
@@ -187,17 +201,40 @@ bool BundledMap::join_parts(KeyframeId child, KeyframeId parent) {
 
 bool BundledMap::remove_part(KeyframeId root) {
   if (!alive(root) || keyframe(root).parent.valid()) return false;
-  std::vector<KeyframeId> part = {root};
-  for (std::size_t i = 0; i < part.size(); ++i) {
-    const std::vector<KeyframeId>& children = keyframe(part[i]).children;
-    part.insert(part.end(), children.begin(), children.end());
-  }
+  const std::vector<KeyframeId> part = part_of(root);
   for (std::size_t i = part.size(); i-- > 1;) remove_keyframe(part[i]);  // leaves first
   const CowArray<LandmarkId> table = keyframe(root).landmarks;
   for (const LandmarkId l : table) {
     if (l.valid()) remove_observation(l, root);
   }
   let_go(root);
+  return true;
+}
+
+bool BundledMap::scale_part(KeyframeId root, double factor) {
+  if (!alive(root) || keyframe(root).parent.valid()) return false;
+  std::vector<std::uint8_t> inside(keyframes_.size(), 0);
+  for (const KeyframeId k : part_of(root)) inside[k.index()] = 1;
+  const auto longer = [factor](const geometry::SE3& T) { return geometry::SE3(T.rotation(), factor * T.translation()); };
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    const KeyframeId now = surviving(KeyframeId(i));
+    if (!now.valid() || !inside[now.index()]) continue;
+    BundledKeyframe& entry = edit(KeyframeId(i));
+    entry.unit *= factor;
+    (entry.alive ? entry.T_rig_world : entry.T_rig_parent) = longer(entry.alive ? entry.T_rig_world : entry.T_rig_parent);
+    if (!entry.alive || entry.frame->twist.tail<3>().isZero(0)) continue;
+    auto frame = std::make_shared<frame::BundledFrame>(*entry.frame);
+    frame->twist.tail<3>() *= factor;
+    entry.frame = std::move(frame);
+  }
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (!landmarks_[i].alive || !inside[landmarks_[i].reference.keyframe.index()]) continue;
+    Landmark& entry = edit(LandmarkId(i));
+    entry.position *= factor;
+    entry.min_distance *= static_cast<float>(factor);
+    entry.max_distance *= static_cast<float>(factor);
+  }
+  begin_gauge_epoch();
   return true;
 }
 
@@ -233,6 +270,15 @@ void BundledMap::unlink(LandmarkId l, Observation o) {
   edit(o.keyframe).landmarks.mutate(owner_.tag())[o.feature.index()] = LandmarkId();
   observations_total_ -= num_keypoints(o);
   for (const Observation& other : observations(l)) change_weight(o.keyframe, other.keyframe, -1);
+}
+
+std::vector<KeyframeId> BundledMap::part_of(KeyframeId root) const {
+  std::vector<KeyframeId> part = {root};
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    const std::vector<KeyframeId>& children = keyframe(part[i]).children;
+    part.insert(part.end(), children.begin(), children.end());
+  }
+  return part;
 }
 
 void BundledMap::let_go(KeyframeId k) {

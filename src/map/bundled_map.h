@@ -5,6 +5,7 @@
 // copy that is being changed are valid until its next change.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -20,6 +21,7 @@
 
 namespace bslam::map {
 
+// kUnobservable: the rig could tell the length of the map's unit, and its motion has not allowed it so far.
 enum class Scale { kMetric, kUpToScale, kUnobservable };
 
 // The pyramid keypoints were found on: what a landmark's distance range is made of.
@@ -38,6 +40,9 @@ class BundledMap {
   const PyramidShape& pyramid() const { return pyramid_; }
   MapVersion version() const { return version_; }
   Scale scale() const { return scale_; }
+  // Relative standard deviation of the length of the map's unit; 0 where cameras that overlap know it, infinite where
+  // nothing is known.
+  double scale_deviation() const { return scale_deviation_; }
   // Counts corrections (loops closed, global adjustments): positions of different epochs do not mix.
   int gauge_epoch() const { return gauge_epoch_; }
 
@@ -70,6 +75,9 @@ class BundledMap {
   // T_rig_world of a keyframe, alive or removed (then carried by its parent).
   geometry::SE3 resolved_pose(KeyframeId k) const;
 
+  // Pose of a keyframe's camera at the time of its own image.
+  geometry::SE3 cam_from_world(KeyframeId k, CameraIndex c) const;
+
   // Covisible keyframes by falling weight (ties: newer first), at most `limit` with at least `min_weight`.
   std::vector<Covisible> best_covisible(KeyframeId k, std::size_t limit, int min_weight = 1) const;
 
@@ -84,7 +92,11 @@ class BundledMap {
 
   // ---- changing (on a private copy only). Functions that return bool change nothing and return false where the landmark
   // or keyframe they name is not alive, or for the reason they give.
-  void set_scale(Scale scale) { scale_ = scale; }
+  void set_scale(Scale scale) { set_scale(scale, scale == Scale::kMetric ? 0.0 : std::numeric_limits<double>::infinity()); }
+  void set_scale(Scale scale, double deviation) {
+    scale_ = scale;
+    scale_deviation_ = deviation;
+  }
   void set_version(MapVersion v) { version_ = v; }
   void begin_gauge_epoch() { ++gauge_epoch_; }
 
@@ -115,6 +127,9 @@ class BundledMap {
   bool join_parts(KeyframeId child, KeyframeId parent);
   // All keyframes and landmarks of a part go. False where `root` is none.
   bool remove_part(KeyframeId root);
+  // All lengths of a part become `factor` times as long, about the origin, those of its removed keyframes too; begins a
+  // gauge epoch. False where `root` is none.
+  bool scale_part(KeyframeId root, double factor);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
   bool set_position(LandmarkId l, const Eigen::Vector3d& position);
   bool add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
@@ -124,11 +139,13 @@ class BundledMap {
  private:
   BundledKeyframe& edit(KeyframeId k) { return keyframes_.mutate(k.index(), owner_.tag()); }
   Landmark& edit(LandmarkId l) { return landmarks_.mutate(l.index(), owner_.tag()); }
+  geometry::SE3 rig_from_cam(const BundledKeyframe& k, CameraIndex c) const;
   std::size_t num_keypoints(Observation o) const { return keyframe(o.keyframe).frame->bundled.keypoints(o.feature).size(); }
 
   // bundled_map.cc. `link` and `unlink` keep list, table, counter and covisibility in step; nothing else does.
   void link(LandmarkId l, Observation o);
   void unlink(LandmarkId l, Observation o);
+  std::vector<KeyframeId> part_of(KeyframeId root) const;  // alive keyframes, parents before children
   void let_go(KeyframeId k);  // without observations and children left
   void bury(LandmarkId l, LandmarkId merged_into);  // without observations left
 
@@ -145,6 +162,7 @@ class BundledMap {
   PyramidShape pyramid_;
   MapVersion version_{0};
   Scale scale_ = Scale::kMetric;
+  double scale_deviation_ = 0;
   int gauge_epoch_ = 0;
   CowOwner owner_;
   CowVector<BundledKeyframe, 1> keyframes_;

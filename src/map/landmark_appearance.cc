@@ -40,9 +40,9 @@ feature::Descriptor medoid(std::span<const feature::Descriptor> descriptors) {
 bool BundledMap::refresh_landmark(LandmarkId l) {
   if (!alive(l)) return false;
   Landmark& entry = edit(l);
-  const auto centre_map = [&](const geometry::SE3& T_rig_world, CameraIndex camera) -> Eigen::Vector3d {
-    const Eigen::Vector3d& centre_rig = rig_->rig_from_cam(camera.index()).translation();
-    return T_rig_world.rotation().conjugate() * (centre_rig - T_rig_world.translation());
+  const auto centre_map = [&](const BundledKeyframe& k, CameraIndex camera) -> Eigen::Vector3d {
+    const Eigen::Vector3d centre_rig = rig_from_cam(k, camera).translation();
+    return k.T_rig_world.rotation().conjugate() * (centre_rig - k.T_rig_world.translation());
   };
 
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -51,7 +51,7 @@ bool BundledMap::refresh_landmark(LandmarkId l) {
   for (const Observation& o : observations(l)) {
     const BundledKeyframe& k = keyframe(o.keyframe);
     for (const frame::KeypointRef& r : k.frame->bundled.keypoints(o.feature)) {
-      sum += (entry.position - centre_map(k.T_rig_world, r.camera)).normalized();
+      sum += (entry.position - centre_map(k, r.camera)).normalized();
       ring[count++ % kMaxDescriptors] = k.frame->keypoints(r.camera).descriptor[r.keypoint.index()];
     }
   }
@@ -66,7 +66,7 @@ bool BundledMap::refresh_landmark(LandmarkId l) {
   const BundledKeyframe& k = keyframe(entry.reference.keyframe);
   const frame::KeypointRef r = entry.reference.keypoint;
   const int level = k.frame->keypoints(r.camera).level[r.keypoint.index()];
-  const double distance = (entry.position - centre_map(k.T_rig_world, r.camera)).norm();
+  const double distance = (entry.position - centre_map(k, r.camera)).norm();
   const double max_distance = distance * std::pow(pyramid_.scale_factor, level);
   entry.max_distance = static_cast<float>(max_distance);
   entry.min_distance = static_cast<float>(max_distance / std::pow(pyramid_.scale_factor, pyramid_.levels - 1));

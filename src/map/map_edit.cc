@@ -64,6 +64,12 @@ bool MapDraft::remove_part(KeyframeId root) {
   return true;
 }
 
+bool MapDraft::scale_part(KeyframeId root, double factor) {
+  if (!working_.scale_part(root, factor)) return false;
+  edit_.operations.emplace_back(ScalePart{root, factor});
+  return true;
+}
+
 void MapDraft::set_poses(SetPoses poses) {
   std::erase_if(poses.keyframes, [&](const auto& entry) { return !working_.set_pose(entry.first, entry.second); });
   std::erase_if(poses.landmarks, [&](const auto& entry) { return !working_.set_position(entry.first, entry.second); });
@@ -87,7 +93,12 @@ void MapDraft::refresh_landmarks(std::vector<LandmarkId> landmarks) {
 
 void MapDraft::set_scale(Scale scale) {
   working_.set_scale(scale);
-  edit_.operations.emplace_back(SetScale{scale});
+  edit_.operations.emplace_back(SetScale{scale, working_.scale_deviation()});
+}
+
+void MapDraft::set_scale(Scale scale, double deviation) {
+  working_.set_scale(scale, deviation);
+  edit_.operations.emplace_back(SetScale{scale, deviation});
 }
 
 MapDraft::Finished MapDraft::finish() && { return {std::move(edit_), std::move(working_)}; }

@@ -18,12 +18,13 @@
 // |                   | entries of removed keyframes and of removed or merged landmarks are dropped; newer keyframes |
 // |                   | move with their parent (chains with the nearest older ancestor), newer landmarks with the    |
 // |                   | keyframe of their reference                                                                  |
+// | ScalePart         | scales what is newer along; dropped where the part is gone or has become part of another     |
 // | JoinParts         | a removed keyframe stands for its nearest ancestor; dropped where they are of one part       |
 // | RemovePart        | dropped where it is gone already or has become part of another                               |
 // | AddSightings      | forwarded along merges, entries dropped where gone                                           |
 // | RefreshLandmarks  | forwarded along merges, entries dropped where gone                                           |
 // | SetScale          | the later one holds                                                                          |
-// An edit that corrects the map (SetPoses::correction) is refused as a whole where another correction was committed since
+// An edit that corrects the map (SetPoses::correction, ScalePart) is refused as a whole where another correction was committed since
 // its base: half of it, landmarks merged and parts hung together that were not moved, would tear the map.
 // So the order in which a new keyframe and a correction of its surroundings are committed does not change where it ends
 // up. An operation of several entries counts as dropped where all of them are. An operation on something the edit itself
@@ -77,6 +78,10 @@ struct JoinParts {
 struct RemovePart {
   KeyframeId root;
 };
+struct ScalePart {
+  KeyframeId root;
+  double factor = 1.0;
+};
 struct SetPoses {
   std::vector<std::pair<KeyframeId, geometry::SE3>> keyframes;        // T_rig_world
   std::vector<std::pair<LandmarkId, Eigen::Vector3d>> landmarks;
@@ -94,10 +99,11 @@ struct RefreshLandmarks {
 };
 struct SetScale {
   Scale scale = Scale::kMetric;
+  double deviation = 0;
 };
 
 using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark, MergeLandmarks,
-                               RemoveKeyframe, JoinParts, RemovePart, SetPoses, AddSightings, RefreshLandmarks, SetScale>;
+                               RemoveKeyframe, JoinParts, RemovePart, ScalePart, SetPoses, AddSightings, RefreshLandmarks, SetScale>;
 
 struct MapEdit {
   std::string_view stage;  // a literal
@@ -130,11 +136,13 @@ class MapDraft {
   bool remove_keyframe(KeyframeId k);
   bool join_parts(KeyframeId child, KeyframeId parent);
   bool remove_part(KeyframeId root);
+  bool scale_part(KeyframeId root, double factor);
   // Entries of what is not alive are left out.
   void set_poses(SetPoses poses);
   void add_sightings(std::vector<Sighting> sightings);
   void refresh_landmarks(std::vector<LandmarkId> landmarks);
-  void set_scale(Scale scale);
+  void set_scale(Scale scale);  // nothing more being known of it than its name says
+  void set_scale(Scale scale, double deviation);
 
   // The edit and the working copy, which MapStore publishes as it is where the base is still the newest version.
   struct Finished {

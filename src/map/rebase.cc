@@ -10,14 +10,25 @@ namespace {
 
 using geometry::SE3;
 
-// How things that hang on a keyframe move in the map when its T_rig_world goes from `before` to `after`: poses become
-// T_rig_world * T, points T^-1 * p, so that both keep their place in the keyframe. Empty where nothing moves, so that
-// what does not move keeps its bits.
-using Motion = std::optional<SE3>;
+// How things that hang on a keyframe move in the map when its T_rig_world goes from `before` to `after` and the lengths
+// about it become `grown` times as long: both poses and points keep their place in the keyframe.
+struct Move {
+  SE3 before, after;
+  double grown = 1.0;
+  SE3 pose(const SE3& T_rig_world) const {
+    const SE3 T_rig_keyframe = T_rig_world * before.inverse();
+    return SE3(T_rig_keyframe.rotation(), grown * T_rig_keyframe.translation()) * after;
+  }
+  Eigen::Vector3d point(const Eigen::Vector3d& position) const { return after.inverse() * (grown * (before * position)); }
+};
 
-Motion motion_between(const SE3& before, const SE3& after) {
-  if (before.rotation().coeffs() == after.rotation().coeffs() && before.translation() == after.translation()) return {};
-  return before.inverse() * after;
+// Empty where nothing moves, so that what does not move keeps its bits.
+using Motion = std::optional<Move>;
+
+Motion motion_between(const SE3& before, const SE3& after, double grown = 1.0) {
+  const bool still = before.rotation().coeffs() == after.rotation().coeffs() && before.translation() == after.translation();
+  if (still && grown == 1.0) return {};
+  return Move{before, after, grown};
 }
 
 class Rebase {
@@ -43,10 +54,11 @@ class Rebase {
   bool operator()(const RemoveKeyframe& op) { return map_.remove_keyframe(here(op.keyframe)); }
   bool operator()(const JoinParts& op) { return map_.join_parts(map_.surviving(here(op.child)), map_.surviving(here(op.parent))); }
   bool operator()(const RemovePart& op) { return map_.remove_part(here(op.root)); }
+  bool operator()(const ScalePart& op) { return map_.scale_part(here(op.root), op.factor); }
   bool operator()(const SetPoses& op);
   bool operator()(const AddSightings& op);
   bool operator()(const RefreshLandmarks& op);
-  bool operator()(const SetScale& op) { return map_.set_scale(op.scale), true; }
+  bool operator()(const SetScale& op) { return map_.set_scale(op.scale, op.deviation), true; }
 
   RebaseReport take_report() && { return std::move(report_); }
   void count(bool was_applied) { ++(was_applied ? report_.applied : report_.dropped); }
@@ -80,14 +92,15 @@ class Rebase {
 Motion Rebase::motion_since_base(KeyframeId edit_id) const {
   if (!edit_id.valid() || written_.contains(edit_id)) return {};
   if (own(edit_id)) return own_motions_[edit_id.index() - base_.keyframe_slots()];
-  return motion_between(base_.resolved_pose(edit_id), map_.resolved_pose(edit_id));
+  const double grown = map_.keyframe(edit_id).unit / base_.keyframe(edit_id).unit;
+  return motion_between(base_.resolved_pose(edit_id), map_.resolved_pose(edit_id), grown);
 }
 
 bool Rebase::operator()(const AddKeyframe& op) {
   std::vector<std::pair<FeatureId, LandmarkId>> matches = op.matches;
   for (auto& [feature, l] : matches) l = here(l);
   const Motion motion = motion_since_base(op.parent);
-  const SE3 T_rig_world = motion ? op.T_rig_world * *motion : op.T_rig_world;
+  const SE3 T_rig_world = motion ? motion->pose(op.T_rig_world) : op.T_rig_world;
   const KeyframeId parent = map_.surviving(here(op.parent));
   report_.keyframes.push_back(map_.add_keyframe(op.frame, T_rig_world, usable_matches(map_, matches), parent));
   own_motions_.push_back(motion);
@@ -109,7 +122,7 @@ bool Rebase::operator()(const AddLandmark& op) {
     return false;
   }
   const Motion motion = motion_since_base(op.reference.keyframe);
-  const Eigen::Vector3d position = motion ? motion->inverse() * op.position : op.position;
+  const Eigen::Vector3d position = motion ? motion->point(op.position) : op.position;
   report_.landmarks.push_back(map_.add_landmark(position, observations, reference));
   return true;
 }
@@ -152,14 +165,14 @@ void Rebase::carry_along(const std::unordered_map<KeyframeId, Motion>& motions) 
   for (std::size_t i = base_.keyframe_slots(); i < others_keyframes_end_; ++i) {
     const KeyframeId k(i);
     if (!map_.alive(k)) continue;
-    if (const Motion motion = motion_of(k)) map_.set_pose(k, map_.keyframe(k).T_rig_world * *motion);
+    if (const Motion motion = motion_of(k)) map_.set_pose(k, motion->pose(map_.keyframe(k).T_rig_world));
   }
   for (std::size_t i = base_.landmark_slots(); i < others_landmarks_end_; ++i) {
     const LandmarkId l(i);
     if (!map_.alive(l)) continue;
     const Motion motion = motion_of(map_.landmark(l).reference.keyframe);
     if (!motion) continue;
-    map_.set_position(l, motion->inverse() * map_.landmark(l).position);
+    map_.set_position(l, motion->point(map_.landmark(l).position));
     map_.refresh_landmark(l);
   }
 }

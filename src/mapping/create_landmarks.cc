@@ -45,7 +45,7 @@ struct View {
 };
 
 SE3 cam_from_world(const map::BundledMap& map, View v) {
-  return map.rig().cam_from_rig(v.camera) * map.keyframe(v.keyframe).T_rig_world;
+  return map.cam_from_world(v.keyframe, v.camera);
 }
 
 // Does camera b see part of what camera a sees at about `depth` metres?

@@ -58,6 +58,15 @@ void fix_gauge(const map::BundledMap& map, adjustment::Selection& selection) {
   std::sort(selection.fixed_keyframes.begin(), selection.fixed_keyframes.end());
 }
 
+// Keyframes of one part, in order of id.
+std::vector<KeyframeId> part_of(const map::BundledMap& map, KeyframeId root) {
+  std::vector<KeyframeId> out;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    if (map.root_of(k) == root) out.push_back(k);
+  }
+  return out;
+}
+
 }  // namespace
 
 adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyframe, const LocalWindowOptions& options) {
@@ -70,6 +79,23 @@ adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyfra
   selection.fixed_keyframes = other_observers(map, selection.landmarks, window, options.fixed_keyframes);
   for (const KeyframeId k : window) (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
   fix_gauge(map, selection);
+  return selection;
+}
+
+bool needs_whole_part(const map::BundledMap& map, KeyframeId keyframe, const ScaleOptions& options) {
+  if (map.scale() != map::Scale::kUnobservable) return false;
+  return part_of(map, map.root_of(keyframe)).size() <= static_cast<std::size_t>(options.keyframes);
+}
+
+adjustment::Selection select_part(const map::BundledMap& map, KeyframeId keyframe) {
+  adjustment::Selection selection;
+  const KeyframeId root = map.root_of(keyframe);
+  const std::vector<KeyframeId> part = part_of(map, root);
+  for (const KeyframeId k : part) {
+    if (k != root) selection.free_keyframes.push_back(k);
+  }
+  selection.fixed_keyframes = {root};
+  selection.landmarks = most_seen(map, part, static_cast<int>(map.landmark_slots()));
   return selection;
 }
 

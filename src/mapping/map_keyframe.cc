@@ -1,10 +1,31 @@
 #include "mapping/map_keyframe.h"
 
+#include <cmath>
+
 #include "mapping/create_landmarks.h"
 #include "mapping/cull.h"
 #include "mapping/local_adjustment.h"
 
 namespace bslam::mapping {
+namespace {
+
+// Corrections of the scale leave what other cameras see out of place: adjustment puts it right, and the next measurement
+// starts from there.
+void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features, map::MapDraft& draft,
+                    const std::stop_token& stop, MappingReport& report) {
+  const double deviation_before = draft.map().scale_deviation();
+  for (int round = 0; round < options.scale.rounds; ++round) {
+    report.scale = observe_scale(keyframe, options.scale, features, draft);
+    const adjustment::Selection selection = needs_whole_part(draft.map(), keyframe, options.scale)
+                                                ? select_part(draft.map(), keyframe)
+                                                : select_local(draft.map(), keyframe, options.window);
+    report.adjustment = adjustment::adjust_map(selection, options.local, features.sigma_px, features.scale_factor, draft, stop);
+    if (std::abs(report.scale.correction - 1.0) <= options.scale.settled || stop.stop_requested()) break;
+  }
+  if (is_metric(report.scale, deviation_before, options.scale)) draft.set_scale(map::Scale::kMetric, report.scale.deviation);
+}
+
+}  // namespace
 
 MappingReport map_keyframe(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
                            map::MapDraft& draft, std::stop_token stop) {
@@ -12,8 +33,7 @@ MappingReport map_keyframe(KeyframeId keyframe, const MappingOptions& options, c
   report.culled_landmarks = cull_landmarks(keyframe, options.culling, draft);
   report.created = create_landmarks(keyframe, options.creation, features, draft);
   report.fusion = fuse_landmarks(keyframe, options.fusion, features, draft);
-  report.adjustment = adjustment::adjust_map(select_local(draft.map(), keyframe, options.window), options.local,
-                                             features.sigma_px, features.scale_factor, draft, stop);
+  adjust_locally(keyframe, options, features, draft, stop, report);
   report.culled_keyframes = cull_keyframes(keyframe, options.culling, draft);
   return report;
 }

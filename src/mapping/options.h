@@ -73,11 +73,32 @@ struct LocalWindowOptions {
   }
 };
 
+// The metric scale of rigs whose cameras do not overlap.
+struct ScaleOptions {
+  double max_deviation = 0.02;            // relative, below which a map may call itself metric
+  double max_correcting_deviation = 0.3;  // above it the unit the map began with is as good a guess
+  int keyframes = 40;                     // that take part in a measurement of the scale
+  int min_keyframes = 6;                  // of them before the map may be metric: outliers hide among few
+  int rounds = 4;                         // of measuring and adjusting at one keyframe, while the unit changes much
+  double settled = 0.05;                  // relative change of the unit that asks for no further round
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("max_deviation", self.max_deviation, Range{1e-4, 1}, "", "relative, below which a map may call itself metric");
+    visitor("max_correcting_deviation", self.max_correcting_deviation, Range{1e-4, 10}, "", "relative, below which the map is scaled");
+    visitor("keyframes", self.keyframes, Range{2, 1000}, "", "keyframes that measure the scale, and up to which all are adjusted");
+    visitor("min_keyframes", self.min_keyframes, Range{2, 1000}, "", "keyframes a metric map needs");
+    visitor("rounds", self.rounds, Range{1, 20}, "", "of measuring and adjusting at one keyframe");
+    visitor("settled", self.settled, Range{0, 1}, "", "relative change of the unit that asks for no further round");
+  }
+};
+
 struct MappingOptions {
   CreationOptions creation;
   FusionOptions fusion;
   CullingOptions culling;
   LocalWindowOptions window;
+  ScaleOptions scale;
   adjustment::AdjustmentOptions local;
   // What a loop leaves to be shared out bends the whole map a little: the cost hardly tells, so it is followed further.
   adjustment::AdjustmentOptions global{.robust_iterations = 10, .final_iterations = 10, .relative_decrease = 1e-7};
@@ -88,6 +109,7 @@ struct MappingOptions {
     visitor.section("fusion", self.fusion);
     visitor.section("culling", self.culling);
     visitor.section("window", self.window);
+    visitor.section("scale", self.scale);
     visitor.section("local", self.local);
     visitor.section("global", self.global);
   }

@@ -69,6 +69,7 @@ struct MapRecord {
   std::int64_t keyframes = 0, landmarks = 0, observations = 0;
   std::string scale = "metric";  // metric, up-to-scale, unobservable
   bool loaded = false;
+  std::optional<double> scale_deviation;  // relative standard deviation; empty where nothing is known of the scale
 };
 
 // A loop closed, or tracking found again: at one time, with the place seen at another.

@@ -146,6 +146,7 @@ ordered_json summary_json(const RunRecord& record) {
         {"landmarks", record.map.landmarks},
         {"observations", record.map.observations},
         {"scale", record.map.scale},
+        {"scale_std", record.map.scale_deviation ? rounded(*record.map.scale_deviation, 4) : ordered_json(nullptr)},
         {"loaded", record.map.loaded}}},
       {"loops", events_json(record.loops)},
       {"relocalisations", events_json(record.relocalisations)},

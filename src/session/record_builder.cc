@@ -1,6 +1,7 @@
 #include "session/record_builder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <string>
 
@@ -151,7 +152,8 @@ RunRecord build_record(const RecordInput& input) {
   add_stages(input, record);
   const map::MapSnapshot map = input.system.snapshot();
   record.map = {static_cast<std::int64_t>(map->num_keyframes()), static_cast<std::int64_t>(map->num_landmarks()),
-                static_cast<std::int64_t>(map->num_observations()), scale_name(map->scale()), input.loaded};
+                static_cast<std::int64_t>(map->num_observations()), scale_name(map->scale()), input.loaded, {}};
+  if (std::isfinite(map->scale_deviation()) && map->scale_deviation() > 0) record.map.scale_deviation = map->scale_deviation();
   record.maps_started = input.system.maps_started();
   add_places(input, record);
   record.start_up_s = input.start_up_s;

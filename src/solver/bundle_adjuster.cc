@@ -98,7 +98,7 @@ BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
   const BundleStructure structure = make_structure(problem, skip);
   BundleSummary summary;
   if (structure.num_points() == 0) return summary;  // nothing to learn from
-  BundleEquations equations(*problem.rig, structure, options.robust ? Kernel::kHuber : Kernel::kNone,
+  BundleEquations equations(problem, structure, options.robust ? Kernel::kHuber : Kernel::kNone,
                             options.dense_poses);
   BundleState state{problem.T_rig_world, problem.points};
   minimise(equations, options, stop, state, summary);
@@ -109,15 +109,21 @@ BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
   return summary;
 }
 
+SE3 cam_from_rig_at(const ReprojectionProblem& problem, std::size_t pose, CameraIndex camera) {
+  const SE3& T_cam_rig = problem.rig->cam_from_rig(camera);
+  return problem.motion.empty() ? T_cam_rig : T_cam_rig * problem.motion[pose * problem.rig->size() + camera.index()];
+}
+
 std::vector<double> squared_errors(const ReprojectionProblem& problem) {
   std::vector<double> out;
   out.reserve(problem.observations.size());
   for (const ReprojectionProblem::Observation& o : problem.observations) {
-    const auto e =
-        ReprojectionResidual::error_only(*problem.rig, o.camera, problem.T_rig_world[static_cast<std::size_t>(o.pose)],
-                                         problem.points[static_cast<std::size_t>(o.point)], o.pixel.cast<double>());
+    const auto pose = static_cast<std::size_t>(o.pose);
+    const Vector3d point_rig = problem.T_rig_world[pose] * problem.points[static_cast<std::size_t>(o.point)];
+    const auto pixel = problem.rig->camera(o.camera).project(cam_from_rig_at(problem, pose, o.camera) * point_rig);
     const double sigma = static_cast<double>(o.sigma);
-    out.push_back(e ? e->squaredNorm() / (sigma * sigma) : std::numeric_limits<double>::infinity());
+    out.push_back(pixel ? (o.pixel.cast<double>() - *pixel).squaredNorm() / (sigma * sigma)
+                        : std::numeric_limits<double>::infinity());
   }
   return out;
 }

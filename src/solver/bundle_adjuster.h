@@ -22,6 +22,9 @@ struct ReprojectionProblem {
   };
   const Rig* rig = nullptr;  // extrinsics are constant, as in the paper
   std::vector<SE3> T_rig_world;
+  // (poses, cameras) row-major, how the rig moved between the time of a pose and that of a camera's image: T_cam_world =
+  // T_cam_rig motion T_rig_world. Constant; empty where all cameras fired together.
+  std::vector<SE3> motion;
   std::vector<std::uint8_t> pose_free;    // per pose
   std::vector<Vector3d> points;           // metres, world; all free
   std::vector<Observation> observations;  // sorted by (point, pose, camera)
@@ -54,6 +57,9 @@ struct BundleSummary {
 // stop request ends it after the step in hand, keeping what was gained. Deterministic to the bit.
 BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
                      std::span<const std::uint8_t> skip = {}, std::stop_token stop = {});
+
+// T_cam_rig of a camera at the time of its own image.
+SE3 cam_from_rig_at(const ReprojectionProblem& problem, std::size_t pose, CameraIndex camera);
 
 // Squared normalised error of each observation at the present values; infinite where it does not project.
 std::vector<double> squared_errors(const ReprojectionProblem& problem);

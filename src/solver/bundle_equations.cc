@@ -29,7 +29,8 @@ geometry::Matrix3d damped_cholesky(const geometry::Matrix3d& V, double damping) 
 
 }  // namespace
 
-BundleEquations::BundleEquations(const Rig& rig, const BundleStructure& structure, Kernel kernel, int dense_poses)
+BundleEquations::BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure, Kernel kernel,
+                                 int dense_poses)
     : structure_(structure),
       kernel_(kernel),
       pose_blocks_(structure.pose_of_slot.size()),
@@ -37,8 +38,14 @@ BundleEquations::BundleEquations(const Rig& rig, const BundleStructure& structur
       L_(structure.num_points()),
       system_(structure.pattern, structure.pattern.size() <= dense_poses ? ReducedCameraSystem::Storage::kDense
                                                                          : ReducedCameraSystem::Storage::kSparse) {
-  for (std::size_t i = 0; i < rig.size(); ++i) {
-    cameras_.push_back({&rig.camera(i).model, {rig.cam_from_rig(i).matrix3(), rig.cam_from_rig(i).translation()}});
+  const Rig& rig = *problem.rig;
+  for (std::size_t i = 0; i < rig.size(); ++i) models_.push_back(&rig.camera(i).model);
+  cam_from_rig_.reserve(problem.T_rig_world.size() * rig.size());
+  for (std::size_t pose = 0; pose < problem.T_rig_world.size(); ++pose) {
+    for (std::size_t i = 0; i < rig.size(); ++i) {
+      const SE3 T = cam_from_rig_at(problem, pose, CameraIndex(i));
+      cam_from_rig_.push_back({T.matrix3(), T.translation()});
+    }
   }
   std::size_t free_groups = 0, most_in_point = 0;
   for (std::size_t i = 0; i < structure.num_points(); ++i) {
@@ -68,9 +75,10 @@ double BundleEquations::cost(const BundleState& state) {
       const Vector3d point_rig = pose.R * point + pose.t;
       for (std::size_t k = structure_.groups[g].first_term; k < structure_.groups[g + 1].first_term; ++k) {
         const BundleStructure::Term& term = structure_.terms[k];
-        const CameraTerms& camera = cameras_[static_cast<std::size_t>(term.camera)];
-        const Vector3d p = camera.cam_from_rig.R * point_rig + camera.cam_from_rig.t;
-        const auto pixel = std::visit([&](const auto& model) { return model.project(p); }, *camera.model);
+        const Rigid& T = cam_from_rig(structure_.groups[g].pose, term.camera);
+        const Vector3d p = T.R * point_rig + T.t;
+        const auto pixel = std::visit([&](const auto& model) { return model.project(p); },
+                                      *models_[static_cast<std::size_t>(term.camera)]);
         double chi2 = kLostChi2;
         if (pixel) chi2 = (term.inverse_sigma * (term.pixel.cast<double>() - *pixel)).squaredNorm();
         sum += kernel_cost(kernel_, chi2 < kLostChi2 ? chi2 : kLostChi2);
@@ -84,10 +92,10 @@ BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const V
   GroupSums out;
   for (std::size_t k = structure_.groups[group].first_term; k < structure_.groups[group + 1].first_term; ++k) {
     const BundleStructure::Term& term = structure_.terms[k];
-    const CameraTerms& camera = cameras_[static_cast<std::size_t>(term.camera)];
-    const Vector3d p = camera.cam_from_rig.R * point_rig + camera.cam_from_rig.t;
-    const auto projection =
-        std::visit([&](const auto& model) { return model.project_with_jacobian(p); }, *camera.model);
+    const Rigid& T = cam_from_rig(structure_.groups[group].pose, term.camera);
+    const Vector3d p = T.R * point_rig + T.t;
+    const auto projection = std::visit([&](const auto& model) { return model.project_with_jacobian(p); },
+                                       *models_[static_cast<std::size_t>(term.camera)]);
     Vector2d e = Vector2d::Zero();
     double chi2 = kLostChi2;
     if (projection) {
@@ -100,7 +108,7 @@ BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const V
     }
     out.cost += kernel_cost(kernel_, chi2);
     const double weight = kernel_weight(kernel_, chi2);
-    const Matrix23d A = (term.inverse_sigma * projection->jacobian) * camera.cam_from_rig.R;
+    const Matrix23d A = (term.inverse_sigma * projection->jacobian) * T.R;
     const Matrix23d wA = weight * A;
     out.M.noalias() += A.transpose() * wA;
     out.m.noalias() += wA.transpose() * e;

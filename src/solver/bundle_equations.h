@@ -18,8 +18,8 @@ struct BundleState {
 // Holds the scratch memory of one adjustment.
 class BundleEquations {
  public:
-  // `structure` and `rig` outlive this. More free poses than `dense_poses` are solved sparsely.
-  BundleEquations(const Rig& rig, const BundleStructure& structure, Kernel kernel, int dense_poses);
+  // `problem` and `structure` outlive this. More free poses than `dense_poses` are solved sparsely.
+  BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure, Kernel kernel, int dense_poses);
 
   // Sum of kernel costs / 2 at a state.
   double cost(const BundleState& state);
@@ -44,10 +44,6 @@ class BundleEquations {
     Matrix3d R;
     Vector3d t;  // metres
   };
-  struct CameraTerms {  // constant over an adjustment
-    const camera::CameraModel* model;
-    Rigid cam_from_rig;
-  };
   struct PoseBlock {
     Matrix6d H;
     Vector6d b;
@@ -64,6 +60,9 @@ class BundleEquations {
   };
 
   void set_poses(const std::vector<SE3>& T_rig_world);
+  const Rigid& cam_from_rig(int pose, int camera) const {
+    return cam_from_rig_[static_cast<std::size_t>(pose) * models_.size() + static_cast<std::size_t>(camera)];
+  }
   GroupSums sum_group(std::size_t group, const Vector3d& point_rig) const;
   void add_to_pose(const GroupSums& sums, const Vector3d& point_rig, const Matrix3d& R_rig_world, PoseBlock& pose,
                    Matrix63d& W) const;
@@ -73,7 +72,8 @@ class BundleEquations {
 
   const BundleStructure& structure_;
   Kernel kernel_;
-  std::vector<CameraTerms> cameras_;
+  std::vector<const camera::CameraModel*> models_;  // per camera
+  std::vector<Rigid> cam_from_rig_;                 // (poses, cameras), T_cam_rig motion: constant over an adjustment
   std::vector<Rigid> poses_;            // R_rig_world, t_rig_world; every pose of the problem
   std::vector<PoseBlock> pose_blocks_;  // per slot
   std::vector<PointBlock> point_blocks_;

@@ -11,6 +11,8 @@ void check(const ReprojectionProblem& problem, std::span<const std::uint8_t> ski
   BSLAM_ASSERT(problem.rig != nullptr, "a problem needs a rig");
   BSLAM_ASSERT(problem.pose_free.size() == problem.T_rig_world.size(), "pose_free has an entry per pose");
   BSLAM_ASSERT(skip.empty() || skip.size() == problem.observations.size(), "skip has an entry per observation");
+  BSLAM_ASSERT(problem.motion.empty() || problem.motion.size() == problem.T_rig_world.size() * problem.rig->size(),
+               "motion has an entry per pose and camera");
   const auto num_poses = static_cast<int>(problem.T_rig_world.size());
   const auto num_points = static_cast<int>(problem.points.size());
   const Observation* last = nullptr;

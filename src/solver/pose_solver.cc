@@ -81,7 +81,7 @@ PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double f
 PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
                         const PoseSolverOptions& options) {
   PoseProblem problem(rig, observations);
-  return solve_rounds(problem, T_rig_world_guess, kLostChi2, options);
+  return solve_rounds(problem, T_rig_world_guess, options.first_chi2, options);
 }
 
 }  // namespace bslam::solver

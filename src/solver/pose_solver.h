@@ -21,6 +21,7 @@ struct PoseSolverOptions {
   int rounds = 4;        // solves with re-classification of outliers between them; the last one without robust kernel
   int iterations = 10;   // Gauss-Newton steps a round at most
   int min_inliers = 10;  // fewer say nothing about a pose
+  double first_chi2 = kLostChi2;  // squared normalised error at the guess beyond which an observation waits for the second round
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

@@ -49,6 +49,7 @@ std::string_view describe(Outage outage) {
     case Outage::kBlack: return "black";
     case Outage::kOverExposed: return "over-exposed";
     case Outage::kFrozen: return "frozen";
+    case Outage::kInconsistent: return "inconsistent";
   }
   return "";
 }

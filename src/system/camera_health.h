@@ -28,8 +28,8 @@ struct HealthOptions {
   }
 };
 
-// Why a camera is out; kNone = it is not.
-enum class Outage : std::uint8_t { kNone, kNoImage, kBlack, kOverExposed, kFrozen };
+// Why a camera is out; kNone = it is not. kInconsistent is tracking's word, the others are known from the pictures.
+enum class Outage : std::uint8_t { kNone, kNoImage, kBlack, kOverExposed, kFrozen, kInconsistent };
 
 std::string_view describe(Outage outage);  // as in the summary: "", "no-images", "black", ...
 

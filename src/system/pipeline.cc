@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <thread>
 
+#include "frame/capture_times.h"
 #include "system/stopwatch.h"
+#include "tracking/feature_budget.h"
 #include "tracking/make_keyframe.h"
 
 namespace bslam::system {
@@ -11,6 +13,7 @@ namespace {
 
 using frame::BundledFrame;
 
+constexpr int kMetricPatience = 5;  // frames a rig whose cameras overlap waits for depth before it starts without
 constexpr int kMaxStartAge = 40;  // frames after which a start up to scale compares with a fresh frame
 
 int thread_count(int wanted, std::size_t cameras) {
@@ -76,19 +79,23 @@ Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<ima
 void Pipeline::restart() {
   state_ = {};
   candidate_.reset();
+  feature_shares_.clear();
   frames_lost_ = 0;
 }
 
 BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages,
-                                  const std::vector<Outage>& outages) {
+                                  std::span<const std::uint8_t> left_out) {
   const Stopwatch extraction;
-  std::vector<std::uint8_t> left_out;
-  for (const Outage o : outages) left_out.push_back(o != Outage::kNone);
-  BundledFrame frame = builder_.extract(images, pool_, left_out);
+  const auto budgets = tracking::feature_budgets(rig_.size(), feature_shares_, left_out, config_.features);
+  BundledFrame frame = builder_.extract(images, pool_, left_out, budgets);
+  for (frame::CameraFrame& c : frame.cameras) {
+    if (!config_.tracking.own_times) c.time_ns = frame.time_ns;
+  }
+  if (state_.twist) frame.twist = *state_.twist;
   stages.push_back({"extract", extraction.ms()});
   const Stopwatch bundling;
   frame.bundled =
-      frame::bundle(rig_, frame.cameras, builder_.pyramids(), config_.bundling, config_.tracking.alignment, pool_);
+      frame::bundle(frame::rig_of(rig_, frame), frame.cameras, builder_.pyramids(), config_.bundling, config_.tracking.alignment, pool_);
   for (std::size_t c = 0; c < rig_.size(); ++c) {
     frame.cameras[c].grid = frame::FeatureGrid(frame.cameras[c].keypoints, rig_.camera(c).width, rig_.camera(c).height);
   }
@@ -96,25 +103,44 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<
   return frame;
 }
 
+// Cameras that are out, and those that say nothing as long as the motion is unknown.
+std::vector<std::uint8_t> Pipeline::left_out(const image::ImageBundle& images, const std::vector<Outage>& outages) const {
+  std::vector<std::uint8_t> out(rig_.size());
+  for (std::size_t c = 0; c < out.size(); ++c) out[c] = outages[c] != Outage::kNone;
+  const bool motion_matters = config_.tracking.own_times && !state_.twist;
+  return motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
+}
+
 Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecutor& executor) {
   const Stopwatch whole;
   Outcome outcome;
   for (const image::CameraImage& i : images.images) outcome.record.images.push_back(i.state);
   outcome.record.outages = monitor_.judge(images);
-  BundledFrame frame = make_frame(images, outcome.record.stages, outcome.record.outages);
+  BundledFrame frame = make_frame(images, outcome.record.stages, left_out(images, outcome.record.outages));
   count_features(frame, outcome.record);
   const Stopwatch results;
   outcome.seen = executor.begin_frame(frame.id);
+  grow_along(*outcome.seen);
   if (config_.mode == Mode::kLagged) outcome.record.stages.push_back({"results", results.ms()});
   if (outcome.seen->num_keyframes() == 0) {
     start(std::move(frame), executor, outcome);
   } else {
     track(std::move(frame), executor, outcome);
   }
+  const bool fresh = !outcome.keyframes.empty() || !state_.reference.valid();
+  outcome.record.unit = unit_ = fresh ? 1.0 : outcome.seen->keyframe(state_.reference).unit;
   outcome.record.T_rig_odom = T_rig_odom_;
   outcome.record.T_map_odom = T_map_odom_;
   outcome.record.frame_ms = whole.ms();
   return outcome;
+}
+
+// The state is in the unit the map had: where its part was scaled since, it grows along.
+void Pipeline::grow_along(const map::BundledMap& map) {
+  if (!state_.reference.valid()) return;
+  const double grown = map.keyframe(state_.reference).unit / unit_;
+  state_.T_rig_reference = geometry::SE3(state_.T_rig_reference.rotation(), grown * state_.T_rig_reference.translation());
+  if (state_.twist) state_.twist->tail<3>() *= grown;
 }
 
 void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outcome) {
@@ -129,14 +155,14 @@ void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outco
   if (recogniser_) recogniser_->describe(frame);
   const auto& options = config_.tracking.initialisation;
   std::optional<tracking::StartedMap> started;
-  if (rig_.any_overlap()) {
-    started = tracking::start_metric(frame, builder_.pyramids(), options, draft);
-  } else if (candidate_) {
+  if (rig_.any_overlap()) started = tracking::start_metric(frame, builder_.pyramids(), options, draft);
+  const int patience = rig_.any_overlap() ? kMetricPatience : 0;
+  if (!started && candidate_ && frame.id.value() - candidate_->frame->id.value() >= patience) {
     const Random random(static_cast<std::uint64_t>(config_.seed), "start", static_cast<std::uint64_t>(frame.id.value()));
     started = tracking::start_up_to_scale(*candidate_, frame, builder_.pyramids(), options, random, draft);
   }
   if (started) {
-    draft.set_scale(started->scale);
+    draft.set_scale(started->scale, started->scale_deviation);
     const map::CommitReport report = executor.commit(JournalStep::kStart, std::move(draft));
     const KeyframeId last = report.keyframes.back();
     state_ = tracking::state_at_keyframe({}, frame.time_ns, last,
@@ -152,7 +178,7 @@ void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outco
     candidate_.reset();
     frames_lost_ = 0;
     T_map_odom_ = result.T_rig_world.inverse() * T_rig_odom_;
-  } else if (!rig_.any_overlap()) {
+  } else {
     keep_candidate(std::move(frame));
   }
   outcome.record.stages.push_back({"start", watch.ms()});
@@ -194,6 +220,10 @@ void Pipeline::track(BundledFrame frame, StageExecutor& executor, Outcome& outco
     if (!is_tracking(output.result.status)) outcome.record.relocalisation.reset();
   }
   outcome.record.result = output.result;
+  feature_shares_ = tracking::feature_shares(feature_shares_, map, frame, output);
+  for (std::size_t c = 0; c < output.result.cameras.size(); ++c) {
+    if (output.result.cameras[c].doubted) outcome.record.outages[c] = Outage::kInconsistent;
+  }
   if (!is_tracking(output.result.status)) {
     state_ = before;
     state_.status = tracking::TrackStatus::kLost;
@@ -230,7 +260,9 @@ bool Pipeline::find_again(BundledFrame& frame, const map::BundledMap& map, Outco
   std::vector<LandmarkId> landmarks;
   for (const auto& [feature, l] : location->matches) landmarks.push_back(l);
   std::sort(landmarks.begin(), landmarks.end());
+  const auto trust = tracking::doubts_of(state_.cameras);
   state_ = tracking::state_at_keyframe({}, frame.time_ns, location->with, std::move(landmarks));
+  state_.cameras = trust;
   state_.T_rig_reference = location->T_rig_world * map.keyframe(location->with).T_rig_world.inverse();
   outcome.record.relocalisation = Relocalisation{location->with, location->inliers};
   return true;

@@ -31,9 +31,9 @@ class Pipeline {
   // Reads the version of the map that `executor` gives the frame and commits keyframes to it.
   Outcome process(const image::ImageBundle& images, StageExecutor& executor);
 
-  // Extraction and bundling alone.
+  // Extraction and bundling alone; cameras with left_out[i] != 0 are taken as without an image.
   frame::BundledFrame make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages,
-                                 const std::vector<Outage>& outages = {});
+                                 std::span<const std::uint8_t> left_out = {});
 
   // Forgets the map that was tracked; the next frames start another.
   void restart();
@@ -41,6 +41,8 @@ class Pipeline {
   const tracking::TrackerState& state() const { return state_; }
 
  private:
+  std::vector<std::uint8_t> left_out(const image::ImageBundle& images, const std::vector<Outage>& outages) const;
+  void grow_along(const map::BundledMap& map);
   void start(frame::BundledFrame frame, StageExecutor& executor, Outcome& outcome);
   void keep_candidate(frame::BundledFrame frame);
   void track(frame::BundledFrame frame, StageExecutor& executor, Outcome& outcome);
@@ -55,7 +57,9 @@ class Pipeline {
   ThreadPool pool_;
   CameraMonitor monitor_;
   frame::FrameBuilder builder_;
+  std::vector<double> feature_shares_;  // of the cameras in the next frame's feature budget; empty: even
   tracking::TrackerState state_;
+  double unit_ = 1.0;  // of the state's reference keyframe when the state was made (map::BundledKeyframe::unit)
   std::optional<tracking::StartCandidate> candidate_;
   const std::unique_ptr<looping::PlaceRecogniser> recogniser_;
   int frames_lost_ = 0;  // with something to see, one after the other

@@ -130,7 +130,9 @@ std::vector<PartTrajectory> System::trajectories() const {
   for (const FrameRecord& record : frames_) {
     const tracking::TrackResult& r = record.result;
     if (r.status != tracking::TrackStatus::kTracking || !map->surviving(r.reference).valid()) continue;
-    add_pose(out, map->root_of(r.reference), r.time_ns, (r.T_rig_reference * map->resolved_pose(r.reference)).inverse());
+    const double grown = map->keyframe(r.reference).unit / record.unit;  // the scale of the map may have been found since
+    const geometry::SE3 T_rig_reference(r.T_rig_reference.rotation(), grown * r.T_rig_reference.translation());
+    add_pose(out, map->root_of(r.reference), r.time_ns, (T_rig_reference * map->resolved_pose(r.reference)).inverse());
   }
   std::stable_sort(out.begin(), out.end(),
                    [](const PartTrajectory& a, const PartTrajectory& b) { return a.poses.size() > b.poses.size(); });

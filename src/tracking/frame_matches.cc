@@ -18,7 +18,7 @@ std::size_t count(const FrameMatches& matches) {
 MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
                            std::span<const LandmarkId> landmarks, const FrameMatches& known,
                            const frame::ProjectionSearchOptions& options, ThreadPool& pool) {
-  const camera::Rig& rig = map.rig();
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   const std::vector<frame::SearchPoint> points = map::search_points(map, landmarks);
   std::vector<std::uint32_t> place_of(map.landmark_slots(), 0);  // position in `points` + 1
   for (std::size_t i = 0; i < landmarks.size(); ++i) place_of[landmarks[i].index()] = static_cast<std::uint32_t>(i + 1);
@@ -44,6 +44,7 @@ MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame
   });
   std::vector<std::uint8_t> seen(landmarks.size(), 0);
   for (const auto& list : visible) {
+    out.visible_by_camera.push_back(static_cast<int>(list.size()));
     for (const std::uint32_t i : list) seen[i] = 1;
   }
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -73,7 +74,7 @@ std::optional<frame::AlignedKeypoint> align_to_reference(const map::BundledMap& 
   const camera::Rig& rig = map.rig();
   const feature::Keypoints& keypoints = map.keypoints(reference.keyframe, reference.keypoint.camera);
   const std::size_t k = reference.keypoint.keypoint.index();
-  const SE3 T_ref_world = rig.cam_from_rig(reference.keypoint.camera) * map.keyframe(reference.keyframe).T_rig_world;
+  const SE3 T_ref_world = map.cam_from_world(reference.keyframe, reference.keypoint.camera);
   const auto warp = frame::patch_warp(rig.camera(reference.keypoint.camera), camera, T_cam_world * T_ref_world.inverse(),
                                       T_ref_world * landmark.position, pyramid.scale_x[std::min<std::size_t>(
                                           keypoints.level[k], pyramid.size() - 1)]);
@@ -86,7 +87,7 @@ std::optional<frame::AlignedKeypoint> align_to_reference(const map::BundledMap& 
 void align_matches(const map::BundledMap& map, const SE3& T_rig_world, const FrameMatches& matches,
                    std::span<const image::Pyramid> pyramids, const frame::AlignmentOptions& options,
                    const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool) {
-  const camera::Rig& rig = map.rig();
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   pool.for_each(matches.size(), [&](std::size_t c) {
     if (matches[c].empty()) return;
     feature::Keypoints& keypoints = frame.cameras[c].keypoints;

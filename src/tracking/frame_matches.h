@@ -30,6 +30,7 @@ std::size_t count(const FrameMatches& matches);
 struct MatchSearch {
   FrameMatches found;
   std::vector<LandmarkId> visible;  // expected in some camera, each once, in order of the input
+  std::vector<int> visible_by_camera;
 };
 
 // Looks for `landmarks` in every camera at `T_rig_world`, leaving out the keypoints and, per camera, the landmarks that

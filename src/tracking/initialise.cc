@@ -1,8 +1,10 @@
 #include "tracking/initialise.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "feature/hamming.h"
+#include "solver/generalised_scale.h"
 
 namespace bslam::tracking {
 namespace {
@@ -62,22 +64,57 @@ struct TwoView {
   solver::RelativePose pose;
 };
 
-// The camera with the widest parallax among those that see enough.
-std::optional<TwoView> best_two_view(const BundledFrame& first, const BundledFrame& second, const InitialisationOptions& options,
-                                     std::uint64_t seed) {
-  std::optional<TwoView> best;
+// What every camera has matched.
+struct FramePairs {
+  std::vector<std::vector<KeypointPair>> keypoints;
+  std::vector<std::vector<solver::BearingPair>> bearings;
+};
+
+FramePairs match_cameras(const BundledFrame& first, const BundledFrame& second) {
+  FramePairs out;
   for (std::size_t c = 0; c < first.cameras.size(); ++c) {
     const feature::Keypoints &a = first.cameras[c].keypoints, &b = second.cameras[c].keypoints;
-    TwoView view{c, match_frames(a, b), {}};
+    const auto& pairs = out.keypoints.emplace_back(match_frames(a, b));
+    auto& bearings = out.bearings.emplace_back();
+    for (const KeypointPair& p : pairs) bearings.push_back({a.bearing[p.a.index()], b.bearing[p.b.index()]});
+  }
+  return out;
+}
+
+// The camera with the widest parallax among those that see enough.
+std::optional<TwoView> best_two_view(const FramePairs& pairs, const InitialisationOptions& options, std::uint64_t seed) {
+  std::optional<TwoView> best;
+  for (std::size_t c = 0; c < pairs.keypoints.size(); ++c) {
+    TwoView view{c, pairs.keypoints[c], {}};
     if (view.pairs.size() < static_cast<std::size_t>(options.min_monocular)) continue;
-    std::vector<solver::BearingPair> bearings;
-    for (const KeypointPair& p : view.pairs) bearings.push_back({a.bearing[p.a.index()], b.bearing[p.b.index()]});
-    const auto pose = solver::relative_pose(bearings, {.min_inliers = kMinInliers}, Random(seed, "two views", c));
+    const auto pose = solver::relative_pose(pairs.bearings[c], {.min_inliers = kMinInliers}, Random(seed, "two views", c));
     if (!pose || pose->num_inliers < options.min_monocular_points) continue;
     view.pose = *pose;
     if (!best || view.pose.median_parallax > best->pose.median_parallax) best = view;
   }
   return best;
+}
+
+// The unit of a start: what the distance between the two frames is multiplied by, and its relative standard deviation.
+struct Unit {
+  double length = 1;
+  double deviation = std::numeric_limits<double>::infinity();
+};
+
+Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig& rig, const InitialisationOptions& options) {
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < view.pairs.size(); ++i) {
+    if (view.pose.inlier[i]) depths.push_back(view.pose.points_a[i].norm());
+  }
+  const double depth = median(depths);
+  if (rig.size() == 1) return {1.0 / depth, std::numeric_limits<double>::infinity()};
+  std::vector<solver::CameraPairs> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    cameras.push_back({rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]});
+  }
+  const auto found = solver::generalised_scale(view.pose.T_b_a, cameras);
+  if (found && found->deviation <= options.max_scale_deviation) return {found->T_b_a.translation().norm(), found->deviation};
+  return {options.guessed_depth / depth, std::numeric_limits<double>::infinity()};
 }
 
 }  // namespace
@@ -103,18 +140,18 @@ std::optional<StartedMap> start_metric(const BundledFrame& frame, std::span<cons
 std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const BundledFrame& frame,
                                             std::span<const image::Pyramid> pyramids, const InitialisationOptions& options,
                                             Random random, map::MapDraft& draft) {
-  const auto view = best_two_view(*first.frame, frame, options, random.next());
+  const camera::Rig& rig = draft.map().rig();
+  const FramePairs pairs = match_cameras(*first.frame, frame);
+  const auto view = best_two_view(pairs, options, random.next());
   if (!view) return std::nullopt;
-  std::vector<double> depths;
-  for (std::size_t i = 0; i < view->pairs.size(); ++i) {
-    if (view->pose.inlier[i]) depths.push_back(view->pose.points_a[i].norm());
-  }
-  const double unit = 1.0 / median(depths);
+  const Unit chosen = choose_unit(*view, pairs, rig, options);
+  const double unit = chosen.length;
   const SE3 T_b_a(view->pose.T_b_a.rotation(), unit * view->pose.T_b_a.translation());
-  const SE3 T_cam_rig = draft.map().rig().cam_from_rig(view->camera), T_rig_cam = T_cam_rig.inverse();
+  const SE3 T_cam_rig = rig.cam_from_rig(view->camera), T_rig_cam = T_cam_rig.inverse();
 
   StartedMap out;
-  out.scale = draft.map().rig().size() == 1 ? map::Scale::kUpToScale : map::Scale::kUnobservable;
+  out.scale = rig.size() == 1 ? map::Scale::kUpToScale : map::Scale::kUnobservable;
+  out.scale_deviation = chosen.deviation;
   out.keyframes.push_back(make_keyframe(*first.frame, {}, SE3(), first.pyramids, KeyframeId(), options, draft));
   const KeyframeId key_a = out.keyframes[0].keyframe;
   out.keyframes.push_back(make_keyframe(frame, {}, T_rig_cam * T_b_a * T_cam_rig, pyramids, key_a, options, draft));

@@ -35,11 +35,12 @@ struct Groups {
 
 // Keypoints that show one landmark are one feature; bundled keypoints without a landmark join the feature they were
 // bundled with, as far as its landmark has none in their camera and they see it where it is.
-Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const map::BundledMap& map, const geometry::SE3& T_rig_world) {
+Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const camera::Rig& rig, const map::BundledMap& map,
+               const geometry::SE3& T_rig_world) {
   const auto agrees = [&](KeypointRef r, LandmarkId l) {
     const feature::Keypoints& keypoints = frame.keypoints(r.camera);
     const std::size_t k = r.keypoint.index();
-    const auto error = solver::ReprojectionResidual::error_only(map.rig(), r.camera, T_rig_world, map.landmark(l).position,
+    const auto error = solver::ReprojectionResidual::error_only(rig, r.camera, T_rig_world, map.landmark(l).position,
                                                                 keypoints.pixel[k].cast<double>());
     return error && error->squaredNorm() <= solver::kChi2TwoDof95 * keypoints.sigma[k] * keypoints.sigma[k];
   };
@@ -119,9 +120,10 @@ bool has_sound_depth(const std::optional<frame::BundledPoint>& point, const Init
 NewKeyframe make_keyframe(const BundledFrame& frame, const FrameMatches& matches, const geometry::SE3& T_rig_world,
                           std::span<const image::Pyramid> pyramids, KeyframeId reference,
                           const InitialisationOptions& options, map::MapDraft& draft) {
+  const camera::Rig rig = frame::rig_of(draft.map().rig(), frame);
   const LandmarkTable table = landmark_table(frame, matches);
-  const Groups groups = regroup(frame, table, draft.map(), T_rig_world);
-  const std::shared_ptr<const BundledFrame> stored = regrouped_frame(frame, groups, draft.map().rig(), pyramids, options);
+  const Groups groups = regroup(frame, table, rig, draft.map(), T_rig_world);
+  const std::shared_ptr<const BundledFrame> stored = regrouped_frame(frame, groups, rig, pyramids, options);
 
   std::vector<std::pair<FeatureId, LandmarkId>> observed;
   std::vector<std::uint8_t> has_landmark(stored->bundled.size(), 0);

@@ -51,6 +51,8 @@ struct InitialisationOptions {
   double max_chi2 = 7.81;        // squared normalised error of a keypoint against its feature's point
   int min_monocular = 80;        // matches between two frames that start a map up to scale
   int min_monocular_points = 50; // points it needs
+  double guessed_depth = 3.0;    // metres: median distance of its points, where the rig may tell the scale later
+  double max_scale_deviation = 0.3; // relative, of the distance between the two frames: above it the guess is as good
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -60,14 +62,40 @@ struct InitialisationOptions {
     visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "", "squared normalised error of a keypoint against its feature's point");
     visitor("min_monocular", self.min_monocular, Range{10, 10000}, "", "matches between two frames that start a map up to scale");
     visitor("min_monocular_points", self.min_monocular_points, Range{10, 10000}, "", "points such a start needs");
+    visitor("guessed_depth", self.guessed_depth, Range{1e-3, 1e4}, "m", "median distance of its points where several cameras may tell later");
+    visitor("max_scale_deviation", self.max_scale_deviation, Range{1e-3, 10}, "", "relative error of a start's scale above which it is guessed");
+  }
+};
+
+// Do the cameras of a frame agree?
+struct ConsensusOptions {
+  int min_expected = 20;       // landmarks a camera should see, below which nothing is said about it
+  double lost_share = 0.1;     // of what it saw in the last frame and should see now: found less, it is doubted ...
+  double sound_share = 0.4;    // ... while another camera finds this much
+  double conflict_share = 0.3; // of a camera's matches that agree with the pose: fewer contradict it
+  double seen_share = 0.15;    // of the map's landmarks in its view, found by a doubted camera: it sees what it should
+  int readmit_after = 3;       // such frames in a row before it counts again
+  int forget_after = 40;       // frames without anything it should see, after which it counts again
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("min_expected", self.min_expected, Range{1, 10000}, "", "landmarks a camera should see, below which nothing is said about it");
+    visitor("lost_share", self.lost_share, Range{0, 1}, "", "of what a camera saw last: finds it less again, it is doubted");
+    visitor("sound_share", self.sound_share, Range{0, 1}, "", "while another camera finds this much");
+    visitor("conflict_share", self.conflict_share, Range{0, 1}, "", "of a camera's matches that agree with the pose: fewer contradict it");
+    visitor("seen_share", self.seen_share, Range{0, 1}, "", "of the landmarks in its view that a doubted camera must find");
+    visitor("readmit_after", self.readmit_after, Range{1, 10000}, "frames", "in a row before it counts again");
+    visitor("forget_after", self.forget_after, Range{1, 1000000}, "frames", "without anything it should see, after which it counts again");
   }
 };
 
 struct TrackingOptions {
+  bool own_times = true;         // images count at their own times; false: at that of their frame
   int min_inliers = 30;          // keypoints that must support a pose, all cameras together
   int min_inliers_wide = 50;     // the same after a search without a usable prediction
   double min_inlier_share = 0.3; // of the matches: fewer agree by chance
   MatchingOptions matching;
+  ConsensusOptions consensus;
   KeyframeOptions keyframe;
   InitialisationOptions initialisation;
   frame::AlignmentOptions alignment;
@@ -76,10 +104,12 @@ struct TrackingOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
+    visitor("own_times", self.own_times, Range{}, "", "images count at their own times; false: at that of their frame");
     visitor("min_inliers", self.min_inliers, Range{6, 10000}, "", "keypoints that must support a pose");
     visitor("min_inliers_wide", self.min_inliers_wide, Range{6, 10000}, "", "the same after a search without a prediction");
     visitor("min_inlier_share", self.min_inlier_share, Range{0, 1}, "", "share of the matches that must agree");
     visitor.section("matching", self.matching);
+    visitor.section("consensus", self.consensus);
     visitor.section("keyframe", self.keyframe);
     visitor.section("initialisation", self.initialisation);
     visitor.section("alignment", self.alignment);

@@ -1,6 +1,7 @@
 #include "tracking/track.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <numeric>
 
 #include "tracking/keyframe_decision.h"
@@ -42,49 +43,115 @@ struct Coarse {
   SE3 T_rig_world;
   FrameMatches matches;  // inliers
   LostReason reason = LostReason::kNone;
+  std::vector<std::uint8_t> left_out = {};  // per camera: doubted before or now
 };
+
+std::vector<std::uint8_t> doubted(const TrackerState& state, std::size_t cameras) {
+  std::vector<std::uint8_t> out(cameras, 0);
+  for (std::size_t c = 0; c < state.cameras.size(); ++c) out[c] = state.cameras[c].doubted;
+  return out;
+}
+
+bool any(const std::vector<std::uint8_t>& flags) { return std::ranges::find(flags, std::uint8_t{1}) != flags.end(); }
+
+void drop(const std::vector<std::uint8_t>& cameras, FrameMatches& matches) {
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    if (cameras[c]) matches[c].clear();
+  }
+}
 
 frame::ProjectionSearchOptions search_options(const TrackInput& input, const MatchingOptions& matching, double radius) {
   return {.radius = radius, .max_hamming = matching.max_hamming, .ratio = matching.ratio, .scale_factor = input.scale_factor};
 }
 
-// Pose from the landmarks of the last frame: guided by the motion model, and where that finds too little, in wide windows
-// with a consensus.
-Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
-                        ThreadPool& pool) {
+// Between the last frame and this one, at its pose as far as it is known.
+std::optional<geometry::Vector6d> twist_to(const TrackInput& input, const SE3& T_rig_world, TimeNs time_ns) {
+  const double dt = to_seconds(time_ns - input.state.time_ns);
+  if (dt <= 0 || dt > kMaxPrediction_s) return std::nullopt;
+  const SE3 last = input.state.T_rig_reference * input.map.resolved_pose(input.state.reference);
+  return ((T_rig_world * last.inverse()).log() / dt).eval();
+}
+
+// Motion while the cameras of a frame fire, from that of the last two intervals, with the acceleration between them. Poses say
+// it, never the late cameras themselves: what they see again they saw first at a place that had the same error.
+geometry::Vector6d twist_in(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world) {
+  const auto now = twist_to(input, T_rig_world, frame.time_ns);
+  if (!now) return frame.twist;
+  if (!input.state.twist) return *now;
+  const double dt = to_seconds(frame.time_ns - input.state.time_ns);
+  double latest = 0;
+  for (const double d : frame::delays_of(frame)) latest = std::abs(d) > std::abs(latest) ? d : latest;
+  return *now + (*now - *input.state.twist) * (0.5 * (dt + latest) / dt);
+}
+
+// Pose from what is found near where the motion model puts it. False where that is too little.
+bool track_by_prediction(const TrackInput& input, frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
+                         const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
-  const SE3 predicted = predict(input, frame.time_ns);
-  const std::vector<LandmarkId> landmarks = surviving(map, input.state.landmarks);
-  Coarse out{predicted, {}, LostReason::kFewMatches};
-  if (input.state.status == TrackStatus::kTracking) {
-    const MatchSearch search = find_landmarks(map, frame, predicted, landmarks, {},
-                                              search_options(input, options.matching, options.matching.predicted_radius), pool);
-    const auto observations = pose_observations(map, frame, search.found, input.noise);
-    if (count(search.found) >= static_cast<std::size_t>(options.min_inliers)) {
-      const auto solution = solver::solve_pose(map.rig(), observations, predicted, options.pose);
-      if (supported(solution, observations.size(), options.min_inliers, options)) {
-        return {solution.T_rig_world, keep_inliers(search.found, solution.inlier), LostReason::kNone};
-      }
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  const SE3 predicted = out.T_rig_world;
+  FrameMatches found = find_landmarks(map, frame, predicted, landmarks, {},
+                                      search_options(input, options.matching, options.matching.predicted_radius), pool).found;
+  std::vector<std::uint8_t> left_out = out.left_out;
+  drop(left_out, found);
+  auto observations = pose_observations(map, frame, found, input.noise);
+  if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
+  auto solution = solver::solve_pose(rig, observations, predicted, options.pose);
+  if (any(contradicting(found, solution.inliers_per_camera, options.consensus))) {
+    const auto steadiest = believe_the_steadiest(rig, found, observations, predicted, options.consensus, options.pose);
+    if (steadiest.ok) {
+      const auto wrong = contradicting(found, steadiest.inliers_per_camera, options.consensus);
+      for (std::size_t c = 0; c < wrong.size(); ++c) left_out[c] |= wrong[c];
+      drop(left_out, found);
+      observations = pose_observations(map, frame, found, input.noise);
+      solution = solver::solve_pose(rig, observations, steadiest.T_rig_world, options.pose);
     }
   }
+  if (!supported(solution, observations.size(), options.min_inliers, options)) return false;
+  frame.twist = twist_in(input, frame, solution.T_rig_world);
+  out.T_rig_world = solution.T_rig_world;
+  out.matches = keep_inliers(found, solution.inlier);
+  out.reason = LostReason::kNone;
+  const auto lost = disagreeing(continuity(map, frame, out.T_rig_world, input.state.cameras, out.matches), options.consensus);
+  for (std::size_t c = 0; c < lost.size(); ++c) left_out[c] |= lost[c];
+  out.left_out = std::move(left_out);
+  drop(out.left_out, out.matches);
+  return true;
+}
+
+// Pose from the landmarks of the last frame: guided by the motion model, and where that finds too little, in wide windows
+// with a consensus.
+Coarse track_last_frame(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
+                        ThreadPool& pool) {
+  const map::BundledMap& map = input.map;
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  const SE3 predicted = predict(input, frame.time_ns);
+  const std::vector<LandmarkId> landmarks = surviving(map, input.state.landmarks);
+  Coarse out{predicted, {}, LostReason::kFewMatches, doubted(input.state, rig.size())};
+  if (input.state.status == TrackStatus::kTracking && track_by_prediction(input, frame, landmarks, options, pool, out)) return out;
   const map::LocalView view = map::make_local_view(map, landmarks, input.state.reference, options.local_view);
   auto wide = search_options(input, options.matching, options.matching.wide_radius);
   wide.level_slack = 2;
   wide.ratio = 0.8 * options.matching.ratio;
-  const MatchSearch search = find_landmarks(map, frame, predicted, view.landmarks, {}, wide, pool);
+  MatchSearch search = find_landmarks(map, frame, predicted, view.landmarks, {}, wide, pool);
+  drop(out.left_out, search.found);
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return out;
   const auto observations = pose_observations(map, frame, search.found, input.noise);
-  const auto solution = solver::ransac_pose(map.rig(), observations, predicted, options.pose, {},
+  const auto solution = solver::ransac_pose(rig, observations, predicted, options.pose, {},
                                             Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
   out.reason = LostReason::kFewInliers;
   if (!supported(solution, observations.size(), options.min_inliers_wide, options)) return out;
-  return {solution.T_rig_world, keep_inliers(search.found, solution.inlier), LostReason::kNone};
+  out.T_rig_world = solution.T_rig_world;
+  out.matches = keep_inliers(search.found, solution.inlier);
+  out.reason = LostReason::kNone;
+  return out;
 }
 
 struct Fine {
   solver::PoseSolution solution;
   FrameMatches matches;                 // all, inliers and outliers
   std::vector<LandmarkId> visible;
+  std::vector<Expectation> views;       // per camera, of the local view
 };
 
 // Pose from all landmarks of the local view, with keypoints aligned to their landmarks' patches.
@@ -96,11 +163,17 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::Bund
   MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, coarse.matches,
                                       search_options(input, options.matching, options.matching.local_radius), pool);
   Fine out;
+  for (std::size_t c = 0; c < search.found.size(); ++c) {
+    out.views.push_back({search.visible_by_camera[c], static_cast<int>(search.found[c].size())});
+  }
+  drop(coarse.left_out, search.found);
   out.matches = merge(coarse.matches, search.found);
   out.visible = std::move(search.visible);
   const std::vector<KeypointPlace> before = places(frame, out.matches);
   align_matches(map, coarse.T_rig_world, out.matches, input.pyramids, options.alignment, input.noise, frame, pool);
-  out.solution = solver::solve_pose(map.rig(), pose_observations(map, frame, out.matches), coarse.T_rig_world, options.pose);
+  out.solution = solver::solve_pose(frame::rig_of(map.rig(), frame), pose_observations(map, frame, out.matches), coarse.T_rig_world,
+                                    options.pose);
+  frame.twist = twist_in(input, frame, out.solution.T_rig_world);
   restore_outliers(out.matches, out.solution.inlier, before, frame);
   return out;
 }
@@ -123,6 +196,21 @@ void note_sightings(const std::vector<LandmarkId>& visible, const std::vector<La
   }
 }
 
+// What the next frame should know about the cameras of this one.
+void note_trust(const Coarse& coarse, const Fine& fine, const FrameMatches& inliers, const TrackingOptions& options, TrackOutput& out) {
+  std::vector<CameraTrust>& cameras = out.state.cameras;
+  cameras.resize(inliers.size());
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    out.result.cameras[c].doubted = coarse.left_out[c];
+    if (coarse.left_out[c]) {
+      doubt(cameras[c], fine.views[c], options.consensus);
+    } else {
+      cameras[c].landmarks.clear();
+      for (const Match& m : inliers[c]) cameras[c].landmarks.push_back(m.landmark);
+    }
+  }
+}
+
 }  // namespace
 
 TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, LostReason reason) {
@@ -140,7 +228,8 @@ TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, Lo
 
 namespace {
 
-TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, Fine fine, const TrackingOptions& options) {
+TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, const Coarse& coarse, const Fine& fine,
+                    const TrackingOptions& options) {
   const map::BundledMap& map = input.map;
   TrackOutput out;
   out.matches = keep_inliers(fine.matches, fine.solution.inlier);
@@ -160,14 +249,12 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, F
   result.reference = state.reference;
   result.T_rig_reference = state.T_rig_reference;
 
-  const double dt = to_seconds(frame.time_ns - input.state.time_ns);
-  const SE3 last = input.state.T_rig_reference * map.resolved_pose(input.state.reference);
-  state.twist.reset();
-  if (dt > 0 && dt < kMaxPrediction_s) state.twist = (result.T_rig_world * last.inverse()).log() / dt;
+  state.twist = twist_to(input, result.T_rig_world, frame.time_ns);
   state.status = TrackStatus::kTracking;
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);
   note_sightings(fine.visible, state.landmarks, state);
+  note_trust(coarse, fine, out.matches, options, out);
 
   ++state.frames_since_keyframe;
   KeyframeEvidence evidence = keyframe_evidence(map, frame, out.matches, state.reference, result.T_rig_world, options);
@@ -206,7 +293,10 @@ TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const Tra
   if (!supported(fine.solution, count(fine.matches), options.min_inliers, options)) {
     return lost(input.state, frame, fine.solution.num_inliers < options.min_inliers ? LostReason::kFewInliers : LostReason::kUnstablePose);
   }
-  return tracked(input, frame, std::move(fine), options);
+  for (std::size_t c = 0; c < coarse.left_out.size(); ++c) {
+    if (coarse.left_out[c]) leave_out(input.map.rig(), c, options.initialisation.min_parallax, options.initialisation.max_chi2, frame);
+  }
+  return tracked(input, frame, coarse, fine, options);
 }
 
 TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,

@@ -7,6 +7,7 @@
 
 #include "base/random.h"
 #include "map/map_edit.h"
+#include "tracking/camera_consensus.h"
 #include "tracking/frame_matches.h"
 
 namespace bslam::tracking {
@@ -20,6 +21,7 @@ std::string_view describe(LostReason reason);
 
 struct CameraCounts {
   int keypoints = 0, matched = 0, inliers = 0;
+  bool doubted = false;  // it delivered a picture, but not of what the rig sees there
 };
 
 struct TrackResult {
@@ -41,6 +43,7 @@ struct TrackerState {
   geometry::SE3 T_rig_reference;
   std::optional<geometry::Vector6d> twist;    // T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); rad/s, m/s
   std::vector<LandmarkId> landmarks;          // inliers of the last tracked frame
+  std::vector<CameraTrust> cameras;           // empty as long as no frame was tracked
   int frames_since_keyframe = 0;
   int best_overlap = 0;                       // most landmarks of the reference found in a frame since it was made
   std::vector<map::Sighting> sightings;       // not yet folded into the map

@@ -112,6 +112,19 @@ std::pair<std::size_t, std::size_t> occupancy(const Keypoints& k) {
           *std::max_element(count.begin(), count.end())};
 }
 
+TEST(Extractor, ABudgetIsAsGoodAsTheOption) {
+  const cv::Mat image = test_view();
+  FeatureOptions fewer;
+  fewer.per_image = 450;
+  Extractor extractor{FeatureOptions{}};
+  image::Pyramid pyramid;
+  Keypoints k;
+  for (const int budget : {450, 9000, 450}) {
+    extractor.extract(view_of(image), {}, pinhole_camera(image.size()), pyramid, k, budget);
+    expect_equal(k, extract(image, budget == 450 ? fewer : FeatureOptions{}));
+  }
+}
+
 TEST(Extractor, SpreadsOverTheImage) {
   const auto [filled, most] = occupancy(extract(test_view()));
   std::printf("grid of 12 x 8: %zu cells filled, at most %zu of 1200 keypoints in one\n", filled, most);

@@ -126,6 +126,28 @@ TEST_F(BundledMapTest, RemovesAPartAndLeavesTheRestAlone) {
   expect_sound();
 }
 
+TEST_F(BundledMapTest, ScalesAPartWithItsRemovedKeyframesAndLeavesTheRestAlone) {
+  const KeyframeId a = add(matches(0, 20), {}), gone = add(matches(0, 10), {});
+  const KeyframeId r = add({}, {}), s = add({}, r);
+  const LandmarkId theirs = map.add_landmark(random_point(random), std::vector<Observation>{{s, FeatureId(2)}});
+  ASSERT_TRUE(map.remove_keyframe(gone));
+  const BundledMap before = map;
+  EXPECT_FALSE(map.scale_part(a, 3.0));
+  EXPECT_TRUE(map.scale_part(KeyframeId(0), 3.0));
+  for (const KeyframeId k : {KeyframeId(0), a, gone}) {
+    const SE3 old = before.resolved_pose(k);
+    EXPECT_LT((map.resolved_pose(k).translation() - 3.0 * old.translation()).norm(), 1e-12);
+    EXPECT_LT(map.resolved_pose(k).rotation().angularDistance(old.rotation()), 1e-7);
+    EXPECT_EQ(map.keyframe(k).unit, 3.0);
+  }
+  EXPECT_EQ(map.landmark(LandmarkId(5)).position, 3.0 * before.landmark(LandmarkId(5)).position);
+  EXPECT_EQ(map.landmark(LandmarkId(5)).max_distance, 3.0f * before.landmark(LandmarkId(5)).max_distance);
+  EXPECT_EQ(map.keyframe(s).T_rig_world.translation(), before.keyframe(s).T_rig_world.translation());
+  EXPECT_EQ(map.landmark(theirs).position, before.landmark(theirs).position);
+  EXPECT_EQ(map.gauge_epoch(), before.gauge_epoch() + 1);
+  expect_sound();
+}
+
 TEST_F(BundledMapTest, SurvivesInTheNearestAliveAncestor) {
   const KeyframeId a = add(matches(0, 20), {}), b = add(matches(0, 10), {}), c = add({}, b);
   EXPECT_EQ(map.surviving(c), c);

@@ -478,6 +478,50 @@ TEST_F(RebaseTest, RefreshesAreForwarded) {
   EXPECT_EQ(report.dropped, 1u);
 }
 
+TEST_F(RebaseTest, ScalingAPartTakesNewerKeyframesAndLandmarksAlong) {
+  const KeyframeId newer = add_keyframe(*early, same_numbers(0, 20));
+  const LandmarkId point = early->add_landmark({1, 2, 3}, {{newer, FeatureId(25)}});
+  const SE3 T_rig_world = early->map().keyframe(newer).T_rig_world;
+  late->scale_part(kRoot, 2.0);
+  const CommitReport report = commit();
+  EXPECT_EQ(report.applied, 1u);
+  EXPECT_EQ(report.published->keyframe(newer).T_rig_world.translation(), 2.0 * T_rig_world.translation());
+  EXPECT_EQ(report.published->landmark(point).position, Eigen::Vector3d(2, 4, 6));
+}
+
+TEST_F(RebaseTest, WhatIsAddedToAPartThatWasScaledKeepsItsPlaceInIt) {
+  const KeyframeId k = add_keyframe(*late, same_numbers(0, 20), kThird);
+  late->remove_observation(LandmarkId(29), kThird);
+  late->add_landmark({1, 2, 3}, {{kThird, FeatureId(29)}});
+  late->add_landmark({3, 2, 1}, {{k, FeatureId(25)}});
+  const SE3 T_rig_world = late->map().keyframe(k).T_rig_world;
+  early->scale_part(kRoot, 2.0);
+  const CommitReport report = commit();
+  const SE3 now = report.published->keyframe(report.keyframes.front()).T_rig_world;
+  expect_near(now, SE3(T_rig_world.rotation(), 2.0 * T_rig_world.translation()));
+  ASSERT_EQ(report.landmarks.size(), 2u);
+  EXPECT_NEAR((report.published->landmark(report.landmarks[0]).position - Eigen::Vector3d(2, 4, 6)).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((report.published->landmark(report.landmarks[1]).position - Eigen::Vector3d(6, 4, 2)).norm(), 0.0, 1e-12);
+}
+
+TEST_F(RebaseTest, PosesInAnOldUnitAreDropped) {
+  const SE3 before = early->map().keyframe(kSecond).T_rig_world;
+  late->set_poses({{{kSecond, random_pose(random, 0.5)}}, {}, false});
+  early->scale_part(kRoot, 2.0);
+  const CommitReport report = commit();
+  EXPECT_EQ(report.dropped, 1u);
+  EXPECT_EQ(report.published->keyframe(kSecond).T_rig_world.translation(), 2.0 * before.translation());
+}
+
+TEST_F(RebaseTest, OneOfTwoScalingsAtATimeIsRefused) {
+  const SE3 before = early->map().keyframe(kSecond).T_rig_world;
+  early->scale_part(kRoot, 2.0);
+  late->scale_part(kRoot, 3.0);
+  const CommitReport report = commit();
+  EXPECT_TRUE(report.refused);
+  EXPECT_EQ(report.published->keyframe(kSecond).T_rig_world.translation(), 2.0 * before.translation());
+}
+
 TEST_F(RebaseTest, ScaleIsWhatTheLaterEditSays) {
   early->set_scale(Scale::kUpToScale);
   late->set_scale(Scale::kUnobservable);

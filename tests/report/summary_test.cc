@@ -40,7 +40,7 @@ TEST(Summary, HasTheKeysOfTheContractInTheirOrder) {
                                     R"("states":[{"state":"degraded","reason":"blurred","from":0.0,"to":1.5}]}])");
   EXPECT_EQ(keys(json["features"]),
             (std::vector<std::string>{"keypoints_per_image", "unique", "monocular", "matched"}));
-  EXPECT_EQ(json["map"].dump(), R"({"keyframes":0,"landmarks":0,"observations":0,"scale":"metric","loaded":false})");
+  EXPECT_EQ(json["map"].dump(), R"({"keyframes":0,"landmarks":0,"observations":0,"scale":"metric","scale_std":null,"loaded":false})");
   EXPECT_EQ(json["loops"].dump(), R"([{"at":43.1,"with":1.2,"inliers":83}])");
   EXPECT_EQ(json["relocalisations"].dump(), R"([{"at":12.4,"with":3.15,"inliers":60}])");
   EXPECT_EQ(keys(json["time"]), (std::vector<std::string>{"start_up_s", "wall_s", "frame_ms", "stages_ms"}));

@@ -57,9 +57,15 @@ TEST(StartMetric, WaitsWhereNothingIsNearEnoughForDepth) {
 
 class StartUpToScale : public ::testing::Test {
  protected:
-  std::optional<StartedMap> start(const simulation::SimulatedFrame& first, const simulation::SimulatedFrame& second, map::MapDraft& draft) {
+  std::optional<StartedMap> start(const simulation::SimulatedFrame& first, const simulation::SimulatedFrame& second, map::MapDraft& draft,
+                                  const InitialisationOptions& options = {}) {
     const StartCandidate candidate{std::make_shared<const frame::BundledFrame>(first.frame), map::flat_pyramids(first.frame.cameras.size())};
-    return start_up_to_scale(candidate, second.frame, map::flat_pyramids(first.frame.cameras.size()), {}, Random(1), draft);
+    return start_up_to_scale(candidate, second.frame, map::flat_pyramids(first.frame.cameras.size()), options, Random(1), draft);
+  }
+  // Ahead and 120 degrees to either side.
+  static camera::Rig three_sides() {
+    const std::vector<int> sides = {0, 2, 3};
+    return simulation::ring_rig(4).subset(sides);
   }
 };
 
@@ -118,18 +124,42 @@ TEST_F(StartUpToScale, DoesNotStartBetweenTwoPlaces) {
   EXPECT_FALSE(start(sim.frame(FrameId(0), 0.0), elsewhere.frame(FrameId(1), 0.3), draft).has_value());
 }
 
-TEST_F(StartUpToScale, ARigWhoseCamerasDoNotOverlapDoesNotKnowItsScale) {
-  const std::vector<int> sides = {0, 2, 3};  // ahead and 120 degrees to either side
-  const auto sim = simulator(simulation::ring_rig(4).subset(sides), room(1, 0.25));
-  ASSERT_FALSE(sim.rig().any_overlap());
-  const auto first = sim.frame(FrameId(0), 0.0), second = sim.frame(FrameId(1), 0.3);
+TEST_F(StartUpToScale, ATurningRigWithoutOverlapStartsAboutAsLargeAsItIs) {
+  int told = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const auto sim = simulator(three_sides(), room(seed, 0.25), {.seed = seed});
+    ASSERT_FALSE(sim.rig().any_overlap());
+    const auto first = sim.frame(FrameId(0), 0.0), second = sim.frame(FrameId(1), 0.3);
+    map::MapDraft draft = empty_draft(sim);
+    const auto started = start(first, second, draft);
+    ASSERT_TRUE(started.has_value());
+    EXPECT_EQ(started->scale, map::Scale::kUnobservable);  // two frames do not decide it
+    EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+    const SE3 found = draft.map().keyframe(KeyframeId(1)).T_rig_world, truth = second.T_world_rig.inverse() * first.T_world_rig;
+    EXPECT_LT(map::angle_rad(found, truth), 0.5 * kDegree);
+    if (!std::isfinite(started->scale_deviation)) continue;
+    ++told;
+    EXPECT_LE(started->scale_deviation, 0.3);
+    const double ratio = found.translation().norm() / truth.translation().norm();
+    EXPECT_NEAR(ratio, 1.0, 4 * started->scale_deviation) << "seed " << seed;
+  }
+  EXPECT_GE(told, 3);
+}
+
+TEST_F(StartUpToScale, GuessesTheDepthWhereTwoFramesDoNotTellTheScale) {
+  const auto sim = simulator(three_sides(), room(1, 0.25));
   map::MapDraft draft = empty_draft(sim);
-  const auto started = start(first, second, draft);
+  InitialisationOptions options;
+  options.max_scale_deviation = 1e-3;
+  options.guessed_depth = 2.0;
+  const auto started = start(sim.frame(FrameId(0), 0.0), sim.frame(FrameId(1), 0.3), draft, options);
   ASSERT_TRUE(started.has_value());
   EXPECT_EQ(started->scale, map::Scale::kUnobservable);
-  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
-  const SE3 truth = second.T_world_rig.inverse() * first.T_world_rig;
-  EXPECT_LT(map::angle_rad(draft.map().keyframe(KeyframeId(1)).T_rig_world, truth), 0.5 * kDegree);
+  EXPECT_TRUE(std::isinf(started->scale_deviation));
+  std::vector<double> depth;
+  for (const LandmarkId l : draft.map().landmark_ids()) depth.push_back(draft.map().landmark(l).position.norm());
+  std::nth_element(depth.begin(), depth.begin() + static_cast<std::ptrdiff_t>(depth.size() / 2), depth.end());
+  EXPECT_NEAR(depth[depth.size() / 2], 2.0, 0.2);
 }
 
 }  // namespace

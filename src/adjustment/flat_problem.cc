@@ -1,0 +1,80 @@
+#include "adjustment/flat_problem.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bslam::adjustment {
+namespace {
+
+constexpr int kAbsent = -1;
+
+// Position of each keyframe among the poses, or kAbsent.
+std::vector<int> pose_positions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
+  std::vector<int> position(map.keyframe_slots(), kAbsent);
+  for (std::size_t i = 0; i < keyframes.size(); ++i) position[keyframes[i].index()] = static_cast<int>(i);
+  return position;
+}
+
+// Adds the observations of one landmark; true where two or more keyframes of the problem see it: a landmark in one alone
+// says nothing about poses.
+bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& position, double sigma_px,
+                  double scale_factor, FlatProblem& flat) {
+  const auto observations = map.observations(id);
+  const auto seen = std::count_if(observations.begin(), observations.end(), [&](const map::Observation& o) {
+    return position[o.keyframe.index()] != kAbsent;
+  });
+  if (seen < 2) return false;
+  const int point = static_cast<int>(flat.landmarks.size());
+  for (const map::Observation& o : observations) {
+    const int pose = position[o.keyframe.index()];
+    if (pose == kAbsent) continue;
+    const frame::BundledFrame& frame = *map.keyframe(o.keyframe).frame;
+    for (const frame::KeypointRef r : frame.bundled.keypoints(o.feature)) {
+      const feature::Keypoints& keypoints = frame.keypoints(r.camera);
+      const std::size_t k = r.keypoint.index();
+      const double detected = sigma_px * std::pow(scale_factor, keypoints.level[k]);
+      const float sigma = o.aligned ? keypoints.sigma[k] : static_cast<float>(detected);
+      flat.problem.observations.push_back({pose, point, r.camera, keypoints.pixel[k], sigma});
+      flat.sources.push_back({id, o.keyframe});
+    }
+  }
+  flat.landmarks.push_back(id);
+  flat.problem.points.push_back(map.landmark(id).position);
+  return true;
+}
+
+// How the rig moved while each keyframe was taken; empty where all their cameras fired together.
+std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
+  std::vector<geometry::SE3> out;
+  bool any = false;
+  for (const KeyframeId k : keyframes) {
+    const frame::BundledFrame& frame = *map.keyframe(k).frame;
+    for (std::size_t c = 0; c < map.rig().size(); ++c) {
+      const double delay_s = frame.delay_s(c);
+      any |= delay_s != 0.0;
+      out.push_back(delay_s == 0.0 ? geometry::SE3() : geometry::SE3::exp(delay_s * frame.twist));
+    }
+  }
+  if (!any) out.clear();
+  return out;
+}
+
+}  // namespace
+
+FlatProblem flatten(const map::BundledMap& map, const Selection& selection, double sigma_px, double scale_factor) {
+  FlatProblem flat;
+  flat.problem.rig = &map.rig();
+  flat.keyframes = selection.free_keyframes;
+  flat.keyframes.insert(flat.keyframes.end(), selection.fixed_keyframes.begin(), selection.fixed_keyframes.end());
+  std::sort(flat.keyframes.begin(), flat.keyframes.end());
+  for (const KeyframeId k : flat.keyframes) {
+    flat.problem.T_rig_world.push_back(map.keyframe(k).T_rig_world);
+    flat.problem.pose_free.push_back(std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), k));
+  }
+  flat.problem.motion = motions(map, flat.keyframes);
+  const std::vector<int> position = pose_positions(map, flat.keyframes);
+  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, position, sigma_px, scale_factor, flat);
+  return flat;
+}
+
+}  // namespace bslam::adjustment

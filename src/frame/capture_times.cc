@@ -1,0 +1,37 @@
+#include "frame/capture_times.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace bslam::frame {
+namespace {
+
+bool any_overlap(const camera::Rig& rig, std::span<const std::uint8_t> left_out) {
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    for (std::size_t j = 0; j < rig.size(); ++j) {
+      if (!left_out[i] && !left_out[j] && rig.overlap(i, j)) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> without_late_cameras(const camera::Rig& rig, const image::ImageBundle& images,
+                                               std::span<const std::uint8_t> left_out) {
+  std::vector<std::uint8_t> out(left_out.begin(), left_out.end());
+  std::vector<std::uint8_t> absent = out;
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    const image::CameraImage& image = images.images[c];
+    const bool present = image.state == image::ImageState::kPresent;
+    absent[c] |= !present;
+    out[c] |= present && std::abs(image.time_ns - images.time_ns) > kTogetherNs;
+  }
+  std::vector<std::uint8_t> gone = absent;
+  for (std::size_t c = 0; c < out.size(); ++c) gone[c] |= out[c];
+  const bool some = std::ranges::find(gone, std::uint8_t{0}) != gone.end();
+  if (!some || (any_overlap(rig, absent) && !any_overlap(rig, gone))) return {left_out.begin(), left_out.end()};
+  return out;
+}
+
+}  // namespace bslam::frame

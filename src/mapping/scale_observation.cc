@@ -1,0 +1,64 @@
+#include "mapping/scale_observation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "adjustment/flat_problem.h"
+#include "solver/rig_scale.h"
+
+namespace bslam::mapping {
+namespace {
+
+constexpr double kLongestStep = 3.0;  // factor of one correction: farther away the equations say little but the direction
+constexpr double kSettled = 3.0;      // standard deviations of a correction that leaves the map as it is
+
+// One keyframe, the oldest, is held: more would keep the map in the shape the scale is read from.
+adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId keyframe, int limit) {
+  adjustment::Selection out;
+  out.free_keyframes.push_back(keyframe);
+  for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(limit - 1))) {
+    out.free_keyframes.push_back(c.keyframe);
+  }
+  std::sort(out.free_keyframes.begin(), out.free_keyframes.end());
+  out.fixed_keyframes.push_back(out.free_keyframes.front());
+  out.free_keyframes.erase(out.free_keyframes.begin());
+  std::vector<std::uint8_t> taken(map.landmark_slots(), 0);
+  const auto add = [&](KeyframeId k) {
+    for (const LandmarkId l : map.keyframe(k).landmarks) {
+      if (l.valid() && !std::exchange(taken[l.index()], std::uint8_t{1})) out.landmarks.push_back(l);
+    }
+  };
+  add(out.fixed_keyframes.front());
+  for (const KeyframeId k : out.free_keyframes) add(k);
+  std::sort(out.landmarks.begin(), out.landmarks.end());
+  return out;
+}
+
+}  // namespace
+
+ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features, map::MapDraft& draft) {
+  ScaleReport report;
+  const map::BundledMap& map = draft.map();
+  if (map.scale() != map::Scale::kUnobservable) return report;
+  const adjustment::Selection selection = select_observers(map, keyframe, options.keyframes);
+  const auto flat = adjustment::flatten(map, selection, features.sigma_px, features.scale_factor);
+  const auto found = solver::rig_scale(flat.problem);
+  if (!found) return report;
+  report.observed = true;
+  report.deviation = found->deviation;
+  report.keyframes = static_cast<int>(flat.keyframes.size());
+  if (found->deviation <= options.max_correcting_deviation) {
+    report.correction = std::clamp(found->scale, 1.0 / kLongestStep, kLongestStep);
+    draft.scale_part(map.root_of(keyframe), report.correction);
+  }
+  draft.set_scale(map::Scale::kUnobservable, found->deviation);
+  return report;
+}
+
+bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options) {
+  return report.observed && report.keyframes >= options.min_keyframes && report.deviation <= options.max_deviation &&
+         deviation_before <= options.max_deviation && std::abs(report.correction - 1.0) <= kSettled * report.deviation;
+}
+
+}  // namespace bslam::mapping

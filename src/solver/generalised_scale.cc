@@ -1,0 +1,131 @@
+#include "solver/generalised_scale.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+namespace bslam::solver {
+namespace {
+
+using Eigen::Vector3d;
+using geometry::Matrix3d;
+using geometry::Matrix6d;
+using geometry::SE3;
+using geometry::Vector6d;
+
+constexpr int kDistances = 41;  // tried, evenly in their logarithm
+constexpr int kIterations = 20;
+constexpr double kConverged = 1e-8;      // of the step
+constexpr double kFirstDamping = 1e-6;   // share of the diagonal
+constexpr double kMinSigma = 1e-5;       // radians: no bearing is better
+constexpr double kMinCondition = 1e-12;  // of the normal equations: below it a direction is not seen at all
+
+struct Sums {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+  double cost = 0.0;  // squared angles, each at most the knee's
+  double squared = 0.0;
+  int inliers = 0;
+};
+
+// Squared Sampson angle of every pair against the plane its camera's motion spans, cut off at the knee. With x = R a and
+// the motion of the camera perturbed by [omega, v], b . (t x R a) changes by v . (x x b) + omega . ((t x x) x b). What
+// lengthens t alone changes no angle: without taking that part off v's, noise would pass for knowledge of the distance.
+Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) {
+  Sums out;
+  for (const CameraPairs& camera : cameras) {
+    const SE3 T = camera.T_cam_ref * T_b_a * camera.T_cam_ref.inverse();
+    const Matrix3d R = T.matrix3();
+    const Matrix6d adjoint = camera.T_cam_ref.adjoint();
+    const Vector3d& t = T.translation();
+    const Vector3d along = t.norm() > 0.0 ? Vector3d(t.normalized()) : Vector3d::Zero();
+    Matrix6d H = Matrix6d::Zero();
+    Vector6d g = Vector6d::Zero();
+    for (const BearingPair& pair : camera.pairs) {
+      const Vector3d x = R * pair.a, normal = t.cross(x), other = pair.b.cross(t);
+      const double turned = pair.b.dot(normal);
+      const double spread = std::sqrt((normal - turned * pair.b).squaredNorm() + (other - x.dot(other) * x).squaredNorm());
+      const double angle = spread > 0.0 ? turned / spread : 0.0;
+      if (!(std::abs(angle) < knee)) {
+        out.cost += knee * knee;
+        continue;
+      }
+      const Vector3d moved = x.cross(pair.b);
+      Vector6d J;
+      J << normal.cross(pair.b), moved - along * along.dot(moved);
+      if (spread > 0.0) J /= spread;
+      H += J * J.transpose();
+      g -= angle * J;
+      out.cost += angle * angle;
+      out.squared += angle * angle;
+      ++out.inliers;
+    }
+    out.H += adjoint.transpose() * H * adjoint;
+    out.b += adjoint.transpose() * g;
+  }
+  return out;
+}
+
+SE3 at_distance(const SE3& T, double distance) { return {T.rotation(), distance * T.translation().normalized()}; }
+
+// The distance along the given direction at which most agrees.
+SE3 best_distance(const SE3& T_b_a, std::span<const CameraPairs> cameras, const GeneralisedScaleOptions& options) {
+  SE3 best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kDistances; ++i) {
+    const double share = static_cast<double>(i) / (kDistances - 1);
+    const SE3 trial = at_distance(T_b_a, options.shortest * std::pow(options.longest / options.shortest, share));
+    const double cost = evaluate(trial, cameras, options.inlier_angle).cost;
+    if (cost < least) {
+      least = cost;
+      best = trial;
+    }
+  }
+  return best;
+}
+
+SE3 refine(SE3 T_b_a, std::span<const CameraPairs> cameras, double knee) {
+  double damping = kFirstDamping;
+  Sums sums = evaluate(T_b_a, cameras, knee);
+  for (int i = 0; i < kIterations; ++i) {
+    Matrix6d H = sums.H;
+    H.diagonal() *= 1.0 + damping;
+    const Vector6d step = H.ldlt().solve(sums.b);
+    if (!step.allFinite() || step.norm() < kConverged) break;
+    const SE3 trial = T_b_a.perturbed(step);
+    const Sums at_trial = evaluate(trial, cameras, knee);
+    if (at_trial.cost < sums.cost) {
+      T_b_a = trial;
+      sums = at_trial;
+      damping *= 0.1;
+    } else {
+      damping *= 100.0;
+    }
+  }
+  return T_b_a;
+}
+
+}  // namespace
+
+std::optional<GeneralisedScale> generalised_scale(const SE3& T_b_a, std::span<const CameraPairs> cameras,
+                                                  const GeneralisedScaleOptions& options) {
+  if (!(T_b_a.translation().norm() > 0.0)) return std::nullopt;
+  GeneralisedScale out;
+  out.T_b_a = refine(best_distance(T_b_a, cameras, options), cameras, options.inlier_angle);
+  const Sums sums = evaluate(out.T_b_a, cameras, options.inlier_angle);
+  out.num_inliers = sums.inliers;
+  const double distance = out.T_b_a.translation().norm();
+  if (sums.inliers <= 6 || !(distance > 0.0)) return std::nullopt;
+  const Eigen::LDLT<Matrix6d> factor(sums.H);
+  if (!factor.isPositive() || !(factor.rcond() > kMinCondition)) return std::nullopt;
+  Vector6d per_step = Vector6d::Zero();  // d log(distance) / d[omega, v]
+  per_step.tail<3>() = out.T_b_a.translation() / (distance * distance);
+  const double variance = std::max(kMinSigma * kMinSigma, sums.squared / (sums.inliers - 6));
+  out.deviation = std::sqrt(variance * per_step.dot(factor.solve(per_step)));
+  if (!std::isfinite(out.deviation) || distance < options.shortest || distance > options.longest) return std::nullopt;
+  return out;
+}
+
+}  // namespace bslam::solver

@@ -1,0 +1,108 @@
+#include "tracking/camera_consensus.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace bslam::tracking {
+
+using geometry::SE3;
+
+std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras) {
+  for (CameraTrust& c : cameras) c.landmarks.clear();
+  return cameras;
+}
+
+std::vector<Expectation> continuity(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                                    const std::vector<CameraTrust>& trust, const FrameMatches& found) {
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  std::vector<Expectation> out(trust.size());
+  for (std::size_t c = 0; c < trust.size(); ++c) {
+    if (frame.cameras[c].state != image::ImageState::kPresent || trust[c].doubted) continue;
+    std::vector<LandmarkId> again;
+    if (c < found.size()) {
+      for (const Match& m : found[c]) again.push_back(m.landmark);
+    }
+    std::sort(again.begin(), again.end());
+    const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
+    for (const LandmarkId before : trust[c].landmarks) {
+      const LandmarkId l = map.resolve(before);
+      if (!l.valid()) continue;
+      const auto pixel = rig.camera(c).project(T_cam_world * map.landmark(l).position);
+      if (!pixel || !rig.camera(c).contains(*pixel)) continue;
+      ++out[c].expected;
+      out[c].found += std::binary_search(again.begin(), again.end(), l);
+    }
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> contradicting(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
+                                        const ConsensusOptions& options) {
+  std::vector<std::uint8_t> out(matches.size(), 0);
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    const auto found = static_cast<int>(matches[c].size());
+    out[c] = found >= options.min_expected && inliers_per_camera[c] < options.conflict_share * found;
+  }
+  return out;
+}
+
+solver::PoseSolution believe_the_steadiest(const camera::Rig& rig, const FrameMatches& matches,
+                                           std::span<const solver::PoseObservation> observations, const SE3& predicted,
+                                           const ConsensusOptions& options, const solver::PoseSolverOptions& pose) {
+  constexpr double kRadiansPerMetre = 1.0;  // turning as much as passing something a metre away
+  constexpr double kAgrees = 25.0;          // squared normalised error at a camera's own pose
+  solver::PoseSolution best;
+  double least = std::numeric_limits<double>::infinity();
+  std::size_t first = 0;
+  for (const auto& camera : matches) {
+    const auto own = observations.subspan(first, camera.size());
+    first += camera.size();
+    if (static_cast<int>(camera.size()) < options.min_expected) continue;
+    const solver::PoseSolution alone = solver::solve_pose(rig, own, predicted, pose);
+    if (!alone.ok || alone.num_inliers < options.sound_share * static_cast<double>(camera.size())) continue;
+    const geometry::Vector6d off = (alone.T_rig_world * predicted.inverse()).log();
+    const double distance = off.head<3>().norm() + kRadiansPerMetre * off.tail<3>().norm();
+    if (distance >= least) continue;
+    least = distance;
+    solver::PoseSolverOptions near = pose;
+    near.first_chi2 = kAgrees;
+    best = solver::solve_pose(rig, observations, alone.T_rig_world, near);
+  }
+  return best;
+}
+
+std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity, const ConsensusOptions& options) {
+  std::vector<std::uint8_t> out(continuity.size(), 0);
+  const auto counts = [&](const Expectation& e) { return e.expected >= options.min_expected; };
+  const bool sound = std::ranges::any_of(continuity, [&](const Expectation& e) { return counts(e) && e.share() >= options.sound_share; });
+  for (std::size_t c = 0; sound && c < out.size(); ++c) out[c] = counts(continuity[c]) && continuity[c].share() < options.lost_share;
+  return out;
+}
+
+void doubt(CameraTrust& camera, const Expectation& view, const ConsensusOptions& options) {
+  camera.landmarks.clear();
+  camera.doubted = true;
+  const bool judged = view.expected >= options.min_expected;
+  const bool sees = judged && view.share() >= options.seen_share;
+  camera.seeing = sees ? camera.seeing + 1 : 0;
+  camera.idle = judged ? 0 : camera.idle + 1;
+  if (camera.seeing >= options.readmit_after || camera.idle >= options.forget_after) camera = CameraTrust{};
+}
+
+void leave_out(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2, frame::BundledFrame& frame) {
+  std::vector<std::vector<frame::KeypointRef>> matched;
+  for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) {
+    const auto all = frame.bundled.keypoints(FeatureId(f));
+    std::vector<frame::KeypointRef> rest;
+    std::copy_if(all.begin(), all.end(), std::back_inserter(rest), [&](const frame::KeypointRef& r) { return r.camera.index() != camera; });
+    if (rest.size() >= 2) matched.push_back(std::move(rest));
+  }
+  frame::CameraFrame& out = frame.cameras[camera];
+  out.state = image::ImageState::kMissing;
+  out.keypoints = {};
+  out.words.clear();
+  out.grid = frame::FeatureGrid(out.keypoints, rig.camera(camera).width, rig.camera(camera).height);
+  frame.bundled = frame::make_bundled(frame::rig_of(rig, frame), frame.cameras, matched, min_parallax, max_chi2);
+}
+
+}  // namespace bslam::tracking

@@ -1,0 +1,52 @@
+// Do the cameras of a frame agree? A camera may deliver good pictures of the wrong thing: another camera's, those of a mount
+// that was knocked, of a cover with texture. Then hardly anything is where the rest of the rig expects it, and it is
+// left out until it sees what it should again.
+#pragma once
+
+#include <vector>
+
+#include "tracking/frame_matches.h"
+
+namespace bslam::tracking {
+
+// What is carried from frame to frame about one camera.
+struct CameraTrust {
+  bool doubted = false;
+  int seeing = 0;                     // frames in a row in which a doubted camera saw what it should
+  int idle = 0;                       // frames in which it should have seen nothing
+  std::vector<LandmarkId> landmarks;  // inliers of the last tracked frame
+};
+
+// What of it still counts where the rig was found again after a loss.
+std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras);
+
+// How much of what a camera should see it found.
+struct Expectation {
+  int expected = 0, found = 0;
+  double share() const { return expected > 0 ? static_cast<double>(found) / expected : 0.0; }
+};
+
+// Of the landmarks each camera saw in the last frame, those in its view at `T_rig_world` now, and among `found`.
+std::vector<Expectation> continuity(const map::BundledMap& map, const frame::BundledFrame& frame, const geometry::SE3& T_rig_world,
+                                    const std::vector<CameraTrust>& trust, const FrameMatches& found);
+
+// Flags the cameras that found much of what they looked for, but elsewhere than the pose puts it.
+std::vector<std::uint8_t> contradicting(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
+                                        const ConsensusOptions& options);
+
+// Where cameras contradict one another, that one is believed whose own pose is nearest to where the motion led to: the pose
+// from its observations and what agrees with them. `observations` of `matches`, in their order.
+solver::PoseSolution believe_the_steadiest(const camera::Rig& rig, const FrameMatches& matches,
+                                           std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
+                                           const ConsensusOptions& options, const solver::PoseSolverOptions& pose);
+
+// Flags the cameras that lost what they saw while another camera did not. At least one camera is not flagged.
+std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity, const ConsensusOptions& options);
+
+// Begins or goes on to doubt a camera. `view`: what of the map should be seen by it in this frame, and is.
+void doubt(CameraTrust& camera, const Expectation& view, const ConsensusOptions& options);
+
+// Takes a camera out of a frame as if it had delivered no image.
+void leave_out(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2, frame::BundledFrame& frame);
+
+}  // namespace bslam::tracking

@@ -1,0 +1,150 @@
+// The scale of maps made by three cameras that share no view, against the truth of the simulation.
+#include "mapping/scale_observation.h"
+
+#include <gtest/gtest.h>
+
+#include "mapping/local_adjustment.h"
+#include "mapping/map_keyframe.h"
+#include "mapping/simulated_map.h"
+
+namespace bslam::mapping {
+namespace {
+
+using map::SimulatedMap;
+const FeatureModel kFeatures;
+
+// Ahead and 120 degrees to either side.
+camera::Rig three_sides() {
+  const std::vector<int> sides = {0, 2, 3};
+  return simulation::ring_rig(4).subset(sides);
+}
+
+simulation::FeatureSimulatorOptions room(std::uint64_t seed) {
+  simulation::FeatureSimulatorOptions options;
+  options.scene_seed = options.noise_seed = seed;
+  options.landmarks = 4000;
+  options.max_keypoints = 300;
+  options.outlier_share = 0.02;
+  return options;
+}
+
+// Keyframes at the truth, every 0.25 s, in a map that has no scale and whose unit is 1 / `factor` metres.
+SimulatedMap ride(const simulation::Trajectory& trajectory, const camera::Rig& rig, int keyframes, double factor,
+                  std::uint64_t seed) {
+  SimulatedMap world(simulation::FeatureSimulator(rig, trajectory, room(seed)));
+  for (int i = 0; i < keyframes; ++i) world.add_keyframe(FrameId(i), 0.25 * i);
+  world.map.set_scale(map::Scale::kUnobservable);
+  world.map.scale_part(KeyframeId(0), factor);
+  return world;
+}
+
+simulation::Trajectory orbit(std::uint64_t seed) { return simulation::make_orbit({.seed = seed}); }
+
+// Ahead at 0.4 m/s, looking the same way all the time; too short a way for a landmark to go from one camera to another.
+simulation::Trajectory straight_line() {
+  std::vector<simulation::ControlPose> control;
+  for (int i = 0; i < 8; ++i) control.push_back({{0.4 * i - 1.5, 0.3, 1.5}, 0.0, 0.0, 0.0});
+  return simulation::Trajectory(std::move(control), 1.0);
+}
+
+// How long the map is for its true length.
+double length_ratio(const SimulatedMap& world, const map::BundledMap& map) {
+  double found = 0, truth = 0;
+  const KeyframeId root(0);
+  for (const KeyframeId k : map.keyframe_ids()) {
+    found += map::distance_m(map.keyframe(k).T_rig_world, map.keyframe(root).T_rig_world);
+    truth += map::distance_m(world.true_pose(k), world.true_pose(root));
+  }
+  return found / truth;
+}
+
+TEST(ObserveScale, DeviationIsThatOfTheErrors) {
+  double squared_z = 0;
+  constexpr int kSeeds = 12;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const SimulatedMap world = ride(orbit(seed), three_sides(), 7, 1.0, seed);
+    map::MapDraft draft = world.draft();
+    map_keyframe(KeyframeId(6), {}, kFeatures, draft);  // the adjustment takes the map from the truth to what the pixels say
+    const ScaleReport report = observe_scale(KeyframeId(6), {}, kFeatures, draft);
+    ASSERT_TRUE(report.observed);
+    const double z = (length_ratio(world, draft.map()) - 1.0) / report.deviation;
+    EXPECT_LT(std::abs(z), 4.0) << "seed " << seed << ": " << length_ratio(world, draft.map()) << " +- " << report.deviation;
+    squared_z += z * z;
+  }
+  EXPECT_GT(squared_z / kSeeds, 0.3);
+  EXPECT_LT(squared_z / kSeeds, 2.5);
+}
+
+TEST(ObserveScale, FindsTheUnitFromAFactorOfThreeEitherWay) {
+  for (const double factor : {1.0 / 3.0, 3.0}) {
+    const SimulatedMap world = ride(orbit(1), three_sides(), 8, factor, 1);
+    map::MapDraft draft = world.draft();
+    const MappingReport report = map_keyframe(KeyframeId(7), {}, kFeatures, draft);
+    EXPECT_TRUE(report.scale.observed);
+    EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);  // one measurement alone
+    EXPECT_NEAR(length_ratio(world, draft.map()), 1.0, 0.05) << factor;
+    map_keyframe(KeyframeId(7), {}, kFeatures, draft);
+    map_keyframe(KeyframeId(7), {}, kFeatures, draft);
+    EXPECT_EQ(draft.map().scale(), map::Scale::kMetric) << factor;
+    EXPECT_LE(draft.map().scale_deviation(), 0.02);
+    EXPECT_NEAR(length_ratio(world, draft.map()), 1.0, 3.5 * draft.map().scale_deviation()) << factor;
+    EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+  }
+}
+
+TEST(ObserveScale, StaysUnknownOnAStraightLine) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const SimulatedMap world = ride(straight_line(), three_sides(), 12, 1.5, seed);
+    map::MapDraft draft = world.draft();
+    for (int i = 0; i < 2; ++i) {
+      const MappingReport report = map_keyframe(KeyframeId(11), {}, kFeatures, draft);
+      EXPECT_TRUE(!report.scale.observed || report.scale.deviation > 0.1) << "seed " << seed << ": " << report.scale.deviation;
+    }
+    EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);
+  }
+}
+
+TEST(ObserveScale, LeavesOtherMapsAlone) {
+  SimulatedMap world = ride(orbit(1), three_sides(), 4, 1.5, 1);
+  for (const map::Scale scale : {map::Scale::kMetric, map::Scale::kUpToScale}) {
+    world.map.set_scale(scale);
+    map::MapDraft draft = world.draft();
+    EXPECT_FALSE(observe_scale(KeyframeId(3), {}, kFeatures, draft).observed);
+    EXPECT_EQ(draft.map().scale(), scale);
+    EXPECT_EQ(draft.map().keyframe(KeyframeId(3)).T_rig_world.translation(), world.map.keyframe(KeyframeId(3)).T_rig_world.translation());
+  }
+}
+
+TEST(ObserveScale, IsSilentAboutOneCameraAndOneKeyframe) {
+  const SimulatedMap one = ride(orbit(1), simulation::ring_rig(1), 5, 1.5, 1);
+  map::MapDraft draft = one.draft();
+  EXPECT_FALSE(observe_scale(KeyframeId(4), {}, kFeatures, draft).observed);
+  const SimulatedMap first = ride(orbit(1), three_sides(), 1, 1.5, 1);
+  map::MapDraft start = first.draft();
+  EXPECT_FALSE(observe_scale(KeyframeId(0), {}, kFeatures, start).observed);
+}
+
+TEST(SelectPart, FreesAllButTheRootWhileTheScaleIsUnknown) {
+  SimulatedMap world = ride(orbit(1), three_sides(), 5, 1.0, 1);
+  EXPECT_TRUE(needs_whole_part(world.map, KeyframeId(4), {.keyframes = 5}));
+  EXPECT_FALSE(needs_whole_part(world.map, KeyframeId(4), {.keyframes = 4}));
+  const adjustment::Selection s = select_part(world.map, KeyframeId(4));
+  EXPECT_EQ(s.fixed_keyframes, std::vector<KeyframeId>{KeyframeId(0)});
+  EXPECT_EQ(s.free_keyframes.size(), 4u);
+  EXPECT_EQ(s.landmarks, world.map.landmark_ids());
+  world.map.set_scale(map::Scale::kMetric);
+  EXPECT_FALSE(needs_whole_part(world.map, KeyframeId(4), {.keyframes = 5}));
+}
+
+TEST(IsMetric, AsksForTwoMeasurementsAndASettledMap) {
+  const ScaleReport sure{.observed = true, .correction = 1.01, .deviation = 0.01, .keyframes = 8};
+  EXPECT_TRUE(is_metric(sure, 0.015, {}));
+  EXPECT_FALSE(is_metric(sure, 0.03, {}));
+  EXPECT_FALSE(is_metric({true, 1.01, 0.03, 8}, 0.015, {}));
+  EXPECT_FALSE(is_metric({true, 1.10, 0.01, 8}, 0.015, {}));
+  EXPECT_FALSE(is_metric({true, 1.01, 0.01, 3}, 0.015, {}));
+  EXPECT_FALSE(is_metric({}, 0.015, {}));
+}
+
+}  // namespace
+}  // namespace bslam::mapping

@@ -1,0 +1,83 @@
+// Distance between two frames of a rig, against the truth of random rooms.
+#include "solver/generalised_scale.h"
+
+#include <gtest/gtest.h>
+
+#include "solver/scene.h"
+
+namespace bslam::solver {
+namespace {
+
+constexpr double kSigma = 1e-3;  // radians of a bearing
+
+Vector3d noisy(const Vector3d& bearing, Random& random) {
+  return (bearing + kSigma * Vector3d(random.normal(), random.normal(), random.normal())).normalized();
+}
+
+// Matches of every camera, `outlier_share` of them anywhere in view.
+std::vector<CameraPairs> see_twice(const Rig& rig, const SE3& T_b_a, int count, double outlier_share, Random& random) {
+  std::vector<CameraPairs> out;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    CameraPairs camera{rig.cam_from_rig(i), {}};  // camera 0 is the reference
+    while (camera.pairs.size() < static_cast<std::size_t>(count)) {
+      const Vector3d direction(random.uniform(-0.7, 0.7), random.uniform(-0.5, 0.5), 1.0);
+      const Vector3d point = random.uniform(1.5, 6.0) * direction.normalized();
+      const Vector3d moved = rig.cam_from_rig(i) * (T_b_a * (rig.rig_from_cam(i) * point));
+      const bool outlier = random.uniform() < outlier_share;
+      const Vector3d elsewhere = (moved.normalized() + 0.1 * scene::random_direction(random)).normalized();
+      camera.pairs.push_back({noisy(point.normalized(), random), outlier ? elsewhere : noisy(moved.normalized(), random)});
+    }
+    out.push_back(camera);
+  }
+  return out;
+}
+
+// The motion as one camera would have it: of unit length, and a little wrong.
+SE3 up_to_scale(const SE3& T_b_a, Random& random) {
+  const SE3 off = T_b_a.perturbed(scene::random_twist(random, 5e-4, 5e-3 * T_b_a.translation().norm()));
+  return {off.rotation(), off.translation().normalized()};
+}
+
+TEST(GeneralisedScale, FindsTheDistanceOfATurningRig) {
+  const Rig rig = scene::make_rig(3, scene::Models::kRadTan);
+  double squared_z = 0.0;
+  constexpr int kSeeds = 40;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed), "turning");
+    const SE3 T_b_a = SE3::exp(scene::random_twist(random, 0.2, 0.3));
+    const auto cameras = see_twice(rig, T_b_a, 300, 0.1, random);
+    const auto found = generalised_scale(up_to_scale(T_b_a, random), cameras);
+    ASSERT_TRUE(found.has_value()) << "seed " << seed;
+    const double ratio = found->T_b_a.translation().norm() / T_b_a.translation().norm();
+    const double z = (ratio - 1.0) / found->deviation;
+    EXPECT_LT(std::abs(z), 5.0) << "seed " << seed << ": " << ratio << " +- " << found->deviation;
+    EXPECT_LT(found->deviation, 0.1);
+    EXPECT_LT(scene::rotation_error(found->T_b_a, T_b_a), 1e-3);
+    EXPECT_GT(found->num_inliers, 700);
+    squared_z += z * z;
+  }
+  EXPECT_GT(squared_z / kSeeds, 0.4);  // the deviation means what it says
+  EXPECT_LT(squared_z / kSeeds, 2.5);
+}
+
+TEST(GeneralisedScale, IsNotDeterminedWithoutRotation) {
+  const Rig rig = scene::make_rig(3, scene::Models::kRadTan);
+  for (int seed = 0; seed < 20; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed), "straight");
+    const SE3 T_b_a(Eigen::Quaterniond::Identity(), 0.3 * scene::random_direction(random));
+    const auto found = generalised_scale(up_to_scale(T_b_a, random), see_twice(rig, T_b_a, 300, 0.1, random));
+    EXPECT_TRUE(!found || found->deviation > 0.3) << "seed " << seed << ": " << found->deviation;
+  }
+}
+
+TEST(GeneralisedScale, IsNotDeterminedByCamerasInOnePlace) {
+  Random random(1, "one place");
+  const Rig rig = scene::make_rig(1, scene::Models::kRadTan);
+  const SE3 T_b_a = SE3::exp(scene::random_twist(random, 0.2, 0.3));
+  const auto found = generalised_scale(up_to_scale(T_b_a, random), see_twice(rig, T_b_a, 300, 0.0, random));
+  EXPECT_TRUE(!found || found->deviation > 1.0);
+  EXPECT_FALSE(generalised_scale(SE3(), {}).has_value());
+}
+
+}  // namespace
+}  // namespace bslam::solver

@@ -1,0 +1,115 @@
+#include "tracking/camera_consensus.h"
+
+#include <gtest/gtest.h>
+
+#include "tracking/simulated_tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+using Flags = std::vector<std::uint8_t>;
+
+TEST(CameraConsensus, FlagsWhoLostWhatItSawWhileAnotherDidNot) {
+  const ConsensusOptions options;
+  EXPECT_EQ(disagreeing({{100, 80}, {100, 2}}, options), Flags({0, 1}));
+  EXPECT_EQ(disagreeing({{100, 3}, {100, 2}, {60, 50}}, options), Flags({1, 1, 0}));
+  EXPECT_EQ(disagreeing({{100, 80}, {100, 30}}, options), Flags({0, 0})) << "a hard frame is no wrong one";
+  EXPECT_EQ(disagreeing({{100, 80}, {10, 0}}, options), Flags({0, 0})) << "too little to judge by";
+  EXPECT_EQ(disagreeing({{100, 5}, {100, 2}}, options), Flags({0, 0})) << "nobody to judge by";
+}
+
+TEST(CameraConsensus, ReadmitsAfterSomeFramesThatFit) {
+  const ConsensusOptions options;
+  CameraTrust camera;
+  doubt(camera, {100, 0}, options);
+  for (int i = 1; i < options.readmit_after; ++i) {
+    doubt(camera, {100, 50}, options);
+    EXPECT_TRUE(camera.doubted);
+  }
+  doubt(camera, {100, 1}, options);  // from the beginning
+  for (int i = 0; i < options.readmit_after; ++i) {
+    EXPECT_TRUE(camera.doubted);
+    doubt(camera, {100, 50}, options);
+  }
+  EXPECT_FALSE(camera.doubted);
+}
+
+TEST(CameraConsensus, ForgetsWhereThereIsLongNothingToJudgeBy) {
+  const ConsensusOptions options;
+  CameraTrust camera;
+  for (int i = 0; i < options.forget_after; ++i) doubt(camera, {3, 0}, options);
+  EXPECT_FALSE(camera.doubted);
+}
+
+class WrongPictures : public ::testing::Test {
+ protected:
+  static const map::SimulatedMap& world() {
+    static const map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 2.0, 0.25);
+    return world;
+  }
+  // The frame, with the pictures of camera `from` in camera `to`: its keypoints as the rig would take them to be.
+  static simulation::SimulatedFrame with_pictures_of(int i, std::size_t to, std::size_t from) {
+    simulation::SimulatedFrame seen = world().sim.frame(FrameId(i), 0.05 * i);
+    frame::CameraFrame& camera = seen.frame.cameras[to];
+    const camera::Rig& rig = world().map.rig();
+    camera.keypoints = seen.frame.cameras[from].keypoints;
+    for (std::size_t k = 0; k < camera.keypoints.size(); ++k) {
+      const auto bearing = rig.camera(to).unproject(camera.keypoints.pixel[k].cast<double>());
+      if (bearing) camera.keypoints.bearing[k] = *bearing;
+    }
+    camera.grid = frame::FeatureGrid(camera.keypoints, rig.camera(to).width, rig.camera(to).height);
+    seen.frame.bundled = frame::make_bundled(rig, seen.frame.cameras, {}, 5e-4, 7.81);
+    return seen;
+  }
+};
+
+TEST_F(WrongPictures, AreLeftOutAtOnceAndTheirCameraComesBackWithItsOwn) {
+  SimulatedTracker tracker(world());
+  const int readmitted = 20 + ConsensusOptions{}.readmit_after;
+  for (int i = 1; i < 30; ++i) {
+    const bool wrong = i >= 10 && i < 20;
+    const auto seen = wrong ? with_pictures_of(i, 2, 3) : world().sim.frame(FrameId(i), 0.05 * i);
+    const TrackOutput out = tracker.track(seen.frame);
+    ASSERT_EQ(out.result.status, TrackStatus::kTracking) << i;
+    EXPECT_LT(map::distance_m(out.result.T_rig_world, seen.T_world_rig.inverse()), 0.012) << i;
+    EXPECT_EQ(out.result.cameras[2].doubted, i >= 10 && i < readmitted) << i;
+    EXPECT_EQ(out.result.cameras[2].inliers > 0, !out.result.cameras[2].doubted) << i;
+    for (const std::size_t c : {0, 1, 3}) EXPECT_FALSE(out.result.cameras[c].doubted) << "camera " << c << ", frame " << i;
+  }
+}
+
+TEST_F(WrongPictures, InAllCamerasButOneLeaveThatOneToGoOn) {
+  SimulatedTracker tracker(world());
+  for (int i = 1; i < 20; ++i) {
+    auto seen = world().sim.frame(FrameId(i), 0.05 * i);
+    if (i >= 8) {
+      for (const std::size_t c : {0, 1, 2}) seen.frame.cameras[c] = with_pictures_of(i, c, (c + 2) % 4).frame.cameras[c];
+      seen.frame.bundled = frame::make_bundled(world().map.rig(), seen.frame.cameras, {}, 5e-4, 7.81);
+    }
+    const TrackOutput out = tracker.track(seen.frame);
+    ASSERT_EQ(out.result.status, TrackStatus::kTracking) << i;
+    EXPECT_LT(map::distance_m(out.result.T_rig_world, seen.T_world_rig.inverse()), 0.03) << i;
+    EXPECT_FALSE(out.result.cameras[3].doubted) << i;
+    EXPECT_EQ(out.result.cameras[2].doubted, i >= 8) << i;
+  }
+}
+
+TEST(LeavingOutACamera, KeepsTheFeaturesOfTheOthers) {
+  const auto sim = simulator(simulation::ring_rig(3));
+  frame::BundledFrame frame = sim.frame(FrameId(1), 0.5).frame;
+  const std::size_t others = frame.cameras[0].keypoints.size() + frame.cameras[1].keypoints.size();
+  leave_out(sim.rig(), 2, 5e-4, 7.81, frame);
+  EXPECT_EQ(frame.num_keypoints(), others);
+  EXPECT_EQ(frame.cameras[2].state, image::ImageState::kMissing);
+  std::size_t keypoints = 0;
+  for (std::size_t f = 0; f < frame.bundled.size(); ++f) {
+    for (const frame::KeypointRef r : frame.bundled.keypoints(FeatureId(f))) {
+      EXPECT_NE(r.camera, CameraIndex(2));
+      ++keypoints;
+    }
+  }
+  EXPECT_EQ(keypoints, others);
+}
+
+}  // namespace
+}  // namespace bslam::tracking

@@ -1,0 +1,192 @@
+#include "tracking/feature_budget.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <Eigen/LU>
+
+#include "tracking/simulated_tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+using geometry::Matrix6d;
+
+constexpr std::size_t kMany = 6;
+
+feature::FeatureOptions options(int per_image, int per_rig) {
+  feature::FeatureOptions o;
+  o.per_image = per_image;
+  o.per_rig = per_rig;
+  return o;
+}
+
+int sum_of(const std::vector<int>& budgets) { return std::accumulate(budgets.begin(), budgets.end(), 0); }
+double sum_of(const std::vector<double>& shares) { return std::accumulate(shares.begin(), shares.end(), 0.0); }
+
+TEST(FeatureBudgets, AreEvenAsLongAsNothingIsKnown) {
+  EXPECT_EQ(feature_budgets(1, {}, {}, options(1200, 3200)), std::vector<int>(1, 1200));
+  EXPECT_EQ(feature_budgets(2, {}, {}, options(1200, 3200)), std::vector<int>(2, 1200));
+  EXPECT_EQ(feature_budgets(4, {}, {}, options(1200, 3200)), std::vector<int>(4, 800));
+  EXPECT_EQ(feature_budgets(4, {}, {}, options(1200, 0)), std::vector<int>(4, 1200));
+}
+
+TEST(FeatureBudgets, FollowTheSharesBeyondHalfOfTheEvenOne) {
+  EXPECT_EQ(feature_budgets(4, std::vector<double>{0.4, 0.3, 0.2, 0.1}, {}, options(1200, 3200)), (std::vector<int>{1040, 880, 720, 560}));
+  // The first would get 2000: what is beyond its cap goes to the others.
+  EXPECT_EQ(feature_budgets(4, std::vector<double>{1, 0, 0, 0}, {}, options(1200, 3200)), (std::vector<int>{1200, 667, 667, 667}));
+}
+
+TEST(FeatureBudgets, GiveToTheOthersWhatACameraThatIsOutDoesNotNeed) {
+  const std::vector<std::uint8_t> out{0, 1, 0, 0};
+  EXPECT_EQ(feature_budgets(4, {}, out, options(1200, 3000)), (std::vector<int>{1000, 0, 1000, 1000}));
+  EXPECT_EQ(feature_budgets(2, {}, std::vector<std::uint8_t>{1, 1}, options(1200, 3000)), (std::vector<int>{0, 0}));
+}
+
+TEST(FeatureBudgets, KeepToTheirBoundsForAnyShares) {
+  Random random(3, "shares");
+  for (int trial = 0; trial < 500; ++trial) {
+    const std::size_t n = 1 + random.below(8);
+    std::vector<double> shares(n);
+    std::vector<std::uint8_t> out(n);
+    for (std::size_t c = 0; c < n; ++c) {
+      shares[c] = std::pow(random.uniform(), 4);
+      out[c] = random.uniform() < 0.2;
+    }
+    const feature::FeatureOptions o = options(1000, 500 + static_cast<int>(random.below(9000)));
+    const auto seeing = static_cast<int>(std::count(out.begin(), out.end(), 0));
+    if (seeing == 0) continue;
+    const std::vector<int> budgets = feature_budgets(n, shares, out, o);
+    const int total = std::min(o.per_rig, seeing * o.per_image);
+    EXPECT_NEAR(sum_of(budgets), total, 0.5 * seeing);
+    for (std::size_t c = 0; c < n; ++c) {
+      EXPECT_LE(budgets[c], out[c] ? 0 : o.per_image);
+      EXPECT_GE(budgets[c], out[c] ? 0 : total / (2 * seeing));
+    }
+  }
+}
+
+// What cameras tell a keypoint: some directions of the pose more than others.
+std::vector<Matrix6d> random_information(Random& random, std::size_t cameras) {
+  std::vector<Matrix6d> out;
+  for (std::size_t c = 0; c < cameras; ++c) {
+    Eigen::Matrix<double, 6, 8> J;
+    for (Eigen::Index i = 0; i < J.size(); ++i) J(i) = random.normal() * std::exp(random.normal());
+    out.push_back(J * J.transpose());
+  }
+  return out;
+}
+
+Matrix6d weighed(const std::vector<Matrix6d>& each, const std::vector<double>& shares) {
+  Matrix6d all = Matrix6d::Zero();
+  for (std::size_t c = 0; c < each.size(); ++c) all += shares[c] * each[c];
+  return all;
+}
+
+// Frames in which camera c tells its share of each[c].
+std::vector<double> after_frames(int frames, const std::vector<Matrix6d>& each, std::vector<double> shares) {
+  const std::vector<std::uint8_t> seeing(each.size(), 1);
+  for (int k = 0; k < frames; ++k) {
+    std::vector<Matrix6d> told;
+    for (std::size_t c = 0; c < each.size(); ++c) told.push_back(shares[c] * each[c]);
+    const double before = weighed(each, shares).determinant();
+    shares = feature_shares(shares, told, seeing);
+    EXPECT_NEAR(sum_of(shares), 1.0, 1e-9);
+    EXPECT_GE(weighed(each, shares).determinant(), before * (1 - 1e-9));
+  }
+  return shares;
+}
+
+TEST(FeatureShares, MakeTheMostOfTheInformationAboutThePose) {
+  Random random(1, "design");
+  for (int trial = 0; trial < 10; ++trial) {
+    const std::vector<Matrix6d> each = random_information(random, 2);
+    const std::vector<double> shares = after_frames(2000, each, {0.5, 0.5});
+    double best = 0, best_share = 0;
+    for (int i = 0; i <= 1000; ++i) {
+      const double d = weighed(each, {0.001 * i, 1 - 0.001 * i}).determinant();
+      if (d > best) best_share = 0.001 * i;
+      best = std::max(best, d);
+    }
+    EXPECT_NEAR(shares[0], best_share, 0.01);
+  }
+  after_frames(200, random_information(random, kMany), std::vector<double>(kMany, 1.0 / kMany));
+}
+
+TEST(FeatureShares, FollowSlowly) {
+  const std::vector<Matrix6d> information{Matrix6d::Identity(), 99 * Matrix6d::Identity()};
+  const std::vector<double> shares = feature_shares({}, information, std::vector<std::uint8_t>{1, 1});
+  EXPECT_LT(shares[0], 0.5);
+  EXPECT_GT(shares[0], 0.4);
+}
+
+TEST(FeatureShares, LeaveThoseOfCamerasWithoutAnImage) {
+  const std::vector<double> before{0.5, 0.2, 0.3};
+  const std::vector<Matrix6d> information{9 * Matrix6d::Identity(), Matrix6d::Zero(), Matrix6d::Identity()};
+  const std::vector<double> shares = feature_shares(before, information, std::vector<std::uint8_t>{1, 0, 1});
+  EXPECT_EQ(shares[1], 0.2);
+  EXPECT_GT(shares[0], 0.5);
+  EXPECT_NEAR(sum_of(shares), 1.0, 1e-12);
+}
+
+TEST(FeatureShares, BecomeEvenWhereThePoseIsUnknown) {
+  std::vector<double> shares{0.7, 0.1, 0.2};
+  for (int k = 0; k < 100; ++k) shares = feature_shares(shares, {}, std::vector<std::uint8_t>{1, 1, 1});
+  for (const double s : shares) EXPECT_NEAR(s, 1.0 / 3, 1e-3);
+}
+
+class TrackedFrame : public ::testing::Test {
+ protected:
+  TrackedFrame() : seen(world.sim.frame(FrameId(1), 0.1)) {
+    SimulatedTracker tracker(world);
+    frame = seen.frame;
+    const TrackInput input{.map = world.map, .pyramids = pyramids, .state = tracker.state, .noise = {world.sim.options().sigma_px}};
+    ThreadPool pool(2);
+    output = track(input, frame, tracker.options, pool);
+  }
+  map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 0.0, 1.0);
+  std::vector<image::Pyramid> pyramids = map::flat_pyramids(4);
+  simulation::SimulatedFrame seen;
+  frame::BundledFrame frame;
+  TrackOutput output;
+};
+
+TEST_F(TrackedFrame, TellsWhatThePoseSolverKnows) {
+  ASSERT_EQ(output.result.status, TrackStatus::kTracking);
+  const auto information = information_by_camera(world.map, frame, output.matches, output.result.T_rig_world);
+  ASSERT_EQ(information.size(), 4u);
+  Matrix6d all = Matrix6d::Zero();
+  for (const Matrix6d& i : information) all += i;
+  const auto observations = pose_observations(world.map, frame, output.matches);
+  solver::PoseSolverOptions accept_all;
+  const auto solution = solver::solve_pose(frame::rig_of(world.map.rig(), frame), observations, output.result.T_rig_world, accept_all);
+  ASSERT_GT(solution.num_inliers, static_cast<int>(0.99 * static_cast<double>(observations.size())));
+  EXPECT_LT((all - solution.information).norm(), 0.02 * all.norm());
+}
+
+TEST_F(TrackedFrame, MovesSharesTowardsWhatHelpsThePose) {
+  const std::vector<double> shares = feature_shares({}, world.map, frame, output);
+  EXPECT_NEAR(sum_of(shares), 1.0, 1e-9);
+  EXPECT_LT(shares[0] + shares[1], 0.5);  // two of the four cameras look into one direction
+  const std::vector<double> again = feature_shares({}, world.map, frame, output);
+  EXPECT_EQ(shares, again);
+}
+
+TEST_F(TrackedFrame, TakesFromACameraThatFindsNothing) {
+  output.matches[2].clear();
+  const std::vector<double> shares = feature_shares({}, world.map, frame, output);
+  EXPECT_LT(shares[2], 0.25);
+}
+
+TEST_F(TrackedFrame, TakesFromADoubtedCamera) {
+  output.matches[2].clear();
+  output.result.cameras[2].doubted = true;
+  frame.cameras[2].state = image::ImageState::kMissing;
+  EXPECT_LT(feature_shares({}, world.map, frame, output)[2], 0.25);
+}
+
+}  // namespace
+}  // namespace bslam::tracking
