@@ -18,10 +18,7 @@ struct CameraPose {
   Vector3d t;  // metres
 };
 
-CameraPose camera_pose(const Rig& rig, std::size_t i, const SE3& T_rig_world) {
-  const SE3 T_cam_world = rig.cam_from_rig(i) * T_rig_world;
-  return {T_cam_world.matrix3(), T_cam_world.translation()};
-}
+CameraPose camera_pose(const SE3& T_cam_world) { return {T_cam_world.matrix3(), T_cam_world.translation()}; }
 
 // Squared normalised error; beyond every bound where the point does not project.
 template <class Model>
@@ -83,18 +80,17 @@ struct AdmitWithinBound {
   }
 };
 
-// T_cam_rig exp(delta) = exp(Ad delta) T_cam_rig turns a camera's equations into the rig's.
-void add_in_rig(const SE3& T_cam_rig, const PoseEquations& camera, PoseEquations& rig) {
-  const Matrix6d ad = T_cam_rig.adjoint();
-  rig.H += ad.transpose() * camera.H * ad;
-  rig.b += ad.transpose() * camera.b;
+// A camera's equations in those of the rig.
+void add_in_rig(const Matrix6d& J, const PoseEquations& camera, PoseEquations& rig) {
+  rig.H += J.transpose() * camera.H * J;
+  rig.b += J.transpose() * camera.b;
   rig.cost += camera.cost;
 }
 
 }  // namespace
 
-PoseProblem::PoseProblem(const Rig& rig, std::span<const PoseObservation> observations)
-    : rig_(&rig), items_(observations.size()), first_(rig.size() + 1, 0) {
+PoseProblem::PoseProblem(const Rig& rig, std::span<const PoseObservation> observations, const MotionModel* motion)
+    : rig_(&rig), motion_(motion), items_(observations.size()), first_(rig.size() + 1, 0) {
   for (const PoseObservation& o : observations) {
     BSLAM_ASSERT(o.camera.valid() && o.camera.index() < rig.size(), "an observation names a camera of the rig");
     BSLAM_ASSERT(o.sigma > 0, "a standard deviation is positive");
@@ -108,11 +104,22 @@ PoseProblem::PoseProblem(const Rig& rig, std::span<const PoseObservation> observ
   }
 }
 
+// T exp(delta) = exp(Ad_T delta) T. With T_cam_rig = T_i0 exp(delay twist), the pose's change moves the camera directly and by
+// the change of the twist, gain * delta; the latter to first order in delay times twist.
+PoseProblem::CameraMotion PoseProblem::camera_motion(std::size_t i, const SE3& T_rig_world) const {
+  const SE3& T_i0 = rig_->cam_from_rig(i);
+  const double delay = motion_ != nullptr ? motion_->delay_s[i] : 0.0;
+  if (delay == 0.0) return {T_i0, T_i0.adjoint()};
+  const SE3 half = SE3::exp(0.5 * delay * motion_->twist(T_rig_world));
+  const SE3 T_cam_rig = T_i0 * half * half;
+  return {T_cam_rig, T_cam_rig.adjoint() + delay * motion_->gain * (T_i0 * half).adjoint()};
+}
+
 int PoseProblem::select(const SE3& T_rig_world, double bound) {
   int changed = 0;
   const AdmitWithinBound admit{bound, changed, num_in_use_};
   for (std::size_t i = 0; i < rig_->size(); ++i) {
-    const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
+    const CameraPose pose = camera_pose(camera_motion(i, T_rig_world).T_cam_rig * T_rig_world);
     std::visit(
         [&](const auto& model) {
           for (Item& item : of_camera(i)) admit(item, squared_error(model, pose, item));
@@ -125,11 +132,12 @@ int PoseProblem::select(const SE3& T_rig_world, double bound) {
 PoseEquations PoseProblem::linearise(const SE3& T_rig_world, Kernel kernel) const {
   PoseEquations out;
   for (std::size_t i = 0; i < rig_->size(); ++i) {
-    const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
+    const CameraMotion motion = camera_motion(i, T_rig_world);
+    const CameraPose pose = camera_pose(motion.T_cam_rig * T_rig_world);
     PoseEquations camera;
     std::visit([&](const auto& model) { accumulate_camera(model, pose, of_camera(i), kernel, AdmitInUse{}, camera); },
                rig_->camera(i).model);
-    add_in_rig(rig_->cam_from_rig(i), camera, out);
+    add_in_rig(motion.J, camera, out);
   }
   return out;
 }
@@ -139,11 +147,12 @@ PoseEquations PoseProblem::reselect_and_linearise(const SE3& T_rig_world, Kernel
   changed = 0;
   const AdmitWithinBound admit{bound, changed, num_in_use_};
   for (std::size_t i = 0; i < rig_->size(); ++i) {
-    const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
+    const CameraMotion motion = camera_motion(i, T_rig_world);
+    const CameraPose pose = camera_pose(motion.T_cam_rig * T_rig_world);
     PoseEquations camera;
     std::visit([&](const auto& model) { accumulate_camera(model, pose, of_camera(i), kernel, admit, camera); },
                rig_->camera(i).model);
-    add_in_rig(rig_->cam_from_rig(i), camera, out);
+    add_in_rig(motion.J, camera, out);
   }
   return out;
 }
@@ -151,7 +160,7 @@ PoseEquations PoseProblem::reselect_and_linearise(const SE3& T_rig_world, Kernel
 double PoseProblem::truncated_cost(const SE3& T_rig_world, double bound, double limit) const {
   double cost = 0.0;
   for (std::size_t i = 0; i < rig_->size() && cost <= limit; ++i) {
-    const CameraPose pose = camera_pose(*rig_, i, T_rig_world);
+    const CameraPose pose = camera_pose(camera_motion(i, T_rig_world).T_cam_rig * T_rig_world);
     std::visit(
         [&](const auto& model) {
           for (const Item& item : of_camera(i)) {

@@ -26,7 +26,8 @@ class PoseProblem {
     bool in_use;
   };
 
-  PoseProblem(const Rig& rig, std::span<const PoseObservation> observations);
+  // `rig` and `motion` outlive this; without a motion all cameras fire together.
+  PoseProblem(const Rig& rig, std::span<const PoseObservation> observations, const MotionModel* motion = nullptr);
 
   const Rig& rig() const { return *rig_; }
   std::span<const Item> items() const { return items_; }
@@ -48,7 +49,15 @@ class PoseProblem {
     return {items_.data() + first_[i], items_.data() + first_[i + 1]};
   }
 
+  // T_cam_rig of camera i at the time of its image, and how its pose follows that of the rig: exp(J delta) with J of (6, 6).
+  struct CameraMotion {
+    SE3 T_cam_rig;
+    geometry::Matrix6d J;
+  };
+  CameraMotion camera_motion(std::size_t i, const SE3& T_rig_world) const;
+
   const Rig* rig_;
+  const MotionModel* motion_;
   std::vector<Item> items_;         // by camera, within a camera in the caller's order
   std::vector<std::size_t> first_;  // per camera and one more
   int num_in_use_ = 0;

@@ -84,4 +84,10 @@ PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observa
   return solve_rounds(problem, T_rig_world_guess, options.first_chi2, options);
 }
 
+PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
+                        const MotionModel& motion, const PoseSolverOptions& options) {
+  PoseProblem problem(rig, observations, &motion);
+  return solve_rounds(problem, T_rig_world_guess, options.first_chi2, options);
+}
+
 }  // namespace bslam::solver

@@ -31,6 +31,18 @@ struct PoseSolverOptions {
   }
 };
 
+// How a rig whose cameras fire one after the other goes on moving from its pose, given the one before it: the twist at a pose
+// is gain * log(T_rig_world T_before^-1) + offset. Its dependence on the pose is part of the problem: left out, an error of
+// the pose would make one of the twist, and that the next of the pose.
+struct MotionModel {
+  std::vector<double> delay_s;  // per camera: time of its image after that of the pose
+  SE3 T_before;                 // T_rig_world of the frame before
+  double gain = 0.0;            // 1/s
+  geometry::Vector6d offset = geometry::Vector6d::Zero();  // rad/s, m/s
+
+  geometry::Vector6d twist(const SE3& T_rig_world) const { return gain * (T_rig_world * T_before.inverse()).log() + offset; }
+};
+
 struct PoseSolution {
   bool ok = false;  // enough inliers and a well-conditioned system
   SE3 T_rig_world;
@@ -46,6 +58,9 @@ struct PoseSolution {
 // order of the sums. Deterministic. Not ok: the pose is the best found and nothing to rely on.
 PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
                         const PoseSolverOptions& options);
+// The same with cameras that move as the model says; `rig` is the rig at rest.
+PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
+                        const MotionModel& motion, const PoseSolverOptions& options);
 
 struct PoseRansacOptions {
   int iterations = 200;       // samples at most

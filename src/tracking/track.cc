@@ -64,24 +64,23 @@ frame::ProjectionSearchOptions search_options(const TrackInput& input, const Mat
   return {.radius = radius, .max_hamming = matching.max_hamming, .ratio = matching.ratio, .scale_factor = input.scale_factor};
 }
 
-// Between the last frame and this one, at its pose as far as it is known.
-std::optional<geometry::Vector6d> twist_to(const TrackInput& input, const SE3& T_rig_world, TimeNs time_ns) {
-  const double dt = to_seconds(time_ns - input.state.time_ns);
-  if (dt <= 0 || dt > kMaxPrediction_s) return std::nullopt;
-  const SE3 last = input.state.T_rig_reference * input.map.resolved_pose(input.state.reference);
-  return ((T_rig_world * last.inverse()).log() / dt).eval();
-}
-
-// Motion while the cameras of a frame fire, from that of the last two intervals, with the acceleration between them. Poses say
-// it, never the late cameras themselves: what they see again they saw first at a place that had the same error.
-geometry::Vector6d twist_in(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world) {
-  const auto now = twist_to(input, T_rig_world, frame.time_ns);
-  if (!now) return frame.twist;
-  if (!input.state.twist) return *now;
+// Motion while the cameras of a frame fire: that since the last frame, going on with the acceleration it had against the
+// interval before. The poses say it, never the late cameras alone: what these see again they saw first with the same error.
+solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFrame& frame) {
+  solver::MotionModel motion{.delay_s = frame::delays_of(frame), .T_before = input.state.T_rig_reference * input.map.resolved_pose(input.state.reference)};
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
+  if (dt <= 0 || dt > kMaxPrediction_s) {
+    motion.offset = frame.twist;  // nothing newer is known
+    return motion;
+  }
+  motion.gain = 1.0 / dt;
+  if (!input.state.twist) return motion;
   double latest = 0;
-  for (const double d : frame::delays_of(frame)) latest = std::abs(d) > std::abs(latest) ? d : latest;
-  return *now + (*now - *input.state.twist) * (0.5 * (dt + latest) / dt);
+  for (const double d : motion.delay_s) latest = std::abs(d) > std::abs(latest) ? d : latest;
+  const double ahead = 0.5 * (dt + latest) / dt;  // from the middle of the interval, in intervals
+  motion.gain = (1.0 + ahead) / dt;
+  motion.offset = -ahead * *input.state.twist;
+  return motion;
 }
 
 // Pose from what is found near where the motion model puts it. False where that is too little.
@@ -96,7 +95,8 @@ bool track_by_prediction(const TrackInput& input, frame::BundledFrame& frame, co
   drop(left_out, found);
   auto observations = pose_observations(map, frame, found, input.noise);
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
-  auto solution = solver::solve_pose(rig, observations, predicted, options.pose);
+  const solver::MotionModel motion = motion_model(input, frame);
+  auto solution = solver::solve_pose(map.rig(), observations, predicted, motion, options.pose);
   if (any(contradicting(found, solution.inliers_per_camera, options.consensus))) {
     const auto steadiest = believe_the_steadiest(rig, found, observations, predicted, options.consensus, options.pose);
     if (steadiest.ok) {
@@ -104,11 +104,11 @@ bool track_by_prediction(const TrackInput& input, frame::BundledFrame& frame, co
       for (std::size_t c = 0; c < wrong.size(); ++c) left_out[c] |= wrong[c];
       drop(left_out, found);
       observations = pose_observations(map, frame, found, input.noise);
-      solution = solver::solve_pose(rig, observations, steadiest.T_rig_world, options.pose);
+      solution = solver::solve_pose(map.rig(), observations, steadiest.T_rig_world, motion, options.pose);
     }
   }
   if (!supported(solution, observations.size(), options.min_inliers, options)) return false;
-  frame.twist = twist_in(input, frame, solution.T_rig_world);
+  frame.twist = motion.twist(solution.T_rig_world);
   out.T_rig_world = solution.T_rig_world;
   out.matches = keep_inliers(found, solution.inlier);
   out.reason = LostReason::kNone;
@@ -171,9 +171,9 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::Bund
   out.visible = std::move(search.visible);
   const std::vector<KeypointPlace> before = places(frame, out.matches);
   align_matches(map, coarse.T_rig_world, out.matches, input.pyramids, options.alignment, input.noise, frame, pool);
-  out.solution = solver::solve_pose(frame::rig_of(map.rig(), frame), pose_observations(map, frame, out.matches), coarse.T_rig_world,
-                                    options.pose);
-  frame.twist = twist_in(input, frame, out.solution.T_rig_world);
+  const solver::MotionModel motion = motion_model(input, frame);
+  out.solution = solver::solve_pose(map.rig(), pose_observations(map, frame, out.matches), coarse.T_rig_world, motion, options.pose);
+  frame.twist = motion.twist(out.solution.T_rig_world);
   restore_outliers(out.matches, out.solution.inlier, before, frame);
   return out;
 }
@@ -249,7 +249,9 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, c
   result.reference = state.reference;
   result.T_rig_reference = state.T_rig_reference;
 
-  state.twist = twist_to(input, result.T_rig_world, frame.time_ns);
+  const double dt = to_seconds(frame.time_ns - input.state.time_ns);
+  state.twist.reset();
+  if (dt > 0 && dt < kMaxPrediction_s) state.twist = (result.T_rig_world * motion_model(input, frame).T_before.inverse()).log() / dt;
   state.status = TrackStatus::kTracking;
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);
