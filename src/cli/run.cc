@@ -113,6 +113,16 @@ Status write_files(const session::SessionResult& result, const system::Config& c
   return io::write_map(*result.map, {vocabulary.id(), result.record.version, result.record.data}, arguments.save_map);
 }
 
+void warn_of_extrinsics(const report::RunRecord& record) {
+  for (const report::CameraRecord& camera : record.cameras) {
+    const auto& e = camera.extrinsics;
+    if (!e || !e->suspect) continue;
+    std::fprintf(stderr, "warning: %s: the images put it %.2f deg and %.1f mm away from where the rig file does%s\n",
+                 camera.name.c_str(), e->change_deg, e->change_mm,
+                 e->refined ? "" : "; --set extrinsics.refine=true accepts that");
+  }
+}
+
 void print_result(const report::RunRecord& record, const std::string& out) {
   const auto tracked = std::count_if(record.frames.begin(), record.frames.end(), [](const report::FrameRecord& f) {
     return f.outcome == report::FrameOutcome::kTracked;
@@ -158,6 +168,7 @@ int run(const RunArguments& arguments) {
   bar.finish();
   if (!result) return report_error(result.error());
   if (const Status s = write_files(*result, *config, arguments, **vocabulary); !s) return report_error(s.error());
+  warn_of_extrinsics(result->record);
   print_result(result->record, arguments.out);
   if (!result->record.complete) return kExitInterrupted;
   return result->live.empty() ? kExitNothingTracked : kExitOk;

@@ -98,6 +98,8 @@ class BundledMap {
     scale_deviation_ = deviation;
   }
   void set_version(MapVersion v) { version_ = v; }
+  // The same cameras with other extrinsics; poses and landmarks stay where they are.
+  void set_rig(std::shared_ptr<const camera::Rig> rig) { rig_ = std::move(rig); }
   void begin_gauge_epoch() { ++gauge_epoch_; }
 
   // Appends a keyframe observing the given landmarks (alive, distinct features, distinct landmarks); its parent becomes

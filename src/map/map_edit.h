@@ -23,7 +23,7 @@
 // | RemovePart        | dropped where it is gone already or has become part of another                               |
 // | AddSightings      | forwarded along merges, entries dropped where gone                                           |
 // | RefreshLandmarks  | forwarded along merges, entries dropped where gone                                           |
-// | SetScale          | the later one holds                                                                          |
+// | SetScale, SetRig  | the later one holds                                                                          |
 // An edit that corrects the map (SetPoses::correction, ScalePart) is refused as a whole where another correction was committed since
 // its base: half of it, landmarks merged and parts hung together that were not moved, would tear the map.
 // So the order in which a new keyframe and a correction of its surroundings are committed does not change where it ends
@@ -102,8 +102,13 @@ struct SetScale {
   double deviation = 0;
 };
 
+struct SetRig {
+  std::shared_ptr<const camera::Rig> rig;
+};
+
 using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark, MergeLandmarks,
-                               RemoveKeyframe, JoinParts, RemovePart, ScalePart, SetPoses, AddSightings, RefreshLandmarks, SetScale>;
+                               RemoveKeyframe, JoinParts, RemovePart, ScalePart, SetPoses, AddSightings, RefreshLandmarks, SetScale,
+                               SetRig>;
 
 struct MapEdit {
   std::string_view stage;  // a literal
@@ -143,6 +148,7 @@ class MapDraft {
   void refresh_landmarks(std::vector<LandmarkId> landmarks);
   void set_scale(Scale scale);  // nothing more being known of it than its name says
   void set_scale(Scale scale, double deviation);
+  void set_rig(camera::Rig rig);  // the same cameras with other extrinsics
 
   // The edit and the working copy, which MapStore publishes as it is where the base is still the newest version.
   struct Finished {

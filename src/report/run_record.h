@@ -58,11 +58,18 @@ struct CameraInterval {
   double from_s = 0.0, to_s = 0.0;
 };
 
+// What the images of the run say about the extrinsics of a camera.
+struct ExtrinsicsRecord {
+  double change_deg = 0.0, change_mm = 0.0, std_deg = 0.0, std_mm = 0.0;  // from the calibrated ones
+  bool rotation_observed = false, translation_observed = false, suspect = false, refined = false;
+};
+
 struct CameraRecord {
   std::string name;
   std::int64_t images = 0;
   std::int64_t skipped = 0;  // listed in the data set, but not readable or without partners in time
   std::vector<CameraInterval> states;
+  std::optional<ExtrinsicsRecord> extrinsics = {};  // none of camera 0, which is the rig
 };
 
 struct MapRecord {

@@ -39,6 +39,17 @@ ordered_json frames_json(const RunRecord& record) {
           {"lost_intervals", intervals}};
 }
 
+ordered_json extrinsics_json(const std::optional<ExtrinsicsRecord>& e) {
+  if (!e) return nullptr;
+  return {{"change_deg", rounded(e->change_deg, 4)},
+          {"std_deg", rounded(e->std_deg, 4)},
+          {"change_mm", rounded(e->change_mm, 2)},
+          {"std_mm", rounded(e->std_mm, 2)},
+          {"observed", {{"rotation", e->rotation_observed}, {"translation", e->translation_observed}}},
+          {"suspect", e->suspect},
+          {"refined", e->refined}};
+}
+
 ordered_json cameras_json(const RunRecord& record) {
   ordered_json cameras = ordered_json::array();
   for (const CameraRecord& camera : record.cameras) {
@@ -50,7 +61,8 @@ ordered_json cameras_json(const RunRecord& record) {
                         {"to", seconds(interval.to_s)}});
     }
     cameras.push_back(
-        {{"name", camera.name}, {"images", camera.images}, {"skipped", camera.skipped}, {"states", states}});
+        {{"name", camera.name}, {"images", camera.images}, {"skipped", camera.skipped}, {"states", states},
+         {"extrinsics", extrinsics_json(camera.extrinsics)}});
   }
   return cameras;
 }

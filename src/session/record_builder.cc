@@ -43,6 +43,24 @@ report::CameraInterval camera_state(const report::FrameRecord& frame, system::Ou
   return {"ok", "", frame.time_s, frame.time_s};
 }
 
+// Frames without an image of camera c that are no outage: it fires at a lower rate than the frames come.
+std::vector<std::uint8_t> between_images(const std::vector<system::FrameRecord>& frames, std::size_t c) {
+  std::vector<std::size_t> at;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    if (frames[k].images[c] == image::ImageState::kPresent) at.push_back(k);
+  }
+  std::vector<std::uint8_t> out(frames.size(), 0);
+  if (at.size() < 2) return out;
+  std::vector<std::size_t> steps;
+  for (std::size_t i = 1; i < at.size(); ++i) steps.push_back(at[i] - at[i - 1]);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  for (std::size_t i = 1; i < at.size(); ++i) {
+    if (at[i] - at[i - 1] <= *middle) std::fill(out.begin() + static_cast<std::ptrdiff_t>(at[i - 1]), out.begin() + static_cast<std::ptrdiff_t>(at[i]), std::uint8_t{1});
+  }
+  return out;
+}
+
 void add_cameras(const RecordInput& input, RunRecord& record) {
   const auto& frames = input.system.frames();
   for (std::size_t c = 0; c < input.dataset.rig.size(); ++c) {
@@ -52,14 +70,24 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
       camera.images += f.images[c] == image::ImageState::kPresent;
       camera.skipped += f.images[c] == image::ImageState::kDamaged;
     }
-    auto seen = frames.begin();
+    const std::vector<std::uint8_t> pause = between_images(frames, c);
+    std::size_t next = 0;
     for (const report::FrameRecord& f : record.frames) {
       if (f.cameras.empty()) continue;  // dropped: the system never saw it
-      const report::CameraInterval state = camera_state(f, (seen++)->outages[c], c);
+      const std::size_t k = next++;
+      const bool waiting = pause[k] && frames[k].outages[c] == system::Outage::kNoImage;
+      const report::CameraInterval state =
+          waiting ? report::CameraInterval{"ok", "", f.time_s, f.time_s} : camera_state(f, frames[k].outages[c], c);
       if (camera.states.empty() || camera.states.back().state != state.state || camera.states.back().reason != state.reason) {
         camera.states.push_back(state);
       }
       camera.states.back().to_s = f.time_s;
+    }
+    const auto& found = input.system.extrinsics().cameras;
+    if (c > 0 && c < found.size()) {
+      const adjustment::CameraRefinement& r = found[c];
+      camera.extrinsics = {r.change_deg, r.change_mm, r.std_deg, r.std_mm, r.rotation_observed(), r.translation_observed(),
+                           r.suspect, input.config.extrinsics.refine};
     }
     record.cameras.push_back(std::move(camera));
   }
@@ -83,6 +111,10 @@ void add_stages(const RecordInput& input, RunRecord& record) {
   if (input.system.final_adjustment_ms() > 0 && !input.inputs.empty()) {
     report::add_stage_sample(record, "global adjustment", report::StagePlace::kBackground,
                              {seconds(input, input.inputs.back().time_ns), input.system.final_adjustment_ms()});
+  }
+  if (input.system.extrinsics_ms() > 0 && !input.inputs.empty()) {
+    report::add_stage_sample(record, "extrinsics", report::StagePlace::kBackground,
+                             {seconds(input, input.inputs.back().time_ns), input.system.extrinsics_ms()});
   }
 }
 

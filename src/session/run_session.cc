@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "io/atomic_file.h"
+#include "io/bslam_rig.h"
 #include "io/config_file.h"
 #include "io/image_file.h"
 #include "io/trajectory_file.h"
@@ -122,6 +123,10 @@ Status write_outputs(const SessionResult& result, const system::Config& config, 
   add_trajectories(result.trajectories, "trajectory", io::PoseState::kFinal, files);
   add_trajectories(result.live, "trajectory_live", io::PoseState::kLive, files);
   files.emplace_back("config.yaml", io::config_to_yaml(table));
+  const auto& cameras = result.record.cameras;
+  if (std::ranges::any_of(cameras, [](const auto& c) { return c.extrinsics && c.extrinsics->refined; })) {
+    files.emplace_back("rig_refined.yaml", io::rig_to_yaml(result.map->rig()));
+  }
   const evaluation::Trajectory path = result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
   files.emplace_back("trajectory.svg", report::trajectory_plot_svg({.title = result.record.data + ": path of camera 0",
                                                                     .subtitle = {},

@@ -1,6 +1,7 @@
 // Every setting of a run, gathered: one struct per stage, with defaults beside their meaning.
 #pragma once
 
+#include "adjustment/rig_refinement.h"
 #include "base/options.h"
 #include "feature/extractor.h"
 #include "frame/bundling.h"
@@ -57,6 +58,7 @@ struct Config {
   tracking::TrackingOptions tracking;
   mapping::MappingOptions mapping;
   looping::LoopingOptions looping;
+  adjustment::RigRefinementOptions extrinsics;
 
   mapping::FeatureModel feature_model() const { return {features.sigma_px, features.scale_factor}; }
 
@@ -74,6 +76,7 @@ struct Config {
     visitor.section("tracking", self.tracking);
     visitor.section("mapping", self.mapping);
     visitor.section("looping", self.looping);
+    visitor.section("extrinsics", self.extrinsics);
   }
 };
 

@@ -97,11 +97,26 @@ void System::finish() {
   if (config_.final_adjustment && !config_.localize_only && !executor_->over()) {
     const Stopwatch watch;
     map::MapDraft draft("final", gate_.newest());
-    mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, interruption_.get_token());
-    if (!interruption_.stop_requested()) executor_->commit(JournalStep::kFinal, std::move(draft));
+    const auto stop = interruption_.get_token();
+    mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
     final_adjustment_ms_ = watch.ms();
+    check_extrinsics(draft, stop);
+    if (!stop.stop_requested()) executor_->commit(JournalStep::kFinal, std::move(draft));
   }
   executor_->end();
+}
+
+// Where the images put the cameras, and where that is wanted, the map with them there.
+void System::check_extrinsics(map::MapDraft& draft, const std::stop_token& stop) {
+  const auto& options = config_.extrinsics;
+  if ((!options.check && !options.refine) || stop.stop_requested()) return;
+  const Stopwatch watch;
+  extrinsics_ = adjustment::refine_rig(draft.map(), options, config_.features.sigma_px, config_.features.scale_factor, stop);
+  if (options.refine && extrinsics_.done) {
+    draft.set_rig(adjustment::refined(draft.map().rig(), extrinsics_));
+    mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
+  }
+  extrinsics_ms_ = watch.ms();
 }
 
 void System::interrupt() {

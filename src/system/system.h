@@ -59,6 +59,9 @@ class System {
   std::vector<StageRecord> stage_runs() const;
   Journal journal() const { return gate_.journal(); }  // what a replay needs
   double final_adjustment_ms() const { return final_adjustment_ms_; }
+  // What finish() found about the extrinsics; not done where that was not asked for or not possible.
+  const adjustment::RigRefinement& extrinsics() const { return extrinsics_; }
+  double extrinsics_ms() const { return extrinsics_ms_; }
   int maps_started() const { return maps_started_; }
 
   std::vector<LoopRecord> loops() const;
@@ -73,6 +76,7 @@ class System {
 
  private:
   void give_up_young_map();
+  void check_extrinsics(map::MapDraft& draft, const std::stop_token& stop);
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
 
   const camera::Rig rig_;
@@ -84,7 +88,8 @@ class System {
   std::vector<StageRecord> stage_runs_;     // guarded by records_mutex_, as the two below
   std::vector<LoopRecord> loops_;
   std::vector<TimeNs> keyframe_time_ns_;    // by KeyframeId of the present map
-  double final_adjustment_ms_ = 0;
+  double final_adjustment_ms_ = 0, extrinsics_ms_ = 0;
+  adjustment::RigRefinement extrinsics_;
   int maps_started_ = 0;
   std::stop_source interruption_;
   map::MapStore store_;
