@@ -57,7 +57,7 @@ struct Images {
 void append_image(const BundledMap& map, KeyframeId k, std::size_t c, std::size_t image, std::string& out) {
   const BundledKeyframe& keyframe = map.keyframe(k);
   const frame::CameraFrame& seen = keyframe.frame->cameras[c];
-  const geometry::SE3 T_cam_world = map.rig().cam_from_rig(c) * keyframe.T_rig_world;
+  const geometry::SE3 T_cam_world = map.cam_from_world(k, CameraIndex(c));
   const geometry::Quaterniond& q = T_cam_world.rotation();
   const geometry::Vector3d& t = T_cam_world.translation();
   const Camera& camera = map.rig().camera(c);
@@ -82,7 +82,7 @@ void append_point(const BundledMap& map, LandmarkId l, const Images& images, std
     const BundledKeyframe& k = map.keyframe(o.keyframe);
     for (const frame::KeypointRef r : k.frame->bundled.keypoints(o.feature)) {
       fmt::format_to(std::back_inserter(track), " {} {}", images.of(o.keyframe, r.camera.index()), r.keypoint.value());
-      const auto pixel = map.rig().camera(r.camera).project(map.rig().cam_from_rig(r.camera) * (k.T_rig_world * p));
+      const auto pixel = map.rig().camera(r.camera).project(map.cam_from_world(o.keyframe, r.camera) * p);
       if (!pixel) continue;
       error_px += (*pixel - k.frame->keypoints(r.camera).pixel[r.keypoint.index()].cast<double>()).norm();
       ++seen;

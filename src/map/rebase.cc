@@ -31,6 +31,13 @@ Motion motion_between(const SE3& before, const SE3& after, double grown = 1.0) {
   return Move{before, after, grown};
 }
 
+// The frame, its motion in the new unit.
+std::shared_ptr<const frame::BundledFrame> grown_along(const frame::BundledFrame& frame, double grown) {
+  auto out = std::make_shared<frame::BundledFrame>(frame);
+  out->twist.tail<3>() *= grown;
+  return out;
+}
+
 class Rebase {
  public:
   Rebase(const MapEdit& edit, BundledMap& map)
@@ -104,7 +111,9 @@ bool Rebase::operator()(const AddKeyframe& op) {
   const Motion motion = motion_since_base(op.parent);
   const SE3 T_rig_world = motion ? motion->pose(op.T_rig_world) : op.T_rig_world;
   const KeyframeId parent = map_.surviving(here(op.parent));
-  report_.keyframes.push_back(map_.add_keyframe(op.frame, T_rig_world, usable_matches(map_, matches), parent));
+  std::shared_ptr<const frame::BundledFrame> frame = op.frame;
+  if (motion && motion->grown != 1.0) frame = grown_along(*frame, motion->grown);
+  report_.keyframes.push_back(map_.add_keyframe(frame, T_rig_world, usable_matches(map_, matches), parent));
   own_motions_.push_back(motion);
   return true;
 }

@@ -22,7 +22,8 @@ void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const Fe
     report.adjustment = adjustment::adjust_map(selection, options.local, features.sigma_px, features.scale_factor, draft, stop);
     if (std::abs(report.scale.correction - 1.0) <= options.scale.settled || stop.stop_requested()) break;
   }
-  if (is_metric(report.scale, deviation_before, options.scale)) draft.set_scale(map::Scale::kMetric, report.scale.deviation);
+  const bool one_part = draft.map().roots().size() == 1;  // the scale is said of all of them
+  if (one_part && is_metric(report.scale, deviation_before, options.scale)) draft.set_scale(map::Scale::kMetric, report.scale.deviation);
 }
 
 }  // namespace

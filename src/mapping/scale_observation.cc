@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kLongestStep = 3.0;  // factor of one correction: farther away the equations say little but the direction
 constexpr double kSettled = 3.0;      // standard deviations of a correction that leaves the map as it is
+constexpr double kSignificant = 0.5;   // standard deviations from which a correction is worth it
 
 // One keyframe, the oldest, is held: more would keep the map in the shape the scale is read from.
 adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId keyframe, int limit) {
@@ -49,8 +50,11 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   report.deviation = found->deviation;
   report.keyframes = static_cast<int>(flat.keyframes.size());
   if (found->deviation <= options.max_correcting_deviation) {
-    report.correction = std::clamp(found->scale, 1.0 / kLongestStep, kLongestStep);
-    draft.scale_part(map.root_of(keyframe), report.correction);
+    const double correction = std::clamp(found->scale, 1.0 / kLongestStep, kLongestStep);
+    if (std::abs(correction - 1.0) > kSignificant * found->deviation) {  // every scaling is a correction, which others wait for
+      report.correction = correction;
+      draft.scale_part(map.root_of(keyframe), correction);
+    }
   }
   draft.set_scale(map::Scale::kUnobservable, found->deviation);
   return report;

@@ -21,12 +21,13 @@ report::FrameRecord frame_record(const RecordInput& input, const InputFrame& in,
     out.outcome = report::FrameOutcome::kDropped;
     return out;
   }
-  const bool tracked = frame->result.status == tracking::TrackStatus::kTracking;
+  const tracking::TrackResult& result = frame->final_result();
+  const bool tracked = result.status == tracking::TrackStatus::kTracking;
   out.outcome = tracked ? report::FrameOutcome::kTracked : report::FrameOutcome::kLost;
-  if (!tracked) out.lost_reason = tracking::describe(frame->result.reason);
+  if (!tracked) out.lost_reason = tracking::describe(result.reason);
   out.keyframe = frame->keyframe;
   for (std::size_t c = 0; c < frame->images.size(); ++c) {
-    const tracking::CameraCounts& n = frame->result.cameras[c];
+    const tracking::CameraCounts& n = result.cameras[c];
     out.cameras.push_back({frame->images[c] == image::ImageState::kPresent, n.keypoints, n.matched, n.inliers});
   }
   out.unique_features = frame->unique;
@@ -87,7 +88,7 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
     if (c > 0 && c < found.size()) {
       const adjustment::CameraRefinement& r = found[c];
       camera.extrinsics = {r.change_deg, r.change_mm, r.std_deg, r.std_mm, r.rotation_observed(), r.translation_observed(),
-                           r.suspect, input.config.extrinsics.refine};
+                           r.suspect, input.system.extrinsics_refined()};
     }
     record.cameras.push_back(std::move(camera));
   }

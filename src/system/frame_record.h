@@ -23,6 +23,7 @@ struct Relocalisation {
 
 struct FrameRecord {
   tracking::TrackResult result;       // as told to the caller
+  std::optional<tracking::TrackResult> found_later;  // where it had no pose: the one it got at the end of the run
   std::vector<image::ImageState> images;
   std::vector<Outage> outages;        // per camera: why its picture was not used
   std::optional<Relocalisation> relocalisation;
@@ -33,6 +34,9 @@ struct FrameRecord {
   int unique = 0, monocular = 0, matched = 0;  // features
   double unit = 1.0;                  // of result.reference then (map::BundledKeyframe::unit): what T_rig_reference is in
   KeyframeId root;                    // of the part of the map the pose was told in
+  // Of the two, what counts in the end.
+  const tracking::TrackResult& final_result() const { return found_later ? *found_later : result; }
+
   std::vector<StageTime> stages;      // in the caller's thread
   double frame_ms = 0;                // from handing over the images to having the pose
 };

@@ -79,6 +79,7 @@ Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<ima
 void Pipeline::restart() {
   state_ = {};
   candidate_.reset();
+  early_.clear();
   feature_shares_.clear();
   frames_lost_ = 0;
 }
@@ -157,7 +158,8 @@ void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outco
   std::optional<tracking::StartedMap> started;
   if (rig_.any_overlap()) started = tracking::start_metric(frame, builder_.pyramids(), options, draft);
   const int patience = rig_.any_overlap() ? kMetricPatience : 0;
-  if (!started && candidate_ && frame.id.value() - candidate_->frame->id.value() >= patience) {
+  const bool may = outcome.seen->num_keyframes() == 0 || outcome.seen->scale() != map::Scale::kMetric;  // one scale is said of all parts
+  if (!started && may && candidate_ && frame.id.value() - candidate_->frame->id.value() >= patience) {
     const Random random(static_cast<std::uint64_t>(config_.seed), "start", static_cast<std::uint64_t>(frame.id.value()));
     started = tracking::start_up_to_scale(*candidate_, frame, builder_.pyramids(), options, random, draft);
   }
@@ -175,6 +177,10 @@ void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outco
     outcome.keyframes = report.keyframes;
     outcome.record.keyframe = true;
     outcome.began_part = true;
+    if (report.keyframes.size() == 2) {
+      for (auto& early : early_) outcome.early.push_back({std::move(early), report.keyframes[0], report.keyframes[1]});
+    }
+    early_.clear();
     candidate_.reset();
     frames_lost_ = 0;
     T_map_odom_ = result.T_rig_world.inverse() * T_rig_odom_;
@@ -190,9 +196,17 @@ void Pipeline::keep_candidate(BundledFrame frame) {
   if (candidate_ && frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular)) return;  // nothing to go by
   const bool good = candidate_ && frame.id.value() - candidate_->frame->id.value() <= kMaxStartAge &&
                     tracking::comparable(*candidate_->frame, frame, options);
-  if (good) return;
-  const auto pyramids = builder_.pyramids();
-  candidate_ = tracking::StartCandidate{std::make_shared<const BundledFrame>(std::move(frame)), {pyramids.begin(), pyramids.end()}};
+  const auto kept = std::make_shared<const BundledFrame>(std::move(frame));
+  if (!good) {
+    const auto pyramids = builder_.pyramids();
+    candidate_ = tracking::StartCandidate{kept, {pyramids.begin(), pyramids.end()}};
+    early_.clear();
+  }
+  early_.push_back(kept);
+}
+
+std::optional<tracking::TrackResult> Pipeline::locate_early(const map::BundledMap& map, const tracking::BetweenKeyframes& early) {
+  return tracking::pose_between(map, early, {config_.features.sigma_px}, config_.tracking, pool_);
 }
 
 tracking::TrackOutput Pipeline::follow(BundledFrame& frame, const map::BundledMap& map) {
@@ -237,6 +251,8 @@ void Pipeline::track(BundledFrame frame, StageExecutor& executor, Outcome& outco
     return;
   }
   frames_lost_ = 0;
+  candidate_.reset();
+  early_.clear();
   state_ = std::move(output.state);
   note_motion(map, before, outcome.record);
   if (config_.localize_only) {
@@ -260,7 +276,11 @@ bool Pipeline::find_again(BundledFrame& frame, const map::BundledMap& map, Outco
   std::vector<LandmarkId> landmarks;
   for (const auto& [feature, l] : location->matches) landmarks.push_back(l);
   std::sort(landmarks.begin(), landmarks.end());
-  const auto trust = tracking::doubts_of(state_.cameras);
+  std::vector<int> seen(rig_.size(), 0);
+  for (const auto& [feature, l] : location->matches) {
+    for (const frame::KeypointRef r : frame.bundled.keypoints(feature)) ++seen[r.camera.index()];
+  }
+  const auto trust = tracking::doubts_of(state_.cameras, seen, config_.tracking.consensus);
   state_ = tracking::state_at_keyframe({}, frame.time_ns, location->with, std::move(landmarks));
   state_.cameras = trust;
   state_.T_rig_reference = location->T_rig_world * map.keyframe(location->with).T_rig_world.inverse();
@@ -291,6 +311,8 @@ void Pipeline::add_keyframe(BundledFrame& frame, const tracking::TrackOutput& ou
       tracking::make_keyframe(frame, output.matches, output.result.T_rig_world, builder_.pyramids(), output.result.reference,
                               config_.tracking.initialisation, draft);
   const map::CommitReport report = executor.commit(JournalStep::kTrack, std::move(draft));
+  const double grown = report.published->keyframe(output.result.reference).unit / outcome.seen->keyframe(output.result.reference).unit;
+  if (state_.twist) state_.twist->tail<3>() *= grown;  // mapping may have found another scale meanwhile
   state_ = tracking::state_at_keyframe(state_, frame.time_ns, report.keyframes.front(),
                                        committed(made.landmarks, outcome.seen->landmark_slots(), report));
   outcome.record.result.reference = report.keyframes.front();

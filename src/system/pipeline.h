@@ -11,6 +11,7 @@
 #include "system/frame_record.h"
 #include "system/stage_executor.h"
 #include "tracking/initialise.h"
+#include "tracking/pose_between.h"
 #include "tracking/track.h"
 
 namespace bslam::system {
@@ -26,6 +27,7 @@ class Pipeline {
     map::MapSnapshot seen;              // version of the map the frame was tracked in
     std::vector<KeyframeId> keyframes;  // added to the map, in order: the background stages are due for them
     bool began_part = false;            // the first of them begins a part of the map
+    std::vector<tracking::BetweenKeyframes> early;  // frames a start up to scale was made over, the first among them
   };
 
   // Reads the version of the map that `executor` gives the frame and commits keyframes to it.
@@ -37,6 +39,9 @@ class Pipeline {
 
   // Forgets the map that was tracked; the next frames start another.
   void restart();
+
+  // Where a frame of before the start is in the map as it is now.
+  std::optional<tracking::TrackResult> locate_early(const map::BundledMap& map, const tracking::BetweenKeyframes& early);
 
   const tracking::TrackerState& state() const { return state_; }
 
@@ -61,6 +66,7 @@ class Pipeline {
   tracking::TrackerState state_;
   double unit_ = 1.0;  // of the state's reference keyframe when the state was made (map::BundledKeyframe::unit)
   std::optional<tracking::StartCandidate> candidate_;
+  std::vector<std::shared_ptr<const frame::BundledFrame>> early_;  // the candidate and the frames since
   const std::unique_ptr<looping::PlaceRecogniser> recogniser_;
   int frames_lost_ = 0;  // with something to see, one after the other
   geometry::SE3 T_rig_odom_, T_map_odom_;

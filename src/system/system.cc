@@ -63,6 +63,7 @@ void System::give_up_young_map() {
     record.result.reason = tracking::LostReason::kNotStarted;
     record.keyframe = false;
   }
+  early_.clear();
   pipeline_.restart();
   executor_->restart(empty_map(rig_, config_));
 }
@@ -77,6 +78,7 @@ const FrameRecord& System::process(const image::ImageBundle& images) {
   const bool had_pose = pipeline_.state().status != tracking::TrackStatus::kNotStarted;
   Pipeline::Outcome outcome = pipeline_.process(images, *executor_);
   maps_started_ += outcome.began_part;
+  std::ranges::move(outcome.early, std::back_inserter(early_));
   // A start up to scale makes two keyframes, both under the time of the frame that made it.
   for (const KeyframeId k : outcome.keyframes) set_keyframe_time(k, outcome.record.result.time_ns);
   const Stopwatch watch;
@@ -102,8 +104,22 @@ void System::finish() {
     final_adjustment_ms_ = watch.ms();
     check_extrinsics(draft, stop);
     if (!stop.stop_requested()) executor_->commit(JournalStep::kFinal, std::move(draft));
+    extrinsics_refined_ = config_.extrinsics.refine && extrinsics_.done && !stop.stop_requested();
   }
+  locate_early_frames();
   executor_->end();
+}
+
+// A start up to scale needs some frames; where the rig was in them the finished map tells.
+void System::locate_early_frames() {
+  const map::MapSnapshot map = store_.snapshot();
+  for (const tracking::BetweenKeyframes& early : early_) {
+    const auto record = std::ranges::lower_bound(frames_, early.frame->id, {}, [](const FrameRecord& r) { return r.result.frame; });
+    if (record == frames_.end() || record->result.frame != early.frame->id) continue;
+    if (record->result.status == tracking::TrackStatus::kTracking) continue;
+    record->found_later = pipeline_.locate_early(*map, early);
+    if (record->found_later) record->unit = map->keyframe(record->found_later->reference).unit;
+  }
 }
 
 // Where the images put the cameras, and where that is wanted, the map with them there.
@@ -143,7 +159,7 @@ std::vector<PartTrajectory> System::trajectories() const {
   const map::MapSnapshot map = store_.snapshot();
   std::vector<PartTrajectory> out;
   for (const FrameRecord& record : frames_) {
-    const tracking::TrackResult& r = record.result;
+    const tracking::TrackResult& r = record.final_result();
     if (r.status != tracking::TrackStatus::kTracking || !map->surviving(r.reference).valid()) continue;
     const double grown = map->keyframe(r.reference).unit / record.unit;  // the scale of the map may have been found since
     const geometry::SE3 T_rig_reference(r.T_rig_reference.rotation(), grown * r.T_rig_reference.translation());

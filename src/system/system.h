@@ -61,6 +61,7 @@ class System {
   double final_adjustment_ms() const { return final_adjustment_ms_; }
   // What finish() found about the extrinsics; not done where that was not asked for or not possible.
   const adjustment::RigRefinement& extrinsics() const { return extrinsics_; }
+  bool extrinsics_refined() const { return extrinsics_refined_; }  // and the map made with them
   double extrinsics_ms() const { return extrinsics_ms_; }
   int maps_started() const { return maps_started_; }
 
@@ -76,6 +77,7 @@ class System {
 
  private:
   void give_up_young_map();
+  void locate_early_frames();
   void check_extrinsics(map::MapDraft& draft, const std::stop_token& stop);
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
 
@@ -84,12 +86,14 @@ class System {
   const bool loaded_;  // a map of an earlier run
   Pipeline pipeline_;
   std::vector<FrameRecord> frames_;
+  std::vector<tracking::BetweenKeyframes> early_;  // frames of before a start, by number
   mutable std::mutex records_mutex_;
   std::vector<StageRecord> stage_runs_;     // guarded by records_mutex_, as the two below
   std::vector<LoopRecord> loops_;
   std::vector<TimeNs> keyframe_time_ns_;    // by KeyframeId of the present map
   double final_adjustment_ms_ = 0, extrinsics_ms_ = 0;
   adjustment::RigRefinement extrinsics_;
+  bool extrinsics_refined_ = false;
   int maps_started_ = 0;
   std::stop_source interruption_;
   map::MapStore store_;

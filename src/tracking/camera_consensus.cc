@@ -7,8 +7,11 @@ namespace bslam::tracking {
 
 using geometry::SE3;
 
-std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras) {
-  for (CameraTrust& c : cameras) c.landmarks.clear();
+std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras, const std::vector<int>& seen, const ConsensusOptions& options) {
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    cameras[c].landmarks.clear();
+    if (seen[c] >= options.min_expected) cameras[c] = CameraTrust{};
+  }
   return cameras;
 }
 

@@ -17,8 +17,8 @@ struct CameraTrust {
   std::vector<LandmarkId> landmarks;  // inliers of the last tracked frame
 };
 
-// What of it still counts where the rig was found again after a loss.
-std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras);
+// What of it still counts where the rig was found again after a loss, `seen[c]` landmarks of the place by camera c.
+std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras, const std::vector<int>& seen, const ConsensusOptions& options);
 
 // How much of what a camera should see it found.
 struct Expectation {

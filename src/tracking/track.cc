@@ -251,7 +251,7 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, c
 
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
   state.twist.reset();
-  if (dt > 0 && dt < kMaxPrediction_s) state.twist = (result.T_rig_world * motion_model(input, frame).T_before.inverse()).log() / dt;
+  if (dt > 0 && dt <= kMaxPrediction_s) state.twist = (result.T_rig_world * motion_model(input, frame).T_before.inverse()).log() / dt;
   state.status = TrackStatus::kTracking;
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);
@@ -289,11 +289,16 @@ TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const Tra
   });
   if (!any_image) return lost(input.state, frame, LostReason::kNoImages);
   if (frame.num_keypoints() < static_cast<std::size_t>(options.min_inliers)) return lost(input.state, frame, LostReason::kFewFeatures);
+  const geometry::Vector6d twist = frame.twist;
+  const auto fail = [&](LostReason reason) {
+    frame.twist = twist;  // what a pose without support said about the motion has none either
+    return lost(input.state, frame, reason);
+  };
   const Coarse coarse = track_last_frame(input, frame, options, pool);
-  if (coarse.reason != LostReason::kNone) return lost(input.state, frame, coarse.reason);
+  if (coarse.reason != LostReason::kNone) return fail(coarse.reason);
   Fine fine = track_local_view(input, coarse, frame, options, pool);
   if (!supported(fine.solution, count(fine.matches), options.min_inliers, options)) {
-    return lost(input.state, frame, fine.solution.num_inliers < options.min_inliers ? LostReason::kFewInliers : LostReason::kUnstablePose);
+    return fail(fine.solution.num_inliers < options.min_inliers ? LostReason::kFewInliers : LostReason::kUnstablePose);
   }
   for (std::size_t c = 0; c < coarse.left_out.size(); ++c) {
     if (coarse.left_out[c]) leave_out(input.map.rig(), c, options.initialisation.min_parallax, options.initialisation.max_chi2, frame);

@@ -319,5 +319,27 @@ TEST_F(BundledMapTest, RefreshesWhatALandmarkLooksLike) {
   EXPECT_NEAR(map.landmark(l).min_distance, distance * std::pow(1.2, level - 7), 1e-5);
 }
 
+// A camera that fired late is where the rig had gone by then; a part that grows takes its motion along.
+TEST_F(BundledMapTest, KnowsWhereALateCameraWas) {
+  auto frame = std::make_shared<frame::BundledFrame>(*synthetic_frame(random, 2, 30, 10));
+  frame->time_ns = 1'000'000'000;
+  for (frame::CameraFrame& c : frame->cameras) c.state = image::ImageState::kPresent;
+  frame->cameras[0].time_ns = frame->time_ns;
+  frame->cameras[1].time_ns = frame->time_ns + 30'000'000;
+  frame->twist << 0.4, -0.2, 0.1, 1.0, 0.3, -0.5;
+  const SE3 T_rig_world = random_pose(random, 0.5);
+  const KeyframeId k = map.add_keyframe(frame, T_rig_world, {}, KeyframeId());
+  EXPECT_EQ(map.cam_from_world(k, CameraIndex(0)).matrix(), T_rig_world.matrix());
+  const SE3 then = SE3::exp(0.03 * frame->twist) * T_rig_world;
+  EXPECT_TRUE(map.cam_from_world(k, CameraIndex(1)).matrix().isApprox((map.rig().cam_from_rig(CameraIndex(1)) * then).matrix(), 1e-12));
+  const camera::Rig rig = frame::rig_of(map.rig(), *frame);
+  EXPECT_TRUE((rig.cam_from_rig(CameraIndex(1)) * T_rig_world).matrix().isApprox(map.cam_from_world(k, CameraIndex(1)).matrix(), 1e-12));
+  EXPECT_TRUE((rig.rig_from_cam(1) * rig.cam_from_rig(CameraIndex(1))).matrix().isApprox(SE3().matrix(), 1e-12));
+
+  ASSERT_TRUE(map.scale_part(k, 3.0));
+  EXPECT_TRUE(map.keyframe(k).frame->twist.tail<3>().isApprox(3.0 * frame->twist.tail<3>()));
+  EXPECT_EQ(map.keyframe(k).frame->twist.head<3>(), frame->twist.head<3>());
+}
+
 }  // namespace
 }  // namespace bslam::map

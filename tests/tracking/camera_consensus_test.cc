@@ -41,6 +41,16 @@ TEST(CameraConsensus, ForgetsWhereThereIsLongNothingToJudgeBy) {
   EXPECT_FALSE(camera.doubted);
 }
 
+TEST(CameraConsensus, KeepsDoubtsThroughALossButOfCamerasThatSawThePlace) {
+  std::vector<CameraTrust> cameras(3);
+  cameras[0].doubted = cameras[1].doubted = true;
+  cameras[2].landmarks = {LandmarkId(4)};
+  const auto after = doubts_of(cameras, {5, 60, 0}, {});
+  EXPECT_TRUE(after[0].doubted);
+  EXPECT_FALSE(after[1].doubted);
+  EXPECT_TRUE(after[2].landmarks.empty());
+}
+
 class WrongPictures : public ::testing::Test {
  protected:
   static const map::SimulatedMap& world() {

@@ -1,0 +1,67 @@
+#include "tracking/pose_between.h"
+
+#include <algorithm>
+#include <array>
+
+namespace bslam::tracking {
+namespace {
+
+using geometry::SE3;
+
+std::vector<LandmarkId> landmarks_of_both(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
+  std::vector<LandmarkId> out;
+  for (const KeyframeId k : {a, b}) {
+    std::ranges::copy_if(map.keyframe(k).landmarks, std::back_inserter(out), [](LandmarkId l) { return l.valid(); });
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+TrackResult result_at(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world, KeyframeId reference) {
+  TrackResult out;
+  out.frame = frame.id;
+  out.time_ns = frame.time_ns;
+  out.status = TrackStatus::kTracking;
+  out.reason = LostReason::kNone;
+  out.T_rig_world = T_rig_world;
+  out.reference = reference;
+  out.T_rig_reference = T_rig_world * map.resolved_pose(reference).inverse();
+  for (const frame::CameraFrame& c : frame.cameras) out.cameras.push_back({static_cast<int>(c.keypoints.size()), 0, 0, false});
+  return out;
+}
+
+}  // namespace
+
+std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early, const frame::DetectionNoise& noise,
+                                        const TrackingOptions& options, ThreadPool& pool) {
+  const KeyframeId before = map.surviving(early.before), after = map.surviving(early.after);
+  if (!before.valid() || !after.valid()) return std::nullopt;
+  const frame::BundledFrame& frame = *early.frame;
+  const SE3 T_before = map.resolved_pose(early.before), T_after = map.resolved_pose(early.after);
+  const TimeNs from = map.keyframe(early.before).frame->time_ns, to = map.keyframe(early.after).frame->time_ns;
+  if (frame.time_ns == from) return result_at(map, frame, T_before, before);
+  SE3 T = geometry::interpolate(T_before, T_after, to_seconds(frame.time_ns - from) / to_seconds(to - from));
+  const std::vector<LandmarkId> landmarks = landmarks_of_both(map, before, after);
+  // What the interpolation predicts, then what the pose found does.
+  solver::PoseSolution solution;
+  FrameMatches found;
+  for (const double radius : {options.matching.predicted_radius, options.matching.local_radius}) {
+    found = find_landmarks(map, frame, T, landmarks, {},
+                           {.radius = radius, .max_hamming = options.matching.max_hamming, .ratio = options.matching.ratio,
+                            .scale_factor = map.pyramid().scale_factor},
+                           pool).found;
+    solution = solver::solve_pose(map.rig(), pose_observations(map, frame, found, noise), T, options.pose);
+    const auto needed = options.min_inlier_share * static_cast<double>(count(found));
+    if (!solution.ok || solution.num_inliers < options.min_inliers || solution.num_inliers < needed) return std::nullopt;
+    T = solution.T_rig_world;
+  }
+  TrackResult out = result_at(map, frame, T, before);
+  for (std::size_t c = 0; c < found.size(); ++c) {
+    out.cameras[c].matched = static_cast<int>(found[c].size());
+    out.cameras[c].inliers = solution.inliers_per_camera[c];
+  }
+  return out;
+}
+
+}  // namespace bslam::tracking

@@ -1,0 +1,20 @@
+// Poses of frames that came before there was a map: between the two keyframes of a start up to scale, found in the map as it
+// became.
+#pragma once
+
+#include <optional>
+
+#include "tracking/track.h"
+
+namespace bslam::tracking {
+
+struct BetweenKeyframes {
+  std::shared_ptr<const frame::BundledFrame> frame;
+  KeyframeId before, after;
+};
+
+// Empty where the map does not support a pose of the frame, or a keyframe's part is gone.
+std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early, const frame::DetectionNoise& noise,
+                                        const TrackingOptions& options, ThreadPool& pool);
+
+}  // namespace bslam::tracking

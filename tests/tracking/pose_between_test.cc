@@ -1,0 +1,48 @@
+#include "tracking/pose_between.h"
+
+#include <gtest/gtest.h>
+
+#include "tracking/simulated_tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+class PoseBetween : public ::testing::Test {
+ protected:
+  PoseBetween() : world_(true_map(simulator(simulation::ring_rig(1)), 0.6, 0.6)), pool_(1) {}
+
+  std::optional<TrackResult> locate(frame::BundledFrame frame) {
+    const BetweenKeyframes early{std::make_shared<const frame::BundledFrame>(std::move(frame)), KeyframeId(0), KeyframeId(1)};
+    return pose_between(world_.map, early, {0.7}, {}, pool_);
+  }
+
+  map::SimulatedMap world_;  // two keyframes, 0.6 s apart
+  ThreadPool pool_;
+};
+
+TEST_F(PoseBetween, IsThatOfTheFrame) {
+  for (const double time_s : {0.1, 0.3, 0.5}) {
+    const auto seen = world_.sim.frame(FrameId(7), time_s);
+    const auto result = locate(seen.frame);
+    ASSERT_TRUE(result) << time_s;
+    EXPECT_EQ(result->status, TrackStatus::kTracking);
+    EXPECT_EQ(result->frame, FrameId(7));
+    EXPECT_LT(map::distance_m(result->T_rig_world, seen.T_world_rig.inverse()), 0.02) << time_s;
+    const geometry::SE3 by_reference = result->T_rig_reference * world_.map.resolved_pose(result->reference);
+    EXPECT_LT(map::distance_m(by_reference, result->T_rig_world), 1e-9);
+    EXPECT_GT(result->cameras[0].inliers, 30);
+  }
+}
+
+TEST_F(PoseBetween, OfTheFirstKeyframeIsItsOwn) {
+  const auto result = locate(world_.frames[0].frame);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->T_rig_world.matrix(), world_.map.keyframe(KeyframeId(0)).T_rig_world.matrix());
+}
+
+TEST_F(PoseBetween, IsNoneForAFrameOfAnotherPlace) {
+  EXPECT_FALSE(locate(simulator(simulation::ring_rig(1), room(99)).frame(FrameId(7), 0.3).frame));
+}
+
+}  // namespace
+}  // namespace bslam::tracking
