@@ -50,9 +50,8 @@ std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector
   for (const KeyframeId k : keyframes) {
     const frame::BundledFrame& frame = *map.keyframe(k).frame;
     for (std::size_t c = 0; c < map.rig().size(); ++c) {
-      const double delay_s = frame.delay_s(c);
-      any |= delay_s != 0.0;
-      out.push_back(delay_s == 0.0 ? geometry::SE3() : geometry::SE3::exp(delay_s * frame.twist));
+      any |= frame.delay_s(c) != 0.0;
+      out.push_back(frame.motion_until(c));
     }
   }
   if (!any) out.clear();

@@ -171,9 +171,8 @@ double in_sigmas(const Vector3d& change, const Matrix3d& covariance) {
   return std::sqrt(change.dot(covariance.llt().solve(change)));
 }
 
-CameraRefinement judge(const solver::ExtrinsicEstimate& estimate, const geometry::SE3& before, const RigRefinementOptions& options) {
+CameraRefinement judge(const solver::ExtrinsicEstimate& estimate, const RigRefinementOptions& options) {
   CameraRefinement out;
-  out.T_cam_rig_before = before;
   out.T_cam_rig_after = estimate.T_cam_rig;
   out.observed = estimate.observed;
   out.observations = estimate.observations;
@@ -236,7 +235,7 @@ RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions&
   first.observed = adjusted.cameras.front().observed;
   first.observations = adjusted.cameras.front().observations;
   for (std::size_t c = 1; c < map.rig().size(); ++c) {
-    out.cameras.push_back(judge(adjusted.cameras[c], map.rig().cam_from_rig(c), options));
+    out.cameras.push_back(judge(adjusted.cameras[c], options));
   }
   return out;
 }

@@ -38,7 +38,7 @@ struct RigRefinementOptions {
 
 // One camera; camera 0 is the rig and does not move.
 struct CameraRefinement {
-  geometry::SE3 T_cam_rig_before, T_cam_rig_after;
+  geometry::SE3 T_cam_rig_after;
   double change_deg = 0, change_mm = 0;  // by which the camera turned and its centre moved
   double std_deg = 0, std_mm = 0;        // of T_cam_rig_after, in the direction in which they are largest
   double rotation_sigmas = 0, translation_sigmas = 0;  // the changes in standard deviations, directions accounted for

@@ -34,6 +34,8 @@ struct BundledFrame {
   std::size_t num_keypoints() const;
   // Time of camera c's image after that of the frame, in seconds; 0 where it has none.
   double delay_s(std::size_t c) const;
+  // How the rig moved from the time of the frame to that of camera c's image; the identity where they are one.
+  geometry::SE3 motion_until(std::size_t c) const;
 };
 
 // Per camera.

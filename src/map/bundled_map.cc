@@ -67,17 +67,15 @@ geometry::SE3 BundledMap::resolved_pose(KeyframeId k) const {
 }
 
 geometry::SE3 BundledMap::rig_from_cam(const BundledKeyframe& k, CameraIndex c) const {
-  const double delay_s = k.frame->delay_s(c.index());
   const geometry::SE3& T_rig_cam = rig_->rig_from_cam(c.index());
-  return delay_s == 0.0 ? T_rig_cam : geometry::SE3::exp(-delay_s * k.frame->twist) * T_rig_cam;
+  return k.frame->delay_s(c.index()) == 0.0 ? T_rig_cam : k.frame->motion_until(c.index()).inverse() * T_rig_cam;
 }
 
 geometry::SE3 BundledMap::cam_from_world(KeyframeId k, CameraIndex c) const {
   const BundledKeyframe& entry = keyframe(k);
-  const double delay_s = entry.frame->delay_s(c.index());
   const geometry::SE3& T_cam_rig = rig_->cam_from_rig(c);
-  if (delay_s == 0.0) return T_cam_rig * entry.T_rig_world;
-  return T_cam_rig * geometry::SE3::exp(delay_s * entry.frame->twist) * entry.T_rig_world;
+  if (entry.frame->delay_s(c.index()) == 0.0) return T_cam_rig * entry.T_rig_world;
+  return T_cam_rig * entry.frame->motion_until(c.index()) * entry.T_rig_world;
 }
 
 KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,

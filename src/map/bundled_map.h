@@ -67,6 +67,8 @@ class BundledMap {
   // Roots of the parts of the map, in ascending order; and that of the part an alive keyframe belongs to.
   std::vector<KeyframeId> roots() const;
   KeyframeId root_of(KeyframeId k) const;
+  // Alive keyframes of the part with this root, parents before children.
+  std::vector<KeyframeId> part_of(KeyframeId root) const;
   // The keyframe or, where it was removed, the nearest ancestor that is alive; invalid where its part was removed.
   KeyframeId surviving(KeyframeId k) const;
 
@@ -147,7 +149,6 @@ class BundledMap {
   // bundled_map.cc. `link` and `unlink` keep list, table, counter and covisibility in step; nothing else does.
   void link(LandmarkId l, Observation o);
   void unlink(LandmarkId l, Observation o);
-  std::vector<KeyframeId> part_of(KeyframeId root) const;  // alive keyframes, parents before children
   void let_go(KeyframeId k);  // without observations and children left
   void bury(LandmarkId l, LandmarkId merged_into);  // without observations left
 

@@ -58,15 +58,6 @@ void fix_gauge(const map::BundledMap& map, adjustment::Selection& selection) {
   std::sort(selection.fixed_keyframes.begin(), selection.fixed_keyframes.end());
 }
 
-// Keyframes of one part, in order of id.
-std::vector<KeyframeId> part_of(const map::BundledMap& map, KeyframeId root) {
-  std::vector<KeyframeId> out;
-  for (const KeyframeId k : map.keyframe_ids()) {
-    if (map.root_of(k) == root) out.push_back(k);
-  }
-  return out;
-}
-
 }  // namespace
 
 adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyframe, const LocalWindowOptions& options) {
@@ -84,13 +75,14 @@ adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyfra
 
 bool needs_whole_part(const map::BundledMap& map, KeyframeId keyframe, const ScaleOptions& options) {
   if (map.scale() != map::Scale::kUnobservable) return false;
-  return part_of(map, map.root_of(keyframe)).size() <= static_cast<std::size_t>(options.keyframes);
+  return map.part_of(map.root_of(keyframe)).size() <= static_cast<std::size_t>(options.keyframes);
 }
 
 adjustment::Selection select_part(const map::BundledMap& map, KeyframeId keyframe) {
   adjustment::Selection selection;
   const KeyframeId root = map.root_of(keyframe);
-  const std::vector<KeyframeId> part = part_of(map, root);
+  std::vector<KeyframeId> part = map.part_of(root);
+  std::sort(part.begin(), part.end());
   for (const KeyframeId k : part) {
     if (k != root) selection.free_keyframes.push_back(k);
   }

@@ -115,12 +115,20 @@ SE3 cam_from_rig_at(const ReprojectionProblem& problem, std::size_t pose, Camera
 }
 
 std::vector<double> squared_errors(const ReprojectionProblem& problem) {
+  std::vector<SE3> T_cam_rig;
+  for (std::size_t i = 0; i < problem.rig->size(); ++i) T_cam_rig.push_back(problem.rig->cam_from_rig(i));
+  return squared_errors(problem, problem.T_rig_world, problem.points, T_cam_rig);
+}
+
+std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span<const SE3> T_rig_world,
+                                   std::span<const Vector3d> points, std::span<const SE3> T_cam_rig) {
   std::vector<double> out;
   out.reserve(problem.observations.size());
   for (const ReprojectionProblem::Observation& o : problem.observations) {
     const auto pose = static_cast<std::size_t>(o.pose);
-    const Vector3d point_rig = problem.T_rig_world[pose] * problem.points[static_cast<std::size_t>(o.point)];
-    const auto pixel = problem.rig->camera(o.camera).project(cam_from_rig_at(problem, pose, o.camera) * point_rig);
+    Vector3d point_rig = T_rig_world[pose] * points[static_cast<std::size_t>(o.point)];
+    if (!problem.motion.empty()) point_rig = problem.motion[pose * problem.rig->size() + o.camera.index()] * point_rig;
+    const auto pixel = problem.rig->camera(o.camera).project(T_cam_rig[o.camera.index()] * point_rig);
     const double sigma = static_cast<double>(o.sigma);
     out.push_back(pixel ? (o.pixel.cast<double>() - *pixel).squaredNorm() / (sigma * sigma)
                         : std::numeric_limits<double>::infinity());

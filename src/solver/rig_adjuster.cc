@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "base/assert.h"
 #include "solver/rig_equations.h"
@@ -23,22 +22,6 @@ struct Round {
 };
 constexpr std::array kRounds = {Round{Kernel::kHuber, kLostChi2}, Round{Kernel::kHuber, 16 * kChi2TwoDof95},
                                 Round{Kernel::kNone, kChi2TwoDof95}, Round{Kernel::kNone, kChi2TwoDof95}};
-
-// Squared normalised error of each observation; infinite where it does not project.
-std::vector<double> errors_at(const ReprojectionProblem& problem, const RigState& state) {
-  std::vector<double> out;
-  out.reserve(problem.observations.size());
-  for (const ReprojectionProblem::Observation& o : problem.observations) {
-    const auto pose = static_cast<std::size_t>(o.pose);
-    Vector3d point = state.T_rig_world[pose] * state.points[static_cast<std::size_t>(o.point)];
-    if (!problem.motion.empty()) point = problem.motion[pose * problem.rig->size() + o.camera.index()] * point;
-    const auto pixel = problem.rig->camera(o.camera).project(state.T_cam_rig[o.camera.index()] * point);
-    const double sigma = static_cast<double>(o.sigma);
-    out.push_back(pixel ? (o.pixel.cast<double>() - *pixel).squaredNorm() / (sigma * sigma)
-                        : std::numeric_limits<double>::infinity());
-  }
-  return out;
-}
 
 // What a round leaves out.
 std::vector<std::uint8_t> beyond(const std::vector<double>& chi2, double bound) {
@@ -135,11 +118,10 @@ RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjusterOptions&
   BSLAM_ASSERT(start.empty() || start.size() == cameras, "a start has extrinsics for every camera");
   if (!start.empty()) state.T_cam_rig.assign(start.begin(), start.end());
   for (std::size_t round = 0; round < kRounds.size(); ++round) {
-    const auto skip = beyond(errors_at(problem, state), kRounds[round].max_chi2);
+    const auto skip = beyond(squared_errors(problem, state.T_rig_world, state.points, state.T_cam_rig), kRounds[round].max_chi2);
     const BundleStructure structure = make_structure(problem, skip);
     if (structure.num_points() == 0) return out;
     RigEquations equations(problem, structure, kRounds[round].kernel, prior);
-    if (round == 0) out.initial_cost = equations.cost(state);
     const auto cost = minimise(equations, options, stop, state);
     if (!cost || stop.stop_requested()) return out;
     if (round + 1 < kRounds.size()) continue;
