@@ -19,21 +19,29 @@ constexpr double kRatio = 0.8;        // to the second best
 
 std::tuple<int, int, CameraIndex> place_of(const Observation& o) { return {o.point, o.pose, o.camera}; }
 
-// Of one image: keypoints that belong to a landmark.
-std::vector<std::uint8_t> taken_keypoints(const map::BundledMap& map, KeyframeId k, CameraIndex camera) {
+bool pixel_before(const Observation& a, const Observation& b) {
+  return std::pair(a.pixel.x(), a.pixel.y()) < std::pair(b.pixel.x(), b.pixel.y());
+}
+
+// Of one image: keypoints that belong to a landmark, in the map or among what the problem has `seen` already.
+std::vector<std::uint8_t> taken_keypoints(const map::BundledMap& map, KeyframeId k, CameraIndex camera, std::vector<Observation> seen) {
+  std::sort(seen.begin(), seen.end(), pixel_before);
   const frame::BundledFrame& frame = *map.keyframe(k).frame;
   std::vector<std::uint8_t> taken(frame.keypoints(camera).size());
+  Observation here{};
   for (std::size_t i = 0; i < taken.size(); ++i) {
-    taken[i] = map.landmark_of(k, frame.bundled.feature(camera, KeypointIndex(i))).valid();
+    here.pixel = frame.keypoints(camera).pixel[i];
+    taken[i] = map.landmark_of(k, frame.bundled.feature(camera, KeypointIndex(i))).valid() ||
+               std::binary_search(seen.begin(), seen.end(), here, pixel_before);
   }
   return taken;
 }
 
-// Which points each image (pose, camera) shows already.
-std::vector<std::vector<std::uint32_t>> points_by_image(const solver::ReprojectionProblem& problem) {
-  std::vector<std::vector<std::uint32_t>> out(problem.T_rig_world.size() * problem.rig->size());
+// What each image (pose, camera) shows already.
+std::vector<std::vector<Observation>> observations_by_image(const solver::ReprojectionProblem& problem) {
+  std::vector<std::vector<Observation>> out(problem.T_rig_world.size() * problem.rig->size());
   for (const Observation& o : problem.observations) {
-    out[static_cast<std::size_t>(o.pose) * problem.rig->size() + o.camera.index()].push_back(static_cast<std::uint32_t>(o.point));
+    out[static_cast<std::size_t>(o.pose) * problem.rig->size() + o.camera.index()].push_back(o);
   }
   return out;
 }
@@ -47,13 +55,15 @@ void sort_observations(FlatProblem& flat) {
 
 // Adds what one image shows of `points`.
 void search_image(const map::BundledMap& map, std::size_t pose, CameraIndex camera, const geometry::SE3& T_cam_world,
-                  std::span<const frame::SearchPoint> points, const map::FeatureModel& features, FlatProblem& flat) {
+                  std::span<const frame::SearchPoint> points, const std::vector<Observation>& seen,
+                  const map::FeatureModel& features, FlatProblem& flat) {
   const KeyframeId keyframe = flat.keyframes[pose];
   const frame::CameraFrame& image = map.keyframe(keyframe).frame->cameras[camera.index()];
   const frame::ProjectionSearchOptions options{
       .radius = kRadius, .max_hamming = kMaxHamming, .ratio = kRatio, .scale_factor = features.scale_factor};
   const camera::Camera& model = map.rig().camera(camera);
-  const auto found = frame::search_by_projection(model, image, T_cam_world, points, taken_keypoints(map, keyframe, camera), options);
+  const auto taken = taken_keypoints(map, keyframe, camera, seen);
+  const auto found = frame::search_by_projection(model, image, T_cam_world, points, taken, options);
   for (const frame::ProjectionMatch& m : found.matches) {
     const auto projected = model.project(T_cam_world * points[m.point].position);
     const Eigen::Vector2f pixel = image.keypoints.pixel[m.keypoint.index()];
@@ -70,17 +80,17 @@ int recover_observations(const map::BundledMap& map, std::span<const geometry::S
                          FlatProblem& flat) {
   const solver::ReprojectionProblem& problem = flat.problem;
   const std::size_t cameras = T_cam_rig.size(), before = problem.observations.size();
-  const auto seen = points_by_image(problem);
+  const auto seen = observations_by_image(problem);
   std::vector<frame::SearchPoint> points = map::search_points(map, flat.landmarks);
   for (std::size_t i = 0; i < points.size(); ++i) points[i].position = problem.points[i];
   for (std::size_t pose = 0; pose < flat.keyframes.size(); ++pose) {
     for (std::size_t c = 0; c < cameras; ++c) {
       const std::size_t image = pose * cameras + c;
-      for (const std::uint32_t p : seen[image]) points[p].skip = 1;
+      for (const Observation& o : seen[image]) points[static_cast<std::size_t>(o.point)].skip = 1;
       const geometry::SE3 T_rig_world =
           problem.motion.empty() ? problem.T_rig_world[pose] : problem.motion[image] * problem.T_rig_world[pose];
-      search_image(map, pose, CameraIndex(c), T_cam_rig[c] * T_rig_world, points, features, flat);
-      for (const std::uint32_t p : seen[image]) points[p].skip = 0;
+      search_image(map, pose, CameraIndex(c), T_cam_rig[c] * T_rig_world, points, seen[image], features, flat);
+      for (const Observation& o : seen[image]) points[static_cast<std::size_t>(o.point)].skip = 0;
     }
   }
   sort_observations(flat);

@@ -128,7 +128,7 @@ void add_simulate(CLI::App& app, int& exit_status) {
   verb->add_option("--exposure-ms", a.exposure_ms, "exposure, which blurs motion")->capture_default_str();
   verb->add_option("--noise", a.noise, "factor on the sensor's noise")->capture_default_str();
   verb->add_option("--faults", a.faults,
-                   "YAML or JSON list of {type, cameras, from, to}; type: black, frozen, over_exposed, "
+                   "YAML or JSON list of {type, cameras, from, to}; type: black, frozen, over_exposed, blurred, "
                    "dropped or delayed (with delay_s)");
   verb->add_option("--threads", a.threads, "threads to work with; 0: one a core")
       ->check(CLI::Range(0, 1024))

@@ -46,7 +46,7 @@ Result<Fault> read_fault(const YamlMap& map, std::size_t num_cameras) {
   const auto name = map.text("type");
   if (!name) return name.error();
   const auto type = simulation::fault_type(*name);
-  if (!type) return map.error("type", *name, "black, frozen, over_exposed, dropped or delayed");
+  if (!type) return map.error("type", *name, "black, frozen, over_exposed, blurred, dropped or delayed");
   Fault fault;
   fault.type = *type;
   if (const Status s = read_cameras(map, num_cameras, fault); !s) return s.error();

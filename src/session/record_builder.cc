@@ -38,8 +38,13 @@ report::FrameRecord frame_record(const RecordInput& input, const InputFrame& in,
 }
 
 // State of a camera in one frame, from what it delivered.
-report::CameraInterval camera_state(const report::FrameRecord& frame, system::Outage outage, std::size_t c) {
-  if (outage != system::Outage::kNone) return {"out", std::string(system::describe(outage)), frame.time_s, frame.time_s};
+report::CameraInterval camera_state(const report::FrameRecord& frame, const system::FrameRecord& known, std::size_t c) {
+  const system::Outage outage = known.outages[c];
+  const bool used = outage == system::Outage::kNone;
+  if (known.blurred[c] && (used || outage == system::Outage::kInconsistent)) {  // blur explains that it sees little
+    return {used ? "degraded" : "out", "blurred", frame.time_s, frame.time_s};
+  }
+  if (!used) return {"out", std::string(system::describe(outage)), frame.time_s, frame.time_s};
   if (frame.cameras[c].keypoints < kFewKeypoints) return {"degraded", "few-features", frame.time_s, frame.time_s};
   return {"ok", "", frame.time_s, frame.time_s};
 }
@@ -78,7 +83,7 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
       const std::size_t k = next++;
       const bool waiting = pause[k] && frames[k].outages[c] == system::Outage::kNoImage;
       const report::CameraInterval state =
-          waiting ? report::CameraInterval{"ok", "", f.time_s, f.time_s} : camera_state(f, frames[k].outages[c], c);
+          waiting ? report::CameraInterval{"ok", "", f.time_s, f.time_s} : camera_state(f, frames[k], c);
       if (camera.states.empty() || camera.states.back().state != state.state || camera.states.back().reason != state.reason) {
         camera.states.push_back(state);
       }

@@ -6,12 +6,13 @@
 namespace bslam::simulation {
 namespace {
 
-constexpr std::array<std::pair<FaultType, std::string_view>, 5> kNames = {{
+constexpr std::array<std::pair<FaultType, std::string_view>, 6> kNames = {{
     {FaultType::kBlack, "black"},
     {FaultType::kFrozen, "frozen"},
     {FaultType::kOverExposed, "over_exposed"},
     {FaultType::kDropped, "dropped"},
     {FaultType::kDelayed, "delayed"},
+    {FaultType::kBlurred, "blurred"},
 }};
 
 }  // namespace

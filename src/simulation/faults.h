@@ -13,6 +13,7 @@ enum class FaultType {
   kOverExposed,  // far too much light
   kDropped,      // no pictures
   kDelayed,      // pictures show the world as it was `delay_s` before their stamp
+  kBlurred,      // out of focus, as behind a drop or a smeared lens
 };
 
 struct Fault {
@@ -22,7 +23,7 @@ struct Fault {
   double delay_s = 0.1;           // of kDelayed
 };
 
-// Names in files: black, frozen, over_exposed, dropped, delayed.
+// Names in files: black, frozen, over_exposed, dropped, delayed, blurred.
 std::string_view fault_name(FaultType type);
 std::optional<FaultType> fault_type(std::string_view name);
 

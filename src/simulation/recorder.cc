@@ -9,6 +9,7 @@
 namespace bslam::simulation {
 namespace {
 
+constexpr double kBlurPixels = 5.0;     // standard deviation of a smeared lens's pictures
 constexpr double kOverExposure = 14.0;  // times the usual light: little is left below saturation
 
 // The last fault in the list that hits a camera at a time, or nothing.
@@ -37,11 +38,15 @@ void apply(const Fault& fault, const Shot* last, Shot& shot) {
     case FaultType::kDelayed:
       shot.scene_time_s = std::max(0.0, shot.scene_time_s - fault.delay_s);
       break;
+    case FaultType::kBlurred:
+      shot.blur_px = kBlurPixels;
+      break;
     case FaultType::kFrozen:
       if (last == nullptr) break;
       shot.scene_time_s = last->scene_time_s;
       shot.noise_key = last->noise_key;
       shot.exposure = last->exposure;
+      shot.blur_px = last->blur_px;
       break;
   }
 }
@@ -89,7 +94,7 @@ image::Image Recorder::picture(const Shot& shot) const {
     const double share = (static_cast<double>(k) + 0.5) / static_cast<double>(poses.size()) - 0.5;
     poses[k] = T_world_cam(shot.camera, shot.scene_time_s + share * exposure_s_);
   }
-  return renderers_[shot.camera]->render(poses, shot.noise_key, shot.exposure);
+  return renderers_[shot.camera]->render(poses, shot.noise_key, shot.exposure, shot.blur_px);
 }
 
 }  // namespace bslam::simulation

@@ -30,6 +30,7 @@ struct Shot {
   double scene_time_s = 0;      // middle of the exposure, seconds of the trajectory
   std::uint64_t noise_key = 0;  // equal keys and scenes give equal bytes
   double exposure = 1.0;        // light against the usual
+  double blur_px = 0.0;         // standard deviation
   bool written = true;          // false: the picture is missing
   std::optional<FaultType> fault;
 };

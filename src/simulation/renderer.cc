@@ -32,6 +32,30 @@ float normal_from(std::uint64_t bits) {
   return kScale * static_cast<float>(sum - 2 * 65535);
 }
 
+// Means over 2 radius + 1 values `step` apart, the outermost repeated, of `count` values from `first` on.
+void box_blur(float* first, int count, int step, int radius, std::vector<float>& line) {
+  line.resize(static_cast<std::size_t>(count));
+  const auto at = [&](int i) { return static_cast<std::ptrdiff_t>(std::clamp(i, 0, count - 1)); };
+  for (int i = 0; i < count; ++i) line[static_cast<std::size_t>(i)] = first[static_cast<std::ptrdiff_t>(i) * step];
+  double sum = 0;
+  for (int i = -radius; i <= radius; ++i) sum += line[static_cast<std::size_t>(at(i))];
+  for (int i = 0; i < count; ++i) {
+    first[static_cast<std::ptrdiff_t>(i) * step] = static_cast<float>(sum / (2 * radius + 1));
+    sum += static_cast<double>(line[static_cast<std::size_t>(at(i + radius + 1))]) - line[static_cast<std::size_t>(at(i - radius))];
+  }
+}
+
+// Three boxes each way are nearly a Gaussian.
+void blur(std::vector<float>& light, int width, int height, int stride, double sigma) {
+  constexpr int kBoxes = 3;
+  const int radius = static_cast<int>(std::lround((std::sqrt(12 * sigma * sigma / kBoxes + 1) - 1) / 2));
+  std::vector<float> line;
+  for (int k = 0; radius > 0 && k < kBoxes; ++k) {
+    for (int y = 0; y < height; ++y) box_blur(light.data() + static_cast<std::ptrdiff_t>(y) * stride, width, 1, radius, line);
+    for (int x = 0; x < width; ++x) box_blur(light.data() + x, height, stride, radius, line);
+  }
+}
+
 }  // namespace
 
 Renderer::Renderer(const World& world, const camera::Camera& camera, const ImagingOptions& options)
@@ -66,21 +90,21 @@ Renderer::Renderer(const World& world, const camera::Camera& camera, const Imagi
   }
 }
 
-image::Image Renderer::render(const ExposurePoses& T_world_cam, std::uint64_t noise_key, double exposure) const {
+image::Image Renderer::render(const ExposurePoses& T_world_cam, std::uint64_t noise_key, double exposure, double blur_px) const {
   image::Image out(width_, height_);  // all 0 to begin with
   if (exposure <= 0) return out;
-  std::vector<float> sum(static_cast<std::size_t>(padded_width_));
+  const auto stride = static_cast<std::size_t>(padded_width_);
+  std::vector<float> light(stride * static_cast<std::size_t>(height_));
+  const auto row = [&](int y) { return std::span(light).subspan(static_cast<std::size_t>(y) * stride, stride); };
   const std::uint64_t noise_seed = mix_bits(options_.seed * 0x9e3779b97f4a7c15ull + mix_bits(noise_key + 1));
   const auto gain = static_cast<float>(options_.gain * exposure / kSubSamples);
-  for (int y = 0; y < height_; ++y) {
-    trace_row(y, T_world_cam, sum);
-    develop_row(y, noise_seed, gain, sum, out);
-  }
+  for (int y = 0; y < height_; ++y) trace_row(y, T_world_cam, row(y));
+  blur(light, width_, height_, padded_width_, blur_px);
+  for (int y = 0; y < height_; ++y) develop_row(y, noise_seed, gain, row(y), out);
   return out;
 }
 
-void Renderer::trace_row(int y, const ExposurePoses& T_world_cam, std::vector<float>& sum) const {
-  std::fill(sum.begin(), sum.end(), 0.0f);
+void Renderer::trace_row(int y, const ExposurePoses& T_world_cam, std::span<float> sum) const {
   const auto stride = static_cast<std::size_t>(padded_width_);
   for (int k = 0; k < kSubSamples; ++k) {
     const geometry::SE3& T = T_world_cam[static_cast<std::size_t>(kQuarter[y & 1][k])];
@@ -107,7 +131,7 @@ void Renderer::trace_row(int y, const ExposurePoses& T_world_cam, std::vector<fl
   }
 }
 
-void Renderer::develop_row(int y, std::uint64_t noise_seed, float gain, const std::vector<float>& sum,
+void Renderer::develop_row(int y, std::uint64_t noise_seed, float gain, std::span<const float> sum,
                            image::Image& out) const {
   const auto shot = static_cast<float>(options_.noise * options_.shot_noise),
              read = static_cast<float>(options_.noise * options_.read_noise);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "camera/camera.h"
@@ -36,12 +37,12 @@ class Renderer {
   Renderer(const World& world, const camera::Camera& camera, const ImagingOptions& options);
 
   // The picture with its noise drawn from (options.seed, noise_key); `exposure` scales the light (1 = as usual, 0 =
-  // all black). Pixels without a bearing are 0.
-  image::Image render(const ExposurePoses& T_world_cam, std::uint64_t noise_key, double exposure = 1.0) const;
+  // all black), `blur_px` is the standard deviation, nearly Gaussian, of what is out of focus. Pixels without a bearing are 0.
+  image::Image render(const ExposurePoses& T_world_cam, std::uint64_t noise_key, double exposure = 1.0, double blur_px = 0.0) const;
 
  private:
-  void trace_row(int y, const ExposurePoses& T_world_cam, std::vector<float>& sum) const;
-  void develop_row(int y, std::uint64_t noise_seed, float gain, const std::vector<float>& sum, image::Image& out) const;
+  void trace_row(int y, const ExposurePoses& T_world_cam, std::span<float> sum) const;
+  void develop_row(int y, std::uint64_t noise_seed, float gain, std::span<const float> sum, image::Image& out) const;
 
   const World& world_;
   ImagingOptions options_;

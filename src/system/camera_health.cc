@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdlib>
 #include <cstring>
+#include <optional>
 
 #include "base/assert.h"
 
@@ -38,6 +40,38 @@ Outage exposure(const image::Image& image, const HealthOptions& options) {
   if (dark >= options.dark_share * samples) return Outage::kBlack;
   if (bright >= options.bright_share * samples) return Outage::kOverExposed;
   return Outage::kNone;
+}
+
+struct Edges {
+  int all = 0, sharp = 0;
+};
+
+// Counts the edges among spans of pixels `step` bytes apart that begin at `first`, span after span.
+void count_edges(const std::uint8_t* first, std::ptrdiff_t step, int pixels, double sharp_slope, Edges& edges) {
+  constexpr int kSpan = 16, kContrast = 40;  // pixels; grey values
+  for (int begin = 0; begin + kSpan < pixels; begin += kSpan) {
+    const std::uint8_t* p = first + begin * step;
+    int low = *p, high = *p, steepest = 0;
+    for (int i = 1; i <= kSpan; ++i) {
+      const int before = p[(i - 1) * step], value = p[i * step];
+      low = std::min(low, value);
+      high = std::max(high, value);
+      steepest = std::max(steepest, std::abs(value - before));
+    }
+    if (high - low < kContrast) continue;
+    ++edges.all;
+    edges.sharp += steepest >= sharp_slope * (high - low);
+  }
+}
+
+// True, false, or nothing where there are too few edges to tell.
+std::optional<bool> is_blurred(const image::Image& image, const HealthOptions& options) {
+  constexpr int kLineStep = 8, kMinEdges = 60;
+  Edges edges;
+  for (int y = 0; y < image.height(); y += kLineStep) count_edges(image.row(y), 1, image.width(), options.sharp_slope, edges);
+  for (int x = 0; x < image.width(); x += kLineStep) count_edges(image.row(0) + x, image.width(), image.height(), options.sharp_slope, edges);
+  if (edges.all < kMinEdges) return std::nullopt;
+  return edges.sharp < options.sharp_share * edges.all;
 }
 
 }  // namespace
@@ -89,6 +123,22 @@ std::vector<Outage> CameraMonitor::judge(const image::ImageBundle& images) {
     found[c] = cameras_[c].outage = Outage::kNone;
   }
   return found;
+}
+
+std::vector<std::uint8_t> CameraMonitor::blurred(const image::ImageBundle& images) {
+  BSLAM_ASSERT(images.images.size() == cameras_.size(), "one image slot per camera");
+  std::vector<std::uint8_t> out(cameras_.size(), 0);
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    const image::CameraImage& input = images.images[c];
+    if (input.state != image::ImageState::kPresent) continue;
+    Camera& camera = cameras_[c];
+    if (const auto now = is_blurred(input.image, options_)) {
+      camera.sharp = *now ? 0 : camera.sharp + 1;
+      camera.blurred = *now || (camera.blurred && camera.sharp < options_.readmit_after);
+    }
+    out[c] = camera.blurred;
+  }
+  return out;
 }
 
 }  // namespace bslam::system

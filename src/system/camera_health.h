@@ -16,6 +16,8 @@ struct HealthOptions {
   int bright_level = 250;        // grey value; a picture mostly above it is over-exposed
   double dark_share = 0.995;     // of the pixels
   double bright_share = 0.6;
+  double sharp_slope = 0.28;     // share of an edge's contrast that a sharp one has between two pixels; Gaussian blur of 3 px leaves 0.27
+  double sharp_share = 0.1;      // of the edges; with fewer sharp ones a picture is blurred
   int readmit_after = 3;         // good pictures in a row before a camera that was out counts again, while there are others
 
   template <class Self, class Visitor>
@@ -24,6 +26,8 @@ struct HealthOptions {
     visitor("bright_level", self.bright_level, Range{0, 255}, "", "grey value: a picture mostly above it is over-exposed");
     visitor("dark_share", self.dark_share, Range{0, 1}, "", "of the pixels, that makes a picture black");
     visitor("bright_share", self.bright_share, Range{0, 1}, "", "of the pixels, that makes a picture over-exposed");
+    visitor("sharp_slope", self.sharp_slope, Range{0, 1}, "", "share of an edge's contrast that a sharp one has between two pixels");
+    visitor("sharp_share", self.sharp_share, Range{0, 1}, "", "of the edges; with fewer sharp ones a picture is blurred");
     visitor("readmit_after", self.readmit_after, Range{1, 1000}, "", "good pictures in a row before a camera that was out counts again");
   }
 };
@@ -43,11 +47,18 @@ class CameraMonitor {
   // with a good picture counts at once.
   std::vector<Outage> judge(const image::ImageBundle& images);
 
+  // One per camera: out of focus or behind something that smears, told from how steep the edges of its picture are, in rows and
+  // columns, so that motion to one side is not blur. Such a camera is used, with what it has. A picture with few edges says
+  // nothing; a camera was blurred until `readmit_after` pictures in a row are sharp.
+  std::vector<std::uint8_t> blurred(const image::ImageBundle& images);
+
  private:
   struct Camera {
     std::optional<std::uint64_t> last;  // content of its last picture
     Outage outage = Outage::kNone;      // why it was out
     int good = 0;                       // pictures since
+    bool blurred = false;
+    int sharp = 0;                      // pictures since it was
   };
   const HealthOptions options_;
   std::vector<Camera> cameras_;

@@ -26,6 +26,7 @@ struct FrameRecord {
   std::optional<tracking::TrackResult> found_later;  // where it had no pose: the one it got at the end of the run
   std::vector<image::ImageState> images;
   std::vector<Outage> outages;        // per camera: why its picture was not used
+  std::vector<std::uint8_t> blurred;  // per camera: out of focus or smeared, used all the same
   std::optional<Relocalisation> relocalisation;
   // The smooth pose: what the motion of the rig alone adds up to. Corrections of the map change T_map_odom and never this;
   // it stands still while the rig is lost. T_rig_odom = T_rig_world * T_map_odom, with T_rig_world of `result`.

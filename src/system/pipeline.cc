@@ -117,6 +117,7 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecu
   Outcome outcome;
   for (const image::CameraImage& i : images.images) outcome.record.images.push_back(i.state);
   outcome.record.outages = monitor_.judge(images);
+  outcome.record.blurred = monitor_.blurred(images);
   BundledFrame frame = make_frame(images, outcome.record.stages, left_out(images, outcome.record.outages));
   count_features(frame, outcome.record);
   const Stopwatch results;

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
 #include "mapping/simulated_map.h"
 
 namespace bslam::adjustment {
@@ -105,6 +109,29 @@ TEST(RecoverObservations, TakesNoKeypointThatHasALandmark) {
     EXPECT_TRUE(!there.valid() || there == flat.sources[i].landmark);
   }
   EXPECT_LT(flat.problem.observations.size(), before + before / 20);
+}
+
+TEST(RecoverObservations, TakesNoKeypointThatTheProblemHasGivenToAnotherPoint) {
+  map::SimulatedMap world = true_map();
+  for (const LandmarkId l : world.map.landmark_ids()) {
+    if (world.map.observations(l).size() >= 3 && world.map.observations(l).back().keyframe == KeyframeId(5)) {
+      world.map.remove_observation(l, KeyframeId(5));
+    }
+  }
+  const FlatProblem before = everything(world.map);
+  FlatProblem once = before, flat = before;
+  ASSERT_GT(recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, once), 0);
+  const auto known = [&](const auto& o) {
+    return std::ranges::any_of(before.problem.observations, [&](const auto& b) { return b.pose == o.pose && b.camera == o.camera && b.pixel == o.pixel; });
+  };
+  auto given = *std::ranges::find_if_not(once.problem.observations, known);  // a keypoint that would be found
+  const int rightful = std::exchange(given.point, given.point == 0 ? 1 : 0);
+  flat.problem.observations.push_back(given);
+  flat.sources.push_back({flat.landmarks[static_cast<std::size_t>(given.point)], flat.keyframes[static_cast<std::size_t>(given.pose)]});
+  recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, flat);
+  for (const auto& o : flat.problem.observations) {
+    EXPECT_FALSE(o.point == rightful && o.pose == given.pose && o.camera == given.camera && o.pixel == given.pixel);
+  }
 }
 
 }  // namespace

@@ -46,7 +46,8 @@ class SimulatedMap {
   // A keyframe of what the rig sees at `time_s`, at its true pose, with landmarks at their true places for every feature
   // that shows one, or only for those of matched features with a point (`all` false: the others stay without).
   KeyframeId add_keyframe(FrameId id, double time_s, bool all = true) {
-    const SimulatedFrame& seen = frames.emplace_back(sim.frame(id, time_s));
+    SimulatedFrame& seen = frames.emplace_back(sim.frame(id, time_s));
+    if (knows_motion) seen.frame.twist = true_twist(time_s);
     const auto stored = std::make_shared<const frame::BundledFrame>(seen.frame);
     std::vector<std::pair<FeatureId, LandmarkId>> known;
     std::vector<std::pair<FeatureId, int>> unknown;
@@ -73,12 +74,19 @@ class SimulatedMap {
   }
 
   const Eigen::Vector3d& truth_of(int landmark) const { return sim.landmarks()[static_cast<std::size_t>(landmark)].position; }
+  // Of the rig over the ten milliseconds after `time_s`, rad/s and m/s.
+  geometry::Vector6d true_twist(double time_s) const {
+    constexpr double kStep = 0.01;
+    const auto T_rig_world = [&](double t) { return (sim.trajectory().T_world_body(t) * sim.rig().body_from_cam(0)).inverse(); };
+    return (T_rig_world(time_s + kStep) * T_rig_world(time_s).inverse()).log() / kStep;
+  }
   geometry::SE3 true_pose(KeyframeId k) const { return frames[k.index()].T_world_rig.inverse(); }
   MapSnapshot snapshot() const { return std::make_shared<const BundledMap>(map); }
   MapDraft draft() const { return MapDraft("test", snapshot()); }
 
   FeatureSimulator sim;
   BundledMap map;
+  bool knows_motion = false;  // keyframes to come are added with the rig's true twist
   std::vector<SimulatedFrame> frames;  // one per keyframe
   std::unordered_map<int, LandmarkId> landmark_of;
   std::unordered_map<int, int> truth_of_landmark;  // by id

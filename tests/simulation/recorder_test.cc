@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "simulation/rigs.h"
 #include "small_world.h"
@@ -19,6 +20,15 @@ double mean_of(const image::Image& image) {
   double sum = 0;
   for (const std::uint8_t v : bytes_of(image)) sum += v;
   return sum / (image.width() * image.height());
+}
+
+// Mean difference of neighbours in a row.
+double roughness_of(const image::Image& image) {
+  double sum = 0;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 1; x < image.width(); ++x) sum += std::abs(image.row(y)[x] - image.row(y)[x - 1]);
+  }
+  return sum / (image.height() * (image.width() - 1));
 }
 
 std::vector<std::vector<std::uint8_t>> record(std::uint64_t seed, int threads) {
@@ -156,7 +166,8 @@ TEST(Recorder, ShowsFaults) {
   RecordingOptions options{.duration_s = 1, .rate_hz = 6};
   options.faults = {{FaultType::kFrozen, {0}, 0.15, 0.4, 0},
                     {FaultType::kBlack, {0}, 0.45, 0.55, 0},
-                    {FaultType::kOverExposed, {0}, 0.6, 0.7, 0}};
+                    {FaultType::kOverExposed, {0}, 0.6, 0.7, 0},
+                    {FaultType::kBlurred, {0}, 0.75, 0.9, 0}};
   const Recorder recorder(world, rig, make_tour(world.building(), {.duration_s = 1}), {}, 0.005, pool);
   const std::vector<Shot> shots = plan_shots(rig, options);
   const auto picture = [&](std::size_t i) { return bytes_of(recorder.picture(shots[i])); };
@@ -166,12 +177,20 @@ TEST(Recorder, ShowsFaults) {
   const auto bright = picture(4);
   EXPECT_GT(std::count_if(bright.begin(), bright.end(), [](std::uint8_t v) { return v >= 250; }),
             static_cast<std::ptrdiff_t>(0.6 * static_cast<double>(bright.size())));
-  EXPECT_NE(picture(5), picture(0));
+  // A smeared lens keeps the light and loses what differs between neighbours.
+  Shot sharp = shots[5];
+  EXPECT_GT(sharp.blur_px, 0);
+  sharp.blur_px = 0;
+  const image::Image blurred = recorder.picture(shots[5]), as_usual = recorder.picture(sharp);
+  EXPECT_NEAR(mean_of(blurred), mean_of(as_usual), 0.05 * mean_of(as_usual));
+  EXPECT_LT(roughness_of(blurred), 0.5 * roughness_of(as_usual));
+  EXPECT_NE(bytes_of(as_usual), picture(0));
 }
 
 TEST(Fault, NamesRoundTrip) {
   for (const FaultType type :
-       {FaultType::kBlack, FaultType::kFrozen, FaultType::kOverExposed, FaultType::kDropped, FaultType::kDelayed}) {
+       {FaultType::kBlack, FaultType::kFrozen, FaultType::kOverExposed, FaultType::kDropped, FaultType::kDelayed,
+                               FaultType::kBlurred}) {
     EXPECT_EQ(fault_type(fault_name(type)), type);
   }
   EXPECT_FALSE(fault_type("cracked").has_value());

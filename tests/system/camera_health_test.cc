@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "base/random.h"
 
 namespace bslam::system {
@@ -95,6 +97,42 @@ TEST(CameraMonitor, ACameraThatComesNowAndThenIsTakenAsItComes) {
   monitor.judge(frame({good(1), good(2)}));
   EXPECT_EQ(monitor.judge(frame({good(3), {}})), (Outages{Outage::kNone, Outage::kNoImage}));
   EXPECT_EQ(monitor.judge(frame({good(4), good(5)})), (Outages{Outage::kNone, Outage::kNone}));
+}
+
+// Tiles of 40 pixels whose edges are blurred by `across` and `along` pixels (standard deviations) in rows and columns.
+image::Image tiles(double across, double along, int contrast = 60) {
+  const auto edge = [](int at, double sigma) {
+    const int in_tile = at % 40;
+    return std::erf((in_tile - 19.5) / (std::sqrt(2.0) * sigma)) * ((at / 40) % 2 == 0 ? 1 : -1);
+  };
+  image::Image image(320, 240);
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      image.row(y)[x] = static_cast<std::uint8_t>(std::lround(128 + contrast * (0.5 * edge(x, across) + 0.5 * edge(y, along))));
+    }
+  }
+  return image;
+}
+
+using Flags = std::vector<std::uint8_t>;
+
+TEST(CameraMonitor, TellsABlurredPictureFromASharpOneAndFromMotion) {
+  CameraMonitor monitor(3, {});
+  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6), tiles(4, 4), tiles(6, 0.6)})), (Flags{0, 1, 0}));
+}
+
+TEST(CameraMonitor, SaysNothingOfBlurWhereThereAreNoEdges) {
+  CameraMonitor monitor(2, {});
+  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4, 15), {}})), (Flags{0, 0}));
+}
+
+TEST(CameraMonitor, ACameraIsBlurredUntilSomePicturesAreSharp) {
+  CameraMonitor monitor(1, {});
+  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4)})), Flags{1});
+  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{1});
+  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4, 15)})), Flags{1});  // says nothing
+  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{1});
+  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{0});
 }
 
 }  // namespace
