@@ -66,10 +66,11 @@ void count_edges(const std::uint8_t* first, std::ptrdiff_t step, int pixels, dou
 
 // True, false, or nothing where there are too few edges to tell.
 std::optional<bool> is_blurred(const image::Image& image, const HealthOptions& options) {
-  constexpr int kLineStep = 8, kMinEdges = 60;
+  constexpr int kLines = 30, kMinEdges = 40;  // rows looked at, and columns as far apart
+  const int step = std::max(1, image.height() / kLines);
   Edges edges;
-  for (int y = 0; y < image.height(); y += kLineStep) count_edges(image.row(y), 1, image.width(), options.sharp_slope, edges);
-  for (int x = 0; x < image.width(); x += kLineStep) count_edges(image.row(0) + x, image.width(), image.height(), options.sharp_slope, edges);
+  for (int y = 0; y < image.height(); y += step) count_edges(image.row(y), 1, image.width(), options.sharp_slope, edges);
+  for (int x = 0; x < image.width(); x += step) count_edges(image.row(0) + x, image.width(), image.height(), options.sharp_slope, edges);
   if (edges.all < kMinEdges) return std::nullopt;
   return edges.sharp < options.sharp_share * edges.all;
 }

@@ -26,6 +26,14 @@ std::atomic<std::size_t> live_bytes{0}, peak_bytes{0};
   }
   return p;
 }
+// Of the library it would call the one above; of a sanitizer it would not.
+[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  try {
+    return operator new(size);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+}
 [[gnu::noinline]] void operator delete(void* p) noexcept {
   if (p != nullptr) live_bytes -= malloc_usable_size(p);
   std::free(p);
