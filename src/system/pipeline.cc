@@ -179,7 +179,10 @@ void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outco
     outcome.record.keyframe = true;
     outcome.began_part = true;
     if (report.keyframes.size() == 2) {
-      for (auto& early : early_) outcome.early.push_back({std::move(early), report.keyframes[0], report.keyframes[1]});
+      const TimeNs before_ns = candidate_->frame->time_ns;
+      for (auto& early : early_) {
+        outcome.early.push_back({std::move(early), report.keyframes[0], report.keyframes[1], before_ns, frame.time_ns});
+      }
     }
     early_.clear();
     candidate_.reset();

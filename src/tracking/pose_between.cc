@@ -39,9 +39,9 @@ std::optional<TrackResult> pose_between(const map::BundledMap& map, const Betwee
   if (!before.valid() || !after.valid()) return std::nullopt;
   const frame::BundledFrame& frame = *early.frame;
   const SE3 T_before = map.resolved_pose(early.before), T_after = map.resolved_pose(early.after);
-  const TimeNs from = map.keyframe(early.before).frame->time_ns, to = map.keyframe(early.after).frame->time_ns;
-  if (frame.time_ns == from) return result_at(map, frame, T_before, before);
-  SE3 T = geometry::interpolate(T_before, T_after, to_seconds(frame.time_ns - from) / to_seconds(to - from));
+  if (frame.time_ns == early.before_ns) return result_at(map, frame, T_before, before);
+  const double share = to_seconds(frame.time_ns - early.before_ns) / to_seconds(early.after_ns - early.before_ns);
+  SE3 T = geometry::interpolate(T_before, T_after, share);
   const std::vector<LandmarkId> landmarks = landmarks_of_both(map, before, after);
   // What the interpolation predicts, then what the pose found does.
   solver::PoseSolution solution;

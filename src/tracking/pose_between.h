@@ -10,7 +10,8 @@ namespace bslam::tracking {
 
 struct BetweenKeyframes {
   std::shared_ptr<const frame::BundledFrame> frame;
-  KeyframeId before, after;
+  KeyframeId before, after;         // as committed: either may have been culled since
+  TimeNs before_ns = 0, after_ns = 0;  // of their frames
 };
 
 // Empty where the map does not support a pose of the frame, or a keyframe's part is gone.

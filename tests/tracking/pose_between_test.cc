@@ -9,14 +9,15 @@ namespace {
 
 class PoseBetween : public ::testing::Test {
  protected:
-  PoseBetween() : world_(true_map(simulator(simulation::ring_rig(1)), 0.6, 0.6)), pool_(1) {}
+  PoseBetween() : world_(true_map(simulator(simulation::ring_rig(1)), 1.2, 0.6)), pool_(1) {}
 
   std::optional<TrackResult> locate(frame::BundledFrame frame) {
-    const BetweenKeyframes early{std::make_shared<const frame::BundledFrame>(std::move(frame)), KeyframeId(0), KeyframeId(1)};
+    const BetweenKeyframes early{std::make_shared<const frame::BundledFrame>(std::move(frame)), KeyframeId(0), KeyframeId(1),
+                                 world_.frames[0].frame.time_ns, world_.frames[1].frame.time_ns};
     return pose_between(world_.map, early, {0.7}, {}, pool_);
   }
 
-  map::SimulatedMap world_;  // two keyframes, 0.6 s apart
+  map::SimulatedMap world_;  // keyframes 0.6 s apart
   ThreadPool pool_;
 };
 
@@ -38,6 +39,15 @@ TEST_F(PoseBetween, OfTheFirstKeyframeIsItsOwn) {
   const auto result = locate(world_.frames[0].frame);
   ASSERT_TRUE(result);
   EXPECT_EQ(result->T_rig_world.matrix(), world_.map.keyframe(KeyframeId(0)).T_rig_world.matrix());
+}
+
+TEST_F(PoseBetween, AlsoWhereTheSecondKeyframeWasCulled) {
+  ASSERT_TRUE(world_.map.remove_keyframe(KeyframeId(1)));
+  const auto seen = world_.sim.frame(FrameId(7), 0.3);
+  const auto result = locate(seen.frame);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->reference, KeyframeId(0));
+  EXPECT_LT(map::distance_m(result->T_rig_world, seen.T_world_rig.inverse()), 0.02);
 }
 
 TEST_F(PoseBetween, IsNoneForAFrameOfAnotherPlace) {
