@@ -118,6 +118,7 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecu
   for (const image::CameraImage& i : images.images) outcome.record.images.push_back(i.state);
   outcome.record.outages = monitor_.judge(images);
   outcome.record.blurred = monitor_.blurred(images);
+  trust_what_is_sharp_again(outcome.record.blurred);
   BundledFrame frame = make_frame(images, outcome.record.stages, left_out(images, outcome.record.outages));
   count_features(frame, outcome.record);
   const Stopwatch results;
@@ -135,6 +136,14 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecu
   outcome.record.T_map_odom = T_map_odom_;
   outcome.record.frame_ms = whole.ms();
   return outcome;
+}
+
+// A camera that saw nothing because it was blurred is doubted no longer.
+void Pipeline::trust_what_is_sharp_again(const std::vector<std::uint8_t>& blurred) {
+  for (std::size_t c = 0; c < blurred_.size() && c < state_.cameras.size(); ++c) {
+    if (blurred_[c] && !blurred[c] && state_.cameras[c].doubted) state_.cameras[c] = tracking::CameraTrust{};
+  }
+  blurred_ = blurred;
 }
 
 // The state is in the unit the map had: where its part was scaled since, it grows along.

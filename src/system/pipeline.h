@@ -46,6 +46,7 @@ class Pipeline {
   const tracking::TrackerState& state() const { return state_; }
 
  private:
+  void trust_what_is_sharp_again(const std::vector<std::uint8_t>& blurred);
   std::vector<std::uint8_t> left_out(const image::ImageBundle& images, const std::vector<Outage>& outages) const;
   void grow_along(const map::BundledMap& map);
   void start(frame::BundledFrame frame, StageExecutor& executor, Outcome& outcome);
@@ -61,6 +62,7 @@ class Pipeline {
   const Config& config_;
   ThreadPool pool_;
   CameraMonitor monitor_;
+  std::vector<std::uint8_t> blurred_;  // cameras in the last frame
   frame::FrameBuilder builder_;
   std::vector<double> feature_shares_;  // of the cameras in the next frame's feature budget; empty: even
   tracking::TrackerState state_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace bslam::tracking {
 
@@ -74,22 +75,42 @@ solver::PoseSolution believe_the_steadiest(const camera::Rig& rig, const FrameMa
   return best;
 }
 
-std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity, const ConsensusOptions& options) {
+std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity, const std::vector<CameraTrust>& trust,
+                                      const ConsensusOptions& options) {
   std::vector<std::uint8_t> out(continuity.size(), 0);
   const auto counts = [&](const Expectation& e) { return e.expected >= options.min_expected; };
   const bool sound = std::ranges::any_of(continuity, [&](const Expectation& e) { return counts(e) && e.share() >= options.sound_share; });
-  for (std::size_t c = 0; sound && c < out.size(); ++c) out[c] = counts(continuity[c]) && continuity[c].share() < options.lost_share;
+  for (std::size_t c = 0; sound && c < out.size(); ++c) {
+    out[c] = counts(continuity[c]) && continuity[c].share() < options.lost_share && trust[c].share >= options.sound_share;
+  }
   return out;
 }
 
-void doubt(CameraTrust& camera, const Expectation& view, const ConsensusOptions& options) {
+void trust(CameraTrust& camera, const Expectation& continuity, const ConsensusOptions& options) {
+  if (continuity.expected >= options.min_expected) camera.share = continuity.share();
+}
+
+void doubt(CameraTrust& camera, const Expectation& view, TimeNs time_ns, const ConsensusOptions& options) {
   camera.landmarks.clear();
-  camera.doubted = true;
+  if (!std::exchange(camera.doubted, true)) camera.judged_ns = camera.since_ns = time_ns;
   const bool judged = view.expected >= options.min_expected;
   const bool sees = judged && view.share() >= options.seen_share;
   camera.seeing = sees ? camera.seeing + 1 : 0;
-  camera.idle = judged ? 0 : camera.idle + 1;
-  if (camera.seeing >= options.readmit_after || camera.idle >= options.forget_after) camera = CameraTrust{};
+  if (judged) camera.judged_ns = time_ns;
+  const bool forgotten = to_seconds(time_ns - camera.judged_ns) >= options.forget_after_s;
+  if (camera.seeing >= options.readmit_after || forgotten) camera = CameraTrust{};
+}
+
+bool due_for_retry(const CameraTrust& camera, TimeNs time_ns, const ConsensusOptions& options) {
+  return camera.doubted && to_seconds(time_ns - camera.since_ns) >= options.retry_after_s;
+}
+
+void retry(CameraTrust& camera, const Expectation& wide, TimeNs time_ns, const ConsensusOptions& options) {
+  if (wide.expected >= options.min_expected && wide.share() >= options.seen_share) {
+    camera.since_ns = time_ns;
+  } else {
+    camera = CameraTrust{};
+  }
 }
 
 void leave_out(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2, frame::BundledFrame& frame) {

@@ -13,7 +13,9 @@ namespace bslam::tracking {
 struct CameraTrust {
   bool doubted = false;
   int seeing = 0;                     // frames in a row in which a doubted camera saw what it should
-  int idle = 0;                       // frames in which it should have seen nothing
+  TimeNs judged_ns = 0;               // when a doubted camera last should have seen something
+  TimeNs since_ns = 0;                // since when it is doubted, or was last found to show its view displaced
+  double share = 1.0;                 // of what it should have seen again in the last frame that could tell, found
   std::vector<LandmarkId> landmarks;  // inliers of the last tracked frame
 };
 
@@ -40,11 +42,22 @@ solver::PoseSolution believe_the_steadiest(const camera::Rig& rig, const FrameMa
                                            std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
                                            const ConsensusOptions& options, const solver::PoseSolverOptions& pose);
 
-// Flags the cameras that lost what they saw while another camera did not. At least one camera is not flagged.
-std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity, const ConsensusOptions& options);
+// Flags the cameras that lost from one frame to the next what they saw, while another camera did not. Where it went little by
+// little something passes by: a doorpost, the end of a wall. At least one camera is not flagged.
+std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity, const std::vector<CameraTrust>& trust,
+                                      const ConsensusOptions& options);
 
-// Begins or goes on to doubt a camera. `view`: what of the map should be seen by it in this frame, and is.
-void doubt(CameraTrust& camera, const Expectation& view, const ConsensusOptions& options);
+// Notes what a camera that counts found again.
+void trust(CameraTrust& camera, const Expectation& continuity, const ConsensusOptions& options);
+
+// Begins or goes on to doubt a camera. `view`: what of the map should be seen by it in the frame of `time_ns`, and is.
+void doubt(CameraTrust& camera, const Expectation& view, TimeNs time_ns, const ConsensusOptions& options);
+
+// Is a doubted camera to be tried again, unless its view is found displaced?
+bool due_for_retry(const CameraTrust& camera, TimeNs time_ns, const ConsensusOptions& options);
+
+// What became of that. `wide`: what of the map should be seen by it, and is anywhere near.
+void retry(CameraTrust& camera, const Expectation& wide, TimeNs time_ns, const ConsensusOptions& options);
 
 // Takes a camera out of a frame as if it had delivered no image.
 void leave_out(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2, frame::BundledFrame& frame);

@@ -71,11 +71,12 @@ struct InitialisationOptions {
 struct ConsensusOptions {
   int min_expected = 20;       // landmarks a camera should see, below which nothing is said about it
   double lost_share = 0.1;     // of what it saw in the last frame and should see now: found less, it is doubted ...
-  double sound_share = 0.4;    // ... while another camera finds this much
+  double sound_share = 0.4;    // ... while another camera finds this much, and it did itself a frame ago
   double conflict_share = 0.3; // of a camera's matches that agree with the pose: fewer contradict it
   double seen_share = 0.15;    // of the map's landmarks in its view, found by a doubted camera: it sees what it should
   int readmit_after = 3;       // such frames in a row before it counts again
-  int forget_after = 40;       // frames without anything it should see, after which it counts again
+  double forget_after_s = 2.0; // without anything it should see, after which it counts again
+  double retry_after_s = 10.0; // out for that long and not seen to show its view displaced, it is tried again
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -85,7 +86,8 @@ struct ConsensusOptions {
     visitor("conflict_share", self.conflict_share, Range{0, 1}, "", "of a camera's matches that agree with the pose: fewer contradict it");
     visitor("seen_share", self.seen_share, Range{0, 1}, "", "of the landmarks in its view that a doubted camera must find");
     visitor("readmit_after", self.readmit_after, Range{1, 10000}, "frames", "in a row before it counts again");
-    visitor("forget_after", self.forget_after, Range{1, 1000000}, "frames", "without anything it should see, after which it counts again");
+    visitor("forget_after_s", self.forget_after_s, Range{0, 1e6}, "s", "without anything it should see, after which it counts again");
+    visitor("retry_after_s", self.retry_after_s, Range{0, 1e6}, "s", "out and not seen to show its view displaced, after which it is tried again");
   }
 };
 

@@ -44,6 +44,7 @@ struct Coarse {
   FrameMatches matches;  // inliers
   LostReason reason = LostReason::kNone;
   std::vector<std::uint8_t> left_out = {};  // per camera: doubted before or now
+  std::vector<Expectation> again = {};      // per camera: what of the last frame was seen again; empty after a wide search
 };
 
 std::vector<std::uint8_t> doubted(const TrackerState& state, std::size_t cameras) {
@@ -112,7 +113,8 @@ bool track_by_prediction(const TrackInput& input, frame::BundledFrame& frame, co
   out.T_rig_world = solution.T_rig_world;
   out.matches = keep_inliers(found, solution.inlier);
   out.reason = LostReason::kNone;
-  const auto lost = disagreeing(continuity(map, frame, out.T_rig_world, input.state.cameras, out.matches), options.consensus);
+  out.again = continuity(map, frame, out.T_rig_world, input.state.cameras, out.matches);
+  const auto lost = disagreeing(out.again, input.state.cameras, options.consensus);
   for (std::size_t c = 0; c < lost.size(); ++c) left_out[c] |= lost[c];
   out.left_out = std::move(left_out);
   drop(out.left_out, out.matches);
@@ -147,11 +149,16 @@ Coarse track_last_frame(const TrackInput& input, frame::BundledFrame& frame, con
   return out;
 }
 
+bool any_due_for_retry(const TrackerState& state, TimeNs time_ns, const ConsensusOptions& options) {
+  return std::ranges::any_of(state.cameras, [&](const CameraTrust& c) { return due_for_retry(c, time_ns, options); });
+}
+
 struct Fine {
   solver::PoseSolution solution;
   FrameMatches matches;                 // all, inliers and outliers
   std::vector<LandmarkId> visible;
   std::vector<Expectation> views;       // per camera, of the local view
+  std::vector<Expectation> wide;        // the same in wide windows, where a doubted camera is due to be tried again
 };
 
 // Pose from all landmarks of the local view, with keypoints aligned to their landmarks' patches.
@@ -165,6 +172,12 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::Bund
   Fine out;
   for (std::size_t c = 0; c < search.found.size(); ++c) {
     out.views.push_back({search.visible_by_camera[c], static_cast<int>(search.found[c].size())});
+  }
+  if (any_due_for_retry(input.state, frame.time_ns, options.consensus)) {
+    auto windows = search_options(input, options.matching, options.matching.wide_radius);
+    windows.ratio = 0.8 * options.matching.ratio;
+    const MatchSearch wide = find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, {}, windows, pool);
+    for (std::size_t c = 0; c < wide.found.size(); ++c) out.wide.push_back({wide.visible_by_camera[c], static_cast<int>(wide.found[c].size())});
   }
   drop(coarse.left_out, search.found);
   out.matches = merge(coarse.matches, search.found);
@@ -203,8 +216,12 @@ void note_trust(const Coarse& coarse, const Fine& fine, const FrameMatches& inli
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     out.result.cameras[c].doubted = coarse.left_out[c];
     if (coarse.left_out[c]) {
-      doubt(cameras[c], fine.views[c], options.consensus);
+      doubt(cameras[c], fine.views[c], out.result.time_ns, options.consensus);
+      if (!fine.wide.empty() && due_for_retry(cameras[c], out.result.time_ns, options.consensus)) {
+        retry(cameras[c], fine.wide[c], out.result.time_ns, options.consensus);
+      }
     } else {
+      if (!coarse.again.empty()) trust(cameras[c], coarse.again[c], options.consensus);
       cameras[c].landmarks.clear();
       for (const Match& m : inliers[c]) cameras[c].landmarks.push_back(m.landmark);
     }

@@ -11,25 +11,25 @@ using Flags = std::vector<std::uint8_t>;
 
 TEST(CameraConsensus, FlagsWhoLostWhatItSawWhileAnotherDidNot) {
   const ConsensusOptions options;
-  EXPECT_EQ(disagreeing({{100, 80}, {100, 2}}, options), Flags({0, 1}));
-  EXPECT_EQ(disagreeing({{100, 3}, {100, 2}, {60, 50}}, options), Flags({1, 1, 0}));
-  EXPECT_EQ(disagreeing({{100, 80}, {100, 30}}, options), Flags({0, 0})) << "a hard frame is no wrong one";
-  EXPECT_EQ(disagreeing({{100, 80}, {10, 0}}, options), Flags({0, 0})) << "too little to judge by";
-  EXPECT_EQ(disagreeing({{100, 5}, {100, 2}}, options), Flags({0, 0})) << "nobody to judge by";
+  EXPECT_EQ(disagreeing({{100, 80}, {100, 2}}, std::vector<CameraTrust>(3), options), Flags({0, 1}));
+  EXPECT_EQ(disagreeing({{100, 3}, {100, 2}, {60, 50}}, std::vector<CameraTrust>(3), options), Flags({1, 1, 0}));
+  EXPECT_EQ(disagreeing({{100, 80}, {100, 30}}, std::vector<CameraTrust>(3), options), Flags({0, 0})) << "a hard frame is no wrong one";
+  EXPECT_EQ(disagreeing({{100, 80}, {10, 0}}, std::vector<CameraTrust>(3), options), Flags({0, 0})) << "too little to judge by";
+  EXPECT_EQ(disagreeing({{100, 5}, {100, 2}}, std::vector<CameraTrust>(3), options), Flags({0, 0})) << "nobody to judge by";
 }
 
 TEST(CameraConsensus, ReadmitsAfterSomeFramesThatFit) {
   const ConsensusOptions options;
   CameraTrust camera;
-  doubt(camera, {100, 0}, options);
+  doubt(camera, {100, 0}, 0, options);
   for (int i = 1; i < options.readmit_after; ++i) {
-    doubt(camera, {100, 50}, options);
+    doubt(camera, {100, 50}, 0, options);
     EXPECT_TRUE(camera.doubted);
   }
-  doubt(camera, {100, 1}, options);  // from the beginning
+  doubt(camera, {100, 1}, 0, options);  // from the beginning
   for (int i = 0; i < options.readmit_after; ++i) {
     EXPECT_TRUE(camera.doubted);
-    doubt(camera, {100, 50}, options);
+    doubt(camera, {100, 50}, 0, options);
   }
   EXPECT_FALSE(camera.doubted);
 }
@@ -37,8 +37,38 @@ TEST(CameraConsensus, ReadmitsAfterSomeFramesThatFit) {
 TEST(CameraConsensus, ForgetsWhereThereIsLongNothingToJudgeBy) {
   const ConsensusOptions options;
   CameraTrust camera;
-  for (int i = 0; i < options.forget_after; ++i) doubt(camera, {3, 0}, options);
+  doubt(camera, {3, 0}, 0, options);
+  doubt(camera, {3, 0}, from_seconds(options.forget_after_s - 0.1), options);
+  EXPECT_TRUE(camera.doubted);
+  doubt(camera, {3, 0}, from_seconds(options.forget_after_s), options);
   EXPECT_FALSE(camera.doubted);
+}
+
+TEST(CameraConsensus, ACameraThatLostItsViewLittleByLittleIsNotDoubted) {
+  const ConsensusOptions options;
+  const std::vector<Expectation> now = {{100, 80}, {100, 2}, {100, 2}};
+  std::vector<CameraTrust> before(3);
+  trust(before[1], {100, 70}, options);
+  trust(before[2], {100, 25}, options);
+  EXPECT_EQ(disagreeing(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
+  trust(before[1], {10, 0}, options);  // too little to tell
+  EXPECT_EQ(disagreeing(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
+}
+
+TEST(CameraConsensus, ACameraLongOutIsTriedAgainUnlessItsViewIsDisplaced) {
+  const ConsensusOptions options;
+  const TimeNs later = from_seconds(options.retry_after_s);
+  for (const bool displaced : {false, true}) {
+    CameraTrust camera;
+    doubt(camera, {100, 2}, 0, options);
+    EXPECT_FALSE(due_for_retry(camera, later - 1, options));
+    doubt(camera, {100, 2}, later, options);
+    ASSERT_TRUE(due_for_retry(camera, later, options));
+    retry(camera, {100, displaced ? 60 : 3}, later, options);
+    EXPECT_EQ(camera.doubted, displaced);
+    EXPECT_FALSE(due_for_retry(camera, later + 1, options));
+    EXPECT_EQ(due_for_retry(camera, 2 * later, options), displaced);
+  }
 }
 
 TEST(CameraConsensus, KeepsDoubtsThroughALossButOfCamerasThatSawThePlace) {
