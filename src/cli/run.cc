@@ -1,5 +1,4 @@
 // bslam run: SLAM over a recorded data set.
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -12,6 +11,7 @@
 #include "cli/dataset_arguments.h"
 #include "cli/interruption.h"
 #include "cli/progress_bar.h"
+#include "cli/run_messages.h"
 #include "cli/verbs.h"
 #include "io/atomic_file.h"
 #include "io/map_file.h"
@@ -113,25 +113,6 @@ Status write_files(const session::SessionResult& result, const system::Config& c
   return io::write_map(*result.map, {vocabulary.id(), result.record.version, result.record.data}, arguments.save_map);
 }
 
-void warn_of_extrinsics(const report::RunRecord& record) {
-  for (const report::CameraRecord& camera : record.cameras) {
-    const auto& e = camera.extrinsics;
-    if (!e || !e->suspect) continue;
-    std::fprintf(stderr, "warning: %s: the images put it %.2f deg and %.1f mm away from where the rig file does%s\n",
-                 camera.name.c_str(), e->change_deg, e->change_mm,
-                 e->refined ? "" : "; --set extrinsics.refine=true accepts that");
-  }
-}
-
-void print_result(const report::RunRecord& record, const std::string& out) {
-  const auto tracked = std::count_if(record.frames.begin(), record.frames.end(), [](const report::FrameRecord& f) {
-    return f.outcome == report::FrameOutcome::kTracked;
-  });
-  std::printf("%zd of %zu frames have a pose, %lld keyframes, %lld landmarks, scale %s; %.1f s\n%s\n",
-              static_cast<std::ptrdiff_t>(tracked), record.frames.size(), static_cast<long long>(record.map.keyframes),
-              static_cast<long long>(record.map.landmarks), record.map.scale.c_str(), record.wall_s, out.c_str());
-}
-
 int run(const RunArguments& arguments) {
   // Before anything is made: whoever sees the folder can rely on an interruption being answered in order.
   const Interruption interruption;
@@ -168,7 +149,7 @@ int run(const RunArguments& arguments) {
   bar.finish();
   if (!result) return report_error(result.error());
   if (const Status s = write_files(*result, *config, arguments, **vocabulary); !s) return report_error(s.error());
-  warn_of_extrinsics(result->record);
+  print_warnings(result->record);
   print_result(result->record, arguments.out);
   if (!result->record.complete) return kExitInterrupted;
   return result->live.empty() ? kExitNothingTracked : kExitOk;

@@ -216,6 +216,21 @@ Status keep_range(const DatasetRequest& request, Dataset& dataset) {
                fmt::format("a range with frames: they last from 0 to {:.3f} s", last_s)};
 }
 
+// The recording's own calibration is what counts; that it may lack times which a rig file beside it has should be known.
+void warn_of_times_in_a_rig_beside(const DatasetRequest& request, std::vector<std::string>& warnings) {
+  const std::filesystem::path file = request.path / "rig.yaml";
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return;
+  const auto rig = read_rig(file);
+  if (!rig) return;
+  for (std::size_t c = 0; c < rig->size(); ++c) {
+    if (rig->camera(c).time_offset_ns == 0) continue;
+    warnings.push_back(fmt::format("{} gives {} a time offset of {:g} ms, which is not used without --rig {}", file.string(),
+                                   rig->camera(c).name, 1e3 * to_seconds(rig->camera(c).time_offset_ns), file.string()));
+    return;
+  }
+}
+
 }  // namespace
 
 Result<Dataset> open_dataset(const DatasetRequest& request) {
@@ -225,6 +240,7 @@ Result<Dataset> open_dataset(const DatasetRequest& request) {
   const Recording& recording = *opened->recording;
   auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
+  if (!request.rig_file) warn_of_times_in_a_rig_beside(request, chosen->warnings);
   const auto images = collect_images(recording, *chosen);
   if (!images) return images.error();
   Dataset dataset{name_of(request.path),

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kTitleFont = 20.0, kSubtitleFont = 13.0, kPanelFont = 14.0, kFont = 12.0;
 constexpr double kGlyphWidth = 0.57;  // of the font size: the mean of sans-serif faces, on the wide side
-constexpr double kMarginLeft = 62.0, kMarginRight = 16.0, kMarginTop = 46.0, kMarginBottom = 44.0;
+constexpr double kMarginLeft = 76.0, kMarginRight = 16.0, kMarginTop = 46.0, kMarginBottom = 44.0;
 constexpr double kPagePadding = 14.0, kTickEveryX = 70.0, kTickEveryY = 32.0;  // pixels
 constexpr double kSmallestStep = 0.4;  // of a line, in pixels: shorter ones cannot be seen and only make the file large
 constexpr std::array<std::string_view, 8> kPalette = {kBlue,   kVermilion, kGreen,    kPurple,

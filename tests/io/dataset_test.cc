@@ -151,6 +151,11 @@ TEST_F(SmallEuroc, TakesAnotherRig) {
   write_text(data() / "rig.yaml", yaml);
   const auto dataset = open_dataset({.path = data(), .rig_file = data() / "rig.yaml"});
   ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_TRUE(dataset->warnings.empty());
+  const auto without = open_dataset({.path = data()});
+  ASSERT_TRUE(without);
+  ASSERT_EQ(without->warnings.size(), 1u);
+  EXPECT_NE(without->warnings[0].find("a time offset of 500 ms, which is not used without --rig"), std::string::npos);
   EXPECT_EQ(dataset->first_time_ns, kSmallStart + 500'000'000);
   EXPECT_EQ(read_frame(*dataset, 0).images[1].time_ns, kSmallStart + 500'000'000);
   fs::remove_all(camera(1));
