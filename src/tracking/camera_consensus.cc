@@ -81,7 +81,7 @@ std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity
   const auto counts = [&](const Expectation& e) { return e.expected >= options.min_expected; };
   const bool sound = std::ranges::any_of(continuity, [&](const Expectation& e) { return counts(e) && e.share() >= options.sound_share; });
   for (std::size_t c = 0; sound && c < out.size(); ++c) {
-    out[c] = counts(continuity[c]) && continuity[c].share() < options.lost_share && trust[c].share >= options.sound_share;
+    out[c] = counts(continuity[c]) && continuity[c].share() < options.lost_share && trust[c].share >= options.steady_share;
   }
   return out;
 }

@@ -71,7 +71,8 @@ struct InitialisationOptions {
 struct ConsensusOptions {
   int min_expected = 20;       // landmarks a camera should see, below which nothing is said about it
   double lost_share = 0.1;     // of what it saw in the last frame and should see now: found less, it is doubted ...
-  double sound_share = 0.4;    // ... while another camera finds this much, and it did itself a frame ago
+  double sound_share = 0.4;    // ... while another camera finds this much ...
+  double steady_share = 0.5;   // ... and it did itself find this much a frame ago: else its view went little by little
   double conflict_share = 0.3; // of a camera's matches that agree with the pose: fewer contradict it
   double seen_share = 0.15;    // of the map's landmarks in its view, found by a doubted camera: it sees what it should
   int readmit_after = 3;       // such frames in a row before it counts again
@@ -83,6 +84,7 @@ struct ConsensusOptions {
     visitor("min_expected", self.min_expected, Range{1, 10000}, "", "landmarks a camera should see, below which nothing is said about it");
     visitor("lost_share", self.lost_share, Range{0, 1}, "", "of what a camera saw last: finds it less again, it is doubted");
     visitor("sound_share", self.sound_share, Range{0, 1}, "", "while another camera finds this much");
+    visitor("steady_share", self.steady_share, Range{0, 1}, "", "and it found this much itself a frame ago");
     visitor("conflict_share", self.conflict_share, Range{0, 1}, "", "of a camera's matches that agree with the pose: fewer contradict it");
     visitor("seen_share", self.seen_share, Range{0, 1}, "", "of the landmarks in its view that a doubted camera must find");
     visitor("readmit_after", self.readmit_after, Range{1, 10000}, "frames", "in a row before it counts again");

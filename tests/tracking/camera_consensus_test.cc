@@ -49,7 +49,7 @@ TEST(CameraConsensus, ACameraThatLostItsViewLittleByLittleIsNotDoubted) {
   const std::vector<Expectation> now = {{100, 80}, {100, 2}, {100, 2}};
   std::vector<CameraTrust> before(3);
   trust(before[1], {100, 70}, options);
-  trust(before[2], {100, 25}, options);
+  trust(before[2], {100, 45}, options);
   EXPECT_EQ(disagreeing(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
   trust(before[1], {10, 0}, options);  // too little to tell
   EXPECT_EQ(disagreeing(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
