@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace bslam::adjustment {
 namespace {
 
 constexpr int kAbsent = -1;
+constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
 // Position of each keyframe among the poses, or kAbsent.
 std::vector<int> pose_positions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
@@ -25,6 +27,8 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
   });
   if (seen < 2) return false;
   const int point = static_cast<int>(flat.landmarks.size());
+  std::size_t reference = kNone;
+  float least = std::numeric_limits<float>::infinity();  // of those aligned to the reference
   for (const map::Observation& o : observations) {
     const int pose = position[o.keyframe.index()];
     if (pose == kAbsent) continue;
@@ -34,10 +38,17 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
       const std::size_t k = r.keypoint.index();
       const double detected = sigma_px * std::pow(scale_factor, keypoints.level[k]);
       const float sigma = o.aligned ? keypoints.sigma[k] : static_cast<float>(detected);
+      if (o.aligned && map.landmark(id).reference == map::LandmarkReference{o.keyframe, r}) {
+        reference = flat.problem.observations.size();
+      } else if (o.aligned) {
+        least = std::min(least, sigma);
+      }
       flat.problem.observations.push_back({pose, point, r.camera, keypoints.pixel[k], sigma});
       flat.sources.push_back({id, o.keyframe});
     }
   }
+  // The reference says what the landmark is: that it was detected, not aligned, is no error.
+  if (reference != kNone) flat.problem.observations[reference].sigma = std::min(flat.problem.observations[reference].sigma, least);
   flat.landmarks.push_back(id);
   flat.problem.points.push_back(map.landmark(id).position);
   return true;

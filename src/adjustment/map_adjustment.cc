@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "adjustment/landmark_noise.h"
+
 namespace bslam::adjustment {
 namespace {
 
@@ -85,7 +87,8 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
     const auto skip = outliers(flat.problem, options.outlier_chi2);
     solve.iterations = options.final_iterations;
     solve.robust = false;
-    const auto last = solver::adjust(flat.problem, solve, skip, stop);
+    const auto variances = landmark_variances(flat.problem, skip);
+    const auto last = adjust_with_variances(flat.problem, variances, solve, skip, stop);
     if (last.usable()) report.final_cost = last.final_cost;
   }
   const std::vector<ObservationSource> bad = bad_observations(flat, options.outlier_chi2);

@@ -42,7 +42,7 @@ PointObservation observation(const camera::Rig& rig, std::span<const CameraFrame
 
 // Places keypoint b where the patch of keypoint a is seen. Empty where it does not look alike there.
 bool align_edge(const camera::Rig& rig, std::span<const CameraFrame> cameras, std::span<const image::Pyramid> pyramids,
-                const AlignmentOptions& options, Edge& edge) {
+                std::span<const AlignmentOptions> alignment, Edge& edge) {
   const feature::Keypoints& ka = cameras[edge.a.camera.index()].keypoints;
   const feature::Keypoints& kb = cameras[edge.b.camera.index()].keypoints;
   const std::size_t ia = edge.a.keypoint.index(), ib = edge.b.keypoint.index();
@@ -55,7 +55,8 @@ bool align_edge(const camera::Rig& rig, std::span<const CameraFrame> cameras, st
   const auto warp = patch_warp(rig.camera(edge.a.camera), rig.camera(edge.b.camera), T_b_a, point_a,
                                pyramid_a.scale_x[ka.level[ia]]);
   if (!warp) return false;
-  const auto aligned = align_patch(ka.patch[ia], *warp, pyramids[edge.b.camera.index()], kb.pixel[ib].cast<double>(), options);
+  const auto aligned = align_patch(ka.patch[ia], *warp, pyramids[edge.b.camera.index()], kb.pixel[ib].cast<double>(),
+                                   alignment[edge.b.camera.index()]);
   if (!aligned) return false;
   const auto bearing = rig.camera(edge.b.camera).unproject(aligned->pixel);
   if (!bearing) return false;
@@ -66,7 +67,7 @@ bool align_edge(const camera::Rig& rig, std::span<const CameraFrame> cameras, st
 
 std::vector<Edge> match_pair(const camera::Rig& rig, std::span<const CameraFrame> cameras,
                              std::span<const image::Pyramid> pyramids, CameraPair pair, const BundlingOptions& options,
-                             const AlignmentOptions& alignment) {
+                             std::span<const AlignmentOptions> alignment) {
   const EpipolarView a{&rig.camera(pair.a), &cameras[pair.a.index()].keypoints, rig.rig_from_cam(pair.a.index()), {}, 0, 0};
   const EpipolarView b{&rig.camera(pair.b), &cameras[pair.b.index()].keypoints, rig.rig_from_cam(pair.b.index()), {}, 0, 0};
   const EpipolarOptions search{.near_m = options.near_m,
@@ -135,7 +136,7 @@ class Placement {
 
   // Moves the second keypoint of an edge to where the patch of the first is seen; the first defines the feature, so its own
   // place is exact. An edge whose first keypoint was moved itself would lead to where that no longer is.
-  void apply(const Edge& edge, std::span<const image::Pyramid> pyramids, const AlignmentOptions& alignment) {
+  void apply(const Edge& edge, std::span<const image::Pyramid> pyramids, std::span<const AlignmentOptions> alignment) {
     if (state(edge.a) == kMoved || state(edge.b) != kAsDetected) return;
     feature::Keypoints& ka = cameras_[edge.a.camera.index()].keypoints;
     feature::Keypoints& kb = cameras_[edge.b.camera.index()].keypoints;
@@ -145,7 +146,7 @@ class Placement {
     state(edge.a) = kReference;
     state(edge.b) = kMoved;
     const double scale_a = pyramids[edge.a.camera.index()].scale_x[ka.level[ia]];
-    ka.sigma[ia] = std::min(ka.sigma[ia], static_cast<float>(alignment.sigma(0.0, scale_a)));
+    ka.sigma[ia] = std::min(ka.sigma[ia], static_cast<float>(alignment[edge.a.camera.index()].sigma(0.0, scale_a)));
     kb.pixel[ib] = edge.aligned.pixel.cast<float>();
     kb.bearing[ib] = edge.bearing;
     kb.sigma[ib] = static_cast<float>(edge.aligned.sigma);
@@ -232,7 +233,7 @@ Bundled make_bundled(const camera::Rig& rig, std::span<const CameraFrame> camera
 }
 
 Bundled bundle(const camera::Rig& rig, std::span<CameraFrame> cameras, std::span<const image::Pyramid> pyramids,
-               const BundlingOptions& options, const AlignmentOptions& alignment, ThreadPool& pool) {
+               const BundlingOptions& options, std::span<const AlignmentOptions> alignment, ThreadPool& pool) {
   const std::vector<CameraPair> pairs = overlapping_pairs(rig);
   std::vector<std::vector<Edge>> found(pairs.size());
   pool.for_each(pairs.size(), [&](std::size_t p) {

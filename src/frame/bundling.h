@@ -41,9 +41,10 @@ struct DetectionNoise {
 
 // Matches the cameras of every overlapping pair, aligns the second keypoint of a match to the patch of the first
 // (moving its pixel, bearing and sigma in `cameras`), merges pairs into features of several cameras (at most one keypoint
-// per camera, else the weaker edge goes) and triangulates them. `pyramids` holds one per camera, as extracted.
+// per camera, else the weaker edge goes) and triangulates them. `pyramids` and `alignment` hold one per camera, the pyramids as
+// extracted.
 Bundled bundle(const camera::Rig& rig, std::span<CameraFrame> cameras, std::span<const image::Pyramid> pyramids,
-               const BundlingOptions& options, const AlignmentOptions& alignment, ThreadPool& pool);
+               const BundlingOptions& options, std::span<const AlignmentOptions> alignment, ThreadPool& pool);
 
 // The Bundled table for given groups of keypoints of the same thing (each with at most one keypoint per camera, in order
 // of camera): each gets its point where the rays allow and none of its keypoints misses it by more than `max_chi2`.

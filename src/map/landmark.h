@@ -24,6 +24,7 @@ struct Observation {
 struct LandmarkReference {
   KeyframeId keyframe;
   frame::KeypointRef keypoint;
+  friend bool operator==(const LandmarkReference&, const LandmarkReference&) = default;
 };
 
 // What is known of one landmark, but for its observations, which are a column of their own.

@@ -5,6 +5,7 @@
 
 #include "frame/capture_times.h"
 #include "system/stopwatch.h"
+#include "tracking/error_floor.h"
 #include "tracking/feature_budget.h"
 #include "tracking/make_keyframe.h"
 
@@ -81,6 +82,7 @@ void Pipeline::restart() {
   candidate_.reset();
   early_.clear();
   feature_shares_.clear();
+  error_floors_.clear();
   frames_lost_ = 0;
 }
 
@@ -96,12 +98,16 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<
   stages.push_back({"extract", extraction.ms()});
   const Stopwatch bundling;
   frame.bundled =
-      frame::bundle(frame::rig_of(rig_, frame), frame.cameras, builder_.pyramids(), config_.bundling, config_.tracking.alignment, pool_);
+      frame::bundle(frame::rig_of(rig_, frame), frame.cameras, builder_.pyramids(), config_.bundling, alignment(), pool_);
   for (std::size_t c = 0; c < rig_.size(); ++c) {
     frame.cameras[c].grid = frame::FeatureGrid(frame.cameras[c].keypoints, rig_.camera(c).width, rig_.camera(c).height);
   }
   stages.push_back({"bundle", bundling.ms()});
   return frame;
+}
+
+std::vector<frame::AlignmentOptions> Pipeline::alignment() const {
+  return tracking::alignment_by_camera(config_.tracking.alignment, error_floors_, rig_.size());
 }
 
 // Cameras that are out, and those that say nothing as long as the motion is unknown.
@@ -227,8 +233,10 @@ tracking::TrackOutput Pipeline::follow(BundledFrame& frame, const map::BundledMa
     const bool blind = frame.num_keypoints() < static_cast<std::size_t>(config_.tracking.min_inliers);
     return tracking::lost(state_, frame, blind ? tracking::LostReason::kFewFeatures : tracking::LostReason::kNotFound);
   }
+  const auto alignment = this->alignment();
   const tracking::TrackInput input{.map = map,
                                    .pyramids = builder_.pyramids(),
+                                   .alignment = alignment,
                                    .state = state_,
                                    .noise = {config_.features.sigma_px},
                                    .scale_factor = config_.features.scale_factor,
@@ -248,6 +256,7 @@ void Pipeline::track(BundledFrame frame, StageExecutor& executor, Outcome& outco
   }
   outcome.record.result = output.result;
   feature_shares_ = tracking::feature_shares(feature_shares_, map, frame, output);
+  error_floors_ = tracking::error_floors(error_floors_, map, frame, output, config_.tracking.alignment);
   for (std::size_t c = 0; c < output.result.cameras.size(); ++c) {
     if (output.result.cameras[c].doubted) outcome.record.outages[c] = Outage::kInconsistent;
   }

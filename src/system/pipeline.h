@@ -48,6 +48,7 @@ class Pipeline {
  private:
   void trust_what_is_sharp_again(const std::vector<std::uint8_t>& blurred);
   std::vector<std::uint8_t> left_out(const image::ImageBundle& images, const std::vector<Outage>& outages) const;
+  std::vector<frame::AlignmentOptions> alignment() const;  // per camera, as it is known at present
   void grow_along(const map::BundledMap& map);
   void start(frame::BundledFrame frame, StageExecutor& executor, Outcome& outcome);
   void keep_candidate(frame::BundledFrame frame);
@@ -65,6 +66,7 @@ class Pipeline {
   std::vector<std::uint8_t> blurred_;  // cameras in the last frame
   frame::FrameBuilder builder_;
   std::vector<double> feature_shares_;  // of the cameras in the next frame's feature budget; empty: even
+  std::vector<double> error_floors_;    // of the cameras, for the next frame; empty: nothing is known
   tracking::TrackerState state_;
   double unit_ = 1.0;  // of the state's reference keyframe when the state was made (map::BundledKeyframe::unit)
   std::optional<tracking::StartCandidate> candidate_;

@@ -85,7 +85,7 @@ std::optional<frame::AlignedKeypoint> align_to_reference(const map::BundledMap& 
 }  // namespace
 
 void align_matches(const map::BundledMap& map, const SE3& T_rig_world, const FrameMatches& matches,
-                   std::span<const image::Pyramid> pyramids, const frame::AlignmentOptions& options,
+                   std::span<const image::Pyramid> pyramids, std::span<const frame::AlignmentOptions> alignment,
                    const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   pool.for_each(matches.size(), [&](std::size_t c) {
@@ -95,7 +95,7 @@ void align_matches(const map::BundledMap& map, const SE3& T_rig_world, const Fra
     for (const Match& m : matches[c]) {
       const std::size_t k = m.keypoint.index();
       const auto aligned = align_to_reference(map, rig.camera(c), T_cam_world, pyramids[c], map.landmark(m.landmark),
-                                              keypoints.pixel[k].cast<double>(), options);
+                                              keypoints.pixel[k].cast<double>(), alignment[c]);
       const auto bearing = aligned ? rig.camera(c).unproject(aligned->pixel) : std::nullopt;
       if (bearing) {
         keypoints.pixel[k] = aligned->pixel.cast<float>();

@@ -43,9 +43,10 @@ MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame
 FrameMatches merge(const FrameMatches& a, const FrameMatches& b);
 
 // Moves each matched keypoint of `frame` to where the reference patch of its landmark is seen from `T_rig_world`, with the
-// standard deviation of that; a keypoint whose patch does not align keeps its place and gets the detector's.
+// standard deviation of that; a keypoint whose patch does not align keeps its place and gets the detector's. `pyramids` and
+// `alignment`: one per camera.
 void align_matches(const map::BundledMap& map, const geometry::SE3& T_rig_world, const FrameMatches& matches,
-                   std::span<const image::Pyramid> pyramids, const frame::AlignmentOptions& options,
+                   std::span<const image::Pyramid> pyramids, std::span<const frame::AlignmentOptions> alignment,
                    const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool);
 
 // Observations for the pose solver, camera by camera in the order of `matches`. Before alignment a keypoint's own standard

@@ -183,7 +183,7 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::Bund
   out.matches = merge(coarse.matches, search.found);
   out.visible = std::move(search.visible);
   const std::vector<KeypointPlace> before = places(frame, out.matches);
-  align_matches(map, coarse.T_rig_world, out.matches, input.pyramids, options.alignment, input.noise, frame, pool);
+  align_matches(map, coarse.T_rig_world, out.matches, input.pyramids, input.alignment, input.noise, frame, pool);
   const solver::MotionModel motion = motion_model(input, frame);
   out.solution = solver::solve_pose(map.rig(), pose_observations(map, frame, out.matches), coarse.T_rig_world, motion, options.pose);
   frame.twist = motion.twist(out.solution.T_rig_world);

@@ -58,7 +58,8 @@ struct TrackOutput {
 
 struct TrackInput {
   const map::BundledMap& map;
-  std::span<const image::Pyramid> pyramids;
+  std::span<const image::Pyramid> pyramids;             // per camera
+  std::span<const frame::AlignmentOptions> alignment;  // per camera
   const TrackerState& state;
   frame::DetectionNoise noise;
   double scale_factor = 1.2;  // of the pyramid

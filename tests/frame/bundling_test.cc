@@ -82,10 +82,11 @@ class Bundle : public ::testing::Test {
   }
   BundledFrame make() {
     BundledFrame frame = builder.extract(images, pool);
-    frame.bundled = bundle(rig, frame.cameras, builder.pyramids(), {}, {}, pool);
+    frame.bundled = bundle(rig, frame.cameras, builder.pyramids(), {}, alignment, pool);
     return frame;
   }
   const camera::Rig rig = wall_rig();
+  const std::vector<AlignmentOptions> alignment = std::vector<AlignmentOptions>(rig.size());
   ThreadPool pool;
   FrameBuilder builder;
   image::ImageBundle images;
@@ -142,7 +143,7 @@ TEST_F(Bundle, IsTheSameWithAnyNumberOfThreads) {
   const BundledFrame once = make();
   ThreadPool alone(1);
   BundledFrame again = builder.extract(images, alone);
-  again.bundled = bundle(rig, again.cameras, builder.pyramids(), {}, {}, alone);
+  again.bundled = bundle(rig, again.cameras, builder.pyramids(), {}, alignment, alone);
   ASSERT_EQ(once.bundled.size(), again.bundled.size());
   for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(once.cameras[c].keypoints.pixel, again.cameras[c].keypoints.pixel);
   for (std::size_t f = 0; f < once.bundled.num_matched(); ++f) {

@@ -143,7 +143,8 @@ class TrackedFrame : public ::testing::Test {
   TrackedFrame() : seen(world.sim.frame(FrameId(1), 0.1)) {
     SimulatedTracker tracker(world);
     frame = seen.frame;
-    const TrackInput input{.map = world.map, .pyramids = pyramids, .state = tracker.state, .noise = {world.sim.options().sigma_px}};
+    const std::vector<frame::AlignmentOptions> alignment(world.map.rig().size());
+    const TrackInput input{.map = world.map, .pyramids = pyramids, .alignment = alignment, .state = tracker.state, .noise = {world.sim.options().sigma_px}};
     ThreadPool pool(2);
     output = track(input, frame, tracker.options, pool);
   }

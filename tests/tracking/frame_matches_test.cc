@@ -73,7 +73,8 @@ TEST_F(FindLandmarks, WhatDoesNotAlignKeepsItsPlaceWithTheDetectorsNoise) {
   const MatchSearch search = find({});
   frame::BundledFrame frame = seen.frame;
   for (auto& s : frame.cameras[0].keypoints.sigma) s = 0.01f;
-  align_matches(world.map, seen.T_world_rig.inverse(), search.found, map::flat_pyramids(4), {}, {.sigma_px = 0.9}, frame, pool);
+  align_matches(world.map, seen.T_world_rig.inverse(), search.found, map::flat_pyramids(4), std::vector<frame::AlignmentOptions>(4),
+                {.sigma_px = 0.9}, frame, pool);
   for (const Match& m : search.found[0]) {
     const std::size_t k = m.keypoint.index();
     EXPECT_EQ(frame.cameras[0].keypoints.pixel[k], seen.frame.cameras[0].keypoints.pixel[k]);

@@ -259,12 +259,13 @@ TEST_F(Track, LearnsTheMotion) {
 
 TEST_F(Track, IsTheSameWithAnyNumberOfThreads) {
   const auto pyramids = map::flat_pyramids(2);
+  const std::vector<frame::AlignmentOptions> alignment(pyramids.size());
   std::vector<SE3> poses;
   for (const int threads : {1, 2, 3}) {
     ThreadPool pool(threads);
     frame::BundledFrame frame = seen(2).frame;
     const TrackerState state = state_at_first(world());
-    poses.push_back(track({.map = world().map, .pyramids = pyramids, .state = state, .noise = {}}, frame, {}, pool).result.T_rig_world);
+    poses.push_back(track({.map = world().map, .pyramids = pyramids, .alignment = alignment, .state = state, .noise = {}}, frame, {}, pool).result.T_rig_world);
   }
   for (const SE3& T : poses) {
     EXPECT_EQ(T.translation(), poses[0].translation());

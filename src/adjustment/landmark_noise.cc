@@ -1,0 +1,50 @@
+#include "adjustment/landmark_noise.h"
+
+#include <cmath>
+
+namespace bslam::adjustment {
+namespace {
+
+constexpr double kPrior = 4;  // degrees of freedom that count as agreeing like all others
+
+}  // namespace
+
+std::vector<double> landmark_variances(const solver::ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
+  const std::vector<double> chi2 = solver::squared_errors(problem);
+  std::vector<double> sum(problem.points.size(), 0.0);
+  std::vector<int> count(problem.points.size(), 0);
+  for (std::size_t i = 0; i < chi2.size(); ++i) {
+    if ((!skip.empty() && skip[i]) || !(chi2[i] < solver::kLostChi2)) continue;
+    sum[static_cast<std::size_t>(problem.observations[i].point)] += chi2[i];
+    ++count[static_cast<std::size_t>(problem.observations[i].point)];
+  }
+  double all = 0, freedom = 0;
+  for (std::size_t p = 0; p < sum.size(); ++p) {
+    if (count[p] < 2) continue;
+    all += sum[p];
+    freedom += 2 * count[p] - 3;
+  }
+  std::vector<double> variances(sum.size(), 1.0);
+  if (!(all > 0)) return variances;
+  const double mean = all / freedom;
+  for (std::size_t p = 0; p < sum.size(); ++p) {
+    if (count[p] >= 2) variances[p] = (kPrior * mean + sum[p]) / (kPrior + 2 * count[p] - 3);
+  }
+  return variances;
+}
+
+solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
+                                            const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
+                                            std::stop_token stop) {
+  std::vector<float> sigmas;
+  sigmas.reserve(problem.observations.size());
+  for (auto& o : problem.observations) {
+    sigmas.push_back(o.sigma);
+    o.sigma *= static_cast<float>(std::sqrt(variances[static_cast<std::size_t>(o.point)]));
+  }
+  const solver::BundleSummary summary = solver::adjust(problem, options, skip, std::move(stop));
+  for (std::size_t i = 0; i < sigmas.size(); ++i) problem.observations[i].sigma = sigmas[i];
+  return summary;
+}
+
+}  // namespace bslam::adjustment

@@ -1,0 +1,29 @@
+// How well a landmark can be placed in images is its own: a corner on a wall to a twentieth of a pixel, one where a near edge
+// crosses a far one not at all, since it is no point. What alignment claims does not tell them apart, and the errors of the
+// latter do not average out: they slide along with the view, which draws the length of the map's unit after it.
+//
+// So each landmark gets a variance of its own, from how well its observations agree: with n of them, their squared normalised
+// errors adding up to S, and all landmarks on average m per degree of freedom,
+//     variance factor = (kPrior m + S) / (kPrior + 2 n - 3),
+// the mode of a scaled inverse chi-square posterior (Gelman et al., Bayesian Data Analysis, section 2.6), as in adjustment with
+// Student's t distribution.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "solver/bundle_adjuster.h"
+
+namespace bslam::adjustment {
+
+// Variance factor of each point of the problem at its present values; 1 where fewer than two observations are left. `skip` as
+// for solver::adjust.
+std::vector<double> landmark_variances(const solver::ReprojectionProblem& problem, std::span<const std::uint8_t> skip);
+
+// Adjusts the problem with the standard deviations of each point's observations times the root of its factor; they are
+// themselves as they were afterwards.
+solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
+                                            const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
+                                            std::stop_token stop);
+
+}  // namespace bslam::adjustment

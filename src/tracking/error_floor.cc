@@ -1,0 +1,61 @@
+#include "tracking/error_floor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace bslam::tracking {
+namespace {
+
+constexpr std::size_t kLeastMatches = 30;  // of one camera that say something about it
+constexpr double kRate = 0.2;              // of a frame against those before
+
+// Not empty.
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+double error_floor(double before, std::vector<double> squared_errors, std::vector<double> variances,
+                   const frame::AlignmentOptions& options) {
+  if (squared_errors.size() < kLeastMatches) return before;
+  const double of_alignment = median(variances) - before * before;
+  const double found = median(squared_errors) / (2 * std::numbers::ln2) - of_alignment;
+  const double least = std::min(options.least_floor_px, options.floor_px);
+  const double now = std::clamp(found, least * least, options.floor_px * options.floor_px);
+  return std::sqrt((1 - kRate) * before * before + kRate * now);
+}
+
+std::vector<double> error_floors(std::span<const double> before, const map::BundledMap& map, const frame::BundledFrame& frame,
+                                 const TrackOutput& output, const frame::AlignmentOptions& options) {
+  if (output.result.status != TrackStatus::kTracking) return {};
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  std::vector<double> floors(before.begin(), before.end());
+  floors.resize(rig.size(), options.floor_px);
+  for (std::size_t c = 0; c < output.matches.size(); ++c) {
+    const geometry::SE3 T_cam_world = rig.cam_from_rig(c) * output.result.T_rig_world;
+    const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
+    std::vector<double> squared_errors, variances;
+    for (const Match& m : output.matches[c]) {
+      const std::size_t k = m.keypoint.index();
+      const auto projected = rig.camera(c).project(T_cam_world * map.landmark(m.landmark).position);
+      if (!projected) continue;
+      squared_errors.push_back((keypoints.pixel[k].cast<double>() - *projected).squaredNorm());
+      variances.push_back(static_cast<double>(keypoints.sigma[k]) * keypoints.sigma[k]);
+    }
+    floors[c] = error_floor(floors[c], std::move(squared_errors), std::move(variances), options);
+  }
+  return floors;
+}
+
+std::vector<frame::AlignmentOptions> alignment_by_camera(const frame::AlignmentOptions& options, std::span<const double> floors,
+                                                         std::size_t cameras) {
+  std::vector<frame::AlignmentOptions> out(cameras, options);
+  for (std::size_t c = 0; c < std::min(cameras, floors.size()); ++c) out[c].floor_px = floors[c];
+  return out;
+}
+
+}  // namespace bslam::tracking

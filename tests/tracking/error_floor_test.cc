@@ -1,0 +1,97 @@
+#include "tracking/error_floor.h"
+
+#include <gtest/gtest.h>
+
+#include "tracking/simulated_tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+const frame::AlignmentOptions kOptions{.floor_px = 0.3, .least_floor_px = 0.05};
+constexpr double kAlignment = 0.1;  // px
+
+// What frames of `count` keypoints say one after the other, whose calibration is off by `floor` pixels and alignment by kAlignment.
+double after(int frames, double floor, int count, double before = kOptions.floor_px) {
+  Random random(1, "floor");
+  const double sigma = std::hypot(floor, kAlignment);
+  for (int f = 0; f < frames; ++f) {
+    std::vector<double> errors, variances(static_cast<std::size_t>(count), kAlignment * kAlignment + before * before);
+    for (int i = 0; i < count; ++i) {
+      const double x = sigma * random.normal(), y = sigma * random.normal();
+      errors.push_back(x * x + y * y);
+    }
+    before = error_floor(before, errors, variances, kOptions);
+  }
+  return before;
+}
+
+TEST(ErrorFloor, IsFoundFromEitherSide) {
+  EXPECT_NEAR(after(40, 0.15, 300), 0.15, 0.02);
+  EXPECT_NEAR(after(40, 0.15, 300, 0.06), 0.15, 0.02);
+}
+
+TEST(ErrorFloor, FollowsWithinSomeTenFrames) {
+  EXPECT_GT(after(3, 0.05, 300), 0.2);
+  EXPECT_LT(after(20, 0.05, 300), 0.1);
+}
+
+TEST(ErrorFloor, StaysWithinItsBounds) {
+  EXPECT_NEAR(after(100, 0.0, 300), kOptions.least_floor_px, 0.01);
+  EXPECT_GE(after(100, 0.0, 300), kOptions.least_floor_px);
+  EXPECT_DOUBLE_EQ(after(100, 3.0, 300), kOptions.floor_px);
+}
+
+TEST(ErrorFloor, NeedsEnoughKeypoints) { EXPECT_EQ(after(10, 0.0, 10), kOptions.floor_px); }
+
+class FloorsOfAFrame : public ::testing::Test {
+ protected:
+  FloorsOfAFrame() : tracker(world) {
+    frame = world.sim.frame(FrameId(1), 0.1).frame;
+    for (frame::CameraFrame& c : frame.cameras) std::fill(c.keypoints.sigma.begin(), c.keypoints.sigma.end(), 0.35f);
+    output = tracker.track(frame);
+  }
+  static map::SimulatedMap make_world() {
+    simulation::FeatureSimulatorOptions options;
+    options.sigma_px = 0.05;
+    map::SimulatedMap out(simulation::FeatureSimulator(simulation::default_rig(), simulation::make_orbit({}), options));
+    out.add_keyframe(FrameId(0), 0.0);
+    out.add_keyframe(FrameId(7), 1.0);
+    return out;
+  }
+  map::SimulatedMap world = make_world();
+  SimulatedTracker tracker;
+  frame::BundledFrame frame;
+  TrackOutput output;
+};
+
+TEST_F(FloorsOfAFrame, FallWhereErrorsAreSmallerThanClaimed) {
+  ASSERT_EQ(output.result.status, TrackStatus::kTracking);
+  const auto floors = error_floors({}, world.map, frame, output, kOptions);
+  ASSERT_EQ(floors.size(), 4u);
+  for (std::size_t c = 0; c < 4; ++c) {
+    EXPECT_LT(floors[c], kOptions.floor_px) << "camera " << c;
+    EXPECT_GT(floors[c], kOptions.least_floor_px) << "camera " << c;
+  }
+}
+
+TEST_F(FloorsOfAFrame, StayForCamerasWithoutMatches) {
+  output.matches[2].clear();
+  const std::vector<double> before = {0.2, 0.2, 0.17, 0.2};
+  EXPECT_EQ(error_floors(before, world.map, frame, output, kOptions)[2], 0.17);
+}
+
+TEST_F(FloorsOfAFrame, AreForgottenWithALostFrame) {
+  output.result.status = TrackStatus::kLost;
+  EXPECT_TRUE(error_floors(std::vector<double>(4, 0.1), world.map, frame, output, kOptions).empty());
+}
+
+TEST(AlignmentByCamera, PutsTheFloorsInTheirPlaces) {
+  const auto some = alignment_by_camera(kOptions, std::vector<double>{0.1, 0.2}, 2);
+  EXPECT_EQ(some[0].floor_px, 0.1);
+  EXPECT_EQ(some[1].floor_px, 0.2);
+  EXPECT_EQ(some[1].least_floor_px, kOptions.least_floor_px);
+  EXPECT_EQ(alignment_by_camera(kOptions, {}, 3)[2].floor_px, kOptions.floor_px);
+}
+
+}  // namespace
+}  // namespace bslam::tracking
