@@ -1,9 +1,8 @@
 // bslam: the command line. Verbs are in files of their own; this one only puts them together.
-#include <algorithm>
 #include <cstdio>
 #include <exception>
-#include <string>
 
+#include "cli/command_line_error.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
 
@@ -20,14 +19,12 @@ int main(int argc, char** argv) {
   add_rig(app, exit_status);
   add_vocab(app, exit_status);
   add_map(app, exit_status);
+  add_settings(app, exit_status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // help and version
-    std::string what = e.what();
-    std::replace(what.begin(), what.end(), '\n', ' ');
-    std::fprintf(stderr, "bslam: command line: %s (see bslam --help)\n", what.c_str());
-    return kExitBadInput;
+    return report_error(command_line_error(app, e));
   } catch (const std::exception& e) {  // out of memory, a thread that cannot be made: nothing the user asked wrongly
     std::fprintf(stderr, "bslam: %s\n", e.what());
     return kExitFailed;

@@ -1,6 +1,7 @@
 // bslam run: SLAM over a recorded data set.
 #include <chrono>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -40,7 +41,9 @@ Result<system::Config> resolve_run_config(const RunArguments& arguments) {
   if (!resolved) return resolved;
   system::Config& config = *resolved;
   if (!arguments.mode.empty()) {
-    if (const Status s = OptionTable(config).set("mode", arguments.mode); !s) return s.error();
+    if (const Status s = OptionTable(config).set("mode", arguments.mode); !s) {
+      return Error{"command line", "--mode", s.error().found, s.error().expected};
+    }
   }
   if (arguments.seed) config.seed = *arguments.seed;
   if (arguments.no_final_ba) config.final_adjustment = false;
@@ -178,7 +181,7 @@ void add_run(CLI::App& app, int& exit_status) {
   verb->add_flag("--localize-only", a->localize_only, "poses in the loaded map, which stays as it is");
   verb->add_option("--vocabulary", a->vocabulary, "for place recognition, ours or DBoW2's text; default: the one of the program");
   verb->add_flag("--no-final-ba", a->no_final_ba, "no global bundle adjustment at the end");
-  verb->add_option("--seed", a->seed, "of all randomness; default 1")->check(CLI::NonNegativeNumber);
+  verb->add_option("--seed", a->seed, "of all randomness; default 1")->check(CLI::Range(0, std::numeric_limits<int>::max()));
   verb->add_option("--progress", a->progress, "auto: a bar when stderr is a terminal; never")
       ->check(CLI::IsMember({"auto", "never"}))
       ->capture_default_str();

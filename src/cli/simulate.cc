@@ -1,8 +1,6 @@
 // bslam simulate: renders a built-in world through a rig.
 #include <fmt/format.h>
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -10,6 +8,7 @@
 #include <string>
 #include <thread>
 
+#include "cli/interruption.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
 #include "io/fault_file.h"
@@ -28,9 +27,6 @@ struct SimulateArguments {
   int laps = 0, threads = 0;
   bool back = false, overwrite = false;
 };
-
-std::atomic<bool> interrupted = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "may be set in a signal handler");
 
 const std::map<std::string, simulation::WorldKind> kWorlds = {{"building", simulation::WorldKind::kBuilding},
                                                               {"corridor", simulation::WorldKind::kCorridor},
@@ -75,13 +71,10 @@ int run_simulate(const SimulateArguments& arguments) {
   if (!request) return report_error(request.error());
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
   ThreadPool pool(arguments.threads > 0 ? arguments.threads : std::max(1, cores));
-  std::signal(SIGINT, [](int) { interrupted = true; });
-  std::signal(SIGTERM, [](int) { interrupted = true; });
+  const Interruption interruption;
   ProgressBar bar(arguments.progress == "auto", "pictures");
-  const auto outcome = io::write_simulation(*request, pool, [&](std::size_t done, std::size_t total) {
-    bar.show(done, total);
-    return !interrupted;
-  });
+  const auto outcome = io::write_simulation(
+      *request, pool, [&](std::size_t done, std::size_t total) { bar.show(done, total); }, interruption.token());
   bar.finish();
   if (!outcome) {
     Error error = outcome.error();

@@ -18,6 +18,7 @@ void add_inspect(CLI::App& app, int& exit_status);
 void add_rig(CLI::App& app, int& exit_status);
 void add_vocab(CLI::App& app, int& exit_status);
 void add_map(CLI::App& app, int& exit_status);
+void add_settings(CLI::App& app, int& exit_status);
 
 // Prints "bslam: MESSAGE" as one line on stderr and returns kExitBadInput.
 int report_error(const Error& error);

@@ -165,15 +165,37 @@ Result<RigReading> read_rigs_txt(const fs::path& file, const Cameras& cameras) {
   return reading;
 }
 
-// One camera of rig_config.json over what cameras.txt says of it.
-Status read_configured(const YamlMap& yaml, CameraDescription d, RigReading& reading) {
-  const Place at{yaml.file(), yaml.key_path("camera_params")};
-  if (yaml.has("image_prefix")) {
+// Cameras of rig_config.json, in its order.
+Result<std::vector<YamlMap>> configured_cameras(const fs::path& file) {
+  const auto text = read_file(file, kMaxBytes);
+  if (!text) return text.error();
+  std::string wrapped = "{\"rigs\": " + *text + "\n}";  // its root is a list, and JSON is YAML but for tabs
+  std::replace(wrapped.begin(), wrapped.end(), '\t', ' ');
+  const auto yaml = YamlMap::parse(file, std::move(wrapped));
+  if (!yaml) return yaml.error();
+  const auto rigs = yaml->maps("rigs");
+  if (!rigs) return rigs.error();
+  if (rigs->size() != 1) return Error{file.string(), "", fmt::format("{} rigs", rigs->size()), "one"};
+  return rigs->front().maps("cameras");
+}
+
+// Names the cameras, in order of their ids, by the folders of their images.
+Status take_names(const std::vector<YamlMap>& configured, Cameras& cameras) {
+  auto camera = cameras.begin();
+  for (const YamlMap& yaml : configured) {
+    CameraDescription& d = (camera++)->second;
+    if (!yaml.has("image_prefix")) continue;
     const auto prefix = yaml.text("image_prefix");
     if (!prefix) return prefix.error();
     d.name = *prefix;
     while (d.name.ends_with('/')) d.name.pop_back();
   }
+  return {};
+}
+
+// One camera of rig_config.json over what cameras.txt says of it.
+Status read_configured(const YamlMap& yaml, CameraDescription d, RigReading& reading) {
+  const Place at{yaml.file(), yaml.key_path("camera_params")};
   if (yaml.has("camera_params")) {
     const auto name = yaml.text("camera_model_name");
     const auto parameters = yaml.numbers("camera_params");
@@ -192,25 +214,10 @@ Status read_configured(const YamlMap& yaml, CameraDescription d, RigReading& rea
   return add(d, *T, at, reading);
 }
 
-Result<RigReading> read_rig_config(const fs::path& file, const Cameras& cameras) {
-  const auto text = read_file(file, kMaxBytes);
-  if (!text) return text.error();
-  std::string wrapped = "{\"rigs\": " + *text + "\n}";  // its root is a list, and JSON is YAML but for tabs
-  std::replace(wrapped.begin(), wrapped.end(), '\t', ' ');
-  const auto yaml = YamlMap::parse(file, std::move(wrapped));
-  if (!yaml) return yaml.error();
-  const auto rigs = yaml->maps("rigs");
-  if (!rigs) return rigs.error();
-  if (rigs->size() != 1) return Error{file.string(), "", fmt::format("{} rigs", rigs->size()), "one"};
-  const auto configured = rigs->front().maps("cameras");
-  if (!configured) return configured.error();
-  if (configured->size() != cameras.size()) {
-    return rigs->front().error("cameras", fmt::format("{} cameras", configured->size()),
-                               fmt::format("{}, as in cameras.txt", cameras.size()));
-  }
+Result<RigReading> read_rig_config(const std::vector<YamlMap>& configured, const Cameras& cameras) {
   RigReading reading;
   auto camera = cameras.begin();
-  for (const YamlMap& map : *configured) {
+  for (const YamlMap& map : configured) {
     if (const Status status = read_configured(map, (camera++)->second, reading); !status) return status.error();
   }
   reading.notes.push_back("the cameras of rig_config.json are those of cameras.txt in order of their ids");
@@ -243,11 +250,23 @@ std::string json_quoted(const std::string& text) {
 }  // namespace
 
 Result<RigReading> read_colmap_rig(const fs::path& folder) {
-  const auto cameras = read_cameras(folder / "cameras.txt");
+  auto cameras = read_cameras(folder / "cameras.txt");
   if (!cameras) return cameras.error();
   std::error_code error;
-  if (fs::exists(folder / "rigs.txt", error)) return read_rigs_txt(folder / "rigs.txt", *cameras);
-  if (fs::exists(folder / "rig_config.json", error)) return read_rig_config(folder / "rig_config.json", *cameras);
+  const fs::path rigs = folder / "rigs.txt", config = folder / "rig_config.json";
+  const bool solved = fs::exists(rigs, error);
+  if (fs::exists(config, error)) {
+    const auto configured = configured_cameras(config);
+    if (!configured) return configured.error();
+    const bool fits = configured->size() == cameras->size();
+    if (!solved && !fits) {
+      return Error{config.string(), "cameras", fmt::format("{} cameras", configured->size()),
+                   fmt::format("{}, as in cameras.txt", cameras->size())};
+    }
+    if (const Status status = fits ? take_names(*configured, *cameras) : Status(); !status) return status.error();
+    if (!solved) return read_rig_config(*configured, *cameras);
+  }
+  if (solved) return read_rigs_txt(rigs, *cameras);
   if (cameras->size() > 1) {
     return Error{folder.string(), "", fmt::format("{} cameras without extrinsics", cameras->size()),
                  "rigs.txt or rig_config.json beside cameras.txt"};

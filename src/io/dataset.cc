@@ -95,8 +95,9 @@ Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recordin
   if (!cameras) return cameras.error();
   for (const int camera : *cameras) {
     if (static_cast<std::size_t>(camera) < recording.camera_count()) continue;
-    return Error{request.path.string(), "", fmt::format("images of {} cameras", recording.camera_count()),
-                 fmt::format("those of camera {} of {}", camera, request.rig_file->string())};
+    const std::size_t there = recording.camera_count();
+    return Error{request.path.string(), "", fmt::format("images of {} camera{}", there, there == 1 ? "" : "s"),
+                 fmt::format("of camera {} as well: {} has {} (--cameras takes some of them)", camera, request.rig_file->string(), rig->size())};
   }
   ChosenRig chosen{*cameras, rig->subset(*cameras), {}};
   if (recording.camera_count() > rig->size()) {

@@ -191,9 +191,8 @@ std::string transform_text(const char* key, const SE3& T) {
   return text;
 }
 
-std::string camera_text(const camera::Rig& rig, std::size_t i) {
+std::string camera_text(const camera::Rig& rig, std::size_t i, const KalibrNumbers& numbers) {
   const camera::Camera& camera = rig.camera(i);
-  const KalibrNumbers numbers = numbers_of(camera.model);
   std::vector<std::size_t> overlaps;
   for (std::size_t j = 0; j < rig.size(); ++j) {
     if (j != i && rig.overlap(i, j)) overlaps.push_back(j);
@@ -248,20 +247,25 @@ Result<std::string> kalibr_rig_text(const camera::Rig& rig, const std::string& o
     }
     text += fmt::format("cam{}:\n", i) + transform_text("T_cam_imu", rig.body_from_cam(i).inverse());
     if (i > 0) text += transform_text("T_cn_cnm1", rig.body_from_cam(i).inverse() * rig.body_from_cam(i - 1));
-    text += camera_text(rig, i);
+    text += camera_text(rig, i, numbers_of(model));
   }
   return text;
 }
 
 Result<std::string> openvins_rig_text(const camera::Rig& rig, const std::string& out) {
   const RigLimits limits{.format = "OpenVINS's camera chain",
-                         .models = {camera::PinholeRadTan::kName, camera::KannalaBrandt::kName},
+                         .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName},
                          .time_offsets = Holds::kEach,
                          .most_coefficients = 4};
   if (const Status status = check_limits(rig, out, limits); !status) return status.error();
   std::string text = "%YAML:1.0\n\n";
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    text += fmt::format("cam{}:\n", i) + transform_text("T_imu_cam", rig.body_from_cam(i)) + camera_text(rig, i);
+    KalibrNumbers numbers = numbers_of(rig.camera(i).model);
+    if (numbers.distortion_model == "none") {  // which it does not know: no distortion is one of zeros
+      numbers.distortion_model = "radtan";
+      numbers.coefficients.assign(4, 0.0);
+    }
+    text += fmt::format("cam{}:\n", i) + transform_text("T_imu_cam", rig.body_from_cam(i)) + camera_text(rig, i, numbers);
   }
   return text;
 }

@@ -110,15 +110,14 @@ Status write_picture(const fs::path& file, const image::Image& picture) {
 // All pictures that are not there yet. True: all are; false: asked to stop.
 Result<bool> write_pictures(const SimulationRequest& request, const std::vector<Shot>& shots,
                             const simulation::Recorder& recorder, ThreadPool& pool,
-                            const SimulationProgress& progress) {
+                            const SimulationProgress& progress, const std::stop_token& stop) {
   std::mutex mutex;
   std::size_t done = 0;
-  bool stop = false;
   std::optional<Error> failure;
   pool.for_each(shots.size(), [&](std::size_t i) {
     {
       const std::lock_guard lock(mutex);
-      if (stop) return;
+      if (failure || stop.stop_requested()) return;
     }
     const fs::path file = picture_file(request.folder, shots[i]);
     Status status;
@@ -127,10 +126,10 @@ Result<bool> write_pictures(const SimulationRequest& request, const std::vector<
     const std::lock_guard lock(mutex);
     ++done;
     if (!status && !failure) failure = status.error();
-    if (failure || (progress && !progress(done, shots.size()))) stop = true;
+    if (progress) progress(done, shots.size());
   });
   if (failure) return *failure;
-  return !stop || done == shots.size();
+  return done == shots.size();
 }
 
 std::string image_list(const std::vector<Shot>& shots, std::size_t camera) {
@@ -218,7 +217,7 @@ std::string simulation_digest(const SimulationRequest& r) {
 }
 
 Result<SimulationOutcome> write_simulation(const SimulationRequest& request, ThreadPool& pool,
-                                           const SimulationProgress& progress) {
+                                           const SimulationProgress& progress, std::stop_token stop) {
   if (const Status s = check(request); !s) return s.error();
   const std::string digest = simulation_digest(request);
   const auto state = prepare_folder(request, digest);
@@ -227,18 +226,19 @@ Result<SimulationOutcome> write_simulation(const SimulationRequest& request, Thr
   for (std::size_t c = 0; c < request.rig.size(); ++c) {
     if (const Status s = make_folder(camera_folder(request.folder, c) / "data"); !s) return s.error();
   }
-  const simulation::Building building = simulation::make_building(request.kind, request.seed);
-  simulation::TourOptions tour = request.tour;
-  tour.duration_s = request.recording.duration_s;
-  const simulation::World world(building, request.world, pool);
-  const simulation::Recorder recorder(world, request.rig, simulation::make_tour(building, tour), request.imaging,
-                                      request.recording.exposure_s, pool);
   const std::vector<Shot> shots = simulation::plan_shots(request.rig, request.recording);
   if (*state == FolderState::kFresh) {  // pictures of those names are not ours to keep
     std::error_code code;
     for (const Shot& shot : shots) fs::remove(picture_file(request.folder, shot), code);
   }
-  const auto all = write_pictures(request, shots, recorder, pool, progress);
+  const simulation::Building building = simulation::make_building(request.kind, request.seed);
+  simulation::TourOptions tour = request.tour;
+  tour.duration_s = request.recording.duration_s;
+  const simulation::World world(building, request.world, pool, stop);
+  if (stop.stop_requested()) return SimulationOutcome::kInterrupted;
+  const simulation::Recorder recorder(world, request.rig, simulation::make_tour(building, tour), request.imaging,
+                                      request.recording.exposure_s, pool);
+  const auto all = write_pictures(request, shots, recorder, pool, progress, stop);
   if (!all) return all.error();
   if (!*all) return SimulationOutcome::kInterrupted;
   if (const Status s = write_lists(request, shots, recorder); !s) return s.error();

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <stop_token>
 
 #include "base/result.h"
 #include "base/thread_pool.h"
@@ -25,11 +26,11 @@ struct SimulationRequest {
 enum class SimulationOutcome {
   kWritten,
   kWasComplete,  // the same request had been carried out before: nothing was done
-  kInterrupted,  // `progress` asked to stop; what is written serves the next attempt
+  kInterrupted,  // it was asked to stop; what is written serves the next attempt
 };
 
-// Called after each picture, from any thread but one at a time: how many of all are there. False asks to stop.
-using SimulationProgress = std::function<bool(std::size_t done, std::size_t total)>;
+// Called after each picture, from any thread but one at a time: how many of all are there.
+using SimulationProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 // Renders the tour through a built-in world and writes into request.folder, making it:
 //   mav0/camN/data/STAMP.png, mav0/camN/data.csv, mav0/camN/sensor.yaml
@@ -40,7 +41,7 @@ using SimulationProgress = std::function<bool(std::size_t done, std::size_t tota
 // A folder that holds a part of the same request's recording is completed, its pictures kept. Errors: a request out of
 // range; a folder with something else in it, without `overwrite`; what cannot be written.
 Result<SimulationOutcome> write_simulation(const SimulationRequest& request, ThreadPool& pool,
-                                           const SimulationProgress& progress = {});
+                                           const SimulationProgress& progress = {}, std::stop_token stop = {});
 
 // Digest of all that decides what the recording contains: 16 hexadecimal digits.
 std::string simulation_digest(const SimulationRequest& request);

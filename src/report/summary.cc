@@ -41,10 +41,11 @@ ordered_json frames_json(const RunRecord& record) {
 
 ordered_json extrinsics_json(const std::optional<ExtrinsicsRecord>& e) {
   if (!e) return nullptr;
+  const auto known = [](double deviation, int digits, bool observed) { return observed ? ordered_json(rounded(deviation, digits)) : ordered_json(); };
   return {{"change_deg", rounded(e->change_deg, 4)},
-          {"std_deg", rounded(e->std_deg, 4)},
+          {"std_deg", known(e->std_deg, 4, e->rotation_observed)},
           {"change_mm", rounded(e->change_mm, 2)},
-          {"std_mm", rounded(e->std_mm, 2)},
+          {"std_mm", known(e->std_mm, 2, e->translation_observed)},
           {"observed", {{"rotation", e->rotation_observed}, {"translation", e->translation_observed}}},
           {"suspect", e->suspect},
           {"refined", e->refined}};

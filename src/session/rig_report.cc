@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "io/atomic_file.h"
+#include "io/image_file.h"
 #include "io/rig_description.h"
 #include "io/rig_file.h"
 #include "io/rig_warnings.h"
@@ -62,6 +63,15 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
   return pairs;
 }
 
+// What is probably wrong, masks that cannot be used among it.
+std::vector<std::string> warnings_of(const camera::Rig& rig) {
+  std::vector<std::string> warnings = io::rig_warnings(rig);
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    if (const auto mask = io::read_mask(rig.camera(i)); !mask) warnings.push_back("mask of " + rig.camera(i).name + ": " + mask.error().message());
+  }
+  return warnings;
+}
+
 std::string as_json(const io::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
   const camera::Rig& rig = file.rig;
   Json cameras = Json::array(), baselines = Json::array();
@@ -77,7 +87,7 @@ std::string as_json(const io::RigFile& file, const std::optional<std::vector<Pai
                {"cameras", std::move(cameras)},
                {"baselines", std::move(baselines)},
                {"notes", file.notes},
-               {"warnings", io::rig_warnings(rig)}};
+               {"warnings", warnings_of(rig)}};
   if (evidence) json["images"] = evidence_json(*evidence);
   return json.dump(1) + "\n";
 }
@@ -85,7 +95,7 @@ std::string as_json(const io::RigFile& file, const std::optional<std::vector<Pai
 std::string as_text(const io::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
   std::string text = fmt::format("format: {}\n", io::format_name(file.format)) + io::describe_rig(file.rig);
   for (const std::string& note : file.notes) text += "note: " + note + "\n";
-  for (const std::string& warning : io::rig_warnings(file.rig)) text += "warning: " + warning + "\n";
+  for (const std::string& warning : warnings_of(file.rig)) text += "warning: " + warning + "\n";
   return evidence ? text + describe_evidence(*evidence) : text;
 }
 

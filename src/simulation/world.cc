@@ -81,11 +81,11 @@ struct World::Scene {
   RTCScene scene = nullptr;
 };
 
-World::World(Building building, const WorldOptions& options, ThreadPool& pool) : building_(std::move(building)) {
+World::World(Building building, const WorldOptions& options, ThreadPool& pool, std::stop_token stop) : building_(std::move(building)) {
   scene_ = std::make_unique<Scene>(building_.surfaces);
   lay_out(options);
-  bake_albedo(pool);
-  bake_light(options, pool);
+  bake_albedo(pool, stop);
+  bake_light(options, pool, stop);
 }
 
 World::~World() = default;
@@ -145,7 +145,7 @@ void World::lay_out(const WorldOptions& options) {
   light_.resize(samples);
 }
 
-void World::bake_albedo(ThreadPool& pool) {
+void World::bake_albedo(ThreadPool& pool, const std::stop_token& stop) {
   struct Rows {
     std::size_t surface;
     std::int32_t from, to;
@@ -157,6 +157,7 @@ void World::bake_albedo(ThreadPool& pool) {
       work.push_back({i, y, std::min(y + kRows, baked_[i].height)});
   }
   pool.for_each(work.size(), [&](std::size_t item) {
+    if (stop.stop_requested()) return;
     const Rows& rows = work[item];
     const Surface& s = building_.surfaces[rows.surface];
     const Baked& b = baked_[rows.surface];
@@ -193,8 +194,9 @@ void World::bake_albedo(ThreadPool& pool) {
   });
 }
 
-void World::bake_light(const WorldOptions& options, ThreadPool& pool) {
+void World::bake_light(const WorldOptions& options, ThreadPool& pool, const std::stop_token& stop) {
   pool.for_each(baked_.size(), [&](std::size_t i) {
+    if (stop.stop_requested()) return;
     const Surface& s = building_.surfaces[i];
     const Baked& b = baked_[i];
     const Vector3d normal = unit_normal(s);

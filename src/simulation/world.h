@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "base/thread_pool.h"
@@ -33,8 +34,9 @@ struct RayPacket {
 
 class World {
  public:
-  // Builds and bakes everything with the threads of `pool`; what comes out does not depend on their number.
-  World(Building building, const WorldOptions& options, ThreadPool& pool);
+  // Builds and bakes everything with the threads of `pool`; what comes out does not depend on their number. Asked to stop it is
+  // there at once, dark in part.
+  World(Building building, const WorldOptions& options, ThreadPool& pool, std::stop_token stop = {});
   ~World();
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
@@ -71,8 +73,8 @@ class World {
   // Metres a texel of a surface may span; nothing where the surface turns its back on all of the tour.
   std::optional<double> texel_of(const Surface& surface, double finest) const;
   void lay_out(const WorldOptions& options);
-  void bake_albedo(ThreadPool& pool);
-  void bake_light(const WorldOptions& options, ThreadPool& pool);
+  void bake_albedo(ThreadPool& pool, const std::stop_token& stop);
+  void bake_light(const WorldOptions& options, ThreadPool& pool, const std::stop_token& stop);
   // Light that arrives at a point of a surface with normal `n`.
   float light_at(const Vector3d& point, const Vector3d& n, int ambient_rays) const;
   bool blocked(const Vector3d& from, const Vector3d& to) const;

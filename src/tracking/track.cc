@@ -161,6 +161,13 @@ struct Fine {
   std::vector<Expectation> wide;        // the same in wide windows, where a doubted camera is due to be tried again
 };
 
+// Per camera.
+std::vector<Expectation> expectations(const MatchSearch& search) {
+  std::vector<Expectation> out;
+  for (std::size_t c = 0; c < search.found.size(); ++c) out.push_back({search.visible_by_camera[c], static_cast<int>(search.found[c].size())});
+  return out;
+}
+
 // Pose from all landmarks of the local view, with keypoints aligned to their landmarks' patches.
 Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::BundledFrame& frame,
                       const TrackingOptions& options, ThreadPool& pool) {
@@ -170,14 +177,11 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::Bund
   MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, coarse.matches,
                                       search_options(input, options.matching, options.matching.local_radius), pool);
   Fine out;
-  for (std::size_t c = 0; c < search.found.size(); ++c) {
-    out.views.push_back({search.visible_by_camera[c], static_cast<int>(search.found[c].size())});
-  }
+  out.views = expectations(search);
   if (any_due_for_retry(input.state, frame.time_ns, options.consensus)) {
     auto windows = search_options(input, options.matching, options.matching.wide_radius);
     windows.ratio = 0.8 * options.matching.ratio;
-    const MatchSearch wide = find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, {}, windows, pool);
-    for (std::size_t c = 0; c < wide.found.size(); ++c) out.wide.push_back({wide.visible_by_camera[c], static_cast<int>(wide.found[c].size())});
+    out.wide = expectations(find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, {}, windows, pool));
   }
   drop(coarse.left_out, search.found);
   out.matches = merge(coarse.matches, search.found);

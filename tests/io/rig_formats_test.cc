@@ -8,8 +8,7 @@
 #include "camera/test_cameras.h"
 #include "geometry/random_transforms.h"
 #include "io/camera_description.h"
-#include "io/data_on_disk.h"
-#include "io/rig_file.h"
+#include "io/rig_formats.h"
 
 namespace bslam::io {
 namespace {
@@ -18,8 +17,6 @@ namespace fs = std::filesystem;
 using geometry::SE3;
 using geometry::Vector2d;
 using geometry::Vector3d;
-
-std::size_t index(std::size_t i) { return i; }
 
 bool holds(RigFormat format, const camera::CameraModel& model) {
   const std::size_t coefficients = camera::distortion(model).size();
@@ -79,20 +76,6 @@ void expect_near(const camera::Rig& a, const camera::Rig& b, double tolerance) {
     EXPECT_LE((a.body_from_cam(i).matrix() - b.body_from_cam(i).matrix()).cwiseAbs().maxCoeff(), tolerance) << i;
   }
 }
-
-class RigFormats : public testing::Test {
- protected:
-  Result<RigFile> read(const std::string& text, const std::string& name = "rig.yaml") {
-    write_text(folder_.path() / name, text);
-    return read_rig_file(folder_.path() / name);
-  }
-  Result<RigFile> read_with(std::string text, const std::string& from, const std::string& to) {
-    const std::size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    return read(text.replace(at, from.size(), to));
-  }
-  TemporaryFolder folder_;
-};
 
 class RigFormatOf : public RigFormats, public testing::WithParamInterface<RigFormat> {
  protected:
@@ -323,6 +306,16 @@ TEST_F(RigFormats, OpenvinsSaysCameraToImu) {
   EXPECT_LT((inverse->rig.body_from_cam(0).inverse().matrix() - file->rig.body_from_cam(0).matrix()).norm(), 1e-12);
 }
 
+TEST_F(RigFormats, OpenvinsHasNoDistortionAsOneOfZeros) {
+  const camera::Rig rig({{camera::Camera{"front", camera::Pinhole({400, 401, 320, 240}), 640, 480, 0, {}}, SE3()}});
+  ASSERT_TRUE(write_rig_as(rig, RigFormat::kOpenvins, folder_.path() / "out.yaml"));
+  const auto again = read_rig_file(folder_.path() / "out.yaml");
+  ASSERT_TRUE(again) << again.error().message();
+  EXPECT_EQ(camera::model_name(again->rig.camera(index(0)).model), "pinhole-radtan");
+  EXPECT_EQ(camera::distortion(again->rig.camera(index(0)).model), std::vector<double>(4, 0.0));
+  EXPECT_EQ(camera::intrinsics(again->rig.camera(index(0)).model).fy, 401);
+}
+
 // ---- ORB-SLAM3
 
 constexpr const char* kOrbslam = R"(%YAML:1.0
@@ -504,88 +497,6 @@ TEST_F(RigFormats, BasaltIsChecked) {
     EXPECT_EQ(file.error().key, c.key) << file.error().message();
   }
   EXPECT_FALSE(read("{\"value0\": {\"T_imu_cam\": "));
-}
-
-// ---- COLMAP
-
-class ColmapRig : public RigFormats {
- protected:
-  Result<RigFile> read_folder(const std::string& cameras, const std::string& rigs, const std::string& config) {
-    std::error_code error;
-    fs::remove_all(folder_.path() / "rig", error);
-    write_text(folder_.path() / "rig" / "cameras.txt", cameras);
-    if (!rigs.empty()) write_text(folder_.path() / "rig" / "rigs.txt", rigs);
-    if (!config.empty()) write_text(folder_.path() / "rig" / "rig_config.json", config);
-    return read_rig_file(folder_.path() / "rig");
-  }
-  static constexpr const char* kCameras =
-      "# Camera list\n1 SIMPLE_RADIAL 640 480 500.5 320 240 -0.02\n2 OPENCV_FISHEYE 640 480 300 301 321 239 .1 .01 0 "
-      "0\n";
-  static constexpr const char* kRigs = "# comment\n7 2 CAMERA 2 CAMERA 1 1 1 0 0 0 -0.2 0.0 0.1\n";
-};
-
-TEST_F(ColmapRig, IsReadFromItsTextModel) {
-  const auto file = read_folder(kCameras, kRigs, "");
-  ASSERT_TRUE(file) << file.error().message();
-  EXPECT_EQ(file->format, RigFormat::kColmap);
-  ASSERT_EQ(file->rig.size(), 2u);
-  EXPECT_EQ(file->rig.camera(index(0)).name, "camera_2");  // the reference sensor
-  EXPECT_EQ(camera::model_name(file->rig.camera(index(0)).model), "kannala-brandt");
-  const camera::Camera& radial = file->rig.camera(index(1));
-  EXPECT_EQ(camera::distortion(radial.model), (std::vector{-0.02, 0.0, 0.0, 0.0}));
-  // sensor_from_rig: the rig's origin lies at (-0.2, 0, 0.1) of the sensor.
-  EXPECT_LT((file->rig.rig_from_cam(1).translation() - Vector3d(0.2, 0, -0.1)).norm(), 1e-12);
-  // The middle of COLMAP's image, 320 of 640, lies between two of our pixels.
-  EXPECT_LT((radial.project({0, 0, 1}).value() - Vector2d(319.5, 239.5)).norm(), 1e-12);
-  for (const char* name : {"cameras.txt", "rigs.txt"}) {
-    EXPECT_EQ(read_rig_file(folder_.path() / "rig" / name)->rig.size(), 2u) << name;
-  }
-}
-
-TEST_F(ColmapRig, IsReadFromItsRigConfiguration) {
-  const std::string config = R"([{"cameras": [{"image_prefix": "rig1/left/", "ref_sensor": true},
-    {"image_prefix": "rig1/right/", "cam_from_rig_rotation": [0.7071067811865475, 0.0, 0.7071067811865476, 0.0],
-     "cam_from_rig_translation": [0, 0, 0.5], "camera_model_name": "PINHOLE", "camera_params": [400, 401, 320, 240]}]}])";
-  const auto file = read_folder(kCameras, "", config);
-  ASSERT_TRUE(file) << file.error().message();
-  EXPECT_EQ(file->rig.camera(index(0)).name, "rig1/left");
-  EXPECT_EQ(camera::model_name(file->rig.camera(index(1)).model), "pinhole");
-  EXPECT_EQ(camera::intrinsics(file->rig.camera(index(1)).model).fy, 401);
-  // A quarter turn about y: what the rig has ahead, the camera has on its right.
-  EXPECT_LT((file->rig.cam_from_rig(index(1)).rotation() * Vector3d::UnitZ() - Vector3d::UnitX()).norm(), 1e-12);
-  std::string broken = config;
-  broken.replace(broken.find("0.7071067811865475"), 18, "0.8");
-  EXPECT_EQ(read_folder(kCameras, "", broken).error().key, "rigs[0].cameras[1].cam_from_rig_rotation");
-  broken = config;
-  broken.replace(broken.find("cam_from_rig_translation"), 24, "rig_from_cam_translation");
-  EXPECT_EQ(read_folder(kCameras, "", broken).error().key, "rigs[0].cameras[1].cam_from_rig_translation");
-}
-
-TEST_F(ColmapRig, IsChecked) {
-  EXPECT_EQ(read_folder("1 THIN_PRISM_FISHEYE 640 480 1 1 1 1\n", "", "").error().found, "THIN_PRISM_FISHEYE");
-  EXPECT_EQ(read_folder("1 PINHOLE 640 480 500 320 240\n", "", "").error().found, "3 parameters");
-  EXPECT_EQ(read_folder("1 PINHOLE 640 480 500 500 320 x\n", "", "").error().key, "line 1");
-  EXPECT_EQ(read_folder(kCameras, "", "").error().found, "2 cameras without extrinsics");
-  EXPECT_EQ(read_folder(kCameras, "1 1 CAMERA 1\n2 1 CAMERA 2\n", "").error().found, "2 rigs");
-  EXPECT_EQ(read_folder(kCameras, "1 2 CAMERA 1 CAMERA 3 1 1 0 0 0 0 0 0\n", "").error().found, "camera 3");
-  EXPECT_EQ(read_folder(kCameras, "1 2 CAMERA 1 CAMERA 2 0\n", "").error().key, "line 1");
-  EXPECT_EQ(read_folder("1 PINHOLE 640 480 500 500 320 240\n", "", "")->rig.size(), 1u);
-}
-
-TEST_F(ColmapRig, HoldsNoBodyFrame) {
-  const camera::Rig rig({{camera::test_cameras()[1], SE3(geometry::Quaterniond::Identity(), {0, 0, 1})}});
-  const auto status = write_rig_as(rig, RigFormat::kColmap, folder_.path() / "out");
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().expected, "camera 0 as the body, or --drop body");
-  EXPECT_TRUE(write_rig_as(without(rig, Droppable::kBodyFrame), RigFormat::kColmap, folder_.path() / "out"));
-}
-
-TEST_F(ColmapRig, KeepsNamesInTheRigConfiguration) {
-  camera::Camera camera = camera::test_cameras()[1];
-  camera.name = "front \"left\"";
-  ASSERT_TRUE(write_rig_as(camera::Rig({{camera, SE3()}}), RigFormat::kColmap, folder_.path() / "out"));
-  fs::remove(folder_.path() / "out" / "rigs.txt");
-  EXPECT_EQ(read_rig_file(folder_.path() / "out")->rig.camera(index(0)).name, "front \"left\"");
 }
 
 // ---- KITTI raw: the calibration of 2011_09_26, cameras 00 and 01.

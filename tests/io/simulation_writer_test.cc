@@ -97,13 +97,28 @@ TEST_F(SimulationWriter, DoesACompleteRequestOnlyOnce) {
   EXPECT_EQ(*again, SimulationOutcome::kWasComplete);
 }
 
+TEST_F(SimulationWriter, StopsWhileItBuildsTheWorld) {
+  const SimulationRequest r = request();
+  std::stop_source source;
+  source.request_stop();
+  const auto stopped = write_simulation(r, pool_, {}, source.get_token());
+  ASSERT_TRUE(stopped.ok());
+  EXPECT_EQ(*stopped, SimulationOutcome::kInterrupted);
+  EXPECT_TRUE(fs::is_empty(r.folder / "mav0/cam0/data"));
+  EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWritten);
+}
+
 TEST_F(SimulationWriter, GoesOnWhereItWasInterrupted) {
   SimulationRequest whole = request(), r = request();
   whole.folder = folder_ / "whole";
   ASSERT_TRUE(write_simulation(whole, pool_).ok());
   std::atomic<std::size_t> first = 0;
-  const auto stopped =
-      write_simulation(r, pool_, [&](std::size_t done, std::size_t) { return first = done, done < 2; });
+  std::stop_source source;
+  const auto stop_at_two = [&](std::size_t done, std::size_t) {
+    first = done;
+    if (done >= 2) source.request_stop();
+  };
+  const auto stopped = write_simulation(r, pool_, stop_at_two, source.get_token());
   ASSERT_TRUE(stopped.ok());
   EXPECT_EQ(*stopped, SimulationOutcome::kInterrupted);
   EXPECT_LT(first, 6u);

@@ -120,6 +120,16 @@ TEST_F(RigReport, IsTextOrJson) {
   EXPECT_FALSE(report_rig({.file = (folder_ / "none.yaml").string()}));
 }
 
+TEST_F(RigReport, NamesAMaskThatCannotBeUsed) {
+  camera::RigCamera camera{stereo().camera(0u), stereo().body_from_cam(0)};
+  camera.camera.mask_file = (folder_ / "none.png").string();
+  ASSERT_TRUE(io::write_rig(camera::Rig({camera}), folder_ / "rig.yaml"));
+  const auto text = report_rig({.file = (folder_ / "rig.yaml").string()});
+  ASSERT_TRUE(text);
+  EXPECT_NE(text->find("warning: mask of "), std::string::npos) << *text;
+  EXPECT_NE(text->find("none.png"), std::string::npos) << *text;
+}
+
 // The whole way: images, features, verdict.
 TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   ThreadPool pool(2);

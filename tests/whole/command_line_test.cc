@@ -87,9 +87,34 @@ TEST_F(CommandLine, TellsItsVersionAndHelpOnEveryVerb) {
   EXPECT_EQ(run("--version").status, 0);
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
   for (const char* verb : {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "map", "map info", "map export", "map merge",
-                           "vocab", "vocab info", "vocab train"}) {
+                           "vocab", "vocab info", "vocab train", "settings"}) {
     EXPECT_EQ(run(std::string(verb) + " --help").status, 0) << verb;
   }
+}
+
+TEST_F(CommandLine, NamesWhatIsMisspeltAndWhatWasMeant) {
+  const std::string base = "run " + data() + " --out " + out("refused");
+  const std::pair<std::string, std::string> cases[] = {
+      {"rum " + data(), "rum: found an unknown verb, expected perhaps run"},
+      {"rig infoo x", "infoo: found an unknown verb, expected perhaps info"},
+      {base + " --mdoe lagged", "--mdoe: found an unknown option, expected perhaps --mode"},
+      {"run " + data() + " --ouT=x", "--ouT: found an unknown option, expected perhaps --out"},
+      {base + " --mode sideways", "--mode: found sideways, expected one of: sequential, lagged, parallel"},
+      {base + " --seed -1", "--seed: Value -1 not in range 0 to 2147483647"},
+      {"run", "DATA is required (see bslam run --help)"}};
+  for (const auto& [arguments, said] : cases) {
+    const Ran ran = run(arguments);
+    EXPECT_EQ(ran.status, 2) << arguments;
+    EXPECT_NE(ran.err.find(said), std::string::npos) << arguments << ": " << ran.err;
+  }
+}
+
+TEST_F(CommandLine, PrintsSettingsThatItReads) {
+  const Ran all = run("settings --set features.levels=5");
+  EXPECT_EQ(all.status, 0);
+  EXPECT_NE(all.out.find("levels: 5"), std::string::npos);
+  std::ofstream(out("settings.yaml")) << all.out;
+  EXPECT_EQ(run("settings --config " + out("settings.yaml")).out, all.out);
 }
 
 TEST_F(CommandLine, RefusesWhatMakesNoSense) {
