@@ -5,7 +5,7 @@
 namespace bslam::adjustment {
 namespace {
 
-constexpr double kPrior = 4;  // degrees of freedom that count as agreeing like all others
+constexpr double kPrior = 4;  // degrees of freedom: the fewer, the more landmarks differ; from 4 to 20 results hardly change
 
 }  // namespace
 

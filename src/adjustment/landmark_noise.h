@@ -4,9 +4,10 @@
 //
 // So each landmark gets a variance of its own, from how well its observations agree: with n of them, their squared normalised
 // errors adding up to S, and all landmarks on average m per degree of freedom,
-//     variance factor = (kPrior m + S) / (kPrior + 2 n - 3),
-// the mode of a scaled inverse chi-square posterior (Gelman et al., Bayesian Data Analysis, section 2.6), as in adjustment with
-// Student's t distribution.
+//     variance factor = (4 m + S) / (4 + 2 n - 3),
+// the point taking three of its 2 n degrees of freedom: the inverse of the mean of 1/variance after S, where before it the
+// variance is m with four degrees of freedom (scaled inverse chi-square; Gelman et al., Bayesian Data Analysis, section 2.6). It is
+// the weight of adjustment with Student's t distribution. Observations left out as outliers do not count, which bounds S.
 #pragma once
 
 #include <span>

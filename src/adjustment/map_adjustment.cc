@@ -88,8 +88,7 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
     solve.iterations = options.final_iterations;
     solve.robust = false;
     const auto variances = landmark_variances(flat.problem, skip);
-    const auto last = adjust_with_variances(flat.problem, variances, solve, skip, stop);
-    if (last.usable()) report.final_cost = last.final_cost;
+    adjust_with_variances(flat.problem, variances, solve, skip, stop);
   }
   const std::vector<ObservationSource> bad = bad_observations(flat, options.outlier_chi2);
   map::SetPoses poses = poses_of(draft.map(), flat);

@@ -29,7 +29,7 @@ struct AdjustmentReport {
   bool done = false;            // false: nothing to adjust, or the solver failed; the draft is as it was
   std::size_t observations = 0;             // keypoints
   std::size_t outliers = 0;                 // features removed from their landmark
-  double initial_cost = 0, final_cost = 0;  // robust at the start, plain over what agrees at the end
+  double initial_cost = 0, final_cost = 0;  // robust, before and after the robust round
 };
 
 // Adjusts the free keyframes and the landmarks with all cameras' observations, two rounds, and writes poses, positions and

@@ -29,6 +29,13 @@ std::vector<std::string> verbs_of(const CLI::App& verb) {
   return names;
 }
 
+// "bslam map info".
+std::string path_of(const CLI::App& verb) {
+  return verb.get_parent() == nullptr ? "bslam" : path_of(*verb.get_parent()) + " " + verb.get_name();
+}
+
+bool is_option(const std::string& word) { return word.size() > 1 && word.front() == '-' && word != "--"; }
+
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
@@ -39,17 +46,18 @@ std::string one_line(std::string text) {
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& verb = chosen(app);
   const std::vector<std::string> unknown = app.remaining(true);
-  const auto option = std::ranges::find_if(unknown, [](const std::string& word) { return word.size() > 1 && word.front() == '-'; });
+  const auto word = std::ranges::find_if_not(unknown, is_option);
+  const std::vector<std::string> verbs = verbs_of(verb);
+  if (word != unknown.end() && !verbs.empty()) {
+    return {"command line", one_line(*word), "an unknown verb", "perhaps " + nearest_name(*word, verbs)};
+  }
+  const auto option = std::ranges::find_if(unknown, is_option);
   if (option != unknown.end()) {
     const std::string name = option->substr(0, option->find('='));
-    return {"command line", one_line(name), "an unknown option", "perhaps " + nearest_name(name, options_of(verb))};
+    const std::string nearest = nearest_name(name, options_of(verb));
+    return {"command line", one_line(name), "an unknown option", nearest == name ? "it after the verb" : "perhaps " + nearest};
   }
-  const std::vector<std::string> verbs = verbs_of(verb);
-  if (!unknown.empty() && !verbs.empty()) {
-    return {"command line", one_line(unknown.front()), "an unknown verb", "perhaps " + nearest_name(unknown.front(), verbs)};
-  }
-  const std::string whole = verb.get_parent() == nullptr ? "bslam" : "bslam " + verb.get_name();
-  return {"command line", one_line(error.what()) + " (see " + whole + " --help)", "", ""};
+  return {"command line", one_line(error.what()) + " (see " + path_of(verb) + " --help)", "", ""};
 }
 
 }  // namespace bslam::cli

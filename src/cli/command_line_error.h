@@ -7,7 +7,7 @@
 
 namespace bslam::cli {
 
-// The first option or verb nobody knows, with the nearest that exists; where all are known, what the parser says.
+// The first verb or else option nobody knows, with the nearest that exists; where all are known, what the parser says.
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace bslam::cli

@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 using geometry::SE3;
 
 constexpr std::size_t kMaxBytes = std::size_t{1} << 24;
+constexpr const char* kInOrder = "the cameras of rig_config.json are those of cameras.txt in order of their ids";
 constexpr double kPixelShift = 0.5;  // COLMAP's origin is the corner of the top-left pixel, ours its centre
 
 // One model of COLMAP: ours, how many focal lengths, how many coefficients follow cx cy, and how many ours has.
@@ -165,8 +166,8 @@ Result<RigReading> read_rigs_txt(const fs::path& file, const Cameras& cameras) {
   return reading;
 }
 
-// Cameras of rig_config.json, in its order.
-Result<std::vector<YamlMap>> configured_cameras(const fs::path& file) {
+// Cameras of rig_config.json, in its order: as many as cameras.txt has.
+Result<std::vector<YamlMap>> configured_cameras(const fs::path& file, std::size_t count) {
   const auto text = read_file(file, kMaxBytes);
   if (!text) return text.error();
   std::string wrapped = "{\"rigs\": " + *text + "\n}";  // its root is a list, and JSON is YAML but for tabs
@@ -176,7 +177,11 @@ Result<std::vector<YamlMap>> configured_cameras(const fs::path& file) {
   const auto rigs = yaml->maps("rigs");
   if (!rigs) return rigs.error();
   if (rigs->size() != 1) return Error{file.string(), "", fmt::format("{} rigs", rigs->size()), "one"};
-  return rigs->front().maps("cameras");
+  auto configured = rigs->front().maps("cameras");
+  if (configured && configured->size() != count) {
+    return rigs->front().error("cameras", fmt::format("{} cameras", configured->size()), fmt::format("{}, as in cameras.txt", count));
+  }
+  return configured;
 }
 
 // Names the cameras, in order of their ids, by the folders of their images.
@@ -220,7 +225,21 @@ Result<RigReading> read_rig_config(const std::vector<YamlMap>& configured, const
   for (const YamlMap& map : configured) {
     if (const Status status = read_configured(map, (camera++)->second, reading); !status) return status.error();
   }
-  reading.notes.push_back("the cameras of rig_config.json are those of cameras.txt in order of their ids");
+  reading.notes.emplace_back(kInOrder);
+  return reading;
+}
+
+// Places by rigs.txt, names by rig_config.json as far as that can be read.
+Result<RigReading> read_solved(const fs::path& rigs, const fs::path& config, Cameras& cameras) {
+  std::string note;
+  std::error_code error;
+  if (fs::exists(config, error)) {
+    const auto configured = configured_cameras(config, cameras.size());
+    const Status named = configured ? take_names(*configured, cameras) : Status(configured.error());
+    if (!named) note = "names are those of cameras.txt: " + named.error().message();
+  }
+  auto reading = read_rigs_txt(rigs, cameras);
+  if (reading && !note.empty()) reading->notes.push_back(note);
   return reading;
 }
 
@@ -254,19 +273,13 @@ Result<RigReading> read_colmap_rig(const fs::path& folder) {
   if (!cameras) return cameras.error();
   std::error_code error;
   const fs::path rigs = folder / "rigs.txt", config = folder / "rig_config.json";
-  const bool solved = fs::exists(rigs, error);
+  if (fs::exists(rigs, error)) return read_solved(rigs, config, *cameras);
   if (fs::exists(config, error)) {
-    const auto configured = configured_cameras(config);
+    const auto configured = configured_cameras(config, cameras->size());
     if (!configured) return configured.error();
-    const bool fits = configured->size() == cameras->size();
-    if (!solved && !fits) {
-      return Error{config.string(), "cameras", fmt::format("{} cameras", configured->size()),
-                   fmt::format("{}, as in cameras.txt", cameras->size())};
-    }
-    if (const Status status = fits ? take_names(*configured, *cameras) : Status(); !status) return status.error();
-    if (!solved) return read_rig_config(*configured, *cameras);
+    if (const Status status = take_names(*configured, *cameras); !status) return status.error();
+    return read_rig_config(*configured, *cameras);
   }
-  if (solved) return read_rigs_txt(rigs, *cameras);
   if (cameras->size() > 1) {
     return Error{folder.string(), "", fmt::format("{} cameras without extrinsics", cameras->size()),
                  "rigs.txt or rig_config.json beside cameras.txt"};

@@ -13,11 +13,6 @@ struct Scored {
 
 bool better(const Candidate& a, const Candidate& b) { return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe; }
 
-bool same_place(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
-  const std::vector<map::Covisible>& neighbours = map.keyframe(a).covisible;
-  return a == b || std::ranges::binary_search(neighbours, b, {}, &map::Covisible::keyframe);
-}
-
 // Score of `at` with those of its best covisible keyframes among `scored` (in order of id), under the name of the one that
 // scores most.
 Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vector<Scored>& scored, int size) {
@@ -120,10 +115,14 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
   for (const Scored& s : scored) groups.push_back(group_of(map, s, scored, options_.group));
   std::sort(groups.begin(), groups.end(), better);
   std::vector<Candidate> out;
+  // What a candidate stands for: itself and its neighbours. A landmark or two in common, seen through a door, are not one place.
+  std::vector<std::uint8_t> taken(map.keyframe_slots(), 0);
   for (const Candidate& g : groups) {
     if (out.size() == static_cast<std::size_t>(options_.max_candidates) || g.score < bounds.group_share * groups.front().score) break;
-    const bool twice = std::ranges::any_of(out, [&](const Candidate& c) { return same_place(map, c.keyframe, g.keyframe); });
-    if (!twice) out.push_back(g);
+    if (taken[g.keyframe.index()]) continue;
+    out.push_back(g);
+    taken[g.keyframe.index()] = 1;
+    for (const map::Covisible& c : neighbours_of(map, g.keyframe, options_)) taken[c.keyframe.index()] = 1;
   }
   return out;
 }

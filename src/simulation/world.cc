@@ -196,7 +196,6 @@ void World::bake_albedo(ThreadPool& pool, const std::stop_token& stop) {
 
 void World::bake_light(const WorldOptions& options, ThreadPool& pool, const std::stop_token& stop) {
   pool.for_each(baked_.size(), [&](std::size_t i) {
-    if (stop.stop_requested()) return;
     const Surface& s = building_.surfaces[i];
     const Baked& b = baked_[i];
     const Vector3d normal = unit_normal(s);
@@ -204,7 +203,7 @@ void World::bake_light(const WorldOptions& options, ThreadPool& pool, const std:
     if (b.hidden) constant = kAmbient;
     if (s.texture.material == Material::kLamp) constant = kLampLight;
     if (s.texture.material == Material::kWindow) constant = kDaylight;
-    for (std::int32_t y = 0; y < b.light_height; ++y) {
+    for (std::int32_t y = 0; y < b.light_height && !stop.stop_requested(); ++y) {
       for (std::int32_t x = 0; x < b.light_width; ++x) {
         const std::size_t at = b.light + static_cast<std::size_t>(y * b.light_width + x);
         if (constant) {

@@ -35,7 +35,7 @@ struct RayPacket {
 class World {
  public:
   // Builds and bakes everything with the threads of `pool`; what comes out does not depend on their number. Asked to stop it is
-  // there at once, dark in part.
+  // there soon, unfinished and of no use.
   World(Building building, const WorldOptions& options, ThreadPool& pool, std::stop_token stop = {});
   ~World();
   World(World&&) noexcept;

@@ -2,7 +2,7 @@
 // calibration gets wrong, images not taken quite when they say, surfaces that are not flat.
 //
 // It decides how much more an aligned keypoint tells than a detected one, and above which error it is an outlier, and it
-// differs tenfold from rig to rig; so it is taken from the frames tracked so far. With squared errors e^2 of a camera's
+// differs much from rig to rig; so it is taken from the frames tracked so far. With squared errors e^2 of a camera's
 // inliers against the map and variances s^2 of their alignment alone, each frame says
 //     floor^2 = median(e^2) / (2 ln 2) - median(s^2),
 // the median of the squared length of a normal error of variance 1 per axis being 2 ln 2.
@@ -18,7 +18,8 @@ namespace bslam::tracking {
 
 // Floors in level-0 pixels after `frame` was tracked with `output`; `before`: those it was tracked with (empty: nothing is
 // known, options.floor_px everywhere). They follow what frames say within some ten of them, between options.least_floor_px and
-// options.floor_px. A camera with few matches keeps its own; after a lost frame nothing is known.
+// options.floor_px. A camera with few matches keeps its own; after a lost frame nothing is known, as
+// what made it lost may have come to stay. Keyframes keep the standard deviations of their time.
 std::vector<double> error_floors(std::span<const double> before, const map::BundledMap& map, const frame::BundledFrame& frame,
                                  const TrackOutput& output, const frame::AlignmentOptions& options);
 // The same for one camera, from squared errors and variances of its keypoints, both with `before` in the variances.

@@ -100,6 +100,11 @@ TEST_F(ColmapRig, TakesNamesByIdAndPlacesFromRigsTxt) {
   const auto other = read_folder(kCameras, kRigs, R"([{"cameras": [{"image_prefix": "left/"}]}])");
   ASSERT_TRUE(other) << other.error().message();
   EXPECT_EQ(other->rig.camera(index(0)).name, "camera_2");
+  const auto broken = read_folder(kCameras, kRigs, "[{\"cameras\": ");
+  ASSERT_TRUE(broken) << broken.error().message();
+  EXPECT_EQ(broken->rig.camera(index(0)).name, "camera_2");
+  EXPECT_NE(broken->notes.back().find("names are those of cameras.txt"), std::string::npos);
+  EXPECT_EQ(read_folder(kCameras, "", R"([{"cameras": [{"image_prefix": "left/"}]}])").error().key, "rigs[0].cameras");
 }
 
 }  // namespace

@@ -79,6 +79,22 @@ TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
   EXPECT_TRUE(std::ranges::any_of(without, [](const Candidate& c) { return c.keyframe.value() < 3; }));
 }
 
+// As of two rooms of which one sees a corner of the other through a door.
+TEST(BagOfWordsRecogniser, OneLandmarkInCommonMakesNoOnePlace) {
+  const FeatureSimulator simulator = hall(rig_of(1));
+  HallMap world(simulator.rig());
+  world.add(simulator.frame(FrameId(0), 0.0));
+  world.add(simulator.frame(FrameId(1), 20.0), {}, 1);
+  const auto frame = described(simulator.frame(FrameId(7), 0.1));
+  ASSERT_EQ(recogniser(kLoose)->recognised(world.map, frame).size(), 2u);
+  const auto any_of = [&](KeyframeId k) {
+    return *std::ranges::find_if(world.map.keyframe(k).landmarks.values(), [](LandmarkId l) { return l.valid(); });
+  };
+  ASSERT_TRUE(world.map.merge_landmarks(any_of(KeyframeId(1)), any_of(KeyframeId(0))));
+  ASSERT_EQ(world.map.best_covisible(KeyframeId(0), 1).front().weight, 1);
+  EXPECT_EQ(recogniser(kLoose)->recognised(world.map, frame).size(), 2u);
+}
+
 TEST(BagOfWordsRecogniser, AnswersDoNotDependOnTheMapsAskedAboutBefore) {
   const HallMap& world = drifted_walk(1);
   const HallMap& other = exact_walk(1);

@@ -96,12 +96,16 @@ TEST_F(CommandLine, NamesWhatIsMisspeltAndWhatWasMeant) {
   const std::string base = "run " + data() + " --out " + out("refused");
   const std::pair<std::string, std::string> cases[] = {
       {"rum " + data(), "rum: found an unknown verb, expected perhaps run"},
+      {"rum " + data() + " --out x", "rum: found an unknown verb, expected perhaps run"},
+      {data() + " --out x", "an unknown verb"},
+      {"--seed 3 " + base, "--seed: found an unknown option, expected it after the verb"},
+      {"map info", "FILE is required (see bslam map info --help)"},
       {"rig infoo x", "infoo: found an unknown verb, expected perhaps info"},
       {base + " --mdoe lagged", "--mdoe: found an unknown option, expected perhaps --mode"},
       {"run " + data() + " --ouT=x", "--ouT: found an unknown option, expected perhaps --out"},
       {base + " --mode sideways", "--mode: found sideways, expected one of: sequential, lagged, parallel"},
       {base + " --seed -1", "--seed: Value -1 not in range 0 to 2147483647"},
-      {"run", "DATA is required (see bslam run --help)"}};
+      {"run", "DATA is required (see bslam run --help)\n"}};
   for (const auto& [arguments, said] : cases) {
     const Ran ran = run(arguments);
     EXPECT_EQ(ran.status, 2) << arguments;
