@@ -13,12 +13,12 @@ struct Scored {
 
 bool better(const Candidate& a, const Candidate& b) { return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe; }
 
-// Score of `at` with those of its best covisible keyframes among `scored` (in order of id), under the name of the one that
-// scores most.
-Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vector<Scored>& scored, int size) {
+// Score of `at` with those of its best covisible keyframes among `scored` (in order of id) that share at least `weight` landmarks
+// with it, under the name of the one that scores most.
+Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vector<Scored>& scored, int size, int weight) {
   Candidate group{at.keyframe, at.score};
   double best = at.score;
-  for (const map::Covisible& c : map.best_covisible(at.keyframe, static_cast<std::size_t>(size))) {
+  for (const map::Covisible& c : map.best_covisible(at.keyframe, static_cast<std::size_t>(size), weight)) {
     const auto entry = std::ranges::lower_bound(scored, c.keyframe, {}, &Scored::keyframe);
     if (entry == scored.end() || entry->keyframe != c.keyframe) continue;
     group.score += entry->score;
@@ -112,7 +112,7 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
     if (score >= bounds.min_score) scored.push_back({c.keyframe, score});
   }
   std::vector<Candidate> groups;
-  for (const Scored& s : scored) groups.push_back(group_of(map, s, scored, options_.group));
+  for (const Scored& s : scored) groups.push_back(group_of(map, s, scored, options_.group, options_.neighbour_weight));
   std::sort(groups.begin(), groups.end(), better);
   std::vector<Candidate> out;
   // What a candidate stands for: itself and its neighbours. A landmark or two in common, seen through a door, are not one place.

@@ -84,7 +84,7 @@ TEST(BagOfWordsRecogniser, OneLandmarkInCommonMakesNoOnePlace) {
   const FeatureSimulator simulator = hall(rig_of(1));
   HallMap world(simulator.rig());
   world.add(simulator.frame(FrameId(0), 0.0));
-  world.add(simulator.frame(FrameId(1), 20.0), {}, 1);
+  world.add(simulator.frame(FrameId(1), 0.2), {}, 1);  // a room that looks the same
   const auto frame = described(simulator.frame(FrameId(7), 0.1));
   ASSERT_EQ(recogniser(kLoose)->recognised(world.map, frame).size(), 2u);
   const auto any_of = [&](KeyframeId k) {
