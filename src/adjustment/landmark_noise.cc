@@ -9,8 +9,8 @@ constexpr double kPrior = 4;  // degrees of freedom: the fewer, the more landmar
 
 }  // namespace
 
-std::vector<double> landmark_variances(const solver::ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
-  const std::vector<double> chi2 = solver::squared_errors(problem);
+std::vector<double> landmark_variances(const solver::ReprojectionProblem& problem, std::span<const double> chi2,
+                                       std::span<const std::uint8_t> skip) {
   std::vector<double> sum(problem.points.size(), 0.0);
   std::vector<int> count(problem.points.size(), 0);
   for (std::size_t i = 0; i < chi2.size(); ++i) {

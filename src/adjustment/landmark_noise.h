@@ -17,9 +17,10 @@
 
 namespace bslam::adjustment {
 
-// Variance factor of each point of the problem at its present values; 1 where fewer than two observations are left. `skip` as
-// for solver::adjust.
-std::vector<double> landmark_variances(const solver::ReprojectionProblem& problem, std::span<const std::uint8_t> skip);
+// Variance factor of each point of the problem; 1 where fewer than two observations are left. `chi2`: the squared errors at its
+// present values; `skip` as for solver::adjust.
+std::vector<double> landmark_variances(const solver::ReprojectionProblem& problem, std::span<const double> chi2,
+                                       std::span<const std::uint8_t> skip);
 
 // Adjusts the problem with the standard deviations of each point's observations times the root of its factor; they are
 // themselves as they were afterwards.

@@ -10,8 +10,7 @@ namespace {
 
 using solver::ReprojectionProblem;
 
-std::vector<std::uint8_t> outliers(const ReprojectionProblem& problem, double max_chi2) {
-  const std::vector<double> chi2 = solver::squared_errors(problem);
+std::vector<std::uint8_t> outliers(const std::vector<double>& chi2, double max_chi2) {
   std::vector<std::uint8_t> out(chi2.size());
   for (std::size_t i = 0; i < chi2.size(); ++i) out[i] = !(chi2[i] <= max_chi2);
   return out;
@@ -84,10 +83,11 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
   report.initial_cost = robust.initial_cost;
   report.final_cost = robust.final_cost;
   if (!stop.stop_requested() && options.final_iterations > 0) {
-    const auto skip = outliers(flat.problem, options.outlier_chi2);
+    const std::vector<double> chi2 = solver::squared_errors(flat.problem);
+    const auto skip = outliers(chi2, options.outlier_chi2);
     solve.iterations = options.final_iterations;
     solve.robust = false;
-    const auto variances = landmark_variances(flat.problem, skip);
+    const auto variances = landmark_variances(flat.problem, chi2, skip);
     adjust_with_variances(flat.problem, variances, solve, skip, stop);
   }
   const std::vector<ObservationSource> bad = bad_observations(flat, options.outlier_chi2);

@@ -36,11 +36,6 @@ std::string path_of(const CLI::App& verb) {
 
 bool is_option(const std::string& word) { return word.size() > 1 && word.front() == '-' && word != "--"; }
 
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
 }  // namespace
 
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error) {
@@ -49,15 +44,15 @@ Error command_line_error(const CLI::App& app, const CLI::ParseError& error) {
   const auto word = std::ranges::find_if_not(unknown, is_option);
   const std::vector<std::string> verbs = verbs_of(verb);
   if (word != unknown.end() && !verbs.empty()) {
-    return {"command line", one_line(*word), "an unknown verb", "perhaps " + nearest_name(*word, verbs)};
+    return {"command line", *word, "an unknown verb", "perhaps " + nearest_name(*word, verbs)};
   }
   const auto option = std::ranges::find_if(unknown, is_option);
   if (option != unknown.end()) {
     const std::string name = option->substr(0, option->find('='));
     const std::string nearest = nearest_name(name, options_of(verb));
-    return {"command line", one_line(name), "an unknown option", nearest == name ? "it after the verb" : "perhaps " + nearest};
+    return {"command line", name, "an unknown option", nearest == name ? "it after the verb" : "perhaps " + nearest};
   }
-  return {"command line", one_line(error.what()) + " (see " + path_of(verb) + " --help)", "", ""};
+  return {"command line", std::string(error.what()) + " (see " + path_of(verb) + " --help)", "", ""};
 }
 
 }  // namespace bslam::cli

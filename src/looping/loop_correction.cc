@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "base/median.h"
 #include "looping/essential_graph.h"
 #include "solver/reprojection.h"
 
@@ -22,12 +23,6 @@ Vector3d centre(const SE3& T_rig_world) { return T_rig_world.inverse().translati
 // The rigid pose in world units that a vertex of the graph stands for.
 SE3 pose_of(const Sim3& S_rig_world) {
   return SE3(S_rig_world.rotation(), S_rig_world.translation() / S_rig_world.scale());
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Median error, in pixels, of what the keyframe sees of the place at the pose it has in the map.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.h"
 #include "frame/epipolar_search.h"
 #include "frame/point_estimation.h"
 
@@ -23,10 +24,7 @@ double median_depth(const map::BundledMap& map, KeyframeId k) {
   for (const LandmarkId l : keyframe.landmarks) {
     if (l.valid()) depths.push_back((keyframe.T_rig_world * map.landmark(l).position).norm());
   }
-  if (depths.empty()) return 0.0;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return depths.empty() ? 0.0 : median(std::move(depths));
 }
 
 // Keypoints of one camera whose feature has no landmark.

@@ -11,6 +11,7 @@
 #include <opengv/relative_pose/CentralRelativeAdapter.hpp>
 #include <opengv/relative_pose/methods.hpp>
 
+#include "base/median.h"
 #include "geometry/triangulation.h"
 #include "solver/epipolar.h"
 
@@ -140,12 +141,6 @@ EpipolarPose refine_and_reselect(const EpipolarPose& start, std::span<const Bear
   EpipolarPose pose = start;
   for (int round = 0; round < 3; ++round) pose = refine_epipolar(pose, pairs, inliers(pose, pairs, bound), bound);
   return pose;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 RelativePose describe(const EpipolarPose& pose, std::span<const BearingPair> pairs, double bound) {

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+
+#include "base/median.h"
 
 namespace bslam::tracking {
 namespace {
@@ -10,20 +13,13 @@ namespace {
 constexpr std::size_t kLeastMatches = 30;  // of one camera that say something about it
 constexpr double kRate = 0.2;              // of a frame against those before
 
-// Not empty.
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 double error_floor(double before, std::vector<double> squared_errors, std::vector<double> variances,
                    const frame::AlignmentOptions& options) {
   if (squared_errors.size() < kLeastMatches) return before;
-  const double of_alignment = median(variances) - before * before;
-  const double found = median(squared_errors) / (2 * std::numbers::ln2) - of_alignment;
+  const double of_alignment = median(std::move(variances)) - before * before;
+  const double found = median(std::move(squared_errors)) / (2 * std::numbers::ln2) - of_alignment;
   const double least = std::min(options.least_floor_px, options.floor_px);
   const double now = std::clamp(found, least * least, options.floor_px * options.floor_px);
   return std::sqrt((1 - kRate) * before * before + kRate * now);

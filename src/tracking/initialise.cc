@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/median.h"
 #include "feature/hamming.h"
 #include "solver/generalised_scale.h"
 
@@ -50,12 +51,6 @@ std::vector<KeypointPair> match_frames(const feature::Keypoints& a, const featur
     }
   }
   return pairs;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 struct TwoView {

@@ -26,6 +26,10 @@ std::unique_ptr<scene::BundleScene> uneven_scene(std::uint64_t seed) {
 
 solver::BundleOptions plain() { return {.iterations = 50, .relative_decrease = 1e-9, .robust = false}; }
 
+std::vector<double> variances_of(const solver::ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
+  return landmark_variances(problem, solver::squared_errors(problem), skip);
+}
+
 double pose_error(const scene::BundleScene& scene) {
   double sum = 0;
   for (std::size_t i = 0; i < scene.T_rig_world.size(); ++i) sum += scene::centre_error(scene.problem.T_rig_world[i], scene.T_rig_world[i]);
@@ -35,7 +39,7 @@ double pose_error(const scene::BundleScene& scene) {
 TEST(LandmarkVariances, TellThoseThatAgreeFromThoseThatDoNot) {
   const auto scene = uneven_scene(1);
   ASSERT_TRUE(solver::adjust(scene->problem, plain()).usable());
-  const auto variances = landmark_variances(scene->problem, {});
+  const auto variances = variances_of(scene->problem, {});
   double steady = 0, uneven = 0;
   int n = 0, m = 0;
   for (std::size_t p = 0; p < variances.size(); ++p) {
@@ -48,10 +52,10 @@ TEST(LandmarkVariances, TellThoseThatAgreeFromThoseThatDoNot) {
 TEST(LandmarkVariances, AreOneWhereNothingCanBeSaid) {
   const auto scene = uneven_scene(2);
   const std::vector<std::uint8_t> all(scene->problem.observations.size(), 1);
-  for (const double v : landmark_variances(scene->problem, all)) EXPECT_EQ(v, 1.0);
+  for (const double v : variances_of(scene->problem, all)) EXPECT_EQ(v, 1.0);
   std::vector<std::uint8_t> but_one = all;
   but_one[0] = 0;
-  for (const double v : landmark_variances(scene->problem, but_one)) EXPECT_EQ(v, 1.0);
+  for (const double v : variances_of(scene->problem, but_one)) EXPECT_EQ(v, 1.0);
 }
 
 TEST(AdjustWithVariances, BringsPosesNearerToTheTruth) {
@@ -61,7 +65,7 @@ TEST(AdjustWithVariances, BringsPosesNearerToTheTruth) {
     ASSERT_TRUE(solver::adjust(scene->problem, plain()).usable());
     without += pose_error(*scene);
     const auto before = scene->problem.observations;
-    ASSERT_TRUE(adjust_with_variances(scene->problem, landmark_variances(scene->problem, {}), plain(), {}, {}).usable());
+    ASSERT_TRUE(adjust_with_variances(scene->problem, variances_of(scene->problem, {}), plain(), {}, {}).usable());
     with += pose_error(*scene);
     for (std::size_t i = 0; i < before.size(); ++i) ASSERT_EQ(scene->problem.observations[i].sigma, before[i].sigma);
   }

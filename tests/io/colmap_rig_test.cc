@@ -5,11 +5,6 @@
 namespace bslam::io {
 namespace {
 
-namespace fs = std::filesystem;
-using geometry::SE3;
-using geometry::Vector2d;
-using geometry::Vector3d;
-
 class ColmapRig : public RigFormats {
  protected:
   Result<RigFile> read_folder(const std::string& cameras, const std::string& rigs, const std::string& config) {

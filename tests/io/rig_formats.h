@@ -8,6 +8,11 @@
 
 namespace bslam::io {
 
+namespace fs = std::filesystem;
+using geometry::SE3;
+using geometry::Vector2d;
+using geometry::Vector3d;
+
 // `camera(index(0))`: a plain 0 would be taken for a name.
 inline std::size_t index(std::size_t i) { return i; }
 

@@ -13,11 +13,6 @@
 namespace bslam::io {
 namespace {
 
-namespace fs = std::filesystem;
-using geometry::SE3;
-using geometry::Vector2d;
-using geometry::Vector3d;
-
 bool holds(RigFormat format, const camera::CameraModel& model) {
   const std::size_t coefficients = camera::distortion(model).size();
   const bool radtan = std::holds_alternative<camera::PinholeRadTan>(model);
