@@ -121,31 +121,40 @@ bool track_by_prediction(const TrackInput& input, frame::BundledFrame& frame, co
   return true;
 }
 
-// Pose from the landmarks of the last frame: guided by the motion model, and where that finds too little, in wide windows
-// with a consensus.
-Coarse track_last_frame(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
-                        ThreadPool& pool) {
+// Pose from the landmarks about those of the last frame, looked for in wide windows, with a consensus. False where that is too
+// little.
+bool track_in_wide_windows(const TrackInput& input, const frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
+                           const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
-  const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  const SE3 predicted = predict(input, frame.time_ns);
-  const std::vector<LandmarkId> landmarks = surviving(map, input.state.landmarks);
-  Coarse out{predicted, {}, LostReason::kFewMatches, doubted(input.state, rig.size())};
-  if (input.state.status == TrackStatus::kTracking && track_by_prediction(input, frame, landmarks, options, pool, out)) return out;
   const map::LocalView view = map::make_local_view(map, landmarks, input.state.reference, options.local_view);
   auto wide = search_options(input, options.matching, options.matching.wide_radius);
   wide.level_slack = 2;
   wide.ratio = 0.8 * options.matching.ratio;
-  MatchSearch search = find_landmarks(map, frame, predicted, view.landmarks, {}, wide, pool);
+  MatchSearch search = find_landmarks(map, frame, out.T_rig_world, view.landmarks, {}, wide, pool);
   drop(out.left_out, search.found);
-  if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return out;
+  if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return false;
   const auto observations = pose_observations(map, frame, search.found, input.noise);
-  const auto solution = solver::ransac_pose(rig, observations, predicted, options.pose, {},
+  const auto solution = solver::ransac_pose(frame::rig_of(map.rig(), frame), observations, out.T_rig_world, options.pose, {},
                                             Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
   out.reason = LostReason::kFewInliers;
-  if (!supported(solution, observations.size(), options.min_inliers_wide, options)) return out;
+  if (!supported(solution, observations.size(), options.min_inliers_wide, options)) return false;
   out.T_rig_world = solution.T_rig_world;
   out.matches = keep_inliers(search.found, solution.inlier);
   out.reason = LostReason::kNone;
+  return true;
+}
+
+// Pose from the landmarks of the last frame: near where the motion model puts them, and where that finds too little or no motion
+// is known yet, about where a search in wide windows does. Narrow windows about a motion that was only guessed would
+// find what seems to confirm the guess.
+Coarse track_last_frame(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
+                        ThreadPool& pool) {
+  const std::vector<LandmarkId> landmarks = surviving(input.map, input.state.landmarks);
+  Coarse out{predict(input, frame.time_ns), {}, LostReason::kFewMatches, doubted(input.state, input.map.rig().size())};
+  const bool tracking = input.state.status == TrackStatus::kTracking, moving = tracking && input.state.twist;
+  if (moving && track_by_prediction(input, frame, landmarks, options, pool, out)) return out;
+  const bool found = track_in_wide_windows(input, frame, landmarks, options, pool, out);
+  if (tracking && (found || !moving)) track_by_prediction(input, frame, landmarks, options, pool, out);
   return out;
 }
 
