@@ -184,8 +184,8 @@ class Recall {
       const Random random(static_cast<std::uint64_t>(config_.seed), "loop", static_cast<std::uint64_t>(now.keyframe.value()));
       const auto location = looping::locate(map_, *map_.keyframe(now.keyframe).frame, candidate.keyframe, config_.looping.verification,
                                             config_.feature_model(), random, &report);
-      note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} visible {}; ", candidate.keyframe.value(), candidate.score,
-                           static_cast<int>(report.rejection), report.matches, report.inliers, report.visible);
+      note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} found {} of {}; ", candidate.keyframe.value(), candidate.score,
+                           static_cast<int>(report.rejection), report.matches, report.inliers, report.found, report.sought);
       if (location) return is_right(now, *old, *location) ? Outcome::kRight : Outcome::kWrong;
     }
     return outcome;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "feature/hamming.h"
 
@@ -27,6 +28,23 @@ bool in_range(const SearchPoint& p, double distance) {
 // Level on which the point is expected at this distance.
 double predicted_level(const SearchPoint& p, double distance, double log_factor) {
   return p.max_distance > 0 ? std::log(p.max_distance / distance) / log_factor : 0.0;
+}
+
+struct Sight {
+  Vector2d pixel;
+  double distance;  // metres
+};
+
+// Of a point, where it lies in the image and within its distances and the cone about the directions it is known from.
+std::optional<Sight> sight_of(const camera::Camera& camera, const geometry::SE3& T_cam_common, const SearchPoint& p, double min_cosine) {
+  const Vector3d in_camera = T_cam_common * p.position;
+  const double distance = in_camera.norm();
+  if (!in_range(p, distance)) return std::nullopt;
+  const auto pixel = camera.project(in_camera);
+  if (!pixel || !camera.contains(*pixel)) return std::nullopt;
+  const bool aside = in_camera.dot(T_cam_common.rotation() * p.view_direction) < min_cosine * distance;
+  if (aside && p.view_direction != Vector3d::Zero()) return std::nullopt;
+  return Sight{*pixel, distance};
 }
 
 Candidate best_candidate(const feature::Keypoints& keypoints, const feature::Descriptor& descriptor,
@@ -65,20 +83,13 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
   for (std::size_t i = 0; i < points.size(); ++i) {
     const SearchPoint& p = points[i];
     if (p.skip) continue;
-    const Vector3d in_camera = T_cam_common * p.position;
-    const double distance = in_camera.norm();
-    if (!in_range(p, distance)) continue;
-    const auto pixel = camera.project(in_camera);
-    if (!pixel || !camera.contains(*pixel)) continue;
-    if (in_camera.dot(T_cam_common.rotation() * p.view_direction) < min_cosine * distance &&
-        p.view_direction != Vector3d::Zero()) {
-      continue;
-    }
+    const auto sight = sight_of(camera, T_cam_common, p, min_cosine);
+    if (!sight) continue;
     result.visible.push_back(static_cast<std::uint32_t>(i));
-    const double level = predicted_level(p, distance, log_factor);
+    const double level = predicted_level(p, sight->distance, log_factor);
     const int centre = static_cast<int>(std::lround(level));
     near.clear();
-    frame.grid.near(keypoints, *pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
+    frame.grid.near(keypoints, sight->pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
                     centre - options.level_slack, centre + options.level_slack, near);
     if (near.empty()) continue;
     const Candidate c = best_candidate(keypoints, *p.descriptor, near, taken);
@@ -93,6 +104,15 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
   }
   std::erase_if(result.matches, [](const ProjectionMatch& m) { return m.hamming < 0; });
   return result;
+}
+
+std::vector<std::uint32_t> visible_points(const camera::Camera& camera, const geometry::SE3& T_cam_common,
+                                          std::span<const SearchPoint> points, double max_view_angle) {
+  std::vector<std::uint32_t> out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].skip && sight_of(camera, T_cam_common, points[i], std::cos(max_view_angle))) out.push_back(static_cast<std::uint32_t>(i));
+  }
+  return out;
 }
 
 }  // namespace bslam::frame

@@ -84,13 +84,8 @@ std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map,
   return out;
 }
 
-struct Guided {
-  std::vector<KeypointMatch> matches;
-  int visible = 0;  // landmarks that should be seen by some camera
-};
-
 // All landmarks looked for where the pose puts them.
-Guided search_at(const map::BundledMap& map, const frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
+std::vector<KeypointMatch> search_at(const map::BundledMap& map, const frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
                  const SE3& T_rig_world, double radius, const VerificationOptions& options, const map::FeatureModel& features) {
   const std::vector<frame::SearchPoint> points = map::search_points(map, landmarks);
   const frame::ProjectionSearchOptions search{.radius = radius,
@@ -99,16 +94,31 @@ Guided search_at(const map::BundledMap& map, const frame::BundledFrame& frame, c
                                               .level_slack = 2,
                                               .scale_factor = features.scale_factor};
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  std::vector<std::uint8_t> visible(landmarks.size(), 0);
-  Guided out;
+  std::vector<KeypointMatch> out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (frame.cameras[c].keypoints.empty()) continue;
     const auto found =
         frame::search_by_projection(rig.camera(c), frame.cameras[c], rig.cam_from_rig(c) * T_rig_world, points, {}, search);
-    for (const std::uint32_t i : found.visible) visible[i] = 1;
-    for (const frame::ProjectionMatch& m : found.matches) out.matches.push_back({{CameraIndex(c), m.keypoint}, landmarks[m.point]});
+    for (const frame::ProjectionMatch& m : found.matches) out.push_back({{CameraIndex(c), m.keypoint}, landmarks[m.point]});
   }
-  out.visible = static_cast<int>(std::count(visible.begin(), visible.end(), 1));
+  return out;
+}
+
+// The landmarks that some camera sees from about where they are known from, in order of id: what is the same place looks the same
+// from there. From far aside it does not, and missing it says nothing.
+std::vector<LandmarkId> to_be_found(const map::BundledMap& map, const frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
+                                    const SE3& T_rig_world, double max_turn) {
+  const std::vector<frame::SearchPoint> points = map::search_points(map, landmarks);
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  std::vector<LandmarkId> out;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    if (frame.cameras[c].keypoints.empty()) continue;
+    for (const std::uint32_t i : frame::visible_points(rig.camera(c), rig.cam_from_rig(c) * T_rig_world, points, max_turn)) {
+      out.push_back(landmarks[i]);
+    }
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;
 }
 
@@ -174,17 +184,19 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
   if (!solution.ok) return rejected(Rejection::kNoConsensus);
 
   // Twice: what the consensus alone gives is good to a few pixels, what the guided search gives to less than one.
-  Guided guided;
+  std::vector<KeypointMatch> guided;
   for (const double radius : {options.radius, 0.5 * options.radius}) {
     guided = search_at(map, frame, landmarks, solution.T_rig_world, radius, options, features);
-    solution = solver::solve_pose(rig, observations_of(map, frame, guided.matches, features), solution.T_rig_world, pose_options);
+    solution = solver::solve_pose(rig, observations_of(map, frame, guided, features), solution.T_rig_world, pose_options);
     if (!solution.ok) return rejected(Rejection::kNoConsensus);
   }
   out.inliers = solution.num_inliers;
-  out.visible = guided.visible;
   if (solution.num_inliers < options.min_inliers) return rejected(Rejection::kFewInliers);
-  Location location{candidate, solution.T_rig_world, by_feature(frame, guided.matches, solution.inlier), solution.num_inliers};
-  if (static_cast<double>(location.matches.size()) < options.min_found_share * guided.visible) return rejected(Rejection::kFewFound);
+  Location location{candidate, solution.T_rig_world, by_feature(frame, guided, solution.inlier), solution.num_inliers};
+  const std::vector<LandmarkId> sought = to_be_found(map, frame, landmarks, solution.T_rig_world, options.max_turn);
+  out.sought = static_cast<int>(sought.size());
+  out.found = static_cast<int>(std::ranges::count_if(location.matches, [&](const auto& m) { return std::ranges::binary_search(sought, m.second); }));
+  if (out.found < options.min_found_share * out.sought) return rejected(Rejection::kFewFound);
   return location;
 }
 

@@ -26,7 +26,8 @@ enum class Rejection { kNone, kFewMatches, kNoConsensus, kFewInliers, kFewFound 
 
 struct LocateReport {
   Rejection rejection = Rejection::kNone;
-  int matches = 0, inliers = 0, visible = 0;
+  int matches = 0, inliers = 0;
+  int sought = 0, found = 0;  // landmarks that should be found from there, and are
 };
 
 // Empty where geometry does not confirm the candidate (alive in `map`). Deterministic for a seed.

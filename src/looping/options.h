@@ -37,7 +37,8 @@ struct VerificationOptions {
   double ratio = 0.85;           // best to second best feature of the frame
   double radius = 0.02;          // rad: guided search at the pose found
   int min_inliers = 50;          // keypoints that must support the pose in the end
-  double min_found_share = 0.2;  // of the landmarks that should be visible then: fewer agree where two places look alike in part
+  double min_found_share = 0.2;  // of the landmarks that should be found then: fewer agree where two places look alike in part
+  double max_turn = 0.52;        // rad: one known only from directions farther aside need not be found
   solver::AbsolutePoseOptions consensus;
 
   template <class Self, class Visitor>
@@ -48,7 +49,8 @@ struct VerificationOptions {
     visitor("ratio", self.ratio, Range{0.1, 1}, "", "best to second best feature of the frame");
     visitor("radius", self.radius, Range{1e-4, 1}, "rad", "guided search at the pose found");
     visitor("min_inliers", self.min_inliers, Range{6, 10000}, "", "keypoints that must support the pose in the end");
-    visitor("min_found_share", self.min_found_share, Range{0, 1}, "", "of the landmarks that should be visible, that must be found");
+    visitor("min_found_share", self.min_found_share, Range{0, 1}, "", "of the landmarks that should be found, that must be");
+    visitor("max_turn", self.max_turn, Range{0.01, 3.15}, "rad", "from the directions it is known from, a landmark should be found");
     visitor.section("consensus", self.consensus);
   }
 };

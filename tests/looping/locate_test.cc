@@ -93,7 +93,7 @@ TEST_P(LocateRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
   LocateReport report;
   EXPECT_FALSE(locate(world.map, other.frame, KeyframeId(8), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
-  EXPECT_LT(report.inliers, report.visible / 4);
+  EXPECT_LT(report.found, report.sought / 4);
   EXPECT_FALSE(reasons.contains(Rejection::kNone));
 }
 
