@@ -1,6 +1,7 @@
 #include "io/dataset.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -217,31 +218,40 @@ Status keep_range(const DatasetRequest& request, Dataset& dataset) {
                fmt::format("a range with frames: they last from 0 to {:.3f} s", last_s)};
 }
 
-// The recording's own calibration is what counts; that it may lack times which a rig file beside it has should be known.
-void warn_of_times_in_a_rig_beside(const DatasetRequest& request, std::vector<std::string>& warnings) {
-  const std::filesystem::path file = request.path / "rig.yaml";
+// The rig file a recording may have beside it; empty where there is none.
+std::optional<fs::path> rig_beside(const DatasetRequest& request) {
+  fs::path file = request.path / "rig.yaml";
   std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) return;
+  return fs::is_regular_file(file, error) ? std::optional(std::move(file)) : std::nullopt;
+}
+
+// The recording's own calibration is what counts; that it may lack times which a rig file beside it has should be known.
+void warn_of_times(const fs::path& file, std::vector<std::string>& warnings) {
   const auto rig = read_rig(file);
   if (!rig) return;
+  std::vector<std::string> offsets;
   for (std::size_t c = 0; c < rig->size(); ++c) {
-    if (rig->camera(c).time_offset_ns == 0) continue;
-    warnings.push_back(fmt::format("{} gives {} a time offset of {:g} ms, which is not used without --rig {}", file.string(),
-                                   rig->camera(c).name, 1e3 * to_seconds(rig->camera(c).time_offset_ns), file.string()));
-    return;
+    const camera::Camera& camera = rig->camera(c);
+    if (camera.time_offset_ns != 0) offsets.push_back(fmt::format("{} {:g} ms", camera.name, 1e3 * to_seconds(camera.time_offset_ns)));
   }
+  if (offsets.empty()) return;
+  warnings.push_back(fmt::format("{} gives time offsets ({}), which are not used without --rig {}", file.string(),
+                                 fmt::join(offsets, ", "), file.string()));
 }
 
 }  // namespace
 
-Result<Dataset> open_dataset(const DatasetRequest& request) {
+Result<Dataset> open_dataset(const DatasetRequest& asked) {
+  DatasetRequest request = asked;
   if (const Status status = check_request(request); !status) return status.error();
   const auto opened = open_recording(request);
   if (!opened) return opened.error();
   const Recording& recording = *opened->recording;
+  const auto beside = request.rig_file ? std::nullopt : rig_beside(request);
+  if (beside && !recording.calibrated()) request.rig_file = *beside;
   auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
-  if (!request.rig_file) warn_of_times_in_a_rig_beside(request, chosen->warnings);
+  if (beside && !request.rig_file) warn_of_times(*beside, chosen->warnings);
   const auto images = collect_images(recording, *chosen);
   if (!images) return images.error();
   Dataset dataset{name_of(request.path),

@@ -57,6 +57,11 @@ class EurocRecording : public Recording {
 
   std::size_t camera_count() const override { return folders_.size(); }
 
+  bool calibrated() const override {
+    std::error_code error;
+    return std::ranges::any_of(folders_, [&](const fs::path& f) { return fs::exists(f / "sensor.yaml", error); });
+  }
+
   Result<camera::RigCamera> calibration(std::size_t camera) const override {
     return read_euroc_sensor(folders_[camera] / "sensor.yaml", folders_[camera].filename().string());
   }

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -20,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxSensorBytes = std::size_t{1} << 20;
+constexpr std::array kModels = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName};
 
 // EuRoC's names of the distortion models and ours.
 std::optional<std::string> model_name(const std::string& distortion_model) {
@@ -115,6 +117,13 @@ fs::path euroc_root(const fs::path& data) {
   return fs::is_directory(data / "mav0", error) ? data / "mav0" : data;
 }
 
+bool euroc_holds_models(const camera::Rig& rig) {
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    if (std::ranges::find(kModels, camera::model_name(rig.camera(c).model)) == kModels.end()) return false;
+  }
+  return true;
+}
+
 std::string euroc_sensor_yaml(const camera::RigCamera& rig_camera, double rate_hz) {
   const camera::Camera& camera = rig_camera.camera;
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
@@ -144,7 +153,7 @@ std::string euroc_sensor_yaml(const camera::RigCamera& rig_camera, double rate_h
 
 Status write_euroc_sensors(const camera::Rig& rig, const fs::path& folder, double rate_hz) {
   const RigLimits limits{.format = "EuRoC sensor files",
-                         .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName}};
+                         .models = {kModels.begin(), kModels.end()}};
   if (const Status status = check_limits(rig, folder.string(), limits); !status) return status;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const fs::path camera_folder = folder / "mav0" / fmt::format("cam{}", i);

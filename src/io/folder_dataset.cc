@@ -16,6 +16,8 @@ class FolderRecording : public Recording {
 
   std::size_t camera_count() const override { return folders_.size(); }
 
+  bool calibrated() const override { return false; }
+
   Result<camera::RigCamera> calibration(std::size_t camera) const override {
     return Error{folders_[camera].parent_path().string(), "", "a layout without calibration",
                  "a rig file (--rig FILE)"};

@@ -19,6 +19,8 @@ class Recording {
   virtual ~Recording() = default;
 
   virtual std::size_t camera_count() const = 0;
+  // Does the layout's own calibration come with it, of any camera?
+  virtual bool calibrated() const { return true; }
   // The calibration the data set itself carries.
   virtual Result<camera::RigCamera> calibration(std::size_t camera) const = 0;
   // Every image that is listed, with its time as recorded; at least one.

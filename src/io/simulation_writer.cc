@@ -174,6 +174,7 @@ Status write_lists(const SimulationRequest& request, const std::vector<Shot>& sh
   const camera::Rig& rig = request.rig;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (Status s = write_atomically(camera_folder(folder, c) / "data.csv", image_list(shots, c)); !s) return s;
+    if (!euroc_holds_models(rig)) continue;  // rig.yaml has them
     const camera::RigCamera camera{rig.camera(c), rig.body_from_cam(c)};
     const std::string sensor = euroc_sensor_yaml(camera, request.recording.rate_hz);
     if (Status s = write_atomically(camera_folder(folder, c) / "sensor.yaml", sensor); !s) return s;
@@ -184,7 +185,7 @@ Status write_lists(const SimulationRequest& request, const std::vector<Shot>& sh
   evaluation::Trajectory of_camera0;
   const TimeNs offset = rig.camera(std::size_t{0}).time_offset_ns;
   for (const Shot& shot : shots) {
-    if (shot.camera != 0 || !shot.written) continue;
+    if (shot.camera != 0) continue;
     // The pose at the true time of the stamp, whatever a fault made the picture show.
     const TimeNs time_ns = shot.stamp_ns + offset;
     of_camera0.push_back({time_ns, recorder.T_world_cam(0, to_seconds(time_ns - request.recording.start_ns))});

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <map>
+#include <numbers>
 
 #include "feature/extractor.h"
 #include "feature/hamming.h"
+#include "geometry/so3.h"
 #include "geometry/triangulation.h"
 #include "io/frame_reader.h"
 #include "solver/epipolar.h"
@@ -24,6 +26,7 @@ constexpr int kLeastAgreeing = 25;
 constexpr double kLeastShare = 0.4;  // of the matches; chance reaches some per cent
 constexpr int kMany = 300;            // matches: enough to expect that some convention fits
 constexpr double kClearly = 1.3;     // times more than as given
+constexpr double kLeastParallax = 0.005;  // radians, of the matches another pose is found from
 
 // For every descriptor of `a` its best in `b`, or -1.
 std::vector<int> best_matches(const feature::Keypoints& a, const feature::Keypoints& b) {
@@ -85,9 +88,14 @@ Hypothesis hypothesis_of(Convention convention, const camera::Rig& rig, std::siz
   return {&cj, &ci, inverse.inverse()};
 }
 
+// Radians.
+double tolerance_of(const camera::Camera& first, const camera::Camera& second) {
+  return kTolerancePx * std::max(first.radians_per_pixel(), second.radians_per_pixel());
+}
+
 int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
   constexpr double kNoBaseline = 1e-6;  // metres
-  const double tolerance = kTolerancePx * std::max(h.first->radians_per_pixel(), h.second->radians_per_pixel());
+  const double tolerance = tolerance_of(*h.first, *h.second);
   const Eigen::Vector3d t = h.T_second_first.translation();
   const bool apart = t.norm() > kNoBaseline;
   const solver::EpipolarPose pose{h.T_second_first.matrix3(), apart ? Eigen::Vector3d(t.normalized()) : t};
@@ -102,6 +110,23 @@ int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
             : 0;
   }
   return agreeing;
+}
+
+// The pose of camera j that the matches of all frames fit, calibrated or not.
+std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const PixelPair> pairs) {
+  const camera::Camera &ci = rig.camera(i), &cj = rig.camera(j);
+  std::vector<solver::BearingPair> bearings;
+  for (const PixelPair& pair : pairs) {
+    const auto a = ci.unproject(pair.a), b = cj.unproject(pair.b);
+    if (a && b) bearings.push_back({*a, *b});
+  }
+  const solver::RelativePoseOptions options{.iterations = 2000, .inlier_angle = tolerance_of(ci, cj), .min_parallax = kLeastParallax,
+                                            .min_inliers = std::max(kLeastAgreeing, static_cast<int>(kLeastShare * static_cast<double>(bearings.size())))};
+  const auto found = solver::relative_pose(bearings, options, Random(1, "extrinsics check"));
+  if (!found) return std::nullopt;
+  const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
+  const double turned = geometry::so3_log((found->T_b_a * given.inverse()).rotation()).norm();
+  return OtherPose{found->num_inliers, turned * 180.0 / std::numbers::pi};
 }
 
 std::optional<Convention> verdict_of(const PairEvidence& evidence) {
@@ -132,15 +157,18 @@ std::string_view convention_in_words(Convention convention) {
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Keypoints> of_i,
                         std::span<const feature::Keypoints> of_j) {
   PairEvidence evidence{.first = i, .second = j};
+  std::vector<PixelPair> all;
   for (std::size_t frame = 0; frame < std::min(of_i.size(), of_j.size()); ++frame) {
     const std::vector<PixelPair> pairs = match(of_i[frame], of_j[frame]);
-    evidence.matches += static_cast<int>(pairs.size());
+    all.insert(all.end(), pairs.begin(), pairs.end());
     for (int c = 0; c < kConventions; ++c) {
       const Hypothesis hypothesis = hypothesis_of(static_cast<Convention>(c), rig, i, j);
       evidence.agreeing[static_cast<std::size_t>(c)] += count_agreeing(hypothesis, pairs);
     }
   }
+  evidence.matches = static_cast<int>(all.size());
   evidence.verdict = verdict_of(evidence);
+  if (!evidence.verdict) evidence.other = other_pose(rig, i, j, all);
   return evidence;
 }
 
@@ -167,35 +195,41 @@ std::vector<PairEvidence> check_extrinsics(const io::Dataset& dataset) {
   return evidence;
 }
 
+namespace {
+
+std::string describe(const PairEvidence& pair) {
+  const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
+  if (pair.other) {
+    return fmt::format("{} of {} matches fit the second turned by {:.2g} degrees from what is given, {} as given", pair.other->agreeing,
+                       pair.matches, pair.other->turned_deg, agreeing(Convention::kAsGiven));
+  }
+  if (!pair.verdict && pair.matches > kMany) return fmt::format("{} matches, and no convention fits enough of them", pair.matches);
+  if (!pair.verdict) return fmt::format("too little in common to tell ({} matches)", pair.matches);
+  std::string text = fmt::format("{} of {} matches fit {}", agreeing(*pair.verdict), pair.matches, convention_in_words(*pair.verdict));
+  if (*pair.verdict != Convention::kAsGiven) text += fmt::format(", {} as given", agreeing(Convention::kAsGiven));
+  return text;
+}
+
+}  // namespace
+
 std::string describe_evidence(std::span<const PairEvidence> evidence) {
   std::string text = "against the images:\n";
-  std::map<Convention, int> votes;
-  int disagreeing = 0;
+  std::map<Convention, int> slips;  // votes
+  int fitting = 0, elsewhere = 0;
   for (const PairEvidence& pair : evidence) {
-    const std::string name = fmt::format("  {} and {}: ", pair.first, pair.second);
-    if (!pair.verdict && pair.matches > kMany) {
-      text += fmt::format("{}{} matches, and no convention fits enough of them\n", name, pair.matches);
-      continue;
-    }
-    if (!pair.verdict) {
-      text += fmt::format("{}too little in common to tell ({} matches)\n", name, pair.matches);
-      continue;
-    }
-    ++votes[*pair.verdict];
-    disagreeing += *pair.verdict == Convention::kAsGiven ? 0 : 1;
-    const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
-    text += fmt::format("{}{} of {} matches fit {}", name, agreeing(*pair.verdict), pair.matches,
-                        convention_in_words(*pair.verdict));
-    text +=
-        *pair.verdict == Convention::kAsGiven ? "\n" : fmt::format(", {} as given\n", agreeing(Convention::kAsGiven));
+    text += fmt::format("  {} and {}: {}\n", pair.first, pair.second, describe(pair));
+    elsewhere += pair.other ? 1 : 0;
+    if (pair.verdict == Convention::kAsGiven) ++fitting;
+    if (pair.verdict && pair.verdict != Convention::kAsGiven) ++slips[*pair.verdict];
   }
-  if (votes.empty()) return text + "  nothing can be said of the extrinsics\n";
-  if (disagreeing == 0) return text + "  the extrinsics fit as given\n";
-  const auto most =
-      std::max_element(votes.begin(), votes.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  return text +
-         fmt::format("warning: the images do not fit the extrinsics; they fit {}\n",
-                     convention_in_words(most->first == Convention::kAsGiven ? std::next(most)->first : most->first));
+  if (!slips.empty()) {
+    const auto most = std::ranges::max_element(slips, {}, [](const auto& slip) { return slip.second; });
+    return text + fmt::format("warning: the images do not fit the extrinsics; they fit {}\n", convention_in_words(most->first));
+  }
+  if (elsewhere > 0) return text + "warning: the images do not fit the extrinsics, nor any common slip of them\n";
+  if (fitting == 0) return text + "  nothing can be said of the extrinsics\n";
+  const std::size_t rest = evidence.size() - static_cast<std::size_t>(fitting);
+  return text + "  the extrinsics fit as given" + (rest > 0 ? fmt::format("; {} of {} pairs could not be judged\n", rest, evidence.size()) : "\n");
 }
 
 }  // namespace bslam::session

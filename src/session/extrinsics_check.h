@@ -27,6 +27,12 @@ enum class Convention {
 constexpr int kConventions = 5;
 std::string_view convention_in_words(Convention convention);
 
+// Where no convention fits: the pose of the second camera seen from the first that does.
+struct OtherPose {
+  int agreeing = 0;       // matches that fit it
+  double turned_deg = 0;  // of the second camera from where it is given
+};
+
 // One pair of cameras.
 struct PairEvidence {
   std::size_t first = 0, second = 0;
@@ -34,6 +40,7 @@ struct PairEvidence {
   std::array<int, kConventions> agreeing = {};  // of them, those that fit a convention
   // The one that most fit, where enough do and clearly more than as given; empty: too little to tell.
   std::optional<Convention> verdict = {};
+  std::optional<OtherPose> other = {};
 };
 
 // Judges the pair (i, j) by keypoints of images taken at the same instants, one entry per frame for each camera.

@@ -58,6 +58,8 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
                      {"fit_pair_inverted", pair.agreeing[2]},
                      {"fit_swapped", pair.agreeing[3]},
                      {"fit_swapped_inverted", pair.agreeing[4]},
+                     {"fit_another", pair.other ? Json(pair.other->agreeing) : Json()},
+                     {"another_turned_deg", pair.other ? Json(pair.other->turned_deg) : Json()},
                      {"verdict", pair.verdict ? Json(convention_in_words(*pair.verdict)) : Json()}});
   }
   return pairs;

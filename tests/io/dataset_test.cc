@@ -155,7 +155,7 @@ TEST_F(SmallEuroc, TakesAnotherRig) {
   const auto without = open_dataset({.path = data()});
   ASSERT_TRUE(without);
   ASSERT_EQ(without->warnings.size(), 1u);
-  EXPECT_NE(without->warnings[0].find("a time offset of 500 ms, which is not used without --rig"), std::string::npos);
+  EXPECT_NE(without->warnings[0].find("gives time offsets (cam0 500 ms, cam1 500 ms), which are not used without --rig"), std::string::npos);
   EXPECT_EQ(dataset->first_time_ns, kSmallStart + 500'000'000);
   EXPECT_EQ(read_frame(*dataset, 0).images[1].time_ns, kSmallStart + 500'000'000);
   fs::remove_all(camera(1));
@@ -208,6 +208,17 @@ TEST_F(SmallEuroc, NoCameraInIt) {
 TEST_F(SmallEuroc, SensorYamlIsMissing) {
   fs::remove(camera(0) / "sensor.yaml");
   expect_error(camera(0) / "sensor.yaml", "No such file");
+}
+
+TEST_F(SmallEuroc, WithoutASensorYamlTheRigBesideItCounts) {
+  write_text(data() / "rig.yaml", rig_to_yaml(read_rig(data()).value()));
+  edit(data() / "rig.yaml", "cam1", "right");
+  fs::remove(camera(0) / "sensor.yaml");
+  expect_error(camera(0) / "sensor.yaml", "No such file");  // half of them is a damaged recording
+  fs::remove(camera(1) / "sensor.yaml");
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->rig.camera(std::size_t{1}).name, "right");
 }
 
 TEST_F(SmallEuroc, SensorYamlIsNotYaml) {

@@ -10,6 +10,7 @@
 #include <map>
 #include <sstream>
 
+#include "io/dataset.h"
 #include "io/rig_file.h"
 #include "io/trajectory_file.h"
 #include "simulation/rigs.h"
@@ -70,6 +71,20 @@ TEST_F(SimulationWriter, WritesEurocLayoutWithGroundTruth) {
     EXPECT_LT((rig->body_from_cam(c).matrix() - r.rig.body_from_cam(c).matrix()).norm(), 1e-9);
     EXPECT_LT((euroc->body_from_cam(c).matrix() - r.rig.body_from_cam(c).matrix()).norm(), 1e-9);
   }
+}
+
+// A sensor.yaml that names another model than the camera's would be believed.
+TEST_F(SimulationWriter, WritesNoSensorYamlOfAModelItCannotHold) {
+  SimulationRequest r = request();
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < 2; ++c) cameras.push_back({r.rig.camera(c), r.rig.body_from_cam(c)});
+  cameras[1].camera.model = camera::DoubleSphere({30, 30, 31.5, 19.5}, -0.2, 0.55);
+  r.rig = camera::Rig(cameras);
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  EXPECT_FALSE(contents(r.folder).contains("mav0/cam0/sensor.yaml"));
+  const auto dataset = open_dataset({.path = r.folder});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(camera::model_name(dataset->rig.camera(std::size_t{1}).model), camera::DoubleSphere::kName);
 }
 
 TEST_F(SimulationWriter, WritesTwoGroundTruthsThatAgree) {
@@ -179,7 +194,7 @@ TEST_F(SimulationWriter, ListsPicturesHitByFaults) {
   EXPECT_EQ(files.at("mav0/cam0/data.csv"),
             "#timestamp [ns],filename\n1000000000,1000000000.png\n1200000000,1200000000.png\n");
   EXPECT_EQ(files.at("mav0/cam1/data/1200000000.png"), files.at("mav0/cam1/data/1100000000.png"));
-  EXPECT_EQ(read_trajectory(r.folder / "groundtruth_cam0.tum")->size(), 2u);
+  EXPECT_EQ(read_trajectory(r.folder / "groundtruth_cam0.tum")->size(), 3u);  // the rig was there all the same
 }
 
 TEST_F(SimulationWriter, RefusesRequestsOutOfRange) {

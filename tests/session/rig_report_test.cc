@@ -76,6 +76,24 @@ TEST(ExtrinsicsCheck, SaysNothingWhereNothingFits) {
   EXPECT_FALSE(evidence.verdict);
 }
 
+TEST(ExtrinsicsCheck, SaysHowFarACameraIsTurned) {
+  const camera::Rig rig = stereo();
+  const SE3 turned(geometry::so3_exp({0.02, 0.06, -0.03}), Eigen::Vector3d::Zero());  // 4 degrees
+  const camera::Rig wrong({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1) * turned}});
+  const PairEvidence evidence = judged(wrong, views_of(rig));
+  EXPECT_FALSE(evidence.verdict);
+  ASSERT_TRUE(evidence.other);
+  EXPECT_GT(evidence.other->agreeing, 140);
+  EXPECT_NEAR(evidence.other->turned_deg, 4.0, 0.05);
+  EXPECT_NE(describe_evidence(std::array{evidence}).find("warning: the images do not fit"), std::string::npos);
+}
+
+TEST(ExtrinsicsCheck, SaysHowManyPairsItCouldJudge) {
+  const PairEvidence good{.first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
+  const PairEvidence apart{.first = 0, .second = 2, .matches = 10};
+  EXPECT_NE(describe_evidence(std::array{good, apart}).find("1 of 2 pairs could not be judged"), std::string::npos);
+}
+
 TEST(ExtrinsicsCheck, SpeaksOfTheMostFrequentFault) {
   PairEvidence good{
       .first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
