@@ -25,6 +25,7 @@ constexpr double kTolerancePx = 2.0;  // of a calibration and its features
 constexpr int kLeastAgreeing = 25;
 constexpr double kLeastShare = 0.4;  // of the matches; chance reaches some per cent
 constexpr int kMany = 300;            // matches: enough to expect that some convention fits
+constexpr double kMost = 0.6;        // of the matches: fewer, and another pose may fit more
 constexpr double kClearly = 1.3;     // times more than as given
 constexpr double kLeastParallax = 0.005;  // radians, of the matches another pose is found from
 
@@ -168,7 +169,11 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
   }
   evidence.matches = static_cast<int>(all.size());
   evidence.verdict = verdict_of(evidence);
-  if (!evidence.verdict) evidence.other = other_pose(rig, i, j, all);
+  const int fitting = evidence.verdict ? evidence.agreeing[static_cast<std::size_t>(*evidence.verdict)] : 0;
+  if (fitting >= kMost * evidence.matches) return evidence;
+  evidence.other = other_pose(rig, i, j, all);
+  if (evidence.other && evidence.other->agreeing < kClearly * fitting) evidence.other.reset();
+  if (evidence.other) evidence.verdict.reset();
   return evidence;
 }
 
@@ -206,7 +211,8 @@ std::string describe(const PairEvidence& pair) {
   if (!pair.verdict && pair.matches > kMany) return fmt::format("{} matches, and no convention fits enough of them", pair.matches);
   if (!pair.verdict) return fmt::format("too little in common to tell ({} matches)", pair.matches);
   std::string text = fmt::format("{} of {} matches fit {}", agreeing(*pair.verdict), pair.matches, convention_in_words(*pair.verdict));
-  if (*pair.verdict != Convention::kAsGiven) text += fmt::format(", {} as given", agreeing(Convention::kAsGiven));
+  if (*pair.verdict != Convention::kAsGiven) return text + fmt::format(", {} as given", agreeing(Convention::kAsGiven));
+  if (agreeing(Convention::kAsGiven) < kMost * pair.matches) text += ": few; are the intrinsics right?";
   return text;
 }
 
