@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 
 #include "image/image_bundle.h"
 #include "io/dataset.h"
@@ -12,5 +13,8 @@ namespace bslam::io {
 // whole, or is not of its camera's resolution is kDamaged; a camera without one at this instant is kMissing. Keeps no
 // state: frames may be read from several threads at a time.
 image::ImageBundle read_frame(const Dataset& dataset, std::size_t index);
+
+// File and cause of an image that is kDamaged, found by reading it again.
+std::string why_damaged(const Dataset& dataset, std::size_t index, std::size_t camera);
 
 }  // namespace bslam::io

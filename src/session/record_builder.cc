@@ -5,6 +5,8 @@
 #include <fstream>
 #include <string>
 
+#include "io/frame_reader.h"
+
 namespace bslam::session {
 namespace {
 
@@ -74,7 +76,8 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
     camera.name = input.dataset.rig.camera(c).name;
     for (const system::FrameRecord& f : frames) {
       camera.images += f.images[c] == image::ImageState::kPresent;
-      camera.skipped += f.images[c] == image::ImageState::kDamaged;
+      if (f.images[c] != image::ImageState::kDamaged) continue;
+      if (camera.skipped++ == 0) camera.first_skipped = io::why_damaged(input.dataset, f.result.frame.index(), c);
     }
     const std::vector<std::uint8_t> pause = between_images(frames, c);
     std::size_t next = 0;

@@ -303,7 +303,7 @@ std::string_view describe(LostReason reason) {
   switch (reason) {
     case LostReason::kNone: return "";
     case LostReason::kNotStarted: return "not started";
-    case LostReason::kNoImages: return "no images";
+    case LostReason::kNoImages: return "no usable image";
     case LostReason::kFewFeatures: return "too few features";
     case LostReason::kFewMatches: return "too few matches";
     case LostReason::kFewInliers: return "too few matches agree";

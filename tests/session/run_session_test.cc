@@ -223,6 +223,7 @@ TEST_F(Session, CountsADamagedImageAsSkippedAndGoesOn) {
   ASSERT_TRUE(result.ok());
   EXPECT_EQ(result->record.cameras[0].skipped, 0);
   EXPECT_EQ(result->record.cameras[1].skipped, 1);
+  EXPECT_EQ(result->record.cameras[1].first_skipped.find(victim.string()), 0u) << result->record.cameras[1].first_skipped;
   EXPECT_EQ(result->record.cameras[1].images, 7);
   ASSERT_EQ(result->record.frames.size(), 8u);
   EXPECT_FALSE(result->record.frames[4].cameras[1].has_image);
