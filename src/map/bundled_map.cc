@@ -256,6 +256,19 @@ bool BundledMap::add_sightings(LandmarkId l, std::uint32_t expected, std::uint32
   return true;
 }
 
+void BundledMap::free_removed(std::size_t slots) {
+  const std::size_t groups = landmarks_.size() / kGroup;  // full ones
+  for (std::size_t n = std::min(slots / kGroup, groups); n > 0; --n) {
+    if (freed_up_to_ >= groups) freed_up_to_ = 0;
+    const std::size_t group = freed_up_to_++;
+    bool gone = true;
+    for (std::size_t l = group * kGroup; gone && l < (group + 1) * kGroup; ++l) gone = !resolve(LandmarkId(l)).valid();
+    if (!gone) continue;
+    landmarks_.blank_chunk(group, owner_.tag());
+    observations_.blank_block(group, owner_.tag());
+  }
+}
+
 void BundledMap::link(LandmarkId l, Observation o) {
   for (const Observation& other : observations(l)) change_weight(o.keyframe, other.keyframe, +1);
   edit(o.keyframe).landmarks.mutate(owner_.tag())[o.feature.index()] = l;

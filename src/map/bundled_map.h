@@ -139,6 +139,9 @@ class BundledMap {
   bool add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes view direction, distance range and descriptor from the observations.
   bool refresh_landmark(LandmarkId l);
+  // Gives up the memory of removed landmarks among the next `slots` of a round over all slots: of neighbours none of which is
+  // alive or leads to one that is. Of these nothing remains but that they are removed.
+  void free_removed(std::size_t slots);
 
  private:
   BundledKeyframe& edit(KeyframeId k) { return keyframes_.mutate(k.index(), owner_.tag()); }
@@ -169,9 +172,11 @@ class BundledMap {
   int gauge_epoch_ = 0;
   CowOwner owner_;
   CowVector<BundledKeyframe, 1> keyframes_;
-  CowVector<Landmark, 16> landmarks_;
+  static constexpr std::size_t kGroup = ObservationColumn::kBlock;  // landmarks that share a chunk
+  CowVector<Landmark, kGroup> landmarks_;
   ObservationColumn observations_;
   std::size_t alive_keyframes_ = 0, alive_landmarks_ = 0, observations_total_ = 0;
+  std::size_t freed_up_to_ = 0;  // group of landmarks free_removed goes on with
 };
 
 using MapSnapshot = std::shared_ptr<const BundledMap>;

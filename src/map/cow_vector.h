@@ -80,6 +80,14 @@ class CowVector {
     return chunk->values[i % kChunk];
   }
 
+  // Gives up the memory of a full chunk: its elements get default values, in a piece that all such chunks share.
+  void blank_chunk(std::size_t chunk, std::uint64_t tag) {
+    static const std::shared_ptr<Chunk> kBlank = std::make_shared<Chunk>(Chunk{kNobody, {}});
+    if (nodes_[chunk / kNode]->chunks[chunk % kNode] == kBlank) return;
+    detach(nodes_[chunk / kNode], tag);
+    nodes_[chunk / kNode]->chunks[chunk % kNode] = kBlank;
+  }
+
   void push_back(T value, std::uint64_t tag) {
     if (size_ % kPerNode == 0) nodes_.push_back(std::make_shared<Node>(Node{tag, {}}));
     if (size_ % kChunk == 0) {
@@ -91,7 +99,8 @@ class CowVector {
   }
 
  private:
-  static constexpr std::size_t kNode = 64;  // chunks
+  static constexpr std::uint64_t kNobody = ~std::uint64_t{0};  // a tag that is never given
+  static constexpr std::size_t kNode = 64;                     // chunks
   static constexpr std::size_t kPerNode = kNode * kChunk;
   struct Chunk {
     std::uint64_t tag;

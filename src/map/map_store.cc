@@ -1,6 +1,11 @@
 #include "map/map_store.h"
 
 namespace bslam::map {
+namespace {
+
+constexpr std::size_t kSlotsPerCommit = 1024;  // of landmarks, looked at for what removed ones leave behind
+
+}  // namespace
 
 MapStore::MapStore(BundledMap initial) : current_(std::make_shared<const BundledMap>(std::move(initial))) {}
 
@@ -37,6 +42,7 @@ CommitReport MapStore::commit(MapDraft draft) {
     for (std::size_t k = current->keyframe_slots(); k < result.keyframe_slots(); ++k) report.keyframes.emplace_back(k);
     for (std::size_t l = current->landmark_slots(); l < result.landmark_slots(); ++l) report.landmarks.emplace_back(l);
   }
+  result.free_removed(kSlotsPerCommit);
   result.set_version(current->version().next());
   report.published = std::make_shared<const BundledMap>(std::move(result));
   {

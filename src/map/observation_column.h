@@ -30,8 +30,11 @@ class ObservationColumn {
   void erase(std::size_t landmark, Observation o, std::uint64_t tag);
   void clear(std::size_t landmark, std::uint64_t tag);
 
- private:
   static constexpr std::size_t kBlock = 16;
+  // Gives up the memory of a full block of landmarks without observations.
+  void blank_block(std::size_t block, std::uint64_t tag) { blocks_.blank_chunk(block, tag); }
+
+ private:
   struct Block {
     std::array<std::uint32_t, kBlock + 1> begin{};  // into entries
     std::vector<Observation> entries;

@@ -49,9 +49,9 @@ int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDra
   for (std::size_t i = map.landmark_slots(); i-- > 0;) {
     const LandmarkId id(i);
     const map::Landmark& l = map.landmark(id);
+    if (!l.alive) continue;
     const int age = newest.value() - l.born.value();
     if (age > options.probation) break;
-    if (!l.alive) continue;
     const bool hard_to_find = l.expected > 3 && l.found < options.min_found_share * l.expected;
     const bool hardly_seen = age >= options.probation && num_keypoints(map, id) < options.min_keypoints;
     if (hard_to_find || hardly_seen) bad.push_back(id);

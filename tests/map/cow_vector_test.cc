@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <span>
 
 #include "base/random.h"
@@ -22,6 +23,10 @@ struct Value {
   void set(std::size_t i, int x) {
     vector.mutate(i, owner.tag()) = x;
     array.mutate(owner.tag())[i] = x;
+  }
+  void blank_chunk(std::size_t chunk) {
+    vector.blank_chunk(chunk, owner.tag());
+    for (std::size_t i = 4 * chunk; i < 4 * chunk + 4; ++i) array.mutate(owner.tag())[i] = 0;
   }
 };
 
@@ -53,6 +58,10 @@ TEST(CowVector, CopiesBehaveAsIndependentValues) {
     } else if (choice < 40 && truth[at].size() < 700) {
       values[at].push_back(x);
       truth[at].push_back(x);
+    } else if (choice < 45 && truth[at].size() >= 4) {
+      const std::size_t chunk = random.below(static_cast<std::uint32_t>(truth[at].size() / 4));
+      values[at].blank_chunk(chunk);
+      std::fill_n(truth[at].begin() + static_cast<std::ptrdiff_t>(4 * chunk), 4, 0);
     } else if (!truth[at].empty()) {
       const std::size_t i = random.below(static_cast<std::uint32_t>(truth[at].size()));
       values[at].set(i, x);
