@@ -51,9 +51,8 @@ KeyframeId BundledMap::surviving(KeyframeId k) const {
 
 LandmarkId BundledMap::resolve(LandmarkId l) const {
   while (l.valid() && l.index() < landmarks_.size()) {
-    const Landmark& entry = landmark(l);
-    if (entry.alive) return l;
-    l = entry.merged_into;
+    if (landmark(l).alive) return l;
+    l = merged_into(l);
   }
   return {};
 }
@@ -121,6 +120,7 @@ LandmarkId BundledMap::add_landmark(const Eigen::Vector3d& position, std::span<c
     entry.reference = {first.keyframe, keyframe(first.keyframe).frame->bundled.keypoints(first.feature).front()};
   }
   landmarks_.push_back(entry, owner_.tag());
+  merged_into_.push_back({}, owner_.tag());
   observations_.push_back(owner_.tag());
   ++alive_landmarks_;
   for (const Observation& o : observations) {
@@ -262,7 +262,7 @@ void BundledMap::free_removed(std::size_t slots) {
     if (freed_up_to_ >= groups) freed_up_to_ = 0;
     const std::size_t group = freed_up_to_++;
     bool gone = true;
-    for (std::size_t l = group * kGroup; gone && l < (group + 1) * kGroup; ++l) gone = !resolve(LandmarkId(l)).valid();
+    for (std::size_t l = group * kGroup; gone && l < (group + 1) * kGroup; ++l) gone = !landmarks_[l].alive;
     if (!gone) continue;
     landmarks_.blank_chunk(group, owner_.tag());
     observations_.blank_block(group, owner_.tag());
@@ -302,9 +302,8 @@ void BundledMap::let_go(KeyframeId k) {
 }
 
 void BundledMap::bury(LandmarkId l, LandmarkId merged_into) {
-  Landmark& entry = edit(l);
-  entry.alive = false;
-  entry.merged_into = merged_into;
+  edit(l).alive = false;
+  if (merged_into.valid()) merged_into_.mutate(l.index(), owner_.tag()) = merged_into;
   --alive_landmarks_;
 }
 

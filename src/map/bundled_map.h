@@ -56,7 +56,8 @@ class BundledMap {
   bool alive(LandmarkId l) const { return l.valid() && l.index() < landmarks_.size() && landmarks_[l.index()].alive; }
 
   const BundledKeyframe& keyframe(KeyframeId k) const { return keyframes_[k.index()]; }  // also removed ones
-  const Landmark& landmark(LandmarkId l) const { return landmarks_[l.index()]; }
+  const Landmark& landmark(LandmarkId l) const { return landmarks_[l.index()]; }        // of removed ones nothing but that
+  LandmarkId merged_into(LandmarkId l) const { return merged_into_[l.index()]; }         // invalid where it was not
   std::span<const Observation> observations(LandmarkId l) const { return observations_[l.index()]; }  // in order of keyframe
   LandmarkId landmark_of(KeyframeId k, FeatureId f) const { return keyframes_[k.index()].landmarks[f.index()]; }
 
@@ -139,8 +140,8 @@ class BundledMap {
   bool add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes view direction, distance range and descriptor from the observations.
   bool refresh_landmark(LandmarkId l);
-  // Gives up the memory of removed landmarks among the next `slots` of a round over all slots: of neighbours none of which is
-  // alive or leads to one that is. Of these nothing remains but that they are removed.
+  // Gives up the memory of removed landmarks among the next `slots` of a round over all slots, where no neighbour that shares it
+  // is alive.
   void free_removed(std::size_t slots);
 
  private:
@@ -174,6 +175,7 @@ class BundledMap {
   CowVector<BundledKeyframe, 1> keyframes_;
   static constexpr std::size_t kGroup = ObservationColumn::kBlock;  // landmarks that share a chunk
   CowVector<Landmark, kGroup> landmarks_;
+  CowVector<LandmarkId, 64> merged_into_;
   ObservationColumn observations_;
   std::size_t alive_keyframes_ = 0, alive_landmarks_ = 0, observations_total_ = 0;
   std::size_t freed_up_to_ = 0;  // group of landmarks free_removed goes on with

@@ -31,7 +31,7 @@ Broken check_landmark(const BundledMap& map, LandmarkId l, std::size_t& keypoint
     if (!list.empty()) return name(l) + " is removed and has observations";
     return {};
   }
-  if (map.landmark(l).merged_into.valid()) return name(l) + " is alive and merged";
+  if (map.merged_into(l).valid()) return name(l) + " is alive and merged";
   if (list.empty()) return name(l) + " is alive without observations";
   for (std::size_t i = 0; i < list.size(); ++i) {
     const KeyframeId k = list[i].keyframe;

@@ -37,7 +37,6 @@ struct Landmark {
   KeyframeId born;                     // newest keyframe when it was made
   std::uint32_t expected = 0, found = 0;  // frames in which it should have been seen, and was
   bool alive = false;
-  LandmarkId merged_into;              // valid where it was merged: follow it
 };
 
 }  // namespace bslam::map

@@ -90,7 +90,7 @@ class Fingerprint {
       add(std::bit_cast<std::uint32_t>(l.min_distance), std::bit_cast<std::uint32_t>(l.max_distance));
       for (const std::uint64_t word : l.descriptor) add(word);
       add(l.reference.keyframe.value(), l.reference.keypoint.camera.value(), l.reference.keypoint.keypoint.value());
-      add(l.born.value(), l.expected, l.found, l.alive, l.merged_into.value());
+      add(l.born.value(), l.expected, l.found, l.alive, map.merged_into(LandmarkId(i)).value());
       for (const Observation& o : map.observations(LandmarkId(i)))
         add(o.keyframe.value(), o.feature.value(), o.aligned);
     }
