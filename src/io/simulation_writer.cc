@@ -37,6 +37,12 @@ Status check(const SimulationRequest& r) {
     return refuse("rate", r.recording.rate_hz, "images a second above 0, at most 1000");
   if (!within(r.recording.exposure_s, 0, 1))
     return refuse("exposure-ms", 1e3 * r.recording.exposure_s, "milliseconds from 0 to 1000");
+  for (const simulation::Fault& f : r.recording.faults) {
+    if (f.from_s >= r.recording.duration_s) {
+      return Error{"", "faults", fmt::format("{} from {} s on", fault_name(f.type), f.from_s),
+                   fmt::format("a beginning within the {} s of the recording", r.recording.duration_s)};
+    }
+  }
   if (!within(r.imaging.noise, 0, 1000)) return refuse("noise", r.imaging.noise, "a factor from 0 to 1000");
   if (!within(r.tour.speed_mps, 0, 5))
     return refuse("speed", r.tour.speed_mps, "metres a second from 0 to 5, 0 for a walking pace");

@@ -210,6 +210,7 @@ TEST_F(SimulationWriter, RefusesRequestsOutOfRange) {
   EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.exposure_s = -0.1; }));
   EXPECT_TRUE(refused([](SimulationRequest& r) { r.imaging.noise = -1; }));
   EXPECT_TRUE(refused([](SimulationRequest& r) { r.tour.laps = -1; }));
+  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.faults = {{simulation::FaultType::kBlack, {0}, 0.3, 0.4}}; }));
   EXPECT_TRUE(refused([](SimulationRequest& r) { r.tour.laps = 1, r.tour.speed_mps = 1; }));
 }
 
