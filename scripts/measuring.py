@@ -56,7 +56,8 @@ def with_fault(data, folder, cameras, kind, from_s, to_s):
         copy = folder / 'mav0' / source.name
         (copy / 'data').mkdir(parents=True)
         for name in ('data.csv', 'sensor.yaml'):
-            shutil.copy(source / name, copy / name)
+            if (source / name).exists():
+                shutil.copy(source / name, copy / name)
         black, shown = None, None
         for file in sorted((source / 'data').iterdir(), key=lambda f: int(f.stem)):
             since = (int(file.stem) - START_NS) * 1e-9

@@ -48,7 +48,7 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
                                             const geometry::SE3& T_cam_common, std::span<const SearchPoint> points,
                                             std::span<const std::uint8_t> taken, const ProjectionSearchOptions& options);
 
-// Of the points, those a camera should see, by the same rules.
+// Of the points, those a camera should see, by the rules of ProjectionSearchResult::visible. `max_view_angle` in radians.
 std::vector<std::uint32_t> visible_points(const camera::Camera& camera, const geometry::SE3& T_cam_common,
                                           std::span<const SearchPoint> points, double max_view_angle);
 

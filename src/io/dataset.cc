@@ -220,7 +220,9 @@ Status keep_range(const DatasetRequest& request, Dataset& dataset) {
 
 // The rig file a recording may have beside it; empty where there is none.
 std::optional<fs::path> rig_beside(const DatasetRequest& request) {
-  fs::path file = request.path / "rig.yaml";
+  fs::path folder = request.path.filename().empty() ? request.path.parent_path() : request.path;
+  if (folder.filename() == "mav0") folder = folder.parent_path();
+  fs::path file = folder / "rig.yaml";
   std::error_code error;
   return fs::is_regular_file(file, error) ? std::optional(std::move(file)) : std::nullopt;
 }

@@ -128,8 +128,9 @@ Result<RigFile> read_folder(const fs::path& folder) {
   }
   if (fs::exists(folder / "cameras.txt", error)) return as_file(read_colmap_rig(folder), RigFormat::kColmap);
   if (fs::exists(folder / "calib_cam_to_cam.txt", error)) return read_rig_file(folder / "calib_cam_to_cam.txt");
+  if (fs::exists(folder / "rig.yaml", error)) return read_rig_file(folder / "rig.yaml");
   return Error{folder.string(), "", "a folder without calibration",
-               "mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt or cameras.txt in it"};
+               "mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt, cameras.txt or rig.yaml in it"};
 }
 
 Status make_folder(const fs::path& folder) {

@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 using simulation::Shot;
 
 constexpr int kWorldVersion = 1;            // of the pictures a request gives: to be raised when they change
+constexpr int kListsVersion = 2;            // the same of the other files
 constexpr double kGroundTruthRate = 200.0;  // Hz
 constexpr const char* kPartial = ".partial";
 constexpr const char* kComplete = ".complete";
@@ -68,6 +69,8 @@ std::string marker(const fs::path& folder, const char* name) {
   return text ? text->substr(0, text->find('\n')) : std::string();
 }
 
+std::string complete_mark(const std::string& digest) { return fmt::format("{} lists {}", digest, kListsVersion); }
+
 enum class FolderState { kFresh, kSamePartly, kSameComplete };
 
 // Looks at the folder and makes it ready; with `overwrite` an earlier recording of ours is removed.
@@ -79,7 +82,8 @@ Result<FolderState> prepare_folder(const SimulationRequest& request, const std::
   }
   if (const Status s = make_folder(folder); !s) return s.error();
   const std::string complete = marker(folder, kComplete), partial = marker(folder, kPartial);
-  if (complete == digest) return FolderState::kSameComplete;
+  if (complete == complete_mark(digest)) return FolderState::kSameComplete;
+  if (complete.starts_with(digest)) return FolderState::kSamePartly;  // the lists are of another version
   const bool ours = !complete.empty() || !partial.empty();
   if (partial == digest && complete.empty()) return FolderState::kSamePartly;
   if (!fs::is_empty(folder, code) && !request.overwrite) {
@@ -180,10 +184,14 @@ Status write_lists(const SimulationRequest& request, const std::vector<Shot>& sh
   const camera::Rig& rig = request.rig;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (Status s = write_atomically(camera_folder(folder, c) / "data.csv", image_list(shots, c)); !s) return s;
-    if (!euroc_holds_models(rig)) continue;  // rig.yaml has them
+    const fs::path sensor = camera_folder(folder, c) / "sensor.yaml";
+    if (!euroc_holds_models(rig)) {  // rig.yaml does
+      std::error_code code;
+      fs::remove(sensor, code);
+      continue;
+    }
     const camera::RigCamera camera{rig.camera(c), rig.body_from_cam(c)};
-    const std::string sensor = euroc_sensor_yaml(camera, request.recording.rate_hz);
-    if (Status s = write_atomically(camera_folder(folder, c) / "sensor.yaml", sensor); !s) return s;
+    if (Status s = write_atomically(sensor, euroc_sensor_yaml(camera, request.recording.rate_hz)); !s) return s;
   }
   const fs::path truth = folder / "mav0" / "state_groundtruth_estimate0";
   if (Status s = make_folder(truth); !s) return s;
@@ -249,7 +257,7 @@ Result<SimulationOutcome> write_simulation(const SimulationRequest& request, Thr
   if (!all) return all.error();
   if (!*all) return SimulationOutcome::kInterrupted;
   if (const Status s = write_lists(request, shots, recorder); !s) return s.error();
-  if (const Status s = write_atomically(request.folder / kComplete, digest + "\n"); !s) return s.error();
+  if (const Status s = write_atomically(request.folder / kComplete, complete_mark(digest) + "\n"); !s) return s.error();
   std::error_code code;
   fs::remove(request.folder / kPartial, code);
   return SimulationOutcome::kWritten;

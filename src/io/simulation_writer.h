@@ -33,11 +33,12 @@ enum class SimulationOutcome {
 using SimulationProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 // Renders the tour through a built-in world and writes into request.folder, making it:
-//   mav0/camN/data/STAMP.png, mav0/camN/data.csv, mav0/camN/sensor.yaml
+//   mav0/camN/data/STAMP.png, mav0/camN/data.csv
+//   mav0/camN/sensor.yaml                        where it can hold the models of all cameras
 //   mav0/state_groundtruth_estimate0/data.csv    the body at 200 Hz
-//   groundtruth_cam0.tum                         T_world_cam0 at camera 0's images
+//   groundtruth_cam0.tum                         T_world_cam0 at camera 0's times, dropped pictures among them
 //   rig.yaml, faults.csv                         the rig in our format; pictures hit by a fault
-//   .partial, then .complete                     a digest of the request
+//   .partial, then .complete                     a digest of the request, and the version of the lists
 // A folder that holds a part of the same request's recording is completed, its pictures kept. Errors: a request out of
 // range; a folder with something else in it, without `overwrite`; what cannot be written.
 Result<SimulationOutcome> write_simulation(const SimulationRequest& request, ThreadPool& pool,

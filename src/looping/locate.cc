@@ -193,9 +193,13 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
   out.inliers = solution.num_inliers;
   if (solution.num_inliers < options.min_inliers) return rejected(Rejection::kFewInliers);
   Location location{candidate, solution.T_rig_world, by_feature(frame, guided, solution.inlier), solution.num_inliers};
-  const std::vector<LandmarkId> sought = to_be_found(map, frame, landmarks, solution.T_rig_world, options.max_turn);
-  out.sought = static_cast<int>(sought.size());
-  out.found = static_cast<int>(std::ranges::count_if(location.matches, [&](const auto& m) { return std::ranges::binary_search(sought, m.second); }));
+  for (const double turn : {options.max_turn, frame::ProjectionSearchOptions{}.max_view_angle}) {
+    const std::vector<LandmarkId> sought = to_be_found(map, frame, landmarks, solution.T_rig_world, turn);
+    const auto is_sought = [&](const auto& match) { return std::ranges::binary_search(sought, match.second); };
+    out.sought = static_cast<int>(sought.size());
+    out.found = static_cast<int>(std::ranges::count_if(location.matches, is_sought));
+    if (out.sought >= options.min_inliers) break;  // fewer: the place is seen from aside, and what is known from there has to do
+  }
   if (out.found < options.min_found_share * out.sought) return rejected(Rejection::kFewFound);
   return location;
 }

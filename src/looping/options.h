@@ -50,7 +50,7 @@ struct VerificationOptions {
     visitor("radius", self.radius, Range{1e-4, 1}, "rad", "guided search at the pose found");
     visitor("min_inliers", self.min_inliers, Range{6, 10000}, "", "keypoints that must support the pose in the end");
     visitor("min_found_share", self.min_found_share, Range{0, 1}, "", "of the landmarks that should be found, that must be");
-    visitor("max_turn", self.max_turn, Range{0.01, 3.15}, "rad", "from the directions it is known from, a landmark should be found");
+    visitor("max_turn", self.max_turn, Range{0.01, 1.05}, "rad", "from the directions it is known from, a landmark should be found");
     visitor.section("consensus", self.consensus);
   }
 };

@@ -56,8 +56,8 @@ class BundledMap {
   bool alive(LandmarkId l) const { return l.valid() && l.index() < landmarks_.size() && landmarks_[l.index()].alive; }
 
   const BundledKeyframe& keyframe(KeyframeId k) const { return keyframes_[k.index()]; }  // also removed ones
-  const Landmark& landmark(LandmarkId l) const { return landmarks_[l.index()]; }        // of removed ones nothing but that
-  LandmarkId merged_into(LandmarkId l) const { return merged_into_[l.index()]; }         // invalid where it was not
+  const Landmark& landmark(LandmarkId l) const { return landmarks_[l.index()]; }  // of removed ones `alive` alone means something
+  LandmarkId merged_into(LandmarkId l) const { return merged_into_[l.index()]; }  // of removed ones; invalid where it was not
   std::span<const Observation> observations(LandmarkId l) const { return observations_[l.index()]; }  // in order of keyframe
   LandmarkId landmark_of(KeyframeId k, FeatureId f) const { return keyframes_[k.index()].landmarks[f.index()]; }
 

@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/assert.h"
+
 namespace bslam::map {
 
 // The tag of one copy of a family of values that share pieces. Copying takes the right to change pieces in place from
@@ -82,6 +84,7 @@ class CowVector {
 
   // Gives up the memory of a full chunk: its elements get default values, in a piece that all such chunks share.
   void blank_chunk(std::size_t chunk, std::uint64_t tag) {
+    BSLAM_ASSERT((chunk + 1) * kChunk <= size_, "a chunk is full before it is given up");
     static const std::shared_ptr<Chunk> kBlank = std::make_shared<Chunk>(Chunk{kNobody, {}});
     if (nodes_[chunk / kNode]->chunks[chunk % kNode] == kBlank) return;
     detach(nodes_[chunk / kNode], tag);

@@ -67,7 +67,7 @@ struct ExtrinsicsRecord {
 struct CameraRecord {
   std::string name;
   std::int64_t images = 0;
-  std::int64_t skipped = 0;  // listed in the data set, but not readable or without partners in time
+  std::int64_t skipped = 0;  // listed in the data set, but not readable
   std::vector<CameraInterval> states;
   std::optional<ExtrinsicsRecord> extrinsics = {};  // none of camera 0, which is the rig
   std::string first_skipped = {};  // file and cause of the first image that was not readable

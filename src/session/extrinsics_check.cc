@@ -27,6 +27,7 @@ constexpr double kLeastShare = 0.4;  // of the matches; chance reaches some per 
 constexpr int kMany = 300;            // matches: enough to expect that some convention fits
 constexpr double kMost = 0.6;        // of the matches: fewer, and another pose may fit more
 constexpr double kClearly = 1.3;     // times more than as given
+constexpr double kNoBaseline = 1e-6;      // metres
 constexpr double kLeastParallax = 0.005;  // radians, of the matches another pose is found from
 
 // For every descriptor of `a` its best in `b`, or -1.
@@ -95,7 +96,6 @@ double tolerance_of(const camera::Camera& first, const camera::Camera& second) {
 }
 
 int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
-  constexpr double kNoBaseline = 1e-6;  // metres
   const double tolerance = tolerance_of(*h.first, *h.second);
   const Eigen::Vector3d t = h.T_second_first.translation();
   const bool apart = t.norm() > kNoBaseline;
@@ -121,13 +121,18 @@ std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::
     const auto a = ci.unproject(pair.a), b = cj.unproject(pair.b);
     if (a && b) bearings.push_back({*a, *b});
   }
-  const solver::RelativePoseOptions options{.iterations = 2000, .inlier_angle = tolerance_of(ci, cj), .min_parallax = kLeastParallax,
-                                            .min_inliers = std::max(kLeastAgreeing, static_cast<int>(kLeastShare * static_cast<double>(bearings.size())))};
+  const int least = std::max(kLeastAgreeing, static_cast<int>(kLeastShare * static_cast<double>(bearings.size())));
+  const solver::RelativePoseOptions options{
+      .iterations = 2000, .inlier_angle = tolerance_of(ci, cj), .min_parallax = kLeastParallax, .min_inliers = least};
   const auto found = solver::relative_pose(bearings, options, Random(1, "extrinsics check"));
   if (!found) return std::nullopt;
   const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
-  const double turned = geometry::so3_log((found->T_b_a * given.inverse()).rotation()).norm();
-  return OtherPose{found->num_inliers, turned * 180.0 / std::numbers::pi};
+  OtherPose out{.agreeing = found->num_inliers};
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  out.turned_deg = kDegrees * geometry::so3_log((found->T_b_a * given.inverse()).rotation()).norm();
+  const Eigen::Vector3d lies = found->T_b_a.inverse().translation(), should_lie = given.inverse().translation();
+  if (should_lie.norm() > kNoBaseline) out.displaced_deg = kDegrees * geometry::angle_between(lies, should_lie.normalized());
+  return out;
 }
 
 std::optional<Convention> verdict_of(const PairEvidence& evidence) {
@@ -169,8 +174,8 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
   }
   evidence.matches = static_cast<int>(all.size());
   evidence.verdict = verdict_of(evidence);
-  const int fitting = evidence.verdict ? evidence.agreeing[static_cast<std::size_t>(*evidence.verdict)] : 0;
-  if (fitting >= kMost * evidence.matches) return evidence;
+  const int fitting = *std::ranges::max_element(evidence.agreeing);
+  if (evidence.verdict && fitting >= kMost * evidence.matches) return evidence;
   evidence.other = other_pose(rig, i, j, all);
   if (evidence.other && evidence.other->agreeing < kClearly * fitting) evidence.other.reset();
   if (evidence.other) evidence.verdict.reset();
@@ -205,8 +210,9 @@ namespace {
 std::string describe(const PairEvidence& pair) {
   const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
   if (pair.other) {
-    return fmt::format("{} of {} matches fit the second turned by {:.2g} degrees from what is given, {} as given", pair.other->agreeing,
-                       pair.matches, pair.other->turned_deg, agreeing(Convention::kAsGiven));
+    return fmt::format("{} of {} matches fit the second turned by {:.1f} degrees from how it is given, in a direction {:.0f} degrees "
+                       "from the given one; {} as given",
+                       pair.other->agreeing, pair.matches, pair.other->turned_deg, pair.other->displaced_deg, agreeing(Convention::kAsGiven));
   }
   if (!pair.verdict && pair.matches > kMany) return fmt::format("{} matches, and no convention fits enough of them", pair.matches);
   if (!pair.verdict) return fmt::format("too little in common to tell ({} matches)", pair.matches);
@@ -235,7 +241,8 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
   if (elsewhere > 0) return text + "warning: the images do not fit the extrinsics, nor any common slip of them\n";
   if (fitting == 0) return text + "  nothing can be said of the extrinsics\n";
   const std::size_t rest = evidence.size() - static_cast<std::size_t>(fitting);
-  return text + "  the extrinsics fit as given" + (rest > 0 ? fmt::format("; {} of {} pairs could not be judged\n", rest, evidence.size()) : "\n");
+  const std::string unjudged = rest > 0 ? fmt::format("; {} of {} pairs could not be judged", rest, evidence.size()) : "";
+  return text + "  the extrinsics fit as given" + unjudged + "\n";
 }
 
 }  // namespace bslam::session

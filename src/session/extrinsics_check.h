@@ -27,10 +27,11 @@ enum class Convention {
 constexpr int kConventions = 5;
 std::string_view convention_in_words(Convention convention);
 
-// Where no convention fits: the pose of the second camera seen from the first that does.
+// The pose of the second camera seen from the first that clearly more matches fit than any convention, where there is one.
 struct OtherPose {
-  int agreeing = 0;       // matches that fit it
-  double turned_deg = 0;  // of the second camera from where it is given
+  int agreeing = 0;          // matches that fit it
+  double turned_deg = 0;     // of the second camera from how it is given
+  double displaced_deg = 0;  // between the directions in which it lies from the first, found and given; 0 without baseline
 };
 
 // One pair of cameras.
@@ -38,7 +39,7 @@ struct PairEvidence {
   std::size_t first = 0, second = 0;
   int matches = 0;                              // features found in both images, over all frames
   std::array<int, kConventions> agreeing = {};  // of them, those that fit a convention
-  // The one that most fit, where enough do and clearly more than as given; empty: too little to tell.
+  // The one that most fit, where enough do and clearly more than as given; empty: too little to tell, or `other`.
   std::optional<Convention> verdict = {};
   std::optional<OtherPose> other = {};
 };

@@ -60,6 +60,7 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
                      {"fit_swapped_inverted", pair.agreeing[4]},
                      {"fit_another", pair.other ? Json(pair.other->agreeing) : Json()},
                      {"another_turned_deg", pair.other ? Json(pair.other->turned_deg) : Json()},
+                     {"another_displaced_deg", pair.other ? Json(pair.other->displaced_deg) : Json()},
                      {"verdict", pair.verdict ? Json(convention_in_words(*pair.verdict)) : Json()}});
   }
   return pairs;

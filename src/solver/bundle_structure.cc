@@ -98,11 +98,16 @@ void number_pairs(BundleStructure& s) {
 
 BundleStructure make_structure(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
   check(problem, skip);
+  return make_structure(problem, squared_errors(problem), skip);
+}
+
+BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2, std::span<const std::uint8_t> skip) {
+  check(problem, skip);
   BundleStructure out;
   out.terms.reserve(problem.observations.size());
   out.groups.reserve(problem.observations.size() + 1);
   out.points.reserve(problem.points.size() + 1);
-  gather(problem, squared_errors(problem), skip, out);
+  gather(problem, chi2, skip, out);
   assign_slots(problem, out);
   number_pairs(out);
   return out;

@@ -41,5 +41,7 @@ struct BundleStructure {
 // Leaves out what `skip` names, what is lost at the present values, points with fewer than two observations left (they
 // say nothing about a pose) and free poses without observations.
 BundleStructure make_structure(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip);
+// The same with the squared normalised errors at other values than the present ones.
+BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2, std::span<const std::uint8_t> skip);
 
 }  // namespace bslam::solver

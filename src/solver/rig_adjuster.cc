@@ -118,8 +118,8 @@ RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjusterOptions&
   BSLAM_ASSERT(start.empty() || start.size() == cameras, "a start has extrinsics for every camera");
   if (!start.empty()) state.T_cam_rig.assign(start.begin(), start.end());
   for (std::size_t round = 0; round < kRounds.size(); ++round) {
-    const auto skip = beyond(squared_errors(problem, state.T_rig_world, state.points, state.T_cam_rig), kRounds[round].max_chi2);
-    const BundleStructure structure = make_structure(problem, skip);
+    const std::vector<double> chi2 = squared_errors(problem, state.T_rig_world, state.points, state.T_cam_rig);
+    const BundleStructure structure = make_structure(problem, chi2, beyond(chi2, kRounds[round].max_chi2));
     if (structure.num_points() == 0) return out;
     RigEquations equations(problem, structure, kRounds[round].kernel, prior);
     const auto cost = minimise(equations, options, stop, state);

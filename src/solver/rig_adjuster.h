@@ -39,9 +39,10 @@ struct RigAdjustment {
 };
 
 // Improves free poses and points in place. The problem's rig is the calibrated one; the extrinsics start from `start`, one
-// T_cam_rig per camera, or from the calibrated ones where it is empty. At least one pose of every part that shares points is fixed. Rounds: Huber kernel over every observation, then over
-// those within a widened bound, then without kernel within the 95 % bound, twice; each judges all of them anew, so that
-// what a wrong calibration had put out of bounds comes back. Deterministic to the bit.
+// T_cam_rig per camera, or from the calibrated ones where it is empty. At least one pose of every part that shares points is
+// fixed. Rounds: Huber kernel over every observation, then over those within a widened bound, then without kernel within the
+// 95 % bound, twice; each judges all of them anew, so that what a wrong calibration had put out of bounds comes back.
+// Deterministic to the bit.
 RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjusterOptions& options = {}, std::span<const SE3> start = {},
                          std::stop_token stop = {});
 

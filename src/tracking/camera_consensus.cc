@@ -94,9 +94,10 @@ void doubt(CameraTrust& camera, const Expectation& view, TimeNs time_ns, const C
   camera.landmarks.clear();
   if (!std::exchange(camera.doubted, true)) camera.judged_ns = camera.since_ns = time_ns;
   const bool judged = view.expected >= options.min_expected;
-  const bool sees = judged && view.share() >= options.seen_share;
-  camera.seeing = sees ? camera.seeing + 1 : 0;
-  if (judged) camera.judged_ns = time_ns;
+  if (judged) {
+    camera.seeing = view.share() >= options.seen_share ? camera.seeing + 1 : 0;
+    camera.judged_ns = time_ns;
+  }
   const bool forgotten = to_seconds(time_ns - camera.judged_ns) >= options.forget_after_s;
   if (camera.seeing >= options.readmit_after || forgotten) camera = CameraTrust{};
 }

@@ -16,7 +16,8 @@ struct CameraTrust {
   TimeNs judged_ns = 0;               // when a doubted camera last should have seen something
   TimeNs since_ns = 0;                // since when it is doubted, or was last found to show its view displaced
   double share = 1.0;                 // of what it should have seen again in the last frame that could tell, found
-  std::vector<LandmarkId> landmarks;  // inliers of the last tracked frame
+  TimeNs seen_ns = 0;                 // when it last delivered an image that counted ...
+  std::vector<LandmarkId> landmarks;  // ... and the inliers of that
 };
 
 // What of it still counts where the rig was found again after a loss, `seen[c]` landmarks of the place by camera c.

@@ -18,8 +18,7 @@ constexpr double kRate = 0.2;              // of a frame against those before
 double error_floor(double before, std::vector<double> squared_errors, std::vector<double> variances,
                    const frame::AlignmentOptions& options) {
   if (squared_errors.size() < kLeastMatches) return before;
-  const double of_alignment = median(std::move(variances)) - before * before;
-  const double found = median(std::move(squared_errors)) / (2 * std::numbers::ln2) - of_alignment;
+  const double found = median(std::move(squared_errors)) / (2 * std::numbers::ln2) - median(std::move(variances));
   const double least = std::min(options.least_floor_px, options.floor_px);
   const double now = std::clamp(found, least * least, options.floor_px * options.floor_px);
   return std::sqrt((1 - kRate) * before * before + kRate * now);
@@ -40,7 +39,8 @@ std::vector<double> error_floors(std::span<const double> before, const map::Bund
       const auto projected = rig.camera(c).project(T_cam_world * map.landmark(m.landmark).position);
       if (!projected) continue;
       squared_errors.push_back((keypoints.pixel[k].cast<double>() - *projected).squaredNorm());
-      variances.push_back(static_cast<double>(keypoints.sigma[k]) * keypoints.sigma[k]);
+      const double variance = static_cast<double>(keypoints.sigma[k]) * keypoints.sigma[k];
+      variances.push_back(m.aligned ? variance - floors[c] * floors[c] : variance);
     }
     floors[c] = error_floor(floors[c], std::move(squared_errors), std::move(variances), options);
   }

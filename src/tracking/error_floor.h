@@ -22,7 +22,7 @@ namespace bslam::tracking {
 // what made it lost may have come to stay. Keyframes keep the standard deviations of their time.
 std::vector<double> error_floors(std::span<const double> before, const map::BundledMap& map, const frame::BundledFrame& frame,
                                  const TrackOutput& output, const frame::AlignmentOptions& options);
-// The same for one camera, from squared errors and variances of its keypoints, both with `before` in the variances.
+// The same for one camera, from squared errors of its keypoints and their variances, px^2, without the floor.
 double error_floor(double before, std::vector<double> squared_errors, std::vector<double> variances,
                    const frame::AlignmentOptions& options);
 

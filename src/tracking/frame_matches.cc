@@ -84,7 +84,7 @@ std::optional<frame::AlignedKeypoint> align_to_reference(const map::BundledMap& 
 
 }  // namespace
 
-void align_matches(const map::BundledMap& map, const SE3& T_rig_world, const FrameMatches& matches,
+void align_matches(const map::BundledMap& map, const SE3& T_rig_world, FrameMatches& matches,
                    std::span<const image::Pyramid> pyramids, std::span<const frame::AlignmentOptions> alignment,
                    const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
@@ -92,11 +92,12 @@ void align_matches(const map::BundledMap& map, const SE3& T_rig_world, const Fra
     if (matches[c].empty()) return;
     feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
-    for (const Match& m : matches[c]) {
+    for (Match& m : matches[c]) {
       const std::size_t k = m.keypoint.index();
       const auto aligned = align_to_reference(map, rig.camera(c), T_cam_world, pyramids[c], map.landmark(m.landmark),
                                               keypoints.pixel[k].cast<double>(), alignment[c]);
       const auto bearing = aligned ? rig.camera(c).unproject(aligned->pixel) : std::nullopt;
+      m.aligned = bearing.has_value();
       if (bearing) {
         keypoints.pixel[k] = aligned->pixel.cast<float>();
         keypoints.bearing[k] = *bearing;

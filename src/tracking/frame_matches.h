@@ -20,6 +20,7 @@ namespace bslam::tracking {
 struct Match {
   KeypointIndex keypoint;
   LandmarkId landmark;
+  bool aligned = false;  // to the landmark's reference patch
 };
 
 // Per camera, in order of keypoint; a keypoint at most once, a landmark at most once per camera.
@@ -43,9 +44,9 @@ MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame
 FrameMatches merge(const FrameMatches& a, const FrameMatches& b);
 
 // Moves each matched keypoint of `frame` to where the reference patch of its landmark is seen from `T_rig_world`, with the
-// standard deviation of that; a keypoint whose patch does not align keeps its place and gets the detector's. `pyramids` and
-// `alignment`: one per camera.
-void align_matches(const map::BundledMap& map, const geometry::SE3& T_rig_world, const FrameMatches& matches,
+// standard deviation of that; a keypoint whose patch does not align keeps its place and gets the detector's. `matches` are told
+// which did. `pyramids` and `alignment`: one per camera.
+void align_matches(const map::BundledMap& map, const geometry::SE3& T_rig_world, FrameMatches& matches,
                    std::span<const image::Pyramid> pyramids, std::span<const frame::AlignmentOptions> alignment,
                    const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool);
 

@@ -13,13 +13,18 @@ using geometry::SE3;
 
 constexpr double kMaxPrediction_s = 0.5;  // the motion model says nothing farther ahead
 
-// Last pose, in the map as it is now, moved on by the twist.
-SE3 predict(const TrackInput& input, TimeNs time_ns) {
-  const TrackerState& state = input.state;
-  const SE3 last = state.T_rig_reference * input.map.resolved_pose(state.reference);
+// Motion from the last pose to `time_ns`, where it is known.
+std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) {
   const double dt = to_seconds(time_ns - state.time_ns);
-  if (!state.twist || dt <= 0 || dt > kMaxPrediction_s) return last;
-  return SE3::exp(dt * *state.twist) * last;
+  if (dt == 0) return SE3();
+  if (!state.twist || dt < 0 || dt > kMaxPrediction_s) return std::nullopt;
+  return SE3::exp(dt * *state.twist);
+}
+
+// Last pose, in the map as it is now, moved on as far as the motion is known.
+SE3 predict(const TrackInput& input, TimeNs time_ns) {
+  const SE3 last = input.state.T_rig_reference * input.map.resolved_pose(input.state.reference);
+  return motion_since_last(input.state, time_ns).value_or(SE3()) * last;
 }
 
 // Landmarks of the last frame that the present map still knows.
@@ -44,7 +49,7 @@ struct Coarse {
   FrameMatches matches;  // inliers
   LostReason reason = LostReason::kNone;
   std::vector<std::uint8_t> left_out = {};  // per camera: doubted before or now
-  std::vector<Expectation> again = {};      // per camera: what of the last frame was seen again; empty after a wide search
+  std::vector<Expectation> again = {};      // per camera: what of the last frame was seen again; empty after a wide search alone
 };
 
 std::vector<std::uint8_t> doubted(const TrackerState& state, std::size_t cameras) {
@@ -68,7 +73,8 @@ frame::ProjectionSearchOptions search_options(const TrackInput& input, const Mat
 // Motion while the cameras of a frame fire: that since the last frame, going on with the acceleration it had against the
 // interval before. The poses say it, never the late cameras alone: what these see again they saw first with the same error.
 solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFrame& frame) {
-  solver::MotionModel motion{.delay_s = frame::delays_of(frame), .T_before = input.state.T_rig_reference * input.map.resolved_pose(input.state.reference)};
+  solver::MotionModel motion{.delay_s = frame::delays_of(frame),
+                             .T_before = input.state.T_rig_reference * input.map.resolved_pose(input.state.reference)};
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
   if (dt <= 0 || dt > kMaxPrediction_s) {
     motion.offset = frame.twist;  // nothing newer is known
@@ -84,12 +90,12 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   return motion;
 }
 
-// Pose from what is found near where the motion model puts it. False where that is too little.
-bool track_by_prediction(const TrackInput& input, frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
-                         const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
+// Pose from what is found near where the pose so far puts it. False where that is too little.
+bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
+                             const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  const SE3 predicted = out.T_rig_world;
+  const SE3 predicted = out.T_rig_world, led_to = predict(input, frame.time_ns);
   FrameMatches found = find_landmarks(map, frame, predicted, landmarks, {},
                                       search_options(input, options.matching, options.matching.predicted_radius), pool).found;
   std::vector<std::uint8_t> left_out = out.left_out;
@@ -99,7 +105,7 @@ bool track_by_prediction(const TrackInput& input, frame::BundledFrame& frame, co
   const solver::MotionModel motion = motion_model(input, frame);
   auto solution = solver::solve_pose(map.rig(), observations, predicted, motion, options.pose);
   if (any(contradicting(found, solution.inliers_per_camera, options.consensus))) {
-    const auto steadiest = believe_the_steadiest(rig, found, observations, predicted, options.consensus, options.pose);
+    const auto steadiest = believe_the_steadiest(rig, found, observations, led_to, options.consensus, options.pose);
     if (steadiest.ok) {
       const auto wrong = contradicting(found, steadiest.inliers_per_camera, options.consensus);
       for (std::size_t c = 0; c < wrong.size(); ++c) left_out[c] |= wrong[c];
@@ -145,16 +151,17 @@ bool track_in_wide_windows(const TrackInput& input, const frame::BundledFrame& f
 }
 
 // Pose from the landmarks of the last frame: near where the motion model puts them, and where that finds too little or no motion
-// is known yet, about where a search in wide windows does. Narrow windows about a motion that was only guessed would
-// find what seems to confirm the guess.
+// is known, about where a search in wide windows does. Narrow windows about a motion that was only guessed would find what
+// seems to confirm the guess.
 Coarse track_last_frame(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
                         ThreadPool& pool) {
   const std::vector<LandmarkId> landmarks = surviving(input.map, input.state.landmarks);
   Coarse out{predict(input, frame.time_ns), {}, LostReason::kFewMatches, doubted(input.state, input.map.rig().size())};
-  const bool tracking = input.state.status == TrackStatus::kTracking, moving = tracking && input.state.twist;
-  if (moving && track_by_prediction(input, frame, landmarks, options, pool, out)) return out;
+  const bool tracking = input.state.status == TrackStatus::kTracking;
+  const bool predicted = tracking && motion_since_last(input.state, frame.time_ns);
+  if (predicted && track_in_narrow_windows(input, frame, landmarks, options, pool, out)) return out;
   const bool found = track_in_wide_windows(input, frame, landmarks, options, pool, out);
-  if (tracking && (found || !moving)) track_by_prediction(input, frame, landmarks, options, pool, out);
+  if (tracking && (found || !predicted)) track_in_narrow_windows(input, frame, landmarks, options, pool, out);
   return out;
 }
 
@@ -223,21 +230,27 @@ void note_sightings(const std::vector<LandmarkId>& visible, const std::vector<La
 }
 
 // What the next frame should know about the cameras of this one.
-void note_trust(const Coarse& coarse, const Fine& fine, const FrameMatches& inliers, const TrackingOptions& options, TrackOutput& out) {
+void note_trust(const frame::BundledFrame& frame, const Coarse& coarse, const Fine& fine, const FrameMatches& inliers,
+                const TrackingOptions& options, TrackOutput& out) {
   std::vector<CameraTrust>& cameras = out.state.cameras;
   cameras.resize(inliers.size());
   for (std::size_t c = 0; c < cameras.size(); ++c) {
+    CameraTrust& camera = cameras[c];
     out.result.cameras[c].doubted = coarse.left_out[c];
     if (coarse.left_out[c]) {
-      doubt(cameras[c], fine.views[c], out.result.time_ns, options.consensus);
-      if (!fine.wide.empty() && due_for_retry(cameras[c], out.result.time_ns, options.consensus)) {
-        retry(cameras[c], fine.wide[c], out.result.time_ns, options.consensus);
-      }
-    } else {
-      if (!coarse.again.empty()) trust(cameras[c], coarse.again[c], options.consensus);
-      cameras[c].landmarks.clear();
-      for (const Match& m : inliers[c]) cameras[c].landmarks.push_back(m.landmark);
+      doubt(camera, fine.views[c], frame.time_ns, options.consensus);
+      const bool tried = !fine.wide.empty() && fine.wide[c].expected > 0;
+      if (tried && due_for_retry(camera, frame.time_ns, options.consensus)) retry(camera, fine.wide[c], frame.time_ns, options.consensus);
+      continue;
     }
+    if (frame.cameras[c].state != image::ImageState::kPresent) {
+      if (to_seconds(frame.time_ns - camera.seen_ns) > kMaxPrediction_s) camera.landmarks.clear();  // much may have come between
+      continue;
+    }
+    if (!coarse.again.empty()) trust(camera, coarse.again[c], options.consensus);
+    camera.seen_ns = frame.time_ns;
+    camera.landmarks.clear();
+    for (const Match& m : inliers[c]) camera.landmarks.push_back(m.landmark);
   }
 }
 
@@ -286,7 +299,7 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, c
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);
   note_sightings(fine.visible, state.landmarks, state);
-  note_trust(coarse, fine, out.matches, options, out);
+  note_trust(frame, coarse, fine, out.matches, options, out);
 
   ++state.frames_since_keyframe;
   KeyframeEvidence evidence = keyframe_evidence(map, frame, out.matches, state.reference, result.T_rig_world, options);

@@ -73,7 +73,6 @@ TEST_F(SimulationWriter, WritesEurocLayoutWithGroundTruth) {
   }
 }
 
-// A sensor.yaml that names another model than the camera's would be believed.
 TEST_F(SimulationWriter, WritesNoSensorYamlOfAModelItCannotHold) {
   SimulationRequest r = request();
   std::vector<camera::RigCamera> cameras;
@@ -85,6 +84,24 @@ TEST_F(SimulationWriter, WritesNoSensorYamlOfAModelItCannotHold) {
   const auto dataset = open_dataset({.path = r.folder});
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(camera::model_name(dataset->rig.camera(std::size_t{1}).model), camera::DoubleSphere::kName);
+  const auto by_mav0 = open_dataset({.path = r.folder / "mav0"});
+  ASSERT_TRUE(by_mav0) << by_mav0.error().message();
+  EXPECT_TRUE(read_rig(r.folder).ok());
+}
+
+// A recording of a version that wrote other lists beside the same pictures.
+TEST_F(SimulationWriter, RenewsListsOfAnotherVersion) {
+  const SimulationRequest r = request();
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  const auto files = contents(r.folder);
+  const fs::path picture = r.folder / "mav0/cam0/data/1100000000.png";
+  const auto rendered = fs::last_write_time(picture);
+  std::ofstream(r.folder / ".complete") << simulation_digest(r) << "\n";
+  std::ofstream(r.folder / "faults.csv") << "old";
+  EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWritten);
+  EXPECT_EQ(contents(r.folder), files);
+  EXPECT_EQ(fs::last_write_time(picture), rendered);
+  EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWasComplete);
 }
 
 TEST_F(SimulationWriter, WritesTwoGroundTruthsThatAgree) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 
 #include "simulated_hall.h"
@@ -109,6 +110,50 @@ TEST_P(LocateRig, AnotherPlaceOfTheHallIsNeverAccepted) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, LocateRig, ::testing::Values(1, 2, 4));
+
+// Everything that is seen from more than `turn` aside of where the map knows it from looks different from there.
+SimulatedFrame changed_aside(SimulatedFrame seen, const HallMap& world, double turn) {
+  std::map<int, Eigen::Vector3d> known_from;
+  for (const LandmarkId l : world.map.landmark_ids()) known_from[world.shown_by_landmark[l.index()].second] = world.map.landmark(l).view_direction;
+  const Eigen::Vector3d here = seen.T_world_rig.translation();
+  for (std::size_t c = 0; c < seen.landmark.size(); ++c) {
+    for (std::size_t k = 0; k < seen.landmark[c].size(); ++k) {
+      const auto at = known_from.find(seen.landmark[c][k]);
+      if (at == known_from.end()) continue;
+      const Eigen::Vector3d direction = (hall_landmarks()[static_cast<std::size_t>(at->first)].position - here).normalized();
+      if (direction.dot(at->second) > std::cos(turn)) continue;
+      Random random(1, "aside", static_cast<std::uint64_t>(at->first));
+      for (std::uint64_t& word : seen.frame.cameras[c].keypoints.descriptor[k]) word ^= random.next();
+    }
+  }
+  return seen;
+}
+
+TEST(Locate, WhatLooksDifferentFromAsideIsNotMissed) {
+  const HallMap& world = exact_walk(4);
+  const SimulatedFrame seen = hall(rig_of(4)).frame(FrameId(1000), kStepS * 11 + 0.5);
+  VerificationOptions options;
+  const SimulatedFrame changed = redecorated(changed_aside(seen, world, options.max_turn), 0.66, 1);
+  LocateReport report;
+  const auto location = locate(world.map, changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report);
+  ASSERT_TRUE(location) << report.found << " of " << report.sought;
+  expect_true_pose(*location, seen.T_world_rig.inverse());
+  options.max_turn = 1.05;
+  EXPECT_FALSE(locate(world.map, changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
+  EXPECT_EQ(report.rejection, Rejection::kFewFound);
+}
+
+// Where hardly anything can be compared from about the same direction, all that is in view counts.
+TEST(Locate, AViewFromFarAsideIsHeldAgainstAllThatIsInView) {
+  const HallMap& world = exact_walk(4);
+  const SimulatedFrame seen = redecorated(hall(rig_of(4)).frame(FrameId(1000), kStepS * 11 + 0.5), 0.85, 1);
+  VerificationOptions options;
+  options.max_turn = 1e-4;
+  LocateReport report;
+  EXPECT_FALSE(locate(world.map, seen.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
+  EXPECT_EQ(report.rejection, Rejection::kFewFound);
+  EXPECT_GT(report.sought, 100);
+}
 
 // The rig comes the other way: what the left camera saw is before the right one now.
 TEST(Locate, AnotherCameraThanThenFindsThePlace) {

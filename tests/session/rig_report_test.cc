@@ -85,7 +85,31 @@ TEST(ExtrinsicsCheck, SaysHowFarACameraIsTurned) {
   ASSERT_TRUE(evidence.other);
   EXPECT_GT(evidence.other->agreeing, 140);
   EXPECT_NEAR(evidence.other->turned_deg, 4.0, 0.05);
+  EXPECT_LT(evidence.other->displaced_deg, 2.0);
   EXPECT_NE(describe_evidence(std::array{evidence}).find("warning: the images do not fit"), std::string::npos);
+}
+
+TEST(ExtrinsicsCheck, SaysHowFarACameraIsDisplaced) {
+  const camera::Rig rig = stereo();
+  const SE3 step = rig.body_from_cam(0).inverse() * rig.body_from_cam(1);
+  const SE3 above(step.rotation(), {step.translation().y(), step.translation().x(), step.translation().z()});
+  const camera::Rig wrong({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(0) * above}});
+  const PairEvidence evidence = judged(wrong, views_of(rig));
+  ASSERT_TRUE(evidence.other);
+  EXPECT_LT(evidence.other->turned_deg, 0.1);
+  EXPECT_NEAR(evidence.other->displaced_deg, 80.5, 2.0);  // between (12, 1, -1) and (1, 12, -1) cm
+}
+
+// Too few that fit as given for a verdict are still held against another pose.
+TEST(ExtrinsicsCheck, IsNotAlarmedByAFewMoreMatchesElsewhere) {
+  const camera::Rig rig = stereo();
+  auto views = views_of(rig);
+  for (feature::Keypoints& v : views) v.pixel.resize(40), v.descriptor.resize(40);
+  for (std::size_t i = 0; i < 16; ++i) views[1].pixel[i] += Eigen::Vector2f(17.0f * static_cast<float>(i % 5), 90.0f - 11.0f * static_cast<float>(i));
+  const PairEvidence evidence = judged(rig, views);
+  EXPECT_LT(evidence.agreeing[0], 28);
+  EXPECT_FALSE(evidence.other);
+  EXPECT_EQ(describe_evidence(std::array{evidence}).find("warning"), std::string::npos);
 }
 
 TEST(ExtrinsicsCheck, SaysHowManyPairsItCouldJudge) {

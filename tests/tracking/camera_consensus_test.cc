@@ -118,6 +118,22 @@ TEST_F(WrongPictures, AreLeftOutAtOnceAndTheirCameraComesBackWithItsOwn) {
   }
 }
 
+TEST_F(WrongPictures, AreLeftOutOfACameraOfHalfTheRateAsWell) {
+  SimulatedTracker tracker(world());
+  const int readmitted = 20 + 2 * ConsensusOptions{}.readmit_after;
+  const std::vector<int> missing = {2};
+  for (int i = 1; i < 36; ++i) {
+    const bool wrong = i >= 10 && i < 20;
+    const auto seen = i % 2 == 1 ? world().sim.frame(FrameId(i), 0.05 * i, missing)
+                      : wrong    ? with_pictures_of(i, 2, 3)
+                                 : world().sim.frame(FrameId(i), 0.05 * i);
+    const TrackOutput out = tracker.track(seen.frame);
+    ASSERT_EQ(out.result.status, TrackStatus::kTracking) << i;
+    if (i % 2 == 1) continue;
+    EXPECT_EQ(out.result.cameras[2].doubted, i >= 10 && i < readmitted) << i;
+  }
+}
+
 TEST_F(WrongPictures, InAllCamerasButOneLeaveThatOneToGoOn) {
   SimulatedTracker tracker(world());
   for (int i = 1; i < 20; ++i) {

@@ -70,7 +70,7 @@ TEST_F(FindLandmarks, ACameraWithoutImageFindsNothing) {
 }
 
 TEST_F(FindLandmarks, WhatDoesNotAlignKeepsItsPlaceWithTheDetectorsNoise) {
-  const MatchSearch search = find({});
+  MatchSearch search = find({});
   frame::BundledFrame frame = seen.frame;
   for (auto& s : frame.cameras[0].keypoints.sigma) s = 0.01f;
   align_matches(world.map, seen.T_world_rig.inverse(), search.found, map::flat_pyramids(4), std::vector<frame::AlignmentOptions>(4),
@@ -78,6 +78,7 @@ TEST_F(FindLandmarks, WhatDoesNotAlignKeepsItsPlaceWithTheDetectorsNoise) {
   for (const Match& m : search.found[0]) {
     const std::size_t k = m.keypoint.index();
     EXPECT_EQ(frame.cameras[0].keypoints.pixel[k], seen.frame.cameras[0].keypoints.pixel[k]);
+    EXPECT_FALSE(m.aligned);
     EXPECT_NEAR(frame.cameras[0].keypoints.sigma[k], 0.9 * std::pow(1.2, frame.cameras[0].keypoints.level[k]), 1e-4);
   }
 }

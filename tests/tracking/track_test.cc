@@ -249,10 +249,12 @@ TEST_F(Track, SearchesWidelyWhereThePredictionIsWrong) {
   expect_true(tracker.track(frame.frame).result, frame.T_world_rig, "wrong prediction");
 }
 
-// On the first frame after the start nothing is known of the motion. Two keypoints of five are where they were before, as with
+// On the first frame after the start nothing is known of the motion, and after a long pause nothing any more. Two keypoints of five are where they were before, as with
 // a pattern that repeats itself: narrow windows about the old pose would hold these alone.
 TEST_F(Track, DoesNotTakeWhatStayedForProofThatNothingMoved) {
-  SimulatedTracker tracker(world());
+  SimulatedTracker tracker(world()), paused(world());
+  paused.state.twist.emplace(geometry::Vector6d::Zero());
+  paused.state.time_ns -= from_seconds(1.0);
   const auto frame = world().sim.frame(FrameId(6), 0.3);
   auto shown = frame.frame;
   const auto& before = world().frames[0];
@@ -270,6 +272,7 @@ TEST_F(Track, DoesNotTakeWhatStayedForProofThatNothingMoved) {
   }
   EXPECT_GT(map::angle_rad(frame.T_world_rig, before.T_world_rig), 2 * tracker.options.matching.predicted_radius);
   expect_true(tracker.track(shown).result, frame.T_world_rig, "first motion");
+  expect_true(paused.track(shown).result, frame.T_world_rig, "motion after a pause");
 }
 
 TEST_F(Track, LearnsTheMotion) {
