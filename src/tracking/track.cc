@@ -27,12 +27,18 @@ SE3 predict(const TrackInput& input, TimeNs time_ns) {
   return motion_since_last(input.state, time_ns).value_or(SE3()) * last;
 }
 
-// Landmarks of the last frame that the present map still knows.
-std::vector<LandmarkId> surviving(const map::BundledMap& map, std::span<const LandmarkId> landmarks) {
+// What the last frame showed, and the last image of cameras that had none in it, as far as the present map still knows it.
+std::vector<LandmarkId> seen_last(const map::BundledMap& map, const TrackerState& state) {
   std::vector<LandmarkId> out;
-  for (const LandmarkId l : landmarks) {
-    const LandmarkId now = map.resolve(l);
-    if (now.valid()) out.push_back(now);
+  const auto add = [&](const std::vector<LandmarkId>& landmarks) {
+    for (const LandmarkId l : landmarks) {
+      const LandmarkId now = map.resolve(l);
+      if (now.valid()) out.push_back(now);
+    }
+  };
+  add(state.landmarks);
+  for (const CameraTrust& camera : state.cameras) {
+    if (camera.seen_ns != state.time_ns) add(camera.landmarks);
   }
   std::sort(out.begin(), out.end());
   out.erase(std::unique(out.begin(), out.end()), out.end());
@@ -155,7 +161,7 @@ bool track_in_wide_windows(const TrackInput& input, const frame::BundledFrame& f
 // seems to confirm the guess.
 Coarse track_last_frame(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
                         ThreadPool& pool) {
-  const std::vector<LandmarkId> landmarks = surviving(input.map, input.state.landmarks);
+  const std::vector<LandmarkId> landmarks = seen_last(input.map, input.state);
   Coarse out{predict(input, frame.time_ns), {}, LostReason::kFewMatches, doubted(input.state, input.map.rig().size())};
   const bool tracking = input.state.status == TrackStatus::kTracking;
   const bool predicted = tracking && motion_since_last(input.state, frame.time_ns);
