@@ -45,7 +45,9 @@ void SearchByProjection(benchmark::State& state) {
   }
   std::size_t matches = 0;
   for (auto _ : state) {
-    matches = search_by_projection(world().map.rig().camera(0), seen.frame.cameras[0], T_cam_world, points, {}, {.radius = 0.006}).matches.size();
+    matches =
+        search_by_projection(world().map.rig().camera(0), seen.frame.cameras[0], T_cam_world, points, {}, {.radius = 0.006})
+            .matches.size();
   }
   state.counters["points"] = static_cast<double>(points.size());
   state.counters["matches"] = static_cast<double>(matches);
@@ -54,7 +56,9 @@ BENCHMARK(SearchByProjection)->Unit(benchmark::kMicrosecond);
 
 // A bump of waves, half a pixel off, slightly turned.
 void AlignPatch(benchmark::State& state) {
-  const auto grey = [](double x, double y) { return static_cast<std::uint8_t>(128 + 50 * std::sin(0.5 * x + 0.2 * y) + 40 * std::cos(0.45 * y)); };
+  const auto grey = [](double x, double y) {
+    return static_cast<std::uint8_t>(128 + 50 * std::sin(0.5 * x + 0.2 * y) + 40 * std::cos(0.45 * y));
+  };
   image::Image image(160, 120);
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) image.row(y)[x] = grey(x - 80, y - 60);

@@ -156,8 +156,9 @@ class Recall {
       ++missed_[static_cast<std::size_t>(outcome)];
     }
     if (arguments_.detail) {
-      fmt::print("{} at {:.2f} s: {} right places, overlap {:.2f}: {} ({})\n", now.keyframe.value(), 1e-9 * static_cast<double>(now.time_ns),
-                 places.size(), best, kOutcomes[static_cast<std::size_t>(outcome)], note_);
+      fmt::print("{} at {:.2f} s: {} right places, overlap {:.2f}: {} ({})\n", now.keyframe.value(),
+                 1e-9 * static_cast<double>(now.time_ns), places.size(), best, kOutcomes[static_cast<std::size_t>(outcome)],
+                 note_);
     }
   }
 
@@ -184,8 +185,9 @@ class Recall {
       const Random random(static_cast<std::uint64_t>(config_.seed), "loop", static_cast<std::uint64_t>(now.keyframe.value()));
       const auto location = looping::locate(map_, *map_.keyframe(now.keyframe).frame, candidate.keyframe, config_.looping.verification,
                                             config_.feature_model(), random, &report);
-      note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} found {} of {}; ", candidate.keyframe.value(), candidate.score,
-                           static_cast<int>(report.rejection), report.matches, report.inliers, report.found, report.sought);
+      note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} found {} of {}; ", candidate.keyframe.value(),
+                           candidate.score, static_cast<int>(report.rejection), report.matches, report.inliers, report.found,
+                           report.sought);
       if (location) return is_right(now, *old, *location) ? Outcome::kRight : Outcome::kWrong;
     }
     return outcome;

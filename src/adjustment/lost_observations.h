@@ -9,9 +9,9 @@
 namespace bslam::adjustment {
 
 // Looks for every point of the problem in every image of its keyframes, under the extrinsics `T_cam_rig` (one per camera)
-// and the problem's own poses and points, and adds what is found as observations, those not aligned. Only keypoints
-// without a landmark, in the map or the problem, are taken; only of keyframes that do not see the point with that camera yet. Bounds are wide: whoever
-// adjusts next judges. Returns how many were added.
+// and the problem's own poses and points, and adds what is found as observations, those not aligned. Only keypoints without
+// a landmark, in the map or the problem, are taken; only of keyframes that do not see the point with that camera yet.
+// Bounds are wide: whoever adjusts next judges. Returns how many were added.
 int recover_observations(const map::BundledMap& map, std::span<const geometry::SE3> T_cam_rig, const map::FeatureModel& features,
                          FlatProblem& flat);
 

@@ -37,7 +37,8 @@ std::ptrdiff_t count(const report::RunRecord& record, report::FrameOutcome outco
 void print_warnings(const report::RunRecord& record) {
   for (const report::CameraRecord& camera : record.cameras) {
     if (camera.skipped > 0) {
-      fmt::print(stderr, "warning: {}: {} of its images could not be read, the first: {}\n", camera.name, camera.skipped, camera.first_skipped);
+      fmt::print(stderr, "warning: {}: {} of its images could not be read, the first: {}\n", camera.name, camera.skipped,
+                 camera.first_skipped);
     }
     warn_of_outages(camera);
     warn_of_extrinsics(camera);

@@ -21,7 +21,8 @@ int print_settings(const ConfigArguments& arguments) {
 
 void add_settings(CLI::App& app, int& exit_status) {
   const auto a = std::make_shared<ConfigArguments>();
-  CLI::App* verb = app.add_subcommand("settings", "every setting with its value (of --config and --set, else its default), meaning and range");
+  CLI::App* verb = app.add_subcommand(
+      "settings", "every setting with its value (of --config and --set, else its default), meaning and range");
   add_config_options(*verb, *a);
   verb->callback([a, &exit_status] { exit_status = print_settings(*a); });
 }

@@ -36,9 +36,9 @@ struct EpipolarMatch {
   int hamming = 0;
 };
 
-// Best matches in order of `a`, each keypoint of b with the one of a that fits it best. All points of one epipolar plane have the same angle about the baseline, so the
-// keypoints of b sorted by that angle give each keypoint of a its candidates in a narrow window. Empty where the
-// baseline is shorter than a micrometre.
+// Best matches in order of `a`, each keypoint of b with the one of a that fits it best. All points of one epipolar plane
+// have the same angle about the baseline, so the keypoints of b sorted by that angle give each keypoint of a its candidates
+// in a narrow window. Empty where the baseline is shorter than a micrometre.
 std::vector<EpipolarMatch> match_epipolar(const EpipolarView& a, const EpipolarView& b, const EpipolarOptions& options);
 
 }  // namespace bslam::frame

@@ -108,9 +108,11 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
 
 std::vector<std::uint32_t> visible_points(const camera::Camera& camera, const geometry::SE3& T_cam_common,
                                           std::span<const SearchPoint> points, double max_view_angle) {
+  const double min_cosine = std::cos(max_view_angle);
   std::vector<std::uint32_t> out;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!points[i].skip && sight_of(camera, T_cam_common, points[i], std::cos(max_view_angle))) out.push_back(static_cast<std::uint32_t>(i));
+    if (points[i].skip || !sight_of(camera, T_cam_common, points[i], min_cosine)) continue;
+    out.push_back(static_cast<std::uint32_t>(i));
   }
   return out;
 }

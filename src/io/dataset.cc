@@ -98,7 +98,8 @@ Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recordin
     if (static_cast<std::size_t>(camera) < recording.camera_count()) continue;
     const std::size_t there = recording.camera_count();
     return Error{request.path.string(), "", fmt::format("images of {} camera{}", there, there == 1 ? "" : "s"),
-                 fmt::format("of camera {} as well: {} has {} (--cameras takes some of them)", camera, request.rig_file->string(), rig->size())};
+                 fmt::format("of camera {} as well: {} has {} (--cameras takes some of them)", camera,
+                             request.rig_file->string(), rig->size())};
   }
   ChosenRig chosen{*cameras, rig->subset(*cameras), {}};
   if (recording.camera_count() > rig->size()) {

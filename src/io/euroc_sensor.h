@@ -23,7 +23,8 @@ std::filesystem::path euroc_root(const std::filesystem::path& data);
 // Can the format hold the models of all cameras?
 bool euroc_holds_models(const camera::Rig& rig);
 
-// One camera as a sensor.yaml, of a model that the format holds; `rate_hz` is for the reader only. The format holds no name, time offset or mask.
+// One camera as a sensor.yaml, of a model that the format holds; `rate_hz` is for the reader only. The format holds no
+// name, time offset or mask.
 std::string euroc_sensor_yaml(const camera::RigCamera& camera, double rate_hz);
 
 // Writes FOLDER/mav0/camN/sensor.yaml for every camera, making the folders. Errors: a camera with a time offset or a

@@ -207,7 +207,8 @@ Status fits(const SavedMap& saved, const camera::Rig& rig, const map::PyramidSha
   const map::PyramidShape& own = saved.map.pyramid();
   if (own.levels != pyramid.levels || own.scale_factor != pyramid.scale_factor) {
     return Error{saved.file, "pyramid", fmt::format("{} levels, factor {}", own.levels, own.scale_factor),
-                 fmt::format("{} levels, factor {} as features.levels and features.scale_factor say", pyramid.levels, pyramid.scale_factor)};
+                 fmt::format("{} levels, factor {} as features.levels and features.scale_factor say", pyramid.levels,
+                             pyramid.scale_factor)};
   }
   if (vocabulary == nullptr || saved.info.vocabulary == 0) return {};
   if (saved.info.vocabulary != vocabulary->id() || saved.words_end > vocabulary->size()) {

@@ -80,8 +80,8 @@ std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyfram
 }
 
 // What the keyframe was found to see becomes its own, then what its window sees as well, looked for at the poses given.
-void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_world, const LoopClosure& closure, const Location& location, const LoopOptions& options,
-          const map::FeatureModel& features, map::MapDraft& draft) {
+void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_world, const LoopClosure& closure,
+          const Location& location, const LoopOptions& options, const map::FeatureModel& features, map::MapDraft& draft) {
   const std::vector<LandmarkId> place =
       landmarks_about(draft.map(), closure.with, options.window, static_cast<int>(draft.map().num_landmarks()));
   for (const auto& [feature, there] : location.matches) {

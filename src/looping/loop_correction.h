@@ -11,9 +11,9 @@ namespace bslam::looping {
 // By how much the world about `keyframe` is off, if the location is right.
 LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Location& location);
 
-// Is it a return to the place, and could the error have grown to that on the way from the place to the keyframe? What looks the same but is somewhere else
-// asks for corrections far beyond drift. Parts that are not joined yet can be anywhere, but without a metric scale they
-// cannot be joined.
+// Is it a return to the place, and could the error have grown to that on the way from the place to the keyframe? What looks
+// the same but is somewhere else asks for corrections far beyond drift. Parts that are not joined yet can be anywhere, but
+// without a metric scale they cannot be joined.
 bool plausible(const map::BundledMap& map, const LoopClosure& closure, const LoopOptions& options);
 
 // Moves the part of one to where the other's says it is, and hangs it below. False, with nothing changed, where scales are

@@ -24,7 +24,8 @@ struct RecognitionOptions {
     visitor("group_share", self.group_share, Range{0, 1}, "", "of the best group's score, that a candidate's must reach");
     visitor("rival_share", self.rival_share, Range{0, 1}, "", "of both shares, where a frame may be anywhere");
     visitor("group", self.group, Range{1, 100}, "", "covisible keyframes whose scores add up");
-    visitor("neighbour_weight", self.neighbour_weight, Range{1, 10000}, "", "shared landmarks that make a keyframe a neighbour, no candidate");
+    visitor("neighbour_weight", self.neighbour_weight, Range{1, 10000}, "",
+            "shared landmarks that make a keyframe a neighbour, no candidate");
     visitor("neighbour_share", self.neighbour_share, Range{0, 1}, "", "of all landmarks of a keyframe, likewise");
     visitor("max_candidates", self.max_candidates, Range{1, 100}, "", "places looked at closely");
   }
@@ -78,7 +79,8 @@ struct LoopOptions {
     visitor("max_apart", self.max_apart, Range{0, 100}, "", "distance to the place, of that to what is seen of it");
     visitor("max_drift", self.max_drift, Range{0, 10}, "", "of the way since the place was seen, that a correction may be");
     visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "the same where the scale is not observable");
-    visitor("near_px", self.near_px, Range{0, 1000}, "px", "error of what is seen of the place, up to which bundle adjustment needs no help");
+    visitor("near_px", self.near_px, Range{0, 1000}, "px",
+            "error of what is seen of the place, up to which bundle adjustment needs no help");
     visitor("edge_weight", self.edge_weight, Range{1, 10000}, "", "shared landmarks of neighbours in the pose graph");
     visitor("window", self.window, Range{0, 100}, "", "covisible keyframes that are fused with the place");
     visitor.section("fusion", self.fusion);

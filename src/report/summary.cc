@@ -41,7 +41,9 @@ ordered_json frames_json(const RunRecord& record) {
 
 ordered_json extrinsics_json(const std::optional<ExtrinsicsRecord>& e) {
   if (!e) return nullptr;
-  const auto known = [](double deviation, int digits, bool observed) { return observed ? ordered_json(rounded(deviation, digits)) : ordered_json(); };
+  const auto known = [](double deviation, int digits, bool observed) {
+    return observed ? ordered_json(rounded(deviation, digits)) : ordered_json();
+  };
   return {{"change_deg", rounded(e->change_deg, 4)},
           {"std_deg", known(e->std_deg, 4, e->rotation_observed)},
           {"change_mm", rounded(e->change_mm, 2)},

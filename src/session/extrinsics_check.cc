@@ -210,9 +210,10 @@ namespace {
 std::string describe(const PairEvidence& pair) {
   const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
   if (pair.other) {
-    return fmt::format("{} of {} matches fit the second turned by {:.1f} degrees from how it is given, in a direction {:.0f} degrees "
-                       "from the given one; {} as given",
-                       pair.other->agreeing, pair.matches, pair.other->turned_deg, pair.other->displaced_deg, agreeing(Convention::kAsGiven));
+    return fmt::format(
+        "{} of {} matches fit the second turned by {:.1f} degrees from how it is given, in a direction {:.0f} degrees "
+        "from the given one; {} as given",
+        pair.other->agreeing, pair.matches, pair.other->turned_deg, pair.other->displaced_deg, agreeing(Convention::kAsGiven));
   }
   if (!pair.verdict && pair.matches > kMany) return fmt::format("{} matches, and no convention fits enough of them", pair.matches);
   if (!pair.verdict) return fmt::format("too little in common to tell ({} matches)", pair.matches);

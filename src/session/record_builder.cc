@@ -64,7 +64,9 @@ std::vector<std::uint8_t> between_images(const std::vector<system::FrameRecord>&
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
   std::nth_element(steps.begin(), middle, steps.end());
   for (std::size_t i = 1; i < at.size(); ++i) {
-    if (at[i] - at[i - 1] <= *middle) std::fill(out.begin() + static_cast<std::ptrdiff_t>(at[i - 1]), out.begin() + static_cast<std::ptrdiff_t>(at[i]), std::uint8_t{1});
+    if (at[i] - at[i - 1] > *middle) continue;
+    const auto first = out.begin() + static_cast<std::ptrdiff_t>(at[i - 1]), last = out.begin() + static_cast<std::ptrdiff_t>(at[i]);
+    std::fill(first, last, std::uint8_t{1});
   }
   return out;
 }

@@ -70,7 +70,8 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
 std::vector<std::string> warnings_of(const camera::Rig& rig) {
   std::vector<std::string> warnings = io::rig_warnings(rig);
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    if (const auto mask = io::read_mask(rig.camera(i)); !mask) warnings.push_back("mask of " + rig.camera(i).name + ": " + mask.error().message());
+    const auto mask = io::read_mask(rig.camera(i));
+    if (!mask) warnings.push_back("mask of " + rig.camera(i).name + ": " + mask.error().message());
   }
   return warnings;
 }

@@ -147,7 +147,8 @@ class ParallelExecutor : public StageExecutor {
     const Stopwatch watch;
     const map::MapSnapshot base = gate_.newest();
     StageResult result = setup_.functions[task.stage](task, base, stop);
-    if (task.stage == Stage::kLoop && result.draft && !result.draft->overtaken(*gate_.newest())) {  // before the commit: what was not committed by now never is
+    // Before the commit: what was not committed by now never is.
+    if (task.stage == Stage::kLoop && result.draft && !result.draft->overtaken(*gate_.newest())) {
       const std::lock_guard lock(mutex_);
       drop(lane(Stage::kGlobal));
     }

@@ -62,8 +62,10 @@ struct InitialisationOptions {
     visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "", "squared normalised error of a keypoint against its feature's point");
     visitor("min_monocular", self.min_monocular, Range{10, 10000}, "", "matches between two frames that start a map up to scale");
     visitor("min_monocular_points", self.min_monocular_points, Range{10, 10000}, "", "points such a start needs");
-    visitor("guessed_depth", self.guessed_depth, Range{1e-3, 1e4}, "m", "median distance of its points where several cameras may tell later");
-    visitor("max_scale_deviation", self.max_scale_deviation, Range{1e-3, 10}, "", "relative error of a start's scale above which it is guessed");
+    visitor("guessed_depth", self.guessed_depth, Range{1e-3, 1e4}, "m",
+            "median distance of its points where several cameras may tell later");
+    visitor("max_scale_deviation", self.max_scale_deviation, Range{1e-3, 10}, "",
+            "relative error of a start's scale above which it is guessed");
   }
 };
 
@@ -89,7 +91,8 @@ struct ConsensusOptions {
     visitor("seen_share", self.seen_share, Range{0, 1}, "", "of the landmarks in its view that a doubted camera must find");
     visitor("readmit_after", self.readmit_after, Range{1, 10000}, "frames", "in a row before it counts again");
     visitor("forget_after_s", self.forget_after_s, Range{0, 1e6}, "s", "without anything it should see, after which it counts again");
-    visitor("retry_after_s", self.retry_after_s, Range{0, 1e6}, "s", "out and not seen to show its view displaced, after which it is tried again");
+    visitor("retry_after_s", self.retry_after_s, Range{0, 1e6}, "s",
+            "out and not seen to show its view displaced, after which it is tried again");
   }
 };
 

@@ -186,7 +186,8 @@ struct Fine {
 // Per camera.
 std::vector<Expectation> expectations(const MatchSearch& search) {
   std::vector<Expectation> out;
-  for (std::size_t c = 0; c < search.found.size(); ++c) out.push_back({search.visible_by_camera[c], static_cast<int>(search.found[c].size())});
+  for (std::size_t c = 0; c < search.found.size(); ++c)
+    out.push_back({search.visible_by_camera[c], static_cast<int>(search.found[c].size())});
   return out;
 }
 

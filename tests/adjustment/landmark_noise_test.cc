@@ -19,7 +19,8 @@ std::unique_ptr<scene::BundleScene> uneven_scene(std::uint64_t seed) {
   spec.noise = 0.2;
   auto out = scene::make_bundle_scene(spec, random);
   for (auto& o : out->problem.observations) {
-    if (noisy(static_cast<std::size_t>(o.point))) o.pixel += Eigen::Vector2f(static_cast<float>(1.2 * random.normal()), static_cast<float>(1.2 * random.normal()));
+    if (noisy(static_cast<std::size_t>(o.point)))
+      o.pixel += Eigen::Vector2f(static_cast<float>(1.2 * random.normal()), static_cast<float>(1.2 * random.normal()));
   }
   return out;
 }

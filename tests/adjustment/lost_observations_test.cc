@@ -122,7 +122,8 @@ TEST(RecoverObservations, TakesNoKeypointThatTheProblemHasGivenToAnotherPoint) {
   FlatProblem once = before, flat = before;
   ASSERT_GT(recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, once), 0);
   const auto known = [&](const auto& o) {
-    return std::ranges::any_of(before.problem.observations, [&](const auto& b) { return b.pose == o.pose && b.camera == o.camera && b.pixel == o.pixel; });
+    return std::ranges::any_of(before.problem.observations,
+                               [&](const auto& b) { return b.pose == o.pose && b.camera == o.camera && b.pixel == o.pixel; });
   };
   auto given = *std::ranges::find_if_not(once.problem.observations, known);  // a keypoint that would be found
   const int rightful = std::exchange(given.point, given.point == 0 ? 1 : 0);

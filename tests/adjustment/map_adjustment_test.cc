@@ -35,7 +35,9 @@ Selection everything(const map::BundledMap& map, int fixed) {
 // Moves free keyframes by about five centimetres and one degree, landmarks by about half a metre.
 void perturb(const Selection& selection, map::BundledMap& map) {
   Random random(5, "perturb");
-  const auto noise = [&](double size) -> Eigen::Vector3d { return size * Eigen::Vector3d(random.normal(), random.normal(), random.normal()); };
+  const auto noise = [&](double size) -> Eigen::Vector3d {
+    return size * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+  };
   for (const KeyframeId k : selection.free_keyframes) {
     geometry::Vector6d delta;
     delta << noise(0.01), noise(0.03);

@@ -35,7 +35,8 @@ class Wall {
  private:
   static double soft(double t) { return std::clamp(4 * (t - 0.5) + 0.5, 0.0, 1.0); }
   double tile(double u, double v) const {
-    const auto i = static_cast<std::uint32_t>(static_cast<int>(std::floor(u)) + 1000), j = static_cast<std::uint32_t>(static_cast<int>(std::floor(v)) + 1000);
+    const auto i = static_cast<std::uint32_t>(static_cast<int>(std::floor(u)) + 1000),
+               j = static_cast<std::uint32_t>(static_cast<int>(std::floor(v)) + 1000);
     return tile_[(i * 131 + j * 31 + (i ^ j)) % tile_.size()];
   }
   std::array<double, 4093> tile_;
@@ -73,7 +74,8 @@ class Bundle : public ::testing::Test {
   Bundle() : pool(2), builder(rig, options(), {}) {
     const Wall wall;
     images.images.resize(4);
-    for (std::size_t c = 0; c < 3; ++c) images.images[c] = {image::ImageState::kPresent, 0, picture(wall, rig.camera(c), rig.rig_from_cam(c))};
+    for (std::size_t c = 0; c < 3; ++c)
+      images.images[c] = {image::ImageState::kPresent, 0, picture(wall, rig.camera(c), rig.rig_from_cam(c))};
   }
   static feature::FeatureOptions options() {
     feature::FeatureOptions o;
@@ -111,7 +113,8 @@ TEST_F(Bundle, MatchedFeaturesShowOnePlaceOfTheWorld) {
     }
     if (const auto& p = frame.bundled.point(FeatureId(f))) {
       const Vector3d ray = p->point_rig.normalized();
-      normalised.push_back(std::abs(p->point_rig.norm() - Wall::hit(Vector3d::Zero(), ray).norm()) / std::sqrt(ray.dot(p->covariance * ray)));
+      normalised.push_back(std::abs(p->point_rig.norm() - Wall::hit(Vector3d::Zero(), ray).norm()) /
+                           std::sqrt(ray.dot(p->covariance * ray)));
     }
   }
   EXPECT_GT(of_three, 30u);

@@ -83,7 +83,8 @@ TEST(AlignPatch, RefusesFlatPatchesAndOtherTextures) {
   flat.fill(100);
   EXPECT_FALSE(align_patch(flat, Matrix2d::Identity(), target, centre, {}).has_value());
   int wrong = 0;
-  for (std::uint64_t seed = 2; seed < 42; ++seed) wrong += align_patch(patch_of(Texture(seed)), Matrix2d::Identity(), target, centre, {}).has_value();
+  for (std::uint64_t seed = 2; seed < 42; ++seed)
+    wrong += align_patch(patch_of(Texture(seed)), Matrix2d::Identity(), target, centre, {}).has_value();
   EXPECT_LE(wrong, 3);
 }
 

@@ -155,7 +155,8 @@ TEST_F(SmallEuroc, TakesAnotherRig) {
   const auto without = open_dataset({.path = data()});
   ASSERT_TRUE(without);
   ASSERT_EQ(without->warnings.size(), 1u);
-  EXPECT_NE(without->warnings[0].find("gives time offsets (cam0 500 ms, cam1 500 ms), which are not used without --rig"), std::string::npos);
+  EXPECT_NE(without->warnings[0].find("gives time offsets (cam0 500 ms, cam1 500 ms), which are not used without --rig"),
+            std::string::npos);
   EXPECT_EQ(dataset->first_time_ns, kSmallStart + 500'000'000);
   EXPECT_EQ(read_frame(*dataset, 0).images[1].time_ns, kSmallStart + 500'000'000);
   fs::remove_all(camera(1));

@@ -114,7 +114,8 @@ INSTANTIATE_TEST_SUITE_P(Cameras, LocateRig, ::testing::Values(1, 2, 4));
 // Everything that is seen from more than `turn` aside of where the map knows it from looks different from there.
 SimulatedFrame changed_aside(SimulatedFrame seen, const HallMap& world, double turn) {
   std::map<int, Eigen::Vector3d> known_from;
-  for (const LandmarkId l : world.map.landmark_ids()) known_from[world.shown_by_landmark[l.index()].second] = world.map.landmark(l).view_direction;
+  for (const LandmarkId l : world.map.landmark_ids())
+    known_from[world.shown_by_landmark[l.index()].second] = world.map.landmark(l).view_direction;
   const Eigen::Vector3d here = seen.T_world_rig.translation();
   for (std::size_t c = 0; c < seen.landmark.size(); ++c) {
     for (std::size_t k = 0; k < seen.landmark[c].size(); ++k) {
@@ -190,7 +191,8 @@ TEST(Locate, FisheyesFindThePlaceTurnedRound) {
 
 TEST(Locate, LandmarksAboutAKeyframeAreThoseSeenMostOften) {
   const HallMap& world = exact_walk(1);
-  const std::vector<LandmarkId> all = landmarks_about(world.map, KeyframeId(9), 4, 100000), few = landmarks_about(world.map, KeyframeId(9), 4, 50);
+  const std::vector<LandmarkId> all = landmarks_about(world.map, KeyframeId(9), 4, 100000),
+                                few = landmarks_about(world.map, KeyframeId(9), 4, 50);
   const std::set<LandmarkId> distinct(all.begin(), all.end());
   EXPECT_EQ(distinct.size(), all.size());
   for (const LandmarkId l : world.map.keyframe(KeyframeId(9)).landmarks) EXPECT_TRUE(!l.valid() || distinct.contains(l));

@@ -91,7 +91,8 @@ TEST_P(CloseLoopRig, MeasuresTheDrift) {
 TEST_P(CloseLoopRig, BringsTheKeyframesBack) {
   for (const KeyframeId k : {kLast, KeyframeId(kLast.value() - 1), KeyframeId(kLast.value() - 4)}) {
     EXPECT_LT(5 * error_of(world, draft.map(), k), error_of(world, world.map, k));
-    EXPECT_LT(5 * angle_rad(draft.map().keyframe(k).T_rig_world, world.truth(k)), angle_rad(world.map.keyframe(k).T_rig_world, world.truth(k)));
+    EXPECT_LT(5 * angle_rad(draft.map().keyframe(k).T_rig_world, world.truth(k)),
+              angle_rad(world.map.keyframe(k).T_rig_world, world.truth(k)));
   }
   EXPECT_LT(2 * mean_error(world, draft.map()), mean_error(world, world.map));  // the graph knows both ends only
   EXPECT_EQ(error_of(world, draft.map(), KeyframeId(0)), error_of(world, world.map, KeyframeId(0)));

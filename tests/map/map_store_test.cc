@@ -48,6 +48,26 @@ TEST(MapStore, GivesTheNextIdsWhereOthersWereFaster) {
   EXPECT_EQ(report.published->check_invariants().value_or("sound"), "sound");
 }
 
+TEST(MapStore, FreesWhatWasRemovedAlsoWhereOthersWereFasterAndNeverForReaders) {
+  Random random(1);
+  MapStore store{BundledMap(synthetic_rig(1))};
+  MapDraft made("made", store.snapshot());
+  const KeyframeId k = made.add_keyframe(synthetic_frame(random, 1, 40, 0), {}, {}, {});
+  for (int i = 0; i < 40; ++i) made.add_landmark({0, 0, 5}, {{k, FeatureId(i)}});
+  store.commit(std::move(made));
+  const MapSnapshot reader = store.snapshot();
+  MapDraft first("first", reader), second("second", reader);
+  for (int i = 0; i < 32; ++i) (i < 16 ? first : second).remove_landmark(LandmarkId(i));
+  store.commit(std::move(first));
+  const CommitReport report = store.commit(std::move(second));
+  EXPECT_TRUE(report.rebased);
+  const auto freed = [](const BundledMap& map) { return &map.landmark(LandmarkId(0)) == &map.landmark(LandmarkId(16)); };
+  EXPECT_TRUE(freed(*report.published));
+  EXPECT_FALSE(freed(*reader));
+  EXPECT_EQ(reader->landmark(LandmarkId(3)).position, Eigen::Vector3d(0, 0, 5));
+  EXPECT_EQ(report.published->check_invariants().value_or("sound"), "sound");
+}
+
 TEST(MapStore, ServesReadersWhileTwoThreadsCommit) {
   constexpr int kCommits = 60;
   MapStore store{BundledMap(synthetic_rig(2))};

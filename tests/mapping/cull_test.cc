@@ -13,7 +13,8 @@ class Cull : public ::testing::Test {
   static constexpr std::size_t kKeypoints = 60, kMatched = 20;
   Cull() : map(map::synthetic_rig(2)) {}
   KeyframeId add_keyframe() {
-    return map.add_keyframe(map::synthetic_frame(random, 2, kKeypoints, kMatched), map::random_pose(random, 0.5), {}, map.newest_keyframe());
+    return map.add_keyframe(map::synthetic_frame(random, 2, kKeypoints, kMatched), map::random_pose(random, 0.5), {},
+                            map.newest_keyframe());
   }
   LandmarkId add_landmark(const std::vector<map::Observation>& observations) {
     return map.add_landmark(map::random_point(random), observations);

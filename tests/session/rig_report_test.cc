@@ -105,7 +105,8 @@ TEST(ExtrinsicsCheck, IsNotAlarmedByAFewMoreMatchesElsewhere) {
   const camera::Rig rig = stereo();
   auto views = views_of(rig);
   for (feature::Keypoints& v : views) v.pixel.resize(40), v.descriptor.resize(40);
-  for (std::size_t i = 0; i < 16; ++i) views[1].pixel[i] += Eigen::Vector2f(17.0f * static_cast<float>(i % 5), 90.0f - 11.0f * static_cast<float>(i));
+  for (std::size_t i = 0; i < 16; ++i)
+    views[1].pixel[i] += Eigen::Vector2f(17.0f * static_cast<float>(i % 5), 90.0f - 11.0f * static_cast<float>(i));
   const PairEvidence evidence = judged(rig, views);
   EXPECT_LT(evidence.agreeing[0], 28);
   EXPECT_FALSE(evidence.other);

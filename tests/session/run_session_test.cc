@@ -106,7 +106,8 @@ TEST_F(Session, EveryPartOfTheMapHasFilesOfItsOwn) {
   SessionOptions o = options();
   auto result = run_session(dataset(), o);
   ASSERT_TRUE(result.ok());
-  result->trajectories.push_back({KeyframeId(7), {result->trajectories.front().poses.begin() + 5, result->trajectories.front().poses.end()}});
+  result->trajectories.push_back(
+      {KeyframeId(7), {result->trajectories.front().poses.begin() + 5, result->trajectories.front().poses.end()}});
   const fs::path out = folder() / "parts";
   fs::create_directory(out);
   ASSERT_TRUE(write_outputs(*result, o.config, out).ok());
@@ -194,7 +195,8 @@ TEST_F(Session, RepeatsARunByItsJournalAlsoAnInterruptedOne) {
     EXPECT_EQ(replayed->journal.entries, recorded->journal.entries);
     ASSERT_EQ(replayed->trajectories.front().poses.size(), end);
     for (std::size_t i = 0; i < end; ++i) {
-      EXPECT_EQ(replayed->trajectories.front().poses[i].T_world_frame.translation(), recorded->trajectories.front().poses[i].T_world_frame.translation());
+      EXPECT_EQ(replayed->trajectories.front().poses[i].T_world_frame.translation(),
+                recorded->trajectories.front().poses[i].T_world_frame.translation());
       EXPECT_EQ(replayed->live.front().poses[i].T_world_frame.translation(), recorded->live.front().poses[i].T_world_frame.translation());
     }
   }

@@ -58,7 +58,9 @@ std::unique_ptr<scene::BundleScene> walk(std::size_t cameras, std::uint64_t seed
   std::vector<SE3> T_rig_world;
   for (int k = 0; k < 16; ++k) {
     const double yaw = 0.12 * k;
-    const geometry::Quaterniond R = Eigen::AngleAxisd(yaw, Vector3d::UnitY()) * geometry::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(k), Vector3d(1, 0, 0.5).normalized()));
+    const geometry::Quaterniond R =
+        Eigen::AngleAxisd(yaw, Vector3d::UnitY()) *
+        geometry::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(k), Vector3d(1, 0, 0.5).normalized()));
     T_rig_world.push_back(SE3(R, Vector3d(1.5 * (1 - std::cos(yaw)), 0.05 * std::cos(k), 1.5 * std::sin(yaw))).inverse());
   }
   return seen_from(T_rig_world, cameras, points, outlier_share, random);
@@ -84,7 +86,8 @@ TEST(RigResidual, JacobiansAreThoseOfDifferences) {
     for (std::size_t i = 0; i < rig.size(); ++i) {
       const SE3 T_cam_rig = rig.cam_from_rig(i).perturbed(off);
       const auto at = [&](const Vector6d& d_rig, const Vector6d& d_pose, const Vector3d& d_point) {
-        return RigResidual::evaluate(rig.camera(i), T_cam_rig.perturbed(d_rig), motion, T_rig_world.perturbed(d_pose), point + d_point, pixel);
+        return RigResidual::evaluate(rig.camera(i), T_cam_rig.perturbed(d_rig), motion, T_rig_world.perturbed(d_pose),
+                                     point + d_point, pixel);
       };
       const Vector6d zero = Vector6d::Zero();
       const auto here = at(zero, zero, Vector3d::Zero());

@@ -76,7 +76,8 @@ TEST_F(FloorsOfAFrame, FallWhereErrorsAreSmallerThanClaimed) {
 
 TEST_F(FloorsOfAFrame, AreEachCamerasOwn) {
   Random random(1, "worse camera");
-  for (Eigen::Vector2f& pixel : frame.cameras[2].keypoints.pixel) pixel += 0.6f * Eigen::Vector2d(random.normal(), random.normal()).cast<float>();
+  for (Eigen::Vector2f& pixel : frame.cameras[2].keypoints.pixel)
+    pixel += 0.6f * Eigen::Vector2d(random.normal(), random.normal()).cast<float>();
   const auto floors = error_floors({}, world.map, frame, output, kOptions);
   for (const std::size_t c : {0u, 1u, 3u}) EXPECT_LT(floors[c] + 0.01, floors[2]) << "camera " << c;
 }

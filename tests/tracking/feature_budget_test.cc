@@ -144,7 +144,11 @@ class TrackedFrame : public ::testing::Test {
     SimulatedTracker tracker(world);
     frame = seen.frame;
     const std::vector<frame::AlignmentOptions> alignment(world.map.rig().size());
-    const TrackInput input{.map = world.map, .pyramids = pyramids, .alignment = alignment, .state = tracker.state, .noise = {world.sim.options().sigma_px}};
+    const TrackInput input{.map = world.map,
+                           .pyramids = pyramids,
+                           .alignment = alignment,
+                           .state = tracker.state,
+                           .noise = {world.sim.options().sigma_px}};
     ThreadPool pool(2);
     output = track(input, frame, tracker.options, pool);
   }

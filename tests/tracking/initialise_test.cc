@@ -59,7 +59,8 @@ class StartUpToScale : public ::testing::Test {
  protected:
   std::optional<StartedMap> start(const simulation::SimulatedFrame& first, const simulation::SimulatedFrame& second, map::MapDraft& draft,
                                   const InitialisationOptions& options = {}) {
-    const StartCandidate candidate{std::make_shared<const frame::BundledFrame>(first.frame), map::flat_pyramids(first.frame.cameras.size())};
+    const StartCandidate candidate{std::make_shared<const frame::BundledFrame>(first.frame),
+                                   map::flat_pyramids(first.frame.cameras.size())};
     return start_up_to_scale(candidate, second.frame, map::flat_pyramids(first.frame.cameras.size()), options, Random(1), draft);
   }
   // Ahead and 120 degrees to either side.
@@ -103,7 +104,8 @@ TEST_F(StartUpToScale, FindsTheMotionAndTheRoomUpToScale) {
   EXPECT_NEAR(depth[depth.size() / 2], 1.0, 0.05);
   const double scale = truth.translation().norm() / found.translation().norm();
   std::vector<double> relative;
-  for (std::size_t i = 0; i < estimated.size(); ++i) relative.push_back((scale * estimated[i] - true_places[i]).norm() / true_places[i].norm());
+  for (std::size_t i = 0; i < estimated.size(); ++i)
+    relative.push_back((scale * estimated[i] - true_places[i]).norm() / true_places[i].norm());
   std::nth_element(relative.begin(), relative.begin() + static_cast<std::ptrdiff_t>(relative.size() / 2), relative.end());
   EXPECT_LT(relative[relative.size() / 2], 0.1);
 }

@@ -89,7 +89,8 @@ class KeyframeEvidenceTest : public ::testing::Test {
       const auto& shown = frame.landmark[static_cast<std::size_t>(c)];
       for (std::size_t k = 0; k < shown.size(); ++k) {
         const auto at = world().landmark_of.find(shown[k]);
-        if (shown[k] >= 0 && at != world().landmark_of.end()) matches[static_cast<std::size_t>(c)].push_back({KeypointIndex(k), at->second});
+        if (shown[k] >= 0 && at != world().landmark_of.end())
+          matches[static_cast<std::size_t>(c)].push_back({KeypointIndex(k), at->second});
       }
     }
     return matches;
@@ -99,7 +100,8 @@ class KeyframeEvidenceTest : public ::testing::Test {
 TEST_F(KeyframeEvidenceTest, CountsTheLandmarksOfTheReferenceOnce) {
   const auto frame = world().sim.frame(FrameId(1), 0.1);
   const FrameMatches matches = true_matches(frame, {0, 1, 2, 3});
-  const KeyframeEvidence e = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), frame.T_world_rig.inverse(), TrackingOptions());
+  const KeyframeEvidence e =
+      keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), frame.T_world_rig.inverse(), TrackingOptions());
   EXPECT_EQ(e.overlap, static_cast<int>(landmarks_of(matches).size()));  // the map is one keyframe
   EXPECT_FALSE(e.starved);
   EXPECT_FALSE(e.fresh_depth);
@@ -130,7 +132,8 @@ TEST_F(KeyframeEvidenceTest, NoticesACameraThatFindsNothing) {
 TEST_F(KeyframeEvidenceTest, NoticesMatchedFeaturesThatNobodyTracks) {
   const auto frame = world().sim.frame(FrameId(1), 0.1);
   FrameMatches matches = true_matches(frame, {2, 3});  // the two in front, which overlap, have nothing
-  const KeyframeEvidence e = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), frame.T_world_rig.inverse(), TrackingOptions());
+  const KeyframeEvidence e =
+      keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), frame.T_world_rig.inverse(), TrackingOptions());
   EXPECT_TRUE(e.fresh_depth);
 }
 

@@ -60,7 +60,8 @@ TEST_F(MakeKeyframe, KeypointsThatShowOneLandmarkBecomeOneFeature) {
     for (const Match& m : matches[c]) {
       const FeatureId f = stored.bundled.feature(CameraIndex(c), m.keypoint);
       EXPECT_EQ(map.landmark_of(made.keyframe, f), m.landmark);
-      joined += stored.bundled.keypoints(f).size() > 1 && !seen.frame.bundled.is_matched(seen.frame.bundled.feature(CameraIndex(c), m.keypoint));
+      joined += stored.bundled.keypoints(f).size() > 1 &&
+                !seen.frame.bundled.is_matched(seen.frame.bundled.feature(CameraIndex(c), m.keypoint));
     }
   }
   EXPECT_GT(joined, 20u);  // a fifth of what two cameras see was not known as matched before

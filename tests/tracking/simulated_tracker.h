@@ -44,11 +44,16 @@ inline TrackerState state_at_first(const map::SimulatedMap& world) {
 class SimulatedTracker {
  public:
   explicit SimulatedTracker(const map::SimulatedMap& world)
-      : state(state_at_first(world)), world_(world), pyramids_(map::flat_pyramids(world.map.rig().size())), alignment_(pyramids_.size()), pool_(1) {}
+      : state(state_at_first(world)),
+        world_(world),
+        pyramids_(map::flat_pyramids(world.map.rig().size())),
+        alignment_(pyramids_.size()),
+        pool_(1) {}
 
   TrackOutput track(frame::BundledFrame frame) { return track(world_.map, std::move(frame)); }
   TrackOutput track(const map::BundledMap& map, frame::BundledFrame frame) {
-    const TrackInput input{.map = map, .pyramids = pyramids_, .alignment = alignment_, .state = state, .noise = {world_.sim.options().sigma_px}};
+    const TrackInput input{
+        .map = map, .pyramids = pyramids_, .alignment = alignment_, .state = state, .noise = {world_.sim.options().sigma_px}};
     TrackOutput out = tracking::track(input, frame, options, pool_);
     state = out.state;
     return out;

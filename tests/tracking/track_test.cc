@@ -221,7 +221,8 @@ TEST_F(Track, IsLostAtAPlaceItDoesNotKnow) {
   for (int i = 1; i <= 5; ++i) {
     const TrackOutput out = tracker.track(elsewhere.frame(FrameId(i), 0.05 * i).frame);
     EXPECT_EQ(out.result.status, TrackStatus::kLost);
-    EXPECT_TRUE(out.result.reason == LostReason::kFewMatches || out.result.reason == LostReason::kFewInliers) << describe(out.result.reason);
+    EXPECT_TRUE(out.result.reason == LostReason::kFewMatches || out.result.reason == LostReason::kFewInliers)
+        << describe(out.result.reason);
   }
 }
 
@@ -249,8 +250,9 @@ TEST_F(Track, SearchesWidelyWhereThePredictionIsWrong) {
   expect_true(tracker.track(frame.frame).result, frame.T_world_rig, "wrong prediction");
 }
 
-// On the first frame after the start nothing is known of the motion, and after a long pause nothing any more. Two keypoints of five are where they were before, as with
-// a pattern that repeats itself: narrow windows about the old pose would hold these alone.
+// On the first frame after the start nothing is known of the motion, and after a long pause nothing any more. Two keypoints of
+// five are where they were before, as with a pattern that repeats itself: narrow windows about the old pose would hold these
+// alone.
 TEST_F(Track, DoesNotTakeWhatStayedForProofThatNothingMoved) {
   SimulatedTracker tracker(world()), paused(world());
   paused.state.twist.emplace(geometry::Vector6d::Zero());
@@ -293,7 +295,9 @@ TEST_F(Track, IsTheSameWithAnyNumberOfThreads) {
     ThreadPool pool(threads);
     frame::BundledFrame frame = seen(2).frame;
     const TrackerState state = state_at_first(world());
-    poses.push_back(track({.map = world().map, .pyramids = pyramids, .alignment = alignment, .state = state, .noise = {}}, frame, {}, pool).result.T_rig_world);
+    poses.push_back(
+        track({.map = world().map, .pyramids = pyramids, .alignment = alignment, .state = state, .noise = {}}, frame, {}, pool)
+            .result.T_rig_world);
   }
   for (const SE3& T : poses) {
     EXPECT_EQ(T.translation(), poses[0].translation());

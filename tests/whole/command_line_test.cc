@@ -86,8 +86,8 @@ class CommandLine : public testing::Test {
 TEST_F(CommandLine, TellsItsVersionAndHelpOnEveryVerb) {
   EXPECT_EQ(run("--version").status, 0);
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
-  for (const char* verb : {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "map", "map info", "map export", "map merge",
-                           "vocab", "vocab info", "vocab train", "settings"}) {
+  for (const char* verb : {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "map", "map info",
+                           "map export", "map merge", "vocab", "vocab info", "vocab train", "settings"}) {
     EXPECT_EQ(run(std::string(verb) + " --help").status, 0) << verb;
   }
 }
@@ -123,10 +123,28 @@ TEST_F(CommandLine, PrintsSettingsThatItReads) {
 
 TEST_F(CommandLine, RefusesWhatMakesNoSense) {
   const std::string base = "run " + data() + " --out " + out("refused") + " --progress never ";
-  for (const char* more : {"--set no.such.key=1", "--set features.per_image=-5", "--set features.per_image=many", "--set seed",
-                           "--cameras 0,9", "--cameras 0,0", "--cameras a", "--cameras 0,", "--cameras ''", "--mode sideways", "--begin 5 --end 1", "--begin 99",
-                           "--format bag", "--pace slow", "--seed -1", "--config /no/such/file", "--rig /no/such/file", "--bogus",
-                           "--localize-only", "--load-map /no/such/file", "--vocabulary /no/such/file", "--replay /no/such/file"}) {
+  for (const char* more : {"--set no.such.key=1",
+                           "--set features.per_image=-5",
+                           "--set features.per_image=many",
+                           "--set seed",
+                           "--cameras 0,9",
+                           "--cameras 0,0",
+                           "--cameras a",
+                           "--cameras 0,",
+                           "--cameras ''",
+                           "--mode sideways",
+                           "--begin 5 --end 1",
+                           "--begin 99",
+                           "--format bag",
+                           "--pace slow",
+                           "--seed -1",
+                           "--config /no/such/file",
+                           "--rig /no/such/file",
+                           "--bogus",
+                           "--localize-only",
+                           "--load-map /no/such/file",
+                           "--vocabulary /no/such/file",
+                           "--replay /no/such/file"}) {
     expect_refused(base + more);
   }
   expect_refused("run /no/such/folder --out " + out("refused"));
