@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <fstream>
 
+#include "base/median.h"
 #include "cli/config_arguments.h"
 #include "io/dataset.h"
 #include "io/vocabulary_file.h"
@@ -47,10 +48,9 @@ class LapTable {
       ms.push_back(frames[i].frame_ms);
       born += frames[i].keyframe;
     }
-    std::nth_element(ms.begin(), ms.begin() + static_cast<std::ptrdiff_t>(ms.size() / 2), ms.end());
     const map::MapSnapshot map = system_.snapshot();
     fmt::print("| {} | {} | {} | {} | {} | {} | {:.0f} | {:.1f} |\n", frames.size() / frames_per_lap_, born, map->num_keyframes(),
-               map->num_landmarks(), map->num_observations(), system_.loops().size(), resident_mb(), ms[ms.size() / 2]);
+               map->num_landmarks(), map->num_observations(), system_.loops().size(), resident_mb(), median(std::move(ms)));
     std::fflush(stdout);
   }
 

@@ -14,6 +14,7 @@
 #include <array>
 #include <numbers>
 
+#include "base/median.h"
 #include "cli/config_arguments.h"
 #include "io/map_file.h"
 #include "io/trajectory_file.h"
@@ -68,8 +69,7 @@ View view_of(const map::BundledMap& map, KeyframeId k, const SE3& T_world_rig) {
       view.by_camera[r.camera.index()].emplace_back(pixel.x(), pixel.y(), depths.back());
     }
   }
-  std::sort(depths.begin(), depths.end());
-  view.median_depth = depths.empty() ? 0 : depths[depths.size() / 2];
+  view.median_depth = depths.empty() ? 0 : median(std::move(depths));
   return view;
 }
 
@@ -141,9 +141,10 @@ class Recall {
   void ask(std::size_t i) {
     const View& now = views_[i];
     std::vector<KeyframeId> places;  // right ones
+    const std::vector<map::Covisible> neighbours = looping::neighbours_of(map_, now.keyframe, config_.looping.recognition);
     double best = 0;
     for (std::size_t j = 0; j < i && old_enough(now, views_[j].time_ns); ++j) {
-      if (neighbours(now.keyframe, views_[j].keyframe)) continue;  // never lost sight of
+      if (std::ranges::binary_search(neighbours, views_[j].keyframe, {}, &map::Covisible::keyframe)) continue;  // never lost sight of
       const double share = shared_share(map_.rig(), now, views_[j]);
       if (share >= arguments_.overlap) places.push_back(views_[j].keyframe);
       best = std::max(best, share);
@@ -162,15 +163,6 @@ class Recall {
     }
   }
 
-  // As recognition has it: neighbours are no candidates.
-  bool neighbours(KeyframeId a, KeyframeId b) const {
-    const looping::RecognitionOptions& options = config_.looping.recognition;
-    const map::BundledKeyframe& keyframe = map_.keyframe(a);
-    const auto landmarks = std::ranges::count_if(keyframe.landmarks.values(), [](LandmarkId l) { return l.valid(); });
-    const auto at = std::ranges::lower_bound(keyframe.covisible.values(), b, {}, &map::Covisible::keyframe);
-    return at != keyframe.covisible.end() && at->keyframe == b && at->weight >= options.neighbour_weight &&
-           at->weight >= options.neighbour_share * static_cast<double>(landmarks);
-  }
   bool old_enough(const View& now, TimeNs then_ns) const { return static_cast<double>(now.time_ns - then_ns) > 1e9 * arguments_.older_s; }
 
   Outcome answer(const View& now, const std::vector<KeyframeId>& places) {

@@ -10,12 +10,6 @@ namespace {
 
 using solver::ReprojectionProblem;
 
-std::vector<std::uint8_t> outliers(const std::vector<double>& chi2, double max_chi2) {
-  std::vector<std::uint8_t> out(chi2.size());
-  for (std::size_t i = 0; i < chi2.size(); ++i) out[i] = !(chi2[i] <= max_chi2);
-  return out;
-}
-
 // Bound of a sum over `keypoints` keypoints that is as improbable as `bound` is for one (Wilson and Hilferty's cube root,
 // scaled so that one keypoint has the bound itself).
 double sum_bound(double bound, int keypoints) {
@@ -84,7 +78,7 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
   report.final_cost = robust.final_cost;
   if (!stop.stop_requested() && options.final_iterations > 0) {
     const std::vector<double> chi2 = solver::squared_errors(flat.problem);
-    const auto skip = outliers(chi2, options.outlier_chi2);
+    const auto skip = solver::beyond(chi2, options.outlier_chi2);
     solve.iterations = options.final_iterations;
     solve.robust = false;
     const auto variances = landmark_variances(flat.problem, chi2, skip);

@@ -8,7 +8,8 @@
 namespace bslam {
 
 // Of an even number the larger of the two in the middle. Not empty.
-inline double median(std::vector<double> values) {
+template <class T>
+T median(std::vector<T> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "base/assert.h"
+#include "base/median.h"
 
 namespace bslam::evaluation {
 
@@ -52,9 +53,7 @@ TimeNs median_interval_ns(const Trajectory& trajectory) {
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
     intervals.push_back(trajectory[i].time_ns - trajectory[i - 1].time_ns);
   }
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
+  return median(std::move(intervals));
 }
 
 double path_length_m(const Trajectory& trajectory) {

@@ -182,10 +182,11 @@ Status write_lists(const SimulationRequest& request, const std::vector<Shot>& sh
                    const simulation::Recorder& recorder) {
   const fs::path& folder = request.folder;
   const camera::Rig& rig = request.rig;
+  const bool sensors = euroc_holds_models(rig);  // rig.yaml does all
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (Status s = write_atomically(camera_folder(folder, c) / "data.csv", image_list(shots, c)); !s) return s;
     const fs::path sensor = camera_folder(folder, c) / "sensor.yaml";
-    if (!euroc_holds_models(rig)) {  // rig.yaml does
+    if (!sensors) {
       std::error_code code;
       fs::remove(sensor, code);
       continue;

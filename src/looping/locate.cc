@@ -84,37 +84,39 @@ std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map,
   return out;
 }
 
-// All landmarks looked for where the pose puts them.
-std::vector<KeypointMatch> search_at(const map::BundledMap& map, const frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
-                 const SE3& T_rig_world, double radius, const VerificationOptions& options, const map::FeatureModel& features) {
-  const std::vector<frame::SearchPoint> points = map::search_points(map, landmarks);
+// What a place is looked for by: landmarks, and as points.
+struct Sought {
+  std::vector<LandmarkId> landmarks;
+  std::vector<frame::SearchPoint> points;  // of each
+};
+
+// All landmarks looked for where the pose puts them. `rig`: as it was while the cameras of the frame fired.
+std::vector<KeypointMatch> search_at(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place, const SE3& T_rig_world,
+                                     double radius, const VerificationOptions& options, const map::FeatureModel& features) {
   const frame::ProjectionSearchOptions search{.radius = radius,
                                               .max_hamming = options.max_hamming,
                                               .ratio = 1.0,
                                               .level_slack = 2,
                                               .scale_factor = features.scale_factor};
-  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   std::vector<KeypointMatch> out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (frame.cameras[c].keypoints.empty()) continue;
     const auto found =
-        frame::search_by_projection(rig.camera(c), frame.cameras[c], rig.cam_from_rig(c) * T_rig_world, points, {}, search);
-    for (const frame::ProjectionMatch& m : found.matches) out.push_back({{CameraIndex(c), m.keypoint}, landmarks[m.point]});
+        frame::search_by_projection(rig.camera(c), frame.cameras[c], rig.cam_from_rig(c) * T_rig_world, place.points, {}, search);
+    for (const frame::ProjectionMatch& m : found.matches) out.push_back({{CameraIndex(c), m.keypoint}, place.landmarks[m.point]});
   }
   return out;
 }
 
 // The landmarks that some camera sees from about where they are known from, in order of id: what is the same place looks the same
 // from there. From far aside it does not, and missing it says nothing.
-std::vector<LandmarkId> to_be_found(const map::BundledMap& map, const frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
-                                    const SE3& T_rig_world, double max_turn) {
-  const std::vector<frame::SearchPoint> points = map::search_points(map, landmarks);
-  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+std::vector<LandmarkId> to_be_found(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place, const SE3& T_rig_world,
+                                    double max_turn) {
   std::vector<LandmarkId> out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (frame.cameras[c].keypoints.empty()) continue;
-    for (const std::uint32_t i : frame::visible_points(rig.camera(c), rig.cam_from_rig(c) * T_rig_world, points, max_turn)) {
-      out.push_back(landmarks[i]);
+    for (const std::uint32_t i : frame::visible_points(rig.camera(c), rig.cam_from_rig(c) * T_rig_world, place.points, max_turn)) {
+      out.push_back(place.landmarks[i]);
     }
   }
   std::sort(out.begin(), out.end());
@@ -171,8 +173,8 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
     out.rejection = why;
     return std::nullopt;
   };
-  const std::vector<LandmarkId> landmarks = landmarks_about(map, candidate, options.neighbours, options.max_landmarks);
-  const std::vector<KeypointMatch> matches = match_descriptors(map, frame, landmarks, options);
+  Sought place{landmarks_about(map, candidate, options.neighbours, options.max_landmarks), {}};
+  const std::vector<KeypointMatch> matches = match_descriptors(map, frame, place.landmarks, options);
   out.matches = static_cast<int>(matches.size());
   if (out.matches < options.consensus.min_inliers) return rejected(Rejection::kFewMatches);
 
@@ -183,10 +185,11 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
   out.inliers = solution.num_inliers;
   if (!solution.ok) return rejected(Rejection::kNoConsensus);
 
+  place.points = map::search_points(map, place.landmarks);
   // Twice: what the consensus alone gives is good to a few pixels, what the guided search gives to less than one.
   std::vector<KeypointMatch> guided;
   for (const double radius : {options.radius, 0.5 * options.radius}) {
-    guided = search_at(map, frame, landmarks, solution.T_rig_world, radius, options, features);
+    guided = search_at(rig, frame, place, solution.T_rig_world, radius, options, features);
     solution = solver::solve_pose(rig, observations_of(map, frame, guided, features), solution.T_rig_world, pose_options);
     if (!solution.ok) return rejected(Rejection::kNoConsensus);
   }
@@ -194,7 +197,7 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
   if (solution.num_inliers < options.min_inliers) return rejected(Rejection::kFewInliers);
   Location location{candidate, solution.T_rig_world, by_feature(frame, guided, solution.inlier), solution.num_inliers};
   for (const double turn : {options.max_turn, frame::ProjectionSearchOptions{}.max_view_angle}) {
-    const std::vector<LandmarkId> sought = to_be_found(map, frame, landmarks, solution.T_rig_world, turn);
+    const std::vector<LandmarkId> sought = to_be_found(rig, frame, place, solution.T_rig_world, turn);
     const auto is_sought = [&](const auto& match) { return std::ranges::binary_search(sought, match.second); };
     out.sought = static_cast<int>(sought.size());
     out.found = static_cast<int>(std::ranges::count_if(location.matches, is_sought));

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "base/median.h"
+
 namespace bslam::looping {
 namespace {
 
@@ -20,9 +22,7 @@ std::optional<double> relative_scale(const map::BundledMap& map, KeyframeId keyf
     ratios.push_back((location.T_rig_world * map.landmark(there).position).norm() / distance_here);
   }
   if (ratios.size() < kMinPairs) return std::nullopt;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+  return median(std::move(ratios));
 }
 
 }  // namespace bslam::looping

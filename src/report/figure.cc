@@ -7,6 +7,8 @@
 #include <iterator>
 #include <limits>
 
+#include "base/median.h"
+
 namespace bslam::report {
 
 namespace {
@@ -275,11 +277,9 @@ void add_panel(std::string& out, const Panel& panel, const Box& outer, int clip_
   add_legend(out, panel, box);
 }
 
-double value_of(std::vector<double>& values, Reduction reduction) {
+double value_of(const std::vector<double>& values, Reduction reduction) {
   if (reduction == Reduction::kMaximum) return *std::ranges::max_element(values);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return median(values);
 }
 
 }  // namespace

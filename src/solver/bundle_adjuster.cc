@@ -120,6 +120,12 @@ std::vector<double> squared_errors(const ReprojectionProblem& problem) {
   return squared_errors(problem, problem.T_rig_world, problem.points, T_cam_rig);
 }
 
+std::vector<std::uint8_t> beyond(const std::vector<double>& chi2, double bound) {
+  std::vector<std::uint8_t> out(chi2.size());
+  for (std::size_t i = 0; i < chi2.size(); ++i) out[i] = !(chi2[i] <= bound);
+  return out;
+}
+
 std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span<const SE3> T_rig_world,
                                    std::span<const Vector3d> points, std::span<const SE3> T_cam_rig) {
   std::vector<double> out;

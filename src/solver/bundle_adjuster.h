@@ -63,7 +63,9 @@ SE3 cam_from_rig_at(const ReprojectionProblem& problem, std::size_t pose, Camera
 
 // Squared normalised error of each observation at the present values; infinite where it does not project.
 std::vector<double> squared_errors(const ReprojectionProblem& problem);
-// The same at other values, extrinsics included; one per pose, point and camera of the problem.
+// Flags those of them that are not at most `bound`.
+std::vector<std::uint8_t> beyond(const std::vector<double>& chi2, double bound);
+// The errors at other values, extrinsics included; one per pose, point and camera of the problem.
 std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span<const SE3> T_rig_world,
                                    std::span<const Vector3d> points, std::span<const SE3> T_cam_rig);
 

@@ -23,13 +23,6 @@ struct Round {
 constexpr std::array kRounds = {Round{Kernel::kHuber, kLostChi2}, Round{Kernel::kHuber, 16 * kChi2TwoDof95},
                                 Round{Kernel::kNone, kChi2TwoDof95}, Round{Kernel::kNone, kChi2TwoDof95}};
 
-// What a round leaves out.
-std::vector<std::uint8_t> beyond(const std::vector<double>& chi2, double bound) {
-  std::vector<std::uint8_t> out(chi2.size());
-  for (std::size_t i = 0; i < chi2.size(); ++i) out[i] = !(chi2[i] <= bound);
-  return out;
-}
-
 // Levenberg-Marquardt from and to `state`; damping after Nielsen, IMM-REP-1999-05, as in bundle adjustment. Returns the
 // cost, or nothing where no step could be solved for.
 std::optional<double> minimise(RigEquations& equations, const RigAdjusterOptions& options, const std::stop_token& stop,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/median.h"
 #include "geometry/triangulation.h"
 #include "tracking/make_keyframe.h"
 
@@ -43,11 +44,7 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
     parallaxes.push_back(geometry::angle_between(p - centre_now, p - centre_then));
   }
   evidence.overlap = static_cast<int>(parallaxes.size());
-  if (!parallaxes.empty()) {
-    const auto middle = parallaxes.begin() + static_cast<std::ptrdiff_t>(parallaxes.size() / 2);
-    std::nth_element(parallaxes.begin(), middle, parallaxes.end());
-    evidence.parallax = *middle;
-  }
+  if (!parallaxes.empty()) evidence.parallax = median(std::move(parallaxes));
   for (std::size_t c = 0; c < inliers.size(); ++c) {
     const auto keypoints = static_cast<double>(frame.cameras[c].keypoints.size());
     const auto found = static_cast<double>(inliers[c].size());

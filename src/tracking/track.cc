@@ -21,10 +21,12 @@ std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) 
   return SE3::exp(dt * *state.twist);
 }
 
-// Last pose, in the map as it is now, moved on as far as the motion is known.
+// In the map as it is now.
+SE3 last_pose(const TrackInput& input) { return input.state.T_rig_reference * input.map.resolved_pose(input.state.reference); }
+
+// The last pose moved on as far as the motion is known.
 SE3 predict(const TrackInput& input, TimeNs time_ns) {
-  const SE3 last = input.state.T_rig_reference * input.map.resolved_pose(input.state.reference);
-  return motion_since_last(input.state, time_ns).value_or(SE3()) * last;
+  return motion_since_last(input.state, time_ns).value_or(SE3()) * last_pose(input);
 }
 
 // What the last frame showed, and the last image of cameras that had none in it, as far as the present map still knows it.
@@ -79,8 +81,7 @@ frame::ProjectionSearchOptions search_options(const TrackInput& input, const Mat
 // Motion while the cameras of a frame fire: that since the last frame, going on with the acceleration it had against the
 // interval before. The poses say it, never the late cameras alone: what these see again they saw first with the same error.
 solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFrame& frame) {
-  solver::MotionModel motion{.delay_s = frame::delays_of(frame),
-                             .T_before = input.state.T_rig_reference * input.map.resolved_pose(input.state.reference)};
+  solver::MotionModel motion{.delay_s = frame::delays_of(frame), .T_before = last_pose(input)};
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
   if (dt <= 0 || dt > kMaxPrediction_s) {
     motion.offset = frame.twist;  // nothing newer is known
@@ -101,7 +102,7 @@ bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame
                              const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  const SE3 predicted = out.T_rig_world, led_to = predict(input, frame.time_ns);
+  const SE3 predicted = out.T_rig_world;
   FrameMatches found = find_landmarks(map, frame, predicted, landmarks, {},
                                       search_options(input, options.matching, options.matching.predicted_radius), pool).found;
   std::vector<std::uint8_t> left_out = out.left_out;
@@ -111,6 +112,7 @@ bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame
   const solver::MotionModel motion = motion_model(input, frame);
   auto solution = solver::solve_pose(map.rig(), observations, predicted, motion, options.pose);
   if (any(contradicting(found, solution.inliers_per_camera, options.consensus))) {
+    const SE3 led_to = predict(input, frame.time_ns);
     const auto steadiest = believe_the_steadiest(rig, found, observations, led_to, options.consensus, options.pose);
     if (steadiest.ok) {
       const auto wrong = contradicting(found, steadiest.inliers_per_camera, options.consensus);
@@ -301,7 +303,7 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, c
 
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
   state.twist.reset();
-  if (dt > 0 && dt <= kMaxPrediction_s) state.twist = (result.T_rig_world * motion_model(input, frame).T_before.inverse()).log() / dt;
+  if (dt > 0 && dt <= kMaxPrediction_s) state.twist = (result.T_rig_world * last_pose(input).inverse()).log() / dt;
   state.status = TrackStatus::kTracking;
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);
