@@ -71,7 +71,7 @@ void AlignPatch(benchmark::State& state) {
       patch[static_cast<std::size_t>(y * feature::kPatchSize + x)] = grey(x - 4.5, y - 4.5);
     }
   }
-  const Eigen::Matrix2d warp = Eigen::Rotation2Dd(0.05).toRotationMatrix();
+  const PatchWarp warp{Eigen::Rotation2Dd(0.05).toRotationMatrix()};
   bool found = false;
   for (auto _ : state) found = align_patch(patch, warp, pyramid, {80.5, 59.6}, {}).has_value();
   state.counters["found"] = found;

@@ -76,21 +76,37 @@ std::size_t best_level(const image::Pyramid& pyramid, double scale) {
   return best;
 }
 
+constexpr float kHalf = 0.5f * (kInner - 1);  // offset of the outermost samples
+
+// A warp in pixels of a level of the target.
+struct LevelWarp {
+  Eigen::Matrix2f linear;
+  Eigen::Matrix<float, 2, 3> quadratic;
+};
+
+LevelWarp on_level(const PatchWarp& warp, const image::Pyramid& pyramid, std::size_t level) {
+  const Eigen::Vector2d per_pixel(1.0 / pyramid.scale_x[level], 1.0 / pyramid.scale_y[level]);
+  return {(per_pixel.asDiagonal() * warp.linear).cast<float>(), (per_pixel.asDiagonal() * warp.quadratic).cast<float>()};
+}
+
 // Samples of the target at the warped patch positions around (x, y), pixels of the level. False outside the image.
-bool sample_target(const image::Image& image, const Eigen::Matrix2f& A, float x, float y, std::array<float, kSamples>& out) {
-  constexpr float kHalf = 0.5f * (kInner - 1), kRounding = 0.01f;
-  const float reach_x = kHalf * (std::abs(A(0, 0)) + std::abs(A(0, 1)));
-  const float reach_y = kHalf * (std::abs(A(1, 0)) + std::abs(A(1, 1)));
-  if (!(x - reach_x >= 0 && y - reach_y >= 0 && x + reach_x < static_cast<float>(image.width() - 1) - kRounding &&
-        y + reach_y < static_cast<float>(image.height() - 1) - kRounding)) {
+bool sample_target(const image::Image& image, const LevelWarp& warp, float x, float y, std::array<float, kSamples>& out) {
+  constexpr float kRounding = 0.01f;
+  const Eigen::Matrix2f& A = warp.linear;
+  const Eigen::Matrix<float, 2, 3>& Q = warp.quadratic;
+  const Eigen::Vector2f reach = kHalf * A.cwiseAbs().rowwise().sum() + kHalf * kHalf * Q.cwiseAbs().rowwise().sum();
+  if (!(x - reach.x() >= 0 && y - reach.y() >= 0 && x + reach.x() < static_cast<float>(image.width() - 1) - kRounding &&
+        y + reach.y() < static_cast<float>(image.height() - 1) - kRounding)) {
     return false;
   }
   std::size_t i = 0;
   for (int r = 0; r < kInner; ++r) {
-    const float dy = static_cast<float>(r) - kHalf;
-    float px = x - A(0, 0) * kHalf + A(0, 1) * dy, py = y - A(1, 0) * kHalf + A(1, 1) * dy;
-    for (int c = 0; c < kInner; ++c, ++i, px += A(0, 0), py += A(1, 0)) {
-      out[i] = bilinear(image, std::max(px, 0.0f), std::max(py, 0.0f));
+    const float dx = -kHalf, dy = static_cast<float>(r) - kHalf;
+    // From column to column the position moves by a step that grows by 2 Q_xx.
+    Eigen::Vector2f p = Eigen::Vector2f(x, y) + A * Eigen::Vector2f(dx, dy) + Q * Eigen::Vector3f(dx * dx, dx * dy, dy * dy);
+    Eigen::Vector2f step = A.col(0) + (2 * dx + 1) * Q.col(0) + dy * Q.col(1);
+    for (int c = 0; c < kInner; ++c, ++i, p += step, step += 2 * Q.col(0)) {
+      out[i] = bilinear(image, std::max(p.x(), 0.0f), std::max(p.y(), 0.0f));
     }
   }
   return true;
@@ -128,36 +144,59 @@ Comparison compare(const Template& t, const std::array<float, kSamples>& samples
   return c;
 }
 
-}  // namespace
-
-std::optional<Eigen::Matrix2d> patch_warp(const camera::Camera& reference_camera, const camera::Camera& target_camera,
-                                          const geometry::SE3& T_target_reference, const Eigen::Vector3d& point_reference,
-                                          double reference_scale) {
-  const auto at_reference = reference_camera.project_with_jacobian(point_reference);
-  const auto at_target = target_camera.project_with_jacobian(T_target_reference * point_reference);
-  if (!at_reference || !at_target) return std::nullopt;
-  Eigen::Matrix<double, 3, 2> tangent;  // of the plane that faces the reference camera
-  tangent.col(0) = point_reference.unitOrthogonal();
-  tangent.col(1) = point_reference.normalized().cross(tangent.col(0));
-  const Eigen::Matrix2d reference = at_reference->jacobian * tangent;
-  const Eigen::Matrix2d target = at_target->jacobian * (T_target_reference.rotation() * tangent.col(0)).eval() * Eigen::RowVector2d(1, 0) +
-                                 at_target->jacobian * (T_target_reference.rotation() * tangent.col(1)).eval() * Eigen::RowVector2d(0, 1);
-  if (!(std::abs(reference.determinant()) > 1e-12)) return std::nullopt;
-  return (reference_scale * target * reference.inverse()).eval();
+// Coefficients of x^2, x y and y^2 of a camera's projection of point + basis * (x, y), by differences over the patch.
+std::optional<Eigen::Matrix<double, 2, 3>> second_order(const camera::Camera& camera, const Eigen::Vector3d& point,
+                                                        const Eigen::Matrix<double, 3, 2>& basis, const Eigen::Vector2d& centre) {
+  constexpr double h = kHalf;
+  const auto bend = [&](const Eigen::Vector2d& step) -> std::optional<Eigen::Vector2d> {
+    const Eigen::Vector3d move = basis * step;
+    const auto ahead = camera.project(point + move), behind = camera.project(point - move);
+    if (!ahead || !behind) return std::nullopt;
+    return ((*ahead + *behind - 2 * centre) / (2 * h * h)).eval();
+  };
+  const auto xx = bend({h, 0}), yy = bend({0, h}), all = bend({h, h});
+  if (!xx || !yy || !all) return std::nullopt;
+  Eigen::Matrix<double, 2, 3> out;
+  out << *xx, *all - *xx - *yy, *yy;
+  return out;
 }
 
-std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Eigen::Matrix2d& warp,
+}  // namespace
+
+std::optional<PatchWarp> patch_warp(const camera::Camera& reference_camera, const camera::Camera& target_camera,
+                                    const geometry::SE3& T_target_reference, const Eigen::Vector3d& point_reference,
+                                    double reference_scale) {
+  const Eigen::Vector3d point_target = T_target_reference * point_reference;
+  const auto at_reference = reference_camera.project_with_jacobian(point_reference);
+  const auto at_target = target_camera.project_with_jacobian(point_target);
+  if (!at_reference || !at_target) return std::nullopt;
+  Eigen::Matrix<double, 3, 2> plane;  // basis of the one that faces the reference camera ...
+  plane.col(0) = point_reference.unitOrthogonal();
+  plane.col(1) = point_reference.normalized().cross(plane.col(0));
+  const Eigen::Matrix2d reference = at_reference->jacobian * plane;
+  if (!(std::abs(reference.determinant()) > 1e-12)) return std::nullopt;
+  plane *= reference_scale * reference.inverse();  // ... that moves the reference pixel by one pixel of its level
+  Eigen::Matrix<double, 3, 2> moved;
+  moved << T_target_reference.rotation() * plane.col(0), T_target_reference.rotation() * plane.col(1);
+  const auto bend_reference = second_order(reference_camera, point_reference, plane, at_reference->pixel);
+  const auto bend_target = second_order(target_camera, point_target, moved, at_target->pixel);
+  if (!bend_reference || !bend_target) return std::nullopt;
+  PatchWarp warp;
+  warp.linear = at_target->jacobian * moved;
+  warp.quadratic = *bend_target - warp.linear / reference_scale * *bend_reference;
+  return warp;
+}
+
+std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const PatchWarp& warp,
                                            const image::Pyramid& target, const Eigen::Vector2d& guess,
                                            const AlignmentOptions& options) {
-  const double scale = std::sqrt(std::abs(warp.determinant()));
+  const double scale = std::sqrt(std::abs(warp.linear.determinant()));
   if (!(scale > 0.2 && scale < 20.0) || target.size() == 0) return std::nullopt;
   const auto t = make_template(patch);
   if (!t) return std::nullopt;
   const std::size_t level = best_level(target, scale);
   const image::Image& image = target.levels[level];
-  Eigen::Matrix2f A;
-  A.row(0) = (warp.row(0) / target.scale_x[level]).cast<float>();
-  A.row(1) = (warp.row(1) / target.scale_y[level]).cast<float>();
+  const LevelWarp on_image = on_level(warp, target, level);
   const Eigen::Vector2f start(static_cast<float>(target.from_base_x(level, guess.x())),
                               static_cast<float>(target.from_base_y(level, guess.y())));
   Eigen::Vector2f at = start;
@@ -165,10 +204,10 @@ std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Ei
   bool converged = false;
   Comparison c;
   for (int i = 0; i < options.iterations && !converged; ++i) {
-    if (!sample_target(image, A, at.x(), at.y(), samples)) return std::nullopt;
+    if (!sample_target(image, on_image, at.x(), at.y(), samples)) return std::nullopt;
     c = compare(*t, samples);
     if (!(c.gain > 0.2f && c.gain < 5.0f)) return std::nullopt;
-    at -= A * c.shift;
+    at -= on_image.linear * c.shift;
     if (!((at - start).norm() < options.max_shift_px)) return std::nullopt;
     converged = c.shift.squaredNorm() < 0.02f * 0.02f;
   }

@@ -40,12 +40,23 @@ struct AlignmentOptions {
   }
 };
 
-// The local affine map from pixels of the reference level to level-0 pixels of the target image, for a small surface
-// around the landmark that faces the reference camera. `reference_scale` = level-0 pixels per pixel of the reference
-// level. Empty where one of the cameras does not project the point.
-std::optional<Eigen::Matrix2d> patch_warp(const camera::Camera& reference_camera, const camera::Camera& target_camera,
-                                          const geometry::SE3& T_target_reference, const Eigen::Vector3d& point_reference,
-                                          double reference_scale);
+// The map from offsets in pixels of the reference level to offsets in level-0 pixels of the target image, to second order
+// (docs/math.md, section 18). The second order matters: it is even in the offset, so that leaving it out displaces the whole patch,
+// in stereo pairs of fisheyes always by the same share of the disparity.
+struct PatchWarp {
+  Eigen::Matrix2d linear = Eigen::Matrix2d::Identity();
+  Eigen::Matrix<double, 2, 3> quadratic = Eigen::Matrix<double, 2, 3>::Zero();  // of x^2, x y, y^2; per pixel
+
+  Eigen::Vector2d operator()(const Eigen::Vector2d& offset) const {
+    return linear * offset + quadratic * Eigen::Vector3d(offset.x() * offset.x(), offset.x() * offset.y(), offset.y() * offset.y());
+  }
+};
+
+// That of a small surface around the landmark that faces the reference camera. `reference_scale` = level-0 pixels per pixel of
+// the reference level. Empty where one of the cameras does not project the patch.
+std::optional<PatchWarp> patch_warp(const camera::Camera& reference_camera, const camera::Camera& target_camera,
+                                    const geometry::SE3& T_target_reference, const Eigen::Vector3d& point_reference,
+                                    double reference_scale);
 
 struct AlignedKeypoint {
   Eigen::Vector2d pixel;  // level-0 pixels of the target image
@@ -56,7 +67,7 @@ struct AlignedKeypoint {
 // Aligns `patch` in `target` by an inverse-compositional Lucas-Kanade step for translation with gain and offset (Baker and
 // Matthews, IJCV 2004), starting at `guess` (level-0 pixels). `warp` as from patch_warp. Empty where it leaves the image,
 // moves too far, does not converge or does not look alike.
-std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Eigen::Matrix2d& warp,
+std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const PatchWarp& warp,
                                            const image::Pyramid& target, const Eigen::Vector2d& guess,
                                            const AlignmentOptions& options);
 

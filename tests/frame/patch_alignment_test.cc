@@ -30,12 +30,16 @@ struct Texture {
   std::array<std::array<double, 4>, 8> waves;
 };
 
-// An image that shows the texture at `A (pixel - centre) + texture_centre`, times gain plus offset.
-image::Pyramid image_of(const Texture& texture, const Matrix2d& A, const Vector2d& centre, double gain = 1, double offset = 0) {
+// An image that shows the texture's point d at `centre + warp(d)`, times gain plus offset.
+image::Pyramid image_of(const Texture& texture, const PatchWarp& warp, const Vector2d& centre, double gain = 1, double offset = 0) {
   image::Image image(160, 120);
+  const Matrix2d inverse = warp.linear.inverse();
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) {
-      const double v = gain * texture(A * (Vector2d(x, y) - centre)) + offset;
+      const Vector2d pixel = Vector2d(x, y) - centre;
+      Vector2d d = inverse * pixel;
+      for (int i = 0; i < 4; ++i) d -= inverse * (warp(d) - pixel);
+      const double v = gain * texture(d) + offset;
       image.row(y)[x] = static_cast<std::uint8_t>(std::clamp(v + 0.5, 0.0, 255.0));
     }
   }
@@ -47,7 +51,7 @@ image::Pyramid image_of(const Texture& texture, const Matrix2d& A, const Vector2
 // The patch about the texture's origin.
 feature::Patch patch_of(const Texture& texture) {
   const Vector2d centre(80, 60);
-  return feature::sample_patch(image_of(texture, Matrix2d::Identity(), centre).levels[0].view(), 80, 60);
+  return feature::sample_patch(image_of(texture, {}, centre).levels[0].view(), 80, 60);
 }
 
 TEST(AlignPatch, RecoversSubPixelShiftsUnderAffineWarpsAndLight) {
@@ -56,10 +60,10 @@ TEST(AlignPatch, RecoversSubPixelShiftsUnderAffineWarpsAndLight) {
   std::vector<double> errors;
   for (std::uint64_t seed = 1; seed <= 60; ++seed, ++tried) {
     const Texture texture(seed);
-    Matrix2d warp;  // from patch to image
-    warp << random.uniform(0.85, 1.2), random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), random.uniform(0.85, 1.2);
+    PatchWarp warp;
+    warp.linear << random.uniform(0.85, 1.2), random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), random.uniform(0.85, 1.2);
     const Vector2d truth(80 + random.uniform(-0.5, 0.5), 60 + random.uniform(-0.5, 0.5));
-    const auto target = image_of(texture, warp.inverse(), truth, random.uniform(0.7, 1.1), random.uniform(-10, 20));
+    const auto target = image_of(texture, warp, truth, random.uniform(0.7, 1.1), random.uniform(-10, 20));
     const Vector2d guess = truth + Vector2d(random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8));
     const auto found = align_patch(patch_of(texture), warp, target, guess, {});
     if (!found) continue;
@@ -75,16 +79,43 @@ TEST(AlignPatch, RecoversSubPixelShiftsUnderAffineWarpsAndLight) {
   EXPECT_LT(errors[errors.size() * 9 / 10], 0.1);
 }
 
+// What bends the patch is no shift of it.
+TEST(AlignPatch, IsNotDisplacedByWarpsOfSecondOrder) {
+  const Vector2d truth(80.3, 59.8);
+  std::vector<Vector2d> with, without;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    const Texture texture(seed);
+    PatchWarp warp;
+    warp.quadratic << 0.02, 0.0, 0.01, 0.0, -0.01, -0.015;
+    const auto target = image_of(texture, warp, truth);
+    const auto found = align_patch(patch_of(texture), warp, target, truth, {});
+    const auto affine = align_patch(patch_of(texture), {warp.linear}, target, truth, {});
+    if (!found || !affine) continue;
+    with.push_back(found->pixel - truth);
+    without.push_back(affine->pixel - truth);
+  }
+  ASSERT_GT(with.size(), 50);
+  const auto mean = [](const std::vector<Vector2d>& errors) {
+    Vector2d sum = Vector2d::Zero();
+    for (const Vector2d& e : errors) sum += e;
+    return (sum / static_cast<double>(errors.size())).eval();
+  };
+  EXPECT_LT(mean(with).norm(), 0.02);
+  // On average over the patch x^2 and y^2 are 5.25.
+  EXPECT_NEAR(mean(without).x(), 5.25 * 0.03, 0.05);
+  EXPECT_NEAR(mean(without).y(), 5.25 * -0.015, 0.05);
+}
+
 TEST(AlignPatch, RefusesFlatPatchesAndOtherTextures) {
   const Texture texture(1);
   const Vector2d centre(80, 60);
-  const auto target = image_of(texture, Matrix2d::Identity(), centre);
+  const auto target = image_of(texture, {}, centre);
   feature::Patch flat;
   flat.fill(100);
-  EXPECT_FALSE(align_patch(flat, Matrix2d::Identity(), target, centre, {}).has_value());
+  EXPECT_FALSE(align_patch(flat, {}, target, centre, {}).has_value());
   int wrong = 0;
   for (std::uint64_t seed = 2; seed < 42; ++seed)
-    wrong += align_patch(patch_of(Texture(seed)), Matrix2d::Identity(), target, centre, {}).has_value();
+    wrong += align_patch(patch_of(Texture(seed)), {}, target, centre, {}).has_value();
   EXPECT_LE(wrong, 3);
 }
 
@@ -92,22 +123,22 @@ TEST(AlignPatch, RefusesToLeaveTheImageOrToMoveTooFar) {
   const Texture texture(1);
   const Vector2d centre(80, 60);
   const feature::Patch patch = patch_of(texture);
-  const auto at_edge = image_of(texture, Matrix2d::Identity(), {1, 60});
-  EXPECT_FALSE(align_patch(patch, Matrix2d::Identity(), at_edge, {1, 60}, {}).has_value());
-  EXPECT_FALSE(align_patch(patch, Matrix2d::Identity(), at_edge, {-50, 1000}, {}).has_value());
-  const auto target = image_of(texture, Matrix2d::Identity(), centre);
-  const auto moved = align_patch(patch, Matrix2d::Identity(), target, centre + Vector2d(1, 0), {.max_shift_px = 0.5});
+  const auto at_edge = image_of(texture, {}, {1, 60});
+  EXPECT_FALSE(align_patch(patch, {}, at_edge, {1, 60}, {}).has_value());
+  EXPECT_FALSE(align_patch(patch, {}, at_edge, {-50, 1000}, {}).has_value());
+  const auto target = image_of(texture, {}, centre);
+  const auto moved = align_patch(patch, {}, target, centre + Vector2d(1, 0), {.max_shift_px = 0.5});
   EXPECT_FALSE(moved.has_value());
-  EXPECT_FALSE(align_patch(patch, 100 * Matrix2d::Identity(), target, centre, {}).has_value());
-  EXPECT_FALSE(align_patch(patch, Matrix2d::Identity(), image::Pyramid(), centre, {}).has_value());
+  EXPECT_FALSE(align_patch(patch, {100 * Matrix2d::Identity()}, target, centre, {}).has_value());
+  EXPECT_FALSE(align_patch(patch, {}, image::Pyramid(), centre, {}).has_value());
 }
 
 TEST(AlignPatch, WorksOnTheLevelThatFitsTheWarp) {
   const Texture texture(5);
   const double scale = 1.728;  // three levels
   const Vector2d truth(80.3, 59.8);
-  const auto target = image_of(texture, Matrix2d::Identity() / scale, truth);
-  const auto found = align_patch(patch_of(texture), scale * Matrix2d::Identity(), target, truth + Vector2d(1, -1), {});
+  const auto target = image_of(texture, {scale * Matrix2d::Identity()}, truth);
+  const auto found = align_patch(patch_of(texture), {scale * Matrix2d::Identity()}, target, truth + Vector2d(1, -1), {});
   ASSERT_TRUE(found.has_value());
   EXPECT_LT((found->pixel - truth).norm(), 0.2);
 }
@@ -124,12 +155,12 @@ TEST(PatchWarp, IsTheProjectionOfTheFacingPlane) {
     for (const camera::Camera& target : cameras) {
       const auto warp = patch_warp(reference, target, T_target_reference, point, 1.44);
       ASSERT_TRUE(warp.has_value());
-      for (const Vector2d& step : {Vector2d(1e-3, 0), Vector2d(0, 1e-3), Vector2d(-2e-3, 1e-3)}) {
+      for (const Vector2d& step : {Vector2d(1e-3, 0), Vector2d(-2e-3, 1e-3), Vector2d(3, 0), Vector2d(0, -3), Vector2d(2, 3)}) {
         const Vector2d pixel = *reference.project(point) + 1.44 * step;
         const Vector3d bearing = *reference.unproject(pixel), normal = point.normalized();
         const Vector3d on_plane = bearing * (normal.dot(point) / normal.dot(bearing));
         const Vector2d moved = *target.project(T_target_reference * on_plane) - *target.project(T_target_reference * point);
-        EXPECT_LT((moved - *warp * step).norm(), 0.01 * step.norm());
+        EXPECT_LT((moved - (*warp)(step)).norm(), 2e-3 * step.norm()) << "step " << step.transpose();
       }
     }
   }
