@@ -210,7 +210,9 @@ solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const map::Fe
     for (std::size_t c = 0; c < T_cam_rig.size(); ++c) T_cam_rig[c] = out.cameras[c].T_cam_rig;
     if (recover_observations(map, T_cam_rig, features, problem.flat) == 0) break;
     part_groups(problem);
-    out = solver::adjust_rig(problem.flat.problem, options, T_cam_rig, stop);
+    solver::RigAdjustment again = solver::adjust_rig(problem.flat.problem, options, T_cam_rig, stop);
+    if (!again.done) break;
+    out = std::move(again);
   }
   return out;
 }

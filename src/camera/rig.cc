@@ -67,6 +67,13 @@ Rig Rig::subset(std::span<const int> indices) const {
   return Rig(std::move(chosen));
 }
 
+Rig Rig::with_extrinsics_of(const Rig& part, std::span<const int> indices) const {
+  BSLAM_ASSERT(part.size() == indices.size(), "one index per camera of the part");
+  std::vector<RigCamera> cameras = calibration_->cameras;
+  for (std::size_t i = 0; i < part.size(); ++i) cameras[static_cast<std::size_t>(indices[i])].T_body_cam = part.body_from_cam(i);
+  return Rig(std::move(cameras));
+}
+
 Rig Rig::moving(std::span<const double> delay_s, const geometry::Vector6d& twist) const {
   BSLAM_ASSERT(delay_s.size() == size(), "one delay per camera");
   Rig out = *this;

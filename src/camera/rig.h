@@ -45,6 +45,8 @@ class Rig {
 
   // The rig of some of the cameras, in the order given; the first becomes camera 0. Indices are valid and distinct.
   Rig subset(std::span<const int> indices) const;
+  // The reverse: this rig with the extrinsics (T_body_cam) that its cameras `indices` have as the cameras of `part`.
+  Rig with_extrinsics_of(const Rig& part, std::span<const int> indices) const;
 
   // The rig as it stands while its cameras fire one after the other: camera i, `delay_s[i]` after the rig's own instant,
   // has moved with the rig by exp(delay twist), so that T_cam_rig is T_i0 exp(delay twist) and the rig's pose is that of

@@ -76,7 +76,7 @@ void add_info(CLI::App& rig, int& exit_status) {
   info->add_option("FILE", request->file, "a calibration, or the folder of a data set")->required();
   info->add_flag("--json", request->json, "as JSON");
   info->add_option("--svg", request->svg, "draw the rig from above and from the side into this file");
-  info->add_option("--images", request->images, "a data set: test the extrinsics against its first images");
+  info->add_option("--images", request->images, "a data set: test the extrinsics against its images");
   info->callback([request, &exit_status] { exit_status = rig_info(*request); });
 }
 

@@ -52,6 +52,10 @@ Result<system::Config> resolve_run_config(const RunArguments& arguments) {
   if (config.localize_only && arguments.load_map.empty()) {
     return Error{"", "--localize-only", "no --load-map", "a map to localise in"};
   }
+  if (config.extrinsics.refine && (config.localize_only || !config.final_adjustment)) {
+    return Error{"command line", "extrinsics.refine", config.localize_only ? "true with --localize-only" : "true with --no-final-ba",
+                 "the adjustment at the end of the run, which refines them"};
+  }
   return resolved;
 }
 

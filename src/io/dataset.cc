@@ -86,6 +86,7 @@ Result<std::vector<int>> chosen_cameras(const std::vector<int>& asked, std::size
 struct ChosenRig {
   std::vector<int> cameras;
   camera::Rig rig;
+  std::optional<camera::Rig> whole;
   std::vector<std::string> warnings;
 };
 
@@ -101,12 +102,23 @@ Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recordin
                  fmt::format("of camera {} as well: {} has {} (--cameras takes some of them)", camera,
                              request.rig_file->string(), rig->size())};
   }
-  ChosenRig chosen{*cameras, rig->subset(*cameras), {}};
+  ChosenRig chosen{*cameras, rig->subset(*cameras), *rig, {}};
   if (recording.camera_count() > rig->size()) {
     chosen.warnings.push_back(fmt::format("{} has {} cameras, the data {}: the others are not used",
                                           request.rig_file->string(), rig->size(), recording.camera_count()));
   }
   return chosen;
+}
+
+// Empty where some camera's calibration cannot be read.
+std::optional<camera::Rig> whole_rig(const Recording& recording) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < recording.camera_count(); ++c) {
+    auto calibration = recording.calibration(c);
+    if (!calibration) return std::nullopt;
+    cameras.push_back(*std::move(calibration));
+  }
+  return camera::Rig(std::move(cameras));
 }
 
 Result<ChosenRig> choose_own(const DatasetRequest& request, const Recording& recording) {
@@ -118,7 +130,7 @@ Result<ChosenRig> choose_own(const DatasetRequest& request, const Recording& rec
     if (!calibration) return calibration.error();
     calibrated.push_back(*std::move(calibration));
   }
-  return ChosenRig{*std::move(cameras), camera::Rig(std::move(calibrated)), {}};
+  return ChosenRig{*std::move(cameras), camera::Rig(std::move(calibrated)), whole_rig(recording), {}};
 }
 
 // Some image exists, and of the first that can be read some has the calibrated size.
@@ -261,6 +273,7 @@ Result<Dataset> open_dataset(const DatasetRequest& asked) {
                   opened->format,
                   std::move(chosen->rig),
                   std::move(chosen->cameras),
+                  std::move(chosen->whole),
                   0,
                   {},
                   recording.ground_truth(),

@@ -40,6 +40,8 @@ struct Dataset {
   DatasetFormat format;            // never kAuto
   camera::Rig rig;                 // the cameras in use, in the order asked for; their names are in it
   std::vector<int> cameras_used;   // their places in the whole rig
+  // All cameras of the calibration in its order; empty where the data set's own cannot be read for one that is not in use.
+  std::optional<camera::Rig> whole_rig;
   TimeNs first_time_ns = 0;        // of the first frame, whatever range was asked for: seconds of a run count from here
   std::vector<FrameEntry> frames;  // in order of time, at least one
   std::optional<std::filesystem::path>

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "base/assert.h"
+#include "base/median.h"
 
 namespace bslam::io {
 namespace {
@@ -13,9 +14,7 @@ TimeNs median_interval(const std::vector<ImageFile>& images) {
   if (images.size() < 2) return 0;
   std::vector<TimeNs> intervals;
   for (std::size_t k = 1; k < images.size(); ++k) intervals.push_back(images[k].time_ns - images[k - 1].time_ns);
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>((intervals.size() - 1) / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
+  return lower_median(std::move(intervals));
 }
 
 struct StrayImage {

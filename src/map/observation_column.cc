@@ -29,13 +29,4 @@ void ObservationColumn::erase(std::size_t landmark, Observation o, std::uint64_t
   for (std::size_t r = row + 1; r <= kBlock; ++r) --block.begin[r];
 }
 
-void ObservationColumn::clear(std::size_t landmark, std::uint64_t tag) {
-  Block& block = blocks_.mutate(landmark / kBlock, tag);
-  const std::size_t row = landmark % kBlock;
-  const std::uint32_t count = block.begin[row + 1] - block.begin[row];
-  const auto first = block.entries.begin() + block.begin[row];
-  block.entries.erase(first, first + count);
-  for (std::size_t r = row + 1; r <= kBlock; ++r) block.begin[r] -= count;
-}
-
 }  // namespace bslam::map

@@ -28,7 +28,6 @@ class ObservationColumn {
   void insert(std::size_t landmark, Observation o, std::uint64_t tag);
   // The landmark has this observation.
   void erase(std::size_t landmark, Observation o, std::uint64_t tag);
-  void clear(std::size_t landmark, std::uint64_t tag);
 
   static constexpr std::size_t kBlock = 16;
   // Gives up the memory of a full block of landmarks without observations.

@@ -1,6 +1,7 @@
 #include "session/extrinsics_check.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <map>
@@ -8,9 +9,11 @@
 
 #include "feature/extractor.h"
 #include "feature/hamming.h"
+#include "frame/capture_times.h"
 #include "geometry/so3.h"
 #include "geometry/triangulation.h"
 #include "io/frame_reader.h"
+#include "io/image_file.h"
 #include "solver/epipolar.h"
 
 namespace bslam::session {
@@ -162,9 +165,10 @@ std::string_view convention_in_words(Convention convention) {
 
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Keypoints> of_i,
                         std::span<const feature::Keypoints> of_j) {
-  PairEvidence evidence{.first = i, .second = j};
+  const std::size_t instants = std::min(of_i.size(), of_j.size());
+  PairEvidence evidence{.first = i, .second = j, .instants = static_cast<int>(instants)};
   std::vector<PixelPair> all;
-  for (std::size_t frame = 0; frame < std::min(of_i.size(), of_j.size()); ++frame) {
+  for (std::size_t frame = 0; frame < instants; ++frame) {
     const std::vector<PixelPair> pairs = match(of_i[frame], of_j[frame]);
     all.insert(all.end(), pairs.begin(), pairs.end());
     for (int c = 0; c < kConventions; ++c) {
@@ -182,24 +186,50 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
   return evidence;
 }
 
-std::vector<PairEvidence> check_extrinsics(const io::Dataset& dataset) {
+namespace {
+
+struct View {
+  TimeNs time_ns = 0;
+  feature::Keypoints keypoints;  // empty without an image
+};
+
+// By camera and frame.
+std::vector<std::vector<View>> look(const io::Dataset& dataset, std::span<const image::Image> masks) {
   const camera::Rig& rig = dataset.rig;
-  std::vector<std::vector<feature::Keypoints>> keypoints(rig.size());  // by camera and frame
+  std::vector<std::vector<View>> views(rig.size());
   feature::Extractor extractor({});
   const std::size_t frames = std::min<std::size_t>(kFrames, dataset.frames.size());
   for (std::size_t k = 0; k < frames; ++k) {
     const image::ImageBundle bundle = io::read_frame(dataset, (2 * k + 1) * dataset.frames.size() / (2 * frames));
     for (std::size_t c = 0; c < rig.size(); ++c) {
-      keypoints[c].emplace_back();
-      if (bundle.images[c].state != image::ImageState::kPresent) continue;
+      const image::CameraImage& image = bundle.images[c];
+      View& view = views[c].emplace_back();
+      if (image.state != image::ImageState::kPresent) continue;
+      view.time_ns = image.time_ns;
       image::Pyramid pyramid;
-      extractor.extract(bundle.images[c].image.view(), {}, rig.camera(c), pyramid, keypoints[c].back());
+      extractor.extract(image.image.view(), masks[c].view(), rig.camera(c), pyramid, view.keypoints);
     }
   }
+  return views;
+}
+
+}  // namespace
+
+Result<std::vector<PairEvidence>> check_extrinsics(const io::Dataset& dataset) {
+  const camera::Rig& rig = dataset.rig;
+  const auto masks = io::read_masks(rig);
+  if (!masks) return masks.error();
+  const std::vector<std::vector<View>> views = look(dataset, *masks);
   std::vector<PairEvidence> evidence;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
-      evidence.push_back(judge_pair(rig, i, j, keypoints[i], keypoints[j]));
+      std::vector<feature::Keypoints> of_i, of_j;
+      for (std::size_t k = 0; k < views[i].size(); ++k) {
+        if (std::abs(views[i][k].time_ns - views[j][k].time_ns) > frame::kTogetherNs) continue;
+        of_i.push_back(views[i][k].keypoints);
+        of_j.push_back(views[j][k].keypoints);
+      }
+      evidence.push_back(judge_pair(rig, i, j, of_i, of_j));
     }
   }
   return evidence;
@@ -215,6 +245,7 @@ std::string describe(const PairEvidence& pair) {
         "from the given one; {} as given",
         pair.other->agreeing, pair.matches, pair.other->turned_deg, pair.other->displaced_deg, agreeing(Convention::kAsGiven));
   }
+  if (pair.instants == 0) return "never taken together: nothing to compare";
   if (!pair.verdict && pair.matches > kMany) return fmt::format("{} matches, and no convention fits enough of them", pair.matches);
   if (!pair.verdict) return fmt::format("too little in common to tell ({} matches)", pair.matches);
   std::string text = fmt::format("{} of {} matches fit {}", agreeing(*pair.verdict), pair.matches, convention_in_words(*pair.verdict));
@@ -227,17 +258,19 @@ std::string describe(const PairEvidence& pair) {
 
 std::string describe_evidence(std::span<const PairEvidence> evidence) {
   std::string text = "against the images:\n";
-  std::map<Convention, int> slips;  // votes
+  std::map<Convention, std::vector<std::string>> slips;  // pairs
   int fitting = 0, elsewhere = 0;
   for (const PairEvidence& pair : evidence) {
     text += fmt::format("  {} and {}: {}\n", pair.first, pair.second, describe(pair));
     elsewhere += pair.other ? 1 : 0;
     if (pair.verdict == Convention::kAsGiven) ++fitting;
-    if (pair.verdict && pair.verdict != Convention::kAsGiven) ++slips[*pair.verdict];
+    if (pair.verdict && pair.verdict != Convention::kAsGiven) slips[*pair.verdict].push_back(fmt::format("{} and {}", pair.first, pair.second));
   }
   if (!slips.empty()) {
-    const auto most = std::ranges::max_element(slips, {}, [](const auto& slip) { return slip.second; });
-    return text + fmt::format("warning: the images do not fit the extrinsics; they fit {}\n", convention_in_words(most->first));
+    const auto most = std::ranges::max_element(slips, {}, [](const auto& slip) { return slip.second.size(); });
+    const auto& pairs = most->second;
+    return text + fmt::format("warning: the images of cameras {} do not fit the extrinsics; they fit {}{}\n", fmt::join(pairs, ", "),
+                              convention_in_words(most->first), fitting > 0 ? fmt::format("; {} of {} pairs fit as given", fitting, evidence.size()) : "");
   }
   if (elsewhere > 0) return text + "warning: the images do not fit the extrinsics, nor any common slip of them\n";
   if (fitting == 0) return text + "  nothing can be said of the extrinsics\n";

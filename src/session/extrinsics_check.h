@@ -37,6 +37,7 @@ struct OtherPose {
 // One pair of cameras.
 struct PairEvidence {
   std::size_t first = 0, second = 0;
+  int instants = 1;                             // at which both were taken
   int matches = 0;                              // features found in both images, over all frames
   std::array<int, kConventions> agreeing = {};  // of them, those that fit a convention
   // The one that most fit, where enough do and clearly more than as given; empty: too little to tell, or `other`.
@@ -48,10 +49,11 @@ struct PairEvidence {
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Keypoints> of_i,
                         std::span<const feature::Keypoints> of_j);
 
-// Judges every pair of cameras by a few frames spread over the data set.
-std::vector<PairEvidence> check_extrinsics(const io::Dataset& dataset);
+// Judges every pair of cameras by a few frames spread over the data set, as far as both were taken at one instant. Masks count.
+// Errors: a mask that cannot be read.
+Result<std::vector<PairEvidence>> check_extrinsics(const io::Dataset& dataset);
 
-// A line for every pair that tells something, and one for what to do.
+// A line for every pair, and one for what to do.
 std::string describe_evidence(std::span<const PairEvidence> evidence);
 
 }  // namespace bslam::session

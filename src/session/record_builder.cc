@@ -5,6 +5,7 @@
 #include <fstream>
 #include <string>
 
+#include "base/median.h"
 #include "io/frame_reader.h"
 
 namespace bslam::session {
@@ -47,7 +48,7 @@ report::CameraInterval camera_state(const report::FrameRecord& frame, const syst
     return {used ? "degraded" : "out", "blurred", frame.time_s, frame.time_s};
   }
   if (!used) return {"out", std::string(system::describe(outage)), frame.time_s, frame.time_s};
-  if (frame.cameras[c].keypoints < kFewKeypoints) return {"degraded", "few-features", frame.time_s, frame.time_s};
+  if (frame.cameras[c].keypoints < kFewKeypoints && !known.waiting[c]) return {"degraded", "few-features", frame.time_s, frame.time_s};
   return {"ok", "", frame.time_s, frame.time_s};
 }
 
@@ -61,10 +62,9 @@ std::vector<std::uint8_t> between_images(const std::vector<system::FrameRecord>&
   if (at.size() < 2) return out;
   std::vector<std::size_t> steps;
   for (std::size_t i = 1; i < at.size(); ++i) steps.push_back(at[i] - at[i - 1]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
+  const std::size_t step = lower_median(std::move(steps));
   for (std::size_t i = 1; i < at.size(); ++i) {
-    if (at[i] - at[i - 1] > *middle) continue;
+    if (at[i] - at[i - 1] > step) continue;
     const auto first = out.begin() + static_cast<std::ptrdiff_t>(at[i - 1]), last = out.begin() + static_cast<std::ptrdiff_t>(at[i]);
     std::fill(first, last, std::uint8_t{1});
   }

@@ -114,9 +114,13 @@ Result<std::string> report_rig(const RigReportRequest& request) {
   }
   std::optional<std::vector<PairEvidence>> evidence;
   if (!request.images.empty()) {
-    const auto dataset = io::open_dataset({.path = request.images, .rig_file = request.file});
+    // Cameras that fire late are no reason to stop.
+    constexpr double kTolerance_s = 0.1;
+    const auto dataset = io::open_dataset({.path = request.images, .rig_file = request.file, .sync_tolerance_s = kTolerance_s});
     if (!dataset) return dataset.error();
-    evidence = check_extrinsics(*dataset);
+    auto checked = check_extrinsics(*dataset);
+    if (!checked) return checked.error();
+    evidence = std::move(*checked);
   }
   return request.json ? as_json(*file, evidence) : as_text(*file, evidence);
 }

@@ -68,6 +68,15 @@ std::vector<InputFrame> feed(const io::Dataset& dataset, const SessionOptions& o
 
 }  // namespace
 
+namespace {
+
+// The whole calibration with the extrinsics of `found`, the rig of the cameras in use.
+camera::Rig put_in(const camera::Rig& found, const io::Dataset& dataset) {
+  return dataset.whole_rig ? dataset.whole_rig->with_extrinsics_of(found, dataset.cameras_used) : found;
+}
+
+}  // namespace
+
 Result<SessionResult> run_session(const io::Dataset& dataset, const SessionOptions& options) {
   const system::Stopwatch start_up;
   auto masks = io::read_masks(dataset.rig);
@@ -97,6 +106,7 @@ Result<SessionResult> run_session(const io::Dataset& dataset, const SessionOptio
   result.trajectories = system.trajectories();
   result.live = system.live_trajectories();
   result.map = system.snapshot();
+  if (system.extrinsics_refined()) result.refined_rig = put_in(result.map->rig(), dataset);
   result.journal = system.journal();
   return result;
 }
@@ -123,10 +133,7 @@ Status write_outputs(const SessionResult& result, const system::Config& config, 
   add_trajectories(result.trajectories, "trajectory", io::PoseState::kFinal, files);
   add_trajectories(result.live, "trajectory_live", io::PoseState::kLive, files);
   files.emplace_back("config.yaml", io::config_to_yaml(table));
-  const auto& cameras = result.record.cameras;
-  if (std::ranges::any_of(cameras, [](const auto& c) { return c.extrinsics && c.extrinsics->refined; })) {
-    files.emplace_back("rig_refined.yaml", io::rig_to_yaml(result.map->rig()));
-  }
+  if (result.refined_rig) files.emplace_back("rig_refined.yaml", io::rig_to_yaml(*result.refined_rig));
   const evaluation::Trajectory path = result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
   files.emplace_back("trajectory.svg", report::trajectory_plot_svg({.title = result.record.data + ": path of camera 0",
                                                                     .subtitle = {},

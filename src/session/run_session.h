@@ -34,14 +34,16 @@ struct SessionResult {
   report::RunRecord record;
   std::vector<system::PartTrajectory> trajectories, live;  // the first are those of trajectory.tum and trajectory_live.tum
   map::MapSnapshot map;
+  // Where extrinsics were refined: all cameras of the calibration, those in use with what was found.
+  std::optional<camera::Rig> refined_rig;
   system::Journal journal;
 };
 
 // Errors: a mask that cannot be read or has another size than its camera's images; a journal that is not of this run.
 Result<SessionResult> run_session(const io::Dataset& dataset, const SessionOptions& options);
 
-// trajectory.tum, trajectory_live.tum (further parts of the map: ..._part2.tum), summary.json, config.yaml, trajectory.svg and
-// run.svg, each whole or not at all.
+// trajectory.tum, trajectory_live.tum (further parts of the map: ..._part2.tum), summary.json, config.yaml, trajectory.svg,
+// run.svg and, where extrinsics were refined, rig_refined.yaml, each whole or not at all.
 Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder);
 
 }  // namespace bslam::session

@@ -34,7 +34,7 @@ struct ExtrinsicEstimate {
 struct RigAdjustment {
   bool done = false;  // false: fewer than two cameras, nothing to learn from, stopped or failed; the problem is as it was
   std::vector<ExtrinsicEstimate> cameras;      // all; the first is the identity and known
-  double final_cost = 0;                       // as in BundleSummary, over what agrees
+  double final_cost = 0;                       // as in BundleSummary, over what agrees and the calibration
   double variance_factor = 1;  // mean squared normalised error over what it should be: covariances are larger by it, if > 1
 };
 

@@ -108,7 +108,9 @@ std::vector<Outage> CameraMonitor::judge(const image::ImageBundle& images) {
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     Camera& camera = cameras_[c];
     if (found[c] == Outage::kNoImage) continue;
-    if (found[c] == Outage::kNone && same[c] && any_changed) found[c] = Outage::kFrozen;
+    // Frozen it stays while its picture is the same, also where no other is there to change.
+    const bool frozen = same[c] && (any_changed || camera.outage == Outage::kFrozen);
+    if (found[c] == Outage::kNone && frozen) found[c] = Outage::kFrozen;
     if (found[c] != Outage::kNone) {
       camera.outage = found[c];
       camera.good = 0;

@@ -27,6 +27,7 @@ struct FrameRecord {
   std::vector<image::ImageState> images;
   std::vector<Outage> outages;        // per camera: why its picture was not used
   std::vector<std::uint8_t> blurred;  // per camera: out of focus or smeared, used all the same
+  std::vector<std::uint8_t> waiting;  // per camera: not used, as it fires late and the motion until then was unknown
   std::optional<Relocalisation> relocalisation;
   // The smooth pose: what the motion of the rig alone adds up to. Corrections of the map change T_map_odom and never this;
   // it stands still while the rig is lost. T_rig_odom = T_rig_world * T_map_odom, with T_rig_world of `result`.

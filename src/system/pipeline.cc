@@ -125,7 +125,11 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecu
   outcome.record.outages = monitor_.judge(images);
   outcome.record.blurred = monitor_.blurred(images);
   trust_what_is_sharp_again(outcome.record.blurred);
-  BundledFrame frame = make_frame(images, outcome.record.stages, left_out(images, outcome.record.outages));
+  const std::vector<std::uint8_t> unused = left_out(images, outcome.record.outages);
+  for (std::size_t c = 0; c < unused.size(); ++c) {
+    outcome.record.waiting.push_back(unused[c] && outcome.record.outages[c] == Outage::kNone);
+  }
+  BundledFrame frame = make_frame(images, outcome.record.stages, unused);
   count_features(frame, outcome.record);
   const Stopwatch results;
   outcome.seen = executor.begin_frame(frame.id);

@@ -67,10 +67,12 @@ solver::PoseSolution believe_the_steadiest(const camera::Rig& rig, const FrameMa
     const geometry::Vector6d off = (alone.T_rig_world * predicted.inverse()).log();
     const double distance = off.head<3>().norm() + kRadiansPerMetre * off.tail<3>().norm();
     if (distance >= least) continue;
-    least = distance;
     solver::PoseSolverOptions near = pose;
     near.first_chi2 = kAgrees;
-    best = solver::solve_pose(rig, observations, alone.T_rig_world, near);
+    solver::PoseSolution joint = solver::solve_pose(rig, observations, alone.T_rig_world, near);
+    if (!joint.ok) continue;
+    least = distance;
+    best = std::move(joint);
   }
   return best;
 }

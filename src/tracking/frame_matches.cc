@@ -75,9 +75,11 @@ std::optional<frame::AlignedKeypoint> align_to_reference(const map::BundledMap& 
   const feature::Keypoints& keypoints = map.keypoints(reference.keyframe, reference.keypoint.camera);
   const std::size_t k = reference.keypoint.keypoint.index();
   const SE3 T_ref_world = map.cam_from_world(reference.keyframe, reference.keypoint.camera);
+  // Smaller pictures have fewer levels than those of the reference may have had.
+  const std::size_t level = keypoints.level[k];
+  const double scale = level < pyramid.size() ? pyramid.scale_x[level] : std::pow(map.pyramid().scale_factor, level);
   const auto warp = frame::patch_warp(rig.camera(reference.keypoint.camera), camera, T_cam_world * T_ref_world.inverse(),
-                                      T_ref_world * landmark.position, pyramid.scale_x[std::min<std::size_t>(
-                                          keypoints.level[k], pyramid.size() - 1)]);
+                                      T_ref_world * landmark.position, scale);
   if (!warp) return std::nullopt;
   return frame::align_patch(keypoints.patch[k], *warp, pyramid, guess, options);
 }

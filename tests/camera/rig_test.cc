@@ -96,6 +96,18 @@ TEST(Rig, SubsetKeepsTheOrderAndMovesTheRigFrame) {
   EXPECT_LT(difference(chosen.body_from_cam(0), rig.body_from_cam(2)), 1e-15);
 }
 
+TEST(Rig, TakesTheExtrinsicsOfAPartOfIt) {
+  const Rig rig = three_cameras();
+  const std::array order = {2, 0};
+  const SE3 moved = rig.body_from_cam(0) * turned(0.1, {0.01, 0.02, 0.03});
+  const Rig part({{rig.camera(std::size_t{2}), rig.body_from_cam(2)}, {rig.camera(std::size_t{0}), moved}});
+  const Rig found = rig.with_extrinsics_of(part, order);
+  EXPECT_EQ(found.camera(std::size_t{0}).name, rig.camera(std::size_t{0}).name);
+  EXPECT_LT(difference(found.body_from_cam(0), moved), 1e-15);
+  EXPECT_LT(difference(found.body_from_cam(1), rig.body_from_cam(1)), 1e-15);
+  EXPECT_LT(difference(found.body_from_cam(2), rig.body_from_cam(2)), 1e-15);
+}
+
 TEST(Rig, OneCameraOverlapsNothing) {
   const Rig rig({{pinhole("only"), SE3()}});
   EXPECT_EQ(rig.size(), 1u);

@@ -133,6 +133,20 @@ TEST(AlignPatch, RefusesToLeaveTheImageOrToMoveTooFar) {
   EXPECT_FALSE(align_patch(patch, {}, image::Pyramid(), centre, {}).has_value());
 }
 
+TEST(AlignPatch, BendsThatLeaveTheImageAreRefused) {
+  const Texture texture(1);
+  const feature::Patch patch = patch_of(texture);
+  for (const Vector2d& at : {Vector2d(6, 60), Vector2d(153, 60), Vector2d(80, 6), Vector2d(80, 113)}) {
+    const auto target = image_of(texture, {}, at);
+    ASSERT_TRUE(align_patch(patch, {}, target, at, {})) << at.transpose();
+    for (const double bend : {0.6, -0.6, 1e6, std::numeric_limits<double>::infinity(), std::nan("")}) {
+      PatchWarp warp;
+      warp.quadratic.setConstant(bend);
+      EXPECT_FALSE(align_patch(patch, warp, target, at, {})) << at.transpose() << " " << bend;
+    }
+  }
+}
+
 TEST(AlignPatch, WorksOnTheLevelThatFitsTheWarp) {
   const Texture texture(5);
   const double scale = 1.728;  // three levels

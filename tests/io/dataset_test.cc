@@ -104,12 +104,17 @@ TEST_F(SmallEuroc, TakesCamerasInTheOrderAsked) {
   EXPECT_EQ(dataset->rig.camera(std::size_t{0}).name, "cam1");
   EXPECT_EQ(dataset->frames[0].images[0]->path, image(0, 1));
   EXPECT_EQ(open_dataset({.path = data(), .cameras = {1}}).value().rig.size(), 1u);
+  ASSERT_TRUE(dataset->whole_rig);
+  EXPECT_EQ(dataset->whole_rig->camera(std::size_t{0}).name, "cam0");
+  EXPECT_EQ(open_dataset({.path = data(), .cameras = {1}}).value().whole_rig->size(), 2u);
 }
 
 TEST_F(SmallEuroc, DoesNotLookAtCamerasNotAskedFor) {
   write_text(camera(1) / "sensor.yaml", "broken: [");
   EXPECT_FALSE(open());
-  EXPECT_TRUE(open_dataset({.path = data(), .cameras = {0}}));
+  const auto one = open_dataset({.path = data(), .cameras = {0}});
+  ASSERT_TRUE(one);
+  EXPECT_FALSE(one->whole_rig);
 }
 
 TEST_F(SmallEuroc, RefusesCamerasTwiceOrNotThere) {

@@ -126,10 +126,10 @@ TEST(ExtrinsicsCheck, SpeaksOfTheMostFrequentFault) {
   PairEvidence bad = good;
   bad.agreeing = {2, 90, 0, 0, 0};
   bad.verdict = Convention::kInverse;
-  EXPECT_NE(describe_evidence(std::array{good, bad})
-                .find("warning: the images do not fit the extrinsics; they fit with "
-                      "every transform inverted"),
-            std::string::npos);
+  const std::string mixed = describe_evidence(std::array{good, bad});
+  EXPECT_NE(mixed.find("warning: the images of cameras 0 and 1 do not fit the extrinsics; they fit with every transform inverted"),
+            std::string::npos) << mixed;
+  EXPECT_NE(mixed.find("; 1 of 2 pairs fit as given"), std::string::npos) << mixed;
   bad.verdict.reset();
   EXPECT_NE(describe_evidence(std::array{bad}).find("nothing can be said"), std::string::npos);
 }
@@ -191,6 +191,12 @@ TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   ASSERT_TRUE(io::write_rig(io::with_inverse_extrinsics(rig), folder_ / "wrong.yaml"));
   const auto wrong = report_rig({.file = (folder_ / "wrong.yaml").string(), .images = images});
   EXPECT_NE(wrong->find("they fit with"), std::string::npos) << *wrong;
+  std::vector<camera::RigCamera> late{{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1)}};
+  late[1].camera.time_offset_ns = 15'000'000;
+  ASSERT_TRUE(io::write_rig(camera::Rig(late), folder_ / "late.yaml"));
+  const auto apart = report_rig({.file = (folder_ / "late.yaml").string(), .images = images});
+  ASSERT_TRUE(apart) << apart.error().message();
+  EXPECT_NE(apart->find("never taken together"), std::string::npos) << *apart;
 }
 
 }  // namespace

@@ -65,6 +65,14 @@ TEST(CameraMonitor, FindsTheFrozenCameraAndNotARigThatStandsStill) {
   EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
 }
 
+TEST(CameraMonitor, AFrozenCameraStaysOutWhereTheOthersMissAFrame) {
+  CameraMonitor monitor(2, {});
+  monitor.judge(frame({good(1), good(2)}));
+  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
+  for (int k = 0; k < 4; ++k) EXPECT_EQ(monitor.judge(frame({{}, good(2)})), (Outages{Outage::kNoImage, Outage::kFrozen}));
+  EXPECT_EQ(monitor.judge(frame({good(4), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
+}
+
 TEST(CameraMonitor, OnePixelIsChangeEnough) {
   CameraMonitor monitor(2, {});
   image::Image almost = good(2);

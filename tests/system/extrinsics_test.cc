@@ -53,8 +53,8 @@ TEST(SystemExtrinsics, RefinedTheMapIsMadeWithWhatWasFound) {
   run(tour, system);
   EXPECT_TRUE(system.extrinsics_refined());
   for (std::size_t c = 0; c < 4; ++c) {
-    // A pixel of these pictures is a third of a degree, and of the cameras that look to the sides little is known after two seconds.
-    EXPECT_LT(angle_deg(system.snapshot()->rig().cam_from_rig(c), tour.rig().cam_from_rig(c)), c == 2 ? 0.1 : 0.2) << "camera " << c;
+    // A pixel of these pictures is a third of a degree; of camera 3, which looks aside, less is known after two seconds.
+    EXPECT_LT(angle_deg(system.snapshot()->rig().cam_from_rig(c), tour.rig().cam_from_rig(c)), c == 3 ? 0.2 : 0.1) << "camera " << c;
   }
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 }
