@@ -140,6 +140,7 @@ int run(const RunArguments& arguments) {
   }
   if (const Status s = prepare_folder(arguments.out, arguments.overwrite); !s) return report_error(s.error());
   for (const std::string& warning : dataset->warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  print_rig_warnings(dataset->rig);
 
   ProgressBar bar(arguments.progress == "auto", "frames");
   session::SessionOptions options;
@@ -157,6 +158,7 @@ int run(const RunArguments& arguments) {
   if (!result) return report_error(result.error());
   if (const Status s = write_files(*result, *config, arguments, **vocabulary); !s) return report_error(s.error());
   print_warnings(result->record);
+  print_if_nothing_matches(result->record, dataset->rig);
   print_result(result->record, arguments.out);
   if (!result->record.complete) return kExitInterrupted;
   return result->live.empty() ? kExitNothingTracked : kExitOk;

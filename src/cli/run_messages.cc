@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdio>
 
+#include "io/rig_warnings.h"
+
 namespace bslam::cli {
 namespace {
 
@@ -24,15 +26,43 @@ void warn_of_outages(const report::CameraRecord& camera) {
 void warn_of_extrinsics(const report::CameraRecord& camera) {
   const auto& e = camera.extrinsics;
   if (!e || !e->suspect) return;
-  fmt::print(stderr, "warning: {}: the images put it {:.2f} deg and {:.1f} mm away from where the rig file does{}\n", camera.name,
-             e->change_deg, e->change_mm, e->refined ? "" : "; --set extrinsics.refine=true accepts that");
+  fmt::print(stderr, "warning: {}: the images put it {:.2f} deg and {:.1f} mm away from where the rig file does, if its times are right{}\n",
+             camera.name, e->change_deg, e->change_mm, e->refined ? "" : "; --set extrinsics.refine=true accepts that");
 }
 
 std::ptrdiff_t count(const report::RunRecord& record, report::FrameOutcome outcome) {
   return std::ranges::count(record.frames, outcome, &report::FrameRecord::outcome);
 }
 
+// Share of a camera's view that another one sees as well, the largest.
+double largest_overlap(const camera::Rig& rig) {
+  double share = 0;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    for (std::size_t j = 0; j < rig.size(); ++j) share = i == j ? share : std::max(share, rig.overlap_share(i, j));
+  }
+  return share;
+}
+
 }  // namespace
+
+void print_rig_warnings(const camera::Rig& rig) {
+  constexpr std::size_t kShown = 2;
+  const std::vector<std::string> warnings = io::rig_warnings(rig);
+  for (std::size_t i = 0; i < std::min(kShown, warnings.size()); ++i) fmt::print(stderr, "warning: {}\n", warnings[i]);
+  if (warnings.size() > kShown) fmt::print(stderr, "warning: {} more of the kind: bslam rig info\n", warnings.size() - kShown);
+}
+
+void print_if_nothing_matches(const report::RunRecord& record, const camera::Rig& rig) {
+  constexpr double kMuchOverlap = 0.4, kLeastShare = 0.01;
+  double matched = 0, unique = 0;
+  for (const report::FrameRecord& frame : record.frames) {
+    matched += frame.matched_features;
+    unique += frame.unique_features;
+  }
+  if (unique == 0 || matched >= kLeastShare * unique || largest_overlap(rig) < kMuchOverlap) return;
+  fmt::print(stderr, "warning: by the calibration cameras see much in common, but only {:.1f} % of the features match between any two; "
+             "bslam rig info RIG --images DATA tests it\n", 100 * matched / unique);
+}
 
 void print_warnings(const report::RunRecord& record) {
   for (const report::CameraRecord& camera : record.cameras) {

@@ -3,9 +3,16 @@
 
 #include <string>
 
+#include "camera/rig.h"
 #include "report/run_record.h"
 
 namespace bslam::cli {
+
+// On stderr, before the run: what is probably wrong with the calibration (io/rig_warnings.h), the first of it.
+void print_rig_warnings(const camera::Rig& rig);
+
+// On stderr: cameras that overlap and still see next to nothing in common; `rig` of the cameras in use.
+void print_if_nothing_matches(const report::RunRecord& record, const camera::Rig& rig);
 
 // On stderr: cameras that were out, images that could not be used, frames there was no time for, extrinsics that do not fit.
 void print_warnings(const report::RunRecord& record);

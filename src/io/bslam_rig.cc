@@ -34,6 +34,7 @@ Status read_time_and_mask(const YamlMap& yaml, CameraDescription& d) {
 }
 
 Result<camera::RigCamera> read_camera(const YamlMap& yaml, std::size_t index) {
+  if (yaml.has("T_cam_body")) return yaml.error("T_cam_body", "the transform from body to camera", "T_body_cam, its inverse");
   const Status known = yaml.allow_only(
       {"name", "model", "resolution", "intrinsics", "distortion", "T_body_cam", "time_offset_s", "mask"});
   if (!known) return known.error();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <numbers>
+#include <set>
 
 #include "feature/extractor.h"
 #include "feature/hamming.h"
@@ -154,7 +155,7 @@ std::string_view convention_in_words(Convention convention) {
     case Convention::kInverse:
       return "with every transform inverted (T_cam_body is given, T_body_cam meant)";
     case Convention::kPairInverse:
-      return "with the transform between the two inverted";
+      return "with the transform between the two inverted, or the two exchanged";
     case Convention::kSwapped:
       return "with the two cameras exchanged";
     case Convention::kSwappedInverse:
@@ -250,8 +251,22 @@ std::string describe(const PairEvidence& pair) {
   if (!pair.verdict) return fmt::format("too little in common to tell ({} matches)", pair.matches);
   std::string text = fmt::format("{} of {} matches fit {}", agreeing(*pair.verdict), pair.matches, convention_in_words(*pair.verdict));
   if (*pair.verdict != Convention::kAsGiven) return text + fmt::format(", {} as given", agreeing(Convention::kAsGiven));
-  if (agreeing(Convention::kAsGiven) < kMost * pair.matches) text += ": few; are the intrinsics right?";
+  if (agreeing(Convention::kAsGiven) < kMost * pair.matches) text += "; few: many wrong matches, or intrinsics that are a little off";
   return text;
+}
+
+// Where none is at fault: what nothing was found out about.
+std::string unjudged(std::span<const PairEvidence> evidence) {
+  std::size_t pairs = 0;
+  std::set<std::size_t> cameras, judged;
+  for (const PairEvidence& pair : evidence) {
+    pairs += pair.verdict ? 0 : 1;
+    for (const std::size_t c : {pair.first, pair.second}) (pair.verdict ? judged : cameras).insert(c);
+  }
+  std::erase_if(cameras, [&](std::size_t c) { return judged.contains(c); });
+  if (pairs == 0) return "";
+  return fmt::format("; {} of {} pairs could not be judged{}", pairs, evidence.size(),
+                     cameras.empty() ? "" : fmt::format(": nothing is known of camera {}", fmt::join(cameras, ", ")));
 }
 
 }  // namespace
@@ -274,9 +289,7 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
   }
   if (elsewhere > 0) return text + "warning: the images do not fit the extrinsics, nor any common slip of them\n";
   if (fitting == 0) return text + "  nothing can be said of the extrinsics\n";
-  const std::size_t rest = evidence.size() - static_cast<std::size_t>(fitting);
-  const std::string unjudged = rest > 0 ? fmt::format("; {} of {} pairs could not be judged", rest, evidence.size()) : "";
-  return text + "  the extrinsics fit as given" + unjudged + "\n";
+  return text + "  the extrinsics fit as given" + unjudged(evidence) + "\n";
 }
 
 }  // namespace bslam::session

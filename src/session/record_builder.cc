@@ -68,6 +68,10 @@ std::vector<std::uint8_t> between_images(const std::vector<system::FrameRecord>&
     const auto first = out.begin() + static_cast<std::ptrdiff_t>(at[i - 1]), last = out.begin() + static_cast<std::ptrdiff_t>(at[i]);
     std::fill(first, last, std::uint8_t{1});
   }
+  // Its first image may come, and the next one after the end, as late as others do.
+  const auto until = static_cast<std::ptrdiff_t>(at.front() < step ? at.front() : 0);
+  std::fill(out.begin(), out.begin() + until, std::uint8_t{1});
+  if (frames.size() - at.back() <= step) std::fill(out.begin() + static_cast<std::ptrdiff_t>(at.back()), out.end(), std::uint8_t{1});
   return out;
 }
 

@@ -135,6 +135,7 @@ TEST_F(OwnRigFile, NamesTheKeyAndWhatIsWrong) {
            Case{"time_offset_s: -0.0015", "time_offset_s: soon", "cameras[0].time_offset_s", "soon"},
            Case{"time_offset_s: -0.0015", "time_offset_s: 1e9", "cameras[0].time_offset_s", "1000000000"},
            Case{"time_offset_s", "time_ofset_s", "cameras[0].time_ofset_s", "an unknown key"},
+           Case{"T_body_cam", "T_cam_body", "cameras[0].T_cam_body", "the transform from body to camera"},
            Case{"    mask:", "    name: again\n    mask:", "cameras[0].name", "the key twice"},
            Case{"bslam_rig: 1", "bslam_rig: 2", "bslam_rig", "2"},
            Case{"bslam_rig: 1", "bslam_rig: one", "bslam_rig", "one"},

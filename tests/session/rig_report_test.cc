@@ -116,7 +116,10 @@ TEST(ExtrinsicsCheck, IsNotAlarmedByAFewMoreMatchesElsewhere) {
 TEST(ExtrinsicsCheck, SaysHowManyPairsItCouldJudge) {
   const PairEvidence good{.first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
   const PairEvidence apart{.first = 0, .second = 2, .matches = 10};
-  EXPECT_NE(describe_evidence(std::array{good, apart}).find("1 of 2 pairs could not be judged"), std::string::npos);
+  const std::string said = describe_evidence(std::array{good, apart});
+  EXPECT_NE(said.find("1 of 2 pairs could not be judged: nothing is known of camera 2\n"), std::string::npos) << said;
+  const PairEvidence also{.first = 1, .second = 2, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
+  EXPECT_NE(describe_evidence(std::array{good, apart, also}).find("1 of 3 pairs could not be judged\n"), std::string::npos);
 }
 
 TEST(ExtrinsicsCheck, SpeaksOfTheMostFrequentFault) {

@@ -13,6 +13,8 @@
 #include <string>
 #include <thread>
 
+#include "io/rig_file.h"
+#include "io/rig_warnings.h"
 #include "io/simulation_writer.h"
 #include "simulation/rigs.h"
 
@@ -272,6 +274,24 @@ TEST_F(CommandLine, InspectShowsABundledTableThatHoldsTogether) {
   }
   EXPECT_EQ(seen, keypoints);
   EXPECT_GT(matched, 100u);
+}
+
+TEST_F(CommandLine, ARunSaysThatItsCalibrationIsProbablyWrong) {
+  const camera::Rig rig = io::read_rig(data() + "/rig.yaml").value();
+  ASSERT_TRUE(io::write_rig(io::with_inverse_extrinsics(rig), out("inverse.yaml")));
+  const std::string options = " --set features.per_image=500 --progress never --rig ";
+  const Ran inverse = run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse"));
+  EXPECT_NE(inverse.err.find("of the features match between any two"), std::string::npos) << inverse.err;
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const geometry::SE3& T = rig.body_from_cam(c);
+    cameras.push_back({rig.camera(c), geometry::SE3(T.rotation(), 1000 * T.translation())});
+  }
+  ASSERT_TRUE(io::write_rig(camera::Rig(cameras), out("millimetres.yaml")));
+  const Ran large = run("run " + data() + options + out("millimetres.yaml") + " --out " + out("millimetres"));
+  EXPECT_NE(large.err.find("are they millimetres?"), std::string::npos) << large.err;
+  const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
+  EXPECT_EQ(right.err, "");
 }
 
 TEST_F(CommandLine, InterruptedRunKeepsWhatItHasAndSaysSo) {
