@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
+#include <vector>
 
 #include "io/rig_warnings.h"
 
@@ -26,8 +27,31 @@ void warn_of_outages(const report::CameraRecord& camera) {
 void warn_of_extrinsics(const report::CameraRecord& camera) {
   const auto& e = camera.extrinsics;
   if (!e || !e->suspect) return;
-  fmt::print(stderr, "warning: {}: the images put it {:.2f} deg and {:.1f} mm away from where the rig file does, if its times are right{}\n",
+  fmt::print(stderr,
+             "warning: {}: the images put it {:.2f} deg and {:.1f} mm away from where the rig file does, if its times are right{}\n",
              camera.name, e->change_deg, e->change_mm, e->refined ? "" : "; --set extrinsics.refine=true accepts that");
+}
+
+// Cameras that see well and agree with nothing: a few degrees off are called inconsistent, these may never get that far.
+void warn_of_strangers(const report::RunRecord& record) {
+  constexpr double kNothing = 0.02, kSound = 0.1;  // of the keypoints
+  constexpr double kEnough = 1000;                 // keypoints
+  std::vector<double> keypoints(record.cameras.size()), inliers(record.cameras.size());
+  for (const report::FrameRecord& frame : record.frames) {
+    for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+      keypoints[c] += frame.cameras[c].keypoints;
+      inliers[c] += frame.cameras[c].inliers;
+    }
+  }
+  bool some_sound = false;
+  for (std::size_t c = 0; c < keypoints.size(); ++c) some_sound |= keypoints[c] > kEnough && inliers[c] > kSound * keypoints[c];
+  for (std::size_t c = 0; some_sound && c < keypoints.size(); ++c) {
+    if (keypoints[c] < kEnough || inliers[c] > kNothing * keypoints[c]) continue;
+    fmt::print(stderr,
+               "warning: {}: next to nothing of what it saw ({:.0f} of {:.0f} keypoints) is where the other cameras say; is it "
+               "where the rig file says? bslam rig info RIG --images DATA\n",
+               record.cameras[c].name, inliers[c], keypoints[c]);
+  }
 }
 
 std::ptrdiff_t count(const report::RunRecord& record, report::FrameOutcome outcome) {
@@ -73,6 +97,7 @@ void print_warnings(const report::RunRecord& record) {
     warn_of_outages(camera);
     warn_of_extrinsics(camera);
   }
+  warn_of_strangers(record);
   const auto dropped = count(record, report::FrameOutcome::kDropped);
   if (dropped > 0) fmt::print(stderr, "warning: {} frames were dropped, there was no time for them\n", dropped);
 }

@@ -279,13 +279,16 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
     text += fmt::format("  {} and {}: {}\n", pair.first, pair.second, describe(pair));
     elsewhere += pair.other ? 1 : 0;
     if (pair.verdict == Convention::kAsGiven) ++fitting;
-    if (pair.verdict && pair.verdict != Convention::kAsGiven) slips[*pair.verdict].push_back(fmt::format("{} and {}", pair.first, pair.second));
+    if (pair.verdict && pair.verdict != Convention::kAsGiven) {
+      slips[*pair.verdict].push_back(fmt::format("{} and {}", pair.first, pair.second));
+    }
   }
   if (!slips.empty()) {
     const auto most = std::ranges::max_element(slips, {}, [](const auto& slip) { return slip.second.size(); });
     const auto& pairs = most->second;
+    const std::string others = fitting > 0 ? fmt::format("; {} of {} pairs fit as given", fitting, evidence.size()) : "";
     return text + fmt::format("warning: the images of cameras {} do not fit the extrinsics; they fit {}{}\n", fmt::join(pairs, ", "),
-                              convention_in_words(most->first), fitting > 0 ? fmt::format("; {} of {} pairs fit as given", fitting, evidence.size()) : "");
+                              convention_in_words(most->first), others);
   }
   if (elsewhere > 0) return text + "warning: the images do not fit the extrinsics, nor any common slip of them\n";
   if (fitting == 0) return text + "  nothing can be said of the extrinsics\n";

@@ -290,6 +290,15 @@ TEST_F(CommandLine, ARunSaysThatItsCalibrationIsProbablyWrong) {
   ASSERT_TRUE(io::write_rig(camera::Rig(cameras), out("millimetres.yaml")));
   const Ran large = run("run " + data() + options + out("millimetres.yaml") + " --out " + out("millimetres"));
   EXPECT_NE(large.err.find("are they millimetres?"), std::string::npos) << large.err;
+  const camera::Rig upside_down = [&] {
+    std::vector<camera::RigCamera> turned;
+    for (std::size_t c = 0; c < rig.size(); ++c) turned.push_back({rig.camera(c), rig.body_from_cam(c)});
+    turned[3].T_body_cam = turned[3].T_body_cam * geometry::SE3(Eigen::Quaterniond(0, 0, 0, 1), {0, 0, 0});
+    return camera::Rig(turned);
+  }();
+  ASSERT_TRUE(io::write_rig(upside_down, out("upside_down.yaml")));
+  const Ran turned = run("run " + data() + options + out("upside_down.yaml") + " --out " + out("upside_down"));
+  EXPECT_NE(turned.err.find("next to nothing of what it saw"), std::string::npos) << turned.err;
   const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
   EXPECT_EQ(right.err, "");
 }
