@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <ranges>
 #include <utility>
 
 #include "base/assert.h"
@@ -59,6 +60,7 @@ bool Rig::any_overlap() const {
 }
 
 Rig Rig::subset(std::span<const int> indices) const {
+  if (std::ranges::equal(indices, std::views::iota(0, static_cast<int>(size())))) return *this;
   std::vector<RigCamera> chosen;
   for (const int i : indices) {
     BSLAM_ASSERT(i >= 0 && static_cast<std::size_t>(i) < size(), "camera index within the rig");

@@ -157,8 +157,7 @@ int run(const RunArguments& arguments) {
   bar.finish();
   if (!result) return report_error(result.error());
   if (const Status s = write_files(*result, *config, arguments, **vocabulary); !s) return report_error(s.error());
-  print_warnings(result->record);
-  print_if_nothing_matches(result->record, dataset->rig);
+  print_warnings(result->record, dataset->rig);
   print_result(result->record, arguments.out);
   if (!result->record.complete) return kExitInterrupted;
   return result->live.empty() ? kExitNothingTracked : kExitOk;

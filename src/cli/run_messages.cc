@@ -67,16 +67,8 @@ double largest_overlap(const camera::Rig& rig) {
   return share;
 }
 
-}  // namespace
-
-void print_rig_warnings(const camera::Rig& rig) {
-  constexpr std::size_t kShown = 2;
-  const std::vector<std::string> warnings = io::rig_warnings(rig);
-  for (std::size_t i = 0; i < std::min(kShown, warnings.size()); ++i) fmt::print(stderr, "warning: {}\n", warnings[i]);
-  if (warnings.size() > kShown) fmt::print(stderr, "warning: {} more of the kind: bslam rig info\n", warnings.size() - kShown);
-}
-
-void print_if_nothing_matches(const report::RunRecord& record, const camera::Rig& rig) {
+// Cameras that overlap and still see next to nothing in common.
+void warn_if_nothing_matches(const report::RunRecord& record, const camera::Rig& rig) {
   constexpr double kMuchOverlap = 0.4, kLeastShare = 0.01;
   double matched = 0, unique = 0;
   for (const report::FrameRecord& frame : record.frames) {
@@ -88,7 +80,16 @@ void print_if_nothing_matches(const report::RunRecord& record, const camera::Rig
              "bslam rig info RIG --images DATA tests it\n", 100 * matched / unique);
 }
 
-void print_warnings(const report::RunRecord& record) {
+}  // namespace
+
+void print_rig_warnings(const camera::Rig& rig) {
+  constexpr std::size_t kShown = 2;
+  const std::vector<std::string> warnings = io::rig_warnings(rig);
+  for (std::size_t i = 0; i < std::min(kShown, warnings.size()); ++i) fmt::print(stderr, "warning: {}\n", warnings[i]);
+  if (warnings.size() > kShown) fmt::print(stderr, "warning: {} more of the kind: bslam rig info\n", warnings.size() - kShown);
+}
+
+void print_warnings(const report::RunRecord& record, const camera::Rig& rig) {
   for (const report::CameraRecord& camera : record.cameras) {
     if (camera.skipped > 0) {
       fmt::print(stderr, "warning: {}: {} of its images could not be read, the first: {}\n", camera.name, camera.skipped,
@@ -100,6 +101,7 @@ void print_warnings(const report::RunRecord& record) {
   warn_of_strangers(record);
   const auto dropped = count(record, report::FrameOutcome::kDropped);
   if (dropped > 0) fmt::print(stderr, "warning: {} frames were dropped, there was no time for them\n", dropped);
+  warn_if_nothing_matches(record, rig);
 }
 
 void print_result(const report::RunRecord& record, const std::string& out) {

@@ -124,13 +124,17 @@ std::optional<camera::Rig> whole_rig(const Recording& recording) {
 Result<ChosenRig> choose_own(const DatasetRequest& request, const Recording& recording) {
   auto cameras = chosen_cameras(request.cameras, recording.camera_count());
   if (!cameras) return cameras.error();
+  if (auto whole = whole_rig(recording)) {
+    camera::Rig rig = whole->subset(*cameras);
+    return ChosenRig{*std::move(cameras), std::move(rig), std::move(whole), {}};
+  }
   std::vector<camera::RigCamera> calibrated;
   for (const int camera : *cameras) {
     auto calibration = recording.calibration(static_cast<std::size_t>(camera));
     if (!calibration) return calibration.error();
     calibrated.push_back(*std::move(calibration));
   }
-  return ChosenRig{*std::move(cameras), camera::Rig(std::move(calibrated)), whole_rig(recording), {}};
+  return ChosenRig{*std::move(cameras), camera::Rig(std::move(calibrated)), std::nullopt, {}};
 }
 
 // Some image exists, and of the first that can be read some has the calibrated size.

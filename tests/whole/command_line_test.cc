@@ -146,7 +146,8 @@ TEST_F(CommandLine, RefusesWhatMakesNoSense) {
                            "--localize-only",
                            "--load-map /no/such/file",
                            "--vocabulary /no/such/file",
-                           "--replay /no/such/file"}) {
+                           "--replay /no/such/file",
+                           "--no-final-ba --set extrinsics.refine=true"}) {
     expect_refused(base + more);
   }
   expect_refused("run /no/such/folder --out " + out("refused"));
