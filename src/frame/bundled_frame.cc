@@ -1,5 +1,7 @@
 #include "frame/bundled_frame.h"
 
+#include <cmath>
+
 namespace bslam::frame {
 
 std::size_t BundledFrame::num_keypoints() const {
@@ -22,6 +24,12 @@ std::vector<double> delays_of(const BundledFrame& frame) {
   std::vector<double> delays(frame.cameras.size());
   for (std::size_t c = 0; c < delays.size(); ++c) delays[c] = frame.delay_s(c);
   return delays;
+}
+
+double farthest_delay_s(const BundledFrame& frame) {
+  double farthest = 0;
+  for (const double delay : delays_of(frame)) farthest = std::abs(delay) > std::abs(farthest) ? delay : farthest;
+  return farthest;
 }
 
 camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame) { return rig.moving(delays_of(frame), frame.twist); }

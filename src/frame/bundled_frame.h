@@ -40,6 +40,8 @@ struct BundledFrame {
 
 // Per camera.
 std::vector<double> delays_of(const BundledFrame& frame);
+// Of the camera that fires farthest from the time of the frame, before or after it.
+double farthest_delay_s(const BundledFrame& frame);
 
 // The rig as it stood while the frame was taken.
 camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame);

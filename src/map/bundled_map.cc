@@ -221,9 +221,9 @@ bool BundledMap::scale_part(KeyframeId root, double factor) {
     entry.unit *= factor;
     (entry.alive ? entry.T_rig_world : entry.T_rig_parent) = longer(entry.alive ? entry.T_rig_world : entry.T_rig_parent);
     if (!entry.alive || entry.frame->twist.tail<3>().isZero(0)) continue;
-    auto frame = std::make_shared<frame::BundledFrame>(*entry.frame);
-    frame->twist.tail<3>() *= factor;
-    entry.frame = std::move(frame);
+    geometry::Vector6d twist = entry.frame->twist;
+    twist.tail<3>() *= factor;
+    set_twist(KeyframeId(i), twist);
   }
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (!landmarks_[i].alive || !inside[landmarks_[i].reference.keyframe.index()]) continue;
@@ -233,6 +233,15 @@ bool BundledMap::scale_part(KeyframeId root, double factor) {
     entry.max_distance *= static_cast<float>(factor);
   }
   begin_gauge_epoch();
+  return true;
+}
+
+bool BundledMap::set_twist(KeyframeId k, const geometry::Vector6d& twist) {
+  if (!alive(k)) return false;
+  BundledKeyframe& entry = edit(k);
+  auto frame = std::make_shared<frame::BundledFrame>(*entry.frame);
+  frame->twist = twist;
+  entry.frame = std::move(frame);
   return true;
 }
 

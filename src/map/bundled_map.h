@@ -136,6 +136,7 @@ class BundledMap {
   // gauge epoch. False where `root` is none.
   bool scale_part(KeyframeId root, double factor);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
+  bool set_twist(KeyframeId k, const geometry::Vector6d& twist);  // BundledFrame::twist of its frame
   bool set_position(LandmarkId l, const Eigen::Vector3d& position);
   bool add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes view direction, distance range and descriptor from the observations.

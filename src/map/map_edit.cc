@@ -78,6 +78,12 @@ void MapDraft::set_poses(SetPoses poses) {
   edit_.operations.emplace_back(std::move(poses));
 }
 
+void MapDraft::set_twists(std::vector<std::pair<KeyframeId, geometry::Vector6d>> twists) {
+  std::erase_if(twists, [&](const auto& entry) { return !working_.set_twist(entry.first, entry.second); });
+  if (twists.empty()) return;
+  edit_.operations.emplace_back(SetTwists{std::move(twists)});
+}
+
 void MapDraft::add_sightings(std::vector<Sighting> sightings) {
   for (Sighting& s : sightings) s.landmark = working_.resolve(s.landmark);  // noted over several versions
   std::erase_if(sightings, [&](const Sighting& s) { return !working_.add_sightings(s.landmark, s.expected, s.found); });

@@ -18,6 +18,8 @@
 // |                   | entries of removed keyframes and of removed or merged landmarks are dropped; newer keyframes |
 // |                   | move with their parent (chains with the nearest older ancestor), newer landmarks with the    |
 // |                   | keyframe of their reference                                                                  |
+// | SetTwists         | entries of removed keyframes are dropped; they grow as lengths about the keyframe have since |
+// |                   | the base                                                                                     |
 // | ScalePart         | scales what is newer along; dropped where the part is gone or has become part of another     |
 // | JoinParts         | a removed keyframe stands for its nearest ancestor; dropped where they are of one part       |
 // | RemovePart        | dropped where it is gone already or has become part of another                               |
@@ -87,6 +89,9 @@ struct SetPoses {
   std::vector<std::pair<LandmarkId, Eigen::Vector3d>> landmarks;
   bool correction = false;  // moves the map as a whole: begins a gauge epoch
 };
+struct SetTwists {
+  std::vector<std::pair<KeyframeId, geometry::Vector6d>> keyframes;  // BundledFrame::twist
+};
 struct Sighting {
   LandmarkId landmark;
   std::uint32_t expected = 0, found = 0;
@@ -107,8 +112,8 @@ struct SetRig {
 };
 
 using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark, MergeLandmarks,
-                               RemoveKeyframe, JoinParts, RemovePart, ScalePart, SetPoses, AddSightings, RefreshLandmarks, SetScale,
-                               SetRig>;
+                               RemoveKeyframe, JoinParts, RemovePart, ScalePart, SetPoses, SetTwists, AddSightings, RefreshLandmarks,
+                               SetScale, SetRig>;
 
 struct MapEdit {
   std::string_view stage;  // a literal
@@ -144,6 +149,7 @@ class MapDraft {
   bool scale_part(KeyframeId root, double factor);
   // Entries of what is not alive are left out.
   void set_poses(SetPoses poses);
+  void set_twists(std::vector<std::pair<KeyframeId, geometry::Vector6d>> twists);
   void add_sightings(std::vector<Sighting> sightings);
   void refresh_landmarks(std::vector<LandmarkId> landmarks);
   void set_scale(Scale scale);  // nothing more being known of it than its name says

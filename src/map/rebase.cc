@@ -63,6 +63,7 @@ class Rebase {
   bool operator()(const RemovePart& op) { return map_.remove_part(here(op.root)); }
   bool operator()(const ScalePart& op) { return map_.scale_part(here(op.root), op.factor); }
   bool operator()(const SetPoses& op);
+  bool operator()(const SetTwists& op);
   bool operator()(const AddSightings& op);
   bool operator()(const RefreshLandmarks& op);
   bool operator()(const SetScale& op) { return map_.set_scale(op.scale, op.deviation), true; }
@@ -186,6 +187,17 @@ void Rebase::carry_along(const std::unordered_map<KeyframeId, Motion>& motions) 
     map_.set_position(l, motion->point(map_.landmark(l).position));
     map_.refresh_landmark(l);
   }
+}
+
+bool Rebase::operator()(const SetTwists& op) {
+  bool any = false;
+  for (auto [edit_id, twist] : op.keyframes) {
+    const KeyframeId k = here(edit_id);
+    if (!map_.alive(k)) continue;
+    if (!own(edit_id)) twist.tail<3>() *= map_.keyframe(k).unit / base_.keyframe(edit_id).unit;
+    any |= map_.set_twist(k, twist);
+  }
+  return any;
 }
 
 bool Rebase::operator()(const AddSightings& op) {

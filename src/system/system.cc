@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mapping/map_keyframe.h"
+#include "system/final_poses.h"
 #include "system/stopwatch.h"
 
 namespace bslam::system {
@@ -36,7 +37,7 @@ void add_pose(std::vector<PartTrajectory>& parts, KeyframeId root, TimeNs time_n
 
 System::System(camera::Rig rig, Config config, Resources resources)
     : rig_(std::move(rig)), config_(std::move(config)),
-      loaded_(resources.map.has_value()), pipeline_(rig_, config_, std::move(resources.masks), recogniser(resources.vocabulary, config_)),
+      loaded_(resources.map.has_value()), first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0), pipeline_(rig_, config_, std::move(resources.masks), recogniser(resources.vocabulary, config_)),
       store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)), gate_(store_) {
   const map::MapSnapshot map = store_.snapshot();
   for (const KeyframeId k : map->keyframe_ids()) set_keyframe_time(k, map->keyframe(k).frame->time_ns);
@@ -100,6 +101,7 @@ void System::finish() {
     const Stopwatch watch;
     map::MapDraft draft("final", gate_.newest());
     const auto stop = interruption_.get_token();
+    draft.set_twists(twists_from_neighbours(draft.map(), first_keyframe_, frames_));
     mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
     final_adjustment_ms_ = watch.ms();
     check_extrinsics(draft, stop);
@@ -160,10 +162,9 @@ std::vector<PartTrajectory> System::trajectories() const {
   std::vector<PartTrajectory> out;
   for (const FrameRecord& record : frames_) {
     const tracking::TrackResult& r = record.final_result();
-    if (r.status != tracking::TrackStatus::kTracking || !map->surviving(r.reference).valid()) continue;
-    const double grown = map->keyframe(r.reference).unit / record.unit;  // the scale of the map may have been found since
-    const geometry::SE3 T_rig_reference(r.T_rig_reference.rotation(), grown * r.T_rig_reference.translation());
-    add_pose(out, map->root_of(r.reference), r.time_ns, (T_rig_reference * map->resolved_pose(r.reference)).inverse());
+    if (const auto T_rig_world = T_rig_world_of(record, *map)) {
+      add_pose(out, map->root_of(r.reference), r.time_ns, T_rig_world->inverse());
+    }
   }
   std::stable_sort(out.begin(), out.end(),
                    [](const PartTrajectory& a, const PartTrajectory& b) { return a.poses.size() > b.poses.size(); });

@@ -84,6 +84,7 @@ class System {
   const camera::Rig rig_;
   const Config config_;
   const bool loaded_;  // a map of an earlier run
+  const KeyframeId first_keyframe_;  // of this run
   Pipeline pipeline_;
   std::vector<FrameRecord> frames_;
   std::vector<tracking::BetweenKeyframes> early_;  // frames of before a start, by number

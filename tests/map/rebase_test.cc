@@ -530,5 +530,19 @@ TEST_F(RebaseTest, ScaleIsWhatTheLaterEditSays) {
   EXPECT_EQ(report.applied, 1u);
 }
 
+TEST_F(RebaseTest, MotionGrowsWithThePartAndIsDroppedWithItsKeyframe) {
+  geometry::Vector6d twist;
+  twist << 0.1, 0.2, 0.3, 1.0, 2.0, 3.0;
+  early->scale_part(kRoot, 2.0);
+  early->remove_keyframe(kThird);
+  const KeyframeId newer = add_keyframe(*late, same_numbers(0, 5));
+  late->set_twists({{kSecond, twist}, {kThird, twist}, {newer, twist}});
+  EXPECT_EQ(late->map().keyframe(kSecond).frame->twist, twist);
+  const CommitReport report = commit();
+  EXPECT_EQ(report.published->keyframe(kSecond).frame->twist.head<3>(), twist.head<3>());
+  EXPECT_EQ(report.published->keyframe(kSecond).frame->twist.tail<3>(), 2.0 * twist.tail<3>());
+  EXPECT_EQ(report.published->keyframe(kThird).frame->twist.norm(), 0.0);
+}
+
 }  // namespace
 }  // namespace bslam::map

@@ -1,0 +1,53 @@
+#include "system/final_poses.h"
+
+#include <algorithm>
+
+namespace bslam::system {
+namespace {
+
+using geometry::SE3;
+using geometry::Vector6d;
+
+constexpr double kMaxInterval_s = 0.5;  // between frames; nothing is known of the motion within longer ones
+
+// Mean twist from the middle frame's time to `delay` after it, of the parabola through three poses: the mean twists of the two
+// intervals are those at their middles, and it is the one at half the delay.
+std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, const map::BundledMap& map, double delay_s) {
+  const double before_s = to_seconds(frames[1].result.time_ns - frames[0].result.time_ns);
+  const double after_s = to_seconds(frames[2].result.time_ns - frames[1].result.time_ns);
+  if (before_s <= 0 || after_s <= 0 || before_s > kMaxInterval_s || after_s > kMaxInterval_s) return std::nullopt;
+  std::optional<SE3> T[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    T[i] = T_rig_world_of(frames[i], map);
+    if (!T[i] || map.root_of(frames[i].final_result().reference) != map.root_of(frames[1].final_result().reference)) return std::nullopt;
+  }
+  const Vector6d before = (*T[1] * T[0]->inverse()).log() / before_s;
+  const Vector6d after = (*T[2] * T[1]->inverse()).log() / after_s;
+  return before + (before_s + delay_s) / (before_s + after_s) * (after - before);
+}
+
+}  // namespace
+
+std::optional<SE3> T_rig_world_of(const FrameRecord& record, const map::BundledMap& map) {
+  const tracking::TrackResult& r = record.final_result();
+  if (r.status != tracking::TrackStatus::kTracking || !map.surviving(r.reference).valid()) return std::nullopt;
+  const double grown = map.keyframe(r.reference).unit / record.unit;  // the scale of the map may have been found since
+  return SE3(r.T_rig_reference.rotation(), grown * r.T_rig_reference.translation()) * map.resolved_pose(r.reference);
+}
+
+std::vector<std::pair<KeyframeId, Vector6d>> twists_from_neighbours(const map::BundledMap& map, KeyframeId first,
+                                                                     std::span<const FrameRecord> frames) {
+  std::vector<std::pair<KeyframeId, Vector6d>> out;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    const frame::BundledFrame& seen = *map.keyframe(k).frame;
+    const double delay_s = frame::farthest_delay_s(seen);
+    if (k.index() < first.index() || delay_s == 0) continue;
+    const auto at = std::ranges::lower_bound(frames, seen.id, {}, [](const FrameRecord& r) { return r.result.frame; });
+    if (at == frames.end() || at->result.frame != seen.id || at == frames.begin() || at + 1 == frames.end()) continue;
+    const std::span<const FrameRecord, 3> three(at - 1, 3);
+    if (const auto twist = twist_through(three, map, delay_s)) out.emplace_back(k, *twist);
+  }
+  return out;
+}
+
+}  // namespace bslam::system

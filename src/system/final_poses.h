@@ -1,0 +1,23 @@
+// Where the rig was, as the finished map has it.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "map/bundled_map.h"
+#include "system/frame_record.h"
+
+namespace bslam::system {
+
+// A frame hangs on the keyframe it was tracked against. Empty where it has no pose or that part of the map is gone.
+std::optional<geometry::SE3> T_rig_world_of(const FrameRecord& record, const map::BundledMap& map);
+
+// How the rig moved while the cameras of a keyframe fired one after the other: by constant acceleration from the frame before
+// through the keyframe to the frame after it, which tracking could not know. Keyframes in slots from `first` on that have late
+// cameras and a frame with a pose on either side, no farther than 0.5 s. `frames`: of the run, in order.
+std::vector<std::pair<KeyframeId, geometry::Vector6d>> twists_from_neighbours(const map::BundledMap& map, KeyframeId first,
+                                                                               std::span<const FrameRecord> frames);
+
+}  // namespace bslam::system

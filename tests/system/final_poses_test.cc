@@ -1,0 +1,101 @@
+#include "system/final_poses.h"
+
+#include <gtest/gtest.h>
+
+#include "map/synthetic_map.h"
+
+namespace bslam::system {
+namespace {
+
+using geometry::SE3;
+using geometry::Vector3d;
+using geometry::Vector6d;
+
+constexpr TimeNs kInterval = 50'000'000, kDelay = 40'000'000;
+
+// A rig that turns and goes ever faster, by constant acceleration.
+Vector3d place(double t) { return {1.0 * t + 0.9 * t * t, 0.4 * t - 0.6 * t * t, 0.2 * t}; }
+SE3 pose(double t, double turn_rate) {
+  const geometry::Quaterniond R_rig_world = geometry::so3_exp({0, turn_rate * t, 0});
+  return SE3(R_rig_world, -(R_rig_world * place(t)));
+}
+
+// Frames around a keyframe of two cameras, the second of which fires late; all hang on the keyframe.
+struct Scene {
+  explicit Scene(double turn_rate, std::size_t count = 5) {
+    const double from = -to_seconds(kInterval) * static_cast<double>(count / 2);
+    for (std::size_t i = 0; i < count; ++i) {
+      FrameRecord record;
+      record.result.frame = FrameId(i);
+      record.result.time_ns = 1'000'000'000 + static_cast<TimeNs>(i) * kInterval;
+      record.result.status = tracking::TrackStatus::kTracking;
+      record.result.reference = KeyframeId(0);
+      record.result.T_rig_reference = pose(from + to_seconds(kInterval) * static_cast<double>(i), turn_rate) * pose(0, turn_rate).inverse();
+      frames.push_back(std::move(record));
+    }
+    auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, 30, 10));
+    frame->id = FrameId(count / 2);
+    frame->time_ns = frames[count / 2].result.time_ns;
+    for (frame::CameraFrame& c : frame->cameras) c.state = image::ImageState::kPresent;
+    frame->cameras[0].time_ns = frame->time_ns;
+    frame->cameras[1].time_ns = frame->time_ns + kDelay;
+    map.add_keyframe(frame, pose(0, turn_rate), {}, KeyframeId());
+  }
+  // True to what the late camera's true place is?
+  double error(const Vector6d& twist, double turn_rate) const {
+    const double delay_s = to_seconds(kDelay);
+    return (SE3::exp(delay_s * twist) * pose(0, turn_rate) * pose(delay_s, turn_rate).inverse()).log().norm();
+  }
+
+  Random random{1, "final poses test"};
+  map::BundledMap map{map::synthetic_rig(2)};
+  std::vector<FrameRecord> frames;
+};
+
+TEST(FinalPoses, MotionGoesThroughTheFramesBeforeAndAfter) {
+  const Scene straight(0.0);
+  auto found = twists_from_neighbours(straight.map, KeyframeId(0), straight.frames);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].first, KeyframeId(0));
+  EXPECT_LT(straight.error(found[0].second, 0.0), 1e-12);
+  const Scene turning(0.8);  // to third order in the interval
+  found = twists_from_neighbours(turning.map, KeyframeId(0), turning.frames);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_LT(turning.error(found[0].second, 0.8), 2e-5);
+}
+
+TEST(FinalPoses, MotionIsInTheUnitOfTheMap) {
+  Scene scene(0.0);
+  ASSERT_TRUE(scene.map.scale_part(KeyframeId(0), 3.0));
+  const auto before = twists_from_neighbours(Scene(0.0).map, KeyframeId(0), scene.frames);
+  const auto found = twists_from_neighbours(scene.map, KeyframeId(0), scene.frames);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].second.tail<3>().isApprox(3.0 * before.at(0).second.tail<3>(), 1e-12));
+}
+
+TEST(FinalPoses, MotionIsLeftWhereANeighbourIsMissing) {
+  Scene lost(0.3);
+  lost.frames[3].result.status = tracking::TrackStatus::kLost;
+  EXPECT_TRUE(twists_from_neighbours(lost.map, KeyframeId(0), lost.frames).empty());
+  Scene pause(0.3);
+  for (std::size_t i = 3; i < pause.frames.size(); ++i) pause.frames[i].result.time_ns += 1'000'000'000;
+  EXPECT_TRUE(twists_from_neighbours(pause.map, KeyframeId(0), pause.frames).empty());
+  EXPECT_TRUE(twists_from_neighbours(Scene(0.3, 1).map, KeyframeId(0), Scene(0.3, 1).frames).empty());
+}
+
+TEST(FinalPoses, MotionOfAnEarlierRunStays) {
+  const Scene scene(0.3);
+  EXPECT_TRUE(twists_from_neighbours(scene.map, KeyframeId(1), scene.frames).empty());
+}
+
+TEST(FinalPoses, MotionMattersToLateCamerasAlone) {
+  Scene scene(0.3);
+  auto together = std::make_shared<frame::BundledFrame>(*scene.map.keyframe(KeyframeId(0)).frame);
+  together->cameras[1].time_ns = together->time_ns;
+  map::BundledMap map(map::synthetic_rig(2));
+  map.add_keyframe(together, SE3(), {}, KeyframeId());
+  EXPECT_TRUE(twists_from_neighbours(map, KeyframeId(0), scene.frames).empty());
+}
+
+}  // namespace
+}  // namespace bslam::system
