@@ -65,6 +65,8 @@ bool allowed(const image::ImageView& mask, double x, double y) {
   return mask.at(column, row) != 0;
 }
 
+int most_of(const FeatureOptions& options) { return FeatureOptions::kInForOthers * options.per_image; }
+
 Region inner_region(const image::Image& level) {
   return {kBorder, kBorder, std::max(0, level.width() - 2 * kBorder), std::max(0, level.height() - 2 * kBorder)};
 }
@@ -130,7 +132,7 @@ void Extractor::Scratch::describe(const image::Pyramid& pyramid, std::size_t lev
 }
 
 Extractor::Extractor(const FeatureOptions& options)
-    : options_(options), scratch_(std::make_unique<Scratch>(static_cast<std::size_t>(options.per_image))) {}
+    : options_(options), scratch_(std::make_unique<Scratch>(static_cast<std::size_t>(most_of(options)))) {}
 Extractor::~Extractor() = default;
 Extractor::Extractor(Extractor&&) noexcept = default;
 Extractor& Extractor::operator=(Extractor&&) noexcept = default;
@@ -139,9 +141,9 @@ void Extractor::extract(const image::ImageView& image, const image::ImageView& m
                         image::Pyramid& pyramid, Keypoints& keypoints, int budget) {
   BSLAM_ASSERT(mask.empty() || (mask.width == image.width && mask.height == image.height),
                "mask and image differ in size");
-  const int wanted = std::clamp(budget, 1, options_.per_image);
+  const int wanted = budget > 0 ? std::min(budget, most_of(options_)) : options_.per_image;
   keypoints.clear();
-  keypoints.reserve(static_cast<std::size_t>(options_.per_image));
+  keypoints.reserve(static_cast<std::size_t>(wanted));
   image::build_pyramid(image, options_.levels, options_.scale_factor, pyramid);
   scratch_->smoothed.resize(image.width, image.height);  // room for all levels, also if this image has no keypoint
   scratch_->detect(pyramid, mask, wanted, options_);

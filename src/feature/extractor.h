@@ -1,7 +1,6 @@
 // Oriented FAST and rotated BRIEF (Rublee et al., ICCV 2011): image -> Keypoints of one camera.
 #pragma once
 
-#include <limits>
 #include <memory>
 
 #include "base/options.h"
@@ -13,7 +12,8 @@
 namespace bslam::feature {
 
 struct FeatureOptions {
-  int per_image = 1200;       // keypoints wanted in one image at most
+  static constexpr int kInForOthers = 2;
+  int per_image = 1200;       // keypoints wanted in one image at most; kInForOthers times as many where other cameras are out
   // Keypoints wanted in the images of all cameras together, 0: no bound. Three cameras just reach it: a third one takes nothing
   // from the first two. Four take some 1.35 times as long as two (1.8 times without bound).
   int per_rig = 3600;
@@ -25,7 +25,8 @@ struct FeatureOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("per_image", self.per_image, Range{50, 20000}, "", "keypoints wanted in one image at most");
+    visitor("per_image", self.per_image, Range{50, 20000}, "",
+            "keypoints wanted in one image at most; twice as many where other cameras are out");
     visitor("per_rig", self.per_rig, Range{0, 100000}, "", "keypoints wanted in all cameras together; 0: no bound");
     visitor("levels", self.levels, Range{1, 16}, "", "pyramid levels");
     visitor("scale_factor", self.scale_factor, Range{1.05, 2.0}, "", "ratio of one level to the next");
@@ -45,11 +46,12 @@ class Extractor {
   Extractor(Extractor&&) noexcept;
   Extractor& operator=(Extractor&&) noexcept;
 
-  // Fills `keypoints` (cleared first) with at most `budget` and options.per_image entries, spread evenly over the image, in
-  // an order that depends on image and number alone, and `pyramid` with the levels they were found on. Keypoints whose pixel
-  // has no bearing in `camera`, or where `mask` (same size as the image, or empty) is 0, are left out.
+  // Fills `keypoints` (cleared first) with at most `budget` entries (no more than kInForOthers * options.per_image; 0:
+  // options.per_image), spread evenly over the image, in an order that depends on image and number alone, and `pyramid` with
+  // the levels they were found on. Keypoints whose pixel has no bearing in `camera`, or where `mask` (same size as the image,
+  // or empty) is 0, are left out.
   void extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
-               image::Pyramid& pyramid, Keypoints& keypoints, int budget = std::numeric_limits<int>::max());
+               image::Pyramid& pyramid, Keypoints& keypoints, int budget = 0);
 
  private:
   struct Scratch;

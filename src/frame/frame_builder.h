@@ -18,8 +18,8 @@ class FrameBuilder {
   FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions& options, std::vector<image::Image> masks);
 
   // Keypoints of every present image; the Bundled table is still empty. Cameras with left_out[i] != 0 (or none where it is
-  // empty) are taken as without an image; from camera i no more than budgets[i] keypoints are taken (empty: as many as the
-  // options say).
+  // empty) are taken as without an image; from camera i no more than budgets[i] keypoints are taken (empty: per_image of the
+  // options).
   BundledFrame extract(const image::ImageBundle& images, ThreadPool& pool, std::span<const std::uint8_t> left_out = {},
                        std::span<const int> budgets = {});
 

@@ -89,7 +89,8 @@ void Pipeline::restart() {
 BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages,
                                   std::span<const std::uint8_t> left_out) {
   const Stopwatch extraction;
-  const auto budgets = tracking::feature_budgets(rig_.size(), feature_shares_, left_out, config_.features);
+  const auto budgets =
+      tracking::feature_budgets(rig_.size(), feature_shares_, left_out, tracking::doubted(state_, rig_.size()), config_.features);
   BundledFrame frame = builder_.extract(images, pool_, left_out, budgets);
   for (frame::CameraFrame& c : frame.cameras) {
     if (!config_.tracking.own_times) c.time_ns = frame.time_ns;

@@ -60,12 +60,6 @@ struct Coarse {
   std::vector<Expectation> again = {};      // per camera: what of the last frame was seen again; empty after a wide search alone
 };
 
-std::vector<std::uint8_t> doubted(const TrackerState& state, std::size_t cameras) {
-  std::vector<std::uint8_t> out(cameras, 0);
-  for (std::size_t c = 0; c < state.cameras.size(); ++c) out[c] = state.cameras[c].doubted;
-  return out;
-}
-
 bool any(const std::vector<std::uint8_t>& flags) { return std::ranges::find(flags, std::uint8_t{1}) != flags.end(); }
 
 void drop(const std::vector<std::uint8_t>& cameras, FrameMatches& matches) {
@@ -89,9 +83,7 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   }
   motion.gain = 1.0 / dt;
   if (!input.state.twist) return motion;
-  double latest = 0;
-  for (const double d : motion.delay_s) latest = std::abs(d) > std::abs(latest) ? d : latest;
-  const double ahead = 0.5 * (dt + latest) / dt;  // from the middle of the interval, in intervals
+  const double ahead = 0.5 * (dt + frame::farthest_delay_s(frame)) / dt;  // from the middle of the interval, in intervals
   motion.gain = (1.0 + ahead) / dt;
   motion.offset = -ahead * *input.state.twist;
   return motion;
@@ -264,6 +256,12 @@ void note_trust(const frame::BundledFrame& frame, const Coarse& coarse, const Fi
 }
 
 }  // namespace
+
+std::vector<std::uint8_t> doubted(const TrackerState& state, std::size_t cameras) {
+  std::vector<std::uint8_t> out(cameras, 0);
+  for (std::size_t c = 0; c < state.cameras.size(); ++c) out[c] = state.cameras[c].doubted;
+  return out;
+}
 
 TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, LostReason reason) {
   TrackOutput out;

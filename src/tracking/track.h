@@ -49,6 +49,9 @@ struct TrackerState {
   std::vector<map::Sighting> sightings;       // not yet folded into the map
 };
 
+// Per camera: it contradicts the others or has seen nothing again, and waits to be believed anew.
+std::vector<std::uint8_t> doubted(const TrackerState& state, std::size_t cameras);
+
 struct TrackOutput {
   TrackResult result;
   TrackerState state;

@@ -114,14 +114,18 @@ std::pair<std::size_t, std::size_t> occupancy(const Keypoints& k) {
 
 TEST(Extractor, ABudgetIsAsGoodAsTheOption) {
   const cv::Mat image = test_view();
-  FeatureOptions fewer;
-  fewer.per_image = 450;
+  const auto with = [](int per_image) {
+    FeatureOptions options;
+    options.per_image = per_image;
+    return options;
+  };
   Extractor extractor{FeatureOptions{}};
   image::Pyramid pyramid;
   Keypoints k;
-  for (const int budget : {450, 9000, 450}) {
+  const int usual = FeatureOptions{}.per_image;
+  for (const auto& [budget, wanted] : {std::pair(450, 450), {9000, 2 * usual}, {0, usual}, {450, 450}}) {
     extractor.extract(view_of(image), {}, pinhole_camera(image.size()), pyramid, k, budget);
-    expect_equal(k, extract(image, budget == 450 ? fewer : FeatureOptions{}));
+    expect_equal(k, extract(image, with(wanted)));
   }
 }
 

@@ -28,22 +28,31 @@ int sum_of(const std::vector<int>& budgets) { return std::accumulate(budgets.beg
 double sum_of(const std::vector<double>& shares) { return std::accumulate(shares.begin(), shares.end(), 0.0); }
 
 TEST(FeatureBudgets, AreEvenAsLongAsNothingIsKnown) {
-  EXPECT_EQ(feature_budgets(1, {}, {}, options(1200, 3200)), std::vector<int>(1, 1200));
-  EXPECT_EQ(feature_budgets(2, {}, {}, options(1200, 3200)), std::vector<int>(2, 1200));
-  EXPECT_EQ(feature_budgets(4, {}, {}, options(1200, 3200)), std::vector<int>(4, 800));
-  EXPECT_EQ(feature_budgets(4, {}, {}, options(1200, 0)), std::vector<int>(4, 1200));
+  EXPECT_EQ(feature_budgets(1, {}, {}, {}, options(1200, 3200)), std::vector<int>(1, 1200));
+  EXPECT_EQ(feature_budgets(2, {}, {}, {}, options(1200, 3200)), std::vector<int>(2, 1200));
+  EXPECT_EQ(feature_budgets(4, {}, {}, {}, options(1200, 3200)), std::vector<int>(4, 800));
+  EXPECT_EQ(feature_budgets(4, {}, {}, {}, options(1200, 0)), std::vector<int>(4, 1200));
 }
 
 TEST(FeatureBudgets, FollowTheSharesBeyondHalfOfTheEvenOne) {
-  EXPECT_EQ(feature_budgets(4, std::vector<double>{0.4, 0.3, 0.2, 0.1}, {}, options(1200, 3200)), (std::vector<int>{1040, 880, 720, 560}));
+  EXPECT_EQ(feature_budgets(4, std::vector<double>{0.4, 0.3, 0.2, 0.1}, {}, {}, options(1200, 3200)), (std::vector<int>{1040, 880, 720, 560}));
   // The first would get 2000: what is beyond its cap goes to the others.
-  EXPECT_EQ(feature_budgets(4, std::vector<double>{1, 0, 0, 0}, {}, options(1200, 3200)), (std::vector<int>{1200, 667, 667, 667}));
+  EXPECT_EQ(feature_budgets(4, std::vector<double>{1, 0, 0, 0}, {}, {}, options(1200, 3200)), (std::vector<int>{1200, 667, 667, 667}));
 }
 
 TEST(FeatureBudgets, GiveToTheOthersWhatACameraThatIsOutDoesNotNeed) {
   const std::vector<std::uint8_t> out{0, 1, 0, 0};
-  EXPECT_EQ(feature_budgets(4, {}, out, options(1200, 3000)), (std::vector<int>{1000, 0, 1000, 1000}));
-  EXPECT_EQ(feature_budgets(2, {}, std::vector<std::uint8_t>{1, 1}, options(1200, 3000)), (std::vector<int>{0, 0}));
+  EXPECT_EQ(feature_budgets(4, {}, out, {}, options(1200, 3000)), (std::vector<int>{1000, 0, 1000, 1000}));
+  EXPECT_EQ(feature_budgets(4, {}, std::vector<std::uint8_t>{1, 1, 0, 1}, {}, options(1200, 3600)), (std::vector<int>{0, 0, 2400, 0}));
+  EXPECT_EQ(feature_budgets(4, {}, std::vector<std::uint8_t>{1, 1, 0, 0}, {}, options(1200, 3600)), (std::vector<int>{0, 0, 1800, 1800}));
+  EXPECT_EQ(feature_budgets(4, std::vector<double>{0, 0.1, 0.2, 0.7}, std::vector<std::uint8_t>{1, 0, 0, 0}, {}, options(1200, 3600)),
+            (std::vector<int>{0, 1200, 1200, 1200}));
+  EXPECT_EQ(feature_budgets(2, {}, std::vector<std::uint8_t>{1, 0}, {}, options(1200, 3600)), (std::vector<int>{0, 2400}));
+  EXPECT_EQ(feature_budgets(3, {}, std::vector<std::uint8_t>{1, 0, 0}, {}, options(1200, 0)), (std::vector<int>{0, 1800, 1800}));
+  const std::vector<std::uint8_t> doubted{1, 1, 0, 1};  // they keep half of the even budget, to be believed again
+  EXPECT_EQ(feature_budgets(4, std::vector<double>{0, 0, 1, 0}, {}, doubted, options(1200, 3600)), (std::vector<int>{450, 450, 2250, 450}));
+  EXPECT_EQ(feature_budgets(4, {}, {}, {}, options(1200, 1)), std::vector<int>(4, 1));  // 0 would mean as many as usual
+  EXPECT_EQ(feature_budgets(2, {}, std::vector<std::uint8_t>{1, 1}, {}, options(1200, 3000)), (std::vector<int>{0, 0}));
 }
 
 TEST(FeatureBudgets, KeepToTheirBoundsForAnyShares) {
@@ -59,11 +68,13 @@ TEST(FeatureBudgets, KeepToTheirBoundsForAnyShares) {
     const feature::FeatureOptions o = options(1000, 500 + static_cast<int>(random.below(9000)));
     const auto seeing = static_cast<int>(std::count(out.begin(), out.end(), 0));
     if (seeing == 0) continue;
-    const std::vector<int> budgets = feature_budgets(n, shares, out, o);
-    const int total = std::min(o.per_rig, seeing * o.per_image);
+    const std::vector<int> budgets = feature_budgets(n, shares, out, {}, o);
+    const int of_rig = std::min(o.per_rig, static_cast<int>(n) * o.per_image);
+    const int most = std::clamp((of_rig + seeing - 1) / seeing, o.per_image, 2 * o.per_image);
+    const int total = std::min(of_rig, seeing * most);
     EXPECT_NEAR(sum_of(budgets), total, 0.5 * seeing);
     for (std::size_t c = 0; c < n; ++c) {
-      EXPECT_LE(budgets[c], out[c] ? 0 : o.per_image);
+      EXPECT_LE(budgets[c], out[c] ? 0 : most);
       EXPECT_GE(budgets[c], out[c] ? 0 : total / (2 * seeing));
     }
   }
