@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 #include <Eigen/Cholesky>
@@ -19,7 +18,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi, kMillimetres = 1000.0;
+constexpr double kMillimetres = 1000.0;
 constexpr std::size_t kStretch = 10;  // keyframes in a row, so that those chosen share landmarks
 constexpr int kPasses = 4;            // at most; each finds anew what the extrinsics before it had refused
 constexpr int kMinShared = 15;        // landmarks two keyframes share, below which one does not hold the other
@@ -178,9 +177,9 @@ CameraRefinement judge(const solver::ExtrinsicEstimate& estimate, const RigRefin
   out.observations = estimate.observations;
   const Vector3d turned = estimate.change.head<3>(), moved = estimate.change.tail<3>();
   const Matrix3d of_rotation = estimate.covariance.topLeftCorner<3, 3>(), of_translation = estimate.covariance.bottomRightCorner<3, 3>();
-  out.change_deg = turned.norm() * kDegrees;
+  out.change_deg = geometry::degrees(turned.norm());
   out.change_mm = moved.norm() * kMillimetres;
-  out.std_deg = worst_deviation(of_rotation) * kDegrees;
+  out.std_deg = geometry::degrees(worst_deviation(of_rotation));
   out.std_mm = worst_deviation(of_translation) * kMillimetres;
   out.rotation_sigmas = in_sigmas(turned, of_rotation);
   out.translation_sigmas = in_sigmas(moved, of_translation);
@@ -228,7 +227,7 @@ RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions&
   RigProblem problem = choose(map, options, features);
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();
-  const solver::RigAdjusterOptions solve{.sigma_rotation = options.calibration_deg / kDegrees,
+  const solver::RigAdjusterOptions solve{.sigma_rotation = geometry::radians(options.calibration_deg),
                                          .sigma_translation = options.calibration_mm / kMillimetres};
   const solver::RigAdjustment adjusted = adjust_in_passes(map, features, solve, problem, stop);
   if (!adjusted.done) return out;

@@ -50,10 +50,11 @@ std::vector<double> Rig::measured_overlap(const std::vector<RigCamera>& cameras)
   return overlap;
 }
 
-bool Rig::any_overlap() const {
+bool Rig::any_overlap(std::span<const std::uint8_t> left_out) const {
+  const auto counts = [&](std::size_t i) { return left_out.empty() || !left_out[i]; };
   for (std::size_t i = 0; i < size(); ++i) {
     for (std::size_t j = 0; j < size(); ++j) {
-      if (overlap(i, j)) return true;
+      if (counts(i) && counts(j) && overlap(i, j)) return true;
     }
   }
   return false;

@@ -40,8 +40,9 @@ class Rig {
   bool overlap(std::size_t i, std::size_t j) const { return overlap_share(i, j) > kMinOverlap; }
   // Share of camera i's image that camera j sees, best over the sampled depths, in [0, 1].
   double overlap_share(std::size_t i, std::size_t j) const { return calibration_->overlap[i * size() + j]; }
-  // True where some pair of cameras overlaps, so that a still rig sees metric depth.
-  bool any_overlap() const;
+  // True where some pair of cameras overlaps, so that a still rig sees metric depth. `left_out`: one per camera, those that do not
+  // count; or empty.
+  bool any_overlap(std::span<const std::uint8_t> left_out = {}) const;
 
   // The rig of some of the cameras, in the order given; the first becomes camera 0. Indices are valid and distinct.
   Rig subset(std::span<const int> indices) const;

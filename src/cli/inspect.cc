@@ -2,7 +2,6 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
@@ -28,7 +27,7 @@ nlohmann::ordered_json to_json(const frame::BundledFrame& frame, const io::Datas
     const feature::Keypoints& k = frame.cameras[c].keypoints;
     nlohmann::ordered_json keypoints = nlohmann::ordered_json::array();
     for (std::size_t i = 0; i < k.size(); ++i) {
-      keypoints.push_back({k.pixel[i].x(), k.pixel[i].y(), k.level[i], k.angle[i] * 180.0 / std::numbers::pi});
+      keypoints.push_back({k.pixel[i].x(), k.pixel[i].y(), k.level[i], geometry::degrees(k.angle[i])});
     }
     cameras.push_back({{"name", dataset.rig.camera(c).name}, {"keypoints", std::move(keypoints)}});
   }

@@ -71,7 +71,9 @@ Status prepare_folder(const std::filesystem::path& folder, bool overwrite) {
   }
   std::filesystem::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be made"};
-  for (const char* name : {"config.yaml", "summary.json", "trajectory.svg", "run.svg"}) std::filesystem::remove(folder / name, error);
+  for (const char* name : {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "rig_refined.yaml"}) {
+    std::filesystem::remove(folder / name, error);
+  }
   for (const char* stem : {"trajectory", "trajectory_live"}) {
     for (std::size_t part = 0; std::filesystem::remove(folder / session::trajectory_file(stem, part), error); ++part) {
     }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <string>
 
 #include "evaluation/trajectory_alignment.h"
@@ -51,7 +50,7 @@ RelativeErrors relative_errors(const Trajectory& aligned, const Trajectory& grou
     const SE3 motion = compared[i].T_world_frame.inverse() * compared[j].T_world_frame;
     const SE3 error = true_motion.inverse() * motion;
     translation.push_back(error.translation().norm());
-    rotation.push_back(geometry::so3_log(error.rotation()).norm() * 180.0 / std::numbers::pi);
+    rotation.push_back(geometry::degrees(geometry::so3_log(error.rotation()).norm()));
   }
   return {.delta_s = delta_s,
           .translation_m = statistics_of(std::move(translation)),

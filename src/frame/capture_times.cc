@@ -4,18 +4,6 @@
 #include <cstdlib>
 
 namespace bslam::frame {
-namespace {
-
-bool any_overlap(const camera::Rig& rig, std::span<const std::uint8_t> left_out) {
-  for (std::size_t i = 0; i < rig.size(); ++i) {
-    for (std::size_t j = 0; j < rig.size(); ++j) {
-      if (!left_out[i] && !left_out[j] && rig.overlap(i, j)) return true;
-    }
-  }
-  return false;
-}
-
-}  // namespace
 
 std::vector<std::uint8_t> without_late_cameras(const camera::Rig& rig, const image::ImageBundle& images,
                                                std::span<const std::uint8_t> left_out) {
@@ -30,7 +18,7 @@ std::vector<std::uint8_t> without_late_cameras(const camera::Rig& rig, const ima
   std::vector<std::uint8_t> gone = absent;
   for (std::size_t c = 0; c < out.size(); ++c) gone[c] |= out[c];
   const bool some = std::ranges::find(gone, std::uint8_t{0}) != gone.end();
-  if (!some || (any_overlap(rig, absent) && !any_overlap(rig, gone))) return {left_out.begin(), left_out.end()};
+  if (!some || (rig.any_overlap(absent) && !rig.any_overlap(gone))) return {left_out.begin(), left_out.end()};
   return out;
 }
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <numbers>
 
 namespace bslam::geometry {
 
@@ -12,6 +13,10 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// For people to read.
+constexpr double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
+constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
 // [v]x, so that skew(v) * w = v x w.
 Matrix3d skew(const Vector3d& v);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -59,9 +60,14 @@ Result<image::Image> read_image(const std::filesystem::path& file) {
 Result<image::Image> read_mask(const camera::Camera& camera) {
   if (camera.mask_file.empty()) return image::Image();
   auto mask = read_image(camera.mask_file);
-  if (mask && (mask->width() != camera.width || mask->height() != camera.height)) {
+  if (!mask) return mask;
+  if (mask->width() != camera.width || mask->height() != camera.height) {
     return Error{camera.mask_file, "", fmt::format("{}x{} pixels", mask->width(), mask->height()),
                  fmt::format("{}x{}, the resolution of {}", camera.width, camera.height, camera.name)};
+  }
+  const std::span pixels(mask->row(0), static_cast<std::size_t>(mask->width()) * static_cast<std::size_t>(mask->height()));
+  if (std::ranges::all_of(pixels, [](std::uint8_t p) { return p == 0; })) {
+    return Error{camera.mask_file, "", "nothing but 0, which hides all of " + camera.name, "other values where the image counts"};
   }
   return mask;
 }

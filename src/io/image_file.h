@@ -21,7 +21,7 @@ std::optional<image::Image> decode_grey(std::string_view bytes);
 Result<image::Image> read_image(const std::filesystem::path& file);
 
 // The mask of a camera, 0 = ignore; an empty image where it has none. Errors: not readable, not the camera's
-// resolution.
+// resolution, 0 everywhere.
 Result<image::Image> read_mask(const camera::Camera& camera);
 
 // The masks of all cameras of a rig, in order; errors as read_mask.

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "base/timestamp.h"
 #include "geometry/triangulation.h"
@@ -15,11 +14,10 @@
 namespace bslam::io {
 namespace {
 
+using geometry::degrees;
 using geometry::SE3;
 using geometry::Vector2d;
 using geometry::Vector3d;
-
-double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
 
 // Angle from the optical axis to the outermost pixel with a bearing on the way from the principal point to `pixel`.
 double angle_towards(const camera::Camera& camera, const Vector2d& pixel) {

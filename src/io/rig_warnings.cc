@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "geometry/triangulation.h"
 #include "io/rig_description.h"
@@ -12,12 +11,11 @@
 namespace bslam::io {
 namespace {
 
+using geometry::degrees;
 using geometry::Vector2d;
 using geometry::Vector3d;
 
 constexpr double kLeastBaseline = 1e-3, kLargestBaseline = 5.0;  // metres
-
-double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
 
 Vector3d axis_of(const camera::Rig& rig, std::size_t i) { return rig.rig_from_cam(i).rotation() * Vector3d::UnitZ(); }
 
@@ -88,6 +86,13 @@ void warn_of_lens(const camera::Camera& camera, std::size_t i, std::vector<std::
                     "those of model {}?",
                     i, 100 * share, camera::model_name(camera.model)));
   }
+}
+
+void warn_of_time(const camera::Camera& camera, std::size_t i, std::vector<std::string>& warnings) {
+  constexpr double kLong_s = 0.5;
+  const double offset_s = to_seconds(camera.time_offset_ns);
+  if (std::abs(offset_s) < kLong_s) return;
+  warnings.push_back(fmt::format("camera {}: a time offset of {:g} s: is it given in milliseconds? (seconds are expected)", i, offset_s));
 }
 
 constexpr double kSameWay = 0.5;  // radians between the views of cameras that look the same way
@@ -163,6 +168,7 @@ std::vector<std::string> rig_warnings(const camera::Rig& rig) {
   for (std::size_t i = 0; i < rig.size(); ++i) {
     warn_of_principal_point(rig.camera(i), i, warnings);
     warn_of_lens(rig.camera(i), i, warnings);
+    warn_of_time(rig.camera(i), i, warnings);
   }
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) warn_of_pair(rig, i, j, warnings);

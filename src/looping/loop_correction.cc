@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "base/median.h"
 #include "looping/essential_graph.h"
@@ -16,7 +15,7 @@ using Eigen::Vector3d;
 using geometry::SE3;
 using geometry::Sim3;
 
-constexpr double kMaxTurn = 20 * std::numbers::pi / 180;  // rad: no drift turns a rig by more
+constexpr double kMaxTurn = geometry::radians(20);  // rad: no drift turns a rig by more
 
 Vector3d centre(const SE3& T_rig_world) { return T_rig_world.inverse().translation(); }
 

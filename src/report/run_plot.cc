@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <optional>
 #include <span>
 
 #include "report/figure.h"
@@ -95,6 +96,28 @@ Panel inlier_panel(const RunRecord& record) {
   return panel;
 }
 
+// A bar for every stretch of time in which a camera was not sound, at the height of its number, in the colour of why; empty
+// where all were.
+std::optional<Panel> camera_state_panel(const RunRecord& record) {
+  Panel panel = time_panel(record, "Cameras that were not sound", "camera");
+  const std::size_t without = panel.series.size();
+  for (std::size_t i = 0; i < record.cameras.size(); ++i) {
+    for (const CameraInterval& interval : record.cameras[i].states) {
+      if (interval.state == "ok") continue;
+      const std::string& why = interval.reason.empty() ? interval.state : interval.reason;
+      auto series = std::ranges::find(panel.series, why, &Series::label);
+      if (series == panel.series.end()) {
+        series = panel.series.insert(series, time_series(why, {}, series_colour(panel.series.size() - without), 6.0));
+      }
+      const double y = static_cast<double>(i);
+      series->points.insert(series->points.end(), {{interval.from_s, y}, {interval.to_s, y}, {kNone, kNone}});
+    }
+  }
+  if (panel.series.size() == without) return std::nullopt;
+  panel.series.push_back(time_series("", {{record.frames.back().time_s, static_cast<double>(record.cameras.size()) - 0.5}}, "none", 0.0));
+  return panel;
+}
+
 Points stage_points(const StageSeries& stage) {
   Points points;
   for (const StageSample& sample : stage.samples) points.push_back({sample.time_s, sample.ms});
@@ -145,6 +168,9 @@ std::string run_plot_svg(const RunRecord& record) {
                 .subtitle = subtitle_of(record)};
   figure.rows.push_back({.height_px = 230.0, .panels = {keypoint_panel(record)}});
   figure.rows.push_back({.height_px = 270.0, .panels = {inlier_panel(record)}});
+  if (auto states = camera_state_panel(record)) {
+    figure.rows.push_back({.height_px = 90.0 + 20.0 * static_cast<double>(record.cameras.size()), .panels = {*std::move(states)}});
+  }
   figure.rows.push_back({.height_px = 270.0, .panels = {frame_time_panel(record)}});
   std::vector<const StageSeries*> background;
   for (const StageSeries& stage : record.stages) {

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <map>
-#include <numbers>
 #include <set>
 
 #include "feature/extractor.h"
@@ -132,10 +131,9 @@ std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::
   if (!found) return std::nullopt;
   const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
   OtherPose out{.agreeing = found->num_inliers};
-  constexpr double kDegrees = 180.0 / std::numbers::pi;
-  out.turned_deg = kDegrees * geometry::so3_log((found->T_b_a * given.inverse()).rotation()).norm();
+  out.turned_deg = geometry::degrees(geometry::so3_log((found->T_b_a * given.inverse()).rotation()).norm());
   const Eigen::Vector3d lies = found->T_b_a.inverse().translation(), should_lie = given.inverse().translation();
-  if (should_lie.norm() > kNoBaseline) out.displaced_deg = kDegrees * geometry::angle_between(lies, should_lie.normalized());
+  if (should_lie.norm() > kNoBaseline) out.displaced_deg = geometry::degrees(geometry::angle_between(lies, should_lie.normalized()));
   return out;
 }
 

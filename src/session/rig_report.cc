@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <optional>
 
 #include "io/atomic_file.h"
@@ -18,8 +17,6 @@ namespace bslam::session {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
 
 Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -36,9 +33,9 @@ Json camera_json(const camera::Rig& rig, std::size_t i) {
           {"intrinsics", {k.fx, k.fy, k.cx, k.cy}},
           {"distortion", camera::distortion(camera.model)},
           {"field_of_view_deg",
-           {{"horizontal", degrees(view.horizontal)},
-            {"vertical", degrees(view.vertical)},
-            {"diagonal", degrees(view.diagonal)}}},
+           {{"horizontal", geometry::degrees(view.horizontal)},
+            {"vertical", geometry::degrees(view.vertical)},
+            {"diagonal", geometry::degrees(view.diagonal)}}},
           {"position_body", vector_json(T.translation())},
           {"optical_axis_body", vector_json(T.rotation() * Eigen::Vector3d::UnitZ())},
           {"position_cam0", vector_json(rig.rig_from_cam(i).translation())},

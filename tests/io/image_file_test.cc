@@ -131,6 +131,10 @@ TEST(ImageFile, ReadsMasksOfTheCamerasSize) {
   EXPECT_EQ(read_mask(camera).error().found, "20x10 pixels");
   camera.mask_file = "none.png";
   EXPECT_FALSE(read_mask(camera));
+  ASSERT_TRUE(cv::imwrite((folder.path() / "black.png").string(), cv::Mat::zeros(10, 30, CV_8U)));
+  camera.mask_file = (folder.path() / "black.png").string();
+  ASSERT_FALSE(read_mask(camera));
+  EXPECT_EQ(read_mask(camera).error().found, "nothing but 0, which hides all of c");
 }
 
 }  // namespace

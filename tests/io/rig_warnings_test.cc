@@ -54,6 +54,14 @@ TEST(RigWarnings, SpeakOfBaselinesHardlyMeant) {
   EXPECT_EQ(rig_warnings(camera::Rig({at({0, 0, 0}), at({0.0005, 0, 0}), at({100, 0, 0})})).size(), 3u);
 }
 
+TEST(RigWarnings, SpeakOfTimesHardlyMeant) {
+  camera::Camera camera = pinhole();
+  camera.time_offset_ns = 40'000'000;
+  EXPECT_TRUE(rig_warnings(one(camera)).empty());
+  camera.time_offset_ns = -20'000'000'000;
+  EXPECT_TRUE(warns(one(camera), "a time offset of -20 s: is it given in milliseconds?"));
+}
+
 TEST(RigWarnings, SpeakOfIntrinsicsThatDoNotFitTheImage) {
   camera::Camera camera = pinhole();
   camera.width = 300;

@@ -52,6 +52,16 @@ TEST(RunPlot, NamesCamerasStagesAndEvents) {
   EXPECT_FALSE(contains(svg, "relocalised"));
 }
 
+TEST(RunPlot, ShowsWhichCamerasWereNotSound) {
+  RunRecord record = short_run(40);
+  record.cameras[1].states = {{"ok", "", 0.0, 0.5}, {"out", "frozen", 0.55, 1.0}, {"ok", "", 1.05, 1.95}};
+  const std::string svg = run_plot_svg(record);
+  EXPECT_EQ(xml_fault(svg), "");
+  EXPECT_TRUE(contains(svg, "Cameras that were not sound"));
+  EXPECT_TRUE(contains(svg, "frozen"));
+  EXPECT_FALSE(contains(run_plot_svg(short_run(40)), "Cameras that were not sound"));
+}
+
 TEST(RunPlot, IsTheSameForTheSameRecord) { EXPECT_EQ(run_plot_svg(short_run(40)), run_plot_svg(short_run(40))); }
 
 TEST(RunPlot, StaysSmallForALongRun) {
