@@ -175,7 +175,7 @@ class Recall {
       if (outcome != Outcome::kRejected) outcome = right_place ? Outcome::kRejected : Outcome::kOtherCandidates;
       looping::LocateReport report;
       const Random random(static_cast<std::uint64_t>(config_.seed), "loop", static_cast<std::uint64_t>(now.keyframe.value()));
-      const auto location = looping::locate(map_, *map_.keyframe(now.keyframe).frame, candidate.keyframe, config_.looping.verification,
+      const auto location = looping::locate(map_, map_.rig_of(now.keyframe), *map_.keyframe(now.keyframe).frame, candidate.keyframe, config_.looping.verification,
                                             config_.feature_model(), random, &report);
       note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} found {} of {}; ", candidate.keyframe.value(),
                            candidate.score, static_cast<int>(report.rejection), report.matches, report.inliers, report.found,

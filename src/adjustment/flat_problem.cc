@@ -59,10 +59,9 @@ std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector
   std::vector<geometry::SE3> out;
   bool any = false;
   for (const KeyframeId k : keyframes) {
-    const frame::BundledFrame& frame = *map.keyframe(k).frame;
     for (std::size_t c = 0; c < map.rig().size(); ++c) {
-      any |= frame.delay_s(c) != 0.0;
-      out.push_back(frame.motion_until(c));
+      any |= map.keyframe(k).frame->delay_s(c) != 0.0;
+      out.push_back(map.motion_until(k, CameraIndex(c)));
     }
   }
   if (!any) out.clear();

@@ -64,7 +64,7 @@ FusionReport fuse_into(KeyframeId target, const SE3& T_rig_world, const std::vec
                        const LandmarkFusionOptions& options, const map::FeatureModel& features, map::MapDraft& draft) {
   FusionReport report;
   const auto frame = draft.map().keyframe(target).frame;  // kept: edits may copy the keyframe
-  const camera::Rig rig = frame::rig_of(draft.map().rig(), *frame);
+  const camera::Rig rig = draft.map().rig_of(target);
   const std::vector<LandmarkId> absent = absent_from(draft.map(), target, landmarks);
   std::vector<frame::SearchPoint> points = map::search_points(draft.map(), absent);
   std::vector<feature::Descriptor> descriptors(points.size());  // likewise

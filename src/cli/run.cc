@@ -59,20 +59,23 @@ Result<system::Config> resolve_run_config(const RunArguments& arguments) {
   return resolved;
 }
 
-// Makes the folder; an existing one must be empty or given up for overwriting, and then loses the files of an earlier run.
-Status prepare_folder(const std::filesystem::path& folder, bool overwrite) {
+// Makes the folder; an existing one must be empty or given up for overwriting, and then loses the files of an earlier run, but not
+// those this one was told to read.
+Status prepare_folder(const RunArguments& arguments) {
+  const std::filesystem::path folder = arguments.out;
   std::error_code error;
   const bool exists = std::filesystem::exists(folder, error);
   if (exists && !std::filesystem::is_directory(folder, error)) {
     return Error{folder.string(), "--out", "a file", "a folder"};
   }
-  if (exists && !overwrite && !std::filesystem::is_empty(folder, error)) {
+  if (exists && !arguments.overwrite && !std::filesystem::is_empty(folder, error)) {
     return Error{folder.string(), "--out", "a folder that is not empty", "an empty or new one, or --overwrite"};
   }
   std::filesystem::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be made"};
   for (const char* name : {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "rig_refined.yaml"}) {
-    std::filesystem::remove(folder / name, error);
+    const auto is = [&](const std::string& input) { return !input.empty() && std::filesystem::equivalent(folder / name, input, error); };
+    if (!is(arguments.data.rig) && !is(arguments.config.file)) std::filesystem::remove(folder / name, error);
   }
   for (const char* stem : {"trajectory", "trajectory_live"}) {
     for (std::size_t part = 0; std::filesystem::remove(folder / session::trajectory_file(stem, part), error); ++part) {
@@ -140,7 +143,7 @@ int run(const RunArguments& arguments) {
   for (const auto& [option, file] : {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
     if (const Status s = check_output_file(file, option); !s) return report_error(s.error());
   }
-  if (const Status s = prepare_folder(arguments.out, arguments.overwrite); !s) return report_error(s.error());
+  if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
   for (const std::string& warning : dataset->warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   print_rig_warnings(dataset->rig);
 

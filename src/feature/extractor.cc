@@ -138,13 +138,14 @@ Extractor::Extractor(Extractor&&) noexcept = default;
 Extractor& Extractor::operator=(Extractor&&) noexcept = default;
 
 void Extractor::extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
-                        image::Pyramid& pyramid, Keypoints& keypoints, int budget) {
+                        image::Pyramid& pyramid, Keypoints& keypoints, std::optional<int> budget) {
   BSLAM_ASSERT(mask.empty() || (mask.width == image.width && mask.height == image.height),
                "mask and image differ in size");
-  const int wanted = budget > 0 ? std::min(budget, most_of(options_)) : options_.per_image;
+  const int wanted = std::clamp(budget.value_or(options_.per_image), 0, most_of(options_));
   keypoints.clear();
   keypoints.reserve(static_cast<std::size_t>(wanted));
   image::build_pyramid(image, options_.levels, options_.scale_factor, pyramid);
+  if (wanted == 0) return;
   scratch_->smoothed.resize(image.width, image.height);  // room for all levels, also if this image has no keypoint
   scratch_->detect(pyramid, mask, wanted, options_);
   for (std::size_t l = 0; l < pyramid.size(); ++l) {

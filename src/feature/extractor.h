@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "base/options.h"
 #include "camera/camera.h"
@@ -46,12 +47,12 @@ class Extractor {
   Extractor(Extractor&&) noexcept;
   Extractor& operator=(Extractor&&) noexcept;
 
-  // Fills `keypoints` (cleared first) with at most `budget` entries (no more than kInForOthers * options.per_image; 0:
-  // options.per_image), spread evenly over the image, in an order that depends on image and number alone, and `pyramid` with
+  // Fills `keypoints` (cleared first) with at most `budget` entries (no more than kInForOthers * options.per_image; none
+  // given: options.per_image), spread evenly over the image, in an order that depends on image and number alone, and `pyramid` with
   // the levels they were found on. Keypoints whose pixel has no bearing in `camera`, or where `mask` (same size as the image,
   // or empty) is 0, are left out.
   void extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
-               image::Pyramid& pyramid, Keypoints& keypoints, int budget = 0);
+               image::Pyramid& pyramid, Keypoints& keypoints, std::optional<int> budget = {});
 
  private:
   struct Scratch;

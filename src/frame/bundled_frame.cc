@@ -15,11 +15,6 @@ double BundledFrame::delay_s(std::size_t c) const {
   return camera.state == image::ImageState::kPresent ? to_seconds(camera.time_ns - time_ns) : 0.0;
 }
 
-geometry::SE3 BundledFrame::motion_until(std::size_t c) const {
-  const double delay = delay_s(c);
-  return delay == 0.0 ? geometry::SE3() : geometry::SE3::exp(delay * twist);
-}
-
 std::vector<double> delays_of(const BundledFrame& frame) {
   std::vector<double> delays(frame.cameras.size());
   for (std::size_t c = 0; c < delays.size(); ++c) delays[c] = frame.delay_s(c);
@@ -32,6 +27,10 @@ double farthest_delay_s(const BundledFrame& frame) {
   return farthest;
 }
 
-camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame) { return rig.moving(delays_of(frame), frame.twist); }
+camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame) { return rig_of(rig, frame, frame.twist); }
+
+camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame, const geometry::Vector6d& twist) {
+  return rig.moving(delays_of(frame), twist);
+}
 
 }  // namespace bslam::frame

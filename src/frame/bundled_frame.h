@@ -27,15 +27,14 @@ struct BundledFrame {
   TimeNs time_ns = 0;
   std::vector<CameraFrame> cameras;  // one per camera of the rig
   Bundled bundled;
-  // Motion of the rig while its cameras fired, rad/s and m/s (see camera::Rig::moving); zero as long as nothing is known.
+  // Motion of the rig while its cameras fired, rad/s and m/s (see camera::Rig::moving), as tracking knew it; zero as long as
+  // nothing is known. That of a keyframe is in the map.
   geometry::Vector6d twist = geometry::Vector6d::Zero();
 
   const feature::Keypoints& keypoints(CameraIndex c) const { return cameras[c.index()].keypoints; }
   std::size_t num_keypoints() const;
   // Time of camera c's image after that of the frame, in seconds; 0 where it has none.
   double delay_s(std::size_t c) const;
-  // How the rig moved from the time of the frame to that of camera c's image; the identity where they are one.
-  geometry::SE3 motion_until(std::size_t c) const;
 };
 
 // Per camera.
@@ -43,7 +42,8 @@ std::vector<double> delays_of(const BundledFrame& frame);
 // Of the camera that fires farthest from the time of the frame, before or after it.
 double farthest_delay_s(const BundledFrame& frame);
 
-// The rig as it stood while the frame was taken.
+// The rig as it stood while the frame was taken, moving by the frame's twist or another one.
 camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame);
+camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame, const geometry::Vector6d& twist);
 
 }  // namespace bslam::frame

@@ -1,5 +1,6 @@
 #include "frame/frame_builder.h"
 
+#include <optional>
 #include <utility>
 
 #include "base/assert.h"
@@ -26,7 +27,7 @@ BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool&
     camera.state = !left_out.empty() && left_out[i] ? image::ImageState::kMissing : input.state;
     camera.time_ns = input.time_ns;
     if (camera.state == image::ImageState::kPresent) {
-      const int budget = budgets.empty() ? 0 : budgets[i];
+      const std::optional<int> budget = budgets.empty() ? std::nullopt : std::optional(budgets[i]);
       extractors_[i].extract(input.image.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], camera.keypoints, budget);
     } else {
       pyramids_[i].levels.clear();

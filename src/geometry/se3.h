@@ -34,6 +34,9 @@ class SE3 {
   Vector3d translation_ = Vector3d::Zero();
 };
 
+// The same where lengths are `factor` times as long.
+inline SE3 scaled(const SE3& T, double factor) { return {T.rotation(), factor * T.translation()}; }
+
 // Pose on the geodesic from `a` (share 0) to `b` (share 1); shares outside [0, 1] extrapolate.
 SE3 interpolate(const SE3& a, const SE3& b, double share);
 

@@ -186,10 +186,10 @@ void take_bundled(ByteReader& in, frame::BundledFrame& frame) {
 
 }  // namespace
 
-void put_frame(const frame::BundledFrame& frame, bool with_words, ByteWriter& out) {
+void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out) {
   out.number(frame.id.value());
   out.number(frame.time_ns);
-  out.numbers(frame.twist.data(), 6);
+  out.numbers(twist.data(), 6);
   for (const frame::CameraFrame& c : frame.cameras) put_camera(c, with_words, out);
   put_bundled(frame.bundled, out);
 }

@@ -223,7 +223,7 @@ void put_keyframes(const map::BundledMap& map, const FileIds& ids, bool with_wor
     const map::BundledKeyframe& keyframe = map.keyframe(k);
     put_transform(keyframe.T_rig_world, out);
     out.number(keyframe.parent.valid() ? ids.keyframe[keyframe.parent.index()].value() : -1);
-    put_frame(*keyframe.frame, with_words, out);
+    put_frame(*keyframe.frame, keyframe.twist, with_words, out);
   }
 }
 

@@ -47,7 +47,7 @@ std::size_t take_keyframes(ByteReader& in, bool with_words, map::BundledMap& map
 void take_landmarks(ByteReader& in, map::BundledMap& map);
 
 // One BundledFrame, as part of a keyframe; map_frame_bytes.cc.
-void put_frame(const frame::BundledFrame& frame, bool with_words, ByteWriter& out);
+void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out);
 frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map::PyramidShape& pyramid,
                                bool with_words, std::size_t& words_end);
 

@@ -92,7 +92,8 @@ void warn_of_time(const camera::Camera& camera, std::size_t i, std::vector<std::
   constexpr double kLong_s = 0.5;
   const double offset_s = to_seconds(camera.time_offset_ns);
   if (std::abs(offset_s) < kLong_s) return;
-  warnings.push_back(fmt::format("camera {}: a time offset of {:g} s: is it given in milliseconds? (seconds are expected)", i, offset_s));
+  warnings.push_back(
+      fmt::format("camera {}: a time offset of {:g} s: is it given in milliseconds? (seconds are expected)", i, offset_s));
 }
 
 constexpr double kSameWay = 0.5;  // radians between the views of cameras that look the same way

@@ -164,7 +164,7 @@ std::vector<LandmarkId> landmarks_about(const map::BundledMap& map, KeyframeId k
   return out;
 }
 
-std::optional<Location> locate(const map::BundledMap& map, const frame::BundledFrame& frame, KeyframeId candidate,
+std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& rig, const frame::BundledFrame& frame, KeyframeId candidate,
                                const VerificationOptions& options, const map::FeatureModel& features, Random random,
                                LocateReport* report) {
   LocateReport unused;
@@ -178,7 +178,6 @@ std::optional<Location> locate(const map::BundledMap& map, const frame::BundledF
   out.matches = static_cast<int>(matches.size());
   if (out.matches < options.consensus.min_inliers) return rejected(Rejection::kFewMatches);
 
-  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   const solver::PoseSolverOptions pose_options;
   solver::PoseSolution solution = solver::absolute_pose(rig, observations_of(map, frame, matches, features), pose_options,
                                                         options.consensus, random);

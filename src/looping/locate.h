@@ -30,8 +30,9 @@ struct LocateReport {
   int sought = 0, found = 0;  // landmarks that should be found from there, and are
 };
 
-// Empty where geometry does not confirm the candidate (alive in `map`). Deterministic for a seed.
-std::optional<Location> locate(const map::BundledMap& map, const frame::BundledFrame& frame, KeyframeId candidate,
+// Empty where geometry does not confirm the candidate (alive in `map`). `rig`: as it stood while the frame was taken, which for a
+// frame that is no keyframe is frame::rig_of(map.rig(), frame). Deterministic for a seed.
+std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& rig, const frame::BundledFrame& frame, KeyframeId candidate,
                                const VerificationOptions& options, const map::FeatureModel& features, Random random,
                                LocateReport* report = nullptr);
 

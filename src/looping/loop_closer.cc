@@ -41,7 +41,7 @@ LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const Loopin
 
 std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const {
   const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
-  return locate(map, *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
+  return locate(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
 }
 
 // Parts may lie anywhere, so that nothing but the pictures speaks against a wrong place: no other of the rest of the map may
@@ -49,11 +49,12 @@ std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::Bundl
 // that nothing is known of.
 bool LoopCloser::undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const {
   const std::shared_ptr<const frame::BundledFrame> frame = map.keyframe(keyframe).frame;
+  const camera::Rig rig = map.rig_of(keyframe);
   map::BundledMap rest = map;
   rest.remove_part(map.root_of(keyframe));
   const Random random(seed_, "rival", static_cast<std::uint64_t>(keyframe.value()));
   return std::ranges::none_of(recogniser_->recognised(rest, *frame), [&](const Candidate& candidate) {
-    const auto other = locate(rest, *frame, candidate.keyframe, options_.verification, features_, random);
+    const auto other = locate(rest, rig, *frame, candidate.keyframe, options_.verification, features_, random);
     return other && disputes(rest, location, *other);
   });
 }

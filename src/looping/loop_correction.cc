@@ -27,7 +27,7 @@ SE3 pose_of(const Sim3& S_rig_world) {
 // Median error, in pixels, of what the keyframe sees of the place at the pose it has in the map.
 double error_px(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
   const map::BundledKeyframe& entry = map.keyframe(keyframe);
-  const camera::Rig rig = frame::rig_of(map.rig(), *entry.frame);
+  const camera::Rig rig = map.rig_of(keyframe);
   std::vector<double> errors;
   for (const auto& [feature, l] : location.matches) {
     const frame::KeypointRef r = entry.frame->bundled.keypoints(feature).front();

@@ -6,8 +6,9 @@ namespace bslam::looping {
 std::optional<Location> relocalise(PlaceRecogniser& recogniser, const map::BundledMap& map, const frame::BundledFrame& frame,
                                    const VerificationOptions& options, const map::FeatureModel& features, Random random) {
   std::vector<Location> found;
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   for (const Candidate& candidate : recogniser.recognised(map, frame)) {
-    if (auto location = locate(map, frame, candidate.keyframe, options, features, random)) found.push_back(std::move(*location));
+    if (auto location = locate(map, rig, frame, candidate.keyframe, options, features, random)) found.push_back(std::move(*location));
   }
   if (found.empty()) return std::nullopt;
   // Of equal ones the first, which looks more alike.

@@ -11,6 +11,7 @@ void append_keyframes(BundledMap& onto, const BundledMap& other, AppendedIds& id
   for (const KeyframeId k : sources) {
     const BundledKeyframe& source = other.keyframe(k);
     ids.keyframes[k.index()] = onto.add_keyframe(source.frame, source.T_rig_world, {}, {});
+    onto.set_twist(ids.keyframes[k.index()], source.twist);
   }
   std::vector<KeyframeId> parents;
   for (const KeyframeId k : sources) {

@@ -27,6 +27,8 @@ struct BundledKeyframe {
   KeyframeId parent;                                 // spanning tree; invalid for the root
   std::vector<KeyframeId> children;                  // in order of id
   geometry::SE3 T_rig_parent;                        // once removed: its pose relative to `parent`
+  // Motion of the rig while its cameras fired, as BundledFrame::twist, in the unit of the map.
+  geometry::Vector6d twist = geometry::Vector6d::Zero();
   bool alive = false;
   double unit = 1.0;  // by how much its part was scaled since it was added: what was measured against it then grows along
 };

@@ -67,14 +67,22 @@ geometry::SE3 BundledMap::resolved_pose(KeyframeId k) const {
 
 geometry::SE3 BundledMap::rig_from_cam(const BundledKeyframe& k, CameraIndex c) const {
   const geometry::SE3& T_rig_cam = rig_->rig_from_cam(c.index());
-  return k.frame->delay_s(c.index()) == 0.0 ? T_rig_cam : k.frame->motion_until(c.index()).inverse() * T_rig_cam;
+  const double delay = k.frame->delay_s(c.index());
+  return delay == 0.0 ? T_rig_cam : geometry::SE3::exp(delay * k.twist).inverse() * T_rig_cam;
+}
+
+camera::Rig BundledMap::rig_of(KeyframeId k) const { return frame::rig_of(*rig_, *keyframe(k).frame, keyframe(k).twist); }
+
+geometry::SE3 BundledMap::motion_until(KeyframeId k, CameraIndex c) const {
+  const double delay = keyframe(k).frame->delay_s(c.index());
+  return delay == 0.0 ? geometry::SE3() : geometry::SE3::exp(delay * keyframe(k).twist);
 }
 
 geometry::SE3 BundledMap::cam_from_world(KeyframeId k, CameraIndex c) const {
   const BundledKeyframe& entry = keyframe(k);
   const geometry::SE3& T_cam_rig = rig_->cam_from_rig(c);
   if (entry.frame->delay_s(c.index()) == 0.0) return T_cam_rig * entry.T_rig_world;
-  return T_cam_rig * entry.frame->motion_until(c.index()) * entry.T_rig_world;
+  return T_cam_rig * motion_until(k, c) * entry.T_rig_world;
 }
 
 KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
@@ -84,6 +92,7 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
   if (!alive(fallback_parent)) fallback_parent = KeyframeId();
   std::vector<LandmarkId> table(frame->bundled.size());
   BundledKeyframe entry;
+  entry.twist = frame->twist;
   entry.frame = std::move(frame);
   entry.T_rig_world = T_rig_world;
   entry.alive = true;
@@ -213,17 +222,14 @@ bool BundledMap::scale_part(KeyframeId root, double factor) {
   if (!alive(root) || keyframe(root).parent.valid()) return false;
   std::vector<std::uint8_t> inside(keyframes_.size(), 0);
   for (const KeyframeId k : part_of(root)) inside[k.index()] = 1;
-  const auto longer = [factor](const geometry::SE3& T) { return geometry::SE3(T.rotation(), factor * T.translation()); };
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
     const KeyframeId now = surviving(KeyframeId(i));
     if (!now.valid() || !inside[now.index()]) continue;
     BundledKeyframe& entry = edit(KeyframeId(i));
     entry.unit *= factor;
-    (entry.alive ? entry.T_rig_world : entry.T_rig_parent) = longer(entry.alive ? entry.T_rig_world : entry.T_rig_parent);
-    if (!entry.alive || entry.frame->twist.tail<3>().isZero(0)) continue;
-    geometry::Vector6d twist = entry.frame->twist;
-    twist.tail<3>() *= factor;
-    set_twist(KeyframeId(i), twist);
+    geometry::SE3& T = entry.alive ? entry.T_rig_world : entry.T_rig_parent;
+    T = geometry::scaled(T, factor);
+    entry.twist.tail<3>() *= factor;
   }
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (!landmarks_[i].alive || !inside[landmarks_[i].reference.keyframe.index()]) continue;
@@ -238,10 +244,7 @@ bool BundledMap::scale_part(KeyframeId root, double factor) {
 
 bool BundledMap::set_twist(KeyframeId k, const geometry::Vector6d& twist) {
   if (!alive(k)) return false;
-  BundledKeyframe& entry = edit(k);
-  auto frame = std::make_shared<frame::BundledFrame>(*entry.frame);
-  frame->twist = twist;
-  entry.frame = std::move(frame);
+  edit(k).twist = twist;
   return true;
 }
 

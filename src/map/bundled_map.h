@@ -78,6 +78,10 @@ class BundledMap {
   // T_rig_world of a keyframe, alive or removed (then carried by its parent).
   geometry::SE3 resolved_pose(KeyframeId k) const;
 
+  // The rig as it stood while a keyframe was taken, and how it moved from the time of the keyframe to that of camera c's image
+  // (the identity where they are one).
+  camera::Rig rig_of(KeyframeId k) const;
+  geometry::SE3 motion_until(KeyframeId k, CameraIndex c) const;
   // Pose of a keyframe's camera at the time of its own image.
   geometry::SE3 cam_from_world(KeyframeId k, CameraIndex c) const;
 
@@ -136,7 +140,7 @@ class BundledMap {
   // gauge epoch. False where `root` is none.
   bool scale_part(KeyframeId root, double factor);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
-  bool set_twist(KeyframeId k, const geometry::Vector6d& twist);  // BundledFrame::twist of its frame
+  bool set_twist(KeyframeId k, const geometry::Vector6d& twist);
   bool set_position(LandmarkId l, const Eigen::Vector3d& position);
   bool add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes view direction, distance range and descriptor from the observations.

@@ -90,7 +90,7 @@ struct SetPoses {
   bool correction = false;  // moves the map as a whole: begins a gauge epoch
 };
 struct SetTwists {
-  std::vector<std::pair<KeyframeId, geometry::Vector6d>> keyframes;  // BundledFrame::twist
+  std::vector<std::pair<KeyframeId, geometry::Vector6d>> keyframes;  // BundledKeyframe::twist
 };
 struct Sighting {
   LandmarkId landmark;

@@ -17,7 +17,7 @@ struct Move {
   double grown = 1.0;
   SE3 pose(const SE3& T_rig_world) const {
     const SE3 T_rig_keyframe = T_rig_world * before.inverse();
-    return SE3(T_rig_keyframe.rotation(), grown * T_rig_keyframe.translation()) * after;
+    return geometry::scaled(T_rig_keyframe, grown) * after;
   }
   Eigen::Vector3d point(const Eigen::Vector3d& position) const { return after.inverse() * (grown * (before * position)); }
 };
@@ -31,10 +31,9 @@ Motion motion_between(const SE3& before, const SE3& after, double grown = 1.0) {
   return Move{before, after, grown};
 }
 
-// The frame, its motion in the new unit.
-std::shared_ptr<const frame::BundledFrame> grown_along(const frame::BundledFrame& frame, double grown) {
-  auto out = std::make_shared<frame::BundledFrame>(frame);
-  out->twist.tail<3>() *= grown;
+geometry::Vector6d grown_along(const geometry::Vector6d& twist, double grown) {
+  geometry::Vector6d out = twist;
+  out.tail<3>() *= grown;
   return out;
 }
 
@@ -112,9 +111,9 @@ bool Rebase::operator()(const AddKeyframe& op) {
   const Motion motion = motion_since_base(op.parent);
   const SE3 T_rig_world = motion ? motion->pose(op.T_rig_world) : op.T_rig_world;
   const KeyframeId parent = map_.surviving(here(op.parent));
-  std::shared_ptr<const frame::BundledFrame> frame = op.frame;
-  if (motion && motion->grown != 1.0) frame = grown_along(*frame, motion->grown);
-  report_.keyframes.push_back(map_.add_keyframe(frame, T_rig_world, usable_matches(map_, matches), parent));
+  const KeyframeId added = map_.add_keyframe(op.frame, T_rig_world, usable_matches(map_, matches), parent);
+  if (motion) map_.set_twist(added, grown_along(op.frame->twist, motion->grown));
+  report_.keyframes.push_back(added);
   own_motions_.push_back(motion);
   return true;
 }
@@ -191,11 +190,9 @@ void Rebase::carry_along(const std::unordered_map<KeyframeId, Motion>& motions) 
 
 bool Rebase::operator()(const SetTwists& op) {
   bool any = false;
-  for (auto [edit_id, twist] : op.keyframes) {
-    const KeyframeId k = here(edit_id);
-    if (!map_.alive(k)) continue;
-    if (!own(edit_id)) twist.tail<3>() *= map_.keyframe(k).unit / base_.keyframe(edit_id).unit;
-    any |= map_.set_twist(k, twist);
+  for (const auto& [edit_id, twist] : op.keyframes) {
+    const Motion motion = motion_since_base(edit_id);
+    any |= map_.set_twist(here(edit_id), grown_along(twist, motion ? motion->grown : 1.0));
   }
   return any;
 }

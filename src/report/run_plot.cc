@@ -97,24 +97,33 @@ Panel inlier_panel(const RunRecord& record) {
 }
 
 // A bar for every stretch of time in which a camera was not sound, at the height of its number, in the colour of why; empty
-// where all were.
+// where all were. Bars too near to each other to be told apart are one.
 std::optional<Panel> camera_state_panel(const RunRecord& record) {
+  if (record.frames.empty()) return std::nullopt;
+  const double begin_s = record.frames.front().time_s, end_s = record.frames.back().time_s, apart_s = (end_s - begin_s) / kBins;
   Panel panel = time_panel(record, "Cameras that were not sound", "camera");
+  panel.floor = AxisFloor::kFromData;
+  panel.series.push_back(time_series("", {{begin_s, -0.5}, {end_s, static_cast<double>(record.cameras.size()) - 0.5}}, "none", 0.0));
   const std::size_t without = panel.series.size();
   for (std::size_t i = 0; i < record.cameras.size(); ++i) {
+    const double y = static_cast<double>(i);
     for (const CameraInterval& interval : record.cameras[i].states) {
       if (interval.state == "ok") continue;
-      const std::string& why = interval.reason.empty() ? interval.state : interval.reason;
+      const std::string why = interval.reason.empty() ? interval.state : interval.state + ": " + interval.reason;
       auto series = std::ranges::find(panel.series, why, &Series::label);
       if (series == panel.series.end()) {
-        series = panel.series.insert(series, time_series(why, {}, series_colour(panel.series.size() - without), 6.0));
+        const std::size_t k = panel.series.size() - without;
+        series = panel.series.insert(series, time_series(why, {}, series_colour(k == 0 ? 0 : k + 1), 6.0));  // 1 is that of lost frames
       }
-      const double y = static_cast<double>(i);
-      series->points.insert(series->points.end(), {{interval.from_s, y}, {interval.to_s, y}, {kNone, kNone}});
+      Points& bars = series->points;
+      if (bars.size() >= 3 && bars[bars.size() - 2][1] == y && interval.from_s - bars[bars.size() - 2][0] < apart_s) {
+        bars[bars.size() - 2][0] = interval.to_s;
+      } else {
+        bars.insert(bars.end(), {{interval.from_s, y}, {interval.to_s, y}, {kNone, kNone}});
+      }
     }
   }
   if (panel.series.size() == without) return std::nullopt;
-  panel.series.push_back(time_series("", {{record.frames.back().time_s, static_cast<double>(record.cameras.size()) - 0.5}}, "none", 0.0));
   return panel;
 }
 

@@ -11,6 +11,7 @@
 namespace bslam::system {
 namespace {
 
+constexpr int kSlow = 10;       // frames a sound camera may be without a picture, as it fires less often than the others
 constexpr int kSampleStep = 4;  // rows and columns: brightness does not hide between them
 
 // A hash of every pixel, eight at a time.
@@ -89,10 +90,20 @@ std::string_view describe(Outage outage) {
   return "";
 }
 
-CameraMonitor::CameraMonitor(std::size_t cameras, const HealthOptions& options) : options_(options), cameras_(cameras) {}
+CameraMonitor::CameraMonitor(std::size_t cameras, const HealthOptions& options) : options_(options), cameras_(cameras), failing_(cameras, 0) {}
 
 std::vector<Outage> CameraMonitor::judge(const image::ImageBundle& images) {
   BSLAM_ASSERT(images.images.size() == cameras_.size(), "one image slot per camera");
+  std::vector<Outage> found = outages(images);
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    int& missed = cameras_[c].missed;
+    missed = found[c] == Outage::kNoImage ? missed + 1 : 0;
+    failing_[c] = found[c] != Outage::kNone && (found[c] != Outage::kNoImage || missed > kSlow);
+  }
+  return found;
+}
+
+std::vector<Outage> CameraMonitor::outages(const image::ImageBundle& images) {
   std::vector<Outage> found(cameras_.size(), Outage::kNoImage);
   std::vector<std::uint8_t> same(cameras_.size(), 0);
   bool any_changed = false;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -46,6 +47,8 @@ class CameraMonitor {
   // A camera without a picture is out for that frame and counts again with its next. Where all others are out as well, one
   // with a good picture counts at once.
   std::vector<Outage> judge(const image::ImageBundle& images);
+  // One per camera: out of the frame judged last, and not only without a picture as slow cameras are now and then.
+  std::span<const std::uint8_t> failing() const { return failing_; }
 
   // One per camera: out of focus or behind something that smears, told from how steep the edges of its picture are, in rows and
   // columns, so that motion to one side is not blur. Such a camera is used, with what it has. A picture with few edges says
@@ -59,9 +62,12 @@ class CameraMonitor {
     int good = 0;                       // pictures since
     bool blurred = false;
     int sharp = 0;                      // pictures since it was
+    int missed = 0;                     // frames since its last picture
   };
+  std::vector<Outage> outages(const image::ImageBundle& images);
   const HealthOptions options_;
   std::vector<Camera> cameras_;
+  std::vector<std::uint8_t> failing_;
 };
 
 }  // namespace bslam::system

@@ -8,19 +8,22 @@ namespace {
 using geometry::SE3;
 using geometry::Vector6d;
 
-constexpr double kMaxInterval_s = 0.5;  // between frames; nothing is known of the motion within longer ones
-
 // Mean twist from the middle frame's time to `delay` after it, of the parabola through three poses: the mean twists of the two
 // intervals are those at their middles, and it is the one at half the delay.
 std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, const map::BundledMap& map, double delay_s) {
   const double before_s = to_seconds(frames[1].result.time_ns - frames[0].result.time_ns);
   const double after_s = to_seconds(frames[2].result.time_ns - frames[1].result.time_ns);
-  if (before_s <= 0 || after_s <= 0 || before_s > kMaxInterval_s || after_s > kMaxInterval_s) return std::nullopt;
+  const auto near = [](double interval_s) { return interval_s > 0 && interval_s <= tracking::kMaxPrediction_s; };
+  if (!near(before_s) || !near(after_s)) return std::nullopt;
+  if (frames[1].relocalisation || frames[2].relocalisation) return std::nullopt;  // found elsewhere: no motion
   std::optional<SE3> T[3];
+  KeyframeId root[3];
   for (std::size_t i = 0; i < 3; ++i) {
     T[i] = T_rig_world_of(frames[i], map);
-    if (!T[i] || map.root_of(frames[i].final_result().reference) != map.root_of(frames[1].final_result().reference)) return std::nullopt;
+    if (!T[i]) return std::nullopt;
+    root[i] = map.root_of(frames[i].final_result().reference);
   }
+  if (root[0] != root[1] || root[2] != root[1]) return std::nullopt;
   const Vector6d before = (*T[1] * T[0]->inverse()).log() / before_s;
   const Vector6d after = (*T[2] * T[1]->inverse()).log() / after_s;
   return before + (before_s + delay_s) / (before_s + after_s) * (after - before);
@@ -32,7 +35,7 @@ std::optional<SE3> T_rig_world_of(const FrameRecord& record, const map::BundledM
   const tracking::TrackResult& r = record.final_result();
   if (r.status != tracking::TrackStatus::kTracking || !map.surviving(r.reference).valid()) return std::nullopt;
   const double grown = map.keyframe(r.reference).unit / record.unit;  // the scale of the map may have been found since
-  return SE3(r.T_rig_reference.rotation(), grown * r.T_rig_reference.translation()) * map.resolved_pose(r.reference);
+  return geometry::scaled(r.T_rig_reference, grown) * map.resolved_pose(r.reference);
 }
 
 std::vector<std::pair<KeyframeId, Vector6d>> twists_from_neighbours(const map::BundledMap& map, KeyframeId first,

@@ -70,6 +70,11 @@ std::vector<tracking::CameraCounts> keypoint_counts(const BundledFrame& frame) {
   return counts;
 }
 
+// One more for every camera that sees the feature.
+void count_by_camera(const BundledFrame& frame, FeatureId feature, std::vector<int>& seen) {
+  for (const frame::KeypointRef r : frame.bundled.keypoints(feature)) ++seen[r.camera.index()];
+}
+
 }  // namespace
 
 Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
@@ -89,8 +94,9 @@ void Pipeline::restart() {
 BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages,
                                   std::span<const std::uint8_t> left_out) {
   const Stopwatch extraction;
-  const auto budgets =
-      tracking::feature_budgets(rig_.size(), feature_shares_, left_out, tracking::doubted(state_, rig_.size()), config_.features);
+  std::vector<std::uint8_t> failing = tracking::doubted(state_, rig_.size());
+  for (std::size_t c = 0; c < failing.size(); ++c) failing[c] |= monitor_.failing()[c];
+  const auto budgets = tracking::feature_budgets(rig_.size(), feature_shares_, left_out, failing, config_.features);
   BundledFrame frame = builder_.extract(images, pool_, left_out, budgets);
   for (frame::CameraFrame& c : frame.cameras) {
     if (!config_.tracking.own_times) c.time_ns = frame.time_ns;
@@ -152,7 +158,7 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecu
 // A camera that saw nothing because it was blurred is doubted no longer.
 void Pipeline::trust_what_is_sharp_again(const std::vector<std::uint8_t>& blurred) {
   for (std::size_t c = 0; c < blurred_.size() && c < state_.cameras.size(); ++c) {
-    if (blurred_[c] && !blurred[c] && state_.cameras[c].doubted) state_.cameras[c] = tracking::CameraTrust{};
+    if (blurred_[c] && !blurred[c] && state_.cameras[c].doubted) state_.cameras[c] = tracking::trusted(state_.cameras[c].established);
   }
   blurred_ = blurred;
 }
@@ -161,7 +167,7 @@ void Pipeline::trust_what_is_sharp_again(const std::vector<std::uint8_t>& blurre
 void Pipeline::grow_along(const map::BundledMap& map) {
   if (!state_.reference.valid()) return;
   const double grown = map.keyframe(state_.reference).unit / unit_;
-  state_.T_rig_reference = geometry::SE3(state_.T_rig_reference.rotation(), grown * state_.T_rig_reference.translation());
+  state_.T_rig_reference = geometry::scaled(state_.T_rig_reference, grown);
   if (state_.twist) state_.twist->tail<3>() *= grown;
 }
 
@@ -190,9 +196,15 @@ void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outco
     const KeyframeId last = report.keyframes.back();
     state_ = tracking::state_at_keyframe({}, frame.time_ns, last,
                                          committed(started->keyframes.back().landmarks, outcome.seen->landmark_slots(), report));
+    const map::BundledKeyframe& keyframe = report.published->keyframe(last);
+    std::vector<int> seen(rig_.size(), 0);
+    for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f) {
+      if (keyframe.landmarks[f].valid()) count_by_camera(*keyframe.frame, FeatureId(f), seen);
+    }
+    state_.cameras = tracking::doubts_of(std::vector<tracking::CameraTrust>(rig_.size()), seen, config_.tracking.consensus);
     result.status = tracking::TrackStatus::kTracking;
     result.reason = tracking::LostReason::kNone;
-    result.T_rig_world = report.published->keyframe(last).T_rig_world;
+    result.T_rig_world = keyframe.T_rig_world;
     result.reference = last;
     outcome.record.root = report.published->root_of(last);
     outcome.keyframes = report.keyframes;
@@ -263,7 +275,8 @@ void Pipeline::track(BundledFrame frame, StageExecutor& executor, Outcome& outco
   feature_shares_ = tracking::feature_shares(feature_shares_, map, frame, output);
   error_floors_ = tracking::error_floors(error_floors_, map, frame, output, config_.tracking.alignment);
   for (std::size_t c = 0; c < output.result.cameras.size(); ++c) {
-    if (output.result.cameras[c].doubted) outcome.record.outages[c] = Outage::kInconsistent;
+    Outage& outage = outcome.record.outages[c];  // what the pictures say themselves explains more
+    if (output.result.cameras[c].doubted && outage == Outage::kNone) outage = Outage::kInconsistent;
   }
   if (!is_tracking(output.result.status)) {
     state_ = before;
@@ -304,9 +317,7 @@ bool Pipeline::find_again(BundledFrame& frame, const map::BundledMap& map, Outco
   for (const auto& [feature, l] : location->matches) landmarks.push_back(l);
   std::sort(landmarks.begin(), landmarks.end());
   std::vector<int> seen(rig_.size(), 0);
-  for (const auto& [feature, l] : location->matches) {
-    for (const frame::KeypointRef r : frame.bundled.keypoints(feature)) ++seen[r.camera.index()];
-  }
+  for (const auto& [feature, l] : location->matches) count_by_camera(frame, feature, seen);
   const auto trust = tracking::doubts_of(state_.cameras, seen, config_.tracking.consensus);
   state_ = tracking::state_at_keyframe({}, frame.time_ns, location->with, std::move(landmarks));
   state_.cameras = trust;

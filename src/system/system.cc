@@ -36,9 +36,13 @@ void add_pose(std::vector<PartTrajectory>& parts, KeyframeId root, TimeNs time_n
 }  // namespace
 
 System::System(camera::Rig rig, Config config, Resources resources)
-    : rig_(std::move(rig)), config_(std::move(config)),
-      loaded_(resources.map.has_value()), first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0), pipeline_(rig_, config_, std::move(resources.masks), recogniser(resources.vocabulary, config_)),
-      store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)), gate_(store_) {
+    : rig_(std::move(rig)),
+      config_(std::move(config)),
+      loaded_(resources.map.has_value()),
+      first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0),
+      pipeline_(rig_, config_, std::move(resources.masks), recogniser(resources.vocabulary, config_)),
+      store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)),
+      gate_(store_) {
   const map::MapSnapshot map = store_.snapshot();
   for (const KeyframeId k : map->keyframe_ids()) set_keyframe_time(k, map->keyframe(k).frame->time_ns);
   const auto note_loop = [this](const LoopRecord& loop) {

@@ -8,10 +8,16 @@ namespace bslam::tracking {
 
 using geometry::SE3;
 
+CameraTrust trusted(bool established) {
+  CameraTrust camera;
+  camera.established = established;
+  return camera;
+}
+
 std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras, const std::vector<int>& seen, const ConsensusOptions& options) {
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     cameras[c].landmarks.clear();
-    if (seen[c] >= options.min_expected) cameras[c] = CameraTrust{};
+    if (seen[c] >= options.min_expected) cameras[c] = trusted(true);
   }
   return cameras;
 }
@@ -41,9 +47,10 @@ std::vector<Expectation> continuity(const map::BundledMap& map, const frame::Bun
 }
 
 std::vector<std::uint8_t> contradicting(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
-                                        const ConsensusOptions& options) {
+                                        const std::vector<CameraTrust>& trust, const ConsensusOptions& options) {
   std::vector<std::uint8_t> out(matches.size(), 0);
-  for (std::size_t c = 0; c < matches.size(); ++c) {
+  for (std::size_t c = 0; c < trust.size(); ++c) {
+    if (!trust[c].established) continue;
     const auto found = static_cast<int>(matches[c].size());
     out[c] = found >= options.min_expected && inliers_per_camera[c] < options.conflict_share * found;
   }
@@ -101,7 +108,7 @@ void doubt(CameraTrust& camera, const Expectation& view, TimeNs time_ns, const C
     camera.judged_ns = time_ns;
   }
   const bool forgotten = to_seconds(time_ns - camera.judged_ns) >= options.forget_after_s;
-  if (camera.seeing >= options.readmit_after || forgotten) camera = CameraTrust{};
+  if (camera.seeing >= options.readmit_after || forgotten) camera = trusted(camera.established);
 }
 
 bool due_for_retry(const CameraTrust& camera, TimeNs time_ns, const ConsensusOptions& options) {
@@ -112,7 +119,7 @@ void retry(CameraTrust& camera, const Expectation& wide, TimeNs time_ns, const C
   if (wide.expected >= options.min_expected && wide.share() >= options.seen_share) {
     camera.since_ns = time_ns;
   } else {
-    camera = CameraTrust{};
+    camera = trusted(camera.established);
   }
 }
 

@@ -12,6 +12,7 @@ namespace bslam::tracking {
 // What is carried from frame to frame about one camera.
 struct CameraTrust {
   bool doubted = false;
+  bool established = false;           // has once seen as much as it can be judged by
   int seeing = 0;                     // frames in a row in which a doubted camera saw what it should
   TimeNs judged_ns = 0;               // when a doubted camera last should have seen something
   TimeNs since_ns = 0;                // since when it is doubted, or was last found to show its view displaced
@@ -20,7 +21,9 @@ struct CameraTrust {
   std::vector<LandmarkId> landmarks;  // ... and the inliers of that
 };
 
-// What of it still counts where the rig was found again after a loss, `seen[c]` landmarks of the place by camera c.
+CameraTrust trusted(bool established);
+
+// What of it counts where the rig starts or was found again after a loss, `seen[c]` landmarks of the place by camera c.
 std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras, const std::vector<int>& seen, const ConsensusOptions& options);
 
 // How much of what a camera should see it found.
@@ -33,9 +36,10 @@ struct Expectation {
 std::vector<Expectation> continuity(const map::BundledMap& map, const frame::BundledFrame& frame, const geometry::SE3& T_rig_world,
                                     const std::vector<CameraTrust>& trust, const FrameMatches& found);
 
-// Flags the cameras that found much of what they looked for, but elsewhere than the pose puts it.
+// Flags the cameras that found much of what they looked for, but elsewhere than the pose puts it. A camera that is not
+// established yet knows of the map only what others saw, which it may mistake: it is not flagged.
 std::vector<std::uint8_t> contradicting(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
-                                        const ConsensusOptions& options);
+                                        const std::vector<CameraTrust>& trust, const ConsensusOptions& options);
 
 // Where cameras contradict one another, that one is believed whose own pose is nearest to where the motion led to: the pose
 // from its observations and what agrees with them. `observations` of `matches`, in their order.

@@ -86,7 +86,7 @@ std::vector<double> feature_shares(std::span<const double> before, const map::Bu
 }
 
 std::vector<int> feature_budgets(std::size_t cameras, std::span<const double> shares, std::span<const std::uint8_t> left_out,
-                                 std::span<const std::uint8_t> doubted, const feature::FeatureOptions& options) {
+                                 std::span<const std::uint8_t> failing, const feature::FeatureOptions& options) {
   std::vector<std::size_t> open;  // cameras that can take more
   for (std::size_t c = 0; c < cameras; ++c) {
     if (left_out.empty() || !left_out[c]) open.push_back(c);
@@ -96,8 +96,8 @@ std::vector<int> feature_budgets(std::size_t cameras, std::span<const double> sh
   const auto n = static_cast<double>(open.size()), per_image = static_cast<double>(options.per_image);
   const double of_all = static_cast<double>(cameras) * per_image;
   const double of_rig = options.per_rig > 0 ? std::min(static_cast<double>(options.per_rig), of_all) : of_all;
-  const auto sound = std::ranges::count_if(open, [&](std::size_t c) { return doubted.empty() || !doubted[c]; });
-  const double even = of_rig / static_cast<double>(std::max<std::ptrdiff_t>(1, sound));
+  const auto sound = static_cast<double>(cameras) - static_cast<double>(std::ranges::count(failing, std::uint8_t{1}));
+  const double even = of_rig / std::max(1.0, sound);
   const double most = std::clamp(even, per_image, feature::FeatureOptions::kInForOthers * per_image);
   const double total = std::min(n * most, of_rig);
   const double least = kEvenPart * total / n;
@@ -109,7 +109,7 @@ std::vector<int> feature_budgets(std::size_t cameras, std::span<const double> sh
     const auto wanted = [&](std::size_t c) { return least + left * share_of(shares, c) / weight; };
     const auto filled = std::stable_partition(open.begin(), open.end(), [&](std::size_t c) { return wanted(c) < most; });
     if (filled == open.end()) {
-      for (const std::size_t c : open) budgets[c] = std::max(1, static_cast<int>(std::lround(wanted(c))));
+      for (const std::size_t c : open) budgets[c] = static_cast<int>(std::lround(wanted(c)));
       break;
     }
     left -= static_cast<double>(open.end() - filled) * (most - least);

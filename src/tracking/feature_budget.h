@@ -36,10 +36,10 @@ std::vector<geometry::Matrix6d> information_by_camera(const map::BundledMap& map
 
 // Keypoints wanted of each of `cameras` cameras, in whole numbers: half of options.per_rig evenly among those not left out
 // (`left_out` empty: all), so that a camera in which little is known can still learn, half by `shares` (empty: even). A camera
-// left out gets 0, none more than options.per_image: what it cannot take goes to the others. Where cameras are left out or
-// doubted (empty: none), that bound is an even share of the rig's budget among the sound ones, up to kInForOthers times
-// options.per_image, so that one that is left of four sees more than it did beside them.
+// left out gets 0, none more than options.per_image: what it cannot take goes to the others. Where cameras are failing (empty:
+// none), that bound is an even share of the rig's budget among those that are not, up to kInForOthers times options.per_image, so
+// that one that is left of four sees more than it did beside them.
 std::vector<int> feature_budgets(std::size_t cameras, std::span<const double> shares, std::span<const std::uint8_t> left_out,
-                                 std::span<const std::uint8_t> doubted, const feature::FeatureOptions& options);
+                                 std::span<const std::uint8_t> failing, const feature::FeatureOptions& options);
 
 }  // namespace bslam::tracking

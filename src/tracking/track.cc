@@ -11,7 +11,6 @@ namespace {
 
 using geometry::SE3;
 
-constexpr double kMaxPrediction_s = 0.5;  // the motion model says nothing farther ahead
 
 // Motion from the last pose to `time_ns`, where it is known.
 std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) {
@@ -103,11 +102,11 @@ bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
   const solver::MotionModel motion = motion_model(input, frame);
   auto solution = solver::solve_pose(map.rig(), observations, predicted, motion, options.pose);
-  if (any(contradicting(found, solution.inliers_per_camera, options.consensus))) {
+  if (any(contradicting(found, solution.inliers_per_camera, input.state.cameras, options.consensus))) {
     const SE3 led_to = predict(input, frame.time_ns);
     const auto steadiest = believe_the_steadiest(rig, found, observations, led_to, options.consensus, options.pose);
     if (steadiest.ok) {
-      const auto wrong = contradicting(found, steadiest.inliers_per_camera, options.consensus);
+      const auto wrong = contradicting(found, steadiest.inliers_per_camera, input.state.cameras, options.consensus);
       for (std::size_t c = 0; c < wrong.size(); ++c) left_out[c] |= wrong[c];
       drop(left_out, found);
       observations = pose_observations(map, frame, found, input.noise);
@@ -250,6 +249,7 @@ void note_trust(const frame::BundledFrame& frame, const Coarse& coarse, const Fi
     }
     if (!coarse.again.empty()) trust(camera, coarse.again[c], options.consensus);
     camera.seen_ns = frame.time_ns;
+    camera.established |= static_cast<int>(inliers[c].size()) >= options.consensus.min_expected;
     camera.landmarks.clear();
     for (const Match& m : inliers[c]) camera.landmarks.push_back(m.landmark);
   }

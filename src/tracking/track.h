@@ -12,6 +12,8 @@
 
 namespace bslam::tracking {
 
+inline constexpr double kMaxPrediction_s = 0.5;  // between frames: the motion says nothing farther ahead
+
 enum class TrackStatus { kNotStarted, kTracking, kLost };
 
 // Why a frame has no pose. A frame whose pose is not supported is lost, never guessed.

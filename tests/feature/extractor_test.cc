@@ -123,10 +123,13 @@ TEST(Extractor, ABudgetIsAsGoodAsTheOption) {
   image::Pyramid pyramid;
   Keypoints k;
   const int usual = FeatureOptions{}.per_image;
-  for (const auto& [budget, wanted] : {std::pair(450, 450), {9000, 2 * usual}, {0, usual}, {450, 450}}) {
+  for (const auto& [budget, wanted] : {std::pair(std::optional(450), 450), {9000, 2 * usual}, {std::nullopt, usual}, {450, 450}}) {
     extractor.extract(view_of(image), {}, pinhole_camera(image.size()), pyramid, k, budget);
     expect_equal(k, extract(image, with(wanted)));
   }
+  extractor.extract(view_of(image), {}, pinhole_camera(image.size()), pyramid, k, 0);
+  EXPECT_EQ(k.size(), 0u);
+  EXPECT_EQ(pyramid.size(), static_cast<std::size_t>(FeatureOptions{}.levels));
 }
 
 TEST(Extractor, SpreadsOverTheImage) {

@@ -26,7 +26,7 @@ TEST_P(LocateRig, FindsThePoseOfAFrameTakenWhereTheCandidateWas) {
   for (const int at : {3, 11, 25}) {
     const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at + 0.4);
     LocateReport report;
-    const auto location = locate(world.map, seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
+    const auto location = locate(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
     ASSERT_TRUE(location) << "rejected for " << static_cast<int>(report.rejection);
     EXPECT_EQ(report.rejection, Rejection::kNone);
     EXPECT_EQ(location->with, KeyframeId(at));
@@ -39,7 +39,7 @@ TEST_P(LocateRig, FindsThePoseOfAFrameTakenWhereTheCandidateWas) {
 TEST_P(LocateRig, ItsMatchesAreDistinctAndTrue) {
   const HallMap& world = exact_walk(GetParam());
   const SimulatedFrame seen = hall(rig_of(GetParam())).frame(FrameId(1000), kStepS * 8 + 0.5);
-  const auto location = locate(world.map, seen.frame, KeyframeId(8), {}, kFeatures, seeded(1));
+  const auto location = locate(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(1));
   ASSERT_TRUE(location);
   std::set<FeatureId> features;
   std::set<LandmarkId> landmarks;
@@ -55,8 +55,8 @@ TEST_P(LocateRig, ItsMatchesAreDistinctAndTrue) {
 TEST_P(LocateRig, SaysTheSameForTheSameSeed) {
   const HallMap& world = exact_walk(GetParam());
   const SimulatedFrame seen = hall(rig_of(GetParam())).frame(FrameId(1000), kStepS * 8 + 0.5);
-  const auto a = locate(world.map, seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
-  const auto b = locate(world.map, seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
+  const auto a = locate(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
+  const auto b = locate(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
   ASSERT_TRUE(a && b);
   EXPECT_EQ(a->T_rig_world.translation(), b->T_rig_world.translation());
   EXPECT_EQ(a->T_rig_world.rotation().coeffs(), b->T_rig_world.rotation().coeffs());
@@ -70,7 +70,7 @@ TEST_P(LocateRig, AHallThatLooksDifferentIsNeverAccepted) {
   for (int at = 0; at < 30; ++at) {
     const SimulatedFrame other = redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 1.0, static_cast<std::uint64_t>(at));
     LocateReport report;
-    EXPECT_FALSE(locate(world.map, other.frame, KeyframeId(at), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
+    EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
     EXPECT_TRUE(report.rejection == Rejection::kFewMatches || report.rejection == Rejection::kNoConsensus);
   }
 }
@@ -84,7 +84,7 @@ TEST_P(LocateRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
   for (int at = 0; at < 30; ++at) {
     const SimulatedFrame other = redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 0.875, static_cast<std::uint64_t>(at));
     LocateReport report;
-    EXPECT_FALSE(locate(world.map, other.frame, KeyframeId(at), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
+    EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
     reasons.insert(report.rejection);
   }
   // With fewer inliers asked for, it is the share that decides.
@@ -92,7 +92,7 @@ TEST_P(LocateRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
   options.min_inliers = 15;
   const SimulatedFrame other = redecorated(simulator.frame(FrameId(2000), kStepS * 8), 0.875, 1);
   LocateReport report;
-  EXPECT_FALSE(locate(world.map, other.frame, KeyframeId(8), options, kFeatures, seeded(1), &report));
+  EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(8), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
   EXPECT_LT(report.found, report.sought / 4);
   EXPECT_FALSE(reasons.contains(Rejection::kNone));
@@ -104,7 +104,7 @@ TEST_P(LocateRig, AnotherPlaceOfTheHallIsNeverAccepted) {
   for (int at = 0; at < 12; ++at) {
     const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at);
     LocateReport report;
-    EXPECT_FALSE(locate(world.map, seen.frame, KeyframeId(at + 20), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
+    EXPECT_FALSE(locate(world.map, world.map.rig(), seen.frame, KeyframeId(at + 20), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
     EXPECT_EQ(report.rejection, Rejection::kFewMatches);
   }
 }
@@ -136,11 +136,11 @@ TEST(Locate, WhatLooksDifferentFromAsideIsNotMissed) {
   VerificationOptions options;
   const SimulatedFrame changed = redecorated(changed_aside(seen, world, options.max_turn), 0.66, 1);
   LocateReport report;
-  const auto location = locate(world.map, changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report);
+  const auto location = locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report);
   ASSERT_TRUE(location) << report.found << " of " << report.sought;
   expect_true_pose(*location, seen.T_world_rig.inverse());
   options.max_turn = 1.05;
-  EXPECT_FALSE(locate(world.map, changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
+  EXPECT_FALSE(locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
 }
 
@@ -151,7 +151,7 @@ TEST(Locate, AViewFromFarAsideIsHeldAgainstAllThatIsInView) {
   VerificationOptions options;
   options.max_turn = 1e-4;
   LocateReport report;
-  EXPECT_FALSE(locate(world.map, seen.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
+  EXPECT_FALSE(locate(world.map, world.map.rig(), seen.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
   EXPECT_GT(report.sought, 100);
 }
@@ -163,7 +163,7 @@ TEST(Locate, AnotherCameraThanThenFindsThePlace) {
   for (const int at : {5, 14, 22}) {
     const SimulatedFrame seen = back.frame(FrameId(1000 + at), kStepS * at + 0.3);
     LocateReport report;
-    const auto location = locate(world.map, seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
+    const auto location = locate(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
     ASSERT_TRUE(location) << "rejected for " << static_cast<int>(report.rejection);
     expect_true_pose(*location, seen.T_world_rig.inverse());
     int by_another = 0;  // matches with landmarks that this camera has never seen
@@ -184,7 +184,7 @@ TEST(Locate, FisheyesFindThePlaceTurnedRound) {
   const FeatureSimulator simulator = hall(rig), back = hall(rig, std::numbers::pi);
   for (int i = 0; i < 6; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
   const SimulatedFrame seen = back.frame(FrameId(1000), kStepS * 2 + 0.5);
-  const auto location = locate(world.map, seen.frame, KeyframeId(2), {}, kFeatures, seeded(1));
+  const auto location = locate(world.map, world.map.rig(), seen.frame, KeyframeId(2), {}, kFeatures, seeded(1));
   ASSERT_TRUE(location);
   expect_true_pose(*location, seen.T_world_rig.inverse(), 0.015);  // 3 times fewer pixels a radian
 }

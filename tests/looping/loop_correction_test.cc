@@ -18,7 +18,7 @@ using map::Fingerprint;
 constexpr KeyframeId kLast(kRound + 1);
 
 std::optional<Location> locate_last(const HallMap& world) {
-  return locate(world.map, *world.map.keyframe(kLast).frame, KeyframeId(1), {}, kFeatures, seeded(1));
+  return locate(world.map, world.map.rig_of(kLast), *world.map.keyframe(kLast).frame, KeyframeId(1), {}, kFeatures, seeded(1));
 }
 
 // Metres between where the map has a keyframe and where it was, and the same for the landmarks it observes, in the mean.
@@ -235,7 +235,7 @@ class JoinParts : public ::testing::TestWithParam<int> {
     for (int i = 8; i < 18; ++i) world.add(simulator.frame(FrameId(i), kStepS * (i - 4) + 0.5), elsewhere, 0, {}, i == 8);
   }
   std::optional<Location> located(int keyframe, int with) const {
-    return locate(world.map, *world.map.keyframe(KeyframeId(keyframe)).frame, KeyframeId(with), {}, kFeatures, seeded(1));
+    return locate(world.map, world.map.rig_of(KeyframeId(keyframe)), *world.map.keyframe(KeyframeId(keyframe)).frame, KeyframeId(with), {}, kFeatures, seeded(1));
   }
   void expect_joined(int keyframe, int with) {
     const auto location = located(keyframe, with);

@@ -352,13 +352,13 @@ TEST_F(BundledMapTest, KnowsWhereALateCameraWas) {
   EXPECT_EQ(map.cam_from_world(k, CameraIndex(0)).matrix(), T_rig_world.matrix());
   const SE3 then = SE3::exp(0.03 * frame->twist) * T_rig_world;
   EXPECT_TRUE(map.cam_from_world(k, CameraIndex(1)).matrix().isApprox((map.rig().cam_from_rig(CameraIndex(1)) * then).matrix(), 1e-12));
-  const camera::Rig rig = frame::rig_of(map.rig(), *frame);
+  const camera::Rig rig = map.rig_of(k);
   EXPECT_TRUE((rig.cam_from_rig(CameraIndex(1)) * T_rig_world).matrix().isApprox(map.cam_from_world(k, CameraIndex(1)).matrix(), 1e-12));
   EXPECT_TRUE((rig.rig_from_cam(1) * rig.cam_from_rig(CameraIndex(1))).matrix().isApprox(SE3().matrix(), 1e-12));
 
   ASSERT_TRUE(map.scale_part(k, 3.0));
-  EXPECT_TRUE(map.keyframe(k).frame->twist.tail<3>().isApprox(3.0 * frame->twist.tail<3>()));
-  EXPECT_EQ(map.keyframe(k).frame->twist.head<3>(), frame->twist.head<3>());
+  EXPECT_TRUE(map.keyframe(k).twist.tail<3>().isApprox(3.0 * frame->twist.tail<3>()));
+  EXPECT_EQ(map.keyframe(k).twist.head<3>(), frame->twist.head<3>());
 }
 
 }  // namespace

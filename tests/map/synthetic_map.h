@@ -156,6 +156,7 @@ class RandomEditor {
       default:
         draft.add_sightings({{landmark(draft), 3, 2}, {landmark(draft), 1, 1}});
         draft.refresh_landmarks({landmark(draft), landmark(draft)});
+        draft.set_twists({{keyframe(draft), random_.normal() * geometry::Vector6d::Ones()}});
         return;
     }
   }

@@ -52,20 +52,38 @@ TEST(RunPlot, NamesCamerasStagesAndEvents) {
   EXPECT_FALSE(contains(svg, "relocalised"));
 }
 
+std::size_t count(const std::string& text, std::string_view part) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
 TEST(RunPlot, ShowsWhichCamerasWereNotSound) {
+  constexpr std::string_view kBar = "stroke-width=\"6";
+  const std::string sound = run_plot_svg(short_run(40));
   RunRecord record = short_run(40);
   record.cameras[1].states = {{"ok", "", 0.0, 0.5}, {"out", "frozen", 0.55, 1.0}, {"ok", "", 1.05, 1.95}};
   const std::string svg = run_plot_svg(record);
   EXPECT_EQ(xml_fault(svg), "");
   EXPECT_TRUE(contains(svg, "Cameras that were not sound"));
-  EXPECT_TRUE(contains(svg, "frozen"));
-  EXPECT_FALSE(contains(run_plot_svg(short_run(40)), "Cameras that were not sound"));
+  EXPECT_TRUE(contains(svg, "out: frozen"));
+  EXPECT_GT(count(svg, kBar), count(sound, kBar));
+  EXPECT_FALSE(contains(sound, "Cameras that were not sound"));
+  record.cameras[1].states = {{"ok", "", 0.0, 1.95}};
+  EXPECT_EQ(run_plot_svg(record), sound);
+  record.frames.clear();
+  record.cameras[1].states = {{"out", "frozen", 0.55, 1.0}};
+  EXPECT_EQ(xml_fault(run_plot_svg(record)), "");
 }
 
 TEST(RunPlot, IsTheSameForTheSameRecord) { EXPECT_EQ(run_plot_svg(short_run(40)), run_plot_svg(short_run(40))); }
 
 TEST(RunPlot, StaysSmallForALongRun) {
-  const std::string svg = run_plot_svg(short_run(20000));
+  RunRecord record = short_run(20000);
+  for (int i = 0; i < 10000; ++i) {  // a camera that flickers
+    record.cameras[1].states.push_back({i % 2 == 0 ? "ok" : "out", i % 2 == 0 ? "" : "no-images", 0.1 * i, 0.1 * i + 0.05});
+  }
+  const std::string svg = run_plot_svg(record);
   EXPECT_EQ(xml_fault(svg), "");
   EXPECT_LT(svg.size(), 1'000'000u);
   EXPECT_TRUE(contains(svg, "frame, largest"));

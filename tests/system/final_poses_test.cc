@@ -41,7 +41,7 @@ struct Scene {
     frame->cameras[1].time_ns = frame->time_ns + kDelay;
     map.add_keyframe(frame, pose(0, turn_rate), {}, KeyframeId());
   }
-  // True to what the late camera's true place is?
+  // Of the rig's pose at the late camera's time, rad and m together.
   double error(const Vector6d& twist, double turn_rate) const {
     const double delay_s = to_seconds(kDelay);
     return (SE3::exp(delay_s * twist) * pose(0, turn_rate) * pose(delay_s, turn_rate).inverse()).log().norm();
@@ -80,7 +80,26 @@ TEST(FinalPoses, MotionIsLeftWhereANeighbourIsMissing) {
   Scene pause(0.3);
   for (std::size_t i = 3; i < pause.frames.size(); ++i) pause.frames[i].result.time_ns += 1'000'000'000;
   EXPECT_TRUE(twists_from_neighbours(pause.map, KeyframeId(0), pause.frames).empty());
-  EXPECT_TRUE(twists_from_neighbours(Scene(0.3, 1).map, KeyframeId(0), Scene(0.3, 1).frames).empty());
+  const Scene alone(0.3, 1);
+  EXPECT_TRUE(twists_from_neighbours(alone.map, KeyframeId(0), alone.frames).empty());
+}
+
+TEST(FinalPoses, ARigFoundElsewhereHasNotMovedThere) {
+  for (const std::size_t found : {2u, 3u}) {
+    Scene scene(0.3);
+    scene.frames[found].relocalisation = Relocalisation{KeyframeId(0), 50};
+    EXPECT_TRUE(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).empty()) << found;
+  }
+  Scene scene(0.3);
+  scene.frames[1].relocalisation = Relocalisation{KeyframeId(0), 50};  // before that pose, not after it
+  EXPECT_EQ(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).size(), 1u);
+}
+
+TEST(FinalPoses, PartsOfTheMapHaveNoMotionBetweenThem) {
+  Scene scene(0.3);
+  const KeyframeId other = scene.map.add_keyframe(map::synthetic_frame(scene.random, 2, 30, 10), SE3(), {}, KeyframeId());
+  scene.frames[3].result.reference = other;
+  EXPECT_TRUE(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).empty());
 }
 
 TEST(FinalPoses, MotionOfAnEarlierRunStays) {

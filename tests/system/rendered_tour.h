@@ -21,11 +21,16 @@ class RenderedTour {
  public:
   using Motion = std::function<simulation::Trajectory(const simulation::Building&, double duration_s)>;
 
-  RenderedTour(int cameras, std::size_t frames) : RenderedTour(cameras, frames, [](const auto& building, double duration_s) {
-    return simulation::make_tour(building, {.duration_s = duration_s, .seed = 3});
-  }) {}
+  RenderedTour(int cameras, std::size_t frames, TimeNs late_ns = 0)
+      : RenderedTour(cameras, frames,
+                     [](const auto& building, double duration_s) {
+                       return simulation::make_tour(building, {.duration_s = duration_s, .seed = 3});
+                     },
+                     late_ns) {}
 
-  RenderedTour(int cameras, std::size_t frames, const Motion& motion) : pool_(2), rig_(first_cameras(cameras)) {
+  // `late_ns`: by how much cameras 2 and on fire after the others.
+  RenderedTour(int cameras, std::size_t frames, const Motion& motion, TimeNs late_ns = 0)
+      : pool_(2), rig_(late(first_cameras(cameras), late_ns)), rig_truth_(rig_.size()) {
     const simulation::World world(simulation::make_building(3), {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2}, pool_);
     const simulation::RecordingOptions options{.duration_s = static_cast<double>(frames) / kRateHz, .rate_hz = kRateHz};
     const simulation::Recorder recorder(world, rig_, motion(world.building(), options.duration_s), {}, 0.002, pool_);
@@ -38,16 +43,19 @@ class RenderedTour {
     }
     pool_.for_each(shots.size(), [&](std::size_t i) {
       const simulation::Shot& shot = shots[i];
-      frames_[shot.frame].images[shot.camera] = {image::ImageState::kPresent, shot.stamp_ns, recorder.picture(shot)};
+      const TimeNs time_ns = shot.stamp_ns + rig_.camera(shot.camera).time_offset_ns;
+      frames_[shot.frame].images[shot.camera] = {image::ImageState::kPresent, time_ns, recorder.picture(shot)};
     });
     for (const simulation::Shot& shot : shots) {
-      if (shot.camera == 0) truth_.push_back({shot.stamp_ns, recorder.T_world_cam(0, shot.scene_time_s)});
+      rig_truth_[shot.camera].push_back({shot.stamp_ns, recorder.T_world_cam(0, shot.scene_time_s)});
     }
   }
 
   const camera::Rig& rig() const { return rig_; }
   const std::vector<image::ImageBundle>& frames() const { return frames_; }
-  const evaluation::Trajectory& truth() const { return truth_; }  // of camera 0
+  const evaluation::Trajectory& truth() const { return rig_truth_[0]; }  // of camera 0
+  // Where the rig was when camera c took its picture, under the time of the frame.
+  const evaluation::Trajectory& rig_truth(std::size_t c) const { return rig_truth_[c]; }
 
   // The same recording with fewer cameras.
   camera::Rig rig_of(int cameras) const { return rig_.subset(camera_list(cameras)); }
@@ -66,7 +74,7 @@ class RenderedTour {
     return out;
   }
   evaluation::Trajectory replayed_truth(std::size_t first_id) const {
-    evaluation::Trajectory out = truth_;
+    evaluation::Trajectory out = truth();
     for (evaluation::TimedPose& p : out) p.time_ns += shift_ns(first_id);
     return out;
   }
@@ -82,10 +90,19 @@ class RenderedTour {
   }
   static camera::Rig first_cameras(int cameras) { return simulation::ring_rig(8, 320).subset(camera_list(cameras)); }
 
+  static camera::Rig late(const camera::Rig& rig, TimeNs late_ns) {
+    std::vector<camera::RigCamera> cameras;
+    for (std::size_t c = 0; c < rig.size(); ++c) {
+      cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+      if (c >= 2) cameras.back().camera.time_offset_ns = late_ns;
+    }
+    return camera::Rig(std::move(cameras));
+  }
+
   ThreadPool pool_;
   camera::Rig rig_;
   std::vector<image::ImageBundle> frames_;
-  evaluation::Trajectory truth_;
+  std::vector<evaluation::Trajectory> rig_truth_;  // by camera
 };
 
 // Another place with as much to see: left and right exchanged.

@@ -79,6 +79,23 @@ TEST(CameraConsensus, KeepsDoubtsThroughALossButOfCamerasThatSawThePlace) {
   EXPECT_TRUE(after[0].doubted);
   EXPECT_FALSE(after[1].doubted);
   EXPECT_TRUE(after[2].landmarks.empty());
+  EXPECT_FALSE(after[0].established || after[2].established);
+  EXPECT_TRUE(after[1].established);
+}
+
+// A camera that is late is left out until the motion is known. What it then finds of what the others mapped, it may mistake.
+TEST(CameraConsensus, DoesNotJudgeACameraByWhatOnlyOthersHaveSeen) {
+  const FrameMatches matches{FrameMatches::value_type(100), FrameMatches::value_type(33)};
+  std::vector<CameraTrust> cameras(2);
+  cameras[0].established = true;
+  EXPECT_EQ(contradicting(matches, {95, 7}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(contradicting(matches, {20, 7}, cameras, {}), (std::vector<std::uint8_t>{1, 0}));
+  cameras[1].established = true;
+  EXPECT_EQ(contradicting(matches, {95, 7}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
+  doubt(cameras[1], {100, 2}, 0, {});
+  for (int k = 1; k <= ConsensusOptions{}.readmit_after; ++k) doubt(cameras[1], {100, 60}, k, {});
+  EXPECT_FALSE(cameras[1].doubted);
+  EXPECT_TRUE(cameras[1].established);
 }
 
 class WrongPictures : public ::testing::Test {

@@ -41,18 +41,26 @@ TEST(FeatureBudgets, FollowTheSharesBeyondHalfOfTheEvenOne) {
 }
 
 TEST(FeatureBudgets, GiveToTheOthersWhatACameraThatIsOutDoesNotNeed) {
-  const std::vector<std::uint8_t> out{0, 1, 0, 0};
-  EXPECT_EQ(feature_budgets(4, {}, out, {}, options(1200, 3000)), (std::vector<int>{1000, 0, 1000, 1000}));
-  EXPECT_EQ(feature_budgets(4, {}, std::vector<std::uint8_t>{1, 1, 0, 1}, {}, options(1200, 3600)), (std::vector<int>{0, 0, 2400, 0}));
-  EXPECT_EQ(feature_budgets(4, {}, std::vector<std::uint8_t>{1, 1, 0, 0}, {}, options(1200, 3600)), (std::vector<int>{0, 0, 1800, 1800}));
-  EXPECT_EQ(feature_budgets(4, std::vector<double>{0, 0.1, 0.2, 0.7}, std::vector<std::uint8_t>{1, 0, 0, 0}, {}, options(1200, 3600)),
-            (std::vector<int>{0, 1200, 1200, 1200}));
-  EXPECT_EQ(feature_budgets(2, {}, std::vector<std::uint8_t>{1, 0}, {}, options(1200, 3600)), (std::vector<int>{0, 2400}));
-  EXPECT_EQ(feature_budgets(3, {}, std::vector<std::uint8_t>{1, 0, 0}, {}, options(1200, 0)), (std::vector<int>{0, 1800, 1800}));
-  const std::vector<std::uint8_t> doubted{1, 1, 0, 1};  // they keep half of the even budget, to be believed again
+  const auto budgets = [](std::vector<std::uint8_t> out, int per_rig, std::vector<double> shares = {}) {
+    return feature_budgets(out.size(), shares, out, out, options(1200, per_rig));
+  };
+  EXPECT_EQ(budgets({0, 1, 0, 0}, 3000), (std::vector<int>{1000, 0, 1000, 1000}));
+  EXPECT_EQ(budgets({1, 0, 0, 0}, 3600, {0, 0.1, 0.2, 0.7}), (std::vector<int>{0, 1200, 1200, 1200}));
+  EXPECT_EQ(budgets({1, 1, 0, 0}, 3600), (std::vector<int>{0, 0, 1800, 1800}));
+  EXPECT_EQ(budgets({1, 1, 0, 1}, 3600), (std::vector<int>{0, 0, 2400, 0}));
+  EXPECT_EQ(budgets({1, 0}, 3600), (std::vector<int>{0, 2400}));
+  EXPECT_EQ(budgets({1, 0, 0}, 0), (std::vector<int>{0, 1800, 1800}));
+  EXPECT_EQ(budgets({1, 1}, 3000), (std::vector<int>{0, 0}));
+}
+
+TEST(FeatureBudgets, LeaveSomeToACameraThatIsDoubted) {
+  const std::vector<std::uint8_t> doubted{1, 1, 0, 1};  // half of the even budget, to be believed again
   EXPECT_EQ(feature_budgets(4, std::vector<double>{0, 0, 1, 0}, {}, doubted, options(1200, 3600)), (std::vector<int>{450, 450, 2250, 450}));
-  EXPECT_EQ(feature_budgets(4, {}, {}, {}, options(1200, 1)), std::vector<int>(4, 1));  // 0 would mean as many as usual
-  EXPECT_EQ(feature_budgets(2, {}, std::vector<std::uint8_t>{1, 1}, {}, options(1200, 3000)), (std::vector<int>{0, 0}));
+}
+
+TEST(FeatureBudgets, DoNotSwingWithSlowCameras) {
+  const std::vector<std::uint8_t> without_image{0, 0, 1, 1};  // in every second frame, which is no fault
+  EXPECT_EQ(feature_budgets(4, {}, without_image, {}, options(1200, 3600)), (std::vector<int>{1200, 1200, 0, 0}));
 }
 
 TEST(FeatureBudgets, KeepToTheirBoundsForAnyShares) {
@@ -68,7 +76,7 @@ TEST(FeatureBudgets, KeepToTheirBoundsForAnyShares) {
     const feature::FeatureOptions o = options(1000, 500 + static_cast<int>(random.below(9000)));
     const auto seeing = static_cast<int>(std::count(out.begin(), out.end(), 0));
     if (seeing == 0) continue;
-    const std::vector<int> budgets = feature_budgets(n, shares, out, {}, o);
+    const std::vector<int> budgets = feature_budgets(n, shares, out, out, o);
     const int of_rig = std::min(o.per_rig, static_cast<int>(n) * o.per_image);
     const int most = std::clamp((of_rig + seeing - 1) / seeing, o.per_image, 2 * o.per_image);
     const int total = std::min(of_rig, seeing * most);

@@ -183,6 +183,15 @@ TEST_F(CommandLine, RunWritesItsFilesAndRepeatsFromItsConfiguration) {
   ASSERT_EQ(again.status, 0) << again.err;
   EXPECT_EQ(slurp(folder_ / "first/trajectory.tum"), slurp(folder_ / "again/trajectory.tum"));
   expect_refused("run " + data() + " --out " + out("again"));  // it is there, and --overwrite was not given
+
+  // What an earlier run refined goes, unless it is what this one is told to read.
+  const std::filesystem::path refined = folder_ / "again/rig_refined.yaml";
+  std::filesystem::copy_file(folder_ / "data/rig.yaml", refined);
+  const std::string overwrite = "run " + data() + " --end 0.2 --overwrite --progress never --out " + out("again");
+  ASSERT_EQ(run(overwrite + " --rig " + refined.string()).status, 0);
+  EXPECT_TRUE(std::filesystem::exists(refined));
+  ASSERT_EQ(run(overwrite).status, 0);
+  EXPECT_FALSE(std::filesystem::exists(refined));
 }
 
 TEST_F(CommandLine, ASavedMapIsDescribedExportedAndGoneOnIn) {

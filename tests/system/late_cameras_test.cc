@@ -1,0 +1,64 @@
+#include <gtest/gtest.h>
+
+#include "base/median.h"
+#include "system/rendered_tour.h"
+
+namespace bslam::system {
+namespace {
+
+using geometry::SE3;
+
+constexpr std::size_t kFrames = 40;
+constexpr TimeNs kLate = 40'000'000;
+
+const RenderedTour& tour() {
+  static const RenderedTour tour(4, kFrames, kLate);
+  return tour;
+}
+
+void play(System& system) {
+  for (const image::ImageBundle& images : tour().frames()) system.process(images);
+  system.finish();
+}
+
+// How far the map has a late camera from where it truly was, from camera 0 at the time of the keyframe; m and rad together.
+double motion_error(const map::BundledMap& map) {
+  std::vector<double> errors;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    const auto frame = static_cast<std::size_t>(map.keyframe(k).frame->id.value());
+    if (frame == 0) continue;  // begins without a motion
+    const SE3 true_motion = tour().rig_truth(2)[frame].T_world_frame.inverse() * tour().truth()[frame].T_world_frame;
+    errors.push_back((map.motion_until(k, CameraIndex(2)) * true_motion.inverse()).log().norm());
+  }
+  return median(std::move(errors));
+}
+
+TEST(LateCameras, AreWhereTheFramesOnBothSidesHaveThem) {
+  Config live = small_config(Mode::kSequential);
+  live.final_adjustment = false;
+  System before(tour().rig(), live);
+  play(before);
+  System after(tour().rig(), small_config(Mode::kSequential));
+  play(after);
+  const double tracked = motion_error(*before.snapshot()), known = motion_error(*after.snapshot());
+  std::printf("motion of late cameras: %.2f mm from the frames before, %.2f mm from those on both sides\n", 1e3 * tracked, 1e3 * known);
+  EXPECT_LT(known, 0.8 * tracked);
+  EXPECT_EQ(after.snapshot()->check_invariants(), std::nullopt);
+}
+
+TEST(LateCameras, OfAnEarlierRunAreLeftWhereTheyWere) {
+  System first(tour().rig(), small_config(Mode::kSequential));
+  play(first);
+  const map::MapSnapshot saved = first.snapshot();
+  Resources resources;
+  resources.map = *saved;
+  System second(tour().rig(), small_config(Mode::kSequential), std::move(resources));
+  play(second);  // frames of the same numbers and times
+  for (const KeyframeId k : saved->keyframe_ids()) {
+    if (!second.snapshot()->alive(k)) continue;
+    EXPECT_EQ(second.snapshot()->keyframe(k).twist, saved->keyframe(k).twist);
+  }
+}
+
+}  // namespace
+}  // namespace bslam::system
