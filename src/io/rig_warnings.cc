@@ -26,19 +26,34 @@ std::string unit_question(const camera::Rig& rig) {
   return longest >= 10.0 && longest <= 5000.0 ? "are they millimetres? (metres are expected)" : "are the units metres?";
 }
 
-void warn_of_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::vector<std::string>& warnings) {
-  const geometry::SE3 T_i_j = rig.cam_from_rig(i) * rig.rig_from_cam(j);
+geometry::SE3 between(const camera::Rig& rig, std::size_t i, std::size_t j) { return rig.cam_from_rig(i) * rig.rig_from_cam(j); }
+
+// One for all pairs, as one wrong unit puts all of them apart.
+void warn_of_long_baselines(const camera::Rig& rig, std::vector<std::string>& warnings) {
+  std::string first;
+  int others = -1;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    for (std::size_t j = i + 1; j < rig.size(); ++j) {
+      const double length = between(rig, i, j).translation().norm();
+      if (length <= kLargestBaseline) continue;
+      if (others++ < 0) first = fmt::format("cameras {} and {} are {} apart", i, j, length_in_words(length));
+    }
+  }
+  if (others < 0) return;
+  const std::string rest = others == 0 ? "" : others == 1 ? ", another pair likewise" : fmt::format(", {} other pairs likewise", others);
+  warnings.push_back(fmt::format("{}{}: {}", first, rest, unit_question(rig)));
+}
+
+void warn_of_short_baseline(const camera::Rig& rig, std::size_t i, std::size_t j, std::vector<std::string>& warnings) {
+  const geometry::SE3 T_i_j = between(rig, i, j);
   const double length = T_i_j.translation().norm();
-  if (length >= kLeastBaseline && length <= kLargestBaseline) return;
+  if (length >= kLeastBaseline) return;
   const bool one_pose = length < 1e-9 && geometry::so3_log(T_i_j.rotation()).norm() < 1e-9;
   if (one_pose) {
     warnings.push_back(fmt::format("cameras {} and {} have the same extrinsics: is a transform missing?", i, j));
-  } else if (length < kLeastBaseline) {
+  } else {
     warnings.push_back(fmt::format("cameras {} and {} are {} apart: is their transform missing, or not in metres?", i,
                                    j, length_in_words(length)));
-  } else {
-    warnings.push_back(
-        fmt::format("cameras {} and {} are {} apart: {}", i, j, length_in_words(length), unit_question(rig)));
   }
 }
 
@@ -172,8 +187,9 @@ std::vector<std::string> rig_warnings(const camera::Rig& rig) {
     warn_of_time(rig.camera(i), i, warnings);
   }
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    for (std::size_t j = i + 1; j < rig.size(); ++j) warn_of_pair(rig, i, j, warnings);
+    for (std::size_t j = i + 1; j < rig.size(); ++j) warn_of_short_baseline(rig, i, j, warnings);
   }
+  warn_of_long_baselines(rig, warnings);
   warn_of_direction(rig, warnings);
   return warnings;
 }

@@ -51,7 +51,9 @@ TEST(RigWarnings, SpeakOfBaselinesHardlyMeant) {
   EXPECT_TRUE(warns(camera::Rig({at({0, 0, 0}), at({0.0005, 0, 0})}), "0.5 mm apart"));
   EXPECT_TRUE(warns(camera::Rig({at({0, 0, 0}), at({110, 0, 0})}), "millimetres"));
   EXPECT_TRUE(warns(camera::Rig({at({0, 0, 0}), at({0, 0, 0})}), "the same extrinsics"));
-  EXPECT_EQ(rig_warnings(camera::Rig({at({0, 0, 0}), at({0.0005, 0, 0}), at({100, 0, 0})})).size(), 3u);
+  EXPECT_EQ(rig_warnings(camera::Rig({at({0, 0, 0}), at({0.0005, 0, 0}), at({100, 0, 0})})).size(), 2u);
+  EXPECT_TRUE(warns(camera::Rig({at({0, 0, 0}), at({100, 0, 0}), at({200, 0, 0}), at({300, 0, 0})}),
+                    "cameras 0 and 1 are 100.00 m apart, 5 other pairs likewise: are they millimetres?"));
 }
 
 TEST(RigWarnings, SpeakOfTimesHardlyMeant) {
