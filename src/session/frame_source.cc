@@ -1,11 +1,31 @@
 #include "session/frame_source.h"
 
+#include <utility>
+
+#if defined(__linux__)
+#include <sys/resource.h>
+#endif
+
 #include "system/stopwatch.h"
 
 namespace bslam::session {
+namespace {
 
-FrameSource::FrameSource(const io::Dataset& dataset, std::size_t ahead)
-    : dataset_(dataset), ahead_(ahead), reader_([this](std::stop_token stop) { read(std::move(stop)); }) {}
+// On Linux the nice value is that of the calling thread. Where it cannot be set nothing but time is lost.
+void give_way() {
+#if defined(__linux__)
+  constexpr int kNice = 10;
+  [[maybe_unused]] const int failed = setpriority(PRIO_PROCESS, 0, kNice);
+#endif
+}
+
+}  // namespace
+
+FrameSource::FrameSource(const io::Dataset& dataset, std::size_t ahead, ReadAhead priority)
+    : dataset_(dataset), ahead_(ahead), reader_([this, priority](std::stop_token stop) {
+        if (priority == ReadAhead::kGivesWay) give_way();
+        read(std::move(stop));
+      }) {}
 
 std::optional<FrameSource::Item> FrameSource::next() {
   std::unique_lock lock(mutex_);

@@ -12,6 +12,10 @@
 
 namespace bslam::session {
 
+// Does reading ahead give way to the threads that work on the frame in hand? Where stages run beside these it must not: they would
+// starve it.
+enum class ReadAhead { kAsAll, kGivesWay };
+
 class FrameSource {
  public:
   struct Item {
@@ -20,7 +24,7 @@ class FrameSource {
   };
 
   // Borrows `dataset`; keeps at most `ahead` frames read and not yet taken.
-  FrameSource(const io::Dataset& dataset, std::size_t ahead);
+  FrameSource(const io::Dataset& dataset, std::size_t ahead, ReadAhead priority = ReadAhead::kAsAll);
   ~FrameSource() = default;
 
   // The next frame; empty after the last. Throws what the reading thread threw.

@@ -48,7 +48,8 @@ std::vector<FrameId> recorded_frames(const system::Journal& journal) {
 // Feeds the frames one after the other; returns what was fed. Stops early where asked to.
 std::vector<InputFrame> feed(const io::Dataset& dataset, const SessionOptions& options, system::System& system) {
   std::vector<InputFrame> inputs;
-  FrameSource source(dataset, kReadAhead);
+  const bool sequential = options.config.mode == system::Mode::kSequential;
+  FrameSource source(dataset, kReadAhead, sequential ? ReadAhead::kGivesWay : ReadAhead::kAsAll);
   const Metronome metronome(dataset.frames.front().time_ns);
   const std::vector<FrameId> recorded = options.replay ? recorded_frames(*options.replay) : std::vector<FrameId>();
   for (std::size_t i = 0; i < dataset.frames.size() && !options.interrupted.stop_requested(); ++i) {

@@ -67,7 +67,7 @@ TEST_F(Session, ReadsFramesInOrder) {
 TEST_F(Session, StopsReadingCleanlyWhereNobodyWantsMoreParallel) {
   const io::Dataset data = dataset();
   for (std::size_t taken = 0; taken <= data.frames.size(); ++taken) {
-    FrameSource source(data, 1 + taken % 3);
+    FrameSource source(data, 1 + taken % 3, taken % 2 == 0 ? ReadAhead::kGivesWay : ReadAhead::kAsAll);
     for (std::size_t i = 0; i < taken; ++i) EXPECT_TRUE(source.next().has_value());
   }
 }
