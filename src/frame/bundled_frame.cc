@@ -23,7 +23,9 @@ std::vector<double> delays_of(const BundledFrame& frame) {
 
 double farthest_delay_s(const BundledFrame& frame) {
   double farthest = 0;
-  for (const double delay : delays_of(frame)) farthest = std::abs(delay) > std::abs(farthest) ? delay : farthest;
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    if (const double delay = frame.delay_s(c); std::abs(delay) > std::abs(farthest)) farthest = delay;
+  }
   return farthest;
 }
 

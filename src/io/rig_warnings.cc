@@ -120,7 +120,7 @@ bool all_apart_along(const camera::Rig& rig, int axis) {
   bool some = false;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
-      const Vector3d baseline = (rig.cam_from_rig(i) * rig.rig_from_cam(j)).translation();
+      const Vector3d baseline = between(rig, i, j).translation();
       if (geometry::angle_between(axis_of(rig, i), axis_of(rig, j)) > kSameWay) continue;
       if (!(std::abs(baseline[axis]) > kAlong * baseline.norm())) return false;
       some = true;

@@ -5,6 +5,15 @@
 #include "base/assert.h"
 
 namespace bslam::map {
+namespace {
+
+// How the rig moved from the time of the keyframe to that of camera c's image.
+geometry::SE3 motion_of(const BundledKeyframe& k, CameraIndex c) {
+  const double delay = k.frame->delay_s(c.index());
+  return delay == 0.0 ? geometry::SE3() : geometry::SE3::exp(delay * k.twist);
+}
+
+}  // namespace
 
 std::vector<KeyframeId> BundledMap::keyframe_ids() const {
   std::vector<KeyframeId> ids;
@@ -67,22 +76,18 @@ geometry::SE3 BundledMap::resolved_pose(KeyframeId k) const {
 
 geometry::SE3 BundledMap::rig_from_cam(const BundledKeyframe& k, CameraIndex c) const {
   const geometry::SE3& T_rig_cam = rig_->rig_from_cam(c.index());
-  const double delay = k.frame->delay_s(c.index());
-  return delay == 0.0 ? T_rig_cam : geometry::SE3::exp(delay * k.twist).inverse() * T_rig_cam;
+  return k.frame->delay_s(c.index()) == 0.0 ? T_rig_cam : motion_of(k, c).inverse() * T_rig_cam;
 }
 
 camera::Rig BundledMap::rig_of(KeyframeId k) const { return frame::rig_of(*rig_, *keyframe(k).frame, keyframe(k).twist); }
 
-geometry::SE3 BundledMap::motion_until(KeyframeId k, CameraIndex c) const {
-  const double delay = keyframe(k).frame->delay_s(c.index());
-  return delay == 0.0 ? geometry::SE3() : geometry::SE3::exp(delay * keyframe(k).twist);
-}
+geometry::SE3 BundledMap::motion_until(KeyframeId k, CameraIndex c) const { return motion_of(keyframe(k), c); }
 
 geometry::SE3 BundledMap::cam_from_world(KeyframeId k, CameraIndex c) const {
   const BundledKeyframe& entry = keyframe(k);
   const geometry::SE3& T_cam_rig = rig_->cam_from_rig(c);
   if (entry.frame->delay_s(c.index()) == 0.0) return T_cam_rig * entry.T_rig_world;
-  return T_cam_rig * motion_until(k, c) * entry.T_rig_world;
+  return T_cam_rig * motion_of(entry, c) * entry.T_rig_world;
 }
 
 KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,

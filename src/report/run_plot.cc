@@ -116,8 +116,9 @@ std::optional<Panel> camera_state_panel(const RunRecord& record) {
         series = panel.series.insert(series, time_series(why, {}, series_colour(k == 0 ? 0 : k + 1), 6.0));  // 1 is that of lost frames
       }
       Points& bars = series->points;
-      if (bars.size() >= 3 && bars[bars.size() - 2][1] == y && interval.from_s - bars[bars.size() - 2][0] < apart_s) {
-        bars[bars.size() - 2][0] = interval.to_s;
+      auto* const last = bars.empty() ? nullptr : &bars[bars.size() - 2];  // the end of the bar before; after it the line is broken
+      if (last != nullptr && (*last)[1] == y && interval.from_s - (*last)[0] < apart_s) {
+        (*last)[0] = interval.to_s;
       } else {
         bars.insert(bars.end(), {{interval.from_s, y}, {interval.to_s, y}, {kNone, kNone}});
       }

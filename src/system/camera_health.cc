@@ -90,7 +90,8 @@ std::string_view describe(Outage outage) {
   return "";
 }
 
-CameraMonitor::CameraMonitor(std::size_t cameras, const HealthOptions& options) : options_(options), cameras_(cameras), failing_(cameras, 0) {}
+CameraMonitor::CameraMonitor(std::size_t cameras, const HealthOptions& options)
+    : options_(options), cameras_(cameras), failing_(cameras, 0) {}
 
 std::vector<Outage> CameraMonitor::judge(const image::ImageBundle& images) {
   BSLAM_ASSERT(images.images.size() == cameras_.size(), "one image slot per camera");

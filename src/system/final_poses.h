@@ -16,7 +16,8 @@ std::optional<geometry::SE3> T_rig_world_of(const FrameRecord& record, const map
 
 // How the rig moved while the cameras of a keyframe fired one after the other: by constant acceleration from the frame before
 // through the keyframe to the frame after it, which tracking could not know. Keyframes in slots from `first` on that have late
-// cameras and a frame with a pose on either side, no farther than tracking::kMaxPrediction_s and not by relocalisation. `frames`: of the run, in order.
+// cameras and a frame with a pose on either side, no farther than tracking::kMaxPrediction_s and not by relocalisation.
+// `frames`: of the run, in order.
 std::vector<std::pair<KeyframeId, geometry::Vector6d>> twists_from_neighbours(const map::BundledMap& map, KeyframeId first,
                                                                                std::span<const FrameRecord> frames);
 

@@ -21,6 +21,7 @@ struct CameraTrust {
   std::vector<LandmarkId> landmarks;  // ... and the inliers of that
 };
 
+// Without doubts, and with nothing seen yet.
 CameraTrust trusted(bool established);
 
 // What of it counts where the rig starts or was found again after a loss, `seen[c]` landmarks of the place by camera c.
