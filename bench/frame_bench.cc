@@ -2,20 +2,20 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/mapping/simulated_map.h"
-#include "frame/epipolar_search.h"
-#include "frame/patch_alignment.h"
-#include "frame/projection_search.h"
 #include "map/local_view.h"
+#include "matching/epipolar_search.h"
+#include "matching/patch_alignment.h"
+#include "matching/projection_search.h"
 
 namespace bslam::frame {
 namespace {
 
 const map::SimulatedMap& world() {
   static const map::SimulatedMap world = [] {
-    simulation::FeatureSimulatorOptions options;
+    synthetic::FeatureSimulatorOptions options;
     options.landmarks = 20000;
     options.max_keypoints = 1143;  // and 5 % outliers
-    map::SimulatedMap out(simulation::FeatureSimulator(simulation::default_rig(), simulation::make_orbit({}), options));
+    map::SimulatedMap out(synthetic::FeatureSimulator(synthetic::default_rig(), synthetic::make_orbit({}), options));
     for (int i = 0; i < 24; ++i) out.add_keyframe(FrameId(i), 0.25 * i);
     return out;
   }();
@@ -25,10 +25,10 @@ const map::SimulatedMap& world() {
 void MatchEpipolar(benchmark::State& state) {
   const camera::Rig& rig = world().map.rig();
   const BundledFrame& frame = world().frames[3].frame;
-  const EpipolarView a{&rig.camera(0), &frame.cameras[0].keypoints, rig.rig_from_cam(0), {}};
-  const EpipolarView b{&rig.camera(1), &frame.cameras[1].keypoints, rig.rig_from_cam(1), {}};
+  const matching::EpipolarView a{&rig.camera(0), &frame.cameras[0].keypoints, rig.rig_from_cam(0), {}};
+  const matching::EpipolarView b{&rig.camera(1), &frame.cameras[1].keypoints, rig.rig_from_cam(1), {}};
   std::size_t matches = 0;
-  for (auto _ : state) matches = match_epipolar(a, b, {}).size();
+  for (auto _ : state) matches = matching::match_epipolar(a, b, {}).size();
   state.counters["keypoints"] = static_cast<double>(frame.cameras[0].keypoints.size());
   state.counters["matches"] = static_cast<double>(matches);
 }
@@ -37,7 +37,7 @@ BENCHMARK(MatchEpipolar)->Unit(benchmark::kMicrosecond);
 void SearchByProjection(benchmark::State& state) {
   const auto& seen = world().frames[5];
   const geometry::SE3 T_cam_world = world().map.rig().cam_from_rig(0) * seen.T_world_rig.inverse();
-  std::vector<SearchPoint> points;
+  std::vector<matching::SearchPoint> points;
   for (const LandmarkId id : world().map.landmark_ids()) {
     if (points.size() == 3000) break;
     const map::Landmark& l = world().map.landmark(id);
@@ -45,9 +45,9 @@ void SearchByProjection(benchmark::State& state) {
   }
   std::size_t matches = 0;
   for (auto _ : state) {
-    matches =
-        search_by_projection(world().map.rig().camera(0), seen.frame.cameras[0], T_cam_world, points, {}, {.radius = 0.006})
-            .matches.size();
+    matches = matching::search_by_projection(world().map.rig().camera(0), seen.frame.cameras[0], T_cam_world, points,
+                                             {}, {.radius = 0.006})
+                  .matches.size();
   }
   state.counters["points"] = static_cast<double>(points.size());
   state.counters["matches"] = static_cast<double>(matches);
@@ -71,9 +71,9 @@ void AlignPatch(benchmark::State& state) {
       patch[static_cast<std::size_t>(y * feature::kPatchSize + x)] = grey(x - 4.5, y - 4.5);
     }
   }
-  const PatchWarp warp{Eigen::Rotation2Dd(0.05).toRotationMatrix()};
+  const matching::PatchWarp warp{Eigen::Rotation2Dd(0.05).toRotationMatrix()};
   bool found = false;
-  for (auto _ : state) found = align_patch(patch, warp, pyramid, {80.5, 59.6}, {}).has_value();
+  for (auto _ : state) found = matching::align_patch(patch, warp, pyramid, {80.5, 59.6}, {}).has_value();
   state.counters["found"] = found;
 }
 BENCHMARK(AlignPatch)->Unit(benchmark::kNanosecond);

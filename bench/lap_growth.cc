@@ -1,5 +1,5 @@
-// Does a map stop growing once the place is known? Plays a recording of laps that ends where it begins over and over, and
-// prints for each lap what the map holds by then and what the lap's frames took.
+// Does a map stop growing once the place is known? Plays a recording of laps that ends where it begins over and over,
+// and prints for each lap what the map holds by then and what the lap's frames took.
 //   bslam_lap_growth DATA --laps 5 --times 4 [--cameras 0,1] [--set key=value ...]
 #include <fmt/format.h>
 #include <unistd.h>
@@ -10,9 +10,9 @@
 
 #include "base/median.h"
 #include "cli/config_arguments.h"
-#include "io/dataset.h"
-#include "io/vocabulary_file.h"
+#include "dataset/dataset.h"
 #include "session/frame_source.h"
+#include "storage/vocabulary_file.h"
 #include "system/system.h"
 
 namespace bslam {
@@ -35,9 +35,11 @@ double resident_mb() {
 // Prints lap by lap what the system makes of the frames.
 class LapTable {
  public:
-  LapTable(const system::System& system, std::size_t frames_per_lap) : system_(system), frames_per_lap_(frames_per_lap) {
-    fmt::print("| lap | new keyframes | keyframes | landmarks | observations | loops | memory [MB] | frame [ms] |\n"
-               "|---|---|---|---|---|---|---|---|\n");
+  LapTable(const system::System& system, std::size_t frames_per_lap)
+      : system_(system), frames_per_lap_(frames_per_lap) {
+    fmt::print(
+        "| lap | new keyframes | keyframes | landmarks | observations | loops | memory [MB] | frame [ms] |\n"
+        "|---|---|---|---|---|---|---|---|\n");
   }
   void after_frame() {
     const std::vector<system::FrameRecord>& frames = system_.frames();
@@ -49,8 +51,9 @@ class LapTable {
       born += frames[i].keyframe;
     }
     const map::MapSnapshot map = system_.snapshot();
-    fmt::print("| {} | {} | {} | {} | {} | {} | {:.0f} | {:.1f} |\n", frames.size() / frames_per_lap_, born, map->num_keyframes(),
-               map->num_landmarks(), map->num_observations(), system_.loops().size(), resident_mb(), median(std::move(ms)));
+    fmt::print("| {} | {} | {} | {} | {} | {} | {:.0f} | {:.1f} |\n", frames.size() / frames_per_lap_, born,
+               map->num_keyframes(), map->num_landmarks(), map->num_observations(), system_.loops().size(),
+               resident_mb(), median(std::move(ms)));
     std::fflush(stdout);
   }
 
@@ -62,10 +65,10 @@ class LapTable {
 Status play(const Arguments& arguments) {
   auto config = cli::resolve_config(arguments.config);
   if (!config) return config.error();
-  config->mode = system::Mode::kSequential;
-  const auto dataset = io::open_dataset({.path = arguments.data, .cameras = arguments.cameras});
+  config->mode = execution::Mode::kSequential;
+  const auto dataset = dataset::open_dataset({.path = arguments.data, .cameras = arguments.cameras});
   if (!dataset) return dataset.error();
-  const auto vocabulary = io::vocabulary_or_shipped("");
+  const auto vocabulary = storage::vocabulary_or_shipped("");
   if (!vocabulary) return vocabulary.error();
   system::System system(dataset->rig, *config, {.vocabulary = *vocabulary});
   LapTable table(system, dataset->frames.size() / static_cast<std::size_t>(arguments.laps));

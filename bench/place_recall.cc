@@ -3,10 +3,10 @@
 //   bslam_place_recall MAP.bmap TRUTH.tum [--older S] [--overlap SHARE] [--set key=value ...]
 // TRUTH: T_world_cam0 at the keyframes' times. Prints a line of a table.
 //
-// A right place exists where, by the true poses, a keyframe more than S seconds older that is no neighbour shows what this
-// one shows: at least SHARE of its landmarks lie in an image of this one, not hidden, at about the distance (within kZoom)
-// and from about the direction (within kTurn) they were seen from then; descriptors cannot be compared beyond. An answer
-// is right where the pose that verification gives is the true one.
+// A right place exists where, by the true poses, a keyframe more than S seconds older that is no neighbour shows what
+// this one shows: at least SHARE of its landmarks lie in an image of this one, not hidden, at about the distance
+// (within kZoom) and from about the direction (within kTurn) they were seen from then; descriptors cannot be compared
+// beyond. An answer is right where the pose that verification gives is the true one.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -16,12 +16,12 @@
 
 #include "base/median.h"
 #include "cli/config_arguments.h"
-#include "io/map_file.h"
-#include "io/trajectory_file.h"
-#include "io/vocabulary_file.h"
+#include "evaluation/trajectory_file.h"
 #include "looping/locate.h"
 #include "looping/place_recogniser.h"
 #include "map/map_edit.h"
+#include "storage/map_file.h"
+#include "storage/vocabulary_file.h"
 
 namespace bslam {
 namespace {
@@ -31,8 +31,8 @@ using Eigen::Vector3d;
 using geometry::SE3;
 
 constexpr double kZoom = 1.5;
-constexpr double kTurn = std::numbers::pi / 6;                   // rad
-constexpr double kMaxOff = 0.1, kMaxTurnOff = 0.05;              // a right pose: of the median depth; rad
+constexpr double kTurn = std::numbers::pi / 6;       // rad
+constexpr double kMaxOff = 0.1, kMaxTurnOff = 0.05;  // a right pose: of the median depth; rad
 
 struct Arguments {
   std::string map, truth;
@@ -73,8 +73,8 @@ View view_of(const map::BundledMap& map, KeyframeId k, const SE3& T_world_rig) {
   return view;
 }
 
-// Whether the view shows a point that was seen from `seen_from` (both in its frame): its nearest known point in the image
-// is about as far away, so that nothing stands between.
+// Whether the view shows a point that was seen from `seen_from` (both in its frame): its nearest known point in the
+// image is about as far away, so that nothing stands between.
 bool shows(const camera::Rig& rig, const View& view, const Vector3d& point, const Vector3d& seen_from) {
   const double depth = point.norm(), depth_then = (point - seen_from).norm();
   if (depth > kZoom * depth_then || depth_then > kZoom * depth) return false;
@@ -109,9 +109,12 @@ constexpr std::array kOutcomes = {"right", "wrong", "no candidate", "other candi
 
 class Recall {
  public:
-  Recall(map::BundledMap map, const evaluation::Trajectory& truth, place::VocabularyPtr vocabulary, const system::Config& config,
-         const Arguments& arguments)
-      : map_(std::move(map)), recogniser_(std::move(vocabulary), config.looping.recognition), config_(config), arguments_(arguments) {
+  Recall(map::BundledMap map, const evaluation::Trajectory& truth, place::VocabularyPtr vocabulary,
+         const system::Config& config, const Arguments& arguments)
+      : map_(std::move(map)),
+        recogniser_(std::move(vocabulary), config.looping.recognition),
+        config_(config),
+        arguments_(arguments) {
     for (const KeyframeId k : map_.keyframe_ids()) {
       const TimeNs time_ns = map_.keyframe(k).frame->time_ns;
       const auto pose = std::ranges::lower_bound(truth, time_ns - 1'000'000, {}, &evaluation::TimedPose::time_ns);
@@ -130,8 +133,8 @@ class Recall {
 
   void print(const std::string& name) const {
     const int right = count_[0], wrong = count_[1];
-    fmt::print("| {} | {} | {} | {} | {} | {:.3f} | {:.3f} |", name, views_.size(), revisits_, revisits_right_, right + wrong,
-               right + wrong > 0 ? static_cast<double>(right) / (right + wrong) : 1.0,
+    fmt::print("| {} | {} | {} | {} | {} | {:.3f} | {:.3f} |", name, views_.size(), revisits_, revisits_right_,
+               right + wrong, right + wrong > 0 ? static_cast<double>(right) / (right + wrong) : 1.0,
                revisits_ > 0 ? static_cast<double>(revisits_right_) / revisits_ : 1.0);
     for (std::size_t o = 2; o < kOutcomes.size(); ++o) fmt::print(" {} {};", kOutcomes[o], missed_[o]);
     fmt::print(" |\n");
@@ -141,10 +144,12 @@ class Recall {
   void ask(std::size_t i) {
     const View& now = views_[i];
     std::vector<KeyframeId> places;  // right ones
-    const std::vector<map::Covisible> neighbours = looping::neighbours_of(map_, now.keyframe, config_.looping.recognition);
+    const std::vector<map::Covisible> neighbours =
+        looping::neighbours_of(map_, now.keyframe, config_.looping.recognition);
     double best = 0;
     for (std::size_t j = 0; j < i && old_enough(now, views_[j].time_ns); ++j) {
-      if (std::ranges::binary_search(neighbours, views_[j].keyframe, {}, &map::Covisible::keyframe)) continue;  // never lost sight of
+      if (std::ranges::binary_search(neighbours, views_[j].keyframe, {}, &map::Covisible::keyframe))
+        continue;  // never lost sight of
       const double share = shared_share(map_.rig(), now, views_[j]);
       if (share >= arguments_.overlap) places.push_back(views_[j].keyframe);
       best = std::max(best, share);
@@ -158,12 +163,14 @@ class Recall {
     }
     if (arguments_.detail) {
       fmt::print("{} at {:.2f} s: {} right places, overlap {:.2f}: {} ({})\n", now.keyframe.value(),
-                 1e-9 * static_cast<double>(now.time_ns), places.size(), best, kOutcomes[static_cast<std::size_t>(outcome)],
-                 note_);
+                 1e-9 * static_cast<double>(now.time_ns), places.size(), best,
+                 kOutcomes[static_cast<std::size_t>(outcome)], note_);
     }
   }
 
-  bool old_enough(const View& now, TimeNs then_ns) const { return static_cast<double>(now.time_ns - then_ns) > 1e9 * arguments_.older_s; }
+  bool old_enough(const View& now, TimeNs then_ns) const {
+    return static_cast<double>(now.time_ns - then_ns) > 1e9 * arguments_.older_s;
+  }
 
   Outcome answer(const View& now, const std::vector<KeyframeId>& places) {
     Outcome outcome = Outcome::kNoCandidate;
@@ -174,12 +181,14 @@ class Recall {
       const bool right_place = std::ranges::find(places, candidate.keyframe) != places.end();
       if (outcome != Outcome::kRejected) outcome = right_place ? Outcome::kRejected : Outcome::kOtherCandidates;
       looping::LocateReport report;
-      const Random random(static_cast<std::uint64_t>(config_.seed), "loop", static_cast<std::uint64_t>(now.keyframe.value()));
-      const auto location = looping::locate(map_, map_.rig_of(now.keyframe), *map_.keyframe(now.keyframe).frame, candidate.keyframe, config_.looping.verification,
-                                            config_.feature_model(), random, &report);
-      note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} found {} of {}; ", candidate.keyframe.value(),
-                           candidate.score, static_cast<int>(report.rejection), report.matches, report.inliers, report.found,
-                           report.sought);
+      const Random random(static_cast<std::uint64_t>(config_.seed), "loop",
+                          static_cast<std::uint64_t>(now.keyframe.value()));
+      const auto location =
+          looping::locate(map_, map_.rig_of(now.keyframe), *map_.keyframe(now.keyframe).frame, candidate.keyframe,
+                          config_.looping.verification, config_.feature_model(), random, &report);
+      note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} found {} of {}; ",
+                           candidate.keyframe.value(), candidate.score, static_cast<int>(report.rejection),
+                           report.matches, report.inliers, report.found, report.sought);
       if (location) return is_right(now, *old, *location) ? Outcome::kRight : Outcome::kWrong;
     }
     return outcome;
@@ -205,11 +214,11 @@ class Recall {
 Status measure(const Arguments& arguments) {
   const auto config = cli::resolve_config(arguments.config);
   if (!config) return config.error();
-  const auto saved = io::read_map(arguments.map);
+  const auto saved = storage::read_map(arguments.map);
   if (!saved) return saved.error();
-  const auto truth = io::read_trajectory(arguments.truth);
+  const auto truth = evaluation::read_trajectory(arguments.truth);
   if (!truth) return truth.error();
-  const auto vocabulary = io::vocabulary_or_shipped("");
+  const auto vocabulary = storage::vocabulary_or_shipped("");
   if (!vocabulary) return vocabulary.error();
   Recall recall(saved->map, *truth, *vocabulary, *config, arguments);
   recall.run();
@@ -226,7 +235,8 @@ int main(int argc, char** argv) {
   app.add_option("map", arguments.map, "as `bslam run --no-loop --save-map` writes it")->required();
   app.add_option("truth", arguments.truth, "true poses of camera 0, TUM")->required();
   app.add_option("--older", arguments.older_s, "seconds that a place was seen before")->capture_default_str();
-  app.add_option("--overlap", arguments.overlap, "share of its landmarks that is seen again where a place is")->capture_default_str();
+  app.add_option("--overlap", arguments.overlap, "share of its landmarks that is seen again where a place is")
+      ->capture_default_str();
   app.add_flag("--detail", arguments.detail, "a line for each keyframe");
   bslam::cli::add_config_options(app, arguments.config);
   CLI11_PARSE(app, argc, argv);

@@ -1,5 +1,5 @@
 // Settings in YAML.
-#include "io/config_file.h"
+#include "yaml/config_file.h"
 
 #include "system/config.h"
 #include "target.h"
@@ -8,7 +8,7 @@ namespace bslam::fuzz {
 
 std::vector<std::string> seeds() {
   system::Config config;
-  return {io::config_to_yaml(OptionTable(config)), "features.per_image: 700\nmode: sequential\n",
+  return {yaml::config_to_yaml(OptionTable(config)), "features.per_image: 700\nmode: sequential\n",
           "features: {per_image: 700, levels: 6}\nseed: 3\n"};
 }
 
@@ -18,14 +18,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace bslam;
   system::Config config;
   OptionTable table(config);
-  const Status status = io::apply_config_file(table, fuzz::scratch_file("config.yaml", fuzz::as_text(data, size)));
-  (void)io::apply_setting(table, fuzz::as_text(data, size));
+  const Status status = yaml::apply_config_file(table, fuzz::scratch_file("config.yaml", fuzz::as_text(data, size)));
+  (void)yaml::apply_setting(table, fuzz::as_text(data, size));
   if (!status) return 0;
-  const std::string yaml = io::config_to_yaml(table);
+  const std::string yaml = yaml::config_to_yaml(table);
   system::Config again;
   OptionTable again_table(again);
-  fuzz::require(io::apply_config_file(again_table, fuzz::scratch_file("again.yaml", yaml)).ok() &&
-                    io::config_to_yaml(again_table) == yaml,
+  fuzz::require(yaml::apply_config_file(again_table, fuzz::scratch_file("again.yaml", yaml)).ok() &&
+                    yaml::config_to_yaml(again_table) == yaml,
                 "settings that were written read the same");
   return 0;
 }

@@ -1,16 +1,16 @@
 // EuRoC's sensor.yaml.
-#include "io/euroc_sensor.h"
+#include "rig_formats/euroc_sensor.h"
 
-#include "simulation/rigs.h"
+#include "synthetic/rigs.h"
 #include "target.h"
 
 namespace bslam::fuzz {
 
 std::vector<std::string> seeds() {
   std::vector<std::string> out;
-  const camera::Rig rig = simulation::mixed_rig();
+  const camera::Rig rig = synthetic::mixed_rig();
   for (std::size_t c = 0; c < rig.size(); c += 2)
-    out.push_back(io::euroc_sensor_yaml({rig.camera(c), rig.body_from_cam(c)}, 20));
+    out.push_back(rig_formats::euroc_sensor_yaml({rig.camera(c), rig.body_from_cam(c)}, 20));
   out.push_back(
       "%YAML:1.0\nsensor_type: camera\ncomment: VI-Sensor\nT_BS:\n  cols: 4\n  rows: 4\n"
       "  data: [1.0, 0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.2,\n         0.0, 0.0, 1.0, 0.3, 0.0, 0.0, 0.0, 1.0]\nrate_hz: "
@@ -24,14 +24,15 @@ std::vector<std::string> seeds() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bslam;
-  const auto camera = io::read_euroc_sensor(fuzz::scratch_file("sensor.yaml", fuzz::as_text(data, size)), "cam0");
+  const auto camera =
+      rig_formats::read_euroc_sensor(fuzz::scratch_file("sensor.yaml", fuzz::as_text(data, size)), "cam0");
   if (!camera) return 0;
   fuzz::require(camera->camera.unproject({0.5 * camera->camera.width, 0.5 * camera->camera.height})
                     .value_or(Eigen::Vector3d::UnitZ())
                     .allFinite(),
                 "a bearing");
-  const std::string yaml = io::euroc_sensor_yaml(*camera, 20);
-  fuzz::require(io::read_euroc_sensor(fuzz::scratch_file("again.yaml", yaml), "cam0").ok(),
+  const std::string yaml = rig_formats::euroc_sensor_yaml(*camera, 20);
+  fuzz::require(rig_formats::read_euroc_sensor(fuzz::scratch_file("again.yaml", yaml), "cam0").ok(),
                 "a camera that was written can be read");
   return 0;
 }

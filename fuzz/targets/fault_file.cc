@@ -1,5 +1,5 @@
 // Lists of faults of a simulated recording.
-#include "io/fault_file.h"
+#include "simulator/fault_file.h"
 
 #include "target.h"
 
@@ -16,9 +16,9 @@ std::vector<std::string> seeds() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bslam;
-  const auto faults = io::read_faults(fuzz::scratch_file("faults.yaml", fuzz::as_text(data, size)), 4);
+  const auto faults = simulator::read_faults(fuzz::scratch_file("faults.yaml", fuzz::as_text(data, size)), 4);
   if (!faults) return 0;
-  for (const simulation::Fault& f : *faults) {
+  for (const simulator::Fault& f : *faults) {
     fuzz::require(!f.cameras.empty() && f.from_s >= 0 && f.to_s > f.from_s && f.delay_s >= 0,
                   "a fault with an interval");
     for (const int c : f.cameras) fuzz::require(c >= 0 && c < 4, "a camera of the rig");

@@ -1,5 +1,5 @@
 // KITTI's calib.txt, without the images beside it.
-#include "io/kitti_calib.h"
+#include "rig_formats/kitti_calib.h"
 
 #include "target.h"
 
@@ -17,11 +17,11 @@ std::vector<std::string> seeds() {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bslam;
   const auto file = fuzz::scratch_file("calib.txt", fuzz::as_text(data, size));
-  const auto projections = io::read_kitti_calib(file);
+  const auto projections = rig_formats::read_kitti_calib(file);
   if (!projections) return 0;
-  for (const io::KittiProjection& p : *projections) {
+  for (const rig_formats::KittiProjection& p : *projections) {
     fuzz::require(p.camera >= 0 && p.camera <= 3, "a camera of the four");
-    const auto camera = io::kitti_camera(p, 1241, 376, file);
+    const auto camera = rig_formats::kitti_camera(p, 1241, 376, file);
     fuzz::require(!camera || camera->T_body_cam.translation().allFinite(), "a camera at a place");
   }
   return 0;

@@ -1,5 +1,5 @@
 // Saved maps: as they come, and with sizes and checksums made right so that what stands behind them is reached.
-#include "io/map_file.h"
+#include "storage/map_file.h"
 
 #include <libdeflate.h>
 
@@ -37,12 +37,13 @@ void repair(std::string& bytes) {
 }
 
 void check(std::string_view bytes) {
-  const auto saved = io::map_from_bytes(bytes, "fuzz");
+  const auto saved = storage::map_from_bytes(bytes, "fuzz");
   if (!saved) return require(!saved.error().message().empty(), "an error says something");
-  const std::string again = io::map_to_bytes(saved->map, saved->info);
+  const std::string again = storage::map_to_bytes(saved->map, saved->info);
   require(again.size() <= bytes.size(), "a map that was read is written as large at most");
-  const auto twice = io::map_from_bytes(again, "fuzz");
-  require(twice.ok() && io::map_to_bytes(twice->map, twice->info) == again, "a map that was written reads the same");
+  const auto twice = storage::map_from_bytes(again, "fuzz");
+  require(twice.ok() && storage::map_to_bytes(twice->map, twice->info) == again,
+          "a map that was written reads the same");
 }
 
 std::shared_ptr<const frame::BundledFrame> small_frame(Random& random, std::size_t cameras, std::size_t keypoints) {
@@ -91,7 +92,7 @@ std::string small_map(std::size_t cameras) {
         {KeyframeId(0), FeatureId(f)}, {KeyframeId(1), FeatureId(f)}, {KeyframeId(3), FeatureId(f), false}};
     map.add_landmark({0, 0, 4}, seen);
   }
-  return io::map_to_bytes(map, {1, "0.1.0", "fuzz"});
+  return storage::map_to_bytes(map, {1, "0.1.0", "fuzz"});
 }
 
 }  // namespace

@@ -2,8 +2,8 @@
 // right.
 #include <libdeflate.h>
 
-#include "io/image_file.h"
-#include "io/png_decoder.h"
+#include "image_files/image_file.h"
+#include "image_files/png_decoder.h"
 #include "target.h"
 
 namespace bslam::fuzz {
@@ -60,7 +60,7 @@ std::string small_png(int width, int height, int channels) {
 }
 
 void check(std::string_view bytes) {
-  const auto image = io::decode_grey(bytes);
+  const auto image = image_files::decode_grey(bytes);
   if (!image) return;
   require(image->width() > 0 && image->height() > 0, "an image has pixels");
   unsigned sum = 0;  // reads them all

@@ -1,13 +1,13 @@
 // Rigs of every format that is told by the content of one file.
-#include "io/rig_file.h"
+#include "rig_formats/rig_file.h"
 
-#include "simulation/rigs.h"
+#include "synthetic/rigs.h"
 #include "target.h"
 
 namespace bslam::fuzz {
 
 std::vector<std::string> seeds() {
-  return {io::rig_to_yaml(simulation::mixed_rig()), io::rig_to_yaml(simulation::ring_rig(1)),
+  return {rig_formats::rig_to_yaml(synthetic::mixed_rig()), rig_formats::rig_to_yaml(synthetic::ring_rig(1)),
           "bslam_rig: 1\ncameras:\n  - model: pinhole\n    resolution: [64, 48]\n    intrinsics: [50, 50, 32, 24]\n"
           "    T_body_cam: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n    mask: a.png\n",
           "cam0:\n  cam_overlaps: [1]\n  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.01, 0, 0]\n  "
@@ -22,10 +22,10 @@ std::vector<std::string> seeds() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bslam;
-  const auto rig = io::read_rig(fuzz::scratch_file("rig.yaml", fuzz::as_text(data, size)));
+  const auto rig = rig_formats::read_rig(fuzz::scratch_file("rig.yaml", fuzz::as_text(data, size)));
   if (!rig) return 0;
-  const std::string yaml = io::rig_to_yaml(*rig);
-  const auto again = io::read_rig(fuzz::scratch_file("again.yaml", yaml));
+  const std::string yaml = rig_formats::rig_to_yaml(*rig);
+  const auto again = rig_formats::read_rig(fuzz::scratch_file("again.yaml", yaml));
   fuzz::require(again.ok() && again->size() == rig->size(), "a rig that was written can be read");
   return 0;
 }

@@ -1,5 +1,5 @@
 // Trajectories: TUM, EuRoC csv and KITTI poses with their times.
-#include "io/trajectory_file.h"
+#include "evaluation/trajectory_file.h"
 #include "target.h"
 
 namespace bslam::fuzz {
@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t split = text.find("====\n");
   const auto poses = fuzz::scratch_file("poses.txt", text.substr(0, split));
   const auto times = fuzz::scratch_file("times.txt", split == std::string_view::npos ? "" : text.substr(split + 5));
-  const auto trajectory = io::read_trajectory(poses, times);
+  const auto trajectory = evaluation::read_trajectory(poses, times);
   if (!trajectory) return 0;
   fuzz::require(!trajectory->empty(), "poses");
   for (std::size_t i = 0; i < trajectory->size(); ++i) {
@@ -32,9 +32,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::require(p.T_world_frame.translation().allFinite() && p.T_world_frame.rotation().coeffs().allFinite(),
                   "finite poses");
   }
-  const auto csv = io::read_trajectory(fuzz::scratch_file("again.csv", io::euroc_csv_text(*trajectory)));
+  const auto csv =
+      evaluation::read_trajectory(fuzz::scratch_file("again.csv", evaluation::euroc_csv_text(*trajectory)));
   fuzz::require(csv.ok() && csv->size() == trajectory->size(), "a trajectory that was written can be read");
-  const auto tum = io::read_trajectory(fuzz::scratch_file("again.tum", io::tum_text(*trajectory, "fuzz")));
+  const auto tum =
+      evaluation::read_trajectory(fuzz::scratch_file("again.tum", evaluation::tum_text(*trajectory, "fuzz")));
   fuzz::require(tum.ok() && tum->size() == trajectory->size(), "a trajectory that was written can be read");
   return 0;
 }

@@ -1,7 +1,7 @@
 // Vocabularies: our format and DBoW2's text.
 #include "base/random.h"
-#include "io/vocabulary_file.h"
 #include "place/vocabulary_bytes.h"
+#include "storage/vocabulary_file.h"
 #include "target.h"
 
 namespace bslam::fuzz {
@@ -28,7 +28,7 @@ std::vector<std::string> seeds() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bslam;
-  const auto vocabulary = io::read_vocabulary(fuzz::scratch_file("vocabulary", fuzz::as_text(data, size)));
+  const auto vocabulary = storage::read_vocabulary(fuzz::scratch_file("vocabulary", fuzz::as_text(data, size)));
   if (!vocabulary) return 0;
   const place::Vocabulary& v = **vocabulary;
   for (const feature::Descriptor& d : {feature::Descriptor{}, feature::Descriptor{~0ull, 1, 2, 3}}) {

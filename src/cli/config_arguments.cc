@@ -1,6 +1,6 @@
 #include "cli/config_arguments.h"
 
-#include "io/config_file.h"
+#include "yaml/config_file.h"
 
 namespace bslam::cli {
 
@@ -13,10 +13,10 @@ Result<system::Config> resolve_config(const ConfigArguments& arguments) {
   system::Config config;
   OptionTable table(config);
   if (!arguments.file.empty()) {
-    if (const Status s = io::apply_config_file(table, arguments.file); !s) return s.error();
+    if (const Status s = yaml::apply_config_file(table, arguments.file); !s) return s.error();
   }
   for (const std::string& setting : arguments.settings) {
-    if (const Status s = io::apply_setting(table, setting); !s) return s.error();
+    if (const Status s = yaml::apply_setting(table, setting); !s) return s.error();
   }
   return config;
 }

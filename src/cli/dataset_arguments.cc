@@ -28,17 +28,18 @@ void add_dataset_options(CLI::App& verb, DatasetArguments& a) {
       ->check(CLI::IsMember({"auto", "euroc", "kitti", "folder"}))
       ->capture_default_str();
   verb.add_option("--rig", a.rig, "calibration; default: what DATA carries");
-  verb.add_option("--cameras", a.cameras, "cameras of the rig to use, in this order, such as 0,1; the first is camera 0 of the run");
+  verb.add_option("--cameras", a.cameras,
+                  "cameras of the rig to use, in this order, such as 0,1; the first is camera 0 of the run");
   verb.add_option("--begin", a.begin_s, "seconds from the first image");
   verb.add_option("--end", a.end_s, "seconds from the first image");
 }
 
-Result<io::DatasetRequest> dataset_request(const DatasetArguments& a, double sync_tolerance_s) {
-  io::DatasetRequest request;
+Result<dataset::DatasetRequest> dataset_request(const DatasetArguments& a, double sync_tolerance_s) {
+  dataset::DatasetRequest request;
   request.path = a.path;
-  if (a.format == "euroc") request.format = io::DatasetFormat::kEuroc;
-  if (a.format == "kitti") request.format = io::DatasetFormat::kKitti;
-  if (a.format == "folder") request.format = io::DatasetFormat::kFolder;
+  if (a.format == "euroc") request.format = dataset::DatasetFormat::kEuroc;
+  if (a.format == "kitti") request.format = dataset::DatasetFormat::kKitti;
+  if (a.format == "folder") request.format = dataset::DatasetFormat::kFolder;
   if (!a.rig.empty()) request.rig_file = a.rig;
   if (a.cameras) {
     auto cameras = parse_cameras(*a.cameras);

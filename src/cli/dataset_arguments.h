@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "io/dataset.h"
+#include "dataset/dataset.h"
 
 namespace bslam::cli {
 
@@ -18,6 +18,6 @@ struct DatasetArguments {
 void add_dataset_options(CLI::App& verb, DatasetArguments& arguments);
 
 // Errors: a list of cameras that is none.
-Result<io::DatasetRequest> dataset_request(const DatasetArguments& arguments, double sync_tolerance_s);
+Result<dataset::DatasetRequest> dataset_request(const DatasetArguments& arguments, double sync_tolerance_s);
 
 }  // namespace bslam::cli

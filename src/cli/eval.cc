@@ -9,12 +9,12 @@
 #include <optional>
 #include <string>
 
+#include "base/atomic_file.h"
 #include "cli/verbs.h"
 #include "evaluation/trajectory_error.h"
-#include "io/atomic_file.h"
-#include "io/rig_file.h"
-#include "io/trajectory_file.h"
+#include "evaluation/trajectory_file.h"
 #include "report/trajectory_plot.h"
+#include "rig_formats/rig_file.h"
 
 namespace bslam::cli {
 
@@ -49,7 +49,7 @@ Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& a
                  .found = "no --rig",
                  .expected = "--rig FILE, for the camera's place on the body"};
   }
-  const auto rig = io::read_rig(*arguments.rig);
+  const auto rig = rig_formats::read_rig(*arguments.rig);
   if (!rig) return rig.error();
   if (static_cast<std::size_t>(arguments.camera) >= rig->size()) {
     return Error{.file = arguments.rig->string(),
@@ -107,12 +107,14 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
     if (std::isfinite(value)) continue;
     return Error{.file = "command line", .key = "--max-dt, --delta", .found = "not a number", .expected = "seconds"};
   }
-  auto read = io::read_trajectory(arguments.estimate, arguments.times);
+  auto read = evaluation::read_trajectory(arguments.estimate, arguments.times);
   if (!read) return read.error();
-  const auto ground_truth = io::read_trajectory(arguments.ground_truth, arguments.times);
+  const auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
   if (!ground_truth) return ground_truth.error();
   if (arguments.gt_frame == "cam0" && std::filesystem::path(arguments.ground_truth).extension() == ".csv") {
-    std::fprintf(stderr, "note: EuRoC ground truth is that of the body; to compare with a camera give --gt-frame body --rig FILE\n");
+    std::fprintf(
+        stderr,
+        "note: EuRoC ground truth is that of the body; to compare with a camera give --gt-frame body --rig FILE\n");
   }
   const auto estimate = in_frame_of_truth(std::move(read).value(), arguments);
   if (!estimate) return estimate.error();
@@ -129,7 +131,7 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
     const std::string title = std::filesystem::path(arguments.estimate).filename().string() + " against " +
                               std::filesystem::path(arguments.ground_truth).filename().string();
     const std::string svg = report::trajectory_plot_svg(report::evaluation_plot_input(*result, *ground_truth, title));
-    if (const Status status = io::write_atomically(*arguments.plot, svg); !status) return status.error();
+    if (const Status status = write_atomically(*arguments.plot, svg); !status) return status.error();
   }
   return result;
 }

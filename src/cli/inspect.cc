@@ -3,12 +3,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/atomic_file.h"
 #include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
 #include "cli/verbs.h"
-#include "io/atomic_file.h"
-#include "io/frame_reader.h"
-#include "io/image_file.h"
+#include "dataset/frame_reader.h"
+#include "image_files/image_file.h"
 #include "system/pipeline.h"
 
 namespace bslam::cli {
@@ -21,7 +21,7 @@ struct InspectArguments {
   int frame = 0;
 };
 
-nlohmann::ordered_json to_json(const frame::BundledFrame& frame, const io::Dataset& dataset) {
+nlohmann::ordered_json to_json(const frame::BundledFrame& frame, const dataset::Dataset& dataset) {
   nlohmann::ordered_json cameras = nlohmann::ordered_json::array();
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     const feature::Keypoints& k = frame.cameras[c].keypoints;
@@ -50,18 +50,19 @@ int inspect(const InspectArguments& arguments) {
   if (!config) return report_error(config.error());
   const auto request = dataset_request(arguments.data, config->io.sync_tolerance);
   if (!request) return report_error(request.error());
-  const auto dataset = io::open_dataset(*request);
+  const auto dataset = dataset::open_dataset(*request);
   if (!dataset) return report_error(dataset.error());
   if (arguments.frame < 0 || static_cast<std::size_t>(arguments.frame) >= dataset->frames.size()) {
     return report_error({arguments.data.path, "--frame", std::to_string(arguments.frame),
                          "0 to " + std::to_string(dataset->frames.size() - 1)});
   }
-  auto masks = io::read_masks(dataset->rig);
+  auto masks = image_files::read_masks(dataset->rig);
   if (!masks) return report_error(masks.error());
   system::Pipeline pipeline(dataset->rig, *config, std::move(*masks));
   std::vector<system::StageTime> stages;
-  const auto frame = pipeline.make_frame(io::read_frame(*dataset, static_cast<std::size_t>(arguments.frame)), stages);
-  const Status written = io::write_atomically(arguments.out, to_json(frame, *dataset).dump(1) + "\n");
+  const auto frame =
+      pipeline.make_frame(dataset::read_frame(*dataset, static_cast<std::size_t>(arguments.frame)), stages);
+  const Status written = write_atomically(arguments.out, to_json(frame, *dataset).dump(1) + "\n");
   if (!written) return report_error(written.error());
   std::printf("%zu keypoints, %zu unique features = %zu monocular + %zu matched\n%s\n", frame.num_keypoints(),
               frame.bundled.size(), frame.bundled.num_monocular(), frame.bundled.num_matched(), arguments.out.c_str());
@@ -72,7 +73,8 @@ int inspect(const InspectArguments& arguments) {
 
 void add_inspect(CLI::App& app, int& exit_status) {
   const auto a = std::make_shared<InspectArguments>();
-  CLI::App* verb = app.add_subcommand("inspect", "the BundledFrame of one input frame: keypoints and the Bundled table");
+  CLI::App* verb =
+      app.add_subcommand("inspect", "the BundledFrame of one input frame: keypoints and the Bundled table");
   add_dataset_options(*verb, a->data);
   verb->add_option("--frame", a->frame, "number of the input frame, from 0")->required();
   verb->add_option("--out", a->out, "JSON file to write")->required();

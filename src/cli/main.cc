@@ -14,7 +14,9 @@ int main(int argc, char** argv) {
   int exit_status = kExitOk;
   add_run(app, exit_status);
   add_eval(app, exit_status);
+#ifdef BSLAM_SIMULATOR
   add_simulate(app, exit_status);
+#endif
   add_inspect(app, exit_status);
   add_rig(app, exit_status);
   add_vocab(app, exit_status);

@@ -8,17 +8,17 @@
 #include <string>
 #include <vector>
 
+#include "base/atomic_file.h"
 #include "cli/config_arguments.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
-#include "io/atomic_file.h"
-#include "io/map_export.h"
-#include "io/map_file.h"
-#include "io/rig_file.h"
-#include "io/trajectory_file.h"
-#include "io/vocabulary_file.h"
+#include "evaluation/trajectory_file.h"
+#include "rig_formats/rig_file.h"
 #include "session/merge_maps.h"
 #include "session/record_builder.h"
+#include "storage/map_export.h"
+#include "storage/map_file.h"
+#include "storage/vocabulary_file.h"
 
 namespace bslam::cli {
 namespace {
@@ -33,7 +33,7 @@ struct MapArguments {
 
 std::string vocabulary_name(std::uint64_t id) { return id == 0 ? "none" : fmt::format("{:016x}", id); }
 
-nlohmann::ordered_json to_json(const io::SavedMap& saved, std::uintmax_t file_bytes) {
+nlohmann::ordered_json to_json(const storage::SavedMap& saved, std::uintmax_t file_bytes) {
   const map::BundledMap& map = saved.map;
   nlohmann::ordered_json cameras = nlohmann::ordered_json::array(), parts = nlohmann::ordered_json::array();
   for (std::size_t c = 0; c < map.rig().size(); ++c) {
@@ -42,12 +42,12 @@ nlohmann::ordered_json to_json(const io::SavedMap& saved, std::uintmax_t file_by
                        {"model", camera::model_name(camera.model)},
                        {"resolution", {camera.width, camera.height}}});
   }
-  for (const io::MapPart& p : io::map_parts(map)) {
+  for (const storage::MapPart& p : storage::map_parts(map)) {
     parts.push_back({{"keyframes", p.keyframes.size()},
                      {"landmarks", p.landmarks},
                      {"extent_m", {p.extent.x(), p.extent.y(), p.extent.z()}},
-                     {"from", to_seconds(io::first_time(map, p))},
-                     {"to", to_seconds(io::last_time(map, p))}});
+                     {"from", to_seconds(storage::first_time(map, p))},
+                     {"to", to_seconds(storage::last_time(map, p))}});
   }
   return {{"schema", 1},
           {"version", saved.info.version},
@@ -62,7 +62,7 @@ nlohmann::ordered_json to_json(const io::SavedMap& saved, std::uintmax_t file_by
           {"parts", std::move(parts)}};
 }
 
-void print_info(const io::SavedMap& saved, std::uintmax_t file_bytes) {
+void print_info(const storage::SavedMap& saved, std::uintmax_t file_bytes) {
   const map::BundledMap& map = saved.map;
   std::string text =
       fmt::format("{}: {:.1f} MB, written by bslam {}{}\n", saved.file, static_cast<double>(file_bytes) / 1e6,
@@ -76,9 +76,9 @@ void print_info(const io::SavedMap& saved, std::uintmax_t file_bytes) {
                       map.num_landmarks(), map.num_observations(), session::scale_name(map.scale()),
                       vocabulary_name(saved.info.vocabulary));
   const std::string unit = map.scale() == map::Scale::kMetric ? "m" : "units";
-  const std::vector<io::MapPart> parts = io::map_parts(map);
+  const std::vector<storage::MapPart> parts = storage::map_parts(map);
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    const TimeNs from = io::first_time(map, parts[i]), to = io::last_time(map, parts[i]);
+    const TimeNs from = storage::first_time(map, parts[i]), to = storage::last_time(map, parts[i]);
     text += fmt::format("part {}: {} keyframes over {:.1f} x {:.1f} x {:.1f} {}, {} landmarks, {:.3f} s to {:.3f} s\n",
                         i, parts[i].keyframes.size(), parts[i].extent.x(), parts[i].extent.y(), parts[i].extent.z(),
                         unit, parts[i].landmarks, to_seconds(from), to_seconds(to));
@@ -87,7 +87,7 @@ void print_info(const io::SavedMap& saved, std::uintmax_t file_bytes) {
 }
 
 int map_info(const MapArguments& arguments) {
-  const auto saved = io::read_map(arguments.file);
+  const auto saved = storage::read_map(arguments.file);
   if (!saved) return report_error(saved.error());
   std::error_code error;
   const std::uintmax_t bytes = fs::file_size(arguments.file, error);
@@ -100,27 +100,29 @@ int map_info(const MapArguments& arguments) {
 }
 
 Status write_exports(const map::BundledMap& map, const fs::path& folder) {
-  if (Status s = io::write_atomically(folder / "points.ply", io::landmarks_ply(map)); !s) return s;
-  if (Status s = io::write_rig(map.rig(), folder / "rig.yaml"); !s) return s;
-  const std::string header = io::trajectory_header("cam0", io::PoseState::kFinal);
-  const std::vector<io::MapPart> parts = io::map_parts(map);
+  if (Status s = write_atomically(folder / "points.ply", storage::landmarks_ply(map)); !s) return s;
+  if (Status s = rig_formats::write_rig(map.rig(), folder / "rig.yaml"); !s) return s;
+  const std::string header = evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal);
+  const std::vector<storage::MapPart> parts = storage::map_parts(map);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const std::string name = parts.size() == 1 ? "keyframes.tum" : fmt::format("keyframes_{}.tum", i);
-    const auto trajectory = io::keyframe_trajectory(map, parts[i]);
-    if (Status s = io::write_trajectory(folder / name, trajectory, io::TrajectoryFormat::kTum, header); !s) return s;
+    const auto trajectory = storage::keyframe_trajectory(map, parts[i]);
+    if (Status s = evaluation::write_trajectory(folder / name, trajectory, evaluation::TrajectoryFormat::kTum, header);
+        !s)
+      return s;
   }
-  const auto model = io::colmap_model(map);
+  const auto model = storage::colmap_model(map);
   if (!model) {  // the rest is worth having
     std::fprintf(stderr, "bslam: no COLMAP model: %s\n", model.error().message().c_str());
     return {};
   }
-  if (Status s = io::write_atomically(folder / "cameras.txt", model->cameras); !s) return s;
-  if (Status s = io::write_atomically(folder / "images.txt", model->images); !s) return s;
-  return io::write_atomically(folder / "points3D.txt", model->points);
+  if (Status s = write_atomically(folder / "cameras.txt", model->cameras); !s) return s;
+  if (Status s = write_atomically(folder / "images.txt", model->images); !s) return s;
+  return write_atomically(folder / "points3D.txt", model->points);
 }
 
 int map_export(const MapArguments& arguments) {
-  const auto saved = io::read_map(arguments.file);
+  const auto saved = storage::read_map(arguments.file);
   if (!saved) return report_error(saved.error());
   std::error_code error;
   if (fs::exists(arguments.out, error)) {
@@ -142,20 +144,21 @@ int map_export(const MapArguments& arguments) {
 int map_merge(const MapArguments& arguments) {
   const auto config = resolve_config(arguments.config);
   if (!config) return report_error(config.error());
-  const auto vocabulary = io::vocabulary_or_shipped(arguments.vocabulary);
+  const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
   std::error_code error;
   if (fs::exists(arguments.out, error) && !arguments.overwrite) {
     return report_error({arguments.out, "--out", "a file that exists", "a new one, or --overwrite"});
   }
-  const auto a = io::read_map(arguments.file);
+  const auto a = storage::read_map(arguments.file);
   if (!a) return report_error(a.error());
-  const auto b = io::read_map(arguments.other);
+  const auto b = storage::read_map(arguments.other);
   if (!b) return report_error(b.error());
   const auto merged = session::merge_maps(*a, *b, *vocabulary, *config);
   if (!merged) return report_error(merged.error());
-  const io::MapFileInfo info{(*vocabulary)->id(), version_number(), fmt::format("{} + {}", a->info.data, b->info.data)};
-  if (const Status s = io::write_map(merged->map, info, arguments.out); !s) return report_error(s.error());
+  const storage::MapFileInfo info{(*vocabulary)->id(), version_number(),
+                                  fmt::format("{} + {}", a->info.data, b->info.data)};
+  if (const Status s = storage::write_map(merged->map, info, arguments.out); !s) return report_error(s.error());
   std::printf("%zu keyframes, %zu landmarks; %d parts joined, %d more common places, %zu %s\n%s\n",
               merged->map.num_keyframes(), merged->map.num_landmarks(), merged->joined, merged->loops, merged->parts,
               merged->parts == 1 ? "part in all" : "parts left apart", arguments.out.c_str());

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cli/verbs.h"
-#include "io/rig_file.h"
+#include "rig_formats/rig_file.h"
 #include "session/rig_report.h"
 
 namespace bslam::cli {
@@ -21,19 +21,20 @@ struct ConvertArguments {
 
 std::string joined_formats() {
   std::string names;
-  for (const io::RigFormat format : io::writable_formats())
-    names += (names.empty() ? "" : ", ") + std::string(io::format_name(format));
+  for (const rig_formats::RigFormat format : rig_formats::writable_formats())
+    names += (names.empty() ? "" : ", ") + std::string(rig_formats::format_name(format));
   return names;
 }
 
 Result<camera::Rig> with_drops(camera::Rig rig, const std::vector<std::string>& drops) {
-  static const std::map<std::string, io::Droppable> kDroppable = {{"body", io::Droppable::kBodyFrame},
-                                                                  {"mask", io::Droppable::kMasks},
-                                                                  {"time-offset", io::Droppable::kTimeOffsets}};
+  static const std::map<std::string, rig_formats::Droppable> kDroppable = {
+      {"body", rig_formats::Droppable::kBodyFrame},
+      {"mask", rig_formats::Droppable::kMasks},
+      {"time-offset", rig_formats::Droppable::kTimeOffsets}};
   for (const std::string& drop : drops) {
     const auto what = kDroppable.find(drop);
     if (what == kDroppable.end()) return Error{"--drop", "", drop, "body, mask or time-offset"};
-    rig = io::without(rig, what->second);
+    rig = rig_formats::without(rig, what->second);
   }
   return rig;
 }
@@ -46,26 +47,26 @@ int rig_info(const session::RigReportRequest& request) {
 }
 
 int rig_convert(const ConvertArguments& arguments) {
-  auto in = io::read_rig_file(arguments.in);
+  auto in = rig_formats::read_rig_file(arguments.in);
   if (!in) return report_error(in.error());
-  io::RigFormat format = io::format_of_output(arguments.out);
+  rig_formats::RigFormat format = rig_formats::format_of_output(arguments.out);
   if (!arguments.to.empty()) {
-    const auto named = io::writable_format(arguments.to);
+    const auto named = rig_formats::writable_format(arguments.to);
     if (!named) return report_error({"--to", "", arguments.to, "one of: " + joined_formats()});
     format = *named;
   }
   const auto rig = with_drops(std::move(in->rig), arguments.drop);
   if (!rig) return report_error(rig.error());
-  const auto there = io::files_in_the_way(format, arguments.out);
+  const auto there = rig_formats::files_in_the_way(format, arguments.out);
   if (!there.empty() && !arguments.overwrite) {
     return report_error({there.front().string(), "", "a calibration there already", "a new name, or --overwrite"});
   }
-  const auto notes = io::write_rig_as(*rig, format, arguments.out);
+  const auto notes = rig_formats::write_rig_as(*rig, format, arguments.out);
   if (!notes) return report_error(notes.error());
   for (const std::string& note : in->notes) std::fprintf(stderr, "note: %s\n", note.c_str());
   for (const std::string& note : *notes) std::fprintf(stderr, "note: %s\n", note.c_str());
   std::printf("%s: %zu camera%s as %s\n", arguments.out.c_str(), rig->size(), rig->size() == 1 ? "" : "s",
-              std::string(io::format_name(format)).c_str());
+              std::string(rig_formats::format_name(format)).c_str());
   return kExitOk;
 }
 

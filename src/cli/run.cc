@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/atomic_file.h"
 #include "base/option_table.h"
 #include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
@@ -14,11 +15,10 @@
 #include "cli/progress_bar.h"
 #include "cli/run_messages.h"
 #include "cli/verbs.h"
-#include "io/atomic_file.h"
-#include "io/map_file.h"
-#include "io/vocabulary_file.h"
 #include "session/record_builder.h"
 #include "session/run_session.h"
+#include "storage/map_file.h"
+#include "storage/vocabulary_file.h"
 
 namespace bslam::cli {
 namespace {
@@ -30,7 +30,8 @@ const auto g_program_start = std::chrono::steady_clock::now();
 struct RunArguments {
   DatasetArguments data;
   ConfigArguments config;
-  std::string out, mode, journal, replay, vocabulary, save_map, load_map, pace = "fast", late = "block", progress = "auto";
+  std::string out, mode, journal, replay, vocabulary, save_map, load_map, pace = "fast", late = "block",
+                                                                          progress = "auto";
   std::optional<int> seed;
   bool no_loop = false, localize_only = false, no_final_ba = false, overwrite = false;
 };
@@ -53,14 +54,15 @@ Result<system::Config> resolve_run_config(const RunArguments& arguments) {
     return Error{"", "--localize-only", "no --load-map", "a map to localise in"};
   }
   if (config.extrinsics.refine && (config.localize_only || !config.final_adjustment)) {
-    return Error{"command line", "extrinsics.refine", config.localize_only ? "true with --localize-only" : "true with --no-final-ba",
+    return Error{"command line", "extrinsics.refine",
+                 config.localize_only ? "true with --localize-only" : "true with --no-final-ba",
                  "the adjustment at the end of the run, which refines them"};
   }
   return resolved;
 }
 
-// Makes the folder; an existing one must be empty or given up for overwriting, and then loses the files of an earlier run, but not
-// those this one was told to read.
+// Makes the folder; an existing one must be empty or given up for overwriting, and then loses the files of an earlier
+// run, but not those this one was told to read.
 Status prepare_folder(const RunArguments& arguments) {
   const std::filesystem::path folder = arguments.out;
   std::error_code error;
@@ -74,7 +76,9 @@ Status prepare_folder(const RunArguments& arguments) {
   std::filesystem::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be made"};
   for (const char* name : {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "rig_refined.yaml"}) {
-    const auto is = [&](const std::string& input) { return !input.empty() && std::filesystem::equivalent(folder / name, input, error); };
+    const auto is = [&](const std::string& input) {
+      return !input.empty() && std::filesystem::equivalent(folder / name, input, error);
+    };
     if (!is(arguments.data.rig) && !is(arguments.config.file)) std::filesystem::remove(folder / name, error);
   }
   for (const char* stem : {"trajectory", "trajectory_live"}) {
@@ -90,26 +94,29 @@ Status check_output_file(const std::string& file, const char* option) {
   std::error_code error;
   const std::filesystem::path path(file), folder = path.has_parent_path() ? path.parent_path() : ".";
   if (std::filesystem::is_directory(path, error)) return Error{file, option, "a folder", "the name of a file"};
-  if (!std::filesystem::is_directory(folder, error)) return Error{folder.string(), option, "no such folder", "one that exists"};
+  if (!std::filesystem::is_directory(folder, error))
+    return Error{folder.string(), option, "no such folder", "one that exists"};
   return {};
 }
 
-Result<std::optional<system::Journal>> read_journal(const std::string& file) {
-  if (file.empty()) return std::optional<system::Journal>();
-  const auto text = io::read_file(file, kMaxJournalBytes);
+Result<std::optional<execution::Journal>> read_journal(const std::string& file) {
+  if (file.empty()) return std::optional<execution::Journal>();
+  const auto text = read_file(file, kMaxJournalBytes);
   if (!text) return text.error();
-  auto journal = system::parse_journal(*text, file);
+  auto journal = execution::parse_journal(*text, file);
   if (!journal) return journal.error();
   return std::optional(std::move(*journal));
 }
 
 // The map of an earlier run, if one is asked for, and whether this one can go on with it.
-Result<std::optional<map::BundledMap>> read_map(const std::string& file, const camera::Rig& rig, const system::Config& config,
-                                                const place::Vocabulary& vocabulary) {
+Result<std::optional<map::BundledMap>> read_map(const std::string& file, const camera::Rig& rig,
+                                                const system::Config& config, const place::Vocabulary& vocabulary) {
   if (file.empty()) return std::optional<map::BundledMap>();
-  auto saved = io::read_map(file);
+  auto saved = storage::read_map(file);
   if (!saved) return saved.error();
-  if (const Status s = io::fits(*saved, rig, {config.features.scale_factor, config.features.levels}, &vocabulary); !s) return s.error();
+  if (const Status s = storage::fits(*saved, rig, {config.features.scale_factor, config.features.levels}, &vocabulary);
+      !s)
+    return s.error();
   if (saved->map.num_keyframes() == 0) return Error{file, "keyframes", "none", "a map of something"};
   return std::optional(std::move(saved->map));
 }
@@ -118,11 +125,12 @@ Status write_files(const session::SessionResult& result, const system::Config& c
                    const place::Vocabulary& vocabulary) {
   if (const Status status = session::write_outputs(result, config, arguments.out); !status) return status;
   if (!arguments.journal.empty()) {
-    const Status status = io::write_atomically(arguments.journal, system::journal_text(result.journal));
+    const Status status = write_atomically(arguments.journal, execution::journal_text(result.journal));
     if (!status) return status;
   }
   if (arguments.save_map.empty()) return {};
-  return io::write_map(*result.map, {vocabulary.id(), result.record.version, result.record.data}, arguments.save_map);
+  return storage::write_map(*result.map, {vocabulary.id(), result.record.version, result.record.data},
+                            arguments.save_map);
 }
 
 int run(const RunArguments& arguments) {
@@ -134,13 +142,14 @@ int run(const RunArguments& arguments) {
   if (!replay) return report_error(replay.error());
   const auto request = dataset_request(arguments.data, config->io.sync_tolerance);
   if (!request) return report_error(request.error());
-  const auto dataset = io::open_dataset(*request);
+  const auto dataset = dataset::open_dataset(*request);
   if (!dataset) return report_error(dataset.error());
-  const auto vocabulary = io::vocabulary_or_shipped(arguments.vocabulary);
+  const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
   auto map = read_map(arguments.load_map, dataset->rig, *config, **vocabulary);
   if (!map) return report_error(map.error());
-  for (const auto& [option, file] : {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
+  for (const auto& [option, file] :
+       {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
     if (const Status s = check_output_file(file, option); !s) return report_error(s.error());
   }
   if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
@@ -176,22 +185,26 @@ void add_run(CLI::App& app, int& exit_status) {
   add_dataset_options(*verb, a->data);
   verb->add_option("--out", a->out, "folder for trajectory, summary, configuration and plots")->required();
   add_config_options(*verb, a->config);
-  verb->add_option("--mode", a->mode, "sequential or lagged (identical bytes on every run), or parallel; default parallel");
+  verb->add_option("--mode", a->mode,
+                   "sequential or lagged (identical bytes on every run), or parallel; default parallel");
   verb->add_option("--journal", a->journal, "file to write: which stage worked on and made which version of the map");
   verb->add_option("--replay", a->replay, "a journal: the run it was written by is repeated, whatever its mode was");
   verb->add_option("--pace", a->pace, "fast, or realtime: images at their recorded pace")
       ->check(CLI::IsMember({"fast", "realtime"}))
       ->capture_default_str();
-  verb->add_option("--late", a->late, "at the recorded pace: block keeps every frame, drop leaves out those there is no time for")
+  verb->add_option("--late", a->late,
+                   "at the recorded pace: block keeps every frame, drop leaves out those there is no time for")
       ->check(CLI::IsMember({"block", "drop"}))
       ->capture_default_str();
   verb->add_flag("--no-loop", a->no_loop, "loop closing off; a lost rig is still looked for all over the map");
   verb->add_option("--save-map", a->save_map, "file for the map at the end");
   verb->add_option("--load-map", a->load_map, "a saved map: the run goes on in it once it finds its place there");
   verb->add_flag("--localize-only", a->localize_only, "poses in the loaded map, which stays as it is");
-  verb->add_option("--vocabulary", a->vocabulary, "for place recognition, ours or DBoW2's text; default: the one of the program");
+  verb->add_option("--vocabulary", a->vocabulary,
+                   "for place recognition, ours or DBoW2's text; default: the one of the program");
   verb->add_flag("--no-final-ba", a->no_final_ba, "no global bundle adjustment at the end");
-  verb->add_option("--seed", a->seed, "of all randomness; default 1")->check(CLI::Range(0, std::numeric_limits<int>::max()));
+  verb->add_option("--seed", a->seed, "of all randomness; default 1")
+      ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   verb->add_option("--progress", a->progress, "auto: a bar when stderr is a terminal; never")
       ->check(CLI::IsMember({"auto", "never"}))
       ->capture_default_str();

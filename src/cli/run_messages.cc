@@ -1,12 +1,13 @@
 #include "cli/run_messages.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
 #include <vector>
 
-#include "io/rig_warnings.h"
+#include "rig_formats/rig_warnings.h"
 
 namespace bslam::cli {
 namespace {
@@ -28,11 +29,13 @@ void warn_of_extrinsics(const report::CameraRecord& camera) {
   const auto& e = camera.extrinsics;
   if (!e || !e->suspect) return;
   fmt::print(stderr,
-             "warning: {}: the images put it {:.2f} deg and {:.1f} mm away from where the rig file does, if its times are right{}\n",
+             "warning: {}: the images put it {:.2f} deg and {:.1f} mm away from where the rig file does, if its times "
+             "are right{}\n",
              camera.name, e->change_deg, e->change_mm, e->refined ? "" : "; --set extrinsics.refine=true accepts that");
 }
 
-// Cameras that see well and agree with nothing: a few degrees off are called inconsistent, these may never get that far.
+// Cameras that see well and agree with nothing: a few degrees off are called inconsistent, these may never get that
+// far.
 void warn_of_strangers(const report::RunRecord& record) {
   constexpr double kNothing = 0.02, kSound = 0.1;  // of the keypoints
   constexpr double kEnough = 1000;                 // keypoints
@@ -44,11 +47,13 @@ void warn_of_strangers(const report::RunRecord& record) {
     }
   }
   bool some_sound = false;
-  for (std::size_t c = 0; c < keypoints.size(); ++c) some_sound |= keypoints[c] > kEnough && inliers[c] > kSound * keypoints[c];
+  for (std::size_t c = 0; c < keypoints.size(); ++c)
+    some_sound |= keypoints[c] > kEnough && inliers[c] > kSound * keypoints[c];
   for (std::size_t c = 0; some_sound && c < keypoints.size(); ++c) {
     if (keypoints[c] < kEnough || inliers[c] > kNothing * keypoints[c]) continue;
     fmt::print(stderr,
-               "warning: {}: next to nothing of what it saw ({:.0f} of {:.0f} keypoints) is where the other cameras say; is it "
+               "warning: {}: next to nothing of what it saw ({:.0f} of {:.0f} keypoints) is where the other cameras "
+               "say; is it "
                "where the rig file says? bslam rig info RIG --images DATA\n",
                record.cameras[c].name, inliers[c], keypoints[c]);
   }
@@ -76,24 +81,28 @@ void warn_if_nothing_matches(const report::RunRecord& record, const camera::Rig&
     unique += frame.unique_features;
   }
   if (unique == 0 || matched >= kLeastShare * unique || largest_overlap(rig) < kMuchOverlap) return;
-  fmt::print(stderr, "warning: by the calibration cameras see much in common, but only {:.1f} % of the features match between any two; "
-             "bslam rig info RIG --images DATA tests it\n", 100 * matched / unique);
+  fmt::print(stderr,
+             "warning: by the calibration cameras see much in common, but only {:.1f} % of the features match between "
+             "any two; "
+             "bslam rig info RIG --images DATA tests it\n",
+             100 * matched / unique);
 }
 
 }  // namespace
 
 void print_rig_warnings(const camera::Rig& rig) {
   constexpr std::size_t kShown = 2;
-  const std::vector<std::string> warnings = io::rig_warnings(rig);
+  const std::vector<std::string> warnings = rig_formats::rig_warnings(rig);
   for (std::size_t i = 0; i < std::min(kShown, warnings.size()); ++i) fmt::print(stderr, "warning: {}\n", warnings[i]);
-  if (warnings.size() > kShown) fmt::print(stderr, "warning: {} more of the kind: bslam rig info\n", warnings.size() - kShown);
+  if (warnings.size() > kShown)
+    fmt::print(stderr, "warning: {} more of the kind: bslam rig info\n", warnings.size() - kShown);
 }
 
 void print_warnings(const report::RunRecord& record, const camera::Rig& rig) {
   for (const report::CameraRecord& camera : record.cameras) {
     if (camera.skipped > 0) {
-      fmt::print(stderr, "warning: {}: {} of its images could not be read, the first: {}\n", camera.name, camera.skipped,
-                 camera.first_skipped);
+      fmt::print(stderr, "warning: {}: {} of its images could not be read, the first: {}\n", camera.name,
+                 camera.skipped, camera.first_skipped);
     }
     warn_of_outages(camera);
     warn_of_extrinsics(camera);
@@ -107,8 +116,8 @@ void print_warnings(const report::RunRecord& record, const camera::Rig& rig) {
 void print_result(const report::RunRecord& record, const std::string& out) {
   const std::string scale = record.map.keyframes > 0 ? ", scale " + record.map.scale : "";
   fmt::print("{}{} of {} frames have a pose, {} keyframes, {} landmarks{}; {:.1f} s\n{}\n",
-             record.complete ? "" : "interrupted: ", count(record, report::FrameOutcome::kTracked), record.frames.size(),
-             record.map.keyframes, record.map.landmarks, scale, record.wall_s, out);
+             record.complete ? "" : "interrupted: ", count(record, report::FrameOutcome::kTracked),
+             record.frames.size(), record.map.keyframes, record.map.landmarks, scale, record.wall_s, out);
 }
 
 }  // namespace bslam::cli

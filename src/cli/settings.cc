@@ -5,7 +5,7 @@
 #include "base/option_table.h"
 #include "cli/config_arguments.h"
 #include "cli/verbs.h"
-#include "io/config_file.h"
+#include "yaml/config_file.h"
 
 namespace bslam::cli {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 int print_settings(const ConfigArguments& arguments) {
   auto config = resolve_config(arguments);
   if (!config) return report_error(config.error());
-  std::fputs(io::config_to_yaml(OptionTable(*config)).c_str(), stdout);
+  std::fputs(yaml::config_to_yaml(OptionTable(*config)).c_str(), stdout);
   return kExitOk;
 }
 

@@ -1,5 +1,6 @@
 // bslam simulate: renders a built-in world through a rig.
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <map>
@@ -11,10 +12,10 @@
 #include "cli/interruption.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
-#include "io/fault_file.h"
-#include "io/rig_file.h"
-#include "io/simulation_writer.h"
-#include "simulation/rigs.h"
+#include "rig_formats/rig_file.h"
+#include "simulator/fault_file.h"
+#include "simulator/simulation_writer.h"
+#include "synthetic/rigs.h"
 
 namespace bslam::cli {
 namespace {
@@ -28,28 +29,28 @@ struct SimulateArguments {
   bool back = false, overwrite = false;
 };
 
-const std::map<std::string, simulation::WorldKind> kWorlds = {{"building", simulation::WorldKind::kBuilding},
-                                                              {"corridor", simulation::WorldKind::kCorridor},
-                                                              {"twin-rooms", simulation::WorldKind::kTwinRooms}};
+const std::map<std::string, simulator::WorldKind> kWorlds = {{"building", simulator::WorldKind::kBuilding},
+                                                             {"corridor", simulator::WorldKind::kCorridor},
+                                                             {"twin-rooms", simulator::WorldKind::kTwinRooms}};
 
-Result<io::SimulationRequest> make_request(const SimulateArguments& arguments) {
+Result<simulator::SimulationRequest> make_request(const SimulateArguments& arguments) {
   std::optional<camera::Rig> rig;
   if (arguments.rig) {
-    auto read = io::read_rig(*arguments.rig);
+    auto read = rig_formats::read_rig(*arguments.rig);
     if (!read) return read.error();
     rig = std::move(read).value();
   } else {
-    rig = simulation::default_rig();
+    rig = synthetic::default_rig();
   }
-  io::SimulationRequest request{.folder = arguments.folder,
-                                .rig = *rig,
-                                .recording = {},
-                                .tour = {},
-                                .imaging = {},
-                                .world = {},
-                                .kind = kWorlds.at(arguments.world),
-                                .seed = arguments.seed,
-                                .overwrite = arguments.overwrite};
+  simulator::SimulationRequest request{.folder = arguments.folder,
+                                       .rig = *rig,
+                                       .recording = {},
+                                       .tour = {},
+                                       .imaging = {},
+                                       .world = {},
+                                       .kind = kWorlds.at(arguments.world),
+                                       .seed = arguments.seed,
+                                       .overwrite = arguments.overwrite};
   request.recording.duration_s = arguments.duration_s;
   request.recording.rate_hz = arguments.rate_hz;
   request.recording.exposure_s = 1e-3 * arguments.exposure_ms;
@@ -59,7 +60,7 @@ Result<io::SimulationRequest> make_request(const SimulateArguments& arguments) {
   request.tour.speed_mps = arguments.speed_mps;
   request.tour.back = arguments.back;
   if (arguments.faults) {
-    auto faults = io::read_faults(*arguments.faults, rig->size());
+    auto faults = simulator::read_faults(*arguments.faults, rig->size());
     if (!faults) return faults.error();
     request.recording.faults = std::move(faults).value();
   }
@@ -73,7 +74,7 @@ int run_simulate(const SimulateArguments& arguments) {
   ThreadPool pool(arguments.threads > 0 ? arguments.threads : std::max(1, cores));
   const Interruption interruption;
   ProgressBar bar(arguments.progress == "auto", "pictures");
-  const auto outcome = io::write_simulation(
+  const auto outcome = simulator::write_simulation(
       *request, pool, [&](std::size_t done, std::size_t total) { bar.show(done, total); }, interruption.token());
   bar.finish();
   if (!outcome) {
@@ -85,14 +86,14 @@ int run_simulate(const SimulateArguments& arguments) {
     return report_error(error);
   }
   switch (*outcome) {
-    case io::SimulationOutcome::kWritten:
-      fmt::print("{}: {} frames of {} cameras\n", arguments.folder, simulation::frame_count(request->recording),
+    case simulator::SimulationOutcome::kWritten:
+      fmt::print("{}: {} frames of {} cameras\n", arguments.folder, simulator::frame_count(request->recording),
                  request->rig.size());
       break;
-    case io::SimulationOutcome::kWasComplete:
+    case simulator::SimulationOutcome::kWasComplete:
       fmt::print("{}: already complete\n", arguments.folder);
       break;
-    case io::SimulationOutcome::kInterrupted:
+    case simulator::SimulationOutcome::kInterrupted:
       fmt::print(stderr, "bslam: interrupted; the same command goes on from here\n");
       return kExitInterrupted;
   }
@@ -108,7 +109,8 @@ void add_simulate(CLI::App& app, int& exit_status) {
       app.add_subcommand("simulate", "render a built-in world through a rig, in EuRoC layout with ground truth");
   verb->add_option("--out", a.folder, "folder to write into")->required();
   verb->add_option("--rig", a.rig, "calibration of the rig (default: four cameras, two of them in front)");
-  verb->add_option("--world", a.world, "building: rooms that differ; corridor, twin-rooms: places that look exactly alike")
+  verb->add_option("--world", a.world,
+                   "building: rooms that differ; corridor, twin-rooms: places that look exactly alike")
       ->check(CLI::IsMember({"building", "corridor", "twin-rooms"}))
       ->capture_default_str();
   verb->add_option("--duration", a.duration_s, "seconds")->capture_default_str();

@@ -31,7 +31,9 @@ std::string version_text() {
   text += fmt::format("Eigen {}.{}.{}\n", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION);
   text += fmt::format("OpenCV {}\n", CV_VERSION);
   text += fmt::format("yaml-cpp {}\n", BSLAM_YAML_CPP_VERSION);
+#ifdef BSLAM_SIMULATOR
   text += fmt::format("Embree {}\n", BSLAM_EMBREE_VERSION);
+#endif
   text += fmt::format("nlohmann-json {}.{}.{}\n", NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR,
                       NLOHMANN_JSON_VERSION_PATCH);
   text += fmt::format("fmt {}.{}.{}\n", FMT_VERSION / 10000, FMT_VERSION / 100 % 100, FMT_VERSION % 100);

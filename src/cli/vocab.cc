@@ -14,12 +14,12 @@
 
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
+#include "dataset/training_images.h"
 #include "feature/extractor.h"
-#include "io/training_images.h"
-#include "io/vocabulary_file.h"
 #include "place/shipped_vocabulary.h"
 #include "place/train.h"
 #include "place/vocabulary_bytes.h"
+#include "storage/vocabulary_file.h"
 
 namespace bslam::cli {
 namespace {
@@ -66,7 +66,7 @@ TrainingSet extract_all(const std::vector<std::filesystem::path>& files, const V
   pool.for_each(shares, [&](std::size_t share) {
     feature::Extractor extractor(a.features);
     for (std::size_t i = share; i < files.size(); i += shares) {
-      const auto image = io::read_training_image(files[i], a.max_side);
+      const auto image = dataset::read_training_image(files[i], a.max_side);
       if (image) {
         found[i] = describe(*image, extractor);
       } else {
@@ -104,7 +104,7 @@ Status check_output(const VocabTrainArguments& a) {
 
 int run_train(const VocabTrainArguments& a) {
   if (const Status s = check_output(a); !s) return report_error(s.error());
-  const auto files = io::find_images(a.images);
+  const auto files = dataset::find_images(a.images);
   if (!files) return report_error(files.error());
   if (files->empty()) return report_error({a.images.front(), "", "no images", "PNG, JPEG, PGM or WebP images"});
   ThreadPool pool(a.threads > 0 ? a.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
@@ -121,7 +121,7 @@ int run_train(const VocabTrainArguments& a) {
     error.file = a.images.front();
     return report_error(error);
   }
-  if (const Status s = io::write_vocabulary(**vocabulary, a.out); !s) return report_error(s.error());
+  if (const Status s = storage::write_vocabulary(**vocabulary, a.out); !s) return report_error(s.error());
   fmt::print("{}: {} words from {} descriptors of {} images ({} skipped)\n", a.out, (*vocabulary)->size(),
              set.descriptors, set.images.size(), set.skipped);
   return kExitOk;
@@ -129,7 +129,7 @@ int run_train(const VocabTrainArguments& a) {
 
 int run_info(const std::string& file) {
   const auto start = std::chrono::steady_clock::now();
-  const auto read = file.empty() ? place::shipped_vocabulary() : io::read_vocabulary(file);
+  const auto read = file.empty() ? place::shipped_vocabulary() : storage::read_vocabulary(file);
   const std::chrono::duration<double, std::milli> load = std::chrono::steady_clock::now() - start;
   if (!read) return report_error(read.error());
   const place::Vocabulary& v = **read;

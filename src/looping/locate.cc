@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "feature/hamming.h"
-#include "frame/projection_search.h"
 #include "map/search_points.h"
+#include "matching/projection_search.h"
 #include "solver/pose_solver.h"
 
 namespace bslam::looping {
@@ -50,7 +50,8 @@ Nearest nearest(const feature::Descriptor& descriptor, const std::vector<feature
 
 // Matches by appearance alone: clear ones, and of several landmarks that choose one feature the nearest.
 std::vector<KeypointMatch> match_descriptors(const map::BundledMap& map, const frame::BundledFrame& frame,
-                                             const std::vector<LandmarkId>& landmarks, const VerificationOptions& options) {
+                                             const std::vector<LandmarkId>& landmarks,
+                                             const VerificationOptions& options) {
   const std::vector<feature::Descriptor> descriptors = feature_descriptors(frame);
   struct Choice {
     LandmarkId landmark;
@@ -87,35 +88,38 @@ std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map,
 // What a place is looked for by: landmarks, and as points.
 struct Sought {
   std::vector<LandmarkId> landmarks;
-  std::vector<frame::SearchPoint> points;  // of each
+  std::vector<matching::SearchPoint> points;  // of each
 };
 
 // All landmarks looked for where the pose puts them. `rig`: as it was while the cameras of the frame fired.
-std::vector<KeypointMatch> search_at(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place, const SE3& T_rig_world,
-                                     double radius, const VerificationOptions& options, const map::FeatureModel& features) {
-  const frame::ProjectionSearchOptions search{.radius = radius,
-                                              .max_hamming = options.max_hamming,
-                                              .ratio = 1.0,
-                                              .level_slack = 2,
-                                              .scale_factor = features.scale_factor};
+std::vector<KeypointMatch> search_at(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place,
+                                     const SE3& T_rig_world, double radius, const VerificationOptions& options,
+                                     const map::FeatureModel& features) {
+  const matching::ProjectionSearchOptions search{.radius = radius,
+                                                 .max_hamming = options.max_hamming,
+                                                 .ratio = 1.0,
+                                                 .level_slack = 2,
+                                                 .scale_factor = features.scale_factor};
   std::vector<KeypointMatch> out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (frame.cameras[c].keypoints.empty()) continue;
-    const auto found =
-        frame::search_by_projection(rig.camera(c), frame.cameras[c], rig.cam_from_rig(c) * T_rig_world, place.points, {}, search);
-    for (const frame::ProjectionMatch& m : found.matches) out.push_back({{CameraIndex(c), m.keypoint}, place.landmarks[m.point]});
+    const auto found = matching::search_by_projection(rig.camera(c), frame.cameras[c],
+                                                      rig.cam_from_rig(c) * T_rig_world, place.points, {}, search);
+    for (const matching::ProjectionMatch& m : found.matches)
+      out.push_back({{CameraIndex(c), m.keypoint}, place.landmarks[m.point]});
   }
   return out;
 }
 
-// The landmarks that some camera sees from about where they are known from, in order of id: what is the same place looks the same
-// from there. From far aside it does not, and missing it says nothing.
-std::vector<LandmarkId> to_be_found(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place, const SE3& T_rig_world,
-                                    double max_turn) {
+// The landmarks that some camera sees from about where they are known from, in order of id: what is the same place
+// looks the same from there. From far aside it does not, and missing it says nothing.
+std::vector<LandmarkId> to_be_found(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place,
+                                    const SE3& T_rig_world, double max_turn) {
   std::vector<LandmarkId> out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (frame.cameras[c].keypoints.empty()) continue;
-    for (const std::uint32_t i : frame::visible_points(rig.camera(c), rig.cam_from_rig(c) * T_rig_world, place.points, max_turn)) {
+    for (const std::uint32_t i :
+         matching::visible_points(rig.camera(c), rig.cam_from_rig(c) * T_rig_world, place.points, max_turn)) {
       out.push_back(place.landmarks[i]);
     }
   }
@@ -125,7 +129,8 @@ std::vector<LandmarkId> to_be_found(const camera::Rig& rig, const frame::Bundled
 }
 
 // Inliers by feature; where cameras disagree about the landmark of a feature, the first in order of camera holds.
-std::vector<std::pair<FeatureId, LandmarkId>> by_feature(const frame::BundledFrame& frame, const std::vector<KeypointMatch>& matches,
+std::vector<std::pair<FeatureId, LandmarkId>> by_feature(const frame::BundledFrame& frame,
+                                                         const std::vector<KeypointMatch>& matches,
                                                          const std::vector<std::uint8_t>& inlier) {
   std::vector<std::pair<FeatureId, LandmarkId>> all;
   for (std::size_t i = 0; i < matches.size(); ++i) {
@@ -148,7 +153,8 @@ std::vector<std::pair<FeatureId, LandmarkId>> by_feature(const frame::BundledFra
 
 std::vector<LandmarkId> landmarks_about(const map::BundledMap& map, KeyframeId keyframe, int neighbours, int limit) {
   std::vector<KeyframeId> keyframes = {keyframe};
-  for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(neighbours))) keyframes.push_back(c.keyframe);
+  for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(neighbours)))
+    keyframes.push_back(c.keyframe);
   std::vector<LandmarkId> out;
   for (const KeyframeId k : keyframes) {
     for (const LandmarkId l : map.keyframe(k).landmarks) {
@@ -157,16 +163,15 @@ std::vector<LandmarkId> landmarks_about(const map::BundledMap& map, KeyframeId k
   }
   std::sort(out.begin(), out.end());
   out.erase(std::unique(out.begin(), out.end()), out.end());
-  std::stable_sort(out.begin(), out.end(), [&](LandmarkId a, LandmarkId b) {
-    return map.observations(a).size() > map.observations(b).size();
-  });
+  std::stable_sort(out.begin(), out.end(),
+                   [&](LandmarkId a, LandmarkId b) { return map.observations(a).size() > map.observations(b).size(); });
   if (out.size() > static_cast<std::size_t>(limit)) out.resize(static_cast<std::size_t>(limit));
   return out;
 }
 
-std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& rig, const frame::BundledFrame& frame, KeyframeId candidate,
-                               const VerificationOptions& options, const map::FeatureModel& features, Random random,
-                               LocateReport* report) {
+std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& rig, const frame::BundledFrame& frame,
+                               KeyframeId candidate, const VerificationOptions& options,
+                               const map::FeatureModel& features, Random random, LocateReport* report) {
   LocateReport unused;
   LocateReport& out = report != nullptr ? *report : unused;
   const auto rejected = [&](Rejection why) {
@@ -179,8 +184,8 @@ std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& ri
   if (out.matches < options.consensus.min_inliers) return rejected(Rejection::kFewMatches);
 
   const solver::PoseSolverOptions pose_options;
-  solver::PoseSolution solution = solver::absolute_pose(rig, observations_of(map, frame, matches, features), pose_options,
-                                                        options.consensus, random);
+  solver::PoseSolution solution = solver::absolute_pose(rig, observations_of(map, frame, matches, features),
+                                                        pose_options, options.consensus, random);
   out.inliers = solution.num_inliers;
   if (!solution.ok) return rejected(Rejection::kNoConsensus);
 
@@ -189,18 +194,20 @@ std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& ri
   std::vector<KeypointMatch> guided;
   for (const double radius : {options.radius, 0.5 * options.radius}) {
     guided = search_at(rig, frame, place, solution.T_rig_world, radius, options, features);
-    solution = solver::solve_pose(rig, observations_of(map, frame, guided, features), solution.T_rig_world, pose_options);
+    solution =
+        solver::solve_pose(rig, observations_of(map, frame, guided, features), solution.T_rig_world, pose_options);
     if (!solution.ok) return rejected(Rejection::kNoConsensus);
   }
   out.inliers = solution.num_inliers;
   if (solution.num_inliers < options.min_inliers) return rejected(Rejection::kFewInliers);
   Location location{candidate, solution.T_rig_world, by_feature(frame, guided, solution.inlier), solution.num_inliers};
-  for (const double turn : {options.max_turn, frame::ProjectionSearchOptions{}.max_view_angle}) {
+  for (const double turn : {options.max_turn, matching::ProjectionSearchOptions{}.max_view_angle}) {
     const std::vector<LandmarkId> sought = to_be_found(rig, frame, place, solution.T_rig_world, turn);
     const auto is_sought = [&](const auto& match) { return std::ranges::binary_search(sought, match.second); };
     out.sought = static_cast<int>(sought.size());
     out.found = static_cast<int>(std::ranges::count_if(location.matches, is_sought));
-    if (out.sought >= options.min_inliers) break;  // fewer: the place is seen from aside, and what is known from there has to do
+    if (out.sought >= options.min_inliers)
+      break;  // fewer: the place is seen from aside, and what is known from there has to do
   }
   if (out.found < options.min_found_share * out.sought) return rejected(Rejection::kFewFound);
   return location;
@@ -211,7 +218,8 @@ bool disputes(const map::BundledMap& map, const Location& best, const Location& 
   constexpr double kSameCentre = 0.05;  // of the distance to what is seen
   constexpr double kSameTurn = 0.05;    // rad
   if (other.inliers <= kRival * best.inliers || map.root_of(best.with) != map.root_of(other.with)) return false;
-  const Eigen::Vector3d centre = best.T_rig_world.inverse().translation(), rival = other.T_rig_world.inverse().translation();
+  const Eigen::Vector3d centre = best.T_rig_world.inverse().translation(),
+                        rival = other.T_rig_world.inverse().translation();
   double distance = 0;
   for (const auto& [feature, l] : best.matches) distance += (map.landmark(l).position - centre).norm();
   distance /= static_cast<double>(best.matches.size());

@@ -32,7 +32,8 @@ double error_px(const map::BundledMap& map, KeyframeId keyframe, const Location&
   for (const auto& [feature, l] : location.matches) {
     const frame::KeypointRef r = entry.frame->bundled.keypoints(feature).front();
     const Eigen::Vector2d pixel = entry.frame->keypoints(r.camera).pixel[r.keypoint.index()].cast<double>();
-    const auto error = solver::ReprojectionResidual::error_only(rig, r.camera, entry.T_rig_world, map.landmark(l).position, pixel);
+    const auto error =
+        solver::ReprojectionResidual::error_only(rig, r.camera, entry.T_rig_world, map.landmark(l).position, pixel);
     errors.push_back(error ? error->norm() : std::numeric_limits<double>::infinity());
   }
   return errors.empty() ? 0.0 : median(std::move(errors));
@@ -73,14 +74,16 @@ double median_depth(const map::BundledMap& map, KeyframeId k) {
 // The keyframe and its best covisible ones: what is moved at once and fused with the place.
 std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyframe, int size) {
   std::vector<KeyframeId> window = {keyframe};
-  for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(size))) window.push_back(c.keyframe);
+  for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(size)))
+    window.push_back(c.keyframe);
   std::sort(window.begin(), window.end());
   return window;
 }
 
 // What the keyframe was found to see becomes its own, then what its window sees as well, looked for at the poses given.
 void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_world, const LoopClosure& closure,
-          const Location& location, const LoopOptions& options, const map::FeatureModel& features, map::MapDraft& draft) {
+          const Location& location, const LoopOptions& options, const map::FeatureModel& features,
+          map::MapDraft& draft) {
   const std::vector<LandmarkId> place =
       landmarks_about(draft.map(), closure.with, options.window, static_cast<int>(draft.map().num_landmarks()));
   for (const auto& [feature, there] : location.matches) {
@@ -94,8 +97,8 @@ void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_w
     }
   }
   for (std::size_t i = 0; i < window.size(); ++i) {
-    adjustment::fuse_into(window[i], T_rig_world[i], place, adjustment::Keep::kSearched, options.fusion, features, draft);
-    draft.refresh_landmarks(adjustment::landmarks_of(draft.map(), window[i]));
+    mapping::fuse_into(window[i], T_rig_world[i], place, mapping::Keep::kSearched, options.fusion, features, draft);
+    draft.refresh_landmarks(mapping::landmarks_of(draft.map(), window[i]));
   }
 }
 
@@ -106,7 +109,7 @@ void move_window(const std::vector<KeyframeId>& window, const EssentialGraph& gr
   for (const KeyframeId k : window) {
     const auto v = static_cast<std::size_t>(graph.vertex(k));
     poses.keyframes.emplace_back(k, pose_of(graph.problem.S_world[v]));
-    for (const LandmarkId l : adjustment::landmarks_of(draft.map(), k)) {
+    for (const LandmarkId l : mapping::landmarks_of(draft.map(), k)) {
       const map::Landmark& landmark = draft.map().landmark(l);
       if (landmark.reference.keyframe != k) continue;
       poses.landmarks.emplace_back(l, graph.problem.S_world[v].inverse() * (before[v] * landmark.position));
@@ -130,7 +133,8 @@ void add_loop_edges(const map::BundledMap& before, const map::BundledMap& fused,
       if (gained < kMinGained && !the_loop) continue;
       const int a = graph.vertex(k);
       const auto& S = graph.problem.S_world;
-      graph.problem.edges.push_back({a, b, S[static_cast<std::size_t>(a)] * S[static_cast<std::size_t>(b)].inverse(), 1.0});
+      graph.problem.edges.push_back(
+          {a, b, S[static_cast<std::size_t>(a)] * S[static_cast<std::size_t>(b)].inverse(), 1.0});
     }
   }
 }
@@ -166,7 +170,8 @@ LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Locat
   LoopClosure out{.keyframe = keyframe, .with = location.with, .inliers = location.inliers};
   const SE3& now = map.keyframe(keyframe).T_rig_world;
   out.moved = (centre(now) - centre(location.T_rig_world)).norm();
-  out.turned = (now.rotation() * location.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
+  out.turned =
+      (now.rotation() * location.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
   out.off_px = error_px(map, keyframe, location);
   out.scaled = location.scale;
   out.apart = apart(map, location);
@@ -182,8 +187,8 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
   return closure.apart <= options.max_apart && closure.moved <= share * way && closure.turned <= kMaxTurn;
 }
 
-bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
-                map::MapDraft& draft) {
+bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,
+                const map::FeatureModel& features, map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
   if (map.scale() != map::Scale::kMetric) return false;
   const KeyframeId here = map.root_of(closure.keyframe), there = map.root_of(closure.with);
@@ -198,7 +203,8 @@ bool join_parts(const LoopClosure& closure, const Location& location, const Loop
     if (map.root_of(k) == moving) poses.keyframes.emplace_back(k, map.keyframe(k).T_rig_world * motion.inverse());
   }
   for (const LandmarkId l : map.landmark_ids()) {
-    if (map.root_of(map.landmark(l).reference.keyframe) == moving) poses.landmarks.emplace_back(l, motion * map.landmark(l).position);
+    if (map.root_of(map.landmark(l).reference.keyframe) == moving)
+      poses.landmarks.emplace_back(l, motion * map.landmark(l).position);
   }
   const std::vector<KeyframeId> window = window_of(map, closure.keyframe, options.window);
   move_map(std::move(poses), draft);
@@ -209,8 +215,8 @@ bool join_parts(const LoopClosure& closure, const Location& location, const Loop
   return true;
 }
 
-bool close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
-                map::MapDraft& draft) {
+bool close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options,
+                const map::FeatureModel& features, map::MapDraft& draft) {
   const map::BundledMap before = draft.map();
   EssentialGraph graph = essential_graph(before, before.root_of(closure.keyframe), options.edge_weight);
   std::vector<KeyframeId> window = window_of(before, closure.keyframe, options.window);
@@ -226,10 +232,11 @@ bool close_loop(const LoopClosure& closure, const Location& location, const Loop
     graph.problem.S_world[v] = S_before[v] * S_keyframe_before.inverse() * S_keyframe;
   }
   std::vector<SE3> T_window;
-  for (const KeyframeId k : window) T_window.push_back(pose_of(graph.problem.S_world[static_cast<std::size_t>(graph.vertex(k))]));
+  for (const KeyframeId k : window)
+    T_window.push_back(pose_of(graph.problem.S_world[static_cast<std::size_t>(graph.vertex(k))]));
   if (closure.off_px <= options.near_px && !graph.problem.scale_free) {
-    // One keyframe places itself by what it sees of the place no better than the map does by all it holds: bundle adjustment
-    // weighs them, from where the map is.
+    // One keyframe places itself by what it sees of the place no better than the map does by all it holds: bundle
+    // adjustment weighs them, from where the map is.
     fuse(window, T_window, closure, location, options, features, draft);
     return true;
   }

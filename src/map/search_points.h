@@ -4,12 +4,12 @@
 #include <span>
 #include <vector>
 
-#include "frame/projection_search.h"
 #include "map/bundled_map.h"
+#include "matching/projection_search.h"
 
 namespace bslam::map {
 
 // One point per landmark (alive), in their order. Descriptors point into `map`: valid until it changes.
-std::vector<frame::SearchPoint> search_points(const BundledMap& map, std::span<const LandmarkId> landmarks);
+std::vector<matching::SearchPoint> search_points(const BundledMap& map, std::span<const LandmarkId> landmarks);
 
 }  // namespace bslam::map

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "base/median.h"
-#include "frame/epipolar_search.h"
-#include "frame/point_estimation.h"
+#include "matching/epipolar_search.h"
+#include "matching/point_estimation.h"
 
 namespace bslam::mapping {
 namespace {
@@ -14,8 +14,9 @@ using Eigen::Vector3d;
 using frame::KeypointRef;
 using geometry::SE3;
 
-constexpr double kMaxScaleRatio = 2.0;   // between the size a point should have in the two views and the levels it was found on
-constexpr std::size_t kProbeStep = 16;   // every so many keypoints are projected to see whether two cameras share a view
+constexpr double kMaxScaleRatio =
+    2.0;  // between the size a point should have in the two views and the levels it was found on
+constexpr std::size_t kProbeStep = 16;  // every so many keypoints are projected to see whether two cameras share a view
 constexpr double kMinShared = 0.1;
 
 double median_depth(const map::BundledMap& map, KeyframeId k) {
@@ -42,9 +43,7 @@ struct View {
   CameraIndex camera;
 };
 
-SE3 cam_from_world(const map::BundledMap& map, View v) {
-  return map.cam_from_world(v.keyframe, v.camera);
-}
+SE3 cam_from_world(const map::BundledMap& map, View v) { return map.cam_from_world(v.keyframe, v.camera); }
 
 // Does camera b see part of what camera a sees at about `depth` metres?
 bool shares_view(const map::BundledMap& map, View a, View b, double depth) {
@@ -59,8 +58,8 @@ bool shares_view(const map::BundledMap& map, View a, View b, double depth) {
   return static_cast<double>(seen) > kMinShared * static_cast<double>(probes);
 }
 
-void append(const map::BundledMap& map, KeyframeId k, FeatureId f, std::vector<frame::PointObservation>& out, double sigma_px,
-            double scale_factor) {
+void append(const map::BundledMap& map, KeyframeId k, FeatureId f, std::vector<matching::PointObservation>& out,
+            double sigma_px, double scale_factor) {
   const map::BundledKeyframe& keyframe = map.keyframe(k);
   for (const KeypointRef r : keyframe.frame->bundled.keypoints(f)) {
     const feature::Keypoints& keypoints = keyframe.frame->keypoints(r.camera);
@@ -74,20 +73,21 @@ void append(const map::BundledMap& map, KeyframeId k, FeatureId f, std::vector<f
 bool sizes_agree(const Vector3d& point, View a, KeypointIndex ka, View b, KeypointIndex kb, const map::BundledMap& map,
                  double scale_factor) {
   const double da = (cam_from_world(map, a) * point).norm(), db = (cam_from_world(map, b) * point).norm();
-  const int levels = map.keypoints(a.keyframe, a.camera).level[ka.index()] - map.keypoints(b.keyframe, b.camera).level[kb.index()];
+  const int levels =
+      map.keypoints(a.keyframe, a.camera).level[ka.index()] - map.keypoints(b.keyframe, b.camera).level[kb.index()];
   const double ratio = da / db * std::pow(scale_factor, levels);
   return ratio < kMaxScaleRatio && ratio > 1.0 / kMaxScaleRatio;
 }
 
 // The landmark two features make, if they make one.
-std::optional<Vector3d> new_point(const map::BundledMap& map, View a, const frame::EpipolarMatch& match, View b,
+std::optional<Vector3d> new_point(const map::BundledMap& map, View a, const matching::EpipolarMatch& match, View b,
                                   const CreationOptions& options, const FeatureModel& features) {
   const FeatureId fa = map.keyframe(a.keyframe).frame->bundled.feature(a.camera, match.a);
   const FeatureId fb = map.keyframe(b.keyframe).frame->bundled.feature(b.camera, match.b);
-  std::vector<frame::PointObservation> observations;
+  std::vector<matching::PointObservation> observations;
   append(map, a.keyframe, fa, observations, features.sigma_px, features.scale_factor);
   append(map, b.keyframe, fb, observations, features.sigma_px, features.scale_factor);
-  const auto estimated = frame::estimate_point(observations, options.min_parallax);
+  const auto estimated = matching::estimate_point(observations, options.min_parallax);
   if (!estimated || estimated->worst_chi2 > options.max_chi2) return std::nullopt;
   const Vector3d from_a = estimated->point - cam_from_world(map, a).inverse().translation();
   const Vector3d ray = from_a.normalized();
@@ -102,19 +102,25 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
   if (!shares_view(map, a, b, depth)) return 0;
   const std::vector<std::uint8_t> free_a = free_keypoints(map.keyframe(a.keyframe), a.camera);
   const std::vector<std::uint8_t> free_b = free_keypoints(map.keyframe(b.keyframe), b.camera);
-  const frame::EpipolarView view_a{&map.rig().camera(a.camera), &map.keypoints(a.keyframe, a.camera),
-                                   cam_from_world(map, a).inverse(), free_a,
-                                   features.sigma_px, features.scale_factor};
-  const frame::EpipolarView view_b{&map.rig().camera(b.camera), &map.keypoints(b.keyframe, b.camera),
-                                   cam_from_world(map, b).inverse(), free_b,
-                                   features.sigma_px, features.scale_factor};
-  const frame::EpipolarOptions search{.near_m = 0.05 * depth,
-                                      .sigmas = 2.0,
-                                      .max_hamming = options.max_hamming,
-                                      .ratio = options.ratio,
-                                      .max_level_difference = 3};
+  const matching::EpipolarView view_a{&map.rig().camera(a.camera),
+                                      &map.keypoints(a.keyframe, a.camera),
+                                      cam_from_world(map, a).inverse(),
+                                      free_a,
+                                      features.sigma_px,
+                                      features.scale_factor};
+  const matching::EpipolarView view_b{&map.rig().camera(b.camera),
+                                      &map.keypoints(b.keyframe, b.camera),
+                                      cam_from_world(map, b).inverse(),
+                                      free_b,
+                                      features.sigma_px,
+                                      features.scale_factor};
+  const matching::EpipolarOptions search{.near_m = 0.05 * depth,
+                                         .sigmas = 2.0,
+                                         .max_hamming = options.max_hamming,
+                                         .ratio = options.ratio,
+                                         .max_level_difference = 3};
   int made = 0;
-  for (const frame::EpipolarMatch& m : frame::match_epipolar(view_a, view_b, search)) {
+  for (const matching::EpipolarMatch& m : matching::match_epipolar(view_a, view_b, search)) {
     const FeatureId fa = draft.map().keyframe(a.keyframe).frame->bundled.feature(a.camera, m.a);
     const FeatureId fb = draft.map().keyframe(b.keyframe).frame->bundled.feature(b.camera, m.b);
     if (draft.map().landmark_of(a.keyframe, fa).valid() || draft.map().landmark_of(b.keyframe, fb).valid()) continue;
@@ -131,17 +137,20 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
 
 }  // namespace
 
-int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features, map::MapDraft& draft) {
+int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features,
+                     map::MapDraft& draft) {
   const double depth = median_depth(draft.map(), keyframe);
   if (depth <= 0) return 0;
   int made = 0;
   const Vector3d centre = draft.map().keyframe(keyframe).T_rig_world.inverse().translation();
-  for (const map::Covisible& neighbour : draft.map().best_covisible(keyframe, static_cast<std::size_t>(options.neighbours))) {
+  for (const map::Covisible& neighbour :
+       draft.map().best_covisible(keyframe, static_cast<std::size_t>(options.neighbours))) {
     const Vector3d other = draft.map().keyframe(neighbour.keyframe).T_rig_world.inverse().translation();
     if ((centre - other).norm() < options.min_baseline_share * depth) continue;
     for (std::size_t i = 0; i < draft.map().rig().size(); ++i) {
       for (std::size_t j = 0; j < draft.map().rig().size(); ++j) {
-        made += create_between({keyframe, CameraIndex(i)}, {neighbour.keyframe, CameraIndex(j)}, depth, options, features, draft);
+        made += create_between({keyframe, CameraIndex(i)}, {neighbour.keyframe, CameraIndex(j)}, depth, options,
+                               features, draft);
       }
     }
   }

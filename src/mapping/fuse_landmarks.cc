@@ -14,7 +14,8 @@ std::vector<KeyframeId> fusion_targets(const map::BundledMap& map, KeyframeId ke
   const auto first = map.best_covisible(keyframe, static_cast<std::size_t>(options.neighbours));
   for (const map::Covisible& c : first) take(c.keyframe);
   for (const map::Covisible& c : first) {
-    for (const map::Covisible& d : map.best_covisible(c.keyframe, static_cast<std::size_t>(options.second_neighbours))) {
+    for (const map::Covisible& d :
+         map.best_covisible(c.keyframe, static_cast<std::size_t>(options.second_neighbours))) {
       take(d.keyframe);
     }
   }
@@ -23,23 +24,24 @@ std::vector<KeyframeId> fusion_targets(const map::BundledMap& map, KeyframeId ke
 
 }  // namespace
 
-FusionReport fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, const FeatureModel& features, map::MapDraft& draft) {
-  using adjustment::Keep;
+FusionReport fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, const FeatureModel& features,
+                            map::MapDraft& draft) {
+  using mapping::Keep;
   FusionReport report;
   const std::vector<KeyframeId> targets = fusion_targets(draft.map(), keyframe, options);
   for (const KeyframeId target : targets) {
-    report += adjustment::fuse_into(target, adjustment::landmarks_of(draft.map(), keyframe), Keep::kMoreObserved, options.search,
-                                    features, draft);
+    report += mapping::fuse_into(target, mapping::landmarks_of(draft.map(), keyframe), Keep::kMoreObserved,
+                                 options.search, features, draft);
   }
   std::vector<LandmarkId> theirs;
   for (const KeyframeId target : targets) {
-    const std::vector<LandmarkId> some = adjustment::landmarks_of(draft.map(), target);
+    const std::vector<LandmarkId> some = mapping::landmarks_of(draft.map(), target);
     theirs.insert(theirs.end(), some.begin(), some.end());
   }
   std::sort(theirs.begin(), theirs.end());
   theirs.erase(std::unique(theirs.begin(), theirs.end()), theirs.end());
-  report += adjustment::fuse_into(keyframe, theirs, Keep::kMoreObserved, options.search, features, draft);
-  draft.refresh_landmarks(adjustment::landmarks_of(draft.map(), keyframe));
+  report += mapping::fuse_into(keyframe, theirs, Keep::kMoreObserved, options.search, features, draft);
+  draft.refresh_landmarks(mapping::landmarks_of(draft.map(), keyframe));
   return report;
 }
 

@@ -7,8 +7,9 @@
 
 namespace bslam::mapping {
 
-using adjustment::FusionReport;
+using mapping::FusionReport;
 
-FusionReport fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, const FeatureModel& features, map::MapDraft& draft);
+FusionReport fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, const FeatureModel& features,
+                            map::MapDraft& draft);
 
 }  // namespace bslam::mapping

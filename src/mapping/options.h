@@ -1,26 +1,28 @@
 // What steers local mapping; gathered in system::Config.
 #pragma once
 
-#include "adjustment/landmark_fusion.h"
 #include "adjustment/map_adjustment.h"
 #include "base/options.h"
+#include "mapping/landmark_fusion.h"
 
 namespace bslam::mapping {
 
 struct CreationOptions {
-  int neighbours = 6;             // covisible keyframes whose free features are compared
+  int neighbours = 6;                // covisible keyframes whose free features are compared
   double min_baseline_share = 0.01;  // of the median depth: closer keyframes show no depth
-  int max_hamming = 50;           // bits
-  double ratio = 0.8;             // best to second best along the epipolar curve
-  double min_parallax = 0.012;    // rad, between the rays of a new landmark
-  double max_depth_error = 0.15;  // relative standard deviation of its depth
-  double max_chi2 = 5.991;        // of each of its keypoints
+  int max_hamming = 50;              // bits
+  double ratio = 0.8;                // best to second best along the epipolar curve
+  double min_parallax = 0.012;       // rad, between the rays of a new landmark
+  double max_depth_error = 0.15;     // relative standard deviation of its depth
+  double max_chi2 = 5.991;           // of each of its keypoints
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes whose free features are compared");
-    visitor("min_baseline_share", self.min_baseline_share, Range{0, 1}, "", "of the median depth: closer keyframes show no depth");
-    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "largest descriptor distance of a new landmark's features");
+    visitor("min_baseline_share", self.min_baseline_share, Range{0, 1}, "",
+            "of the median depth: closer keyframes show no depth");
+    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits",
+            "largest descriptor distance of a new landmark's features");
     visitor("ratio", self.ratio, Range{0.1, 1}, "", "best to second best along the epipolar curve");
     visitor("min_parallax", self.min_parallax, Range{0, 1}, "rad", "least parallax of a new landmark");
     visitor("max_depth_error", self.max_depth_error, Range{0.001, 10}, "", "relative depth error of a new landmark");
@@ -29,17 +31,17 @@ struct CreationOptions {
 };
 
 struct FusionOptions {
-  int neighbours = 10;       // covisible keyframes, and ...
-  int second_neighbours = 3; // ... of each of these as many again
+  int neighbours = 10;        // covisible keyframes, and ...
+  int second_neighbours = 3;  // ... of each of these as many again
   int max_targets = 20;
-  adjustment::LandmarkFusionOptions search;
+  mapping::LandmarkFusionOptions search;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes searched for duplicates");
     visitor("second_neighbours", self.second_neighbours, Range{0, 100}, "", "of each of these as many again");
     visitor("max_targets", self.max_targets, Range{0, 1000}, "", "keyframes searched at most");
-    adjustment::LandmarkFusionOptions::visit(self.search, visitor);
+    mapping::LandmarkFusionOptions::visit(self.search, visitor);
   }
 };
 
@@ -52,10 +54,13 @@ struct CullingOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("probation", self.probation, Range{1, 100}, "keyframes", "after which a new landmark must have proven itself");
-    visitor("min_found_share", self.min_found_share, Range{0, 1}, "", "frames that found a landmark, of those that should have");
+    visitor("probation", self.probation, Range{1, 100}, "keyframes",
+            "after which a new landmark must have proven itself");
+    visitor("min_found_share", self.min_found_share, Range{0, 1}, "",
+            "frames that found a landmark, of those that should have");
     visitor("min_keypoints", self.min_keypoints, Range{1, 100}, "", "that observe a landmark after its probation");
-    visitor("redundant_share", self.redundant_share, Range{0, 1}, "", "share of landmarks seen elsewhere that makes a keyframe redundant");
+    visitor("redundant_share", self.redundant_share, Range{0, 1}, "",
+            "share of landmarks seen elsewhere that makes a keyframe redundant");
     visitor("redundant_views", self.redundant_views, Range{1, 100}, "", "other keyframes that must see them");
   }
 };
@@ -67,8 +72,10 @@ struct LocalWindowOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("free_keyframes", self.free_keyframes, Range{1, 1000}, "", "keyframes adjusted: the newest and its best covisible ones");
-    visitor("fixed_keyframes", self.fixed_keyframes, Range{1, 1000}, "", "further observers that hold the window in place");
+    visitor("free_keyframes", self.free_keyframes, Range{1, 1000}, "",
+            "keyframes adjusted: the newest and its best covisible ones");
+    visitor("fixed_keyframes", self.fixed_keyframes, Range{1, 1000}, "",
+            "further observers that hold the window in place");
     visitor("max_landmarks", self.max_landmarks, Range{10, 1000000}, "", "landmarks adjusted at most");
   }
 };
@@ -84,9 +91,12 @@ struct ScaleOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("max_deviation", self.max_deviation, Range{1e-4, 1}, "", "relative, below which a map may call itself metric");
-    visitor("max_correcting_deviation", self.max_correcting_deviation, Range{1e-4, 10}, "", "relative, below which the map is scaled");
-    visitor("keyframes", self.keyframes, Range{2, 1000}, "", "keyframes that measure the scale, and up to which all are adjusted");
+    visitor("max_deviation", self.max_deviation, Range{1e-4, 1}, "",
+            "relative, below which a map may call itself metric");
+    visitor("max_correcting_deviation", self.max_correcting_deviation, Range{1e-4, 10}, "",
+            "relative, below which the map is scaled");
+    visitor("keyframes", self.keyframes, Range{2, 1000}, "",
+            "keyframes that measure the scale, and up to which all are adjusted");
     visitor("min_keyframes", self.min_keyframes, Range{2, 1000}, "", "keyframes a metric map needs");
     visitor("rounds", self.rounds, Range{1, 20}, "", "of measuring and adjusting at one keyframe");
     visitor("settled", self.settled, Range{0, 1}, "", "relative change of the unit that asks for no further round");

@@ -7,13 +7,13 @@
 #include <map>
 #include <set>
 
+#include "dataset/frame_reader.h"
 #include "feature/extractor.h"
 #include "feature/hamming.h"
 #include "frame/capture_times.h"
 #include "geometry/so3.h"
 #include "geometry/triangulation.h"
-#include "io/frame_reader.h"
-#include "io/image_file.h"
+#include "image_files/image_file.h"
 #include "solver/epipolar.h"
 
 namespace bslam::session {
@@ -26,10 +26,10 @@ constexpr int kFarthest = 60;         // bits between descriptors of one point
 constexpr double kRatio = 0.85;       // to the second best
 constexpr double kTolerancePx = 2.0;  // of a calibration and its features
 constexpr int kLeastAgreeing = 25;
-constexpr double kLeastShare = 0.4;  // of the matches; chance reaches some per cent
-constexpr int kMany = 300;            // matches: enough to expect that some convention fits
-constexpr double kMost = 0.6;        // of the matches: fewer, and another pose may fit more
-constexpr double kClearly = 1.3;     // times more than as given
+constexpr double kLeastShare = 0.4;       // of the matches; chance reaches some per cent
+constexpr int kMany = 300;                // matches: enough to expect that some convention fits
+constexpr double kMost = 0.6;             // of the matches: fewer, and another pose may fit more
+constexpr double kClearly = 1.3;          // times more than as given
 constexpr double kNoBaseline = 1e-6;      // metres
 constexpr double kLeastParallax = 0.005;  // radians, of the matches another pose is found from
 
@@ -117,7 +117,8 @@ int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
 }
 
 // The pose of camera j that the matches of all frames fit, calibrated or not.
-std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const PixelPair> pairs) {
+std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::size_t j,
+                                    std::span<const PixelPair> pairs) {
   const camera::Camera &ci = rig.camera(i), &cj = rig.camera(j);
   std::vector<solver::BearingPair> bearings;
   for (const PixelPair& pair : pairs) {
@@ -133,7 +134,8 @@ std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::
   OtherPose out{.agreeing = found->num_inliers};
   out.turned_deg = geometry::degrees(geometry::so3_log((found->T_b_a * given.inverse()).rotation()).norm());
   const Eigen::Vector3d lies = found->T_b_a.inverse().translation(), should_lie = given.inverse().translation();
-  if (should_lie.norm() > kNoBaseline) out.displaced_deg = geometry::degrees(geometry::angle_between(lies, should_lie.normalized()));
+  if (should_lie.norm() > kNoBaseline)
+    out.displaced_deg = geometry::degrees(geometry::angle_between(lies, should_lie.normalized()));
   return out;
 }
 
@@ -193,13 +195,13 @@ struct View {
 };
 
 // By camera and frame.
-std::vector<std::vector<View>> look(const io::Dataset& dataset, std::span<const image::Image> masks) {
+std::vector<std::vector<View>> look(const dataset::Dataset& dataset, std::span<const image::Image> masks) {
   const camera::Rig& rig = dataset.rig;
   std::vector<std::vector<View>> views(rig.size());
   feature::Extractor extractor({});
   const std::size_t frames = std::min<std::size_t>(kFrames, dataset.frames.size());
   for (std::size_t k = 0; k < frames; ++k) {
-    const image::ImageBundle bundle = io::read_frame(dataset, (2 * k + 1) * dataset.frames.size() / (2 * frames));
+    const image::ImageBundle bundle = dataset::read_frame(dataset, (2 * k + 1) * dataset.frames.size() / (2 * frames));
     for (std::size_t c = 0; c < rig.size(); ++c) {
       const image::CameraImage& image = bundle.images[c];
       View& view = views[c].emplace_back();
@@ -214,9 +216,9 @@ std::vector<std::vector<View>> look(const io::Dataset& dataset, std::span<const 
 
 }  // namespace
 
-Result<std::vector<PairEvidence>> check_extrinsics(const io::Dataset& dataset) {
+Result<std::vector<PairEvidence>> check_extrinsics(const dataset::Dataset& dataset) {
   const camera::Rig& rig = dataset.rig;
-  const auto masks = io::read_masks(rig);
+  const auto masks = image_files::read_masks(rig);
   if (!masks) return masks.error();
   const std::vector<std::vector<View>> views = look(dataset, *masks);
   std::vector<PairEvidence> evidence;
@@ -242,14 +244,18 @@ std::string describe(const PairEvidence& pair) {
     return fmt::format(
         "{} of {} matches fit the second turned by {:.1f} degrees from how it is given, in a direction {:.0f} degrees "
         "from the given one; {} as given",
-        pair.other->agreeing, pair.matches, pair.other->turned_deg, pair.other->displaced_deg, agreeing(Convention::kAsGiven));
+        pair.other->agreeing, pair.matches, pair.other->turned_deg, pair.other->displaced_deg,
+        agreeing(Convention::kAsGiven));
   }
   if (pair.instants == 0) return "never taken together: nothing to compare";
-  if (!pair.verdict && pair.matches > kMany) return fmt::format("{} matches, and no convention fits enough of them", pair.matches);
+  if (!pair.verdict && pair.matches > kMany)
+    return fmt::format("{} matches, and no convention fits enough of them", pair.matches);
   if (!pair.verdict) return fmt::format("too little in common to tell ({} matches)", pair.matches);
-  std::string text = fmt::format("{} of {} matches fit {}", agreeing(*pair.verdict), pair.matches, convention_in_words(*pair.verdict));
+  std::string text =
+      fmt::format("{} of {} matches fit {}", agreeing(*pair.verdict), pair.matches, convention_in_words(*pair.verdict));
   if (*pair.verdict != Convention::kAsGiven) return text + fmt::format(", {} as given", agreeing(Convention::kAsGiven));
-  if (agreeing(Convention::kAsGiven) < kMost * pair.matches) text += "; few: many wrong matches, or intrinsics that are a little off";
+  if (agreeing(Convention::kAsGiven) < kMost * pair.matches)
+    text += "; few: many wrong matches, or intrinsics that are a little off";
   return text;
 }
 
@@ -284,9 +290,10 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
   if (!slips.empty()) {
     const auto most = std::ranges::max_element(slips, {}, [](const auto& slip) { return slip.second.size(); });
     const auto& pairs = most->second;
-    const std::string others = fitting > 0 ? fmt::format("; {} of {} pairs fit as given", fitting, evidence.size()) : "";
-    return text + fmt::format("warning: the images of cameras {} do not fit the extrinsics; they fit {}{}\n", fmt::join(pairs, ", "),
-                              convention_in_words(most->first), others);
+    const std::string others =
+        fitting > 0 ? fmt::format("; {} of {} pairs fit as given", fitting, evidence.size()) : "";
+    return text + fmt::format("warning: the images of cameras {} do not fit the extrinsics; they fit {}{}\n",
+                              fmt::join(pairs, ", "), convention_in_words(most->first), others);
   }
   if (elsewhere > 0) return text + "warning: the images do not fit the extrinsics, nor any common slip of them\n";
   if (fitting == 0) return text + "  nothing can be said of the extrinsics\n";

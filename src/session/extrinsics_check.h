@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "base/result.h"
+#include "dataset/dataset.h"
 #include "feature/keypoints.h"
-#include "io/dataset.h"
 
 namespace bslam::session {
 
@@ -27,11 +27,13 @@ enum class Convention {
 constexpr int kConventions = 5;
 std::string_view convention_in_words(Convention convention);
 
-// The pose of the second camera seen from the first that clearly more matches fit than any convention, where there is one.
+// The pose of the second camera seen from the first that clearly more matches fit than any convention, where there is
+// one.
 struct OtherPose {
-  int agreeing = 0;          // matches that fit it
-  double turned_deg = 0;     // of the second camera from how it is given
-  double displaced_deg = 0;  // between the directions in which it lies from the first, found and given; 0 without baseline
+  int agreeing = 0;       // matches that fit it
+  double turned_deg = 0;  // of the second camera from how it is given
+  double displaced_deg =
+      0;  // between the directions in which it lies from the first, found and given; 0 without baseline
 };
 
 // One pair of cameras.
@@ -49,9 +51,9 @@ struct PairEvidence {
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Keypoints> of_i,
                         std::span<const feature::Keypoints> of_j);
 
-// Judges every pair of cameras by a few frames spread over the data set, as far as both were taken at one instant. Masks count.
-// Errors: a mask that cannot be read.
-Result<std::vector<PairEvidence>> check_extrinsics(const io::Dataset& dataset);
+// Judges every pair of cameras by a few frames spread over the data set, as far as both were taken at one instant.
+// Masks count. Errors: a mask that cannot be read.
+Result<std::vector<PairEvidence>> check_extrinsics(const dataset::Dataset& dataset);
 
 // A line for every pair, and one for what to do.
 std::string describe_evidence(std::span<const PairEvidence> evidence);

@@ -6,7 +6,7 @@
 #include <sys/resource.h>
 #endif
 
-#include "system/stopwatch.h"
+#include "base/stopwatch.h"
 
 namespace bslam::session {
 namespace {
@@ -21,7 +21,7 @@ void give_way() {
 
 }  // namespace
 
-FrameSource::FrameSource(const io::Dataset& dataset, std::size_t ahead, ReadAhead priority)
+FrameSource::FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReadAhead priority)
     : dataset_(dataset), ahead_(ahead), reader_([this, priority](std::stop_token stop) {
         if (priority == ReadAhead::kGivesWay) give_way();
         read(std::move(stop));
@@ -44,8 +44,8 @@ void FrameSource::read(std::stop_token stop) {
   std::exception_ptr failure;
   try {
     for (std::size_t i = 0; i < dataset_.frames.size() && !stop.stop_requested(); ++i) {
-      const system::Stopwatch watch;
-      Item item{io::read_frame(dataset_, i), 0};
+      const Stopwatch watch;
+      Item item{dataset::read_frame(dataset_, i), 0};
       item.read_ms = watch.ms();
       std::unique_lock lock(mutex_);
       if (!changed_.wait(lock, stop, [this] { return ready_.size() < ahead_; })) break;

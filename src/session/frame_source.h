@@ -8,12 +8,12 @@
 #include <optional>
 #include <thread>
 
-#include "io/frame_reader.h"
+#include "dataset/frame_reader.h"
 
 namespace bslam::session {
 
-// Does reading ahead give way to the threads that work on the frame in hand? Where stages run beside these it must not: they would
-// starve it.
+// Does reading ahead give way to the threads that work on the frame in hand? Where stages run beside these it must not:
+// they would starve it.
 enum class ReadAhead { kAsAll, kGivesWay };
 
 class FrameSource {
@@ -24,7 +24,7 @@ class FrameSource {
   };
 
   // Borrows `dataset`; keeps at most `ahead` frames read and not yet taken.
-  FrameSource(const io::Dataset& dataset, std::size_t ahead, ReadAhead priority = ReadAhead::kAsAll);
+  FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReadAhead priority = ReadAhead::kAsAll);
   ~FrameSource() = default;
 
   // The next frame; empty after the last. Throws what the reading thread threw.
@@ -33,7 +33,7 @@ class FrameSource {
  private:
   void read(std::stop_token stop);
 
-  const io::Dataset& dataset_;
+  const dataset::Dataset& dataset_;
   const std::size_t ahead_;
   std::mutex mutex_;
   std::condition_variable_any changed_;

@@ -9,20 +9,20 @@
 
 namespace bslam::session {
 
-Result<MergeResult> merge_maps(const io::SavedMap& a, const io::SavedMap& b, const place::VocabularyPtr& vocabulary,
-                               const system::Config& config) {
+Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedMap& b,
+                               const place::VocabularyPtr& vocabulary, const system::Config& config) {
   map::FeatureModel features = config.feature_model();
   features.scale_factor = a.map.pyramid().scale_factor;
-  for (const io::SavedMap* saved : {&a, &b}) {
+  for (const storage::SavedMap* saved : {&a, &b}) {
     if (saved->map.scale() != map::Scale::kMetric) return Error{saved->file, "scale", "not metric", "maps of one unit"};
-    if (const Status s = io::fits(*saved, a.map.rig(), a.map.pyramid(), vocabulary.get()); !s) return s.error();
+    if (const Status s = storage::fits(*saved, a.map.rig(), a.map.pyramid(), vocabulary.get()); !s) return s.error();
   }
   map::BundledMap both = a.map;
   const map::AppendedIds ids = map::append_map(both, b.map);
   map::MapStore store(std::move(both));
   MergeResult result{.map = a.map};
-  looping::LoopCloser closer(std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition), config.looping,
-                             features, static_cast<std::uint64_t>(config.seed));
+  looping::LoopCloser closer(std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition),
+                             config.looping, features, static_cast<std::uint64_t>(config.seed));
   for (const KeyframeId k : ids.keyframes) {
     if (!store.snapshot()->alive(k)) continue;
     map::MapDraft draft("loop", store.snapshot());

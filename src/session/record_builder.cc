@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/median.h"
-#include "io/frame_reader.h"
+#include "dataset/frame_reader.h"
 
 namespace bslam::session {
 namespace {
@@ -42,13 +42,14 @@ report::FrameRecord frame_record(const RecordInput& input, const InputFrame& in,
 
 // State of a camera in one frame, from what it delivered.
 report::CameraInterval camera_state(const report::FrameRecord& frame, const system::FrameRecord& known, std::size_t c) {
-  const system::Outage outage = known.outages[c];
-  const bool used = outage == system::Outage::kNone;
-  if (known.blurred[c] && (used || outage == system::Outage::kInconsistent)) {  // blur explains that it sees little
+  const tracking::Outage outage = known.outages[c];
+  const bool used = outage == tracking::Outage::kNone;
+  if (known.blurred[c] && (used || outage == tracking::Outage::kInconsistent)) {  // blur explains that it sees little
     return {used ? "degraded" : "out", "blurred", frame.time_s, frame.time_s};
   }
-  if (!used) return {"out", std::string(system::describe(outage)), frame.time_s, frame.time_s};
-  if (frame.cameras[c].keypoints < kFewKeypoints && !known.waiting[c]) return {"degraded", "few-features", frame.time_s, frame.time_s};
+  if (!used) return {"out", std::string(tracking::describe(outage)), frame.time_s, frame.time_s};
+  if (frame.cameras[c].keypoints < kFewKeypoints && !known.waiting[c])
+    return {"degraded", "few-features", frame.time_s, frame.time_s};
   return {"ok", "", frame.time_s, frame.time_s};
 }
 
@@ -65,13 +66,15 @@ std::vector<std::uint8_t> between_images(const std::vector<system::FrameRecord>&
   const std::size_t step = lower_median(std::move(steps));
   for (std::size_t i = 1; i < at.size(); ++i) {
     if (at[i] - at[i - 1] > step) continue;
-    const auto first = out.begin() + static_cast<std::ptrdiff_t>(at[i - 1]), last = out.begin() + static_cast<std::ptrdiff_t>(at[i]);
+    const auto first = out.begin() + static_cast<std::ptrdiff_t>(at[i - 1]),
+               last = out.begin() + static_cast<std::ptrdiff_t>(at[i]);
     std::fill(first, last, std::uint8_t{1});
   }
   // Its first image may come, and the next one after the end, as late as others do.
   const auto until = static_cast<std::ptrdiff_t>(at.front() < step ? at.front() : 0);
   std::fill(out.begin(), out.begin() + until, std::uint8_t{1});
-  if (frames.size() - at.back() <= step) std::fill(out.begin() + static_cast<std::ptrdiff_t>(at.back()), out.end(), std::uint8_t{1});
+  if (frames.size() - at.back() <= step)
+    std::fill(out.begin() + static_cast<std::ptrdiff_t>(at.back()), out.end(), std::uint8_t{1});
   return out;
 }
 
@@ -83,26 +86,33 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
     for (const system::FrameRecord& f : frames) {
       camera.images += f.images[c] == image::ImageState::kPresent;
       if (f.images[c] != image::ImageState::kDamaged) continue;
-      if (camera.skipped++ == 0) camera.first_skipped = io::why_damaged(input.dataset, f.result.frame.index(), c);
+      if (camera.skipped++ == 0) camera.first_skipped = dataset::why_damaged(input.dataset, f.result.frame.index(), c);
     }
     const std::vector<std::uint8_t> pause = between_images(frames, c);
     std::size_t next = 0;
     for (const report::FrameRecord& f : record.frames) {
       if (f.cameras.empty()) continue;  // dropped: the system never saw it
       const std::size_t k = next++;
-      const bool waiting = pause[k] && frames[k].outages[c] == system::Outage::kNoImage;
+      const bool waiting = pause[k] && frames[k].outages[c] == tracking::Outage::kNoImage;
       const report::CameraInterval state =
           waiting ? report::CameraInterval{"ok", "", f.time_s, f.time_s} : camera_state(f, frames[k], c);
-      if (camera.states.empty() || camera.states.back().state != state.state || camera.states.back().reason != state.reason) {
+      if (camera.states.empty() || camera.states.back().state != state.state ||
+          camera.states.back().reason != state.reason) {
         camera.states.push_back(state);
       }
       camera.states.back().to_s = f.time_s;
     }
     const auto& found = input.system.extrinsics().cameras;
     if (c > 0 && c < found.size()) {
-      const adjustment::CameraRefinement& r = found[c];
-      camera.extrinsics = {r.change_deg, r.change_mm, r.std_deg, r.std_mm, r.rotation_observed(), r.translation_observed(),
-                           r.suspect, input.system.extrinsics_refined()};
+      const calibration::CameraRefinement& r = found[c];
+      camera.extrinsics = {r.change_deg,
+                           r.change_mm,
+                           r.std_deg,
+                           r.std_mm,
+                           r.rotation_observed(),
+                           r.translation_observed(),
+                           r.suspect,
+                           input.system.extrinsics_refined()};
     }
     record.cameras.push_back(std::move(camera));
   }
@@ -120,7 +130,7 @@ void add_stages(const RecordInput& input, RunRecord& record) {
     ++next;
   }
   for (const system::StageRecord& s : input.system.stage_runs()) {
-    report::add_stage_sample(record, system::stage_name(s.run.task.stage), report::StagePlace::kBackground,
+    report::add_stage_sample(record, execution::stage_name(s.run.task.stage), report::StagePlace::kBackground,
                              {seconds(input, s.time_ns), s.run.ms});
   }
   if (input.system.final_adjustment_ms() > 0 && !input.inputs.empty()) {
@@ -140,7 +150,8 @@ void add_places(const RecordInput& input, RunRecord& record) {
   for (const system::FrameRecord& f : input.system.frames()) {
     if (!f.relocalisation) continue;
     const TimeNs with_ns = input.system.keyframe_time(f.relocalisation->with);
-    record.relocalisations.push_back({seconds(input, f.result.time_ns), seconds(input, with_ns), f.relocalisation->inliers});
+    record.relocalisations.push_back(
+        {seconds(input, f.result.time_ns), seconds(input, with_ns), f.relocalisation->inliers});
   }
   const auto parts = input.system.trajectories();
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -153,7 +164,7 @@ void add_places(const RecordInput& input, RunRecord& record) {
 // When stages ran.
 std::string mode_name(const RecordInput& input) {
   if (input.replayed) return "replay";
-  for (const auto& [mode, name] : EnumNames<system::Mode>::kNames) {
+  for (const auto& [mode, name] : EnumNames<execution::Mode>::kNames) {
     if (mode == input.config.mode) return std::string(name);
   }
   return "";
@@ -172,9 +183,12 @@ std::optional<double> peak_memory_mb() {
 
 std::string scale_name(map::Scale scale) {
   switch (scale) {
-    case map::Scale::kMetric: return "metric";
-    case map::Scale::kUpToScale: return "up-to-scale";
-    case map::Scale::kUnobservable: return "unobservable";
+    case map::Scale::kMetric:
+      return "metric";
+    case map::Scale::kUpToScale:
+      return "up-to-scale";
+    case map::Scale::kUnobservable:
+      return "unobservable";
   }
   return "";
 }
@@ -198,9 +212,14 @@ RunRecord build_record(const RecordInput& input) {
   add_cameras(input, record);
   add_stages(input, record);
   const map::MapSnapshot map = input.system.snapshot();
-  record.map = {static_cast<std::int64_t>(map->num_keyframes()), static_cast<std::int64_t>(map->num_landmarks()),
-                static_cast<std::int64_t>(map->num_observations()), scale_name(map->scale()), input.loaded, {}};
-  if (std::isfinite(map->scale_deviation()) && map->scale_deviation() > 0) record.map.scale_deviation = map->scale_deviation();
+  record.map = {static_cast<std::int64_t>(map->num_keyframes()),
+                static_cast<std::int64_t>(map->num_landmarks()),
+                static_cast<std::int64_t>(map->num_observations()),
+                scale_name(map->scale()),
+                input.loaded,
+                {}};
+  if (std::isfinite(map->scale_deviation()) && map->scale_deviation() > 0)
+    record.map.scale_deviation = map->scale_deviation();
   record.maps_started = input.system.maps_started();
   add_places(input, record);
   record.start_up_s = input.start_up_s;

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "io/dataset.h"
+#include "dataset/dataset.h"
 #include "report/run_record.h"
 #include "system/system.h"
 
@@ -17,12 +17,12 @@ struct InputFrame {
 };
 
 struct RecordInput {
-  const io::Dataset& dataset;
+  const dataset::Dataset& dataset;
   const system::Config& config;
   const std::vector<InputFrame>& inputs;  // in order; those not dropped match the frames of `system` one by one
   const system::System& system;
   bool replayed = false;
-  bool loaded = false;    // the run went on in a saved map
+  bool loaded = false;  // the run went on in a saved map
   bool complete = true;
   double start_up_s = 0, wall_s = 0;
 };

@@ -5,12 +5,12 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "io/atomic_file.h"
-#include "io/image_file.h"
-#include "io/rig_description.h"
-#include "io/rig_file.h"
-#include "io/rig_warnings.h"
+#include "base/atomic_file.h"
+#include "image_files/image_file.h"
 #include "report/rig_plot.h"
+#include "rig_formats/rig_description.h"
+#include "rig_formats/rig_file.h"
+#include "rig_formats/rig_warnings.h"
 #include "session/extrinsics_check.h"
 
 namespace bslam::session {
@@ -23,7 +23,7 @@ Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Json camera_json(const camera::Rig& rig, std::size_t i) {
   const camera::Camera& camera = rig.camera(i);
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
-  const io::FieldOfView view = io::field_of_view(camera);
+  const rig_formats::FieldOfView view = rig_formats::field_of_view(camera);
   const geometry::SE3& T = rig.body_from_cam(i);
   Json overlaps = Json::array();
   for (std::size_t j = 0; j < rig.size(); ++j) overlaps.push_back(i == j ? 1.0 : rig.overlap_share(i, j));
@@ -65,15 +65,15 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
 
 // What is probably wrong, masks that cannot be used among it.
 std::vector<std::string> warnings_of(const camera::Rig& rig) {
-  std::vector<std::string> warnings = io::rig_warnings(rig);
+  std::vector<std::string> warnings = rig_formats::rig_warnings(rig);
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    const auto mask = io::read_mask(rig.camera(i));
+    const auto mask = image_files::read_mask(rig.camera(i));
     if (!mask) warnings.push_back("mask of " + rig.camera(i).name + ": " + mask.error().message());
   }
   return warnings;
 }
 
-std::string as_json(const io::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
+std::string as_json(const rig_formats::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
   const camera::Rig& rig = file.rig;
   Json cameras = Json::array(), baselines = Json::array();
   for (std::size_t i = 0; i < rig.size(); ++i) {
@@ -84,7 +84,7 @@ std::string as_json(const io::RigFile& file, const std::optional<std::vector<Pai
     }
   }
   Json json = {{"schema", 1},
-               {"format", io::format_name(file.format)},
+               {"format", rig_formats::format_name(file.format)},
                {"cameras", std::move(cameras)},
                {"baselines", std::move(baselines)},
                {"notes", file.notes},
@@ -93,8 +93,9 @@ std::string as_json(const io::RigFile& file, const std::optional<std::vector<Pai
   return json.dump(1) + "\n";
 }
 
-std::string as_text(const io::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
-  std::string text = fmt::format("format: {}\n", io::format_name(file.format)) + io::describe_rig(file.rig);
+std::string as_text(const rig_formats::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
+  std::string text =
+      fmt::format("format: {}\n", rig_formats::format_name(file.format)) + rig_formats::describe_rig(file.rig);
   for (const std::string& note : file.notes) text += "note: " + note + "\n";
   for (const std::string& warning : warnings_of(file.rig)) text += "warning: " + warning + "\n";
   return evidence ? text + describe_evidence(*evidence) : text;
@@ -103,17 +104,18 @@ std::string as_text(const io::RigFile& file, const std::optional<std::vector<Pai
 }  // namespace
 
 Result<std::string> report_rig(const RigReportRequest& request) {
-  const auto file = io::read_rig_file(request.file);
+  const auto file = rig_formats::read_rig_file(request.file);
   if (!file) return file.error();
   if (!request.svg.empty()) {
-    const Status written = io::write_atomically(request.svg, report::rig_plot_svg(file->rig));
+    const Status written = write_atomically(request.svg, report::rig_plot_svg(file->rig));
     if (!written) return written.error();
   }
   std::optional<std::vector<PairEvidence>> evidence;
   if (!request.images.empty()) {
     // Cameras that fire late are no reason to stop.
     constexpr double kTolerance_s = 0.1;
-    const auto dataset = io::open_dataset({.path = request.images, .rig_file = request.file, .sync_tolerance_s = kTolerance_s});
+    const auto dataset =
+        dataset::open_dataset({.path = request.images, .rig_file = request.file, .sync_tolerance_s = kTolerance_s});
     if (!dataset) return dataset.error();
     auto checked = check_extrinsics(*dataset);
     if (!checked) return checked.error();

@@ -4,18 +4,18 @@
 #include <chrono>
 #include <thread>
 
-#include "io/atomic_file.h"
-#include "io/bslam_rig.h"
-#include "io/config_file.h"
-#include "io/image_file.h"
-#include "io/trajectory_file.h"
+#include "base/atomic_file.h"
+#include "base/stopwatch.h"
+#include "evaluation/trajectory_file.h"
+#include "image_files/image_file.h"
 #include "report/run_plot.h"
 #include "report/summary.h"
 #include "report/trajectory_plot.h"
+#include "rig_formats/bslam_rig.h"
 #include "session/frame_source.h"
 #include "session/record_builder.h"
-#include "system/stopwatch.h"
 #include "system/system.h"
+#include "yaml/config_file.h"
 
 namespace bslam::session {
 namespace {
@@ -37,18 +37,18 @@ class Metronome {
 };
 
 // Frames of the recorded run, in order; an interrupted one has fewer than the data set, one that was late has gaps.
-std::vector<FrameId> recorded_frames(const system::Journal& journal) {
+std::vector<FrameId> recorded_frames(const execution::Journal& journal) {
   std::vector<FrameId> frames;
-  for (const system::JournalEntry& e : journal.entries) {
-    if (e.step == system::JournalStep::kFrame) frames.emplace_back(e.input);
+  for (const execution::JournalEntry& e : journal.entries) {
+    if (e.step == execution::JournalStep::kFrame) frames.emplace_back(e.input);
   }
   return frames;
 }
 
 // Feeds the frames one after the other; returns what was fed. Stops early where asked to.
-std::vector<InputFrame> feed(const io::Dataset& dataset, const SessionOptions& options, system::System& system) {
+std::vector<InputFrame> feed(const dataset::Dataset& dataset, const SessionOptions& options, system::System& system) {
   std::vector<InputFrame> inputs;
-  const bool sequential = options.config.mode == system::Mode::kSequential;
+  const bool sequential = options.config.mode == execution::Mode::kSequential;
   FrameSource source(dataset, kReadAhead, sequential ? ReadAhead::kGivesWay : ReadAhead::kAsAll);
   const Metronome metronome(dataset.frames.front().time_ns);
   const std::vector<FrameId> recorded = options.replay ? recorded_frames(*options.replay) : std::vector<FrameId>();
@@ -72,38 +72,40 @@ std::vector<InputFrame> feed(const io::Dataset& dataset, const SessionOptions& o
 namespace {
 
 // The whole calibration with the extrinsics of `found`, the rig of the cameras in use.
-camera::Rig put_in(const camera::Rig& found, const io::Dataset& dataset) {
+camera::Rig put_in(const camera::Rig& found, const dataset::Dataset& dataset) {
   return dataset.whole_rig ? dataset.whole_rig->with_extrinsics_of(found, dataset.cameras_used) : found;
 }
 
 }  // namespace
 
-Result<SessionResult> run_session(const io::Dataset& dataset, const SessionOptions& options) {
-  const system::Stopwatch start_up;
-  auto masks = io::read_masks(dataset.rig);
+Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options) {
+  const Stopwatch start_up;
+  auto masks = image_files::read_masks(dataset.rig);
   if (!masks) return masks.error();
-  system::System system(dataset.rig, options.config, {std::move(*masks), options.vocabulary, options.map, options.replay});
+  system::System system(dataset.rig, options.config,
+                        {std::move(*masks), options.vocabulary, options.map, options.replay});
   const double start_up_s = options.start_up_s + 1e-3 * start_up.ms();
 
-  const system::Stopwatch wall;
+  const Stopwatch wall;
   std::vector<InputFrame> inputs;
   try {
     const std::stop_callback on_interruption(options.interrupted, [&system] { system.interrupt(); });
     inputs = feed(dataset, options, system);
     system.finish();
-  } catch (const system::ReplayMismatch& mismatch) {
+  } catch (const execution::ReplayMismatch& mismatch) {
     return mismatch.error;
   }
   SessionResult result;
-  result.record = build_record({.dataset = dataset,
-                                .config = options.config,
-                                .inputs = inputs,
-                                .system = system,
-                                .replayed = options.replay.has_value(),
-                                .loaded = options.map.has_value(),
-                                .complete = inputs.size() == dataset.frames.size() && !options.interrupted.stop_requested(),
-                                .start_up_s = start_up_s,
-                                .wall_s = 1e-3 * wall.ms()});
+  result.record =
+      build_record({.dataset = dataset,
+                    .config = options.config,
+                    .inputs = inputs,
+                    .system = system,
+                    .replayed = options.replay.has_value(),
+                    .loaded = options.map.has_value(),
+                    .complete = inputs.size() == dataset.frames.size() && !options.interrupted.stop_requested(),
+                    .start_up_s = start_up_s,
+                    .wall_s = 1e-3 * wall.ms()});
   result.trajectories = system.trajectories();
   result.live = system.live_trajectories();
   result.map = system.snapshot();
@@ -117,11 +119,12 @@ namespace {
 using Files = std::vector<std::pair<std::string, std::string>>;  // name, bytes
 
 // At least the file of the first part, also where there is none.
-void add_trajectories(const std::vector<system::PartTrajectory>& parts, const std::string& stem, io::PoseState state, Files& files) {
-  const std::string header = io::trajectory_header("cam0", state);
+void add_trajectories(const std::vector<system::PartTrajectory>& parts, const std::string& stem,
+                      evaluation::PoseState state, Files& files) {
+  const std::string header = evaluation::trajectory_header("cam0", state);
   for (std::size_t i = 0; i < std::max<std::size_t>(parts.size(), 1); ++i) {
     const evaluation::Trajectory poses = parts.empty() ? evaluation::Trajectory() : parts[i].poses;
-    files.emplace_back(trajectory_file(stem, i), io::tum_text(poses, header));
+    files.emplace_back(trajectory_file(stem, i), evaluation::tum_text(poses, header));
   }
 }
 
@@ -131,11 +134,12 @@ Status write_outputs(const SessionResult& result, const system::Config& config, 
   system::Config copy = config;
   const OptionTable table(copy);
   Files files;
-  add_trajectories(result.trajectories, "trajectory", io::PoseState::kFinal, files);
-  add_trajectories(result.live, "trajectory_live", io::PoseState::kLive, files);
-  files.emplace_back("config.yaml", io::config_to_yaml(table));
-  if (result.refined_rig) files.emplace_back("rig_refined.yaml", io::rig_to_yaml(*result.refined_rig));
-  const evaluation::Trajectory path = result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
+  add_trajectories(result.trajectories, "trajectory", evaluation::PoseState::kFinal, files);
+  add_trajectories(result.live, "trajectory_live", evaluation::PoseState::kLive, files);
+  files.emplace_back("config.yaml", yaml::config_to_yaml(table));
+  if (result.refined_rig) files.emplace_back("rig_refined.yaml", rig_formats::rig_to_yaml(*result.refined_rig));
+  const evaluation::Trajectory path =
+      result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
   files.emplace_back("trajectory.svg", report::trajectory_plot_svg({.title = result.record.data + ": path of camera 0",
                                                                     .subtitle = {},
                                                                     .estimate = path,
@@ -144,7 +148,7 @@ Status write_outputs(const SessionResult& result, const system::Config& config, 
   files.emplace_back("run.svg", report::run_plot_svg(result.record));
   files.emplace_back("summary.json", report::summary_text(result.record));  // last: where it is, the rest is
   for (const auto& [name, bytes] : files) {
-    if (const Status status = io::write_atomically(folder / name, bytes); !status) return status;
+    if (const Status status = write_atomically(folder / name, bytes); !status) return status;
   }
   return {};
 }

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <thread>
 
+#include "base/stopwatch.h"
 #include "frame/capture_times.h"
-#include "system/stopwatch.h"
 #include "tracking/error_floor.h"
 #include "tracking/feature_budget.h"
 #include "tracking/make_keyframe.h"
@@ -15,7 +15,7 @@ namespace {
 using frame::BundledFrame;
 
 constexpr int kMetricPatience = 5;  // frames a rig whose cameras overlap waits for depth before it starts without
-constexpr int kMaxStartAge = 40;  // frames after which a start up to scale compares with a fresh frame
+constexpr int kMaxStartAge = 40;    // frames after which a start up to scale compares with a fresh frame
 
 int thread_count(int wanted, std::size_t cameras) {
   const int available = wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -27,7 +27,8 @@ std::vector<LandmarkId> committed(const std::vector<LandmarkId>& provisional, st
                                   const map::CommitReport& report) {
   std::vector<LandmarkId> out;
   for (const LandmarkId l : provisional) {
-    const LandmarkId id = l.index() < base_slots ? report.published->resolve(l) : report.landmarks[l.index() - base_slots];
+    const LandmarkId id =
+        l.index() < base_slots ? report.published->resolve(l) : report.landmarks[l.index() - base_slots];
     if (report.published->alive(id)) out.push_back(id);
   }
   std::sort(out.begin(), out.end());
@@ -79,8 +80,12 @@ void count_by_camera(const BundledFrame& frame, FeatureId feature, std::vector<i
 
 Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
                    std::unique_ptr<looping::PlaceRecogniser> recogniser)
-    : rig_(rig), config_(config), pool_(thread_count(config.execution.threads, rig.size())),
-      monitor_(rig.size(), config.health), builder_(rig, config.features, std::move(masks)), recogniser_(std::move(recogniser)) {}
+    : rig_(rig),
+      config_(config),
+      pool_(thread_count(config.execution.threads, rig.size())),
+      monitor_(rig.size(), config.health),
+      builder_(rig, config.features, std::move(masks)),
+      recogniser_(std::move(recogniser)) {}
 
 void Pipeline::restart() {
   state_ = {};
@@ -104,8 +109,8 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<
   if (state_.twist) frame.twist = *state_.twist;
   stages.push_back({"extract", extraction.ms()});
   const Stopwatch bundling;
-  frame.bundled =
-      frame::bundle(frame::rig_of(rig_, frame), frame.cameras, builder_.pyramids(), config_.bundling, alignment(), pool_);
+  frame.bundled = matching::bundle(frame::rig_of(rig_, frame), frame.cameras, builder_.pyramids(), config_.bundling,
+                                   alignment(), pool_);
   for (std::size_t c = 0; c < rig_.size(); ++c) {
     frame.cameras[c].grid = frame::FeatureGrid(frame.cameras[c].keypoints, rig_.camera(c).width, rig_.camera(c).height);
   }
@@ -113,19 +118,20 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<
   return frame;
 }
 
-std::vector<frame::AlignmentOptions> Pipeline::alignment() const {
+std::vector<matching::AlignmentOptions> Pipeline::alignment() const {
   return tracking::alignment_by_camera(config_.tracking.alignment, error_floors_, rig_.size());
 }
 
 // Cameras that are out, and those that say nothing as long as the motion is unknown.
-std::vector<std::uint8_t> Pipeline::left_out(const image::ImageBundle& images, const std::vector<Outage>& outages) const {
+std::vector<std::uint8_t> Pipeline::left_out(const image::ImageBundle& images,
+                                             const std::vector<tracking::Outage>& outages) const {
   std::vector<std::uint8_t> out(rig_.size());
-  for (std::size_t c = 0; c < out.size(); ++c) out[c] = outages[c] != Outage::kNone;
+  for (std::size_t c = 0; c < out.size(); ++c) out[c] = outages[c] != tracking::Outage::kNone;
   const bool motion_matters = config_.tracking.own_times && !state_.twist;
   return motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
 }
 
-Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecutor& executor) {
+Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution::StageExecutor& executor) {
   const Stopwatch whole;
   Outcome outcome;
   for (const image::CameraImage& i : images.images) outcome.record.images.push_back(i.state);
@@ -134,14 +140,14 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecu
   trust_what_is_sharp_again(outcome.record.blurred);
   const std::vector<std::uint8_t> unused = left_out(images, outcome.record.outages);
   for (std::size_t c = 0; c < unused.size(); ++c) {
-    outcome.record.waiting.push_back(unused[c] && outcome.record.outages[c] == Outage::kNone);
+    outcome.record.waiting.push_back(unused[c] && outcome.record.outages[c] == tracking::Outage::kNone);
   }
   BundledFrame frame = make_frame(images, outcome.record.stages, unused);
   count_features(frame, outcome.record);
   const Stopwatch results;
   outcome.seen = executor.begin_frame(frame.id);
   grow_along(*outcome.seen);
-  if (config_.mode == Mode::kLagged) outcome.record.stages.push_back({"results", results.ms()});
+  if (config_.mode == execution::Mode::kLagged) outcome.record.stages.push_back({"results", results.ms()});
   if (outcome.seen->num_keyframes() == 0) {
     start(std::move(frame), executor, outcome);
   } else {
@@ -158,7 +164,8 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, StageExecu
 // A camera that saw nothing because it was blurred is doubted no longer.
 void Pipeline::trust_what_is_sharp_again(const std::vector<std::uint8_t>& blurred) {
   for (std::size_t c = 0; c < blurred_.size() && c < state_.cameras.size(); ++c) {
-    if (blurred_[c] && !blurred[c] && state_.cameras[c].doubted) state_.cameras[c] = tracking::trusted(state_.cameras[c].established);
+    if (blurred_[c] && !blurred[c] && state_.cameras[c].doubted)
+      state_.cameras[c] = tracking::trusted(state_.cameras[c].established);
   }
   blurred_ = blurred;
 }
@@ -171,7 +178,7 @@ void Pipeline::grow_along(const map::BundledMap& map) {
   if (state_.twist) state_.twist->tail<3>() *= grown;
 }
 
-void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outcome) {
+void Pipeline::start(BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome) {
   const Stopwatch watch;
   tracking::TrackResult& result = outcome.record.result;
   result.frame = frame.id;
@@ -185,23 +192,27 @@ void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outco
   std::optional<tracking::StartedMap> started;
   if (rig_.any_overlap()) started = tracking::start_metric(frame, builder_.pyramids(), options, draft);
   const int patience = rig_.any_overlap() ? kMetricPatience : 0;
-  const bool may = outcome.seen->num_keyframes() == 0 || outcome.seen->scale() != map::Scale::kMetric;  // one scale is said of all parts
+  const bool may = outcome.seen->num_keyframes() == 0 ||
+                   outcome.seen->scale() != map::Scale::kMetric;  // one scale is said of all parts
   if (!started && may && candidate_ && frame.id.value() - candidate_->frame->id.value() >= patience) {
-    const Random random(static_cast<std::uint64_t>(config_.seed), "start", static_cast<std::uint64_t>(frame.id.value()));
+    const Random random(static_cast<std::uint64_t>(config_.seed), "start",
+                        static_cast<std::uint64_t>(frame.id.value()));
     started = tracking::start_up_to_scale(*candidate_, frame, builder_.pyramids(), options, random, draft);
   }
   if (started) {
     draft.set_scale(started->scale, started->scale_deviation);
-    const map::CommitReport report = executor.commit(JournalStep::kStart, std::move(draft));
+    const map::CommitReport report = executor.commit(execution::JournalStep::kStart, std::move(draft));
     const KeyframeId last = report.keyframes.back();
-    state_ = tracking::state_at_keyframe({}, frame.time_ns, last,
-                                         committed(started->keyframes.back().landmarks, outcome.seen->landmark_slots(), report));
+    state_ = tracking::state_at_keyframe(
+        {}, frame.time_ns, last,
+        committed(started->keyframes.back().landmarks, outcome.seen->landmark_slots(), report));
     const map::BundledKeyframe& keyframe = report.published->keyframe(last);
     std::vector<int> seen(rig_.size(), 0);
     for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f) {
       if (keyframe.landmarks[f].valid()) count_by_camera(*keyframe.frame, FeatureId(f), seen);
     }
-    state_.cameras = tracking::doubts_of(std::vector<tracking::CameraTrust>(rig_.size()), seen, config_.tracking.consensus);
+    state_.cameras =
+        tracking::doubts_of(std::vector<tracking::CameraTrust>(rig_.size()), seen, config_.tracking.consensus);
     result.status = tracking::TrackStatus::kTracking;
     result.reason = tracking::LostReason::kNone;
     result.T_rig_world = keyframe.T_rig_world;
@@ -229,7 +240,8 @@ void Pipeline::start(BundledFrame frame, StageExecutor& executor, Outcome& outco
 // The frame later ones are compared with is given up when it is old or its view is gone.
 void Pipeline::keep_candidate(BundledFrame frame) {
   const auto& options = config_.tracking.initialisation;
-  if (candidate_ && frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular)) return;  // nothing to go by
+  if (candidate_ && frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular))
+    return;  // nothing to go by
   const bool good = candidate_ && frame.id.value() - candidate_->frame->id.value() <= kMaxStartAge &&
                     tracking::comparable(*candidate_->frame, frame, options);
   const auto kept = std::make_shared<const BundledFrame>(std::move(frame));
@@ -241,7 +253,8 @@ void Pipeline::keep_candidate(BundledFrame frame) {
   early_.push_back(kept);
 }
 
-std::optional<tracking::TrackResult> Pipeline::locate_early(const map::BundledMap& map, const tracking::BetweenKeyframes& early) {
+std::optional<tracking::TrackResult> Pipeline::locate_early(const map::BundledMap& map,
+                                                            const tracking::BetweenKeyframes& early) {
   return tracking::pose_between(map, early, {config_.features.sigma_px}, config_.tracking, pool_);
 }
 
@@ -261,7 +274,7 @@ tracking::TrackOutput Pipeline::follow(BundledFrame& frame, const map::BundledMa
   return tracking::track(input, frame, config_.tracking, pool_);
 }
 
-void Pipeline::track(BundledFrame frame, StageExecutor& executor, Outcome& outcome) {
+void Pipeline::track(BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome) {
   const Stopwatch watch;
   const map::BundledMap& map = *outcome.seen;
   const tracking::TrackerState before = state_;
@@ -275,8 +288,8 @@ void Pipeline::track(BundledFrame frame, StageExecutor& executor, Outcome& outco
   feature_shares_ = tracking::feature_shares(feature_shares_, map, frame, output);
   error_floors_ = tracking::error_floors(error_floors_, map, frame, output, config_.tracking.alignment);
   for (std::size_t c = 0; c < output.result.cameras.size(); ++c) {
-    Outage& outage = outcome.record.outages[c];  // what the pictures say themselves explains more
-    if (output.result.cameras[c].doubted && outage == Outage::kNone) outage = Outage::kInconsistent;
+    tracking::Outage& outage = outcome.record.outages[c];  // what the pictures say themselves explains more
+    if (output.result.cameras[c].doubted && outage == tracking::Outage::kNone) outage = tracking::Outage::kInconsistent;
   }
   if (!is_tracking(output.result.status)) {
     state_ = before;
@@ -309,8 +322,10 @@ bool Pipeline::find_again(BundledFrame& frame, const map::BundledMap& map, Outco
   if (!recogniser_) return false;
   const Stopwatch watch;
   recogniser_->describe(frame);
-  const Random random(static_cast<std::uint64_t>(config_.seed), "relocalise", static_cast<std::uint64_t>(frame.id.value()));
-  const auto location = looping::relocalise(*recogniser_, map, frame, config_.looping.verification, config_.feature_model(), random);
+  const Random random(static_cast<std::uint64_t>(config_.seed), "relocalise",
+                      static_cast<std::uint64_t>(frame.id.value()));
+  const auto location =
+      looping::relocalise(*recogniser_, map, frame, config_.looping.verification, config_.feature_model(), random);
   outcome.record.stages.push_back({"relocalise", watch.ms()});
   if (!location) return false;
   std::vector<LandmarkId> landmarks;
@@ -340,16 +355,17 @@ void Pipeline::note_motion(const map::BundledMap& map, const tracking::TrackerSt
   }
 }
 
-void Pipeline::add_keyframe(BundledFrame& frame, const tracking::TrackOutput& output, StageExecutor& executor,
-                            Outcome& outcome) {
+void Pipeline::add_keyframe(BundledFrame& frame, const tracking::TrackOutput& output,
+                            execution::StageExecutor& executor, Outcome& outcome) {
   map::MapDraft draft("track", outcome.seen);
   draft.add_sightings(folded(std::move(state_.sightings)));
   if (recogniser_) recogniser_->describe(frame);
   const tracking::NewKeyframe made =
-      tracking::make_keyframe(frame, output.matches, output.result.T_rig_world, builder_.pyramids(), output.result.reference,
-                              config_.tracking.initialisation, draft);
-  const map::CommitReport report = executor.commit(JournalStep::kTrack, std::move(draft));
-  const double grown = report.published->keyframe(output.result.reference).unit / outcome.seen->keyframe(output.result.reference).unit;
+      tracking::make_keyframe(frame, output.matches, output.result.T_rig_world, builder_.pyramids(),
+                              output.result.reference, config_.tracking.initialisation, draft);
+  const map::CommitReport report = executor.commit(execution::JournalStep::kTrack, std::move(draft));
+  const double grown =
+      report.published->keyframe(output.result.reference).unit / outcome.seen->keyframe(output.result.reference).unit;
   if (state_.twist) state_.twist->tail<3>() *= grown;  // mapping may have found another scale meanwhile
   state_ = tracking::state_at_keyframe(state_, frame.time_ns, report.keyframes.front(),
                                        committed(made.landmarks, outcome.seen->landmark_slots(), report));

@@ -5,11 +5,11 @@
 #include <optional>
 
 #include "base/thread_pool.h"
-#include "frame/frame_builder.h"
+#include "execution/stage_executor.h"
 #include "looping/relocalise.h"
+#include "matching/frame_builder.h"
 #include "system/config.h"
 #include "system/frame_record.h"
-#include "system/stage_executor.h"
 #include "tracking/initialise.h"
 #include "tracking/pose_between.h"
 #include "tracking/track.h"
@@ -31,7 +31,7 @@ class Pipeline {
   };
 
   // Reads the version of the map that `executor` gives the frame and commits keyframes to it.
-  Outcome process(const image::ImageBundle& images, StageExecutor& executor);
+  Outcome process(const image::ImageBundle& images, execution::StageExecutor& executor);
 
   // Extraction and bundling alone; cameras with left_out[i] != 0 are taken as without an image.
   frame::BundledFrame make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages,
@@ -41,30 +41,32 @@ class Pipeline {
   void restart();
 
   // Where a frame of before the start is in the map as it is now.
-  std::optional<tracking::TrackResult> locate_early(const map::BundledMap& map, const tracking::BetweenKeyframes& early);
+  std::optional<tracking::TrackResult> locate_early(const map::BundledMap& map,
+                                                    const tracking::BetweenKeyframes& early);
 
   const tracking::TrackerState& state() const { return state_; }
 
  private:
   void trust_what_is_sharp_again(const std::vector<std::uint8_t>& blurred);
-  std::vector<std::uint8_t> left_out(const image::ImageBundle& images, const std::vector<Outage>& outages) const;
-  std::vector<frame::AlignmentOptions> alignment() const;  // per camera, as it is known at present
+  std::vector<std::uint8_t> left_out(const image::ImageBundle& images,
+                                     const std::vector<tracking::Outage>& outages) const;
+  std::vector<matching::AlignmentOptions> alignment() const;  // per camera, as it is known at present
   void grow_along(const map::BundledMap& map);
-  void start(frame::BundledFrame frame, StageExecutor& executor, Outcome& outcome);
+  void start(frame::BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome);
   void keep_candidate(frame::BundledFrame frame);
-  void track(frame::BundledFrame frame, StageExecutor& executor, Outcome& outcome);
+  void track(frame::BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome);
   tracking::TrackOutput follow(frame::BundledFrame& frame, const map::BundledMap& map);
   bool find_again(frame::BundledFrame& frame, const map::BundledMap& map, Outcome& outcome);
   void note_motion(const map::BundledMap& map, const tracking::TrackerState& before, FrameRecord& record);
-  void add_keyframe(frame::BundledFrame& frame, const tracking::TrackOutput& output, StageExecutor& executor,
+  void add_keyframe(frame::BundledFrame& frame, const tracking::TrackOutput& output, execution::StageExecutor& executor,
                     Outcome& outcome);
 
   const camera::Rig& rig_;
   const Config& config_;
   ThreadPool pool_;
-  CameraMonitor monitor_;
+  tracking::CameraMonitor monitor_;
   std::vector<std::uint8_t> blurred_;  // cameras in the last frame
-  frame::FrameBuilder builder_;
+  matching::FrameBuilder builder_;
   std::vector<double> feature_shares_;  // of the cameras in the next frame's feature budget; empty: even
   std::vector<double> error_floors_;    // of the cameras, for the next frame; empty: nothing is known
   tracking::TrackerState state_;

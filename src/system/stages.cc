@@ -5,14 +5,16 @@
 namespace bslam::system {
 namespace {
 
-StageResult map_keyframe(const Config& config, const StageTask& task, const map::MapSnapshot& base, std::stop_token stop) {
+execution::StageResult map_keyframe(const Config& config, const execution::StageTask& task,
+                                    const map::MapSnapshot& base, std::stop_token stop) {
   if (!base->alive(task.keyframe)) return {};
   map::MapDraft draft("map", base);
   mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop));
   return {std::move(draft), {}};
 }
 
-StageResult close_loop(looping::LoopCloser& closer, const LoopObserver& observer, const StageTask& task, const map::MapSnapshot& base) {
+execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserver& observer,
+                                  const execution::StageTask& task, const map::MapSnapshot& base) {
   if (!base->alive(task.keyframe)) return {};
   map::MapDraft draft("loop", base);
   const auto closure = closer.close(task.keyframe, draft);
@@ -22,7 +24,7 @@ StageResult close_loop(looping::LoopCloser& closer, const LoopObserver& observer
   return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }};
 }
 
-StageResult adjust_globally(const Config& config, const map::MapSnapshot& base, std::stop_token stop) {
+execution::StageResult adjust_globally(const Config& config, const map::MapSnapshot& base, std::stop_token stop) {
   map::MapDraft draft("global", base);
   mapping::adjust_globally(config.mapping, config.feature_model(), draft, std::move(stop));
   return {std::move(draft), {}};
@@ -30,21 +32,24 @@ StageResult adjust_globally(const Config& config, const map::MapSnapshot& base, 
 
 }  // namespace
 
-StageFunctions make_stages(const Config& config, const place::VocabularyPtr& vocabulary, LoopObserver observer) {
-  StageFunctions functions;
-  functions[Stage::kMap] = [&config](const StageTask& task, const map::MapSnapshot& base, std::stop_token stop) {
+execution::StageFunctions make_stages(const Config& config, const place::VocabularyPtr& vocabulary,
+                                      LoopObserver observer) {
+  execution::StageFunctions functions;
+  functions[execution::Stage::kMap] = [&config](const execution::StageTask& task, const map::MapSnapshot& base,
+                                                std::stop_token stop) {
     return map_keyframe(config, task, base, std::move(stop));
   };
-  functions[Stage::kGlobal] = [&config](const StageTask&, const map::MapSnapshot& base, std::stop_token stop) {
+  functions[execution::Stage::kGlobal] = [&config](const execution::StageTask&, const map::MapSnapshot& base,
+                                                   std::stop_token stop) {
     return adjust_globally(config, base, std::move(stop));
   };
   if (!config.looping.loop.enabled || !vocabulary) return functions;
   auto recogniser = std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition);
-  const auto closer = std::make_shared<looping::LoopCloser>(std::move(recogniser), config.looping, config.feature_model(),
-                                                            static_cast<std::uint64_t>(config.seed));
-  functions[Stage::kLoop] = [closer, observer = std::move(observer)](const StageTask& task, const map::MapSnapshot& base, std::stop_token) {
-    return close_loop(*closer, observer, task, base);
-  };
+  const auto closer = std::make_shared<looping::LoopCloser>(
+      std::move(recogniser), config.looping, config.feature_model(), static_cast<std::uint64_t>(config.seed));
+  functions[execution::Stage::kLoop] = [closer, observer = std::move(observer)](
+                                           const execution::StageTask& task, const map::MapSnapshot& base,
+                                           std::stop_token) { return close_loop(*closer, observer, task, base); };
   return functions;
 }
 

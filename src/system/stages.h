@@ -4,9 +4,9 @@
 #include <functional>
 
 #include "base/timestamp.h"
+#include "execution/stage.h"
 #include "looping/loop_closer.h"
 #include "system/config.h"
-#include "system/stage.h"
 
 namespace bslam::system {
 
@@ -20,6 +20,7 @@ struct LoopRecord {
 using LoopObserver = std::function<void(const LoopRecord&)>;
 
 // `config` outlives them. Without a vocabulary no loops are closed.
-StageFunctions make_stages(const Config& config, const place::VocabularyPtr& vocabulary, LoopObserver observer);
+execution::StageFunctions make_stages(const Config& config, const place::VocabularyPtr& vocabulary,
+                                      LoopObserver observer);
 
 }  // namespace bslam::system

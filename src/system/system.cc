@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
+#include "base/stopwatch.h"
 #include "mapping/map_keyframe.h"
 #include "system/final_poses.h"
-#include "system/stopwatch.h"
 
 namespace bslam::system {
 namespace {
@@ -19,7 +19,8 @@ bool disowns_map(const tracking::TrackResult& result) {
 }
 
 map::BundledMap empty_map(const camera::Rig& rig, const Config& config) {
-  return map::BundledMap(std::make_shared<const camera::Rig>(rig), {config.features.scale_factor, config.features.levels});
+  return map::BundledMap(std::make_shared<const camera::Rig>(rig),
+                         {config.features.scale_factor, config.features.levels});
 }
 
 std::unique_ptr<looping::PlaceRecogniser> recogniser(const place::VocabularyPtr& vocabulary, const Config& config) {
@@ -49,13 +50,13 @@ System::System(camera::Rig rig, Config config, Resources resources)
     const std::lock_guard lock(records_mutex_);
     loops_.push_back(loop);
   };
-  const auto note_run = [this](const StageRun& run) {
+  const auto note_run = [this](const execution::StageRun& run) {
     const std::lock_guard lock(records_mutex_);
     stage_runs_.push_back({run, keyframe_time_ns_[run.task.keyframe.index()]});
   };
-  ExecutionSetup setup{make_stages(config_, resources.vocabulary, note_loop), config_.execution, note_run};
-  executor_ = resources.replay ? make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
-                               : make_stage_executor(config_.mode, gate_, std::move(setup));
+  execution::ExecutionSetup setup{make_stages(config_, resources.vocabulary, note_loop), config_.execution, note_run};
+  executor_ = resources.replay ? execution::make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
+                               : execution::make_stage_executor(config_.mode, gate_, std::move(setup));
 }
 
 System::~System() = default;
@@ -88,14 +89,15 @@ const FrameRecord& System::process(const image::ImageBundle& images) {
   for (const KeyframeId k : outcome.keyframes) set_keyframe_time(k, outcome.record.result.time_ns);
   const Stopwatch watch;
   for (const KeyframeId k : outcome.keyframes) executor_->enqueue(k);
-  if (!outcome.keyframes.empty() && config_.mode != Mode::kSequential) {
+  if (!outcome.keyframes.empty() && config_.mode != execution::Mode::kSequential) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
   frames_.push_back(std::move(outcome.record));
   const bool failed = had_pose && disowns_map(frames_.back().result);
   const map::BundledMap& seen = *outcome.seen;
-  if (failed && !loaded_ && seen.scale() != map::Scale::kMetric && seen.keyframe_slots() <= kYoungMap) give_up_young_map();
+  if (failed && !loaded_ && seen.scale() != map::Scale::kMetric && seen.keyframe_slots() <= kYoungMap)
+    give_up_young_map();
   return frames_.back();
 }
 
@@ -109,7 +111,7 @@ void System::finish() {
     mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
     final_adjustment_ms_ = watch.ms();
     check_extrinsics(draft, stop);
-    if (!stop.stop_requested()) executor_->commit(JournalStep::kFinal, std::move(draft));
+    if (!stop.stop_requested()) executor_->commit(execution::JournalStep::kFinal, std::move(draft));
     extrinsics_refined_ = config_.extrinsics.refine && extrinsics_.done && !stop.stop_requested();
   }
   locate_early_frames();
@@ -120,7 +122,8 @@ void System::finish() {
 void System::locate_early_frames() {
   const map::MapSnapshot map = store_.snapshot();
   for (const tracking::BetweenKeyframes& early : early_) {
-    const auto record = std::ranges::lower_bound(frames_, early.frame->id, {}, [](const FrameRecord& r) { return r.result.frame; });
+    const auto record =
+        std::ranges::lower_bound(frames_, early.frame->id, {}, [](const FrameRecord& r) { return r.result.frame; });
     if (record == frames_.end() || record->result.frame != early.frame->id) continue;
     if (record->result.status == tracking::TrackStatus::kTracking) continue;
     record->found_later = pipeline_.locate_early(*map, early);
@@ -133,9 +136,10 @@ void System::check_extrinsics(map::MapDraft& draft, const std::stop_token& stop)
   const auto& options = config_.extrinsics;
   if ((!options.check && !options.refine) || stop.stop_requested()) return;
   const Stopwatch watch;
-  extrinsics_ = adjustment::refine_rig(draft.map(), options, config_.features.sigma_px, config_.features.scale_factor, stop);
+  extrinsics_ =
+      calibration::refine_rig(draft.map(), options, config_.features.sigma_px, config_.features.scale_factor, stop);
   if (options.refine && extrinsics_.done) {
-    draft.set_rig(adjustment::refined(draft.map().rig(), extrinsics_));
+    draft.set_rig(calibration::refined(draft.map().rig(), extrinsics_));
     mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
   }
   extrinsics_ms_ = watch.ms();

@@ -9,27 +9,28 @@
 
 #include "camera/rig.h"
 #include "evaluation/trajectory.h"
+#include "execution/map_gate.h"
+#include "execution/stage_executor.h"
 #include "system/config.h"
 #include "system/frame_record.h"
-#include "system/map_gate.h"
 #include "system/pipeline.h"
-#include "system/stage_executor.h"
 #include "system/stages.h"
 
 namespace bslam::system {
 
 // One run of a background stage, for the timing record.
 struct StageRecord {
-  StageRun run;
+  execution::StageRun run;
   TimeNs time_ns = 0;  // of its keyframe
 };
 
 // What a run may be given besides rig and configuration.
 struct Resources {
-  std::vector<image::Image> masks = {};      // one per camera of the rig, an empty image = none; or no masks at all
-  place::VocabularyPtr vocabulary = {};      // null: no place is recognised
-  std::optional<map::BundledMap> map = {};   // of an earlier run with this rig; the run goes on in it once it finds its place
-  std::optional<Journal> replay = {};        // its run is repeated whatever the mode
+  std::vector<image::Image> masks = {};  // one per camera of the rig, an empty image = none; or no masks at all
+  place::VocabularyPtr vocabulary = {};  // null: no place is recognised
+  std::optional<map::BundledMap> map =
+      {};  // of an earlier run with this rig; the run goes on in it once it finds its place
+  std::optional<execution::Journal> replay = {};  // its run is repeated whatever the mode
 };
 
 // Poses of one part of the map. Parts that no common place joined have worlds of their own.
@@ -40,7 +41,8 @@ struct PartTrajectory {
 
 class System {
  public:
-  // Where a journal is given, the frames must be those of the journal, and calls throw ReplayMismatch where it does not fit.
+  // Where a journal is given, the frames must be those of the journal, and calls throw ReplayMismatch where it does not
+  // fit.
   System(camera::Rig rig, Config config, Resources resources = {});
   ~System();
 
@@ -50,17 +52,17 @@ class System {
   // Waits for the stages and, where configured, adjusts the whole map. Call once, after the last frame.
   void finish();
 
-  // From any thread, at any time: background stages and the adjustment at the end are stopped or left out, so that whatever
-  // the caller's thread is in returns soon. What a stopped one had found does not come into the map.
+  // From any thread, at any time: background stages and the adjustment at the end are stopped or left out, so that
+  // whatever the caller's thread is in returns soon. What a stopped one had found does not come into the map.
   void interrupt();
 
   map::MapSnapshot snapshot() const { return store_.snapshot(); }
   const std::vector<FrameRecord>& frames() const { return frames_; }
   std::vector<StageRecord> stage_runs() const;
-  Journal journal() const { return gate_.journal(); }  // what a replay needs
+  execution::Journal journal() const { return gate_.journal(); }  // what a replay needs
   double final_adjustment_ms() const { return final_adjustment_ms_; }
   // What finish() found about the extrinsics; not done where that was not asked for or not possible.
-  const adjustment::RigRefinement& extrinsics() const { return extrinsics_; }
+  const calibration::RigRefinement& extrinsics() const { return extrinsics_; }
   bool extrinsics_refined() const { return extrinsics_refined_; }  // and the map made with them
   double extrinsics_ms() const { return extrinsics_ms_; }
   int maps_started() const { return maps_started_; }
@@ -68,8 +70,8 @@ class System {
   std::vector<LoopRecord> loops() const;
   TimeNs keyframe_time(KeyframeId k) const;
 
-  // Every frame that has a pose, resolved against the present map: a trajectory for each part of the map that has some, the
-  // longest first.
+  // Every frame that has a pose, resolved against the present map: a trajectory for each part of the map that has some,
+  // the longest first.
   std::vector<PartTrajectory> trajectories() const;
   // The same as the caller was told at the time, never corrected, by parts as they were then; that of the longest final
   // trajectory first.
@@ -83,23 +85,23 @@ class System {
 
   const camera::Rig rig_;
   const Config config_;
-  const bool loaded_;  // a map of an earlier run
+  const bool loaded_;                // a map of an earlier run
   const KeyframeId first_keyframe_;  // of this run
   Pipeline pipeline_;
   std::vector<FrameRecord> frames_;
   std::vector<tracking::BetweenKeyframes> early_;  // frames of before a start, by number
   mutable std::mutex records_mutex_;
-  std::vector<StageRecord> stage_runs_;     // guarded by records_mutex_, as the two below
+  std::vector<StageRecord> stage_runs_;  // guarded by records_mutex_, as the two below
   std::vector<LoopRecord> loops_;
-  std::vector<TimeNs> keyframe_time_ns_;    // by KeyframeId of the present map
+  std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId of the present map
   double final_adjustment_ms_ = 0, extrinsics_ms_ = 0;
-  adjustment::RigRefinement extrinsics_;
+  calibration::RigRefinement extrinsics_;
   bool extrinsics_refined_ = false;
   int maps_started_ = 0;
   std::stop_source interruption_;
   map::MapStore store_;
-  MapGate gate_;
-  std::unique_ptr<StageExecutor> executor_;  // last: its threads end before the rest goes
+  execution::MapGate gate_;
+  std::unique_ptr<execution::StageExecutor> executor_;  // last: its threads end before the rest goes
 };
 
 }  // namespace bslam::system

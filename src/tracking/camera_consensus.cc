@@ -14,7 +14,8 @@ CameraTrust trusted(bool established) {
   return camera;
 }
 
-std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras, const std::vector<int>& seen, const ConsensusOptions& options) {
+std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras, const std::vector<int>& seen,
+                                   const ConsensusOptions& options) {
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     cameras[c].landmarks.clear();
     if (seen[c] >= options.min_expected) cameras[c] = trusted(true);
@@ -22,8 +23,9 @@ std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras, const std::
   return cameras;
 }
 
-std::vector<Expectation> continuity(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
-                                    const std::vector<CameraTrust>& trust, const FrameMatches& found) {
+std::vector<Expectation> continuity(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                    const SE3& T_rig_world, const std::vector<CameraTrust>& trust,
+                                    const FrameMatches& found) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   std::vector<Expectation> out(trust.size());
   for (std::size_t c = 0; c < trust.size(); ++c) {
@@ -88,9 +90,11 @@ std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity
                                       const ConsensusOptions& options) {
   std::vector<std::uint8_t> out(continuity.size(), 0);
   const auto counts = [&](const Expectation& e) { return e.expected >= options.min_expected; };
-  const bool sound = std::ranges::any_of(continuity, [&](const Expectation& e) { return counts(e) && e.share() >= options.sound_share; });
+  const bool sound = std::ranges::any_of(
+      continuity, [&](const Expectation& e) { return counts(e) && e.share() >= options.sound_share; });
   for (std::size_t c = 0; sound && c < out.size(); ++c) {
-    out[c] = counts(continuity[c]) && continuity[c].share() < options.lost_share && trust[c].share >= options.steady_share;
+    out[c] =
+        counts(continuity[c]) && continuity[c].share() < options.lost_share && trust[c].share >= options.steady_share;
   }
   return out;
 }
@@ -123,12 +127,14 @@ void retry(CameraTrust& camera, const Expectation& wide, TimeNs time_ns, const C
   }
 }
 
-void leave_out(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2, frame::BundledFrame& frame) {
+void leave_out(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2,
+               frame::BundledFrame& frame) {
   std::vector<std::vector<frame::KeypointRef>> matched;
   for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) {
     const auto all = frame.bundled.keypoints(FeatureId(f));
     std::vector<frame::KeypointRef> rest;
-    std::copy_if(all.begin(), all.end(), std::back_inserter(rest), [&](const frame::KeypointRef& r) { return r.camera.index() != camera; });
+    std::copy_if(all.begin(), all.end(), std::back_inserter(rest),
+                 [&](const frame::KeypointRef& r) { return r.camera.index() != camera; });
     if (rest.size() >= 2) matched.push_back(std::move(rest));
   }
   frame::CameraFrame& out = frame.cameras[camera];
@@ -136,7 +142,7 @@ void leave_out(const camera::Rig& rig, std::size_t camera, double min_parallax, 
   out.keypoints = {};
   out.words.clear();
   out.grid = frame::FeatureGrid(out.keypoints, rig.camera(camera).width, rig.camera(camera).height);
-  frame.bundled = frame::make_bundled(frame::rig_of(rig, frame), frame.cameras, matched, min_parallax, max_chi2);
+  frame.bundled = matching::make_bundled(frame::rig_of(rig, frame), frame.cameras, matched, min_parallax, max_chi2);
 }
 
 }  // namespace bslam::tracking

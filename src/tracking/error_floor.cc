@@ -16,7 +16,7 @@ constexpr double kRate = 0.2;              // of a frame against those before
 }  // namespace
 
 double error_floor(double before, std::vector<double> squared_errors, std::vector<double> variances,
-                   const frame::AlignmentOptions& options) {
+                   const matching::AlignmentOptions& options) {
   if (squared_errors.size() < kLeastMatches) return before;
   const double found = median(std::move(squared_errors)) / (2 * std::numbers::ln2) - median(std::move(variances));
   const double least = std::min(options.least_floor_px, options.floor_px);
@@ -24,8 +24,9 @@ double error_floor(double before, std::vector<double> squared_errors, std::vecto
   return std::sqrt((1 - kRate) * before * before + kRate * now);
 }
 
-std::vector<double> error_floors(std::span<const double> before, const map::BundledMap& map, const frame::BundledFrame& frame,
-                                 const TrackOutput& output, const frame::AlignmentOptions& options) {
+std::vector<double> error_floors(std::span<const double> before, const map::BundledMap& map,
+                                 const frame::BundledFrame& frame, const TrackOutput& output,
+                                 const matching::AlignmentOptions& options) {
   if (output.result.status != TrackStatus::kTracking) return {};
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   std::vector<double> floors(before.begin(), before.end());
@@ -47,9 +48,9 @@ std::vector<double> error_floors(std::span<const double> before, const map::Bund
   return floors;
 }
 
-std::vector<frame::AlignmentOptions> alignment_by_camera(const frame::AlignmentOptions& options, std::span<const double> floors,
-                                                         std::size_t cameras) {
-  std::vector<frame::AlignmentOptions> out(cameras, options);
+std::vector<matching::AlignmentOptions> alignment_by_camera(const matching::AlignmentOptions& options,
+                                                            std::span<const double> floors, std::size_t cameras) {
+  std::vector<matching::AlignmentOptions> out(cameras, options);
   for (std::size_t c = 0; c < std::min(cameras, floors.size()); ++c) out[c].floor_px = floors[c];
   return out;
 }

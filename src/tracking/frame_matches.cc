@@ -17,9 +17,9 @@ std::size_t count(const FrameMatches& matches) {
 
 MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
                            std::span<const LandmarkId> landmarks, const FrameMatches& known,
-                           const frame::ProjectionSearchOptions& options, ThreadPool& pool) {
+                           const matching::ProjectionSearchOptions& options, ThreadPool& pool) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  const std::vector<frame::SearchPoint> points = map::search_points(map, landmarks);
+  const std::vector<matching::SearchPoint> points = map::search_points(map, landmarks);
   std::vector<std::uint32_t> place_of(map.landmark_slots(), 0);  // position in `points` + 1
   for (std::size_t i = 0; i < landmarks.size(); ++i) place_of[landmarks[i].index()] = static_cast<std::uint32_t>(i + 1);
 
@@ -29,7 +29,7 @@ MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame
   pool.for_each(rig.size(), [&](std::size_t c) {
     const frame::CameraFrame& camera_frame = frame.cameras[c];
     if (camera_frame.keypoints.empty()) return;
-    std::vector<frame::SearchPoint> own = points;
+    std::vector<matching::SearchPoint> own = points;
     std::vector<std::uint8_t> taken(camera_frame.keypoints.size(), 0);
     if (!known.empty()) {
       for (const Match& m : known[c]) {
@@ -37,10 +37,12 @@ MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame
         if (const std::uint32_t place = place_of[m.landmark.index()]) own[place - 1].skip = 1;
       }
     }
-    auto result = frame::search_by_projection(rig.camera(c), camera_frame, rig.cam_from_rig(c) * T_rig_world, own, taken, options);
+    auto result = matching::search_by_projection(rig.camera(c), camera_frame, rig.cam_from_rig(c) * T_rig_world, own,
+                                                 taken, options);
     visible[c] = std::move(result.visible);
-    for (const frame::ProjectionMatch& m : result.matches) out.found[c].push_back({m.keypoint, landmarks[m.point]});
-    std::sort(out.found[c].begin(), out.found[c].end(), [](const Match& a, const Match& b) { return a.keypoint < b.keypoint; });
+    for (const matching::ProjectionMatch& m : result.matches) out.found[c].push_back({m.keypoint, landmarks[m.point]});
+    std::sort(out.found[c].begin(), out.found[c].end(),
+              [](const Match& a, const Match& b) { return a.keypoint < b.keypoint; });
   });
   std::vector<std::uint8_t> seen(landmarks.size(), 0);
   for (const auto& list : visible) {
@@ -66,10 +68,10 @@ FrameMatches merge(const FrameMatches& a, const FrameMatches& b) {
 namespace {
 
 // Aligns one matched keypoint to its landmark's reference patch.
-std::optional<frame::AlignedKeypoint> align_to_reference(const map::BundledMap& map, const camera::Camera& camera,
-                                                         const SE3& T_cam_world, const image::Pyramid& pyramid,
-                                                         const map::Landmark& landmark, const Eigen::Vector2d& guess,
-                                                         const frame::AlignmentOptions& options) {
+std::optional<matching::AlignedKeypoint> align_to_reference(const map::BundledMap& map, const camera::Camera& camera,
+                                                            const SE3& T_cam_world, const image::Pyramid& pyramid,
+                                                            const map::Landmark& landmark, const Eigen::Vector2d& guess,
+                                                            const matching::AlignmentOptions& options) {
   const map::LandmarkReference& reference = landmark.reference;
   const camera::Rig& rig = map.rig();
   const feature::Keypoints& keypoints = map.keypoints(reference.keyframe, reference.keypoint.camera);
@@ -78,17 +80,17 @@ std::optional<frame::AlignedKeypoint> align_to_reference(const map::BundledMap& 
   // Smaller pictures have fewer levels than those of the reference may have had.
   const std::size_t level = keypoints.level[k];
   const double scale = level < pyramid.size() ? pyramid.scale_x[level] : std::pow(map.pyramid().scale_factor, level);
-  const auto warp = frame::patch_warp(rig.camera(reference.keypoint.camera), camera, T_cam_world * T_ref_world.inverse(),
-                                      T_ref_world * landmark.position, scale);
+  const auto warp = matching::patch_warp(rig.camera(reference.keypoint.camera), camera,
+                                         T_cam_world * T_ref_world.inverse(), T_ref_world * landmark.position, scale);
   if (!warp) return std::nullopt;
-  return frame::align_patch(keypoints.patch[k], *warp, pyramid, guess, options);
+  return matching::align_patch(keypoints.patch[k], *warp, pyramid, guess, options);
 }
 
 }  // namespace
 
 void align_matches(const map::BundledMap& map, const SE3& T_rig_world, FrameMatches& matches,
-                   std::span<const image::Pyramid> pyramids, std::span<const frame::AlignmentOptions> alignment,
-                   const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool) {
+                   std::span<const image::Pyramid> pyramids, std::span<const matching::AlignmentOptions> alignment,
+                   const matching::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   pool.for_each(matches.size(), [&](std::size_t c) {
     if (matches[c].empty()) return;
@@ -113,15 +115,15 @@ void align_matches(const map::BundledMap& map, const SE3& T_rig_world, FrameMatc
 
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                        const FrameMatches& matches,
-                                                       std::optional<frame::DetectionNoise> unaligned) {
+                                                       std::optional<matching::DetectionNoise> unaligned) {
   std::vector<solver::PoseObservation> out;
   out.reserve(count(matches));
   for (std::size_t c = 0; c < matches.size(); ++c) {
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     for (const Match& m : matches[c]) {
       const std::size_t k = m.keypoint.index();
-      const double sigma =
-          unaligned ? unaligned->sigma_px * std::pow(map.pyramid().scale_factor, keypoints.level[k]) : keypoints.sigma[k];
+      const double sigma = unaligned ? unaligned->sigma_px * std::pow(map.pyramid().scale_factor, keypoints.level[k])
+                                     : keypoints.sigma[k];
       out.push_back({CameraIndex(c), map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>(), sigma});
     }
   }
@@ -141,8 +143,8 @@ std::vector<KeypointPlace> places(const frame::BundledFrame& frame, const FrameM
   return out;
 }
 
-void restore_outliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier, std::span<const KeypointPlace> before,
-                      frame::BundledFrame& frame) {
+void restore_outliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier,
+                      std::span<const KeypointPlace> before, frame::BundledFrame& frame) {
   std::size_t i = 0;
   for (std::size_t c = 0; c < matches.size(); ++c) {
     feature::Keypoints& keypoints = frame.cameras[c].keypoints;

@@ -7,10 +7,10 @@
 
 #include "base/thread_pool.h"
 #include "frame/bundled_frame.h"
-#include "frame/bundling.h"
-#include "frame/patch_alignment.h"
-#include "frame/projection_search.h"
 #include "map/bundled_map.h"
+#include "matching/bundling.h"
+#include "matching/patch_alignment.h"
+#include "matching/projection_search.h"
 #include "solver/pose_solver.h"
 #include "tracking/options.h"
 
@@ -36,25 +36,26 @@ struct MatchSearch {
 
 // Looks for `landmarks` in every camera at `T_rig_world`, leaving out the keypoints and, per camera, the landmarks that
 // are in `known` already.
-MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame& frame, const geometry::SE3& T_rig_world,
-                           std::span<const LandmarkId> landmarks, const FrameMatches& known,
-                           const frame::ProjectionSearchOptions& options, ThreadPool& pool);
+MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame& frame,
+                           const geometry::SE3& T_rig_world, std::span<const LandmarkId> landmarks,
+                           const FrameMatches& known, const matching::ProjectionSearchOptions& options,
+                           ThreadPool& pool);
 
 // `a` and `b` together; they share no keypoint.
 FrameMatches merge(const FrameMatches& a, const FrameMatches& b);
 
-// Moves each matched keypoint of `frame` to where the reference patch of its landmark is seen from `T_rig_world`, with the
-// standard deviation of that; a keypoint whose patch does not align keeps its place and gets the detector's. `matches` are told
-// which did. `pyramids` and `alignment`: one per camera.
+// Moves each matched keypoint of `frame` to where the reference patch of its landmark is seen from `T_rig_world`, with
+// the standard deviation of that; a keypoint whose patch does not align keeps its place and gets the detector's.
+// `matches` are told which did. `pyramids` and `alignment`: one per camera.
 void align_matches(const map::BundledMap& map, const geometry::SE3& T_rig_world, FrameMatches& matches,
-                   std::span<const image::Pyramid> pyramids, std::span<const frame::AlignmentOptions> alignment,
-                   const frame::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool);
+                   std::span<const image::Pyramid> pyramids, std::span<const matching::AlignmentOptions> alignment,
+                   const matching::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool);
 
-// Observations for the pose solver, camera by camera in the order of `matches`. Before alignment a keypoint's own standard
-// deviation is that between cameras of one frame; against the map it has the detector's: `unaligned`.
+// Observations for the pose solver, camera by camera in the order of `matches`. Before alignment a keypoint's own
+// standard deviation is that between cameras of one frame; against the map it has the detector's: `unaligned`.
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                        const FrameMatches& matches,
-                                                       std::optional<frame::DetectionNoise> unaligned = {});
+                                                       std::optional<matching::DetectionNoise> unaligned = {});
 
 // Where keypoints were before alignment.
 struct KeypointPlace {
@@ -63,10 +64,11 @@ struct KeypointPlace {
   float sigma = 0;
 };
 
-// The places of the matched keypoints, in the order of `matches`; and back to them where they turned out to be outliers.
+// The places of the matched keypoints, in the order of `matches`; and back to them where they turned out to be
+// outliers.
 std::vector<KeypointPlace> places(const frame::BundledFrame& frame, const FrameMatches& matches);
-void restore_outliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier, std::span<const KeypointPlace> before,
-                      frame::BundledFrame& frame);
+void restore_outliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier,
+                      std::span<const KeypointPlace> before, frame::BundledFrame& frame);
 
 // The matches whose observation is an inlier.
 FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier);

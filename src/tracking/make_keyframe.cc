@@ -4,7 +4,7 @@
 #include <map>
 
 #include "feature/window.h"
-#include "frame/bundling.h"
+#include "matching/bundling.h"
 
 namespace bslam::tracking {
 namespace {
@@ -35,8 +35,8 @@ struct Groups {
 
 // Keypoints that show one landmark are one feature; bundled keypoints without a landmark join the feature they were
 // bundled with, as far as its landmark has none in their camera and they see it where it is.
-Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const camera::Rig& rig, const map::BundledMap& map,
-               const geometry::SE3& T_rig_world) {
+Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const camera::Rig& rig,
+               const map::BundledMap& map, const geometry::SE3& T_rig_world) {
   const auto agrees = [&](KeypointRef r, LandmarkId l) {
     const feature::Keypoints& keypoints = frame.keypoints(r.camera);
     const std::size_t k = r.keypoint.index();
@@ -88,7 +88,8 @@ void follow_with_patch(const image::Pyramid& pyramid, feature::Keypoints& keypoi
   constexpr double kMargin = feature::kPatchSize / 2 + 1;
   const std::size_t level = keypoints.level[k];
   const image::Image& image = pyramid.levels[level];
-  const double x = pyramid.from_base_x(level, keypoints.pixel[k].x()), y = pyramid.from_base_y(level, keypoints.pixel[k].y());
+  const double x = pyramid.from_base_x(level, keypoints.pixel[k].x()),
+               y = pyramid.from_base_y(level, keypoints.pixel[k].y());
   if (x < kMargin || y < kMargin || x > image.width() - 1 - kMargin || y > image.height() - 1 - kMargin) return;
   keypoints.patch[k] = feature::sample_patch(image.view(), static_cast<float>(x), static_cast<float>(y));
 }
@@ -105,7 +106,7 @@ std::shared_ptr<BundledFrame> regrouped_frame(const BundledFrame& frame, const G
     }
     camera.grid = frame::FeatureGrid(camera.keypoints, rig.camera(c).width, rig.camera(c).height);
   }
-  out->bundled = frame::make_bundled(rig, out->cameras, groups.matched, options.min_parallax, options.max_chi2);
+  out->bundled = matching::make_bundled(rig, out->cameras, groups.matched, options.min_parallax, options.max_chi2);
   return out;
 }
 
@@ -145,7 +146,8 @@ NewKeyframe make_keyframe(const BundledFrame& frame, const FrameMatches& matches
     const auto& point = stored->bundled.point(feature);
     if (has_landmark[f] || !has_sound_depth(point, options)) continue;
     const KeypointRef first = stored->bundled.keypoints(feature).front();
-    out.landmarks.push_back(draft.add_landmark(T_world_rig * point->point_rig, {{out.keyframe, feature}}, {out.keyframe, first}));
+    out.landmarks.push_back(
+        draft.add_landmark(T_world_rig * point->point_rig, {{out.keyframe, feature}}, {out.keyframe, first}));
   }
   std::vector<LandmarkId> seen_again = out.landmarks;
   draft.refresh_landmarks(std::move(seen_again));

@@ -18,7 +18,8 @@ std::vector<LandmarkId> landmarks_of_both(const map::BundledMap& map, KeyframeId
   return out;
 }
 
-TrackResult result_at(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world, KeyframeId reference) {
+TrackResult result_at(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                      KeyframeId reference) {
   TrackResult out;
   out.frame = frame.id;
   out.time_ns = frame.time_ns;
@@ -27,14 +28,16 @@ TrackResult result_at(const map::BundledMap& map, const frame::BundledFrame& fra
   out.T_rig_world = T_rig_world;
   out.reference = reference;
   out.T_rig_reference = T_rig_world * map.resolved_pose(reference).inverse();
-  for (const frame::CameraFrame& c : frame.cameras) out.cameras.push_back({static_cast<int>(c.keypoints.size()), 0, 0, false});
+  for (const frame::CameraFrame& c : frame.cameras)
+    out.cameras.push_back({static_cast<int>(c.keypoints.size()), 0, 0, false});
   return out;
 }
 
 }  // namespace
 
-std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early, const frame::DetectionNoise& noise,
-                                        const TrackingOptions& options, ThreadPool& pool) {
+std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early,
+                                        const matching::DetectionNoise& noise, const TrackingOptions& options,
+                                        ThreadPool& pool) {
   const KeyframeId before = map.surviving(early.before), after = map.surviving(early.after);
   if (!before.valid() || !after.valid()) return std::nullopt;
   const frame::BundledFrame& frame = *early.frame;
@@ -48,12 +51,16 @@ std::optional<TrackResult> pose_between(const map::BundledMap& map, const Betwee
   FrameMatches found;
   for (const double radius : {options.matching.predicted_radius, options.matching.local_radius}) {
     found = find_landmarks(map, frame, T, landmarks, {},
-                           {.radius = radius, .max_hamming = options.matching.max_hamming, .ratio = options.matching.ratio,
+                           {.radius = radius,
+                            .max_hamming = options.matching.max_hamming,
+                            .ratio = options.matching.ratio,
                             .scale_factor = map.pyramid().scale_factor},
-                           pool).found;
+                           pool)
+                .found;
     solution = solver::solve_pose(map.rig(), pose_observations(map, frame, found, noise), T, options.pose);
     const auto needed = options.min_inlier_share * static_cast<double>(count(found));
-    if (!solution.ok || solution.num_inliers < options.min_inliers || solution.num_inliers < needed) return std::nullopt;
+    if (!solution.ok || solution.num_inliers < options.min_inliers || solution.num_inliers < needed)
+      return std::nullopt;
     T = solution.T_rig_world;
   }
   TrackResult out = result_at(map, frame, T, before);

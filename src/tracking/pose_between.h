@@ -1,5 +1,5 @@
-// Poses of frames that came before there was a map: between the two keyframes of a start up to scale, found in the map as it
-// became.
+// Poses of frames that came before there was a map: between the two keyframes of a start up to scale, found in the map
+// as it became.
 #pragma once
 
 #include <optional>
@@ -10,12 +10,13 @@ namespace bslam::tracking {
 
 struct BetweenKeyframes {
   std::shared_ptr<const frame::BundledFrame> frame;
-  KeyframeId before, after;         // as committed: either may have been culled since
+  KeyframeId before, after;            // as committed: either may have been culled since
   TimeNs before_ns = 0, after_ns = 0;  // of their frames
 };
 
 // Empty where the map does not support a pose of the frame, or a keyframe's part is gone.
-std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early, const frame::DetectionNoise& noise,
-                                        const TrackingOptions& options, ThreadPool& pool);
+std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early,
+                                        const matching::DetectionNoise& noise, const TrackingOptions& options,
+                                        ThreadPool& pool);
 
 }  // namespace bslam::tracking

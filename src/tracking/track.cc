@@ -11,7 +11,6 @@ namespace {
 
 using geometry::SE3;
 
-
 // Motion from the last pose to `time_ns`, where it is known.
 std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) {
   const double dt = to_seconds(time_ns - state.time_ns);
@@ -21,14 +20,17 @@ std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) 
 }
 
 // In the map as it is now.
-SE3 last_pose(const TrackInput& input) { return input.state.T_rig_reference * input.map.resolved_pose(input.state.reference); }
+SE3 last_pose(const TrackInput& input) {
+  return input.state.T_rig_reference * input.map.resolved_pose(input.state.reference);
+}
 
 // The last pose moved on as far as the motion is known.
 SE3 predict(const TrackInput& input, TimeNs time_ns) {
   return motion_since_last(input.state, time_ns).value_or(SE3()) * last_pose(input);
 }
 
-// What the last frame showed, and the last image of cameras that had none in it, as far as the present map still knows it.
+// What the last frame showed, and the last image of cameras that had none in it, as far as the present map still knows
+// it.
 std::vector<LandmarkId> seen_last(const map::BundledMap& map, const TrackerState& state) {
   std::vector<LandmarkId> out;
   const auto add = [&](const std::vector<LandmarkId>& landmarks) {
@@ -46,7 +48,8 @@ std::vector<LandmarkId> seen_last(const map::BundledMap& map, const TrackerState
   return out;
 }
 
-bool supported(const solver::PoseSolution& solution, std::size_t num_matches, int min_inliers, const TrackingOptions& options) {
+bool supported(const solver::PoseSolution& solution, std::size_t num_matches, int min_inliers,
+               const TrackingOptions& options) {
   return solution.ok && solution.num_inliers >= min_inliers &&
          solution.num_inliers >= options.min_inlier_share * static_cast<double>(num_matches);
 }
@@ -56,7 +59,8 @@ struct Coarse {
   FrameMatches matches;  // inliers
   LostReason reason = LostReason::kNone;
   std::vector<std::uint8_t> left_out = {};  // per camera: doubted before or now
-  std::vector<Expectation> again = {};      // per camera: what of the last frame was seen again; empty after a wide search alone
+  std::vector<Expectation> again =
+      {};  // per camera: what of the last frame was seen again; empty after a wide search alone
 };
 
 bool any(const std::vector<std::uint8_t>& flags) { return std::ranges::find(flags, std::uint8_t{1}) != flags.end(); }
@@ -67,12 +71,17 @@ void drop(const std::vector<std::uint8_t>& cameras, FrameMatches& matches) {
   }
 }
 
-frame::ProjectionSearchOptions search_options(const TrackInput& input, const MatchingOptions& matching, double radius) {
-  return {.radius = radius, .max_hamming = matching.max_hamming, .ratio = matching.ratio, .scale_factor = input.scale_factor};
+matching::ProjectionSearchOptions search_options(const TrackInput& input, const MatchingOptions& matching,
+                                                 double radius) {
+  return {.radius = radius,
+          .max_hamming = matching.max_hamming,
+          .ratio = matching.ratio,
+          .scale_factor = input.scale_factor};
 }
 
-// Motion while the cameras of a frame fire: that since the last frame, going on with the acceleration it had against the
-// interval before. The poses say it, never the late cameras alone: what these see again they saw first with the same error.
+// Motion while the cameras of a frame fire: that since the last frame, going on with the acceleration it had against
+// the interval before. The poses say it, never the late cameras alone: what these see again they saw first with the
+// same error.
 solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFrame& frame) {
   solver::MotionModel motion{.delay_s = frame::delays_of(frame), .T_before = last_pose(input)};
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
@@ -82,20 +91,23 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   }
   motion.gain = 1.0 / dt;
   if (!input.state.twist) return motion;
-  const double ahead = 0.5 * (dt + frame::farthest_delay_s(frame)) / dt;  // from the middle of the interval, in intervals
+  const double ahead =
+      0.5 * (dt + frame::farthest_delay_s(frame)) / dt;  // from the middle of the interval, in intervals
   motion.gain = (1.0 + ahead) / dt;
   motion.offset = -ahead * *input.state.twist;
   return motion;
 }
 
 // Pose from what is found near where the pose so far puts it. False where that is too little.
-bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
-                             const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
+bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame,
+                             const std::vector<LandmarkId>& landmarks, const TrackingOptions& options, ThreadPool& pool,
+                             Coarse& out) {
   const map::BundledMap& map = input.map;
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   const SE3 predicted = out.T_rig_world;
   FrameMatches found = find_landmarks(map, frame, predicted, landmarks, {},
-                                      search_options(input, options.matching, options.matching.predicted_radius), pool).found;
+                                      search_options(input, options.matching, options.matching.predicted_radius), pool)
+                           .found;
   std::vector<std::uint8_t> left_out = out.left_out;
   drop(left_out, found);
   auto observations = pose_observations(map, frame, found, input.noise);
@@ -126,10 +138,11 @@ bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame
   return true;
 }
 
-// Pose from the landmarks about those of the last frame, looked for in wide windows, with a consensus. False where that is too
-// little.
-bool track_in_wide_windows(const TrackInput& input, const frame::BundledFrame& frame, const std::vector<LandmarkId>& landmarks,
-                           const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
+// Pose from the landmarks about those of the last frame, looked for in wide windows, with a consensus. False where that
+// is too little.
+bool track_in_wide_windows(const TrackInput& input, const frame::BundledFrame& frame,
+                           const std::vector<LandmarkId>& landmarks, const TrackingOptions& options, ThreadPool& pool,
+                           Coarse& out) {
   const map::BundledMap& map = input.map;
   const map::LocalView view = map::make_local_view(map, landmarks, input.state.reference, options.local_view);
   auto wide = search_options(input, options.matching, options.matching.wide_radius);
@@ -139,8 +152,9 @@ bool track_in_wide_windows(const TrackInput& input, const frame::BundledFrame& f
   drop(out.left_out, search.found);
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return false;
   const auto observations = pose_observations(map, frame, search.found, input.noise);
-  const auto solution = solver::ransac_pose(frame::rig_of(map.rig(), frame), observations, out.T_rig_world, options.pose, {},
-                                            Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
+  const auto solution =
+      solver::ransac_pose(frame::rig_of(map.rig(), frame), observations, out.T_rig_world, options.pose, {},
+                          Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
   out.reason = LostReason::kFewInliers;
   if (!supported(solution, observations.size(), options.min_inliers_wide, options)) return false;
   out.T_rig_world = solution.T_rig_world;
@@ -149,9 +163,9 @@ bool track_in_wide_windows(const TrackInput& input, const frame::BundledFrame& f
   return true;
 }
 
-// Pose from the landmarks of the last frame: near where the motion model puts them, and where that finds too little or no motion
-// is known, about where a search in wide windows does. Narrow windows about a motion that was only guessed would find what
-// seems to confirm the guess.
+// Pose from the landmarks of the last frame: near where the motion model puts them, and where that finds too little or
+// no motion is known, about where a search in wide windows does. Narrow windows about a motion that was only guessed
+// would find what seems to confirm the guess.
 Coarse track_last_frame(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
                         ThreadPool& pool) {
   const std::vector<LandmarkId> landmarks = seen_last(input.map, input.state);
@@ -170,10 +184,10 @@ bool any_due_for_retry(const TrackerState& state, TimeNs time_ns, const Consensu
 
 struct Fine {
   solver::PoseSolution solution;
-  FrameMatches matches;                 // all, inliers and outliers
+  FrameMatches matches;  // all, inliers and outliers
   std::vector<LandmarkId> visible;
-  std::vector<Expectation> views;       // per camera, of the local view
-  std::vector<Expectation> wide;        // the same in wide windows, where a doubted camera is due to be tried again
+  std::vector<Expectation> views;  // per camera, of the local view
+  std::vector<Expectation> wide;   // the same in wide windows, where a doubted camera is due to be tried again
 };
 
 // Per camera.
@@ -205,13 +219,15 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::Bund
   const std::vector<KeypointPlace> before = places(frame, out.matches);
   align_matches(map, coarse.T_rig_world, out.matches, input.pyramids, input.alignment, input.noise, frame, pool);
   const solver::MotionModel motion = motion_model(input, frame);
-  out.solution = solver::solve_pose(map.rig(), pose_observations(map, frame, out.matches), coarse.T_rig_world, motion, options.pose);
+  out.solution = solver::solve_pose(map.rig(), pose_observations(map, frame, out.matches), coarse.T_rig_world, motion,
+                                    options.pose);
   frame.twist = motion.twist(out.solution.T_rig_world);
   restore_outliers(out.matches, out.solution.inlier, before, frame);
   return out;
 }
 
-std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const FrameMatches& matched, const FrameMatches& inliers) {
+std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const FrameMatches& matched,
+                                        const FrameMatches& inliers) {
   std::vector<CameraCounts> counts(frame.cameras.size());
   for (std::size_t c = 0; c < counts.size(); ++c) {
     counts[c].keypoints = static_cast<int>(frame.cameras[c].keypoints.size());
@@ -240,11 +256,13 @@ void note_trust(const frame::BundledFrame& frame, const Coarse& coarse, const Fi
     if (coarse.left_out[c]) {
       doubt(camera, fine.views[c], frame.time_ns, options.consensus);
       const bool tried = !fine.wide.empty() && fine.wide[c].expected > 0;
-      if (tried && due_for_retry(camera, frame.time_ns, options.consensus)) retry(camera, fine.wide[c], frame.time_ns, options.consensus);
+      if (tried && due_for_retry(camera, frame.time_ns, options.consensus))
+        retry(camera, fine.wide[c], frame.time_ns, options.consensus);
       continue;
     }
     if (frame.cameras[c].state != image::ImageState::kPresent) {
-      if (to_seconds(frame.time_ns - camera.seen_ns) > kMaxPrediction_s) camera.landmarks.clear();  // much may have come between
+      if (to_seconds(frame.time_ns - camera.seen_ns) > kMaxPrediction_s)
+        camera.landmarks.clear();  // much may have come between
       continue;
     }
     if (!coarse.again.empty()) trust(camera, coarse.again[c], options.consensus);
@@ -321,24 +339,34 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, c
 
 std::string_view describe(LostReason reason) {
   switch (reason) {
-    case LostReason::kNone: return "";
-    case LostReason::kNotStarted: return "not started";
-    case LostReason::kNoImages: return "no usable image";
-    case LostReason::kFewFeatures: return "too few features";
-    case LostReason::kFewMatches: return "too few matches";
-    case LostReason::kFewInliers: return "too few matches agree";
-    case LostReason::kUnstablePose: return "pose not supported";
-    case LostReason::kNotFound: return "place not found in the map";
+    case LostReason::kNone:
+      return "";
+    case LostReason::kNotStarted:
+      return "not started";
+    case LostReason::kNoImages:
+      return "no usable image";
+    case LostReason::kFewFeatures:
+      return "too few features";
+    case LostReason::kFewMatches:
+      return "too few matches";
+    case LostReason::kFewInliers:
+      return "too few matches agree";
+    case LostReason::kUnstablePose:
+      return "pose not supported";
+    case LostReason::kNotFound:
+      return "place not found in the map";
   }
   return "";
 }
 
-TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options, ThreadPool& pool) {
+TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
+                  ThreadPool& pool) {
   const bool any_image = std::any_of(frame.cameras.begin(), frame.cameras.end(), [](const frame::CameraFrame& c) {
     return c.state == image::ImageState::kPresent;
   });
   if (!any_image) return lost(input.state, frame, LostReason::kNoImages);
-  if (frame.num_keypoints() < static_cast<std::size_t>(options.min_inliers)) return lost(input.state, frame, LostReason::kFewFeatures);
+  if (frame.num_keypoints() < static_cast<std::size_t>(options.min_inliers))
+    return lost(input.state, frame, LostReason::kFewFeatures);
   const geometry::Vector6d twist = frame.twist;
   const auto fail = [&](LostReason reason) {
     frame.twist = twist;  // what a pose without support said about the motion has none either
@@ -351,7 +379,8 @@ TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const Tra
     return fail(fine.solution.num_inliers < options.min_inliers ? LostReason::kFewInliers : LostReason::kUnstablePose);
   }
   for (std::size_t c = 0; c < coarse.left_out.size(); ++c) {
-    if (coarse.left_out[c]) leave_out(input.map.rig(), c, options.initialisation.min_parallax, options.initialisation.max_chi2, frame);
+    if (coarse.left_out[c])
+      leave_out(input.map.rig(), c, options.initialisation.min_parallax, options.initialisation.max_chi2, frame);
   }
   return tracked(input, frame, coarse, fine, options);
 }

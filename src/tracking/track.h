@@ -17,7 +17,16 @@ inline constexpr double kMaxPrediction_s = 0.5;  // between frames: the motion s
 enum class TrackStatus { kNotStarted, kTracking, kLost };
 
 // Why a frame has no pose. A frame whose pose is not supported is lost, never guessed.
-enum class LostReason { kNone, kNotStarted, kNoImages, kFewFeatures, kFewMatches, kFewInliers, kUnstablePose, kNotFound };
+enum class LostReason {
+  kNone,
+  kNotStarted,
+  kNoImages,
+  kFewFeatures,
+  kFewMatches,
+  kFewInliers,
+  kUnstablePose,
+  kNotFound
+};
 
 std::string_view describe(LostReason reason);
 
@@ -31,8 +40,8 @@ struct TrackResult {
   TimeNs time_ns = 0;
   TrackStatus status = TrackStatus::kNotStarted;
   LostReason reason = LostReason::kNotStarted;
-  geometry::SE3 T_rig_world;      // meaningful while tracking
-  KeyframeId reference;           // the pose is kept relative to this keyframe, so that corrections carry it along
+  geometry::SE3 T_rig_world;  // meaningful while tracking
+  KeyframeId reference;       // the pose is kept relative to this keyframe, so that corrections carry it along
   geometry::SE3 T_rig_reference;
   std::vector<CameraCounts> cameras;
 };
@@ -40,15 +49,15 @@ struct TrackResult {
 // What the tracker carries from frame to frame; a value.
 struct TrackerState {
   TrackStatus status = TrackStatus::kNotStarted;
-  TimeNs time_ns = 0;                         // of the last tracked frame
-  KeyframeId reference;                       // as in TrackResult, of the last tracked frame
+  TimeNs time_ns = 0;    // of the last tracked frame
+  KeyframeId reference;  // as in TrackResult, of the last tracked frame
   geometry::SE3 T_rig_reference;
-  std::optional<geometry::Vector6d> twist;    // T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); rad/s, m/s
-  std::vector<LandmarkId> landmarks;          // inliers of the last tracked frame
-  std::vector<CameraTrust> cameras;           // empty as long as no frame was tracked
+  std::optional<geometry::Vector6d> twist;  // T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); rad/s, m/s
+  std::vector<LandmarkId> landmarks;        // inliers of the last tracked frame
+  std::vector<CameraTrust> cameras;         // empty as long as no frame was tracked
   int frames_since_keyframe = 0;
-  int best_overlap = 0;                       // most landmarks of the reference found in a frame since it was made
-  std::vector<map::Sighting> sightings;       // not yet folded into the map
+  int best_overlap = 0;                  // most landmarks of the reference found in a frame since it was made
+  std::vector<map::Sighting> sightings;  // not yet folded into the map
 };
 
 // Per camera: it contradicts the others or has seen nothing again, and waits to be believed anew.
@@ -57,22 +66,23 @@ std::vector<std::uint8_t> doubted(const TrackerState& state, std::size_t cameras
 struct TrackOutput {
   TrackResult result;
   TrackerState state;
-  FrameMatches matches;       // inliers
+  FrameMatches matches;  // inliers
   bool keyframe_due = false;
 };
 
 struct TrackInput {
   const map::BundledMap& map;
-  std::span<const image::Pyramid> pyramids;             // per camera
-  std::span<const frame::AlignmentOptions> alignment;  // per camera
+  std::span<const image::Pyramid> pyramids;               // per camera
+  std::span<const matching::AlignmentOptions> alignment;  // per camera
   const TrackerState& state;
-  frame::DetectionNoise noise;
+  matching::DetectionNoise noise;
   double scale_factor = 1.2;  // of the pyramid
   std::uint64_t seed = 1;
 };
 
 // Finds the pose of `frame`, moving matched keypoints to their aligned places. The map has at least one keyframe.
-TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options, ThreadPool& pool);
+TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
+                  ThreadPool& pool);
 
 // A frame without a pose, and the state after it.
 TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, LostReason reason);

@@ -13,12 +13,12 @@ constexpr double kSigmaPx = 0.7, kScaleFactor = 1.2;
 
 // Cameras named in `late_s` fire that much after the frame.
 map::SimulatedMap true_map(camera::Rig rig, int keyframes, std::vector<double> late_s = {}, bool knows_motion = false) {
-  simulation::FeatureSimulatorOptions options;
+  synthetic::FeatureSimulatorOptions options;
   options.landmarks = 2500;
   options.max_keypoints = 500;
   options.sigma_px = kSigmaPx;
   options.capture_offset_s = std::move(late_s);
-  map::SimulatedMap out(simulation::FeatureSimulator(std::move(rig), simulation::make_orbit({}), options));
+  map::SimulatedMap out(synthetic::FeatureSimulator(std::move(rig), synthetic::make_orbit({}), options));
   out.knows_motion = knows_motion;
   for (int i = 0; i < keyframes; ++i) out.add_keyframe(FrameId(i), 0.25 * i);
   return out;
@@ -66,17 +66,19 @@ double median_point_error_m(const map::SimulatedMap& world, const map::BundledMa
 
 TEST(AdjustMap, BringsPerturbedPosesAndPointsNearTheTruth) {
   for (const int cameras : {1, 2, 4}) {
-    map::SimulatedMap world = true_map(simulation::ring_rig(cameras), 5);
+    map::SimulatedMap world = true_map(synthetic::ring_rig(cameras), 5);
     const Selection selection = everything(world.map, cameras == 1 ? 2 : 1);
     map::BundledMap start = world.map;
     perturb(selection, start);
     map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
-    const AdjustmentReport report = adjust_map(selection, {.robust_iterations = 10, .final_iterations = 10}, kSigmaPx, kScaleFactor, draft);
+    const AdjustmentReport report =
+        adjust_map(selection, {.robust_iterations = 10, .final_iterations = 10}, kSigmaPx, kScaleFactor, draft);
     ASSERT_TRUE(report.done) << cameras << " cameras";
     EXPECT_LT(report.final_cost, report.initial_cost);
     EXPECT_LT(mean_pose_error_m(world, draft.map()), 0.4 * mean_pose_error_m(world, start)) << cameras << " cameras";
     EXPECT_LT(mean_pose_error_m(world, draft.map()), 0.012) << cameras << " cameras";
-    EXPECT_LT(median_point_error_m(world, draft.map()), 0.7 * median_point_error_m(world, start)) << cameras << " cameras";
+    EXPECT_LT(median_point_error_m(world, draft.map()), 0.7 * median_point_error_m(world, start))
+        << cameras << " cameras";
     // 5 % of all observations lie beyond the 95 % bound by their noise alone.
     EXPECT_LT(static_cast<double>(report.outliers), 0.08 * static_cast<double>(report.observations));
     EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
@@ -85,7 +87,7 @@ TEST(AdjustMap, BringsPerturbedPosesAndPointsNearTheTruth) {
 
 // Of four cameras two fire 40 ms late while the rig moves on.
 double error_of_a_rig_with_late_cameras(bool knows_motion) {
-  const map::SimulatedMap world = true_map(simulation::default_rig(), 8, {0, 0, 0.04, 0.04}, knows_motion);
+  const map::SimulatedMap world = true_map(synthetic::default_rig(), 8, {0, 0, 0.04, 0.04}, knows_motion);
   const Selection selection = everything(world.map, 2);
   map::BundledMap start = world.map;
   perturb(selection, start);
@@ -101,7 +103,7 @@ TEST(AdjustMap, SeesLateCamerasFromWhereTheyWere) {
 }
 
 TEST(AdjustMap, LeavesAloneWhatIsFixedOrNotSelected) {
-  map::SimulatedMap world = true_map(simulation::ring_rig(2), 5);
+  map::SimulatedMap world = true_map(synthetic::ring_rig(2), 5);
   Selection selection;
   selection.free_keyframes = {KeyframeId(2), KeyframeId(3)};
   selection.fixed_keyframes = {KeyframeId(0), KeyframeId(1)};
@@ -113,7 +115,8 @@ TEST(AdjustMap, LeavesAloneWhatIsFixedOrNotSelected) {
   map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
   ASSERT_TRUE(adjust_map(selection, {}, kSigmaPx, kScaleFactor, draft).done);
   for (const int k : {0, 1, 4}) {
-    const SE3 &before = start.keyframe(KeyframeId(k)).T_rig_world, &after = draft.map().keyframe(KeyframeId(k)).T_rig_world;
+    const SE3 &before = start.keyframe(KeyframeId(k)).T_rig_world,
+              &after = draft.map().keyframe(KeyframeId(k)).T_rig_world;
     EXPECT_EQ(before.translation(), after.translation());
     EXPECT_EQ(before.rotation().coeffs(), after.rotation().coeffs());
   }
@@ -136,9 +139,10 @@ TEST(AdjustMap, LeavesAloneWhatIsFixedOrNotSelected) {
 }
 
 TEST(AdjustMap, RemovesPlantedOutliers) {
-  map::SimulatedMap world = true_map(simulation::ring_rig(2), 5);
+  map::SimulatedMap world = true_map(synthetic::ring_rig(2), 5);
   const KeyframeId last(4);
-  std::vector<LandmarkId> planted;  // landmarks seen by four keyframes and, wrongly, by an outlier's feature of the last
+  std::vector<LandmarkId>
+      planted;  // landmarks seen by four keyframes and, wrongly, by an outlier's feature of the last
   const frame::BundledFrame& frame = *world.map.keyframe(last).frame;
   std::vector<FeatureId> free;
   for (std::size_t f = 0; f < frame.bundled.size(); ++f) {
@@ -165,7 +169,7 @@ TEST(AdjustMap, RemovesPlantedOutliers) {
 }
 
 TEST(AdjustMap, DoesNothingWithoutAFixedOrAFreeKeyframe) {
-  map::SimulatedMap world = true_map(simulation::ring_rig(2), 3);
+  map::SimulatedMap world = true_map(synthetic::ring_rig(2), 3);
   for (const int fixed : {0, 3}) {
     map::MapDraft draft = world.draft();
     EXPECT_FALSE(adjust_map(everything(world.map, fixed), {}, kSigmaPx, kScaleFactor, draft).done);
@@ -178,7 +182,7 @@ TEST(AdjustMap, DoesNothingWithoutAFixedOrAFreeKeyframe) {
 }
 
 TEST(AdjustMap, AskedToStopItKeepsTheMapSound) {
-  map::SimulatedMap world = true_map(simulation::ring_rig(2), 4);
+  map::SimulatedMap world = true_map(synthetic::ring_rig(2), 4);
   std::stop_source stop;
   stop.request_stop();
   map::MapDraft draft = world.draft();
@@ -188,7 +192,7 @@ TEST(AdjustMap, AskedToStopItKeepsTheMapSound) {
 }
 
 TEST(AdjustMap, IsDeterministic) {
-  map::SimulatedMap world = true_map(simulation::ring_rig(3), 4);
+  map::SimulatedMap world = true_map(synthetic::ring_rig(3), 4);
   const Selection selection = everything(world.map, 1);
   map::MapDraft a = world.draft(), b = world.draft();
   adjust_map(selection, {}, kSigmaPx, kScaleFactor, a);

@@ -1,4 +1,4 @@
-#include "io/trajectory_file.h"
+#include "evaluation/trajectory_file.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,8 +1,8 @@
 #include "frame/capture_times.h"
 
-#include <numbers>
-
 #include <gtest/gtest.h>
+
+#include <numbers>
 
 namespace bslam::frame {
 namespace {
@@ -10,10 +10,10 @@ namespace {
 using Flags = std::vector<std::uint8_t>;
 
 image::ImageBundle taken_at(const std::vector<TimeNs>& times) {
-  image::ImageBundle bundle;
-  bundle.time_ns = times[0];
-  for (const TimeNs t : times) bundle.images.push_back({image::ImageState::kPresent, t, {}});
-  return bundle;
+  image::ImageBundle matching::bundle;
+  matching::bundle.time_ns = times[0];
+  for (const TimeNs t : times) matching::bundle.images.push_back({image::ImageState::kPresent, t, {}});
+  return matching::bundle;
 }
 
 constexpr TimeNs kMs = 1'000'000;
@@ -24,7 +24,8 @@ camera::Rig looking(const std::vector<double>& yaws) {
   for (const double yaw : yaws) {
     const geometry::Quaterniond R(Eigen::AngleAxisd(yaw * std::numbers::pi / 180, Eigen::Vector3d::UnitY()));
     const Eigen::Vector3d t(0.1 * static_cast<double>(cameras.size()), 0, 0);
-    cameras.push_back({camera::Camera{"cam", camera::Pinhole({450, 450, 375, 239}), 752, 480, 0, ""}, geometry::SE3(R, t)});
+    cameras.push_back(
+        {camera::Camera{"cam", camera::Pinhole({450, 450, 375, 239}), 752, 480, 0, ""}, geometry::SE3(R, t)});
   }
   return camera::Rig(std::move(cameras));
 }
@@ -32,7 +33,8 @@ camera::Rig looking(const std::vector<double>& yaws) {
 TEST(CaptureTimes, LeaveOutCamerasThatFiredLater) {
   const camera::Rig rig = looking({0, 0, 90, -90});
   EXPECT_EQ(without_late_cameras(rig, taken_at({0, 0, 15 * kMs, 15 * kMs}), Flags(4, 0)), Flags({0, 0, 1, 1}));
-  EXPECT_EQ(without_late_cameras(rig, taken_at({0, kMs, -kMs, 0}), Flags(4, 0)), Flags(4, 0)) << "a millisecond is together";
+  EXPECT_EQ(without_late_cameras(rig, taken_at({0, kMs, -kMs, 0}), Flags(4, 0)), Flags(4, 0))
+      << "a millisecond is together";
 }
 
 TEST(CaptureTimes, KeepWhatWasLeftOut) {

@@ -11,7 +11,8 @@
 namespace bslam::looping {
 namespace {
 
-constexpr double kFar = 0.006, kTurned = 0.1 * kDegree;  // metres, radians: what noise of 0.7 px on 100 keypoints allows
+constexpr double kFar = 0.006,
+                 kTurned = 0.1 * kDegree;  // metres, radians: what noise of 0.7 px on 100 keypoints allows
 
 void expect_true_pose(const Location& location, const SE3& T_rig_world, double metres = kFar) {
   EXPECT_LT(distance_m(location.T_rig_world, T_rig_world), metres);
@@ -26,7 +27,8 @@ TEST_P(LocateRig, FindsThePoseOfAFrameTakenWhereTheCandidateWas) {
   for (const int at : {3, 11, 25}) {
     const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at + 0.4);
     LocateReport report;
-    const auto location = locate(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
+    const auto location =
+        locate(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
     ASSERT_TRUE(location) << "rejected for " << static_cast<int>(report.rejection);
     EXPECT_EQ(report.rejection, Rejection::kNone);
     EXPECT_EQ(location->with, KeyframeId(at));
@@ -68,9 +70,11 @@ TEST_P(LocateRig, AHallThatLooksDifferentIsNeverAccepted) {
   const HallMap& world = exact_walk(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (int at = 0; at < 30; ++at) {
-    const SimulatedFrame other = redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 1.0, static_cast<std::uint64_t>(at));
+    const SimulatedFrame other =
+        redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 1.0, static_cast<std::uint64_t>(at));
     LocateReport report;
-    EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
+    EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures,
+                        seeded(static_cast<std::uint64_t>(at)), &report));
     EXPECT_TRUE(report.rejection == Rejection::kFewMatches || report.rejection == Rejection::kNoConsensus);
   }
 }
@@ -82,9 +86,11 @@ TEST_P(LocateRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   std::set<Rejection> reasons;
   for (int at = 0; at < 30; ++at) {
-    const SimulatedFrame other = redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 0.875, static_cast<std::uint64_t>(at));
+    const SimulatedFrame other =
+        redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 0.875, static_cast<std::uint64_t>(at));
     LocateReport report;
-    EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
+    EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures,
+                        seeded(static_cast<std::uint64_t>(at)), &report));
     reasons.insert(report.rejection);
   }
   // With fewer inliers asked for, it is the share that decides.
@@ -104,7 +110,8 @@ TEST_P(LocateRig, AnotherPlaceOfTheHallIsNeverAccepted) {
   for (int at = 0; at < 12; ++at) {
     const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at);
     LocateReport report;
-    EXPECT_FALSE(locate(world.map, world.map.rig(), seen.frame, KeyframeId(at + 20), {}, kFeatures, seeded(static_cast<std::uint64_t>(at)), &report));
+    EXPECT_FALSE(locate(world.map, world.map.rig(), seen.frame, KeyframeId(at + 20), {}, kFeatures,
+                        seeded(static_cast<std::uint64_t>(at)), &report));
     EXPECT_EQ(report.rejection, Rejection::kFewMatches);
   }
 }
@@ -121,7 +128,8 @@ SimulatedFrame changed_aside(SimulatedFrame seen, const HallMap& world, double t
     for (std::size_t k = 0; k < seen.landmark[c].size(); ++k) {
       const auto at = known_from.find(seen.landmark[c][k]);
       if (at == known_from.end()) continue;
-      const Eigen::Vector3d direction = (hall_landmarks()[static_cast<std::size_t>(at->first)].position - here).normalized();
+      const Eigen::Vector3d direction =
+          (hall_landmarks()[static_cast<std::size_t>(at->first)].position - here).normalized();
       if (direction.dot(at->second) > std::cos(turn)) continue;
       Random random(1, "aside", static_cast<std::uint64_t>(at->first));
       for (std::uint64_t& word : seen.frame.cameras[c].keypoints.descriptor[k]) word ^= random.next();
@@ -136,11 +144,13 @@ TEST(Locate, WhatLooksDifferentFromAsideIsNotMissed) {
   VerificationOptions options;
   const SimulatedFrame changed = redecorated(changed_aside(seen, world, options.max_turn), 0.66, 1);
   LocateReport report;
-  const auto location = locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report);
+  const auto location =
+      locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report);
   ASSERT_TRUE(location) << report.found << " of " << report.sought;
   expect_true_pose(*location, seen.T_world_rig.inverse());
   options.max_turn = 1.05;
-  EXPECT_FALSE(locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
+  EXPECT_FALSE(
+      locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
 }
 
@@ -163,14 +173,16 @@ TEST(Locate, AnotherCameraThanThenFindsThePlace) {
   for (const int at : {5, 14, 22}) {
     const SimulatedFrame seen = back.frame(FrameId(1000 + at), kStepS * at + 0.3);
     LocateReport report;
-    const auto location = locate(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
+    const auto location =
+        locate(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
     ASSERT_TRUE(location) << "rejected for " << static_cast<int>(report.rejection);
     expect_true_pose(*location, seen.T_world_rig.inverse());
     int by_another = 0;  // matches with landmarks that this camera has never seen
     for (const auto& [feature, l] : location->matches) {
       std::set<CameraIndex> then;
       for (const map::Observation& o : world.map.observations(l)) {
-        for (const frame::KeypointRef r : world.map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature)) then.insert(r.camera);
+        for (const frame::KeypointRef r : world.map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature))
+          then.insert(r.camera);
       }
       by_another += !then.contains(seen.frame.bundled.keypoints(feature).front().camera);
     }
@@ -179,7 +191,7 @@ TEST(Locate, AnotherCameraThanThenFindsThePlace) {
 }
 
 TEST(Locate, FisheyesFindThePlaceTurnedRound) {
-  const camera::Rig rig = simulation::fisheye_rig(2);
+  const camera::Rig rig = synthetic::fisheye_rig(2);
   HallMap world(rig);
   const FeatureSimulator simulator = hall(rig), back = hall(rig, std::numbers::pi);
   for (int i = 0; i < 6; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
@@ -195,13 +207,15 @@ TEST(Locate, LandmarksAboutAKeyframeAreThoseSeenMostOften) {
                                 few = landmarks_about(world.map, KeyframeId(9), 4, 50);
   const std::set<LandmarkId> distinct(all.begin(), all.end());
   EXPECT_EQ(distinct.size(), all.size());
-  for (const LandmarkId l : world.map.keyframe(KeyframeId(9)).landmarks) EXPECT_TRUE(!l.valid() || distinct.contains(l));
+  for (const LandmarkId l : world.map.keyframe(KeyframeId(9)).landmarks)
+    EXPECT_TRUE(!l.valid() || distinct.contains(l));
   for (const map::Covisible& c : world.map.best_covisible(KeyframeId(9), 4)) {
     for (const LandmarkId l : world.map.keyframe(c.keyframe).landmarks) EXPECT_TRUE(!l.valid() || distinct.contains(l));
   }
   ASSERT_EQ(few.size(), 50u);
   EXPECT_TRUE(std::equal(few.begin(), few.end(), all.begin()));
-  for (std::size_t i = 1; i < all.size(); ++i) EXPECT_GE(world.map.observations(all[i - 1]).size(), world.map.observations(all[i]).size());
+  for (std::size_t i = 1; i < all.size(); ++i)
+    EXPECT_GE(world.map.observations(all[i - 1]).size(), world.map.observations(all[i]).size());
 }
 
 }  // namespace

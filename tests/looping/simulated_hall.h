@@ -1,5 +1,5 @@
-// Maps of a large hall made of simulated frames, with the truth beside them: a walk round it comes back to where it began,
-// and what was seen there long ago is mapped once more, at a place that has drifted away.
+// Maps of a large hall made of simulated frames, with the truth beside them: a walk round it comes back to where it
+// began, and what was seen there long ago is mapped once more, at a place that has drifted away.
 #pragma once
 
 #include <cmath>
@@ -14,8 +14,8 @@
 #include "map/map_store.h"
 #include "mapping/simulated_map.h"
 #include "place/train.h"
-#include "simulation/feature_simulator.h"
-#include "simulation/rigs.h"
+#include "synthetic/feature_simulator.h"
+#include "synthetic/rigs.h"
 
 namespace bslam::looping {
 
@@ -23,14 +23,14 @@ using geometry::SE3;
 using geometry::Sim3;
 using map::angle_rad;
 using map::distance_m;
-using simulation::FeatureSimulator;
-using simulation::SimulatedFrame;
+using synthetic::FeatureSimulator;
+using synthetic::SimulatedFrame;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
 // 20 m x 20 m; landmarks are visible from at most 4.5 m, so that nobody sees the far side.
-inline simulation::FeatureSimulatorOptions hall_options() {
-  simulation::FeatureSimulatorOptions options;
+inline synthetic::FeatureSimulatorOptions hall_options() {
+  synthetic::FeatureSimulatorOptions options;
   options.room_low = {-10, -10, 0};
   options.room_high = {10, 10, 3};
   options.landmarks = 24000;
@@ -48,15 +48,17 @@ constexpr double kStepS = 1.0;  // between two keyframes
 constexpr int kRound = 48;      // keyframes
 
 // Rounds of 7 m radius, with a little sway; `turned` from the direction of motion, radians.
-inline simulation::Trajectory rounds(double turned = 0.0) {
-  std::vector<simulation::ControlPose> control;
+inline synthetic::Trajectory rounds(double turned = 0.0) {
+  std::vector<synthetic::ControlPose> control;
   for (int i = -1; i < 66; ++i) {
     const double angle = 2 * std::numbers::pi * i / kRoundS;
     const double radius = 7.0 + 0.2 * std::sin(5 * angle);
     control.push_back({{radius * std::cos(angle), radius * std::sin(angle), 1.5 + 0.1 * std::sin(9 * angle)},
-                       angle + 0.5 * std::numbers::pi + turned, 0.05 * std::sin(7 * angle), 0.04 * std::sin(4 * angle)});
+                       angle + 0.5 * std::numbers::pi + turned,
+                       0.05 * std::sin(7 * angle),
+                       0.04 * std::sin(4 * angle)});
   }
-  return simulation::Trajectory(std::move(control), 1.0);
+  return synthetic::Trajectory(std::move(control), 1.0);
 }
 
 inline FeatureSimulator hall(camera::Rig rig, double turned = 0.0) {
@@ -65,11 +67,11 @@ inline FeatureSimulator hall(camera::Rig rig, double turned = 0.0) {
 
 // Rigs of 1, 2 and 4 cameras; those of the last look to all sides.
 inline camera::Rig rig_of(int cameras) {
-  return cameras == 4 ? simulation::default_rig() : simulation::ring_rig(cameras);
+  return cameras == 4 ? synthetic::default_rig() : synthetic::ring_rig(cameras);
 }
 
 // The same for every rig.
-inline const std::vector<simulation::SimulatedLandmark>& hall_landmarks() {
+inline const std::vector<synthetic::SimulatedLandmark>& hall_landmarks() {
   static const FeatureSimulator simulator = hall(rig_of(1));
   return simulator.landmarks();
 }
@@ -78,7 +80,7 @@ inline place::VocabularyPtr small_vocabulary() {
   static const place::VocabularyPtr vocabulary = [] {
     std::vector<std::vector<feature::Descriptor>> images(100);
     std::size_t i = 0;
-    for (const simulation::SimulatedLandmark& l : hall_landmarks()) images[i++ % images.size()].push_back(l.descriptor);
+    for (const synthetic::SimulatedLandmark& l : hall_landmarks()) images[i++ % images.size()].push_back(l.descriptor);
     Random random(5, "vocabulary");
     ThreadPool pool(1);
     return place::train_vocabulary(images, {.branching = 10, .levels = 4, .iterations = 6}, random, pool).value();
@@ -90,7 +92,8 @@ inline std::unique_ptr<BagOfWordsRecogniser> recogniser(const RecognitionOptions
   return std::make_unique<BagOfWordsRecogniser>(small_vocabulary(), options);
 }
 
-// The hall decorated anew: that share of its landmarks looks different, always the same ones in the same way for a seed.
+// The hall decorated anew: that share of its landmarks looks different, always the same ones in the same way for a
+// seed.
 inline SimulatedFrame redecorated(SimulatedFrame seen, double share, std::uint64_t seed) {
   for (std::size_t c = 0; c < seen.landmark.size(); ++c) {
     for (std::size_t k = 0; k < seen.landmark[c].size(); ++k) {
@@ -111,9 +114,9 @@ class HallMap {
 
   explicit HallMap(const camera::Rig& rig) : map(std::make_shared<const camera::Rig>(rig)) {}
 
-  // A keyframe of what was seen in hall number `room`, `T_world_room` where that stands; it hangs on the newest, or begins a
-  // part. The estimate has gone astray by `error`, from the true world to that of the map. Landmarks not seen for
-  // `kMemory` keyframes, or from another part, are not known again: the map holds them twice.
+  // A keyframe of what was seen in hall number `room`, `T_world_room` where that stands; it hangs on the newest, or
+  // begins a part. The estimate has gone astray by `error`, from the true world to that of the map. Landmarks not seen
+  // for `kMemory` keyframes, or from another part, are not known again: the map holds them twice.
   KeyframeId add(const SimulatedFrame& seen, const Sim3& error = {}, int room = 0, const SE3& T_world_room = {},
                  bool new_part = false) {
     if (new_part) known_.clear();
@@ -135,7 +138,8 @@ class HallMap {
       }
     }
     const SE3 T_world_rig = T_world_room * seen.T_world_rig;
-    map.add_keyframe(stored, error.apply_to_pose(T_world_rig).inverse(), matches, new_part ? KeyframeId() : map.newest_keyframe());
+    map.add_keyframe(stored, error.apply_to_pose(T_world_rig).inverse(), matches,
+                     new_part ? KeyframeId() : map.newest_keyframe());
     for (const auto& [feature, shown] : unknown) {
       const Vector3d place = T_world_room * hall_landmarks()[static_cast<std::size_t>(shown.second)].position;
       const map::Observation observation{k, feature};
@@ -155,8 +159,8 @@ class HallMap {
   const Vector3d& truth(LandmarkId l) const { return true_place[l.index()]; }
 
   map::BundledMap map;
-  std::vector<SE3> T_rig_world;        // true, by keyframe
-  std::vector<Vector3d> true_place;    // by landmark
+  std::vector<SE3> T_rig_world;      // true, by keyframe
+  std::vector<Vector3d> true_place;  // by landmark
   std::vector<Shown> shown_by_landmark;
   BagOfWordsRecogniser describe{small_vocabulary(), {}};
 
@@ -179,15 +183,16 @@ inline Sim3 scale_drift() {
   return Sim3::exp((geometry::Vector7d() << 0.005, -0.006, 0.015, 0.2, -0.15, 0.1, std::log(0.9)).finished());
 }
 
-// A round and `more` keyframes, whose error grows to `drift` at the end. `after_each` may look at the map as it grows and
-// stop it by returning false.
+// A round and `more` keyframes, whose error grows to `drift` at the end. `after_each` may look at the map as it grows
+// and stop it by returning false.
 inline HallMap walk(const FeatureSimulator& simulator, int more, const Sim3& drift,
                     const std::function<bool(const HallMap&, KeyframeId)>& after_each = {}) {
   HallMap out(simulator.rig());
   if (std::abs(drift.scale() - 1) > 1e-9) out.map.set_scale(map::Scale::kUpToScale);
   const int count = kRound + more;
   for (int i = 0; i < count; ++i) {
-    const KeyframeId k = out.add(simulator.frame(FrameId(i), kStepS * i), part_of(drift, static_cast<double>(i) / (count - 1)));
+    const KeyframeId k =
+        out.add(simulator.frame(FrameId(i), kStepS * i), part_of(drift, static_cast<double>(i) / (count - 1)));
     if (after_each && !after_each(out, k)) break;
   }
   return out;
@@ -208,7 +213,8 @@ inline const HallMap& exact_walk(int cameras) {
 inline const HallMap& drifted_walk(int cameras) {
   static std::map<int, HallMap> made;
   const auto at = made.find(cameras);
-  return at != made.end() ? at->second : made.emplace(cameras, walk(hall(rig_of(cameras)), 2, rigid_drift())).first->second;
+  return at != made.end() ? at->second
+                          : made.emplace(cameras, walk(hall(rig_of(cameras)), 2, rigid_drift())).first->second;
 }
 
 // The frame as the tracker hands it to relocalisation.

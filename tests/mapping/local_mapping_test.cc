@@ -14,11 +14,11 @@ namespace {
 using map::SimulatedMap;
 const FeatureModel kFeatures;
 
-simulation::FeatureSimulator simulator(camera::Rig rig, double period_s = 12.0) {
-  simulation::FeatureSimulatorOptions options;
+synthetic::FeatureSimulator simulator(camera::Rig rig, double period_s = 12.0) {
+  synthetic::FeatureSimulatorOptions options;
   options.landmarks = 4000;
   options.max_keypoints = 700;
-  return simulation::FeatureSimulator(std::move(rig), simulation::make_orbit({.period_s = period_s}), options);
+  return synthetic::FeatureSimulator(std::move(rig), synthetic::make_orbit({.period_s = period_s}), options);
 }
 
 // Landmarks only for matched features: the monocular ones are left to mapping.
@@ -31,12 +31,13 @@ SimulatedMap stereo_map(camera::Rig rig, int keyframes, double period_s = 12.0) 
 // The simulator's landmarks that the observations of a landmark show; -1 among them: an outlier.
 std::set<int> shown(const SimulatedMap& world, const map::BundledMap& map, LandmarkId l) {
   std::set<int> out;
-  for (const map::Observation& o : map.observations(l)) out.insert(map::shown_by(world.frames[o.keyframe.index()], o.feature));
+  for (const map::Observation& o : map.observations(l))
+    out.insert(map::shown_by(world.frames[o.keyframe.index()], o.feature));
   return out;
 }
 
 TEST(CreateLandmarks, MakesLandmarksNearTheirTruePlaces) {
-  const camera::Rig rigs[] = {simulation::ring_rig(2), simulation::default_rig(), simulation::mixed_rig()};
+  const camera::Rig rigs[] = {synthetic::ring_rig(2), synthetic::default_rig(), synthetic::mixed_rig()};
   for (const camera::Rig& rig : rigs) {
     const SimulatedMap world = stereo_map(rig, 4);
     map::MapDraft draft = world.draft();
@@ -52,7 +53,8 @@ TEST(CreateLandmarks, MakesLandmarksNearTheirTruePlaces) {
       ++pure;
       const Eigen::Vector3d& place = world.truth_of(*truth.begin());
       const double distance = (place - world.frames[3].T_world_rig.translation()).norm();
-      near += (draft.map().landmark(LandmarkId(i)).position - place).norm() < 0.3 * distance;  // two sigmas of the bound
+      near +=
+          (draft.map().landmark(LandmarkId(i)).position - place).norm() < 0.3 * distance;  // two sigmas of the bound
     }
     EXPECT_GT(static_cast<double>(pure), 0.97 * made);
     EXPECT_GT(static_cast<double>(near), 0.92 * static_cast<double>(pure));
@@ -61,7 +63,8 @@ TEST(CreateLandmarks, MakesLandmarksNearTheirTruePlaces) {
 }
 
 TEST(CreateLandmarks, JoinsAnyCameraThenToAnyCameraNow) {
-  const SimulatedMap world = stereo_map(simulation::default_rig(), 5, 5.0);  // 72 degrees per second: sides follow the front
+  const SimulatedMap world =
+      stereo_map(synthetic::default_rig(), 5, 5.0);  // 72 degrees per second: sides follow the front
   map::MapDraft draft = world.draft();
   const std::size_t before = draft.map().landmark_slots();
   create_landmarks(KeyframeId(4), {}, kFeatures, draft);
@@ -81,7 +84,7 @@ TEST(CreateLandmarks, JoinsAnyCameraThenToAnyCameraNow) {
 }
 
 TEST(CreateLandmarks, MakesNoneWithoutABaseline) {
-  SimulatedMap world(simulator(simulation::ring_rig(2)));
+  SimulatedMap world(simulator(synthetic::ring_rig(2)));
   world.add_keyframe(FrameId(0), 0.5, false);
   world.add_keyframe(FrameId(1), 0.5, false);
   map::MapDraft draft = world.draft();
@@ -89,7 +92,7 @@ TEST(CreateLandmarks, MakesNoneWithoutABaseline) {
 }
 
 TEST(CreateLandmarks, NeverGivesAFeatureTwoLandmarks) {
-  const SimulatedMap world = stereo_map(simulation::ring_rig(3), 4);
+  const SimulatedMap world = stereo_map(synthetic::ring_rig(3), 4);
   map::MapDraft draft = world.draft();
   create_landmarks(KeyframeId(3), {}, kFeatures, draft);
   const int again = create_landmarks(KeyframeId(3), {}, kFeatures, draft);
@@ -98,7 +101,7 @@ TEST(CreateLandmarks, NeverGivesAFeatureTwoLandmarks) {
 }
 
 TEST(CreateLandmarks, ComparesWithNobodyWhereToldSo) {
-  const SimulatedMap world = stereo_map(simulation::ring_rig(2), 4);
+  const SimulatedMap world = stereo_map(synthetic::ring_rig(2), 4);
   map::MapDraft draft = world.draft();
   EXPECT_EQ(create_landmarks(KeyframeId(3), {.neighbours = 0}, kFeatures, draft), 0);
   const adjustment::Selection alone = select_local(world.map, KeyframeId(3), {.free_keyframes = 1});
@@ -109,7 +112,7 @@ class FuseLandmarks : public ::testing::Test {
  protected:
   // Every keyframe's landmarks are its own: all that two of them share exists twice.
   static SimulatedMap doubled_map() {
-    SimulatedMap world(simulator(simulation::ring_rig(2)));
+    SimulatedMap world(simulator(synthetic::ring_rig(2)));
     world.add_keyframe(FrameId(0), 0.0);
     world.add_keyframe(FrameId(1), 0.2);
     world.add_keyframe(FrameId(2), 0.4);
@@ -126,13 +129,15 @@ TEST_F(FuseLandmarks, MergesPlantedDuplicates) {
     if (list.size() < 2 || list.back().keyframe != last || l.value() % 3 != 0) continue;
     const map::Observation o = list.back();
     ASSERT_TRUE(world.map.remove_observation(l, last));
-    twins.emplace_back(l, world.map.add_landmark(world.map.landmark(l).position + Eigen::Vector3d(0.002, -0.002, 0.001), std::span(&o, 1)));
+    twins.emplace_back(l, world.map.add_landmark(world.map.landmark(l).position + Eigen::Vector3d(0.002, -0.002, 0.001),
+                                                 std::span(&o, 1)));
   }
   ASSERT_GT(twins.size(), 30u);
   map::MapDraft draft = world.draft();
   const FusionReport report = fuse_landmarks(last, {}, kFeatures, draft);
   std::size_t joined = 0;
-  for (const auto& [a, b] : twins) joined += draft.map().resolve(a).valid() && draft.map().resolve(a) == draft.map().resolve(b);
+  for (const auto& [a, b] : twins)
+    joined += draft.map().resolve(a).valid() && draft.map().resolve(a) == draft.map().resolve(b);
   EXPECT_GT(static_cast<double>(joined), 0.7 * static_cast<double>(twins.size()));
   EXPECT_GE(report.merged, static_cast<int>(joined));
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
@@ -178,20 +183,21 @@ TEST_F(FuseLandmarks, WorksWhereACameraHadNoImage) {
 }
 
 TEST(SelectLocal, HoldsTheRootAndTheKeyframesBeyondTheWindow) {
-  const SimulatedMap world = stereo_map(simulation::ring_rig(2), 8);
+  const SimulatedMap world = stereo_map(synthetic::ring_rig(2), 8);
   const adjustment::Selection s = select_local(world.map, KeyframeId(7), {.free_keyframes = 3, .fixed_keyframes = 4});
   EXPECT_EQ(s.free_keyframes.size(), 3u);
   EXPECT_TRUE(std::binary_search(s.free_keyframes.begin(), s.free_keyframes.end(), KeyframeId(7)));
   EXPECT_FALSE(std::binary_search(s.free_keyframes.begin(), s.free_keyframes.end(), KeyframeId(0)));
   EXPECT_LE(s.fixed_keyframes.size(), 4u);
   EXPECT_GE(s.fixed_keyframes.size(), 1u);
-  for (const KeyframeId k : s.fixed_keyframes) EXPECT_FALSE(std::binary_search(s.free_keyframes.begin(), s.free_keyframes.end(), k));
+  for (const KeyframeId k : s.fixed_keyframes)
+    EXPECT_FALSE(std::binary_search(s.free_keyframes.begin(), s.free_keyframes.end(), k));
   EXPECT_TRUE(std::is_sorted(s.fixed_keyframes.begin(), s.fixed_keyframes.end()));
   EXPECT_TRUE(std::is_sorted(s.landmarks.begin(), s.landmarks.end()));
 }
 
 TEST(SelectLocal, TakesTheLandmarksSeenMost) {
-  const SimulatedMap world = stereo_map(simulation::ring_rig(2), 6);
+  const SimulatedMap world = stereo_map(synthetic::ring_rig(2), 6);
   const adjustment::Selection s = select_local(world.map, KeyframeId(5), {.max_landmarks = 50});
   ASSERT_EQ(s.landmarks.size(), 50u);
   std::size_t least = 100;
@@ -200,7 +206,7 @@ TEST(SelectLocal, TakesTheLandmarksSeenMost) {
 }
 
 TEST(SelectLocal, HoldsTwoPosesWhereTheScaleIsFree) {
-  SimulatedMap world = stereo_map(simulation::ring_rig(2), 5);
+  SimulatedMap world = stereo_map(synthetic::ring_rig(2), 5);
   world.map.set_scale(map::Scale::kUpToScale);
   EXPECT_GE(select_local(world.map, KeyframeId(4), {}).fixed_keyframes.size(), 2u);
   EXPECT_EQ(select_all(world.map).fixed_keyframes.size(), 2u);
@@ -209,7 +215,7 @@ TEST(SelectLocal, HoldsTwoPosesWhereTheScaleIsFree) {
 }
 
 TEST(MapKeyframe, GrowsAnAccurateMapKeyframeByKeyframe) {
-  const camera::Rig rigs[] = {simulation::ring_rig(2), simulation::mixed_rig()};
+  const camera::Rig rigs[] = {synthetic::ring_rig(2), synthetic::mixed_rig()};
   for (const camera::Rig& rig : rigs) {
     SimulatedMap world(simulator(rig));
     Random random(3, "drift");
@@ -232,7 +238,8 @@ TEST(MapKeyframe, GrowsAnAccurateMapKeyframeByKeyframe) {
     }
     EXPECT_GT(created, 200);  // of some 600 features a camera and keyframe, most of which show landmarks already
     for (const KeyframeId k : world.map.keyframe_ids()) {
-      EXPECT_LT(map::distance_m(world.map.keyframe(k).T_rig_world, world.true_pose(k)), 0.02) << "keyframe " << k.value();
+      EXPECT_LT(map::distance_m(world.map.keyframe(k).T_rig_world, world.true_pose(k)), 0.02)
+          << "keyframe " << k.value();
     }
     std::size_t mixed = 0, several = 0;
     for (const LandmarkId l : world.map.landmark_ids()) {
@@ -245,7 +252,7 @@ TEST(MapKeyframe, GrowsAnAccurateMapKeyframeByKeyframe) {
 }
 
 TEST(MapKeyframe, StopsEarlyWithASoundMap) {
-  const SimulatedMap world = stereo_map(simulation::ring_rig(2), 4);
+  const SimulatedMap world = stereo_map(synthetic::ring_rig(2), 4);
   std::stop_source stop;
   stop.request_stop();
   map::MapDraft draft = world.draft();
@@ -254,7 +261,7 @@ TEST(MapKeyframe, StopsEarlyWithASoundMap) {
 }
 
 TEST(AdjustGlobally, ImprovesAPerturbedMap) {
-  SimulatedMap world(simulator(simulation::ring_rig(2)));
+  SimulatedMap world(simulator(synthetic::ring_rig(2)));
   for (int i = 0; i < 6; ++i) world.add_keyframe(FrameId(i), 0.3 * i);
   Random random(4, "drift");
   double before = 0, after = 0;
@@ -266,7 +273,8 @@ TEST(AdjustGlobally, ImprovesAPerturbedMap) {
   }
   map::MapDraft draft = world.draft();
   ASSERT_TRUE(adjust_globally({}, kFeatures, draft).done);
-  for (int i = 1; i < 6; ++i) after += map::distance_m(draft.map().keyframe(KeyframeId(i)).T_rig_world, world.true_pose(KeyframeId(i)));
+  for (int i = 1; i < 6; ++i)
+    after += map::distance_m(draft.map().keyframe(KeyframeId(i)).T_rig_world, world.true_pose(KeyframeId(i)));
   EXPECT_LT(after, 0.4 * before);
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }

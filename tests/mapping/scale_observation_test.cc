@@ -16,11 +16,11 @@ const FeatureModel kFeatures;
 // Ahead and 120 degrees to either side.
 camera::Rig three_sides() {
   const std::vector<int> sides = {0, 2, 3};
-  return simulation::ring_rig(4).subset(sides);
+  return synthetic::ring_rig(4).subset(sides);
 }
 
-simulation::FeatureSimulatorOptions room(std::uint64_t seed) {
-  simulation::FeatureSimulatorOptions options;
+synthetic::FeatureSimulatorOptions room(std::uint64_t seed) {
+  synthetic::FeatureSimulatorOptions options;
   options.scene_seed = options.noise_seed = seed;
   options.landmarks = 4000;
   options.max_keypoints = 300;
@@ -29,22 +29,22 @@ simulation::FeatureSimulatorOptions room(std::uint64_t seed) {
 }
 
 // Keyframes at the truth, every 0.25 s, in a map that has no scale and whose unit is 1 / `factor` metres.
-SimulatedMap ride(const simulation::Trajectory& trajectory, const camera::Rig& rig, int keyframes, double factor,
+SimulatedMap ride(const synthetic::Trajectory& trajectory, const camera::Rig& rig, int keyframes, double factor,
                   std::uint64_t seed) {
-  SimulatedMap world(simulation::FeatureSimulator(rig, trajectory, room(seed)));
+  SimulatedMap world(synthetic::FeatureSimulator(rig, trajectory, room(seed)));
   for (int i = 0; i < keyframes; ++i) world.add_keyframe(FrameId(i), 0.25 * i);
   world.map.set_scale(map::Scale::kUnobservable);
   world.map.scale_part(KeyframeId(0), factor);
   return world;
 }
 
-simulation::Trajectory orbit(std::uint64_t seed) { return simulation::make_orbit({.seed = seed}); }
+synthetic::Trajectory orbit(std::uint64_t seed) { return synthetic::make_orbit({.seed = seed}); }
 
 // Ahead at 0.4 m/s, looking the same way all the time; too short a way for a landmark to go from one camera to another.
-simulation::Trajectory straight_line() {
-  std::vector<simulation::ControlPose> control;
+synthetic::Trajectory straight_line() {
+  std::vector<synthetic::ControlPose> control;
   for (int i = 0; i < 8; ++i) control.push_back({{0.4 * i - 1.5, 0.3, 1.5}, 0.0, 0.0, 0.0});
-  return simulation::Trajectory(std::move(control), 1.0);
+  return synthetic::Trajectory(std::move(control), 1.0);
 }
 
 // How long the map is for its true length.
@@ -64,11 +64,13 @@ TEST(ObserveScale, DeviationIsThatOfTheErrors) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     const SimulatedMap world = ride(orbit(seed), three_sides(), 7, 1.0, seed);
     map::MapDraft draft = world.draft();
-    map_keyframe(KeyframeId(6), {}, kFeatures, draft);  // the adjustment takes the map from the truth to what the pixels say
+    map_keyframe(KeyframeId(6), {}, kFeatures,
+                 draft);  // the adjustment takes the map from the truth to what the pixels say
     const ScaleReport report = observe_scale(KeyframeId(6), {}, kFeatures, draft);
     ASSERT_TRUE(report.observed);
     const double z = (length_ratio(world, draft.map()) - 1.0) / report.deviation;
-    EXPECT_LT(std::abs(z), 4.0) << "seed " << seed << ": " << length_ratio(world, draft.map()) << " +- " << report.deviation;
+    EXPECT_LT(std::abs(z), 4.0) << "seed " << seed << ": " << length_ratio(world, draft.map()) << " +- "
+                                << report.deviation;
     squared_z += z * z;
   }
   EXPECT_GT(squared_z / kSeeds, 0.3);
@@ -98,7 +100,8 @@ TEST(ObserveScale, StaysUnknownOnAStraightLine) {
     map::MapDraft draft = world.draft();
     for (int i = 0; i < 2; ++i) {
       const MappingReport report = map_keyframe(KeyframeId(11), {}, kFeatures, draft);
-      EXPECT_TRUE(!report.scale.observed || report.scale.deviation > 0.1) << "seed " << seed << ": " << report.scale.deviation;
+      EXPECT_TRUE(!report.scale.observed || report.scale.deviation > 0.1)
+          << "seed " << seed << ": " << report.scale.deviation;
     }
     EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);
   }
@@ -111,12 +114,13 @@ TEST(ObserveScale, LeavesOtherMapsAlone) {
     map::MapDraft draft = world.draft();
     EXPECT_FALSE(observe_scale(KeyframeId(3), {}, kFeatures, draft).observed);
     EXPECT_EQ(draft.map().scale(), scale);
-    EXPECT_EQ(draft.map().keyframe(KeyframeId(3)).T_rig_world.translation(), world.map.keyframe(KeyframeId(3)).T_rig_world.translation());
+    EXPECT_EQ(draft.map().keyframe(KeyframeId(3)).T_rig_world.translation(),
+              world.map.keyframe(KeyframeId(3)).T_rig_world.translation());
   }
 }
 
 TEST(ObserveScale, IsSilentAboutOneCameraAndOneKeyframe) {
-  const SimulatedMap one = ride(orbit(1), simulation::ring_rig(1), 5, 1.5, 1);
+  const SimulatedMap one = ride(orbit(1), synthetic::ring_rig(1), 5, 1.5, 1);
   map::MapDraft draft = one.draft();
   EXPECT_FALSE(observe_scale(KeyframeId(4), {}, kFeatures, draft).observed);
   const SimulatedMap first = ride(orbit(1), three_sides(), 1, 1.5, 1);

@@ -11,13 +11,13 @@
 
 #include "image/pyramid.h"
 #include "map/map_store.h"
-#include "simulation/feature_simulator.h"
-#include "simulation/rigs.h"
+#include "synthetic/feature_simulator.h"
+#include "synthetic/rigs.h"
 
 namespace bslam::map {
 
-using simulation::FeatureSimulator;
-using simulation::SimulatedFrame;
+using synthetic::FeatureSimulator;
+using synthetic::SimulatedFrame;
 
 // The simulator's landmark that a feature shows, or -1.
 inline int shown_by(const SimulatedFrame& frame, FeatureId f) {
@@ -43,8 +43,8 @@ class SimulatedMap {
   explicit SimulatedMap(FeatureSimulator simulator)
       : sim(std::move(simulator)), map(std::make_shared<const camera::Rig>(sim.rig())) {}
 
-  // A keyframe of what the rig sees at `time_s`, at its true pose, with landmarks at their true places for every feature
-  // that shows one, or only for those of matched features with a point (`all` false: the others stay without).
+  // A keyframe of what the rig sees at `time_s`, at its true pose, with landmarks at their true places for every
+  // feature that shows one, or only for those of matched features with a point (`all` false: the others stay without).
   KeyframeId add_keyframe(FrameId id, double time_s, bool all = true) {
     SimulatedFrame& seen = frames.emplace_back(sim.frame(id, time_s));
     if (knows_motion) seen.frame.twist = true_twist(time_s);
@@ -73,11 +73,15 @@ class SimulatedMap {
     return k;
   }
 
-  const Eigen::Vector3d& truth_of(int landmark) const { return sim.landmarks()[static_cast<std::size_t>(landmark)].position; }
+  const Eigen::Vector3d& truth_of(int landmark) const {
+    return sim.landmarks()[static_cast<std::size_t>(landmark)].position;
+  }
   // Of the rig over the ten milliseconds after `time_s`, rad/s and m/s.
   geometry::Vector6d true_twist(double time_s) const {
     constexpr double kStep = 0.01;
-    const auto T_rig_world = [&](double t) { return (sim.trajectory().T_world_body(t) * sim.rig().body_from_cam(0)).inverse(); };
+    const auto T_rig_world = [&](double t) {
+      return (sim.trajectory().T_world_body(t) * sim.rig().body_from_cam(0)).inverse();
+    };
     return (T_rig_world(time_s + kStep) * T_rig_world(time_s).inverse()).log() / kStep;
   }
   geometry::SE3 true_pose(KeyframeId k) const { return frames[k.index()].T_world_rig.inverse(); }
@@ -86,7 +90,7 @@ class SimulatedMap {
 
   FeatureSimulator sim;
   BundledMap map;
-  bool knows_motion = false;  // keyframes to come are added with the rig's true twist
+  bool knows_motion = false;           // keyframes to come are added with the rig's true twist
   std::vector<SimulatedFrame> frames;  // one per keyframe
   std::unordered_map<int, LandmarkId> landmark_of;
   std::unordered_map<int, int> truth_of_landmark;  // by id
@@ -96,6 +100,8 @@ class SimulatedMap {
 inline double distance_m(const geometry::SE3& a, const geometry::SE3& b) {
   return (a.inverse().translation() - b.inverse().translation()).norm();
 }
-inline double angle_rad(const geometry::SE3& a, const geometry::SE3& b) { return a.rotation().angularDistance(b.rotation()); }
+inline double angle_rad(const geometry::SE3& a, const geometry::SE3& b) {
+  return a.rotation().angularDistance(b.rotation());
+}
 
 }  // namespace bslam::map

@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 
 #include "base/random.h"
-#include "io/rig_file.h"
-#include "io/rig_warnings.h"
-#include "io/simulation_writer.h"
+#include "rig_formats/rig_file.h"
+#include "rig_formats/rig_warnings.h"
 #include "session/extrinsics_check.h"
-#include "simulation/rigs.h"
+#include "simulator/simulation_writer.h"
+#include "synthetic/rigs.h"
 
 namespace bslam::session {
 namespace {
@@ -56,14 +56,14 @@ TEST(ExtrinsicsCheck, FindsWhatIsMeant) {
   const auto views = views_of(rig);
   EXPECT_EQ(judged(rig, views).verdict, Convention::kAsGiven);
   EXPECT_EQ(judged(rig, views).agreeing[0], 150);
-  EXPECT_EQ(judged(io::with_inverse_extrinsics(rig), views).verdict, Convention::kInverse);
+  EXPECT_EQ(judged(rig_formats::with_inverse_extrinsics(rig), views).verdict, Convention::kInverse);
   const SE3 wrong_step = rig.body_from_cam(0) * rig.rig_from_cam(1).inverse();
   EXPECT_EQ(judged(camera::Rig({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), wrong_step}}), views).verdict,
             Convention::kPairInverse);
   const std::array exchange = {1, 0};
   const camera::Rig swapped = rig.subset(exchange);
   EXPECT_EQ(judged(swapped, views).verdict, Convention::kSwapped);
-  EXPECT_EQ(judged(io::with_inverse_extrinsics(swapped), views).verdict, Convention::kSwappedInverse);
+  EXPECT_EQ(judged(rig_formats::with_inverse_extrinsics(swapped), views).verdict, Convention::kSwappedInverse);
 }
 
 TEST(ExtrinsicsCheck, SaysNothingWhereNothingFits) {
@@ -114,12 +114,15 @@ TEST(ExtrinsicsCheck, IsNotAlarmedByAFewMoreMatchesElsewhere) {
 }
 
 TEST(ExtrinsicsCheck, SaysHowManyPairsItCouldJudge) {
-  const PairEvidence good{.first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
+  const PairEvidence good{
+      .first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
   const PairEvidence apart{.first = 0, .second = 2, .matches = 10};
   const std::string said = describe_evidence(std::array{good, apart});
   EXPECT_NE(said.find("1 of 2 pairs could not be judged: nothing is known of camera 2\n"), std::string::npos) << said;
-  const PairEvidence also{.first = 1, .second = 2, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
-  EXPECT_NE(describe_evidence(std::array{good, apart, also}).find("1 of 3 pairs could not be judged\n"), std::string::npos);
+  const PairEvidence also{
+      .first = 1, .second = 2, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
+  EXPECT_NE(describe_evidence(std::array{good, apart, also}).find("1 of 3 pairs could not be judged\n"),
+            std::string::npos);
 }
 
 TEST(ExtrinsicsCheck, SpeaksOfTheMostFrequentFault) {
@@ -130,8 +133,11 @@ TEST(ExtrinsicsCheck, SpeaksOfTheMostFrequentFault) {
   bad.agreeing = {2, 90, 0, 0, 0};
   bad.verdict = Convention::kInverse;
   const std::string mixed = describe_evidence(std::array{good, bad});
-  EXPECT_NE(mixed.find("warning: the images of cameras 0 and 1 do not fit the extrinsics; they fit with every transform inverted"),
-            std::string::npos) << mixed;
+  EXPECT_NE(
+      mixed.find(
+          "warning: the images of cameras 0 and 1 do not fit the extrinsics; they fit with every transform inverted"),
+      std::string::npos)
+      << mixed;
   EXPECT_NE(mixed.find("; 1 of 2 pairs fit as given"), std::string::npos) << mixed;
   bad.verdict.reset();
   EXPECT_NE(describe_evidence(std::array{bad}).find("nothing can be said"), std::string::npos);
@@ -152,7 +158,7 @@ TEST_F(RigReport, IsTextOrJson) {
     cameras.push_back({stereo().camera(i), stereo().body_from_cam(i)});
     cameras.back().camera.name = "eye" + std::to_string(i);
   }
-  ASSERT_TRUE(io::write_rig(camera::Rig(cameras), folder_ / "rig.yaml"));
+  ASSERT_TRUE(rig_formats::write_rig(camera::Rig(cameras), folder_ / "rig.yaml"));
   const auto text = report_rig({.file = (folder_ / "rig.yaml").string()});
   ASSERT_TRUE(text);
   EXPECT_NE(text->find("camera 1: eye1"), std::string::npos);
@@ -169,7 +175,7 @@ TEST_F(RigReport, IsTextOrJson) {
 TEST_F(RigReport, NamesAMaskThatCannotBeUsed) {
   camera::RigCamera camera{stereo().camera(0u), stereo().body_from_cam(0)};
   camera.camera.mask_file = (folder_ / "none.png").string();
-  ASSERT_TRUE(io::write_rig(camera::Rig({camera}), folder_ / "rig.yaml"));
+  ASSERT_TRUE(rig_formats::write_rig(camera::Rig({camera}), folder_ / "rig.yaml"));
   const auto text = report_rig({.file = (folder_ / "rig.yaml").string()});
   ASSERT_TRUE(text);
   EXPECT_NE(text->find("warning: mask of "), std::string::npos) << *text;
@@ -179,24 +185,24 @@ TEST_F(RigReport, NamesAMaskThatCannotBeUsed) {
 // The whole way: images, features, verdict.
 TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   ThreadPool pool(2);
-  const io::SimulationRequest request{.folder = folder_ / "data",
-                                      .rig = simulation::ring_rig(2, 240),
-                                      .recording = {.duration_s = 0.4, .rate_hz = 10},
-                                      .tour = {.duration_s = 0.4},
-                                      .imaging = {},
-                                      .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
-  ASSERT_TRUE(io::write_simulation(request, pool).ok());
+  const simulator::SimulationRequest request{.folder = folder_ / "data",
+                                             .rig = synthetic::ring_rig(2, 240),
+                                             .recording = {.duration_s = 0.4, .rate_hz = 10},
+                                             .tour = {.duration_s = 0.4},
+                                             .imaging = {},
+                                             .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
+  ASSERT_TRUE(simulator::write_simulation(request, pool).ok());
   const std::string images = (folder_ / "data").string();
   const auto good = report_rig({.file = images, .images = images});
   ASSERT_TRUE(good) << good.error().message();
   EXPECT_NE(good->find("the extrinsics fit as given"), std::string::npos) << *good;
-  const camera::Rig rig = io::read_rig(images).value();
-  ASSERT_TRUE(io::write_rig(io::with_inverse_extrinsics(rig), folder_ / "wrong.yaml"));
+  const camera::Rig rig = rig_formats::read_rig(images).value();
+  ASSERT_TRUE(rig_formats::write_rig(rig_formats::with_inverse_extrinsics(rig), folder_ / "wrong.yaml"));
   const auto wrong = report_rig({.file = (folder_ / "wrong.yaml").string(), .images = images});
   EXPECT_NE(wrong->find("they fit with"), std::string::npos) << *wrong;
   std::vector<camera::RigCamera> late{{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1)}};
   late[1].camera.time_offset_ns = 15'000'000;
-  ASSERT_TRUE(io::write_rig(camera::Rig(late), folder_ / "late.yaml"));
+  ASSERT_TRUE(rig_formats::write_rig(camera::Rig(late), folder_ / "late.yaml"));
   const auto apart = report_rig({.file = (folder_ / "late.yaml").string(), .images = images});
   ASSERT_TRUE(apart) << apart.error().message();
   EXPECT_NE(apart->find("never taken together"), std::string::npos) << *apart;

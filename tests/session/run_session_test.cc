@@ -1,15 +1,14 @@
 #include "session/run_session.h"
 
 #include <gtest/gtest.h>
-
 #include <unistd.h>
 
 #include <fstream>
 
-#include "io/simulation_writer.h"
 #include "place/shipped_vocabulary.h"
 #include "session/frame_source.h"
-#include "simulation/rigs.h"
+#include "simulator/simulation_writer.h"
+#include "synthetic/rigs.h"
 
 namespace bslam::session {
 namespace {
@@ -22,13 +21,13 @@ class Session : public ::testing::Test {
   static void SetUpTestSuite() {
     folder() = fs::temp_directory_path() / ("bslam_session_test_" + std::to_string(::getpid()));
     ThreadPool pool(2);
-    const io::SimulationRequest request{.folder = folder() / "data",
-                                        .rig = simulation::ring_rig(2, 240),
-                                        .recording = {.duration_s = 0.8, .rate_hz = 10},
-                                        .tour = {.duration_s = 0.8},
-                                        .imaging = {},
-                                        .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
-    const auto outcome = io::write_simulation(request, pool);
+    const simulator::SimulationRequest request{.folder = folder() / "data",
+                                               .rig = synthetic::ring_rig(2, 240),
+                                               .recording = {.duration_s = 0.8, .rate_hz = 10},
+                                               .tour = {.duration_s = 0.8},
+                                               .imaging = {},
+                                               .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
+    const auto outcome = simulator::write_simulation(request, pool);
     ASSERT_TRUE(outcome.ok()) << outcome.error().message();
   }
   static void TearDownTestSuite() { fs::remove_all(folder()); }
@@ -36,21 +35,21 @@ class Session : public ::testing::Test {
     static fs::path path;
     return path;
   }
-  static io::Dataset dataset() {
-    auto opened = io::open_dataset({.path = folder() / "data"});
+  static dataset::Dataset dataset() {
+    auto opened = dataset::open_dataset({.path = folder() / "data"});
     EXPECT_TRUE(opened.ok());
     return std::move(*opened);
   }
   static SessionOptions options() {
     SessionOptions o;
-    o.config.mode = system::Mode::kSequential;
+    o.config.mode = execution::Mode::kSequential;
     o.config.features.per_image = 400;
     return o;
   }
 };
 
 TEST_F(Session, ReadsFramesInOrder) {
-  const io::Dataset data = dataset();
+  const dataset::Dataset data = dataset();
   FrameSource source(data, 2);
   for (std::size_t i = 0; i < data.frames.size(); ++i) {
     const auto item = source.next();
@@ -65,7 +64,7 @@ TEST_F(Session, ReadsFramesInOrder) {
 }
 
 TEST_F(Session, StopsReadingCleanlyWhereNobodyWantsMoreParallel) {
-  const io::Dataset data = dataset();
+  const dataset::Dataset data = dataset();
   for (std::size_t taken = 0; taken <= data.frames.size(); ++taken) {
     FrameSource source(data, 1 + taken % 3, taken % 2 == 0 ? ReadAhead::kGivesWay : ReadAhead::kAsAll);
     for (std::size_t i = 0; i < taken; ++i) EXPECT_TRUE(source.next().has_value());
@@ -73,7 +72,7 @@ TEST_F(Session, StopsReadingCleanlyWhereNobodyWantsMoreParallel) {
 }
 
 TEST_F(Session, WritesAllItsFiles) {
-  const io::Dataset data = dataset();
+  const dataset::Dataset data = dataset();
   SessionOptions o = options();
   std::vector<std::size_t> progress;
   o.progress = [&](std::size_t done, std::size_t all) {
@@ -96,7 +95,8 @@ TEST_F(Session, WritesAllItsFiles) {
   EXPECT_FALSE(write_outputs(*result, o.config, out).ok());  // the folder is the caller's
   fs::create_directory(out);
   ASSERT_TRUE(write_outputs(*result, o.config, out).ok());
-  for (const char* name : {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg", "run.svg"}) {
+  for (const char* name :
+       {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg", "run.svg"}) {
     EXPECT_GT(fs::file_size(out / name), 50u) << name;
   }
   EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 6);  // and nothing half-written
@@ -148,7 +148,7 @@ TEST_F(Session, GoesOnInAMapOfAnEarlierRun) {
 
 TEST_F(Session, TracksTheSameInParallel) {
   SessionOptions o = options();
-  o.config.mode = system::Mode::kParallel;
+  o.config.mode = execution::Mode::kParallel;
   const auto result = run_session(dataset(), o);
   ASSERT_TRUE(result.ok());
   EXPECT_EQ(result->trajectories.front().poses.size(), 8u);
@@ -179,7 +179,7 @@ TEST_F(Session, RepeatsARunByItsJournalAlsoAnInterruptedOne) {
   for (const std::size_t end : {3u, 8u}) {
     std::stop_source interruption;
     SessionOptions o = options();
-    o.config.mode = system::Mode::kParallel;
+    o.config.mode = execution::Mode::kParallel;
     o.interrupted = interruption.get_token();
     o.progress = [&](std::size_t done, std::size_t all) {
       if (done == end && end < all) interruption.request_stop();
@@ -197,7 +197,8 @@ TEST_F(Session, RepeatsARunByItsJournalAlsoAnInterruptedOne) {
     for (std::size_t i = 0; i < end; ++i) {
       EXPECT_EQ(replayed->trajectories.front().poses[i].T_world_frame.translation(),
                 recorded->trajectories.front().poses[i].T_world_frame.translation());
-      EXPECT_EQ(replayed->live.front().poses[i].T_world_frame.translation(), recorded->live.front().poses[i].T_world_frame.translation());
+      EXPECT_EQ(replayed->live.front().poses[i].T_world_frame.translation(),
+                recorded->live.front().poses[i].T_world_frame.translation());
     }
   }
 }
@@ -216,7 +217,7 @@ TEST_F(Session, RefusesAJournalOfAnotherRun) {
 }
 
 TEST_F(Session, CountsADamagedImageAsSkippedAndGoesOn) {
-  const io::Dataset data = dataset();
+  const dataset::Dataset data = dataset();
   const fs::path victim = data.frames[4].images[1]->path, kept = folder() / "kept.png";
   fs::rename(victim, kept);
   std::ofstream(victim) << "no image";
@@ -225,7 +226,8 @@ TEST_F(Session, CountsADamagedImageAsSkippedAndGoesOn) {
   ASSERT_TRUE(result.ok());
   EXPECT_EQ(result->record.cameras[0].skipped, 0);
   EXPECT_EQ(result->record.cameras[1].skipped, 1);
-  EXPECT_EQ(result->record.cameras[1].first_skipped.find(victim.string()), 0u) << result->record.cameras[1].first_skipped;
+  EXPECT_EQ(result->record.cameras[1].first_skipped.find(victim.string()), 0u)
+      << result->record.cameras[1].first_skipped;
   EXPECT_EQ(result->record.cameras[1].images, 7);
   ASSERT_EQ(result->record.frames.size(), 8u);
   EXPECT_FALSE(result->record.frames[4].cameras[1].has_image);
@@ -233,7 +235,7 @@ TEST_F(Session, CountsADamagedImageAsSkippedAndGoesOn) {
 }
 
 TEST_F(Session, ReportsAMaskThatCannotBeRead) {
-  io::Dataset data = dataset();
+  dataset::Dataset data = dataset();
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < data.rig.size(); ++c) cameras.push_back({data.rig.camera(c), data.rig.body_from_cam(c)});
   cameras[1].camera.mask_file = (folder() / "no_such_mask.png").string();

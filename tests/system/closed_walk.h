@@ -15,24 +15,25 @@ namespace bslam::system {
 constexpr std::size_t kRound = 60, kWalk = 76;  // frames until the rig is back, and in all
 
 // `beside` metres to the left of the walk and as much above it.
-inline simulation::Trajectory round_and_home(const simulation::Building& building, double duration_s, double beside = 0) {
+inline synthetic::Trajectory round_and_home(const simulator::Building& building, double duration_s, double beside = 0) {
   constexpr double kKnot_s = 0.1, kReach_m = 1.2;
   const double round_s = static_cast<double>(kRound) / RenderedTour::kRateHz;
   const Eigen::Vector2d ahead = (building.tour[20] - building.tour[0]).normalized(), left(-ahead.y(), ahead.x());
-  std::vector<simulation::ControlPose> control;
+  std::vector<synthetic::ControlPose> control;
   for (int i = -1; (i - 3) * kKnot_s < duration_s; ++i) {
     const double turn = 2 * std::numbers::pi * i * kKnot_s / round_s;
     const Eigen::Vector2d at = building.tour[0] + 0.5 * kReach_m * (1 - std::cos(turn)) * ahead + beside * left;
     control.push_back({{at.x(), at.y(), 1.5 + beside + 0.05 * std::sin(3 * turn)},
-                       std::atan2(ahead.y(), ahead.x()) + turn, 0.04 * std::sin(5 * turn), 0.03 * std::sin(4 * turn)});
+                       std::atan2(ahead.y(), ahead.x()) + turn,
+                       0.04 * std::sin(5 * turn),
+                       0.03 * std::sin(4 * turn)});
   }
-  return simulation::Trajectory(std::move(control), kKnot_s);
+  return synthetic::Trajectory(std::move(control), kKnot_s);
 }
 
 inline const RenderedTour& closed_walk() {
-  static const RenderedTour walk(2, kWalk, [](const auto& building, double duration_s) {
-    return round_and_home(building, duration_s);
-  });
+  static const RenderedTour walk(
+      2, kWalk, [](const auto& building, double duration_s) { return round_and_home(building, duration_s); });
   return walk;
 }
 
@@ -75,9 +76,10 @@ inline PoseError pose_error(const geometry::SE3& estimate, const geometry::SE3& 
   return {off.translation().norm(), off.rotation().angularDistance(Eigen::Quaterniond::Identity())};
 }
 
-// Every tracked frame was told where it is, in the world whose frame camera 0 was at `T_world_origin`. Bounds are some five
-// times what these small images give.
-inline void expect_told_where_it_is(const System& system, const evaluation::Trajectory& truth, const geometry::SE3& T_world_origin) {
+// Every tracked frame was told where it is, in the world whose frame camera 0 was at `T_world_origin`. Bounds are some
+// five times what these small images give.
+inline void expect_told_where_it_is(const System& system, const evaluation::Trajectory& truth,
+                                    const geometry::SE3& T_world_origin) {
   for (const FrameRecord& record : system.frames()) {
     if (!is_tracked(record)) continue;
     const geometry::SE3 T_origin_rig = T_world_origin.inverse() * truth[record.result.frame.index()].T_world_frame;
@@ -108,13 +110,16 @@ inline bool identical(const map::BundledMap& a, const map::BundledMap& b) {
   const auto same = [](const geometry::SE3& x, const geometry::SE3& y) {
     return x.translation() == y.translation() && x.rotation().coeffs() == y.rotation().coeffs();
   };
-  if (a.version() != b.version() || a.keyframe_ids() != b.keyframe_ids() || a.landmark_ids() != b.landmark_ids()) return false;
+  if (a.version() != b.version() || a.keyframe_ids() != b.keyframe_ids() || a.landmark_ids() != b.landmark_ids())
+    return false;
   for (const KeyframeId k : a.keyframe_ids()) {
     const map::BundledKeyframe &x = a.keyframe(k), &y = b.keyframe(k);
-    if (!same(x.T_rig_world, y.T_rig_world) || x.parent != y.parent || x.frame->time_ns != y.frame->time_ns) return false;
+    if (!same(x.T_rig_world, y.T_rig_world) || x.parent != y.parent || x.frame->time_ns != y.frame->time_ns)
+      return false;
   }
   for (const LandmarkId l : a.landmark_ids()) {
-    if (a.landmark(l).position != b.landmark(l).position || a.landmark(l).descriptor != b.landmark(l).descriptor) return false;
+    if (a.landmark(l).position != b.landmark(l).position || a.landmark(l).descriptor != b.landmark(l).descriptor)
+      return false;
     if (!std::ranges::equal(a.observations(l), b.observations(l))) return false;
   }
   return true;

@@ -18,12 +18,12 @@ TEST(SystemLagged, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
     if (journal.empty()) {
       final = final_poses(system);
       live = live_poses(system);
-      journal = journal_text(system.journal());
+      journal = execution::journal_text(system.journal());
       EXPECT_EQ(final.size(), tour.frames().size());
     }
     EXPECT_TRUE(identical(final, final_poses(system))) << threads << " threads";
     EXPECT_TRUE(identical(live, live_poses(system))) << threads << " threads";
-    EXPECT_EQ(journal_text(system.journal()), journal) << threads << " threads";
+    EXPECT_EQ(execution::journal_text(system.journal()), journal) << threads << " threads";
   }
 }
 

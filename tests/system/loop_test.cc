@@ -137,7 +137,7 @@ TEST(SystemLoopReplay, RepeatsAParallelRunWithLoopsToTheBit) {
     process_all(recorded, walk.frames);
     recorded.finish();
     EXPECT_FALSE(recorded.loops().empty());
-    auto journal = parse_journal(journal_text(recorded.journal()), "recorded");
+    auto journal = execution::parse_journal(execution::journal_text(recorded.journal()), "recorded");
     ASSERT_TRUE(journal.ok());
     Resources resources = with_vocabulary();
     resources.replay = std::move(*journal);

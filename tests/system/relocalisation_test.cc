@@ -62,9 +62,8 @@ class SystemSavedMap : public ::testing::Test {
     return out;
   }
   static const RenderedTour& beside() {
-    static const RenderedTour walk(2, 20, [](const auto& building, double duration_s) {
-      return round_and_home(building, duration_s, 0.08);
-    });
+    static const RenderedTour walk(
+        2, 20, [](const auto& building, double duration_s) { return round_and_home(building, duration_s, 0.08); });
     return walk;
   }
   // Where the world of the map stands.
@@ -121,7 +120,7 @@ TEST_F(SystemSavedMap, ARunGoesOnInItAndCanBeRepeated) {
   EXPECT_EQ(system.snapshot()->roots(), saved_->roots());
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 
-  auto journal = parse_journal(journal_text(system.journal()), "recorded");
+  auto journal = execution::parse_journal(execution::journal_text(system.journal()), "recorded");
   ASSERT_TRUE(journal.ok());
   Resources again = resources();
   again.replay = std::move(*journal);

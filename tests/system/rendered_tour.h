@@ -11,42 +11,44 @@
 
 #include "evaluation/trajectory_error.h"
 #include "image/image_bundle.h"
-#include "simulation/recorder.h"
-#include "simulation/rigs.h"
+#include "simulator/recorder.h"
+#include "synthetic/rigs.h"
 #include "system/system.h"
 
 namespace bslam::system {
 
 class RenderedTour {
  public:
-  using Motion = std::function<simulation::Trajectory(const simulation::Building&, double duration_s)>;
+  using Motion = std::function<synthetic::Trajectory(const simulator::Building&, double duration_s)>;
 
   RenderedTour(int cameras, std::size_t frames, TimeNs late_ns = 0)
-      : RenderedTour(cameras, frames,
-                     [](const auto& building, double duration_s) {
-                       return simulation::make_tour(building, {.duration_s = duration_s, .seed = 3});
-                     },
-                     late_ns) {}
+      : RenderedTour(
+            cameras, frames,
+            [](const auto& building, double duration_s) {
+              return simulator::make_tour(building, {.duration_s = duration_s, .seed = 3});
+            },
+            late_ns) {}
 
   // `late_ns`: by how much cameras 2 and on fire after the others.
   RenderedTour(int cameras, std::size_t frames, const Motion& motion, TimeNs late_ns = 0)
       : pool_(2), rig_(late(first_cameras(cameras), late_ns)), rig_truth_(rig_.size()) {
-    const simulation::World world(simulation::make_building(3), {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2}, pool_);
-    const simulation::RecordingOptions options{.duration_s = static_cast<double>(frames) / kRateHz, .rate_hz = kRateHz};
-    const simulation::Recorder recorder(world, rig_, motion(world.building(), options.duration_s), {}, 0.002, pool_);
-    const std::vector<simulation::Shot> shots = simulation::plan_shots(rig_, options);
+    const simulator::World world(simulator::make_building(3), {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2},
+                                 pool_);
+    const simulator::RecordingOptions options{.duration_s = static_cast<double>(frames) / kRateHz, .rate_hz = kRateHz};
+    const simulator::Recorder recorder(world, rig_, motion(world.building(), options.duration_s), {}, 0.002, pool_);
+    const std::vector<simulator::Shot> shots = simulator::plan_shots(rig_, options);
     frames_.resize(frames);
     for (std::size_t k = 0; k < frames; ++k) {
       frames_[k].id = FrameId(k);
-      frames_[k].time_ns = simulation::frame_stamp(options, k);
+      frames_[k].time_ns = simulator::frame_stamp(options, k);
       frames_[k].images.resize(rig_.size());
     }
     pool_.for_each(shots.size(), [&](std::size_t i) {
-      const simulation::Shot& shot = shots[i];
+      const simulator::Shot& shot = shots[i];
       const TimeNs time_ns = shot.stamp_ns + rig_.camera(shot.camera).time_offset_ns;
       frames_[shot.frame].images[shot.camera] = {image::ImageState::kPresent, time_ns, recorder.picture(shot)};
     });
-    for (const simulation::Shot& shot : shots) {
+    for (const simulator::Shot& shot : shots) {
       rig_truth_[shot.camera].push_back({shot.stamp_ns, recorder.T_world_cam(0, shot.scene_time_s)});
     }
   }
@@ -88,7 +90,7 @@ class RenderedTour {
     std::iota(list.begin(), list.end(), 0);
     return list;
   }
-  static camera::Rig first_cameras(int cameras) { return simulation::ring_rig(8, 320).subset(camera_list(cameras)); }
+  static camera::Rig first_cameras(int cameras) { return synthetic::ring_rig(8, 320).subset(camera_list(cameras)); }
 
   static camera::Rig late(const camera::Rig& rig, TimeNs late_ns) {
     std::vector<camera::RigCamera> cameras;
@@ -107,7 +109,8 @@ class RenderedTour {
 
 // Another place with as much to see: left and right exchanged.
 inline void mirror(image::CameraImage& image) {
-  for (int y = 0; y < image.image.height(); ++y) std::reverse(image.image.row(y), image.image.row(y) + image.image.width());
+  for (int y = 0; y < image.image.height(); ++y)
+    std::reverse(image.image.row(y), image.image.row(y) + image.image.width());
 }
 
 inline void blacken(image::CameraImage& input) {

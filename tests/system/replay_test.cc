@@ -10,12 +10,12 @@ namespace {
 void expect_same(const System& a, const System& b) {
   EXPECT_TRUE(identical(a.trajectories(), b.trajectories()));
   EXPECT_TRUE(identical(a.live_trajectories(), b.live_trajectories()));
-  EXPECT_EQ(journal_text(a.journal()), journal_text(b.journal()));
+  EXPECT_EQ(execution::journal_text(a.journal()), execution::journal_text(b.journal()));
 }
 
 // The recorded journal as it would come back from a file.
-Journal reread(const System& system) {
-  auto journal = parse_journal(journal_text(system.journal()), "recorded");
+execution::Journal reread(const System& system) {
+  auto journal = execution::parse_journal(execution::journal_text(system.journal()), "recorded");
   EXPECT_TRUE(journal.ok());
   return std::move(*journal);
 }
@@ -42,7 +42,8 @@ TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
   std::vector<image::ImageBundle> frames(tour.frames().begin(), tour.frames().begin() + 6);
   frames.push_back(tour.frames()[6]);
   mirror(frames.back().images[0]);
-  for (std::size_t i = 0, first = frames.size(); i < tour.frames().size(); ++i) frames.push_back(tour.replayed(i, first));
+  for (std::size_t i = 0, first = frames.size(); i < tour.frames().size(); ++i)
+    frames.push_back(tour.replayed(i, first));
   System recorded(tour.rig(), small_config(Mode::kParallel));
   for (const image::ImageBundle& images : frames) recorded.process(images);
   recorded.finish();
@@ -52,7 +53,7 @@ TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
   replayed.finish();
   expect_same(recorded, replayed);
   MapVersion newest{0};
-  for (const JournalEntry& e : recorded.journal().entries) {  // versions go on counting over the maps
+  for (const execution::JournalEntry& e : recorded.journal().entries) {  // versions go on counting over the maps
     if (!e.committed) continue;
     EXPECT_EQ(*e.committed, newest.next());
     newest = *e.committed;
@@ -72,13 +73,13 @@ TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
     for (const image::ImageBundle& images : tour.frames()) replayed.process(images);
     replayed.finish();
   };
-  EXPECT_THROW(replay(), ReplayMismatch);
+  EXPECT_THROW(replay(), execution::ReplayMismatch);
 
   Config without = small_config(Mode::kSequential);
   without.final_adjustment = false;
   System shorter(tour.rig(), without, {.replay = reread(recorded)});
   for (const image::ImageBundle& images : tour.frames()) shorter.process(images);
-  EXPECT_THROW(shorter.finish(), ReplayMismatch);
+  EXPECT_THROW(shorter.finish(), execution::ReplayMismatch);
 }
 
 TEST(SystemReplay, RepeatsAnInterruptedRunParallel) {
@@ -88,13 +89,14 @@ TEST(SystemReplay, RepeatsAnInterruptedRunParallel) {
     for (std::size_t k = 0; k < 7; ++k) recorded.process(tour.frames()[k]);
     std::jthread([&] { recorded.interrupt(); }).join();
     recorded.finish();
-    for (const JournalEntry& e : recorded.journal().entries) EXPECT_NE(e.step, JournalStep::kFinal);
+    for (const execution::JournalEntry& e : recorded.journal().entries)
+      EXPECT_NE(e.step, execution::JournalStep::kFinal);
     EXPECT_EQ(final_poses(recorded).size(), 7u);
     System replayed(tour.rig(), small_config(mode), {.replay = reread(recorded)});
     for (std::size_t k = 0; k < 7; ++k) replayed.process(tour.frames()[k]);
     replayed.finish();
     expect_same(recorded, replayed);
-    EXPECT_THROW(replayed.process(tour.frames()[7]), ReplayMismatch);
+    EXPECT_THROW(replayed.process(tour.frames()[7]), execution::ReplayMismatch);
   }
 }
 

@@ -18,7 +18,8 @@ Outcome run(const RenderedTour& tour, const Config& config) {
   System system(tour.rig(), config);
   for (const image::ImageBundle& images : tour.frames()) system.process(images);
   system.finish();
-  return {final_poses(system), live_poses(system), system.snapshot()->num_landmarks(), system.snapshot()->num_observations()};
+  return {final_poses(system), live_poses(system), system.snapshot()->num_landmarks(),
+          system.snapshot()->num_observations()};
 }
 
 TEST(SystemSequential, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
@@ -72,7 +73,8 @@ TEST(SystemSequential, ADamagedOrMissingImageCostsOnlyItsCamera) {
       const bool present = images.images[c].state == ImageState::kPresent;
       EXPECT_EQ(record.images[c], images.images[c].state);
       EXPECT_EQ(record.result.cameras[c].keypoints > 0, present);
-      EXPECT_EQ(record.result.cameras[c].inliers > 0, present && images.id.value() > 0) << "frame " << images.id.value();
+      EXPECT_EQ(record.result.cameras[c].inliers > 0, present && images.id.value() > 0)
+          << "frame " << images.id.value();
     }
   }
   system.finish();
@@ -90,9 +92,12 @@ TEST(SystemSequential, IsLostInTheDarkAndRecovers) {
   for (const image::ImageBundle& images : frames) {
     const FrameRecord& record = system.process(images);
     const bool dark = images.id.value() == 8 || images.id.value() == 9;
-    EXPECT_EQ(record.result.status, dark ? TrackStatus::kLost : TrackStatus::kTracking) << "frame " << images.id.value();
+    EXPECT_EQ(record.result.status, dark ? TrackStatus::kLost : TrackStatus::kTracking)
+        << "frame " << images.id.value();
     EXPECT_EQ(record.result.reason, dark ? LostReason::kNoImages : LostReason::kNone);
-    EXPECT_EQ(record.outages, std::vector<Outage>(2, dark ? Outage::kBlack : Outage::kNone)) << "frame " << images.id.value();
+    EXPECT_EQ(record.outages,
+              std::vector<tracking::Outage>(2, dark ? tracking::Outage::kBlack : tracking::Outage::kNone))
+        << "frame " << images.id.value();
   }
   system.finish();
   EXPECT_EQ(final_poses(system).size(), frames.size() - 2);
@@ -131,9 +136,9 @@ TEST(SystemSequential, RecordsEveryInputFrame) {
   EXPECT_EQ(system.frames()[0].result.reason, LostReason::kNotStarted);
   EXPECT_EQ(system.frames()[6].result.reason, LostReason::kNoImages);
   EXPECT_TRUE(system.frames()[1].keyframe);
-  EXPECT_EQ(system.stage_runs().size(), static_cast<std::size_t>(std::count_if(
-                                              system.frames().begin(), system.frames().end(),
-                                              [](const FrameRecord& r) { return r.keyframe; })));
+  EXPECT_EQ(system.stage_runs().size(),
+            static_cast<std::size_t>(std::count_if(system.frames().begin(), system.frames().end(),
+                                                   [](const FrameRecord& r) { return r.keyframe; })));
 }
 
 TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {

@@ -1,13 +1,13 @@
-// A run without images: keyframes made by a caller frame by frame, and stages that write a hash of all they were given into
-// the map. Whatever version, order or stage differs shows in every later position.
+// A run without images: keyframes made by a caller frame by frame, and stages that write a hash of all they were given
+// into the map. Whatever version, order or stage differs shows in every later position.
 #pragma once
 
 #include <bit>
 #include <memory>
 #include <vector>
 
+#include "execution/stage_executor.h"
 #include "map/synthetic_map.h"
-#include "system/stage_executor.h"
 
 namespace bslam::system {
 
@@ -45,13 +45,13 @@ class StageWorld {
   map::BundledMap empty_map() const { return map::BundledMap(rig_); }
 
   // A keyframe with two landmarks of its own, placed by what the frame saw.
-  KeyframeId add_keyframe(FrameId frame, const map::MapSnapshot& seen, StageExecutor& executor) const {
+  KeyframeId add_keyframe(FrameId frame, const map::MapSnapshot& seen, execution::StageExecutor& executor) const {
     map::MapDraft draft("track", seen);
     const auto hash = hash_of(*seen, static_cast<std::uint64_t>(frame.value()));
     Random random(hash);
     const KeyframeId k = draft.add_keyframe(frame_, map::random_pose(random, 0.2), {}, KeyframeId());
     for (std::size_t f = 0; f < 2; ++f) draft.add_landmark(map::random_point(random), {{k, FeatureId(f)}});
-    return executor.commit(JournalStep::kTrack, std::move(draft)).keyframes.front();
+    return executor.commit(execution::JournalStep::kTrack, std::move(draft)).keyframes.front();
   }
 
  private:
@@ -59,28 +59,32 @@ class StageWorld {
   std::shared_ptr<const frame::BundledFrame> frame_;
 };
 
-// Two landmarks by what the stage saw, one new, one moved; kLoop finds something for every `loop_every`th keyframe alone.
-// Every stage takes between none and some 100 microseconds, by `delay_seed`; kGlobal four times that.
-inline StageFunctions hashing_stages(std::uint64_t delay_seed, int loop_every = 3, std::uint64_t max_delay = 100'000) {
-  const auto stage = [=](const StageTask& task, const map::MapSnapshot& base, const std::stop_token& stop) -> StageResult {
-    const auto number = static_cast<std::uint64_t>(task.stage) * 1000 + static_cast<std::uint64_t>(task.keyframe.value());
+// Two landmarks by what the stage saw, one new, one moved; kLoop finds something for every `loop_every`th keyframe
+// alone. Every stage takes between none and some 100 microseconds, by `delay_seed`; kGlobal four times that.
+inline execution::StageFunctions hashing_stages(std::uint64_t delay_seed, int loop_every = 3,
+                                                std::uint64_t max_delay = 100'000) {
+  const auto stage = [=](const execution::StageTask& task, const map::MapSnapshot& base,
+                         const std::stop_token& stop) -> execution::StageResult {
+    const auto number =
+        static_cast<std::uint64_t>(task.stage) * 1000 + static_cast<std::uint64_t>(task.keyframe.value());
     Random delay(delay_seed, "delay", number);
     const auto rounds = max_delay == 0 ? 0 : delay.below(static_cast<std::uint32_t>(max_delay));
-    for (int part = 0; part < (task.stage == Stage::kGlobal ? 4 : 1); ++part) {
+    for (int part = 0; part < (task.stage == execution::Stage::kGlobal ? 4 : 1); ++part) {
       if (busy(rounds) < 0 || stop.stop_requested()) return {};
     }
-    if (task.stage == Stage::kLoop && task.keyframe.value() % loop_every != 0) return {};
-    map::MapDraft draft(stage_name(task.stage), base);
+    if (task.stage == execution::Stage::kLoop && task.keyframe.value() % loop_every != 0) return {};
+    map::MapDraft draft(execution::stage_name(task.stage), base);
     const std::uint64_t hash = hash_of(*base, number);
     map::SetPoses poses;
     poses.landmarks.emplace_back(LandmarkId(hash % base->landmark_slots()), point_of(hash));
     draft.set_poses(std::move(poses));
     const FeatureId free(2 + static_cast<std::size_t>(task.stage));
-    if (!base->landmark_of(task.keyframe, free).valid()) draft.add_landmark(point_of(hash + 1), {{task.keyframe, free}});
+    if (!base->landmark_of(task.keyframe, free).valid())
+      draft.add_landmark(point_of(hash + 1), {{task.keyframe, free}});
     return {std::move(draft), {}};
   };
-  StageFunctions functions;
-  for (const Stage s : kStages) functions[s] = stage;
+  execution::StageFunctions functions;
+  for (const execution::Stage s : execution::kStages) functions[s] = stage;
   return functions;
 }
 

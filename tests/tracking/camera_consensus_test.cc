@@ -13,9 +13,12 @@ TEST(CameraConsensus, FlagsWhoLostWhatItSawWhileAnotherDidNot) {
   const ConsensusOptions options;
   EXPECT_EQ(disagreeing({{100, 80}, {100, 2}}, std::vector<CameraTrust>(3), options), Flags({0, 1}));
   EXPECT_EQ(disagreeing({{100, 3}, {100, 2}, {60, 50}}, std::vector<CameraTrust>(3), options), Flags({1, 1, 0}));
-  EXPECT_EQ(disagreeing({{100, 80}, {100, 30}}, std::vector<CameraTrust>(3), options), Flags({0, 0})) << "a hard frame is no wrong one";
-  EXPECT_EQ(disagreeing({{100, 80}, {10, 0}}, std::vector<CameraTrust>(3), options), Flags({0, 0})) << "too little to judge by";
-  EXPECT_EQ(disagreeing({{100, 5}, {100, 2}}, std::vector<CameraTrust>(3), options), Flags({0, 0})) << "nobody to judge by";
+  EXPECT_EQ(disagreeing({{100, 80}, {100, 30}}, std::vector<CameraTrust>(3), options), Flags({0, 0}))
+      << "a hard frame is no wrong one";
+  EXPECT_EQ(disagreeing({{100, 80}, {10, 0}}, std::vector<CameraTrust>(3), options), Flags({0, 0}))
+      << "too little to judge by";
+  EXPECT_EQ(disagreeing({{100, 5}, {100, 2}}, std::vector<CameraTrust>(3), options), Flags({0, 0}))
+      << "nobody to judge by";
 }
 
 TEST(CameraConsensus, ReadmitsAfterSomeFramesThatFit) {
@@ -83,7 +86,8 @@ TEST(CameraConsensus, KeepsDoubtsThroughALossButOfCamerasThatSawThePlace) {
   EXPECT_TRUE(after[1].established);
 }
 
-// A camera that is late is left out until the motion is known. What it then finds of what the others mapped, it may mistake.
+// A camera that is late is left out until the motion is known. What it then finds of what the others mapped, it may
+// mistake.
 TEST(CameraConsensus, DoesNotJudgeACameraByWhatOnlyOthersHaveSeen) {
   const FrameMatches matches{FrameMatches::value_type(100), FrameMatches::value_type(33)};
   std::vector<CameraTrust> cameras(2);
@@ -101,12 +105,12 @@ TEST(CameraConsensus, DoesNotJudgeACameraByWhatOnlyOthersHaveSeen) {
 class WrongPictures : public ::testing::Test {
  protected:
   static const map::SimulatedMap& world() {
-    static const map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 2.0, 0.25);
+    static const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 2.0, 0.25);
     return world;
   }
   // The frame, with the pictures of camera `from` in camera `to`: its keypoints as the rig would take them to be.
-  static simulation::SimulatedFrame with_pictures_of(int i, std::size_t to, std::size_t from) {
-    simulation::SimulatedFrame seen = world().sim.frame(FrameId(i), 0.05 * i);
+  static synthetic::SimulatedFrame with_pictures_of(int i, std::size_t to, std::size_t from) {
+    synthetic::SimulatedFrame seen = world().sim.frame(FrameId(i), 0.05 * i);
     frame::CameraFrame& camera = seen.frame.cameras[to];
     const camera::Rig& rig = world().map.rig();
     camera.keypoints = seen.frame.cameras[from].keypoints;
@@ -115,7 +119,7 @@ class WrongPictures : public ::testing::Test {
       if (bearing) camera.keypoints.bearing[k] = *bearing;
     }
     camera.grid = frame::FeatureGrid(camera.keypoints, rig.camera(to).width, rig.camera(to).height);
-    seen.frame.bundled = frame::make_bundled(rig, seen.frame.cameras, {}, 5e-4, 7.81);
+    seen.frame.bundled = matching::make_bundled(rig, seen.frame.cameras, {}, 5e-4, 7.81);
     return seen;
   }
 };
@@ -131,7 +135,8 @@ TEST_F(WrongPictures, AreLeftOutAtOnceAndTheirCameraComesBackWithItsOwn) {
     EXPECT_LT(map::distance_m(out.result.T_rig_world, seen.T_world_rig.inverse()), 0.012) << i;
     EXPECT_EQ(out.result.cameras[2].doubted, i >= 10 && i < readmitted) << i;
     EXPECT_EQ(out.result.cameras[2].inliers > 0, !out.result.cameras[2].doubted) << i;
-    for (const std::size_t c : {0, 1, 3}) EXPECT_FALSE(out.result.cameras[c].doubted) << "camera " << c << ", frame " << i;
+    for (const std::size_t c : {0, 1, 3})
+      EXPECT_FALSE(out.result.cameras[c].doubted) << "camera " << c << ", frame " << i;
   }
 }
 
@@ -156,8 +161,9 @@ TEST_F(WrongPictures, InAllCamerasButOneLeaveThatOneToGoOn) {
   for (int i = 1; i < 20; ++i) {
     auto seen = world().sim.frame(FrameId(i), 0.05 * i);
     if (i >= 8) {
-      for (const std::size_t c : {0, 1, 2}) seen.frame.cameras[c] = with_pictures_of(i, c, (c + 2) % 4).frame.cameras[c];
-      seen.frame.bundled = frame::make_bundled(world().map.rig(), seen.frame.cameras, {}, 5e-4, 7.81);
+      for (const std::size_t c : {0, 1, 2})
+        seen.frame.cameras[c] = with_pictures_of(i, c, (c + 2) % 4).frame.cameras[c];
+      seen.frame.bundled = matching::make_bundled(world().map.rig(), seen.frame.cameras, {}, 5e-4, 7.81);
     }
     const TrackOutput out = tracker.track(seen.frame);
     ASSERT_EQ(out.result.status, TrackStatus::kTracking) << i;
@@ -168,7 +174,7 @@ TEST_F(WrongPictures, InAllCamerasButOneLeaveThatOneToGoOn) {
 }
 
 TEST(LeavingOutACamera, KeepsTheFeaturesOfTheOthers) {
-  const auto sim = simulator(simulation::ring_rig(3));
+  const auto sim = simulator(synthetic::ring_rig(3));
   frame::BundledFrame frame = sim.frame(FrameId(1), 0.5).frame;
   const std::size_t others = frame.cameras[0].keypoints.size() + frame.cameras[1].keypoints.size();
   leave_out(sim.rig(), 2, 5e-4, 7.81, frame);

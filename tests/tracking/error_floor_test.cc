@@ -7,10 +7,11 @@
 namespace bslam::tracking {
 namespace {
 
-const frame::AlignmentOptions kOptions{.floor_px = 0.3, .least_floor_px = 0.05};
+const matching::AlignmentOptions kOptions{.floor_px = 0.3, .least_floor_px = 0.05};
 constexpr double kAlignment = 0.1;  // px
 
-// What frames of `count` keypoints say one after the other, whose calibration is off by `floor` pixels and alignment by kAlignment.
+// What frames of `count` keypoints say one after the other, whose calibration is off by `floor` pixels and alignment by
+// kAlignment.
 double after(int frames, double floor, int count, double before = kOptions.floor_px) {
   Random random(1, "floor");
   const double sigma = std::hypot(floor, kAlignment);
@@ -51,9 +52,9 @@ class FloorsOfAFrame : public ::testing::Test {
     output = tracker.track(frame);
   }
   static map::SimulatedMap make_world() {
-    simulation::FeatureSimulatorOptions options;
+    synthetic::FeatureSimulatorOptions options;
     options.sigma_px = 0.05;
-    map::SimulatedMap out(simulation::FeatureSimulator(simulation::default_rig(), simulation::make_orbit({}), options));
+    map::SimulatedMap out(synthetic::FeatureSimulator(synthetic::default_rig(), synthetic::make_orbit({}), options));
     out.add_keyframe(FrameId(0), 0.0);
     out.add_keyframe(FrameId(7), 1.0);
     return out;

@@ -2,11 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-
-#include <Eigen/LU>
 
 #include "tracking/simulated_tracker.h"
 
@@ -35,9 +34,11 @@ TEST(FeatureBudgets, AreEvenAsLongAsNothingIsKnown) {
 }
 
 TEST(FeatureBudgets, FollowTheSharesBeyondHalfOfTheEvenOne) {
-  EXPECT_EQ(feature_budgets(4, std::vector<double>{0.4, 0.3, 0.2, 0.1}, {}, {}, options(1200, 3200)), (std::vector<int>{1040, 880, 720, 560}));
+  EXPECT_EQ(feature_budgets(4, std::vector<double>{0.4, 0.3, 0.2, 0.1}, {}, {}, options(1200, 3200)),
+            (std::vector<int>{1040, 880, 720, 560}));
   // The first would get 2000: what is beyond its cap goes to the others.
-  EXPECT_EQ(feature_budgets(4, std::vector<double>{1, 0, 0, 0}, {}, {}, options(1200, 3200)), (std::vector<int>{1200, 667, 667, 667}));
+  EXPECT_EQ(feature_budgets(4, std::vector<double>{1, 0, 0, 0}, {}, {}, options(1200, 3200)),
+            (std::vector<int>{1200, 667, 667, 667}));
 }
 
 TEST(FeatureBudgets, GiveToTheOthersWhatACameraThatIsOutDoesNotNeed) {
@@ -55,7 +56,8 @@ TEST(FeatureBudgets, GiveToTheOthersWhatACameraThatIsOutDoesNotNeed) {
 
 TEST(FeatureBudgets, LeaveSomeToACameraThatIsDoubted) {
   const std::vector<std::uint8_t> doubted{1, 1, 0, 1};  // half of the even budget, to be believed again
-  EXPECT_EQ(feature_budgets(4, std::vector<double>{0, 0, 1, 0}, {}, doubted, options(1200, 3600)), (std::vector<int>{450, 450, 2250, 450}));
+  EXPECT_EQ(feature_budgets(4, std::vector<double>{0, 0, 1, 0}, {}, doubted, options(1200, 3600)),
+            (std::vector<int>{450, 450, 2250, 450}));
 }
 
 TEST(FeatureBudgets, DoNotSwingWithSlowCameras) {
@@ -162,7 +164,7 @@ class TrackedFrame : public ::testing::Test {
   TrackedFrame() : seen(world.sim.frame(FrameId(1), 0.1)) {
     SimulatedTracker tracker(world);
     frame = seen.frame;
-    const std::vector<frame::AlignmentOptions> alignment(world.map.rig().size());
+    const std::vector<matching::AlignmentOptions> alignment(world.map.rig().size());
     const TrackInput input{.map = world.map,
                            .pyramids = pyramids,
                            .alignment = alignment,
@@ -171,9 +173,9 @@ class TrackedFrame : public ::testing::Test {
     ThreadPool pool(2);
     output = track(input, frame, tracker.options, pool);
   }
-  map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 0.0, 1.0);
+  map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 0.0, 1.0);
   std::vector<image::Pyramid> pyramids = map::flat_pyramids(4);
-  simulation::SimulatedFrame seen;
+  synthetic::SimulatedFrame seen;
   frame::BundledFrame frame;
   TrackOutput output;
 };
@@ -186,7 +188,8 @@ TEST_F(TrackedFrame, TellsWhatThePoseSolverKnows) {
   for (const Matrix6d& i : information) all += i;
   const auto observations = pose_observations(world.map, frame, output.matches);
   solver::PoseSolverOptions accept_all;
-  const auto solution = solver::solve_pose(frame::rig_of(world.map.rig(), frame), observations, output.result.T_rig_world, accept_all);
+  const auto solution =
+      solver::solve_pose(frame::rig_of(world.map.rig(), frame), observations, output.result.T_rig_world, accept_all);
   ASSERT_GT(solution.num_inliers, static_cast<int>(0.99 * static_cast<double>(observations.size())));
   EXPECT_LT((all - solution.information).norm(), 0.02 * all.norm());
 }

@@ -10,8 +10,8 @@ namespace {
 class FindLandmarks : public ::testing::Test {
  protected:
   static constexpr double kRadius = 0.02;  // radians
-  map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 0.0, 1.0);
-  simulation::SimulatedFrame seen = world.sim.frame(FrameId(1), 0.1);
+  map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 0.0, 1.0);
+  synthetic::SimulatedFrame seen = world.sim.frame(FrameId(1), 0.1);
   std::vector<LandmarkId> all = world.map.landmark_ids();
   ThreadPool pool{2};
   MatchSearch find(const FrameMatches& known) {
@@ -21,7 +21,8 @@ class FindLandmarks : public ::testing::Test {
   std::pair<std::size_t, std::size_t> right(const FrameMatches& found) const {
     std::size_t right = 0, possible = 0;
     for (std::size_t c = 0; c < found.size(); ++c) {
-      for (const Match& m : found[c]) right += world.truth_of_landmark.at(m.landmark.value()) == seen.landmark[c][m.keypoint.index()];
+      for (const Match& m : found[c])
+        right += world.truth_of_landmark.at(m.landmark.value()) == seen.landmark[c][m.keypoint.index()];
       for (const int truth : seen.landmark[c]) possible += truth >= 0 && world.landmark_of.contains(truth);
     }
     return {right, possible};
@@ -40,7 +41,8 @@ TEST_F(FindLandmarks, ListsEachExpectedLandmarkOnceAndInOrder) {
   const MatchSearch search = find({});
   EXPECT_TRUE(std::is_sorted(search.visible.begin(), search.visible.end()));
   EXPECT_EQ(std::adjacent_find(search.visible.begin(), search.visible.end()), search.visible.end());
-  for (const LandmarkId l : landmarks_of(search.found)) EXPECT_TRUE(std::binary_search(search.visible.begin(), search.visible.end(), l));
+  for (const LandmarkId l : landmarks_of(search.found))
+    EXPECT_TRUE(std::binary_search(search.visible.begin(), search.visible.end(), l));
 }
 
 TEST_F(FindLandmarks, LeavesOutWhatIsKnownCameraByCamera) {
@@ -57,7 +59,8 @@ TEST_F(FindLandmarks, LeavesOutWhatIsKnownCameraByCamera) {
   const FrameMatches both = merge(known, again.found);
   EXPECT_EQ(count(both), count(known) + count(again.found));
   for (const auto& camera : both) {
-    EXPECT_TRUE(std::is_sorted(camera.begin(), camera.end(), [](const Match& a, const Match& b) { return a.keypoint < b.keypoint; }));
+    EXPECT_TRUE(std::is_sorted(camera.begin(), camera.end(),
+                               [](const Match& a, const Match& b) { return a.keypoint < b.keypoint; }));
   }
 }
 
@@ -73,8 +76,8 @@ TEST_F(FindLandmarks, WhatDoesNotAlignKeepsItsPlaceWithTheDetectorsNoise) {
   MatchSearch search = find({});
   frame::BundledFrame frame = seen.frame;
   for (auto& s : frame.cameras[0].keypoints.sigma) s = 0.01f;
-  align_matches(world.map, seen.T_world_rig.inverse(), search.found, map::flat_pyramids(4), std::vector<frame::AlignmentOptions>(4),
-                {.sigma_px = 0.9}, frame, pool);
+  align_matches(world.map, seen.T_world_rig.inverse(), search.found, map::flat_pyramids(4),
+                std::vector<matching::AlignmentOptions>(4), {.sigma_px = 0.9}, frame, pool);
   for (const Match& m : search.found[0]) {
     const std::size_t k = m.keypoint.index();
     EXPECT_EQ(frame.cameras[0].keypoints.pixel[k], seen.frame.cameras[0].keypoints.pixel[k]);

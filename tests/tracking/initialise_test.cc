@@ -10,12 +10,13 @@ namespace {
 
 using geometry::SE3;
 
-map::MapDraft empty_draft(const simulation::FeatureSimulator& sim) {
-  return map::MapDraft("start", std::make_shared<const map::BundledMap>(std::make_shared<const camera::Rig>(sim.rig())));
+map::MapDraft empty_draft(const synthetic::FeatureSimulator& sim) {
+  return map::MapDraft("start",
+                       std::make_shared<const map::BundledMap>(std::make_shared<const camera::Rig>(sim.rig())));
 }
 
 TEST(StartMetric, MakesLandmarksAtTheirTruePlaces) {
-  const auto sim = simulator(simulation::ring_rig(2));
+  const auto sim = simulator(synthetic::ring_rig(2));
   const auto seen = sim.frame(FrameId(0), 0.0);
   map::MapDraft draft = empty_draft(sim);
   const auto started = start_metric(seen.frame, map::flat_pyramids(2), {}, draft);
@@ -30,13 +31,15 @@ TEST(StartMetric, MakesLandmarksAtTheirTruePlaces) {
     const frame::KeypointRef r = map.landmark(l).reference.keypoint;
     const int truth = seen.landmark[r.camera.index()][r.keypoint.index()];
     ASSERT_GE(truth, 0);
-    const Eigen::Vector3d true_rig = seen.T_world_rig.inverse() * sim.landmarks()[static_cast<std::size_t>(truth)].position;
-    EXPECT_LT((map.landmark(l).position - true_rig).norm(), 0.8 * true_rig.norm());  // 15 % depth error, more than four sigmas
+    const Eigen::Vector3d true_rig =
+        seen.T_world_rig.inverse() * sim.landmarks()[static_cast<std::size_t>(truth)].position;
+    EXPECT_LT((map.landmark(l).position - true_rig).norm(),
+              0.8 * true_rig.norm());  // 15 % depth error, more than four sigmas
   }
 }
 
 TEST(StartMetric, WaitsForEnoughMatchedFeatures) {
-  const auto sim = simulator(simulation::ring_rig(2));
+  const auto sim = simulator(synthetic::ring_rig(2));
   const std::vector<int> missing = {1};
   map::MapDraft draft = empty_draft(sim);
   EXPECT_FALSE(start_metric(sim.frame(FrameId(0), 0.0, missing).frame, map::flat_pyramids(2), {}, draft).has_value());
@@ -44,12 +47,12 @@ TEST(StartMetric, WaitsForEnoughMatchedFeatures) {
 }
 
 TEST(StartMetric, WaitsWhereNothingIsNearEnoughForDepth) {
-  simulation::FeatureSimulatorOptions options = room();
+  synthetic::FeatureSimulatorOptions options = room();
   options.room_low = {-60, -60, -60};
   options.room_high = {60, 60, 60};
   options.nearest_base = 60;
   options.farthest_base = 160;
-  const auto sim = simulator(simulation::ring_rig(2), options);
+  const auto sim = simulator(synthetic::ring_rig(2), options);
   map::MapDraft draft = empty_draft(sim);
   const auto started = start_metric(sim.frame(FrameId(0), 0.0).frame, map::flat_pyramids(2), {}, draft);
   EXPECT_TRUE(!started || draft.map().num_landmarks() >= 60u) << draft.map().num_landmarks() << " landmarks";
@@ -57,21 +60,22 @@ TEST(StartMetric, WaitsWhereNothingIsNearEnoughForDepth) {
 
 class StartUpToScale : public ::testing::Test {
  protected:
-  std::optional<StartedMap> start(const simulation::SimulatedFrame& first, const simulation::SimulatedFrame& second, map::MapDraft& draft,
-                                  const InitialisationOptions& options = {}) {
+  std::optional<StartedMap> start(const synthetic::SimulatedFrame& first, const synthetic::SimulatedFrame& second,
+                                  map::MapDraft& draft, const InitialisationOptions& options = {}) {
     const StartCandidate candidate{std::make_shared<const frame::BundledFrame>(first.frame),
                                    map::flat_pyramids(first.frame.cameras.size())};
-    return start_up_to_scale(candidate, second.frame, map::flat_pyramids(first.frame.cameras.size()), options, Random(1), draft);
+    return start_up_to_scale(candidate, second.frame, map::flat_pyramids(first.frame.cameras.size()), options,
+                             Random(1), draft);
   }
   // Ahead and 120 degrees to either side.
   static camera::Rig three_sides() {
     const std::vector<int> sides = {0, 2, 3};
-    return simulation::ring_rig(4).subset(sides);
+    return synthetic::ring_rig(4).subset(sides);
   }
 };
 
 TEST_F(StartUpToScale, FindsTheMotionAndTheRoomUpToScale) {
-  const auto sim = simulator(simulation::ring_rig(1), room(1, 0.25), {.radius = 2.2, .period_s = 20});
+  const auto sim = simulator(synthetic::ring_rig(1), room(1, 0.25), {.radius = 2.2, .period_s = 20});
   const auto first = sim.frame(FrameId(0), 0.0);
   auto second = first;
   map::MapDraft draft = empty_draft(sim);
@@ -106,12 +110,13 @@ TEST_F(StartUpToScale, FindsTheMotionAndTheRoomUpToScale) {
   std::vector<double> relative;
   for (std::size_t i = 0; i < estimated.size(); ++i)
     relative.push_back((scale * estimated[i] - true_places[i]).norm() / true_places[i].norm());
-  std::nth_element(relative.begin(), relative.begin() + static_cast<std::ptrdiff_t>(relative.size() / 2), relative.end());
+  std::nth_element(relative.begin(), relative.begin() + static_cast<std::ptrdiff_t>(relative.size() / 2),
+                   relative.end());
   EXPECT_LT(relative[relative.size() / 2], 0.1);
 }
 
 TEST_F(StartUpToScale, WaitsForParallax) {
-  const auto sim = simulator(simulation::ring_rig(1));
+  const auto sim = simulator(synthetic::ring_rig(1));
   map::MapDraft draft = empty_draft(sim);
   EXPECT_FALSE(start(sim.frame(FrameId(0), 0.0), sim.frame(FrameId(1), 0.0), draft).has_value());
   EXPECT_FALSE(start(sim.frame(FrameId(0), 0.0), sim.frame(FrameId(1), 0.02), draft).has_value());
@@ -119,10 +124,10 @@ TEST_F(StartUpToScale, WaitsForParallax) {
 }
 
 TEST_F(StartUpToScale, DoesNotStartBetweenTwoPlaces) {
-  const auto sim = simulator(simulation::ring_rig(1));
+  const auto sim = simulator(synthetic::ring_rig(1));
   map::MapDraft draft = empty_draft(sim);
   EXPECT_FALSE(start(sim.frame(FrameId(0), 0.0), sim.frame(FrameId(1), 6.0), draft).has_value());
-  const auto elsewhere = simulator(simulation::ring_rig(1), room(42));
+  const auto elsewhere = simulator(synthetic::ring_rig(1), room(42));
   EXPECT_FALSE(start(sim.frame(FrameId(0), 0.0), elsewhere.frame(FrameId(1), 0.3), draft).has_value());
 }
 
@@ -137,7 +142,8 @@ TEST_F(StartUpToScale, ATurningRigWithoutOverlapStartsAboutAsLargeAsItIs) {
     ASSERT_TRUE(started.has_value());
     EXPECT_EQ(started->scale, map::Scale::kUnobservable);  // two frames do not decide it
     EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
-    const SE3 found = draft.map().keyframe(KeyframeId(1)).T_rig_world, truth = second.T_world_rig.inverse() * first.T_world_rig;
+    const SE3 found = draft.map().keyframe(KeyframeId(1)).T_rig_world,
+              truth = second.T_world_rig.inverse() * first.T_world_rig;
     EXPECT_LT(map::angle_rad(found, truth), 0.5 * kDegree);
     if (!std::isfinite(started->scale_deviation)) continue;
     ++told;

@@ -79,11 +79,11 @@ TEST(KeyframeDecision, AStarvedCameraAsksForOneNowAndThenUnlessTheRigRests) {
 class KeyframeEvidenceTest : public ::testing::Test {
  protected:
   static const map::SimulatedMap& world() {
-    static const map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 0.0, 1.0);
+    static const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 0.0, 1.0);
     return world;
   }
   // Every keypoint that shows a landmark of the map, in the cameras asked for.
-  static FrameMatches true_matches(const simulation::SimulatedFrame& frame, const std::vector<int>& cameras) {
+  static FrameMatches true_matches(const synthetic::SimulatedFrame& frame, const std::vector<int>& cameras) {
     FrameMatches matches(frame.frame.cameras.size());
     for (const int c : cameras) {
       const auto& shown = frame.landmark[static_cast<std::size_t>(c)];
@@ -100,8 +100,8 @@ class KeyframeEvidenceTest : public ::testing::Test {
 TEST_F(KeyframeEvidenceTest, CountsTheLandmarksOfTheReferenceOnce) {
   const auto frame = world().sim.frame(FrameId(1), 0.1);
   const FrameMatches matches = true_matches(frame, {0, 1, 2, 3});
-  const KeyframeEvidence e =
-      keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), frame.T_world_rig.inverse(), TrackingOptions());
+  const KeyframeEvidence e = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0),
+                                               frame.T_world_rig.inverse(), TrackingOptions());
   EXPECT_EQ(e.overlap, static_cast<int>(landmarks_of(matches).size()));  // the map is one keyframe
   EXPECT_FALSE(e.starved);
   EXPECT_FALSE(e.fresh_depth);
@@ -111,11 +111,14 @@ TEST_F(KeyframeEvidenceTest, MeasuresParallaxAtTheLandmarks) {
   const auto frame = world().sim.frame(FrameId(1), 0.0);
   const FrameMatches matches = true_matches(frame, {0, 1, 2, 3});
   const geometry::SE3 here = world().true_pose(KeyframeId(0));
-  EXPECT_NEAR(keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), here, TrackingOptions()).parallax, 0.0, 1e-9);
+  EXPECT_NEAR(keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), here, TrackingOptions()).parallax,
+              0.0, 1e-9);
   const geometry::SE3 turned = geometry::SE3::exp((geometry::Vector6d() << 0.1, 0.2, 0, 0, 0, 0).finished()) * here;
-  EXPECT_NEAR(keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), turned, TrackingOptions()).parallax, 0.0, 1e-9);
+  EXPECT_NEAR(keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), turned, TrackingOptions()).parallax,
+              0.0, 1e-9);
   const geometry::SE3 moved(here.rotation(), here.translation() + Eigen::Vector3d(0, 0.2, 0));
-  const double parallax = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), moved, TrackingOptions()).parallax;
+  const double parallax =
+      keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), moved, TrackingOptions()).parallax;
   EXPECT_GT(parallax, 0.2 / 10);  // the room is ten metres long
   EXPECT_LT(parallax, 0.2 / 1.5);
 }
@@ -123,17 +126,21 @@ TEST_F(KeyframeEvidenceTest, MeasuresParallaxAtTheLandmarks) {
 TEST_F(KeyframeEvidenceTest, NoticesACameraThatFindsNothing) {
   const auto frame = world().sim.frame(FrameId(1), 0.1);
   const geometry::SE3 pose = frame.T_world_rig.inverse();
-  EXPECT_TRUE(keyframe_evidence(world().map, frame.frame, true_matches(frame, {0, 1, 2}), KeyframeId(0), pose, TrackingOptions()).starved);
+  EXPECT_TRUE(keyframe_evidence(world().map, frame.frame, true_matches(frame, {0, 1, 2}), KeyframeId(0), pose,
+                                TrackingOptions())
+                  .starved);
   const std::vector<int> missing = {3};  // a camera without keypoints does not starve
   const auto three = world().sim.frame(FrameId(1), 0.1, missing);
-  EXPECT_FALSE(keyframe_evidence(world().map, three.frame, true_matches(three, {0, 1, 2}), KeyframeId(0), pose, TrackingOptions()).starved);
+  EXPECT_FALSE(keyframe_evidence(world().map, three.frame, true_matches(three, {0, 1, 2}), KeyframeId(0), pose,
+                                 TrackingOptions())
+                   .starved);
 }
 
 TEST_F(KeyframeEvidenceTest, NoticesMatchedFeaturesThatNobodyTracks) {
   const auto frame = world().sim.frame(FrameId(1), 0.1);
   FrameMatches matches = true_matches(frame, {2, 3});  // the two in front, which overlap, have nothing
-  const KeyframeEvidence e =
-      keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), frame.T_world_rig.inverse(), TrackingOptions());
+  const KeyframeEvidence e = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0),
+                                               frame.T_world_rig.inverse(), TrackingOptions());
   EXPECT_TRUE(e.fresh_depth);
 }
 

@@ -43,8 +43,8 @@ class MakeKeyframe : public ::testing::Test {
     return make_keyframe(seen.frame, matches, seen.T_world_rig.inverse(), pyramids, KeyframeId(0), {}, draft);
   }
 
-  map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 0.0, 1.0);
-  simulation::SimulatedFrame seen = world.sim.frame(FrameId(1), 0.3);
+  map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 0.0, 1.0);
+  synthetic::SimulatedFrame seen = world.sim.frame(FrameId(1), 0.3);
   FrameMatches matches;
   std::vector<image::Pyramid> pyramids = map::flat_pyramids(4);
 };
@@ -85,7 +85,8 @@ TEST_F(MakeKeyframe, MatchedFeaturesOfSoundDepthGetLandmarksAtTheirPlace) {
     const int truth = seen.landmark[first.camera.index()][first.keypoint.index()];
     ASSERT_GE(truth, 0);
     const Eigen::Matrix3d& covariance = stored.bundled.point(f)->covariance;
-    const Eigen::Vector3d error = seen.T_world_rig.inverse() * world.truth_of(truth) - stored.bundled.point(f)->point_rig;
+    const Eigen::Vector3d error =
+        seen.T_world_rig.inverse() * world.truth_of(truth) - stored.bundled.point(f)->point_rig;
     near += error.dot(covariance.ldlt().solve(error)) < 16.3;  // 99.9 %, three degrees of freedom
   }
   EXPECT_GT(fresh, 5u);

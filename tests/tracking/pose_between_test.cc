@@ -9,11 +9,11 @@ namespace {
 
 class PoseBetween : public ::testing::Test {
  protected:
-  PoseBetween() : world_(true_map(simulator(simulation::ring_rig(1)), 1.2, 0.6)), pool_(1) {}
+  PoseBetween() : world_(true_map(simulator(synthetic::ring_rig(1)), 1.2, 0.6)), pool_(1) {}
 
   std::optional<TrackResult> locate(frame::BundledFrame frame) {
-    const BetweenKeyframes early{std::make_shared<const frame::BundledFrame>(std::move(frame)), KeyframeId(0), KeyframeId(1),
-                                 world_.frames[0].frame.time_ns, world_.frames[1].frame.time_ns};
+    const BetweenKeyframes early{std::make_shared<const frame::BundledFrame>(std::move(frame)), KeyframeId(0),
+                                 KeyframeId(1), world_.frames[0].frame.time_ns, world_.frames[1].frame.time_ns};
     return pose_between(world_.map, early, {0.7}, {}, pool_);
   }
 
@@ -51,7 +51,7 @@ TEST_F(PoseBetween, AlsoWhereTheSecondKeyframeWasCulled) {
 }
 
 TEST_F(PoseBetween, IsNoneForAFrameOfAnotherPlace) {
-  EXPECT_FALSE(locate(simulator(simulation::ring_rig(1), room(99)).frame(FrameId(7), 0.3).frame));
+  EXPECT_FALSE(locate(simulator(synthetic::ring_rig(1), room(99)).frame(FrameId(7), 0.3).frame));
 }
 
 }  // namespace

@@ -9,8 +9,9 @@ namespace bslam::tracking {
 constexpr double kDegree = 0.017453292519943295;
 
 // A room of 5000 landmarks.
-inline simulation::FeatureSimulatorOptions room(std::uint64_t scene_seed = 1, double sigma_px = 0.7, double outlier_share = 0.05) {
-  simulation::FeatureSimulatorOptions options;
+inline synthetic::FeatureSimulatorOptions room(std::uint64_t scene_seed = 1, double sigma_px = 0.7,
+                                               double outlier_share = 0.05) {
+  synthetic::FeatureSimulatorOptions options;
   options.scene_seed = scene_seed;
   options.landmarks = 5000;
   options.sigma_px = sigma_px;
@@ -18,13 +19,14 @@ inline simulation::FeatureSimulatorOptions room(std::uint64_t scene_seed = 1, do
   return options;
 }
 
-inline simulation::FeatureSimulator simulator(camera::Rig rig, const simulation::FeatureSimulatorOptions& options = room(),
-                                              const simulation::OrbitOptions& orbit = {}) {
-  return simulation::FeatureSimulator(std::move(rig), simulation::make_orbit(orbit), options);
+inline synthetic::FeatureSimulator simulator(camera::Rig rig,
+                                             const synthetic::FeatureSimulatorOptions& options = room(),
+                                             const synthetic::OrbitOptions& orbit = {}) {
+  return synthetic::FeatureSimulator(std::move(rig), synthetic::make_orbit(orbit), options);
 }
 
 // Keyframes every `step_s` until `to_s`, numbered from 1000 so that tracked frames have noise of their own.
-inline map::SimulatedMap true_map(simulation::FeatureSimulator sim, double to_s, double step_s) {
+inline map::SimulatedMap true_map(synthetic::FeatureSimulator sim, double to_s, double step_s) {
   map::SimulatedMap out(std::move(sim));
   for (int i = 0; step_s * i <= to_s; ++i) out.add_keyframe(FrameId(1000 + i), step_s * i);
   return out;
@@ -52,8 +54,11 @@ class SimulatedTracker {
 
   TrackOutput track(frame::BundledFrame frame) { return track(world_.map, std::move(frame)); }
   TrackOutput track(const map::BundledMap& map, frame::BundledFrame frame) {
-    const TrackInput input{
-        .map = map, .pyramids = pyramids_, .alignment = alignment_, .state = state, .noise = {world_.sim.options().sigma_px}};
+    const TrackInput input{.map = map,
+                           .pyramids = pyramids_,
+                           .alignment = alignment_,
+                           .state = state,
+                           .noise = {world_.sim.options().sigma_px}};
     TrackOutput out = tracking::track(input, frame, options, pool_);
     state = out.state;
     return out;
@@ -65,7 +70,7 @@ class SimulatedTracker {
  private:
   const map::SimulatedMap& world_;
   std::vector<image::Pyramid> pyramids_;
-  std::vector<frame::AlignmentOptions> alignment_;
+  std::vector<matching::AlignmentOptions> alignment_;
   ThreadPool pool_;
 };
 
@@ -75,7 +80,8 @@ inline void displace_keypoints(const camera::Rig& rig, double share, Random rand
     feature::Keypoints& k = frame.cameras[c].keypoints;
     for (std::size_t i = 0; i < k.size(); ++i) {
       if (random.uniform() >= share) continue;
-      const Eigen::Vector2d moved = k.pixel[i].cast<double>() + Eigen::Vector2d(random.uniform(-25, 25), random.uniform(-25, 25));
+      const Eigen::Vector2d moved =
+          k.pixel[i].cast<double>() + Eigen::Vector2d(random.uniform(-25, 25), random.uniform(-25, 25));
       const auto bearing = rig.camera(c).unproject(moved);
       if (!bearing || !rig.camera(c).contains(moved)) continue;
       k.pixel[i] = moved.cast<float>();

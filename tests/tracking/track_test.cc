@@ -1,8 +1,8 @@
 #include "tracking/track.h"
 
-#include <algorithm>
-
 #include <gtest/gtest.h>
+
+#include <algorithm>
 
 #include "tracking/simulated_tracker.h"
 
@@ -17,10 +17,10 @@ struct RigCase {
   double mean_error_m, mean_angle_deg;  // over all frames, per pixel of noise
 };
 
-// Squared Mahalanobis distance of the pose from the truth under the noise of the keypoints it was made of: six on average
-// where nothing but that noise is at work.
-double squared_normalised_error(const map::BundledMap& map, const frame::BundledFrame& frame, const FrameMatches& matches,
-                                const SE3& T_rig_world, const SE3& true_T_rig_world) {
+// Squared Mahalanobis distance of the pose from the truth under the noise of the keypoints it was made of: six on
+// average where nothing but that noise is at work.
+double squared_normalised_error(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                const FrameMatches& matches, const SE3& T_rig_world, const SE3& true_T_rig_world) {
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
   for (const solver::PoseObservation& o : pose_observations(map, frame, matches)) {
     const Eigen::Vector3d p = true_T_rig_world * o.point_world;
@@ -40,11 +40,16 @@ class TrackRigs : public ::testing::TestWithParam<int> {
  protected:
   static RigCase rig_case(int i) {
     switch (i) {
-      case 0: return {"one camera", simulation::ring_rig(1), 0.008, 0.12};
-      case 1: return {"two cameras", simulation::ring_rig(2), 0.005, 0.08};
-      case 2: return {"four cameras", simulation::default_rig(), 0.003, 0.05};
-      case 3: return {"two fisheyes back to back", simulation::fisheye_rig(2), 0.005, 0.10};
-      default: return {"two pinholes, two fisheyes", simulation::mixed_rig(), 0.004, 0.06};
+      case 0:
+        return {"one camera", synthetic::ring_rig(1), 0.008, 0.12};
+      case 1:
+        return {"two cameras", synthetic::ring_rig(2), 0.005, 0.08};
+      case 2:
+        return {"four cameras", synthetic::default_rig(), 0.003, 0.05};
+      case 3:
+        return {"two fisheyes back to back", synthetic::fisheye_rig(2), 0.005, 0.10};
+      default:
+        return {"two pinholes, two fisheyes", synthetic::mixed_rig(), 0.004, 0.06};
     }
   }
 };
@@ -59,7 +64,8 @@ TEST_P(TrackRigs, FollowsTheRigThroughTheRoomWithinTheNoiseOfItsKeypoints) {
     for (int i = 1; i <= kFrames; ++i) {
       const auto seen = world.sim.frame(FrameId(i), 0.05 * i);
       const TrackOutput out = tracker.track(seen.frame);
-      ASSERT_EQ(out.result.status, TrackStatus::kTracking) << rig.name << " frame " << i << ": " << describe(out.result.reason);
+      ASSERT_EQ(out.result.status, TrackStatus::kTracking)
+          << rig.name << " frame " << i << ": " << describe(out.result.reason);
       const SE3 truth = seen.T_world_rig.inverse();
       error_m += map::distance_m(out.result.T_rig_world, truth) / kFrames;
       error_rad += map::angle_rad(out.result.T_rig_world, truth) / kFrames;
@@ -78,10 +84,10 @@ class Track : public ::testing::Test {
  protected:
   // Two cameras in front, the first second of the orbit.
   static const map::SimulatedMap& world() {
-    static const map::SimulatedMap world = true_map(simulator(simulation::ring_rig(2)), 1.0, 0.25);
+    static const map::SimulatedMap world = true_map(simulator(synthetic::ring_rig(2)), 1.0, 0.25);
     return world;
   }
-  static simulation::SimulatedFrame seen(int i) { return world().sim.frame(FrameId(i), 0.05 * i); }
+  static synthetic::SimulatedFrame seen(int i) { return world().sim.frame(FrameId(i), 0.05 * i); }
   static void expect_true(const TrackResult& result, const SE3& T_world_rig, const char* what) {
     ASSERT_EQ(result.status, TrackStatus::kTracking) << what << ": " << describe(result.reason);
     EXPECT_LT(map::distance_m(result.T_rig_world, T_world_rig.inverse()), 0.012) << what;
@@ -147,7 +153,8 @@ TEST_F(Track, CorrectionsOfTheMapCarryTheTrackerAlong) {
   for (int i = 1; i <= 4; ++i) ASSERT_EQ(tracker.track(seen(i).frame).result.status, TrackStatus::kTracking);
   const SE3 T_new_old = SE3::exp((geometry::Vector6d() << 0.2, -0.1, 0.4, 3, -2, 1).finished());
   map::BundledMap moved = world().map;
-  for (const KeyframeId k : moved.keyframe_ids()) moved.set_pose(k, moved.keyframe(k).T_rig_world * T_new_old.inverse());
+  for (const KeyframeId k : moved.keyframe_ids())
+    moved.set_pose(k, moved.keyframe(k).T_rig_world * T_new_old.inverse());
   for (const LandmarkId l : moved.landmark_ids()) {
     moved.set_position(l, T_new_old * moved.landmark(l).position);
     moved.refresh_landmark(l);
@@ -216,7 +223,7 @@ TEST_F(Track, GoesOnWithTheCamerasThatAreLeft) {
 }
 
 TEST_F(Track, IsLostAtAPlaceItDoesNotKnow) {
-  const simulation::FeatureSimulator elsewhere = simulator(simulation::ring_rig(2), room(99));
+  const synthetic::FeatureSimulator elsewhere = simulator(synthetic::ring_rig(2), room(99));
   SimulatedTracker tracker(world());
   for (int i = 1; i <= 5; ++i) {
     const TrackOutput out = tracker.track(elsewhere.frame(FrameId(i), 0.05 * i).frame);
@@ -245,14 +252,15 @@ TEST_F(Track, IsLostRatherThanWrong) {
 
 TEST_F(Track, SearchesWidelyWhereThePredictionIsWrong) {
   SimulatedTracker tracker(world());
-  tracker.state.twist = (geometry::Vector6d() << 0.0, 1.2, 0.4, 0.5, 0, 0).finished();  // 3.6 degrees, 2.5 cm in a frame
+  tracker.state.twist =
+      (geometry::Vector6d() << 0.0, 1.2, 0.4, 0.5, 0, 0).finished();  // 3.6 degrees, 2.5 cm in a frame
   const auto frame = seen(1);
   expect_true(tracker.track(frame.frame).result, frame.T_world_rig, "wrong prediction");
 }
 
-// On the first frame after the start nothing is known of the motion, and after a long pause nothing any more. Two keypoints of
-// five are where they were before, as with a pattern that repeats itself: narrow windows about the old pose would hold these
-// alone.
+// On the first frame after the start nothing is known of the motion, and after a long pause nothing any more. Two
+// keypoints of five are where they were before, as with a pattern that repeats itself: narrow windows about the old
+// pose would hold these alone.
 TEST_F(Track, DoesNotTakeWhatStayedForProofThatNothingMoved) {
   SimulatedTracker tracker(world()), paused(world());
   paused.state.twist.emplace(geometry::Vector6d::Zero());
@@ -270,7 +278,8 @@ TEST_F(Track, DoesNotTakeWhatStayedForProofThatNothingMoved) {
       k.pixel[i] = old.pixel[o];
       k.bearing[i] = old.bearing[o];
     }
-    shown.cameras[c].grid = frame::FeatureGrid(k, world().map.rig().camera(c).width, world().map.rig().camera(c).height);
+    shown.cameras[c].grid =
+        frame::FeatureGrid(k, world().map.rig().camera(c).width, world().map.rig().camera(c).height);
   }
   EXPECT_GT(map::angle_rad(frame.T_world_rig, before.T_world_rig), 2 * tracker.options.matching.predicted_radius);
   expect_true(tracker.track(shown).result, frame.T_world_rig, "first motion");
@@ -289,14 +298,15 @@ TEST_F(Track, LearnsTheMotion) {
 
 TEST_F(Track, IsTheSameWithAnyNumberOfThreads) {
   const auto pyramids = map::flat_pyramids(2);
-  const std::vector<frame::AlignmentOptions> alignment(pyramids.size());
+  const std::vector<matching::AlignmentOptions> alignment(pyramids.size());
   std::vector<SE3> poses;
   for (const int threads : {1, 2, 3}) {
     ThreadPool pool(threads);
     frame::BundledFrame frame = seen(2).frame;
     const TrackerState state = state_at_first(world());
     poses.push_back(
-        track({.map = world().map, .pyramids = pyramids, .alignment = alignment, .state = state, .noise = {}}, frame, {}, pool)
+        track({.map = world().map, .pyramids = pyramids, .alignment = alignment, .state = state, .noise = {}}, frame,
+              {}, pool)
             .result.T_rig_world);
   }
   for (const SE3& T : poses) {
@@ -325,7 +335,8 @@ TEST(TrackerState, StartsAfreshAtAKeyframe) {
 
 TEST(LostReason, EachHasWordsOfItsOwn) {
   std::vector<std::string_view> words;
-  for (int i = 1; i <= static_cast<int>(LostReason::kUnstablePose); ++i) words.push_back(describe(static_cast<LostReason>(i)));
+  for (int i = 1; i <= static_cast<int>(LostReason::kUnstablePose); ++i)
+    words.push_back(describe(static_cast<LostReason>(i)));
   for (std::size_t i = 0; i < words.size(); ++i) {
     EXPECT_FALSE(words[i].empty());
     for (std::size_t j = 0; j < i; ++j) EXPECT_NE(words[i], words[j]);
@@ -335,10 +346,10 @@ TEST(LostReason, EachHasWordsOfItsOwn) {
 
 // Errors of the positions, over frames in which the rig turns and the side cameras fire late.
 double mean_error_with_late_sides(bool own_times) {
-  const map::SimulatedMap world = true_map(simulator(simulation::default_rig()), 2.0, 0.25);
-  simulation::FeatureSimulatorOptions late = room();
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 2.0, 0.25);
+  synthetic::FeatureSimulatorOptions late = room();
   late.capture_offset_s = {0, 0, 0.03, 0.03};
-  const auto sim = simulator(simulation::default_rig(), late);
+  const auto sim = simulator(synthetic::default_rig(), late);
   SimulatedTracker tracker(world);
   double error = 0;
   constexpr int kFrames = 30;

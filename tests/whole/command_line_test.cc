@@ -13,10 +13,10 @@
 #include <string>
 #include <thread>
 
-#include "io/rig_file.h"
-#include "io/rig_warnings.h"
-#include "io/simulation_writer.h"
-#include "simulation/rigs.h"
+#include "rig_formats/rig_file.h"
+#include "rig_formats/rig_warnings.h"
+#include "simulator/simulation_writer.h"
+#include "synthetic/rigs.h"
 
 namespace bslam {
 namespace {
@@ -39,14 +39,14 @@ class CommandLine : public testing::Test {
   static void SetUpTestSuite() {
     folder_ = fs::temp_directory_path() / ("bslam_cli_" + std::to_string(::getpid()));
     fs::create_directories(folder_);
-    const io::SimulationRequest request{.folder = data(),
-                                        .rig = simulation::ring_rig(4, 376),
-                                        .recording = {.duration_s = 1.5, .rate_hz = 10},
-                                        .tour = {},
-                                        .imaging = {},
-                                        .world = {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2}};
+    const simulator::SimulationRequest request{.folder = data(),
+                                               .rig = synthetic::ring_rig(4, 376),
+                                               .recording = {.duration_s = 1.5, .rate_hz = 10},
+                                               .tour = {},
+                                               .imaging = {},
+                                               .world = {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2}};
     ThreadPool pool(2);
-    const auto made = io::write_simulation(request, pool);
+    const auto made = simulator::write_simulation(request, pool);
     ASSERT_TRUE(made.ok()) << made.error().message();
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
@@ -55,7 +55,8 @@ class CommandLine : public testing::Test {
   static std::string out(const std::string& name) { return (folder_ / name).string(); }
 
   static Ran run(const std::string& arguments) {
-    const std::string command = std::string(BSLAM_PROGRAM) + " " + arguments + " >" + out("stdout") + " 2>" + out("stderr");
+    const std::string command =
+        std::string(BSLAM_PROGRAM) + " " + arguments + " >" + out("stdout") + " 2>" + out("stderr");
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(out("stdout")), slurp(out("stderr"))};
   }
@@ -70,7 +71,8 @@ class CommandLine : public testing::Test {
 
   // A run over the recording, with fewer features for small images; its files are in out(name).
   static nlohmann::json summary_of(const std::string& name, const std::string& more) {
-    const Ran ran = run("run " + data() + " --out " + out(name) + " --set features.per_image=500 --progress never " + more);
+    const Ran ran =
+        run("run " + data() + " --out " + out(name) + " --set features.per_image=500 --progress never " + more);
     EXPECT_EQ(ran.status, 0) << more << ": " << ran.err;
     return nlohmann::json::parse(slurp(out(name) + "/summary.json"), nullptr, false);
   }
@@ -88,8 +90,8 @@ class CommandLine : public testing::Test {
 TEST_F(CommandLine, TellsItsVersionAndHelpOnEveryVerb) {
   EXPECT_EQ(run("--version").status, 0);
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
-  for (const char* verb : {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "map", "map info",
-                           "map export", "map merge", "vocab", "vocab info", "vocab train", "settings"}) {
+  for (const char* verb : {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "map",
+                           "map info", "map export", "map merge", "vocab", "vocab info", "vocab train", "settings"}) {
     EXPECT_EQ(run(std::string(verb) + " --help").status, 0) << verb;
   }
 }
@@ -166,9 +168,11 @@ TEST_F(CommandLine, RefusesWhatMakesNoSense) {
 }
 
 TEST_F(CommandLine, RunWritesItsFilesAndRepeatsFromItsConfiguration) {
-  const Ran first = run("run " + data() + " --out " + out("first") + " --mode sequential --progress never --set features.per_image=700");
+  const Ran first = run("run " + data() + " --out " + out("first") +
+                        " --mode sequential --progress never --set features.per_image=700");
   ASSERT_EQ(first.status, 0) << first.err;
-  for (const char* file : {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg", "run.svg"}) {
+  for (const char* file :
+       {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg", "run.svg"}) {
     EXPECT_TRUE(fs::exists(folder_ / "first" / file)) << file;
   }
   const auto summary = nlohmann::json::parse(slurp(folder_ / "first/summary.json"));
@@ -177,9 +181,11 @@ TEST_F(CommandLine, RunWritesItsFilesAndRepeatsFromItsConfiguration) {
   EXPECT_EQ(summary["frames"]["input"], 15);
   EXPECT_EQ(summary["frames"]["tracked"], 15);
   EXPECT_EQ(summary["map"]["scale"], "metric");
-  EXPECT_NE(slurp(folder_ / "first/trajectory.tum").find("# bslam trajectory frame=cam0 parent=world final=true\n"), std::string::npos);
+  EXPECT_NE(slurp(folder_ / "first/trajectory.tum").find("# bslam trajectory frame=cam0 parent=world final=true\n"),
+            std::string::npos);
 
-  const Ran again = run("run " + data() + " --out " + out("again") + " --progress never --config " + out("first/config.yaml"));
+  const Ran again =
+      run("run " + data() + " --out " + out("again") + " --progress never --config " + out("first/config.yaml"));
   ASSERT_EQ(again.status, 0) << again.err;
   EXPECT_EQ(slurp(folder_ / "first/trajectory.tum"), slurp(folder_ / "again/trajectory.tum"));
   expect_refused("run " + data() + " --out " + out("again"));  // it is there, and --overwrite was not given
@@ -245,17 +251,20 @@ TEST_F(CommandLine, AVocabularyIsTrainedDescribedAndUsed) {
   EXPECT_NE(info.out.find("branching    6\nlevels       3\nwords        216\n"), std::string::npos) << info.out;
 
   summary_of("worded", "--cameras 0,1 --vocabulary " + out("one.bvoc") + " --save-map " + out("worded.map"));
-  expect_refused("run " + data() + " --out " + out("refused") + " --cameras 0,1 --load-map " + out("worded.map"));  // other words
-  const std::string same = "--cameras 0,1 --vocabulary " + out("one.bvoc") + " --localize-only --load-map " + out("worded.map");
+  expect_refused("run " + data() + " --out " + out("refused") + " --cameras 0,1 --load-map " +
+                 out("worded.map"));  // other words
+  const std::string same =
+      "--cameras 0,1 --vocabulary " + out("one.bvoc") + " --localize-only --load-map " + out("worded.map");
   EXPECT_EQ(summary_of("worded_again", same)["frames"]["tracked"], 15);
 }
 
 TEST_F(CommandLine, AJournalRepeatsItsRun) {
-  EXPECT_EQ(summary_of("recorded", "--cameras 0,1 --mode parallel --journal " + out("run.journal"))["mode"], "parallel");
+  EXPECT_EQ(summary_of("recorded", "--cameras 0,1 --mode parallel --journal " + out("run.journal"))["mode"],
+            "parallel");
   EXPECT_EQ(summary_of("replayed", "--cameras 0,1 --mode parallel --replay " + out("run.journal"))["mode"], "replay");
   expect_same_trajectories("recorded", "replayed");
-  expect_refused("run " + data() + " --out " + out("other") + " --cameras 0,1 --set features.per_image=300 --progress never" +
-                 " --replay " + out("run.journal"));
+  expect_refused("run " + data() + " --out " + out("other") +
+                 " --cameras 0,1 --set features.per_image=300 --progress never" + " --replay " + out("run.journal"));
 }
 
 TEST_F(CommandLine, LaggedRunsGiveTheSameBytes) {
@@ -287,8 +296,8 @@ TEST_F(CommandLine, InspectShowsABundledTableThatHoldsTogether) {
 }
 
 TEST_F(CommandLine, ARunSaysThatItsCalibrationIsProbablyWrong) {
-  const camera::Rig rig = io::read_rig(data() + "/rig.yaml").value();
-  ASSERT_TRUE(io::write_rig(io::with_inverse_extrinsics(rig), out("inverse.yaml")));
+  const camera::Rig rig = rig_formats::read_rig(data() + "/rig.yaml").value();
+  ASSERT_TRUE(rig_formats::write_rig(rig_formats::with_inverse_extrinsics(rig), out("inverse.yaml")));
   const std::string options = " --set features.per_image=500 --progress never --rig ";
   const Ran inverse = run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse"));
   EXPECT_NE(inverse.err.find("of the features match between any two"), std::string::npos) << inverse.err;
@@ -297,7 +306,7 @@ TEST_F(CommandLine, ARunSaysThatItsCalibrationIsProbablyWrong) {
     const geometry::SE3& T = rig.body_from_cam(c);
     cameras.push_back({rig.camera(c), geometry::SE3(T.rotation(), 1000 * T.translation())});
   }
-  ASSERT_TRUE(io::write_rig(camera::Rig(cameras), out("millimetres.yaml")));
+  ASSERT_TRUE(rig_formats::write_rig(camera::Rig(cameras), out("millimetres.yaml")));
   const Ran large = run("run " + data() + options + out("millimetres.yaml") + " --out " + out("millimetres"));
   EXPECT_NE(large.err.find("are they millimetres?"), std::string::npos) << large.err;
   const camera::Rig upside_down = [&] {
@@ -306,7 +315,7 @@ TEST_F(CommandLine, ARunSaysThatItsCalibrationIsProbablyWrong) {
     turned[3].T_body_cam = turned[3].T_body_cam * geometry::SE3(Eigen::Quaterniond(0, 0, 0, 1), {0, 0, 0});
     return camera::Rig(turned);
   }();
-  ASSERT_TRUE(io::write_rig(upside_down, out("upside_down.yaml")));
+  ASSERT_TRUE(rig_formats::write_rig(upside_down, out("upside_down.yaml")));
   const Ran turned = run("run " + data() + options + out("upside_down.yaml") + " --out " + out("upside_down"));
   EXPECT_NE(turned.err.find("next to nothing of what it saw"), std::string::npos) << turned.err;
   const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
@@ -320,8 +329,8 @@ TEST_F(CommandLine, InterruptedRunKeepsWhatItHasAndSaysSo) {
   if (child == 0) {
     const std::string path = data();
     std::freopen("/dev/null", "w", stdout);
-    ::execl(BSLAM_PROGRAM, BSLAM_PROGRAM, "run", path.c_str(), "--out", folder.c_str(), "--pace", "realtime", "--progress", "never",
-            static_cast<char*>(nullptr));
+    ::execl(BSLAM_PROGRAM, BSLAM_PROGRAM, "run", path.c_str(), "--out", folder.c_str(), "--pace", "realtime",
+            "--progress", "never", static_cast<char*>(nullptr));
     std::_Exit(127);
   }
   // Its folder appears before the first frame; at the recorded pace the run then lasts a second and a half.

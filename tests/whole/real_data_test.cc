@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "evaluation/trajectory_error.h"
-#include "io/trajectory_file.h"
+#include "evaluation/trajectory_file.h"
 #include "session/run_session.h"
 
 namespace bslam {
@@ -16,21 +16,23 @@ struct RealCase {
   double max_ate_m;          // generous: far below what a wrong scale or a lost stretch gives
 };
 
-void PrintTo(const RealCase& c, std::ostream* out) { *out << c.folder << " with " << c.cameras.size() << " cameras named"; }
+void PrintTo(const RealCase& c, std::ostream* out) {
+  *out << c.folder << " with " << c.cameras.size() << " cameras named";
+}
 
 class RealData : public testing::TestWithParam<RealCase> {};
 
 TEST_P(RealData, PosesEveryFrame) {
   const std::filesystem::path data = std::filesystem::path(BSLAM_SHARED_DIR) / "data" / GetParam().folder;
   if (!std::filesystem::is_directory(data)) GTEST_SKIP() << data << " is not here";
-  const auto dataset = io::open_dataset({.path = data, .cameras = GetParam().cameras});
+  const auto dataset = dataset::open_dataset({.path = data, .cameras = GetParam().cameras});
   ASSERT_TRUE(dataset) << dataset.error().message();
   session::SessionOptions options;
-  options.config.mode = system::Mode::kSequential;
+  options.config.mode = execution::Mode::kSequential;
   const auto result = session::run_session(*dataset, options);
   ASSERT_TRUE(result) << result.error().message();
   EXPECT_EQ(result->trajectories.front().poses.size(), dataset->frames.size());
-  const auto truth = io::read_trajectory(data / "groundtruth_cam0.tum");
+  const auto truth = evaluation::read_trajectory(data / "groundtruth_cam0.tum");
   ASSERT_TRUE(truth) << truth.error().message();
   const auto evaluated = evaluation::evaluate(result->trajectories.front().poses, *truth, {});
   ASSERT_TRUE(evaluated) << evaluated.error().message();
@@ -39,21 +41,23 @@ TEST_P(RealData, PosesEveryFrame) {
 
 INSTANTIATE_TEST_SUITE_P(Sets, RealData,
                          testing::Values(RealCase{"kitti_06_start", {}, 0.1}, RealCase{"aria_gen2_4cam", {}, 0.01},
-                                         RealCase{"aria_gen2_4cam", {0, 1}, 0.01},
-                                         RealCase{"kitti_0039", {}, 0.25}));
+                                         RealCase{"aria_gen2_4cam", {0, 1}, 0.01}, RealCase{"kitti_0039", {}, 0.25}));
 
 TEST(RealData, StandsStillWhereTheRigDoes) {
   const std::filesystem::path data = std::filesystem::path(BSLAM_SHARED_DIR) / "data/euroc_v101_rest";
   if (!std::filesystem::is_directory(data)) GTEST_SKIP() << data << " is not here";
-  const auto dataset = io::open_dataset({.path = data});
+  const auto dataset = dataset::open_dataset({.path = data});
   ASSERT_TRUE(dataset) << dataset.error().message();
   session::SessionOptions options;
-  options.config.mode = system::Mode::kSequential;
+  options.config.mode = execution::Mode::kSequential;
   const auto result = session::run_session(*dataset, options);
   ASSERT_TRUE(result) << result.error().message();
   ASSERT_EQ(result->trajectories.front().poses.size(), dataset->frames.size());
   for (const evaluation::TimedPose& pose : result->trajectories.front().poses) {
-    EXPECT_LT((pose.T_world_frame.translation() - result->trajectories.front().poses.front().T_world_frame.translation()).norm(), 0.006);
+    EXPECT_LT(
+        (pose.T_world_frame.translation() - result->trajectories.front().poses.front().T_world_frame.translation())
+            .norm(),
+        0.006);
   }
 }
 

@@ -6,10 +6,10 @@
 #include <fstream>
 
 #include "evaluation/trajectory_error.h"
-#include "io/simulation_writer.h"
-#include "io/trajectory_file.h"
+#include "evaluation/trajectory_file.h"
 #include "session/run_session.h"
-#include "simulation/rigs.h"
+#include "simulator/simulation_writer.h"
+#include "synthetic/rigs.h"
 
 namespace bslam {
 namespace {
@@ -24,27 +24,28 @@ class SimulatedRun : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = fs::temp_directory_path() / ("bslam_whole_" + std::to_string(::getpid()));
-    io::SimulationRequest request{.folder = folder_,
-                                  .rig = simulation::ring_rig(kCameras, kWidth),
-                                  .recording = {.duration_s = kDuration_s, .rate_hz = kRate_hz},
-                                  .tour = {},
-                                  .imaging = {},
-                                  .world = {}};
+    simulator::SimulationRequest request{.folder = folder_,
+                                         .rig = synthetic::ring_rig(kCameras, kWidth),
+                                         .recording = {.duration_s = kDuration_s, .rate_hz = kRate_hz},
+                                         .tour = {},
+                                         .imaging = {},
+                                         .world = {}};
     ThreadPool pool(2);
-    const auto written = io::write_simulation(request, pool);
+    const auto written = simulator::write_simulation(request, pool);
     ASSERT_TRUE(written) << written.error().message();
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
-  static io::Dataset open(int cameras) {
+  static dataset::Dataset open(int cameras) {
     std::vector<int> used;
     for (int c = 0; c < cameras; ++c) used.push_back(c);
-    auto dataset = io::open_dataset({.path = folder_, .cameras = used});
+    auto dataset = dataset::open_dataset({.path = folder_, .cameras = used});
     EXPECT_TRUE(dataset) << dataset.error().message();
     return std::move(*dataset);
   }
 
-  static session::SessionResult run(const io::Dataset& dataset, system::Mode mode = system::Mode::kSequential) {
+  static session::SessionResult run(const dataset::Dataset& dataset,
+                                    execution::Mode mode = execution::Mode::kSequential) {
     session::SessionOptions options;
     options.config.mode = mode;
     options.config.features.per_image = 600;  // small images
@@ -53,8 +54,9 @@ class SimulatedRun : public testing::Test {
     return std::move(*result);
   }
 
-  static evaluation::TrajectoryEvaluation evaluate(const evaluation::Trajectory& estimate, evaluation::AlignMode align) {
-    const auto truth = io::read_trajectory(folder_ / "groundtruth_cam0.tum");
+  static evaluation::TrajectoryEvaluation evaluate(const evaluation::Trajectory& estimate,
+                                                   evaluation::AlignMode align) {
+    const auto truth = evaluation::read_trajectory(folder_ / "groundtruth_cam0.tum");
     EXPECT_TRUE(truth);
     auto evaluated = evaluation::evaluate(estimate, *truth, {.align = align});
     EXPECT_TRUE(evaluated) << evaluated.error().message();
@@ -66,16 +68,17 @@ class SimulatedRun : public testing::Test {
 
 TEST_F(SimulatedRun, TracksWithEveryNumberOfCamerasFromTwoUp) {
   for (const int cameras : {2, 3, 4, 5, 6, 7, 8}) {
-    const io::Dataset dataset = open(cameras);
+    const dataset::Dataset dataset = open(cameras);
     const session::SessionResult result = run(dataset);
     EXPECT_EQ(result.trajectories.front().poses.size(), dataset.frames.size()) << cameras << " cameras";
     EXPECT_EQ(result.record.map.scale, "metric") << cameras << " cameras";
-    EXPECT_LT(evaluate(result.trajectories.front().poses, evaluation::AlignMode::kSe3).ate.rmse, 0.02) << cameras << " cameras";
+    EXPECT_LT(evaluate(result.trajectories.front().poses, evaluation::AlignMode::kSe3).ate.rmse, 0.02)
+        << cameras << " cameras";
   }
 }
 
 TEST_F(SimulatedRun, OneCameraTracksUpToScaleAndSaysSo) {
-  const io::Dataset dataset = open(1);
+  const dataset::Dataset dataset = open(1);
   const session::SessionResult result = run(dataset);
   EXPECT_EQ(result.record.map.scale, "up-to-scale");
   EXPECT_GT(result.trajectories.front().poses.size(), dataset.frames.size() / 2);
@@ -84,15 +87,16 @@ TEST_F(SimulatedRun, OneCameraTracksUpToScaleAndSaysSo) {
 }
 
 TEST_F(SimulatedRun, SequentialRunsGiveTheSameBytes) {
-  const io::Dataset dataset = open(4);
+  const dataset::Dataset dataset = open(4);
   const session::SessionResult first = run(dataset), second = run(dataset);
-  EXPECT_EQ(io::tum_text(first.trajectories.front().poses, ""), io::tum_text(second.trajectories.front().poses, ""));
-  EXPECT_EQ(io::tum_text(first.live.front().poses, ""), io::tum_text(second.live.front().poses, ""));
+  EXPECT_EQ(evaluation::tum_text(first.trajectories.front().poses, ""),
+            evaluation::tum_text(second.trajectories.front().poses, ""));
+  EXPECT_EQ(evaluation::tum_text(first.live.front().poses, ""), evaluation::tum_text(second.live.front().poses, ""));
 }
 
 TEST_F(SimulatedRun, ParallelRunIsAboutAsAccurate) {
-  const io::Dataset dataset = open(4);
-  const session::SessionResult result = run(dataset, system::Mode::kParallel);
+  const dataset::Dataset dataset = open(4);
+  const session::SessionResult result = run(dataset, execution::Mode::kParallel);
   EXPECT_EQ(result.trajectories.front().poses.size(), dataset.frames.size());
   EXPECT_LT(evaluate(result.trajectories.front().poses, evaluation::AlignMode::kSe3).ate.rmse, 0.02);
 }
@@ -100,7 +104,7 @@ TEST_F(SimulatedRun, ParallelRunIsAboutAsAccurate) {
 TEST_F(SimulatedRun, DamagedImageIsSkippedForItsCameraAndCounted) {
   const fs::path copy = folder_.string() + "_damaged";
   fs::copy(folder_, copy, fs::copy_options::recursive);
-  auto dataset = io::open_dataset({.path = copy, .cameras = {0, 1, 2, 3}});
+  auto dataset = dataset::open_dataset({.path = copy, .cameras = {0, 1, 2, 3}});
   ASSERT_TRUE(dataset);
   fs::resize_file(dataset->frames[10].images[0]->path, 500);
   std::ofstream(dataset->frames[20].images[2]->path) << "no image";

@@ -1,0 +1,100 @@
+#include "base/atomic_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+namespace bslam {
+namespace {
+
+// Owns a file descriptor; -1 = none.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  int get() const { return fd_; }
+  bool close() { return ::close(std::exchange(fd_, -1)) == 0; }
+
+ private:
+  int fd_;
+};
+
+Error system_error(const std::filesystem::path& path, std::string expected) {
+  return {path.string(), "", std::system_category().message(errno), std::move(expected)};
+}
+
+bool write_all(int fd, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+// A new file beside `path` with a name of its own, which is put into `name`.
+int open_beside(const std::filesystem::path& path, std::filesystem::path& name) {
+  for (int attempt = 0;; ++attempt) {
+    name = path;
+    name += ".part-" + std::to_string(::getpid()) + "-" + std::to_string(attempt);
+    const int fd = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd >= 0 || errno != EEXIST) return fd;
+  }
+}
+
+}  // namespace
+
+Status write_atomically(const std::filesystem::path& path, std::string_view bytes) {
+  const std::string expected = "a file that can be written";
+  std::filesystem::path part;
+  Descriptor file(open_beside(path, part));
+  if (file.get() < 0) return system_error(path, expected);
+  const bool written = write_all(file.get(), bytes) && ::fsync(file.get()) == 0 && file.close() &&
+                       ::rename(part.c_str(), path.c_str()) == 0;
+  if (!written) {
+    const Error error = system_error(path, expected);
+    ::unlink(part.c_str());
+    return error;
+  }
+  // The name is durable once the folder is; a file system that cannot flush folders is not an error.
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (opened.get() >= 0) ::fsync(opened.get());
+  return {};
+}
+
+Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes) {
+  // Non-blocking, so that a pipe of that name is refused instead of waited for.
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  struct stat status {};
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return system_error(path, "a file that can be read");
+  if (!S_ISREG(status.st_mode))
+    return Error{path.string(), "", S_ISDIR(status.st_mode) ? "a folder" : "no file", "a file"};
+  const Error too_large{path.string(), "", "more than " + std::to_string(max_bytes) + " bytes", "a smaller file"};
+  if (static_cast<std::size_t>(status.st_size) > max_bytes) return too_large;
+  std::string bytes(static_cast<std::size_t>(status.st_size) + 1, '\0');  // one more, to see the end without growing
+  std::size_t size = 0;
+  for (;;) {
+    if (size == bytes.size()) bytes.resize(2 * size);  // it grew since
+    const ssize_t got = ::read(file.get(), bytes.data() + size, bytes.size() - size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return system_error(path, "a file that can be read");
+    if (got == 0) break;
+    size += static_cast<std::size_t>(got);
+    if (size > max_bytes) return too_large;
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+}  // namespace bslam

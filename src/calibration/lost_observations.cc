@@ -1,0 +1,102 @@
+#include "calibration/lost_observations.h"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include "map/search_points.h"
+#include "matching/projection_search.h"
+
+namespace bslam::calibration {
+namespace {
+
+using Observation = solver::ReprojectionProblem::Observation;
+
+constexpr double kRadius = 0.012;   // radians about the projection
+constexpr double kMaxChi2 = 100.0;  // ten standard deviations
+constexpr int kMaxHamming = 50;     // bits
+constexpr double kRatio = 0.8;      // to the second best
+
+std::tuple<int, int, CameraIndex> place_of(const Observation& o) { return {o.point, o.pose, o.camera}; }
+
+bool pixel_before(const Observation& a, const Observation& b) {
+  return std::pair(a.pixel.x(), a.pixel.y()) < std::pair(b.pixel.x(), b.pixel.y());
+}
+
+// Of one image: keypoints that belong to a landmark, in the map or among what the problem has `seen` already.
+std::vector<std::uint8_t> taken_keypoints(const map::BundledMap& map, KeyframeId k, CameraIndex camera,
+                                          std::vector<Observation> seen) {
+  std::sort(seen.begin(), seen.end(), pixel_before);
+  const frame::BundledFrame& frame = *map.keyframe(k).frame;
+  std::vector<std::uint8_t> taken(frame.keypoints(camera).size());
+  Observation here{};
+  for (std::size_t i = 0; i < taken.size(); ++i) {
+    here.pixel = frame.keypoints(camera).pixel[i];
+    taken[i] = map.landmark_of(k, frame.bundled.feature(camera, KeypointIndex(i))).valid() ||
+               std::binary_search(seen.begin(), seen.end(), here, pixel_before);
+  }
+  return taken;
+}
+
+// What each image (pose, camera) shows already.
+std::vector<std::vector<Observation>> observations_by_image(const solver::ReprojectionProblem& problem) {
+  std::vector<std::vector<Observation>> out(problem.T_rig_world.size() * problem.rig->size());
+  for (const Observation& o : problem.observations) {
+    out[static_cast<std::size_t>(o.pose) * problem.rig->size() + o.camera.index()].push_back(o);
+  }
+  return out;
+}
+
+void sort_observations(adjustment::FlatProblem& flat) {
+  std::vector<std::pair<Observation, adjustment::ObservationSource>> all;
+  for (std::size_t i = 0; i < flat.sources.size(); ++i) all.emplace_back(flat.problem.observations[i], flat.sources[i]);
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return place_of(a.first) < place_of(b.first); });
+  for (std::size_t i = 0; i < all.size(); ++i) std::tie(flat.problem.observations[i], flat.sources[i]) = all[i];
+}
+
+// Adds what one image shows of `points`.
+void search_image(const map::BundledMap& map, std::size_t pose, CameraIndex camera, const geometry::SE3& T_cam_world,
+                  std::span<const matching::SearchPoint> points, const std::vector<Observation>& seen,
+                  const map::FeatureModel& features, adjustment::FlatProblem& flat) {
+  const KeyframeId keyframe = flat.keyframes[pose];
+  const frame::CameraFrame& image = map.keyframe(keyframe).frame->cameras[camera.index()];
+  const matching::ProjectionSearchOptions options{
+      .radius = kRadius, .max_hamming = kMaxHamming, .ratio = kRatio, .scale_factor = features.scale_factor};
+  const camera::Camera& model = map.rig().camera(camera);
+  const auto taken = taken_keypoints(map, keyframe, camera, seen);
+  const auto found = matching::search_by_projection(model, image, T_cam_world, points, taken, options);
+  for (const matching::ProjectionMatch& m : found.matches) {
+    const auto projected = model.project(T_cam_world * points[m.point].position);
+    const Eigen::Vector2f pixel = image.keypoints.pixel[m.keypoint.index()];
+    const double sigma = features.sigma(image.keypoints.level[m.keypoint.index()]);
+    if (!projected || (pixel.cast<double>() - *projected).squaredNorm() > kMaxChi2 * sigma * sigma) continue;
+    flat.problem.observations.push_back(
+        {static_cast<int>(pose), static_cast<int>(m.point), camera, pixel, static_cast<float>(sigma)});
+    flat.sources.push_back({flat.landmarks[m.point], keyframe});
+  }
+}
+
+}  // namespace
+
+int recover_observations(const map::BundledMap& map, std::span<const geometry::SE3> T_cam_rig,
+                         const map::FeatureModel& features, adjustment::FlatProblem& flat) {
+  const solver::ReprojectionProblem& problem = flat.problem;
+  const std::size_t cameras = T_cam_rig.size(), before = problem.observations.size();
+  const auto seen = observations_by_image(problem);
+  std::vector<matching::SearchPoint> points = map::search_points(map, flat.landmarks);
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].position = problem.points[i];
+  for (std::size_t pose = 0; pose < flat.keyframes.size(); ++pose) {
+    for (std::size_t c = 0; c < cameras; ++c) {
+      const std::size_t image = pose * cameras + c;
+      for (const Observation& o : seen[image]) points[static_cast<std::size_t>(o.point)].skip = 1;
+      const geometry::SE3 T_rig_world =
+          problem.motion.empty() ? problem.T_rig_world[pose] : problem.motion[image] * problem.T_rig_world[pose];
+      search_image(map, pose, CameraIndex(c), T_cam_rig[c] * T_rig_world, points, seen[image], features, flat);
+      for (const Observation& o : seen[image]) points[static_cast<std::size_t>(o.point)].skip = 0;
+    }
+  }
+  sort_observations(flat);
+  return static_cast<int>(flat.problem.observations.size() - before);
+}
+
+}  // namespace bslam::calibration

@@ -1,0 +1,219 @@
+#include "camera/camera_description.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include "base/number_text.h"
+#include "base/timestamp.h"
+
+namespace bslam::camera {
+namespace {
+
+using geometry::Matrix3d;
+using geometry::SE3;
+using geometry::Vector3d;
+
+constexpr std::int64_t kMaxSidePx = 20000;
+constexpr double kMaxTranslation = 1e6;      // metres; a larger one is a slip of units or a broken file
+constexpr double kMaxTimeOffset = 1e6;       // seconds; keeps sums of nanoseconds far from overflow
+constexpr double kRotationTolerance = 1e-3;  // files round to four digits and more
+
+// The rotation nearest to R whose quaternion lies on a grid, so fine that it does not matter (4e-15) and so coarse that
+// going to a matrix and back leads to the same point. The largest coefficient follows from the other three; of nearly
+// equal ones it is the first.
+geometry::Quaterniond rounded_rotation(const Matrix3d& R) {
+  constexpr double kGrid = 0x1p-48, kTie = 1e-9;
+  const Eigen::JacobiSVD<Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector4d q = geometry::Quaterniond(Matrix3d(svd.matrixU() * svd.matrixV().transpose())).coeffs();
+  const double largest_value = q.cwiseAbs().maxCoeff();
+  Eigen::Index largest = 0;
+  while (std::abs(q[largest]) < largest_value - kTie) ++largest;
+  if (q[largest] < 0) q = -q;
+  for (Eigen::Index i = 0; i < 4; ++i) q[i] = i == largest ? 0.0 : std::round(q[i] / kGrid) * kGrid + 0.0;  // no -0
+  q[largest] = std::sqrt(1 - q.squaredNorm());
+  return geometry::Quaterniond(q);
+}
+
+std::optional<camera::CameraModel> model_of(const CameraDescription& d) {
+  const camera::Intrinsics k{d.intrinsics[0], d.intrinsics[1], d.intrinsics[2], d.intrinsics[3]};
+  const std::size_t count = d.distortion.size();
+  if (d.model == camera::Pinhole::kName && count == 0) return camera::Pinhole(k);
+  if (d.model == camera::PinholeRadTan::kName && (count == 4 || count == 5 || count == 8)) {
+    return camera::PinholeRadTan(k, d.distortion);
+  }
+  if (d.model == camera::KannalaBrandt::kName && count == 4) {
+    return camera::KannalaBrandt(k, {d.distortion[0], d.distortion[1], d.distortion[2], d.distortion[3]});
+  }
+  if (d.model == camera::Unified::kName && count == 1) return camera::Unified(k, d.distortion[0]);
+  if (d.model == camera::ExtendedUnified::kName && count == 2) {
+    return camera::ExtendedUnified(k, d.distortion[0], d.distortion[1]);
+  }
+  if (d.model == camera::DoubleSphere::kName && count == 2) {
+    return camera::DoubleSphere(k, d.distortion[0], d.distortion[1]);
+  }
+  return std::nullopt;
+}
+
+std::string coefficients_expected(const std::string& model) {
+  if (model == camera::Pinhole::kName) return "none for " + model;
+  if (model == camera::PinholeRadTan::kName) return "4, 5 or 8 coefficients for " + model;
+  if (model == camera::Unified::kName) return "1, alpha, for " + model;
+  if (model == camera::ExtendedUnified::kName) return "2, alpha and beta, for " + model;
+  if (model == camera::DoubleSphere::kName) return "2, xi and alpha, for " + model;
+  return "4 coefficients for " + model;
+}
+
+struct ParameterRange {
+  std::string_view model;
+  std::size_t index;
+  std::string_view name;
+  double above, least, most;  // above < value where `above` is finite; least <= value <= most
+};
+constexpr double kNone = -std::numeric_limits<double>::infinity();
+constexpr std::array<ParameterRange, 5> kRanges = {{{camera::Unified::kName, 0, "alpha", kNone, 0, 1},
+                                                    {camera::ExtendedUnified::kName, 0, "alpha", kNone, 0, 1},
+                                                    {camera::ExtendedUnified::kName, 1, "beta", 0, 0, 1e6},
+                                                    {camera::DoubleSphere::kName, 0, "xi", -1, -1, 1},
+                                                    {camera::DoubleSphere::kName, 1, "alpha", kNone, 0, 1}}};
+
+Status check_ranges(const CameraDescription& d, const DescriptionKeys& keys) {
+  for (const ParameterRange& range : kRanges) {
+    if (d.model != range.model || range.index >= d.distortion.size()) continue;
+    const double value = d.distortion[range.index];
+    if (value > range.above && value >= range.least && value <= range.most) continue;
+    return Error{keys.file, keys.distortion, fmt::format("{} {}", range.name, value),
+                 fmt::format("{} in {}{}, {}]", range.name, range.above == kNone ? '[' : '(', range.least, range.most)};
+  }
+  return {};
+}
+
+Status check_numbers(const CameraDescription& d, const DescriptionKeys& keys) {
+  if (d.resolution.size() != 2) {
+    return Error{keys.file, keys.resolution, fmt::format("{} numbers", d.resolution.size()), "width and height"};
+  }
+  for (const std::int64_t side : d.resolution) {
+    if (side < 1 || side > kMaxSidePx) {
+      return Error{keys.file, keys.resolution, std::to_string(side), fmt::format("pixels in [1, {}]", kMaxSidePx)};
+    }
+  }
+  if (d.intrinsics.size() != 4) {
+    return Error{keys.file, keys.intrinsics, fmt::format("{} numbers", d.intrinsics.size()), "four: fx fy cx cy"};
+  }
+  for (const double value : d.intrinsics) {
+    if (!std::isfinite(value)) return Error{keys.file, keys.intrinsics, fmt::format("{}", value), "finite numbers"};
+  }
+  for (const double focal : {d.intrinsics[0], d.intrinsics[1]}) {
+    if (!(focal > 0)) return Error{keys.file, keys.intrinsics, fmt::format("focal length {}", focal), "one above 0"};
+  }
+  for (const double value : d.distortion) {
+    if (!std::isfinite(value)) return Error{keys.file, keys.distortion, fmt::format("{}", value), "finite numbers"};
+  }
+  if (!(std::abs(d.time_offset_s) <= kMaxTimeOffset)) {
+    return Error{keys.file, keys.time_offset, fmt::format("{}", d.time_offset_s), "seconds, at most a million"};
+  }
+  return {};
+}
+
+}  // namespace
+
+const std::vector<std::string>& known_models() {
+  static const std::vector<std::string> models = {
+      std::string(camera::Pinhole::kName),         std::string(camera::PinholeRadTan::kName),
+      std::string(camera::KannalaBrandt::kName),   std::string(camera::Unified::kName),
+      std::string(camera::ExtendedUnified::kName), std::string(camera::DoubleSphere::kName)};
+  return models;
+}
+
+Result<SE3> rigid_transform(const std::vector<double>& m, const std::string& file, const std::string& key) {
+  const auto error = [&](std::string found, std::string expected) {
+    return Error{file, key, std::move(found), std::move(expected)};
+  };
+  if (m.size() != 16) return error(fmt::format("{} numbers", m.size()), "16, the rows of a 4x4 transform");
+  if (!std::all_of(m.begin(), m.end(), [](double v) { return std::isfinite(v); })) {
+    return error("a number that is not finite", "a rigid transform");
+  }
+  if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1) {
+    return error(fmt::format("last row {} {} {} {}", m[12], m[13], m[14], m[15]), "0 0 0 1");
+  }
+  Matrix3d R;
+  R << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
+  const double deviation = (R.transpose() * R - Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(deviation <= kRotationTolerance)) {
+    return error(fmt::format("a 3x3 part that is no rotation (R'R differs from I by {:.3g})", deviation),
+                 "a rigid transform, with orthonormal axes");
+  }
+  if (R.determinant() < 0) {
+    return error("a mirrored frame (determinant -1)", "a rotation with determinant +1: x right, y down, z forward");
+  }
+  const Vector3d translation(m[3], m[7], m[11]);
+  if (!(translation.norm() <= kMaxTranslation)) {
+    return error(fmt::format("a translation of {:.3g}", translation.norm()), "metres");
+  }
+  return SE3(rounded_rotation(R), translation);
+}
+
+std::vector<double> rows_of(const SE3& T) {
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> m = T.matrix();
+  return {m.data(), m.data() + m.size()};
+}
+
+Result<SE3> rigid_transform(const geometry::Quaterniond& rotation, const Vector3d& translation, const std::string& file,
+                            const std::string& key) {
+  constexpr double kUnit = 1e-14;  // a unit quaternion, written with all its digits, keeps its bits
+  const double norm2 = rotation.squaredNorm();
+  if (!(std::abs(std::sqrt(norm2) - 1) <= kRotationTolerance)) {
+    return Error{file, key, fmt::format("a quaternion of norm {:.4g}", std::sqrt(norm2)), "a unit quaternion"};
+  }
+  Eigen::Matrix<double, 4, 4, Eigen::RowMajor> m = Eigen::Matrix4d::Identity();
+  const bool unit = std::abs(norm2 - 1) <= kUnit;
+  m.topLeftCorner<3, 3>() = (unit ? rotation : rotation.normalized()).toRotationMatrix();
+  m.topRightCorner<3, 1>() = translation;
+  return rigid_transform(std::vector<double>(m.data(), m.data() + m.size()), file, key);
+}
+
+Result<std::vector<std::int64_t>> whole_pixels(const std::vector<double>& sides, const std::string& file,
+                                               const std::string& key) {
+  std::vector<std::int64_t> whole;
+  for (const double side : sides) {
+    whole.push_back(static_cast<std::int64_t>(std::clamp(side, -1.0, 1e9)));
+    if (static_cast<double>(whole.back()) != side) return Error{file, key, format_double(side), "whole pixels"};
+  }
+  return whole;
+}
+
+Result<camera::RigCamera> make_camera(const CameraDescription& d, const DescriptionKeys& keys) {
+  const auto& models = known_models();
+  if (std::find(models.begin(), models.end(), d.model) == models.end()) {
+    return Error{keys.file, keys.model, d.model, fmt::format("one of: {}", fmt::join(models, ", "))};
+  }
+  if (const Status status = check_numbers(d, keys); !status) return status.error();
+  if (const Status status = check_ranges(d, keys); !status) return status.error();
+  const auto model = model_of(d);
+  if (!model) {
+    return Error{keys.file, keys.distortion, fmt::format("{} numbers", d.distortion.size()),
+                 coefficients_expected(d.model)};
+  }
+  const auto T_body_cam = rigid_transform(d.T_body_cam, keys.file, keys.T_body_cam);
+  if (!T_body_cam) return T_body_cam.error();
+  const camera::Camera camera{d.name,
+                              *model,
+                              static_cast<int>(d.resolution[0]),
+                              static_cast<int>(d.resolution[1]),
+                              from_seconds(d.time_offset_s),
+                              d.mask_file};
+  if (!camera.unproject({d.intrinsics[2], d.intrinsics[3]})) {
+    return Error{keys.file, keys.distortion, "coefficients that bend every ray back", "those of a lens"};
+  }
+  return camera::RigCamera{camera, *T_body_cam};
+}
+
+}  // namespace bslam::camera

@@ -1,0 +1,293 @@
+#include "dataset/dataset.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include "dataset/frame_grouping.h"
+#include "dataset/recording.h"
+#include "image_files/image_file.h"
+#include "rig_formats/rig_file.h"
+
+namespace bslam::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct OpenRecording {
+  DatasetFormat format;
+  std::unique_ptr<Recording> recording;
+};
+
+Result<DatasetFormat> detect_format(const fs::path& folder) {
+  if (looks_like_euroc(folder)) return DatasetFormat::kEuroc;
+  if (looks_like_kitti(folder)) return DatasetFormat::kKitti;
+  if (looks_like_folder(folder)) return DatasetFormat::kFolder;
+  return Error{
+      folder.string(), "", "no data set of a known layout",
+      "mav0/camN/data.csv (euroc), image_N with times.txt (kitti), or camN with images named by time (folder)"};
+}
+
+Result<OpenRecording> open_recording(const DatasetRequest& request) {
+  std::error_code error;
+  if (!fs::is_directory(request.path, error)) {
+    const bool exists = fs::exists(request.path, error);
+    return Error{request.path.string(), "", exists ? "a file" : "no such folder", "the folder of a data set"};
+  }
+  DatasetFormat format = request.format;
+  if (format == DatasetFormat::kAuto) {
+    const auto detected = detect_format(request.path);
+    if (!detected) return detected.error();
+    format = *detected;
+  }
+  auto recording = format == DatasetFormat::kEuroc   ? open_euroc(request.path)
+                   : format == DatasetFormat::kKitti ? open_kitti(request.path)
+                                                     : open_folder(request.path);
+  if (!recording) return recording.error();
+  return OpenRecording{format, *std::move(recording)};
+}
+
+// Folder name; of "DATA/mav0", "DATA/" and "." too.
+std::string name_of(const fs::path& path) {
+  std::error_code error;
+  fs::path whole = fs::weakly_canonical(path, error);
+  if (error) whole = fs::absolute(path, error);
+  if (whole.filename().empty() || whole.filename() == "mav0") whole = whole.parent_path();
+  return whole.filename().string();
+}
+
+// The cameras asked for, or all of `count`.
+Result<std::vector<int>> chosen_cameras(const std::vector<int>& asked, std::size_t count) {
+  std::vector<int> cameras = asked;
+  if (cameras.empty()) {
+    cameras.resize(count);
+    std::iota(cameras.begin(), cameras.end(), 0);
+  }
+  std::set<int> seen;
+  for (const int camera : cameras) {
+    if (camera < 0 || static_cast<std::size_t>(camera) >= count) {
+      return Error{"--cameras", "", std::to_string(camera), fmt::format("indices in [0, {}]", count - 1)};
+    }
+    if (!seen.insert(camera).second) {
+      return Error{"--cameras", "", fmt::format("camera {} twice", camera), "every camera once"};
+    }
+  }
+  return cameras;
+}
+
+struct ChosenRig {
+  std::vector<int> cameras;
+  camera::Rig rig;
+  std::optional<camera::Rig> whole;
+  std::vector<std::string> warnings;
+};
+
+Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recording& recording) {
+  const auto rig = rig_formats::read_rig(*request.rig_file);
+  if (!rig) return rig.error();
+  const auto cameras = chosen_cameras(request.cameras, rig->size());
+  if (!cameras) return cameras.error();
+  for (const int camera : *cameras) {
+    if (static_cast<std::size_t>(camera) < recording.camera_count()) continue;
+    const std::size_t there = recording.camera_count();
+    return Error{request.path.string(), "", fmt::format("images of {} camera{}", there, there == 1 ? "" : "s"),
+                 fmt::format("of camera {} as well: {} has {} (--cameras takes some of them)", camera,
+                             request.rig_file->string(), rig->size())};
+  }
+  ChosenRig chosen{*cameras, rig->subset(*cameras), *rig, {}};
+  if (recording.camera_count() > rig->size()) {
+    chosen.warnings.push_back(fmt::format("{} has {} cameras, the data {}: the others are not used",
+                                          request.rig_file->string(), rig->size(), recording.camera_count()));
+  }
+  return chosen;
+}
+
+// Empty where some camera's calibration cannot be read.
+std::optional<camera::Rig> whole_rig(const Recording& recording) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < recording.camera_count(); ++c) {
+    auto calibration = recording.calibration(c);
+    if (!calibration) return std::nullopt;
+    cameras.push_back(*std::move(calibration));
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+Result<ChosenRig> choose_own(const DatasetRequest& request, const Recording& recording) {
+  auto cameras = chosen_cameras(request.cameras, recording.camera_count());
+  if (!cameras) return cameras.error();
+  if (auto whole = whole_rig(recording)) {
+    camera::Rig rig = whole->subset(*cameras);
+    return ChosenRig{*std::move(cameras), std::move(rig), std::move(whole), {}};
+  }
+  std::vector<camera::RigCamera> calibrated;
+  for (const int camera : *cameras) {
+    auto calibration = recording.calibration(static_cast<std::size_t>(camera));
+    if (!calibration) return calibration.error();
+    calibrated.push_back(*std::move(calibration));
+  }
+  return ChosenRig{*std::move(cameras), camera::Rig(std::move(calibrated)), std::nullopt, {}};
+}
+
+// Some image exists, and of the first that can be read some has the calibrated size.
+Status check_images(const std::vector<image_files::ImageFile>& images, const camera::Camera& camera) {
+  constexpr int kTries = 5;
+  int read = 0;
+  bool any = false;
+  std::string found;
+  for (const image_files::ImageFile& file : images) {
+    std::error_code error;
+    if (!fs::exists(file.path, error)) continue;
+    any = true;
+    if (++read > kTries) break;
+    const auto image = image_files::read_image(file.path);
+    if (!image) continue;
+    if (image->width() == camera.width && image->height() == camera.height) return {};
+    found = fmt::format("{}x{} pixels", image->width(), image->height());
+  }
+  const std::string folder = images.front().path.parent_path().string();
+  if (!any) return Error{folder, camera.name, "none of the listed images", "images"};
+  if (found.empty()) return {};  // the first ones are damaged: to be seen when they are read
+  return Error{folder, camera.name, "images of " + found,
+               fmt::format("{}x{}, the resolution of the calibration", camera.width, camera.height)};
+}
+
+// The images of every camera in use at their true times.
+Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Recording& recording, ChosenRig& chosen) {
+  std::vector<std::vector<image_files::ImageFile>> images;
+  for (std::size_t i = 0; i < chosen.cameras.size(); ++i) {
+    auto list = recording.images(static_cast<std::size_t>(chosen.cameras[i]));
+    if (!list) return list.error();
+    chosen.warnings.insert(chosen.warnings.end(), list->warnings.begin(), list->warnings.end());
+    const camera::Camera& camera = chosen.rig.camera(i);
+    if (const Status status = check_images(list->images, camera); !status) return status.error();
+    if (const auto mask = image_files::read_mask(camera); !mask) return mask.error();
+    for (image_files::ImageFile& image : list->images) image.time_ns += camera.time_offset_ns;
+    images.push_back(std::move(list->images));
+  }
+  return images;
+}
+
+double nearest_distance_s(const std::vector<image_files::ImageFile>& a, const std::vector<image_files::ImageFile>& b) {
+  TimeNs least = std::numeric_limits<TimeNs>::max();
+  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+    least = std::min(least, std::abs(a[i].time_ns - b[j].time_ns));
+    ++(a[i].time_ns < b[j].time_ns ? i : j);
+  }
+  return to_seconds(least);
+}
+
+Status group(const DatasetRequest& request, const std::vector<std::vector<image_files::ImageFile>>& images,
+             Dataset& dataset) {
+  FrameGrouping grouping = group_frames(images, from_seconds(request.sync_tolerance_s));
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const std::string& name = dataset.rig.camera(i).name;
+    if (grouping.shared_with_camera0[i] == 0) {
+      return Error{request.path.string(), name,
+                   fmt::format("no image within {:g} ms of one of {} (the nearest is {:g} ms away)",
+                               1e3 * request.sync_tolerance_s, dataset.rig.camera(std::size_t{0}).name,
+                               1e3 * nearest_distance_s(images[0], images[i])),
+                   "cameras with a common time, or a larger io.sync_tolerance"};
+    }
+    if (grouping.unassigned[i] > 0) {
+      dataset.warnings.push_back(fmt::format("{}: {} of {} images belong to no frame and are not used", name,
+                                             grouping.unassigned[i], images[i].size()));
+    }
+  }
+  dataset.frames = std::move(grouping.frames);
+  dataset.first_time_ns = dataset.frames.front().time_ns;
+  return {};
+}
+
+Status check_request(const DatasetRequest& request) {
+  for (const auto& [name, value] : {std::pair("--begin", request.begin_s), std::pair("--end", request.end_s)}) {
+    if (value && !(*value >= 0 && *value < 1e9))
+      return Error{name, "", fmt::format("{}", *value), "seconds, not below 0"};
+  }
+  if (request.begin_s && request.end_s && !(*request.begin_s < *request.end_s)) {
+    return Error{"--begin", "", fmt::format("{} s with --end {} s", *request.begin_s, *request.end_s),
+                 "begin before end"};
+  }
+  if (!(request.sync_tolerance_s >= 0 && request.sync_tolerance_s < 1e3)) {
+    return Error{"io.sync_tolerance", "", fmt::format("{}", request.sync_tolerance_s), "seconds, not below 0"};
+  }
+  return {};
+}
+
+Status keep_range(const DatasetRequest& request, Dataset& dataset) {
+  const double last_s = to_seconds(dataset.frames.back().time_ns - dataset.first_time_ns);
+  const TimeNs begin = from_seconds(request.begin_s.value_or(0.0));
+  const TimeNs end = request.end_s ? from_seconds(*request.end_s) : std::numeric_limits<TimeNs>::max();
+  std::erase_if(dataset.frames, [&](const FrameEntry& frame) {
+    const TimeNs time = frame.time_ns - dataset.first_time_ns;
+    return time < begin || time >= end;
+  });
+  if (!dataset.frames.empty()) return {};
+  return Error{request.begin_s ? "--begin" : "--end", "",
+               fmt::format("{} s", request.begin_s ? *request.begin_s : *request.end_s),
+               fmt::format("a range with frames: they last from 0 to {:.3f} s", last_s)};
+}
+
+// The rig file a recording may have beside it; empty where there is none.
+std::optional<fs::path> rig_beside(const DatasetRequest& request) {
+  fs::path folder = request.path.filename().empty() ? request.path.parent_path() : request.path;
+  if (folder.filename() == "mav0") folder = folder.parent_path();
+  fs::path file = folder / "rig.yaml";
+  std::error_code error;
+  return fs::is_regular_file(file, error) ? std::optional(std::move(file)) : std::nullopt;
+}
+
+// The recording's own calibration is what counts; that it may lack times which a rig file beside it has should be
+// known.
+void warn_of_times(const fs::path& file, std::vector<std::string>& warnings) {
+  const auto rig = rig_formats::read_rig(file);
+  if (!rig) return;
+  std::vector<std::string> offsets;
+  for (std::size_t c = 0; c < rig->size(); ++c) {
+    const camera::Camera& camera = rig->camera(c);
+    if (camera.time_offset_ns != 0)
+      offsets.push_back(fmt::format("{} {:g} ms", camera.name, 1e3 * to_seconds(camera.time_offset_ns)));
+  }
+  if (offsets.empty()) return;
+  warnings.push_back(fmt::format("{} gives time offsets ({}), which are not used without --rig {}", file.string(),
+                                 fmt::join(offsets, ", "), file.string()));
+}
+
+}  // namespace
+
+Result<Dataset> open_dataset(const DatasetRequest& asked) {
+  DatasetRequest request = asked;
+  if (const Status status = check_request(request); !status) return status.error();
+  const auto opened = open_recording(request);
+  if (!opened) return opened.error();
+  const Recording& recording = *opened->recording;
+  const auto beside = request.rig_file ? std::nullopt : rig_beside(request);
+  if (beside && !recording.calibrated()) request.rig_file = *beside;
+  auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
+  if (!chosen) return chosen.error();
+  if (beside && !request.rig_file) warn_of_times(*beside, chosen->warnings);
+  const auto images = collect_images(recording, *chosen);
+  if (!images) return images.error();
+  Dataset dataset{name_of(request.path),
+                  opened->format,
+                  std::move(chosen->rig),
+                  std::move(chosen->cameras),
+                  std::move(chosen->whole),
+                  0,
+                  {},
+                  recording.ground_truth(),
+                  std::move(chosen->warnings)};
+  if (const Status status = group(request, *images, dataset); !status) return status.error();
+  if (const Status status = keep_range(request, dataset); !status) return status.error();
+  return dataset;
+}
+
+}  // namespace bslam::dataset

@@ -1,0 +1,105 @@
+// EuRoC: mav0/camN/{data.csv, data/, sensor.yaml} and mav0/state_groundtruth_estimate0/data.csv.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "base/atomic_file.h"
+#include "base/number_text.h"
+#include "dataset/recording.h"
+#include "rig_formats/euroc_sensor.h"
+
+namespace bslam::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxListBytes = std::size_t{1} << 28;
+// Nanoseconds: room above it for time offsets without overflow.
+constexpr TimeNs kMaxTime = 9'200'000'000'000'000'000;
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r\n";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+// "timestamp [ns],filename" a line; lines that begin with # and empty ones are passed over.
+Result<std::vector<image_files::ImageFile>> parse_list(const fs::path& file, std::string_view text,
+                                                       const fs::path& image_folder) {
+  std::vector<image_files::ImageFile> images;
+  std::size_t number = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = trimmed(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+    ++number;
+    if (line.empty() || line.front() == '#') continue;
+    const auto error = [&](std::string_view found, std::string expected) {
+      return Error{file.string(), fmt::format("line {}", number), std::string(found.substr(0, 60)),
+                   std::move(expected)};
+    };
+    const std::size_t comma = line.find(',');
+    const auto time = parse_integer(trimmed(line.substr(0, comma)));
+    if (!time || *time < 0 || *time > kMaxTime) return error(line.substr(0, comma), "a timestamp in nanoseconds");
+    const std::string_view rest = comma == std::string_view::npos ? "" : line.substr(comma + 1);
+    const std::string_view name = trimmed(rest.substr(0, rest.find(',')));
+    if (name.empty()) return error(line, "timestamp,filename");
+    images.push_back({image_folder / name, *time});
+  }
+  return images;
+}
+
+class EurocRecording : public Recording {
+ public:
+  EurocRecording(fs::path root, std::vector<fs::path> folders) : root_(std::move(root)), folders_(std::move(folders)) {}
+
+  std::size_t camera_count() const override { return folders_.size(); }
+
+  bool calibrated() const override {
+    std::error_code error;
+    return std::ranges::any_of(folders_, [&](const fs::path& f) { return fs::exists(f / "sensor.yaml", error); });
+  }
+
+  Result<camera::RigCamera> calibration(std::size_t camera) const override {
+    return rig_formats::read_euroc_sensor(folders_[camera] / "sensor.yaml", folders_[camera].filename().string());
+  }
+
+  Result<image_files::ImageList> images(std::size_t camera) const override {
+    const fs::path file = folders_[camera] / "data.csv";
+    const auto text = read_file(file, kMaxListBytes);
+    if (!text) return text.error();
+    auto images = parse_list(file, *text, folders_[camera] / "data");
+    if (!images) return images.error();
+    if (images->empty()) return Error{file.string(), "", "no images", "a line timestamp,filename for every image"};
+    return image_files::in_time_order(*std::move(images), file.string());
+  }
+
+  std::optional<fs::path> ground_truth() const override {
+    fs::path file = root_ / "state_groundtruth_estimate0" / "data.csv";
+    std::error_code error;
+    return fs::exists(file, error) ? std::optional(std::move(file)) : std::nullopt;
+  }
+
+ private:
+  fs::path root_;
+  std::vector<fs::path> folders_;
+};
+
+}  // namespace
+
+bool looks_like_euroc(const fs::path& folder) {
+  std::error_code error;
+  return fs::is_directory(folder / "mav0", error) || !rig_formats::camera_folders(folder, "data.csv").empty();
+}
+
+RecordingResult open_euroc(const fs::path& folder) {
+  const fs::path root = rig_formats::euroc_root(folder);
+  auto folders = rig_formats::camera_folders(root, "");
+  if (folders.empty()) return Error{root.string(), "", "no camera", "cam0, cam1, ... with data.csv and sensor.yaml"};
+  return std::unique_ptr<Recording>(std::make_unique<EurocRecording>(root, std::move(folders)));
+}
+
+}  // namespace bslam::dataset

@@ -1,0 +1,48 @@
+#include "dataset/frame_reader.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "base/assert.h"
+#include "image_files/image_file.h"
+
+namespace bslam::dataset {
+
+namespace {
+
+Result<image::Image> read_of_camera(const std::filesystem::path& file, const camera::Camera& camera) {
+  auto image = image_files::read_image(file);
+  if (!image || (image->width() == camera.width && image->height() == camera.height)) return image;
+  return Error{file.string(), "", fmt::format("{}x{} pixels", image->width(), image->height()),
+               fmt::format("{}x{}, the resolution of {}", camera.width, camera.height, camera.name)};
+}
+
+}  // namespace
+
+std::string why_damaged(const Dataset& dataset, std::size_t index, std::size_t camera) {
+  const auto& file = dataset.frames.at(index).images.at(camera);
+  if (!file) return "";
+  const auto image = read_of_camera(file->path, dataset.rig.camera(camera));
+  return image ? file->path.string() + ": can be read now" : image.error().message();
+}
+
+image::ImageBundle read_frame(const Dataset& dataset, std::size_t index) {
+  BSLAM_ASSERT(index < dataset.frames.size(), "a frame of the data set");
+  const FrameEntry& frame = dataset.frames[index];
+  image::ImageBundle bundle{FrameId(index), frame.time_ns, {}};
+  bundle.images.resize(frame.images.size());
+  for (std::size_t i = 0; i < frame.images.size(); ++i) {
+    if (!frame.images[i]) continue;
+    image::CameraImage& out = bundle.images[i];
+    out.time_ns = frame.images[i]->time_ns;
+    out.state = image::ImageState::kDamaged;
+    auto image = read_of_camera(frame.images[i]->path, dataset.rig.camera(i));
+    if (!image) continue;
+    out.image = *std::move(image);
+    out.state = image::ImageState::kPresent;
+  }
+  return bundle;
+}
+
+}  // namespace bslam::dataset

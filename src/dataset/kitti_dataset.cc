@@ -1,0 +1,120 @@
+// KITTI odometry: image_0 to image_3 with NNNNNN.png, times.txt, calib.txt, poses.txt.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
+#include <utility>
+
+#include "base/atomic_file.h"
+#include "dataset/recording.h"
+#include "evaluation/trajectory_file.h"
+#include "rig_formats/kitti_calib.h"
+
+namespace bslam::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxListBytes = std::size_t{1} << 28;
+constexpr int kCameras = 4;
+
+Result<std::vector<TimeNs>> read_times(const fs::path& file) {
+  const auto text = read_file(file, kMaxListBytes);
+  if (!text) return text.error();
+  std::vector<TimeNs> times;
+  std::istringstream lines(*text);
+  std::size_t number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    std::string word, more;
+    std::istringstream words(line);
+    if (!(words >> word)) continue;
+    const auto time = evaluation::parse_seconds(word);
+    if (!time || words >> more)
+      return Error{file.string(), fmt::format("line {}", number), line.substr(0, 60), "seconds"};
+    times.push_back(*time);
+  }
+  if (times.empty()) return Error{file.string(), "", "no times", "the seconds of every image, one a line"};
+  return times;
+}
+
+class KittiRecording : public Recording {
+ public:
+  KittiRecording(fs::path root, std::vector<int> cameras) : root_(std::move(root)), cameras_(std::move(cameras)) {}
+
+  std::size_t camera_count() const override { return cameras_.size(); }
+
+  Result<camera::RigCamera> calibration(std::size_t camera) const override {
+    const fs::path file = root_ / "calib.txt";
+    const auto projections = rig_formats::read_kitti_calib(file);
+    if (!projections) return projections.error();
+    for (const rig_formats::KittiProjection& projection : *projections) {
+      if (projection.camera != cameras_[camera]) continue;
+      const fs::path folder = rig_formats::kitti_image_folder(root_, projection.camera);
+      const auto size = image_files::first_image_size(image_files::images_in(folder));
+      if (!size) return Error{folder.string(), "", "no image that can be read", "images: they tell the resolution"};
+      return rig_formats::kitti_camera(projection, size->width, size->height, file);
+    }
+    return Error{file.string(), "", "no such line", fmt::format("P{}: and twelve numbers", cameras_[camera])};
+  }
+
+  Result<image_files::ImageList> images(std::size_t camera) const override {
+    const fs::path folder = rig_formats::kitti_image_folder(root_, cameras_[camera]);
+    const auto times = read_times(root_ / "times.txt");
+    if (!times) return times.error();
+    std::vector<image_files::ImageFile> images;
+    for (std::size_t k = 0; k < times->size(); ++k) {
+      images.push_back({folder / fmt::format("{:06}.png", k), (*times)[k]});  // unless found under another name
+    }
+    std::size_t without_time = 0;
+    for (image_files::NumberedImage& image : image_files::images_in(folder)) {
+      const auto k = static_cast<std::size_t>(image.number);
+      if (k < images.size()) {
+        images[k].path = std::move(image.path);
+      } else {
+        ++without_time;
+      }
+    }
+    image_files::ImageList list = image_files::in_time_order(std::move(images), (root_ / "times.txt").string());
+    if (without_time > 0) {
+      list.warnings.push_back(
+          fmt::format("{}: {} images beyond the end of times.txt, not used", folder.string(), without_time));
+    }
+    return list;
+  }
+
+  std::optional<fs::path> ground_truth() const override {
+    fs::path file = root_ / "poses.txt";
+    std::error_code error;
+    return fs::exists(file, error) ? std::optional(std::move(file)) : std::nullopt;
+  }
+
+ private:
+  fs::path root_;
+  std::vector<int> cameras_;  // the numbers in image_N
+};
+
+std::vector<int> cameras_in(const fs::path& folder) {
+  std::vector<int> cameras;
+  for (int camera = 0; camera < kCameras; ++camera) {
+    std::error_code error;
+    if (fs::is_directory(rig_formats::kitti_image_folder(folder, camera), error)) cameras.push_back(camera);
+  }
+  return cameras;
+}
+
+}  // namespace
+
+bool looks_like_kitti(const fs::path& folder) {
+  std::error_code error;
+  return fs::exists(folder / "times.txt", error) && !cameras_in(folder).empty();
+}
+
+RecordingResult open_kitti(const fs::path& folder) {
+  std::vector<int> cameras = cameras_in(folder);
+  if (cameras.empty())
+    return Error{folder.string(), "", "no camera", "image_0 to image_3 with times.txt and calib.txt"};
+  return std::unique_ptr<Recording>(std::make_unique<KittiRecording>(folder, std::move(cameras)));
+}
+
+}  // namespace bslam::dataset

@@ -1,0 +1,74 @@
+#include "execution/map_gate.h"
+
+namespace bslam::execution {
+
+MapGate::MapGate(map::MapStore& store) : store_(store), newest_(store.snapshot()) {}
+
+map::MapSnapshot MapGate::newest() const {
+  const std::lock_guard lock(mutex_);
+  return newest_;
+}
+
+map::MapSnapshot MapGate::begin_frame(FrameId frame) {
+  frame_ = frame;
+  const std::lock_guard lock(mutex_);
+  journal_.entries.push_back({JournalStep::kFrame, frame.value(), newest_->version(), std::nullopt});
+  return newest_;
+}
+
+void MapGate::begin_frame(FrameId frame, const map::MapSnapshot& seen) {
+  frame_ = frame;
+  append({JournalStep::kFrame, frame.value(), seen->version(), std::nullopt});
+}
+
+map::CommitReport MapGate::commit(JournalStep step, map::MapDraft draft) {
+  const std::lock_guard order(order_);
+  return publish(step, frame_.value(), std::move(draft));
+}
+
+bool MapGate::settle(const StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop) {
+  const std::lock_guard order(order_);
+  if (stop.stop_requested()) return false;
+  if (!result.draft) {
+    append({journal_step(task.stage), task.keyframe.value(), base, std::nullopt});
+    return false;
+  }
+  BSLAM_ASSERT(result.draft->map().version() == base, "a stage's draft is of the version it was given");
+  const map::CommitReport report = publish(journal_step(task.stage), task.keyframe.value(), std::move(*result.draft));
+  if (report.refused) return false;
+  if (result.committed) result.committed(report);
+  return true;
+}
+
+void MapGate::restart(map::BundledMap initial) {
+  const std::lock_guard order(order_);
+  const MapVersion base = newest()->version();
+  store_.restart(std::move(initial));
+  map::MapSnapshot fresh = store_.snapshot();
+  const MapVersion version = fresh->version();
+  append({JournalStep::kRestart, frame_.value(), base, version}, std::move(fresh));
+}
+
+Journal MapGate::journal() const {
+  const std::lock_guard lock(mutex_);
+  return journal_;
+}
+
+map::CommitReport MapGate::publish(JournalStep step, std::int32_t input, map::MapDraft draft) {
+  const MapVersion base = draft.map().version();  // a draft keeps that of its base
+  map::CommitReport report = store_.commit(std::move(draft));
+  if (report.refused) {
+    append({step, input, base, std::nullopt});
+  } else {
+    append({step, input, base, report.published->version()}, report.published);
+  }
+  return report;
+}
+
+void MapGate::append(const JournalEntry& entry, map::MapSnapshot newest) {
+  const std::lock_guard lock(mutex_);
+  journal_.entries.push_back(entry);
+  if (newest) newest_.swap(newest);  // the old version goes with the argument, after the lock
+}
+
+}  // namespace bslam::execution

@@ -1,0 +1,143 @@
+#include <array>
+#include <deque>
+#include <map>
+
+#include "execution/schedules.h"
+
+namespace bslam::execution {
+namespace {
+
+class ReplayExecutor : public StageExecutor {
+ public:
+  ReplayExecutor(Journal journal, MapGate& gate, ExecutionSetup setup)
+      : journal_(std::move(journal)), gate_(gate), setup_(std::move(setup)) {
+    for (std::size_t i = 0; i < journal_.entries.size(); ++i) last_use_[journal_.entries[i].base] = i;
+    keep(gate_.newest());
+  }
+
+  map::MapSnapshot begin_frame(FrameId frame) override {
+    run_background();
+    if (interrupted()) return gate_.begin_frame(frame);
+    expect(JournalStep::kFrame, frame.value());
+    const map::MapSnapshot seen = recorded_base();
+    gate_.begin_frame(frame, seen);
+    advance();
+    return seen;
+  }
+
+  map::CommitReport commit(JournalStep step, map::MapDraft draft) override {
+    run_background();
+    if (interrupted()) return gate_.commit(step, std::move(draft));
+    expect(step, gate_.frame().value(), draft.map().version());
+    if (step == JournalStep::kFinal) expect_nothing_waits();
+    const map::CommitReport report = gate_.commit(step, std::move(draft));
+    keep(report.published);
+    advance();
+    return report;
+  }
+
+  void enqueue(KeyframeId keyframe) override { waiting(Stage::kMap).push_back(keyframe); }
+
+  void drain() override { run_background(); }
+
+  void restart(map::BundledMap initial) override {
+    run_background();
+    if (interrupted()) return gate_.restart(std::move(initial));
+    expect(JournalStep::kRestart, gate_.frame().value(), gate_.newest()->version());
+    for (auto& tasks : waiting_) tasks.clear();
+    gate_.restart(std::move(initial));
+    keep(gate_.newest());
+    advance();
+  }
+
+  void end() override {
+    if (!over()) fail("the end");
+  }
+
+  void interrupt() override { stop_.request_stop(); }
+  bool over() const override { return interrupted() || at_end(); }
+
+ private:
+  bool interrupted() const { return stop_.stop_requested(); }
+  bool at_end() const { return next_ == journal_.entries.size(); }
+  const JournalEntry& entry() const { return journal_.entries[next_]; }
+  std::deque<KeyframeId>& waiting(Stage stage) { return waiting_[static_cast<std::size_t>(stage)]; }
+
+  [[noreturn]] void fail(const std::string& this_run) const {
+    throw ReplayMismatch({journal_.name, "entry " + std::to_string(next_), at_end() ? "the end" : entry_text(entry()),
+                          this_run + ", as this run does"});
+  }
+
+  // What the caller's thread does is what it did then.
+  void expect(JournalStep step, std::int32_t input, std::optional<MapVersion> base = std::nullopt) const {
+    const bool fits = !at_end() && entry().step == step && entry().input == input && (!base || entry().base == *base);
+    if (!fits) fail(step_text(step, input) + (base ? " on version " + std::to_string(base->value()) : ""));
+  }
+
+  void expect_nothing_waits() const {
+    for (const Stage stage : {Stage::kMap, Stage::kLoop}) {
+      const auto& tasks = waiting_[static_cast<std::size_t>(stage)];
+      if (!tasks.empty()) fail(step_text(journal_step(stage), tasks.front().value()));
+    }
+  }
+
+  // Stages that ended before the next thing the caller's thread did.
+  void run_background() {
+    while (!over()) {
+      const std::optional<Stage> stage = background_stage(entry().step);
+      if (!stage) return;
+      run({*stage, KeyframeId(entry().input)});
+    }
+  }
+
+  void run(const StageTask& task) {
+    std::deque<KeyframeId>& tasks = waiting(task.stage);
+    // A superseded adjustment leaves no entry.
+    while (task.stage == Stage::kGlobal && !tasks.empty() && tasks.front() != task.keyframe) tasks.pop_front();
+    if (tasks.empty() || tasks.front() != task.keyframe) fail("no such task");
+    const map::MapSnapshot base = recorded_base();
+    const bool committed = run_to_commit(task, base, gate_, setup_, stop_.get_token());
+    if (interrupted()) return;
+    if (committed != entry().committed.has_value()) fail(committed ? "a commit" : "no commit");
+    tasks.pop_front();
+    if (committed) {
+      keep(gate_.newest());
+      if (task.stage == Stage::kLoop) waiting(Stage::kGlobal).clear();
+      if (const auto next = following(task, setup_.functions)) waiting(next->stage).push_back(next->keyframe);
+    }
+    advance();
+  }
+
+  map::MapSnapshot recorded_base() const {
+    const auto kept = kept_.find(entry().base);
+    if (kept == kept_.end()) fail("a version from " + std::to_string(gate_.newest()->version().value()) + " on");
+    return kept->second;
+  }
+
+  void keep(map::MapSnapshot version) {
+    const MapVersion number = version->version();
+    if (last_use_.contains(number)) kept_[number] = std::move(version);
+  }
+
+  void advance() {
+    if (last_use_.at(entry().base) == next_) kept_.erase(entry().base);
+    ++next_;
+  }
+
+  const Journal journal_;
+  MapGate& gate_;
+  const ExecutionSetup setup_;
+  std::size_t next_ = 0;                         // entry
+  std::map<MapVersion, std::size_t> last_use_;   // entry that needs a version last
+  std::map<MapVersion, map::MapSnapshot> kept_;  // versions still needed
+  std::array<std::deque<KeyframeId>, kStages.size()> waiting_;
+  std::stop_source stop_;
+};
+
+}  // namespace
+
+std::unique_ptr<StageExecutor> make_replay_executor(Journal journal, MapGate& gate, ExecutionSetup setup) {
+  return std::make_unique<ReplayExecutor>(std::move(journal), gate, std::move(setup));
+}
+
+}  // namespace bslam::execution

@@ -1,0 +1,40 @@
+#include "execution/schedules.h"
+
+namespace bslam::execution {
+namespace {
+
+class SequentialExecutor : public StageExecutor {
+ public:
+  SequentialExecutor(MapGate& gate, ExecutionSetup setup) : gate_(gate), setup_(std::move(setup)) {}
+
+  map::MapSnapshot begin_frame(FrameId frame) override { return gate_.begin_frame(frame); }
+  map::CommitReport commit(JournalStep step, map::MapDraft draft) override {
+    return gate_.commit(step, std::move(draft));
+  }
+
+  void enqueue(KeyframeId keyframe) override {
+    std::optional<StageTask> task = StageTask{Stage::kMap, keyframe};
+    while (task && !over()) {
+      const bool committed = run_to_commit(*task, gate_.newest(), gate_, setup_, stop_.get_token());
+      task = committed ? following(*task, setup_.functions) : std::nullopt;
+    }
+  }
+
+  void drain() override {}
+  void restart(map::BundledMap initial) override { gate_.restart(std::move(initial)); }
+  void interrupt() override { stop_.request_stop(); }
+  bool over() const override { return stop_.stop_requested(); }
+
+ private:
+  MapGate& gate_;
+  const ExecutionSetup setup_;
+  std::stop_source stop_;
+};
+
+}  // namespace
+
+std::unique_ptr<StageExecutor> make_sequential_executor(MapGate& gate, ExecutionSetup setup) {
+  return std::make_unique<SequentialExecutor>(gate, std::move(setup));
+}
+
+}  // namespace bslam::execution

@@ -1,0 +1,96 @@
+#include "mapping/landmark_fusion.h"
+
+#include <algorithm>
+
+#include "map/search_points.h"
+#include "matching/projection_search.h"
+
+namespace bslam::mapping {
+namespace {
+
+using geometry::SE3;
+
+// The keypoint agrees with the landmark's projection.
+bool agrees(const map::BundledMap& map, LandmarkId l, const camera::Camera& camera, const SE3& T_cam_world,
+            const feature::Keypoints& keypoints, std::size_t k, const LandmarkFusionOptions& options,
+            const map::FeatureModel& features) {
+  const auto pixel = camera.project(T_cam_world * map.landmark(l).position);
+  if (!pixel) return false;
+  const double sigma = features.sigma(keypoints.level[k]);
+  return (keypoints.pixel[k].cast<double>() - *pixel).squaredNorm() < options.max_chi2 * sigma * sigma;
+}
+
+// One landmark found at a feature of a keyframe: a new observation, or two landmarks that are one.
+void join(LandmarkId l, KeyframeId target, FeatureId feature, Keep keep, map::MapDraft& draft, FusionReport& report) {
+  const LandmarkId there = draft.map().landmark_of(target, feature);
+  if (!there.valid()) {
+    report.added += draft.add_observation(l, {target, feature, false});
+  } else if (there != l) {
+    const bool keep_there =
+        keep == Keep::kMoreObserved && draft.map().observations(there).size() > draft.map().observations(l).size();
+    draft.merge_landmarks(keep_there ? l : there, keep_there ? there : l);
+    ++report.merged;
+  }
+}
+
+// Those of `landmarks` that are alive and not observed by `target`.
+std::vector<LandmarkId> absent_from(const map::BundledMap& map, KeyframeId target,
+                                    const std::vector<LandmarkId>& landmarks) {
+  const std::vector<LandmarkId> present = landmarks_of(map, target);
+  std::vector<LandmarkId> absent;
+  for (const LandmarkId l : landmarks) {
+    if (map.alive(l) && !std::binary_search(present.begin(), present.end(), l)) absent.push_back(l);
+  }
+  return absent;
+}
+
+}  // namespace
+
+std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId k) {
+  std::vector<LandmarkId> out;
+  for (const LandmarkId l : map.keyframe(k).landmarks) {
+    if (l.valid()) out.push_back(l);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
+                       const LandmarkFusionOptions& options, const map::FeatureModel& features, map::MapDraft& draft) {
+  const SE3 T_rig_world = draft.map().keyframe(target).T_rig_world;
+  return fuse_into(target, T_rig_world, landmarks, keep, options, features, draft);
+}
+
+FusionReport fuse_into(KeyframeId target, const SE3& T_rig_world, const std::vector<LandmarkId>& landmarks, Keep keep,
+                       const LandmarkFusionOptions& options, const map::FeatureModel& features, map::MapDraft& draft) {
+  FusionReport report;
+  const auto frame = draft.map().keyframe(target).frame;  // kept: edits may copy the keyframe
+  const camera::Rig rig = draft.map().rig_of(target);
+  const std::vector<LandmarkId> absent = absent_from(draft.map(), target, landmarks);
+  std::vector<matching::SearchPoint> points = map::search_points(draft.map(), absent);
+  std::vector<feature::Descriptor> descriptors(points.size());  // likewise
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    descriptors[i] = *points[i].descriptor;
+    points[i].descriptor = &descriptors[i];
+  }
+  const matching::ProjectionSearchOptions search{.radius = options.radius,
+                                                 .max_hamming = options.max_hamming,
+                                                 .ratio = 1.0,
+                                                 .scale_factor = features.scale_factor};
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
+    const auto found =
+        matching::search_by_projection(rig.camera(c), frame->cameras[c], T_cam_world, points, {}, search);
+    for (const matching::ProjectionMatch& m : found.matches) {
+      const LandmarkId l = draft.map().resolve(absent[m.point]);
+      if (!l.valid()) continue;
+      const feature::Keypoints& keypoints = frame->cameras[c].keypoints;
+      if (!agrees(draft.map(), l, rig.camera(c), T_cam_world, keypoints, m.keypoint.index(), options, features))
+        continue;
+      join(l, target, frame->bundled.feature(CameraIndex(c), m.keypoint), keep, draft, report);
+    }
+  }
+  return report;
+}
+
+}  // namespace bslam::mapping

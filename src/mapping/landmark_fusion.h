@@ -1,0 +1,51 @@
+// Landmarks looked for in one keyframe: what is found there becomes an observation, or one landmark with the one there.
+#pragma once
+
+#include <vector>
+
+#include "base/options.h"
+#include "map/feature_model.h"
+#include "map/map_edit.h"
+
+namespace bslam::mapping {
+
+struct LandmarkFusionOptions {
+  double radius = 0.006;    // rad about the projection
+  int max_hamming = 50;     // bits
+  double max_chi2 = 5.991;  // squared normalised error of the keypoint against the landmark
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("radius", self.radius, Range{1e-4, 1}, "rad", "search radius about the projection");
+    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "largest descriptor distance");
+    visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "", "squared normalised error against the landmark");
+  }
+};
+
+struct FusionReport {
+  int added = 0;   // observations
+  int merged = 0;  // landmarks
+
+  FusionReport& operator+=(const FusionReport& other) {
+    added += other.added;
+    merged += other.merged;
+    return *this;
+  }
+};
+
+// Which of two landmarks found to be one keeps its place.
+enum class Keep { kMoreObserved, kSearched };
+
+// Looks for `landmarks` in every camera of `target` as if that were at `T_rig_world`. Those it observes already are
+// left out.
+FusionReport fuse_into(KeyframeId target, const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& landmarks,
+                       Keep keep, const LandmarkFusionOptions& options, const map::FeatureModel& features,
+                       map::MapDraft& draft);
+// The same at its pose in the draft.
+FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
+                       const LandmarkFusionOptions& options, const map::FeatureModel& features, map::MapDraft& draft);
+
+// The landmarks a keyframe observes, in order of id.
+std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId k);
+
+}  // namespace bslam::mapping

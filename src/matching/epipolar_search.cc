@@ -1,0 +1,149 @@
+#include "matching/epipolar_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "feature/hamming.h"
+
+namespace bslam::matching {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kMaxWindow = 0.25;  // radians about the baseline: wider means next to the epipole
+constexpr double kSamePlace = 4.0;   // standard deviations: the same corner found on two levels
+
+// A bearing seen from the baseline: angle about it, angle from it (at this camera), angular standard deviation.
+struct Polar {
+  double about = 0, from = 0, sigma = 0;
+  std::uint32_t keypoint = 0;
+};
+
+// Standard deviation of a difference.
+double both(double sigma_a, double sigma_b) { return std::sqrt(sigma_a * sigma_a + sigma_b * sigma_b); }
+
+struct BaselineFrame {
+  Vector3d e, x, y;
+  explicit BaselineFrame(const Vector3d& baseline) : e(baseline.normalized()), x(e.unitOrthogonal()), y(e.cross(x)) {}
+};
+
+double sigma_px(const EpipolarView& view, std::size_t k) {
+  if (view.detector_sigma_px <= 0) return view.keypoints->sigma[k];
+  return view.detector_sigma_px * std::pow(view.scale_factor, view.keypoints->level[k]);
+}
+
+std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame) {
+  std::vector<Polar> out;
+  out.reserve(view.keypoints->size());
+  const double radians_per_px = view.camera->radians_per_pixel();
+  for (std::size_t k = 0; k < view.keypoints->size(); ++k) {
+    if (!view.usable.empty() && !view.usable[k]) continue;
+    const Vector3d d = view.T_common_cam.rotation() * view.keypoints->bearing[k];
+    const double u = d.dot(frame.x), v = d.dot(frame.y);
+    out.push_back({std::atan2(v, u), std::atan2(std::hypot(u, v), d.dot(frame.e)), sigma_px(view, k) * radians_per_px,
+                   static_cast<std::uint32_t>(k)});
+  }
+  return out;
+}
+
+// Angle from the baseline at the second camera of a point at `distance` along a ray that leaves the first under `from`.
+double angle_at_second(double from, double distance, double baseline) {
+  return std::atan2(distance * std::sin(from), distance * std::cos(from) - baseline);
+}
+
+// Keypoints of b in order of their angle about the baseline; those near the seam stand at both ends, so that windows
+// need not wrap around.
+struct SortedView {
+  std::vector<Polar> polar;
+  double max_sigma = 0;
+};
+
+SortedView sorted_view(const EpipolarView& view, const BaselineFrame& frame) {
+  SortedView out{to_polar(view, frame), 0};
+  for (std::size_t i = 0, n = out.polar.size(); i < n; ++i) {
+    out.max_sigma = std::max(out.max_sigma, out.polar[i].sigma);
+    for (const double turn : {-2 * std::numbers::pi, 2 * std::numbers::pi}) {
+      if (std::abs(out.polar[i].about + turn) > std::numbers::pi + kMaxWindow) continue;
+      Polar copy = out.polar[i];
+      copy.about += turn;
+      out.polar.push_back(copy);
+    }
+  }
+  std::sort(out.polar.begin(), out.polar.end(), [](const Polar& p, const Polar& q) {
+    return p.about != q.about ? p.about < q.about : p.keypoint < q.keypoint;
+  });
+  return out;
+}
+
+struct Best {
+  int hamming = 0;
+  std::uint32_t keypoint = 0;
+};
+
+// The keypoint of b that fits keypoint `p` of a best, where it is clearly better than any at another place.
+std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const EpipolarView& b, const SortedView& sorted,
+                               double baseline, const EpipolarOptions& options, std::vector<const Polar*>& candidates) {
+  const double sine = std::sin(p.from);
+  const double window = options.sigmas * both(p.sigma, sorted.max_sigma) / std::max(sine, 1e-9);
+  if (!(window < kMaxWindow)) return std::nullopt;
+  const double nearest = angle_at_second(p.from, options.near_m, baseline);
+  const double farthest = angle_at_second(p.from, options.far_m, baseline);
+  const feature::Descriptor& descriptor = a.keypoints->descriptor[p.keypoint];
+  const int level = a.keypoints->level[p.keypoint];
+  candidates.clear();
+  int best = options.max_hamming + 1;
+  const Polar* found = nullptr;
+  auto it = std::lower_bound(sorted.polar.begin(), sorted.polar.end(), p.about - window,
+                             [](const Polar& q, double value) { return q.about < value; });
+  for (; it != sorted.polar.end() && it->about <= p.about + window; ++it) {
+    const double slack = options.sigmas * both(p.sigma, it->sigma);
+    if (std::abs(it->about - p.about) * sine > slack) continue;
+    if (it->from < farthest - slack || it->from > nearest + slack) continue;
+    if (std::abs(b.keypoints->level[it->keypoint] - level) > options.max_level_difference) continue;
+    candidates.push_back(&*it);
+    const int distance = feature::hamming(descriptor, b.keypoints->descriptor[it->keypoint]);
+    if (distance < best) {
+      best = distance;
+      found = &*it;
+    }
+  }
+  if (found == nullptr) return std::nullopt;
+  for (const Polar* other : candidates) {
+    if (std::abs(other->from - found->from) < kSamePlace * std::max(other->sigma, found->sigma)) continue;
+    if (best > options.ratio * feature::hamming(descriptor, b.keypoints->descriptor[other->keypoint]))
+      return std::nullopt;
+  }
+  return Best{best, found->keypoint};
+}
+
+}  // namespace
+
+std::vector<EpipolarMatch> match_epipolar(const EpipolarView& a, const EpipolarView& b,
+                                          const EpipolarOptions& options) {
+  std::vector<EpipolarMatch> matches;
+  const Vector3d baseline = b.T_common_cam.translation() - a.T_common_cam.translation();
+  const double length = baseline.norm();
+  if (!(length > 1e-6) || a.keypoints->empty() || b.keypoints->empty()) return matches;
+  const BaselineFrame frame(baseline);
+  const SortedView sorted = sorted_view(b, frame);
+  constexpr int kNone = 1 << 20;
+  std::vector<std::pair<int, std::uint32_t>> owner(b.keypoints->size(), {kNone, 0});  // (hamming, position in matches)
+  std::vector<const Polar*> candidates;
+  for (const Polar& p : to_polar(a, frame)) {
+    const auto best = best_match(p, a, b, sorted, length, options, candidates);
+    if (!best) continue;
+    auto& [distance, position] = owner[best->keypoint];
+    if (best->hamming >= distance) continue;  // an earlier keypoint of a fits as well or better
+    if (distance < kNone) matches[position].hamming = -1;
+    distance = best->hamming;
+    position = static_cast<std::uint32_t>(matches.size());
+    matches.push_back({KeypointIndex(static_cast<std::int32_t>(p.keypoint)),
+                       KeypointIndex(static_cast<std::int32_t>(best->keypoint)), best->hamming});
+  }
+  std::erase_if(matches, [](const EpipolarMatch& m) { return m.hamming < 0; });
+  return matches;
+}
+
+}  // namespace bslam::matching

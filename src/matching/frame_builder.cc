@@ -1,0 +1,41 @@
+#include "matching/frame_builder.h"
+
+#include <optional>
+#include <utility>
+
+#include "base/assert.h"
+
+namespace bslam::matching {
+
+FrameBuilder::FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions& options,
+                           std::vector<image::Image> masks)
+    : rig_(rig), masks_(std::move(masks)), pyramids_(rig.size()) {
+  masks_.resize(rig.size());
+  for (std::size_t i = 0; i < rig.size(); ++i) extractors_.emplace_back(options);
+}
+
+frame::BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool& pool,
+                                          std::span<const std::uint8_t> left_out, std::span<const int> budgets) {
+  BSLAM_ASSERT(images.images.size() == rig_.size(), "one image slot per camera of the rig");
+  BSLAM_ASSERT(budgets.empty() || budgets.size() == rig_.size(), "one budget per camera of the rig");
+  frame::BundledFrame frame;
+  frame.id = images.id;
+  frame.time_ns = images.time_ns;
+  frame.cameras.resize(rig_.size());
+  pool.for_each(rig_.size(), [&](std::size_t i) {
+    const image::CameraImage& input = images.images[i];
+    frame::CameraFrame& camera = frame.cameras[i];
+    camera.state = !left_out.empty() && left_out[i] ? image::ImageState::kMissing : input.state;
+    camera.time_ns = input.time_ns;
+    if (camera.state == image::ImageState::kPresent) {
+      const std::optional<int> budget = budgets.empty() ? std::nullopt : std::optional(budgets[i]);
+      extractors_[i].extract(input.image.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], camera.keypoints,
+                             budget);
+    } else {
+      pyramids_[i].levels.clear();
+    }
+  });
+  return frame;
+}
+
+}  // namespace bslam::matching

@@ -1,0 +1,123 @@
+#include "matching/projection_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "feature/hamming.h"
+
+namespace bslam::matching {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr int kNone = 1 << 20;
+
+struct Candidate {
+  int best = kNone, second = kNone;
+  int best_level = -1, second_level = -1;
+  std::uint32_t keypoint = 0;
+};
+
+// A little beyond the range a landmark was seen in, levels overlap.
+bool in_range(const SearchPoint& p, double distance) {
+  return p.max_distance <= 0 || (distance > 0.8 * p.min_distance && distance < 1.2 * p.max_distance);
+}
+
+// Level on which the point is expected at this distance.
+double predicted_level(const SearchPoint& p, double distance, double log_factor) {
+  return p.max_distance > 0 ? std::log(p.max_distance / distance) / log_factor : 0.0;
+}
+
+struct Sight {
+  Vector2d pixel;
+  double distance;  // metres
+};
+
+// Of a point, where it lies in the image and within its distances and the cone about the directions it is known from.
+std::optional<Sight> sight_of(const camera::Camera& camera, const geometry::SE3& T_cam_common, const SearchPoint& p,
+                              double min_cosine) {
+  const Vector3d in_camera = T_cam_common * p.position;
+  const double distance = in_camera.norm();
+  if (!in_range(p, distance)) return std::nullopt;
+  const auto pixel = camera.project(in_camera);
+  if (!pixel || !camera.contains(*pixel)) return std::nullopt;
+  const bool aside = in_camera.dot(T_cam_common.rotation() * p.view_direction) < min_cosine * distance;
+  if (aside && p.view_direction != Vector3d::Zero()) return std::nullopt;
+  return Sight{*pixel, distance};
+}
+
+Candidate best_candidate(const feature::Keypoints& keypoints, const feature::Descriptor& descriptor,
+                         std::span<const std::uint32_t> near, std::span<const std::uint8_t> taken) {
+  Candidate c;
+  for (const std::uint32_t k : near) {
+    if (!taken.empty() && taken[k]) continue;
+    const int distance = feature::hamming(descriptor, keypoints.descriptor[k]);
+    const int level = keypoints.level[k];
+    if (distance < c.best) {
+      c.second = c.best;
+      c.second_level = c.best_level;
+      c.best = distance;
+      c.best_level = level;
+      c.keypoint = k;
+    } else if (distance < c.second) {
+      c.second = distance;
+      c.second_level = level;
+    }
+  }
+  return c;
+}
+
+}  // namespace
+
+ProjectionSearchResult search_by_projection(const camera::Camera& camera, const frame::CameraFrame& frame,
+                                            const geometry::SE3& T_cam_common, std::span<const SearchPoint> points,
+                                            std::span<const std::uint8_t> taken,
+                                            const ProjectionSearchOptions& options) {
+  ProjectionSearchResult result;
+  const feature::Keypoints& keypoints = frame.keypoints;
+  const double log_factor = std::log(options.scale_factor);
+  const double radius_px = options.radius / camera.radians_per_pixel();
+  const double min_cosine = std::cos(options.max_view_angle);
+  std::vector<std::uint32_t> near;
+  std::vector<std::pair<int, std::uint32_t>> owner(keypoints.size(), {kNone, 0});  // (hamming, position in matches)
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const SearchPoint& p = points[i];
+    if (p.skip) continue;
+    const auto sight = sight_of(camera, T_cam_common, p, min_cosine);
+    if (!sight) continue;
+    result.visible.push_back(static_cast<std::uint32_t>(i));
+    const double level = predicted_level(p, sight->distance, log_factor);
+    const int centre = static_cast<int>(std::lround(level));
+    near.clear();
+    frame.grid.near(keypoints, sight->pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
+                    centre - options.level_slack, centre + options.level_slack, near);
+    if (near.empty()) continue;
+    const Candidate c = best_candidate(keypoints, *p.descriptor, near, taken);
+    if (c.best > options.max_hamming) continue;
+    if (c.best_level == c.second_level && c.best > options.ratio * c.second) continue;
+    auto& [owned, position] = owner[c.keypoint];
+    if (c.best >= owned) continue;
+    if (owned < kNone) result.matches[position].hamming = -1;  // this point fits better
+    owned = c.best;
+    position = static_cast<std::uint32_t>(result.matches.size());
+    result.matches.push_back(
+        {static_cast<std::uint32_t>(i), KeypointIndex(static_cast<std::int32_t>(c.keypoint)), c.best});
+  }
+  std::erase_if(result.matches, [](const ProjectionMatch& m) { return m.hamming < 0; });
+  return result;
+}
+
+std::vector<std::uint32_t> visible_points(const camera::Camera& camera, const geometry::SE3& T_cam_common,
+                                          std::span<const SearchPoint> points, double max_view_angle) {
+  const double min_cosine = std::cos(max_view_angle);
+  std::vector<std::uint32_t> out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].skip || !sight_of(camera, T_cam_common, points[i], min_cosine)) continue;
+    out.push_back(static_cast<std::uint32_t>(i));
+  }
+  return out;
+}
+
+}  // namespace bslam::matching

@@ -1,0 +1,18 @@
+// Basalt's calibration JSON (docs/calibration.md).
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "camera/camera_description.h"
+
+namespace bslam::rig_formats {
+
+// value0 with T_imu_cam (camera to IMU, quaternion x y z w), intrinsics of camera_type pinhole, pinhole-radtan8, kb4,
+// ucm, eucm or ds, resolution, and cam_time_offset_ns, which is added to the stamps of all cameras.
+Result<camera::RigReading> read_basalt_rig(const std::filesystem::path& file, const std::string& text);
+
+// Reads back as the same bits. What an IMU would need is written as zeros.
+Result<std::string> basalt_rig_text(const camera::Rig& rig, const std::string& out);
+
+}  // namespace bslam::rig_formats

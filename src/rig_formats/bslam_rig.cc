@@ -1,0 +1,119 @@
+#include "rig_formats/bslam_rig.h"
+
+#include <fmt/format.h>
+
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "base/number_text.h"
+#include "base/timestamp.h"
+#include "rig_formats/rig_limits.h"
+#include "yaml/yaml_map.h"
+
+namespace bslam::rig_formats {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kRigVersion = 1;
+
+Status read_time_and_mask(const yaml::YamlMap& yaml, camera::CameraDescription& d) {
+  if (yaml.has("time_offset_s")) {
+    const auto offset = yaml.number("time_offset_s");
+    if (!offset) return offset.error();
+    d.time_offset_s = *offset;
+  }
+  if (yaml.has("mask")) {
+    const auto mask = yaml.text("mask");
+    if (!mask) return mask.error();
+    // Relative to the rig file, and absolute from here on, so that the rig may be written elsewhere.
+    d.mask_file = (fs::absolute(yaml.file()).parent_path() / *mask).lexically_normal().string();
+  }
+  return {};
+}
+
+Result<camera::RigCamera> read_camera(const yaml::YamlMap& yaml, std::size_t index) {
+  if (yaml.has("T_cam_body"))
+    return yaml.error("T_cam_body", "the transform from body to camera", "T_body_cam, its inverse");
+  const Status known = yaml.allow_only(
+      {"name", "model", "resolution", "intrinsics", "distortion", "T_body_cam", "time_offset_s", "mask"});
+  if (!known) return known.error();
+  camera::CameraDescription d;
+  d.name = fmt::format("cam{}", index);
+  if (yaml.has("name")) {
+    auto name = yaml.text("name");
+    if (!name) return name.error();
+    d.name = *std::move(name);
+  }
+  auto model = yaml.text("model");
+  if (!model) return model.error();
+  d.model = *std::move(model);
+  const auto resolution = yaml.numbers("resolution");
+  if (!resolution) return resolution.error();
+  auto sides = camera::whole_pixels(*resolution, yaml.file(), yaml.key_path("resolution"));
+  if (!sides) return sides.error();
+  d.resolution = *std::move(sides);
+  auto intrinsics = yaml.numbers("intrinsics");
+  if (!intrinsics) return intrinsics.error();
+  d.intrinsics = *std::move(intrinsics);
+  if (yaml.has("distortion") || d.model != camera::Pinhole::kName) {
+    auto distortion = yaml.numbers("distortion");
+    if (!distortion) return distortion.error();
+    d.distortion = *std::move(distortion);
+  }
+  auto T_body_cam = yaml.rows("T_body_cam", 4);
+  if (!T_body_cam) return T_body_cam.error();
+  d.T_body_cam = *std::move(T_body_cam);
+  if (const Status status = read_time_and_mask(yaml, d); !status) return status.error();
+  return camera::make_camera(
+      d, {yaml.file(), yaml.key_path("model"), yaml.key_path("resolution"), yaml.key_path("intrinsics"),
+          yaml.key_path("distortion"), yaml.key_path("T_body_cam"), yaml.key_path("time_offset_s")});
+}
+
+std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_body_cam) {
+  const camera::Intrinsics& k = camera::intrinsics(camera.model);
+  std::string yaml =
+      fmt::format("  - name: {}\n    model: {}\n    resolution: [{}, {}]\n", yaml::yaml_quoted(camera.name),
+                  camera::model_name(camera.model), camera.width, camera.height);
+  yaml += fmt::format("    intrinsics: {}  # fx fy cx cy\n", number_list({k.fx, k.fy, k.cx, k.cy}));
+  yaml += fmt::format("    distortion: {}\n    T_body_cam:\n", number_list(camera::distortion(camera.model)));
+  const Eigen::Matrix4d T = T_body_cam.matrix();
+  for (int r = 0; r < 4; ++r) yaml += fmt::format("      - {}\n", number_list({T(r, 0), T(r, 1), T(r, 2), T(r, 3)}));
+  // Divided, not multiplied by 1e-9: the quotient is the double nearest to the decimal, so its text is short and exact.
+  yaml += fmt::format("    time_offset_s: {}\n", format_double(static_cast<double>(camera.time_offset_ns) / 1e9));
+  return yaml + fmt::format("    mask: {}\n", camera.mask_file.empty() ? "null" : yaml::yaml_quoted(camera.mask_file));
+}
+
+}  // namespace
+
+Result<camera::RigReading> read_bslam_rig(const fs::path& file, const std::string& text) {
+  const auto parsed = yaml::YamlMap::parse(file, text);
+  if (!parsed) return parsed.error();
+  const yaml::YamlMap& yaml = *parsed;
+  if (const Status known = yaml.allow_only({"bslam_rig", "cameras"}); !known) return known.error();
+  const auto version = yaml.integer("bslam_rig");
+  if (!version) return version.error();
+  if (*version != kRigVersion) return yaml.error("bslam_rig", std::to_string(*version), std::to_string(kRigVersion));
+  const auto maps = yaml.maps("cameras");
+  if (!maps) return maps.error();
+  camera::RigReading reading;
+  std::set<std::string> names;
+  for (const yaml::YamlMap& map : *maps) {
+    auto camera = read_camera(map, reading.cameras.size());
+    if (!camera) return camera.error();
+    if (!names.insert(camera->camera.name).second) {
+      return map.error("name", camera->camera.name + " for a second camera", "a name of its own for every camera");
+    }
+    reading.cameras.push_back(*std::move(camera));
+  }
+  return reading;
+}
+
+std::string rig_to_yaml(const camera::Rig& rig) {
+  std::string yaml = fmt::format("bslam_rig: {}\ncameras:\n", kRigVersion);
+  for (std::size_t i = 0; i < rig.size(); ++i) yaml += camera_to_yaml(rig.camera(i), rig.body_from_cam(i));
+  return yaml;
+}
+
+}  // namespace bslam::rig_formats

@@ -1,0 +1,137 @@
+#include "rig_formats/rig_description.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/timestamp.h"
+#include "geometry/triangulation.h"
+#include "rig_formats/rig_warnings.h"
+
+namespace bslam::rig_formats {
+namespace {
+
+using geometry::degrees;
+using geometry::SE3;
+using geometry::Vector2d;
+using geometry::Vector3d;
+
+// Angle from the optical axis to the outermost pixel with a bearing on the way from the principal point to `pixel`.
+double angle_towards(const camera::Camera& camera, const Vector2d& pixel) {
+  constexpr int kSteps = 256;
+  const camera::Intrinsics& k = camera::intrinsics(camera.model);
+  const Vector2d centre(k.cx, k.cy);
+  for (int step = kSteps; step > 0; --step) {
+    const Vector2d at = centre + (pixel - centre) * step / kSteps;
+    if (const auto bearing = camera.unproject(at)) return geometry::angle_between(Vector3d::UnitZ(), *bearing);
+  }
+  return 0.0;
+}
+
+double span(const camera::Camera& camera, const Vector2d& from, const Vector2d& to) {
+  return angle_towards(camera, from) + angle_towards(camera, to);
+}
+
+std::string vector_text(const Vector3d& v) {
+  std::array<double, 3> shown{};
+  for (int i = 0; i < 3; ++i) shown[static_cast<std::size_t>(i)] = std::abs(v[i]) < 5e-5 ? 0.0 : v[i];  // no "-0.0000"
+  return fmt::format("({:.4f}, {:.4f}, {:.4f})", shown[0], shown[1], shown[2]);
+}
+
+// Where the optical axis points, seen from camera 0.
+std::string direction_in_words(const Vector3d& axis) {
+  constexpr double kStraight = 1.0;  // degrees
+  const double right = degrees(std::atan2(axis.x(), axis.z()));
+  const double down = degrees(std::asin(std::clamp(axis.y(), -1.0, 1.0)));
+  std::vector<std::string> words;
+  if (std::abs(right) >= kStraight) {
+    words.push_back(fmt::format("{:.1f} deg to the {}", std::abs(right), right > 0 ? "right" : "left"));
+  }
+  if (std::abs(down) >= kStraight)
+    words.push_back(fmt::format("{:.1f} deg {}", std::abs(down), down > 0 ? "down" : "up"));
+  return words.empty() ? "looks the same way" : fmt::format("looks {}", fmt::join(words, ", "));
+}
+
+std::string describe_camera(const camera::Rig& rig, std::size_t i) {
+  const camera::Camera& camera = rig.camera(i);
+  const camera::Intrinsics& k = camera::intrinsics(camera.model);
+  const FieldOfView view = field_of_view(camera);
+  const SE3& T_body_cam = rig.body_from_cam(i);
+  std::string text =
+      fmt::format("camera {}: {}\n  {}, {} x {} px, focal length {:.1f} {:.1f} px, centre {:.1f} {:.1f} px\n", i,
+                  camera.name, camera::model_name(camera.model), camera.width, camera.height, k.fx, k.fy, k.cx, k.cy);
+  text += fmt::format("  field of view {:.1f} deg horizontal, {:.1f} deg vertical, {:.1f} deg diagonal\n",
+                      degrees(view.horizontal), degrees(view.vertical), degrees(view.diagonal));
+  text += fmt::format("  in the body frame: at {} m, optical axis {}\n", vector_text(T_body_cam.translation()),
+                      vector_text(T_body_cam.rotation() * Vector3d::UnitZ()));
+  if (i > 0) {
+    const SE3& T_rig_cam = rig.rig_from_cam(i);
+    text += fmt::format("  from camera 0: {}; {}\n", displacement_in_words(T_rig_cam.translation()),
+                        direction_in_words(T_rig_cam.rotation() * Vector3d::UnitZ()));
+  }
+  if (camera.time_offset_ns != 0) text += fmt::format("  time offset {:.6f} s\n", to_seconds(camera.time_offset_ns));
+  if (!camera.mask_file.empty()) text += fmt::format("  mask {}\n", camera.mask_file);
+  return text;
+}
+
+double baseline(const camera::Rig& rig, std::size_t i, std::size_t j) {
+  return (rig.rig_from_cam(i).translation() - rig.rig_from_cam(j).translation()).norm();
+}
+
+std::string overlap_table(const camera::Rig& rig) {
+  std::string text = "overlap, per cent of the row's image that the column's camera sees:\n        ";
+  for (std::size_t j = 0; j < rig.size(); ++j) text += fmt::format("{:>5}", j);
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    text += fmt::format("\n  {:>6}", i);
+    for (std::size_t j = 0; j < rig.size(); ++j) {
+      text += i == j ? "    -" : fmt::format("{:>5.0f}", 100 * rig.overlap_share(i, j));
+    }
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+FieldOfView field_of_view(const camera::Camera& camera) {
+  const camera::Intrinsics& k = camera::intrinsics(camera.model);
+  const double right = camera.width - 1, bottom = camera.height - 1;
+  return {span(camera, {0, k.cy}, {right, k.cy}), span(camera, {k.cx, 0}, {k.cx, bottom}),
+          std::max(span(camera, {0, 0}, {right, bottom}), span(camera, {0, bottom}, {right, 0}))};
+}
+
+std::string displacement_in_words(const Vector3d& displacement) {
+  struct Axis {
+    double along;
+    const char *positive, *negative;
+  };
+  std::array<Axis, 3> axes = {{{displacement.x(), "to the right", "to the left"},
+                               {displacement.y(), "below", "above"},
+                               {displacement.z(), "in front", "behind"}}};
+  std::stable_sort(axes.begin(), axes.end(),
+                   [](const Axis& a, const Axis& b) { return std::abs(a.along) > std::abs(b.along); });
+  const double least = std::max(1e-4, 0.01 * displacement.norm());  // what is smaller is noise of the calibration
+  std::vector<std::string> words;
+  for (const Axis& axis : axes) {
+    if (std::abs(axis.along) < least) continue;
+    words.push_back(length_in_words(std::abs(axis.along)) + " " + (axis.along > 0 ? axis.positive : axis.negative));
+  }
+  return words.empty() ? "at the same place" : fmt::format("{}", fmt::join(words, ", "));
+}
+
+std::string describe_rig(const camera::Rig& rig) {
+  std::string text = fmt::format("{} camera{}\n", rig.size(), rig.size() == 1 ? "" : "s");
+  for (std::size_t i = 0; i < rig.size(); ++i) text += describe_camera(rig, i);
+  if (rig.size() == 1) return text;
+  text += "baselines:\n";
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    for (std::size_t j = i + 1; j < rig.size(); ++j) {
+      text += fmt::format("  {} to {}: {}\n", i, j, length_in_words(baseline(rig, i, j)));
+    }
+  }
+  return text + overlap_table(rig);
+}
+
+}  // namespace bslam::rig_formats

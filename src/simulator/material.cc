@@ -1,0 +1,302 @@
+#include "simulator/material.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "simulator/noise.h"
+
+namespace bslam::simulator {
+namespace {
+
+using Seed = std::uint32_t;
+
+constexpr float kEdge = 0.004f;  // metres over which painted edges go from one shade to the other
+
+// A cell of a regular grid and the place in it.
+struct Cell {
+  std::int32_t column, row;
+  float x, y;  // metres from the cell's low corner
+};
+
+Cell cell_at(float x, float y, float width, float height) {
+  Cell c{floor_int(x / width), floor_int(y / height), 0, 0};
+  c.x = x - static_cast<float>(c.column) * width;
+  c.y = y - static_cast<float>(c.row) * height;
+  return c;
+}
+
+// 1 inside a shape whose signed distance is negative, soft edge.
+float inside(float signed_distance) { return smooth_step(0.5f * kEdge, -0.5f * kEdge, signed_distance); }
+
+float box_distance(float x, float y, float half_width, float half_height) {
+  return std::max(std::abs(x) - half_width, std::abs(y) - half_height);
+}
+
+// A random figure about the origin that fits into a circle of `radius`: coverage in [0, 1].
+float motif(float x, float y, float radius, Seed seed) {
+  const float turn = 6.2832f * unit(hash(1, 0, seed)), c = std::cos(turn), s = std::sin(turn);
+  const float u = c * x + s * y, v = c * y - s * x, r = std::sqrt(x * x + y * y);
+  const float stretch = mix(0.35f, 0.8f, unit(hash(2, 0, seed)));
+  switch (hash(3, 0, seed) % 7) {
+    case 0:
+      return inside(r - radius);
+    case 1:
+      return inside(std::abs(r - 0.75f * radius) - 0.22f * radius);
+    case 2:
+      return inside(box_distance(u, v, 0.7f * radius, 0.7f * stretch * radius));
+    case 3:
+      return std::max(inside(box_distance(u, v, 0.9f * radius, 0.2f * radius)),
+                      inside(box_distance(u, v, 0.2f * radius, 0.9f * radius)));
+    case 4:
+      return inside(std::max(-v - 0.5f * radius, 0.866f * std::abs(u) + 0.5f * v - 0.5f * radius));
+    case 5:
+      return inside(std::max(r - radius, u - 0.1f * radius));
+    default: {
+      const float petals = 0.65f + 0.35f * std::cos(5.0f * std::atan2(v, u));
+      return inside(r - radius * petals);
+    }
+  }
+}
+
+// Motifs scattered over cells of `size` metres: positive and negative coverage, 0 between them.
+float scattered_motifs(float x, float y, float size, float density, Seed seed) {
+  const Cell c = cell_at(x, y, size, size);
+  const Seed own = hash(c.column, c.row, seed);
+  if (unit(hash(10, 0, own)) > density) return 0;
+  const float radius = size * mix(0.12f, 0.36f, unit(hash(11, 0, own)));
+  const float slack = 0.5f * size - radius;
+  const float cx = 0.5f * size + slack * mix(-1, 1, unit(hash(12, 0, own)));
+  const float cy = 0.5f * size + slack * mix(-1, 1, unit(hash(13, 0, own)));
+  const float strength = mix(-1, 1, unit(hash(14, 0, own)));
+  return motif(c.x - cx, c.y - cy, radius, own) * (strength < 0 ? strength - 0.4f : strength + 0.4f) / 1.4f;
+}
+
+// Writing: cells of `height` metres with 5 x 7 random dots each, words of random length; 1 where there is ink.
+float glyphs(float x, float y, float height, Seed seed) {
+  const float width = 0.75f * height;
+  const Cell c = cell_at(x, y, width, 1.6f * height);
+  if (unit(hash(c.column, c.row, seed)) < 0.18f || c.y > height) return 0;
+  const auto column = static_cast<std::int32_t>(c.x / width * 6), row = static_cast<std::int32_t>(c.y / height * 7);
+  if (column == 5) return 0;
+  return (hash(column, row, hash(c.column, c.row, seed + 1)) & 1u) ? 1.0f : 0.0f;
+}
+
+float speckle(float x, float y, Seed seed) { return value_noise(x * 140, y * 140, seed); }
+
+float plaster(const Texture& t, float x, float y) {
+  const float stains = fractal_noise(1.3f * x, 1.3f * y, t.seed, 4);
+  const float grain = fractal_noise(22 * x, 22 * y, t.seed + 1, 3);
+  const float ridge = std::abs(fractal_noise(1.7f * x, 1.7f * y, t.seed + 2, 3));
+  const float crack = smooth_step(0.012f, 0.0f, ridge);
+  float a = t.shade * (1 + 0.28f * stains + 0.20f * grain + 0.10f * speckle(x, y, t.seed + 3));
+  a *= 1 + 0.75f * scattered_motifs(x, y, 0.09f, 0.30f, t.seed + 4) * smooth_step(-0.3f, 0.3f, stains);
+  return a * (1 - 0.55f * crack);
+}
+
+float wallpaper(const Texture& t, float x, float y) {
+  const float large = scattered_motifs(x, y, 0.31f, 0.55f, t.seed);
+  const float small = scattered_motifs(x, y, 0.083f, 0.5f, t.seed + 1);
+  const float age = fractal_noise(0.9f * x, 0.9f * y, t.seed + 2, 5);
+  const float stripe = unit(floor_int(x / 0.17f), 0, t.seed + 3) - 0.5f;
+  const float pattern = std::abs(large) > 0.01f ? 0.5f * large + 0.2f * small : 0.45f * small;
+  return t.shade * (1 + 0.14f * stripe + 0.16f * age) * (1 + pattern) + 0.03f * speckle(x, y, t.seed + 4);
+}
+
+float brick(const Texture& t, float x, float y) {
+  constexpr float kWidth = 0.25f, kHeight = 0.085f, kJoint = 0.006f;
+  const std::int32_t course = floor_int(y / kHeight);
+  const Cell c =
+      cell_at(x + 0.5f * kWidth * static_cast<float>(course & 1) + 0.02f * unit(course, 3, t.seed), y, kWidth, kHeight);
+  const Seed own = hash(c.column, c.row, t.seed);
+  const float wear = 0.006f * value_noise(30 * x, 30 * y, t.seed + 1);
+  const float edge = std::min(std::min(c.x, kWidth - c.x), std::min(c.y, kHeight - c.y)) + wear;
+  const float body = smooth_step(kJoint, kJoint + 0.005f, edge);
+  const float grain = fractal_noise(18 * x, 18 * y, t.seed + 2, 4, 0.7f);
+  const float tint = mix(0.55f, 1.4f, unit(hash(1, 1, own)));
+  const float chips = scattered_motifs(x, y, 0.055f, 0.25f, t.seed + 3);
+  const float face = t.shade * tint * (1 + 0.3f * grain + 0.45f * chips);
+  return mix(t.shade * 1.25f * (1 + 0.2f * grain), face, body);
+}
+
+float tile(const Texture& t, float x, float y) {
+  constexpr float kSize = 0.21f, kJoint = 0.004f;
+  const Cell c = cell_at(x, y, kSize, kSize);
+  const Seed own = hash(c.column, c.row, t.seed);
+  const float edge = std::min(std::min(c.x, kSize - c.x), std::min(c.y, kSize - c.y));
+  const float veins = fractal_noise(7 * x + 3 * unit(own), 7 * y, own & 0xffffu, 4, 0.65f);
+  float a = t.shade * mix(0.7f, 1.3f, unit(hash(1, 2, own))) * (1 + 0.22f * veins);
+  if (hash(2, 2, own) % 5 < 2) {
+    const float figure = motif(c.x - 0.5f * kSize, c.y - 0.5f * kSize, mix(0.04f, 0.09f, unit(hash(3, 2, own))), own);
+    a *= 1 + figure * (hash(4, 2, own) & 1u ? 0.6f : -0.6f);
+  }
+  a *= 1 + 0.5f * scattered_motifs(x, y, 0.06f, 0.22f, t.seed + 5);
+  return mix(0.45f * t.shade, a, smooth_step(0.0f, 0.004f, edge - kJoint)) + 0.02f * speckle(x, y, t.seed + 4);
+}
+
+// Grain along x of a board whose own seed is given.
+float grain(float x, float y, Seed own) {
+  const float bend = 0.02f * value_noise(2.0f * x, 9 * y, own);
+  const float lines = fractal_noise(3.5f * x, 75 * (y + bend), own + 1, 3, 0.7f);
+  return lines;
+}
+
+float knots(float x, float y, Seed seed) {
+  const Cell c = cell_at(x, y, 0.24f, 0.13f);
+  const Seed own = hash(c.column, c.row, seed);
+  if (own % 3 != 0) return 0;
+  const float dx = (c.x - mix(0.05f, 0.19f, unit(hash(1, 3, own)))) * 0.6f;
+  const float dy = c.y - mix(0.03f, 0.10f, unit(hash(2, 3, own)));
+  const float r = std::sqrt(dx * dx + dy * dy), size = mix(0.006f, 0.018f, unit(hash(3, 3, own)));
+  return smooth_step(size, 0.6f * size, r) * 0.8f + 0.3f * smooth_step(2.2f * size, size, r);
+}
+
+float planks(const Texture& t, float x, float y) {
+  constexpr float kWidth = 0.115f;
+  const std::int32_t row = floor_int(y / kWidth);
+  const float length = mix(0.5f, 1.3f, unit(row, 1, t.seed));
+  const Cell c = cell_at(x + 3 * unit(row, 2, t.seed), y, length, kWidth);
+  const Seed own = hash(c.column, c.row, t.seed + 9);
+  const float edge = std::min(std::min(c.x, length - c.x), std::min(c.y, kWidth - c.y));
+  const float body = smooth_step(0.001f, 0.004f, edge);
+  const float tint = mix(0.6f, 1.35f, unit(hash(1, 4, own)));
+  const float scuffs = scattered_motifs(x, y, 0.11f, 0.25f, t.seed + 3);
+  float a = t.shade * tint * (1 + 0.28f * grain(x, y, own)) * (1 - 0.7f * knots(x + 7 * unit(own), y, own));
+  a *= 1 + 0.30f * scuffs + 0.12f * fractal_noise(2 * x, 2 * y, t.seed + 2, 3);
+  return mix(0.25f * t.shade, a, body);
+}
+
+float wood(const Texture& t, float x, float y) {
+  const float marks = scattered_motifs(x, y, 0.12f, 0.28f, t.seed + 5);
+  const float a = t.shade * (1 + 0.32f * grain(x, y, t.seed)) * (1 - 0.65f * knots(x, y, t.seed + 1));
+  return a * (1 + 0.4f * marks) + 0.02f * speckle(x, y, t.seed + 2);
+}
+
+float carpet(const Texture& t, float x, float y) {
+  const float warp = 0.05f * fractal_noise(1.5f * x, 1.5f * y, t.seed, 2);
+  const float large = scattered_motifs(x + warp, y - warp, 0.42f, 0.75f, t.seed + 1);
+  const float small = scattered_motifs(x, y, 0.12f, 0.6f, t.seed + 2);
+  const float pile = fractal_noise(60 * x, 60 * y, t.seed + 3, 2);
+  return t.shade * (1 + 0.5f * large + 0.35f * small * (1 - std::abs(large))) * (1 + 0.18f * pile);
+}
+
+float ceiling(const Texture& t, float x, float y) {
+  constexpr float kSize = 0.6f;
+  const Cell c = cell_at(x, y, kSize, kSize);
+  const float edge = std::min(std::min(c.x, kSize - c.x), std::min(c.y, kSize - c.y));
+  const Seed own = hash(c.column, c.row, t.seed);
+  const float holes = scattered_motifs(x, y, 0.055f, 0.3f, own);
+  const float stains = fractal_noise(1.1f * x, 1.1f * y, t.seed + 1, 5);
+  const float a = t.shade * mix(0.85f, 1.1f, unit(own)) * (1 + 0.2f * stains) * (1 + 0.55f * std::min(holes, 0.15f));
+  return mix(0.55f * t.shade, a, smooth_step(0.006f, 0.010f, edge)) + 0.03f * speckle(x, y, t.seed + 2);
+}
+
+// What is on a picture, without its frame; x, y from its low corner.
+float artwork(const Texture& t, float x, float y, float width, float height) {
+  const float size = std::min(width, height);
+  float a = mix(0.25f, 0.85f, unit(hash(1, 5, t.seed))) * (1 + 0.3f * fractal_noise(4 * x, 4 * y, t.seed, 3));
+  for (std::int32_t i = 0; i < 9; ++i) {
+    const Seed own = hash(i, 6, t.seed);
+    const float cx = width * unit(hash(1, i, own)), cy = height * unit(hash(2, i, own));
+    const float covered = motif(x - cx, y - cy, size * mix(0.06f, 0.30f, unit(hash(3, i, own))), own);
+    a = mix(a, mix(0.04f, 0.95f, unit(hash(4, i, own))), covered);
+  }
+  const bool written = y < mix(0.1f, 0.5f, unit(hash(2, 5, t.seed))) * height;
+  if (written)
+    a = mix(a, a > 0.45f ? 0.05f : 0.9f, glyphs(x, y, mix(0.03f, 0.07f, unit(hash(3, 5, t.seed))), t.seed + 1));
+  return a + 0.03f * speckle(x, y, t.seed + 2);
+}
+
+float poster(const Texture& t, float x, float y, float width, float height) {
+  const float edge = std::min(std::min(x, width - x), std::min(y, height - y));
+  if (edge < 0.022f) return (t.seed & 1u ? 0.12f : 0.75f) * (1 + 0.2f * grain(x + y, x - y, t.seed));
+  if (edge < 0.045f) return 0.85f + 0.03f * speckle(x, y, t.seed);
+  return artwork(t, x, y, width, height);
+}
+
+float window(const Texture& t, float x, float y, float width, float height) {
+  const float cross = std::min(std::abs(x - 0.5f * width), std::abs(y - 0.6f * height));
+  const float edge = std::min(std::min(std::min(x, width - x), std::min(y, height - y)), cross + 0.02f);
+  if (edge < 0.045f) return 0.78f * (1 + 0.12f * fractal_noise(9 * x, 30 * y, t.seed, 3));
+  const float ridge = height * (0.5f + 0.18f * fractal_noise(1.5f * x, 0.5f, t.seed + 1, 3));
+  const float clouds = 0.80f + 0.18f * fractal_noise(2 * x, 4 * y, t.seed + 2, 4);
+  if (y > ridge) return clouds;
+  const Cell house = cell_at(x, y, 0.19f, 0.14f);
+  const Seed own = hash(house.column, house.row, t.seed + 3);
+  const float wall = mix(0.12f, 0.6f, unit(own)) * (1 + 0.3f * fractal_noise(25 * x, 25 * y, t.seed + 4, 3));
+  return wall * (1 + 0.8f * scattered_motifs(x, y, 0.05f, 0.6f, t.seed + 5));
+}
+
+float book(const Texture& t, float x, float y, float height) {
+  const bool band = unit(floor_int(y / 0.021f), 0, t.seed) > 0.82f;
+  float a = band ? (t.shade > 0.4f ? 0.15f : 0.8f) : t.shade;
+  if (y > 0.2f * height && y < 0.85f * height) {
+    a = mix(a, t.shade > 0.4f ? 0.08f : 0.85f, glyphs(y, x, 0.018f, t.seed + 1));
+  }
+  return a * (1 + 0.12f * fractal_noise(40 * x, 40 * y, t.seed + 2, 2));
+}
+
+float cardboard(const Texture& t, float x, float y, float width, float height) {
+  const float wave = 0.05f * value_noise(4 * x, 120 * y, t.seed);
+  float a = t.shade * (1 + wave + 0.2f * fractal_noise(5 * x, 5 * y, t.seed + 1, 4));
+  if (std::abs(x - 0.5f * width) < 0.03f) a *= 1.35f + 0.1f * value_noise(50 * x, 8 * y, t.seed + 2);
+  const float lx = x - width * mix(0.08f, 0.3f, unit(t.seed)),
+              ly = y - height * mix(0.15f, 0.4f, unit(hash(1, 7, t.seed)));
+  if (lx > 0 && ly > 0 && lx < 0.38f * width && ly < 0.35f * height)
+    a = mix(0.88f, 0.06f, glyphs(lx, ly, 0.022f, t.seed + 3));
+  a *= 1 + 0.6f * scattered_motifs(x, y, 0.10f, 0.3f, t.seed + 4);
+  return a;
+}
+
+float fabric(const Texture& t, float x, float y) {
+  const float warp = 0.012f * fractal_noise(5 * x, 5 * y, t.seed, 2);
+  const float across = unit(floor_int((x + warp) / 0.045f), 1, t.seed),
+              along = unit(floor_int((y + warp) / 0.045f), 2, t.seed);
+  const float folds = fractal_noise(5 * x, 1.2f * y, t.seed + 1, 3);
+  return t.shade * (0.55f + 0.5f * across + 0.5f * along) *
+         (1 + 0.25f * folds + 0.15f * fractal_noise(70 * x, 70 * y, t.seed + 2, 2)) *
+         (1 + 0.5f * scattered_motifs(x, y, 0.09f, 0.35f, t.seed + 3));
+}
+
+float pattern(const Texture& t, float x, float y, float width, float height) {
+  switch (t.material) {
+    case Material::kPlain:
+      return t.shade * (1 + 0.12f * fractal_noise(12 * x, 12 * y, t.seed, 4));
+    case Material::kPlaster:
+      return plaster(t, x, y);
+    case Material::kWallpaper:
+      return wallpaper(t, x, y);
+    case Material::kBrick:
+      return brick(t, x, y);
+    case Material::kTile:
+      return tile(t, x, y);
+    case Material::kPlanks:
+      return planks(t, x, y);
+    case Material::kWood:
+      return wood(t, x, y);
+    case Material::kCarpet:
+      return carpet(t, x, y);
+    case Material::kCeiling:
+      return ceiling(t, x, y);
+    case Material::kPoster:
+      return poster(t, x, y, width, height);
+    case Material::kWindow:
+      return window(t, x, y, width, height);
+    case Material::kBook:
+      return book(t, x, y, height);
+    case Material::kCardboard:
+      return cardboard(t, x, y, width, height);
+    case Material::kFabric:
+      return fabric(t, x, y);
+    case Material::kLamp:
+      return 0.9f;
+  }
+  return t.shade;
+}
+
+}  // namespace
+
+float albedo(const Texture& texture, float x, float y, float width, float height) {
+  return std::clamp(pattern(texture, x, y, width, height), 0.03f, 0.95f);
+}
+
+}  // namespace bslam::simulator

@@ -1,0 +1,112 @@
+#include "simulator/tour.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/assert.h"
+#include "base/random.h"
+#include "synthetic/sway.h"
+
+namespace bslam::simulator {
+namespace {
+
+using std::numbers::pi;
+using synthetic::ControlPose;
+using synthetic::kKnotSpacing;
+using synthetic::Offsets;
+using synthetic::Sway;
+using synthetic::Trajectory;
+
+constexpr double kWalkingPace = 1.2;  // metres per second
+constexpr double kFastestPace = 1.5;
+constexpr double kTurnRound_s = 4.0, kHalt_s = 1.0;  // seconds: of turning on the spot; of halting before
+constexpr double kTangentReach = 0.4;  // metres of path on either side that give the direction of looking
+
+// A closed polyline by arc length.
+class Loop {
+ public:
+  explicit Loop(const std::vector<Vector2d>& points) : points_(points) {
+    at_.push_back(0);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      at_.push_back(at_.back() + (points[(i + 1) % points.size()] - points[i]).norm());
+    }
+  }
+  double length() const { return at_.back(); }
+  Vector2d operator()(double arc) const {
+    arc -= length() * std::floor(arc / length());
+    const auto next = std::upper_bound(at_.begin() + 1, at_.end() - 1, arc);
+    const std::size_t i = static_cast<std::size_t>(next - at_.begin()) - 1;
+    const double share = (arc - at_[i]) / (at_[i + 1] - at_[i]);
+    return points_[i] + share * (points_[(i + 1) % points_.size()] - points_[i]);
+  }
+  Vector2d tangent(double arc) const {
+    return ((*this)(arc + kTangentReach) - (*this)(arc - kTangentReach)).normalized();
+  }
+
+ private:
+  const std::vector<Vector2d>& points_;
+  std::vector<double> at_;  // arc length at each point, and the whole
+};
+
+// Seconds of walking one way.
+double walking_s(const TourOptions& o) { return o.back ? std::max(0.1, 0.5 * (o.duration_s - kTurnRound_s)) : o.duration_s; }
+
+double laps_of(const TourOptions& o, double length) {
+  if (o.laps > 0) return o.laps;
+  if (o.speed_mps > 0) return o.speed_mps * walking_s(o) / length;
+  const double wanted = kWalkingPace * walking_s(o) / length;
+  const double most = std::floor(kFastestPace * walking_s(o) / length);
+  return most < 1 ? wanted : std::clamp(std::round(wanted), 1.0, most);
+}
+
+// Where a tour is at a time: in laps walked, and how far it has turned round.
+struct Progress {
+  double laps = 0, turned = 0;  // turned: radians
+};
+
+Progress there_and_back(const TourOptions& o, double laps, double time_s) {
+  const double walk = walking_s(o);
+  const double turning = std::clamp((time_s - walk) / kTurnRound_s, 0.0, 1.0);
+  // A walker comes to a halt within kHalt_s, and gets going the same way.
+  const double away = walk - std::clamp(std::abs(time_s - 0.5 * o.duration_s) - 0.5 * kTurnRound_s, 0.0, 2 * walk);
+  const double halt = std::min(kHalt_s, walk), left = walk - away;
+  const double eased = left < halt ? 0.5 * left * left / halt : left - 0.5 * halt;
+  return {laps * (1 - eased / (walk - 0.5 * halt)), pi * turning * turning * (3 - 2 * turning)};
+}
+
+}  // namespace
+
+Trajectory make_tour(const simulator::Building& building, const TourOptions& options) {
+  BSLAM_ASSERT(options.duration_s > 0, "a tour takes time");
+  const Loop loop(building.tour);
+  const double laps = laps_of(options, loop.length());
+  Random base_random(options.seed, "sway");
+  const Sway base(base_random);
+  std::vector<Sway> own;
+  for (int lap = -1; lap <= static_cast<int>(laps) + 1; ++lap) {
+    Random random(options.seed, "sway of lap", static_cast<std::uint64_t>(lap + 1));
+    own.emplace_back(random);
+  }
+  const auto pieces = static_cast<std::size_t>(std::max(1.0, std::round(options.duration_s / kKnotSpacing)));
+  const double spacing = options.duration_s / static_cast<double>(pieces);
+  std::vector<ControlPose> control;
+  double last_yaw = 0;
+  for (std::size_t i = 0; i < pieces + 3; ++i) {
+    const double step = static_cast<double>(i) - 1;
+    const Progress progress = options.back ? there_and_back(options, laps, spacing * step)
+                                           : Progress{laps * step / static_cast<double>(pieces), 0};
+    const double lap = std::floor(progress.laps), phase = progress.laps - lap;
+    const Offsets o = offsets_at(base, own[static_cast<std::size_t>(lap + 1)], phase);
+    // The pace swells and ebbs by a tenth, the same way in every lap.
+    const double arc = loop.length() * (phase + 0.1 / (6 * pi) * std::sin(6 * pi * phase));
+    const Vector2d tangent = loop.tangent(arc), place = loop(arc) + o.aside * Vector2d(-tangent.y(), tangent.x());
+    double yaw = std::atan2(tangent.y(), tangent.x());
+    yaw += 2 * pi * std::round((last_yaw - yaw) / (2 * pi));
+    last_yaw = yaw;
+    control.push_back({{place.x(), place.y(), 1.5 + o.up}, yaw + progress.turned + o.yaw, o.pitch, o.roll});
+  }
+  return Trajectory(std::move(control), spacing);
+}
+
+}  // namespace bslam::simulator

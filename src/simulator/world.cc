@@ -1,0 +1,336 @@
+#include "simulator/world.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "base/assert.h"
+#include "simulator/embree.h"
+
+namespace bslam::simulator {
+namespace {
+
+constexpr float kAmbient = 0.42f;      // light from everywhere, before enclosing surfaces take theirs
+constexpr double kAmbientReach = 1.2;  // metres within which surfaces enclose a place
+constexpr double kLampRadius = 0.14;   // metres: its shadows are that soft
+constexpr double kOffSurface = 0.006;  // metres: rays start that far off their surface
+constexpr double kLeastLight = 0.012;  // of a lamp at a place: less is not worth its shadow
+const Vector3d kLampPoints[] = {{1, 0.2, 0}, {-0.3, 0.9, 0.1}, {-0.9, -0.4, -0.1}, {0.2, -0.9, 0}, {0, 0, -0.2}};
+constexpr float kLampLight = 2.2f, kDaylight = 0.75f;
+
+Vector3d unit_normal(const Surface& s) { return s.u.cross(s.v).normalized(); }
+
+// Level of the texture pyramid for a footprint of `texels` finest texels: floor(log2).
+int level_of(float texels, int levels) {
+  const int exponent = static_cast<int>(std::bit_cast<std::uint32_t>(texels) >> 23) - 127;
+  return std::clamp(exponent, 0, levels - 1);
+}
+
+RTCRay make_ray(const Vector3d& origin, const Vector3d& direction, double near, double far) {
+  RTCRay ray{};
+  ray.org_x = static_cast<float>(origin.x());
+  ray.org_y = static_cast<float>(origin.y());
+  ray.org_z = static_cast<float>(origin.z());
+  ray.dir_x = static_cast<float>(direction.x());
+  ray.dir_y = static_cast<float>(direction.y());
+  ray.dir_z = static_cast<float>(direction.z());
+  ray.tnear = static_cast<float>(near);
+  ray.tfar = static_cast<float>(far);
+  ray.mask = ~0u;
+  return ray;
+}
+
+}  // namespace
+
+// Owns Embree's handles. One quad a surface, in order, so that primID is the surface's index.
+struct World::Scene {
+  explicit Scene(const std::vector<Surface>& surfaces) : device(rtcNewDevice("threads=1,set_affinity=0")) {
+    BSLAM_ASSERT(device != nullptr, "Embree gives a device");
+    scene = rtcNewScene(device);
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_QUAD);
+    auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                               3 * sizeof(float), 4 * surfaces.size()));
+    auto* index = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(std::uint32_t), surfaces.size()));
+    std::uint32_t next = 0;
+    for (const Surface& s : surfaces) {
+      for (const Vector3d& corner :
+           {s.origin, Vector3d(s.origin + s.u), Vector3d(s.origin + s.u + s.v), Vector3d(s.origin + s.v)}) {
+        for (int i = 0; i < 3; ++i) *vertex++ = static_cast<float>(corner[i]);
+        *index++ = next++;
+      }
+    }
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(scene);
+  }
+  ~Scene() {
+    rtcReleaseScene(scene);
+    rtcReleaseDevice(device);
+  }
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+
+  RTCDevice device;
+  RTCScene scene = nullptr;
+};
+
+World::World(Building building, const WorldOptions& options, ThreadPool& pool, std::stop_token stop)
+    : building_(std::move(building)) {
+  scene_ = std::make_unique<Scene>(building_.surfaces);
+  lay_out(options);
+  bake_albedo(pool, stop);
+  bake_light(options, pool, stop);
+}
+
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+std::optional<double> World::texel_of(const Surface& s, double finest) const {
+  constexpr double kTexelPerDistance = 0.002;  // radians: about a pixel of the default cameras
+  constexpr double kCoarsest = 4.0;            // times the finest
+  const Vector3d n = unit_normal(s);
+  bool seen = building_.tour.empty();
+  double nearest = seen ? 0.0 : std::numeric_limits<double>::infinity();
+  for (const Vector2d& place : building_.tour) {
+    for (const double z : {Building::kTourLow, Building::kTourHigh}) {
+      const Vector3d d = Vector3d(place.x(), place.y(), z) - s.origin;
+      constexpr double kRoom = 2 * Building::kTourSway;  // metres: cameras are beside the tour
+      if (d.dot(n) < -kRoom) continue;
+      seen = true;
+      const double a = std::clamp(d.dot(s.u) / s.u.squaredNorm(), 0.0, 1.0);
+      const double b = std::clamp(d.dot(s.v) / s.v.squaredNorm(), 0.0, 1.0);
+      nearest = std::min(nearest, (d - a * s.u - b * s.v).norm());
+    }
+  }
+  if (!seen) return std::nullopt;
+  return std::clamp(kTexelPerDistance * nearest, finest, kCoarsest * finest);
+}
+
+void World::lay_out(const WorldOptions& options) {
+  std::uint32_t texels = 0, samples = 0;
+  for (const Surface& s : building_.surfaces) {
+    Baked b{};
+    b.normal = unit_normal(s).cast<float>();
+    const double w = s.u.norm(), h = s.v.norm();
+    constexpr double kHiddenTexel = 0.25;  // metres
+    const std::optional<double> wanted = texel_of(s, options.texel);
+    const double texel = wanted.value_or(kHiddenTexel);
+    b.hidden = !wanted.has_value();
+    b.texels_per_m = static_cast<float>(1 / texel);
+    b.width = std::max(1, static_cast<std::int32_t>(std::lround(w / texel)));
+    b.height = std::max(1, static_cast<std::int32_t>(std::lround(h / texel)));
+    for (b.levels = 0; b.levels < kLevels; ++b.levels) {
+      const std::int32_t lw = ((b.width - 1) >> b.levels) + 1, lh = ((b.height - 1) >> b.levels) + 1;
+      b.texel[b.levels] = texels;
+      texels += static_cast<std::uint32_t>(lw * lh);
+      if (lw == 1 && lh == 1) {
+        ++b.levels;
+        break;
+      }
+    }
+    b.light_width = 2 + (b.hidden ? 0 : static_cast<std::int32_t>(w / options.light_texel));
+    b.light_height = 2 + (b.hidden ? 0 : static_cast<std::int32_t>(h / options.light_texel));
+    b.light = samples;
+    samples += static_cast<std::uint32_t>(b.light_width * b.light_height);
+    baked_.push_back(b);
+  }
+  texels_.resize(texels);
+  light_.resize(samples);
+}
+
+void World::bake_albedo(ThreadPool& pool, const std::stop_token& stop) {
+  struct Rows {
+    std::size_t surface;
+    std::int32_t from, to;
+  };
+  constexpr std::int32_t kRows = 64;
+  std::vector<Rows> work;
+  for (std::size_t i = 0; i < baked_.size(); ++i) {
+    for (std::int32_t y = 0; y < baked_[i].height; y += kRows)
+      work.push_back({i, y, std::min(y + kRows, baked_[i].height)});
+  }
+  pool.for_each(work.size(), [&](std::size_t item) {
+    if (stop.stop_requested()) return;
+    const Rows& rows = work[item];
+    const Surface& s = building_.surfaces[rows.surface];
+    const Baked& b = baked_[rows.surface];
+    const auto w = static_cast<float>(s.u.norm()), h = static_cast<float>(s.v.norm());
+    const auto x0 = static_cast<float>(s.pattern_origin.x()), y0 = static_cast<float>(s.pattern_origin.y());
+    for (std::int32_t y = rows.from; y < rows.to; ++y) {
+      std::uint8_t* out = texels_.data() + b.texel[0] + static_cast<std::size_t>(y) * static_cast<std::size_t>(b.width);
+      const float py = y0 + (static_cast<float>(y) + 0.5f) * h / static_cast<float>(b.height);
+      for (std::int32_t x = 0; x < b.width; ++x) {
+        const float px = x0 + (static_cast<float>(x) + 0.5f) * w / static_cast<float>(b.width);
+        out[x] = static_cast<std::uint8_t>(255.0f * std::sqrt(albedo(s.texture, px, py, w, h)) + 0.5f);
+      }
+    }
+  });
+  pool.for_each(baked_.size(), [&](std::size_t i) {
+    const Baked& b = baked_[i];
+    for (std::int32_t level = 1; level < b.levels; ++level) {
+      const std::int32_t fw = ((b.width - 1) >> (level - 1)) + 1, fh = ((b.height - 1) >> (level - 1)) + 1;
+      const std::int32_t w = ((b.width - 1) >> level) + 1, h = ((b.height - 1) >> level) + 1;
+      const std::uint8_t* fine = texels_.data() + b.texel[level - 1];
+      std::uint8_t* out = texels_.data() + b.texel[level];
+      const auto square = [&](std::int32_t x, std::int32_t y) {
+        const std::int32_t v = fine[std::min(y, fh - 1) * fw + std::min(x, fw - 1)];
+        return v * v;
+      };
+      for (std::int32_t y = 0; y < h; ++y) {
+        for (std::int32_t x = 0; x < w; ++x) {
+          const std::int32_t sum =
+              square(2 * x, 2 * y) + square(2 * x + 1, 2 * y) + square(2 * x, 2 * y + 1) + square(2 * x + 1, 2 * y + 1);
+          out[y * w + x] = static_cast<std::uint8_t>(0.5f * std::sqrt(static_cast<float>(sum)) + 0.5f);
+        }
+      }
+    }
+  });
+}
+
+void World::bake_light(const WorldOptions& options, ThreadPool& pool, const std::stop_token& stop) {
+  pool.for_each(baked_.size(), [&](std::size_t i) {
+    const Surface& s = building_.surfaces[i];
+    const Baked& b = baked_[i];
+    const Vector3d normal = unit_normal(s);
+    std::optional<float> constant;
+    if (b.hidden) constant = kAmbient;
+    if (s.texture.material == Material::kLamp) constant = kLampLight;
+    if (s.texture.material == Material::kWindow) constant = kDaylight;
+    for (std::int32_t y = 0; y < b.light_height && !stop.stop_requested(); ++y) {
+      for (std::int32_t x = 0; x < b.light_width; ++x) {
+        const std::size_t at = b.light + static_cast<std::size_t>(y * b.light_width + x);
+        if (constant) {
+          light_[at] = *constant;
+          continue;
+        }
+        // A little inside the edges, where the neighbouring surface does not cover the sample.
+        const auto inset = [](std::int32_t k, std::int32_t count) {
+          return std::clamp(static_cast<double>(k) / (count - 1), 0.02, 0.98);
+        };
+        const Vector3d point = s.origin + inset(x, b.light_width) * s.u + inset(y, b.light_height) * s.v;
+        light_[at] = light_at(point, normal, options.ambient_rays);
+      }
+    }
+  });
+}
+
+float World::light_at(const Vector3d& point, const Vector3d& n, int ambient_rays) const {
+  // All samples use the same pattern of rays: noise from sample to sample would look like stains.
+  const Vector3d start = point + kOffSurface * n;
+  double light = 0;
+  for (const Lamp& lamp : building_.lamps) {
+    const Vector3d to = lamp.position - start;
+    const double distance2 = to.squaredNorm(), facing = to.dot(n) / std::sqrt(distance2);
+    const double unshadowed = lamp.intensity * facing / (distance2 + 0.35);
+    if (unshadowed < kLeastLight) continue;
+    int open = 0;
+    for (const Vector3d& offset : kLampPoints) open += blocked(start, lamp.position + kLampRadius * offset) ? 0 : 1;
+    light += unshadowed * open / static_cast<double>(std::size(kLampPoints));
+  }
+  int open = 0;
+  const Vector3d side = n.unitOrthogonal(), up = n.cross(side);
+  for (int k = 0; k < ambient_rays; ++k) {  // cosine-weighted directions on a golden spiral
+    const double r2 = (k + 0.5) / ambient_rays, r = std::sqrt(r2), angle = 2.399963 * k;
+    const Vector3d d = r * std::cos(angle) * side + r * std::sin(angle) * up + std::sqrt(1 - r2) * n;
+    if (!blocked(start, start + kAmbientReach * d)) ++open;
+  }
+  const double enclosed = ambient_rays > 0 ? static_cast<double>(open) / ambient_rays : 1.0;
+  return static_cast<float>(light + kAmbient * (0.25 + 0.75 * enclosed));
+}
+
+bool World::blocked(const Vector3d& from, const Vector3d& to) const {
+  RTCRay ray = make_ray(from, to - from, 0.0, 1.0);
+  occluded(scene_->scene, ray);
+  return ray.tfar < 0;
+}
+
+std::optional<Hit> World::cast(const Vector3d& origin, const Vector3d& direction) const {
+  RTCRayHit query{};
+  query.ray = make_ray(origin, direction, 0.0, 1e6);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  intersect(scene_->scene, query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  // Embree works in floats; place and distance follow in doubles from the surface's plane.
+  const Surface& s = building_.surfaces[query.hit.primID];
+  const Vector3d n = s.u.cross(s.v);
+  const double distance = (s.origin - origin).dot(n) / direction.dot(n);
+  const Vector3d d = origin + distance * direction - s.origin;
+  return Hit{query.hit.primID, std::clamp(d.dot(s.u) / s.u.squaredNorm(), 0.0, 1.0),
+             std::clamp(d.dot(s.v) / s.v.squaredNorm(), 0.0, 1.0), distance};
+}
+
+float World::lookup(const Baked& b, float a, float v, int level) const {
+  const std::int32_t w = ((b.width - 1) >> level) + 1, h = ((b.height - 1) >> level) + 1;
+  const float shrink = std::bit_cast<float>(static_cast<std::uint32_t>(127 - level) << 23);  // 2^-level
+  const float x = std::max(0.0f, a * static_cast<float>(b.width) * shrink - 0.5f);
+  const float y = std::max(0.0f, v * static_cast<float>(b.height) * shrink - 0.5f);
+  const std::int32_t x0 = std::min(static_cast<std::int32_t>(x), w - 1),
+                     y0 = std::min(static_cast<std::int32_t>(y), h - 1);
+  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
+  const std::int32_t right = x0 + 1 < w ? 1 : 0, below = y0 + 1 < h ? w : 0;
+  const std::uint8_t* t = texels_.data() + b.texel[level] + y0 * w + x0;
+  const float top = static_cast<float>(t[0]) + fx * static_cast<float>(t[right] - t[0]);
+  const float bottom = static_cast<float>(t[below]) + fx * static_cast<float>(t[below + right] - t[below]);
+  const float root = (top + fy * (bottom - top)) * (1.0f / 255.0f);
+
+  const float lx = a * static_cast<float>(b.light_width - 1), ly = v * static_cast<float>(b.light_height - 1);
+  const std::int32_t i = std::min(static_cast<std::int32_t>(lx), b.light_width - 2);
+  const std::int32_t j = std::min(static_cast<std::int32_t>(ly), b.light_height - 2);
+  const float gx = lx - static_cast<float>(i), gy = ly - static_cast<float>(j);
+  const float* l = light_.data() + b.light + j * b.light_width + i;
+  const float upper = l[0] + gx * (l[1] - l[0]);
+  const float lower = l[b.light_width] + gx * (l[b.light_width + 1] - l[b.light_width]);
+  return root * root * (upper + gy * (lower - upper));
+}
+
+float World::radiance(const Hit& hit, double footprint) const {
+  const Baked& b = baked_[hit.surface];
+  return lookup(b, static_cast<float>(hit.a), static_cast<float>(hit.b),
+                level_of(static_cast<float>(footprint) * b.texels_per_m, b.levels));
+}
+
+void World::radiance(const Eigen::Vector3f& origin, const RayPacket& rays, float spread, float detail,
+                     float* out) const {
+  constexpr int kN = RayPacket::kSize;
+  static constexpr int kAllValid[kN] = {-1, -1, -1, -1, -1, -1, -1, -1};
+  alignas(32) RTCRayHit8 query;
+  for (int i = 0; i < kN; ++i) {
+    query.ray.org_x[i] = origin.x();
+    query.ray.org_y[i] = origin.y();
+    query.ray.org_z[i] = origin.z();
+    query.ray.dir_x[i] = rays.x[i];
+    query.ray.dir_y[i] = rays.y[i];
+    query.ray.dir_z[i] = rays.z[i];
+    query.ray.tnear[i] = 0;
+    query.ray.tfar[i] = 1e6f;
+    query.ray.time[i] = 0;
+    query.ray.mask[i] = ~0u;
+    query.ray.flags[i] = 0;
+    query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  alignas(32) static constexpr auto& valid = kAllValid;
+  intersect_coherent(valid, scene_->scene, query);
+  const float scale = spread * std::exp2(detail);
+  for (int i = 0; i < kN; ++i) {
+    if (query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
+      out[i] = 0.02f;
+      continue;
+    }
+    const Baked& b = baked_[query.hit.primID[i]];
+    const float cosine = std::abs(b.normal.x() * rays.x[i] + b.normal.y() * rays.y[i] + b.normal.z() * rays.z[i]);
+    // A slanted ray's footprint is longer one way only: the mean of both ways.
+    const float texels = query.ray.tfar[i] * scale * b.texels_per_m / std::sqrt(std::max(cosine, 0.02f));
+    out[i] = lookup(b, query.hit.u[i], query.hit.v[i], level_of(texels, b.levels));
+  }
+}
+
+}  // namespace bslam::simulator

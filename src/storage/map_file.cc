@@ -1,0 +1,222 @@
+#include "storage/map_file.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <libdeflate.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "base/atomic_file.h"
+#include "storage/map_sections.h"
+
+namespace bslam::storage {
+namespace {
+
+constexpr std::string_view kMagic = "BSLAMMAP";
+constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 2;
+constexpr std::array<std::string_view, 4> kTags = {"RIG ", "INFO", "KEYF", "LAND"};
+constexpr std::array<const char*, 4> kNames = {"rig", "info", "keyframes", "landmarks"};
+constexpr std::size_t kTableEntryBytes = 4 + 4 + 8;
+constexpr std::size_t kHeaderBytes = 8 + 3 * 4 + 8 + kTags.size() * kTableEntryBytes + 4;
+constexpr std::size_t kMaxMapBytes = std::size_t{1} << 36;
+
+std::uint32_t checksum(std::string_view bytes) { return libdeflate_crc32(0, bytes.data(), bytes.size()); }
+
+using Sections = std::array<std::string_view, kTags.size()>;
+
+std::string header_of(const std::array<std::string, kTags.size()>& sections) {
+  std::size_t total = kHeaderBytes;
+  for (const std::string& s : sections) total += s.size();
+  ByteWriter out;
+  out.numbers(kMagic.data(), kMagic.size());
+  out.number(kOrderMark);
+  out.number(kVersion);
+  out.number(static_cast<std::uint32_t>(kTags.size()));
+  out.number(std::uint64_t{total});
+  for (std::size_t i = 0; i < kTags.size(); ++i) {
+    out.numbers(kTags[i].data(), kTags[i].size());
+    out.number(checksum(sections[i]));
+    out.number(std::uint64_t{sections[i].size()});
+  }
+  std::string header = std::move(out).take();
+  ByteWriter seal;
+  seal.number(checksum(header));
+  return header + std::move(seal).take();
+}
+
+Error damaged(std::string_view part, std::string found, std::string expected) {
+  return {"", std::string(part), std::move(found), std::move(expected)};
+}
+
+// The sections of a whole file whose checksums are right. Errors name no file.
+Result<Sections> take_apart(std::string_view bytes) {
+  if (!bytes.starts_with(kMagic)) return damaged("", "no saved map", fmt::format("a file that begins with {}", kMagic));
+  if (bytes.size() < kHeaderBytes) return damaged("header", fmt::format("{} bytes", bytes.size()), "a whole header");
+  ByteReader in(bytes.substr(kMagic.size(), kHeaderBytes - kMagic.size()), "header");
+  if (in.number<std::uint32_t>() != kOrderMark) return damaged("header", "another order of bytes", "little endian");
+  const auto version = in.number<std::uint32_t>();
+  if (version != kVersion) return damaged("format version", std::to_string(version), std::to_string(kVersion));
+  const auto count = in.number<std::uint32_t>();
+  const auto total = in.number<std::uint64_t>();
+  struct Entry {
+    std::array<char, 4> tag;
+    std::uint32_t checksum;
+    std::uint64_t size;
+  };
+  std::array<Entry, kTags.size()> table;
+  for (Entry& e : table) {
+    in.numbers(e.tag.data(), e.tag.size());
+    e.checksum = in.number<std::uint32_t>();
+    e.size = in.number<std::uint64_t>();
+  }
+  if (in.number<std::uint32_t>() != checksum(bytes.substr(0, kHeaderBytes - 4)) || count != kTags.size()) {
+    return damaged("header", "a wrong checksum", "an undamaged file");
+  }
+  if (total != bytes.size()) return damaged("size", fmt::format("{} bytes", bytes.size()), std::to_string(total));
+  Sections sections;
+  std::string_view rest = bytes.substr(kHeaderBytes);
+  for (std::size_t i = 0; i < kTags.size(); ++i) {
+    const Entry& e = table[i];
+    if (std::string_view(e.tag.data(), e.tag.size()) != kTags[i])
+      return damaged("header", "unknown sections", "those of this version");
+    if (e.size > rest.size()) return damaged(kNames[i], "a section beyond the end", "one within the file");
+    sections[i] = rest.substr(0, e.size);
+    rest.remove_prefix(e.size);
+    if (checksum(sections[i]) != e.checksum) return damaged(kNames[i], "a wrong checksum", "an undamaged file");
+  }
+  if (!rest.empty()) return damaged("size", "bytes after the last section", "none");
+  return sections;
+}
+
+Result<SavedMap> build(const Sections& sections, std::string file) {
+  const auto reader = [&](std::size_t i) { return ByteReader(sections[i], kNames[i]); };
+  ByteReader rig_in = reader(0), info_in = reader(1), keyframes_in = reader(2), landmarks_in = reader(3);
+  auto rig = take_rig(rig_in);
+  if (!rig) return rig_in.error();
+  InfoSection info = take_info(info_in);
+  if (!info_in.ok()) return info_in.error();
+  SavedMap saved{std::move(file), map::BundledMap(std::make_shared<const camera::Rig>(*std::move(rig)), info.pyramid),
+                 std::move(info.info)};
+  saved.map.set_scale(info.scale);
+  saved.words_end = take_keyframes(keyframes_in, saved.info.vocabulary != 0, saved.map);
+  if (!keyframes_in.ok()) return keyframes_in.error();
+  take_landmarks(landmarks_in, saved.map);
+  if (!landmarks_in.ok()) return landmarks_in.error();
+  if (auto broken = saved.map.check_invariants())
+    return damaged("", *std::move(broken), "a map without contradictions");
+  return saved;
+}
+
+// ---- fits
+
+bool near(double a, double b) { return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a)); }
+
+std::string numbers_text(const std::vector<double>& values) {
+  return values.empty() ? "none" : fmt::format("{:.12g}", fmt::join(values, " "));
+}
+
+std::vector<double> transform_numbers(const geometry::SE3& T) {
+  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = T.matrix().topRows<3>();
+  return {rows.data(), rows.data() + rows.size()};
+}
+
+Status compare_camera(const SavedMap& saved, const camera::Rig& rig, std::size_t i) {
+  const camera::Camera &ours = saved.map.rig().camera(i), &other = rig.camera(i);
+  const auto error = [&](std::string_view field, std::string found, std::string expected) {
+    return Error{saved.file, fmt::format("camera {} ({}): {}", i, ours.name, field), std::move(found),
+                 std::move(expected) + " as the rig of the run has"};
+  };
+  const auto compare = [&](std::string_view field, const std::vector<double>& a,
+                           const std::vector<double>& b) -> Status {
+    if (a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), near)) return {};
+    return error(field, numbers_text(a), numbers_text(b));
+  };
+  const auto model = camera::model_name(ours.model), other_model = camera::model_name(other.model);
+  if (model != other_model) return error("model", std::string(model), std::string(other_model));
+  if (ours.width != other.width || ours.height != other.height) {
+    return error("resolution", fmt::format("{}x{}", ours.width, ours.height),
+                 fmt::format("{}x{}", other.width, other.height));
+  }
+  const auto list = [](const camera::Intrinsics& k) { return std::vector<double>{k.fx, k.fy, k.cx, k.cy}; };
+  if (Status s = compare("intrinsics", list(camera::intrinsics(ours.model)), list(camera::intrinsics(other.model))); !s)
+    return s;
+  if (Status s = compare("distortion", camera::distortion(ours.model), camera::distortion(other.model)); !s) return s;
+  return compare("place in the rig", transform_numbers(saved.map.rig().cam_from_rig(i)),
+                 transform_numbers(rig.cam_from_rig(i)));
+}
+
+}  // namespace
+
+std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info) {
+  const FileIds ids(map);
+  std::array<ByteWriter, kTags.size()> writers;
+  put_rig(map.rig(), writers[0]);
+  put_info(map, info, writers[1]);
+  put_keyframes(map, ids, info.vocabulary != 0, writers[2]);
+  put_landmarks(map, ids, writers[3]);
+  std::array<std::string, kTags.size()> sections;
+  for (std::size_t i = 0; i < kTags.size(); ++i) sections[i] = std::move(writers[i]).take();
+  std::string bytes = header_of(sections);
+  std::size_t total = bytes.size();
+  for (const std::string& s : sections) total += s.size();
+  bytes.reserve(total);
+  for (std::string& s : sections) {
+    bytes += s;
+    s = {};  // its memory goes before that of the next is filled
+  }
+  return bytes;
+}
+
+Result<SavedMap> map_from_bytes(std::string_view bytes, std::string file) {
+  const auto named = [&](Error error) {
+    error.file = file;
+    return error;
+  };
+  const auto sections = take_apart(bytes);
+  if (!sections) return named(sections.error());
+  auto saved = build(*sections, file);
+  if (!saved) return named(saved.error());
+  return saved;
+}
+
+Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std::filesystem::path& file) {
+  if (map.rig().size() > kMaxCameras) {
+    return Error{file.string(), "rig", std::to_string(map.rig().size()) + " cameras",
+                 "at most " + std::to_string(kMaxCameras)};
+  }
+  return write_atomically(file, map_to_bytes(map, info));
+}
+
+Result<SavedMap> read_map(const std::filesystem::path& file) {
+  const auto bytes = read_file(file, kMaxMapBytes);
+  if (!bytes) return bytes.error();
+  return map_from_bytes(*bytes, file.string());
+}
+
+Status fits(const SavedMap& saved, const camera::Rig& rig, const map::PyramidShape& pyramid,
+            const place::Vocabulary* vocabulary) {
+  if (saved.map.rig().size() != rig.size()) {
+    return Error{saved.file, "rig", fmt::format("{} cameras", saved.map.rig().size()),
+                 fmt::format("{} as the rig of the run has", rig.size())};
+  }
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    if (Status status = compare_camera(saved, rig, i); !status) return status;
+  }
+  const map::PyramidShape& own = saved.map.pyramid();
+  if (own.levels != pyramid.levels || own.scale_factor != pyramid.scale_factor) {
+    return Error{saved.file, "pyramid", fmt::format("{} levels, factor {}", own.levels, own.scale_factor),
+                 fmt::format("{} levels, factor {} as features.levels and features.scale_factor say", pyramid.levels,
+                             pyramid.scale_factor)};
+  }
+  if (vocabulary == nullptr || saved.info.vocabulary == 0) return {};
+  if (saved.info.vocabulary != vocabulary->id() || saved.words_end > vocabulary->size()) {
+    return Error{saved.file, "vocabulary", fmt::format("{:016x}", saved.info.vocabulary),
+                 fmt::format("{:016x} as the run uses", vocabulary->id())};
+  }
+  return {};
+}
+
+}  // namespace bslam::storage

@@ -1,0 +1,217 @@
+// BundledFrames in saved maps.
+#include <cmath>
+#include <utility>
+
+#include "storage/map_sections.h"
+
+namespace bslam::storage {
+namespace {
+
+using feature::Descriptor;
+using feature::Keypoints;
+using feature::Patch;
+using frame::KeypointRef;
+
+// Pixel, level, angle, sigma, bearing, descriptor and patch of one keypoint. The bearing belongs to the pixel before it
+// was rounded to a float, so it cannot be computed from it again.
+constexpr std::size_t kKeypointBytes = 8 + 1 + 4 + 4 + 24 + 32 + sizeof(Patch);
+constexpr std::size_t kMatchedBytes = 1 + 2 * (2 + 4) + 1;  // at the least
+constexpr double kUnitTolerance = 1e-6;
+constexpr double kMaxTwist = 1e6;             // rad/s, m/s
+constexpr TimeNs kMaxTime = TimeNs{1} << 62;  // so that differences do not overflow
+
+// Arrays of these are read and written as the numbers they consist of.
+static_assert(sizeof(Eigen::Vector2f) == 2 * sizeof(float) && sizeof(Eigen::Vector3d) == 3 * sizeof(double));
+static_assert(sizeof(Descriptor) == 4 * sizeof(std::uint64_t) &&
+              sizeof(Patch) == feature::kPatchSize * feature::kPatchSize);
+
+void put_camera(const frame::CameraFrame& camera, bool with_words, ByteWriter& out) {
+  const Keypoints& k = camera.keypoints;
+  const std::size_t n = k.size();
+  out.number(static_cast<std::uint8_t>(camera.state));
+  out.number(camera.time_ns);
+  out.count(n);
+  if (n > 0) {
+    out.numbers(k.pixel.front().data(), 2 * n);
+    out.numbers(k.level.data(), n);
+    out.numbers(k.angle.data(), n);
+    out.numbers(k.sigma.data(), n);
+    out.numbers(k.bearing.front().data(), 3 * n);
+    out.numbers(k.descriptor.front().data(), 4 * n);
+    out.numbers(k.patch.front().data(), n * sizeof(Patch));
+  }
+  const bool has_words = with_words && camera.words.size() == n;
+  out.number(static_cast<std::uint8_t>(has_words));
+  for (std::size_t i = 0; has_words && i < n; ++i) out.number(camera.words[i].value());
+}
+
+void take_keypoints(ByteReader& in, Keypoints& k) {
+  const std::size_t n = in.count(kKeypointBytes);
+  if (n == 0) return;
+  k.pixel.resize(n);
+  k.level.resize(n);
+  k.angle.resize(n);
+  k.sigma.resize(n);
+  k.bearing.resize(n);
+  k.descriptor.resize(n);
+  k.patch.resize(n);
+  in.numbers(k.pixel.front().data(), 2 * n);
+  in.numbers(k.level.data(), n);
+  in.numbers(k.angle.data(), n);
+  in.numbers(k.sigma.data(), n);
+  in.numbers(k.bearing.front().data(), 3 * n);
+  in.numbers(k.descriptor.front().data(), 4 * n);
+  in.numbers(k.patch.front().data(), n * sizeof(Patch));
+}
+
+// Pixels may lie beside the image, but not so far that they cannot be meant.
+bool check_keypoints(ByteReader& in, const Keypoints& k, const camera::Camera& camera, int levels) {
+  const auto width = static_cast<float>(camera.width), height = static_cast<float>(camera.height);
+  const auto within = [](float value, float size) { return value >= -size && value <= 2 * size; };  // false for NaN
+  bool pixels = true, on_levels = true, numbers = true, unit = true;
+  for (std::size_t i = 0; i < k.size(); ++i) {
+    pixels &= within(k.pixel[i].x(), width) && within(k.pixel[i].y(), height);
+    on_levels &= k.level[i] < levels;
+    numbers &= std::isfinite(k.angle[i]) && std::isfinite(k.sigma[i]) && k.sigma[i] > 0;
+    unit &= std::abs(k.bearing[i].squaredNorm() - 1) <= kUnitTolerance;
+  }
+  return in.require(pixels, "a keypoint far outside of the image", "pixels of the camera") &&
+         in.require(on_levels, "a keypoint on a level that does not exist", "levels of the pyramid") &&
+         in.require(numbers, "an angle or standard deviation that cannot be", "finite numbers, deviations above 0") &&
+         in.require(unit, "a bearing that is no unit vector", "unit vectors");
+}
+
+void take_words(ByteReader& in, frame::CameraFrame& camera, bool with_words, std::size_t& words_end) {
+  const auto has_words = in.number<std::uint8_t>();
+  if (!in.require(has_words <= 1, "neither 0 nor 1", "whether words follow")) return;
+  if (has_words == 0 || !in.require(with_words, "words", "none, as the map names no vocabulary")) return;
+  const std::size_t n = camera.keypoints.size();
+  if (!in.require(n <= in.remaining() / sizeof(std::int32_t), "the end of the section", "a word for each keypoint"))
+    return;
+  camera.words.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const WordId word(in.number<std::int32_t>());
+    if (!in.require(word.valid(), "a negative word", "words of the vocabulary")) return;
+    words_end = std::max(words_end, word.index() + 1);
+    camera.words.push_back(word);
+  }
+}
+
+void take_camera(ByteReader& in, const camera::Camera& calibration, int levels, bool with_words, std::size_t& words_end,
+                 frame::CameraFrame& camera) {
+  const auto state = in.number<std::uint8_t>();
+  if (!in.require(state <= static_cast<int>(image::ImageState::kDamaged), "an unknown state", "that of an image"))
+    return;
+  camera.state = static_cast<image::ImageState>(state);
+  camera.time_ns = in.number<TimeNs>();
+  if (!in.require(std::abs(camera.time_ns / 2) < kMaxTime / 2, "a time beyond all times", "nanoseconds")) return;
+  take_keypoints(in, camera.keypoints);
+  if (!in.ok() || !check_keypoints(in, camera.keypoints, calibration, levels)) return;
+  take_words(in, camera, with_words, words_end);
+  if (!in.ok() || camera.keypoints.empty()) return;
+  camera.grid = frame::FeatureGrid(camera.keypoints, calibration.width, calibration.height);
+}
+
+void put_bundled(const frame::Bundled& bundled, ByteWriter& out) {
+  out.count(bundled.num_matched());
+  for (std::size_t f = 0; f < bundled.num_matched(); ++f) {
+    const auto refs = bundled.keypoints(FeatureId(f));
+    out.number(static_cast<std::uint8_t>(refs.size()));
+    for (const KeypointRef r : refs) {
+      out.number(static_cast<std::uint16_t>(r.camera.value()));
+      out.number(static_cast<std::uint32_t>(r.keypoint.value()));
+    }
+    const auto& point = bundled.point(FeatureId(f));
+    out.number(static_cast<std::uint8_t>(point.has_value()));
+    if (point) {
+      out.numbers(point->point_rig.data(), 3);
+      out.numbers(point->covariance.data(), 9);
+    }
+  }
+}
+
+// One matched feature. `taken` has a flag for every keypoint of every camera.
+std::vector<KeypointRef> take_group(ByteReader& in, const frame::BundledFrame& frame,
+                                    std::vector<std::vector<std::uint8_t>>& taken) {
+  const std::size_t size = in.number<std::uint8_t>();
+  std::vector<KeypointRef> group;
+  if (!in.require(size >= 2 && size <= frame.cameras.size(), "a matched feature of too few or too many keypoints",
+                  "two or more, at most one for each camera")) {
+    return group;
+  }
+  for (std::size_t i = 0; i < size; ++i) {
+    const std::size_t c = in.number<std::uint16_t>(), k = in.number<std::uint32_t>();
+    if (!in.require(c < frame.cameras.size() && k < frame.cameras[c].keypoints.size(), "a keypoint that does not exist",
+                    "one of the frame") ||
+        !in.require(group.empty() || group.back().camera.index() < c, "cameras out of order or twice",
+                    "one keypoint a camera") ||
+        !in.require(!std::exchange(taken[c][k], std::uint8_t{1}), "a keypoint of two features", "one feature each")) {
+      break;
+    }
+    group.push_back({CameraIndex(c), KeypointIndex(k)});
+  }
+  return group;
+}
+
+std::optional<frame::BundledPoint> take_point(ByteReader& in) {
+  const auto has_point = in.number<std::uint8_t>();
+  if (!in.require(has_point <= 1, "neither 0 nor 1", "whether a point follows") || has_point == 0) return {};
+  frame::BundledPoint point;
+  in.numbers(point.point_rig.data(), 3);
+  in.numbers(point.covariance.data(), 9);
+  in.require(is_plausible(point.point_rig) && point.covariance.allFinite(), "a point that cannot be", "finite numbers");
+  return point;
+}
+
+void take_bundled(ByteReader& in, frame::BundledFrame& frame) {
+  std::vector<std::size_t> counts;
+  std::vector<std::vector<std::uint8_t>> taken;
+  for (const frame::CameraFrame& c : frame.cameras) {
+    counts.push_back(c.keypoints.size());
+    taken.emplace_back(c.keypoints.size(), std::uint8_t{0});
+  }
+  const std::size_t matched = in.count(kMatchedBytes);
+  std::vector<std::vector<KeypointRef>> groups;
+  std::vector<std::optional<frame::BundledPoint>> points;
+  groups.reserve(matched);
+  points.reserve(matched);
+  for (std::size_t f = 0; f < matched && in.ok(); ++f) {
+    in.enter("feature", f);
+    groups.push_back(take_group(in, frame, taken));
+    points.push_back(take_point(in));
+    in.leave();
+  }
+  if (in.ok()) frame.bundled = frame::Bundled(counts, groups, points);
+}
+
+}  // namespace
+
+void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out) {
+  out.number(frame.id.value());
+  out.number(frame.time_ns);
+  out.numbers(twist.data(), 6);
+  for (const frame::CameraFrame& c : frame.cameras) put_camera(c, with_words, out);
+  put_bundled(frame.bundled, out);
+}
+
+frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map::PyramidShape& pyramid,
+                               bool with_words, std::size_t& words_end) {
+  frame::BundledFrame frame;
+  frame.id = FrameId(in.number<std::int32_t>());
+  frame.time_ns = in.number<TimeNs>();
+  if (!in.require(std::abs(frame.time_ns / 2) < kMaxTime / 2, "a time beyond all times", "nanoseconds")) return frame;
+  in.numbers(frame.twist.data(), 6);
+  if (!in.require(frame.twist.allFinite() && frame.twist.cwiseAbs().maxCoeff() < kMaxTwist, "a motion that cannot be",
+                  "rad/s and m/s"))
+    return frame;
+  frame.cameras.resize(rig.size());
+  for (std::size_t c = 0; c < rig.size() && in.ok(); ++c) {
+    in.enter("camera", c);
+    take_camera(in, rig.camera(c), pyramid.levels, with_words, words_end, frame.cameras[c]);
+    in.leave();
+  }
+  if (in.ok()) take_bundled(in, frame);
+  return frame;
+}
+
+}  // namespace bslam::storage

@@ -1,0 +1,284 @@
+#include "storage/map_sections.h"
+
+#include <cmath>
+#include <utility>
+
+#include "camera/camera_description.h"
+#include "map/append_map.h"
+
+namespace bslam::storage {
+namespace {
+
+using geometry::Quaterniond;
+using geometry::SE3;
+using geometry::Vector3d;
+
+constexpr double kUnitTolerance = 1e-12;
+constexpr double kMaxCoordinate = 1e30;  // metres, or units of a map without scale
+constexpr int kMaxLevels = 32;
+constexpr std::size_t kCameraBytes = 3 * 4 + 2 * 4 + 4 * 8 + kTransformBytes + 8 + 4;  // at the least
+constexpr std::size_t kObservationBytes = 4 + 4 + 1;
+constexpr std::size_t kLandmarkBytes = 3 * 8 + 4 + 2 + 4 + 3 * 4 + 4 + kObservationBytes;
+
+// SE3 normalises what it is made of, and that may change the last bits of a quaternion normalised before. But `q` came
+// out of a normalisation once, so that multiples of it differ only in how they are rounded, and one of the first few
+// becomes `q` again; where none does it was no SE3's, and is normalised.
+SE3 with_exact_rotation(const Quaterniond& q, const Vector3d& translation) {
+  constexpr int kTries = 1 << 14;
+  for (int i = 0; i < kTries; ++i) {
+    const Quaterniond multiple((1 + static_cast<double>(i) / kTries * 4) * q.coeffs());
+    const SE3 transform(multiple, translation);
+    if (transform.rotation().coeffs() == q.coeffs()) return transform;
+  }
+  return SE3(q, translation);
+}
+
+camera::CameraDescription take_description(ByteReader& in) {
+  camera::CameraDescription d;
+  d.name = in.text();
+  d.model = in.text();
+  d.resolution = {in.number<std::int32_t>(), in.number<std::int32_t>()};
+  d.intrinsics.resize(4);
+  in.numbers(d.intrinsics.data(), 4);
+  d.distortion.resize(in.count(sizeof(double)));
+  in.numbers(d.distortion.data(), d.distortion.size());
+  return d;
+}
+
+// The checks are those of every rig file; the numbers stay as they stand in this one.
+std::optional<camera::RigCamera> take_rig_camera(ByteReader& in) {
+  camera::CameraDescription d = take_description(in);
+  const SE3 T_body_cam = take_transform(in);
+  const auto offset_ns = in.number<TimeNs>();
+  d.mask_file = in.text();
+  if (!in.ok()) return {};
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = T_body_cam.matrix();
+  d.T_body_cam.assign(rows.data(), rows.data() + rows.size());
+  d.time_offset_s = to_seconds(offset_ns);
+  auto camera =
+      camera::make_camera(d, {"", "model", "resolution", "intrinsics", "distortion", "T_body_cam", "time_offset"});
+  if (!camera) {
+    const Error& error = camera.error();
+    in.require(false, error.key + " " + error.found, error.expected);
+    return {};
+  }
+  camera->T_body_cam = T_body_cam;
+  camera->camera.time_offset_ns = offset_ns;
+  return *std::move(camera);
+}
+
+bool in_range(std::int32_t id, std::size_t end) { return id >= 0 && static_cast<std::size_t>(id) < end; }
+
+// Observations of one landmark, all of them possible in `map`.
+std::vector<map::Observation> take_observations(ByteReader& in, const map::BundledMap& map) {
+  const std::size_t n = in.count(kObservationBytes);
+  std::vector<map::Observation> observations;
+  if (!in.require(n > 0, "no observation", "one or more")) return observations;
+  observations.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto k = in.number<std::int32_t>(), f = in.number<std::int32_t>();
+    const auto aligned = in.number<std::uint8_t>();
+    if (!in.require(in_range(k, map.keyframe_slots()), "observation by a keyframe that does not exist",
+                    "one of the map") ||
+        !in.require(i == 0 || observations.back().keyframe.value() < k, "observations out of order",
+                    "keyframes in order, each once") ||
+        !in.require(in_range(f, map.keyframe(KeyframeId(k)).landmarks.size()),
+                    "observation by a feature that does not exist", "one of the keyframe") ||
+        !in.require(!map.landmark_of(KeyframeId(k), FeatureId(f)).valid(), "a feature of two landmarks",
+                    "one landmark each") ||
+        !in.require(aligned <= 1, "neither 0 nor 1", "whether the observation is aligned")) {
+      break;
+    }
+    observations.push_back({KeyframeId(k), FeatureId(f), aligned == 1});
+  }
+  return observations;
+}
+
+bool is_among(const map::LandmarkReference& reference, const std::vector<map::Observation>& observations,
+              const map::BundledMap& map) {
+  for (const map::Observation& o : observations) {
+    if (o.keyframe != reference.keyframe) continue;
+    const auto refs = map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature);
+    return std::find(refs.begin(), refs.end(), reference.keypoint) != refs.end();
+  }
+  return false;
+}
+
+void take_landmark(ByteReader& in, map::BundledMap& map) {
+  Vector3d position;
+  in.numbers(position.data(), 3);
+  map::LandmarkReference reference;
+  reference.keyframe = KeyframeId(in.number<std::int32_t>());
+  reference.keypoint.camera = CameraIndex(std::size_t{in.number<std::uint16_t>()});
+  reference.keypoint.keypoint = KeypointIndex(in.number<std::int32_t>());
+  const auto born = in.number<std::int32_t>();
+  const auto expected = in.number<std::uint32_t>(), found = in.number<std::uint32_t>();
+  const std::vector<map::Observation> observations = take_observations(in, map);
+  if (!in.ok() || !in.require(is_plausible(position), "a position that cannot be", "finite coordinates") ||
+      !in.require(in_range(born, map.keyframe_slots()), "born with a keyframe that does not exist", "one of the map") ||
+      !in.require(is_among(reference, observations, map), "a reference that is none of its observations",
+                  "one of them")) {
+    return;
+  }
+  const LandmarkId l = map.add_landmark(position, observations, reference, KeyframeId(born));
+  map.add_sightings(l, expected, found);
+}
+
+}  // namespace
+
+FileIds::FileIds(const map::BundledMap& map) : keyframe(map.keyframe_slots()) {
+  std::size_t next = 0;
+  for (const KeyframeId k : map.keyframe_ids()) keyframe[k.index()] = KeyframeId(next++);
+}
+
+KeyframeId FileIds::nearest_older(KeyframeId k) const {
+  for (std::size_t i = k.index() + 1; i-- > 0;) {
+    if (keyframe[i].valid()) return keyframe[i];
+  }
+  return KeyframeId(0);
+}
+
+bool is_plausible(const Eigen::Vector3d& point) { return (point.array().abs() <= kMaxCoordinate).all(); }
+
+void put_transform(const SE3& transform, ByteWriter& out) {
+  out.numbers(transform.rotation().coeffs().data(), 4);
+  out.numbers(transform.translation().data(), 3);
+}
+
+SE3 take_transform(ByteReader& in) {
+  Eigen::Vector4d xyzw;
+  Vector3d translation;
+  in.numbers(xyzw.data(), 4);
+  in.numbers(translation.data(), 3);
+  if (!in.ok() ||
+      !in.require(std::abs(xyzw.squaredNorm() - 1) <= kUnitTolerance, "a rotation that is no unit quaternion", "one") ||
+      !in.require(is_plausible(translation), "a translation that cannot be", "finite coordinates")) {
+    return {};
+  }
+  return with_exact_rotation(Quaterniond(xyzw), translation);
+}
+
+void put_rig(const camera::Rig& rig, ByteWriter& out) {
+  out.count(rig.size());
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    const camera::Camera& c = rig.camera(i);
+    out.text(c.name);
+    out.text(camera::model_name(c.model));
+    out.number(std::int32_t{c.width});
+    out.number(std::int32_t{c.height});
+    const camera::Intrinsics& k = camera::intrinsics(c.model);
+    for (const double value : {k.fx, k.fy, k.cx, k.cy}) out.number(value);
+    const std::vector<double> distortion = camera::distortion(c.model);
+    out.count(distortion.size());
+    out.numbers(distortion.data(), distortion.size());
+    put_transform(rig.body_from_cam(i), out);
+    out.number(c.time_offset_ns);
+    out.text(c.mask_file);
+  }
+}
+
+std::optional<camera::Rig> take_rig(ByteReader& in) {
+  const std::size_t n = in.count(kCameraBytes);
+  in.require(n >= 1 && n <= kMaxCameras, std::to_string(n) + " cameras", "1 to " + std::to_string(kMaxCameras));
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t i = 0; i < n && in.ok(); ++i) {
+    in.enter("camera", i);
+    if (auto camera = take_rig_camera(in)) cameras.push_back(*std::move(camera));
+    in.leave();
+  }
+  if (!in.finish()) return {};
+  return camera::Rig(std::move(cameras));
+}
+
+void put_info(const map::BundledMap& map, const MapFileInfo& info, ByteWriter& out) {
+  out.number(map.pyramid().scale_factor);
+  out.number(std::int32_t{map.pyramid().levels});
+  out.number(static_cast<std::uint8_t>(map.scale()));
+  out.text(place::kDescriptorKind);
+  out.number(info.vocabulary);
+  out.text(info.version);
+  out.text(info.data);
+}
+
+InfoSection take_info(ByteReader& in) {
+  InfoSection section;
+  section.pyramid.scale_factor = in.number<double>();
+  section.pyramid.levels = in.number<std::int32_t>();
+  const auto scale = in.number<std::uint8_t>();
+  const std::string kind = in.text();
+  section.info = {in.number<std::uint64_t>(), in.text(), in.text()};
+  section.scale = static_cast<map::Scale>(scale);
+  const bool pyramid = section.pyramid.scale_factor > 1 && section.pyramid.scale_factor <= 4 &&
+                       section.pyramid.levels >= 1 && section.pyramid.levels <= kMaxLevels;
+  in.require(pyramid, "a pyramid that cannot be", "levels in [1, 32] of a scale in (1, 4]");
+  in.require(scale <= static_cast<int>(map::Scale::kUnobservable), "an unknown scale",
+             "metric, up to scale or unobservable");
+  in.require(kind == place::kDescriptorKind, "features of kind " + kind, std::string(place::kDescriptorKind));
+  in.finish();
+  return section;
+}
+
+void put_keyframes(const map::BundledMap& map, const FileIds& ids, bool with_words, ByteWriter& out) {
+  out.count(map.num_keyframes());
+  for (const KeyframeId k : map.keyframe_ids()) {
+    const map::BundledKeyframe& keyframe = map.keyframe(k);
+    put_transform(keyframe.T_rig_world, out);
+    out.number(keyframe.parent.valid() ? ids.keyframe[keyframe.parent.index()].value() : -1);
+    put_frame(*keyframe.frame, keyframe.twist, with_words, out);
+  }
+}
+
+std::size_t take_keyframes(ByteReader& in, bool with_words, map::BundledMap& map) {
+  constexpr std::size_t kKeyframeBytes = kTransformBytes + 4 + 4 + 8 + 4;
+  constexpr std::size_t kCameraFrameBytes = 1 + 8 + 4 + 1;
+  const std::size_t n = in.count(kKeyframeBytes + map.rig().size() * kCameraFrameBytes);
+  std::size_t words_end = 0;
+  std::vector<KeyframeId> parents;
+  for (std::size_t i = 0; i < n && in.ok(); ++i) {
+    in.enter("keyframe", i);
+    const SE3 T_rig_world = take_transform(in);
+    const auto parent = in.number<std::int32_t>();
+    in.require(parent == -1 || in_range(parent, n), "a parent that does not exist", "a keyframe, or -1");
+    auto frame = take_frame(in, map.rig(), map.pyramid(), with_words, words_end);
+    in.leave();
+    if (!in.ok()) return 0;
+    map.add_keyframe(std::make_shared<const frame::BundledFrame>(std::move(frame)), T_rig_world, {}, {});
+    parents.emplace_back(parent);
+  }
+  if (!in.finish()) return 0;
+  in.require(map::hang_keyframes(map, KeyframeId(0), parents), "parents in a circle", "trees");
+  return words_end;
+}
+
+void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& out) {
+  out.count(map.num_landmarks());
+  for (const LandmarkId l : map.landmark_ids()) {
+    const map::Landmark& landmark = map.landmark(l);
+    out.numbers(landmark.position.data(), 3);
+    out.number(ids.keyframe[landmark.reference.keyframe.index()].value());
+    out.number(static_cast<std::uint16_t>(landmark.reference.keypoint.camera.value()));
+    out.number(landmark.reference.keypoint.keypoint.value());
+    out.number(ids.nearest_older(landmark.born).value());
+    out.number(landmark.expected);
+    out.number(landmark.found);
+    const auto observations = map.observations(l);
+    out.count(observations.size());
+    for (const map::Observation& o : observations) {
+      out.number(ids.keyframe[o.keyframe.index()].value());
+      out.number(o.feature.value());
+      out.number(static_cast<std::uint8_t>(o.aligned));
+    }
+  }
+}
+
+void take_landmarks(ByteReader& in, map::BundledMap& map) {
+  const std::size_t n = in.count(kLandmarkBytes);
+  for (std::size_t i = 0; i < n && in.ok(); ++i) {
+    in.enter("landmark", i);
+    take_landmark(in, map);
+    in.leave();
+  }
+  in.finish();
+}
+
+}  // namespace bslam::storage

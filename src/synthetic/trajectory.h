@@ -1,0 +1,52 @@
+// The true motion of the simulated rig: a smooth curve of poses, known exactly at any time.
+#pragma once
+
+#include <vector>
+
+#include "geometry/se3.h"
+
+namespace bslam::synthetic {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// Position and orientation the curve is drawn to. The body looks along x, y is to its left, z up.
+struct ControlPose {
+  Vector3d position = Vector3d::Zero();  // metres, world
+  double yaw = 0, pitch = 0, roll = 0;   // radians, unwrapped: R_world_body = Rz(yaw) Ry(pitch) Rx(roll)
+};
+
+// Uniform cubic B-spline over position and the three angles: twice continuously differentiable.
+class Trajectory {
+ public:
+  // Control pose i acts about the time (i - 1) * knot_spacing_s. At least four of them.
+  Trajectory(std::vector<ControlPose> control, double knot_spacing_s);
+
+  double duration_s() const { return (static_cast<double>(control_.size()) - 3.0) * knot_spacing_s_; }
+
+  // Times in seconds from the start of the trajectory; outside of [0, duration] the motion goes on along the end
+  // pieces' polynomials, which serves exposures that reach a few milliseconds over the end.
+  geometry::SE3 T_world_body(double time_s) const;
+  Vector3d velocity(double time_s) const;  // metres per second, world
+  double yaw_rate(double time_s) const;    // radians per second
+
+ private:
+  using Vector = Eigen::Matrix<double, 6, 1>;  // position, yaw, pitch, roll
+  Vector blend(double time_s, bool derivative) const;
+
+  std::vector<ControlPose> control_;
+  double knot_spacing_s_;
+};
+
+// Circles about the vertical axis through `centre`, looking along the motion, with gentle sway: for rooms without a
+// tour.
+struct OrbitOptions {
+  Vector3d centre = {0, 0, 1.5};  // metres
+  double radius = 1.5;            // metres
+  double period_s = 12.0;         // of one round
+  double duration_s = 12.0;
+  std::uint64_t seed = 1;
+};
+Trajectory make_orbit(const OrbitOptions& options);
+
+}  // namespace bslam::synthetic

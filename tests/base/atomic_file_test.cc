@@ -1,0 +1,72 @@
+#include "base/atomic_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include "dataset/data_on_disk.h"
+
+namespace bslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+int entries(const fs::path& folder) {
+  int count = 0;
+  for ([[maybe_unused]] const auto& entry : fs::directory_iterator(folder)) ++count;
+  return count;
+}
+
+TEST(AtomicFile, WritesAndReadsAnyBytes) {
+  const TemporaryFolder folder;
+  std::string bytes = "text\n";
+  bytes.push_back('\0');
+  for (int i = 0; i < 300000; ++i) bytes.push_back(static_cast<char>(i * 31));
+  ASSERT_TRUE(write_atomically(folder.path() / "file", bytes));
+  EXPECT_EQ(read_file(folder.path() / "file", 1 << 20).value(), bytes);
+  EXPECT_EQ(entries(folder.path()), 1);
+}
+
+TEST(AtomicFile, ReplacesAFile) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_atomically(folder.path() / "file", "a longer text"));
+  ASSERT_TRUE(write_atomically(folder.path() / "file", "short"));
+  EXPECT_EQ(read_file(folder.path() / "file", 100).value(), "short");
+}
+
+TEST(AtomicFile, LeavesNothingBehindOnError) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder.path() / "taken" / "inside");
+  const Status onto_folder = write_atomically(folder.path() / "taken", "text");
+  ASSERT_FALSE(onto_folder);
+  EXPECT_EQ(onto_folder.error().file, (folder.path() / "taken").string());
+  EXPECT_FALSE(write_atomically(folder.path() / "no" / "such" / "folder", "text"));
+  EXPECT_EQ(entries(folder.path()), 1);
+}
+
+TEST(AtomicFile, MayBeReadByOthersAsUsual) {
+  const TemporaryFolder folder;
+  const mode_t old = ::umask(022);
+  ASSERT_TRUE(write_atomically(folder.path() / "file", "text"));
+  ::umask(old);
+  EXPECT_EQ(fs::status(folder.path() / "file").permissions() & fs::perms::mask, fs::perms(0644));
+}
+
+TEST(ReadFile, RefusesWhatIsNoReadableFile) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(read_file(folder.path() / "none", 10).error().found, "No such file or directory");
+  EXPECT_EQ(read_file(folder.path(), 10).error().found, "a folder");
+  ASSERT_EQ(::mkfifo((folder.path() / "pipe").c_str(), 0600), 0);
+  EXPECT_FALSE(read_file(folder.path() / "pipe", 10));
+}
+
+TEST(ReadFile, RefusesWhatIsTooLarge) {
+  const TemporaryFolder folder;
+  write_text(folder.path() / "file", "12345");
+  EXPECT_TRUE(read_file(folder.path() / "file", 5));
+  EXPECT_FALSE(read_file(folder.path() / "file", 4));
+  write_text(folder.path() / "empty", "");
+  EXPECT_EQ(read_file(folder.path() / "empty", 0).value(), "");
+}
+
+}  // namespace
+}  // namespace bslam

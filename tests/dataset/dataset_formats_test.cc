@@ -1,0 +1,181 @@
+// The layouts beside EuRoC, and real recordings where they are present.
+#include <gtest/gtest.h>
+
+#include "dataset/data_on_disk.h"
+#include "dataset/dataset.h"
+#include "dataset/frame_reader.h"
+#include "rig_formats/rig_file.h"
+
+namespace bslam::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+using image::ImageState;
+
+class SmallKitti : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string times;
+    for (int k = 0; k < 10; ++k) {
+      times += std::to_string(k) + ".044989e-01\n";
+      for (const int c : {0, 1}) write_picture(image(k, c), 60, 20, k);
+    }
+    write_text(data() / "times.txt", times);
+    write_text(data() / "calib.txt",
+               "P0: 50 0 30 0 0 50 10 0 0 0 1 0\nP1: 50 0 30 -25 0 50 10 0 0 0 1 0\n"
+               "P2: 50 0 30 3 0 50 10 0 0 0 1 0\nP3: 50 0 30 -22 0 50 10 0 0 0 1 0\n");
+  }
+  const fs::path& data() const { return folder_.path(); }
+  fs::path image(int k, int c) const {
+    return data() / ("image_" + std::to_string(c)) / ("00000" + std::to_string(k) + ".png");
+  }
+  Result<Dataset> open() const { return open_dataset({.path = data()}); }
+  TemporaryFolder folder_;
+};
+
+TEST_F(SmallKitti, Opens) {
+  write_text(data() / "poses.txt", "");
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->format, DatasetFormat::kKitti);
+  EXPECT_EQ(dataset->rig.size(), 2u);
+  EXPECT_NEAR(dataset->rig.rig_from_cam(1).translation().x(), 0.5, 1e-12);
+  ASSERT_EQ(dataset->frames.size(), 10u);
+  EXPECT_EQ(dataset->frames[1].time_ns, 104'498'900);
+  EXPECT_EQ(dataset->ground_truth, data() / "poses.txt");
+  EXPECT_EQ(read_frame(*dataset, 9).images[1].image.width(), 60);
+}
+
+TEST_F(SmallKitti, AMissingImageIsDamagedAndKeepsItsPlace) {
+  fs::remove(image(4, 1));
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(read_frame(*dataset, 4).images[1].state, ImageState::kDamaged);
+  EXPECT_EQ(read_frame(*dataset, 5).images[1].state, ImageState::kPresent);
+}
+
+TEST_F(SmallKitti, ImagesWithoutATimeAreWarnedOf) {
+  write_picture(data() / "image_0" / "000010.png", 60, 20);
+  const auto dataset = open();
+  ASSERT_TRUE(dataset);
+  EXPECT_EQ(dataset->frames.size(), 10u);
+  EXPECT_EQ(dataset->warnings.size(), 1u);
+}
+
+TEST_F(SmallKitti, IsChecked) {
+  write_text(data() / "times.txt", "0.0\nsoon\n");
+  EXPECT_EQ(open().error().key, "line 2");
+  write_text(data() / "times.txt", "");
+  EXPECT_EQ(open().error().found, "no times");
+  fs::remove(data() / "times.txt");
+  EXPECT_FALSE(open());
+  EXPECT_FALSE(open_dataset({.path = data(), .format = DatasetFormat::kKitti}));
+}
+
+TEST_F(SmallKitti, NeedsALineForEveryCamera) {
+  write_text(data() / "calib.txt", "P0: 50 0 30 0 0 50 10 0 0 0 1 0\n");
+  EXPECT_FALSE(open());
+  EXPECT_TRUE(open_dataset({.path = data(), .cameras = {0}}));
+  fs::remove(data() / "calib.txt");
+  EXPECT_EQ(open().error().file, (data() / "calib.txt").string());
+}
+
+TEST(FolderDataset, OpensWithARigFile) {
+  const TemporaryFolder folder;
+  write_small_euroc(folder.path() / "euroc");
+  const fs::path data = folder.path() / "plain";
+  for (const char* camera : {"cam0", "cam1"}) {
+    fs::create_directories(data);
+    fs::rename(folder.path() / "euroc" / "mav0" / camera / "data", data / camera);
+  }
+  ASSERT_TRUE(
+      rig_formats::write_rig(rig_formats::read_rig(folder.path() / "euroc").value(), folder.path() / "rig.yaml"));
+  const auto dataset = open_dataset({.path = data, .rig_file = folder.path() / "rig.yaml"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->format, DatasetFormat::kFolder);
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
+  EXPECT_EQ(dataset->first_time_ns, kSmallStart);
+  EXPECT_EQ(read_frame(*dataset, 3).images[1].state, ImageState::kPresent);
+  EXPECT_EQ(open_dataset({.path = data}).error().expected, "a rig file (--rig FILE)");
+  EXPECT_FALSE(open_dataset({.path = data, .format = DatasetFormat::kEuroc}));
+  EXPECT_FALSE(open_dataset({.path = data, .format = DatasetFormat::kKitti}));
+}
+
+TEST(Dataset, SaysWhatLayoutsItLookedFor) {
+  const TemporaryFolder folder;
+  const auto dataset = open_dataset({.path = folder.path()});
+  ASSERT_FALSE(dataset);
+  for (const char* word : {"euroc", "kitti", "folder"}) {
+    EXPECT_NE(dataset.error().expected.find(word), std::string::npos) << word;
+  }
+}
+
+struct Recorded {
+  const char* name;
+  std::size_t cameras, frames;
+  int width, height;
+  const char* model;
+};
+
+class RecordedDataset : public testing::TestWithParam<Recorded> {};
+
+TEST_P(RecordedDataset, OpensWithItsFramesAndSizes) {
+  const auto path = shared_data(GetParam().name);
+  if (!path) GTEST_SKIP() << "../shared/data/" << GetParam().name << " is not there";
+  const auto dataset = open_dataset({.path = *path});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->rig.size(), GetParam().cameras);
+  EXPECT_EQ(dataset->frames.size(), GetParam().frames);
+  EXPECT_TRUE(dataset->warnings.empty());
+  EXPECT_TRUE(dataset->rig.any_overlap());
+  for (std::size_t i = 0; i < dataset->rig.size(); ++i) {
+    EXPECT_EQ(camera::model_name(dataset->rig.camera(i).model), GetParam().model);
+  }
+  std::vector<int> seen(dataset->rig.size(), 0);
+  for (std::size_t k = 0; k < dataset->frames.size(); k += 3) {
+    const image::ImageBundle bundle = read_frame(*dataset, k);
+    for (std::size_t i = 0; i < bundle.images.size(); ++i) {
+      const image::CameraImage& image = bundle.images[i];
+      ASSERT_EQ(image.state != ImageState::kMissing, dataset->frames[k].images[i].has_value());
+      if (image.state == ImageState::kMissing) continue;
+      ASSERT_EQ(image.state, ImageState::kPresent);
+      EXPECT_EQ(image.image.width(), GetParam().width);
+      EXPECT_EQ(image.image.height(), GetParam().height);
+      ++seen[i];
+    }
+  }
+  for (const int images : seen) EXPECT_GT(images, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sets, RecordedDataset,
+                         testing::Values(Recorded{"kitti_0039", 4, 160, 1392, 512, "pinhole-radtan"},
+                                         Recorded{"kitti_06_start", 2, 20, 1226, 370, "pinhole"},
+                                         Recorded{"euroc_v101_rest", 2, 12, 752, 480, "pinhole-radtan"},
+                                         Recorded{"aria_gen2_4cam", 4, 9, 512, 512, "kannala-brandt"}),
+                         [](const auto& instance) { return instance.param.name; });
+
+// Cameras 2 and 3 of this recording have 25 images each among the 160 of cameras 0 and 1.
+TEST(RealDataset, CamerasWithFewImagesJoinTheFramesOfTheOthers) {
+  const auto path = shared_data("kitti_0039");
+  if (!path) GTEST_SKIP() << "../shared/data/kitti_0039 is not there";
+  const auto dataset = open_dataset({.path = *path});
+  ASSERT_TRUE(dataset);
+  std::vector<int> counts(4, 0);
+  for (const FrameEntry& frame : dataset->frames) {
+    for (std::size_t i = 0; i < 4; ++i) counts[i] += frame.images[i].has_value();
+  }
+  EXPECT_EQ(counts, (std::vector<int>{160, 160, 25, 25}));
+}
+
+// The stamps of these cameras differ by some microseconds, and every image keeps its own.
+TEST(RealDataset, ImagesKeepTheirOwnTimes) {
+  const auto path = shared_data("aria_gen2_4cam");
+  if (!path) GTEST_SKIP() << "../shared/data/aria_gen2_4cam is not there";
+  const auto dataset = open_dataset({.path = *path});
+  ASSERT_TRUE(dataset);
+  EXPECT_EQ(dataset->frames[0].images[0]->time_ns, 7385791599780);
+  EXPECT_EQ(dataset->frames[0].images[3]->time_ns, 7385791599365);
+}
+
+}  // namespace
+}  // namespace bslam::dataset

@@ -1,0 +1,408 @@
+#include "dataset/dataset.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "dataset/data_on_disk.h"
+#include "dataset/frame_reader.h"
+#include "rig_formats/rig_file.h"
+
+namespace bslam::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+using image::ImageState;
+
+// A small EuRoC data set to damage.
+class SmallEuroc : public testing::Test {
+ protected:
+  void SetUp() override { write_small_euroc(data()); }
+
+  fs::path data() const { return folder_.path() / "small"; }
+  fs::path camera(int c) const { return data() / "mav0" / ("cam" + std::to_string(c)); }
+  fs::path image(int k, int c = 0) const { return camera(c) / "data" / small_image_name(k); }
+  Result<Dataset> open() const { return open_dataset({.path = data()}); }
+
+  void edit(const fs::path& file, const std::string& from, const std::string& to) {
+    std::string text = read_text(file);
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    write_text(file, text.replace(at, from.size(), to));
+  }
+  std::string line(int k) const { return small_list({k}).substr(small_list({}).size()); }
+
+  // Opening is refused; the message names the file.
+  void expect_error(const fs::path& file, std::string_view found) const {
+    const auto dataset = open();
+    ASSERT_FALSE(dataset);
+    EXPECT_EQ(dataset.error().file, file.string()) << dataset.error().message();
+    EXPECT_NE(dataset.error().found.find(found), std::string::npos) << dataset.error().message();
+  }
+
+  // It opens, and of all images only image 20 of camera 0 is damaged.
+  void expect_one_damaged() const {
+    const auto dataset = open();
+    ASSERT_TRUE(dataset) << dataset.error().message();
+    ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
+    for (std::size_t k = 0; k < dataset->frames.size(); ++k) {
+      const image::ImageBundle bundle = read_frame(*dataset, k);
+      EXPECT_EQ(bundle.images[0].state, k == 20 ? ImageState::kDamaged : ImageState::kPresent) << k;
+      EXPECT_EQ(bundle.images[0].image.empty(), k == 20);
+      EXPECT_EQ(bundle.images[1].state, ImageState::kPresent);
+    }
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(SmallEuroc, Opens) {
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->name, "small");
+  EXPECT_EQ(dataset->format, DatasetFormat::kEuroc);
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
+  EXPECT_EQ(dataset->first_time_ns, kSmallStart);
+  EXPECT_EQ(dataset->frames[3].time_ns, kSmallStart + 3 * kSmallInterval);
+  EXPECT_EQ(dataset->cameras_used, (std::vector<int>{0, 1}));
+  EXPECT_EQ(dataset->rig.camera(std::size_t{1}).name, "cam1");
+  EXPECT_NEAR(dataset->rig.rig_from_cam(1).translation().x(), 0.1, 1e-12);
+  EXPECT_TRUE(dataset->warnings.empty());
+  EXPECT_FALSE(dataset->ground_truth);
+}
+
+TEST_F(SmallEuroc, ReadsFrames) {
+  const auto dataset = open();
+  ASSERT_TRUE(dataset);
+  const image::ImageBundle bundle = read_frame(*dataset, 5);
+  EXPECT_EQ(bundle.id, FrameId(5));
+  EXPECT_EQ(bundle.time_ns, kSmallStart + 5 * kSmallInterval);
+  ASSERT_EQ(bundle.images.size(), 2u);
+  for (const image::CameraImage& image : bundle.images) {
+    EXPECT_EQ(image.state, ImageState::kPresent);
+    EXPECT_EQ(image.time_ns, bundle.time_ns);
+    EXPECT_EQ(image.image.width(), kSmallWidth);
+    EXPECT_EQ(image.image.height(), kSmallHeight);
+  }
+}
+
+TEST_F(SmallEuroc, OpensByItsMav0FolderToo) {
+  const auto dataset = open_dataset({.path = data() / "mav0"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->name, "small");
+  EXPECT_EQ(open_dataset({.path = data() / ""}).value().name, "small");
+}
+
+TEST_F(SmallEuroc, NamesItsGroundTruth) {
+  write_text(data() / "mav0" / "state_groundtruth_estimate0" / "data.csv", "#\n");
+  EXPECT_EQ(open().value().ground_truth, data() / "mav0" / "state_groundtruth_estimate0" / "data.csv");
+}
+
+TEST_F(SmallEuroc, TakesCamerasInTheOrderAsked) {
+  const auto dataset = open_dataset({.path = data(), .cameras = {1, 0}});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->rig.camera(std::size_t{0}).name, "cam1");
+  EXPECT_EQ(dataset->frames[0].images[0]->path, image(0, 1));
+  EXPECT_EQ(open_dataset({.path = data(), .cameras = {1}}).value().rig.size(), 1u);
+  ASSERT_TRUE(dataset->whole_rig);
+  EXPECT_EQ(dataset->whole_rig->camera(std::size_t{0}).name, "cam0");
+  EXPECT_EQ(open_dataset({.path = data(), .cameras = {1}}).value().whole_rig->size(), 2u);
+}
+
+TEST_F(SmallEuroc, DoesNotLookAtCamerasNotAskedFor) {
+  write_text(camera(1) / "sensor.yaml", "broken: [");
+  EXPECT_FALSE(open());
+  const auto one = open_dataset({.path = data(), .cameras = {0}});
+  ASSERT_TRUE(one);
+  EXPECT_FALSE(one->whole_rig);
+}
+
+TEST_F(SmallEuroc, RefusesCamerasTwiceOrNotThere) {
+  for (const std::vector<int>& cameras : {std::vector<int>{0, 9}, {0, 0}, {-1}, {2}}) {
+    const auto dataset = open_dataset({.path = data(), .cameras = cameras});
+    ASSERT_FALSE(dataset);
+    EXPECT_EQ(dataset.error().file, "--cameras");
+  }
+}
+
+TEST_F(SmallEuroc, KeepsTheRangeAskedFor) {
+  const auto dataset = open_dataset({.path = data(), .begin_s = 0.1, .end_s = 0.25});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->frames.size(), 3u);
+  EXPECT_EQ(dataset->frames.front().time_ns, kSmallStart + 2 * kSmallInterval);
+  EXPECT_EQ(dataset->first_time_ns, kSmallStart);
+}
+
+TEST_F(SmallEuroc, RefusesEmptyAndReversedRanges) {
+  EXPECT_EQ(open_dataset({.path = data(), .begin_s = 5, .end_s = 1}).error().file, "--begin");
+  EXPECT_EQ(open_dataset({.path = data(), .begin_s = 1, .end_s = 1}).error().file, "--begin");
+  EXPECT_EQ(open_dataset({.path = data(), .begin_s = 100}).error().file, "--begin");
+  EXPECT_EQ(open_dataset({.path = data(), .end_s = 0}).error().file, "--end");
+  EXPECT_FALSE(open_dataset({.path = data(), .begin_s = -1}));
+  EXPECT_FALSE(open_dataset({.path = data(), .begin_s = std::nan("")}));
+}
+
+TEST_F(SmallEuroc, IgnoresARigBesideItUnlessAskedFor) {
+  write_text(data() / "rig.yaml", "bslam_rig: 1\ncameras: nonsense\n");
+  EXPECT_TRUE(open());
+  EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
+}
+
+TEST_F(SmallEuroc, TakesAnotherRig) {
+  std::string yaml = rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value());
+  for (std::size_t at = 0; (at = yaml.find("time_offset_s: 0.0", at)) != std::string::npos; ++at) {
+    yaml.replace(at, 18, "time_offset_s: 0.5");
+  }
+  write_text(data() / "rig.yaml", yaml);
+  const auto dataset = open_dataset({.path = data(), .rig_file = data() / "rig.yaml"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_TRUE(dataset->warnings.empty());
+  const auto rig_formats::without = open_dataset({.path = data()});
+  ASSERT_TRUE(rig_formats::without);
+  ASSERT_EQ(rig_formats::without->warnings.size(), 1u);
+  EXPECT_NE(rig_formats::without->warnings[0].find(
+                "gives time offsets (cam0 500 ms, cam1 500 ms), which are not used without --rig"),
+            std::string::npos);
+  EXPECT_EQ(dataset->first_time_ns, kSmallStart + 500'000'000);
+  EXPECT_EQ(read_frame(*dataset, 0).images[1].time_ns, kSmallStart + 500'000'000);
+  fs::remove_all(camera(1));
+  EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
+  EXPECT_TRUE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml", .cameras = {0}}));
+}
+
+TEST_F(SmallEuroc, AMaskThatDoesNotFitIsAnError) {
+  std::string yaml = rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value());
+  yaml.replace(yaml.find("mask: null"), 10, "mask: mask.png");
+  write_text(data() / "rig.yaml", yaml);
+  EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
+  write_picture(data() / "mask.png", 5, 5);
+  EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
+  write_picture(data() / "mask.png", kSmallWidth, kSmallHeight);
+  EXPECT_TRUE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
+}
+
+TEST_F(SmallEuroc, TellsWhereAnImageIsMissingFromAnInstant) {
+  std::vector<int> some;
+  for (int k = 0; k < kSmallFrames; k += 2) some.push_back(k);
+  write_text(camera(1) / "data.csv", small_list(some));
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
+  EXPECT_EQ(read_frame(*dataset, 2).images[1].state, ImageState::kPresent);
+  EXPECT_EQ(read_frame(*dataset, 3).images[1].state, ImageState::kMissing);
+}
+
+// ---- what folders look like when they are wrong
+
+TEST_F(SmallEuroc, NoSuchFolder) {
+  fs::remove_all(data());
+  expect_error(data(), "no such folder");
+}
+
+TEST_F(SmallEuroc, AFileInsteadOfAFolder) {
+  fs::remove_all(data());
+  write_text(data(), "text");
+  expect_error(data(), "a file");
+}
+
+TEST_F(SmallEuroc, NoCameraInIt) {
+  fs::remove_all(data() / "mav0");
+  expect_error(data(), "no data set of a known layout");
+  fs::create_directories(data() / "mav0");
+  expect_error(data() / "mav0", "no camera");
+}
+
+TEST_F(SmallEuroc, SensorYamlIsMissing) {
+  fs::remove(camera(0) / "sensor.yaml");
+  expect_error(camera(0) / "sensor.yaml", "No such file");
+}
+
+TEST_F(SmallEuroc, WithoutASensorYamlTheRigBesideItCounts) {
+  write_text(data() / "rig.yaml", rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value()));
+  edit(data() / "rig.yaml", "cam1", "right");
+  fs::remove(camera(0) / "sensor.yaml");
+  expect_error(camera(0) / "sensor.yaml", "No such file");  // half of them is a damaged recording
+  fs::remove(camera(1) / "sensor.yaml");
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->rig.camera(std::size_t{1}).name, "right");
+}
+
+TEST_F(SmallEuroc, SensorYamlIsNotYaml) {
+  write_text(camera(0) / "sensor.yaml", "a: [1, 2\n b}");
+  expect_error(camera(0) / "sensor.yaml", "no YAML");
+  EXPECT_EQ(open().error().key, "line 2");
+}
+
+TEST_F(SmallEuroc, NegativeFocalLength) {
+  edit(camera(0) / "sensor.yaml", "[20, 20,", "[-200.0, 200.0,");
+  expect_error(camera(0) / "sensor.yaml", "focal length -200");
+}
+
+TEST_F(SmallEuroc, NanFocalLength) {
+  edit(camera(0) / "sensor.yaml", "[20, 20,", "[.nan, 20,");
+  expect_error(camera(0) / "sensor.yaml", ".nan");
+}
+
+TEST_F(SmallEuroc, ThreeIntrinsics) {
+  edit(camera(0) / "sensor.yaml", "[20, 20,", "[20,");
+  expect_error(camera(0) / "sensor.yaml", "3 numbers");
+}
+
+TEST_F(SmallEuroc, UnknownCameraModel) {
+  edit(camera(0) / "sensor.yaml", "radial-tangential", "telepathic");
+  expect_error(camera(0) / "sensor.yaml", "telepathic");
+}
+
+TEST_F(SmallEuroc, TransformIsNoRotation) {
+  edit(camera(1) / "sensor.yaml", "[1, 0, 0,", "[2.0, 0, 0,");
+  expect_error(camera(1) / "sensor.yaml", "no rotation");
+}
+
+TEST_F(SmallEuroc, TransformIsMirrored) {
+  edit(camera(1) / "sensor.yaml", "[1, 0, 0,", "[-1, 0, 0,");
+  expect_error(camera(1) / "sensor.yaml", "mirrored");
+}
+
+TEST_F(SmallEuroc, TransformHasFifteenNumbers) {
+  edit(camera(1) / "sensor.yaml", "[1, 0, 0,", "[1, 0,");
+  expect_error(camera(1) / "sensor.yaml", "15 numbers");
+}
+
+TEST_F(SmallEuroc, ResolutionOfAnotherCamera) {
+  edit(camera(0) / "sensor.yaml", "[32, 24]", "[640, 480]");
+  expect_error(camera(0) / "data", "32x24");
+}
+
+TEST_F(SmallEuroc, EveryImageOfACameraHasAnotherSize) {
+  for (int k = 0; k < kSmallFrames; ++k) write_picture(image(k, 1), 64, 48);
+  expect_error(camera(1) / "data", "64x48");
+}
+
+TEST_F(SmallEuroc, EmptyList) {
+  for (const char* text : {"", "#timestamp [ns],filename\n", "\r\n\n"}) {
+    write_text(camera(0) / "data.csv", text);
+    expect_error(camera(0) / "data.csv", "no images");
+  }
+}
+
+TEST_F(SmallEuroc, ListIsMissing) {
+  fs::remove(camera(0) / "data.csv");
+  expect_error(camera(0) / "data.csv", "No such file");
+}
+
+TEST_F(SmallEuroc, ListHoldsWords) {
+  edit(camera(0) / "data.csv", line(0), "then,image.png\n");
+  expect_error(camera(0) / "data.csv", "then");
+  EXPECT_EQ(open().error().key, "line 2");
+}
+
+TEST_F(SmallEuroc, ListWithoutFileNames) {
+  edit(camera(0) / "data.csv", line(0), "123\n");
+  expect_error(camera(0) / "data.csv", "123");
+}
+
+TEST_F(SmallEuroc, TimestampsBeyondReason) {
+  for (const char* time : {"-5", "99999999999999999999", "9223372036854775807", "1.5"}) {
+    write_text(camera(0) / "data.csv", std::string(time) + ",a.png\n");
+    expect_error(camera(0) / "data.csv", time);
+  }
+}
+
+TEST_F(SmallEuroc, ATimestampTwiceIsDroppedWithAWarning) {
+  edit(camera(0) / "data.csv", line(4), line(4) + line(4));
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
+  EXPECT_EQ(dataset->warnings.size(), 1u);
+}
+
+TEST_F(SmallEuroc, TimestampsOutOfOrderAreSortedWithAWarning) {
+  edit(camera(0) / "data.csv", line(5) + line(6) + line(7), line(7) + line(6) + line(5));
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[6].images[0]->path, image(6));
+  EXPECT_EQ(dataset->warnings.size(), 1u);
+}
+
+TEST_F(SmallEuroc, CamerasWithNoCommonTime) {
+  std::string list;
+  for (int k = 0; k < 20; ++k) list += std::to_string(9'000'000'000'000'000'000 + k) + "," + small_image_name(k) + "\n";
+  write_text(camera(1) / "data.csv", list);
+  expect_error(data(), "no image within 2 ms of one of cam0");
+}
+
+TEST_F(SmallEuroc, CamerasThatAlternateNeedALargerTolerance) {
+  std::string list;
+  for (int k = 0; k < kSmallFrames; ++k) {
+    list += std::to_string(kSmallStart + k * kSmallInterval + kSmallInterval / 2) + "," + small_image_name(k) + "\n";
+  }
+  write_text(camera(1) / "data.csv", list);
+  expect_error(data(), "the nearest is 25 ms away");
+  EXPECT_TRUE(open_dataset({.path = data(), .sync_tolerance_s = 0.026}));
+}
+
+TEST_F(SmallEuroc, NoneOfTheListedImagesExists) {
+  fs::remove_all(camera(1) / "data");
+  expect_error(camera(1) / "data", "none of the listed images");
+}
+
+TEST_F(SmallEuroc, OneImageIsTruncated) {
+  const std::string bytes = read_text(image(20));
+  ASSERT_GT(bytes.size(), 500u);
+  write_text(image(20), bytes.substr(0, 500));
+  expect_one_damaged();
+}
+
+TEST_F(SmallEuroc, OneImageIsEmpty) {
+  write_text(image(20), "");
+  expect_one_damaged();
+}
+
+TEST_F(SmallEuroc, OneImageIsMissing) {
+  fs::remove(image(20));
+  expect_one_damaged();
+}
+
+TEST_F(SmallEuroc, AnImageIsATextFile) {
+  write_text(image(20), "not an image");
+  expect_one_damaged();
+}
+
+TEST_F(SmallEuroc, OneImageHasAnotherSize) {
+  write_picture(image(20), 31, 24);
+  expect_one_damaged();
+}
+
+TEST_F(SmallEuroc, TheFirstImagesMayBeDamaged) {
+  for (int k = 0; k < 10; ++k) write_text(image(k), "not an image");
+  EXPECT_TRUE(open());
+  fs::remove(image(0));
+  write_picture(image(1), 10, 10);
+  EXPECT_TRUE(open_dataset({.path = data(), .cameras = {1}}));
+}
+
+TEST_F(SmallEuroc, ReadsListsFromOtherSystems) {
+  std::string text = "#timestamp [ns],filename\r\n\r\n# a word\r\n";
+  for (int k = 0; k < kSmallFrames; ++k) {
+    const std::string l = line(k);
+    text += "  " + l.substr(0, l.find(',')) + " , " + small_image_name(k) + " \r\n";
+  }
+  write_text(camera(0) / "data.csv", text + "\r\n\r\n");
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(read_frame(*dataset, 23).images[0].state, ImageState::kPresent);
+}
+
+TEST_F(SmallEuroc, IncompleteImagesPrintNothing) {
+  write_text(image(20), read_text(image(20)).substr(0, 300));
+  write_text(image(21), "");
+  const auto dataset = open();
+  ASSERT_TRUE(dataset);
+  testing::internal::CaptureStderr();
+  for (std::size_t k = 19; k < 23; ++k) read_frame(*dataset, k);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+}  // namespace
+}  // namespace bslam::dataset

@@ -1,0 +1,89 @@
+#include "dataset/frame_grouping.h"
+
+#include <gtest/gtest.h>
+
+namespace bslam::dataset {
+namespace {
+
+constexpr TimeNs kMs = 1'000'000;
+
+std::vector<image_files::ImageFile> at_ms(const std::vector<double>& times_ms) {
+  std::vector<image_files::ImageFile> images;
+  for (const double t : times_ms) images.push_back({"", static_cast<TimeNs>(t * 1e6)});
+  return images;
+}
+
+// Per frame, the times of its images in ms; -1 = none.
+std::vector<std::vector<double>> times(const FrameGrouping& grouping) {
+  std::vector<std::vector<double>> out;
+  for (const FrameEntry& frame : grouping.frames) {
+    out.emplace_back();
+    for (const auto& image : frame.images) out.back().push_back(image ? static_cast<double>(image->time_ns) / 1e6 : -1);
+  }
+  return out;
+}
+
+FrameGrouping group(const std::vector<std::vector<image_files::ImageFile>>& images) {
+  return group_frames(images, 2 * kMs);
+}
+
+TEST(FrameGrouping, JoinsImagesWithinTheToleranceAndKeepsTheirTimes) {
+  const auto g = group({at_ms({0, 100, 200}), at_ms({0.5, 99, 202}), at_ms({1.9, 100, 199})});
+  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, 0.5, 1.9}, {100, 99, 100}, {200, 202, 199}}));
+  EXPECT_EQ(g.frames[1].time_ns, 100 * kMs);
+  EXPECT_EQ(g.unassigned, (std::vector<int>{0, 0, 0}));
+}
+
+TEST(FrameGrouping, CamerasThatFireElsewhereMakeNoFrames) {
+  const auto g = group({at_ms({0, 100, 200}), at_ms({10, 101, 150, 190})});
+  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, -1}, {100, 101}, {200, -1}}));
+  EXPECT_EQ(g.unassigned, (std::vector<int>{0, 3}));
+  EXPECT_EQ(g.shared_with_camera0, (std::vector<int>{3, 1}));
+}
+
+TEST(FrameGrouping, AFasterCameraDoesNotRaiseTheFrameRate) {
+  const auto g = group({at_ms({0, 100, 200, 300}), at_ms({0, 50, 100, 150, 200, 250, 300})});
+  EXPECT_EQ(g.frames.size(), 4u);
+  EXPECT_EQ(g.unassigned[1], 3);
+}
+
+TEST(FrameGrouping, OthersGoOnWhereCamera0HasAGap) {
+  const auto g = group({at_ms({0, 100, 500}), at_ms({0, 100, 200, 300, 400, 500, 600}), at_ms({301, 600.5})});
+  EXPECT_EQ(
+      times(g),
+      (std::vector<std::vector<double>>{
+          {0, 0, -1}, {100, 100, -1}, {-1, 200, -1}, {-1, 300, 301}, {-1, 400, -1}, {500, 500, -1}, {-1, 600, 600.5}}));
+  const auto h = group(
+      {at_ms({0, 100, 200, 300, 700, 800}), at_ms({0, 100, 200, 300, 400, 500, 600, 700}), at_ms({300, 499, 900})});
+  EXPECT_EQ(times(h), (std::vector<std::vector<double>>{{0, 0, -1},
+                                                        {100, 100, -1},
+                                                        {200, 200, -1},
+                                                        {300, 300, 300},
+                                                        {-1, 400, -1},
+                                                        {-1, 500, 499},
+                                                        {-1, 600, -1},
+                                                        {700, 700, -1},
+                                                        {800, -1, -1},
+                                                        {-1, -1, 900}}));
+  EXPECT_EQ(h.frames[5].time_ns, 499 * kMs);
+}
+
+TEST(FrameGrouping, TheNearerOfTwoImagesStays) {
+  const auto g = group({at_ms({0, 100}), at_ms({-1.5, 0.5, 99, 100.5})});
+  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, 0.5}, {100, 100.5}}));
+  EXPECT_EQ(g.unassigned[1], 2);
+  EXPECT_EQ(g.shared_with_camera0[1], 2);
+}
+
+TEST(FrameGrouping, OneImageOfCamera0IsEnough) {
+  const auto g = group({at_ms({50}), at_ms({49, 200})});
+  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{50, 49}, {-1, 200}}));
+}
+
+TEST(FrameGrouping, OneCameraKeepsEveryImage) {
+  const auto g = group({at_ms({0, 1, 2, 50})});
+  EXPECT_EQ(g.frames.size(), 4u);
+}
+
+}  // namespace
+}  // namespace bslam::dataset

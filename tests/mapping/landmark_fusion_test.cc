@@ -1,0 +1,207 @@
+// Landmarks looked for in a keyframe of a simulated map, with the truth about who shows what.
+#include "mapping/landmark_fusion.h"
+
+#include <gtest/gtest.h>
+
+#include "mapping/simulated_map.h"
+
+namespace bslam::mapping {
+namespace {
+
+using map::SimulatedMap;
+const map::FeatureModel kFeatures{.sigma_px = synthetic::FeatureSimulatorOptions().sigma_px};
+constexpr KeyframeId kFirst(0), kSecond(1), kThird(2);
+
+synthetic::FeatureSimulator simulator(camera::Rig rig) {
+  synthetic::FeatureSimulatorOptions options;
+  options.landmarks = 3000;
+  options.max_keypoints = 500;
+  return synthetic::FeatureSimulator(std::move(rig), synthetic::make_orbit({}), options);
+}
+
+// Keyframes 0 and 1 share their landmarks; keyframe 2 has its own, so that what all see is in the map twice.
+SimulatedMap doubled_map(camera::Rig rig) {
+  SimulatedMap world(simulator(std::move(rig)));
+  world.add_keyframe(FrameId(0), 0.0);
+  world.add_keyframe(FrameId(1), 0.1);
+  world.landmark_of.clear();
+  world.add_keyframe(FrameId(2), 0.2);
+  return world;
+}
+
+int truth_of(const SimulatedMap& world, LandmarkId l) { return world.truth_of_landmark.at(l.value()); }
+
+// Of the searched landmarks and the target's, pairs that are one in truth.
+std::vector<std::pair<LandmarkId, LandmarkId>> pairs(const SimulatedMap& world, KeyframeId a, KeyframeId b) {
+  std::vector<std::pair<LandmarkId, LandmarkId>> out;
+  for (const LandmarkId l : landmarks_of(world.map, a)) {
+    for (const LandmarkId m : landmarks_of(world.map, b)) {
+      if (l != m && truth_of(world, l) == truth_of(world, m)) out.emplace_back(l, m);
+    }
+  }
+  return out;
+}
+
+class LandmarkFusion : public ::testing::TestWithParam<int> {
+ protected:
+  camera::Rig rig() const { return synthetic::ring_rig(GetParam()); }
+};
+
+TEST_P(LandmarkFusion, LandmarksOfAKeyframeAreInOrderAndDistinct) {
+  const SimulatedMap world = doubled_map(rig());
+  const std::vector<LandmarkId> list = landmarks_of(world.map, kSecond);
+  EXPECT_GT(list.size(), 100u);
+  EXPECT_EQ(std::adjacent_find(list.begin(), list.end(), std::greater_equal<>()), list.end());
+}
+
+TEST_P(LandmarkFusion, WhatIsFoundAtAFreeFeatureBecomesAnObservation) {
+  const SimulatedMap world = doubled_map(rig());
+  map::MapDraft draft = world.draft();
+  const std::vector<LandmarkId> searched = landmarks_of(world.map, kFirst);
+  std::vector<std::pair<LandmarkId, FeatureId>> lost;
+  for (const LandmarkId l : searched) {
+    for (const map::Observation& o : world.map.observations(l)) {
+      if (o.keyframe == kSecond) lost.emplace_back(l, o.feature);
+    }
+  }
+  for (const auto& [l, feature] : lost) draft.remove_observation(l, kSecond);
+  const FusionReport report = fuse_into(kSecond, searched, Keep::kSearched, {}, kFeatures, draft);
+  int back = 0, elsewhere = 0;
+  for (const auto& [l, feature] : lost) back += draft.map().landmark_of(kSecond, feature) == l;
+  for (const LandmarkId l : landmarks_of(draft.map(), kSecond)) {
+    for (const map::Observation& o : draft.map().observations(l)) {
+      if (o.keyframe != kSecond || !std::ranges::binary_search(searched, l)) continue;
+      EXPECT_FALSE(o.aligned);
+      elsewhere += map::shown_by(world.frames[1], o.feature) != truth_of(world, l);
+    }
+  }
+  EXPECT_GT(back, static_cast<int>(0.85 * static_cast<double>(lost.size())));
+  EXPECT_LE(elsewhere, back / 100);
+  EXPECT_GE(report.added, back);
+  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+}
+
+TEST_P(LandmarkFusion, LandmarksFoundAtOneFeatureBecomeOne) {
+  const SimulatedMap world = doubled_map(rig());
+  const auto doubles = pairs(world, kSecond, kThird);
+  ASSERT_GT(doubles.size(), 100u);
+  map::MapDraft draft = world.draft();
+  const FusionReport report =
+      fuse_into(kThird, landmarks_of(world.map, kSecond), Keep::kSearched, {}, kFeatures, draft);
+  int one = 0, wrong = 0;
+  for (const auto& [l, m] : doubles) one += draft.map().resolve(l) == draft.map().resolve(m);
+  for (const LandmarkId l : world.map.landmark_ids()) {
+    if (!draft.map().alive(l)) wrong += truth_of(world, l) != truth_of(world, draft.map().resolve(l));
+  }
+  EXPECT_GT(one, static_cast<int>(0.85 * static_cast<double>(doubles.size())));
+  EXPECT_LE(wrong, one / 100);
+  EXPECT_EQ(world.map.num_landmarks() - draft.map().num_landmarks(), static_cast<std::size_t>(report.merged));
+  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+}
+
+// Landmarks of keyframe 1 have two observations where keyframe 0 sees them as well, those of keyframe 2 one; and the
+// other way round.
+TEST_P(LandmarkFusion, KeepsTheOneItIsToldTo) {
+  const SimulatedMap world = doubled_map(rig());
+  const auto merged = [&](KeyframeId target, KeyframeId from, Keep keep) {
+    map::MapDraft draft = world.draft();
+    fuse_into(target, landmarks_of(world.map, from), keep, {}, kFeatures, draft);
+    int searched_died = 0, target_died = 0, less_observed_stayed = 0;
+    for (const auto& [l, m] : pairs(world, from, target)) {
+      if (draft.map().resolve(l) != draft.map().resolve(m)) continue;
+      const bool died = !draft.map().alive(l);
+      ++(died ? searched_died : target_died);
+      const auto [kept, gone] = died ? std::pair(m, l) : std::pair(l, m);
+      less_observed_stayed += world.map.observations(kept).size() < world.map.observations(gone).size();
+    }
+    return std::array{searched_died, target_died, less_observed_stayed};
+  };
+  for (const auto& [target, from] : {std::pair(kThird, kSecond), std::pair(kSecond, kThird)}) {
+    const auto searched = merged(target, from, Keep::kSearched);
+    EXPECT_EQ(searched[0], 0);
+    EXPECT_GT(searched[1], 100);
+    EXPECT_EQ(merged(target, from, Keep::kMoreObserved)[2], 0);
+  }
+  EXPECT_GT(merged(kSecond, kThird, Keep::kSearched)[2], 50);
+  EXPECT_GT(merged(kSecond, kThird, Keep::kMoreObserved)[0], 50);
+}
+
+TEST_P(LandmarkFusion, WhatTheKeyframeObservesAlreadyIsLeftAlone) {
+  const SimulatedMap world = doubled_map(rig());
+  map::MapDraft draft = world.draft();
+  const FusionReport report = fuse_into(kThird, landmarks_of(world.map, kThird), Keep::kSearched, {}, kFeatures, draft);
+  EXPECT_EQ(report.added + report.merged, 0);
+  EXPECT_TRUE(std::move(draft).finish().edit.operations.empty());
+}
+
+TEST_P(LandmarkFusion, RemovedAndMergedLandmarksAreNotLookedFor) {
+  const SimulatedMap world = doubled_map(rig());
+  map::MapDraft draft = world.draft();
+  const std::vector<LandmarkId> searched = landmarks_of(world.map, kSecond);
+  for (const LandmarkId l : searched) draft.remove_landmark(l);
+  const FusionReport report = fuse_into(kThird, searched, Keep::kSearched, {}, kFeatures, draft);
+  EXPECT_EQ(report.added + report.merged, 0);
+}
+
+// Half a degree beside its place a landmark is within the search radius, but agrees with keypoints of coarse levels
+// only.
+TEST_P(LandmarkFusion, WhatDisagreesWithTheKeypointIsRefused) {
+  SimulatedMap world = doubled_map(rig());
+  const std::vector<LandmarkId> searched = landmarks_of(world.map, kSecond);
+  const Eigen::Vector3d centre = world.frames[2].T_world_rig.translation();
+  for (const LandmarkId l : searched) {
+    const Eigen::Vector3d away = world.map.landmark(l).position - centre;
+    const Eigen::Vector3d aside = away.cross(Eigen::Vector3d::UnitZ()).normalized();
+    world.map.set_position(l, world.map.landmark(l).position + 0.009 * away.norm() * aside);
+  }
+  LandmarkFusionOptions options;
+  options.radius = 0.012;
+  map::MapDraft strict = world.draft(), lenient = world.draft();
+  const FusionReport refused = fuse_into(kThird, searched, Keep::kSearched, options, kFeatures, strict);
+  const double chi2 = std::exchange(options.max_chi2, 1000);
+  const FusionReport accepted = fuse_into(kThird, searched, Keep::kSearched, options, kFeatures, lenient);
+  EXPECT_GT(accepted.merged, refused.merged + 100);
+  for (const LandmarkId l : landmarks_of(strict.map(), kThird)) {
+    if (!std::ranges::binary_search(searched, l)) continue;
+    double least = 1e9;  // of the feature's keypoints: one of them was agreed with
+    const auto o = std::ranges::find(strict.map().observations(l), kThird, &map::Observation::keyframe);
+    const map::BundledKeyframe& target = strict.map().keyframe(kThird);
+    for (const frame::KeypointRef r : target.frame->bundled.keypoints(o->feature)) {
+      const camera::Rig& cameras = strict.map().rig();
+      const Eigen::Vector3d in_camera =
+          cameras.cam_from_rig(r.camera) * (target.T_rig_world * strict.map().landmark(l).position);
+      const feature::Keypoints& keypoints = target.frame->keypoints(r.camera);
+      const double sigma = kFeatures.sigma(keypoints.level[r.keypoint.index()]);
+      const Eigen::Vector2d error =
+          keypoints.pixel[r.keypoint.index()].cast<double>() - *cameras.camera(r.camera).project(in_camera);
+      least = std::min(least, error.squaredNorm() / (sigma * sigma));
+    }
+    EXPECT_LT(least, chi2);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, LandmarkFusion, ::testing::Values(1, 2, 4));
+
+// The rig has turned by a right angle: the left camera sees what the front ones saw.
+TEST(LandmarkFusionAcrossCameras, AnyCameraFindsWhatAnotherSaw) {
+  SimulatedMap world(simulator(synthetic::default_rig()));
+  world.add_keyframe(FrameId(0), 0.0);
+  world.landmark_of.clear();
+  world.add_keyframe(FrameId(1), 3.0);
+  map::MapDraft draft = world.draft();
+  fuse_into(kSecond, landmarks_of(world.map, kFirst), Keep::kSearched, {}, kFeatures, draft);
+  int across = 0;
+  for (const LandmarkId l : landmarks_of(draft.map(), kSecond)) {
+    const auto list = draft.map().observations(l);
+    if (list.size() < 2) continue;
+    const auto camera = [&](const map::Observation& o) {
+      return draft.map().keyframe(o.keyframe).frame->bundled.keypoints(o.feature).front().camera;
+    };
+    across += camera(list[0]) != camera(list[1]);
+  }
+  EXPECT_GT(across, 30);
+  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+}
+
+}  // namespace
+}  // namespace bslam::mapping

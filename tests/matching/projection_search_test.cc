@@ -1,0 +1,134 @@
+#include "matching/projection_search.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "base/random.h"
+
+namespace bslam::matching {
+namespace {
+
+using Eigen::Vector3d;
+using geometry::SE3;
+
+// 300 points before a camera, each with a keypoint on the level its distance asks for, a little off.
+class SearchByProjection : public ::testing::Test {
+ protected:
+  static constexpr std::size_t kPoints = 300;
+  SearchByProjection() {
+    Random random(1, "search");
+    feature::Keypoints& k = frame.keypoints;
+    while (points.size() < kPoints) {
+      const Eigen::Vector2d pixel(random.uniform(20, 619), random.uniform(20, 459));
+      const double distance = random.uniform(2, 6);
+      const Vector3d in_camera = distance * *camera.unproject(pixel);
+      const auto level = static_cast<int>(random.below(6));
+      descriptors.push_back({random.next(), random.next(), random.next(), random.next()});
+      const double max_distance = distance * std::pow(1.2, level);
+      points.push_back({T_cam_common.inverse() * in_camera, T_cam_common.rotation().inverse() * in_camera.normalized(),
+                        static_cast<float>(max_distance / std::pow(1.2, 7)), static_cast<float>(max_distance), nullptr,
+                        0});
+      const Eigen::Vector2d off = pixel + 2 * Eigen::Vector2d(random.normal(), random.normal());
+      feature::Descriptor seen = descriptors.back();
+      for (int b = 0; b < 15; ++b) seen[random.below(4)] ^= std::uint64_t{1} << random.below(64);
+      k.pixel.push_back(off.cast<float>());
+      k.level.push_back(static_cast<std::uint8_t>(level));
+      k.angle.push_back(0);
+      k.sigma.push_back(0.7f);
+      k.bearing.push_back(*camera.unproject(off));
+      k.descriptor.push_back(seen);
+      k.patch.emplace_back();
+    }
+    for (std::size_t i = 0; i < kPoints; ++i) points[i].descriptor = &descriptors[i];
+    frame.grid = frame::FeatureGrid(k, camera.width, camera.height);
+  }
+  ProjectionSearchResult search(const ProjectionSearchOptions& options = {}) const {
+    return search_by_projection(camera, frame, T_cam_common, points, taken, options);
+  }
+
+  camera::Camera camera{"pinhole", camera::Pinhole({400, 400, 319.5, 239.5}), 640, 480, 0, ""};
+  SE3 T_cam_common = SE3::exp((geometry::Vector6d() << 0.3, -0.8, 0.2, 1, 2, -1).finished());
+  frame::CameraFrame frame;
+  std::vector<SearchPoint> points;
+  std::vector<feature::Descriptor> descriptors;
+  std::vector<std::uint8_t> taken;
+};
+
+TEST_F(SearchByProjection, FindsTheRightKeypointsEachOnce) {
+  const ProjectionSearchResult result = search();
+  EXPECT_EQ(result.visible.size(), kPoints);
+  EXPECT_GT(result.matches.size(), kPoints * 95 / 100);
+  std::set<std::uint32_t> keypoints;
+  std::uint32_t last = 0;
+  for (const ProjectionMatch& m : result.matches) {
+    EXPECT_EQ(m.keypoint.index(), m.point);
+    EXPECT_TRUE(keypoints.insert(static_cast<std::uint32_t>(m.keypoint.index())).second);
+    EXPECT_TRUE(last <= m.point);
+    EXPECT_LE(m.hamming, 80);
+    last = m.point;
+  }
+}
+
+TEST_F(SearchByProjection, GivesAKeypointToThePointThatFitsBest) {
+  points[1] = points[0];  // looks exactly like keypoint 0 now
+  descriptors[1] = frame.keypoints.descriptor[0];
+  points[1].descriptor = &descriptors[1];
+  for (const ProjectionMatch& m : search().matches) {
+    EXPECT_NE(m.point, 0u);
+    if (m.point == 1) {
+      EXPECT_EQ(m.keypoint.index(), 0u);
+    }
+  }
+}
+
+TEST_F(SearchByProjection, LeavesOutWhatIsSkippedOrTaken) {
+  for (std::size_t i = 0; i < 100; ++i) points[i].skip = 1;
+  taken.assign(kPoints, 0);
+  for (std::size_t i = 100; i < 200; ++i) taken[i] = 1;
+  const ProjectionSearchResult result = search();
+  EXPECT_EQ(result.visible.size(), kPoints - 100);  // a taken keypoint does not make its point invisible
+  for (const ProjectionMatch& m : result.matches) EXPECT_GE(m.keypoint.index(), 200u);
+  EXPECT_GT(result.matches.size(), 90u);
+}
+
+TEST_F(SearchByProjection, LooksOnlyAroundTheLevelExpected) {
+  for (std::uint8_t& l : frame.keypoints.level) l = static_cast<std::uint8_t>(l + 2);
+  EXPECT_LT(search().matches.size(), kPoints / 20);
+  EXPECT_GT(search({.level_slack = 2}).matches.size(), kPoints * 9 / 10);
+}
+
+TEST_F(SearchByProjection, LooksOnlyFromDirectionsThePointWasSeenFrom) {
+  for (std::size_t i = 0; i < kPoints; ++i) {
+    Vector3d& direction = points[i].view_direction;
+    if (i < 100) direction = -direction;
+    if (i >= 100 && i < 200) direction = Eigen::AngleAxisd(1.2, direction.unitOrthogonal()) * direction;
+    if (i >= 200 && i < 250) direction = Eigen::AngleAxisd(0.9, direction.unitOrthogonal()) * direction;
+    if (i >= 250) direction = Vector3d::Zero();  // unknown
+  }
+  for (const std::uint32_t i : search().visible) EXPECT_GE(i, 200u);
+  EXPECT_EQ(search().visible.size(), 100u);
+}
+
+TEST_F(SearchByProjection, LooksOnlyWithinTheDistancesOfThePyramid) {
+  for (std::size_t i = 0; i < 50; ++i) points[i].max_distance *= 0.3f;     // too far away now
+  for (std::size_t i = 50; i < 100; ++i) points[i].min_distance *= 10.0f;  // too near
+  for (const std::uint32_t i : search().visible) EXPECT_GE(i, 50u);
+  std::size_t near = 0;
+  for (const std::uint32_t i : search().visible) near += i >= 50 && i < 100 && points[i].min_distance > 10;
+  EXPECT_EQ(near, 0u);
+}
+
+TEST_F(SearchByProjection, IgnoresWhatIsBehindOrOutside) {
+  for (SearchPoint& p : points) p.position = T_cam_common.inverse() * -(T_cam_common * p.position);
+  const ProjectionSearchResult result = search();
+  EXPECT_TRUE(result.visible.empty() && result.matches.empty());
+}
+
+TEST_F(SearchByProjection, FindsNothingInACameraWithoutImage) {
+  frame = frame::CameraFrame();
+  EXPECT_TRUE(search().matches.empty());
+}
+
+}  // namespace
+}  // namespace bslam::matching

@@ -1,0 +1,333 @@
+#include "rig_formats/rig_file.h"
+
+#include <gtest/gtest.h>
+
+#include "base/random.h"
+#include "camera/test_cameras.h"
+#include "dataset/data_on_disk.h"
+#include "geometry/random_transforms.h"
+#include "rig_formats/euroc_sensor.h"
+#include "rig_formats/rig_description.h"
+
+namespace bslam::rig_formats {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Cameras of every model at random places.
+camera::Rig mixed_rig() {
+  Random random(1);
+  std::vector<camera::RigCamera> cameras;
+  for (camera::Camera& camera : camera::test_cameras()) cameras.push_back({camera, geometry::random_se3(random, 0.5)});
+  return camera::Rig(std::move(cameras));
+}
+
+// Those of them that EuRoC's format can hold.
+camera::Rig euroc_rig() {
+  const camera::Rig rig = mixed_rig();
+  std::vector<int> chosen;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    if (!camera::is_sphere_model(rig.camera(i).model)) chosen.push_back(static_cast<int>(i));
+  }
+  return rig.subset(chosen);
+}
+
+void expect_equal(const camera::Rig& a, const camera::Rig& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const camera::Camera &ca = a.camera(i), &cb = b.camera(i);
+    const camera::Intrinsics &ka = camera::intrinsics(ca.model), &kb = camera::intrinsics(cb.model);
+    EXPECT_EQ(camera::model_name(ca.model), camera::model_name(cb.model));
+    EXPECT_EQ((std::array{ka.fx, ka.fy, ka.cx, ka.cy}), (std::array{kb.fx, kb.fy, kb.cx, kb.cy}));
+    EXPECT_EQ(camera::distortion(ca.model), camera::distortion(cb.model));
+    EXPECT_EQ((std::array{ca.width, ca.height}), (std::array{cb.width, cb.height}));
+    EXPECT_EQ(ca.time_offset_ns, cb.time_offset_ns);
+    EXPECT_EQ(ca.mask_file, cb.mask_file);
+    EXPECT_EQ(a.body_from_cam(i).translation(), b.body_from_cam(i).translation());
+    EXPECT_LT((a.body_from_cam(i).matrix() - b.body_from_cam(i).matrix()).cwiseAbs().maxCoeff(), 2e-14);
+  }
+}
+
+// The file of one camera, with lines of it replaced.
+class OwnRigFile : public testing::Test {
+ protected:
+  Result<camera::Rig> read(const std::string& text) {
+    write_text(folder_.path() / "rig.yaml", text);
+    return read_rig(folder_.path() / "rig.yaml");
+  }
+  Result<camera::Rig> read_with(const std::string& from, const std::string& to) {
+    std::string text = kGood;
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return read(text.replace(at, from.size(), to));
+  }
+
+  static constexpr const char* kGood =
+      "bslam_rig: 1\n"
+      "cameras:\n"
+      "  - name: left\n"
+      "    model: pinhole-radtan\n"
+      "    resolution: [752, 480]\n"
+      "    intrinsics: [458.654, 457.296, 367.215, 248.375]\n"
+      "    distortion: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n"
+      "    T_body_cam: [[0, -1, 0, 0.5], [1, 0, 0, -0.25], [0, 0, 1, 0.125], [0, 0, 0, 1]]\n"
+      "    time_offset_s: -0.0015\n"
+      "    mask: masks/left.png\n";
+  TemporaryFolder folder_;
+};
+
+TEST_F(OwnRigFile, IsRead) {
+  const auto rig = read(kGood);
+  ASSERT_TRUE(rig) << rig.error().message();
+  ASSERT_EQ(rig->size(), 1u);
+  const camera::Camera& camera = rig->camera(std::size_t{0});
+  EXPECT_EQ(camera.name, "left");
+  EXPECT_EQ(camera.width, 752);
+  EXPECT_EQ(camera.time_offset_ns, -1'500'000);
+  EXPECT_EQ(camera.mask_file, (folder_.path() / "masks" / "left.png").string());
+  EXPECT_LT((rig->body_from_cam(0) * geometry::Vector3d(1, 0, 0) - geometry::Vector3d(0.5, 0.75, 0.125)).norm(), 1e-12);
+}
+
+TEST_F(OwnRigFile, MayLeaveOutWhatHasADefault) {
+  const auto rig = read(
+      "bslam_rig: 1\ncameras:\n  - {model: pinhole, resolution: [4, 3], intrinsics: [1, 1, 2, 2],\n"
+      "     T_body_cam: [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]], mask: null}\n");
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(rig->camera(std::size_t{0}).name, "cam0");
+  EXPECT_EQ(rig->camera(std::size_t{0}).mask_file, "");
+}
+
+TEST_F(OwnRigFile, RenormalisesARoundedRotation) {
+  const auto rig = read_with("[0, -1, 0, 0.5]", "[0.0003, -1.0002, 0, 0.5]");
+  ASSERT_TRUE(rig) << rig.error().message();
+  const geometry::Matrix3d R = rig->body_from_cam(0).matrix3();
+  EXPECT_LT((R.transpose() * R - geometry::Matrix3d::Identity()).norm(), 1e-14);
+}
+
+TEST_F(OwnRigFile, NamesTheKeyAndWhatIsWrong) {
+  struct Case {
+    const char *from, *to, *key, *found;
+  };
+  for (const Case& c : {
+           Case{"[458.654, 457.296", "[-458.654, 457.296", "cameras[0].intrinsics", "focal length -458.654"},
+           Case{"[458.654, 457.296", "[0, 457.296", "cameras[0].intrinsics", "focal length 0"},
+           Case{"[458.654, 457.296", "[.nan, 457.296", "cameras[0].intrinsics[0]", ".nan"},
+           Case{"367.215", ".inf", "cameras[0].intrinsics[2]", ".inf"},
+           Case{"[458.654, ", "[", "cameras[0].intrinsics", "3 numbers"},
+           Case{"[458.654, 457.296, 367.215, 248.375]", "458", "cameras[0].intrinsics", "458"},
+           Case{"pinhole-radtan", "telepathic", "cameras[0].model", "telepathic"},
+           Case{", 1.76187114e-05]", "]", "cameras[0].distortion", "3 numbers"},
+           Case{"pinhole-radtan", "pinhole", "cameras[0].distortion", "4 numbers"},
+           Case{"-0.28340811", "wide", "cameras[0].distortion[0]", "wide"},
+           Case{"-0.28340811", "-1e9", "cameras[0].distortion", "coefficients that bend every ray back"},
+           Case{"[752, 480]", "[752, 0]", "cameras[0].resolution", "0"},
+           Case{"[752, 480]", "[30000, 480]", "cameras[0].resolution", "30000"},
+           Case{"[752, 480]", "[752.5, 480]", "cameras[0].resolution", "752.5"},
+           Case{"[752, 480]", "[752]", "cameras[0].resolution", "1 numbers"},
+           Case{"[0, -1, 0, 0.5]", "[0, -2, 0, 0.5]", "cameras[0].T_body_cam",
+                "a 3x3 part that is no rotation (R'R differs from I by 3)"},
+           Case{"[0, -1, 0, 0.5]", "[0, 1, 0, 0.5]", "cameras[0].T_body_cam", "a mirrored frame (determinant -1)"},
+           Case{"[0, 0, 0, 1]]", "[0, 0, 0.1, 1]]", "cameras[0].T_body_cam", "last row 0 0 0.1 1"},
+           Case{", [0, 0, 0, 1]]", "]", "cameras[0].T_body_cam", "a list of 3"},
+           Case{"[0, 0, 0, 1]]", "[0, 0, 1]]", "cameras[0].T_body_cam[3]", "a list of 3"},
+           Case{"    resolution: [752, 480]\n", "", "cameras[0].resolution", "nothing"},
+           Case{"    model: pinhole-radtan\n", "", "cameras[0].model", "nothing"},
+           Case{"time_offset_s: -0.0015", "time_offset_s: soon", "cameras[0].time_offset_s", "soon"},
+           Case{"time_offset_s: -0.0015", "time_offset_s: 1e9", "cameras[0].time_offset_s", "1000000000"},
+           Case{"time_offset_s", "time_ofset_s", "cameras[0].time_ofset_s", "an unknown key"},
+           Case{"T_body_cam", "T_cam_body", "cameras[0].T_cam_body", "the transform from body to camera"},
+           Case{"    mask:", "    name: again\n    mask:", "cameras[0].name", "the key twice"},
+           Case{"bslam_rig: 1", "bslam_rig: 2", "bslam_rig", "2"},
+           Case{"bslam_rig: 1", "bslam_rig: one", "bslam_rig", "one"},
+           Case{"bslam_rig: 1", "bslam_rig: 1\nrate: 5", "rate", "an unknown key"},
+       }) {
+    const auto rig = read_with(c.from, c.to);
+    ASSERT_FALSE(rig) << c.to;
+    EXPECT_EQ(rig.error().file, (folder_.path() / "rig.yaml").string());
+    EXPECT_EQ(rig.error().key, c.key) << c.to;
+    EXPECT_EQ(rig.error().found, c.found) << c.to;
+    EXPECT_FALSE(rig.error().expected.empty());
+  }
+}
+
+TEST_F(OwnRigFile, NamesTheNearestKeyAndTheKnownModels) {
+  EXPECT_EQ(read_with("time_offset_s", "time_ofset_s").error().expected, "perhaps time_offset_s");
+  EXPECT_EQ(read_with("pinhole-radtan", "telepathic").error().expected,
+            "one of: pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere");
+}
+
+TEST_F(OwnRigFile, RefusesNoCamerasAndNamesTwice) {
+  EXPECT_EQ(read("bslam_rig: 1\n").error().key, "cameras");
+  EXPECT_EQ(read("bslam_rig: 1\ncameras: []\n").error().key, "cameras");
+  const std::string two = std::string(kGood) + std::string(kGood).substr(std::string(kGood).find("  - name"));
+  EXPECT_EQ(read(two).error().key, "cameras[1].name");
+}
+
+TEST_F(OwnRigFile, SyntaxErrorsCarryTheLine) {
+  EXPECT_EQ(read("bslam_rig: 1\ncameras:\n  - [1, 2\n b}").error().key, "line 4");
+  EXPECT_EQ(read("a: [1, 2\n b}").error().key, "line 2");
+}
+
+TEST_F(OwnRigFile, OfNoKnownFormatIsSaidSo) {
+  EXPECT_EQ(read("something: else\n").error().found, "no rig of a known format");
+  EXPECT_FALSE(read(""));
+  EXPECT_FALSE(read_rig(folder_.path() / "none.yaml"));
+  fs::create_directories(folder_.path() / "empty");
+  EXPECT_EQ(read_rig(folder_.path() / "empty").error().found, "a folder without calibration");
+}
+
+TEST_F(OwnRigFile, ComesBackExactly) {
+  const camera::Rig rig = mixed_rig();
+  ASSERT_TRUE(write_rig(rig, folder_.path() / "rig.yaml"));
+  const auto again = read_rig(folder_.path() / "rig.yaml");
+  ASSERT_TRUE(again) << again.error().message();
+  expect_equal(rig, *again);
+  for (std::size_t i = 0; i < rig.size(); ++i) EXPECT_EQ(again->camera(i).name, rig.camera(i).name);
+}
+
+TEST_F(OwnRigFile, KeepsOffsetsAndMasks) {
+  std::vector<camera::RigCamera> cameras;
+  for (const TimeNs offset : {TimeNs{0}, TimeNs{1}, TimeNs{-1}, TimeNs{1234567891}, TimeNs{-999999999999}}) {
+    camera::Camera camera = camera::test_cameras()[0];
+    camera.name = "a \"name\": # " + std::to_string(offset);
+    camera.time_offset_ns = offset;
+    camera.mask_file = (folder_.path() / "mask with space.png").string();
+    cameras.push_back({camera, geometry::SE3()});
+  }
+  const camera::Rig rig(cameras);
+  ASSERT_TRUE(write_rig(rig, folder_.path() / "rig.yaml"));
+  const auto again = read_rig(folder_.path() / "rig.yaml");
+  ASSERT_TRUE(again) << again.error().message();
+  expect_equal(rig, *again);
+  EXPECT_EQ(again->camera(std::size_t{1}).name, rig.camera(std::size_t{1}).name);
+}
+
+// ---- EuRoC
+
+class EurocSensor : public OwnRigFile {
+ protected:
+  Result<camera::Rig> sensor_with(const std::string& from, const std::string& to) {
+    std::string text = small_sensor_yaml(0.1);
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return read(text.replace(at, from.size(), to));
+  }
+};
+
+TEST_F(EurocSensor, IsReadInAllItsModels) {
+  EXPECT_EQ(camera::model_name(sensor_with("intr", "intr").value().camera(std::size_t{0}).model), "pinhole-radtan");
+  const auto kb = sensor_with("radial-tangential", "equidistant");
+  EXPECT_EQ(camera::model_name(kb.value().camera(std::size_t{0}).model), "kannala-brandt");
+  EXPECT_EQ(camera::model_name(sensor_with("radial-tangential", "none").value().camera(std::size_t{0}).model),
+            "pinhole");
+  EXPECT_EQ(camera::model_name(sensor_with("radial-tangential", "radtan").value().camera(std::size_t{0}).model),
+            "pinhole-radtan");
+  for (const char* coefficients : {"[.1, 0, 0, 0, 0]", "[.1, 0, 0, 0, 0, .1, 0, 0]"}) {
+    EXPECT_TRUE(sensor_with("[0, 0, 0, 0]", coefficients));
+  }
+}
+
+TEST_F(EurocSensor, NamesTheKeyAndWhatIsWrong) {
+  struct Case {
+    const char *from, *to, *key;
+  };
+  for (const Case& c :
+       {Case{"[20, 20,", "[-20, 20,", "intrinsics"}, Case{"[20, 20,", "[.nan, 20,", "intrinsics[0]"},
+        Case{"[20, 20,", "[20,", "intrinsics"}, Case{"radial-tangential", "telepathic", "distortion_model"},
+        Case{"camera_model: pinhole", "camera_model: omni", "camera_model"},
+        Case{"[0, 0, 0, 0]", "[0, 0, 0]", "distortion_coefficients"},
+        Case{"[1, 0, 0, 0.1", "[2, 0, 0, 0.1", "T_BS.data"}, Case{"[1, 0, 0, 0.1", "[-1, 0, 0, 0.1", "T_BS.data"},
+        Case{"[1, 0, 0, 0.1", "[1, 0, 0.1", "T_BS.data"}, Case{"T_BS:", "T_SB:", "T_BS"},
+        Case{"resolution", "size", "resolution"}, Case{"[32, 24]", "[32, -24]", "resolution"}}) {
+    const auto rig = sensor_with(c.from, c.to);
+    ASSERT_FALSE(rig) << c.to;
+    EXPECT_EQ(rig.error().key, c.key) << rig.error().message();
+  }
+  EXPECT_EQ(sensor_with("[1, 0, 0, 0.1", "[-1, 0, 0, 0.1").error().found, "a mirrored frame (determinant -1)");
+  EXPECT_EQ(sensor_with("radial-tangential", "telepathic").error().expected,
+            "one of: none, radial-tangential, equidistant");
+}
+
+TEST_F(EurocSensor, ComesBackExactly) {
+  const camera::Rig rig = euroc_rig();
+  ASSERT_TRUE(write_euroc_sensors(rig, folder_.path() / "out", 20.0));
+  const auto again = read_rig(folder_.path() / "out");
+  ASSERT_TRUE(again) << again.error().message();
+  expect_equal(rig, *again);
+}
+
+TEST_F(EurocSensor, CannotHoldAnOffset) {
+  camera::Camera camera = camera::test_cameras()[0];
+  camera.time_offset_ns = 1;
+  EXPECT_FALSE(write_euroc_sensors(camera::Rig({{camera, geometry::SE3()}}), folder_.path(), 20.0));
+}
+
+TEST_F(EurocSensor, CannotHoldASphereModel) {
+  const Status status = write_euroc_sensors(mixed_rig(), folder_.path(), 20.0);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().found, "model double-sphere, which EuRoC sensor files cannot hold");
+}
+
+// ---- KITTI
+
+constexpr const char* kCalib =
+    "P0: 700 0 600 0 0 710 180 0 0 0 1 0\n"
+    "P1: 700 0 600 -350 0 710 180 0 0 0 1 0\n"
+    "P2: 700 0 600 45.38 0 710 180 -0.1130887 0 0 1 0.003779761\n"
+    "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n";
+
+TEST_F(OwnRigFile, KittiCalibrationPlacesCamerasByTheirProjections) {
+  write_text(folder_.path() / "calib.txt", kCalib);
+  for (const int c : {0, 1, 2}) write_picture(folder_.path() / ("image_" + std::to_string(c)) / "000000.png", 124, 37);
+  for (const fs::path& path : {folder_.path(), folder_.path() / "calib.txt"}) {
+    const auto rig = read_rig(path);
+    ASSERT_TRUE(rig) << rig.error().message();
+    ASSERT_EQ(rig->size(), 3u);
+    EXPECT_EQ(rig->camera(std::size_t{1}).name, "image_1");
+    EXPECT_EQ(rig->camera(std::size_t{1}).width, 124);
+    EXPECT_LT((rig->body_from_cam(1).translation() - geometry::Vector3d(0.5, 0, 0)).norm(), 1e-12);
+    // P = K [I | t]: a point of camera 0 projects through P2 as through the camera at its place.
+    const geometry::Vector3d p(0.3, -0.2, 4.0);
+    const geometry::Vector3d h(700 * p.x() + 600 * p.z() + 45.38, 710 * p.y() + 180 * p.z() - 0.1130887,
+                               p.z() + 0.003779761);
+    const auto pixel = rig->camera(std::size_t{2}).project(rig->cam_from_rig(std::size_t{2}) * p);
+    EXPECT_LT((pixel.value() - h.head<2>() / h.z()).norm(), 1e-9);
+  }
+}
+
+TEST_F(OwnRigFile, KittiCalibrationIsChecked) {
+  write_picture(folder_.path() / "image_0" / "000000.png", 124, 37);
+  const auto broken = [&](const std::string& text) {
+    write_text(folder_.path() / "calib.txt", text);
+    return read_rig(folder_.path()).error();
+  };
+  EXPECT_EQ(broken("P0: 700 0 600 0 0 710 180 0 0 0 1\n").found, "11 numbers");
+  EXPECT_EQ(broken("P0: 700 0 600 0 0 ten 180 0 0 0 1 0\n").found, "ten");
+  EXPECT_EQ(broken("P0: -700 0 600 0 0 710 180 0 0 0 1 0\n").expected, "both above 0");
+  EXPECT_EQ(broken("P0: 700 1 600 0 0 710 180 0 0 0 1 0\n").key, "P0");
+  EXPECT_EQ(broken("P0: 700 0 600 0 0 710 180 0 0 0 1 0\nP0: 700 0 600 0 0 710 180 0 0 0 1 0\n").found, "it twice");
+  EXPECT_EQ(broken("nothing\n").found, "no projection");
+  EXPECT_EQ(broken("P3: 700 0 600 0 0 710 180 0 0 0 1 0\n").found, "no images beside it");
+}
+
+// ---- in words
+
+TEST(RigDescription, SpeaksOfDisplacements) {
+  EXPECT_EQ(displacement_in_words({0.11, 0, 0}), "11.0 cm to the right");
+  EXPECT_EQ(displacement_in_words({-1.2, 0.02, -0.3}), "1.20 m to the left, 30.0 cm behind, 2.0 cm below");
+  EXPECT_EQ(displacement_in_words({0, -0.005, 0.001}), "5.0 mm above, 1.0 mm in front");
+  EXPECT_EQ(displacement_in_words({0, 0, 0}), "at the same place");
+}
+
+TEST(RigDescription, MeasuresFieldsOfView) {
+  const camera::Camera pinhole{"p", camera::Pinhole({50, 50, 49.5, 39.5}), 100, 80, 0, ""};
+  const FieldOfView view = field_of_view(pinhole);
+  EXPECT_NEAR(view.horizontal, 2 * std::atan(49.5 / 50), 1e-9);
+  EXPECT_NEAR(view.vertical, 2 * std::atan(39.5 / 50), 1e-9);
+  EXPECT_NEAR(view.diagonal, 2 * std::atan(std::hypot(49.5, 39.5) / 50), 1e-9);
+  const camera::Camera wide{"w", camera::KannalaBrandt({130, 130, 319.5, 239.5}, {0, 0, 0, 0}), 640, 480, 0, ""};
+  EXPECT_NEAR(field_of_view(wide).horizontal, 2 * 319.5 / 130, 1e-9);  // 281 degrees: more than half the sphere
+}
+
+}  // namespace
+}  // namespace bslam::rig_formats

@@ -1,0 +1,33 @@
+// What the tests of calibration formats share: a folder with a calibration in it, read.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "dataset/data_on_disk.h"
+#include "rig_formats/rig_file.h"
+
+namespace bslam::rig_formats {
+
+namespace fs = std::filesystem;
+using geometry::SE3;
+using geometry::Vector2d;
+using geometry::Vector3d;
+
+// `camera(index(0))`: a plain 0 would be taken for a name.
+inline std::size_t index(std::size_t i) { return i; }
+
+class RigFormats : public testing::Test {
+ protected:
+  Result<RigFile> read(const std::string& text, const std::string& name = "rig.yaml") {
+    write_text(folder_.path() / name, text);
+    return read_rig_file(folder_.path() / name);
+  }
+  Result<RigFile> read_with(std::string text, const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return read(text.replace(at, from.size(), to));
+  }
+  TemporaryFolder folder_;
+};
+
+}  // namespace bslam::rig_formats

@@ -1,0 +1,551 @@
+// Calibrations as other programs write them: read, and written and read again.
+#include "rig_formats/rig_formats.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstring>
+
+#include "base/random.h"
+#include "camera/camera_description.h"
+#include "camera/test_cameras.h"
+#include "geometry/random_transforms.h"
+
+namespace bslam::rig_formats {
+namespace {
+
+bool holds(RigFormat format, const camera::CameraModel& model) {
+  const std::size_t coefficients = camera::distortion(model).size();
+  const bool radtan = std::holds_alternative<camera::PinholeRadTan>(model);
+  const bool pinhole = std::holds_alternative<camera::Pinhole>(model);
+  switch (format) {
+    case RigFormat::kKalibr:
+      return !radtan || coefficients == 4;
+    case RigFormat::kOpenvins:
+      return !camera::is_sphere_model(model) && !pinhole && (!radtan || coefficients == 4);
+    case RigFormat::kOrbslam3:
+      return !camera::is_sphere_model(model) && (!radtan || coefficients <= 5);
+    case RigFormat::kEuroc:
+    case RigFormat::kColmap:
+      return !camera::is_sphere_model(model);
+    default:
+      return true;
+  }
+}
+
+// Rigs that the format can hold, of all its models at random places.
+std::vector<camera::Rig> rigs_for(RigFormat format) {
+  Random random(7);
+  std::vector<camera::RigCamera> cameras;
+  for (camera::Camera& camera : camera::test_cameras()) {
+    if (!holds(format, camera.model)) continue;
+    camera.name = "cam" + std::to_string(cameras.size());
+    const bool stays = format == RigFormat::kColmap && cameras.empty();
+    cameras.push_back({camera, stays ? SE3() : geometry::random_se3(random, 0.5)});
+  }
+  if (format != RigFormat::kOrbslam3) return {camera::Rig(cameras)};
+  std::vector<camera::Rig> pairs;  // two of one size and kind at a time
+  for (const camera::RigCamera& c : cameras) {
+    camera::RigCamera other{c.camera, geometry::random_se3(random, 0.5)};
+    camera::RigCamera first = c;
+    first.camera.name = "cam0";
+    other.camera.name = "cam1";
+    pairs.push_back(camera::Rig({first, other}));
+  }
+  return pairs;
+}
+
+void expect_near(const camera::Rig& a, const camera::Rig& b, double tolerance) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const camera::Camera &ca = a.camera(i), &cb = b.camera(i);
+    EXPECT_EQ(camera::model_name(ca.model), camera::model_name(cb.model));
+    const camera::Intrinsics &ka = camera::intrinsics(ca.model), &kb = camera::intrinsics(cb.model);
+    EXPECT_LE(std::abs(ka.fx - kb.fx) + std::abs(ka.fy - kb.fy), tolerance) << i;
+    EXPECT_LE(std::abs(ka.cx - kb.cx) + std::abs(ka.cy - kb.cy), tolerance) << i;
+    std::vector<double> da = camera::distortion(ca.model), db = camera::distortion(cb.model);
+    const std::size_t count = std::max(da.size(), db.size());  // zeros may be written out
+    da.resize(count), db.resize(count);
+    for (std::size_t k = 0; k < count; ++k) EXPECT_LE(std::abs(da[k] - db[k]), tolerance) << i;
+    EXPECT_EQ((std::array{ca.width, ca.height}), (std::array{cb.width, cb.height}));
+    EXPECT_EQ(ca.time_offset_ns, cb.time_offset_ns);
+    EXPECT_LE((a.body_from_cam(i).matrix() - b.body_from_cam(i).matrix()).cwiseAbs().maxCoeff(), tolerance) << i;
+  }
+}
+
+class RigFormatOf : public RigFormats, public testing::WithParamInterface<RigFormat> {
+ protected:
+  fs::path out() const {
+    const bool folder = GetParam() == RigFormat::kEuroc || GetParam() == RigFormat::kColmap;
+    return folder_.path() / (folder ? "out" : "out.txt");
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Writable, RigFormatOf, testing::ValuesIn(writable_formats().begin(), writable_formats().end()),
+                         [](const auto& instance) { return std::string(format_name(instance.param)); });
+
+TEST_P(RigFormatOf, ComesBack) {
+  for (const camera::Rig& rig : rigs_for(GetParam())) {
+    ASSERT_GE(rig.size(), 2u);
+    const auto notes = write_rig_as(rig, GetParam(), out());
+    ASSERT_TRUE(notes) << notes.error().message();
+    EXPECT_TRUE(notes->empty());
+    const auto again = read_rig_file(out());
+    ASSERT_TRUE(again) << again.error().message();
+    EXPECT_EQ(again->format, GetParam());
+    expect_near(rig, again->rig, 1e-9);
+  }
+}
+
+TEST_P(RigFormatOf, RefusesWhatItCannotHold) {
+  const bool all = GetParam() == RigFormat::kBslam;
+  camera::Camera camera = camera::test_cameras()[1];
+  camera.mask_file = "/mask.png";
+  const auto masked = write_rig_as(camera::Rig({{camera, SE3()}}), GetParam(), out());
+  EXPECT_EQ(masked.ok(), all);
+  if (!all) {
+    EXPECT_EQ(masked.error().key, camera.name);
+    EXPECT_NE(masked.error().found.find("a mask"), std::string::npos);
+    EXPECT_NE(masked.error().expected.find("--drop mask"), std::string::npos);
+  }
+  camera.mask_file.clear();
+  camera.time_offset_ns = 1;
+  camera::Camera plain = camera;
+  plain.time_offset_ns = 0;
+  plain.name = "plain";
+  const bool each = all || GetParam() == RigFormat::kKalibr || GetParam() == RigFormat::kOpenvins;
+  EXPECT_EQ(write_rig_as(camera::Rig({{camera, SE3()}, {plain, SE3()}}), GetParam(), out()).ok(), each);
+}
+
+// What has been read once is read again from another format with the same bits, where that holds the same numbers.
+TEST_F(RigFormats, KeepTheBitsOfWhatWasRead) {
+  for (const RigFormat format : {RigFormat::kBslam, RigFormat::kEuroc, RigFormat::kOpenvins, RigFormat::kBasalt}) {
+    const camera::Rig first = read(rig_to_yaml(rigs_for(format).front())).value().rig;
+    const fs::path out = folder_.path() / (format == RigFormat::kEuroc ? "out" : "out.txt");
+    ASSERT_TRUE(write_rig_as(first, format, out));
+    const camera::Rig again = read_rig_file(out).value().rig;
+    expect_near(first, again, 0.0);
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      EXPECT_EQ(first.body_from_cam(i).rotation().coeffs(), again.body_from_cam(i).rotation().coeffs()) << i;
+      EXPECT_EQ(first.body_from_cam(i).translation(), again.body_from_cam(i).translation()) << i;
+    }
+  }
+}
+
+TEST(RigTransform, KeepsRightAnglesExact) {
+  const auto T = camera::rigid_transform({0, 0, 1, 0.5, -1, 0, 0, 0.25, 0, -1, 0, 0.125, 0, 0, 0, 1}, "", "");
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  EXPECT_EQ(T->matrix3(), R);
+  EXPECT_EQ(camera::rigid_transform(camera::rows_of(SE3()), "", "")->matrix(), Eigen::Matrix4d::Identity());
+}
+
+TEST(RigTransform, IsReadFromItsOwnMatrixWithTheSameBits) {
+  Random random(3);
+  for (int i = 0; i < 50000; ++i) {
+    const auto first = camera::rigid_transform(camera::rows_of(geometry::random_se3(random, 1.0)), "", "");
+    const auto again = camera::rigid_transform(camera::rows_of(*first), "", "");
+    ASSERT_EQ(first->rotation().coeffs(), again->rotation().coeffs());
+    ASSERT_EQ(first->translation(), again->translation());
+    const auto from_quaternion = camera::rigid_transform(first->rotation(), first->translation(), "", "");
+    ASSERT_EQ(first->rotation().coeffs(), from_quaternion->rotation().coeffs());
+  }
+}
+
+TEST(RigFormat, FollowsFromTheName) {
+  EXPECT_EQ(format_of_output("rig.yaml"), RigFormat::kBslam);
+  EXPECT_EQ(format_of_output("rig.json"), RigFormat::kBasalt);
+  EXPECT_EQ(format_of_output("folder/"), RigFormat::kEuroc);
+  EXPECT_EQ(writable_format("colmap"), RigFormat::kColmap);
+  EXPECT_FALSE(writable_format("kitti"));
+}
+
+TEST_F(RigFormats, DropsWhatIsAskedFor) {
+  camera::Camera camera = camera::test_cameras()[1];
+  camera.mask_file = "/mask.png";
+  camera.time_offset_ns = 5;
+  const SE3 T(geometry::so3_exp({0.1, 0.2, 0.3}), {1, 2, 3}), step(geometry::Quaterniond::Identity(), {0.1, 0, 0});
+  const camera::Rig rig({{camera, T}, {camera, T * step}});
+  EXPECT_EQ(without(rig, Droppable::kMasks).camera(index(1)).mask_file, "");
+  EXPECT_EQ(without(rig, Droppable::kTimeOffsets).camera(index(1)).time_offset_ns, 0);
+  const camera::Rig bare = without(rig, Droppable::kBodyFrame);
+  EXPECT_EQ(bare.body_from_cam(0).matrix(), Eigen::Matrix4d::Identity());
+  EXPECT_LT((bare.body_from_cam(1).translation() - Vector3d(0.1, 0, 0)).norm(), 1e-12);
+  EXPECT_EQ(bare.camera(index(1)).time_offset_ns, 5);
+}
+
+// ---- Kalibr and OpenVINS
+
+constexpr const char* kKalibr = R"(cam0:
+  T_cam_imu:
+  - [0.0, -1.0, 0.0, 0.1]
+  - [0.0, 0.0, -1.0, 0.2]
+  - [1.0, 0.0, 0.0, 0.3]
+  - [0.0, 0.0, 0.0, 1.0]
+  cam_overlaps: [1]
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]
+  distortion_model: radtan
+  intrinsics: [458.0, 457.0, 367.0, 248.0]
+  resolution: [752, 480]
+  rostopic: /cam0/image_raw
+  timeshift_cam_imu: 0.0019
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.11]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: ds
+  distortion_coeffs: []
+  distortion_model: none
+  intrinsics: [-0.2, 0.6, 350.0, 351.0, 366.0, 249.0]
+  resolution: [752, 480]
+)";
+
+TEST_F(RigFormats, KalibrChainsCamerasAndShiftsTime) {
+  const auto file = read(kKalibr);
+  ASSERT_TRUE(file) << file.error().message();
+  const camera::Rig& rig = file->rig;
+  EXPECT_EQ(file->format, RigFormat::kKalibr);
+  EXPECT_TRUE(file->notes.empty());
+  ASSERT_EQ(rig.size(), 2u);
+  EXPECT_EQ(rig.camera(index(0)).time_offset_ns, 1'900'000);
+  EXPECT_EQ(camera::model_name(rig.camera(index(1)).model), "double-sphere");
+  EXPECT_EQ(camera::distortion(rig.camera(index(1)).model), (std::vector{-0.2, 0.6}));
+  EXPECT_EQ(camera::intrinsics(rig.camera(index(1)).model).fy, 351);
+  // A point of camera 0 moves by -0.11 in camera 1: camera 1 stands 0.11 to the right.
+  EXPECT_LT((rig.rig_from_cam(1).translation() - Vector3d(0.11, 0, 0)).norm(), 1e-12);
+  // T_cam_imu maps the IMU's x axis to the camera's z.
+  EXPECT_LT((rig.body_from_cam(0).rotation() * Vector3d::UnitZ() - Vector3d::UnitX()).norm(), 1e-12);
+  EXPECT_LT((rig.body_from_cam(0).inverse() * Vector3d::Zero() - Vector3d(0.1, 0.2, 0.3)).norm(), 1e-12);
+}
+
+TEST_F(RigFormats, KalibrWithoutImuHasItsBodyAtCamera0) {
+  const std::string text(kKalibr);
+  const auto file = read(text.substr(0, 6) + text.substr(text.find("  cam_overlaps")));
+  ASSERT_TRUE(file) << file.error().message();
+  EXPECT_EQ(file->rig.body_from_cam(0).matrix(), Eigen::Matrix4d::Identity());
+  ASSERT_EQ(file->notes.size(), 1u);
+}
+
+TEST_F(RigFormats, KalibrOmniBecomesTheUnifiedModel) {
+  const std::string text = R"(cam0:
+  camera_model: omni
+  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
+  distortion_model: radtan
+  intrinsics: [1.3, 540.0, 541.0, 320.0, 240.0]
+  resolution: [640, 480]
+)";
+  const auto file = read(text);
+  ASSERT_TRUE(file) << file.error().message();
+  const Vector3d p(0.4, -0.3, 0.9);
+  const double divisor = p.z() + 1.3 * p.norm();
+  EXPECT_LT((file->rig.camera(index(0)).project(p).value() -
+             Vector2d(320 + 540 * p.x() / divisor, 240 + 541 * p.y() / divisor))
+                .norm(),
+            1e-10);
+  const auto distorted = read_with(text, "[0.0, 0.0, 0.0, 0.0]", "[-0.1, 0.0, 0.0, 0.0]");
+  ASSERT_FALSE(distorted);
+  EXPECT_EQ(distorted.error().key, "cam0.distortion_coeffs");
+  EXPECT_EQ(distorted.error().found, "omni with distortion");
+}
+
+TEST_F(RigFormats, KalibrIsChecked) {
+  struct Case {
+    const char *from, *to, *key;
+  };
+  for (const Case& c :
+       {Case{"camera_model: pinhole", "camera_model: telepathic", "cam0.camera_model"},
+        Case{"distortion_model: radtan", "distortion_model: fov", "cam0.distortion_model"},
+        Case{"[458.0, 457.0,", "[458.0,", "cam0.intrinsics"}, Case{"[-0.2, 0.6, 350.0,", "[350.0,", "cam1.intrinsics"},
+        Case{"[-0.2, 0.6, 350.0,", "[-2.0, 0.6, 350.0,", "cam1.distortion_coeffs"},
+        Case{"[0.0, -1.0, 0.0, 0.1]", "[0.0, 1.0, 0.0, 0.1]", "cam0.T_cam_imu"},
+        Case{"[0.0, -1.0, 0.0, 0.1]", "[0.0, -1.1, 0.0, 0.1]", "cam0.T_cam_imu"},
+        Case{"T_cn_cnm1", "T_cn_cnm2", "cam1.T_cn_cnm1"},
+        Case{"resolution: [752, 480]", "size: [752, 480]", "cam0.resolution"},
+        Case{"timeshift_cam_imu: 0.0019", "timeshift_cam_imu: late", "cam0.timeshift_cam_imu"}}) {
+    const auto file = read_with(kKalibr, c.from, c.to);
+    ASSERT_FALSE(file) << c.to;
+    EXPECT_EQ(file.error().key, c.key) << file.error().message();
+    EXPECT_FALSE(file.error().expected.empty());
+  }
+}
+
+TEST_F(RigFormats, KalibrMustAgreeWithItself) {
+  const std::string wrong =
+      "  T_cam_imu:\n  - [0.0, -1.0, 0.0, 0.21]\n  - [0.0, 0.0, -1.0, 0.2]\n"
+      "  - [1.0, 0.0, 0.0, 0.3]\n  - [0.0, 0.0, 0.0, 1.0]\n  T_cn_cnm1:\n";
+  EXPECT_EQ(read_with(kKalibr, "  T_cn_cnm1:\n", wrong).error().key, "cam1.T_cn_cnm1");
+  std::string right = wrong;
+  right.replace(right.find("0.21"), 4, "-0.01");
+  EXPECT_TRUE(read_with(kKalibr, "  T_cn_cnm1:\n", right));
+}
+
+TEST_F(RigFormats, OpenvinsSaysCameraToImu) {
+  const std::string head = "%YAML:1.0\n\ncam0:\n", rest = R"(
+    - [0.0148655429818, -0.999880929698, 0.00414029679422, -0.0216401454975]
+    - [0.999557249008, 0.0149672133247, 0.025715529948, -0.064676986768]
+    - [-0.0257744366974, 0.00375618835797, 0.999660727178, 0.00981073058949]
+    - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  distortion_coeffs: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]
+  distortion_model: radtan
+  intrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv
+  resolution: [752, 480]
+)";
+  const auto file = read(head + "  T_imu_cam: #rotation from camera to IMU" + rest);
+  ASSERT_TRUE(file) << file.error().message();
+  EXPECT_EQ(file->format, RigFormat::kOpenvins);
+  EXPECT_EQ(file->rig.body_from_cam(0).translation(), Vector3d(-0.0216401454975, -0.064676986768, 0.00981073058949));
+  const auto inverse = read(head + "  T_cam_imu:" + rest);
+  EXPECT_EQ(inverse->format, RigFormat::kKalibr);
+  EXPECT_LT((inverse->rig.body_from_cam(0).inverse().matrix() - file->rig.body_from_cam(0).matrix()).norm(), 1e-12);
+}
+
+TEST_F(RigFormats, OpenvinsHasNoDistortionAsOneOfZeros) {
+  const camera::Rig rig({{camera::Camera{"front", camera::Pinhole({400, 401, 320, 240}), 640, 480, 0, {}}, SE3()}});
+  ASSERT_TRUE(write_rig_as(rig, RigFormat::kOpenvins, folder_.path() / "out.yaml"));
+  const auto again = read_rig_file(folder_.path() / "out.yaml");
+  ASSERT_TRUE(again) << again.error().message();
+  EXPECT_EQ(camera::model_name(again->rig.camera(index(0)).model), "pinhole-radtan");
+  EXPECT_EQ(camera::distortion(again->rig.camera(index(0)).model), std::vector<double>(4, 0.0));
+  EXPECT_EQ(camera::intrinsics(again->rig.camera(index(0)).model).fy, 401);
+}
+
+// ---- ORB-SLAM3
+
+constexpr const char* kOrbslam = R"(%YAML:1.0
+File.version: "1.0"
+Camera.type: "KannalaBrandt8"
+Camera1.fx: 190.97847715128717
+Camera1.fy: 190.9733070521226
+Camera1.cx: 254.93170605935475
+Camera1.cy: 256.8974428996504
+Camera1.k1: 0.0034823894022493434
+Camera1.k2: 0.0007150348452162257
+Camera1.k3: -0.0020532361418706202
+Camera1.k4: 0.00020293673591811182
+Camera2.fx: 190.44236969414825
+Camera2.fy: 190.4344384721956
+Camera2.cx: 252.59949716835982
+Camera2.cy: 254.91723064636983
+Camera2.k1: 0.0034003170790442797
+Camera2.k2: 0.001766278153469831
+Camera2.k3: -0.00266312569781606
+Camera2.k4: 0.0003299517423931039
+Stereo.T_c1_c2: !!opencv-matrix
+  rows: 4
+  cols: 4
+  dt: f
+  data: [ 0.999999445773493,   0.000791687752817,   0.000694034010224,   0.101063427414194,
+         -0.000823363992158,   0.998899461915674,   0.046895490788700,   0.001946204678584,
+         -0.000656143613644,  -0.046896036240590,   0.998899560146304,   0.001015350132563,
+         0.0,0.0,0.0,1.0]
+Camera.width: 512
+Camera.height: 512
+)";
+
+TEST_F(RigFormats, OrbslamFisheyesHaveTheirOwnCoefficients) {
+  const auto file = read(kOrbslam);
+  ASSERT_TRUE(file) << file.error().message();
+  EXPECT_EQ(file->format, RigFormat::kOrbslam3);
+  ASSERT_EQ(file->rig.size(), 2u);
+  EXPECT_EQ(camera::distortion(file->rig.camera(index(1)).model)[0], 0.0034003170790442797);
+  EXPECT_LT(
+      (file->rig.rig_from_cam(1).translation() - Vector3d(0.101063427414194, 0.001946204678584, 0.001015350132563))
+          .norm(),
+      1e-12);
+  EXPECT_EQ(file->notes.size(), 2u);  // on the body frame, and on the coefficients
+}
+
+TEST_F(RigFormats, OrbslamRectifiedPairIsABaselineApart) {
+  const std::string common = "%YAML:1.0\nCamera.width: 752\nCamera.height: 480\n";
+  const auto stereo = read(common +
+                           "Camera.type: \"Rectified\"\nCamera1.fx: 435.2\nCamera1.fy: 435.2\nCamera1.cx: 367.4\n"
+                           "Camera1.cy: 252.2\nStereo.b: 0.1100785\n");
+  ASSERT_TRUE(stereo) << stereo.error().message();
+  EXPECT_EQ(stereo->rig.rig_from_cam(1).translation(), Vector3d(0.1100785, 0, 0));
+  const std::string old = common + "Camera.fx: 435.2\nCamera.fy: 435.2\nCamera.cx: 367.4\nCamera.cy: 252.2\n";
+  const auto by_bf = read(old + "Camera.bf: 47.90639\n");
+  ASSERT_TRUE(by_bf) << by_bf.error().message();
+  EXPECT_NEAR(by_bf->rig.rig_from_cam(1).translation().x(), 47.90639 / 435.2, 1e-15);
+  EXPECT_EQ(read(old)->rig.size(), 1u);
+  EXPECT_EQ(read(old + "Camera.bf: 40.0\nDepthMapFactor: 5000.0\n")->rig.size(), 1u);  // RGB-D
+  EXPECT_EQ(read(old + "Camera.bf: -40.0\n").error().key, "Camera.bf");
+}
+
+// ORB-SLAM2's EuRoC.yaml: the extrinsics of the raw cameras, found back from their rectification, are those of EuRoC.
+TEST_F(RigFormats, OrbslamRectificationLeadsToTheRawCameras) {
+  const auto matrix = [](const std::string& key, int rows, int cols, const std::string& data) {
+    return key + ": !!opencv-matrix\n   rows: " + std::to_string(rows) + "\n   cols: " + std::to_string(cols) +
+           "\n   dt: d\n   data:[" + data + "]\n";
+  };
+  const auto file = read(
+      "%YAML:1.0\nCamera.fx: 435.2046959714599\nCamera.fy: 435.2046959714599\nCamera.cx: 367.4517211914062\n"
+      "Camera.cy: 252.2008514404297\nCamera.width: 752\nCamera.height: 480\nCamera.bf: 47.90639384423901\n" +
+      matrix("LEFT.D", 1, 5, "-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0") +
+      matrix("LEFT.K", 3, 3, "458.654, 0.0, 367.215, 0.0, 457.296, 248.375, 0.0, 0.0, 1.0") +
+      matrix("LEFT.R", 3, 3,
+             "0.999966347530033, -0.001422739138722922, 0.008079580483432283, 0.001365741834644127, "
+             "0.9999741760894847, 0.007055629199258132, -0.008089410156878961, -0.007044357138835809, "
+             "0.9999424675829176") +
+      matrix("RIGHT.D", 1, 5, "-0.28368365, 0.07451284, -0.00010473, -3.555907e-05, 0.0") +
+      matrix("RIGHT.K", 3, 3, "457.587, 0.0, 379.999, 0.0, 456.134, 255.238, 0.0, 0.0, 1") +
+      matrix(
+          "RIGHT.R", 3, 3,
+          "0.9999633526194376, -0.003625811871560086, 0.007755443660172947, 0.003680398547259526, "
+          "0.9999684752771629, -0.007035845251224894, -0.007729688520722713, 0.007064130529506649, 0.999945173484644"));
+  ASSERT_TRUE(file) << file.error().message();
+  EXPECT_EQ(camera::intrinsics(file->rig.camera(index(1)).model).fx, 457.587);
+  const auto sensor = [](const char* T, const char* intrinsics) {
+    return std::string("camera_model: pinhole\nT_BS:\n  data: [") + T + ", 0, 0, 0, 1]\nresolution: [752, 480]\n" +
+           "intrinsics: [" + intrinsics + "]\ndistortion_model: none\n";
+  };
+  const auto left = read(sensor("0.0148655429818, -0.999880929698, 0.00414029679422, -0.0216401454975, 0.999557249008, "
+                                "0.0149672133247, 0.025715529948, -0.064676986768, -0.0257744366974, 0.00375618835797, "
+                                "0.999660727178, 0.00981073058949",
+                                "458, 457, 367, 248"),
+                         "left.yaml");
+  const auto right =
+      read(sensor("0.0125552670891, -0.999755099723, 0.0182237714554, -0.0198435579556, 0.999598781151, "
+                  "0.0130119051815, 0.0251588363115, 0.0453689425024, -0.0253898008918, 0.0179005838253, "
+                  "0.999517347078, 0.00786212447038",
+                  "458, 457, 367, 248"),
+           "right.yaml");
+  const SE3 T_left_right = left->rig.body_from_cam(0).inverse() * right->rig.body_from_cam(0);
+  EXPECT_LT((file->rig.rig_from_cam(1).matrix() - T_left_right.matrix()).cwiseAbs().maxCoeff(), 2e-5);
+}
+
+TEST_F(RigFormats, OrbslamIsChecked) {
+  struct Case {
+    const char *from, *to, *key;
+  };
+  for (const Case& c :
+       {Case{"KannalaBrandt8", "Telepathic", "Camera.type"}, Case{"Camera1.k3: -0.002", "Camera1.k9: 0", "Camera1.k3"},
+        Case{"Camera.width: 512", "Camera.width: wide", "Camera.width"},
+        Case{"Camera.height: 512", "", "Camera.height"}, Case{"Stereo.T_c1_c2", "Stereo.T_c2_c1", "Stereo.T_c1_c2"},
+        Case{"0.999999445773493", "1.2", "Stereo.T_c1_c2.data"},
+        Case{"Camera2.fy: 190", "Camera2.fz: 190", "Camera2.fy"}}) {
+    const auto file = read_with(kOrbslam, c.from, c.to);
+    ASSERT_FALSE(file) << c.to;
+    EXPECT_EQ(file.error().key, c.key) << file.error().message();
+  }
+}
+
+TEST_F(RigFormats, OrbslamHoldsTwoCamerasOfOneKind) {
+  const auto cameras = camera::test_cameras();
+  const auto write = [&](const std::vector<camera::RigCamera>& rig) {
+    return write_rig_as(camera::Rig(rig), RigFormat::kOrbslam3, folder_.path() / "out.yaml");
+  };
+  EXPECT_TRUE(write({{cameras[1], SE3()}}));
+  EXPECT_EQ(write({{cameras[1], SE3()}, {cameras[1], SE3()}, {cameras[1], SE3()}}).error().found, "3 cameras");
+  EXPECT_EQ(write({{cameras[1], SE3()}, {cameras[5], SE3()}}).error().found, "kannala-brandt");
+  EXPECT_EQ(write({{cameras[1], SE3()}, {cameras[2], SE3()}}).error().found, "1392x512 pixels");
+}
+
+// ---- Basalt
+
+constexpr const char* kBasalt = R"({
+	"value0": {
+		"T_imu_cam": [
+			{"px": 0.1, "py": -0.2, "pz":0.3, "qx": 0.5, "qy": -0.5, "qz": 0.5, "qw": -0.5},
+			{"px": 0.2, "py": -0.2, "pz": 0.3, "qx": 0.5, "qy": -0.5, "qz": 0.5, "qw": -0.5}
+		],
+		"intrinsics": [
+			{"camera_type": "ds", "intrinsics": {"fx": 349.7, "fy": 348.6, "cx": 365.9, "cy": 249.3, "xi": -0.24, "alpha": 0.567}},
+			{"camera_type":"pinhole-radtan8","intrinsics":{"fx":269.7,"fy":269.8,"cx":322.6,"cy":228.9,"k1":0.302,"k2":-0.021,
+			 "p1":-0.00025,"p2":6.1e-05,"k3":0.0158,"k4":0.575,"k5":-0.063,"k6":0.034,"rpmax":2.7276}}
+		],
+		"resolution": [[752, 480], [640, 480]],
+		"cam_time_offset_ns": -1500,
+		"vignette": []
+	}
+})";
+
+TEST_F(RigFormats, BasaltIsRead) {
+  const auto file = read(kBasalt, "calibration.json");
+  ASSERT_TRUE(file) << file.error().message();
+  EXPECT_EQ(file->format, RigFormat::kBasalt);
+  const camera::Rig& rig = file->rig;
+  EXPECT_EQ(camera::model_name(rig.camera(index(0)).model), "double-sphere");
+  EXPECT_EQ(camera::distortion(rig.camera(index(0)).model), (std::vector{-0.24, 0.567}));
+  EXPECT_EQ(camera::distortion(rig.camera(index(1)).model).size(), 8u);
+  EXPECT_EQ(rig.camera(index(1)).time_offset_ns, -1500);
+  EXPECT_EQ(rig.body_from_cam(0).translation(), Vector3d(0.1, -0.2, 0.3));
+  const geometry::Quaterniond q(-0.5, 0.5, -0.5, 0.5);  // w x y z
+  EXPECT_LT((rig.body_from_cam(0).matrix3() - q.toRotationMatrix()).norm(), 1e-15);
+}
+
+TEST_F(RigFormats, BasaltIsChecked) {
+  struct Case {
+    const char *from, *to, *key;
+  };
+  for (const Case& c :
+       {Case{"\"ds\"", "\"bal\"", "value0.intrinsics[0].camera_type"},
+        Case{"\"xi\": -0.24", "\"eta\": 1", "value0.intrinsics[0].intrinsics.xi"},
+        Case{"\"xi\": -0.24", "\"xi\": -1.24", "value0.intrinsics[0].intrinsics"},
+        Case{"\"qx\": 0.5", "\"qx\": 0.6", "value0.T_imu_cam[0]"},
+        Case{"\"qx\": 0.5", "\"qx\": null", "value0.T_imu_cam[0].qx"}, Case{"[752, 480], ", "", "value0.resolution"},
+        Case{"[752, 480]", "[752]", "value0.resolution[0]"}, Case{"\"resolution\"", "\"size\"", "value0.resolution"},
+        Case{"-1500", "1.5", "value0.cam_time_offset_ns"}}) {
+    const auto file = read_with(kBasalt, c.from, c.to);
+    ASSERT_FALSE(file) << c.to;
+    EXPECT_EQ(file.error().key, c.key) << file.error().message();
+  }
+  EXPECT_FALSE(read("{\"value0\": {\"T_imu_cam\": "));
+}
+
+// ---- KITTI raw: the calibration of 2011_09_26, cameras 00 and 01.
+
+constexpr const char* kKittiRaw =
+    "calib_time: 09-Jan-2012 13:57:47\ncorner_dist: 9.950000e-02\n"
+    "S_00: 1.392000e+03 5.120000e+02\n"
+    "K_00: 9.842439e+02 0.000000e+00 6.900000e+02 0.000000e+00 9.808141e+02 2.331966e+02 0.000000e+00 0.000000e+00 "
+    "1.000000e+00\n"
+    "D_00: -3.728755e-01 2.037299e-01 2.219027e-03 1.383707e-03 -7.233722e-02\n"
+    "R_00: 1.000000e+00 0.000000e+00 0.000000e+00 0.000000e+00 1.000000e+00 0.000000e+00 0.000000e+00 0.000000e+00 "
+    "1.000000e+00\n"
+    "T_00: 2.573699e-16 -1.059758e-16 1.614870e-16\n"
+    "S_rect_00: 1.242000e+03 3.750000e+02\n"
+    "P_rect_00: 7.215377e+02 0.000000e+00 6.095593e+02 0.000000e+00 0.000000e+00 7.215377e+02 1.728540e+02 "
+    "0.000000e+00 0.000000e+00 0.000000e+00 1.000000e+00 0.000000e+00\n"
+    "S_01: 1.392000e+03 5.120000e+02\n"
+    "K_01: 9.895267e+02 0.000000e+00 7.020000e+02 0.000000e+00 9.878386e+02 2.455590e+02 0.000000e+00 0.000000e+00 "
+    "1.000000e+00\n"
+    "D_01: -3.644661e-01 1.790019e-01 1.148107e-03 -6.298563e-04 -5.314062e-02\n"
+    "R_01: 9.993513e-01 1.860866e-02 -3.083487e-02 -1.887662e-02 9.997863e-01 -8.421873e-03 3.067156e-02 8.998467e-03 "
+    "9.994890e-01\n"
+    "T_01: -5.370000e-01 4.822061e-03 -1.252488e-02\n"
+    "S_rect_01: 1.242000e+03 3.750000e+02\n"
+    "P_rect_01: 7.215377e+02 0.000000e+00 6.095593e+02 -3.875744e+02 0.000000e+00 7.215377e+02 1.728540e+02 "
+    "0.000000e+00 0.000000e+00 0.000000e+00 1.000000e+00 0.000000e+00\n";
+
+TEST_F(RigFormats, KittiRawFollowsWhereItLies) {
+  const auto at = [&](const std::string& name) { return read(kKittiRaw, name + "/calib_cam_to_cam.txt"); };
+  const auto rectified = at("plain");
+  ASSERT_TRUE(rectified) << rectified.error().message();
+  EXPECT_EQ(rectified->format, RigFormat::kKittiRaw);
+  EXPECT_EQ(rectified->rig.camera(index(0)).width, 1242);
+  EXPECT_NEAR(rectified->rig.rig_from_cam(1).translation().x(), 387.5744 / 721.5377, 1e-12);
+  const auto raw = at("2011_09_26_drive_0039_extract");
+  EXPECT_EQ(raw->rig.camera(index(0)).width, 1392);
+  EXPECT_EQ(camera::distortion(raw->rig.camera(index(1)).model)[4], -5.314062e-02);
+  EXPECT_NEAR(raw->rig.rig_from_cam(1).translation().norm(), 0.537, 1e-3);
+  EXPECT_GT(raw->rig.rig_from_cam(1).translation().x(), 0.53);  // camera 01 stands on the right
+  EXPECT_EQ(at("2011_09_26_drive_0039_sync")->rig.camera(index(0)).width, 1242);
+  fs::create_directories(folder_.path() / "date" / "2011_09_26_drive_0039_extract");
+  EXPECT_EQ(at("date")->rig.camera(index(0)).width, 1392);
+  write_picture(folder_.path() / "images" / "image_00" / "data" / "0000000000.png", 1392, 512);
+  EXPECT_EQ(at("images")->rig.camera(index(0)).width, 1392);
+  EXPECT_EQ(read_rig_file(folder_.path() / "images")->rig.size(), 2u);
+}
+
+TEST_F(RigFormats, KittiRawIsChecked) {
+  EXPECT_EQ(read_with(kKittiRaw, "S_rect_00: 1.242000e+03", "S_rect_00:").error().key, "S_rect_00");
+  EXPECT_EQ(read_with(kKittiRaw, "P_rect_01: 7.2", "P_rect_01: x7.2").error().found, "x7.215377e+02");
+  EXPECT_EQ(read_with(kKittiRaw, "P_rect_01: 7.215377e+02 0.0", "P_rect_01: 7.215377e+02 0.1").error().key,
+            "P_rect_01");
+}
+
+}  // namespace
+}  // namespace bslam::rig_formats

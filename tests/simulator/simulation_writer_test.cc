@@ -1,0 +1,235 @@
+#include "simulator/simulation_writer.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "dataset/dataset.h"
+#include "evaluation/trajectory_file.h"
+#include "rig_formats/rig_file.h"
+#include "synthetic/rigs.h"
+
+namespace bslam::simulator {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SimulationWriter : public testing::Test {
+ protected:
+  ~SimulationWriter() override { fs::remove_all(folder_); }
+
+  // Three frames of two small cameras in a world of little detail.
+  SimulationRequest request() const {
+    SimulationRequest r{.folder = folder_ / "sim",
+                        .rig = synthetic::ring_rig(2, 64),
+                        .recording = {},
+                        .tour = {},
+                        .imaging = {},
+                        .world = {.texel = 0.05, .light_texel = 2.0, .ambient_rays = 1}};
+    r.recording.duration_s = 0.3;
+    r.recording.rate_hz = 10;
+    return r;
+  }
+
+  // Bytes of all files but the markers, by name within the folder.
+  std::map<std::string, std::string> contents(const fs::path& folder) const {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+      if (!entry.is_regular_file() || entry.path().filename().string().front() == '.') continue;
+      std::ostringstream bytes;
+      bytes << std::ifstream(entry.path(), std::ios::binary).rdbuf();
+      files[fs::relative(entry.path(), folder).string()] = bytes.str();
+    }
+    return files;
+  }
+
+  fs::path folder_ = fs::temp_directory_path() / ("bslam_simulation_" + std::to_string(::getpid()));
+  ThreadPool pool_{2};
+};
+
+TEST_F(SimulationWriter, WritesEurocLayoutWithGroundTruth) {
+  const SimulationRequest r = request();
+  const auto outcome = write_simulation(r, pool_);
+  ASSERT_TRUE(outcome.ok());
+  EXPECT_EQ(*outcome, SimulationOutcome::kWritten);
+  const auto files = contents(r.folder);
+  EXPECT_EQ(files.size(), 2u * (3 + 2) + 4);
+  EXPECT_TRUE(files.contains("mav0/cam1/data/1200000000.png"));
+  EXPECT_EQ(
+      files.at("mav0/cam0/data.csv"),
+      "#timestamp [ns],filename\n1000000000,1000000000.png\n1100000000,1100000000.png\n1200000000,1200000000.png\n");
+  const auto rig = rig_formats::read_rig(r.folder / "rig.yaml"), euroc = rig_formats::read_rig(r.folder);
+  ASSERT_TRUE(rig.ok());
+  ASSERT_TRUE(euroc.ok());
+  for (std::size_t c = 0; c < 2; ++c) {
+    EXPECT_LT((rig->body_from_cam(c).matrix() - r.rig.body_from_cam(c).matrix()).norm(), 1e-9);
+    EXPECT_LT((euroc->body_from_cam(c).matrix() - r.rig.body_from_cam(c).matrix()).norm(), 1e-9);
+  }
+}
+
+TEST_F(SimulationWriter, WritesNoSensorYamlOfAModelItCannotHold) {
+  SimulationRequest r = request();
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < 2; ++c) cameras.push_back({r.rig.camera(c), r.rig.body_from_cam(c)});
+  cameras[1].camera.model = camera::DoubleSphere({30, 30, 31.5, 19.5}, -0.2, 0.55);
+  r.rig = camera::Rig(cameras);
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  EXPECT_FALSE(contents(r.folder).contains("mav0/cam0/sensor.yaml"));
+  const auto dataset = dataset::open_dataset({.path = r.folder});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(camera::model_name(dataset->rig.camera(std::size_t{1}).model), camera::DoubleSphere::kName);
+  const auto by_mav0 = dataset::open_dataset({.path = r.folder / "mav0"});
+  ASSERT_TRUE(by_mav0) << by_mav0.error().message();
+  EXPECT_TRUE(rig_formats::read_rig(r.folder).ok());
+}
+
+// A recording of a version that wrote other lists beside the same pictures.
+TEST_F(SimulationWriter, RenewsListsOfAnotherVersion) {
+  const SimulationRequest r = request();
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  const auto files = contents(r.folder);
+  const fs::path picture = r.folder / "mav0/cam0/data/1100000000.png";
+  const auto rendered = fs::last_write_time(picture);
+  std::ofstream(r.folder / ".complete") << simulation_digest(r) << "\n";
+  std::ofstream(r.folder / "faults.csv") << "old";
+  EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWritten);
+  EXPECT_EQ(contents(r.folder), files);
+  EXPECT_EQ(fs::last_write_time(picture), rendered);
+  EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWasComplete);
+}
+
+TEST_F(SimulationWriter, WritesTwoGroundTruthsThatAgree) {
+  const SimulationRequest r = request();
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  const auto body = evaluation::read_trajectory(r.folder / "mav0/state_groundtruth_estimate0/data.csv");
+  const auto camera = evaluation::read_trajectory(r.folder / "groundtruth_cam0.tum");
+  ASSERT_TRUE(body.ok());
+  ASSERT_TRUE(camera.ok());
+  ASSERT_EQ(camera->size(), 3u);
+  EXPECT_EQ(body->size(), 61u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const evaluation::TimedPose& of_body = (*body)[20 * i];
+    ASSERT_EQ(of_body.time_ns, (*camera)[i].time_ns);
+    const geometry::SE3 expected = of_body.T_world_frame * r.rig.body_from_cam(0);
+    EXPECT_LT((expected.matrix() - (*camera)[i].T_world_frame.matrix()).norm(), 1e-7);
+  }
+}
+
+TEST_F(SimulationWriter, DoesACompleteRequestOnlyOnce) {
+  const SimulationRequest r = request();
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  const auto again = write_simulation(r, pool_);
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ(*again, SimulationOutcome::kWasComplete);
+}
+
+TEST_F(SimulationWriter, StopsWhileItBuildsTheWorld) {
+  const SimulationRequest r = request();
+  std::stop_source source;
+  source.request_stop();
+  const auto stopped = write_simulation(r, pool_, {}, source.get_token());
+  ASSERT_TRUE(stopped.ok());
+  EXPECT_EQ(*stopped, SimulationOutcome::kInterrupted);
+  EXPECT_TRUE(fs::is_empty(r.folder / "mav0/cam0/data"));
+  EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWritten);
+}
+
+TEST_F(SimulationWriter, GoesOnWhereItWasInterrupted) {
+  SimulationRequest whole = request(), r = request();
+  whole.folder = folder_ / "whole";
+  ASSERT_TRUE(write_simulation(whole, pool_).ok());
+  std::atomic<std::size_t> first = 0;
+  std::stop_source source;
+  const auto stop_at_two = [&](std::size_t done, std::size_t) {
+    first = done;
+    if (done >= 2) source.request_stop();
+  };
+  const auto stopped = write_simulation(r, pool_, stop_at_two, source.get_token());
+  ASSERT_TRUE(stopped.ok());
+  EXPECT_EQ(*stopped, SimulationOutcome::kInterrupted);
+  EXPECT_LT(first, 6u);
+  EXPECT_TRUE(fs::exists(r.folder / ".partial"));
+  const fs::path kept = r.folder / "mav0/cam0/data/1000000000.png";
+  const auto written_at = fs::last_write_time(kept);
+  const auto resumed = write_simulation(r, pool_);
+  ASSERT_TRUE(resumed.ok());
+  EXPECT_EQ(*resumed, SimulationOutcome::kWritten);
+  EXPECT_EQ(fs::last_write_time(kept), written_at);
+  EXPECT_FALSE(fs::exists(r.folder / ".partial"));
+  EXPECT_EQ(contents(r.folder), contents(whole.folder));
+}
+
+TEST_F(SimulationWriter, LeavesForeignFoldersAlone) {
+  const SimulationRequest r = request();
+  fs::create_directories(r.folder);
+  std::ofstream(r.folder / "letter.txt") << "mine";
+  const auto refused = write_simulation(r, pool_);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(contents(r.folder).size(), 1u);
+  SimulationRequest allowed = r;
+  allowed.overwrite = true;
+  ASSERT_TRUE(write_simulation(allowed, pool_).ok());
+  EXPECT_EQ(contents(r.folder).at("letter.txt"), "mine");
+}
+
+TEST_F(SimulationWriter, KeepsNoForeignPictures) {
+  SimulationRequest r = request();
+  const fs::path picture = r.folder / "mav0/cam0/data/1000000000.png";
+  fs::create_directories(picture.parent_path());
+  std::ofstream(picture) << "foreign";
+  r.overwrite = true;
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  EXPECT_GT(fs::file_size(picture), 100u);
+}
+
+TEST_F(SimulationWriter, ReplacesAnotherRecordingOnlyWhenAllowed) {
+  SimulationRequest r = request();
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  r.recording.duration_s = 0.2;
+  EXPECT_FALSE(write_simulation(r, pool_).ok());
+  r.overwrite = true;
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  EXPECT_FALSE(fs::exists(r.folder / "mav0/cam0/data/1200000000.png"));
+}
+
+TEST_F(SimulationWriter, ListsPicturesHitByFaults) {
+  SimulationRequest r = request();
+  r.recording.faults = {{FaultType::kDropped, {0}, 0.1, 0.15, 0}, {FaultType::kFrozen, {1}, 0.2, 9, 0}};
+  ASSERT_TRUE(write_simulation(r, pool_).ok());
+  const auto files = contents(r.folder);
+  EXPECT_EQ(files.at("faults.csv"),
+            "#timestamp [ns],camera,filename,fault\n"
+            "1100000000,0,1100000000.png,dropped\n1200000000,1,1200000000.png,frozen\n");
+  EXPECT_FALSE(files.contains("mav0/cam0/data/1100000000.png"));
+  EXPECT_EQ(files.at("mav0/cam0/data.csv"),
+            "#timestamp [ns],filename\n1000000000,1000000000.png\n1200000000,1200000000.png\n");
+  EXPECT_EQ(files.at("mav0/cam1/data/1200000000.png"), files.at("mav0/cam1/data/1100000000.png"));
+  EXPECT_EQ(evaluation::read_trajectory(r.folder / "groundtruth_cam0.tum")->size(),
+            3u);  // the rig was there all the same
+}
+
+TEST_F(SimulationWriter, RefusesRequestsOutOfRange) {
+  const auto refused = [&](auto change) {
+    SimulationRequest r = request();
+    change(r);
+    const bool wrong = !write_simulation(r, pool_).ok();
+    return wrong && !fs::exists(r.folder);
+  };
+  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.duration_s = -1; }));
+  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.duration_s = std::nan(""); }));
+  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.rate_hz = 0; }));
+  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.exposure_s = -0.1; }));
+  EXPECT_TRUE(refused([](SimulationRequest& r) { r.imaging.noise = -1; }));
+  EXPECT_TRUE(refused([](SimulationRequest& r) { r.tour.laps = -1; }));
+  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.faults = {{FaultType::kBlack, {0}, 0.3, 0.4}}; }));
+  EXPECT_TRUE(refused([](SimulationRequest& r) { r.tour.laps = 1, r.tour.speed_mps = 1; }));
+}
+
+}  // namespace
+}  // namespace bslam::simulator

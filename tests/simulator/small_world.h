@@ -1,0 +1,12 @@
+// The built-in world with little detail, which bakes in a fraction of a second.
+#pragma once
+
+#include "simulator/world.h"
+
+namespace bslam::simulator {
+
+inline World small_world(std::uint64_t seed, ThreadPool& pool) {
+  return World(make_building(seed), {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}, pool);
+}
+
+}  // namespace bslam::simulator

@@ -1,0 +1,183 @@
+// A thousand damaged map files: every one is refused or gives a sound map, and none makes the reader ask for much
+// memory.
+#include <gtest/gtest.h>
+#include <libdeflate.h>
+#include <malloc.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "base/random.h"
+#include "small_map.h"
+#include "synthetic/rigs.h"
+
+namespace {
+std::atomic<std::size_t> live_bytes{0}, peak_bytes{0};
+}
+
+// Not inlined: the compiler would see free() meet what it takes for the library's operator new.
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  void* p = std::malloc(size > 0 ? size : 1);
+  if (p == nullptr) throw std::bad_alloc();
+  const std::size_t live = live_bytes += malloc_usable_size(p);
+  std::size_t peak = peak_bytes;
+  while (live > peak && !peak_bytes.compare_exchange_weak(peak, live)) {
+  }
+  return p;
+}
+// Of the library it would call the one above; of a sanitizer it would not.
+[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  try {
+    return operator new(size);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+}
+[[gnu::noinline]] void operator delete(void* p) noexcept {
+  if (p != nullptr) live_bytes -= malloc_usable_size(p);
+  std::free(p);
+}
+[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept { operator delete(p); }
+
+namespace bslam::storage {
+namespace {
+
+constexpr std::size_t kTotal = 20, kTable = 28, kEntry = 16, kSections = 4, kHeader = kTable + kSections * kEntry + 4;
+
+template <class T>
+T number_at(const std::string& bytes, std::size_t at) {
+  T value;
+  std::memcpy(&value, bytes.data() + at, sizeof(T));
+  return value;
+}
+template <class T>
+void set_number(std::string& bytes, std::size_t at, T value) {
+  std::memcpy(bytes.data() + at, &value, sizeof(T));
+}
+
+std::size_t section_size(const std::string& bytes, std::size_t i) {
+  return number_at<std::uint64_t>(bytes, kTable + i * kEntry + 8);
+}
+
+// Makes sizes and checksums those of a file that was written like this; the last section takes what is missing or too
+// much.
+void repair(std::string& bytes) {
+  if (bytes.size() < kHeader) bytes.resize(kHeader, '\0');
+  set_number(bytes, kTotal, std::uint64_t{bytes.size()});
+  std::size_t at = kHeader;
+  for (std::size_t i = 0; i < kSections; ++i) {
+    const std::size_t rest = bytes.size() - at;
+    const std::size_t size = i + 1 == kSections ? rest : std::min(rest, section_size(bytes, i));
+    set_number(bytes, kTable + i * kEntry + 4, libdeflate_crc32(0, bytes.data() + at, size));
+    set_number(bytes, kTable + i * kEntry + 8, std::uint64_t{size});
+    at += size;
+  }
+  set_number(bytes, kHeader - 4, libdeflate_crc32(0, bytes.data(), kHeader - 4));
+}
+
+// A place in the file, with its small sections and the beginnings of sections as likely as the bulk.
+std::size_t place_in(const std::string& bytes, Random& random) {
+  const auto below = [&](std::size_t n) { return std::size_t{random.below(static_cast<std::uint32_t>(n))}; };
+  const std::size_t section = below(kSections);
+  std::size_t begin = kHeader;
+  for (std::size_t i = 0; i < section; ++i) begin += section_size(bytes, i);
+  switch (random.below(4)) {
+    case 0:
+      return below(kHeader);
+    case 1:
+      return begin + below(std::min<std::size_t>(section_size(bytes, section), 200));
+    case 2:
+      return begin + below(section_size(bytes, section));
+    default:
+      return below(bytes.size());
+  }
+}
+
+std::string damage(const std::string& whole, Random& random) {
+  std::string bytes = whole;
+  const std::size_t at = place_in(whole, random);
+  switch (random.below(4)) {
+    case 0:
+      for (std::uint32_t n = 1 + random.below(3); n > 0; --n)
+        bytes[place_in(whole, random)] ^= static_cast<char>(1 + random.below(255));
+      break;
+    case 1:
+      bytes.resize(at);
+      break;
+    case 2: {
+      constexpr std::array<std::uint32_t, 6> kLarge = {0xffffffffu, 0x7fffffffu, 0x80000000u,
+                                                       0x01000000u, 0x00010000u, 0x0000ffffu};
+      if (at + 4 <= bytes.size()) set_number(bytes, at, kLarge[random.below(kLarge.size())]);
+      break;
+    }
+    default: {
+      const std::size_t from = place_in(whole, random),
+                        n = std::min<std::size_t>(1 + random.below(64), bytes.size() - std::max(at, from));
+      bytes.replace(at, n, bytes.substr(from, n));
+    }
+  }
+  return bytes;
+}
+
+TEST(DamagedMaps, AreRefusedOrSoundAndCostLittleMemory) {
+  const std::string whole = map_to_bytes(
+      small_map(synthetic::mixed_rig(), {.keyframes = 6, .max_keypoints = 30, .landmarks = 800}), small_info());
+  ASSERT_TRUE(map_from_bytes(whole, "whole"));
+  Random random(2, "damage");
+  int repaired_and_sound = 0, repaired_and_refused = 0;
+  std::size_t worst = 0;
+  for (int n = 0; n < 1000; ++n) {
+    std::string bytes = damage(whole, random);
+    if (bytes == whole) continue;
+    const bool repaired = n % 2 == 1;
+    if (repaired) repair(bytes);
+    const std::size_t before = live_bytes;
+    peak_bytes = before;
+    const auto saved = map_from_bytes(bytes, "damaged");
+    const std::size_t needed = peak_bytes - before;
+    worst = std::max(worst, needed);
+    EXPECT_LE(needed + bytes.size(), 2 * bytes.size() + (std::size_t{64} << 20)) << n;
+    if (!repaired) {
+      EXPECT_FALSE(saved) << "damaged file " << n << " was taken";
+    } else if (saved) {
+      EXPECT_EQ(saved->map.check_invariants(), std::nullopt);
+      EXPECT_EQ(map_to_bytes(saved->map, saved->info).size(), bytes.size());
+      ++repaired_and_sound;
+    } else {
+      EXPECT_EQ(saved.error().file, "damaged");
+      EXPECT_FALSE(saved.error().found.empty());
+      ++repaired_and_refused;
+    }
+  }
+  EXPECT_GT(repaired_and_refused, 150);  // the parser was exercised
+  EXPECT_GT(repaired_and_sound, 20);     // a changed grey value of a patch breaks nothing
+  RecordProperty("file_bytes", static_cast<int>(whole.size()));
+  RecordProperty("worst_bytes", static_cast<int>(worst));
+}
+
+// Counts that promise more than the file holds, wherever a count may stand: all places near the beginning of sections,
+// and others.
+TEST(DamagedMaps, PromiseMoreThanTheyHold) {
+  const std::string whole = map_to_bytes(
+      small_map(synthetic::ring_rig(2), {.keyframes = 3, .max_keypoints = 8, .landmarks = 300}), small_info());
+  std::vector<std::size_t> places;
+  std::size_t begin = kHeader;
+  for (std::size_t i = 0; i < kSections; begin += section_size(whole, i++)) {
+    for (std::size_t n = 0; n < std::min<std::size_t>(section_size(whole, i), 300); ++n) places.push_back(begin + n);
+  }
+  for (std::size_t at = kHeader; at < whole.size(); at += 37) places.push_back(at);
+  for (const std::size_t at : places) {
+    if (at + 4 > whole.size()) continue;
+    std::string bytes = whole;
+    set_number(bytes, at, std::uint32_t{0x10000000});
+    repair(bytes);
+    const std::size_t before = live_bytes;
+    peak_bytes = before;
+    const auto saved = map_from_bytes(bytes, "damaged");
+    ASSERT_LE(peak_bytes - before, whole.size() + (std::size_t{64} << 20)) << at;
+  }
+}
+
+}  // namespace
+}  // namespace bslam::storage

@@ -1,0 +1,293 @@
+#include "storage/map_file.h"
+
+#include <gtest/gtest.h>
+
+#include "data_on_disk.h"
+#include "small_map.h"
+#include "synthetic/rigs.h"
+
+namespace bslam::storage {
+namespace {
+
+namespace fs = std::filesystem;
+
+SavedMap read_back(const map::BundledMap& map, const MapFileInfo& info = small_info()) {
+  auto saved = map_from_bytes(map_to_bytes(map, info), "test");
+  EXPECT_TRUE(saved) << saved.error().message();
+  return *std::move(saved);
+}
+
+void expect_same_bits(const geometry::SE3& a, const geometry::SE3& b) {
+  EXPECT_EQ(a.rotation().coeffs(), b.rotation().coeffs());
+  EXPECT_EQ(a.translation(), b.translation());
+}
+
+void expect_same_frame(const frame::BundledFrame& a, const frame::BundledFrame& b, bool with_words) {
+  EXPECT_EQ(a.id, b.id);
+  EXPECT_EQ(a.time_ns, b.time_ns);
+  ASSERT_EQ(a.cameras.size(), b.cameras.size());
+  for (std::size_t c = 0; c < a.cameras.size(); ++c) {
+    const feature::Keypoints &ka = a.cameras[c].keypoints, &kb = b.cameras[c].keypoints;
+    EXPECT_EQ(a.cameras[c].state, b.cameras[c].state);
+    EXPECT_EQ(a.cameras[c].time_ns, b.cameras[c].time_ns);
+    EXPECT_EQ(ka.pixel, kb.pixel);
+    EXPECT_EQ(ka.level, kb.level);
+    EXPECT_EQ(ka.angle, kb.angle);
+    EXPECT_EQ(ka.sigma, kb.sigma);
+    EXPECT_EQ(ka.bearing, kb.bearing);
+    EXPECT_EQ(ka.descriptor, kb.descriptor);
+    EXPECT_EQ(ka.patch, kb.patch);
+    EXPECT_EQ(with_words ? a.cameras[c].words : std::vector<WordId>(), b.cameras[c].words);
+    std::vector<std::uint32_t> near_a, near_b;
+    a.cameras[c].grid.near(ka, {300, 200}, 150, 0, 7, near_a);
+    b.cameras[c].grid.near(kb, {300, 200}, 150, 0, 7, near_b);
+    EXPECT_EQ(near_a, near_b);
+  }
+  ASSERT_EQ(a.bundled.size(), b.bundled.size());
+  ASSERT_EQ(a.bundled.num_matched(), b.bundled.num_matched());
+  for (std::size_t f = 0; f < a.bundled.size(); ++f) {
+    const auto ra = a.bundled.keypoints(FeatureId(f)), rb = b.bundled.keypoints(FeatureId(f));
+    EXPECT_TRUE(std::equal(ra.begin(), ra.end(), rb.begin(), rb.end()));
+    const auto &pa = a.bundled.point(FeatureId(f)), &pb = b.bundled.point(FeatureId(f));
+    ASSERT_EQ(pa.has_value(), pb.has_value());
+    if (!pa) continue;
+    EXPECT_EQ(pa->point_rig, pb->point_rig);
+    EXPECT_EQ(pa->covariance, pb->covariance);
+  }
+}
+
+// The n-th alive keyframe and landmark of one map are those of number n of the other.
+void expect_same_map(const map::BundledMap& a, const map::BundledMap& b, bool with_words = true) {
+  const std::vector<KeyframeId> keyframes = a.keyframe_ids();
+  const std::vector<LandmarkId> landmarks = a.landmark_ids();
+  const auto number = [&](KeyframeId k) {
+    return KeyframeId(std::ranges::find(keyframes, k) - keyframes.begin() + std::size_t{0});
+  };
+  ASSERT_EQ(b.keyframe_slots(), keyframes.size());
+  ASSERT_EQ(b.landmark_slots(), landmarks.size());
+  EXPECT_EQ(a.num_observations(), b.num_observations());
+  EXPECT_EQ(a.scale(), b.scale());
+  EXPECT_EQ(a.pyramid().levels, b.pyramid().levels);
+  EXPECT_EQ(a.pyramid().scale_factor, b.pyramid().scale_factor);
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    const map::BundledKeyframe &ka = a.keyframe(keyframes[i]), &kb = b.keyframe(KeyframeId(i));
+    expect_same_bits(ka.T_rig_world, kb.T_rig_world);
+    EXPECT_EQ(ka.parent.valid() ? number(ka.parent) : KeyframeId(), kb.parent);
+    expect_same_frame(*ka.frame, *kb.frame, with_words);
+    ASSERT_EQ(ka.covisible.size(), kb.covisible.size());
+    for (std::size_t n = 0; n < ka.covisible.size(); ++n) EXPECT_EQ(ka.covisible[n].weight, kb.covisible[n].weight);
+  }
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const map::Landmark &la = a.landmark(landmarks[i]), &lb = b.landmark(LandmarkId(i));
+    EXPECT_EQ(la.position, lb.position);
+    EXPECT_EQ(la.view_direction, lb.view_direction);
+    EXPECT_EQ(la.min_distance, lb.min_distance);
+    EXPECT_EQ(la.max_distance, lb.max_distance);
+    EXPECT_EQ(la.descriptor, lb.descriptor);
+    EXPECT_EQ(number(la.reference.keyframe), lb.reference.keyframe);
+    EXPECT_EQ(la.reference.keypoint, lb.reference.keypoint);
+    if (a.alive(la.born)) {
+      EXPECT_EQ(number(la.born), lb.born);
+    }
+    EXPECT_EQ(la.expected, lb.expected);
+    EXPECT_EQ(la.found, lb.found);
+    const auto oa = a.observations(landmarks[i]), ob = b.observations(LandmarkId(i));
+    ASSERT_EQ(oa.size(), ob.size());
+    for (std::size_t n = 0; n < oa.size(); ++n)
+      EXPECT_EQ((map::Observation{number(oa[n].keyframe), oa[n].feature, oa[n].aligned}), ob[n]);
+  }
+}
+
+std::size_t words_end(const map::BundledMap& map) {
+  std::size_t end = 0;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    for (const frame::CameraFrame& c : map.keyframe(k).frame->cameras) {
+      for (const WordId word : c.words) end = std::max(end, word.index() + 1);
+    }
+  }
+  return end;
+}
+
+TEST(MapFile, GivesBackTheMapToTheBit) {
+  for (const camera::Rig& rig :
+       {synthetic::default_rig(), synthetic::mixed_rig(), synthetic::ring_rig(1), synthetic::fisheye_rig(3)}) {
+    const map::BundledMap map = small_map(rig);
+    ASSERT_GT(map.keyframe_slots(), map.num_keyframes());
+    ASSERT_GT(map.landmark_slots(), map.num_landmarks());
+    ASSERT_EQ(map.roots().size(), 2u);
+    const SavedMap saved = read_back(map);
+    expect_same_map(map, saved.map);
+    EXPECT_EQ(saved.info.vocabulary, small_info().vocabulary);
+    EXPECT_EQ(saved.info.version, "0.1.0");
+    EXPECT_EQ(saved.info.data, "a recording");
+    EXPECT_EQ(saved.words_end, words_end(map));
+  }
+}
+
+camera::Rig changed(const camera::Rig& rig, std::size_t i, const std::function<void(camera::RigCamera&)>& change) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+  change(cameras[i]);
+  return camera::Rig(std::move(cameras));
+}
+
+TEST(MapFile, GivesBackTheRigToTheBit) {
+  camera::Rig rig = changed(synthetic::mixed_rig(), 1, [](camera::RigCamera& c) {
+    c.camera.model = camera::DoubleSphere(camera::intrinsics(c.camera.model), -0.2, 0.6);
+    c.camera.time_offset_ns = -1'234'567;
+    c.camera.mask_file = "/masks/b.png";
+  });
+  const SavedMap saved = read_back(small_map(rig));
+  const camera::Rig& back = saved.map.rig();
+  ASSERT_EQ(back.size(), rig.size());
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    expect_same_bits(back.body_from_cam(i), rig.body_from_cam(i));
+    expect_same_bits(back.cam_from_rig(i), rig.cam_from_rig(i));
+    EXPECT_EQ(back.camera(i).name, rig.camera(i).name);
+    EXPECT_EQ(back.camera(i).time_offset_ns, rig.camera(i).time_offset_ns);
+    EXPECT_EQ(back.camera(i).mask_file, rig.camera(i).mask_file);
+    EXPECT_EQ(camera::model_name(back.camera(i).model), camera::model_name(rig.camera(i).model));
+    EXPECT_EQ(camera::distortion(back.camera(i).model), camera::distortion(rig.camera(i).model));
+    EXPECT_EQ(camera::intrinsics(back.camera(i).model).fx, camera::intrinsics(rig.camera(i).model).fx);
+    EXPECT_EQ(back.camera(i).unproject({100, 50}), rig.camera(i).unproject({100, 50}));
+  }
+}
+
+TEST(MapFile, KeepsPosesToTheBitThatNormalisingAgainWouldChange) {
+  Random random(5);
+  map::BundledMap map(std::make_shared<const camera::Rig>(synthetic::ring_rig(1)));
+  std::size_t changeable = 0;
+  for (int i = 0; i < 2000; ++i) {
+    geometry::Vector6d xi;
+    for (int n = 0; n < 6; ++n) xi[n] = random.uniform(-2, 2);
+    auto frame = std::make_shared<frame::BundledFrame>();
+    frame->cameras.resize(1);
+    const geometry::SE3 T_rig_world = geometry::SE3::exp(xi) * geometry::SE3::exp(-0.3 * xi).inverse();
+    changeable += T_rig_world.rotation().normalized().coeffs() != T_rig_world.rotation().coeffs();
+    map.add_keyframe(std::move(frame), T_rig_world, {}, {});
+  }
+  ASSERT_GT(changeable, 20u);
+  const SavedMap saved = read_back(map);
+  for (const KeyframeId k : map.keyframe_ids())
+    expect_same_bits(saved.map.keyframe(k).T_rig_world, map.keyframe(k).T_rig_world);
+}
+
+TEST(MapFile, IsTheSameBytesWhenWrittenAgain) {
+  const TemporaryFolder folder;
+  const fs::path a = folder.path() / "a.map", b = folder.path() / "b.map";
+  ASSERT_TRUE(write_map(small_map(synthetic::default_rig()), small_info(), a));
+  const auto saved = read_map(a);
+  ASSERT_TRUE(saved) << saved.error().message();
+  EXPECT_EQ(saved->file, a.string());
+  ASSERT_TRUE(write_map(saved->map, saved->info, b));
+  EXPECT_TRUE(read_text(a) == read_text(b));
+}
+
+TEST(MapFile, HoldsAnEmptyMap) {
+  const map::BundledMap map(std::make_shared<const camera::Rig>(synthetic::ring_rig(2)));
+  const SavedMap saved = read_back(map);
+  EXPECT_EQ(saved.map.keyframe_slots(), 0u);
+  EXPECT_EQ(saved.words_end, 0u);
+}
+
+TEST(MapFile, LeavesWordsOutWithoutTheirVocabulary) {
+  const map::BundledMap map = small_map(synthetic::default_rig());
+  const SavedMap saved = read_back(map, {0, "0.1.0", ""});
+  expect_same_map(map, saved.map, false);
+  EXPECT_EQ(saved.words_end, 0u);
+}
+
+TEST(MapFile, RefusesWhatIsNoMap) {
+  const TemporaryFolder folder;
+  const auto refused = [&](std::string_view content) {
+    write_text(folder.path() / "file", content);
+    const auto saved = read_map(folder.path() / "file");
+    EXPECT_FALSE(saved);
+    EXPECT_EQ(saved.error().file, (folder.path() / "file").string());
+    return saved.error();
+  };
+  EXPECT_EQ(refused("").found, "no saved map");
+  EXPECT_EQ(refused("PNG and so on").found, "no saved map");
+  EXPECT_EQ(refused("BSLAMMAP").key, "header");
+  std::string bytes = map_to_bytes(small_map(synthetic::ring_rig(1)), small_info());
+  EXPECT_EQ(refused(bytes + "x").key, "size");
+  bytes[12] = 99;
+  EXPECT_EQ(refused(bytes).key, "format version");
+  EXPECT_EQ(refused(bytes).found, "99");
+  EXPECT_FALSE(read_map(folder.path() / "none"));
+  EXPECT_FALSE(read_map(folder.path()));
+}
+
+TEST(MapFile, IsWholeOrNotThere) {
+  const TemporaryFolder folder;
+  const map::BundledMap map = small_map(synthetic::ring_rig(1));
+  EXPECT_FALSE(write_map(map, small_info(), folder.path() / "no" / "folder.map"));
+  ASSERT_TRUE(write_map(map, small_info(), folder.path() / "a.map"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+}
+
+// ---- fits
+
+TEST(MapFits, TheSameRigWhereverItsBodyFrameIs) {
+  const camera::Rig rig = synthetic::default_rig();
+  const SavedMap saved = read_back(small_map(rig));
+  EXPECT_TRUE(fits(saved, rig, saved.map.pyramid(), nullptr));
+  std::vector<camera::RigCamera> cameras;
+  const geometry::SE3 T_new_body(Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {1, 2, 3});
+  for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), T_new_body * rig.body_from_cam(c)});
+  EXPECT_TRUE(fits(saved, camera::Rig(std::move(cameras)), saved.map.pyramid(), nullptr));
+}
+
+TEST(MapFits, NamesTheCameraAndWhatDiffersOfIt) {
+  const camera::Rig rig = synthetic::default_rig();
+  const SavedMap saved = read_back(small_map(rig));
+  const auto key = [&](std::size_t i, const std::function<void(camera::RigCamera&)>& change) {
+    const Status status = fits(saved, changed(rig, i, change), saved.map.pyramid(), nullptr);
+    EXPECT_FALSE(status);
+    EXPECT_EQ(status.error().file, "test");
+    return status.error().key;
+  };
+  const std::string second = "camera 1 (" + rig.camera(1).name + "): ";
+  const camera::Intrinsics k = camera::intrinsics(rig.camera(1).model);
+  const std::vector<double> d = camera::distortion(rig.camera(1).model);
+  EXPECT_EQ(key(1, [](camera::RigCamera& c) { c.camera.width += 1; }), second + "resolution");
+  EXPECT_EQ(key(1, [&](camera::RigCamera& c) { c.camera.model = camera::Pinhole(k); }), second + "model");
+  EXPECT_EQ(key(1,
+                [&](camera::RigCamera& c) {
+                  c.camera.model = camera::PinholeRadTan({k.fx + 1e-4, k.fy, k.cx, k.cy}, d);
+                }),
+            second + "intrinsics");
+  EXPECT_EQ(key(1,
+                [&](camera::RigCamera& c) {
+                  c.camera.model = camera::PinholeRadTan(k, {d[0], d[1], d[2], d[3] + 1e-6});
+                }),
+            second + "distortion");
+  EXPECT_EQ(key(1,
+                [](camera::RigCamera& c) {
+                  c.T_body_cam = geometry::SE3(c.T_body_cam.rotation(), c.T_body_cam.translation() * 1.001);
+                }),
+            second + "place in the rig");
+  const std::vector<int> fewer = {0, 1};
+  EXPECT_EQ(fits(saved, rig.subset(fewer), saved.map.pyramid(), nullptr).error().key, "rig");
+}
+
+TEST(MapFits, OnlyTheVocabularyOfItsWords) {
+  const camera::Rig rig = synthetic::ring_rig(1);
+  place::VocabularyContent content;
+  content.branching = 2;
+  content.levels = 1;
+  content.child_count = {2, 0, 0};
+  content.descriptor = {{1, 2, 3, 4}, {5, 6, 7, 8}};
+  content.weight = {1, 1};
+  const auto vocabulary = place::Vocabulary::make(content);
+  ASSERT_TRUE(vocabulary);
+  const map::BundledMap map = small_map(rig);
+  EXPECT_EQ(fits(read_back(map), rig, map.pyramid(), vocabulary->get()).error().key, "vocabulary");
+  EXPECT_TRUE(fits(read_back(map, {0, "", ""}), rig, map.pyramid(), vocabulary->get()));
+  // The right name does not make up for words it does not have.
+  EXPECT_EQ(fits(read_back(map, {(*vocabulary)->id(), "", ""}), rig, map.pyramid(), vocabulary->get()).error().key,
+            "vocabulary");
+}
+
+}  // namespace
+}  // namespace bslam::storage

@@ -1,0 +1,152 @@
+#include "tracking/camera_health.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/random.h"
+
+namespace bslam::tracking {
+namespace {
+
+constexpr int kWidth = 101, kHeight = 40;  // rows do not end on a word
+
+// Grey values within [low, high], different for every seed.
+image::Image picture(std::uint64_t seed, int low, int high) {
+  Random random(seed);
+  image::Image image(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      image.row(y)[x] =
+          static_cast<std::uint8_t>(low + static_cast<int>(random.below(static_cast<std::uint32_t>(high - low + 1))));
+    }
+  }
+  return image;
+}
+
+image::Image good(std::uint64_t seed) { return picture(seed, 20, 200); }
+
+image::ImageBundle frame(std::vector<image::Image> images) {
+  image::ImageBundle bundle;
+  for (image::Image& i : images) {
+    const auto state = i.empty() ? image::ImageState::kMissing : image::ImageState::kPresent;
+    bundle.images.push_back({state, 0, std::move(i)});
+  }
+  return bundle;
+}
+
+using Outages = std::vector<Outage>;
+
+TEST(CameraMonitor, PassesOrdinaryPictures) {
+  CameraMonitor monitor(2, {});
+  for (std::uint64_t k = 0; k < 5; ++k) {
+    EXPECT_EQ(monitor.judge(frame({good(2 * k), good(2 * k + 1)})), (Outages{Outage::kNone, Outage::kNone}));
+  }
+}
+
+TEST(CameraMonitor, TellsBlackOverExposedAndMissingApart) {
+  CameraMonitor monitor(3, {});
+  EXPECT_EQ(monitor.judge(frame({picture(1, 0, 12), picture(2, 251, 255), {}})),
+            (Outages{Outage::kBlack, Outage::kOverExposed, Outage::kNoImage}));
+}
+
+TEST(CameraMonitor, ANightSceneWithLampsIsNotBlack) {
+  image::Image night = picture(1, 0, 10);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < 8; ++x) night.row(y)[x] = 180;
+  }
+  CameraMonitor monitor(1, {});
+  EXPECT_EQ(monitor.judge(frame({night})), Outages{Outage::kNone});
+}
+
+TEST(CameraMonitor, FindsTheFrozenCameraAndNotARigThatStandsStill) {
+  CameraMonitor monitor(2, {});
+  monitor.judge(frame({good(1), good(2)}));
+  EXPECT_EQ(monitor.judge(frame({good(1), good(2)})), (Outages{Outage::kNone, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
+}
+
+TEST(CameraMonitor, AFrozenCameraStaysOutWhereTheOthersMissAFrame) {
+  CameraMonitor monitor(2, {});
+  monitor.judge(frame({good(1), good(2)}));
+  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
+  for (int k = 0; k < 4; ++k)
+    EXPECT_EQ(monitor.judge(frame({{}, good(2)})), (Outages{Outage::kNoImage, Outage::kFrozen}));
+  EXPECT_EQ(monitor.judge(frame({good(4), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
+}
+
+TEST(CameraMonitor, OnePixelIsChangeEnough) {
+  CameraMonitor monitor(2, {});
+  image::Image almost = good(2);
+  monitor.judge(frame({good(1), good(2)}));
+  almost.row(kHeight - 1)[kWidth - 1] ^= 1;
+  EXPECT_EQ(monitor.judge(frame({good(3), almost})), (Outages{Outage::kNone, Outage::kNone}));
+}
+
+TEST(CameraMonitor, ReadmitsAfterGoodPicturesInARow) {
+  CameraMonitor monitor(2, {.readmit_after = 3});
+  monitor.judge(frame({picture(1, 0, 5), good(11)}));
+  EXPECT_EQ(monitor.judge(frame({good(1), good(12)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(2), good(13)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({picture(2, 0, 5), good(14)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(3), good(15)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(4), good(16)})), (Outages{Outage::kBlack, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(5), good(17)})), (Outages{Outage::kNone, Outage::kNone}));
+}
+
+TEST(CameraMonitor, ReadmitsAtOnceWhereNoOtherIsLeft) {
+  CameraMonitor monitor(3, {.readmit_after = 3});
+  const Outages dark(3, Outage::kBlack);
+  EXPECT_EQ(monitor.judge(frame({picture(1, 0, 5), picture(2, 0, 5), picture(3, 0, 5)})), dark);
+  EXPECT_EQ(monitor.judge(frame({picture(4, 0, 5), good(1), {}})),
+            (Outages{Outage::kBlack, Outage::kNone, Outage::kNoImage}));
+  EXPECT_EQ(monitor.judge(frame({good(2), good(3), good(4)})),
+            (Outages{Outage::kBlack, Outage::kNone, Outage::kBlack}));
+}
+
+TEST(CameraMonitor, ACameraThatComesNowAndThenIsTakenAsItComes) {
+  CameraMonitor monitor(2, {});
+  monitor.judge(frame({good(1), good(2)}));
+  EXPECT_EQ(monitor.judge(frame({good(3), {}})), (Outages{Outage::kNone, Outage::kNoImage}));
+  EXPECT_EQ(monitor.judge(frame({good(4), good(5)})), (Outages{Outage::kNone, Outage::kNone}));
+}
+
+// Tiles of 40 pixels whose edges are blurred by `across` and `along` pixels (standard deviations) in rows and columns.
+image::Image tiles(double across, double along, int contrast = 60) {
+  const auto edge = [](int at, double sigma) {
+    const int in_tile = at % 40;
+    return std::erf((in_tile - 19.5) / (std::sqrt(2.0) * sigma)) * ((at / 40) % 2 == 0 ? 1 : -1);
+  };
+  image::Image image(320, 240);
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      image.row(y)[x] =
+          static_cast<std::uint8_t>(std::lround(128 + contrast * (0.5 * edge(x, across) + 0.5 * edge(y, along))));
+    }
+  }
+  return image;
+}
+
+using Flags = std::vector<std::uint8_t>;
+
+TEST(CameraMonitor, TellsABlurredPictureFromASharpOneAndFromMotion) {
+  CameraMonitor monitor(3, {});
+  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6), tiles(4, 4), tiles(6, 0.6)})), (Flags{0, 1, 0}));
+}
+
+TEST(CameraMonitor, SaysNothingOfBlurWhereThereAreNoEdges) {
+  CameraMonitor monitor(2, {});
+  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4, 15), {}})), (Flags{0, 0}));
+}
+
+TEST(CameraMonitor, ACameraIsBlurredUntilSomePicturesAreSharp) {
+  CameraMonitor monitor(1, {});
+  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4)})), Flags{1});
+  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{1});
+  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4, 15)})), Flags{1});  // says nothing
+  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{1});
+  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{0});
+}
+
+}  // namespace
+}  // namespace bslam::tracking
