@@ -22,7 +22,8 @@ struct Camera {
 
   // True where the pixel lies at least `margin` pixels inside the image.
   bool contains(const Vector2d& pixel, double margin = 0.0) const {
-    return pixel.x() >= margin && pixel.y() >= margin && pixel.x() <= width - 1 - margin && pixel.y() <= height - 1 - margin;
+    return pixel.x() >= margin && pixel.y() >= margin && pixel.x() <= width - 1 - margin &&
+           pixel.y() <= height - 1 - margin;
   }
 
   // Radians a pixel at the principal point spans: 1 / mean focal length.

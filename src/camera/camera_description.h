@@ -13,11 +13,11 @@ namespace bslam::camera {
 
 struct CameraDescription {
   std::string name;
-  std::string model;                     // one of known_models()
+  std::string model;                     // a name of model_table()
   std::vector<std::int64_t> resolution;  // width, height in pixels
   std::vector<double> intrinsics;        // fx fy cx cy
-  std::vector<double> distortion;        // coefficients, or what shapes the model, as camera::distortion() gives them
-  std::vector<double> T_body_cam;        // (4, 4) row-major, metres
+  std::vector<double> distortion;  // coefficients, or what shapes the model, as distortion() of the model gives them
+  std::vector<double> T_body_cam;  // (4, 4) row-major, metres
   double time_offset_s = 0.0;
   std::string mask_file;
 };
@@ -28,13 +28,10 @@ struct DescriptionKeys {
   std::string model, resolution, intrinsics, distortion, T_body_cam, time_offset;
 };
 
-// The models a rig may have, as named in our rig file.
-const std::vector<std::string>& known_models();
-
 // Checks and converts. Errors: unknown model; resolution not within [1, 20000]; focal lengths not above 0; a wrong
 // count of coefficients; parameters outside of their model's range; a lens that maps nothing; what rigid_transform
 // refuses; a time offset beyond a million seconds.
-Result<camera::RigCamera> make_camera(const CameraDescription& description, const DescriptionKeys& keys);
+Result<RigCamera> make_camera(const CameraDescription& description, const DescriptionKeys& keys);
 
 // The rigid transform of sixteen numbers, the rows of a 4x4 matrix; `file` and `key` are for errors. Errors: another
 // count; a rotation that is off by more than 1e-3 or mirrored; a last row that is not 0 0 0 1; a translation beyond a
@@ -55,7 +52,7 @@ Result<std::vector<std::int64_t>> whole_pixels(const std::vector<double>& sides,
 
 // What a reader of some format hands on: its cameras, and remarks on how the file was understood.
 struct RigReading {
-  std::vector<camera::RigCamera> cameras;
+  std::vector<RigCamera> cameras;
   std::vector<std::string> notes;
 };
 

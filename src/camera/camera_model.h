@@ -3,13 +3,12 @@
 // project and unproject answer nothing instead of something wrong.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <optional>
 #include <string_view>
 #include <variant>
 #include <vector>
-
-#include <Eigen/Core>
 
 namespace bslam::camera {
 
@@ -70,8 +69,8 @@ class PinholeRadTan {
   double max_radius_ = 0;
 };
 
-// Kannala-Brandt fisheye (PAMI 2006; OpenCV's fisheye, Kalibr's equidistant): r = theta (1 + k1 theta^2 + ... k4 theta^8).
-// Sees behind its plane: domain theta below the first angle at which r stops growing, at most pi.
+// Kannala-Brandt fisheye (PAMI 2006; OpenCV's fisheye, Kalibr's equidistant): r = theta (1 + k1 theta^2 + ... k4
+// theta^8). Sees behind its plane: domain theta below the first angle at which r stops growing, at most pi.
 class KannalaBrandt {
  public:
   KannalaBrandt(const Intrinsics& k, const std::array<double, 4>& distortion);
@@ -89,10 +88,10 @@ class KannalaBrandt {
   double max_theta_ = 0, max_r_ = 0;
 };
 
-// Unified camera model (Geyer, Daniilidis 2000; Mei, Rives 2007, in the form of Usenko et al., 3DV 2018): a point goes to
-// the unit sphere and from there, through a centre behind it, to the plane: m = (x, y) / (alpha |p| + (1 - alpha) z) with
-// alpha in [0, 1]. alpha = 0 is a pinhole; Mei's xi is alpha / (1 - alpha), his focal length f (1 + xi). Domain: where
-// the projection is one to one, section 8 of docs/math.md; for alpha > 0 it sees behind its plane.
+// Unified camera model (Geyer, Daniilidis 2000; Mei, Rives 2007, in the form of Usenko et al., 3DV 2018): a point goes
+// to the unit sphere and from there, through a centre behind it, to the plane: m = (x, y) / (alpha |p| + (1 - alpha) z)
+// with alpha in [0, 1]. alpha = 0 is a pinhole; Mei's xi is alpha / (1 - alpha), his focal length f (1 + xi). Domain:
+// where the projection is one to one, section 8 of docs/math.md; for alpha > 0 it sees behind its plane.
 class Unified {
  public:
   Unified(const Intrinsics& k, double alpha);
@@ -125,8 +124,8 @@ class ExtendedUnified {
   double alpha_ = 0, beta_ = 1;
 };
 
-// Double sphere model (Usenko, Demmel, Cremers, 3DV 2018): two unit spheres whose centres are xi apart, then the plane of
-// the unified model. xi in (-1, 1], alpha in [0, 1]. At the optical axis a focal length of f / (1 + xi).
+// Double sphere model (Usenko, Demmel, Cremers, 3DV 2018): two unit spheres whose centres are xi apart, then the plane
+// of the unified model. xi in (-1, 1], alpha in [0, 1]. At the optical axis a focal length of f / (1 + xi).
 class DoubleSphere {
  public:
   DoubleSphere(const Intrinsics& k, double xi, double alpha);

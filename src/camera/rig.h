@@ -1,5 +1,5 @@
-// The rig: cameras and their constant extrinsics. Its frame is camera 0 (the paper's camera 1), so T_cam_rig of camera 0
-// is the identity; the paper's T_i1 is T_cam_rig of camera i, and c_i = T_i1 c_1 is cam_from_rig(i) * T_rig_world.
+// The rig: cameras and their constant extrinsics. Its frame is camera 0 (the paper's camera 1), so T_cam_rig of camera
+// 0 is the identity; the paper's T_i1 is T_cam_rig of camera i, and c_i = T_i1 c_1 is cam_from_rig(i) * T_rig_world.
 #pragma once
 
 #include <memory>
@@ -40,8 +40,8 @@ class Rig {
   bool overlap(std::size_t i, std::size_t j) const { return overlap_share(i, j) > kMinOverlap; }
   // Share of camera i's image that camera j sees, best over the sampled depths, in [0, 1].
   double overlap_share(std::size_t i, std::size_t j) const { return calibration_->overlap[i * size() + j]; }
-  // True where some pair of cameras overlaps, so that a still rig sees metric depth. `left_out`: one per camera, those that do not
-  // count; or empty.
+  // True where some pair of cameras overlaps, so that a still rig sees metric depth. `left_out`: one per camera, those
+  // that do not count; or empty.
   bool any_overlap(std::span<const std::uint8_t> left_out = {}) const;
 
   // The rig of some of the cameras, in the order given; the first becomes camera 0. Indices are valid and distinct.
@@ -49,9 +49,9 @@ class Rig {
   // The reverse: this rig with the extrinsics (T_body_cam) that its cameras `indices` have as the cameras of `part`.
   Rig with_extrinsics_of(const Rig& part, std::span<const int> indices) const;
 
-  // The rig as it stands while its cameras fire one after the other: camera i, `delay_s[i]` after the rig's own instant,
-  // has moved with the rig by exp(delay twist), so that T_cam_rig is T_i0 exp(delay twist) and the rig's pose is that of
-  // its own instant. `twist`: T_rig_world(t + dt) = exp(dt twist) T_rig_world(t), rad/s and m/s. Cheap.
+  // The rig as it stands while its cameras fire one after the other: camera i, `delay_s[i]` after the rig's own
+  // instant, has moved with the rig by exp(delay twist), so that T_cam_rig is T_i0 exp(delay twist) and the rig's pose
+  // is that of its own instant. `twist`: T_rig_world(t + dt) = exp(dt twist) T_rig_world(t), rad/s and m/s. Cheap.
   Rig moving(std::span<const double> delay_s, const geometry::Vector6d& twist) const;
 
  private:
