@@ -24,13 +24,14 @@ Rig::Rig(std::vector<RigCamera> cameras) {
 
 std::vector<double> Rig::measured_overlap(const std::vector<RigCamera>& cameras) const {
   constexpr int kColumns = 24, kRows = 16;
-  constexpr std::array kDepths = {0.5, 2.0, 10.0, 100.0};  // metres, near to far
+  constexpr std::array kDepths = {0.5, 2.0, 10.0, 100.0};  // metres
   std::vector<double> overlap(size() * size(), 0.0);
   for (std::size_t i = 0; i < size(); ++i) {
     std::vector<Vector3d> bearings;
     for (int r = 0; r < kRows; ++r) {
       for (int c = 0; c < kColumns; ++c) {
-        const Vector2d pixel((c + 0.5) * cameras[i].camera.width / kColumns - 0.5, (r + 0.5) * cameras[i].camera.height / kRows - 0.5);
+        const Vector2d pixel((c + 0.5) * cameras[i].camera.width / kColumns - 0.5,
+                             (r + 0.5) * cameras[i].camera.height / kRows - 0.5);
         if (const auto bearing = cameras[i].camera.unproject(pixel)) bearings.push_back(*bearing);
       }
     }
@@ -73,7 +74,8 @@ Rig Rig::subset(std::span<const int> indices) const {
 Rig Rig::with_extrinsics_of(const Rig& part, std::span<const int> indices) const {
   BSLAM_ASSERT(part.size() == indices.size(), "one index per camera of the part");
   std::vector<RigCamera> cameras = calibration_->cameras;
-  for (std::size_t i = 0; i < part.size(); ++i) cameras[static_cast<std::size_t>(indices[i])].T_body_cam = part.body_from_cam(i);
+  for (std::size_t i = 0; i < part.size(); ++i)
+    cameras[static_cast<std::size_t>(indices[i])].T_body_cam = part.body_from_cam(i);
   return Rig(std::move(cameras));
 }
 
