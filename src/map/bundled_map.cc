@@ -7,7 +7,7 @@
 namespace bslam::map {
 namespace {
 
-// How the rig moved from the time of the keyframe to that of camera c's image.
+// Motion of the rig from the keyframe's time to the capture time of camera c's image.
 geometry::SE3 motion_of(const BundledKeyframe& k, CameraIndex c) {
   const double delay = k.frame->delay_s(c.index());
   return delay == 0.0 ? geometry::SE3() : geometry::SE3::exp(delay * k.twist);
@@ -70,7 +70,8 @@ geometry::SE3 BundledMap::resolved_pose(KeyframeId k) const {
   const BundledKeyframe* entry = &keyframe(k);
   if (entry->alive) return entry->T_rig_world;
   geometry::SE3 T_rig_ancestor;
-  for (; !entry->alive && entry->parent.valid(); entry = &keyframe(entry->parent)) T_rig_ancestor = T_rig_ancestor * entry->T_rig_parent;
+  for (; !entry->alive && entry->parent.valid(); entry = &keyframe(entry->parent))
+    T_rig_ancestor = T_rig_ancestor * entry->T_rig_parent;
   return T_rig_ancestor * entry->T_rig_world;
 }
 
@@ -79,7 +80,9 @@ geometry::SE3 BundledMap::rig_from_cam(const BundledKeyframe& k, CameraIndex c) 
   return k.frame->delay_s(c.index()) == 0.0 ? T_rig_cam : motion_of(k, c).inverse() * T_rig_cam;
 }
 
-camera::Rig BundledMap::rig_of(KeyframeId k) const { return frame::rig_of(*rig_, *keyframe(k).frame, keyframe(k).twist); }
+camera::Rig BundledMap::rig_of(KeyframeId k) const {
+  return frame::rig_of(*rig_, *keyframe(k).frame, keyframe(k).twist);
+}
 
 geometry::SE3 BundledMap::motion_until(KeyframeId k, CameraIndex c) const { return motion_of(keyframe(k), c); }
 
@@ -182,7 +185,7 @@ bool BundledMap::merge_landmarks(LandmarkId from, LandmarkId into) {
   const std::vector<Observation> moving(list.begin(), list.end());
   for (Observation o : moving) {
     unlink(from, o);
-    o.aligned = false;  // to the patch of another reference
+    o.aligned = false;  // it was aligned to the patch of another reference keypoint
     add_observation(into, o);
   }
   add_sightings(into, landmark(from).expected, landmark(from).found);
@@ -274,7 +277,7 @@ bool BundledMap::add_sightings(LandmarkId l, std::uint32_t expected, std::uint32
 }
 
 void BundledMap::free_removed(std::size_t slots) {
-  const std::size_t groups = landmarks_.size() / kGroup;  // full ones
+  const std::size_t groups = landmarks_.size() / kGroup;  // blocks that are full
   for (std::size_t n = std::min(slots / kGroup, groups); n > 0; --n) {
     if (freed_up_to_ >= groups) freed_up_to_ = 0;
     const std::size_t group = freed_up_to_++;

@@ -10,8 +10,8 @@ namespace {
 
 using geometry::SE3;
 
-// How things that hang on a keyframe move in the map when its T_rig_world goes from `before` to `after` and the lengths
-// about it become `grown` times as long: both poses and points keep their place in the keyframe.
+// Motion of poses and points attached to a keyframe when its T_rig_world changes from `before` to `after` and lengths
+// about it are multiplied by `grown`: they keep their pose or position relative to the keyframe.
 struct Move {
   SE3 before, after;
   double grown = 1.0;
@@ -19,14 +19,17 @@ struct Move {
     const SE3 T_rig_keyframe = T_rig_world * before.inverse();
     return geometry::scaled(T_rig_keyframe, grown) * after;
   }
-  Eigen::Vector3d point(const Eigen::Vector3d& position) const { return after.inverse() * (grown * (before * position)); }
+  Eigen::Vector3d point(const Eigen::Vector3d& position) const {
+    return after.inverse() * (grown * (before * position));
+  }
 };
 
-// Empty where nothing moves, so that what does not move keeps its bits.
+// Empty if nothing moves, so that unmoved poses and points stay bit-identical.
 using Motion = std::optional<Move>;
 
 Motion motion_between(const SE3& before, const SE3& after, double grown = 1.0) {
-  const bool still = before.rotation().coeffs() == after.rotation().coeffs() && before.translation() == after.translation();
+  const bool still =
+      before.rotation().coeffs() == after.rotation().coeffs() && before.translation() == after.translation();
   if (still && grown == 1.0) return {};
   return Move{before, after, grown};
 }
@@ -46,7 +49,7 @@ class Rebase {
         others_landmarks_end_(map.landmark_slots()),
         same_epoch_(edit.base->gauge_epoch() == map.gauge_epoch()) {}
 
-  // Each applies one operation; false where it is dropped.
+  // Each overload applies one operation and returns false if it is dropped.
   bool operator()(const AddKeyframe& op);
   bool operator()(const AddLandmark& op);
   bool operator()(const AddObservation& op) {
@@ -58,7 +61,9 @@ class Rebase {
   bool operator()(const RemoveLandmark& op);
   bool operator()(const MergeLandmarks& op) { return map_.merge_landmarks(forward(op.from), forward(op.into)); }
   bool operator()(const RemoveKeyframe& op) { return map_.remove_keyframe(here(op.keyframe)); }
-  bool operator()(const JoinParts& op) { return map_.join_parts(map_.surviving(here(op.child)), map_.surviving(here(op.parent))); }
+  bool operator()(const JoinParts& op) {
+    return map_.join_parts(map_.surviving(here(op.child)), map_.surviving(here(op.parent)));
+  }
   bool operator()(const RemovePart& op) { return map_.remove_part(here(op.root)); }
   bool operator()(const ScalePart& op) { return map_.scale_part(here(op.root), op.factor); }
   bool operator()(const SetPoses& op);
@@ -73,7 +78,7 @@ class Rebase {
   void count(bool was_applied) { ++(was_applied ? report_.applied : report_.dropped); }
 
  private:
-  // Ids of the edit as ids of the map: what the edit added itself got another id at commit, or none.
+  // Converts ids of the edit to ids of the map: things that the edit added may get other ids at commit, or none.
   KeyframeId here(KeyframeId k) const { return own(k) ? report_.keyframes[k.index() - base_.keyframe_slots()] : k; }
   LandmarkId here(LandmarkId l) const {
     if (!l.valid() || l.index() < base_.landmark_slots()) return l;
@@ -89,15 +94,15 @@ class Rebase {
 
   const BundledMap& base_;
   BundledMap& map_;
-  const std::size_t others_keyframes_end_, others_landmarks_end_;  // slots; newer ones are the edit's own
-  const bool same_epoch_;  // no correction by others since the base
-  std::vector<Motion> own_motions_;                                // per keyframe the edit added, when it was
-  std::unordered_set<KeyframeId> written_;                         // keyframes the edit has set; ids of the edit
+  // number of slots before the edit; higher ids were added by the edit itself
+  const std::size_t others_keyframes_end_, others_landmarks_end_;
+  const bool same_epoch_;                   // no correction by others since the base
+  std::vector<Motion> own_motions_;         // motion of each keyframe the edit added, computed at its addition
+  std::unordered_set<KeyframeId> written_;  // keyframes whose pose the edit has set; ids of the edit
   RebaseReport report_;
 };
 
-// By which others moved a keyframe of the edit since the edit's base. What the edit itself has set stands in the map as
-// the edit meant it.
+// Returns by how much others moved a keyframe since the edit's base. Poses set by the edit itself have not moved.
 Motion Rebase::motion_since_base(KeyframeId edit_id) const {
   if (!edit_id.valid() || written_.contains(edit_id)) return {};
   if (own(edit_id)) return own_motions_[edit_id.index() - base_.keyframe_slots()];
@@ -150,7 +155,7 @@ bool Rebase::operator()(const RemoveLandmark& op) {
 bool Rebase::operator()(const SetPoses& op) {
   if (!same_epoch_) return false;
   bool any = false;
-  std::unordered_map<KeyframeId, Motion> motions;  // ids of the map
+  std::unordered_map<KeyframeId, Motion> motions;  // keyed by ids of the map
   for (const auto& [edit_id, T_rig_world] : op.keyframes) {
     const KeyframeId k = here(edit_id);
     if (!map_.alive(k)) continue;
@@ -164,9 +169,9 @@ bool Rebase::operator()(const SetPoses& op) {
   return any;
 }
 
-// Newer keyframes inherit the motion of their nearest ancestor that is not newer: as each keeps its pose relative to
-// its parent, T_rig_world_new = T_rig_parent * T_parent_world_new, the motion is the same all the way down. Newer
-// landmarks take that of their reference's keyframe.
+// Newer keyframes inherit the motion of their nearest ancestor that is not newer: since each one keeps its pose
+// relative to its parent, T_rig_world_new = T_rig_parent * T_parent_world_new, the motion is the same along the whole
+// chain. Newer landmarks inherit the motion of the keyframe of their reference.
 void Rebase::carry_along(const std::unordered_map<KeyframeId, Motion>& motions) {
   const auto motion_of = [&](KeyframeId k) -> Motion {
     while (newer(k)) k = map_.keyframe(k).parent;
