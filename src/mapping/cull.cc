@@ -13,7 +13,7 @@ int num_keypoints(const map::BundledMap& map, LandmarkId l) {
   return n;
 }
 
-// Finest level on which an observation shows its landmark.
+// Finest pyramid level of the keypoints of an observation.
 int finest_level(const map::BundledMap& map, const map::Observation& o) {
   const frame::BundledFrame& frame = *map.keyframe(o.keyframe).frame;
   int finest = 255;
@@ -30,7 +30,8 @@ bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& o
     ++landmarks;
     const auto observations = map.observations(l);
     if (static_cast<int>(observations.size()) <= options.redundant_views) continue;
-    const auto own = std::find_if(observations.begin(), observations.end(), [&](const map::Observation& o) { return o.keyframe == k; });
+    const auto own = std::find_if(observations.begin(), observations.end(),
+                                  [&](const map::Observation& o) { return o.keyframe == k; });
     const int level = finest_level(map, *own);
     const auto others = std::count_if(observations.begin(), observations.end(), [&](const map::Observation& o) {
       return o.keyframe != k && finest_level(map, o) <= level + 1;
@@ -44,7 +45,7 @@ bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& o
 
 int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
-  // Landmarks are numbered in order of birth: the young ones are at the end.
+  // Landmark ids are in order of creation, so the recent ones are at the end.
   std::vector<LandmarkId> bad;
   for (std::size_t i = map.landmark_slots(); i-- > 0;) {
     const LandmarkId id(i);

@@ -7,7 +7,7 @@ namespace {
 
 bool is_root(const map::BundledMap& map, KeyframeId k) { return !map.keyframe(k).parent.valid(); }
 
-// Landmarks seen by the keyframes, by how many of them, falling; at most `limit`, then in order of id.
+// Returns the landmarks observed by the most of these keyframes, at most `limit`, in order of id.
 std::vector<LandmarkId> most_seen(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes, int limit) {
   std::vector<int> count(map.landmark_slots(), 0);
   std::vector<LandmarkId> out;
@@ -25,7 +25,7 @@ std::vector<LandmarkId> most_seen(const map::BundledMap& map, const std::vector<
   return out;
 }
 
-// Other keyframes that see the landmarks, those that see most of them, at most `limit`, in order of id.
+// Returns the other keyframes that observe the most of these landmarks, at most `limit`, in order of id.
 std::vector<KeyframeId> other_observers(const map::BundledMap& map, const std::vector<LandmarkId>& landmarks,
                                         const std::vector<KeyframeId>& inside, int limit) {
   std::vector<int> count(map.keyframe_slots(), 0);
@@ -45,10 +45,10 @@ std::vector<KeyframeId> other_observers(const map::BundledMap& map, const std::v
   return out;
 }
 
-// Poses that must be held besides the root so that the gauge is fixed: without metric scale two in all.
+// Number of poses to fix so that the gauge is determined: two if the scale is arbitrary, otherwise one.
 std::size_t held_poses(const map::BundledMap& map) { return map.scale() == map::Scale::kUpToScale ? 2 : 1; }
 
-// Fixes the oldest free keyframes until enough poses are held; sorts both lists.
+// Fixes the oldest free keyframes until enough poses are fixed; sorts both lists.
 void fix_gauge(const map::BundledMap& map, adjustment::Selection& selection) {
   std::sort(selection.free_keyframes.begin(), selection.free_keyframes.end());
   while (selection.fixed_keyframes.size() < held_poses(map) && selection.free_keyframes.size() > 1) {
@@ -68,7 +68,8 @@ adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyfra
   adjustment::Selection selection;
   selection.landmarks = most_seen(map, window, options.max_landmarks);
   selection.fixed_keyframes = other_observers(map, selection.landmarks, window, options.fixed_keyframes);
-  for (const KeyframeId k : window) (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
+  for (const KeyframeId k : window)
+    (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
   fix_gauge(map, selection);
   return selection;
 }
