@@ -24,7 +24,7 @@ struct TrainingOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("branching", self.branching, Range{2, kMaxBranching}, "", "children of a node of the tree");
     visitor("levels", self.levels, Range{1, kMaxLevels}, "", "steps from the root to a word");
-    visitor("iterations", self.iterations, Range{1, 1000}, "", "most iterations of one clustering");
+    visitor("iterations", self.iterations, Range{1, 1000}, "", "maximum number of iterations per clustering");
   }
 };
 
