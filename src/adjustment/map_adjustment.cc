@@ -22,7 +22,7 @@ double sum_bound(double bound, int keypoints) {
 
 // Outliers are classified per observation, that is for all keypoints of a feature together: judged one by one, the
 // probability that one of them exceeds its bound by chance would grow with the number of cameras.
-std::vector<ObservationSource> bad_observations(const FlatProblem& flat, double bound) {
+std::vector<ObservationSource> outlier_observations(const FlatProblem& flat, double bound) {
   const std::vector<double> chi2 = solver::squared_errors(flat.problem);
   std::vector<ObservationSource> bad;
   for (std::size_t i = 0; i < chi2.size();) {
@@ -42,8 +42,8 @@ std::vector<ObservationSource> bad_observations(const FlatProblem& flat, double 
 
 // Landmarks observed by one keyframe only are not part of the problem; they keep their position relative to that
 // keyframe.
-void carry_single_views(const map::BundledMap& map, KeyframeId k, const geometry::SE3& T_rig_world,
-                        map::SetPoses& poses) {
+void move_single_view_landmarks(const map::BundledMap& map, KeyframeId k, const geometry::SE3& T_rig_world,
+                                map::SetPoses& poses) {
   const geometry::SE3 T_new_old = T_rig_world.inverse() * map.keyframe(k).T_rig_world;
   for (const LandmarkId l : map.keyframe(k).landmarks) {
     if (!l.valid() || map.observations(l).size() != 1) continue;
@@ -56,7 +56,7 @@ map::SetPoses poses_of(const map::BundledMap& map, const FlatProblem& flat) {
   for (std::size_t i = 0; i < flat.keyframes.size(); ++i) {
     if (!flat.problem.pose_free[i]) continue;
     poses.keyframes.emplace_back(flat.keyframes[i], flat.problem.T_rig_world[i]);
-    carry_single_views(map, flat.keyframes[i], flat.problem.T_rig_world[i], poses);
+    move_single_view_landmarks(map, flat.keyframes[i], flat.problem.T_rig_world[i], poses);
   }
   for (std::size_t i = 0; i < flat.landmarks.size(); ++i) {
     if (flat.problem.points[i].allFinite()) poses.landmarks.emplace_back(flat.landmarks[i], flat.problem.points[i]);
@@ -89,7 +89,7 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
     const auto variances = landmark_variances(flat.problem, chi2, skip);
     adjust_with_variances(flat.problem, variances, solve, skip, stop);
   }
-  const std::vector<ObservationSource> bad = bad_observations(flat, options.outlier_chi2);
+  const std::vector<ObservationSource> bad = outlier_observations(flat, options.outlier_chi2);
   map::SetPoses poses = poses_of(draft.map(), flat);
   poses.correction = selection.whole_map;
   std::vector<LandmarkId> touched;

@@ -147,7 +147,7 @@ RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& option
 // Removes the observations of a point by groups other than the one with the most observations (the first one on ties).
 // Otherwise the point would connect two fixed keyframes, and their distance would constrain lengths, which the
 // extrinsics have to determine.
-void part_groups(RigProblem& problem) {
+void separate_groups(RigProblem& problem) {
   std::vector<solver::ReprojectionProblem::Observation>& observations = problem.flat.problem.observations;
   std::vector<int> count(problem.group.size());
   std::size_t kept = 0;
@@ -168,29 +168,29 @@ void part_groups(RigProblem& problem) {
 }
 
 // Square root of the largest eigenvalue.
-double worst_deviation(const Matrix3d& covariance) {
+double largest_deviation(const Matrix3d& covariance) {
   return std::sqrt(
       Eigen::SelfAdjointEigenSolver<Matrix3d>(covariance, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff());
 }
 
-double in_sigmas(const Vector3d& change, const Matrix3d& covariance) {
+double mahalanobis_distance(const Vector3d& change, const Matrix3d& covariance) {
   return std::sqrt(change.dot(covariance.llt().solve(change)));
 }
 
-CameraRefinement judge(const solver::ExtrinsicEstimate& estimate, const RigRefinementOptions& options) {
+CameraRefinement evaluate_camera(const solver::ExtrinsicEstimate& estimate, const RigRefinementOptions& options) {
   CameraRefinement out;
   out.T_cam_rig_after = estimate.T_cam_rig;
   out.observed = estimate.observed;
   out.observations = estimate.observations;
-  const Vector3d turned = estimate.change.head<3>(), moved = estimate.change.tail<3>();
-  const Matrix3d of_rotation = estimate.covariance.topLeftCorner<3, 3>(),
-                 of_translation = estimate.covariance.bottomRightCorner<3, 3>();
-  out.change_deg = geometry::degrees(turned.norm());
-  out.change_mm = moved.norm() * kMillimetres;
-  out.std_deg = geometry::degrees(worst_deviation(of_rotation));
-  out.std_mm = worst_deviation(of_translation) * kMillimetres;
-  out.rotation_sigmas = in_sigmas(turned, of_rotation);
-  out.translation_sigmas = in_sigmas(moved, of_translation);
+  const Vector3d rotation = estimate.change.head<3>(), translation = estimate.change.tail<3>();
+  const Matrix3d rotation_covariance = estimate.covariance.topLeftCorner<3, 3>(),
+                 translation_covariance = estimate.covariance.bottomRightCorner<3, 3>();
+  out.change_deg = geometry::degrees(rotation.norm());
+  out.change_mm = translation.norm() * kMillimetres;
+  out.std_deg = geometry::degrees(largest_deviation(rotation_covariance));
+  out.std_mm = largest_deviation(translation_covariance) * kMillimetres;
+  out.rotation_sigmas = mahalanobis_distance(rotation, rotation_covariance);
+  out.translation_sigmas = mahalanobis_distance(translation, translation_covariance);
   out.suspect = (out.rotation_sigmas > options.suspect_sigmas && out.change_deg > options.suspect_deg) ||
                 (out.translation_sigmas > options.suspect_sigmas && out.change_mm > options.suspect_mm);
   return out;
@@ -199,8 +199,9 @@ CameraRefinement judge(const solver::ExtrinsicEstimate& estimate, const RigRefin
 // Returns true if no extrinsics have moved from `before` by more than their own uncertainty.
 bool settled(const solver::RigAdjustment& adjusted, const std::vector<geometry::SE3>& before) {
   for (std::size_t c = 1; c < before.size(); ++c) {
-    const geometry::Vector6d moved = solver::extrinsic_change(adjusted.cameras[c].T_cam_rig, before[c]);
-    if (moved.dot(adjusted.cameras[c].covariance.llt().solve(moved)) > static_cast<double>(moved.size())) return false;
+    const geometry::Vector6d change = solver::extrinsic_change(adjusted.cameras[c].T_cam_rig, before[c]);
+    if (change.dot(adjusted.cameras[c].covariance.llt().solve(change)) > static_cast<double>(change.size()))
+      return false;
   }
   return true;
 }
@@ -212,12 +213,12 @@ solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const map::Fe
                                        const std::stop_token& stop) {
   std::vector<geometry::SE3> T_cam_rig;
   for (std::size_t c = 0; c < map.rig().size(); ++c) T_cam_rig.push_back(map.rig().cam_from_rig(c));
-  part_groups(problem);
+  separate_groups(problem);
   solver::RigAdjustment out = solver::adjust_rig(problem.flat.problem, options, T_cam_rig, stop);
   for (int pass = 1; pass < kPasses && out.done && !settled(out, T_cam_rig); ++pass) {
     for (std::size_t c = 0; c < T_cam_rig.size(); ++c) T_cam_rig[c] = out.cameras[c].T_cam_rig;
     if (recover_observations(map, T_cam_rig, features, problem.flat) == 0) break;
-    part_groups(problem);
+    separate_groups(problem);
     solver::RigAdjustment again = solver::adjust_rig(problem.flat.problem, options, T_cam_rig, stop);
     if (!again.done) break;
     out = std::move(again);
@@ -245,7 +246,7 @@ RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions&
   first.observed = adjusted.cameras.front().observed;
   first.observations = adjusted.cameras.front().observations;
   for (std::size_t c = 1; c < map.rig().size(); ++c) {
-    out.cameras.push_back(judge(adjusted.cameras[c], options));
+    out.cameras.push_back(evaluate_camera(adjusted.cameras[c], options));
   }
   return out;
 }

@@ -10,7 +10,7 @@ namespace {
 
 // On a continuous path the candidate is linked to the keyframe by those in between, and the landmarks matched are
 // mostly ones that the keyframe observes already. A real revisit matches landmarks that it does not observe yet.
-bool shows_news(const map::BundledMap& map, KeyframeId keyframe, const Location& location, const LoopOptions& options) {
+bool is_revisit(const map::BundledMap& map, KeyframeId keyframe, const Location& location, const LoopOptions& options) {
   const auto known = std::ranges::count_if(location.matches, [&](const auto& match) {
     const std::span<const map::Observation> list = map.observations(match.second);
     return std::ranges::find(list, keyframe, &map::Observation::keyframe) != list.end();
@@ -21,8 +21,8 @@ bool shows_news(const map::BundledMap& map, KeyframeId keyframe, const Location&
 
 // Returns, among the candidate and its best covisible keyframes, without the keyframe's own neighbours, the one that is
 // closest to the verified position of the keyframe.
-KeyframeId nearest_of_place(const map::BundledMap& map, KeyframeId keyframe, const Location& location,
-                            const LoopingOptions& options) {
+KeyframeId closest_keyframe_of_place(const map::BundledMap& map, KeyframeId keyframe, const Location& location,
+                                     const LoopingOptions& options) {
   const Eigen::Vector3d here = location.T_rig_world.inverse().translation();
   const auto distance = [&](KeyframeId k) {
     return (map.keyframe(k).T_rig_world.inverse().translation() - here).norm();
@@ -54,7 +54,7 @@ std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::Bundl
 // Submaps can have any relative pose, so no pose prior can reject a wrong match, only appearance. Therefore no other
 // place in the rest of the map may match equally well. The candidates are searched as for relocalisation, with lower
 // thresholds, because a look-alike place observed by fewer keyframes would not be a candidate beside the right one.
-bool LoopCloser::undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const {
+bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const {
   const std::shared_ptr<const frame::BundledFrame> frame = map.keyframe(keyframe).frame;
   const camera::Rig rig = map.rig_of(keyframe);
   map::BundledMap rest = map;
@@ -70,14 +70,14 @@ std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::Bundled
   const std::vector<Candidate> candidates = recogniser_->revisited(map, keyframe);
   for (const Candidate& candidate : consistent_candidates(map, keyframe, candidates, options_.loop, history_)) {
     auto location = verify(keyframe, map, candidate);
-    if (!location || !shows_news(map, keyframe, *location, options_.loop)) continue;
+    if (!location || !is_revisit(map, keyframe, *location, options_.loop)) continue;
     const auto scale = relative_scale(map, keyframe, *location);
     if (!scale) continue;
     location->scale = *scale;
-    location->with = nearest_of_place(map, keyframe, *location, options_);
+    location->with = closest_keyframe_of_place(map, keyframe, *location, options_);
     const LoopClosure closure = measure(map, keyframe, *location);
     if (!plausible(map, closure, options_.loop)) continue;
-    if (!closure.joined || undisputed(keyframe, map, *location)) return location;
+    if (!closure.joined || is_unambiguous(keyframe, map, *location)) return location;
   }
   return std::nullopt;
 }

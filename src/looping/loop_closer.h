@@ -34,7 +34,7 @@ class LoopCloser {
 
  private:
   std::optional<Location> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const;
-  bool undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const;
+  bool is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const;
   std::optional<Location> find(KeyframeId keyframe, const map::BundledMap& map);
 
   const std::unique_ptr<PlaceRecogniser> recogniser_;

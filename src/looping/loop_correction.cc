@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 using geometry::SE3;
 using geometry::Sim3;
 
-constexpr double kMaxTurn = geometry::radians(20);  // rad: larger rotations cannot be explained by drift
+constexpr double kMaxRotation = geometry::radians(20);  // rad: larger rotations cannot be explained by drift
 
 Vector3d centre(const SE3& T_rig_world) { return T_rig_world.inverse().translation(); }
 
@@ -25,7 +25,7 @@ SE3 pose_of(const Sim3& S_rig_world) {
 }
 
 // Median reprojection error, in pixels, of the matched landmarks of the place at the keyframe's current pose.
-double error_px(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
+double reprojection_error_px(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
   const map::BundledKeyframe& entry = map.keyframe(keyframe);
   const camera::Rig rig = map.rig_of(keyframe);
   std::vector<double> errors;
@@ -41,7 +41,7 @@ double error_px(const map::BundledMap& map, KeyframeId keyframe, const Location&
 
 // Distance between the verified pose and the matched keyframe, divided by the median distance to the landmarks both
 // observe.
-double apart(const map::BundledMap& map, const Location& location) {
+double relative_distance(const map::BundledMap& map, const Location& location) {
   const Vector3d here = centre(location.T_rig_world);
   std::vector<double> distances;
   for (const auto& [feature, l] : location.matches) distances.push_back((map.landmark(l).position - here).norm());
@@ -50,7 +50,7 @@ double apart(const map::BundledMap& map, const Location& location) {
 }
 
 // Length of the path between two keyframes through all keyframes of their submap created in between.
-double way_between(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
+double path_length(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
   const KeyframeId root = map.root_of(to);
   double length = 0;
   Vector3d last = centre(map.keyframe(from).T_rig_world);
@@ -176,9 +176,9 @@ LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Locat
   out.moved = (centre(now) - centre(location.T_rig_world)).norm();
   out.turned =
       (now.rotation() * location.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
-  out.off_px = error_px(map, keyframe, location);
+  out.off_px = reprojection_error_px(map, keyframe, location);
   out.scaled = location.scale;
-  out.apart = apart(map, location);
+  out.apart = relative_distance(map, location);
   out.joined = map.root_of(keyframe) != map.root_of(location.with);
   return out;
 }
@@ -187,8 +187,8 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
   if (closure.joined) return map.scale() == map::Scale::kMetric;
   const auto [first, last] = std::minmax(closure.keyframe, closure.with);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
-  const double way = way_between(map, first, last) + median_depth(map, closure.keyframe);
-  return closure.apart <= options.max_apart && closure.moved <= share * way && closure.turned <= kMaxTurn;
+  const double way = path_length(map, first, last) + median_depth(map, closure.keyframe);
+  return closure.apart <= options.max_apart && closure.moved <= share * way && closure.turned <= kMaxRotation;
 }
 
 bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,

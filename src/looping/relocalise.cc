@@ -16,9 +16,9 @@ std::optional<Location> relocalise(PlaceRecogniser& recogniser, const map::Bundl
   // Ties go to the first one, which scores higher in appearance.
   auto best = std::max_element(found.begin(), found.end(),
                                [](const Location& a, const Location& b) { return a.inliers < b.inliers; });
-  const bool disputed =
+  const bool ambiguous =
       std::any_of(found.begin(), found.end(), [&](const Location& other) { return disputes(map, *best, other); });
-  if (disputed) return std::nullopt;
+  if (ambiguous) return std::nullopt;
   return std::move(*best);
 }
 

@@ -164,7 +164,7 @@ bool BundledMap::remove_observation(LandmarkId l, KeyframeId k) {
   unlink(l, Observation(*at));
   const auto rest = observations(l);
   if (rest.empty()) {
-    bury(l, {});
+    mark_removed(l, {});
   } else if (landmark(l).reference.keyframe == k) {
     const Observation oldest = rest.front();
     edit(l).reference = {oldest.keyframe, keyframe(oldest.keyframe).frame->bundled.keypoints(oldest.feature).front()};
@@ -175,7 +175,7 @@ bool BundledMap::remove_observation(LandmarkId l, KeyframeId k) {
 bool BundledMap::remove_landmark(LandmarkId l) {
   if (!alive(l)) return false;
   while (!observations(l).empty()) unlink(l, Observation(observations(l).back()));
-  bury(l, {});
+  mark_removed(l, {});
   return true;
 }
 
@@ -189,7 +189,7 @@ bool BundledMap::merge_landmarks(LandmarkId from, LandmarkId into) {
     add_observation(into, o);
   }
   add_sightings(into, landmark(from).expected, landmark(from).found);
-  bury(from, into);
+  mark_removed(from, into);
   return true;
 }
 
@@ -203,7 +203,7 @@ bool BundledMap::remove_keyframe(KeyframeId k) {
   BundledKeyframe& entry = edit(k);
   const geometry::SE3& T_parent_world = keyframe(entry.parent).T_rig_world;
   entry.T_rig_parent = entry.T_rig_world * T_parent_world.inverse();
-  let_go(k);
+  mark_removed(k);
   return true;
 }
 
@@ -222,7 +222,7 @@ bool BundledMap::remove_part(KeyframeId root) {
   for (const LandmarkId l : table) {
     if (l.valid()) remove_observation(l, root);
   }
-  let_go(root);
+  mark_removed(root);
   return true;
 }
 
@@ -277,12 +277,13 @@ bool BundledMap::add_sightings(LandmarkId l, std::uint32_t expected, std::uint32
 }
 
 void BundledMap::free_removed(std::size_t slots) {
-  const std::size_t groups = landmarks_.size() / kGroup;  // blocks that are full
-  for (std::size_t n = std::min(slots / kGroup, groups); n > 0; --n) {
-    if (freed_up_to_ >= groups) freed_up_to_ = 0;
-    const std::size_t group = freed_up_to_++;
+  const std::size_t groups = landmarks_.size() / kLandmarksPerChunk;  // blocks that are full
+  for (std::size_t n = std::min(slots / kLandmarksPerChunk, groups); n > 0; --n) {
+    if (next_chunk_to_free_ >= groups) next_chunk_to_free_ = 0;
+    const std::size_t group = next_chunk_to_free_++;
     bool gone = true;
-    for (std::size_t l = group * kGroup; gone && l < (group + 1) * kGroup; ++l) gone = !landmarks_[l].alive;
+    for (std::size_t l = group * kLandmarksPerChunk; gone && l < (group + 1) * kLandmarksPerChunk; ++l)
+      gone = !landmarks_[l].alive;
     if (!gone) continue;
     landmarks_.blank_chunk(group, owner_.tag());
     observations_.blank_block(group, owner_.tag());
@@ -312,7 +313,7 @@ std::vector<KeyframeId> BundledMap::part_of(KeyframeId root) const {
   return part;
 }
 
-void BundledMap::let_go(KeyframeId k) {
+void BundledMap::mark_removed(KeyframeId k) {
   BundledKeyframe& entry = edit(k);
   entry.frame.reset();
   entry.landmarks.clear();
@@ -321,7 +322,7 @@ void BundledMap::let_go(KeyframeId k) {
   --alive_keyframes_;
 }
 
-void BundledMap::bury(LandmarkId l, LandmarkId merged_into) {
+void BundledMap::mark_removed(LandmarkId l, LandmarkId merged_into) {
   edit(l).alive = false;
   if (merged_into.valid()) merged_into_.mutate(l.index(), owner_.tag()) = merged_into;
   --alive_landmarks_;

@@ -169,8 +169,8 @@ class BundledMap {
   // counters and covisibility consistent.
   void link(LandmarkId l, Observation o);
   void unlink(LandmarkId l, Observation o);
-  void let_go(KeyframeId k);                        // must have no observations or children left
-  void bury(LandmarkId l, LandmarkId merged_into);  // must have no observations left
+  void mark_removed(KeyframeId k);                          // must have no observations or children left
+  void mark_removed(LandmarkId l, LandmarkId merged_into);  // must have no observations left
 
   // In covisibility.cc.
   void change_weight(KeyframeId a, KeyframeId b, int change);
@@ -190,12 +190,12 @@ class BundledMap {
   int gauge_epoch_ = 0;
   CowOwner owner_;
   CowVector<BundledKeyframe, 1> keyframes_;
-  static constexpr std::size_t kGroup = ObservationColumn::kBlock;  // number of landmarks per chunk
-  CowVector<Landmark, kGroup> landmarks_;
+  static constexpr std::size_t kLandmarksPerChunk = ObservationColumn::kBlock;  // number of landmarks per chunk
+  CowVector<Landmark, kLandmarksPerChunk> landmarks_;
   CowVector<LandmarkId, 64> merged_into_;
   ObservationColumn observations_;
   std::size_t alive_keyframes_ = 0, alive_landmarks_ = 0, observations_total_ = 0;
-  std::size_t freed_up_to_ = 0;  // next block of landmarks that free_removed visits
+  std::size_t next_chunk_to_free_ = 0;  // next block of landmarks that free_removed visits
 };
 
 using MapSnapshot = std::shared_ptr<const BundledMap>;

@@ -86,7 +86,7 @@ class CowVector {
   // Releases the memory of a full chunk: its elements become default values in a piece shared by all such chunks.
   void blank_chunk(std::size_t chunk, std::uint64_t tag) {
     BSLAM_ASSERT((chunk + 1) * kChunk <= size_, "a chunk is full before it is given up");
-    static const std::shared_ptr<Chunk> kBlank = std::make_shared<Chunk>(Chunk{kNobody, {}});
+    static const std::shared_ptr<Chunk> kBlank = std::make_shared<Chunk>(Chunk{kNoOwner, {}});
     if (nodes_[chunk / kNode]->chunks[chunk % kNode] == kBlank) return;
     detach(nodes_[chunk / kNode], tag);
     nodes_[chunk / kNode]->chunks[chunk % kNode] = kBlank;
@@ -103,8 +103,8 @@ class CowVector {
   }
 
  private:
-  static constexpr std::uint64_t kNobody = ~std::uint64_t{0};  // a tag that is never assigned
-  static constexpr std::size_t kNode = 64;                     // chunks per node
+  static constexpr std::uint64_t kNoOwner = ~std::uint64_t{0};  // a tag that is never assigned
+  static constexpr std::size_t kNode = 64;                      // chunks per node
   static constexpr std::size_t kPerNode = kNode * kChunk;
   struct Chunk {
     std::uint64_t tag;

@@ -24,7 +24,7 @@ int finest_level(const map::BundledMap& map, const map::Observation& o) {
 }
 
 bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& options) {
-  int landmarks = 0, seen_elsewhere = 0;
+  int landmarks = 0, observed_elsewhere = 0;
   for (const LandmarkId l : map.keyframe(k).landmarks) {
     if (!l.valid()) continue;
     ++landmarks;
@@ -36,9 +36,9 @@ bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& o
     const auto others = std::count_if(observations.begin(), observations.end(), [&](const map::Observation& o) {
       return o.keyframe != k && finest_level(map, o) <= level + 1;
     });
-    seen_elsewhere += others >= options.redundant_views;
+    observed_elsewhere += others >= options.redundant_views;
   }
-  return landmarks > 0 && seen_elsewhere > options.redundant_share * landmarks;
+  return landmarks > 0 && observed_elsewhere > options.redundant_share * landmarks;
 }
 
 }  // namespace
@@ -53,9 +53,9 @@ int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDra
     if (!l.alive) continue;
     const int age = newest.value() - l.born.value();
     if (age > options.probation) break;
-    const bool hard_to_find = l.expected > 3 && l.found < options.min_found_share * l.expected;
-    const bool hardly_seen = age >= options.probation && num_keypoints(map, id) < options.min_keypoints;
-    if (hard_to_find || hardly_seen) bad.push_back(id);
+    const bool rarely_matched = l.expected > 3 && l.found < options.min_found_share * l.expected;
+    const bool few_keypoints = age >= options.probation && num_keypoints(map, id) < options.min_keypoints;
+    if (rarely_matched || few_keypoints) bad.push_back(id);
   }
   for (const LandmarkId l : bad) draft.remove_landmark(l);
   return static_cast<int>(bad.size());

@@ -13,10 +13,10 @@ adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyfra
 
 // Returns true if the scale of the map is not observable yet and the submap of `keyframe` is small enough to be
 // adjusted as a whole. Fixed keyframes would fix the scale as well.
-bool needs_whole_part(const map::BundledMap& map, KeyframeId keyframe, const ScaleOptions& options);
+bool needs_whole_submap(const map::BundledMap& map, KeyframeId keyframe, const ScaleOptions& options);
 
 // Selects all keyframes of the submap of `keyframe` except its root, and the landmarks they observe.
-adjustment::Selection select_part(const map::BundledMap& map, KeyframeId keyframe);
+adjustment::Selection select_submap(const map::BundledMap& map, KeyframeId keyframe);
 
 // Selects all keyframes except the roots, and all landmarks.
 adjustment::Selection select_all(const map::BundledMap& map);

@@ -16,8 +16,8 @@ void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const Fe
   const double deviation_before = draft.map().scale_deviation();
   for (int round = 0; round < options.scale.rounds; ++round) {
     report.scale = observe_scale(keyframe, options.scale, features, draft);
-    const adjustment::Selection selection = needs_whole_part(draft.map(), keyframe, options.scale)
-                                                ? select_part(draft.map(), keyframe)
+    const adjustment::Selection selection = needs_whole_submap(draft.map(), keyframe, options.scale)
+                                                ? select_submap(draft.map(), keyframe)
                                                 : select_local(draft.map(), keyframe, options.window);
     report.adjustment =
         adjustment::adjust_map(selection, options.local, features.sigma_px, features.scale_factor, draft, stop);

@@ -12,9 +12,10 @@ namespace {
 
 // Largest scale factor applied at once: the equations are linearised, and far from the solution only their direction is
 // right.
-constexpr double kLongestStep = 3.0;
-constexpr double kSettled = 3.0;      // in standard deviations: a smaller correction leaves the map metric
-constexpr double kSignificant = 0.5;  // in standard deviations: a smaller correction is not applied
+constexpr double kMaxScaleStep = 3.0;
+constexpr double kMaxMetricCorrectionSigmas =
+    3.0;                                      // in standard deviations: a smaller correction leaves the map metric
+constexpr double kMinCorrectionSigmas = 0.5;  // in standard deviations: a smaller correction is not applied
 
 // Only the oldest keyframe is fixed: fixing more would constrain the very shape from which the scale is estimated.
 adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId keyframe, int limit) {
@@ -53,9 +54,9 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   report.deviation = found->deviation;
   report.keyframes = static_cast<int>(flat.keyframes.size());
   if (found->deviation <= options.max_correcting_deviation) {
-    const double correction = std::clamp(found->scale, 1.0 / kLongestStep, kLongestStep);
+    const double correction = std::clamp(found->scale, 1.0 / kMaxScaleStep, kMaxScaleStep);
     // every scaling is a map correction, which invalidates the work of other stages
-    if (std::abs(correction - 1.0) > kSignificant * found->deviation) {
+    if (std::abs(correction - 1.0) > kMinCorrectionSigmas * found->deviation) {
       report.correction = correction;
       draft.scale_part(map.root_of(keyframe), correction);
     }
@@ -66,7 +67,8 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
 
 bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options) {
   return report.observed && report.keyframes >= options.min_keyframes && report.deviation <= options.max_deviation &&
-         deviation_before <= options.max_deviation && std::abs(report.correction - 1.0) <= kSettled * report.deviation;
+         deviation_before <= options.max_deviation &&
+         std::abs(report.correction - 1.0) <= kMaxMetricCorrectionSigmas * report.deviation;
 }
 
 }  // namespace bslam::mapping

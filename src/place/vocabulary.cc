@@ -114,13 +114,13 @@ WordId Vocabulary::word(const feature::Descriptor& descriptor) const {
 // compared.
 void Vocabulary::words(std::span<const feature::Descriptor> descriptors, std::span<WordId> words) const {
   BSLAM_ASSERT(descriptors.size() == words.size(), "one word a descriptor");
-  constexpr std::size_t kTogether = 32;
+  constexpr std::size_t kBatch = 32;
   constexpr std::size_t kCacheLine = 64;
-  std::array<Node, kTogether> at;
-  for (std::size_t begin = 0; begin < words.size(); begin += kTogether) {
-    const std::size_t count = std::min(kTogether, words.size() - begin);
+  std::array<Node, kBatch> at;
+  for (std::size_t begin = 0; begin < words.size(); begin += kBatch) {
+    const std::size_t count = std::min(kBatch, words.size() - begin);
     at.fill(nodes_.front());
-    std::array<std::int32_t, kTogether> next{};
+    std::array<std::int32_t, kBatch> next{};
     for (int step = 0; step < depth_; ++step) {
       for (std::size_t i = 0; i < count; ++i) {
         if (at[i].count == 0) continue;

@@ -131,14 +131,14 @@ TEST(ObserveScale, IsSilentAboutOneCameraAndOneKeyframe) {
 
 TEST(SelectPart, FreesAllButTheRootWhileTheScaleIsUnknown) {
   SimulatedMap world = ride(orbit(1), three_sides(), 5, 1.0, 1);
-  EXPECT_TRUE(needs_whole_part(world.map, KeyframeId(4), {.keyframes = 5}));
-  EXPECT_FALSE(needs_whole_part(world.map, KeyframeId(4), {.keyframes = 4}));
-  const adjustment::Selection s = select_part(world.map, KeyframeId(4));
+  EXPECT_TRUE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 5}));
+  EXPECT_FALSE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 4}));
+  const adjustment::Selection s = select_submap(world.map, KeyframeId(4));
   EXPECT_EQ(s.fixed_keyframes, std::vector<KeyframeId>{KeyframeId(0)});
   EXPECT_EQ(s.free_keyframes.size(), 4u);
   EXPECT_EQ(s.landmarks, world.map.landmark_ids());
   world.map.set_scale(map::Scale::kMetric);
-  EXPECT_FALSE(needs_whole_part(world.map, KeyframeId(4), {.keyframes = 5}));
+  EXPECT_FALSE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 5}));
 }
 
 TEST(IsMetric, AsksForTwoMeasurementsAndASettledMap) {
