@@ -228,8 +228,8 @@ bool close_loop(const LoopClosure& closure, const Location& location, const Loop
 
   // Poses of the window as given by the verification: S_i' = T_i T_k^-1 S_k', in the scale of the window.
   const std::vector<Sim3> S_before = graph.problem.S_world;
-  const double unit = 1.0 / closure.scaled;
-  const Sim3 S_keyframe(unit, location.T_rig_world.rotation(), unit * location.T_rig_world.translation());
+  const double scale = 1.0 / closure.scaled;
+  const Sim3 S_keyframe(scale, location.T_rig_world.rotation(), scale * location.T_rig_world.translation());
   const Sim3 S_keyframe_before(before.keyframe(closure.keyframe).T_rig_world);
   for (const KeyframeId k : window) {
     const auto v = static_cast<std::size_t>(graph.vertex(k));

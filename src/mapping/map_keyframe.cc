@@ -23,8 +23,8 @@ void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const Fe
         adjustment::adjust_map(selection, options.local, features.sigma_px, features.scale_factor, draft, stop);
     if (std::abs(report.scale.correction - 1.0) <= options.scale.settled || stop.stop_requested()) break;
   }
-  const bool one_part = draft.map().roots().size() == 1;  // the scale is a property of the whole map
-  if (one_part && is_metric(report.scale, deviation_before, options.scale))
+  const bool single_submap = draft.map().roots().size() == 1;  // the scale is a property of the whole map
+  if (single_submap && is_metric(report.scale, deviation_before, options.scale))
     draft.set_scale(map::Scale::kMetric, report.scale.deviation);
 }
 

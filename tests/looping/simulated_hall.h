@@ -174,7 +174,7 @@ class HallMap {
 };
 
 // Returns the fraction `share` of the similarity `whole`.
-inline Sim3 part_of(const Sim3& whole, double share) { return Sim3::exp(share * whole.log()); }
+inline Sim3 fraction_of(const Sim3& whole, double share) { return Sim3::exp(share * whole.log()); }
 
 // Drift at the end of a lap.
 inline Sim3 rigid_drift() {
@@ -193,7 +193,7 @@ inline HallMap walk(const FeatureSimulator& simulator, int more, const Sim3& dri
   const int count = kRound + more;
   for (int i = 0; i < count; ++i) {
     const KeyframeId k =
-        out.add(simulator.frame(FrameId(i), kStepS * i), part_of(drift, static_cast<double>(i) / (count - 1)));
+        out.add(simulator.frame(FrameId(i), kStepS * i), fraction_of(drift, static_cast<double>(i) / (count - 1)));
     if (after_each && !after_each(out, k)) break;
   }
   return out;
