@@ -20,13 +20,13 @@ using geometry::SE3;
 using geometry::Vector3d;
 
 constexpr std::int64_t kMaxSidePx = 20000;
-constexpr double kMaxTranslation = 1e6;      // metres; a larger one is a slip of units or a broken file
+constexpr double kMaxTranslation = 1e6;      // metres; a larger value is a unit mistake or a broken file
 constexpr double kMaxTimeOffset = 1e6;       // seconds; keeps sums of nanoseconds far from overflow
-constexpr double kRotationTolerance = 1e-3;  // files round to four digits and more
+constexpr double kRotationTolerance = 1e-3;  // calibration files round to four or more digits
 
-// The rotation nearest to R whose quaternion lies on a grid, so fine that it does not matter (4e-15) and so coarse that
-// going to a matrix and back leads to the same point. The largest coefficient follows from the other three; of nearly
-// equal ones it is the first.
+// Returns the rotation nearest to R, with quaternion coefficients rounded to a grid. The grid is fine enough not to
+// matter (4e-15) and coarse enough that a conversion to a matrix and back gives the same quaternion. The largest
+// coefficient is computed from the other three; among nearly equal ones the first is taken.
 geometry::Quaterniond rounded_rotation(const Matrix3d& R) {
   constexpr double kGrid = 0x1p-48, kTie = 1e-9;
   const Eigen::JacobiSVD<Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -128,7 +128,8 @@ std::vector<double> rows_of(const SE3& T) {
 
 Result<SE3> rigid_transform(const geometry::Quaterniond& rotation, const Vector3d& translation, const std::string& file,
                             const std::string& key) {
-  constexpr double kUnit = 1e-14;  // a unit quaternion, written with all its digits, keeps its bits
+  // A unit quaternion that was written with all digits keeps its exact bits.
+  constexpr double kUnit = 1e-14;
   const double norm2 = rotation.squaredNorm();
   if (!(std::abs(std::sqrt(norm2) - 1) <= kRotationTolerance)) {
     return Error{file, key, fmt::format("a quaternion of norm {:.4g}", std::sqrt(norm2)), "a unit quaternion"};

@@ -25,7 +25,7 @@ TEST(ShippedVocabulary, LoadsInLessThanFiftyMilliseconds) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
   GTEST_SKIP() << "times are those of a release build";
 #endif
-  double best_ms = 1e9;  // the machine may be busy with something else in one of them
+  double best_ms = 1e9;  // the best of several attempts, since the machine may be busy
   for (int i = 0; i < 5; ++i) {
     const auto start = std::chrono::steady_clock::now();
     ASSERT_TRUE(shipped_vocabulary().ok());
@@ -35,8 +35,8 @@ TEST(ShippedVocabulary, LoadsInLessThanFiftyMilliseconds) {
   EXPECT_LT(best_ms, 50.0);
 }
 
-// A word is worth log2(words) bits if all are equally likely. Descriptors as they scatter around the centres of the
-// tree itself must come near that, and spread over most words.
+// A word carries log2(number of words) bits if all words are equally likely. Descriptors scattered around the tree's
+// own centres must come close to that and use most of the words.
 TEST(ShippedVocabulary, SpreadsDescriptorsOverItsWords) {
   const VocabularyPtr v = shipped_vocabulary().value();
   Random random(41);
