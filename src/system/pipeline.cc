@@ -109,11 +109,8 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<
   if (state_.twist) frame.twist = *state_.twist;
   stages.push_back({"extract", extraction.ms()});
   const Stopwatch bundling;
-  frame.bundled = matching::bundle(frame::rig_of(rig_, frame), frame.cameras, builder_.pyramids(), config_.bundling,
-                                   alignment(), pool_);
-  for (std::size_t c = 0; c < rig_.size(); ++c) {
-    frame.cameras[c].grid = frame::FeatureGrid(frame.cameras[c].keypoints, rig_.camera(c).width, rig_.camera(c).height);
-  }
+  frame =
+      matching::bundle(frame::rig_of(rig_, frame), frame, builder_.pyramids(), config_.bundling, alignment(), pool_);
   stages.push_back({"bundle", bundling.ms()});
   return frame;
 }
@@ -258,7 +255,7 @@ std::optional<tracking::TrackResult> Pipeline::locate_early(const map::BundledMa
   return tracking::pose_between(map, early, {config_.features.sigma_px}, config_.tracking, pool_);
 }
 
-tracking::TrackOutput Pipeline::follow(BundledFrame& frame, const map::BundledMap& map) {
+tracking::TrackOutput Pipeline::follow(const BundledFrame& frame, const map::BundledMap& map) {
   if (!map.surviving(state_.reference).valid()) {  // no pose in this map so far
     const bool blind = frame.num_keypoints() < static_cast<std::size_t>(config_.tracking.min_inliers);
     return tracking::lost(state_, frame, blind ? tracking::LostReason::kFewFeatures : tracking::LostReason::kNotFound);
@@ -284,6 +281,7 @@ void Pipeline::track(BundledFrame frame, execution::StageExecutor& executor, Out
     output = follow(frame, map);
     if (!is_tracking(output.result.status)) outcome.record.relocalisation.reset();
   }
+  if (is_tracking(output.result.status)) frame = output.frame;
   outcome.record.result = output.result;
   feature_shares_ = tracking::feature_shares(feature_shares_, map, frame, output);
   error_floors_ = tracking::error_floors(error_floors_, map, frame, output, config_.tracking.alignment);

@@ -55,7 +55,7 @@ class Pipeline {
   void start(frame::BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome);
   void keep_candidate(frame::BundledFrame frame);
   void track(frame::BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome);
-  tracking::TrackOutput follow(frame::BundledFrame& frame, const map::BundledMap& map);
+  tracking::TrackOutput follow(const frame::BundledFrame& frame, const map::BundledMap& map);
   bool find_again(frame::BundledFrame& frame, const map::BundledMap& map, Outcome& outcome);
   void note_motion(const map::BundledMap& map, const tracking::TrackerState& before, FrameRecord& record);
   void add_keyframe(frame::BundledFrame& frame, const tracking::TrackOutput& output, execution::StageExecutor& executor,

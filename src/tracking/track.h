@@ -67,6 +67,9 @@ struct TrackOutput {
   TrackResult result;
   TrackerState state;
   FrameMatches matches;  // inliers
+  // The frame as tracking leaves it: keypoints of the inliers aligned to their landmarks, the velocity of the rig as
+  // estimated, cameras that are not trusted without keypoints. Empty where the frame has no pose.
+  frame::BundledFrame frame;
   bool keyframe_due = false;
 };
 
@@ -80,8 +83,8 @@ struct TrackInput {
   std::uint64_t seed = 1;
 };
 
-// Finds the pose of `frame`, moving matched keypoints to their aligned places. The map has at least one keyframe.
-TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
+// Finds the pose of `frame`. The map has at least one keyframe.
+TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
                   ThreadPool& pool);
 
 // A frame without a pose, and the state after it.

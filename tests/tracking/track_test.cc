@@ -22,7 +22,7 @@ struct RigCase {
 double squared_normalised_error(const map::BundledMap& map, const frame::BundledFrame& frame,
                                 const FrameMatches& matches, const SE3& T_rig_world, const SE3& true_T_rig_world) {
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
-  for (const solver::PoseObservation& o : pose_observations(map, frame, matches)) {
+  for (const solver::PoseObservation& o : observations_of(map, frame, matches)) {
     const Eigen::Vector3d p = true_T_rig_world * o.point_world;
     const SE3& T_cam_rig = map.rig().cam_from_rig(o.camera);
     const auto projection = map.rig().camera(o.camera).project_with_jacobian(T_cam_rig * p);
@@ -269,17 +269,16 @@ TEST_F(Track, DoesNotTakeWhatStayedForProofThatNothingMoved) {
   auto shown = frame.frame;
   const auto& before = world().frames[0];
   for (std::size_t c = 0; c < shown.cameras.size(); ++c) {
-    feature::Keypoints& k = shown.cameras[c].keypoints;
+    feature::Refinement k = shown.cameras[c].keypoints.positions();
     const feature::Keypoints& old = before.frame.cameras[c].keypoints;
-    for (std::size_t i = 0; i < k.size(); ++i) {
+    for (std::size_t i = 0; i < k.pixel.size(); ++i) {
       const auto same = std::ranges::find(before.landmark[c], frame.landmark[c][i]);
       if (i % 5 > 1 || frame.landmark[c][i] < 0 || same == before.landmark[c].end()) continue;
       const auto o = static_cast<std::size_t>(same - before.landmark[c].begin());
       k.pixel[i] = old.pixel[o];
       k.bearing[i] = old.bearing[o];
     }
-    shown.cameras[c].grid =
-        frame::FeatureGrid(k, world().map.rig().camera(c).width, world().map.rig().camera(c).height);
+    shown.cameras[c] = frame::refined(shown.cameras[c], std::move(k), world().map.rig().camera(c));
   }
   EXPECT_GT(map::angle_rad(frame.T_world_rig, before.T_world_rig), 2 * tracker.options.matching.predicted_radius);
   expect_true(tracker.track(shown).result, frame.T_world_rig, "first motion");
