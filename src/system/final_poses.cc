@@ -21,7 +21,7 @@ std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, co
   for (std::size_t i = 0; i < 3; ++i) {
     T[i] = T_rig_world_of(frames[i], map);
     if (!T[i]) return std::nullopt;
-    root[i] = map.root_of(frames[i].final_result().reference);
+    root[i] = map.root_of(frames[i].final_result().anchored.reference);
   }
   if (root[0] != root[1] || root[2] != root[1]) return std::nullopt;
   const Vector6d before = (*T[1] * T[0]->inverse()).log() / before_s;
@@ -33,9 +33,7 @@ std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, co
 
 std::optional<SE3> T_rig_world_of(const FrameRecord& record, const map::BundledMap& map) {
   const tracking::TrackResult& r = record.final_result();
-  if (r.status != tracking::TrackStatus::kTracking || !map.surviving(r.reference).valid()) return std::nullopt;
-  const double grown = map.keyframe(r.reference).unit / record.unit;  // the scale of the map may have been found since
-  return geometry::scaled(r.T_rig_reference, grown) * map.resolved_pose(r.reference);
+  return r.status == tracking::TrackStatus::kTracking ? r.anchored.resolve(map) : std::nullopt;
 }
 
 std::vector<std::pair<KeyframeId, Vector6d>> twists_from_neighbours(const map::BundledMap& map, KeyframeId first,

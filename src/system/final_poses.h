@@ -11,7 +11,7 @@
 
 namespace bslam::system {
 
-// A frame hangs on the keyframe it was tracked against. Empty where it has no pose or that part of the map is gone.
+// Pose of a frame in `map`. Empty where the frame has none or `map` no longer holds the submap it was tracked in.
 std::optional<geometry::SE3> T_rig_world_of(const FrameRecord& record, const map::BundledMap& map);
 
 // How the rig moved while the cameras of a keyframe fired one after the other: by constant acceleration from the frame before

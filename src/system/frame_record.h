@@ -34,7 +34,6 @@ struct FrameRecord {
   geometry::SE3 T_rig_odom, T_map_odom;
   bool keyframe = false;
   int unique = 0, monocular = 0, matched = 0;  // features
-  double unit = 1.0;  // of result.reference then (map::BundledKeyframe::unit): what T_rig_reference is in
   KeyframeId root;    // of the part of the map the pose was told in
   // Of the two, what counts in the end.
   const tracking::TrackResult& final_result() const { return found_later ? *found_later : result; }

@@ -146,15 +146,13 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   count_features(frame, outcome.record);
   const Stopwatch results;
   outcome.seen = executor.begin_frame(frame.id);
-  grow_along(*outcome.seen);
+  apply_scale_change(*outcome.seen);
   if (config_.mode == execution::Mode::kLagged) outcome.record.stages.push_back({"results", results.ms()});
   if (outcome.seen->num_keyframes() == 0) {
     start(std::move(frame), executor, outcome);
   } else {
     track(std::move(frame), executor, outcome);
   }
-  const bool fresh = !outcome.keyframes.empty() || !state_.reference.valid();
-  outcome.record.unit = unit_ = fresh ? 1.0 : outcome.seen->keyframe(state_.reference).unit;
   outcome.record.T_rig_odom = T_rig_odom_;
   outcome.record.T_map_odom = T_map_odom_;
   outcome.record.frame_ms = whole.ms();
@@ -170,12 +168,10 @@ void Pipeline::trust_what_is_sharp_again(const std::vector<std::uint8_t>& blurre
   blurred_ = blurred;
 }
 
-// The state is in the unit the map had: where its part was scaled since, it grows along.
-void Pipeline::grow_along(const map::BundledMap& map) {
-  if (!state_.reference.valid()) return;
-  const double grown = map.keyframe(state_.reference).unit / unit_;
-  state_.T_rig_reference = geometry::scaled(state_.T_rig_reference, grown);
-  if (state_.twist) state_.twist->tail<3>() *= grown;
+// Mapping may have rescaled the submap since the last frame: pose and velocity follow.
+void Pipeline::apply_scale_change(const map::BundledMap& map) {
+  if (state_.twist) state_.twist->tail<3>() *= state_.anchored.scale_change(map);
+  state_.anchored.rescale(map);
 }
 
 void Pipeline::start(BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome) {
@@ -216,7 +212,7 @@ void Pipeline::start(BundledFrame frame, execution::StageExecutor& executor, Out
     result.status = tracking::TrackStatus::kTracking;
     result.reason = tracking::LostReason::kNone;
     result.T_rig_world = keyframe.T_rig_world;
-    result.reference = last;
+    result.anchored.reference = last;
     outcome.record.root = report.published->root_of(last);
     outcome.keyframes = report.keyframes;
     outcome.record.keyframe = true;
@@ -259,7 +255,7 @@ std::optional<tracking::TrackResult> Pipeline::locate_early(const map::BundledMa
 }
 
 tracking::TrackOutput Pipeline::follow(BundledFrame& frame, const map::BundledMap& map) {
-  if (!map.surviving(state_.reference).valid()) {  // no pose in this map so far
+  if (!state_.anchored.known_in(map)) {  // no pose in this map so far
     const bool blind = frame.num_keypoints() < static_cast<std::size_t>(config_.tracking.min_inliers);
     return tracking::lost(state_, frame, blind ? tracking::LostReason::kFewFeatures : tracking::LostReason::kNotFound);
   }
@@ -336,22 +332,22 @@ bool Pipeline::find_again(BundledFrame& frame, const map::BundledMap& map, Outco
   const auto trust = tracking::doubts_of(state_.cameras, seen, config_.tracking.consensus);
   state_ = tracking::state_at_keyframe({}, frame.time_ns, location->with, std::move(landmarks));
   state_.cameras = trust;
-  state_.T_rig_reference = location->T_rig_world * map.keyframe(location->with).T_rig_world.inverse();
+  state_.anchored = map::AnchoredPose::at(map, location->with, location->T_rig_world);
   outcome.record.relocalisation = Relocalisation{location->with, location->inliers};
   return true;
 }
 
 // What moved between the last frame and this one: the rig, or the map below it?
 void Pipeline::note_motion(const map::BundledMap& map, const tracking::TrackerState& before, FrameRecord& record) {
-  const bool continued = is_tracking(before.status) && map.surviving(before.reference).valid();
-  if (continued) T_map_odom_ = (before.T_rig_reference * map.resolved_pose(before.reference)).inverse() * T_rig_odom_;
+  const bool continued = is_tracking(before.status) && before.anchored.known_in(map);
+  if (continued) T_map_odom_ = before.anchored.resolve(map)->inverse() * T_rig_odom_;
   if (is_tracking(record.result.status)) {
     if (continued && !record.relocalisation) {
       T_rig_odom_ = record.result.T_rig_world * T_map_odom_;
     } else {
       T_map_odom_ = record.result.T_rig_world.inverse() * T_rig_odom_;
     }
-    record.root = map.root_of(record.result.reference);
+    record.root = map.root_of(record.result.anchored.reference);
   }
 }
 
@@ -362,15 +358,14 @@ void Pipeline::add_keyframe(BundledFrame& frame, const tracking::TrackOutput& ou
   if (recogniser_) recogniser_->describe(frame);
   const tracking::NewKeyframe made =
       tracking::make_keyframe(frame, output.matches, output.result.T_rig_world, builder_.pyramids(),
-                              output.result.reference, config_.tracking.initialisation, draft);
+                              output.result.anchored.reference, config_.tracking.initialisation, draft);
   const map::CommitReport report = executor.commit(execution::JournalStep::kTrack, std::move(draft));
   const double grown =
-      report.published->keyframe(output.result.reference).unit / outcome.seen->keyframe(output.result.reference).unit;
+      output.result.anchored.scale_change(*report.published);
   if (state_.twist) state_.twist->tail<3>() *= grown;  // mapping may have found another scale meanwhile
   state_ = tracking::state_at_keyframe(state_, frame.time_ns, report.keyframes.front(),
                                        committed(made.landmarks, outcome.seen->landmark_slots(), report));
-  outcome.record.result.reference = report.keyframes.front();
-  outcome.record.result.T_rig_reference = geometry::SE3();
+  outcome.record.result.anchored = {.reference = report.keyframes.front(), .T_rig_reference = {}};
   outcome.record.keyframe = true;
   outcome.keyframes = report.keyframes;
 }

@@ -51,7 +51,7 @@ class Pipeline {
   std::vector<std::uint8_t> left_out(const image::ImageBundle& images,
                                      const std::vector<tracking::Outage>& outages) const;
   std::vector<matching::AlignmentOptions> alignment() const;  // per camera, as it is known at present
-  void grow_along(const map::BundledMap& map);
+  void apply_scale_change(const map::BundledMap& map);
   void start(frame::BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome);
   void keep_candidate(frame::BundledFrame frame);
   void track(frame::BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome);
@@ -70,7 +70,6 @@ class Pipeline {
   std::vector<double> feature_shares_;  // of the cameras in the next frame's feature budget; empty: even
   std::vector<double> error_floors_;    // of the cameras, for the next frame; empty: nothing is known
   tracking::TrackerState state_;
-  double unit_ = 1.0;  // of the state's reference keyframe when the state was made (map::BundledKeyframe::unit)
   std::optional<tracking::StartCandidate> candidate_;
   std::vector<std::shared_ptr<const frame::BundledFrame>> early_;  // the candidate and the frames since
   const std::unique_ptr<looping::PlaceRecogniser> recogniser_;

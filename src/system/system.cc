@@ -127,7 +127,6 @@ void System::locate_early_frames() {
     if (record == frames_.end() || record->result.frame != early.frame->id) continue;
     if (record->result.status == tracking::TrackStatus::kTracking) continue;
     record->found_later = pipeline_.locate_early(*map, early);
-    if (record->found_later) record->unit = map->keyframe(record->found_later->reference).unit;
   }
 }
 
@@ -171,7 +170,7 @@ std::vector<PartTrajectory> System::trajectories() const {
   for (const FrameRecord& record : frames_) {
     const tracking::TrackResult& r = record.final_result();
     if (const auto T_rig_world = T_rig_world_of(record, *map)) {
-      add_pose(out, map->root_of(r.reference), r.time_ns, T_rig_world->inverse());
+      add_pose(out, map->root_of(r.anchored.reference), r.time_ns, T_rig_world->inverse());
     }
   }
   std::stable_sort(out.begin(), out.end(),
