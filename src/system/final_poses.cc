@@ -7,10 +7,12 @@ namespace {
 
 using geometry::SE3;
 using geometry::Vector6d;
+using tracking::FrameRecord;
 
-// Mean twist from the middle frame's time to `delay` after it, of the parabola through three poses: the mean twists of the two
-// intervals are those at their middles, and it is the one at half the delay.
-std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, const map::BundledMap& map, double delay_s) {
+// Mean twist from the middle frame's time to `delay` after it, of the parabola through three poses: the mean twists of
+// the two intervals are those at their middles, and it is the one at half the delay.
+std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, const map::BundledMap& map,
+                                      double delay_s) {
   const double before_s = to_seconds(frames[1].result.time_ns - frames[0].result.time_ns);
   const double after_s = to_seconds(frames[2].result.time_ns - frames[1].result.time_ns);
   const auto near = [](double interval_s) { return interval_s > 0 && interval_s <= tracking::kMaxPrediction_s; };
@@ -37,7 +39,7 @@ std::optional<SE3> T_rig_world_of(const FrameRecord& record, const map::BundledM
 }
 
 std::vector<std::pair<KeyframeId, Vector6d>> twists_from_neighbours(const map::BundledMap& map, KeyframeId first,
-                                                                     std::span<const FrameRecord> frames) {
+                                                                    std::span<const FrameRecord> frames) {
   std::vector<std::pair<KeyframeId, Vector6d>> out;
   for (const KeyframeId k : map.keyframe_ids()) {
     const frame::BundledFrame& seen = *map.keyframe(k).frame;

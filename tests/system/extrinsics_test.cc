@@ -27,13 +27,14 @@ double angle_deg(const SE3& a, const SE3& b) { return a.rotation().angularDistan
 
 // Runs with camera 2 off by a degree.
 void run(const RenderedTour& tour, System& system) {
-  for (const image::ImageBundle& images : tour.frames()) system.process(images);
+  for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
   ASSERT_TRUE(system.extrinsics().done);
   const auto& found = system.extrinsics().cameras;
   ASSERT_EQ(found.size(), 4u);
   EXPECT_NEAR(found[2].change_deg, 1.0, 0.1);
-  for (std::size_t c = 0; c < 4; ++c) EXPECT_EQ(found[c].suspect, c == 2) << "camera " << c << ": " << found[c].change_deg << " degrees";
+  for (std::size_t c = 0; c < 4; ++c)
+    EXPECT_EQ(found[c].suspect, c == 2) << "camera " << c << ": " << found[c].change_deg << " degrees";
 }
 
 TEST(SystemExtrinsics, ACameraThatWasTurnedIsNamedAndTheMapIsMadeAsAsked) {
@@ -53,8 +54,10 @@ TEST(SystemExtrinsics, RefinedTheMapIsMadeWithWhatWasFound) {
   run(tour, system);
   EXPECT_TRUE(system.extrinsics_refined());
   for (std::size_t c = 0; c < 4; ++c) {
-    // A pixel of these pictures is a third of a degree; of camera 3, which looks aside, less is known after two seconds.
-    EXPECT_LT(angle_deg(system.snapshot()->rig().cam_from_rig(c), tour.rig().cam_from_rig(c)), c == 3 ? 0.2 : 0.1) << "camera " << c;
+    // A pixel of these pictures is a third of a degree; of camera 3, which looks aside, less is known after two
+    // seconds.
+    EXPECT_LT(angle_deg(system.snapshot()->rig().cam_from_rig(c), tour.rig().cam_from_rig(c)), c == 3 ? 0.2 : 0.1)
+        << "camera " << c;
   }
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 }
@@ -64,7 +67,7 @@ TEST(SystemExtrinsics, NotAskedForNothingIsSaid) {
   Config config = small_config(Mode::kSequential);
   config.extrinsics.check = false;
   System system(tour.rig(), config);
-  for (const image::ImageBundle& images : tour.frames()) system.process(images);
+  for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
   EXPECT_FALSE(system.extrinsics().done);
   EXPECT_FALSE(system.extrinsics_refined());

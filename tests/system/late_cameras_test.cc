@@ -17,11 +17,12 @@ const RenderedTour& tour() {
 }
 
 void play(System& system) {
-  for (const image::ImageBundle& images : tour().frames()) system.process(images);
+  for (const image::ImageBundle& images : tour().frames()) must_process(system, images);
   system.finish();
 }
 
-// How far the map has a late camera from where it truly was, from camera 0 at the time of the keyframe; m and rad together.
+// How far the map has a late camera from where it truly was, from camera 0 at the time of the keyframe; m and rad
+// together.
 double motion_error(const map::BundledMap& map) {
   std::vector<double> errors;
   for (const KeyframeId k : map.keyframe_ids()) {
@@ -41,7 +42,8 @@ TEST(LateCameras, AreWhereTheFramesOnBothSidesHaveThem) {
   System after(tour().rig(), small_config(Mode::kSequential));
   play(after);
   const double tracked = motion_error(*before.snapshot()), known = motion_error(*after.snapshot());
-  std::printf("motion of late cameras: %.2f mm from the frames before, %.2f mm from those on both sides\n", 1e3 * tracked, 1e3 * known);
+  std::printf("motion of late cameras: %.2f mm from the frames before, %.2f mm from those on both sides\n",
+              1e3 * tracked, 1e3 * known);
   EXPECT_LT(known, 0.8 * tracked);
   EXPECT_EQ(after.snapshot()->check_invariants(), std::nullopt);
 }
