@@ -52,13 +52,13 @@ TEST(Config, ReadsTheModeByName) {
   Config config;
   OptionTable table(config);
   ASSERT_TRUE(table.set("mode", "sequential").ok());
-  EXPECT_EQ(config.mode, Mode::kSequential);
+  EXPECT_EQ(config.mode, execution::Mode::kSequential);
   ASSERT_TRUE(table.set("mode", "lagged").ok());
-  EXPECT_EQ(config.mode, Mode::kLagged);
+  EXPECT_EQ(config.mode, execution::Mode::kLagged);
   ASSERT_TRUE(table.set("mode", "parallel").ok());
-  EXPECT_EQ(config.mode, Mode::kParallel);
+  EXPECT_EQ(config.mode, execution::Mode::kParallel);
   EXPECT_FALSE(table.set("mode", "sometimes").ok());
-  EXPECT_EQ(config.mode, Mode::kParallel);
+  EXPECT_EQ(config.mode, execution::Mode::kParallel);
 }
 
 }  // namespace

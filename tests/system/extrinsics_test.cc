@@ -40,7 +40,7 @@ void run(const RenderedTour& tour, System& system) {
 TEST(SystemExtrinsics, ACameraThatWasTurnedIsNamedAndTheMapIsMadeAsAsked) {
   const RenderedTour tour(4, 40);
   const camera::Rig wrong = turned(tour.rig(), 2);
-  System system(wrong, small_config(Mode::kSequential));
+  System system(wrong, small_config(execution::Mode::kSequential));
   run(tour, system);
   EXPECT_FALSE(system.extrinsics_refined());
   EXPECT_EQ(angle_deg(system.snapshot()->rig().cam_from_rig(2), wrong.cam_from_rig(2)), 0.0);
@@ -48,7 +48,7 @@ TEST(SystemExtrinsics, ACameraThatWasTurnedIsNamedAndTheMapIsMadeAsAsked) {
 
 TEST(SystemExtrinsics, RefinedTheMapIsMadeWithWhatWasFound) {
   const RenderedTour tour(4, 40);
-  Config config = small_config(Mode::kSequential);
+  Config config = small_config(execution::Mode::kSequential);
   config.extrinsics.refine = true;
   System system(turned(tour.rig(), 2), config);
   run(tour, system);
@@ -64,7 +64,7 @@ TEST(SystemExtrinsics, RefinedTheMapIsMadeWithWhatWasFound) {
 
 TEST(SystemExtrinsics, NotAskedForNothingIsSaid) {
   const RenderedTour tour(2, 16);
-  Config config = small_config(Mode::kSequential);
+  Config config = small_config(execution::Mode::kSequential);
   config.extrinsics.check = false;
   System system(tour.rig(), config);
   for (const image::ImageBundle& images : tour.frames()) must_process(system, images);

@@ -35,11 +35,11 @@ double motion_error(const map::BundledMap& map) {
 }
 
 TEST(LateCameras, AreWhereTheFramesOnBothSidesHaveThem) {
-  Config live = small_config(Mode::kSequential);
+  Config live = small_config(execution::Mode::kSequential);
   live.final_adjustment = false;
   System before(tour().rig(), live);
   play(before);
-  System after(tour().rig(), small_config(Mode::kSequential));
+  System after(tour().rig(), small_config(execution::Mode::kSequential));
   play(after);
   const double tracked = motion_error(*before.snapshot()), known = motion_error(*after.snapshot());
   std::printf("motion of late cameras: %.2f mm from the frames before, %.2f mm from those on both sides\n",
@@ -49,12 +49,12 @@ TEST(LateCameras, AreWhereTheFramesOnBothSidesHaveThem) {
 }
 
 TEST(LateCameras, OfAnEarlierRunAreLeftWhereTheyWere) {
-  System first(tour().rig(), small_config(Mode::kSequential));
+  System first(tour().rig(), small_config(execution::Mode::kSequential));
   play(first);
   const map::MapSnapshot saved = first.snapshot();
   Resources resources;
   resources.map = *saved;
-  System second(tour().rig(), small_config(Mode::kSequential), std::move(resources));
+  System second(tour().rig(), small_config(execution::Mode::kSequential), std::move(resources));
   play(second);  // frames of the same numbers and times
   for (const KeyframeId k : saved->keyframe_ids()) {
     if (!second.snapshot()->alive(k)) continue;

@@ -24,10 +24,10 @@ Outcome run(const RenderedTour& tour, const Config& config) {
 
 TEST(SystemSequential, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
   const RenderedTour tour(4, 16);
-  const Outcome first = run(tour, small_config(Mode::kSequential, 1));
+  const Outcome first = run(tour, small_config(execution::Mode::kSequential, 1));
   EXPECT_EQ(first.final.size(), tour.frames().size());
   for (const int threads : {1, 2, 4}) {
-    const Outcome again = run(tour, small_config(Mode::kSequential, threads));
+    const Outcome again = run(tour, small_config(execution::Mode::kSequential, threads));
     EXPECT_TRUE(identical(first.final, again.final)) << threads << " threads";
     EXPECT_TRUE(identical(first.live, again.live)) << threads << " threads";
     EXPECT_EQ(first.landmarks, again.landmarks);
@@ -39,7 +39,7 @@ TEST(SystemSequential, TracksWithOneToEightCameras) {
   const std::size_t count = 20;
   const RenderedTour tour(8, count);
   for (int n = 1; n <= 8; ++n) {
-    System system(tour.rig_of(n), small_config(Mode::kSequential));
+    System system(tour.rig_of(n), small_config(execution::Mode::kSequential));
     for (std::size_t k = 0; k < count; ++k) must_process(system, tour.frame_of(k, n));
     system.finish();
     const auto align = n == 1 ? evaluation::AlignMode::kSim3 : evaluation::AlignMode::kSe3;
@@ -53,7 +53,7 @@ TEST(SystemSequential, TracksWithOneToEightCameras) {
 
 TEST(SystemSequential, KnowsTheTruePathLengthWithTwoCameras) {
   const RenderedTour tour(2, 24);
-  const Outcome outcome = run(tour, small_config(Mode::kSequential));
+  const Outcome outcome = run(tour, small_config(execution::Mode::kSequential));
   const double truth_m = evaluation::path_length_m(tour.truth());
   EXPECT_NEAR(evaluation::path_length_m(outcome.final), truth_m, 0.03 * truth_m);
 }
@@ -65,7 +65,7 @@ TEST(SystemSequential, ADamagedOrMissingImageCostsOnlyItsCamera) {
   for (const std::size_t k : {8u, 9u}) make_absent(frames[k].images[0], ImageState::kMissing);
   make_absent(frames[11].images[0], ImageState::kDamaged);
   make_absent(frames[11].images[1], ImageState::kDamaged);
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : frames) {
     const FrameRecord record = must_process(system, images);
     EXPECT_EQ(record.result.status, TrackStatus::kTracking) << "frame " << images.id.value();
@@ -88,7 +88,7 @@ TEST(SystemSequential, IsLostInTheDarkAndRecovers) {
   for (const std::size_t k : {8u, 9u}) {
     for (image::CameraImage& i : frames[k].images) blacken(i);
   }
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : frames) {
     const FrameRecord record = must_process(system, images);
     const bool dark = images.id.value() == 8 || images.id.value() == 9;
@@ -112,7 +112,7 @@ TEST(SystemSequential, RecordsEveryInputFrame) {
   for (const std::size_t k : {0u, 6u}) {
     for (image::CameraImage& i : frames[k].images) make_absent(i, ImageState::kMissing);
   }
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : frames) must_process(system, images);
   system.finish();
   ASSERT_EQ(system.frames().size(), frames.size());
@@ -147,7 +147,7 @@ TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {
   image::Image nothing(tour.rig().camera(1).width, tour.rig().camera(1).height);
   image::CameraImage black{ImageState::kPresent, 0, nothing};
   blacken(black);
-  System system(tour.rig(), small_config(Mode::kSequential), {.masks = {image::Image(), black.image}});
+  System system(tour.rig(), small_config(execution::Mode::kSequential), {.masks = {image::Image(), black.image}});
   for (const image::ImageBundle& images : tour.frames()) {
     const FrameRecord record = must_process(system, images);
     EXPECT_GT(record.result.cameras[0].keypoints, 100);
@@ -159,7 +159,7 @@ TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {
 
 TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
   const RenderedTour tour(1, 16);
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);
   ASSERT_GT(tracked_frames(system), 0u);
@@ -179,7 +179,7 @@ TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
 
 TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {
   const RenderedTour tour(1, 16);
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);
   const std::size_t before = tracked_frames(system);
@@ -195,7 +195,7 @@ TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {
 
 TEST(SystemSequential, StartsUpToScaleSoonAfterADarkFirstFrame) {
   const RenderedTour tour(1, 16);
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   image::ImageBundle dark = tour.frames()[0];
   blacken(dark.images[0]);
   must_process(system, dark);
@@ -205,7 +205,8 @@ TEST(SystemSequential, StartsUpToScaleSoonAfterADarkFirstFrame) {
 
 TEST(SystemSequential, RefusesAFrameThatIsNoneOfItsRigAndGoesOn) {
   const RenderedTour tour(2, 6);
-  System system(tour.rig(), small_config(Mode::kSequential)), undisturbed(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential)),
+      undisturbed(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : tour.frames()) {
     image::ImageBundle wrong = images;
     wrong.images.pop_back();
@@ -221,8 +222,8 @@ TEST(SystemSequential, RefusesAFrameThatIsNoneOfItsRigAndGoesOn) {
 TEST(SystemSequential, KeepsAsMuchHistoryAsAskedFor) {
   constexpr std::size_t kHistory = 4;
   const RenderedTour tour(2, 16);
-  System all(tour.rig(), small_config(Mode::kSequential)),
-      bounded(tour.rig(), small_config(Mode::kSequential), {.history = kHistory});
+  System all(tour.rig(), small_config(execution::Mode::kSequential)),
+      bounded(tour.rig(), small_config(execution::Mode::kSequential), {.history = kHistory});
   for (const image::ImageBundle& images : tour.frames()) {
     must_process(all, images);
     const FrameRecord record = must_process(bounded, images);
@@ -241,7 +242,7 @@ TEST(SystemSequential, KeepsAsMuchHistoryAsAskedFor) {
 TEST(SystemSequential, TellsAnObserverWhatItsStagesDid) {
   const RenderedTour tour(2, 8);
   std::vector<StageRecord> told;
-  System system(tour.rig(), small_config(Mode::kSequential),
+  System system(tour.rig(), small_config(execution::Mode::kSequential),
                 {.observer = [&](const StageRecord& record) { told.push_back(record); }});
   for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
@@ -260,7 +261,7 @@ TEST(SystemSequential, TellsAnObserverWhatItsStagesDid) {
 TEST(SystemSequential, AdjustsTheWholeMapAtTheEndOnlyWhereConfigured) {
   const RenderedTour tour(2, 8);
   for (const bool wanted : {false, true}) {
-    Config config = small_config(Mode::kSequential);
+    Config config = small_config(execution::Mode::kSequential);
     config.final_adjustment = wanted;
     System system(tour.rig(), config);
     for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
