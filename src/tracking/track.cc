@@ -1,5 +1,6 @@
 #include "tracking/track.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cstdlib>
 #include <numeric>
@@ -20,9 +21,7 @@ std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) 
 }
 
 // In the map as it is now.
-SE3 last_pose(const TrackInput& input) {
-  return input.state.T_rig_reference * input.map.resolved_pose(input.state.reference);
-}
+SE3 last_pose(const TrackInput& input) { return input.state.anchored.resolve(input.map).value(); }
 
 // The last pose moved on as far as the motion is known.
 SE3 predict(const TrackInput& input, TimeNs time_ns) {
@@ -145,7 +144,7 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
                            const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
   const frame::BundledFrame& frame = out.frame;
-  const map::LocalView view = map::make_local_view(map, landmarks, input.state.reference, options.local_view);
+  const map::LocalView view = map::make_local_view(map, landmarks, input.state.anchored.reference, options.local_view);
   auto wide = search_options(input, options.matching, options.matching.wide_radius);
   wide.level_slack = 2;
   wide.ratio = 0.8 * options.matching.ratio;
@@ -207,7 +206,7 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   const map::BundledMap& map = input.map;
   const frame::BundledFrame& frame = coarse.frame;
   const map::LocalView view =
-      map::make_local_view(map, landmarks_of(coarse.matches), input.state.reference, options.local_view);
+      map::make_local_view(map, landmarks_of(coarse.matches), input.state.anchored.reference, options.local_view);
   MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, coarse.matches,
                                       search_options(input, options.matching, options.matching.local_radius), pool);
   Fine out;
@@ -310,6 +309,10 @@ TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, Lo
 
 namespace {
 
+geometry::Matrix6d covariance_of(const solver::PoseSolution& solution) {
+  return solution.information.ldlt().solve(geometry::Matrix6d::Identity());
+}
+
 TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& fine, const TrackingOptions& options) {
   const map::BundledMap& map = input.map;
   TrackOutput out;
@@ -326,11 +329,9 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& f
 
   TrackerState& state = out.state;
   state = input.state;
-  state.reference = map.surviving(state.reference);
-  const SE3 T_ref_world = map.resolved_pose(state.reference);
-  state.T_rig_reference = result.T_rig_world * T_ref_world.inverse();
-  result.reference = state.reference;
-  result.T_rig_reference = state.T_rig_reference;
+  state.anchored = map::AnchoredPose::at(map, map.surviving(input.state.anchored.reference), result.T_rig_world);
+  result.anchored = state.anchored;
+  result.covariance = covariance_of(fine.solution);
 
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
   state.twist.reset();
@@ -342,7 +343,8 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& f
   note_trust(frame, coarse, fine, out.matches, options, out);
 
   ++state.frames_since_keyframe;
-  KeyframeEvidence evidence = keyframe_evidence(map, frame, out.matches, state.reference, result.T_rig_world, options);
+  KeyframeEvidence evidence =
+      keyframe_evidence(map, frame, out.matches, state.anchored.reference, result.T_rig_world, options);
   state.best_overlap = std::max(state.best_overlap, evidence.overlap);
   evidence.best_overlap = state.best_overlap;
   evidence.frames_since_keyframe = state.frames_since_keyframe;
@@ -397,8 +399,7 @@ TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, Keyfr
   TrackerState state = before;
   state.status = TrackStatus::kTracking;
   state.time_ns = time_ns;
-  state.reference = keyframe;
-  state.T_rig_reference = SE3();
+  state.anchored = {.reference = keyframe, .T_rig_reference = SE3()};
   state.landmarks = std::move(landmarks);
   state.frames_since_keyframe = 0;
   state.best_overlap = 0;

@@ -142,9 +142,9 @@ TEST_F(Track, KeepsThePoseRelativeToItsReference) {
   SimulatedTracker tracker(world());
   const TrackOutput out = tracker.track(seen(3).frame);
   ASSERT_EQ(out.result.status, TrackStatus::kTracking);
-  const SE3 again = out.result.T_rig_reference * world().map.resolved_pose(out.result.reference);
+  const SE3 again = out.result.anchored.resolve(world().map).value();
   EXPECT_LT(map::distance_m(again, out.result.T_rig_world), 1e-9);
-  EXPECT_EQ(out.state.reference, out.result.reference);
+  EXPECT_EQ(out.state.anchored.reference, out.result.anchored.reference);
   EXPECT_EQ(out.state.landmarks, landmarks_of(out.matches));
 }
 
@@ -322,12 +322,12 @@ TEST(TrackerState, StartsAfreshAtAKeyframe) {
   before.best_overlap = 300;
   before.sightings = {{LandmarkId(1), 1, 1}};
   const TrackerState state = state_at_keyframe(before, 50, KeyframeId(4), {LandmarkId(2), LandmarkId(3)});
-  EXPECT_EQ(state.reference, KeyframeId(4));
+  EXPECT_EQ(state.anchored.reference, KeyframeId(4));
   EXPECT_EQ(state.time_ns, 50);
   EXPECT_EQ(state.frames_since_keyframe, 0);
   EXPECT_EQ(state.best_overlap, 0);
   EXPECT_TRUE(state.sightings.empty());
-  EXPECT_EQ(state.T_rig_reference.translation().norm(), 0.0);
+  EXPECT_EQ(state.anchored.T_rig_reference.translation().norm(), 0.0);
   EXPECT_TRUE(state.twist.has_value());
   EXPECT_EQ(state.landmarks.size(), 2u);
 }
