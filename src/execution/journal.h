@@ -1,4 +1,4 @@
-// What was done to the map and in which order: enough to run the same stages on the same versions again.
+// The order in which the map was read and changed: enough to run the same stages on the same versions again.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// The gate through which a run meets its map: reading and committing pass here, so that the journal tells both in an
-// order that can be repeated.
+// Serialises snapshot reads and commits of the map, and journals them in an order that a replay can repeat.
 #pragma once
 
 #include <mutex>
@@ -17,19 +16,19 @@ class MapGate {
   // The newest version the journal knows of. From any thread, never waiting for a commit under way.
   map::MapSnapshot newest() const;
 
-  // The version a frame sees: the newest, or one given. Of the caller's thread.
+  // Begins a frame and returns the version it sees: the newest, or the one given. Caller's thread only.
   map::MapSnapshot begin_frame(FrameId frame);
   void begin_frame(FrameId frame, const map::MapSnapshot& seen);
-  FrameId frame() const { return frame_; }  // begun last; of the caller's thread
+  FrameId frame() const { return frame_; }  // begun last; caller's thread only
 
-  // Commits what the caller's thread did.
+  // Commits an edit of the caller's thread.
   map::CommitReport commit(JournalStep step, map::MapDraft draft);
 
-  // What a background stage answered goes into the map, but not where a stop was requested before its turn came: then
-  // it is as if the stage had never run. True where it was committed. From any thread.
+  // Commits the result of a background stage. If a stop was requested before its turn comes, the result is discarded as
+  // if the stage had never run. Returns whether it was committed. From any thread.
   bool settle(const StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop);
 
-  // Leaves the map for another; versions go on counting.
+  // Replaces the map by another one; version numbers continue.
   void restart(map::BundledMap initial);
 
   // What was done so far; from any thread.

@@ -1,5 +1,5 @@
-// Stages that run behind tracking, as functions over values: what they are given, what they answer, what follows them.
-// When and where they run is the business of a StageExecutor.
+// Background stages (mapping, loop closing, global adjustment) as functions over values: their input, their result, and
+// which stage follows. A StageExecutor decides when and in which thread they run.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@
 
 namespace bslam::execution {
 
-// A lane each: one task at a time, first in, first out. A keyframe goes to kMap. What a stage committed calls for the
-// next one: kMap for kLoop, kLoop for kGlobal.
+// Each stage has a queue of its own, first in, first out, and runs one task at a time. A new keyframe is a task of
+// kMap; a commit of kMap makes one of kLoop, a commit of kLoop one of kGlobal.
 enum class Stage { kMap, kLoop, kGlobal };
 inline constexpr std::array<Stage, 3> kStages = {Stage::kMap, Stage::kLoop, Stage::kGlobal};
 
@@ -28,7 +28,7 @@ struct StageTask {
   friend bool operator==(const StageTask&, const StageTask&) = default;
 };
 
-// A figure that a stage tells of its run: landmarks it created, observations it adjusted, ...
+// A figure a stage reports about its run: landmarks created, observations adjusted, ...
 struct StageStatistic {
   std::string_view name;  // a literal
   double value = 0;
@@ -54,7 +54,7 @@ struct StageFunctions {
   StageFunction& operator[](Stage s) { return by_stage[static_cast<std::size_t>(s)]; }
 };
 
-// The task that a committed one calls for, if any.
+// The task that follows the commit of another one, if any.
 std::optional<StageTask> following(const StageTask& task, const StageFunctions& functions);
 
 // The stage whose tasks, waiting or running, are dropped when a result of `stage` goes into the map. A closed loop

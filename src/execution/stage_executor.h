@@ -1,5 +1,5 @@
-// When stages run behind tracking, and in which thread; never what they compute. The caller's thread meets the map
-// through an executor alone.
+// Decides when and in which thread background stages run, never what they compute. The caller's thread reads and
+// changes the map through an executor only.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,9 @@
 
 namespace bslam::execution {
 
-// All but interrupt() are for one thread, the caller's. Any of its calls may throw what a stage threw in a worker, and
-// after that all do. An executor may go at any moment: stages under way are stopped, what waits is dropped.
+// All functions but interrupt() and over() are for one thread, the caller's. Any of its calls may throw what a stage
+// threw in a worker; after that all of them do. An executor may be destroyed at any time: running stages are stopped,
+// waiting tasks are dropped.
 class StageExecutor {
  public:
   virtual ~StageExecutor() = default;
@@ -23,20 +24,20 @@ class StageExecutor {
   // An edit of the caller's thread.
   virtual map::CommitReport commit(JournalStep step, map::MapDraft draft) = 0;
 
-  // The stages are due for a keyframe that was committed. May wait where too many are.
+  // Hands a committed keyframe to the stages. May block while too many tasks are waiting.
   virtual void enqueue(KeyframeId keyframe) = 0;
 
-  // Returns when everything enqueued, and what followed of it, is in the map.
+  // Returns when all tasks enqueued, and those that followed them, are done and committed.
   virtual void drain() = 0;
 
-  // Drains, then leaves the map for another.
+  // Drains, then replaces the map by another one.
   virtual void restart(map::BundledMap initial) = 0;
 
-  // Nothing follows; after drain. Where a replayed run should have gone on, it throws.
+  // The run is over; call after drain. Throws where a replayed run should have gone on.
   virtual void end() {}
 
-  // From any thread: stages under way are stopped and their results discarded, what waits is dropped, and from then on
-  // only the caller's own edits change the map.
+  // From any thread: running stages are stopped and their results discarded, waiting tasks are dropped. From then on
+  // only edits of the caller's thread change the map.
   virtual void interrupt() = 0;
 
   // No stages will run any more: interrupted, or a replayed run ended here.
@@ -50,13 +51,13 @@ struct ExecutionSetup {
 };
 
 // The executor of a mode. `gate` outlives it.
-//   sequential: every stage to its commit, in the caller's thread, at enqueue.
-//   parallel: a thread per lane; a task works on the newest version at its start and is committed as soon as it is
-//   done. lagged: a thread per lane, but the caller's thread fixes a task's base when it starts, and commits its result
-//   at the
-//     beginning of the frame `lag` frames later, waiting for it where it is late. A lane's next task starts with that
-//     commit. So results do not depend on the threads; an exception appears when the result it stands for is due.
-// A result of kLoop supersedes kGlobal: what of it waits or runs is stopped and never committed, and a new one follows.
+//   sequential: each stage runs to its commit in the caller's thread, within enqueue().
+//   parallel:   one thread per stage; a task works on the newest version at its start and is committed as soon as it is
+//   done. lagged:     one thread per stage, but the caller's thread fixes the base of a task when it starts, and
+//   commits its result
+//               at the beginning of the frame `lag` frames later, waiting for it if necessary; then the next task of
+//               the stage starts. So results do not depend on threads; an exception appears when the result was due.
+// Which results drop tasks of other stages: superseded_by (execution/stage.h).
 std::unique_ptr<StageExecutor> make_stage_executor(Mode mode, MapGate& gate, ExecutionSetup setup);
 
 // A run that is not the one its journal tells of; `error` names the first entry that differs.

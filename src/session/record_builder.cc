@@ -13,14 +13,15 @@ namespace {
 double seconds(const RecordInput& input, TimeNs time_ns) { return to_seconds(time_ns - input.dataset.first_time_ns); }
 
 void add_cameras(const RecordInput& input, RunRecord& record) {
-  const auto& frames = input.system.frames();
   for (std::size_t c = 0; c < input.dataset.rig.size(); ++c) {
     CameraRecord camera;
     camera.name = input.dataset.rig.camera(c).name;
-    for (const tracking::FrameRecord& f : frames) {
-      camera.images += f.images[c] == image::ImageState::kPresent;
-      if (f.images[c] != image::ImageState::kDamaged) continue;
-      if (camera.skipped++ == 0) camera.first_skipped = dataset::why_damaged(input.dataset, f.result.frame.index(), c);
+    for (const RunFrame& frame : record.frames) {
+      if (!frame.record) continue;
+      const image::ImageState image = frame.record->images[c];
+      camera.images += image == image::ImageState::kPresent;
+      if (image != image::ImageState::kDamaged || camera.skipped++ > 0) continue;
+      camera.first_skipped = dataset::why_damaged(input.dataset, frame.record->result.frame.index(), c);
     }
     camera.states = camera_intervals(record.frames, c);
     const auto& found = input.system.extrinsics().cameras;
@@ -40,15 +41,12 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
 }
 
 void add_stages(const RecordInput& input, RunRecord& record) {
-  std::size_t next = 0;
-  for (const InputFrame& in : input.inputs) {
-    const double time_s = seconds(input, in.time_ns);
-    add_stage_sample(record, "read", StagePlace::kBackground, {time_s, in.read_ms});
-    if (in.dropped) continue;
-    for (const tracking::StageTime& s : input.system.frames()[next].stages) {
-      add_stage_sample(record, s.stage, StagePlace::kFrame, {time_s, s.ms});
-    }
-    ++next;
+  for (std::size_t i = 0; i < input.inputs.size(); ++i) {
+    const RunFrame& frame = record.frames[i];
+    add_stage_sample(record, "read", StagePlace::kBackground, {frame.time_s, input.inputs[i].read_ms});
+    if (!frame.record) continue;
+    for (const tracking::StageTime& s : frame.record->stages)
+      add_stage_sample(record, s.stage, StagePlace::kFrame, {frame.time_s, s.ms});
   }
   for (const system::StageRecord& s : input.system.stage_runs()) {
     add_stage_sample(record, execution::stage_name(s.run.task.stage), StagePlace::kBackground,
@@ -68,13 +66,14 @@ void add_places(const RecordInput& input, RunRecord& record) {
   for (const system::LoopRecord& loop : input.system.loops()) {
     record.loops.push_back({seconds(input, loop.time_ns), seconds(input, loop.with_time_ns), loop.closure.inliers});
   }
-  for (const tracking::FrameRecord& f : input.system.frames()) {
-    if (!f.relocalisation) continue;
-    const TimeNs with_ns = input.system.keyframe_time(f.relocalisation->with);
+  for (const RunFrame& frame : record.frames) {
+    if (!frame.record || !frame.record->relocalisation) continue;
+    const tracking::Relocalisation& found = *frame.record->relocalisation;
+    const TimeNs with_ns = input.system.keyframe_time(found.with);
     record.relocalisations.push_back(
-        {seconds(input, f.result.time_ns), seconds(input, with_ns), f.relocalisation->inliers});
+        {seconds(input, frame.record->result.time_ns), seconds(input, with_ns), found.inliers});
   }
-  const auto parts = input.system.trajectories();
+  const auto& parts = input.trajectories;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const evaluation::Trajectory& poses = parts[i].poses;
     record.parts.push_back({static_cast<std::int64_t>(poses.size()), seconds(input, poses.front().time_ns),
@@ -118,7 +117,7 @@ std::string trajectory_file(const std::string& stem, std::size_t part) {
   return part == 0 ? stem + ".tum" : stem + "_part" + std::to_string(part + 1) + ".tum";
 }
 
-RunRecord build_record(const RecordInput& input) {
+RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameRecord> frames) {
   RunRecord record;
   record.version = BSLAM_VERSION;
   record.data = input.dataset.name;
@@ -126,10 +125,11 @@ RunRecord build_record(const RecordInput& input) {
   record.complete = input.complete;
   record.seed = static_cast<std::uint64_t>(input.config.seed);
   record.cameras_used = input.dataset.cameras_used;
+  record.frames.reserve(input.inputs.size());
   std::size_t next = 0;
   for (const InputFrame& in : input.inputs) {
     RunFrame& frame = record.frames.emplace_back(RunFrame{seconds(input, in.time_ns), {}});
-    if (!in.dropped) frame.record = input.system.frames()[next++];
+    if (!in.dropped) frame.record = std::move(frames[next++]);
   }
   add_cameras(input, record);
   add_stages(input, record);

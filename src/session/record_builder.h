@@ -19,8 +19,9 @@ struct InputFrame {
 struct RecordInput {
   const dataset::Dataset& dataset;
   const system::Config& config;
-  const std::vector<InputFrame>& inputs;  // in order; those not dropped match the frames of `system` one by one
+  const std::vector<InputFrame>& inputs;  // in order; those not dropped match `frames` one by one
   const system::System& system;
+  const std::vector<system::PartTrajectory>& trajectories;  // final
   bool replayed = false;
   bool loaded = false;  // the run went on in a saved map
   bool complete = true;
@@ -33,6 +34,7 @@ std::string scale_name(map::Scale scale);
 // Name of the file of the i-th part's poses: "trajectory.tum", "trajectory_part2.tum".
 std::string trajectory_file(const std::string& stem, std::size_t part);
 
-RunRecord build_record(const RecordInput& input);
+// `frames`: all of the run, moved into the record.
+RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameRecord> frames);
 
 }  // namespace bslam::session

@@ -101,18 +101,21 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
     return mismatch.error;
   }
   SessionResult result;
+  const double wall_s = 1e-3 * wall.ms();
+  result.trajectories = system.trajectories();
+  result.live = system.live_trajectories();
   result.record =
       build_record({.dataset = dataset,
                     .config = options.config,
                     .inputs = inputs,
                     .system = system,
+                    .trajectories = result.trajectories,
                     .replayed = options.replay.has_value(),
                     .loaded = options.map.has_value(),
                     .complete = inputs.size() == dataset.frames.size() && !options.interrupted.stop_requested(),
                     .start_up_s = start_up_s,
-                    .wall_s = 1e-3 * wall.ms()});
-  result.trajectories = system.trajectories();
-  result.live = system.live_trajectories();
+                    .wall_s = wall_s},
+                   system.take_frames());
   result.map = system.snapshot();
   if (system.extrinsics_refined()) result.refined_rig = put_in(result.map->rig(), dataset);
   result.journal = system.journal();

@@ -1,4 +1,4 @@
-// Where the rig was, as the finished map has it.
+// Poses and motions of all frames in the finished map.
 #pragma once
 
 #include <optional>

@@ -35,4 +35,17 @@ Status check_frame(const image::ImageBundle& images, const camera::Rig& rig, con
   return {};
 }
 
+Status check_masks(std::span<const image::Image> masks, const camera::Rig& rig) {
+  if (masks.empty()) return {};
+  if (masks.size() != rig.size())
+    return Error{"", "masks", std::to_string(masks.size()), std::to_string(rig.size()) + ", one per camera, or none"};
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const camera::Camera& camera = rig.camera(c);
+    if (masks[c].empty() || (masks[c].width() == camera.width && masks[c].height() == camera.height)) continue;
+    return Error{"", "mask of " + camera.name, size_text(masks[c].width(), masks[c].height()),
+                 size_text(camera.width, camera.height) + ", as in the calibration"};
+  }
+  return {};
+}
+
 }  // namespace bslam::system

@@ -1,4 +1,4 @@
-// The stages of a run, as its executor calls them.
+// The background stages of a run, as functions its executor calls.
 #pragma once
 
 #include <functional>
@@ -10,13 +10,13 @@
 
 namespace bslam::system {
 
-// A loop closed, or two parts of the map joined.
+// A loop that was closed, or two submaps that were merged.
 struct LoopRecord {
   looping::LoopClosure closure;
   TimeNs time_ns = 0, with_time_ns = 0;  // of the frames of the two keyframes
 };
 
-// Told of every loop that went into the map, by whatever thread commits.
+// Called for every loop closure that was committed, in the committing thread.
 using LoopObserver = std::function<void(const LoopRecord&)>;
 
 // `config` outlives them. Without a vocabulary no loops are closed.

@@ -146,7 +146,8 @@ void System::locate_early_frames() {
         std::ranges::lower_bound(frames_, early.frame->id, {}, [](const FrameRecord& r) { return r.result.frame; });
     if (record == frames_.end() || record->result.frame != early.frame->id) continue;
     if (record->result.status == tracking::TrackStatus::kTracking) continue;
-    record->found_later = pipeline_.tracker().locate_early(*map, early);
+    if (auto found = pipeline_.tracker().locate_early(*map, early))
+      record->found_later = std::make_shared<const tracking::TrackResult>(std::move(*found));
   }
 }
 

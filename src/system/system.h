@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <utility>
 #include <vector>
 
 #include "adjustment/map_adjustment.h"
@@ -51,8 +52,8 @@ struct PartTrajectory {
 
 class System {
  public:
-  // Where a journal is given, the frames must be those of the journal, and calls throw ReplayMismatch where it does not
-  // fit.
+  // `resources`: masks that pass check_masks. Where a journal is given, the frames must be those of the journal, and
+  // calls throw ReplayMismatch where it does not fit.
   System(camera::Rig rig, Config config, Resources resources = {});
   ~System();
 
@@ -72,6 +73,8 @@ class System {
   // The last frames in order: all of the run, or at least Resources::history of them. Valid until the next
   // process().
   const std::vector<FrameRecord>& frames() const { return frames_; }
+  // The same given away, which leaves none: for what is wanted of a run after its trajectories.
+  std::vector<FrameRecord> take_frames() { return std::exchange(frames_, {}); }
   std::vector<StageRecord> stage_runs() const;
   execution::Journal journal() const {
     return gate_.journal();

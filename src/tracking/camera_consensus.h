@@ -1,6 +1,6 @@
-// Do the cameras of a frame agree? A camera may deliver good pictures of the wrong thing: another camera's, those of a
-// mount that was knocked, of a cover with texture. Then hardly anything is where the rest of the rig expects it, and it
-// is left out until it sees what it should again.
+// Do the cameras of a frame agree? A camera may deliver good pictures of the wrong thing: of another camera, from a
+// mount that was knocked, of a cover with texture. Then hardly any landmark is where the pose of the rig puts it, and
+// the camera is left out until it sees again what it should.
 #pragma once
 
 #include <vector>
@@ -11,64 +11,69 @@ namespace bslam::tracking {
 
 // What is carried from frame to frame about one camera.
 struct CameraTrust {
-  bool doubted = false;
-  bool established = false;           // has once seen as much as it can be judged by
+  bool doubted = false;               // left out of the frames
+  bool established = false;           // once found enough landmarks in a frame to be judged by
   int seeing = 0;                     // frames in a row in which a doubted camera saw what it should
-  TimeNs judged_ns = 0;               // when a doubted camera last should have seen something
-  TimeNs since_ns = 0;                // since when it is doubted, or was last found to show its view displaced
-  double share = 1.0;                 // of what it should have seen again in the last frame that could tell, found
-  TimeNs seen_ns = 0;                 // when it last delivered an image that counted ...
-  std::vector<LandmarkId> landmarks;  // ... and the inliers of that
+  TimeNs judged_ns = 0;               // when a doubted camera last had enough landmarks in view to be judged by
+  TimeNs since_ns = 0;                // since when it is doubted, or when its view was last found to be displaced
+  double share = 1.0;                 // re-observation ratio in the last frame that could be judged
+  TimeNs seen_ns = 0;                 // time of its last image that was used
+  std::vector<LandmarkId> landmarks;  // inliers of that image
 };
 
-// Without doubts, and with nothing seen yet.
+// A camera that is not doubted, with no landmarks seen yet.
 CameraTrust trusted(bool established);
 
-// What of it counts where the rig starts or was found again after a loss, `seen[c]` landmarks of the place by camera c.
+// The trust that remains where a map is started or the rig is located after a loss. `seen[c]`: landmarks of the place
+// seen by camera c; with enough of them it is trusted.
 std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras, const std::vector<int>& seen,
                                    const ConsensusOptions& options);
 
-// How much of what a camera should see it found.
+// Landmarks a camera should find, and how many of them it found.
 struct Expectation {
   int expected = 0, found = 0;
   double share() const { return expected > 0 ? static_cast<double>(found) / expected : 0.0; }
 };
 
-// Of the landmarks each camera saw in the last frame, those in its view at `T_rig_world` now, and among `found`.
+// Per camera: the landmarks it saw in the last frame that project into its image at `T_rig_world`, and how many of them
+// are among `found`.
 std::vector<Expectation> continuity(const map::BundledMap& map, const frame::BundledFrame& frame,
                                     const geometry::SE3& T_rig_world, const std::vector<CameraTrust>& trust,
                                     const FrameMatches& found);
 
-// Flags the cameras that found much of what they looked for, but elsewhere than the pose puts it. A camera that is not
-// established yet knows of the map only what others saw, which it may mistake: it is not flagged.
+// Flags the cameras that have many matches of which few agree with the pose. A camera that is not established is not
+// flagged: it knows of the map only what others saw, and may mistake it.
 std::vector<std::uint8_t> contradicting(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
                                         const std::vector<CameraTrust>& trust, const ConsensusOptions& options);
 
-// Where cameras contradict one another, that one is believed whose own pose is nearest to where the motion led to: the
-// pose from its observations and what agrees with them. `observations` of `matches`, in their order.
+// The pose where cameras contradict one another: of the poses estimated from one camera each, the one nearest to the
+// prediction of the motion model is refined with all observations that agree with it. `observations`: those of
+// `matches`, in their order.
 solver::PoseSolution believe_the_steadiest(const camera::Rig& rig, const FrameMatches& matches,
                                            std::span<const solver::PoseObservation> observations,
                                            const geometry::SE3& predicted, const ConsensusOptions& options,
                                            const solver::PoseSolverOptions& pose);
 
-// Flags the cameras that lost from one frame to the next what they saw, while another camera did not. Where it went
-// little by little something passes by: a doorpost, the end of a wall. At least one camera is not flagged.
+// Flags the cameras that lost what they saw from one frame to the next, while another camera did not. One that loses it
+// over several frames is not flagged: something near passes by. At least one camera is not flagged.
 std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity, const std::vector<CameraTrust>& trust,
                                       const ConsensusOptions& options);
 
-// Notes what a camera that counts found again.
+// Updates the re-observation ratio of a camera that is used.
 void trust(CameraTrust& camera, const Expectation& continuity, const ConsensusOptions& options);
 
-// Begins or goes on to doubt a camera. `view`: what of the map should be seen by it in the frame of `time_ns`, and is.
+// Marks a camera as doubted, or decides whether one that is may be used again. `view`: landmarks of the map in its view
+// in the frame of `time_ns`.
 void doubt(CameraTrust& camera, const Expectation& view, TimeNs time_ns, const ConsensusOptions& options);
 
-// Is a doubted camera to be tried again, unless its view is found displaced?
+// Has a camera been doubted for so long that it is used again, unless its view is found to be displaced?
 bool due_for_retry(const CameraTrust& camera, TimeNs time_ns, const ConsensusOptions& options);
 
-// What became of that. `wide`: what of the map should be seen by it, and is anywhere near.
+// Decides that. `wide`: landmarks of the map in its view, searched for in wide windows; finding many of them there
+// means that the view is displaced.
 void retry(CameraTrust& camera, const Expectation& wide, TimeNs time_ns, const ConsensusOptions& options);
 
-// Takes a camera out of a frame as if it had delivered no image.
+// Removes a camera's keypoints from a frame as if it had delivered no image.
 void leave_out(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2,
                frame::BundledFrame& frame);
 

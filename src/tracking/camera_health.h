@@ -1,4 +1,4 @@
-// Which cameras deliver pictures worth looking at. Judged before anything is extracted, from the pictures alone.
+// Judges the pictures of each camera before anything is extracted from them: black, over-exposed, frozen, blurred.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,7 @@
 // What became of one input frame. The one record of it: callers of the system, the summary and the plots read this.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -22,10 +23,11 @@ struct Relocalisation {
 };
 
 struct FrameRecord {
-  TrackResult result;                      // as returned when the frame was processed
-  std::optional<TrackResult> found_later;  // of a frame without a pose then: the pose found at the end of the run
-  std::vector<image::ImageState> images;   // per camera
-  std::vector<CameraStatus> cameras;       // per camera
+  TrackResult result;  // as returned when the frame was processed
+  // The pose found at the end of the run, of a frame that had none when it was processed; else null.
+  std::shared_ptr<const TrackResult> found_later;
+  std::vector<image::ImageState> images;  // per camera
+  std::vector<CameraStatus> cameras;      // per camera
   std::optional<Relocalisation> relocalisation;
   // Velocity of the rig: T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); angular (rad/s) first, then linear (map
   // units/s). Empty where it is not known: without a pose, and in the first frame with one.

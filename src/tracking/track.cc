@@ -310,7 +310,8 @@ TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, Lo
 namespace {
 
 geometry::Matrix6d covariance_of(const solver::PoseSolution& solution) {
-  return solution.information.ldlt().solve(geometry::Matrix6d::Identity());
+  const geometry::Matrix6d covariance = solution.information.ldlt().solve(geometry::Matrix6d::Identity());
+  return 0.5 * (covariance + covariance.transpose());
 }
 
 TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& fine, const TrackingOptions& options) {

@@ -89,6 +89,27 @@ std::size_t overtaken(const Journal& journal) {
   return n;
 }
 
+TEST(Stage, OnlyALoopThatWillBeCommittedSupersedesGlobalAdjustment) {
+  EXPECT_EQ(superseded_by(Stage::kLoop), Stage::kGlobal);
+  EXPECT_FALSE(superseded_by(Stage::kMap));
+  EXPECT_FALSE(superseded_by(Stage::kGlobal));
+  map::MapStore store{StageWorld().empty_map()};
+  const StageResult nothing, loop{map::MapDraft("loop", store.snapshot()), {}};
+  EXPECT_FALSE(superseded_by(Stage::kLoop, nothing, *store.snapshot()));
+  EXPECT_EQ(superseded_by(Stage::kLoop, loop, *store.snapshot()), Stage::kGlobal);
+  EXPECT_FALSE(superseded_by(Stage::kMap, loop, *store.snapshot()));
+}
+
+TEST(MapGate, KeepsNoJournalWhereNoneIsWanted) {
+  const StageWorld world;
+  map::MapStore store{world.empty_map()};
+  MapGate gate(store, false);
+  const auto executor = make_stage_executor(execution::Mode::kSequential, gate, setup(hashing_stages(1)));
+  executor->enqueue(world.add_keyframe(FrameId(0), executor->begin_frame(FrameId(0)), *executor));
+  EXPECT_GT(gate.newest()->version(), MapVersion(1));
+  EXPECT_TRUE(gate.journal().entries.empty());
+}
+
 TEST(StageExecutorSequential, RunsWhatFollowsBeforeItReturns) {
   WorldRun run(execution::Mode::kSequential, setup(hashing_stages(1, 2)));
   run.frame_with_keyframe();

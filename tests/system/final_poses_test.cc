@@ -10,6 +10,8 @@ namespace {
 using geometry::SE3;
 using geometry::Vector3d;
 using geometry::Vector6d;
+using tracking::FrameRecord;
+using tracking::Relocalisation;
 
 constexpr TimeNs kInterval = 50'000'000, kDelay = 40'000'000;
 

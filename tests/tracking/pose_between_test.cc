@@ -46,7 +46,7 @@ TEST_F(PoseBetween, AlsoWhereTheSecondKeyframeWasCulled) {
   const auto seen = world_.sim.frame(FrameId(7), 0.3);
   const auto result = locate(seen.frame);
   ASSERT_TRUE(result);
-  EXPECT_EQ(result->reference, KeyframeId(0));
+  EXPECT_EQ(result->anchored.reference, KeyframeId(0));
   EXPECT_LT(map::distance_m(result->T_rig_world, seen.T_world_rig.inverse()), 0.02);
 }
 
