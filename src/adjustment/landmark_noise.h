@@ -24,7 +24,7 @@ std::vector<double> landmark_variances(const solver::ReprojectionProblem& proble
 
 // Adjusts the problem with the standard deviations of each point's observations times the root of its factor; they are
 // themselves as they were afterwards.
-solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
+solver::LmSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
                                             const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
                                             std::stop_token stop);
 
