@@ -44,7 +44,7 @@ PoseGraphProblem loop(int count, bool scale_free) {
 
 void pose_graph(benchmark::State& state, bool scale_free) {
   const PoseGraphProblem start = loop(static_cast<int>(state.range(0)), scale_free);
-  PoseGraphSummary summary;
+  LmSummary summary;
   for (auto _ : state) {
     PoseGraphProblem problem = start;
     summary = optimise(problem, {});

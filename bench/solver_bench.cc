@@ -35,8 +35,8 @@ void bundle(benchmark::State& state, const scene::BundleSpec& spec, int iteratio
   std::size_t steps = 0;
   for (auto _ : state) {
     ReprojectionProblem problem = scene->problem;
-    const BundleSummary summary = adjust(problem, options);
-    steps = summary.steps.size();
+    const LmSummary summary = adjust(problem, options);
+    steps = static_cast<std::size_t>(summary.iterations);
     benchmark::DoNotOptimize(summary.final_cost);
   }
   state.counters["observations"] = static_cast<double>(scene->problem.observations.size());

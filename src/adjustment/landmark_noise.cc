@@ -16,7 +16,7 @@ std::vector<double> landmark_variances(const solver::ReprojectionProblem& proble
   std::vector<double> sum(problem.points.size(), 0.0);
   std::vector<int> count(problem.points.size(), 0);
   for (std::size_t i = 0; i < chi2.size(); ++i) {
-    if ((!skip.empty() && skip[i]) || !(chi2[i] < solver::kLostChi2)) continue;
+    if ((!skip.empty() && skip[i]) || !(chi2[i] < solver::kMaxChi2)) continue;
     sum[static_cast<std::size_t>(problem.observations[i].point)] += chi2[i];
     ++count[static_cast<std::size_t>(problem.observations[i].point)];
   }
@@ -35,7 +35,7 @@ std::vector<double> landmark_variances(const solver::ReprojectionProblem& proble
   return variances;
 }
 
-solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
+solver::LmSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
                                             const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
                                             std::stop_token stop) {
   std::vector<float> sigmas;
@@ -44,7 +44,7 @@ solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem
     sigmas.push_back(o.sigma);
     o.sigma *= static_cast<float>(std::sqrt(variances[static_cast<std::size_t>(o.point)]));
   }
-  const solver::BundleSummary summary = solver::adjust(problem, options, skip, std::move(stop));
+  const solver::LmSummary summary = solver::adjust(problem, options, skip, std::move(stop));
   for (std::size_t i = 0; i < sigmas.size(); ++i) problem.observations[i].sigma = sigmas[i];
   return summary;
 }

@@ -8,8 +8,7 @@
 
 #include "adjustment/flat_problem.h"
 #include "calibration/lost_observations.h"
-#include "solver/rig_adjuster.h"
-#include "solver/rig_equations.h"
+#include "solver/extrinsic_bundle_adjustment.h"
 
 namespace bslam::calibration {
 namespace {
@@ -197,7 +196,7 @@ CameraRefinement evaluate_camera(const solver::ExtrinsicEstimate& estimate, cons
 }
 
 // Returns true if no extrinsics have moved from `before` by more than their own uncertainty.
-bool settled(const solver::RigAdjustment& adjusted, const std::vector<geometry::SE3>& before) {
+bool settled(const solver::ExtrinsicAdjustment& adjusted, const std::vector<geometry::SE3>& before) {
   for (std::size_t c = 1; c < before.size(); ++c) {
     const geometry::Vector6d change = solver::extrinsic_change(adjusted.cameras[c].T_cam_rig, before[c]);
     if (change.dot(adjusted.cameras[c].covariance.llt().solve(change)) > static_cast<double>(change.size()))
@@ -208,18 +207,18 @@ bool settled(const solver::RigAdjustment& adjusted, const std::vector<geometry::
 
 // A map built with wrong extrinsics contains mostly the observations that agree with them, so adjusting it once stops
 // short of the truth. Therefore the rejected observations are searched again with the new extrinsics.
-solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const map::FeatureModel& features,
-                                       const solver::RigAdjusterOptions& options, RigProblem& problem,
-                                       const std::stop_token& stop) {
+solver::ExtrinsicAdjustment adjust_in_passes(const map::BundledMap& map, const map::FeatureModel& features,
+                                             const solver::ExtrinsicAdjustmentOptions& options, RigProblem& problem,
+                                             const std::stop_token& stop) {
   std::vector<geometry::SE3> T_cam_rig;
   for (std::size_t c = 0; c < map.rig().size(); ++c) T_cam_rig.push_back(map.rig().cam_from_rig(c));
   separate_groups(problem);
-  solver::RigAdjustment out = solver::adjust_rig(problem.flat.problem, options, T_cam_rig, stop);
+  solver::ExtrinsicAdjustment out = solver::adjust_extrinsics(problem.flat.problem, options, T_cam_rig, stop);
   for (int pass = 1; pass < kPasses && out.done && !settled(out, T_cam_rig); ++pass) {
     for (std::size_t c = 0; c < T_cam_rig.size(); ++c) T_cam_rig[c] = out.cameras[c].T_cam_rig;
     if (recover_observations(map, T_cam_rig, features, problem.flat) == 0) break;
     separate_groups(problem);
-    solver::RigAdjustment again = solver::adjust_rig(problem.flat.problem, options, T_cam_rig, stop);
+    solver::ExtrinsicAdjustment again = solver::adjust_extrinsics(problem.flat.problem, options, T_cam_rig, stop);
     if (!again.done) break;
     out = std::move(again);
   }
@@ -237,9 +236,9 @@ RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions&
   RigProblem problem = choose(map, options, features);
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();
-  const solver::RigAdjusterOptions solve{.sigma_rotation = geometry::radians(options.calibration_deg),
-                                         .sigma_translation = options.calibration_mm / kMillimetres};
-  const solver::RigAdjustment adjusted = adjust_in_passes(map, features, solve, problem, stop);
+  const solver::ExtrinsicAdjustmentOptions solve{.sigma_rotation = geometry::radians(options.calibration_deg),
+                                                 .sigma_translation = options.calibration_mm / kMillimetres};
+  const solver::ExtrinsicAdjustment adjusted = adjust_in_passes(map, features, solve, problem, stop);
   if (!adjusted.done) return out;
   out.done = true;
   CameraRefinement& first = out.cameras.emplace_back();

@@ -1,12 +1,9 @@
 #include "solver/absolute_pose.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-
-#include <Eigen/LU>
-
 #include <opengv/absolute_pose/CentralAbsoluteAdapter.hpp>
 #include <opengv/absolute_pose/methods.hpp>
 
@@ -111,43 +108,6 @@ void solve_sample(const Sample& sample, std::vector<SE3>& T_rig_world) {
   }
 }
 
-// The best pose so far, by what all observations say.
-class Search {
- public:
-  Search(PoseProblem& problem, double bound)
-      : problem_(problem), bound_(bound), cost_(std::numeric_limits<double>::infinity()) {}
-
-  // True where the pose is better. It is improved over all that agrees with it: its own noise is that of three points.
-  bool offer(const SE3& T_rig_world) {
-    constexpr int kLocalSteps = 4;
-    const double cost = problem_.truncated_cost(T_rig_world, bound_, cost_);
-    if (!(cost < cost_)) return false;
-    take(T_rig_world, cost);
-    problem_.select(best_, bound_);
-    const PoseEquations equations = problem_.linearise(best_, Kernel::kHuber);
-    const SE3 local = minimise(problem_, best_, equations, Kernel::kHuber, kLocalSteps, 0.1);
-    const double local_cost = problem_.truncated_cost(local, bound_, cost_);
-    if (local_cost < cost_) take(local, local_cost);
-    return true;
-  }
-
-  const SE3& best() const { return best_; }
-  double inlier_share() {
-    problem_.select(best_, bound_);
-    return problem_.num_in_use() / static_cast<double>(problem_.items().size());
-  }
-
- private:
-  void take(const SE3& T_rig_world, double cost) {
-    best_ = T_rig_world;
-    cost_ = cost;
-  }
-
-  PoseProblem& problem_;
-  double bound_, cost_;
-  SE3 best_;
-};
-
 int count_distinct_points(std::span<const PoseObservation> observations, const std::vector<std::uint8_t>& inlier) {
   std::vector<std::array<double, 3>> points;
   for (std::size_t i = 0; i < observations.size(); ++i) {
@@ -164,7 +124,7 @@ PoseSolution absolute_pose(const Rig& rig, std::span<const PoseObservation> obse
                            const PoseSolverOptions& options, const AbsolutePoseOptions& ransac, Random random) {
   const std::vector<Ray> rays = rays_of(rig, observations);
   PoseProblem problem(rig, observations);
-  Search search(problem, ransac.inlier_chi2);
+  PoseSearch search(problem, ransac.inlier_chi2);
   std::vector<SE3> candidates;
   double needed = ransac.iterations;
   for (int i = 0; rays.size() >= 3 && i < ransac.iterations && i < std::max<double>(kMinSamples, needed); ++i) {

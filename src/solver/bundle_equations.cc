@@ -1,23 +1,21 @@
 #include "solver/bundle_equations.h"
 
-#include <algorithm>
 #include <cmath>
-#include <variant>
+#include <limits>
 
 namespace bslam::solver {
 namespace {
 
-// Bounds of the diagonal that damping scales: a direction without information still gets some damping.
-constexpr double kMinDiagonal = 1e-6, kMaxDiagonal = 1e32;
-
-double scale_of(double diagonal) { return std::clamp(diagonal, kMinDiagonal, kMaxDiagonal); }
+// Damping of an information matrix: large enough to factorise points without parallax, small beside a prior. A change
+// of all lengths together is held by the prior alone and moves every point, each of which damping resists.
+constexpr double kInformationDamping = 1e-13;
 
 // L with L L^T = V + damping * diag(V).
 geometry::Matrix3d damped_cholesky(const geometry::Matrix3d& V, double damping) {
   geometry::Matrix3d L = geometry::Matrix3d::Zero();
-  const double v00 = V(0, 0) + damping * scale_of(V(0, 0));
-  const double v11 = V(1, 1) + damping * scale_of(V(1, 1));
-  const double v22 = V(2, 2) + damping * scale_of(V(2, 2));
+  const double v00 = V(0, 0) + damping * bounded_diagonal(V(0, 0));
+  const double v11 = V(1, 1) + damping * bounded_diagonal(V(1, 1));
+  const double v22 = V(2, 2) + damping * bounded_diagonal(V(2, 2));
   L(0, 0) = std::sqrt(v00);
   L(1, 0) = V(1, 0) / L(0, 0);
   L(2, 0) = V(2, 0) / L(0, 0);
@@ -27,26 +25,37 @@ geometry::Matrix3d damped_cholesky(const geometry::Matrix3d& V, double damping) 
   return L;
 }
 
+ReducedSystem::Storage storage_for(const BundleStructure& structure, int dense_poses) {
+  return structure.pattern.size() <= dense_poses ? ReducedSystem::Storage::kDense : ReducedSystem::Storage::kSparse;
+}
+
+int rig_size(const RigBlocks& blocks) {
+  int size = 0;
+  for (const auto& block : blocks) size += block->size();
+  return size;
+}
+
 }  // namespace
 
-BundleEquations::BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure, Kernel kernel,
-                                 int dense_poses)
-    : structure_(structure),
+BundleState state_of(const ReprojectionProblem& problem) {
+  BundleState out{problem.T_rig_world, problem.points, {}};
+  for (std::size_t i = 0; i < problem.rig->size(); ++i) out.rig.T_cam_rig.push_back(problem.rig->cam_from_rig(i));
+  return out;
+}
+
+BundleEquations::BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure,
+                                 const RigBlocks& rig_blocks, Kernel kernel, int dense_poses, BundleState start)
+    : problem_(problem),
+      structure_(structure),
       kernel_(kernel),
+      state_(std::move(start)),
+      trial_(state_),
       pose_blocks_(structure.pose_of_slot.size()),
       point_blocks_(structure.num_points()),
       L_(structure.num_points()),
-      system_(structure.pattern, structure.pattern.size() <= dense_poses ? ReducedCameraSystem::Storage::kDense
-                                                                         : ReducedCameraSystem::Storage::kSparse) {
-  const Rig& rig = *problem.rig;
-  for (std::size_t i = 0; i < rig.size(); ++i) models_.push_back(&rig.camera(i).model);
-  cam_from_rig_.reserve(problem.T_rig_world.size() * rig.size());
-  for (std::size_t pose = 0; pose < problem.T_rig_world.size(); ++pose) {
-    for (std::size_t i = 0; i < rig.size(); ++i) {
-      const SE3 T = cam_from_rig_at(problem, pose, CameraIndex(i));
-      cam_from_rig_.push_back({T.matrix3(), T.translation()});
-    }
-  }
+      system_(structure.pattern, structure.frame_sizes, rig_size(rig_blocks), storage_for(structure, dense_poses)),
+      rig_(structure, problem.rig->size(), rig_blocks, system_.frames().rows()) {
+  for (std::size_t i = 0; i < problem.rig->size(); ++i) models_.push_back(&problem.rig->camera(i).model);
   std::size_t free_groups = 0, most_in_point = 0;
   for (std::size_t i = 0; i < structure.num_points(); ++i) {
     first_W_.push_back(free_groups);
@@ -60,14 +69,25 @@ BundleEquations::BundleEquations(const ReprojectionProblem& problem, const Bundl
   U_.resize(most_in_point);
 }
 
-void BundleEquations::set_poses(const std::vector<SE3>& T_rig_world) {
-  poses_.resize(T_rig_world.size());
-  for (std::size_t i = 0; i < poses_.size(); ++i) poses_[i] = {T_rig_world[i].matrix3(), T_rig_world[i].translation()};
+void BundleEquations::set_poses(const BundleState& state) {
+  poses_.resize(state.T_rig_world.size());
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    poses_[i] = {state.T_rig_world[i].matrix3(), state.T_rig_world[i].translation()};
+  }
+  if (rig_.size() == 0 && !cam_from_rig_.empty()) return;  // constant
+  cam_from_rig_.clear();
+  cam_from_rig_.reserve(poses_.size() * models_.size());
+  for (std::size_t k = 0; k < poses_.size() * models_.size(); ++k) {
+    const SE3& T_cam_rig = state.rig.T_cam_rig[k % models_.size()];
+    const SE3 T = problem_.motion.empty() ? T_cam_rig : T_cam_rig * problem_.motion[k];
+    cam_from_rig_.push_back({T.matrix3(), T.translation()});
+  }
 }
 
-double BundleEquations::cost(const BundleState& state) {
-  set_poses(state.T_rig_world);
-  double sum = 0.0;
+// Calls visit(chi2) for each term, in order.
+template <class Visit>
+void BundleEquations::for_each_error(const BundleState& state, const Visit& visit) {
+  set_poses(state);
   for (std::size_t i = 0; i < structure_.num_points(); ++i) {
     const Vector3d& point = state.points[static_cast<std::size_t>(structure_.points[i].point)];
     for (std::size_t g = structure_.points[i].first_group; g < structure_.points[i + 1].first_group; ++g) {
@@ -76,42 +96,52 @@ double BundleEquations::cost(const BundleState& state) {
       for (std::size_t k = structure_.groups[g].first_term; k < structure_.groups[g + 1].first_term; ++k) {
         const BundleStructure::Term& term = structure_.terms[k];
         const Rigid& T = cam_from_rig(structure_.groups[g].pose, term.camera);
-        const Vector3d p = T.R * point_rig + T.t;
-        const auto pixel = std::visit([&](const auto& model) { return model.project(p); },
-                                      *models_[static_cast<std::size_t>(term.camera)]);
-        double chi2 = kLostChi2;
-        if (pixel) chi2 = (term.inverse_sigma * (term.pixel.cast<double>() - *pixel)).squaredNorm();
-        sum += kernel_cost(kernel_, chi2 < kLostChi2 ? chi2 : kLostChi2);
+        const auto error = residual_error(*models_[static_cast<std::size_t>(term.camera)], T.R * point_rig + T.t,
+                                          term.pixel.cast<double>());
+        visit(error ? (term.inverse_sigma * *error).squaredNorm() : std::numeric_limits<double>::infinity());
       }
     }
   }
-  return 0.5 * sum;
 }
 
-BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const Vector3d& point_rig) const {
+double BundleEquations::cost(const BundleState& state) {
+  double sum = 0.0;
+  for_each_error(state, [&](double chi2) { sum += kernel_cost(kernel_, chi2); });
+  return 0.5 * sum + rig_.prior_cost(state.rig);
+}
+
+std::vector<double> BundleEquations::squared_errors() {
+  std::vector<double> out;
+  out.reserve(structure_.terms.size());
+  for_each_error(state_, [&](double chi2) { out.push_back(chi2); });
+  return out;
+}
+
+BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const Rigid& pose, const Vector3d& point_rig) {
   GroupSums out;
+  const int slot = structure_.groups[group].slot;
+  const RigTerms::Point point{point_rig, pose.R, slot < 0 ? -1 : system_.frames().offset(slot)};
   for (std::size_t k = structure_.groups[group].first_term; k < structure_.groups[group + 1].first_term; ++k) {
     const BundleStructure::Term& term = structure_.terms[k];
     const Rigid& T = cam_from_rig(structure_.groups[group].pose, term.camera);
     const Vector3d p = T.R * point_rig + T.t;
-    const auto projection = std::visit([&](const auto& model) { return model.project_with_jacobian(p); },
-                                       *models_[static_cast<std::size_t>(term.camera)]);
+    const auto camera = static_cast<std::size_t>(term.camera);
+    const auto r = residual(*models_[camera], p, term.pixel.cast<double>());
     Vector2d e = Vector2d::Zero();
-    double chi2 = kLostChi2;
-    if (projection) {
-      e = term.inverse_sigma * (term.pixel.cast<double>() - projection->pixel);
+    double chi2 = kMaxChi2;
+    if (r) {
+      e = term.inverse_sigma * r->error;
       chi2 = e.squaredNorm();
     }
-    if (!(chi2 < kLostChi2)) {
-      out.cost += kernel_cost(kernel_, kLostChi2);
-      continue;
-    }
     out.cost += kernel_cost(kernel_, chi2);
+    if (!(chi2 < kMaxChi2)) continue;
     const double weight = kernel_weight(kernel_, chi2);
-    const Matrix23d A = (term.inverse_sigma * projection->jacobian) * T.R;
+    const Matrix23d J = term.inverse_sigma * r->J;
+    const Matrix23d A = J * T.R;
     const Matrix23d wA = weight * A;
     out.M.noalias() += A.transpose() * wA;
     out.m.noalias() += wA.transpose() * e;
+    if (rig_.size() > 0) rig_.add({term.camera, state_.rig.T_cam_rig[camera], p, J}, A, e, weight, point);
   }
   return out;
 }
@@ -130,36 +160,43 @@ void BundleEquations::add_to_pose(const GroupSums& sums, const Vector3d& point_r
   W.bottomRows<3>().noalias() = sums.M * R_rig_world;
 }
 
-double BundleEquations::linearise(const BundleState& state) {
-  set_poses(state.T_rig_world);
+// Adds the costs of the point's observations to `sum`.
+void BundleEquations::linearise_point(std::size_t i, double& sum) {
+  const Vector3d& point = state_.points[static_cast<std::size_t>(structure_.points[i].point)];
+  PointBlock block{Matrix3d::Zero(), Vector3d::Zero()};
+  std::size_t next_W = first_W_[i];
+  for (std::size_t g = structure_.points[i].first_group; g < structure_.points[i + 1].first_group; ++g) {
+    const BundleStructure::Group& group = structure_.groups[g];
+    const Rigid& pose = poses_[static_cast<std::size_t>(group.pose)];
+    const Vector3d point_rig = pose.R * point + pose.t;
+    const GroupSums sums = sum_group(g, pose, point_rig);
+    sum += sums.cost;
+    block.b.noalias() += pose.R.transpose() * sums.m;
+    if (group.slot < 0) {
+      const Matrix3d MR = sums.M * pose.R;
+      block.V.noalias() += pose.R.transpose() * MR;
+    } else {
+      Matrix63d& W = W_[next_W++];
+      add_to_pose(sums, point_rig, pose.R, pose_blocks_[static_cast<std::size_t>(group.slot)], W);
+      block.V.noalias() += pose.R.transpose() * W.bottomRows<3>();
+    }
+  }
+  point_blocks_[i] = block;
+}
+
+double BundleEquations::linearise() {
+  set_poses(state_);
   for (PoseBlock& block : pose_blocks_) {
     block.H.setZero();
     block.b.setZero();
   }
+  if (rig_.size() > 0) rig_.begin(state_.rig);
   double sum = 0.0;
-  std::size_t next_W = 0;
   for (std::size_t i = 0; i < structure_.num_points(); ++i) {
-    const Vector3d& point = state.points[static_cast<std::size_t>(structure_.points[i].point)];
-    PointBlock block{Matrix3d::Zero(), Vector3d::Zero()};
-    for (std::size_t g = structure_.points[i].first_group; g < structure_.points[i + 1].first_group; ++g) {
-      const BundleStructure::Group& group = structure_.groups[g];
-      const Rigid& pose = poses_[static_cast<std::size_t>(group.pose)];
-      const Vector3d point_rig = pose.R * point + pose.t;
-      const GroupSums sums = sum_group(g, point_rig);
-      sum += sums.cost;
-      block.b.noalias() += pose.R.transpose() * sums.m;
-      if (group.slot < 0) {
-        const Matrix3d MR = sums.M * pose.R;
-        block.V.noalias() += pose.R.transpose() * MR;
-      } else {
-        Matrix63d& W = W_[next_W++];
-        add_to_pose(sums, point_rig, pose.R, pose_blocks_[static_cast<std::size_t>(group.slot)], W);
-        block.V.noalias() += pose.R.transpose() * W.bottomRows<3>();
-      }
-    }
-    point_blocks_[i] = block;
+    if (rig_.size() > 0) rig_.begin_point(i);
+    linearise_point(i, sum);
   }
-  return 0.5 * sum;
+  return 0.5 * sum + rig_.prior_cost(state_.rig);
 }
 
 // Subtracts what the point says from the reduced system: S_ab -= U_a U_b^T, r_a -= U_a (L^-1 b), U = W L^-T.
@@ -167,7 +204,8 @@ void BundleEquations::eliminate_point(std::size_t point, double damping) {
   const Matrix3d L = damped_cholesky(point_blocks_[point].V, damping);
   L_[point] = L;
   const double i0 = 1.0 / L(0, 0), i1 = 1.0 / L(1, 1), i2 = 1.0 / L(2, 2);
-  const Vector3d y = L.triangularView<Eigen::Lower>().solve(point_blocks_[point].b);
+  Vector3d y = point_blocks_[point].b;
+  L.triangularView<Eigen::Lower>().solveInPlace(y);
   const int* block = structure_.pair_block.data() + structure_.points[point].first_pair;
   const std::size_t first = first_W_[point], count = first_W_[point + 1] - first;
   std::size_t a = 0;
@@ -175,66 +213,81 @@ void BundleEquations::eliminate_point(std::size_t point, double damping) {
     const int slot = structure_.groups[g].slot;
     if (slot < 0) continue;
     const Matrix63d& W = W_[first + a];
-    Matrix63d& U = U_[a];
+    Matrix63d& U = U_[a].U;
     U.col(0) = W.col(0) * i0;
     U.col(1) = (W.col(1) - L(1, 0) * U.col(0)) * i1;
     U.col(2) = (W.col(2) - L(2, 0) * U.col(0) - L(2, 1) * U.col(1)) * i2;
-    system_.rhs().segment<6>(6 * slot).noalias() -= U * y;
+    U_[a].pose_offset = system_.frames().offset(slot);
+    system_.rhs().segment<6>(U_[a].pose_offset).noalias() -= U * y;
     for (std::size_t b = 0; b <= a; ++b) {
-      system_.blocks()[static_cast<std::size_t>(*block++)].noalias() -= U.lazyProduct(U_[b].transpose());
+      system_.frames().leading<6>(*block++).noalias() -= U.lazyProduct(U_[b].U.transpose());
     }
     ++a;
   }
+  if (rig_.size() > 0) rig_.eliminate(point, L, y, {U_.data(), count}, system_);
 }
 
-void BundleEquations::eliminate_points(double damping) {
-  for (Matrix6d& block : system_.blocks()) block.setZero();
+ReducedSystem& BundleEquations::reduce(double damping) {
+  system_.frames().set_zero();
   for (std::size_t slot = 0; slot < pose_blocks_.size(); ++slot) {
     const int at = static_cast<int>(slot);
-    Matrix6d& block = system_.blocks()[static_cast<std::size_t>(structure_.pattern.index(at, at))];
+    auto block = system_.frames().leading<6>(structure_.pattern.index(at, at));
     block = pose_blocks_[slot].H;
-    for (int k = 0; k < 6; ++k) block(k, k) += damping * scale_of(block(k, k));
-    system_.rhs().segment<6>(6 * at) = pose_blocks_[slot].b;
+    for (int k = 0; k < 6; ++k) block(k, k) += damping * bounded_diagonal(block(k, k));
+    system_.rhs().segment<6>(system_.frames().offset(at)) = pose_blocks_[slot].b;
   }
+  if (rig_.size() > 0) rig_.copy_to(damping, system_);
   for (std::size_t i = 0; i < structure_.num_points(); ++i) eliminate_point(i, damping);
+  return system_;
 }
 
-// V delta_p = b - sum of W^T delta over the point's free poses.
+std::optional<Eigen::MatrixXd> BundleEquations::rig_information() {
+  if (!reduce(kInformationDamping).solve(delta_)) return std::nullopt;
+  return system_.rig_information();
+}
+
+// V delta_p = b - sum of W^T delta over the point's free poses and the rig.
 Vector3d BundleEquations::point_update(std::size_t point) const {
   Vector3d rhs = point_blocks_[point].b;
   std::size_t next_W = first_W_[point];
   for (std::size_t g = structure_.points[point].first_group; next_W < first_W_[point + 1]; ++g) {
     const int slot = structure_.groups[g].slot;
-    if (slot >= 0) rhs.noalias() -= W_[next_W++].transpose() * delta_.segment<6>(6 * slot);
+    if (slot >= 0) rhs.noalias() -= W_[next_W++].transpose() * delta_.segment<6>(system_.frames().offset(slot));
   }
+  if (rig_.size() > 0) rig_.substitute(point, delta_.tail(rig_.size()), rhs);
   L_[point].triangularView<Eigen::Lower>().solveInPlace(rhs);
   L_[point].transpose().triangularView<Eigen::Upper>().solveInPlace(rhs);
   return rhs;
 }
 
-bool BundleEquations::solve(double damping, const BundleState& from, BundleState& to, Step& step) {
-  eliminate_points(damping);
-  if (!system_.solve(delta_)) return false;
-  to = from;
-  double gain = 0.0, squared = delta_.squaredNorm();  // gain = delta^T (b + damping D delta)
+// The predicted decrease is 1/2 delta^T (b + damping D delta).
+std::optional<double> BundleEquations::solve(double damping) {
+  if (!reduce(damping).solve(delta_)) return std::nullopt;
+  trial_ = state_;
+  double gain = 0.0;
   for (std::size_t slot = 0; slot < pose_blocks_.size(); ++slot) {
-    const Vector6d delta = delta_.segment<6>(6 * static_cast<int>(slot));
+    const Vector6d delta = delta_.segment<6>(system_.frames().offset(static_cast<int>(slot)));
     const PoseBlock& block = pose_blocks_[slot];
     gain += delta.dot(block.b);
-    for (int k = 0; k < 6; ++k) gain += damping * scale_of(block.H(k, k)) * delta(k) * delta(k);
-    SE3& T = to.T_rig_world[static_cast<std::size_t>(structure_.pose_of_slot[slot])];
+    for (int k = 0; k < 6; ++k) gain += damping * bounded_diagonal(block.H(k, k)) * delta(k) * delta(k);
+    SE3& T = trial_.T_rig_world[static_cast<std::size_t>(structure_.pose_of_slot[slot])];
     T = T.perturbed(delta);
+  }
+  if (rig_.size() > 0) {
+    const Eigen::VectorXd delta = delta_.tail(rig_.size());
+    gain += delta.dot(rig_.b());
+    for (int k = 0; k < rig_.size(); ++k) gain += damping * bounded_diagonal(rig_.H()(k, k)) * delta(k) * delta(k);
+    rig_.apply(delta, trial_.rig);
   }
   for (std::size_t i = 0; i < structure_.num_points(); ++i) {
     const Vector3d delta = point_update(i);
     const PointBlock& block = point_blocks_[i];
     gain += delta.dot(block.b);
-    for (int k = 0; k < 3; ++k) gain += damping * scale_of(block.V(k, k)) * delta(k) * delta(k);
-    squared += delta.squaredNorm();
-    to.points[static_cast<std::size_t>(structure_.points[i].point)] += delta;
+    for (int k = 0; k < 3; ++k) gain += damping * bounded_diagonal(block.V(k, k)) * delta(k) * delta(k);
+    trial_.points[static_cast<std::size_t>(structure_.points[i].point)] += delta;
   }
-  step = {0.5 * gain, std::sqrt(squared)};
-  return std::isfinite(gain) && std::isfinite(squared);
+  if (!std::isfinite(gain)) return std::nullopt;
+  return 0.5 * gain;
 }
 
 }  // namespace bslam::solver

@@ -1,88 +1,112 @@
-// Normal equations of a bundle adjustment: linearised once, damped and solved many times (docs/math.md, section 5).
+// Bundle adjustment as a least-squares problem (solver/lm.h): poses, points and the parameters of the rig, with the
+// points eliminated by the Schur complement (docs/math.md, section 5). The only assembly and elimination of this
+// folder.
 #pragma once
 
-#include <array>
+#include <optional>
 #include <vector>
 
 #include "solver/bundle_structure.h"
-#include "solver/reduced_camera_system.h"
+#include "solver/reduced_system.h"
+#include "solver/rig_terms.h"
 
 namespace bslam::solver {
 
-// The variables of an adjustment. Points are all of the problem's, poses too; only what the structure uses moves.
+// The variables: all points and poses of the problem, of which those that the structure uses move.
 struct BundleState {
   std::vector<SE3> T_rig_world;
   std::vector<Vector3d> points;  // metres, world
+  RigValues rig;
 };
 
-// Holds the scratch memory of one adjustment.
+// The values of a problem, with the extrinsics of its rig.
+BundleState state_of(const ReprojectionProblem& problem);
+
 class BundleEquations {
  public:
-  // `problem` and `structure` outlive this. More free poses than `dense_poses` are solved sparsely.
-  BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure, Kernel kernel, int dense_poses);
-
-  // Sum of kernel costs / 2 at a state.
-  double cost(const BundleState& state);
-  // The same, and keeps the normal equations there.
-  double linearise(const BundleState& state);
-
-  struct Step {
-    double predicted = 0.0;  // decrease of the cost by the quadratic model
-    double norm = 0.0;       // of all updates together: radians and metres
-  };
-  // Solves the equations with `damping` times their (bounded) diagonal added and applies the solution to `from`.
-  // False where the system is not positive definite.
-  bool solve(double damping, const BundleState& from, BundleState& to, Step& step);
-
- private:
   using Matrix3d = geometry::Matrix3d;
   using Matrix6d = geometry::Matrix6d;
   using Vector6d = geometry::Vector6d;
+
+  // `problem`, `structure` and `rig_blocks` outlive this; the values are those of `start`. Without rig blocks the rig
+  // is constant. More free poses than `dense_poses` are solved sparsely.
+  BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure, const RigBlocks& rig_blocks,
+                  Kernel kernel, int dense_poses, BundleState start);
+
+  // The problem that solver/lm.h minimises: half the sum of kernel costs, and the priors of the rig blocks.
+  double linearise();
+  std::optional<double> solve(double damping);
+  double trial_cost() { return cost(trial_); }
+  void accept() { std::swap(state_, trial_); }
+
+  const BundleState& state() const { return state_; }
+  BundleState& state() { return state_; }
+
+  // Squared normalised error of each term of the structure at the current values; infinite where it does not project.
+  std::vector<double> squared_errors();
+  // The equations of poses and rig where linearise() was called last, with the points eliminated.
+  ReducedSystem& reduce(double damping);
+  // Information about the rig's unknowns with poses and points marginalised out, priors included; empty where it is
+  // singular.
+  std::optional<Eigen::MatrixXd> rig_information();
+
+  struct PoseBlock {
+    Matrix6d H;  // lower triangle
+    Vector6d b;
+  };
+  struct PointBlock {
+    Matrix3d V;
+    Vector3d b;
+  };
+  // The blocks of linearise(): of each free pose, of each point of the structure, of the rig.
+  const std::vector<PoseBlock>& pose_blocks() const { return pose_blocks_; }
+  const std::vector<PointBlock>& point_blocks() const { return point_blocks_; }
+  const RigTerms& rig_terms() const { return rig_; }
+
+ private:
   using Matrix63d = Eigen::Matrix<double, 6, 3>;
 
   struct Rigid {
     Matrix3d R;
     Vector3d t;  // metres
   };
-  struct PoseBlock {
-    Matrix6d H;
-    Vector6d b;
-  };
-  struct PointBlock {
-    Matrix3d V;  // symmetric
-    Vector3d b;
-  };
-  // What the terms of one group say about their point in the rig frame.
+  // What the observations of one group say about their point in the rig frame.
   struct GroupSums {
     Matrix3d M = Matrix3d::Zero();  // sum of w A^T A, A = J_h R_cam_rig / sigma
     Vector3d m = Vector3d::Zero();  // sum of w A^T e / sigma
     double cost = 0.0;
   };
 
-  void set_poses(const std::vector<SE3>& T_rig_world);
+  void set_poses(const BundleState& state);
   const Rigid& cam_from_rig(int pose, int camera) const {
     return cam_from_rig_[static_cast<std::size_t>(pose) * models_.size() + static_cast<std::size_t>(camera)];
   }
-  GroupSums sum_group(std::size_t group, const Vector3d& point_rig) const;
+  template <class Visit>
+  void for_each_error(const BundleState& state, const Visit& visit);
+  double cost(const BundleState& state);
+  GroupSums sum_group(std::size_t group, const Rigid& pose, const Vector3d& point_rig);
   void add_to_pose(const GroupSums& sums, const Vector3d& point_rig, const Matrix3d& R_rig_world, PoseBlock& pose,
                    Matrix63d& W) const;
-  void eliminate_points(double damping);
+  void linearise_point(std::size_t point, double& sum);
   void eliminate_point(std::size_t point, double damping);
   Vector3d point_update(std::size_t point) const;
 
+  const ReprojectionProblem& problem_;
   const BundleStructure& structure_;
   Kernel kernel_;
   std::vector<const camera::CameraModel*> models_;  // per camera
-  std::vector<Rigid> cam_from_rig_;                 // (poses, cameras), T_cam_rig motion: constant over an adjustment
-  std::vector<Rigid> poses_;            // R_rig_world, t_rig_world; every pose of the problem
-  std::vector<PoseBlock> pose_blocks_;  // per slot
-  std::vector<PointBlock> point_blocks_;
-  std::vector<Matrix63d> W_;          // per free group, in order
-  std::vector<std::size_t> first_W_;  // per point and one more
-  std::vector<Matrix3d> L_;           // per point: Cholesky factor of the damped V
-  std::vector<Matrix63d> U_;          // W L^-T of one point
-  ReducedCameraSystem system_;
-  Eigen::VectorXd delta_;  // per slot, six each
+  BundleState state_, trial_;
+  std::vector<Rigid> cam_from_rig_;        // (poses, cameras): T_cam_rig motion
+  std::vector<Rigid> poses_;               // R_rig_world, t_rig_world; every pose of the problem
+  std::vector<PoseBlock> pose_blocks_;     // per slot
+  std::vector<PointBlock> point_blocks_;   // per point of the structure
+  std::vector<Matrix63d> W_;               // per free group, in order
+  std::vector<std::size_t> first_W_;       // per point and one more
+  std::vector<Matrix3d> L_;                // per point: Cholesky factor of the damped V
+  std::vector<RigTerms::PoseCoupling> U_;  // scratch memory of one elimination
+  ReducedSystem system_;
+  RigTerms rig_;
+  Eigen::VectorXd delta_;  // frames, then rig
 };
 
 }  // namespace bslam::solver

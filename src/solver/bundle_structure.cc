@@ -39,7 +39,7 @@ void gather(const ReprojectionProblem& problem, const std::vector<double>& chi2,
     const std::size_t first_term = out.terms.size();
     for (; end < observations.size() && observations[end].point == point.point; ++end) {
       const Observation& o = observations[end];
-      if ((!skip.empty() && skip[end] != 0) || !(chi2[end] < kLostChi2)) continue;
+      if ((!skip.empty() && skip[end] != 0) || !(chi2[end] < kMaxChi2)) continue;
       if (out.groups.size() == point.first_group || out.groups.back().pose != o.pose) {
         out.groups.push_back({o.pose, -1, out.terms.size()});
       }
@@ -65,6 +65,7 @@ void assign_slots(const ReprojectionProblem& problem, BundleStructure& out) {
     slot[p] = static_cast<int>(out.pose_of_slot.size());
     out.pose_of_slot.push_back(static_cast<int>(p));
   }
+  out.frame_sizes.assign(out.pose_of_slot.size(), 6);
   for (std::size_t g = 0; g + 1 < out.groups.size(); ++g) {
     out.groups[g].slot = slot[static_cast<std::size_t>(out.groups[g].pose)];
   }
@@ -101,7 +102,8 @@ BundleStructure make_structure(const ReprojectionProblem& problem, std::span<con
   return make_structure(problem, squared_errors(problem), skip);
 }
 
-BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2, std::span<const std::uint8_t> skip) {
+BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2,
+                               std::span<const std::uint8_t> skip) {
   check(problem, skip);
   BundleStructure out;
   out.terms.reserve(problem.observations.size());

@@ -1,5 +1,5 @@
-// What of a ReprojectionProblem takes part in an adjustment, laid out for its loops: terms grouped by pose
-// within points.
+// The observations of a ReprojectionProblem that take part in an adjustment, laid out for its loops: by point, and
+// within a point by pose.
 #pragma once
 
 #include <span>
@@ -31,17 +31,23 @@ struct BundleStructure {
   std::vector<Group> groups;  // and one more that ends the last
   std::vector<Point> points;  // and one more that ends the last
   std::vector<int> pose_of_slot;
+  std::vector<int> frame_sizes;  // per slot: unknowns of the frame, of which the pose's six come first
   BlockPattern pattern{0};
   // Block number of each pair of free groups (a, b), b <= a, of each point, in the order of a, then b.
   std::vector<int> pair_block;
 
   std::size_t num_points() const { return points.size() - 1; }
+  std::span<const Term> terms_of(std::size_t point) const {
+    const std::size_t begin = groups[points[point].first_group].first_term;
+    return {terms.data() + begin, groups[points[point + 1].first_group].first_term - begin};
+  }
 };
 
-// Leaves out what `skip` names, what is lost at the present values, points with fewer than two observations left (they
-// say nothing about a pose) and free poses without observations.
+// Leaves out the observations flagged in `skip`, those whose squared normalised error in `chi2` is not below kMaxChi2,
+// points with fewer than two observations left, which say nothing about a pose, and free poses without observations.
+BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2,
+                               std::span<const std::uint8_t> skip);
+// The same with the errors at the problem's values.
 BundleStructure make_structure(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip);
-// The same with the squared normalised errors at other values than the present ones.
-BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2, std::span<const std::uint8_t> skip);
 
 }  // namespace bslam::solver

@@ -1,10 +1,10 @@
 #include "solver/epipolar.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Geometry>
+#include "solver/lm.h"
 
 namespace bslam::solver {
 namespace {
@@ -12,7 +12,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Vector5d = Eigen::Matrix<double, 5, 1>;
-using Matrix5d = Eigen::Matrix<double, 5, 5>;
 
 constexpr double kSmall = 1e-12;  // sine below which a bearing lies on the baseline and spans no plane
 
@@ -61,11 +60,7 @@ SampsonTerm sampson(const EpipolarPose& pose, const Eigen::Matrix<double, 3, 2>&
   return out;
 }
 
-struct Equations {
-  Matrix5d H = Matrix5d::Zero();
-  Vector5d b = Vector5d::Zero();
-  double cost = 0.0;
-};
+using Equations = NormalEquations<5>;
 
 Equations linearise(const EpipolarPose& pose, const Eigen::Matrix<double, 3, 2>& basis,
                     std::span<const BearingPair> pairs, const std::vector<std::uint8_t>& use, double knee) {
@@ -113,31 +108,20 @@ Vector3d midpoint_in_a(const EpipolarPose& pose, const BearingPair& pair) {
 
 EpipolarPose refine_epipolar(const EpipolarPose& start, std::span<const BearingPair> pairs,
                              const std::vector<std::uint8_t>& use, double knee) {
-  constexpr int kSteps = 15;
-  constexpr double kConverged = 1e-9;  // radians: length of a step
-  EpipolarPose pose = start;
-  auto basis = tangent_basis(pose.t_b_a);
-  Equations equations = linearise(pose, basis, pairs, use, knee);
-  double damping = 1e-6;
-  for (int i = 0; i < kSteps; ++i) {
-    Matrix5d damped = equations.H;
-    damped.diagonal() *= 1.0 + damping;
-    const Vector5d delta = damped.ldlt().solve(equations.b);
-    if (!delta.allFinite()) break;
-    const EpipolarPose trial = moved(pose, basis, delta);
-    const auto trial_basis = tangent_basis(trial.t_b_a);
-    const Equations next = linearise(trial, trial_basis, pairs, use, knee);
-    if (next.cost <= equations.cost) {
-      pose = trial;
-      basis = trial_basis;
-      equations = next;
-      damping *= 0.1;
-      if (delta.norm() < kConverged) break;
-    } else {
-      damping = std::max(1e-4, 10.0 * damping);
-    }
-  }
-  return pose;
+  struct State {
+    EpipolarPose pose;
+    Eigen::Matrix<double, 3, 2> basis;  // of the translation's two degrees of freedom
+  };
+  const auto equations_at = [&](const State& s) { return linearise(s.pose, s.basis, pairs, use, knee); };
+  const auto plus = [](const State& s, const Vector5d& delta) {
+    const EpipolarPose pose = moved(s.pose, s.basis, delta);
+    return State{pose, tangent_basis(pose.t_b_a)};
+  };
+  const State state{start, tangent_basis(start.t_b_a)};
+  SmallProblem<5, State, decltype(equations_at), decltype(plus)> problem(state, equations_at(state), equations_at,
+                                                                         plus);
+  minimise(problem, {.iterations = 15, .relative_decrease = 0.0, .min_gain = 0.0, .rule = DampingRule::kOnFailure});
+  return problem.state().pose;
 }
 
 }  // namespace bslam::solver

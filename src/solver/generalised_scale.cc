@@ -1,10 +1,11 @@
 #include "solver/generalised_scale.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
+#include "solver/lm.h"
 
 namespace bslam::solver {
 namespace {
@@ -15,24 +16,20 @@ using geometry::Matrix6d;
 using geometry::SE3;
 using geometry::Vector6d;
 
-constexpr int kDistances = 41;  // tried, evenly in their logarithm
-constexpr int kIterations = 20;
-constexpr double kConverged = 1e-8;      // of the step
-constexpr double kFirstDamping = 1e-6;   // share of the diagonal
+constexpr int kDistances = 41;           // tried, evenly in their logarithm
 constexpr double kMinSigma = 1e-5;       // radians: no bearing is better
 constexpr double kMinCondition = 1e-12;  // of the normal equations: below it a direction is not seen at all
 
-struct Sums {
-  Matrix6d H = Matrix6d::Zero();
-  Vector6d b = Vector6d::Zero();
-  double cost = 0.0;  // squared angles, each at most the knee's
-  double squared = 0.0;
+// `cost`: half the sum of squared angles, each at most the square of the knee.
+struct Sums : NormalEquations<6> {
+  double squared = 0.0;  // sum of squared angles of the inliers
   int inliers = 0;
 };
 
-// Squared Sampson angle of every pair against the plane its camera's motion spans, cut off at the knee. With x = R a and
-// the motion of the camera perturbed by [omega, v], b . (t x R a) changes by v . (x x b) + omega . ((t x x) x b). What
-// lengthens t alone changes no angle: without taking that part off v's, noise would pass for knowledge of the distance.
+// Squared Sampson angle of every pair against the plane its camera's motion spans, cut off at the knee. With x = R a
+// and the motion of the camera perturbed by [omega, v], b . (t x R a) changes by v . (x x b) + omega . ((t x x) x b).
+// What lengthens t alone changes no angle: without taking that part off v's, noise would pass for knowledge of the
+// distance.
 Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) {
   Sums out;
   for (const CameraPairs& camera : cameras) {
@@ -46,10 +43,11 @@ Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double kne
     for (const BearingPair& pair : camera.pairs) {
       const Vector3d x = R * pair.a, normal = t.cross(x), other = pair.b.cross(t);
       const double turned = pair.b.dot(normal);
-      const double spread = std::sqrt((normal - turned * pair.b).squaredNorm() + (other - x.dot(other) * x).squaredNorm());
+      const double spread =
+          std::sqrt((normal - turned * pair.b).squaredNorm() + (other - x.dot(other) * x).squaredNorm());
       const double angle = spread > 0.0 ? turned / spread : 0.0;
       if (!(std::abs(angle) < knee)) {
-        out.cost += knee * knee;
+        out.cost += 0.5 * knee * knee;
         continue;
       }
       const Vector3d moved = x.cross(pair.b);
@@ -58,7 +56,7 @@ Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double kne
       if (spread > 0.0) J /= spread;
       H += J * J.transpose();
       g -= angle * J;
-      out.cost += angle * angle;
+      out.cost += 0.5 * angle * angle;
       out.squared += angle * angle;
       ++out.inliers;
     }
@@ -86,25 +84,12 @@ SE3 best_distance(const SE3& T_b_a, std::span<const CameraPairs> cameras, const 
   return best;
 }
 
-SE3 refine(SE3 T_b_a, std::span<const CameraPairs> cameras, double knee) {
-  double damping = kFirstDamping;
-  Sums sums = evaluate(T_b_a, cameras, knee);
-  for (int i = 0; i < kIterations; ++i) {
-    Matrix6d H = sums.H;
-    H.diagonal() *= 1.0 + damping;
-    const Vector6d step = H.ldlt().solve(sums.b);
-    if (!step.allFinite() || step.norm() < kConverged) break;
-    const SE3 trial = T_b_a.perturbed(step);
-    const Sums at_trial = evaluate(trial, cameras, knee);
-    if (at_trial.cost < sums.cost) {
-      T_b_a = trial;
-      sums = at_trial;
-      damping *= 0.1;
-    } else {
-      damping *= 100.0;
-    }
-  }
-  return T_b_a;
+SE3 refine(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) {
+  const auto equations_at = [&](const SE3& T) -> NormalEquations<6> { return evaluate(T, cameras, knee); };
+  const auto plus = [](const SE3& T, const Vector6d& delta) { return T.perturbed(delta); };
+  SmallProblem<6, SE3, decltype(equations_at), decltype(plus)> problem(T_b_a, equations_at(T_b_a), equations_at, plus);
+  minimise(problem, {.iterations = 20, .relative_decrease = 0.0, .min_gain = 0.0, .rule = DampingRule::kOnFailure});
+  return problem.state();
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Metric motion of a rig between two frames, from matches within each of its cameras: one of them, the reference, knows its
-// motion up to scale, and where the others are on the rig gives the scale where the rig turns (generalised epipolar
+// Metric motion of a rig between two frames, from matches within each of its cameras: one of them, the reference, knows
+// its motion up to scale, and where the others are on the rig gives the scale where the rig turns (generalised epipolar
 // constraint; Pless, "Using many cameras as one", CVPR 2003).
 #pragma once
 
@@ -28,9 +28,10 @@ struct GeneralisedScale {
   int num_inliers = 0;
 };
 
-// Tries distances all over the range along `T_b_a` (of the reference; only the direction of its translation counts), then
-// refines rotation and translation together from the best, so that the deviation holds what the reference does not know of
-// its motion. Empty where nothing tells the distance: one camera, all cameras in one place, a motion without rotation.
+// Tries distances all over the range along `T_b_a` (of the reference; only the direction of its translation counts),
+// then refines rotation and translation together from the best, so that the deviation holds what the reference does not
+// know of its motion. Empty where nothing tells the distance: one camera, all cameras in one place, a motion without
+// rotation.
 std::optional<GeneralisedScale> generalised_scale(const geometry::SE3& T_b_a, std::span<const CameraPairs> cameras,
                                                   const GeneralisedScaleOptions& options = {});
 

@@ -1,14 +1,12 @@
 #include "solver/pose_graph.h"
 
+#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
-#include <Eigen/SparseCholesky>
-
 #include "base/assert.h"
-#include "solver/block_pattern.h"
+#include "solver/block_matrix.h"
 
 namespace bslam::solver {
 namespace {
@@ -19,8 +17,6 @@ using geometry::Vector3d;
 using geometry::Vector7d;
 using Edge = PoseGraphProblem::Edge;
 using Poses = std::vector<Sim3>;
-
-constexpr double kNegligible = 1e-10;  // share of the cost that rounding alone may change, and absolute cost of nothing
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -89,63 +85,61 @@ class PoseGraphEquations {
   using Vector = Eigen::Matrix<double, N, 1>;
   using Matrix = Eigen::Matrix<double, N, N>;
 
-  // `problem` outlives this.
+  // `problem` outlives this; the vertices start at its values.
   PoseGraphEquations(const PoseGraphProblem& problem, const PoseGraphOptions& options)
       : problem_(problem),
+        S_world_(problem.S_world),
+        trial_(problem.S_world),
         column_(elimination_order(problem)),
         pattern_(pattern_of(problem, column_)),
-        blocks_(pattern_.positions().size()),
-        rhs_(N * pattern_.size()) {
+        H_(pattern_, std::vector<int>(at(pattern_.size()), N)),
+        rhs_(N * pattern_.size()),
+        sparse_(H_.sparse_structure()) {
     inverse_sigma_.template head<3>().setConstant(1.0 / options.sigma_rotation);
     inverse_sigma_.template segment<3>(3).setConstant(1.0 / options.sigma_translation);
     if constexpr (N == 7) inverse_sigma_(6) = 1.0 / options.sigma_log_scale;
     S_b_a_.reserve(problem.edges.size());
     for (const Edge& edge : problem.edges) S_b_a_.push_back(edge.S_a_b.inverse());
-    lay_out();
+    factor_.analyzePattern(sparse_);
   }
 
-  bool empty() const { return pattern_.size() == 0; }
-
-  double cost(const Poses& S_world) const {
+  double trial_cost() const {
     double sum = 0.0;
-    for (std::size_t k = 0; k < S_b_a_.size(); ++k) sum += 0.5 * evaluate(k, S_world).error.squaredNorm();
+    for (std::size_t k = 0; k < S_b_a_.size(); ++k) sum += 0.5 * evaluate(k, trial_).error.squaredNorm();
     return sum;
   }
 
-  // Returns the cost.
-  double linearise(const Poses& S_world) {
-    for (Matrix& block : blocks_) block.setZero();
+  double linearise() {
+    H_.set_zero();
     rhs_.setZero();
     double sum = 0.0;
     for (std::size_t k = 0; k < S_b_a_.size(); ++k) {
-      const Residual r = evaluate(k, S_world);
+      const Residual r = evaluate(k, S_world_);
       sum += 0.5 * r.error.squaredNorm();
       add(k, r);
     }
     return sum;
   }
 
-  // Solves (H + damping diag(H)) delta = b. False where that fails; `predicted` is the decrease of the cost.
-  bool solve(double damping, Eigen::VectorXd& delta, double& predicted) {
-    fill(1.0 + damping);
+  std::optional<double> solve(double damping) {
+    if (rhs_.size() == 0) return 0.0;  // every vertex is held
+    H_.copy_to(sparse_);
+    const Eigen::VectorXd diagonal = sparse_.diagonal();
+    sparse_.diagonal() = (1.0 + damping) * diagonal;
     factor_.factorize(sparse_);
-    if (factor_.info() != Eigen::Success) return false;
-    delta = factor_.solve(rhs_);
-    predicted = 0.5 * delta.dot(rhs_);
-    for (int c = 0; c < pattern_.size(); ++c) {
-      const auto d = delta.segment<N>(N * c);
-      predicted += 0.5 * damping * d.cwiseAbs2().dot(blocks_[at(pattern_.index(c, c))].diagonal());
-    }
-    return delta.allFinite() && std::isfinite(predicted);
-  }
-
-  void apply(const Eigen::VectorXd& delta, const Poses& S_world, Poses& moved) const {
-    for (std::size_t v = 0; v < S_world.size(); ++v) {
+    if (factor_.info() != Eigen::Success) return std::nullopt;
+    const Eigen::VectorXd delta = factor_.solve(rhs_);
+    if (!delta.allFinite()) return std::nullopt;
+    for (std::size_t v = 0; v < S_world_.size(); ++v) {
       Vector7d step = Vector7d::Zero();
       if (column_[v] >= 0) step.head<N>() = delta.segment<N>(N * column_[v]);
-      moved[v] = column_[v] >= 0 ? S_world[v].perturbed(step) : S_world[v];
+      trial_[v] = column_[v] >= 0 ? S_world_[v].perturbed(step) : S_world_[v];
     }
+    return 0.5 * (delta.dot(rhs_) + damping * delta.cwiseAbs2().dot(diagonal));
   }
+
+  void accept() { std::swap(S_world_, trial_); }
+  Poses& S_world() { return S_world_; }
 
  private:
   struct Residual {
@@ -191,107 +185,41 @@ class PoseGraphEquations {
     if (b >= 0) add_vertex(b, J_b, r.error);
     if (a < 0 || b < 0) return;
     if (a > b) {
-      blocks_[at(pattern_.index(a, b))].noalias() += J_a.transpose() * J_b;
+      H_.leading<N>(pattern_.index(a, b)).noalias() += J_a.transpose() * J_b;
     } else {
-      blocks_[at(pattern_.index(b, a))].noalias() += J_b.transpose() * J_a;
+      H_.leading<N>(pattern_.index(b, a)).noalias() += J_b.transpose() * J_a;
     }
   }
 
   void add_vertex(int column, const Matrix& J, const Vector& error) {
-    blocks_[at(pattern_.index(column, column))].noalias() += J.transpose() * J;
+    H_.leading<N>(pattern_.index(column, column)).noalias() += J.transpose() * J;
     rhs_.template segment<N>(N * column).noalias() -= J.transpose() * error;
   }
 
-  // Structure of the lower triangle, compressed by columns; values follow in the same order in fill.
-  void lay_out() {
-    const auto& positions = pattern_.positions();
-    column_begin_.assign(at(pattern_.size()) + 1, 0);
-    for (const auto& p : positions) ++column_begin_[at(p.column) + 1];
-    for (std::size_t c = 1; c < column_begin_.size(); ++c) column_begin_[c] += column_begin_[c - 1];
-    sparse_.resize(rhs_.size(), rhs_.size());
-    sparse_.reserve(static_cast<Eigen::Index>(N * N * positions.size()));
-    for (int column = 0; column < N * pattern_.size(); ++column) {
-      sparse_.startVec(column);
-      for (std::size_t b = column_begin_[at(column / N)]; b < column_begin_[at(column / N) + 1]; ++b) {
-        for (int row = N * positions[b].row; row < N * positions[b].row + N; ++row) {
-          if (row >= column) sparse_.insertBack(row, column) = 0.0;
-        }
-      }
-    }
-    sparse_.finalize();
-    factor_.analyzePattern(sparse_);
-  }
-
-  void fill(double diagonal_factor) {
-    double* value = sparse_.valuePtr();
-    for (std::size_t c = 0; c + 1 < column_begin_.size(); ++c) {
-      for (int k = 0; k < N; ++k) {
-        for (std::size_t b = column_begin_[c]; b < column_begin_[c + 1]; ++b) {
-          const bool diagonal = b == column_begin_[c];  // the first of each column
-          for (int r = diagonal ? k : 0; r < N; ++r) {
-            *value++ = blocks_[b](r, k) * (diagonal && r == k ? diagonal_factor : 1.0);
-          }
-        }
-      }
-    }
-  }
-
   const PoseGraphProblem& problem_;
+  Poses S_world_, trial_;
   std::vector<int> column_;  // per vertex, -1: held
   BlockPattern pattern_;
-  std::vector<Matrix> blocks_;
+  BlockMatrix H_;
   Eigen::VectorXd rhs_;
   Vector inverse_sigma_;
   std::vector<Sim3> S_b_a_;  // per edge, the measurement's inverse
-  std::vector<std::size_t> column_begin_;
   Eigen::SparseMatrix<double> sparse_;
   // The order of elimination is that of the blocks. Eigen's own code, MPL-2.
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor_;
 };
 
-// Gauss-Newton, damped once a step fails.
+// Gauss-Newton, damped once a step fails. On success the problem takes the new values.
 template <int N>
-PoseGraphSummary minimise(const PoseGraphProblem& problem, const PoseGraphOptions& options, const std::stop_token& stop,
-                          Poses& S_world) {
-  constexpr double kFirstDamping = 1e-4, kMaxDamping = 1e12, kMinGain = 1e-3;
+LmSummary optimise_with(PoseGraphProblem& problem, const PoseGraphOptions& options, const std::stop_token& stop) {
   PoseGraphEquations<N> equations(problem, options);
-  PoseGraphSummary out;
-  double cost = equations.linearise(S_world), damping = 0.0;
-  out.initial_cost = out.final_cost = cost;
-  if (!std::isfinite(cost)) return out;
-  out.stop = equations.empty() ? PoseGraphStop::kConverged : PoseGraphStop::kIterations;
-  bool any_solved = false;
-  Poses trial = S_world;
-  Eigen::VectorXd delta;
-  for (; out.stop == PoseGraphStop::kIterations && out.iterations < options.iterations; ++out.iterations) {
-    if (stop.stop_requested()) {
-      out.stop = PoseGraphStop::kStopped;
-      return out;
-    }
-    double predicted = 0.0, trial_cost = std::numeric_limits<double>::infinity();
-    const bool solved = equations.solve(damping, delta, predicted);
-    any_solved |= solved;
-    if (solved && predicted <= kNegligible * (1.0 + cost)) {
-      out.stop = PoseGraphStop::kConverged;
-      break;
-    }
-    if (solved) {
-      equations.apply(delta, S_world, trial);
-      trial_cost = equations.cost(trial);
-    }
-    if (!(cost - trial_cost > kMinGain * predicted)) {
-      damping = std::max(kFirstDamping, 10.0 * damping);
-      if (damping > kMaxDamping) out.stop = PoseGraphStop::kConverged;
-      continue;
-    }
-    damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
-    std::swap(S_world, trial);
-    if (cost - trial_cost <= options.relative_decrease * cost) out.stop = PoseGraphStop::kConverged;
-    out.final_cost = cost = trial_cost;
-    if (out.stop != PoseGraphStop::kConverged) equations.linearise(S_world);
-  }
-  if (!equations.empty() && !any_solved) out.stop = PoseGraphStop::kFailed;
-  return out;
+  const LmSummary summary = minimise(equations,
+                                     {.iterations = options.iterations,
+                                      .relative_decrease = options.relative_decrease,
+                                      .rule = DampingRule::kOnFailure},
+                                     stop);
+  if (summary.usable()) problem.S_world = std::move(equations.S_world());
+  return summary;
 }
 
 void check(const PoseGraphProblem& problem) {
@@ -308,13 +236,9 @@ void check(const PoseGraphProblem& problem) {
 
 }  // namespace
 
-PoseGraphSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop) {
+LmSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop) {
   check(problem);
-  Poses S_world = problem.S_world;
-  const PoseGraphSummary summary =
-      problem.scale_free ? minimise<7>(problem, options, stop, S_world) : minimise<6>(problem, options, stop, S_world);
-  if (summary.usable()) problem.S_world = std::move(S_world);
-  return summary;
+  return problem.scale_free ? optimise_with<7>(problem, options, stop) : optimise_with<6>(problem, options, stop);
 }
 
 }  // namespace bslam::solver

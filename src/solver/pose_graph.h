@@ -1,6 +1,6 @@
-// Pose graph optimisation: what a closed loop corrects before bundle adjustment. Rigid, or with a scale per vertex
-// where the rig does not observe it (Strasdat, Montiel and Davison, RSS 2010). It knows no map. Equations:
-// docs/math.md.
+// Pose graph optimisation, which distributes the correction of a loop closure before bundle adjustment: rigid, or with
+// a scale per vertex where the scale is not observable (Strasdat, Montiel and Davison, RSS 2010). Equations:
+// docs/math.md, section 9.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 
 #include "base/options.h"
 #include "geometry/sim3.h"
+#include "solver/lm.h"
 
 namespace bslam::solver {
 
@@ -46,18 +47,10 @@ struct PoseGraphOptions {
   }
 };
 
-enum class PoseGraphStop { kConverged, kIterations, kStopped, kFailed };
-
-struct PoseGraphSummary {
-  PoseGraphStop stop = PoseGraphStop::kFailed;
-  double initial_cost = 0, final_cost = 0;  // sum of squared normalised errors / 2
-  int iterations = 0;                       // steps tried
-  bool usable() const { return stop != PoseGraphStop::kFailed; }
-};
-
-// Improves the vertices in place by Levenberg-Marquardt; on kFailed the problem is as it was. A connected part without
-// a fixed vertex is held by its first; so a vertex without edges stays where it is. A stop request ends it after the
-// step in hand, keeping what was gained. Deterministic to the bit.
-PoseGraphSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop = {});
+// Improves the vertices in place by Levenberg-Marquardt; on LmStop::kFailed the problem is unchanged. The first vertex
+// of a connected component without a fixed vertex is held, so a vertex without edges does not move. The cost is half
+// the sum of squared normalised errors. A stop request ends it after the current step and keeps the improvement so far.
+// Deterministic to the bit.
+LmSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop = {});
 
 }  // namespace bslam::solver

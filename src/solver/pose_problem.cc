@@ -20,25 +20,20 @@ struct CameraPose {
 
 CameraPose camera_pose(const SE3& T_cam_world) { return {T_cam_world.matrix3(), T_cam_world.translation()}; }
 
-// Squared normalised error; beyond every bound where the point does not project.
+// Squared normalised error; infinite where the point does not project.
 template <class Model>
 double squared_error(const Model& model, const CameraPose& pose, const PoseProblem::Item& item) {
-  const auto pixel = model.project(pose.R * item.point_world + pose.t);
-  if (!pixel) return std::numeric_limits<double>::infinity();
-  return (item.pixel - *pixel).squaredNorm() * item.inverse_sigma * item.inverse_sigma;
+  const auto error = residual_error(model, pose.R * item.point_world + pose.t, item.pixel);
+  if (!error) return std::numeric_limits<double>::infinity();
+  return error->squaredNorm() * item.inverse_sigma * item.inverse_sigma;
 }
 
-// Adds one observation to equations in the camera's own perturbation, T_cam_world <- exp(delta) T_cam_world, where the
-// Jacobian is J_h [-[p]x  I] without a rotation (docs/math.md, section 4).
-void accumulate(const camera::Matrix23d& J_h, const Vector3d& p, const Vector2d& e, double weight, PoseEquations& out) {
-  Eigen::Matrix<double, 6, 2> Jt;
-  for (int k = 0; k < 2; ++k) {
-    const double x = J_h(k, 0), y = J_h(k, 1), z = J_h(k, 2);
-    Jt.col(k) << p.y() * z - p.z() * y, p.z() * x - p.x() * z, p.x() * y - p.y() * x, x, y, z;
-  }
-  const Eigen::Matrix<double, 6, 2> wJt = weight * Jt;
+// Adds one observation to equations in the camera's own perturbation, T_cam_world <- exp(delta) T_cam_world, whose
+// Jacobian needs no rotation (docs/math.md, section 4).
+void accumulate(const Residual& residual, const Vector3d& point_cam, double weight, PoseEquations& out) {
+  const Matrix62d Jt = pose_jacobian_transposed(residual.J, point_cam), wJt = weight * Jt;
   for (int c = 0; c < 6; ++c) out.H.col(c) += wJt.col(0) * Jt(c, 0) + wJt.col(1) * Jt(c, 1);
-  out.b += wJt.col(0) * e.x() + wJt.col(1) * e.y();
+  out.b += wJt.col(0) * residual.error.x() + wJt.col(1) * residual.error.y();
 }
 
 // `admit(item, chi2)` says whether an item is in use, and may change that.
@@ -48,17 +43,12 @@ void accumulate_camera(const Model& model, const CameraPose& pose, Items items, 
   for (auto& item : items) {
     if (!admit.worth_a_look(item)) continue;
     const Vector3d p = pose.R * item.point_world + pose.t;
-    const auto projection = model.project_with_jacobian(p);
-    const Vector2d e = projection ? Vector2d(item.pixel - projection->pixel) : Vector2d::Zero();
+    const auto r = residual(model, p, item.pixel);
     const double information = item.inverse_sigma * item.inverse_sigma;
-    const double chi2 = projection ? e.squaredNorm() * information : std::numeric_limits<double>::infinity();
+    const double chi2 = r ? r->error.squaredNorm() * information : std::numeric_limits<double>::infinity();
     if (!admit(item, chi2)) continue;
-    if (chi2 < kLostChi2) {
-      out.cost += 0.5 * kernel_cost(kernel, chi2);
-      accumulate(projection->jacobian, p, e, kernel_weight(kernel, chi2) * information, out);
-    } else {
-      out.cost += 0.5 * kernel_cost(kernel, kLostChi2);
-    }
+    out.cost += 0.5 * kernel_cost(kernel, chi2);
+    if (chi2 < kMaxChi2) accumulate(*r, p, kernel_weight(kernel, chi2) * information, out);
   }
 }
 
@@ -104,8 +94,8 @@ PoseProblem::PoseProblem(const Rig& rig, std::span<const PoseObservation> observ
   }
 }
 
-// T exp(delta) = exp(Ad_T delta) T. With T_cam_rig = T_i0 exp(delay twist), the pose's change moves the camera directly and by
-// the change of the twist, gain * delta; the latter to first order in delay times twist.
+// T exp(delta) = exp(Ad_T delta) T. With T_cam_rig = T_i0 exp(delay twist), the pose's change moves the camera directly
+// and by the change of the twist, gain * delta; the latter to first order in delay times twist.
 PoseProblem::CameraMotion PoseProblem::camera_motion(std::size_t i, const SE3& T_rig_world) const {
   const SE3& T_i0 = rig_->cam_from_rig(i);
   const double delay = motion_ != nullptr ? motion_->delay_s[i] : 0.0;
@@ -174,30 +164,18 @@ double PoseProblem::truncated_cost(const SE3& T_rig_world, double bound, double 
   return cost;
 }
 
-SE3 minimise(const PoseProblem& problem, const SE3& T_rig_world, PoseEquations equations, Kernel kernel, int iterations,
-             double tolerance) {
-  constexpr double kFirstDamping = 1e-3, kMaxDamping = 1e6, kRidge = 1e-9;  // of the diagonal
-  SE3 T = T_rig_world;
-  double damping = 0.0;  // Gauss-Newton until a step fails
-  for (int i = 0; i < iterations && damping < kMaxDamping; ++i) {
-    Matrix6d damped = equations.H;
-    damped.diagonal() *= 1.0 + damping;
-    damped.diagonal().array() += kRidge * equations.H.diagonal().maxCoeff();
-    const Vector6d delta = damped.ldlt().solve(equations.b);
-    if (!delta.allFinite()) break;
-    const SE3 trial = T.perturbed(delta);
-    // The step in standard deviations: below the tolerance nothing is left to gain, or to check.
-    if (damping == 0.0 && delta.dot(equations.H * delta) < tolerance * tolerance) return trial;
-    const PoseEquations next = problem.linearise(trial, kernel);
-    if (next.cost <= equations.cost) {
-      T = trial;
-      equations = next;
-      damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
-    } else {
-      damping = std::max(kFirstDamping, 10.0 * damping);
-    }
-  }
-  return T;
+SE3 refine_pose(const PoseProblem& problem, const SE3& T_rig_world, const PoseEquations& equations, Kernel kernel,
+                int iterations, double tolerance) {
+  const auto equations_at = [&](const SE3& T) { return problem.linearise(T, kernel); };
+  const auto plus = [](const SE3& T, const Vector6d& delta) { return T.perturbed(delta); };
+  SmallProblem<6, SE3, decltype(equations_at), decltype(plus)> steps(T_rig_world, equations, equations_at, plus);
+  minimise(steps, {.iterations = iterations,
+                   .relative_decrease = 0.0,
+                   .step_tolerance = tolerance,
+                   .min_gain = 0.0,
+                   .rule = DampingRule::kOnFailure,
+                   .first_damping = 1e-3});
+  return steps.state();
 }
 
 }  // namespace bslam::solver

@@ -1,19 +1,17 @@
 // The observations of one rig pose, laid out camera by camera for the loops of motion-only bundle adjustment.
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
+#include "solver/lm.h"
 #include "solver/pose_solver.h"
 
 namespace bslam::solver {
 
-// H delta = b for the left perturbation of T_rig_world, with cost = sum of kernel costs / 2 over what is in use.
-struct PoseEquations {
-  geometry::Matrix6d H = geometry::Matrix6d::Zero();
-  geometry::Vector6d b = geometry::Vector6d::Zero();
-  double cost = 0.0;
-};
+// For the left perturbation of T_rig_world; the cost is half the sum of kernel costs over the items in use.
+using PoseEquations = NormalEquations<6>;
 
 class PoseProblem {
  public:
@@ -49,7 +47,8 @@ class PoseProblem {
     return {items_.data() + first_[i], items_.data() + first_[i + 1]};
   }
 
-  // T_cam_rig of camera i at the time of its image, and how its pose follows that of the rig: exp(J delta) with J of (6, 6).
+  // T_cam_rig of camera i at the time of its image, and how its pose follows that of the rig: exp(J delta) with J of
+  // (6, 6).
   struct CameraMotion {
     SE3 T_cam_rig;
     geometry::Matrix6d J;
@@ -63,15 +62,33 @@ class PoseProblem {
   int num_in_use_ = 0;
 };
 
-// At most `iterations` Levenberg-Marquardt steps over the items in use, from `equations` at T_rig_world; ends once a
-// step is shorter than `tolerance` standard deviations of the pose. Returns the pose reached.
-SE3 minimise(const PoseProblem& problem, const SE3& T_rig_world, PoseEquations equations, Kernel kernel, int iterations,
-             double tolerance);
+// Minimises over the items in use, from `equations` at T_rig_world; converged once a step is shorter than `tolerance`
+// standard deviations of the pose. Returns the pose reached.
+SE3 refine_pose(const PoseProblem& problem, const SE3& T_rig_world, const PoseEquations& equations, Kernel kernel,
+                int iterations, double tolerance);
 
-// Rounds of minimisation and re-classification. The first uses what lies within `first_bound` (squared error) at
-// the start.
+// Rounds of minimisation, each after a classification of all items. The first uses the bound `first_bound` (squared
+// error).
 PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double first_bound,
                           const PoseSolverOptions& options);
+
+// The best of the poses offered, by the truncated cost over all items. Each better one is refined over the items that
+// agree with it, as a pose from a sample has the noise of three points (LO-RANSAC; Chum, Matas and Kittler, DAGM 2003).
+class PoseSearch {
+ public:
+  // `problem` outlives this, which selects its items; `bound`: squared error of an item that agrees.
+  PoseSearch(PoseProblem& problem, double bound) : problem_(problem), bound_(bound) {}
+
+  // True where the pose is better than the best so far.
+  bool offer(const SE3& T_rig_world);
+  const SE3& best() const { return best_; }
+  double inlier_share();
+
+ private:
+  PoseProblem& problem_;
+  double bound_, cost_ = std::numeric_limits<double>::infinity();
+  SE3 best_;
+};
 
 // Samples of three needed for one without outliers with the confidence asked for, at this share of inliers.
 double samples_needed(double inlier_share, double confidence);

@@ -1,8 +1,7 @@
 #include "solver/pose_solver.h"
 
-#include <algorithm>
-
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 
 #include "solver/pose_problem.h"
 
@@ -71,8 +70,8 @@ PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double f
     // After a re-classification all that is in use lies inside the kernel's knee: these equations are also those
     // without it. A round that would change nothing is passed over.
     const bool last = round > 0 && (round == options.rounds - 1 || changed == 0);
-    T = minimise(problem, T, equations, last ? Kernel::kNone : Kernel::kHuber, options.iterations,
-                 last || options.rounds == 1 ? kFinalTolerance : kRoundTolerance);
+    T = refine_pose(problem, T, equations, last ? Kernel::kNone : Kernel::kHuber, options.iterations,
+                    last || options.rounds == 1 ? kFinalTolerance : kRoundTolerance);
     if (last) break;
   }
   return report(problem, T, options);

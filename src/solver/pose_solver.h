@@ -21,7 +21,8 @@ struct PoseSolverOptions {
   int rounds = 4;        // solves with re-classification of outliers between them; the last one without robust kernel
   int iterations = 10;   // Gauss-Newton steps a round at most
   int min_inliers = 10;  // fewer say nothing about a pose
-  double first_chi2 = kLostChi2;  // squared normalised error at the guess beyond which an observation waits for the second round
+  double first_chi2 =
+      kMaxChi2;  // squared normalised error at the guess beyond which an observation waits for the second round
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -31,16 +32,18 @@ struct PoseSolverOptions {
   }
 };
 
-// How a rig whose cameras fire one after the other goes on moving from its pose, given the one before it: the twist at a pose
-// is gain * log(T_rig_world T_before^-1) + offset. Its dependence on the pose is part of the problem: left out, an error of
-// the pose would make one of the twist, and that the next of the pose.
+// How a rig whose cameras fire one after the other goes on moving from its pose, given the one before it: the twist at
+// a pose is gain * log(T_rig_world T_before^-1) + offset. Its dependence on the pose is part of the problem: left out,
+// an error of the pose would make one of the twist, and that the next of the pose.
 struct MotionModel {
-  std::vector<double> delay_s;  // per camera: time of its image after that of the pose
-  SE3 T_before;                 // T_rig_world of the frame before
-  double gain = 0.0;            // 1/s
+  std::vector<double> delay_s;                             // per camera: time of its image after that of the pose
+  SE3 T_before;                                            // T_rig_world of the frame before
+  double gain = 0.0;                                       // 1/s
   geometry::Vector6d offset = geometry::Vector6d::Zero();  // rad/s, m/s
 
-  geometry::Vector6d twist(const SE3& T_rig_world) const { return gain * (T_rig_world * T_before.inverse()).log() + offset; }
+  geometry::Vector6d twist(const SE3& T_rig_world) const {
+    return gain * (T_rig_world * T_before.inverse()).log() + offset;
+  }
 };
 
 struct PoseSolution {

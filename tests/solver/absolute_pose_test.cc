@@ -1,9 +1,9 @@
 #include "solver/absolute_pose.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <thread>
-
-#include <gtest/gtest.h>
 
 #include "solver/scene.h"
 

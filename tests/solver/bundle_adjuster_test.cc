@@ -46,7 +46,7 @@ TEST_P(AgainstCeres, ReachesTheSameMinimum) {
     spec.farthest = 10;  // farther ones may have their minimum at infinity, which no solver reaches
     const auto scene = scene::make_bundle_scene(spec, random);
     ReprojectionProblem ours = scene->problem, theirs = scene->problem;
-    const BundleSummary summary = adjust(ours, to_the_end(c.robust));
+    const LmSummary summary = adjust(ours, to_the_end(c.robust));
     const double reference = ceres_reference::adjust(theirs, c.robust);
     ASSERT_TRUE(summary.usable());
     EXPECT_NEAR(summary.final_cost, reference, 1e-6 * reference) << "seed " << seed;
@@ -66,7 +66,7 @@ TEST(BundleAdjuster, RecoversTruthWithoutNoise) {
   BundleSpec spec;
   spec.noise = 0.0;
   const auto scene = scene::make_bundle_scene(spec, random);
-  const BundleSummary summary = adjust(scene->problem, to_the_end(true));
+  const LmSummary summary = adjust(scene->problem, to_the_end(true));
   // Pixels are stored as float: 1e-5 px.
   EXPECT_LT(summary.final_cost, 1e-4);
   for (std::size_t i = 0; i < scene->T_rig_world.size(); ++i) {
@@ -114,9 +114,9 @@ TEST(BundleAdjuster, StopsWhenAsked) {
   const ReprojectionProblem before = scene->problem;
   std::stop_source stop;
   stop.request_stop();
-  const BundleSummary summary = adjust(scene->problem, {}, {}, stop.get_token());
-  EXPECT_EQ(summary.stop, BundleStop::kStopped);
-  EXPECT_TRUE(summary.steps.empty());
+  const LmSummary summary = adjust(scene->problem, {}, {}, stop.get_token());
+  EXPECT_EQ(summary.stop, LmStop::kStopped);
+  EXPECT_EQ(summary.iterations, 0);
   EXPECT_EQ(largest_difference(before, scene->problem), 0.0);
 }
 
@@ -141,10 +141,10 @@ TEST(BundleAdjuster, SparseAndDenseSolutionsAgree) {
   const auto scene = scene::make_bundle_scene(spec, random);
   ReprojectionProblem dense = scene->problem, sparse = scene->problem;
   BundleOptions options;
-  const BundleSummary a = adjust(dense, options);
+  const LmSummary a = adjust(dense, options);
   options.dense_poses = 0;
-  const BundleSummary b = adjust(sparse, options);
-  EXPECT_EQ(a.steps.size(), b.steps.size());
+  const LmSummary b = adjust(sparse, options);
+  EXPECT_EQ(a.iterations, b.iterations);
   EXPECT_NEAR(a.final_cost, b.final_cost, 1e-9 * a.final_cost);
   EXPECT_LT(largest_difference(dense, sparse), 1e-8);
 }
@@ -162,7 +162,7 @@ TEST(BundleAdjuster, LeavesOutWhatIsSkipped) {
   EXPECT_LT(adjust(scene->problem, to_the_end(false), skip).final_cost, 1e-4);
 }
 
-TEST(BundleAdjuster, CostNeverRisesAndMatchesTheErrors) {
+TEST(BundleAdjuster, CostNeverRises) {
   Random random(9);
   BundleSpec spec;
   spec.outlier_share = 0.2;
@@ -170,21 +170,21 @@ TEST(BundleAdjuster, CostNeverRisesAndMatchesTheErrors) {
   spec.pose_distance = 0.5;
   spec.point_distance = 1.0;
   const auto scene = scene::make_bundle_scene(spec, random);
-  BundleOptions options;
-  options.iterations = 30;
-  const BundleSummary summary = adjust(scene->problem, options);
-  double last = summary.initial_cost;
-  for (const auto& step : summary.steps) {
-    EXPECT_LE(step.cost, last);
-    last = step.cost;
+  double last = std::numeric_limits<double>::infinity();
+  for (int iterations = 0; iterations <= 30; ++iterations) {
+    ReprojectionProblem problem = scene->problem;
+    BundleOptions options;
+    options.iterations = iterations;
+    const LmSummary summary = adjust(problem, options);
+    EXPECT_LE(summary.final_cost, last) << iterations;
+    last = summary.final_cost;
   }
-  EXPECT_EQ(last, summary.final_cost);
 }
 
 TEST(BundleAdjuster, FinalCostIsThatOfTheSquaredErrors) {
   Random random(10);
   const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
-  const BundleSummary summary = adjust(scene->problem, {});
+  const LmSummary summary = adjust(scene->problem, {});
   double sum = 0.0;
   std::vector<int> count(scene->problem.points.size(), 0);
   for (const auto& o : scene->problem.observations) ++count[static_cast<std::size_t>(o.point)];
@@ -211,7 +211,7 @@ TEST(BundleAdjuster, LivesWithPointsOfOneRayAndPointsBehindACamera) {
   for (std::size_t p = 20; p < 30; ++p)
     problem.points[p] = scene->T_rig_world[7].inverse() * Vector3d(0.01, 0.01, 0.02);
   const auto before = problem.points;
-  const BundleSummary summary = adjust(problem, to_the_end(true));
+  const LmSummary summary = adjust(problem, to_the_end(true));
   EXPECT_TRUE(summary.usable());
   for (std::size_t p = 0; p < 20; ++p) EXPECT_EQ(problem.points[p], before[p]) << p;
   for (std::size_t i = 0; i < scene->T_rig_world.size(); ++i) {
@@ -226,7 +226,7 @@ TEST(BundleAdjuster, SaysSoWhereThereIsNothingToLearnFrom) {
   problem.rig = &rig;
   problem.T_rig_world = {SE3(), SE3()};
   problem.pose_free = {0, 1};
-  EXPECT_EQ(adjust(problem, {}).stop, BundleStop::kFailed);
+  EXPECT_EQ(adjust(problem, {}).stop, LmStop::kFailed);
 }
 
 TEST(BundleAdjusterDeathTest, RefusesAProblemWithoutAFixedPose) {

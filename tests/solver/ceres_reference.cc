@@ -1,8 +1,8 @@
 #include "solver/ceres_reference.h"
 
-#include <cmath>
-
 #include <ceres/ceres.h>
+
+#include <cmath>
 
 namespace bslam::solver::ceres_reference {
 namespace {
@@ -53,26 +53,40 @@ class Cost : public ceres::SizedCostFunction<2, 6, 3> {
   SE3 start_;
 };
 
-}  // namespace
+// The same with the extrinsics as increments on the left, for numeric differentiation.
+struct ErrorWithExtrinsics {
+  const Rig& rig;
+  ReprojectionProblem::Observation observation;
+  SE3 pose_start, camera_start;
 
-double adjust(ReprojectionProblem& problem, bool robust) {
-  // Left out as by our own: what does not project at the start, and points with less than two observations then.
-  std::vector<int> rays(problem.points.size(), 0);
-  const std::vector<double> chi2 = squared_errors(problem);
-  for (std::size_t i = 0; i < chi2.size(); ++i) {
-    rays[static_cast<std::size_t>(problem.observations[i].point)] += chi2[i] < kLostChi2;
+  bool operator()(const double* pose, const double* point, const double* camera, double* residuals) const {
+    const SE3 T_rig_world = SE3::exp(Eigen::Map<const geometry::Vector6d>(pose)) * pose_start;
+    const SE3 T_cam_rig = SE3::exp(Eigen::Map<const geometry::Vector6d>(camera)) * camera_start;
+    const auto pixel =
+        rig.camera(observation.camera).project(T_cam_rig * (T_rig_world * Eigen::Map<const Vector3d>(point)));
+    if (!pixel) return false;
+    Eigen::Map<Vector2d>{residuals} =
+        (observation.pixel.cast<double>() - *pixel) / static_cast<double>(observation.sigma);
+    return true;
   }
-  std::vector<geometry::Vector6d> increments(problem.T_rig_world.size(), geometry::Vector6d::Zero());
-  ceres::Problem ceres_problem;
-  for (std::size_t i = 0; i < chi2.size(); ++i) {
-    const auto& o = problem.observations[i];
-    if (!(chi2[i] < kLostChi2) || rays[static_cast<std::size_t>(o.point)] < 2) continue;
-    const auto pose = static_cast<std::size_t>(o.pose);
-    ceres_problem.AddResidualBlock(new Cost(problem, o, problem.T_rig_world[pose]),
-                                   robust ? new ceres::HuberLoss(std::sqrt(kChi2TwoDof95)) : nullptr,
-                                   increments[pose].data(), problem.points[static_cast<std::size_t>(o.point)].data());
-    if (problem.pose_free[pose] == 0) ceres_problem.SetParameterBlockConstant(increments[pose].data());
+};
+
+struct PriorError {
+  const ExtrinsicPrior& prior;
+  std::size_t camera;
+
+  bool operator()(const double* increment, double* residuals) const {
+    const SE3& calibrated = prior.T_cam_rig[camera];
+    const SE3 T_cam_rig = SE3::exp(Eigen::Map<const geometry::Vector6d>(increment)) * calibrated;
+    Eigen::Map<geometry::Vector6d> out(residuals);
+    out = extrinsic_change(T_cam_rig, calibrated);
+    out.head<3>() /= prior.sigma_rotation;
+    out.tail<3>() /= prior.sigma_translation;
+    return true;
   }
+};
+
+double solve(ceres::Problem& problem) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
   options.max_num_iterations = 500;
@@ -81,11 +95,67 @@ double adjust(ReprojectionProblem& problem, bool robust) {
   options.parameter_tolerance = 1e-14;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
-  ceres::Solve(options, &ceres_problem, &summary);
+  ceres::Solve(options, &problem, &summary);
+  return summary.final_cost;
+}
+
+}  // namespace
+
+double adjust_with_extrinsics(ReprojectionProblem& problem, const ExtrinsicPrior& prior, std::vector<SE3>& T_cam_rig) {
+  std::vector<int> rays(problem.points.size(), 0);
+  const std::vector<double> chi2 = squared_errors(problem);
+  for (std::size_t i = 0; i < chi2.size(); ++i) {
+    rays[static_cast<std::size_t>(problem.observations[i].point)] += chi2[i] < kMaxChi2;
+  }
+  std::vector<geometry::Vector6d> poses(problem.T_rig_world.size(), geometry::Vector6d::Zero());
+  std::vector<geometry::Vector6d> cameras(T_cam_rig.size(), geometry::Vector6d::Zero());
+  ceres::Problem ceres_problem;
+  for (std::size_t i = 0; i < chi2.size(); ++i) {
+    const auto& o = problem.observations[i];
+    if (!(chi2[i] < kMaxChi2) || rays[static_cast<std::size_t>(o.point)] < 2) continue;
+    const auto pose = static_cast<std::size_t>(o.pose);
+    const std::size_t camera = o.camera.index();
+    ceres_problem.AddResidualBlock(
+        new ceres::NumericDiffCostFunction<ErrorWithExtrinsics, ceres::CENTRAL, 2, 6, 3, 6>(
+            new ErrorWithExtrinsics{*problem.rig, o, problem.T_rig_world[pose], T_cam_rig[camera]}),
+        new ceres::HuberLoss(std::sqrt(kChi2TwoDof95)), poses[pose].data(),
+        problem.points[static_cast<std::size_t>(o.point)].data(), cameras[camera].data());
+    if (problem.pose_free[pose] == 0) ceres_problem.SetParameterBlockConstant(poses[pose].data());
+    if (camera == 0) ceres_problem.SetParameterBlockConstant(cameras[0].data());
+  }
+  for (std::size_t c = 1; c < cameras.size(); ++c) {
+    ceres_problem.AddResidualBlock(
+        new ceres::NumericDiffCostFunction<PriorError, ceres::CENTRAL, 6, 6>(new PriorError{prior, c}), nullptr,
+        cameras[c].data());
+  }
+  const double cost = solve(ceres_problem);
+  for (std::size_t c = 1; c < cameras.size(); ++c) T_cam_rig[c] = SE3::exp(cameras[c]) * T_cam_rig[c];
+  return cost;
+}
+
+double adjust(ReprojectionProblem& problem, bool robust) {
+  // Left out as by our own: what does not project at the start, and points with less than two observations then.
+  std::vector<int> rays(problem.points.size(), 0);
+  const std::vector<double> chi2 = squared_errors(problem);
+  for (std::size_t i = 0; i < chi2.size(); ++i) {
+    rays[static_cast<std::size_t>(problem.observations[i].point)] += chi2[i] < kMaxChi2;
+  }
+  std::vector<geometry::Vector6d> increments(problem.T_rig_world.size(), geometry::Vector6d::Zero());
+  ceres::Problem ceres_problem;
+  for (std::size_t i = 0; i < chi2.size(); ++i) {
+    const auto& o = problem.observations[i];
+    if (!(chi2[i] < kMaxChi2) || rays[static_cast<std::size_t>(o.point)] < 2) continue;
+    const auto pose = static_cast<std::size_t>(o.pose);
+    ceres_problem.AddResidualBlock(new Cost(problem, o, problem.T_rig_world[pose]),
+                                   robust ? new ceres::HuberLoss(std::sqrt(kChi2TwoDof95)) : nullptr,
+                                   increments[pose].data(), problem.points[static_cast<std::size_t>(o.point)].data());
+    if (problem.pose_free[pose] == 0) ceres_problem.SetParameterBlockConstant(increments[pose].data());
+  }
+  const double cost = solve(ceres_problem);
   for (std::size_t i = 0; i < increments.size(); ++i) {
     if (problem.pose_free[i] != 0) problem.T_rig_world[i] = SE3::exp(increments[i]) * problem.T_rig_world[i];
   }
-  return summary.final_cost;
+  return cost;
 }
 
 }  // namespace bslam::solver::ceres_reference

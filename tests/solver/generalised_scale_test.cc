@@ -25,7 +25,8 @@ std::vector<CameraPairs> see_twice(const Rig& rig, const SE3& T_b_a, int count, 
       const Vector3d moved = rig.cam_from_rig(i) * (T_b_a * (rig.rig_from_cam(i) * point));
       const bool outlier = random.uniform() < outlier_share;
       const Vector3d elsewhere = (moved.normalized() + 0.1 * scene::random_direction(random)).normalized();
-      camera.pairs.push_back({noisy(point.normalized(), random), outlier ? elsewhere : noisy(moved.normalized(), random)});
+      camera.pairs.push_back(
+          {noisy(point.normalized(), random), outlier ? elsewhere : noisy(moved.normalized(), random)});
     }
     out.push_back(camera);
   }

@@ -1,12 +1,12 @@
 #include "solver/pose_graph.h"
 
-#include <array>
-#include <cmath>
-#include <numbers>
-
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 #include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
 
 #include "solver/scene.h"
 
@@ -89,8 +89,8 @@ TEST(PoseGraph, RecoversTruthFromExactEdges) {
       off << scene::random_twist(random, 0.3, 1.0), scale_free ? random.uniform(-0.3, 0.3) : 0.0;
       circle.problem.S_world[i] = circle.problem.S_world[i].perturbed(off);
     }
-    const PoseGraphSummary summary = optimise(circle.problem, {});
-    EXPECT_EQ(summary.stop, PoseGraphStop::kConverged);
+    const LmSummary summary = optimise(circle.problem, {});
+    EXPECT_EQ(summary.stop, LmStop::kConverged);
     EXPECT_LT(summary.final_cost, 1e-8);
     for (std::size_t i = 0; i < circle.truth.size(); ++i) {
       EXPECT_LT((circle.problem.S_world[i] * circle.truth[i].inverse()).log().norm(), 1e-6) << i;
@@ -133,7 +133,7 @@ TEST(PoseGraph, LeavesAsMuchErrorAsTheNoiseHas) {
     double sum = 0.0, dof = 0.0;
     for (int trial = 0; trial < 5; ++trial) {
       Circle circle = make_circle(100, 4, true, scale_free, 1.0, random);
-      const PoseGraphSummary summary = optimise(circle.problem, {});
+      const LmSummary summary = optimise(circle.problem, {});
       sum += 2 * summary.final_cost;
       dof += (scale_free ? 7.0 : 6.0) * static_cast<double>(circle.problem.edges.size() - circle.truth.size() + 1);
     }
@@ -166,7 +166,7 @@ TEST(PoseGraph, HoldsTheFirstOfAPartWithoutFixedVertexAndWhatHasNoEdge) {
   problem.S_world.push_back(away);  // 40: alone
   problem.fixed.resize(41, 0);
   const std::vector<Sim3> before = problem.S_world;
-  ASSERT_EQ(optimise(problem, {}).stop, PoseGraphStop::kConverged);
+  ASSERT_EQ(optimise(problem, {}).stop, LmStop::kConverged);
   for (const std::size_t i : {0u, 20u, 40u}) expect_equal(problem.S_world[i], before[i]);
   ASSERT_TRUE(optimise(one.problem, {}).usable());
   for (std::size_t i = 0; i < 20; ++i) {  // the parts do not disturb one another
@@ -190,8 +190,8 @@ TEST(PoseGraph, HasNothingToDoWithoutEdgesOrFreeVertices) {
   Random random(7);
   Circle circle = make_circle(10, 2, false, kRigid, 1.0, random);
   circle.problem.fixed.assign(10, 1);
-  const PoseGraphSummary summary = optimise(circle.problem, {});
-  EXPECT_EQ(summary.stop, PoseGraphStop::kConverged);
+  const LmSummary summary = optimise(circle.problem, {});
+  EXPECT_EQ(summary.stop, LmStop::kConverged);
   EXPECT_GT(summary.initial_cost, 0.0);
   EXPECT_EQ(summary.final_cost, summary.initial_cost);
 }
@@ -201,7 +201,7 @@ TEST(PoseGraph, LeavesTheProblemAsItWasWhereItFails) {
   Circle circle = make_circle(10, 2, true, kRigid, 1.0, random);
   circle.problem.edges[3].S_a_b = Sim3(1.0, Quaterniond::Identity(), Vector3d(0, std::nan(""), 0));
   const std::vector<Sim3> before = circle.problem.S_world;
-  EXPECT_EQ(optimise(circle.problem, {}).stop, PoseGraphStop::kFailed);
+  EXPECT_EQ(optimise(circle.problem, {}).stop, LmStop::kFailed);
   for (std::size_t i = 0; i < before.size(); ++i) expect_equal(circle.problem.S_world[i], before[i]);
 }
 
@@ -210,8 +210,8 @@ TEST(PoseGraph, EndsOnAStopRequest) {
   Circle circle = make_circle(30, 2, true, kRigid, 1.0, random);
   std::stop_source source;
   source.request_stop();
-  const PoseGraphSummary summary = optimise(circle.problem, {}, source.get_token());
-  EXPECT_EQ(summary.stop, PoseGraphStop::kStopped);
+  const LmSummary summary = optimise(circle.problem, {}, source.get_token());
+  EXPECT_EQ(summary.stop, LmStop::kStopped);
   EXPECT_EQ(summary.final_cost, summary.initial_cost);
 }
 
@@ -323,8 +323,8 @@ TEST(PoseGraph, ReachesTheSameMinimumAsCeres) {
     PoseGraphOptions options;
     options.relative_decrease = 0.0;
     options.iterations = 50;
-    const PoseGraphSummary summary = optimise(circle.problem, options);
-    EXPECT_EQ(summary.stop, PoseGraphStop::kConverged);
+    const LmSummary summary = optimise(circle.problem, options);
+    EXPECT_EQ(summary.stop, LmStop::kConverged);
     const double cost = solve_by_ceres(reference, options);
     EXPECT_NEAR(summary.final_cost, cost, 1e-8 * cost);
     for (std::size_t i = 0; i < circle.truth.size(); ++i) {
@@ -345,8 +345,8 @@ TEST(PoseGraph, NeedsFewStepsFromFarAway) {
     }
     PoseGraphOptions options;
     options.relative_decrease = 1e-9;
-    const PoseGraphSummary summary = optimise(circle.problem, options);
-    EXPECT_EQ(summary.stop, PoseGraphStop::kConverged);
+    const LmSummary summary = optimise(circle.problem, options);
+    EXPECT_EQ(summary.stop, LmStop::kConverged);
     EXPECT_LE(summary.iterations, 8);
   }
 }

@@ -79,7 +79,8 @@ TEST(PoseWithMotion, HasTheGradientOfItsCost) {
     constexpr double kStep = 1e-7;
     const Vector6d delta = kStep * Vector6d::Unit(k);
     const double gradient = (problem.linearise(at.perturbed(delta), Kernel::kNone).cost -
-                             problem.linearise(at.perturbed(-delta), Kernel::kNone).cost) / (2 * kStep);
+                             problem.linearise(at.perturbed(-delta), Kernel::kNone).cost) /
+                            (2 * kStep);
     EXPECT_NEAR(equations.b(k), -gradient, 0.02 * equations.b.cwiseAbs().maxCoeff()) << k;
   }
 }

@@ -1,8 +1,8 @@
 #include "solver/pose_solver.h"
 
-#include <algorithm>
-
 #include <gtest/gtest.h>
+
+#include <algorithm>
 
 #include "solver/scene.h"
 

@@ -1,8 +1,8 @@
 #include "solver/relative_pose.h"
 
-#include <algorithm>
-
 #include <gtest/gtest.h>
+
+#include <algorithm>
 
 #include "geometry/triangulation.h"
 #include "solver/epipolar.h"

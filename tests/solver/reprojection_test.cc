@@ -9,13 +9,56 @@ namespace {
 
 using scene::Models;
 
+std::vector<camera::CameraModel> every_model() {
+  const camera::Intrinsics k{220, 221, 374, 238};
+  return {camera::Pinhole({420, 422, 376, 240}),
+          camera::PinholeRadTan({458, 457, 367, 248}, {-0.28, 0.074, 2e-4, 2e-5}),
+          camera::KannalaBrandt(k, {0.01, -0.004, 0.002, -0.0005}),
+          camera::Unified(k, 0.6),
+          camera::ExtendedUnified(k, 0.57, 1.1),
+          camera::DoubleSphere(k, -0.2, 0.58)};
+}
+
+// Central differences of a residual's error, as the Jacobian of the prediction: the error is the observation minus it.
+template <int N, class Error>
+Eigen::Matrix<double, 2, N> numeric_jacobian(const Error& error) {
+  constexpr double kStep = 1e-6;
+  Eigen::Matrix<double, 2, N> J;
+  for (int k = 0; k < N; ++k) {
+    const Eigen::Matrix<double, N, 1> d = kStep * Eigen::Matrix<double, N, 1>::Unit(k);
+    J.col(k) = -(error(d) - error(-d)) / (2 * kStep);
+  }
+  return J;
+}
+
+class ResidualOfModel : public testing::TestWithParam<std::size_t> {};
+
+// The kernel of every optimisation: its error is pixel minus projection, its Jacobians are those of differences.
+TEST_P(ResidualOfModel, AgreesWithFiniteDifferences) {
+  const camera::CameraModel model = every_model()[GetParam()];
+  Random random(5, "residual");
+  for (int trial = 0; trial < 200; ++trial) {
+    const Vector3d q(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(1.5, 8));
+    const SE3 T = SE3::exp(scene::random_twist(random, 0.2, 0.3));
+    const Vector2d pixel(random.uniform(0, 700), random.uniform(0, 400));
+    const auto r = residual(model, T * q, pixel);
+    if (!r) continue;
+    EXPECT_LT((r->error - *residual_error(model, T * q, pixel)).norm(), 1e-9);
+    const auto J = numeric_jacobian<3>([&](const Vector3d& d) { return *residual_error(model, T * q + d, pixel); });
+    EXPECT_LT((J - r->J).norm(), 1e-6 * (1 + J.norm()));
+    const auto J_pose = numeric_jacobian<6>(
+        [&](const geometry::Vector6d& d) { return *residual_error(model, T.perturbed(d) * q, pixel); });
+    EXPECT_LT((J_pose - pose_jacobian_transposed(r->J, T * q).transpose()).norm(), 1e-6 * (1 + J_pose.norm()));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryModel, ResidualOfModel, testing::Range(std::size_t{0}, every_model().size()));
+
 class ReprojectionJacobian : public testing::TestWithParam<Models> {};
 
-// Central differences of the error over a perturbation on the left, rotation first, and over the point.
 TEST_P(ReprojectionJacobian, AgreesWithFiniteDifferences) {
   const Rig rig = scene::make_rig(4, GetParam());
   Random random(3, "jacobian");
-  constexpr double kStep = 1e-6;
   for (int trial = 0; trial < 200; ++trial) {
     const SE3 T = SE3::exp(scene::random_twist(random, 1.0, 4.0));
     const Vector3d point = scene::random_visible_point(rig, T, random);
@@ -27,22 +70,14 @@ TEST_P(ReprojectionJacobian, AgreesWithFiniteDifferences) {
       const auto r = ReprojectionResidual::evaluate(rig, camera, T, point, pixel);
       ASSERT_TRUE(r);
       EXPECT_NEAR((r->error - Vector2d(2, -3)).norm(), 0, 1e-9);
-      Matrix26d J_pose;
-      for (int k = 0; k < 6; ++k) {
-        const geometry::Vector6d d = kStep * geometry::Vector6d::Unit(k);
-        J_pose.col(k) = (*ReprojectionResidual::error_only(rig, camera, T.perturbed(d), point, pixel) -
-                         *ReprojectionResidual::error_only(rig, camera, T.perturbed(-d), point, pixel)) /
-                        (2 * kStep);
-      }
-      Matrix23d J_point;
-      for (int k = 0; k < 3; ++k) {
-        const Vector3d d = kStep * Vector3d::Unit(k);
-        J_point.col(k) = (*ReprojectionResidual::error_only(rig, camera, T, point + d, pixel) -
-                          *ReprojectionResidual::error_only(rig, camera, T, point - d, pixel)) /
-                         (2 * kStep);
-      }
-      EXPECT_LT((J_pose - r->J_pose).norm(), 1e-6 * (1 + J_pose.norm()));
-      EXPECT_LT((J_point - r->J_point).norm(), 1e-6 * (1 + J_point.norm()));
+      const auto error_at = [&](const SE3& pose, const Vector3d& p) {
+        return *ReprojectionResidual::error_only(rig, camera, pose, p, pixel);
+      };
+      const auto J_pose =
+          numeric_jacobian<6>([&](const geometry::Vector6d& d) { return error_at(T.perturbed(d), point); });
+      const auto J_point = numeric_jacobian<3>([&](const Vector3d& d) { return error_at(T, point + d); });
+      EXPECT_LT((J_pose + r->J_pose).norm(), 1e-6 * (1 + J_pose.norm()));
+      EXPECT_LT((J_point + r->J_point).norm(), 1e-6 * (1 + J_point.norm()));
     }
   }
 }

@@ -13,8 +13,8 @@ struct Ride {
   ReprojectionProblem problem;  // its rig points to `rig`
 };
 
-// Ten poses, 0.15 m apart, turning by `turn_rad` from one to the next; at the truth, pixels with noise of 1 px. A point that
-// one camera hands to another would tell the scale without any rotation: each is seen by one camera alone.
+// Ten poses, 0.15 m apart, turning by `turn_rad` from one to the next; at the truth, pixels with noise of 1 px. A point
+// that one camera hands to another would tell the scale without any rotation: each is seen by one camera alone.
 std::unique_ptr<Ride> make_ride(double turn_rad, Random& random, std::size_t cameras = 3) {
   auto out = std::make_unique<Ride>(Ride{scene::make_rig(cameras, scene::Models::kRadTan), {}});
   ReprojectionProblem& problem = out->problem;
@@ -47,7 +47,8 @@ void grow(ReprojectionProblem& problem, double factor) {
   for (Vector3d& p : problem.points) p *= factor;
 }
 
-// What adjustment leaves of the truth where two poses are held: errors of rotations and places by the noise of the pixels.
+// What adjustment leaves of the truth where two poses are held: errors of rotations and places by the noise of the
+// pixels.
 void settle(ReprojectionProblem& problem) {
   problem.pose_free[1] = 0;
   adjust(problem, {.iterations = 20});
@@ -117,7 +118,8 @@ TEST(RigScale, IsUnknownOnAStraightLine) {
     const auto ride = make_ride(0.0, random);
     settle(ride->problem);
     const auto found = rig_scale(ride->problem);
-    EXPECT_TRUE(!found || found->deviation > 0.3) << "seed " << seed << ": " << found->scale << " +- " << found->deviation;
+    EXPECT_TRUE(!found || found->deviation > 0.3)
+        << "seed " << seed << ": " << found->scale << " +- " << found->deviation;
   }
 }
 

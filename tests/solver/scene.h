@@ -16,14 +16,18 @@ namespace bslam::solver::scene {
 
 using geometry::Vector6d;
 
-enum class Models { kPinhole, kRadTan, kFisheye, kMixed };
+enum class Models { kPinhole, kRadTan, kFisheye, kSpheres, kMixed };
 
 inline camera::CameraModel make_model(Models models, std::size_t i) {
   if (models == Models::kMixed) models = std::array{Models::kRadTan, Models::kFisheye, Models::kPinhole}[i % 3];
   const double step = static_cast<double>(i);  // no two cameras alike
   if (models == Models::kPinhole) return camera::Pinhole({420 + step, 422, 376, 240 + step});
   if (models == Models::kRadTan) return camera::PinholeRadTan({458 + step, 457, 367, 248}, {-0.28, 0.074, 2e-4, 2e-5});
-  return camera::KannalaBrandt({220 + step, 221, 374, 238}, {0.01, -0.004, 0.002, -0.0005});
+  const camera::Intrinsics wide{220 + step, 221, 374, 238};
+  if (models == Models::kFisheye) return camera::KannalaBrandt(wide, {0.01, -0.004, 0.002, -0.0005});
+  if (i % 3 == 0) return camera::Unified(wide, 0.6);
+  if (i % 3 == 1) return camera::ExtendedUnified(wide, 0.57, 1.1);
+  return camera::DoubleSphere(wide, -0.2, 0.58);
 }
 
 // Up to two cameras look ahead with a baseline of 0.2 m; more look outwards all around, 0.2 m from the middle.

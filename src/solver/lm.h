@@ -1,0 +1,164 @@
+// Levenberg-Marquardt: the loop behind every optimisation of this folder (docs/math.md, section 3).
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <optional>
+#include <stop_token>
+#include <utility>
+
+namespace bslam::solver {
+
+enum class DampingRule {
+  kNielsen,    // follows the ratio of actual to predicted decrease (Nielsen, IMM-REP-1999-05)
+  kOnFailure,  // none (Gauss-Newton) until a step fails; then ten times more after a failure, ten times less after a
+               // success
+};
+
+struct LmOptions {
+  int iterations = 10;              // steps at most, accepted or rejected
+  double relative_decrease = 1e-4;  // converged where a step lowers the cost by a smaller share
+  double step_tolerance = 0.0;      // standard deviations: a shorter undamped step is the last and is not evaluated
+  double min_gain = 1e-3;           // actual over predicted decrease from which a step is accepted
+  DampingRule rule = DampingRule::kNielsen;
+  double first_damping = 1e-4;  // factor of the diagonal, at the start or after the first failure
+};
+
+enum class LmStop { kConverged, kIterations, kStopped, kFailed };
+
+struct LmSummary {
+  LmStop stop = LmStop::kFailed;  // kFailed: the cost is not finite at the start, or no step could be solved for
+  double initial_cost = 0, final_cost = 0;
+  int iterations = 0;  // steps tried
+  bool usable() const { return stop != LmStop::kFailed; }
+};
+
+// A problem holds its current values and those of a trial step.
+template <class P>
+concept LeastSquaresProblem = requires(P p, double damping) {
+  // Builds the normal equations H delta = b at the current values and returns the cost there.
+  { p.linearise() } -> std::same_as<double>;
+  // Solves (H + damping D) delta = b, D the diagonal of H, for the trial values. Returns the decrease of the cost that
+  // the quadratic model predicts; empty where the system cannot be solved.
+  { p.solve(damping) } -> std::same_as<std::optional<double>>;
+  { p.trial_cost() } -> std::same_as<double>;
+  p.accept();  // the trial values become the current ones
+};
+
+class Damping {
+ public:
+  explicit Damping(const LmOptions& options)
+      : rule_(options.rule), first_(options.first_damping), value_(rule_ == DampingRule::kNielsen ? first_ : 0.0) {}
+
+  double value() const { return value_; }
+  bool exhausted() const { return value_ > 1e16; }
+
+  // `gain`: actual over predicted decrease.
+  void accept(double gain) {
+    constexpr double kMin = 1e-10;  // keeps the blocks of points without parallax invertible
+    const double bend = 2.0 * gain - 1.0;
+    if (rule_ == DampingRule::kNielsen) {
+      value_ = std::max(kMin, value_ * std::max(1.0 / 3.0, 1.0 - bend * bend * bend));
+    } else {
+      value_ = value_ > first_ ? 0.1 * value_ : 0.0;
+    }
+    growth_ = 2.0;
+  }
+  void reject() {
+    value_ = rule_ == DampingRule::kNielsen ? value_ * growth_ : std::max(first_, 10.0 * value_);
+    growth_ *= 2.0;
+  }
+
+ private:
+  DampingRule rule_;
+  double first_, value_, growth_ = 2.0;
+};
+
+// Improves the current values until it converges, has used up its iterations, or is asked to stop. The normal equations
+// are built once per accepted step, not after the last one.
+template <LeastSquaresProblem Problem>
+LmSummary minimise(Problem& problem, const LmOptions& options, const std::stop_token& stop = {}) {
+  constexpr double kRounding = 1e-10;  // share of the cost that rounding alone may change, and absolute cost of nothing
+  LmSummary out;
+  double& cost = out.final_cost;
+  out.initial_cost = cost = problem.linearise();
+  if (!std::isfinite(cost)) return out;
+  const auto end = [&](LmStop reason) { return out.stop = reason, out; };
+  Damping damping(options);
+  bool any_solved = options.iterations == 0;
+  while (out.iterations < options.iterations) {
+    if (stop.stop_requested()) return end(LmStop::kStopped);
+    ++out.iterations;
+    const std::optional<double> predicted = problem.solve(damping.value());
+    any_solved |= predicted.has_value();
+    if (predicted && damping.value() <= 0.0 && 2.0 * *predicted < options.step_tolerance * options.step_tolerance) {
+      problem.accept();
+      cost -= *predicted;
+      return end(LmStop::kConverged);
+    }
+    if (predicted && *predicted <= kRounding * (1.0 + cost)) return end(LmStop::kConverged);
+    const double trial = predicted ? problem.trial_cost() : std::numeric_limits<double>::infinity();
+    const double decrease = cost - trial;
+    if (!predicted || !(decrease >= options.min_gain * *predicted)) {
+      damping.reject();
+      if (damping.exhausted()) return end(any_solved ? LmStop::kConverged : LmStop::kFailed);
+      continue;
+    }
+    damping.accept(decrease / *predicted);
+    problem.accept();
+    const bool converged = decrease <= options.relative_decrease * cost;
+    cost = trial;
+    if (converged) return end(LmStop::kConverged);
+    if (out.iterations < options.iterations) problem.linearise();
+  }
+  return end(any_solved ? LmStop::kIterations : LmStop::kFailed);
+}
+
+// H delta = b in N unknowns, and the cost where it was built.
+template <int N>
+struct NormalEquations {
+  Eigen::Matrix<double, N, N> H = Eigen::Matrix<double, N, N>::Zero();
+  Eigen::Matrix<double, N, 1> b = Eigen::Matrix<double, N, 1>::Zero();
+  double cost = 0.0;
+};
+
+// A problem of a few unknowns, whose equations come in the same pass as its cost: `linearise(state)` returns
+// NormalEquations<N>, `plus(state, delta)` the state after a step.
+template <int N, class State, class Linearise, class Plus>
+class SmallProblem {
+ public:
+  // `at_start`: the equations at the start.
+  SmallProblem(const State& start, const NormalEquations<N>& at_start, Linearise linearise, Plus plus)
+      : linearise_(std::move(linearise)), plus_(std::move(plus)), state_(start), trial_(start), equations_(at_start) {}
+
+  double linearise() { return equations_.cost; }  // built by trial_cost()
+  std::optional<double> solve(double damping) {
+    constexpr double kRidge = 1e-9;  // of the largest diagonal entry: holds what the data do not determine
+    Eigen::Matrix<double, N, N> damped = equations_.H;
+    damped.diagonal() *= 1.0 + damping;
+    damped.diagonal().array() += kRidge * equations_.H.diagonal().maxCoeff();
+    const Eigen::Matrix<double, N, 1> delta = damped.ldlt().solve(equations_.b);
+    if (!delta.allFinite()) return std::nullopt;
+    trial_ = plus_(state_, delta);
+    return 0.5 * (delta.dot(equations_.b) + damping * delta.cwiseAbs2().dot(equations_.H.diagonal()));
+  }
+  double trial_cost() { return (at_trial_ = linearise_(trial_)).cost; }
+  void accept() {
+    state_ = trial_;
+    equations_ = at_trial_;
+  }
+
+  const State& state() const { return state_; }
+
+ private:
+  Linearise linearise_;
+  Plus plus_;
+  State state_, trial_;
+  NormalEquations<N> equations_, at_trial_;
+};
+
+}  // namespace bslam::solver

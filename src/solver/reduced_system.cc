@@ -1,0 +1,48 @@
+#include "solver/reduced_system.h"
+
+#include <Eigen/Cholesky>
+
+namespace bslam::solver {
+
+ReducedSystem::ReducedSystem(const BlockPattern& pattern, std::span<const int> frame_sizes, int rig_size,
+                             Storage storage)
+    : storage_(storage),
+      frames_(pattern, frame_sizes),
+      border_(Eigen::MatrixXd::Zero(frames_.rows(), rig_size)),
+      rig_(Eigen::MatrixXd::Zero(rig_size, rig_size)),
+      rhs_(Eigen::VectorXd::Zero(frames_.rows() + rig_size)) {
+  if (storage == Storage::kDense) return;
+  sparse_ = frames_.sparse_structure();
+  sparse_factor_.analyzePattern(sparse_);
+}
+
+// The frames are eliminated first: (C - B^T S^-1 B) x_rig = r_rig - B^T S^-1 r_frames.
+template <class Factor>
+bool ReducedSystem::solve_with(const Factor& factor, Eigen::VectorXd& delta) {
+  if (factor.info() != Eigen::Success) return false;
+  const Eigen::Index frames = border_.rows(), rig = border_.cols();
+  delta.resize(frames + rig);
+  delta.head(frames) = factor.solve(rhs_.head(frames));
+  if (rig == 0) return delta.allFinite();
+  const Eigen::MatrixXd X = factor.solve(border_);
+  rig_information_ = rig_.selfadjointView<Eigen::Lower>();
+  rig_information_.noalias() -= border_.transpose() * X;
+  const Eigen::LLT<Eigen::MatrixXd> rig_factor(rig_information_);
+  if (rig_factor.info() != Eigen::Success) return false;
+  delta.tail(rig) = rig_factor.solve(rhs_.tail(rig) - X.transpose() * rhs_.head(frames));
+  delta.head(frames) -= X * delta.tail(rig);
+  return delta.allFinite();
+}
+
+bool ReducedSystem::solve(Eigen::VectorXd& delta) {
+  if (storage_ == Storage::kSparse && frames_.rows() > 0) {
+    frames_.copy_to(sparse_);
+    sparse_factor_.factorize(sparse_);
+    return solve_with(sparse_factor_, delta);
+  }
+  dense_.setZero(frames_.rows(), frames_.rows());
+  frames_.copy_to(dense_);
+  return solve_with(Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(dense_), delta);
+}
+
+}  // namespace bslam::solver

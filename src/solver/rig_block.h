@@ -1,0 +1,83 @@
+// Parameters of the rig in bundle adjustment. A block type has some unknowns that all poses share; it says how each
+// pixel depends on them and what is known of them beforehand. The assembly of the normal equations knows no more of it.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "solver/reprojection.h"
+
+namespace bslam::solver {
+
+// The parameters themselves.
+struct RigValues {
+  std::vector<SE3> T_cam_rig;  // per camera; camera 0 is the identity
+};
+
+// One observation at the values of the linearisation.
+struct RigObservation {
+  int camera = 0;
+  const SE3& T_cam_rig;       // extrinsics, without the motion between the times of pose and image
+  const Vector3d& point_cam;  // metres, at the time of the image
+  const Matrix23d& J;         // d pixel / d point_cam, divided by sigma
+};
+
+class RigBlock {
+ public:
+  using Jacobian = Eigen::Matrix<double, 2, Eigen::Dynamic>;
+  struct Range {
+    int first = 0, size = 0;
+  };
+
+  virtual ~RigBlock() = default;
+  virtual int size() const = 0;  // unknowns
+  // Which of its unknowns a pixel of a camera depends on.
+  virtual Range columns(int camera) const = 0;
+  // d pixel / d those unknowns, divided by sigma: (2, columns(camera).size).
+  virtual void evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const = 0;
+  virtual void apply(const Eigen::VectorXd& delta, RigValues& values) const = 0;
+  // Half the squared normalised deviation from what is known beforehand, and its normal equations. The default is no
+  // prior.
+  virtual double prior_cost(const RigValues&) const { return 0.0; }
+  virtual void add_prior(const RigValues&, Eigen::Ref<Eigen::MatrixXd>, Eigen::Ref<Eigen::VectorXd>) const {}
+};
+
+using RigBlocks = std::vector<std::unique_ptr<RigBlock>>;  // of one adjustment; no two change the same values
+
+// Calibrated extrinsics: those of each camera but the first are normally distributed about the calibrated ones.
+struct ExtrinsicPrior {
+  std::vector<SE3> T_cam_rig;                        // calibrated, per camera
+  double sigma_rotation = 0, sigma_translation = 0;  // radians, metres; per axis
+};
+
+// Difference of extrinsics from a reference: of D = T_cam_rig reference^-1, the logarithm of the rotation (radians),
+// then the translation (metres), both in the axes of the camera. The length of the latter is how far the camera's
+// centre moved.
+geometry::Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference);
+
+// The extrinsics of cameras 1 to N-1: left perturbations of T_cam_rig, rotation first.
+class ExtrinsicsBlock : public RigBlock {
+ public:
+  explicit ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)) {}
+
+  int size() const override { return 6 * (static_cast<int>(prior_.T_cam_rig.size()) - 1); }
+  Range columns(int camera) const override { return camera == 0 ? Range{} : Range{6 * (camera - 1), 6}; }
+  void evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const override;
+  void apply(const Eigen::VectorXd& delta, RigValues& values) const override;
+  double prior_cost(const RigValues& values) const override;
+  void add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H, Eigen::Ref<Eigen::VectorXd> b) const override;
+
+ private:
+  ExtrinsicPrior prior_;
+};
+
+// One factor of all translations of the extrinsics, as its relative change: their length in units of the map.
+class BaselineScaleBlock : public RigBlock {
+ public:
+  int size() const override { return 1; }
+  Range columns(int camera) const override { return {0, camera == 0 ? 0 : 1}; }
+  void evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const override;
+  void apply(const Eigen::VectorXd& delta, RigValues& values) const override;
+};
+
+}  // namespace bslam::solver
