@@ -1,4 +1,4 @@
-// What was meant by a misspelt name.
+// Suggestions for misspelt names.
 #pragma once
 
 #include <span>
@@ -7,11 +7,13 @@
 
 namespace bslam {
 
-// Least number of single-character insertions, deletions and replacements that turn `a` into `b` (Levenshtein, 1966).
+// The smallest number of single-character insertions, deletions and replacements that turn `a` into `b` (Levenshtein,
+// 1966).
 std::size_t edit_distance(std::string_view a, std::string_view b);
 
-// The known name nearest to `name`, the first of equals. A name without dots is also compared with the last part of
-// dotted ones, so that "levels" finds "features.levels". Empty where nothing is known.
+// The known name closest to `name`, the first among equally close ones. Empty if none is close enough to be a likely
+// misspelling: at most one edit for every three characters of the longer name, and at least one. A name without dots is
+// also compared with the last component of dotted names, so that "levels" finds "features.levels".
 std::string nearest_name(std::string_view name, std::span<const std::string> known);
 
 }  // namespace bslam
