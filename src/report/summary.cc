@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// So many decimals and no more: beyond them the figures are noise. NaN becomes null.
+// Rounded to the given number of decimals, since further digits are noise. NaN becomes null.
 ordered_json rounded(double value, int decimals) {
   if (!std::isfinite(value)) return nullptr;
   const double unit = std::pow(10.0, decimals);
@@ -63,9 +63,11 @@ ordered_json cameras_json(const RunRecord& record) {
                         {"from", seconds(interval.from_s)},
                         {"to", seconds(interval.to_s)}});
     }
-    cameras.push_back(
-        {{"name", camera.name}, {"images", camera.images}, {"skipped", camera.skipped}, {"states", states},
-         {"extrinsics", extrinsics_json(camera.extrinsics)}});
+    cameras.push_back({{"name", camera.name},
+                       {"images", camera.images},
+                       {"skipped", camera.skipped},
+                       {"states", states},
+                       {"extrinsics", extrinsics_json(camera.extrinsics)}});
   }
   return cameras;
 }
@@ -101,7 +103,10 @@ ordered_json events_json(const std::vector<PlaceEvent>& events) {
 ordered_json parts_json(const std::vector<PartRecord>& parts) {
   ordered_json list = ordered_json::array();
   for (const PartRecord& part : parts) {
-    list.push_back({{"frames", part.frames}, {"from", seconds(part.from_s)}, {"to", seconds(part.to_s)}, {"trajectory", part.trajectory}});
+    list.push_back({{"frames", part.frames},
+                    {"from", seconds(part.from_s)},
+                    {"to", seconds(part.to_s)},
+                    {"trajectory", part.trajectory}});
   }
   return list;
 }

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <string>
 
 #include "report/run_plot.h"
 #include "report/trajectory_plot.h"
@@ -58,17 +60,18 @@ std::size_t count(const std::string& text, std::string_view part) {
   return n;
 }
 
-TEST(RunPlot, ShowsWhichCamerasWereNotSound) {
+TEST(RunPlot, ShowsCameraFaultsWithTheNamesOfTheCameras) {
   constexpr std::string_view kBar = "stroke-width=\"6";
   const std::string sound = run_plot_svg(short_run(40));
   RunRecord record = short_run(40);
   record.cameras[1].states = {{"ok", "", 0.0, 0.5}, {"out", "frozen", 0.55, 1.0}, {"ok", "", 1.05, 1.95}};
   const std::string svg = run_plot_svg(record);
   EXPECT_EQ(xml_fault(svg), "");
-  EXPECT_TRUE(contains(svg, "Cameras that were not sound"));
+  EXPECT_TRUE(contains(svg, "Camera faults"));
   EXPECT_TRUE(contains(svg, "out: frozen"));
   EXPECT_GT(count(svg, kBar), count(sound, kBar));
-  EXPECT_FALSE(contains(sound, "Cameras that were not sound"));
+  EXPECT_GT(count(svg, ">rear<"), count(sound, ">rear<"));  // the tick of the camera, besides the legends
+  EXPECT_FALSE(contains(sound, "Camera faults"));
   record.cameras[1].states = {{"ok", "", 0.0, 1.95}};
   EXPECT_EQ(run_plot_svg(record), sound);
   record.frames.clear();
@@ -81,12 +84,13 @@ TEST(RunPlot, IsTheSameForTheSameRecord) { EXPECT_EQ(run_plot_svg(short_run(40))
 TEST(RunPlot, StaysSmallForALongRun) {
   RunRecord record = short_run(20000);
   for (int i = 0; i < 10000; ++i) {  // a camera that flickers
-    record.cameras[1].states.push_back({i % 2 == 0 ? "ok" : "out", i % 2 == 0 ? "" : "no-images", 0.1 * i, 0.1 * i + 0.05});
+    record.cameras[1].states.push_back(
+        {i % 2 == 0 ? "ok" : "out", i % 2 == 0 ? "" : "no-images", 0.1 * i, 0.1 * i + 0.05});
   }
   const std::string svg = run_plot_svg(record);
   EXPECT_EQ(xml_fault(svg), "");
   EXPECT_LT(svg.size(), 1'000'000u);
-  EXPECT_TRUE(contains(svg, "frame, largest"));
+  EXPECT_TRUE(contains(svg, "frame, maximum"));
 }
 
 TEST(RunPlot, DrawsARunThatHasNothing) {
@@ -113,6 +117,44 @@ TEST(TrajectoryPlot, LooksAlongYInAWorldOfCameraAxes) {
   EXPECT_TRUE(contains(svg, "Top view (along y)"));
   EXPECT_FALSE(contains(svg, "ground truth"));
   EXPECT_FALSE(contains(svg, "Position error"));
+}
+
+// The vertical positions on the page of the points named start and end in the side view.
+std::array<double, 2> ends_of_side_view(const std::string& svg) {
+  const std::size_t side = svg.find("Side view");
+  const auto y_after = [&](std::size_t at) { return std::stod(svg.substr(svg.find("cy=\"", at) + 4)); };
+  const std::size_t start = svg.find("<circle", side);
+  return {y_after(start), y_after(start + 1)};
+}
+
+TEST(TrajectoryPlot, DrawsAClimbUpwards) {
+  TrajectoryPlotInput camera{.axes = WorldAxes::kCamera};
+  TrajectoryPlotInput body;
+  for (int i = 0; i <= 20; ++i) {  // 4 m forward and 1 m up
+    const double s = 0.05 * i;
+    camera.estimate.push_back({from_seconds(s), {geometry::Quaterniond::Identity(), {0, -s, 4 * s}}});
+    body.estimate.push_back({from_seconds(s), {geometry::Quaterniond::Identity(), {4 * s, 2 * s, s}}});
+  }
+  for (const TrajectoryPlotInput& input : {camera, body}) {
+    const auto [start, end] = ends_of_side_view(trajectory_plot_svg(input));
+    EXPECT_LT(end, start);  // pixels are counted from the top of the page
+  }
+  EXPECT_TRUE(contains(trajectory_plot_svg(camera), ">-y [m]<"));
+}
+
+TEST(TrajectoryPlot, GivesSmallErrorsInMillimetres) {
+  const evaluation::Trajectory truth = circle(false);
+  evaluation::Trajectory estimate = truth;
+  for (std::size_t i = 0; i < estimate.size(); i += 2) {
+    estimate[i].T_world_frame = {geometry::Quaterniond::Identity(),
+                                 estimate[i].T_world_frame.translation() + geometry::Vector3d(0, 0, 0.001)};
+  }
+  const auto evaluation = evaluation::evaluate(estimate, truth, {});
+  ASSERT_TRUE(evaluation.ok());
+  const std::string svg = trajectory_plot_svg(evaluation_plot_input(*evaluation, truth, "errors"));
+  EXPECT_TRUE(contains(svg, "error [mm]"));
+  EXPECT_TRUE(contains(svg, "ATE rmse 0.5 mm"));
+  EXPECT_FALSE(contains(svg, "error [m]"));
 }
 
 TEST(TrajectoryPlot, DrawsATrajectoryThatIsEmpty) { EXPECT_EQ(xml_fault(trajectory_plot_svg({})), ""); }
