@@ -36,7 +36,7 @@ void warn_of_extrinsics(const report::CameraRecord& camera) {
 
 // Cameras that see well and agree with nothing: a few degrees off are called inconsistent, these may never get that
 // far.
-void warn_of_strangers(const report::RunRecord& record) {
+void warn_of_strangers(const report::RunRecord& record, const std::string& check_command) {
   constexpr double kNothing = 0.02, kSound = 0.1;  // of the keypoints
   constexpr double kEnough = 1000;                 // keypoints
   std::vector<double> keypoints(record.cameras.size()), inliers(record.cameras.size());
@@ -54,8 +54,8 @@ void warn_of_strangers(const report::RunRecord& record) {
     fmt::print(stderr,
                "warning: {}: next to nothing of what it saw ({:.0f} of {:.0f} keypoints) is where the other cameras "
                "say; is it "
-               "where the rig file says? bslam rig info RIG --images DATA\n",
-               record.cameras[c].name, inliers[c], keypoints[c]);
+               "where the rig file says? {}\n",
+               record.cameras[c].name, inliers[c], keypoints[c], check_command);
   }
 }
 
@@ -73,7 +73,8 @@ double largest_overlap(const camera::Rig& rig) {
 }
 
 // Cameras that overlap and still see next to nothing in common.
-void warn_if_nothing_matches(const report::RunRecord& record, const camera::Rig& rig) {
+void warn_if_nothing_matches(const report::RunRecord& record, const camera::Rig& rig,
+                             const std::string& check_command) {
   constexpr double kMuchOverlap = 0.4, kLeastShare = 0.01;
   double matched = 0, unique = 0;
   for (const report::FrameRecord& frame : record.frames) {
@@ -84,8 +85,8 @@ void warn_if_nothing_matches(const report::RunRecord& record, const camera::Rig&
   fmt::print(stderr,
              "warning: by the calibration cameras see much in common, but only {:.1f} % of the features match between "
              "any two; "
-             "bslam rig info RIG --images DATA tests it\n",
-             100 * matched / unique);
+             "{} tests it\n",
+             100 * matched / unique, check_command);
 }
 
 }  // namespace
@@ -98,7 +99,7 @@ void print_rig_warnings(const camera::Rig& rig) {
     fmt::print(stderr, "warning: {} more of the kind: bslam rig info\n", warnings.size() - kShown);
 }
 
-void print_warnings(const report::RunRecord& record, const camera::Rig& rig) {
+void print_warnings(const report::RunRecord& record, const camera::Rig& rig, const std::string& check_command) {
   for (const report::CameraRecord& camera : record.cameras) {
     if (camera.skipped > 0) {
       fmt::print(stderr, "warning: {}: {} of its images could not be read, the first: {}\n", camera.name,
@@ -107,10 +108,10 @@ void print_warnings(const report::RunRecord& record, const camera::Rig& rig) {
     warn_of_outages(camera);
     warn_of_extrinsics(camera);
   }
-  warn_of_strangers(record);
+  warn_of_strangers(record, check_command);
   const auto dropped = count(record, report::FrameOutcome::kDropped);
   if (dropped > 0) fmt::print(stderr, "warning: {} frames were dropped, there was no time for them\n", dropped);
-  warn_if_nothing_matches(record, rig);
+  warn_if_nothing_matches(record, rig, check_command);
 }
 
 void print_result(const report::RunRecord& record, const std::string& out) {

@@ -13,7 +13,8 @@ void print_rig_warnings(const camera::Rig& rig);
 
 // On stderr: cameras that were out or agreed with nothing, images that could not be used, frames there was no time for, extrinsics that do not fit;
 // and where cameras of `rig`, those in use, match nothing although they overlap.
-void print_warnings(const report::RunRecord& record, const camera::Rig& rig);
+// `check_command` tests the calibration against the images; it is printed for the user to copy.
+void print_warnings(const report::RunRecord& record, const camera::Rig& rig, const std::string& check_command);
 
 // On stdout: how many frames have a pose, the size of the map, where the files are.
 void print_result(const report::RunRecord& record, const std::string& out);
