@@ -25,8 +25,8 @@ struct RigRefinementOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("check", self.check, Range{}, "",
-            "at the end, find out which cameras are not where the calibration has them");
-    visitor("refine", self.refine, Range{}, "", "at the end, accept the extrinsics that suit the map best");
+            "at the end, find out which cameras are not where the calibration has them", kCommon);
+    visitor("refine", self.refine, Range{}, "", "at the end, accept the extrinsics that suit the map best", kCommon);
     visitor("keyframes", self.keyframes, Range{10, 500}, "", "keyframes used at most");
     visitor("landmarks", self.landmarks, Range{100, 1e5}, "", "landmarks used at most");
     visitor("calibration_deg", self.calibration_deg, Range{1e-3, 20}, "deg",

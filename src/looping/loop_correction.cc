@@ -184,7 +184,7 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
   const auto [first, last] = std::minmax(closure.keyframe, closure.with);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
   const double way = way_between(map, first, last) + median_depth(map, closure.keyframe);
-  return closure.apart <= options.max_apart && closure.moved <= share * way && closure.turned <= kMaxTurn;
+  return closure.apart <= options.max_distance_over_depth && closure.moved <= share * way && closure.turned <= kMaxTurn;
 }
 
 bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,
@@ -234,7 +234,7 @@ bool close_loop(const LoopClosure& closure, const Location& location, const Loop
   std::vector<SE3> T_window;
   for (const KeyframeId k : window)
     T_window.push_back(pose_of(graph.problem.S_world[static_cast<std::size_t>(graph.vertex(k))]));
-  if (closure.off_px <= options.near_px && !graph.problem.scale_free) {
+  if (closure.off_px <= options.max_bundle_error_px && !graph.problem.scale_free) {
     // One keyframe places itself by what it sees of the place no better than the map does by all it holds: bundle
     // adjustment weighs them, from where the map is.
     fuse(window, T_window, closure, location, options, features, draft);

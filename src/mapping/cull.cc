@@ -37,7 +37,7 @@ bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& o
     });
     seen_elsewhere += others >= options.redundant_views;
   }
-  return landmarks > 0 && seen_elsewhere > options.redundant_share * landmarks;
+  return landmarks > 0 && seen_elsewhere > options.redundant_ratio * landmarks;
 }
 
 }  // namespace
@@ -52,7 +52,7 @@ int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDra
     if (!l.alive) continue;
     const int age = newest.value() - l.born.value();
     if (age > options.probation) break;
-    const bool hard_to_find = l.expected > 3 && l.found < options.min_found_share * l.expected;
+    const bool hard_to_find = l.expected > 3 && l.found < options.min_found_ratio * l.expected;
     const bool hardly_seen = age >= options.probation && num_keypoints(map, id) < options.min_keypoints;
     if (hard_to_find || hardly_seen) bad.push_back(id);
   }

@@ -9,7 +9,7 @@ namespace bslam::mapping {
 
 struct CreationOptions {
   int neighbours = 6;                // covisible keyframes whose free features are compared
-  double min_baseline_share = 0.01;  // of the median depth: closer keyframes show no depth
+  double min_baseline_over_depth = 0.01;  // of the median depth: closer keyframes show no depth
   int max_hamming = 50;              // bits
   double ratio = 0.8;                // best to second best along the epipolar curve
   double min_parallax = 0.012;       // rad, between the rays of a new landmark
@@ -19,8 +19,8 @@ struct CreationOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes whose free features are compared");
-    visitor("min_baseline_share", self.min_baseline_share, Range{0, 1}, "",
-            "of the median depth: closer keyframes show no depth");
+    visitor("min_baseline_over_depth", self.min_baseline_over_depth, Range{0, 1}, "",
+            "of the median depth: closer keyframes show no depth", OptionNote{.formerly = "min_baseline_share"});
     visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits",
             "largest descriptor distance of a new landmark's features");
     visitor("ratio", self.ratio, Range{0.1, 1}, "", "best to second best along the epipolar curve");
@@ -47,20 +47,21 @@ struct FusionOptions {
 
 struct CullingOptions {
   int probation = 3;              // keyframes after which a new landmark must have proven itself
-  double min_found_share = 0.25;  // frames that found it, of those that should have
+  double min_found_ratio = 0.25;  // frames that found it, of those that should have
   int min_keypoints = 3;          // that observe it after the probation
-  double redundant_share = 0.9;   // of a keyframe's landmarks seen by `redundant_views` others: it goes
+  double redundant_ratio = 0.9;   // of a keyframe's landmarks seen by `redundant_views` others: it goes
   int redundant_views = 3;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("probation", self.probation, Range{1, 100}, "keyframes",
             "after which a new landmark must have proven itself");
-    visitor("min_found_share", self.min_found_share, Range{0, 1}, "",
-            "frames that found a landmark, of those that should have");
+    visitor("min_found_ratio", self.min_found_ratio, Range{0, 1}, "",
+            "frames that found a landmark, of those that should have", OptionNote{.formerly = "min_found_share"});
     visitor("min_keypoints", self.min_keypoints, Range{1, 100}, "", "that observe a landmark after its probation");
-    visitor("redundant_share", self.redundant_share, Range{0, 1}, "",
-            "share of landmarks seen elsewhere that makes a keyframe redundant");
+    visitor("redundant_ratio", self.redundant_ratio, Range{0, 1}, "",
+            "share of landmarks seen elsewhere that makes a keyframe redundant",
+            OptionNote{.common = true, .formerly = "redundant_share"});
     visitor("redundant_views", self.redundant_views, Range{1, 100}, "", "other keyframes that must see them");
   }
 };
@@ -73,10 +74,10 @@ struct LocalWindowOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("free_keyframes", self.free_keyframes, Range{1, 1000}, "",
-            "keyframes adjusted: the newest and its best covisible ones");
+            "keyframes adjusted: the newest and its best covisible ones", kCommon);
     visitor("fixed_keyframes", self.fixed_keyframes, Range{1, 1000}, "",
             "further observers that hold the window in place");
-    visitor("max_landmarks", self.max_landmarks, Range{10, 1000000}, "", "landmarks adjusted at most");
+    visitor("max_landmarks", self.max_landmarks, Range{10, 1000000}, "", "landmarks adjusted at most", kCommon);
   }
 };
 
@@ -87,7 +88,7 @@ struct ScaleOptions {
   int keyframes = 40;                     // that take part in a measurement of the scale
   int min_keyframes = 6;                  // of them before the map may be metric: outliers hide among few
   int rounds = 4;                         // of measuring and adjusting at one keyframe, while the unit changes much
-  double settled = 0.05;                  // relative change of the unit that asks for no further round
+  double converged_change = 0.05;         // relative change of the unit that asks for no further round
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -99,7 +100,8 @@ struct ScaleOptions {
             "keyframes that measure the scale, and up to which all are adjusted");
     visitor("min_keyframes", self.min_keyframes, Range{2, 1000}, "", "keyframes a metric map needs");
     visitor("rounds", self.rounds, Range{1, 20}, "", "of measuring and adjusting at one keyframe");
-    visitor("settled", self.settled, Range{0, 1}, "", "relative change of the unit that asks for no further round");
+    visitor("converged_change", self.converged_change, Range{0, 1}, "",
+            "relative change of the unit that asks for no further round", OptionNote{.formerly = "settled"});
   }
 };
 

@@ -104,7 +104,7 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images, std::vector<
   const auto budgets = tracking::feature_budgets(rig_.size(), feature_shares_, left_out, failing, config_.features);
   BundledFrame frame = builder_.extract(images, pool_, left_out, budgets);
   for (frame::CameraFrame& c : frame.cameras) {
-    if (!config_.tracking.own_times) c.time_ns = frame.time_ns;
+    if (!config_.tracking.use_capture_times) c.time_ns = frame.time_ns;
   }
   if (state_.twist) frame.twist = *state_.twist;
   stages.push_back({"extract", extraction.ms()});
@@ -127,7 +127,7 @@ std::vector<std::uint8_t> Pipeline::left_out(const image::ImageBundle& images,
                                              const std::vector<tracking::Outage>& outages) const {
   std::vector<std::uint8_t> out(rig_.size());
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = outages[c] != tracking::Outage::kNone;
-  const bool motion_matters = config_.tracking.own_times && !state_.twist;
+  const bool motion_matters = config_.tracking.use_capture_times && !state_.twist;
   return motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
 }
 
@@ -297,7 +297,7 @@ void Pipeline::track(BundledFrame frame, execution::StageExecutor& executor, Out
     state_.twist.reset();
     frames_lost_ += saw_something(output.result);
     note_motion(map, before, outcome.record);
-    const bool anew = frames_lost_ >= config_.looping.recovery.new_part_after && !config_.localize_only;
+    const bool anew = frames_lost_ >= config_.looping.recovery.new_submap_after && !config_.localize_only;
     if (!anew || !saw_something(output.result)) return;
     start(std::move(frame), executor, outcome);
     if (!outcome.began_part) outcome.record.result = output.result;

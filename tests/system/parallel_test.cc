@@ -17,7 +17,8 @@ TEST(SystemParallel, TracksAllFramesAsWellAsSequential) {
   EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
   EXPECT_LT(ate_m(live_poses(system), tour.truth()), 0.015);
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
-  const auto keyframes = std::count_if(system.frames().begin(), system.frames().end(), [](const auto& r) { return r.keyframe; });
+  const auto keyframes =
+      std::count_if(system.frames().begin(), system.frames().end(), [](const auto& r) { return r.keyframe; });
   EXPECT_LE(system.stage_runs().size(), static_cast<std::size_t>(keyframes));
   EXPECT_GT(system.stage_runs().size(), 0u);
 }
@@ -34,7 +35,7 @@ TEST(SystemParallel, MayEndAtAnyFrameWithoutBeingFinished) {
 TEST(SystemParallel, WaitsForAPendingKeyframeAtMost) {
   const RenderedTour tour(2, 12);
   Config config = small_config(Mode::kParallel);
-  config.execution.pending_keyframes = 1;
+  config.execution.max_pending_keyframes = 1;
   config.tracking.keyframe.min_interval = 1;
   config.tracking.keyframe.min_overlap = 1.0;  // a keyframe with every frame that lost one landmark
   System system(tour.rig(), config);
