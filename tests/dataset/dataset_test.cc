@@ -161,7 +161,7 @@ TEST_F(SmallEuroc, TakesAnotherRig) {
   ASSERT_TRUE(rig_formats::without);
   ASSERT_EQ(rig_formats::without->warnings.size(), 1u);
   EXPECT_NE(rig_formats::without->warnings[0].find(
-                "gives time offsets (cam0 500 ms, cam1 500 ms), which are not used without --rig"),
+                "contains time offsets (cam0 500 ms, cam1 500 ms), which are only used with --rig"),
             std::string::npos);
   EXPECT_EQ(dataset->first_time_ns, kSmallStart + 500'000'000);
   EXPECT_EQ(read_frame(*dataset, 0).images[1].time_ns, kSmallStart + 500'000'000);
@@ -207,7 +207,7 @@ TEST_F(SmallEuroc, AFileInsteadOfAFolder) {
 
 TEST_F(SmallEuroc, NoCameraInIt) {
   fs::remove_all(data() / "mav0");
-  expect_error(data(), "no data set of a known layout");
+  expect_error(data(), "no data set of a known format");
   fs::create_directories(data() / "mav0");
   expect_error(data() / "mav0", "no camera");
 }
@@ -329,7 +329,7 @@ TEST_F(SmallEuroc, CamerasWithNoCommonTime) {
   std::string list;
   for (int k = 0; k < 20; ++k) list += std::to_string(9'000'000'000'000'000'000 + k) + "," + small_image_name(k) + "\n";
   write_text(camera(1) / "data.csv", list);
-  expect_error(data(), "no image within 2 ms of one of cam0");
+  expect_error(data(), "no image within 2 ms of an image of cam0");
 }
 
 TEST_F(SmallEuroc, CamerasThatAlternateNeedALargerTolerance) {

@@ -173,7 +173,7 @@ TEST_F(OwnRigFile, OfNoKnownFormatIsSaidSo) {
   EXPECT_FALSE(read(""));
   EXPECT_FALSE(read_rig(folder_.path() / "none.yaml"));
   fs::create_directories(folder_.path() / "empty");
-  EXPECT_EQ(read_rig(folder_.path() / "empty").error().found, "a folder without calibration");
+  EXPECT_EQ(read_rig(folder_.path() / "empty").error().found, "a folder without a calibration");
 }
 
 TEST_F(OwnRigFile, ComesBackExactly) {
