@@ -1,5 +1,5 @@
-// Time of feature extraction and its parts on 752 x 480 images. BSLAM_BENCH_IMAGES=FOLDER takes the images of a folder
-// (every tenth, up to 16) instead of a synthetic one.
+// Time of feature extraction and its parts on 752 x 480 images. With BSLAM_BENCH_IMAGES=FOLDER, images of a folder
+// (every tenth, at most 16) are used instead of a synthetic one.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Matching of one frame at full size: 1200 keypoints a camera, 3000 landmarks in view.
+// Matching of one frame at full size: 1200 keypoints per camera, 3000 landmarks in view.
 #include <benchmark/benchmark.h>
 
 #include "../tests/mapping/simulated_map.h"
@@ -54,7 +54,7 @@ void SearchByProjection(benchmark::State& state) {
 }
 BENCHMARK(SearchByProjection)->Unit(benchmark::kMicrosecond);
 
-// A bump of waves, half a pixel off, slightly turned.
+// A wave pattern, shifted by half a pixel and slightly rotated.
 void AlignPatch(benchmark::State& state) {
   const auto grey = [](double x, double y) {
     return static_cast<std::uint8_t>(128 + 50 * std::sin(0.5 * x + 0.2 * y) + 40 * std::cos(0.45 * y));

@@ -1,5 +1,5 @@
-// Does a map stop growing once the place is known? Plays a recording of laps that ends where it begins over and over,
-// and prints for each lap what the map holds by then and what the lap's frames took.
+// Measures whether a map stops growing once the place is known. Plays a recording of laps that ends at its start
+// several times, and prints the size of the map and the time of the frames for each lap.
 //   bslam_lap_growth DATA --laps 5 --times 4 [--cameras 0,1] [--set key=value ...]
 #include <fmt/format.h>
 #include <unistd.h>
@@ -32,7 +32,7 @@ double resident_mb() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
-// Prints lap by lap what the system makes of the frames.
+// Prints the statistics of every lap.
 class LapTable {
  public:
   LapTable(const system::System& system, std::size_t frames_per_lap)

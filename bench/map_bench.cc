@@ -1,5 +1,5 @@
 // The versioned map at the size of a long run: 1,000 keyframes of 4 cameras with 600 keypoints each, 100,000 landmarks
-// with 8 observations each. Keyframe k and landmark l are neighbours where l / 100 is near k, so that edits are local.
+// with 8 observations each. Keyframe k and landmark l are close if l / 100 is close to k, so that edits are local.
 #include <benchmark/benchmark.h>
 
 #include "../tests/map/synthetic_map.h"
@@ -8,9 +8,9 @@ namespace bslam::map {
 namespace {
 
 constexpr std::size_t kKeyframes = 1000, kLandmarks = 100000, kObservations = 8, kCameras = 4, kPerCamera = 600;
-constexpr std::size_t kPerKeyframe = kLandmarks / kKeyframes;  // landmarks first seen
+constexpr std::size_t kPerKeyframe = kLandmarks / kKeyframes;  // landmarks first observed by a keyframe
 
-// Frames are shared between keyframes: the map does not look into them here but for descriptors.
+// Frames are shared between keyframes, since only their descriptors are used here.
 std::vector<std::shared_ptr<const frame::BundledFrame>> make_frames() {
   Random random(1, "map bench");
   std::vector<std::shared_ptr<const frame::BundledFrame>> frames;
@@ -22,7 +22,7 @@ const auto& frames() {
   return kFrames;
 }
 
-// Landmark l is seen by kObservations of the 16 keyframes from l / 100 on, by the next free feature of each.
+// Landmark l is observed by kObservations of the 16 keyframes from l / 100 on, with the next free feature of each.
 BundledMap make_map() {
   Random random(2, "map bench");
   BundledMap map(synthetic_rig(kCameras));
@@ -46,7 +46,7 @@ MapStore& store() {
   static MapStore store(make_map());
   return store;
 }
-// Benchmarks leave the shared store alone.
+// Benchmarks do not modify the shared store.
 BundledMap fresh() { return *store().snapshot(); }
 
 void report(benchmark::State& state) {
@@ -71,7 +71,7 @@ void EmptyDraft(benchmark::State& state) {
 }
 BENCHMARK(EmptyDraft)->Unit(benchmark::kMicrosecond);
 
-// `spread`: 600 matches evenly among the landmarks of that many keyframes; 1000 is the whole map.
+// `spread`: the 600 matches are distributed evenly over the landmarks of that many keyframes; 1000 is the whole map.
 void CommitKeyframe(benchmark::State& state) {
   const auto spread = static_cast<std::size_t>(state.range(0));
   std::vector<std::pair<FeatureId, LandmarkId>> matches;
@@ -123,7 +123,7 @@ void CommitSightings(benchmark::State& state) {
 BENCHMARK(CommitSightings)->Unit(benchmark::kMicrosecond);
 
 // A run of mapping behind keyframe 500: 1,000 new landmarks with 3 observations each, 2,000 observations added, 1,000
-// removed, 100 merges, all landmarks touched refreshed.
+// removed, 100 merges, and an update of all modified landmarks.
 void CommitMappingRun(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();

@@ -17,7 +17,7 @@ const Vocabulary& vocabulary() {
   return *shipped;
 }
 
-// Descriptors near nodes of the tree, as those of images are.
+// Descriptors close to nodes of the tree, like those of images.
 std::vector<feature::Descriptor> descriptors(std::size_t count, Random& random) {
   const auto& centres = vocabulary().content().descriptor;
   std::vector<feature::Descriptor> result(count);

@@ -1,12 +1,12 @@
-// Precision and recall of place recognition, apart from the system: a map that was made without closing loops is gone
-// through as it grew, and every keyframe is asked which older place it shows.
+// Precision and recall of place recognition without the rest of the system: a map that was made without loop closing is
+// traversed in the order in which it grew, and for every keyframe an older place is searched.
 //   bslam_place_recall MAP.bmap TRUTH.tum [--older S] [--overlap SHARE] [--set key=value ...]
-// TRUTH: T_world_cam0 at the keyframes' times. Prints a line of a table.
+// TRUTH: T_world_cam0 at the times of the keyframes. Prints a line of a table.
 //
-// A right place exists where, by the true poses, a keyframe more than S seconds older that is no neighbour shows what
-// this one shows: at least SHARE of its landmarks lie in an image of this one, not hidden, at about the distance
-// (within kZoom) and from about the direction (within kTurn) they were seen from then; descriptors cannot be compared
-// beyond. An answer is right where the pose that verification gives is the true one.
+// A place to be recognised exists if, according to the true poses, the keyframe sees the same as another keyframe that
+// is more than S seconds older and not a neighbour: at least SHARE of its landmarks project to an image of this
+// keyframe, are not occluded, and are seen from a similar distance (within kZoom) and direction (within kTurn) as
+// before, beyond which descriptors cannot be compared. An answer is correct if the verified pose is the true one.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -32,7 +32,7 @@ using geometry::SE3;
 
 constexpr double kZoom = 1.5;
 constexpr double kTurn = std::numbers::pi / 6;       // rad
-constexpr double kMaxOff = 0.1, kMaxTurnOff = 0.05;  // a right pose: of the median depth; rad
+constexpr double kMaxOff = 0.1, kMaxTurnOff = 0.05;  // tolerances of a correct pose: relative to the median depth; rad
 
 struct Arguments {
   std::string map, truth;
@@ -41,13 +41,13 @@ struct Arguments {
   cli::ConfigArguments config;
 };
 
-// What a keyframe sees, in camera 0's frame of its time: true up to the error of the local map.
+// The landmarks that a keyframe sees, in the frame of its camera 0. They are correct up to the error of the local map.
 struct View {
   KeyframeId keyframe;
   TimeNs time_ns = 0;
-  SE3 T_world_rig;                               // the truth
-  std::vector<Vector3d> points;                  // of its landmarks
-  std::vector<std::vector<Vector3d>> by_camera;  // u, v, depth of its keypoints that show landmarks
+  SE3 T_world_rig;                               // true pose
+  std::vector<Vector3d> points;                  // positions of its landmarks
+  std::vector<std::vector<Vector3d>> by_camera;  // u, v and depth of its keypoints with landmarks
   double median_depth = 0;
 };
 
@@ -73,8 +73,8 @@ View view_of(const map::BundledMap& map, KeyframeId k, const SE3& T_world_rig) {
   return view;
 }
 
-// Whether the view shows a point that was seen from `seen_from` (both in its frame): its nearest known point in the
-// image is about as far away, so that nothing stands between.
+// Whether the view shows a point that was observed from `seen_from` (both in its frame). The known point closest to it
+// in the image must have a similar depth, so that the point is not occluded.
 bool shows(const camera::Rig& rig, const View& view, const Vector3d& point, const Vector3d& seen_from) {
   const double depth = point.norm(), depth_then = (point - seen_from).norm();
   if (depth > kZoom * depth_then || depth_then > kZoom * depth) return false;
@@ -95,7 +95,7 @@ bool shows(const camera::Rig& rig, const View& view, const Vector3d& point, cons
   return false;
 }
 
-// Of the landmarks of `old`, the share that `now` shows.
+// The fraction of the landmarks of `old` that `now` shows.
 double shared_share(const camera::Rig& rig, const View& now, const View& old) {
   const SE3 T_now_old = now.T_world_rig.inverse() * old.T_world_rig;
   if (T_now_old.translation().norm() > 2 * std::max(now.median_depth, old.median_depth)) return 0;
@@ -143,13 +143,13 @@ class Recall {
  private:
   void ask(std::size_t i) {
     const View& now = views_[i];
-    std::vector<KeyframeId> places;  // right ones
+    std::vector<KeyframeId> places;  // correct places
     const std::vector<map::Covisible> neighbours =
         looping::neighbours_of(map_, now.keyframe, config_.looping.recognition);
     double best = 0;
     for (std::size_t j = 0; j < i && old_enough(now, views_[j].time_ns); ++j) {
       if (std::ranges::binary_search(neighbours, views_[j].keyframe, {}, &map::Covisible::keyframe))
-        continue;  // never lost sight of
+        continue;  // the place was in view all the time
       const double share = shared_share(map_.rig(), now, views_[j]);
       if (share >= arguments_.overlap) places.push_back(views_[j].keyframe);
       best = std::max(best, share);
@@ -205,7 +205,7 @@ class Recall {
   looping::BagOfWordsRecogniser recogniser_;
   const system::Config& config_;
   const Arguments& arguments_;
-  std::vector<View> views_;  // in order of time
+  std::vector<View> views_;  // ordered by time
   std::array<int, 5> count_{}, missed_{};
   int revisits_ = 0, revisits_right_ = 0;
   std::string note_;

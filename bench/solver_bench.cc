@@ -1,4 +1,5 @@
-// Pose solver, pose RANSAC, bundle adjustment and relative pose at the sizes of tracking, local and global adjustment.
+// Pose solver, pose RANSAC, bundle adjustment and relative pose with the problem sizes of tracking, local and global
+// bundle adjustment.
 #include <benchmark/benchmark.h>
 
 #include "../tests/solver/scene.h"
@@ -7,7 +8,7 @@
 namespace bslam::solver {
 namespace {
 
-// 1500 observations over four cameras; range(0): per cent of outliers.
+// 1500 observations over four cameras; range(0): percentage of outliers.
 void pose(benchmark::State& state) {
   const Rig rig = scene::make_rig(4, scene::Models::kRadTan);
   Random random(1);
@@ -55,7 +56,7 @@ void local_adjustment(benchmark::State& state) {
 }
 BENCHMARK(local_adjustment)->Unit(benchmark::kMillisecond);
 
-// range(0): free poses; 200 points and 2000 observations each.
+// range(0): number of free poses, with 200 points and 2000 observations each.
 void global_adjustment(benchmark::State& state) {
   scene::BundleSpec spec;
   spec.models = scene::Models::kRadTan;

@@ -1,4 +1,4 @@
-// Compiled without instrumentation; linked to everything that is instrumented.
+// This file is compiled without instrumentation and linked to all instrumented code.
 #include "coverage.h"
 
 #include <array>
@@ -11,16 +11,16 @@ namespace {
 
 constexpr std::size_t kPlaces = std::size_t{1} << 18;
 
-// Counters of steps from one place to another, as hashes of both addresses.
+// Counters of edges, indexed by a hash of both addresses.
 struct Trace {
   std::array<std::uint8_t, kPlaces> count{};
-  std::array<std::uint8_t, kPlaces> seen{};  // bit n: reached about 2^n times by some input
+  std::array<std::uint8_t, kPlaces> seen{};  // bit n: some input reached the edge about 2^n times
   std::vector<std::uint32_t> touched;
   std::size_t previous = 0;
   bool recording = false;
 };
 
-constinit Trace trace;  // there before anything else runs
+constinit Trace trace;  // initialised before any other code runs
 
 }  // namespace
 
@@ -49,7 +49,7 @@ std::size_t new_places() {
 extern "C" void __sanitizer_cov_trace_pc() {
   bslam::fuzz::Trace& t = bslam::fuzz::trace;
   if (!t.recording) return;
-  // Relative to a function of the program, so that the numbers are those of every run.
+  // Relative to a function of the program, so that the numbers are the same in every run.
   const std::size_t here = reinterpret_cast<std::uintptr_t>(__builtin_return_address(0)) -
                            reinterpret_cast<std::uintptr_t>(&bslam::fuzz::begin_coverage);
   const std::size_t mixed = (here * 0x9e3779b97f4a7c15ull) >> 40;
@@ -57,7 +57,7 @@ extern "C" void __sanitizer_cov_trace_pc() {
   t.previous = mixed >> 1;
   std::uint8_t& count = t.count[place];
   if (count == 0) {
-    t.recording = false;  // the vector may call instrumented code
+    t.recording = false;  // since the vector may call instrumented code
     t.touched.push_back(place);
     t.recording = true;
   }

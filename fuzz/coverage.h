@@ -1,14 +1,15 @@
-// Which parts of the program an input reached, as far as the compiler tells (gcc's -fsanitize-coverage=trace-pc).
+// Records which edges of the program an input reached, if the compiler supports it (-fsanitize-coverage=trace-pc of
+// gcc).
 #pragma once
 
 #include <cstddef>
 
 namespace bslam::fuzz {
 
-// Begins to record from nothing.
+// Starts a new recording.
 void begin_coverage();
 
-// Ends recording and returns how many places were reached that no input before had reached.
+// Ends the recording and returns the number of edges that no previous input reached.
 std::size_t new_places();
 
 }  // namespace bslam::fuzz

@@ -1,5 +1,5 @@
-// Runs a target on inputs made from its seeds: for compilers without libFuzzer. Where the program is instrumented,
-// inputs that reach something new are kept to make others from. The same seed and number of runs give the same inputs.
+// Runs a target on mutations of its seeds, for compilers without libFuzzer. If the program is instrumented, inputs that
+// reach new edges are added to the corpus. The same seed and number of runs give the same inputs.
 #include <signal.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -20,10 +20,10 @@
 #include "mutation.h"
 #include "target.h"
 
-// Of the sanitizers, where the program is built with them; this file is not, as they ask for options before they are
-// ready.
+// Options of the sanitizers, if the program is built with them. This file is not instrumented, since the sanitizers ask
+// for their options before they are initialised.
 extern "C" void __sanitizer_set_death_callback(void (*)()) __attribute__((weak));
-// An input is at most 64 KB: what asks for a gigabyte believes a number it should not.
+// Inputs have at most 64 KB, so a reader that allocates a gigabyte trusts a number that it should check.
 extern "C" const char* __asan_default_options();
 extern "C" const char* __ubsan_default_options();
 const char* __asan_default_options() { return "max_allocation_size_mb=1024:allocator_may_return_null=0"; }
@@ -34,7 +34,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kSlowSeconds = 20;  // an input that takes longer counts as a hang
+constexpr int kSlowSeconds = 20;  // an input that takes longer is reported as a hang
 constexpr std::size_t kMaxCorpus = 4000;
 
 struct Arguments {
@@ -44,7 +44,7 @@ struct Arguments {
   std::vector<fs::path> inputs;
 };
 
-// What is being run, for the handlers below.
+// The current input, for the handlers below.
 std::string current;
 std::string crash_file;
 
@@ -91,7 +91,7 @@ Arguments parse(int argc, char** argv) {
   return a;
 }
 
-// Of the processor: a busy machine is no hang. 0 = no limit.
+// Limits processor time, so that a busy machine is not reported as a hang. 0: no limit.
 void limit_time(int seconds) {
   itimerval limit{};
   limit.it_value.tv_sec = seconds;
@@ -118,7 +118,7 @@ void search(const Arguments& a, std::vector<std::string> corpus) {
   if (corpus.empty()) corpus.emplace_back();
   Random random(a.seed, "fuzz");
   for (; a.runs >= 0 ? runs < a.runs : Clock::now() < end; ++runs) {
-    // The newest are the least tried.
+    // Prefers the newest inputs, which were mutated least often.
     const std::size_t n = corpus.size(), newest = std::min<std::size_t>(n, 50);
     const std::size_t pick = random.below(2) == 0 ? random.below(static_cast<std::uint32_t>(n))
                                                   : n - 1 - random.below(static_cast<std::uint32_t>(newest));
@@ -129,7 +129,7 @@ void search(const Arguments& a, std::vector<std::string> corpus) {
     places += fresh;
     if (fresh > 0 && corpus.size() < kMaxCorpus) corpus.push_back(std::move(input));
   }
-  std::printf("%ld inputs, %zu kept, %zu places reached, slowest %.0f ms\n", runs, corpus.size(), places, longest_ms);
+  std::printf("%ld inputs, %zu kept, %zu edges reached, slowest %.0f ms\n", runs, corpus.size(), places, longest_ms);
 }
 
 int main_of(int argc, char** argv) {
@@ -146,7 +146,7 @@ int main_of(int argc, char** argv) {
     }
     return 0;
   }
-  if (!a.inputs.empty()) {  // these alone, once each
+  if (!a.inputs.empty()) {  // only these inputs, once each
     for (const fs::path& file : a.inputs) run(slurp(file));
     return 0;
   }

@@ -10,7 +10,7 @@
 namespace bslam::fuzz {
 namespace {
 
-constexpr std::size_t kMaxBytes = std::size_t{1} << 16;  // more is slow and shows nothing new
+constexpr std::size_t kMaxBytes = std::size_t{1} << 16;  // larger inputs are slow and find nothing new
 
 std::size_t below(std::size_t n, Random& random) { return n == 0 ? 0 : random.below(static_cast<std::uint32_t>(n)); }
 
@@ -21,7 +21,7 @@ void change_bytes(std::string& s, Random& random) {
   }
 }
 
-// A number of 1, 2, 4 or 8 bytes becomes one that is at some border, or a little more or less.
+// Replaces a number of 1, 2, 4 or 8 bytes by a boundary value or a value close to one.
 void change_binary_number(std::string& s, Random& random) {
   constexpr std::array<std::uint64_t, 12> kBorders = {0,
                                                       1,
@@ -44,7 +44,7 @@ void change_binary_number(std::string& s, Random& random) {
   std::memcpy(s.data() + at, &value, size);
 }
 
-// A number in text becomes another.
+// Replaces a number in text.
 void change_text_number(std::string& s, Random& random) {
   constexpr std::array<std::string_view, 20> kNumbers = {"0",
                                                          "-1",
@@ -85,7 +85,7 @@ void change_range(std::string& s, Random& random) {
     case 0:
       s.erase(from, n);
       break;
-    case 1: {  // again, sometimes many times
+    case 1: {  // duplicates it, sometimes many times
       const std::string part = s.substr(from, n);
       const std::size_t times = random.below(8) == 0 ? 1 + below(200, random) : 1;
       for (std::size_t i = 0; i < times && s.size() + n < kMaxBytes; ++i) s.insert(from, part);
@@ -108,7 +108,7 @@ void take_from_another(std::string& s, std::span<const std::string> corpus, Rand
   }
 }
 
-// Lines and separators are what text formats hang on.
+// Lines and separators, which are important in text formats.
 void insert_token(std::string& s, Random& random) {
   constexpr std::array<std::string_view, 22> kTokens = {
       "\n",   "\r\n",      " ",  ",", ":",   ": ",          "- ",           "[", "]", "{", "}", "#", "&a ", "*a",

@@ -1,4 +1,4 @@
-// Inputs made from others.
+// Mutation of inputs.
 #pragma once
 
 #include <span>
@@ -8,8 +8,8 @@
 
 namespace bslam::fuzz {
 
-// One to several changes: bytes and bits, numbers in binary and in text, ranges cut, doubled, moved, or taken from
-// another input of the corpus (not empty).
+// Applies one or several changes: of bytes and bits, of numbers in binary and in text, and of ranges, which are
+// removed, duplicated, moved, or copied from another input of the corpus, which must not be empty.
 std::string mutate(std::string input, std::span<const std::string> corpus, Random& random);
 
 }  // namespace bslam::fuzz

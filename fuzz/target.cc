@@ -52,7 +52,7 @@ fs::path scratch_file(std::string_view name, std::string_view bytes) {
 
 void require(bool holds, const char* what) {
   if (holds) return;
-  std::fprintf(stderr, "fuzz: does not hold: %s\n", what);
+  std::fprintf(stderr, "fuzz: check failed: %s\n", what);
   std::abort();
 }
 

@@ -1,5 +1,5 @@
-// What a fuzz target is made of. Every target gives its function and seeds to one of two drivers: libFuzzer, where the
-// compiler has it (it takes the function; the seeds come as a corpus on disk), or the one of driver.cc.
+// The interface of fuzz targets. Every target provides a function and seeds for one of two drivers: libFuzzer, if the
+// compiler has it (it uses the function, and a corpus of seeds on disk), or the driver of driver.cc.
 #pragma once
 
 #include <cstddef>
@@ -13,21 +13,21 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 namespace bslam::fuzz {
 
-// Small files that are right: what mutation starts from.
+// Small valid files, from which mutation starts.
 std::vector<std::string> seeds();
 
 inline std::string_view as_text(const std::uint8_t* data, std::size_t size) {
   return {reinterpret_cast<const char*>(data), size};
 }
 
-// A folder of this process, made at the first call and removed at its end, in memory where the system has such a place:
-// for readers that take a path.
+// A folder for readers that require a path. It is created by the first call, in memory if possible, and removed at the
+// end of the process.
 const std::filesystem::path& scratch_folder();
 
 // Writes `bytes` to a file of that folder.
 std::filesystem::path scratch_file(std::string_view name, std::string_view bytes);
 
-// Stops with a message where `holds` is false: what is wrong then is the program, not the input.
+// Aborts with a message if `holds` is false, which indicates an error in the program, not in the input.
 void require(bool holds, const char* what);
 
 }  // namespace bslam::fuzz

@@ -1,4 +1,4 @@
-"""What the measuring scripts have in common: the program called, its files read, recordings with faults made of sound ones."""
+"""Functions shared by the measuring scripts: running the program, reading its files, and adding faults to recordings."""
 import json
 import os
 import pathlib
@@ -9,7 +9,7 @@ import sys
 import zlib
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-START_NS = 1_000_000_000  # stamp of the first picture of `bslam simulate`
+START_NS = 1_000_000_000  # time stamp of the first image of `bslam simulate`
 
 
 def call(*command):
@@ -24,12 +24,12 @@ def summary_of(out):
 
 
 def evaluate(bslam, out, data, align='se3'):
-    """`bslam eval` of a run: {"ate": ..., "scale": ...}."""
+    """Result of `bslam eval` for a run: {"ate": ..., "scale": ...}."""
     return json.loads(call(bslam, 'eval', out / 'trajectory.tum', data / 'groundtruth_cam0.tum', '--align', align, '--json'))
 
 
 def black_like(file):
-    """Bytes of a black PNG of the size of another."""
+    """A black PNG with the size of another one."""
     width, height = struct.unpack('>II', file.read_bytes()[16:24])
 
     def chunk(kind, body):
@@ -40,8 +40,8 @@ def black_like(file):
 
 
 def with_fault(data, folder, cameras, kind, from_s, to_s):
-    """A copy of a recording whose `cameras` are black, frozen or show each what the next camera of `kind[1]` sees, for a while.
-    Pictures are links to those of the original."""
+    """A copy of a recording in which `cameras` are temporarily black or frozen, or have the images of the next camera in
+    `kind[1]`. Images are links to those of the original."""
     if folder.exists():
         shutil.rmtree(folder)
     (folder / 'mav0').mkdir(parents=True)

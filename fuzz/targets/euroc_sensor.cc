@@ -1,4 +1,4 @@
-// EuRoC's sensor.yaml.
+// sensor.yaml of EuRoC.
 #include "rig_formats/euroc_sensor.h"
 
 #include "synthetic/rigs.h"

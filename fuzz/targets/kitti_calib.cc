@@ -1,4 +1,4 @@
-// KITTI's calib.txt, without the images beside it.
+// calib.txt of KITTI, without images in its folder.
 #include "rig_formats/kitti_calib.h"
 
 #include "target.h"

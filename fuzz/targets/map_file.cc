@@ -1,4 +1,5 @@
-// Saved maps: as they come, and with sizes and checksums made right so that what stands behind them is reached.
+// Saved maps: unchanged inputs, and inputs with corrected sizes and checksums, so that the code behind these checks is
+// reached.
 #include "storage/map_file.h"
 
 #include <libdeflate.h>

@@ -1,4 +1,4 @@
-// Rigs of every format that is told by the content of one file.
+// Rigs in all formats that are recognised by the content of one file.
 #include "rig_formats/rig_file.h"
 
 #include "synthetic/rigs.h"

@@ -4,7 +4,7 @@
 
 namespace bslam::fuzz {
 
-// An input is the poses; KITTI's times follow a line "====".
+// An input contains poses. Times for KITTI poses follow a line "====".
 std::vector<std::string> seeds() {
   return {
       "# a comment\n1403636579.763555584 1 2 3 0 0 0 1\n1403636579.813555584 1.1 2 3 0 0 0.1 0.995\n1403636580 1.2 2 "

@@ -1,4 +1,4 @@
-// Vocabularies: our format and DBoW2's text.
+// Vocabularies in the format of bslam and in the text format of DBoW2.
 #include "base/random.h"
 #include "place/vocabulary_bytes.h"
 #include "storage/vocabulary_file.h"

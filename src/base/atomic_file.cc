@@ -28,8 +28,11 @@ class Descriptor {
   int fd_;
 };
 
-Error system_error(const std::filesystem::path& path, std::string expected) {
-  return {path.string(), "", std::system_category().message(errno), std::move(expected)};
+// "cannot open FILE: No such file or directory", from errno.
+Error system_error(std::string_view attempt, const std::filesystem::path& path, std::string expected) {
+  const std::string reason = std::system_category().message(errno);
+  std::string sentence = "cannot " + std::string(attempt) + " " + path.string() + ": " + reason;
+  return {path.string(), "", reason, std::move(expected), std::move(sentence)};
 }
 
 bool write_all(int fd, std::string_view bytes) {
@@ -42,7 +45,7 @@ bool write_all(int fd, std::string_view bytes) {
   return true;
 }
 
-// Creates a new file with a unique name next to `path`, stores that name in `name` and returns the file descriptor.
+// Creates a new file with a unique name in the folder of `path`; its path is stored in `name`.
 int open_beside(const std::filesystem::path& path, std::filesystem::path& name) {
   for (int attempt = 0;; ++attempt) {
     name = path;
@@ -58,16 +61,15 @@ Status write_atomically(const std::filesystem::path& path, std::string_view byte
   const std::string expected = "a file that can be written";
   std::filesystem::path part;
   Descriptor file(open_beside(path, part));
-  if (file.get() < 0) return system_error(path, expected);
+  if (file.get() < 0) return system_error("write", path, expected);
   const bool written = write_all(file.get(), bytes) && ::fsync(file.get()) == 0 && file.close() &&
                        ::rename(part.c_str(), path.c_str()) == 0;
   if (!written) {
-    const Error error = system_error(path, expected);
+    const Error error = system_error("write", path, expected);
     ::unlink(part.c_str());
     return error;
   }
-  // The rename is durable only after the folder is flushed too. Some file systems cannot flush folders, so a failure is
-  // ignored.
+  // The new name is durable once the folder is flushed. A file system that cannot flush folders is not an error.
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (opened.get() >= 0) ::fsync(opened.get());
@@ -75,22 +77,22 @@ Status write_atomically(const std::filesystem::path& path, std::string_view byte
 }
 
 Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes) {
-  // Open without blocking, so that a named pipe is rejected instead of waited for.
+  // Non-blocking, so that a named pipe is refused instead of blocking until someone writes to it.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat status {};
-  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return system_error(path, "a file that can be read");
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return system_error("open", path, "a file that can be read");
   if (!S_ISREG(status.st_mode))
-    return Error{path.string(), "", S_ISDIR(status.st_mode) ? "a folder" : "no file", "a file"};
+    return Error{path.string(), "", S_ISDIR(status.st_mode) ? "a folder" : "not a regular file", "a file"};
   const Error too_large{path.string(), "", "more than " + std::to_string(max_bytes) + " bytes", "a smaller file"};
   if (static_cast<std::size_t>(status.st_size) > max_bytes) return too_large;
-  // One byte more than the file size, so that the end of the file is detected without growing the buffer.
-  std::string bytes(static_cast<std::size_t>(status.st_size) + 1, '\0');
+  std::string bytes(static_cast<std::size_t>(status.st_size) + 1,
+                    '\0');  // one byte more, so that the end of the file shows without growing the buffer
   std::size_t size = 0;
   for (;;) {
     if (size == bytes.size()) bytes.resize(2 * size);  // the file has grown since fstat
     const ssize_t got = ::read(file.get(), bytes.data() + size, bytes.size() - size);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return system_error(path, "a file that can be read");
+    if (got < 0) return system_error("read", path, "a file that can be read");
     if (got == 0) break;
     size += static_cast<std::size_t>(got);
     if (size > max_bytes) return too_large;

@@ -1,4 +1,4 @@
-// Reading whole files, and writing them atomically: a written file is either complete or absent.
+// Reading and writing of whole files. A written file appears under its name completely or not at all.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,12 @@
 
 namespace bslam {
 
-// Writes `bytes` to a temporary file next to `path`, flushes it to disk and renames it to `path`. The folder must
-// exist; an existing file is replaced. On error no temporary file remains and an existing file is unchanged.
+// Writes `bytes` to a temporary file in the same folder, flushes it to disk and renames it to `path`. The folder must
+// exist. An existing file is replaced. On error the temporary file is removed and an existing file is unchanged.
 Status write_atomically(const std::filesystem::path& path, std::string_view bytes);
 
-// Returns the bytes of a regular file. Errors: the file does not exist, cannot be read, is not a regular file, or is
-// larger than `max_bytes`.
+// The contents of a regular file. Errors: it cannot be opened or read, is not a regular file, or is larger than
+// `max_bytes`.
 Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes);
 
 }  // namespace bslam

@@ -1,4 +1,4 @@
-// Suggests the intended name for a misspelt one.
+// Suggestions for misspelt names.
 #pragma once
 
 #include <span>
@@ -7,13 +7,13 @@
 
 namespace bslam {
 
-// Levenshtein distance (1966): the smallest number of single-character insertions, deletions and replacements that turn
-// `a` into `b`.
+// The smallest number of single-character insertions, deletions and replacements that turn `a` into `b` (Levenshtein,
+// 1966).
 std::size_t edit_distance(std::string_view a, std::string_view b);
 
-// Returns the known name with the smallest edit distance to `name`; the first one on ties. A name without a dot is also
-// compared with the last component of dotted names, so that "levels" finds "features.levels". Returns an empty string
-// if `known` is empty.
+// The known name closest to `name`, the first among equally close ones. Empty if none is close enough to be a likely
+// misspelling: at most one edit for every three characters of the longer name, and at least one. A name without dots is
+// also compared with the last component of dotted names, so that "levels" finds "features.levels".
 std::string nearest_name(std::string_view name, std::span<const std::string> known);
 
 }  // namespace bslam

@@ -32,7 +32,7 @@ std::string range_text(const Range& range, bool integer) {
 
 bool within(double value, const Range& range) { return value >= range.low && value <= range.high; }
 
-// Each overload parses `text` and stores the value, or returns false and leaves the field unchanged.
+// Each overload parses the text and stores the value, or returns false and leaves the field unchanged.
 bool store(bool* field, const Range&, std::string_view text) {
   if (text != "true" && text != "false") return false;
   *field = text == "true";
@@ -66,12 +66,20 @@ bool store(const EnumField& field, const Range&, std::string_view text) {
   return true;
 }
 
+std::string suggestion_text(const std::string& nearest) {
+  if (nearest.empty()) return "; 'bslam settings --common' lists those that are commonly changed";
+  return "; did you mean '" + nearest + "'?";
+}
+
 }  // namespace
 
 void OptionTable::check_keys() const {
   std::set<std::string> seen;
   for (const Option& option : options_) {
     BSLAM_ASSERT(seen.insert(option.key).second, "an option is declared once");
+    if (!option.former_key.empty()) {
+      BSLAM_ASSERT(seen.insert(option.former_key).second, "a former key is declared once and no longer in use");
+    }
   }
 }
 
@@ -82,16 +90,27 @@ std::vector<std::string> OptionTable::keys() const {
 }
 
 const Option* OptionTable::find(std::string_view key) const {
-  const auto found = std::find_if(options_.begin(), options_.end(), [&](const Option& o) { return o.key == key; });
+  const auto found = std::find_if(options_.begin(), options_.end(), [&](const Option& o) {
+    return o.key == key || (!o.former_key.empty() && o.former_key == key);
+  });
   return found == options_.end() ? nullptr : &*found;
+}
+
+void OptionTable::warn_of_former_key(const Option& option) {
+  std::string warning = "setting '" + option.former_key + "' is now called '" + option.key +
+                        "'; the old name will stop working in the next release";
+  if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) {
+    warnings_.push_back(std::move(warning));
+  }
 }
 
 Status OptionTable::set(std::string_view key, std::string_view text) {
   const Option* option = find(key);
   if (option == nullptr) {
-    const std::string nearest = nearest_name(key, keys());
-    return Error{"", std::string(key), "an unknown key", nearest.empty() ? "no keys" : "perhaps " + nearest};
+    return Error{"", std::string(key), "an unknown key", "a setting of 'bslam settings'",
+                 "unknown setting '" + std::string(key) + "'" + suggestion_text(nearest_name(key, keys()))};
   }
+  if (key == option->former_key) warn_of_former_key(*option);
   const bool stored = std::visit([&](const auto& field) { return store(field, option->range, text); }, option->field);
   if (stored) return {};
   return Error{"", option->key, text.empty() ? "nothing" : std::string(text), expected_text(*option)};

@@ -1,5 +1,5 @@
-// A flat table over any struct of options that has a `visit` (base/options.h). Options are addressed by dotted keys,
-// and their values are converted to and from text.
+// A flat table of the options of any struct with a `visit` (base/options.h): dotted keys, and conversion of values to
+// and from text.
 #pragma once
 
 #include <string>
@@ -14,10 +14,10 @@
 
 namespace bslam {
 
-// A type-erased field of an enumeration type. Values are given as positions in `names`.
+// A field of an enumeration type, with the type erased: values are positions in `names`.
 struct EnumField {
   void* field = nullptr;
-  int (*get)(const void* field) = nullptr;  // returns -1 if the value has no name
+  int (*get)(const void* field) = nullptr;  // -1 if the value has no name
   void (*set)(void* field, int position) = nullptr;
   std::vector<std::string_view> names;
 };
@@ -28,11 +28,13 @@ struct Option {
   Range range;  // numeric options only
   std::string unit;
   std::string help;
+  bool common = false;     // in the supported set of docs/settings.md; all others are advanced
+  std::string former_key;  // the key before it was renamed, still accepted; empty if it never was
 };
 
 class OptionTable {
  public:
-  // Keeps references into `options`, which must outlive the table and must not move. Every key must be unique.
+  // Refers to `options`, which must outlive the table and must not move. Every key occurs once.
   template <class Options>
   explicit OptionTable(Options& options) {
     Collector collector{*this, ""};
@@ -43,12 +45,16 @@ class OptionTable {
   // The options in the order of `visit`.
   const std::vector<Option>& options() const { return options_; }
   std::vector<std::string> keys() const;
+  // By current or former key; null if there is no such option.
   const Option* find(std::string_view key) const;
 
-  // Sets one option from text. Errors: an unknown key (the message suggests the nearest one), text of the wrong type,
-  // NaN or infinity, a value out of range, an unknown enumerator. On error the field is unchanged. Error::file is left
-  // empty.
+  // Sets one option from text. Errors: unknown key (with a suggestion if one is close), text of another type, NaN or
+  // infinity, value out of range, unknown name of an enumeration. The field keeps its value on error; Error.file is
+  // left empty. Setting an option by its former key works and adds a warning.
   Status set(std::string_view key, std::string_view text);
+
+  // One sentence for every former key that was set, in order of first use.
+  const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
   struct Collector {
@@ -56,8 +62,10 @@ class OptionTable {
     std::string prefix;  // empty, or ends with a dot
 
     template <class Field>
-    void operator()(std::string_view name, Field& field, Range range, std::string_view unit, std::string_view help) {
-      Option option{prefix + std::string(name), {}, range, std::string(unit), std::string(help)};
+    void operator()(std::string_view name, Field& field, Range range, std::string_view unit, std::string_view help,
+                    OptionNote note = {}) {
+      Option option{prefix + std::string(name), {}, range, std::string(unit), std::string(help), note.common, {}};
+      if (!note.formerly.empty()) option.former_key = prefix + std::string(note.formerly);
       if constexpr (std::is_enum_v<Field>) {
         option.field = enum_field(field);
       } else {
@@ -93,14 +101,16 @@ class OptionTable {
   }
 
   void check_keys() const;
+  void warn_of_former_key(const Option& option);
 
   std::vector<Option> options_;
+  std::vector<std::string> warnings_;
 };
 
-// Returns the value as text that OptionTable::set parses back exactly.
+// The value as text, from which `OptionTable::set` restores exactly the same value.
 std::string value_text(const Option& option);
 
-// Describes the accepted values, for example "an integer in [1, 20]" or "one of: fast, realtime".
+// The accepted values in words: "an integer in [1, 20]", "one of: fast, realtime".
 std::string expected_text(const Option& option);
 
 }  // namespace bslam

@@ -1,6 +1,5 @@
-// Each option is declared once, in the struct of its stage, with its name, default, range, unit and help text. YAML
-// files, the command line and the resolved configuration of a run are all derived from the function `visit` (see
-// base/option_table.h).
+// Options are declared once: name, default, range, unit and help text are given in the options struct of a stage. The
+// YAML reader, the command line and the configuration written by a run all use its `visit` (see base/option_table.h).
 //
 //   enum class Pace { kFast, kRealtime };
 //   template <>
@@ -9,20 +8,21 @@
 //   };
 //
 //   struct FooOptions {
-//     int rounds = 4;  // solver rounds, with outlier classification between them
+//     int rounds = 4;  // optimisation rounds, with reclassification of outliers between them
 //     Pace pace = Pace::kFast;
-//     BarOptions bar;  // nested options, with a `visit` of their own
+//     BarOptions bar;  // nested options, with a visit of their own
 //     template <class Self, class Visitor>
 //     static void visit(Self& self, Visitor& visitor) {
-//       visitor("rounds", self.rounds, Range{1, 20}, "", "solver rounds, with outlier classification between them");
-//       visitor("pace", self.pace, Range{}, "", "how images are fed");
+//       visitor("rounds", self.rounds, Range{1, 20}, "", "optimisation rounds", OptionNote{.formerly = "repeats"});
+//       visitor("pace", self.pace, Range{}, "", "speed at which images are fed", kCommon);
 //       visitor.section("bar", self.bar);
 //     }
 //   };
 //
-// A visitor is called as `visitor(name, field, Range, unit, help)` for every option of type bool, int, double,
+// A visitor is called as `visitor(name, field, Range, unit, help)` for every option, which is a bool, int, double,
 // std::string or an enumeration with EnumNames, and as `visitor.section(name, field)` for nested options, whose keys
-// become "name.key". Names are snake_case without dots. `Self` is const if the visitor only reads.
+// become "name.key". Names are snake_case without dots. An optional last argument is an OptionNote. `Self` is const if
+// the visitor only reads.
 #pragma once
 
 #include <limits>
@@ -30,11 +30,18 @@
 
 namespace bslam {
 
-// Closed interval of valid values of a numeric option. Values outside are rejected with an error that names the key.
+// Closed interval of accepted values of a number. Values outside are refused with an error that names the option.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
 };
+
+// What is known of an option beyond its value.
+struct OptionNote {
+  bool common = false;             // in the supported set of docs/settings.md; all other options are advanced
+  std::string_view formerly = {};  // its previous name in the same section, still accepted for one release
+};
+inline constexpr OptionNote kCommon{.common = true};
 
 template <class E>
 struct EnumName {
@@ -42,7 +49,7 @@ struct EnumName {
   std::string_view name;
 };
 
-// Specialised for every enumeration used as an option: `kNames` is an array of EnumName<E> that lists every value once.
+// Specialised for every enumeration that is an option: `kNames` is an array of EnumName<E> with every value once.
 template <class E>
 struct EnumNames;
 

@@ -1,4 +1,5 @@
-// Errors as return values: Error describes a problem caused by user input or the environment. It is shown as one line.
+// Errors as values: everything a user or a file can cause is returned as an Error, which the command line prints as one
+// line.
 #pragma once
 
 #include <optional>
@@ -10,18 +11,20 @@
 
 namespace bslam {
 
-// One problem with the user's input: where it is, what was found, and what was expected.
+// One problem with the user's input: where it is, what was found there and what was expected.
 struct Error {
-  std::string file;      // file, folder or command-line option; may be empty
-  std::string key;       // key, line or section within the file; may be empty
-  std::string found;     // the actual value
-  std::string expected;  // the expected value
+  std::string file;           // file, folder or command-line option; may be empty
+  std::string key;            // key, line or part within the file; may be empty
+  std::string found;          // what the input holds
+  std::string expected;       // what would be accepted
+  std::string sentence = {};  // message in place of "found X, expected Y", where a sentence reads better; may be empty
 
-  // "FILE: KEY: found X, expected Y" on one line. Empty fields are omitted and control characters are replaced.
+  // One line: "FILE: KEY: found X, expected Y", or "FILE: KEY: SENTENCE". Empty parts are left out, and so are file and
+  // key where the sentence names them itself. Control characters are replaced by spaces.
   std::string message() const;
 };
 
-// Either a value or an Error. Accessing the one that is absent is an assertion failure.
+// A value or an Error. Accessing the alternative that is not held is an assertion failure.
 template <class T>
 class [[nodiscard]] Result {
  public:

@@ -26,8 +26,8 @@ struct RigRefinementOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("check", self.check, Range{}, "",
-            "at the end of a run, report cameras whose estimated extrinsics differ from the calibration");
-    visitor("refine", self.refine, Range{}, "", "at the end of a run, accept the estimated extrinsics");
+            "at the end of a run, report cameras whose estimated extrinsics differ from the calibration", kCommon);
+    visitor("refine", self.refine, Range{}, "", "at the end of a run, accept the estimated extrinsics", kCommon);
     visitor("keyframes", self.keyframes, Range{10, 500}, "", "maximum number of keyframes used");
     visitor("landmarks", self.landmarks, Range{100, 1e5}, "", "maximum number of landmarks used");
     visitor("calibration_deg", self.calibration_deg, Range{1e-3, 20}, "deg",

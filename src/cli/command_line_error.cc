@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/nearest_name.h"
@@ -9,7 +10,7 @@
 namespace bslam::cli {
 namespace {
 
-// The verb that was chosen last: `map info` within `map`.
+// The innermost command that was recognised: for `bslam map info`, this is `info`.
 const CLI::App& chosen(const CLI::App& app) {
   const auto verbs = app.get_subcommands();
   return verbs.empty() ? app : chosen(*verbs.back());
@@ -36,23 +37,34 @@ std::string path_of(const CLI::App& verb) {
 
 bool is_option(const std::string& word) { return word.size() > 1 && word.front() == '-' && word != "--"; }
 
+Error sentence_error(std::string sentence) {
+  Error error;
+  error.sentence = std::move(sentence);
+  return error;
+}
+
 }  // namespace
 
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& verb = chosen(app);
+  const std::string see_help = "see " + path_of(verb) + " --help";
+  const auto hint = [&](const std::string& nearest) {
+    return nearest.empty() ? "; " + see_help : "; did you mean '" + nearest + "'?";
+  };
   const std::vector<std::string> unknown = app.remaining(true);
   const auto word = std::ranges::find_if_not(unknown, is_option);
   const std::vector<std::string> verbs = verbs_of(verb);
   if (word != unknown.end() && !verbs.empty()) {
-    return {"command line", *word, "an unknown verb", "perhaps " + nearest_name(*word, verbs)};
+    return sentence_error("unknown command '" + *word + "'" + hint(nearest_name(*word, verbs)));
   }
   const auto option = std::ranges::find_if(unknown, is_option);
   if (option != unknown.end()) {
     const std::string name = option->substr(0, option->find('='));
     const std::string nearest = nearest_name(name, options_of(verb));
-    return {"command line", name, "an unknown option", nearest == name ? "it after the verb" : "perhaps " + nearest};
+    if (nearest == name) return sentence_error("option '" + name + "' must follow the command");
+    return sentence_error("unknown option '" + name + "'" + hint(nearest));
   }
-  return {"command line", std::string(error.what()) + " (see " + path_of(verb) + " --help)", "", ""};
+  return sentence_error(std::string(error.what()) + " (" + see_help + ")");
 }
 
 }  // namespace bslam::cli

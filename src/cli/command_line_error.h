@@ -1,4 +1,4 @@
-// What is wrong with a command line, in the words of all other errors.
+// Turns errors of the command line parser into the error type of the program.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,7 +7,8 @@
 
 namespace bslam::cli {
 
-// The first verb or else option nobody knows, with the nearest that exists; where all are known, what the parser says.
+// Names the first unknown command or option, and suggests an existing one if its name is close. Other errors are
+// reported in the words of the parser.
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace bslam::cli

@@ -1,12 +1,17 @@
 #include "cli/config_arguments.h"
 
+#include <cstdio>
+
 #include "yaml/config_file.h"
 
 namespace bslam::cli {
 
 void add_config_options(CLI::App& verb, ConfigArguments& arguments) {
-  verb.add_option("--config", arguments.file, "settings in YAML, as config.yaml of an earlier run");
-  verb.add_option("--set", arguments.settings, "key=value, over the file; repeats")->expected(1)->take_all();
+  verb.add_option("--config", arguments.file, "settings in YAML, such as the config.yaml of an earlier run");
+  verb.add_option("--set", arguments.settings,
+                  "a setting as key=value, which overrides the file; may be repeated; see bslam settings")
+      ->expected(1)
+      ->take_all();
 }
 
 Result<system::Config> resolve_config(const ConfigArguments& arguments) {
@@ -18,6 +23,7 @@ Result<system::Config> resolve_config(const ConfigArguments& arguments) {
   for (const std::string& setting : arguments.settings) {
     if (const Status s = yaml::apply_setting(table, setting); !s) return s.error();
   }
+  for (const std::string& warning : table.warnings()) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   return config;
 }
 

@@ -1,4 +1,4 @@
-// The options that change settings, shared by the verbs that run stages.
+// The command-line options that change settings, shared by the commands that run the SLAM system.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -17,7 +17,8 @@ struct ConfigArguments {
 
 void add_config_options(CLI::App& verb, ConfigArguments& arguments);
 
-// Defaults, then the file, then the single settings. Errors: what io/config_file.h refuses.
+// The defaults, overridden by the file, overridden by single settings. Prints a warning for every former name of a
+// setting. Errors: those of yaml/config_file.h.
 Result<system::Config> resolve_config(const ConfigArguments& arguments);
 
 }  // namespace bslam::cli

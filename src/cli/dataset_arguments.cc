@@ -8,12 +8,12 @@ namespace {
 
 Result<std::vector<int>> parse_cameras(const std::string& text) {
   std::vector<int> cameras;
-  std::istringstream parts(text + ",");  // an empty last number is found as well
+  std::istringstream parts(text + ",");  // the added comma makes an empty last number an error as well
   for (std::string part; std::getline(parts, part, ',');) {
     int value = -1;
     const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
     if (error != std::errc() || end != part.data() + part.size() || value < 0) {
-      return Error{"command line", "--cameras", "'" + text + "'", "camera numbers with commas between, such as 0,1"};
+      return Error{"command line", "--cameras", "'" + text + "'", "camera numbers separated by commas, such as 0,1"};
     }
     cameras.push_back(value);
   }
@@ -24,14 +24,14 @@ Result<std::vector<int>> parse_cameras(const std::string& text) {
 
 void add_dataset_options(CLI::App& verb, DatasetArguments& a) {
   verb.add_option("DATA", a.path, "folder of the data set")->required();
-  verb.add_option("--format", a.format, "how it is laid out")
+  verb.add_option("--format", a.format, "data set format")
       ->check(CLI::IsMember({"auto", "euroc", "kitti", "folder"}))
       ->capture_default_str();
-  verb.add_option("--rig", a.rig, "calibration; default: what DATA carries");
+  verb.add_option("--rig", a.rig, "calibration file; default: the calibration in DATA");
   verb.add_option("--cameras", a.cameras,
-                  "cameras of the rig to use, in this order, such as 0,1; the first is camera 0 of the run");
-  verb.add_option("--begin", a.begin_s, "seconds from the first image");
-  verb.add_option("--end", a.end_s, "seconds from the first image");
+                  "cameras of the rig to use, in this order, such as 0,1; the first becomes camera 0 of the run");
+  verb.add_option("--begin", a.begin_s, "start of the part to use, in seconds after the first image");
+  verb.add_option("--end", a.end_s, "end of the part to use, in seconds after the first image");
 }
 
 Result<dataset::DatasetRequest> dataset_request(const DatasetArguments& a, double sync_tolerance_s) {

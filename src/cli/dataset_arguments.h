@@ -1,4 +1,4 @@
-// The options that say which data to read, shared by the verbs that read a data set.
+// The command-line options that select the input, shared by the commands that read a data set.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,13 +11,13 @@ namespace bslam::cli {
 
 struct DatasetArguments {
   std::string path, format = "auto", rig;
-  std::optional<std::string> cameras;  // absent: all
+  std::optional<std::string> cameras;  // all cameras if absent
   std::optional<double> begin_s, end_s;
 };
 
 void add_dataset_options(CLI::App& verb, DatasetArguments& arguments);
 
-// Errors: a list of cameras that is none.
+// Errors: a malformed list of cameras.
 Result<dataset::DatasetRequest> dataset_request(const DatasetArguments& arguments, double sync_tolerance_s);
 
 }  // namespace bslam::cli

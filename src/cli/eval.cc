@@ -1,4 +1,4 @@
-// bslam eval: errors of a trajectory against ground truth.
+// bslam eval: errors of an estimated trajectory with respect to ground truth.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -40,14 +40,14 @@ AlignMode align_mode(const std::string& name) {
   return name == "none" ? AlignMode::kNone : AlignMode::kSe3;
 }
 
-// The estimate as poses of the body, where the ground truth is that: T_world_body = T_world_cam * T_cam_body.
+// The estimate in the frame of the ground truth. If that is the body: T_world_body = T_world_cam * T_cam_body.
 Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& arguments) {
   if (arguments.gt_frame != "body") return estimate;
   if (!arguments.rig) {
     return Error{.file = "command line",
                  .key = "--gt-frame body",
                  .found = "no --rig",
-                 .expected = "--rig FILE, for the camera's place on the body"};
+                 .expected = "--rig FILE with the pose of the camera on the body"};
   }
   const auto rig = rig_formats::read_rig(*arguments.rig);
   if (!rig) return rig.error();
@@ -55,7 +55,7 @@ Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& a
     return Error{.file = arguments.rig->string(),
                  .key = "--camera",
                  .found = std::to_string(arguments.camera),
-                 .expected = fmt::format("one of its {} cameras, from 0", rig->size())};
+                 .expected = fmt::format("a camera number below {}", rig->size())};
   }
   const auto camera = static_cast<std::size_t>(arguments.camera);
   return evaluation::moved_to_frame(estimate, rig->body_from_cam(camera).inverse());
@@ -89,7 +89,7 @@ std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& argum
     return fmt::format("{:<24}{}\n", name, value);
   };
   const auto errors = [](const evaluation::ErrorStatistics& s, std::string_view unit) {
-    if (s.count == 0) return std::string("no pairs of poses so far apart in time");
+    if (s.count == 0) return std::string("no two poses are this far apart in time");
     return fmt::format("rmse {:.6f}  mean {:.6f}  median {:.6f}  max {:.6f}  {}  ({})", s.rmse, s.mean, s.median, s.max,
                        unit, s.count);
   };
@@ -103,7 +103,7 @@ std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& argum
 }
 
 Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
-  for (const double value : {arguments.max_dt_s, arguments.delta_s}) {  // CLI11 lets NaN pass as within any range
+  for (const double value : {arguments.max_dt_s, arguments.delta_s}) {  // CLI11 accepts NaN in any range
     if (std::isfinite(value)) continue;
     return Error{.file = "command line", .key = "--max-dt, --delta", .found = "not a number", .expected = "seconds"};
   }
@@ -112,9 +112,9 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
   const auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
   if (!ground_truth) return ground_truth.error();
   if (arguments.gt_frame == "cam0" && std::filesystem::path(arguments.ground_truth).extension() == ".csv") {
-    std::fprintf(
-        stderr,
-        "note: EuRoC ground truth is that of the body; to compare with a camera give --gt-frame body --rig FILE\n");
+    std::fprintf(stderr,
+                 "note: EuRoC ground truth holds poses of the body; use --gt-frame body --rig FILE to compare it with "
+                 "a camera\n");
   }
   const auto estimate = in_frame_of_truth(std::move(read).value(), arguments);
   if (!estimate) return estimate.error();
@@ -148,28 +148,31 @@ int run_eval(const EvalArguments& arguments) {
 
 void add_eval(CLI::App& app, int& exit_status) {
   const auto arguments = std::make_shared<EvalArguments>();
-  CLI::App* verb = app.add_subcommand("eval", "trajectory error against ground truth: ATE, RPE, coverage");
+  CLI::App* verb = app.add_subcommand("eval", "trajectory error with respect to ground truth: ATE, RPE, coverage");
   verb->add_option("EST", arguments->estimate, "estimated trajectory: TUM, EuRoC csv or KITTI poses")->required();
-  verb->add_option("GT", arguments->ground_truth, "true trajectory, in any of these formats")->required();
-  verb->add_option("--align", arguments->align, "how the estimate is moved onto the truth first")
+  verb->add_option("GT", arguments->ground_truth, "ground truth trajectory, in any of these formats")->required();
+  verb->add_option("--align", arguments->align, "alignment of the estimate to ground truth")
       ->check(CLI::IsMember({"se3", "sim3", "none"}))
       ->capture_default_str();
-  verb->add_option("--max-dt", arguments->max_dt_s, "seconds up to which poses belong together; the nearest counts")
+  verb->add_option(
+          "--max-dt", arguments->max_dt_s,
+          "largest time difference in seconds between an estimated pose and the ground truth pose it is compared with")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  verb->add_option("--gt-frame", arguments->gt_frame, "whose poses the ground truth has; body needs --rig")
+  verb->add_option("--gt-frame", arguments->gt_frame, "frame of the ground truth poses; body needs --rig")
       ->check(CLI::IsMember({"cam0", "body"}))
       ->capture_default_str();
-  verb->add_option("--rig", arguments->rig, "calibration with the camera's place on the body");
-  verb->add_option("--camera", arguments->camera, "the rig's camera that the estimate calls camera 0")
+  verb->add_option("--rig", arguments->rig, "calibration with the pose of the camera on the body");
+  verb->add_option("--camera", arguments->camera, "camera of the rig whose poses are estimated, if it is not the first")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  verb->add_option("--delta", arguments->delta_s, "seconds over which relative errors are taken")
+  verb->add_option("--delta", arguments->delta_s, "time in seconds between the two poses of a relative error (RPE)")
       ->check(CLI::Range(1e-6, 1e6))
       ->capture_default_str();
-  verb->add_option("--times", arguments->times, "times of KITTI poses, one a line; default: times.txt beside them");
+  verb->add_option("--times", arguments->times,
+                   "time stamps of KITTI poses, one per line; default: times.txt in their folder");
   verb->add_flag("--json", arguments->json, "JSON instead of a table");
-  verb->add_option("--plot", arguments->plot, "write an SVG with views of the paths and the error over time");
+  verb->add_option("--plot", arguments->plot, "write an SVG with both paths and the error over time to this file");
   verb->callback([arguments, &exit_status] { exit_status = run_eval(*arguments); });
 }
 

@@ -1,4 +1,4 @@
-// bslam inspect: the BundledFrame of one input frame, as JSON.
+// bslam inspect: writes the BundledFrame of one input frame as JSON.
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -72,9 +72,9 @@ int inspect(const InspectArguments& arguments) {
 void add_inspect(CLI::App& app, int& exit_status) {
   const auto a = std::make_shared<InspectArguments>();
   CLI::App* verb =
-      app.add_subcommand("inspect", "the BundledFrame of one input frame: keypoints and the Bundled table");
+      app.add_subcommand("inspect", "write the BundledFrame of one input frame: its keypoints and the Bundled table");
   add_dataset_options(*verb, a->data);
-  verb->add_option("--frame", a->frame, "number of the input frame, from 0")->required();
+  verb->add_option("--frame", a->frame, "index of the input frame, counted from 0")->required();
   verb->add_option("--out", a->out, "JSON file to write")->required();
   add_config_options(*verb, a->config);
   verb->callback([a, &exit_status] { exit_status = inspect(*a); });

@@ -7,7 +7,8 @@
 namespace bslam::cli {
 namespace {
 
-// A handler can reach nothing else and may do hardly more than post: to stop something takes locks. So a thread waits.
+// Posting a semaphore is one of the few things a signal handler may do. Requesting a stop takes locks, so a thread
+// waits for the semaphore and does that.
 sem_t g_signalled;
 
 void on_signal(int) { ::sem_post(&g_signalled); }
@@ -19,7 +20,7 @@ Interruption::Interruption() {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   listener_ = std::jthread([this] {
-    while (::sem_wait(&g_signalled) != 0) {  // woken by another signal
+    while (::sem_wait(&g_signalled) != 0) {  // interrupted by another signal
     }
     if (!over_) source_.request_stop();
   });

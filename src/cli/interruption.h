@@ -1,4 +1,4 @@
-// SIGINT and SIGTERM as a stop token.
+// Turns SIGINT and SIGTERM into a stop token.
 #pragma once
 
 #include <atomic>
@@ -7,7 +7,8 @@
 
 namespace bslam::cli {
 
-// While one lives, and after it, the signals no longer end the program. One at a time.
+// Once an object has been created, the signals no longer end the program, even after its destruction. Only one object
+// may exist at a time.
 class Interruption {
  public:
   Interruption();
@@ -15,13 +16,13 @@ class Interruption {
   Interruption(const Interruption&) = delete;
   Interruption& operator=(const Interruption&) = delete;
 
-  // Stopped by the first signal.
+  // Stop is requested by the first signal.
   std::stop_token token() const { return source_.get_token(); }
 
  private:
   std::stop_source source_;
   std::atomic<bool> over_ = false;
-  std::jthread listener_;  // last: it uses the rest
+  std::jthread listener_;  // declared last, since it uses the other members
 };
 
 }  // namespace bslam::cli

@@ -1,17 +1,20 @@
-// bslam map: saved maps described, exported and merged.
+// bslam map: describes, exports and merges saved maps.
 #include <fmt/format.h>
 
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/atomic_file.h"
 #include "cli/config_arguments.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
+#include "dataset/dataset.h"
 #include "evaluation/trajectory_file.h"
 #include "rig_formats/rig_file.h"
 #include "session/merge_maps.h"
@@ -26,10 +29,15 @@ namespace {
 namespace fs = std::filesystem;
 
 struct MapArguments {
-  std::string file, other, out, vocabulary;
+  std::string file, other, out, vocabulary, images, rig;
   ConfigArguments config;
   bool json = false, overwrite = false;
 };
+
+// "1 submap", "2 submaps".
+std::string counted(std::size_t count, std::string_view name) {
+  return fmt::format("{} {}{}", count, name, count == 1 ? "" : "s");
+}
 
 std::string vocabulary_name(std::uint64_t id) { return id == 0 ? "none" : fmt::format("{:016x}", id); }
 
@@ -79,9 +87,10 @@ void print_info(const storage::SavedMap& saved, std::uintmax_t file_bytes) {
   const std::vector<storage::MapPart> parts = storage::map_parts(map);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const TimeNs from = storage::first_time(map, parts[i]), to = storage::last_time(map, parts[i]);
-    text += fmt::format("part {}: {} keyframes over {:.1f} x {:.1f} x {:.1f} {}, {} landmarks, {:.3f} s to {:.3f} s\n",
-                        i, parts[i].keyframes.size(), parts[i].extent.x(), parts[i].extent.y(), parts[i].extent.z(),
-                        unit, parts[i].landmarks, to_seconds(from), to_seconds(to));
+    text +=
+        fmt::format("submap {}: {} keyframes over {:.1f} x {:.1f} x {:.1f} {}, {} landmarks, {:.3f} s to {:.3f} s\n", i,
+                    parts[i].keyframes.size(), parts[i].extent.x(), parts[i].extent.y(), parts[i].extent.z(), unit,
+                    parts[i].landmarks, to_seconds(from), to_seconds(to));
   }
   std::fputs(text.c_str(), stdout);
 }
@@ -99,7 +108,32 @@ int map_info(const MapArguments& arguments) {
   return kExitOk;
 }
 
-Status write_exports(const map::BundledMap& map, const fs::path& folder) {
+// Names the images of the map by their files in a data set. Without a data set, or for images that are not in it, the
+// default names are used.
+Result<storage::ImageNamer> image_namer(const camera::Rig& rig, const MapArguments& arguments) {
+  if (arguments.images.empty()) return storage::ImageNamer();
+  constexpr double kTolerance_s = 0.1;  // includes images of cameras that are not synchronised
+  dataset::DatasetRequest request{.path = arguments.images, .sync_tolerance_s = kTolerance_s};
+  if (!arguments.rig.empty()) request.rig_file = arguments.rig;
+  const auto data = dataset::open_dataset(request);
+  if (!data) return data.error();
+  std::map<std::pair<std::string, TimeNs>, std::string> names;  // by camera and time stamp
+  for (const dataset::FrameEntry& frame : data->frames) {
+    for (std::size_t c = 0; c < frame.images.size(); ++c) {
+      if (!frame.images[c]) continue;
+      const camera::Camera& camera = data->rig.camera(c);
+      names[{camera.name, frame.images[c]->time_ns - camera.time_offset_ns}] =
+          frame.images[c]->path.lexically_relative(arguments.images).string();
+    }
+  }
+  return storage::ImageNamer([&rig, names = std::move(names)](std::size_t c, TimeNs stamp_ns) {
+    const std::string& camera = rig.camera(c).name;
+    const auto found = names.find({camera, stamp_ns});
+    return found != names.end() ? found->second : fmt::format("{}/{}.png", camera, stamp_ns);
+  });
+}
+
+Status write_exports(const map::BundledMap& map, const storage::ImageNamer& namer, const fs::path& folder) {
   if (Status s = write_atomically(folder / "points.ply", storage::landmarks_ply(map)); !s) return s;
   if (Status s = rig_formats::write_rig(map.rig(), folder / "rig.yaml"); !s) return s;
   const std::string header = evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal);
@@ -111,9 +145,9 @@ Status write_exports(const map::BundledMap& map, const fs::path& folder) {
         !s)
       return s;
   }
-  const auto model = storage::colmap_model(map);
-  if (!model) {  // the rest is worth having
-    std::fprintf(stderr, "bslam: no COLMAP model: %s\n", model.error().message().c_str());
+  const auto model = storage::colmap_model(map, namer);
+  if (!model) {  // the other files are still useful
+    std::fprintf(stderr, "warning: no COLMAP model was written: %s\n", model.error().message().c_str());
     return {};
   }
   if (Status s = write_atomically(folder / "cameras.txt", model->cameras); !s) return s;
@@ -124,17 +158,20 @@ Status write_exports(const map::BundledMap& map, const fs::path& folder) {
 int map_export(const MapArguments& arguments) {
   const auto saved = storage::read_map(arguments.file);
   if (!saved) return report_error(saved.error());
+  const auto namer = image_namer(saved->map.rig(), arguments);
+  if (!namer) return report_error(namer.error());
   std::error_code error;
   if (fs::exists(arguments.out, error)) {
     const bool folder = fs::is_directory(arguments.out, error);
     if (!folder) return report_error({arguments.out, "--out", "a file", "a folder"});
     if (!fs::is_empty(arguments.out, error) && !arguments.overwrite) {
-      return report_error({arguments.out, "--out", "a folder that is not empty", "a new one, or --overwrite"});
+      return report_error(
+          {arguments.out, "--out", "a folder that is not empty", "an empty or new folder, or --overwrite"});
     }
   }
   fs::create_directories(arguments.out, error);
-  if (error) return report_error({arguments.out, "--out", error.message(), "a folder that can be made"});
-  const Status status = write_exports(saved->map, arguments.out);
+  if (error) return report_error({arguments.out, "--out", error.message(), "a folder that can be created"});
+  const Status status = write_exports(saved->map, *namer, arguments.out);
   if (!status) return report_error(status.error());
   std::printf("%s: %zu keyframes, %zu landmarks\n", arguments.out.c_str(), saved->map.num_keyframes(),
               saved->map.num_landmarks());
@@ -148,7 +185,7 @@ int map_merge(const MapArguments& arguments) {
   if (!vocabulary) return report_error(vocabulary.error());
   std::error_code error;
   if (fs::exists(arguments.out, error) && !arguments.overwrite) {
-    return report_error({arguments.out, "--out", "a file that exists", "a new one, or --overwrite"});
+    return report_error({arguments.out, "--out", "a file that exists", "a new file, or --overwrite"});
   }
   const auto a = storage::read_map(arguments.file);
   if (!a) return report_error(a.error());
@@ -159,9 +196,10 @@ int map_merge(const MapArguments& arguments) {
   const storage::MapFileInfo info{(*vocabulary)->id(), version_number(),
                                   fmt::format("{} + {}", a->info.data, b->info.data)};
   if (const Status s = storage::write_map(merged->map, info, arguments.out); !s) return report_error(s.error());
-  std::printf("%zu keyframes, %zu landmarks; %d parts joined, %d more common places, %zu %s\n%s\n",
-              merged->map.num_keyframes(), merged->map.num_landmarks(), merged->joined, merged->loops, merged->parts,
-              merged->parts == 1 ? "part in all" : "parts left apart", arguments.out.c_str());
+  fmt::print("{} keyframes, {} landmarks; merged {}, {}, {} left\n{}\n", merged->map.num_keyframes(),
+             merged->map.num_landmarks(), counted(static_cast<std::size_t>(merged->joined), "submap"),
+             counted(static_cast<std::size_t>(merged->loops), "further loop closure"), counted(merged->parts, "submap"),
+             arguments.out);
   return kExitOk;
 }
 
@@ -172,23 +210,27 @@ void add_map(CLI::App& app, int& exit_status) {
   CLI::App* map = app.add_subcommand("map", "describe, export and merge saved maps");
   map->require_subcommand(1);
 
-  CLI::App* info = map->add_subcommand("info", "cameras, size, parts, scale, extent and times");
+  CLI::App* info = map->add_subcommand("info", "print cameras, size, submaps, scale, extent and times of a map");
   info->add_option("FILE", arguments->file, "a saved map")->required();
-  info->add_flag("--json", arguments->json, "as JSON");
+  info->add_flag("--json", arguments->json, "print JSON");
   info->callback([arguments, &exit_status] { exit_status = map_info(*arguments); });
 
-  CLI::App* out = map->add_subcommand("export", "points.ply, keyframes.tum, rig.yaml and a COLMAP text model");
+  CLI::App* out = map->add_subcommand("export", "write points.ply, keyframes.tum, rig.yaml and a COLMAP text model");
   out->add_option("FILE", arguments->file, "a saved map")->required();
   out->add_option("--out", arguments->out, "folder to write to")->required();
-  out->add_flag("--overwrite", arguments->overwrite, "the folder may exist");
+  out->add_option("--images", arguments->images,
+                  "the data set of the map: the COLMAP model then names images by their files in it");
+  out->add_option("--rig", arguments->rig, "calibration of the data set, as for bslam run");
+  out->add_flag("--overwrite", arguments->overwrite, "write into a folder that is not empty");
   out->callback([arguments, &exit_status] { exit_status = map_export(*arguments); });
 
-  CLI::App* merge = map->add_subcommand("merge", "maps of separate runs made one over the places they share");
-  merge->add_option("A", arguments->file, "a saved map; the other is moved into its world")->required();
+  CLI::App* merge = map->add_subcommand("merge", "merge maps of separate runs that show common places");
+  merge->add_option("A", arguments->file, "a saved map, whose world frame is kept")->required();
   merge->add_option("B", arguments->other, "a saved map of the same rig")->required();
-  merge->add_option("--out", arguments->out, "file for both together")->required();
-  merge->add_option("--vocabulary", arguments->vocabulary, "the maps were made with; default: the one of the program");
-  merge->add_flag("--overwrite", arguments->overwrite, "the file may exist");
+  merge->add_option("--out", arguments->out, "file for the merged map")->required();
+  merge->add_option("--vocabulary", arguments->vocabulary,
+                    "vocabulary with which the maps were made; default: the one shipped with this program");
+  merge->add_flag("--overwrite", arguments->overwrite, "replace an existing file");
   add_config_options(*merge, arguments->config);
   merge->callback([arguments, &exit_status] { exit_status = map_merge(*arguments); });
 }

@@ -1,4 +1,4 @@
-// A progress bar on stderr, where that is a terminal.
+// A progress bar on stderr, shown only if stderr is a terminal.
 #pragma once
 
 #include <chrono>
@@ -10,7 +10,7 @@ namespace bslam::cli {
 class ProgressBar {
  public:
   ProgressBar(bool wanted, std::string unit);
-  void show(std::size_t done, std::size_t all);  // redraws at most ten times a second
+  void show(std::size_t done, std::size_t all);  // redrawn at most ten times per second
   void finish();                                 // ends the line
 
  private:

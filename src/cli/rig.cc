@@ -1,4 +1,4 @@
-// bslam rig: describe, check and convert a rig calibration.
+// bslam rig: describes, checks and converts a rig calibration.
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -59,7 +59,7 @@ int rig_convert(const ConvertArguments& arguments) {
   if (!rig) return report_error(rig.error());
   const auto there = rig_formats::files_in_the_way(format, arguments.out);
   if (!there.empty() && !arguments.overwrite) {
-    return report_error({there.front().string(), "", "a calibration there already", "a new name, or --overwrite"});
+    return report_error({there.front().string(), "", "an existing calibration", "a new name, or --overwrite"});
   }
   const auto notes = rig_formats::write_rig_as(*rig, format, arguments.out);
   if (!notes) return report_error(notes.error());
@@ -72,12 +72,12 @@ int rig_convert(const ConvertArguments& arguments) {
 
 void add_info(CLI::App& rig, int& exit_status) {
   const auto request = std::make_shared<session::RigReportRequest>();
-  CLI::App* info =
-      rig.add_subcommand("info", "cameras, fields of view, baselines, overlap, and what is probably wrong");
+  CLI::App* info = rig.add_subcommand(
+      "info", "print cameras, fields of view, baselines and overlaps, and warn about likely mistakes");
   info->add_option("FILE", request->file, "a calibration, or the folder of a data set")->required();
-  info->add_flag("--json", request->json, "as JSON");
-  info->add_option("--svg", request->svg, "draw the rig from above and from the side into this file");
-  info->add_option("--images", request->images, "a data set: test the extrinsics against its images");
+  info->add_flag("--json", request->json, "print JSON");
+  info->add_option("--svg", request->svg, "write a drawing of the rig from above and from the side to this SVG file");
+  info->add_option("--images", request->images, "test the extrinsics against the images of this data set");
   info->callback([request, &exit_status] { exit_status = rig_info(*request); });
 }
 
@@ -87,11 +87,11 @@ void add_convert(CLI::App& rig, int& exit_status) {
   convert->add_option("IN", arguments->in, "a calibration, or the folder of a data set")->required();
   convert
       ->add_option("OUT", arguments->out,
-                   "a file (bslam; .json: basalt), or a folder, ending in / where it is new (euroc)")
+                   "a file (.json: basalt, else bslam), or a folder (euroc); the name of a new folder must end in /")
       ->required();
   convert->add_option("--to", arguments->to, "format of OUT: " + joined_formats());
-  convert->add_option("--drop", arguments->drop, "give up what the format cannot hold: body, mask, time-offset");
-  convert->add_flag("--overwrite", arguments->overwrite, "OUT may exist");
+  convert->add_option("--drop", arguments->drop, "leave out what the format cannot store: body, mask, time-offset");
+  convert->add_flag("--overwrite", arguments->overwrite, "replace an existing calibration");
   convert->callback([arguments, &exit_status] { exit_status = rig_convert(*arguments); });
 }
 

@@ -1,4 +1,4 @@
-// bslam run: SLAM over a recorded data set.
+// bslam run: runs the SLAM system on a recorded data set.
 #include <chrono>
 #include <cstdio>
 #include <limits>
@@ -13,7 +13,9 @@
 #include "cli/dataset_arguments.h"
 #include "cli/interruption.h"
 #include "cli/progress_bar.h"
+#include "cli/run_log.h"
 #include "cli/run_messages.h"
+#include "cli/shell_command.h"
 #include "cli/verbs.h"
 #include "session/record_builder.h"
 #include "session/run_session.h"
@@ -23,20 +25,20 @@
 namespace bslam::cli {
 namespace {
 
-constexpr std::size_t kMaxJournalBytes = std::size_t{1} << 30;  // some weeks of frames
+constexpr std::size_t kMaxJournalBytes = std::size_t{1} << 30;  // enough for weeks of recording
 
 const auto g_program_start = std::chrono::steady_clock::now();
 
 struct RunArguments {
   DatasetArguments data;
   ConfigArguments config;
-  std::string out, mode, journal, replay, vocabulary, save_map, load_map, pace = "fast", late = "block",
-                                                                          progress = "auto";
+  std::string out, mode, journal, replay, vocabulary, save_map, load_map;
+  std::string pace = "fast", late = "block", progress = "auto", log_level = "warning";
   std::optional<int> seed;
   bool no_loop = false, localize_only = false, no_final_ba = false, overwrite = false;
 };
 
-// The options of the command line win over file and single settings.
+// Options of their own override --config and --set.
 Result<system::Config> resolve_run_config(const RunArguments& arguments) {
   auto resolved = resolve_config(arguments.config);
   if (!resolved) return resolved;
@@ -51,18 +53,18 @@ Result<system::Config> resolve_run_config(const RunArguments& arguments) {
   if (arguments.no_loop) config.looping.loop.enabled = false;
   if (arguments.localize_only) config.localize_only = true;
   if (config.localize_only && arguments.load_map.empty()) {
-    return Error{"", "--localize-only", "no --load-map", "a map to localise in"};
+    return Error{"", "--localize-only", "no --load-map", "--load-map FILE with the map for localisation"};
   }
   if (config.extrinsics.refine && (config.localize_only || !config.final_adjustment)) {
     return Error{"command line", "extrinsics.refine",
                  config.localize_only ? "true with --localize-only" : "true with --no-final-ba",
-                 "the adjustment at the end of the run, which refines them"};
+                 "a run with the final bundle adjustment, which refines the extrinsics"};
   }
   return resolved;
 }
 
-// Makes the folder; an existing one must be empty or given up for overwriting, and then loses the files of an earlier
-// run, but not those this one was told to read.
+// Creates the output folder. An existing folder must be empty unless --overwrite is given, which removes the files of
+// an earlier run except for those that are input of this run.
 Status prepare_folder(const RunArguments& arguments) {
   const std::filesystem::path folder = arguments.out;
   std::error_code error;
@@ -71,10 +73,10 @@ Status prepare_folder(const RunArguments& arguments) {
     return Error{folder.string(), "--out", "a file", "a folder"};
   }
   if (exists && !arguments.overwrite && !std::filesystem::is_empty(folder, error)) {
-    return Error{folder.string(), "--out", "a folder that is not empty", "an empty or new one, or --overwrite"};
+    return Error{folder.string(), "--out", "a folder that is not empty", "an empty or new folder, or --overwrite"};
   }
   std::filesystem::create_directories(folder, error);
-  if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be made"};
+  if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
   for (const char* name : {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "rig_refined.yaml"}) {
     const auto is = [&](const std::string& input) {
       return !input.empty() && std::filesystem::equivalent(folder / name, input, error);
@@ -88,14 +90,14 @@ Status prepare_folder(const RunArguments& arguments) {
   return {};
 }
 
-// Before hours of work, not after: can a file be made there? An existing one is replaced.
+// Checks before the run whether the file can be created later. An existing file will be replaced.
 Status check_output_file(const std::string& file, const char* option) {
   if (file.empty()) return {};
   std::error_code error;
   const std::filesystem::path path(file), folder = path.has_parent_path() ? path.parent_path() : ".";
   if (std::filesystem::is_directory(path, error)) return Error{file, option, "a folder", "the name of a file"};
   if (!std::filesystem::is_directory(folder, error))
-    return Error{folder.string(), option, "no such folder", "one that exists"};
+    return Error{folder.string(), option, "no such folder", "an existing folder"};
   return {};
 }
 
@@ -108,7 +110,7 @@ Result<std::optional<execution::Journal>> read_journal(const std::string& file) 
   return std::optional(std::move(*journal));
 }
 
-// The map of an earlier run, if one is asked for, and whether this one can go on with it.
+// Reads the map of an earlier run if one is given, and checks that this run can continue with it.
 Result<std::optional<map::BundledMap>> read_map(const std::string& file, const camera::Rig& rig,
                                                 const system::Config& config, const place::Vocabulary& vocabulary) {
   if (file.empty()) return std::optional<map::BundledMap>();
@@ -117,7 +119,7 @@ Result<std::optional<map::BundledMap>> read_map(const std::string& file, const c
   if (const Status s = storage::fits(*saved, rig, {config.features.scale_factor, config.features.levels}, &vocabulary);
       !s)
     return s.error();
-  if (saved->map.num_keyframes() == 0) return Error{file, "keyframes", "none", "a map of something"};
+  if (saved->map.num_keyframes() == 0) return Error{file, "keyframes", "none", "a map with keyframes"};
   return std::optional(std::move(saved->map));
 }
 
@@ -133,8 +135,27 @@ Status write_files(const session::SessionResult& result, const system::Config& c
                             arguments.save_map);
 }
 
+// The command that tests the calibration of the run against its images.
+std::string check_command(const DatasetArguments& data) {
+  return shell_command({"bslam", "rig", "info", data.rig.empty() ? data.path : data.rig, "--images", data.path});
+}
+
+void print_before(const dataset::Dataset& dataset, LogVerbosity verbosity) {
+  if (verbosity < LogVerbosity::kWarning) return;
+  for (const std::string& warning : dataset.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  print_rig_warnings(dataset.rig);
+}
+
+void print_after(const report::RunRecord& record, const dataset::Dataset& dataset, const RunArguments& arguments) {
+  const LogVerbosity verbosity = log_verbosity(arguments.log_level);
+  if (verbosity >= LogVerbosity::kDebug) print_frames(record);
+  if (verbosity >= LogVerbosity::kInfo) print_stage_statistics(record);
+  if (verbosity >= LogVerbosity::kWarning) print_warnings(record, dataset.rig, check_command(arguments.data));
+  print_result(record, arguments.out);
+}
+
 int run(const RunArguments& arguments) {
-  // Before anything is made: whoever sees the folder can rely on an interruption being answered in order.
+  // Created first: as soon as the output folder exists, an interruption ends the run in an orderly way.
   const Interruption interruption;
   const auto config = resolve_run_config(arguments);
   if (!config) return report_error(config.error());
@@ -153,8 +174,7 @@ int run(const RunArguments& arguments) {
     if (const Status s = check_output_file(file, option); !s) return report_error(s.error());
   }
   if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
-  for (const std::string& warning : dataset->warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
-  print_rig_warnings(dataset->rig);
+  print_before(*dataset, log_verbosity(arguments.log_level));
 
   ProgressBar bar(arguments.progress == "auto", "frames");
   session::SessionOptions options;
@@ -171,8 +191,7 @@ int run(const RunArguments& arguments) {
   bar.finish();
   if (!result) return report_error(result.error());
   if (const Status s = write_files(*result, *config, arguments, **vocabulary); !s) return report_error(s.error());
-  print_warnings(result->record, dataset->rig);
-  print_result(result->record, arguments.out);
+  print_after(result->record, *dataset, arguments);
   if (!result->record.complete) return kExitInterrupted;
   return result->live.empty() ? kExitNothingTracked : kExitOk;
 }
@@ -181,34 +200,45 @@ int run(const RunArguments& arguments) {
 
 void add_run(CLI::App& app, int& exit_status) {
   const auto a = std::make_shared<RunArguments>();
-  CLI::App* verb = app.add_subcommand("run", "SLAM over a recorded data set");
+  CLI::App* verb = app.add_subcommand("run", "run the SLAM system on a recorded data set");
   add_dataset_options(*verb, a->data);
   verb->add_option("--out", a->out, "folder for trajectory, summary, configuration and plots")->required();
   add_config_options(*verb, a->config);
   verb->add_option("--mode", a->mode,
-                   "sequential or lagged (identical bytes on every run), or parallel; default parallel");
-  verb->add_option("--journal", a->journal, "file to write: which stage worked on and made which version of the map");
-  verb->add_option("--replay", a->replay, "a journal: the run it was written by is repeated, whatever its mode was");
-  verb->add_option("--pace", a->pace, "fast, or realtime: images at their recorded pace")
+                   "sequential, lagged or parallel (default). Repeated sequential runs give identical results, and so "
+                   "do repeated lagged "
+                   "runs; the two differ from each other");
+  verb->add_option("--journal", a->journal,
+                   "write a journal to this file: which stage read and which produced each version of the map");
+  verb->add_option("--replay", a->replay, "repeat the run that wrote this journal exactly, in whichever mode it was");
+  verb->add_option("--pace", a->pace, "fast: as fast as possible; realtime: feed images at their recorded rate")
       ->check(CLI::IsMember({"fast", "realtime"}))
       ->capture_default_str();
-  verb->add_option("--late", a->late,
-                   "at the recorded pace: block keeps every frame, drop leaves out those there is no time for")
+  verb->add_option(
+          "--late", a->late,
+          "with --pace realtime, if processing is too slow: block processes every frame late, drop skips frames")
       ->check(CLI::IsMember({"block", "drop"}))
       ->capture_default_str();
-  verb->add_flag("--no-loop", a->no_loop, "loop closing off; a lost rig is still looked for all over the map");
-  verb->add_option("--save-map", a->save_map, "file for the map at the end");
-  verb->add_option("--load-map", a->load_map, "a saved map: the run goes on in it once it finds its place there");
-  verb->add_flag("--localize-only", a->localize_only, "poses in the loaded map, which stays as it is");
-  verb->add_option("--vocabulary", a->vocabulary,
-                   "for place recognition, ours or DBoW2's text; default: the one of the program");
-  verb->add_flag("--no-final-ba", a->no_final_ba, "no global bundle adjustment at the end");
-  verb->add_option("--seed", a->seed, "of all randomness; default 1")
+  verb->add_flag("--no-loop", a->no_loop, "disable loop closing; relocalisation stays enabled");
+  verb->add_option("--save-map", a->save_map, "save the final map to this file");
+  verb->add_option("--load-map", a->load_map, "a saved map, which the run continues after relocalising in it");
+  verb->add_flag("--localize-only", a->localize_only, "localise in the loaded map without changing it");
+  verb->add_option(
+      "--vocabulary", a->vocabulary,
+      "vocabulary for place recognition, in bslam or DBoW2 text format; default: the one shipped with this program");
+  verb->add_flag("--no-final-ba", a->no_final_ba, "skip the global bundle adjustment at the end");
+  verb->add_option("--seed", a->seed, "seed of all random numbers; default 1")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
-  verb->add_option("--progress", a->progress, "auto: a bar when stderr is a terminal; never")
+  verb->add_option("--progress", a->progress, "auto: show a progress bar if stderr is a terminal; never: show none")
       ->check(CLI::IsMember({"auto", "never"}))
       ->capture_default_str();
-  verb->add_flag("--overwrite", a->overwrite, "the folder may exist; files of an earlier run are replaced");
+  verb->add_option("--log-level", a->log_level,
+                   "what is printed on stderr: error, warning, info (also the processing time of every stage) or debug "
+                   "(also the outcome of every frame)")
+      ->check(CLI::IsMember({"error", "warning", "info", "debug"}))
+      ->capture_default_str();
+  verb->add_flag("--overwrite", a->overwrite,
+                 "write into a folder that is not empty; files of an earlier run are replaced");
   verb->callback([a, &exit_status] { exit_status = run(*a); });
 }
 

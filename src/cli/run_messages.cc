@@ -37,7 +37,7 @@ void warn_of_extrinsics(const session::CameraRecord& camera) {
 
 // A camera that at the end of the run still agrees with nothing the others see is probably not where the rig file puts
 // it.
-void warn_of_disagreement(const session::RunRecord& record, std::size_t camera) {
+void warn_of_disagreement(const session::RunRecord& record, std::size_t camera, const std::string& check_command) {
   constexpr tracking::CameraStatus kDisagrees{tracking::CameraState::kDegraded, tracking::CameraReason::kInconsistent};
   const std::vector<session::CameraInterval>& states = record.cameras[camera].states;
   if (states.empty() || states.back().status != kDisagrees) return;
@@ -47,10 +47,8 @@ void warn_of_disagreement(const session::RunRecord& record, std::size_t camera) 
     keypoints += frame.record->final_result().cameras[camera].keypoints;
     inliers += frame.record->final_result().cameras[camera].inliers;
   }
-  fmt::print(stderr,
-             "warning: {}: only {} of {} keypoints are inliers: check this camera's extrinsics "
-             "(bslam rig info RIG --images DATA)\n",
-             record.cameras[camera].name, inliers, keypoints);
+  fmt::print(stderr, "warning: {}: only {} of {} keypoints are inliers: check this camera's extrinsics ({})\n",
+             record.cameras[camera].name, inliers, keypoints, check_command);
 }
 
 std::ptrdiff_t count(const session::RunRecord& record, session::FrameOutcome outcome) {
@@ -67,7 +65,8 @@ double largest_overlap(const camera::Rig& rig) {
 }
 
 // Cameras that overlap and still see next to nothing in common.
-void warn_if_nothing_matches(const session::RunRecord& record, const camera::Rig& rig) {
+void warn_if_nothing_matches(const session::RunRecord& record, const camera::Rig& rig,
+                             const std::string& check_command) {
   constexpr double kMuchOverlap = 0.4, kLeastShare = 0.01;
   double matched = 0, unique = 0;
   for (const session::RunFrame& frame : record.frames) {
@@ -79,8 +78,8 @@ void warn_if_nothing_matches(const session::RunRecord& record, const camera::Rig
   fmt::print(stderr,
              "warning: by the calibration cameras see much in common, but only {:.1f} % of the features match between "
              "any two; "
-             "bslam rig info RIG --images DATA tests it\n",
-             100 * matched / unique);
+             "{} tests it\n",
+             100 * matched / unique, check_command);
 }
 
 }  // namespace
@@ -93,7 +92,7 @@ void print_rig_warnings(const camera::Rig& rig) {
     fmt::print(stderr, "warning: {} more of the kind: bslam rig info\n", warnings.size() - kShown);
 }
 
-void print_warnings(const session::RunRecord& record, const camera::Rig& rig) {
+void print_warnings(const session::RunRecord& record, const camera::Rig& rig, const std::string& check_command) {
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
     const session::CameraRecord& camera = record.cameras[c];
     if (camera.skipped > 0) {
@@ -102,11 +101,11 @@ void print_warnings(const session::RunRecord& record, const camera::Rig& rig) {
     }
     warn_of_outages(camera);
     warn_of_extrinsics(camera);
-    warn_of_disagreement(record, c);
+    warn_of_disagreement(record, c, check_command);
   }
   const auto dropped = count(record, session::FrameOutcome::kDropped);
   if (dropped > 0) fmt::print(stderr, "warning: {} frames were dropped, there was no time for them\n", dropped);
-  warn_if_nothing_matches(record, rig);
+  warn_if_nothing_matches(record, rig, check_command);
 }
 
 void print_result(const session::RunRecord& record, const std::string& out) {

@@ -1,4 +1,4 @@
-// bslam settings: every setting with its value, meaning and range.
+// bslam settings: prints the settings with their values, meanings and ranges.
 #include <cstdio>
 #include <memory>
 
@@ -10,20 +10,29 @@
 namespace bslam::cli {
 namespace {
 
-int print_settings(const ConfigArguments& arguments) {
-  auto config = resolve_config(arguments);
+struct SettingsArguments {
+  ConfigArguments config;
+  bool common = false;
+};
+
+int print_settings(const SettingsArguments& arguments) {
+  auto config = resolve_config(arguments.config);
   if (!config) return report_error(config.error());
-  std::fputs(yaml::config_to_yaml(OptionTable(*config)).c_str(), stdout);
+  const auto selection = arguments.common ? yaml::Selection::kCommon : yaml::Selection::kAll;
+  std::fputs(yaml::config_to_yaml(OptionTable(*config), selection).c_str(), stdout);
   return kExitOk;
 }
 
 }  // namespace
 
 void add_settings(CLI::App& app, int& exit_status) {
-  const auto a = std::make_shared<ConfigArguments>();
-  CLI::App* verb = app.add_subcommand(
-      "settings", "every setting with its value (of --config and --set, else its default), meaning and range");
-  add_config_options(*verb, *a);
+  const auto a = std::make_shared<SettingsArguments>();
+  CLI::App* verb = app.add_subcommand("settings",
+                                      "print the settings as YAML, each with its value, meaning and range; settings "
+                                      "marked [advanced] are not meant to be "
+                                      "changed and may change in any release");
+  verb->add_flag("--common", a->common, "print only the settings that are commonly changed, without the advanced ones");
+  add_config_options(*verb, a->config);
   verb->callback([a, &exit_status] { exit_status = print_settings(*a); });
 }
 

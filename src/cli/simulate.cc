@@ -1,4 +1,4 @@
-// bslam simulate: renders a built-in world through a rig.
+// bslam simulate: renders images of a built-in world as seen by a rig.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -73,13 +73,13 @@ int run_simulate(const SimulateArguments& arguments) {
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
   ThreadPool pool(arguments.threads > 0 ? arguments.threads : std::max(1, cores));
   const Interruption interruption;
-  ProgressBar bar(arguments.progress == "auto", "pictures");
+  ProgressBar bar(arguments.progress == "auto", "images");
   const auto outcome = simulator::write_simulation(
       *request, pool, [&](std::size_t done, std::size_t total) { bar.show(done, total); }, interruption.token());
   bar.finish();
   if (!outcome) {
     Error error = outcome.error();
-    if (error.file.empty()) {  // a value out of range, named as the request names it
+    if (error.file.empty()) {  // a value out of range; the key is the name of the option
       error.file = "command line";
       error.key = "--" + error.key;
     }
@@ -94,7 +94,7 @@ int run_simulate(const SimulateArguments& arguments) {
       fmt::print("{}: already complete\n", arguments.folder);
       break;
     case simulator::SimulationOutcome::kInterrupted:
-      fmt::print(stderr, "bslam: interrupted; the same command goes on from here\n");
+      fmt::print(stderr, "bslam: interrupted; repeat the same command to continue\n");
       return kExitInterrupted;
   }
   return kExitOk;
@@ -105,34 +105,36 @@ int run_simulate(const SimulateArguments& arguments) {
 void add_simulate(CLI::App& app, int& exit_status) {
   const auto arguments = std::make_shared<SimulateArguments>();
   SimulateArguments& a = *arguments;
-  CLI::App* verb =
-      app.add_subcommand("simulate", "render a built-in world through a rig, in EuRoC layout with ground truth");
+  CLI::App* verb = app.add_subcommand(
+      "simulate", "render images of a built-in world as seen by a rig, in EuRoC layout with ground truth");
   verb->add_option("--out", a.folder, "folder to write into")->required();
   verb->add_option("--rig", a.rig, "calibration of the rig (default: four cameras, two of them in front)");
   verb->add_option("--world", a.world,
-                   "building: rooms that differ; corridor, twin-rooms: places that look exactly alike")
+                   "building: different rooms; corridor, twin-rooms: places that look exactly alike")
       ->check(CLI::IsMember({"building", "corridor", "twin-rooms"}))
       ->capture_default_str();
-  verb->add_option("--duration", a.duration_s, "seconds")->capture_default_str();
-  verb->add_option("--rate", a.rate_hz, "images a second of each camera")->capture_default_str();
-  verb->add_option("--seed", a.seed, "of the world, the motion and the noise")->capture_default_str();
-  verb->add_option("--laps", a.laps, "rounds of the tour within the duration; 0: as many as suit a walking pace")
+  verb->add_option("--duration", a.duration_s, "duration in seconds")->capture_default_str();
+  verb->add_option("--rate", a.rate_hz, "frame rate of each camera in images per second")->capture_default_str();
+  verb->add_option("--seed", a.seed, "seed of world, motion and noise")->capture_default_str();
+  verb->add_option("--laps", a.laps, "laps of the tour within the duration; 0: as many as a walking pace allows")
       ->capture_default_str();
-  verb->add_option("--speed", a.speed_mps, "metres a second; 0: follows from duration and laps")->capture_default_str();
-  verb->add_flag("--back", a.back, "after half of the time turn round and walk the same way back");
-  verb->add_option("--exposure-ms", a.exposure_ms, "exposure, which blurs motion")->capture_default_str();
-  verb->add_option("--noise", a.noise, "factor on the sensor's noise")->capture_default_str();
+  verb->add_option("--speed", a.speed_mps, "speed in metres per second; 0: determined by duration and laps")
+      ->capture_default_str();
+  verb->add_flag("--back", a.back, "turn around after half of the duration and return along the same path");
+  verb->add_option("--exposure-ms", a.exposure_ms, "exposure time in milliseconds, which causes motion blur")
+      ->capture_default_str();
+  verb->add_option("--noise", a.noise, "factor applied to the sensor noise")->capture_default_str();
   verb->add_option("--faults", a.faults,
                    "YAML or JSON list of {type, cameras, from, to}; type: black, frozen, over_exposed, blurred, "
                    "dropped or delayed (with delay_s)");
-  verb->add_option("--threads", a.threads, "threads to work with; 0: one a core")
+  verb->add_option("--threads", a.threads, "number of threads; 0: one per core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  verb->add_option("--progress", a.progress, "a bar when stderr is a terminal")
+  verb->add_option("--progress", a.progress, "auto: show a progress bar if stderr is a terminal; never: show none")
       ->check(CLI::IsMember({"auto", "never"}))
       ->capture_default_str();
   verb->add_flag("--overwrite", a.overwrite,
-                 "write into a folder that is not empty; a recording made before is replaced");
+                 "write into a folder that is not empty; an earlier recording in it is replaced");
   verb->callback([arguments, &exit_status] { exit_status = run_simulate(*arguments); });
 }
 

@@ -1,5 +1,5 @@
-// One function per verb: adds its subcommand to the parser. When the verb was chosen and has run, `exit_status` holds
-// its status (0, 2, 3 or 130 as docs/cli.md says).
+// One function per command, which adds the subcommand to the parser. After the chosen command has run, `exit_status`
+// holds its exit status (0, 2, 3 or 130, see docs/cli.md).
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,7 +9,7 @@
 namespace bslam::cli {
 
 constexpr int kExitOk = 0, kExitBadInput = 2, kExitNothingTracked = 3, kExitInterrupted = 130;
-constexpr int kExitFailed = 1;  // the program, not the request, is at fault
+constexpr int kExitFailed = 1;  // the program failed, not the request
 
 void add_run(CLI::App& app, int& exit_status);
 void add_eval(CLI::App& app, int& exit_status);

@@ -1,14 +1,14 @@
-// What `bslam --version` says.
+// The output of `bslam --version`.
 #pragma once
 
 #include <string>
 
 namespace bslam::cli {
 
-// Several lines: version, git revision, compiler, and the versions of what is linked.
+// Several lines: version, git revision, compiler, and the versions of the linked libraries.
 std::string version_text();
 
-// The version alone, "0.1.0".
+// Only the version, such as "0.1.0".
 std::string version_number();
 
 }  // namespace bslam::cli

@@ -1,4 +1,4 @@
-// bslam vocab: the vocabulary of place recognition, its training and its description.
+// bslam vocab: trains and describes vocabularies for place recognition.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -34,7 +34,7 @@ struct VocabTrainArguments {
   bool overwrite = false;
 };
 
-// The descriptors of an image; the camera is any that sees all of it, for the extractor wants one.
+// The descriptors of an image. The extractor needs a camera model, so one that covers the whole image is made up.
 std::vector<feature::Descriptor> describe(const image::Image& image, feature::Extractor& extractor) {
   const double focal = std::max(image.width(), image.height());
   camera::Camera camera{.name = "any",
@@ -50,11 +50,11 @@ std::vector<feature::Descriptor> describe(const image::Image& image, feature::Ex
 }
 
 struct TrainingSet {
-  std::vector<std::vector<feature::Descriptor>> images;  // those that could be read
+  std::vector<std::vector<feature::Descriptor>> images;  // the images that could be read
   std::size_t skipped = 0, descriptors = 0;
 };
 
-// Each share of the images has an extractor of its own; results are in the order of the files.
+// Every thread has an extractor of its own. The results are in the order of the files.
 TrainingSet extract_all(const std::vector<std::filesystem::path>& files, const VocabTrainArguments& a,
                         ThreadPool& pool) {
   std::vector<std::optional<std::vector<feature::Descriptor>>> found(files.size());
@@ -84,21 +84,21 @@ TrainingSet extract_all(const std::vector<std::filesystem::path>& files, const V
       set.images.push_back(std::move(*found[i]));
     } else {
       ++set.skipped;
-      fmt::print(stderr, "bslam: warning: {}: skipped\n", warnings[i]);
+      fmt::print(stderr, "warning: {}; the image is skipped\n", warnings[i]);
     }
   }
   return set;
 }
 
-// What would only be noticed after all the work.
+// Checks before the training what would otherwise only be noticed when it is done.
 Status check_output(const VocabTrainArguments& a) {
   std::error_code error;
   const std::filesystem::path out(a.out), folder = out.has_parent_path() ? out.parent_path() : ".";
   if (std::filesystem::is_directory(out, error)) return Error{a.out, "--out", "a folder", "the name of a file"};
   if (!std::filesystem::is_directory(folder, error))
-    return Error{folder.string(), "--out", "no such folder", "one that exists"};
+    return Error{folder.string(), "--out", "no such folder", "an existing folder"};
   if (std::filesystem::exists(out, error) && !a.overwrite)
-    return Error{a.out, "--out", "a file there already", "a new name, or --overwrite"};
+    return Error{a.out, "--out", "an existing file", "a new name, or --overwrite"};
   return {};
 }
 
@@ -135,7 +135,7 @@ int run_info(const std::string& file) {
   const place::Vocabulary& v = **read;
   const std::vector<float>& weights = v.content().weight;
   const auto [least, most] = std::minmax_element(weights.begin(), weights.end());
-  fmt::print("vocabulary   {}\n", file.empty() ? "the one shipped with this program" : file);
+  fmt::print("vocabulary   {}\n", file.empty() ? "shipped with this program" : file);
   fmt::print("descriptors  {}\n", v.kind());
   fmt::print("branching    {}\nlevels       {}\nwords        {}\nnodes        {}\n", v.branching(), v.levels(),
              v.size(), v.num_nodes());
@@ -144,8 +144,9 @@ int run_info(const std::string& file) {
   fmt::print("id           {:016x}\n", v.id());
   fmt::print("load time    {:.1f} ms\n", load.count());
   if (v.kind() != place::kDescriptorKind) {
-    fmt::print("note         made for other descriptors than this program's ({}): places are told apart less well\n",
-               place::kDescriptorKind);
+    fmt::print(
+        "note         made for other descriptors than those of this program ({}): place recognition is less reliable\n",
+        place::kDescriptorKind);
   }
   return kExitOk;
 }
@@ -153,41 +154,43 @@ int run_info(const std::string& file) {
 void add_train(CLI::App& vocab, int& exit_status) {
   const auto arguments = std::make_shared<VocabTrainArguments>();
   VocabTrainArguments& a = *arguments;
-  CLI::App* verb = vocab.add_subcommand("train", "make a vocabulary from images");
-  verb->add_option("IMAGES", a.images, "PNG, JPEG, PGM or WebP images, or folders with such in them or below")
+  CLI::App* verb = vocab.add_subcommand("train", "train a vocabulary on images");
+  verb->add_option("IMAGES", a.images,
+                   "PNG, JPEG, PGM or WebP images, or folders that are searched for them recursively")
       ->required();
   verb->add_option("--out", a.out, "file to write")->required();
-  verb->add_option("--branching", a.training.branching, "children of a node of the tree")
+  verb->add_option("--branching", a.training.branching, "number of children of a tree node")
       ->check(CLI::Range(2, place::kMaxBranching))
       ->capture_default_str();
-  verb->add_option("--levels", a.training.levels, "steps from its root to a word")
+  verb->add_option("--levels", a.training.levels, "number of levels between root and words")
       ->check(CLI::Range(1, place::kMaxLevels))
       ->capture_default_str();
-  verb->add_option("--seed", a.seed, "of the clustering")->capture_default_str();
-  verb->add_option("--features", a.features.per_image, "keypoints wanted in one image")
+  verb->add_option("--seed", a.seed, "seed of the clustering")->capture_default_str();
+  verb->add_option("--features", a.features.per_image, "number of keypoints extracted per image")
       ->check(CLI::Range(50, 20000))
       ->capture_default_str();
-  verb->add_option("--max-side", a.max_side, "pixels; larger images are shrunk to it; 0: none is")
+  verb->add_option("--max-side", a.max_side,
+                   "larger images are scaled down to this many pixels on their longer side; 0: never")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str();
-  verb->add_option("--threads", a.threads, "threads to work with; 0: one a core")
+  verb->add_option("--threads", a.threads, "number of threads; 0: one per core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  verb->add_option("--progress", a.progress, "a bar when stderr is a terminal")
+  verb->add_option("--progress", a.progress, "auto: show a progress bar if stderr is a terminal; never: show none")
       ->check(CLI::IsMember({"auto", "never"}))
       ->capture_default_str();
-  verb->add_flag("--overwrite", a.overwrite, "the file may exist");
+  verb->add_flag("--overwrite", a.overwrite, "replace an existing file");
   verb->callback([arguments, &exit_status] { exit_status = run_train(*arguments); });
 }
 
 }  // namespace
 
 void add_vocab(CLI::App& app, int& exit_status) {
-  CLI::App* vocab = app.add_subcommand("vocab", "the vocabulary of place recognition: train or describe one");
+  CLI::App* vocab = app.add_subcommand("vocab", "train or describe a vocabulary for place recognition");
   vocab->require_subcommand(1);
   add_train(*vocab, exit_status);
   const auto file = std::make_shared<std::string>();
-  CLI::App* info = vocab->add_subcommand("info", "kind, size, id and weights of a vocabulary");
+  CLI::App* info = vocab->add_subcommand("info", "print kind, size, id and weights of a vocabulary");
   info->add_option("FILE", *file, "bslam vocabulary or DBoW2 text file (default: the one shipped with this program)");
   info->callback([file, &exit_status] { exit_status = run_info(*file); });
 }

@@ -32,8 +32,9 @@ Result<DatasetFormat> detect_format(const fs::path& folder) {
   if (looks_like_kitti(folder)) return DatasetFormat::kKitti;
   if (looks_like_folder(folder)) return DatasetFormat::kFolder;
   return Error{
-      folder.string(), "", "no data set of a known layout",
-      "mav0/camN/data.csv (euroc), image_N with times.txt (kitti), or camN with images named by time (folder)"};
+      folder.string(), "", "no data set of a known format",
+      "mav0/camN/data.csv (euroc), image_N with times.txt (kitti), or camN with images named by their time stamps "
+      "(folder)"};
 }
 
 Result<OpenRecording> open_recording(const DatasetRequest& request) {
@@ -55,7 +56,7 @@ Result<OpenRecording> open_recording(const DatasetRequest& request) {
   return OpenRecording{format, *std::move(recording)};
 }
 
-// Folder name; of "DATA/mav0", "DATA/" and "." too.
+// The name of the data set folder. Handles "DATA/mav0", "DATA/" and "." as well.
 std::string name_of(const fs::path& path) {
   std::error_code error;
   fs::path whole = fs::weakly_canonical(path, error);
@@ -64,7 +65,7 @@ std::string name_of(const fs::path& path) {
   return whole.filename().string();
 }
 
-// The cameras asked for, or all of `count`.
+// The requested cameras, or all `count` cameras if none were requested.
 Result<std::vector<int>> chosen_cameras(const std::vector<int>& asked, std::size_t count) {
   std::vector<int> cameras = asked;
   if (cameras.empty()) {
@@ -74,10 +75,10 @@ Result<std::vector<int>> chosen_cameras(const std::vector<int>& asked, std::size
   std::set<int> seen;
   for (const int camera : cameras) {
     if (camera < 0 || static_cast<std::size_t>(camera) >= count) {
-      return Error{"--cameras", "", std::to_string(camera), fmt::format("indices in [0, {}]", count - 1)};
+      return Error{"--cameras", "", std::to_string(camera), fmt::format("camera numbers from 0 to {}", count - 1)};
     }
     if (!seen.insert(camera).second) {
-      return Error{"--cameras", "", fmt::format("camera {} twice", camera), "every camera once"};
+      return Error{"--cameras", "", fmt::format("camera {} twice", camera), "each camera at most once"};
     }
   }
   return cameras;
@@ -99,18 +100,19 @@ Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recordin
     if (static_cast<std::size_t>(camera) < recording.camera_count()) continue;
     const std::size_t there = recording.camera_count();
     return Error{request.path.string(), "", fmt::format("images of {} camera{}", there, there == 1 ? "" : "s"),
-                 fmt::format("of camera {} as well: {} has {} (--cameras takes some of them)", camera,
+                 fmt::format("images of camera {} as well, since {} has {} cameras; --cameras selects a subset", camera,
                              request.rig_file->string(), rig->size())};
   }
   ChosenRig chosen{*cameras, rig->subset(*cameras), *rig, {}};
   if (recording.camera_count() > rig->size()) {
-    chosen.warnings.push_back(fmt::format("{} has {} cameras, the data {}: the others are not used",
-                                          request.rig_file->string(), rig->size(), recording.camera_count()));
+    chosen.warnings.push_back(
+        fmt::format("{} has {} cameras but the data set has {}; the additional cameras are not used",
+                    request.rig_file->string(), rig->size(), recording.camera_count()));
   }
   return chosen;
 }
 
-// Empty where some camera's calibration cannot be read.
+// Empty if the calibration of any camera cannot be read.
 std::optional<camera::Rig> whole_rig(const Recording& recording) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < recording.camera_count(); ++c) {
@@ -137,7 +139,7 @@ Result<ChosenRig> choose_own(const DatasetRequest& request, const Recording& rec
   return ChosenRig{*std::move(cameras), camera::Rig(std::move(calibrated)), std::nullopt, {}};
 }
 
-// Some image exists, and of the first that can be read some has the calibrated size.
+// Checks that an image exists, and that one of the first readable images has the calibrated resolution.
 Status check_images(const std::vector<image_files::ImageFile>& images, const camera::Camera& camera) {
   constexpr int kTries = 5;
   int read = 0;
@@ -154,13 +156,13 @@ Status check_images(const std::vector<image_files::ImageFile>& images, const cam
     found = fmt::format("{}x{} pixels", image->width(), image->height());
   }
   const std::string folder = images.front().path.parent_path().string();
-  if (!any) return Error{folder, camera.name, "none of the listed images", "images"};
-  if (found.empty()) return {};  // the first ones are damaged: to be seen when they are read
+  if (!any) return Error{folder, camera.name, "none of the listed images", "at least one image"};
+  if (found.empty()) return {};  // the first images are damaged, which is reported when they are read
   return Error{folder, camera.name, "images of " + found,
                fmt::format("{}x{}, the resolution of the calibration", camera.width, camera.height)};
 }
 
-// The images of every camera in use at their true times.
+// The images of every camera in use, with time offsets applied to the time stamps.
 Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Recording& recording, ChosenRig& chosen) {
   std::vector<std::vector<image_files::ImageFile>> images;
   for (std::size_t i = 0; i < chosen.cameras.size(); ++i) {
@@ -192,13 +194,13 @@ Status group(const DatasetRequest& request, const std::vector<std::vector<image_
     const std::string& name = dataset.rig.camera(i).name;
     if (grouping.shared_with_camera0[i] == 0) {
       return Error{request.path.string(), name,
-                   fmt::format("no image within {:g} ms of one of {} (the nearest is {:g} ms away)",
+                   fmt::format("no image within {:g} ms of an image of {} (the nearest is {:g} ms away)",
                                1e3 * request.sync_tolerance_s, dataset.rig.camera(std::size_t{0}).name,
                                1e3 * nearest_distance_s(images[0], images[i])),
-                   "cameras with a common time, or a larger io.sync_tolerance"};
+                   "synchronised cameras, or a larger io.sync_tolerance"};
     }
     if (grouping.unassigned[i] > 0) {
-      dataset.warnings.push_back(fmt::format("{}: {} of {} images belong to no frame and are not used", name,
+      dataset.warnings.push_back(fmt::format("{}: {} of {} images match no frame in time and are not used", name,
                                              grouping.unassigned[i], images[i].size()));
     }
   }
@@ -210,14 +212,14 @@ Status group(const DatasetRequest& request, const std::vector<std::vector<image_
 Status check_request(const DatasetRequest& request) {
   for (const auto& [name, value] : {std::pair("--begin", request.begin_s), std::pair("--end", request.end_s)}) {
     if (value && !(*value >= 0 && *value < 1e9))
-      return Error{name, "", fmt::format("{}", *value), "seconds, not below 0"};
+      return Error{name, "", fmt::format("{}", *value), "seconds, at least 0"};
   }
   if (request.begin_s && request.end_s && !(*request.begin_s < *request.end_s)) {
     return Error{"--begin", "", fmt::format("{} s with --end {} s", *request.begin_s, *request.end_s),
-                 "begin before end"};
+                 "a begin before the end"};
   }
   if (!(request.sync_tolerance_s >= 0 && request.sync_tolerance_s < 1e3)) {
-    return Error{"io.sync_tolerance", "", fmt::format("{}", request.sync_tolerance_s), "seconds, not below 0"};
+    return Error{"io.sync_tolerance", "", fmt::format("{}", request.sync_tolerance_s), "seconds, at least 0"};
   }
   return {};
 }
@@ -233,10 +235,10 @@ Status keep_range(const DatasetRequest& request, Dataset& dataset) {
   if (!dataset.frames.empty()) return {};
   return Error{request.begin_s ? "--begin" : "--end", "",
                fmt::format("{} s", request.begin_s ? *request.begin_s : *request.end_s),
-               fmt::format("a range with frames: they last from 0 to {:.3f} s", last_s)};
+               fmt::format("a range that contains frames, which are between 0 and {:.3f} s", last_s)};
 }
 
-// The rig file a recording may have beside it; empty where there is none.
+// The rig file in the folder of a recording, if there is one.
 std::optional<fs::path> rig_beside(const DatasetRequest& request) {
   fs::path folder = request.path.filename().empty() ? request.path.parent_path() : request.path;
   if (folder.filename() == "mav0") folder = folder.parent_path();
@@ -245,8 +247,8 @@ std::optional<fs::path> rig_beside(const DatasetRequest& request) {
   return fs::is_regular_file(file, error) ? std::optional(std::move(file)) : std::nullopt;
 }
 
-// The recording's own calibration is what counts; that it may lack times which a rig file beside it has should be
-// known.
+// The calibration of the recording itself is used. Warns if a rig file in its folder has time offsets, which are then
+// ignored.
 void warn_of_times(const fs::path& file, std::vector<std::string>& warnings) {
   const auto rig = rig_formats::read_rig(file);
   if (!rig) return;
@@ -257,7 +259,7 @@ void warn_of_times(const fs::path& file, std::vector<std::string>& warnings) {
       offsets.push_back(fmt::format("{} {:g} ms", camera.name, 1e3 * to_seconds(camera.time_offset_ns)));
   }
   if (offsets.empty()) return;
-  warnings.push_back(fmt::format("{} gives time offsets ({}), which are not used without --rig {}", file.string(),
+  warnings.push_back(fmt::format("{} contains time offsets ({}), which are only used with --rig {}", file.string(),
                                  fmt::join(offsets, ", "), file.string()));
 }
 

@@ -1,5 +1,5 @@
-// Recorded data sets: which images there are, when they were taken, and through which rig. Images are read one frame at
-// a time (io/frame_reader.h).
+// Recorded data sets: lists of images with their time stamps, and the calibration of the rig. The images themselves are
+// read one frame at a time (dataset/frame_reader.h).
 #pragma once
 
 #include <filesystem>
@@ -19,38 +19,38 @@ enum class DatasetFormat { kAuto, kEuroc, kKitti, kFolder };
 struct DatasetRequest {
   std::filesystem::path path;
   DatasetFormat format = DatasetFormat::kAuto;
-  std::optional<std::filesystem::path> rig_file = {};  // default: the calibration the data set carries
-  std::vector<int> cameras = {};                       // in this order; the first is camera 0 of the run; empty = all
-  double sync_tolerance_s = 0.002;                     // images of different cameras this near make one frame
+  std::optional<std::filesystem::path> rig_file = {};  // default: the calibration in the data set
+  std::vector<int> cameras = {};                       // in this order; the first becomes camera 0; empty: all
+  double sync_tolerance_s = 0.002;                     // largest time difference within a frame
   std::optional<double> begin_s = {}, end_s = {};      // seconds from the first frame: begin <= t < end
 };
 
-// One instant: at most one image of every camera.
+// Images taken at the same time, at most one of every camera.
 struct FrameEntry {
-  TimeNs time_ns = 0;  // of camera 0's image, or the earliest where that is missing
+  TimeNs time_ns = 0;  // time of the image of camera 0, or of the earliest image if that is missing
   std::vector<std::optional<image_files::ImageFile>> images;  // one per camera in use
 };
 
 struct Dataset {
-  std::string name;               // of the folder
+  std::string name;               // name of the folder
   DatasetFormat format;           // never kAuto
-  camera::Rig rig;                // the cameras in use, in the order asked for; their names are in it
-  std::vector<int> cameras_used;  // their places in the whole rig
-  // All cameras of the calibration in its order; empty where the data set's own cannot be read for one that is not in
-  // use.
+  camera::Rig rig;                // the cameras in use, in the requested order
+  std::vector<int> cameras_used;  // their indices in the whole rig
+  // All cameras of the calibration in its order. Empty if the calibration of a camera that is not in use cannot be
+  // read.
   std::optional<camera::Rig> whole_rig;
-  TimeNs first_time_ns = 0;        // of the first frame, whatever range was asked for: seconds of a run count from here
+  TimeNs first_time_ns = 0;  // time of the first frame of the recording, from which the seconds of a run are counted
   std::vector<FrameEntry> frames;  // in order of time, at least one
   std::optional<std::filesystem::path>
-      ground_truth;                   // as the format keeps it: EuRoC csv (body) or KITTI poses (camera 0)
-  std::vector<std::string> warnings;  // what was passed over: lines sorted or dropped, images of no frame
+      ground_truth;                   // in the format of the data set: EuRoC csv (body) or KITTI poses (camera 0)
+  std::vector<std::string> warnings;  // for the user: entries that were sorted or dropped, images in no frame
 };
 
-// Finds the layout, reads the calibration and the lists of images, and groups them into frames (io/frame_grouping.h).
-// An image that is listed but cannot be read is no error here; the reader reports it as damaged.
-// Errors: no such folder; no known layout; calibration missing or bad; lists missing, empty or not to be parsed; a
-// camera without a single image file, or whose images are not of its calibrated resolution; cameras that share no
-// instant; cameras asked for twice or not there; an empty or reversed range.
+// Detects the format, reads the calibration and the lists of images, and groups the images into frames
+// (dataset/frame_grouping.h). An image that is listed but cannot be read is not an error here; read_frame reports it as
+// damaged. Errors: the folder does not exist or has no known format; the calibration is missing or invalid; a list is
+// missing, empty or malformed; a camera has no image file, or its images differ from the calibrated resolution; two
+// cameras have no common frame; a camera is requested twice or does not exist; the time range is empty or reversed.
 Result<Dataset> open_dataset(const DatasetRequest& request);
 
 }  // namespace bslam::dataset

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxListBytes = std::size_t{1} << 28;
-// Nanoseconds: room above it for time offsets without overflow.
+// Nanoseconds. Time offsets can be added to it without overflow.
 constexpr TimeNs kMaxTime = 9'200'000'000'000'000'000;
 
 std::string_view trimmed(std::string_view text) {
@@ -26,7 +26,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-// "timestamp [ns],filename" a line; lines that begin with # and empty ones are passed over.
+// One line "timestamp [ns],filename" per image. Empty lines and lines that begin with # are ignored.
 Result<std::vector<image_files::ImageFile>> parse_list(const fs::path& file, std::string_view text,
                                                        const fs::path& image_folder) {
   std::vector<image_files::ImageFile> images;
@@ -43,7 +43,7 @@ Result<std::vector<image_files::ImageFile>> parse_list(const fs::path& file, std
     };
     const std::size_t comma = line.find(',');
     const auto time = parse_integer(trimmed(line.substr(0, comma)));
-    if (!time || *time < 0 || *time > kMaxTime) return error(line.substr(0, comma), "a timestamp in nanoseconds");
+    if (!time || *time < 0 || *time > kMaxTime) return error(line.substr(0, comma), "a time stamp in nanoseconds");
     const std::string_view rest = comma == std::string_view::npos ? "" : line.substr(comma + 1);
     const std::string_view name = trimmed(rest.substr(0, rest.find(',')));
     if (name.empty()) return error(line, "timestamp,filename");
@@ -73,7 +73,7 @@ class EurocRecording : public Recording {
     if (!text) return text.error();
     auto images = parse_list(file, *text, folders_[camera] / "data");
     if (!images) return images.error();
-    if (images->empty()) return Error{file.string(), "", "no images", "a line timestamp,filename for every image"};
+    if (images->empty()) return Error{file.string(), "", "no images", "one line timestamp,filename per image"};
     return image_files::in_time_order(*std::move(images), file.string());
   }
 

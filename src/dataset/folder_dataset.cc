@@ -1,4 +1,5 @@
-// The plain layout: camN/ with images named by their time in nanoseconds; the calibration is a file of its own.
+// The plain format: folders camN/ with images named by their time stamps in nanoseconds. The calibration is given
+// separately.
 #include <algorithm>
 #include <utility>
 
@@ -19,15 +20,17 @@ class FolderRecording : public Recording {
   bool calibrated() const override { return false; }
 
   Result<camera::RigCamera> calibration(std::size_t camera) const override {
-    return Error{folders_[camera].parent_path().string(), "", "a layout without calibration",
-                 "a rig file (--rig FILE)"};
+    const std::string data = folders_[camera].parent_path().string();
+    return Error{data, "", "no calibration", "a rig file (--rig FILE)",
+                 "no calibration in " + data + ": give --rig FILE"};
   }
 
   Result<image_files::ImageList> images(std::size_t camera) const override {
     std::vector<image_files::ImageFile> images;
     for (image_files::NumberedImage& image : image_files::images_in(folders_[camera]))
       images.push_back({std::move(image.path), image.number});
-    if (images.empty()) return Error{folders_[camera].string(), "", "no images", "images named by their time in ns"};
+    if (images.empty())
+      return Error{folders_[camera].string(), "", "no images", "images named by their time stamps in ns"};
     return image_files::in_time_order(std::move(images), folders_[camera].string());
   }
 
@@ -46,7 +49,7 @@ bool looks_like_folder(const fs::path& folder) {
 RecordingResult open_folder(const fs::path& folder) {
   auto folders = rig_formats::camera_folders(folder, "");
   if (folders.empty())
-    return Error{folder.string(), "", "no camera", "cam0, cam1, ... with images named by time in ns"};
+    return Error{folder.string(), "", "no camera", "cam0, cam1, ... with images named by their time stamps in ns"};
   return std::unique_ptr<Recording>(std::make_unique<FolderRecording>(std::move(folders)));
 }
 

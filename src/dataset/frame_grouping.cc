@@ -9,7 +9,7 @@
 namespace bslam::dataset {
 namespace {
 
-// The lower of the two in the middle: gaps make intervals longer, never shorter.
+// The lower median, since gaps make intervals longer but never shorter.
 TimeNs median_interval(const std::vector<image_files::ImageFile>& images) {
   if (images.size() < 2) return 0;
   std::vector<TimeNs> intervals;

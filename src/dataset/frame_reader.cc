@@ -24,7 +24,8 @@ std::string why_damaged(const Dataset& dataset, std::size_t index, std::size_t c
   const auto& file = dataset.frames.at(index).images.at(camera);
   if (!file) return "";
   const auto image = read_of_camera(file->path, dataset.rig.camera(camera));
-  return image ? file->path.string() + ": can be read now" : image.error().message();
+  return image ? file->path.string() + ": can be read now, although it could not be read before"
+               : image.error().message();
 }
 
 image::ImageBundle read_frame(const Dataset& dataset, std::size_t index) {

@@ -1,4 +1,4 @@
-// The images of one frame of a data set.
+// Reads the images of one frame of a data set.
 #pragma once
 
 #include <cstddef>
@@ -9,12 +9,12 @@
 
 namespace bslam::dataset {
 
-// Reads and decodes the images of frame `index` as 8-bit grey. An image that is missing on disk, cannot be decoded
-// whole, or is not of its camera's resolution is kDamaged; a camera without one at this instant is kMissing. Keeps no
-// state: frames may be read from several threads at a time.
+// Reads and decodes the images of frame `index` as 8-bit grey values. The state of an image is kDamaged if its file is
+// missing, cannot be decoded completely, or differs from the calibrated resolution, and kMissing if the camera has no
+// image in this frame. May be called from several threads at the same time.
 image::ImageBundle read_frame(const Dataset& dataset, std::size_t index);
 
-// File and cause of an image that is kDamaged, found by reading it again.
+// File and cause of damage of an image in state kDamaged, found by reading it again.
 std::string why_damaged(const Dataset& dataset, std::size_t index, std::size_t camera);
 
 }  // namespace bslam::dataset

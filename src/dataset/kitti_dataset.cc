@@ -34,7 +34,7 @@ Result<std::vector<TimeNs>> read_times(const fs::path& file) {
       return Error{file.string(), fmt::format("line {}", number), line.substr(0, 60), "seconds"};
     times.push_back(*time);
   }
-  if (times.empty()) return Error{file.string(), "", "no times", "the seconds of every image, one a line"};
+  if (times.empty()) return Error{file.string(), "", "no times", "the time of every image in seconds, one per line"};
   return times;
 }
 
@@ -52,10 +52,13 @@ class KittiRecording : public Recording {
       if (projection.camera != cameras_[camera]) continue;
       const fs::path folder = rig_formats::kitti_image_folder(root_, projection.camera);
       const auto size = image_files::first_image_size(image_files::images_in(folder));
-      if (!size) return Error{folder.string(), "", "no image that can be read", "images: they tell the resolution"};
+      if (!size)
+        return Error{folder.string(), "", "no image that can be read",
+                     "an image, since calib.txt does not contain the resolution"};
       return rig_formats::kitti_camera(projection, size->width, size->height, file);
     }
-    return Error{file.string(), "", "no such line", fmt::format("P{}: and twelve numbers", cameras_[camera])};
+    return Error{file.string(), "", fmt::format("no line P{}", cameras_[camera]),
+                 "the projection of every camera, twelve numbers each"};
   }
 
   Result<image_files::ImageList> images(std::size_t camera) const override {
@@ -64,7 +67,8 @@ class KittiRecording : public Recording {
     if (!times) return times.error();
     std::vector<image_files::ImageFile> images;
     for (std::size_t k = 0; k < times->size(); ++k) {
-      images.push_back({folder / fmt::format("{:06}.png", k), (*times)[k]});  // unless found under another name
+      images.push_back(
+          {folder / fmt::format("{:06}.png", k), (*times)[k]});  // replaced below if the file has another name
     }
     std::size_t without_time = 0;
     for (image_files::NumberedImage& image : image_files::images_in(folder)) {
@@ -78,7 +82,7 @@ class KittiRecording : public Recording {
     image_files::ImageList list = image_files::in_time_order(std::move(images), (root_ / "times.txt").string());
     if (without_time > 0) {
       list.warnings.push_back(
-          fmt::format("{}: {} images beyond the end of times.txt, not used", folder.string(), without_time));
+          fmt::format("{}: {} images are not listed in times.txt and are not used", folder.string(), without_time));
     }
     return list;
   }
@@ -91,7 +95,7 @@ class KittiRecording : public Recording {
 
  private:
   fs::path root_;
-  std::vector<int> cameras_;  // the numbers in image_N
+  std::vector<int> cameras_;  // the numbers N of the folders image_N
 };
 
 std::vector<int> cameras_in(const fs::path& folder) {

@@ -1,4 +1,4 @@
-// What a data set format has to answer; one implementation per format. Internal to io.
+// The interface of data set formats, with one implementation per format. Internal to this folder.
 #pragma once
 
 #include <filesystem>
@@ -13,29 +13,29 @@
 
 namespace bslam::dataset {
 
-// A recorded data set on disk. Cameras are counted from 0 in the order of their folders.
+// A recorded data set on disk. Cameras are numbered from 0 in the order of their folders.
 class Recording {
  public:
   virtual ~Recording() = default;
 
   virtual std::size_t camera_count() const = 0;
-  // Does the layout's own calibration come with it, of any camera?
+  // Whether the data set contains the calibration of at least one camera.
   virtual bool calibrated() const { return true; }
-  // The calibration the data set itself carries.
+  // The calibration in the data set.
   virtual Result<camera::RigCamera> calibration(std::size_t camera) const = 0;
-  // Every image that is listed, with its time as recorded; at least one.
+  // All listed images with their recorded time stamps; at least one.
   virtual Result<image_files::ImageList> images(std::size_t camera) const = 0;
   virtual std::optional<std::filesystem::path> ground_truth() const { return std::nullopt; }
 };
 
 using RecordingResult = Result<std::unique_ptr<Recording>>;
 
-// Each answers an Error where `folder` is not of that layout, saying what was looked for.
+// Each returns an Error that says what is expected if `folder` does not have its format.
 RecordingResult open_euroc(const std::filesystem::path& folder);   // mav0/camN/data.csv
 RecordingResult open_kitti(const std::filesystem::path& folder);   // image_N/NNNNNN.png and times.txt
 RecordingResult open_folder(const std::filesystem::path& folder);  // camN/<ns>.png
 
-// Does the folder look like that format?
+// Whether the folder seems to have the format.
 bool looks_like_euroc(const std::filesystem::path& folder);
 bool looks_like_kitti(const std::filesystem::path& folder);
 bool looks_like_folder(const std::filesystem::path& folder);

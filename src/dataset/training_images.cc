@@ -58,12 +58,12 @@ std::optional<int> header_number(std::string_view& bytes) {
   return value;
 }
 
-// Binary PGM of 8 bits. Our own, for OpenCV prints where the pixels end early.
+// Binary PGM with 8 bits per pixel. OpenCV is not used, since it prints a message if the file is truncated.
 std::optional<image::Image> decode_pgm(std::string_view bytes) {
   bytes.remove_prefix(2);  // "P5"
   const auto width = header_number(bytes), height = header_number(bytes), most = header_number(bytes);
   if (!width || !height || !most || *most > 255 || bytes.empty()) return std::nullopt;
-  bytes.remove_prefix(1);  // the one white space before the pixels
+  bytes.remove_prefix(1);  // the single white space before the pixels
   if (bytes.size() < static_cast<std::uint64_t>(*width) * static_cast<std::uint64_t>(*height)) return std::nullopt;
   image::Image image(*width, *height);
   const auto* from = reinterpret_cast<const std::uint8_t*>(bytes.data());
@@ -77,7 +77,7 @@ std::optional<image::Image> decode_webp(std::string_view bytes) {
   try {
     decoded = cv::imdecode(buffer, cv::IMREAD_GRAYSCALE);
   } catch (const cv::Exception&) {
-    return std::nullopt;  // a header that promises an impossible size
+    return std::nullopt;  // a header with an impossible size
   }
   if (decoded.empty()) return std::nullopt;
   image::Image image(decoded.cols, decoded.rows);
@@ -85,7 +85,7 @@ std::optional<image::Image> decode_webp(std::string_view bytes) {
   return image;
 }
 
-// Formats for training beside those of recordings.
+// Supports more formats than recordings do.
 std::optional<image::Image> decode_any(std::string_view bytes) {
   if (bytes.starts_with("P5")) return decode_pgm(bytes);
   if (bytes.starts_with("RIFF") && bytes.size() > 12 && bytes.substr(8, 4) == "WEBP") return decode_webp(bytes);
@@ -120,7 +120,7 @@ Result<std::vector<fs::path>> find_images(const std::vector<std::string>& paths)
     } else if (!fs::exists(status)) {
       return Error{path, "", error ? error.message() : "No such file or directory", "an image or a folder of images"};
     } else if (!is_image_name(path)) {
-      return Error{path, "", "a file of another kind", "a PNG, JPEG, PGM or WebP image, or a folder"};
+      return Error{path, "", "a file of another type", "a PNG, JPEG, PGM or WebP image, or a folder"};
     } else {
       take(path);
     }
@@ -132,7 +132,7 @@ Result<image::Image> read_training_image(const fs::path& file, int max_side) {
   const auto bytes = read_file(file, kMaxImageBytes);
   if (!bytes) return bytes.error();
   auto image = decode_any(*bytes);
-  if (!image) return Error{file.string(), "", "no whole image", "a PNG, JPEG, PGM or WebP image"};
+  if (!image) return Error{file.string(), "", "no complete image", "a PNG, JPEG, PGM or WebP image"};
   const bool large = max_side > 0 && std::max(image->width(), image->height()) > max_side;
   return large ? shrink(*image, max_side) : *std::move(image);
 }

@@ -1,4 +1,4 @@
-// Pictures to learn from: photographs of any usual format and size.
+// Training images for vocabularies, in any common format and size.
 #pragma once
 
 #include <filesystem>
@@ -10,12 +10,13 @@
 
 namespace bslam::dataset {
 
-// The PNG, JPEG, PGM and WebP files among `paths` and, by name, in the folders among them and below; each folder's in
-// the order of their paths, none twice. Errors: a path that is not there or cannot be searched, a file of another kind.
+// The PNG, JPEG, PGM and WebP files in `paths`, and, recognised by their names, those in folders in `paths` and their
+// subfolders. The files of a folder are ordered by path; duplicates are removed. Errors: a path that does not exist or
+// cannot be searched; a file of another type.
 Result<std::vector<std::filesystem::path>> find_images(const std::vector<std::string>& paths);
 
-// Grey, and shrunk by averaging until no side is longer than `max_side` pixels (0: as it is). Errors: not readable, no
-// whole image.
+// Reads a grey image and scales it down by averaging so that no side is longer than `max_side` pixels (0: no limit).
+// Errors: the file cannot be read or is not a complete image.
 Result<image::Image> read_training_image(const std::filesystem::path& file, int max_side);
 
 }  // namespace bslam::dataset

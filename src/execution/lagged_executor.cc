@@ -115,7 +115,7 @@ class LaggedExecutor : public StageExecutor {
   // Whether a lane is full is a matter of counts: then its task under way is committed early.
   void push(const StageTask& task) {
     Lane& l = lane(task.stage);
-    if (l.waiting.size() >= static_cast<std::size_t>(setup_.options.pending_keyframes)) settle(task.stage);
+    if (l.waiting.size() >= static_cast<std::size_t>(setup_.options.max_pending_keyframes)) settle(task.stage);
     l.waiting.push_back(task);
     if (!l.running) start_next(task.stage);
   }

@@ -97,7 +97,7 @@ class ParallelExecutor : public StageExecutor {
 
   void push(const StageTask& task, std::unique_lock<std::mutex>& lock) {
     Lane& l = lane(task.stage);
-    const auto room = static_cast<std::size_t>(setup_.options.pending_keyframes);
+    const auto room = static_cast<std::size_t>(setup_.options.max_pending_keyframes);
     changed_.wait(lock, [&] { return closed_ || l.waiting.size() < room; });
     if (closed_) return;
     l.waiting.push_back(task);

@@ -29,14 +29,15 @@ struct FeatureOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("per_image", self.per_image, Range{50, 20000}, "",
-            "keypoints wanted in one image at most; twice as many where other cameras are out");
-    visitor("per_rig", self.per_rig, Range{0, 100000}, "", "keypoints wanted in all cameras together; 0: no bound");
-    visitor("levels", self.levels, Range{1, 16}, "", "pyramid levels");
-    visitor("scale_factor", self.scale_factor, Range{1.05, 2.0}, "", "ratio of one level to the next");
-    visitor("fast_threshold", self.fast_threshold, Range{2, 200}, "grey levels",
-            "corner threshold in a well lit image");
+            "keypoints wanted in one image at most; twice as many where other cameras are out", kCommon);
+    visitor("per_rig", self.per_rig, Range{0, 100000}, "", "keypoints wanted in all cameras together; 0: no bound",
+            kCommon);
+    visitor("levels", self.levels, Range{1, 16}, "", "pyramid levels", kCommon);
+    visitor("scale_factor", self.scale_factor, Range{1.05, 2.0}, "", "ratio of one level to the next", kCommon);
+    visitor("fast_threshold", self.fast_threshold, Range{2, 200}, "grey levels", "corner threshold in a well lit image",
+            kCommon);
     visitor("fast_threshold_min", self.fast_threshold_min, Range{1, 200}, "grey levels",
-            "least corner threshold in dark or blurred regions");
+            "least corner threshold in dark or blurred regions", kCommon);
     visitor("sigma_px", self.sigma_px, Range{0.05, 5.0}, "px", "standard deviation of a keypoint on its level");
   }
 };

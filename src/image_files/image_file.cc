@@ -17,7 +17,8 @@ namespace {
 
 constexpr std::size_t kMaxImageBytes = std::size_t{1} << 30;
 
-// Starts as a JPEG and ends with its end-of-image marker; zeros that some recorders pad with are allowed.
+// Whether the bytes start as a JPEG and end with the end-of-image marker. Zeros after it, which some recorders add, are
+// allowed.
 bool is_whole_jpeg(std::string_view bytes) {
   if (!bytes.starts_with("\xff\xd8\xff")) return false;
   const std::size_t last = bytes.find_last_not_of('\0');
@@ -30,7 +31,7 @@ std::optional<image::Image> decode_with_opencv(std::string_view bytes) {
   try {
     decoded = cv::imdecode(buffer, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception&) {
-    return std::nullopt;  // a header that promises an impossible size: damaged, like any other nonsense
+    return std::nullopt;  // a header with an impossible size: the file is damaged
   }
   if (decoded.empty()) return std::nullopt;
   image::Image image(decoded.cols, decoded.rows);
@@ -53,7 +54,7 @@ Result<image::Image> read_image(const std::filesystem::path& file) {
   const auto bytes = read_file(file, kMaxImageBytes);
   if (!bytes) return bytes.error();
   auto image = decode_grey(*bytes);
-  if (!image) return Error{file.string(), "", "no whole PNG or JPEG image", "one"};
+  if (!image) return Error{file.string(), "", "no complete PNG or JPEG image", "a complete PNG or JPEG image"};
   return *std::move(image);
 }
 
@@ -68,8 +69,8 @@ Result<image::Image> read_mask(const camera::Camera& camera) {
   const std::span pixels(mask->row(0),
                          static_cast<std::size_t>(mask->width()) * static_cast<std::size_t>(mask->height()));
   if (std::ranges::all_of(pixels, [](std::uint8_t p) { return p == 0; })) {
-    return Error{camera.mask_file, "", "nothing but 0, which hides all of " + camera.name,
-                 "other values where the image counts"};
+    return Error{camera.mask_file, "", "only zeros, which mask all of " + camera.name,
+                 "values above 0 where the image is to be used"};
   }
   return mask;
 }

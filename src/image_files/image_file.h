@@ -12,16 +12,16 @@
 
 namespace bslam::image_files {
 
-// Grey pixels of a PNG or JPEG in memory, as stored: a rotation noted in the file is not applied. Colours are weighted
-// to luminance; of 16 bits the upper eight are kept. Empty for anything else and for files that end early or whose
-// checksums are wrong: decoders would hand out the part they could read.
+// Decodes a PNG or JPEG in memory to grey values. Orientation tags are ignored, colours are converted to luminance, and
+// the upper eight of 16 bits are kept. Empty for other formats, and for truncated files or wrong checksums, of which
+// decoders would return the readable part.
 std::optional<image::Image> decode_grey(std::string_view bytes);
 
-// The same from a file. Errors: not readable, no whole image.
+// The same from a file. Errors: the file cannot be read or is not a complete image.
 Result<image::Image> read_image(const std::filesystem::path& file);
 
-// The mask of a camera, 0 = ignore; an empty image where it has none. Errors: not readable, not the camera's
-// resolution, 0 everywhere.
+// The mask of a camera, where 0 means ignore, or an empty image if the camera has none. Errors: the file cannot be
+// read, differs from the resolution of the camera, or is 0 everywhere.
 Result<image::Image> read_mask(const camera::Camera& camera);
 
 // The masks of all cameras of a rig, in order; errors as read_mask.

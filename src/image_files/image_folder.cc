@@ -28,7 +28,7 @@ ImageList in_time_order(std::vector<image_files::ImageFile> images, const std::s
     return a.time_ns < b.time_ns;
   };
   if (!std::is_sorted(images.begin(), images.end(), earlier)) {
-    list.warnings.push_back(fmt::format("{}: timestamps out of order, sorted", source));
+    list.warnings.push_back(fmt::format("{}: time stamps were out of order and have been sorted", source));
     std::stable_sort(images.begin(), images.end(), earlier);
   }
   const auto last = std::unique(
@@ -36,7 +36,7 @@ ImageList in_time_order(std::vector<image_files::ImageFile> images, const std::s
       [](const image_files::ImageFile& a, const image_files::ImageFile& b) { return a.time_ns == b.time_ns; });
   if (last != images.end()) {
     list.warnings.push_back(
-        fmt::format("{}: {} images with the timestamp of another, dropped", source, images.end() - last));
+        fmt::format("{}: {} images with the time stamp of another image are not used", source, images.end() - last));
     images.erase(last, images.end());
   }
   list.images = std::move(images);

@@ -1,4 +1,4 @@
-// Lists of images: files in time order, and folders of images named by a number. Internal to io.
+// Lists of images: files in time order, and folders of images named by numbers.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,17 @@ namespace bslam::image_files {
 
 struct ImageFile {
   std::filesystem::path path;
-  TimeNs time_ns = 0;  // of capture: the camera's time offset is applied
+  TimeNs time_ns = 0;  // time of capture, with the time offset of the camera applied
 };
 
-// Images of one camera with their times as recorded, strictly increasing.
+// Images of one camera with their recorded time stamps, strictly increasing.
 struct ImageList {
   std::vector<ImageFile> images;
   std::vector<std::string> warnings;
 };
 
-// Sorts by time and drops the second of two images with one time; says so in the warnings, which name `source`.
+// Sorts by time and removes the second of two images with equal time stamps. Both are reported in the warnings, which
+// name `source`.
 ImageList in_time_order(std::vector<ImageFile> images, const std::string& source);
 
 struct NumberedImage {
@@ -30,14 +31,14 @@ struct NumberedImage {
   std::filesystem::path path;
 };
 
-// The PNG and JPEG files of a folder whose names are numbers, by number; none where there is no such folder.
+// The PNG and JPEG files of a folder whose names are numbers, ordered by number. None if the folder does not exist.
 std::vector<NumberedImage> images_in(const std::filesystem::path& folder);
 
 struct ImageSize {
   int width = 0, height = 0;
 };
 
-// Size of the first image that can be read, of the first few.
+// Size of the first readable image among the first few.
 std::optional<ImageSize> first_image_size(const std::vector<NumberedImage>& images);
 
 }  // namespace bslam::image_files

@@ -15,7 +15,7 @@ namespace bslam::image_files {
 namespace {
 
 constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
-constexpr std::size_t kChunkFrame = 12;  // length, type and checksum around a chunk's data
+constexpr std::size_t kChunkFrame = 12;  // bytes of length, type and checksum around the data of a chunk
 
 std::uint32_t big_endian(const char* p) {
   const auto byte = [&](int i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(p[i])); };
@@ -27,7 +27,7 @@ struct Chunk {
   std::uint32_t checksum = 0;  // CRC-32 over type and data, as stored
 };
 
-// Takes the next chunk off `rest`; empty where it is cut off.
+// Removes the next chunk from `rest`. Empty if it is truncated.
 std::optional<Chunk> next_chunk(std::string_view& rest) {
   if (rest.size() < kChunkFrame) return std::nullopt;
   const std::size_t length = big_endian(rest.data());
@@ -47,7 +47,7 @@ struct Header {
   int width = 0, height = 0;
 };
 
-// Empty where the picture is not 8-bit grey without interlacing.
+// Empty unless the image is 8-bit grey without interlacing.
 std::optional<Header> read_header(const Chunk& chunk) {
   if (chunk.type != "IHDR" || chunk.data.size() != 13) return std::nullopt;
   const std::uint32_t width = big_endian(chunk.data.data()), height = big_endian(chunk.data.data() + 4);
@@ -57,7 +57,7 @@ std::optional<Header> read_header(const Chunk& chunk) {
   return Header{static_cast<int>(width), static_cast<int>(height)};
 }
 
-// The compressed stream: the data of all IDAT chunks, one after the other.
+// The compressed stream: the concatenated data of all IDAT chunks.
 std::string join_data(std::string_view chunks) {
   std::string joined;
   joined.reserve(chunks.size());
@@ -67,7 +67,8 @@ std::string join_data(std::string_view chunks) {
   return joined;
 }
 
-// Of left, above and above-left, the one nearest to left + above - corner; ties in this order.
+// The Paeth predictor: of left, above and corner (above-left), in this order, the value closest to left + above -
+// corner.
 int paeth(int left, int above, int corner) {
   const int a = above - corner, b = left - corner;
   const int to_left = std::abs(a), to_above = std::abs(b), to_corner = std::abs(a + b);
@@ -76,7 +77,7 @@ int paeth(int left, int above, int corner) {
   return to_corner < least ? corner : best;
 }
 
-// Undoes the filter of one row (ISO/IEC 15948, section 9.2); `above` is the row before it, zeros for the first.
+// Reverses the filter of one row (ISO/IEC 15948, section 9.2). `above` is the previous row, or zeros for the first row.
 bool unfilter(int filter, const std::uint8_t* in, const std::uint8_t* above, std::uint8_t* out, int width) {
   int left = 0, corner = 0;
   switch (filter) {
@@ -125,7 +126,7 @@ std::optional<image::Image> decode_grey_png([[maybe_unused]] std::string_view by
   if (!header) return std::nullopt;
   const std::string compressed = join_data(bytes);
   const auto width = static_cast<std::size_t>(header->width), height = static_cast<std::size_t>(header->height);
-  const std::size_t size = (width + 1) * height;  // every row begins with its filter
+  const std::size_t size = (width + 1) * height;  // every row begins with a filter byte
   const auto filtered = std::make_unique_for_overwrite<std::uint8_t[]>(size);
   const std::unique_ptr<libdeflate_decompressor, void (*)(libdeflate_decompressor*)> decompressor(
       libdeflate_alloc_decompressor(), libdeflate_free_decompressor);

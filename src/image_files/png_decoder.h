@@ -1,4 +1,4 @@
-// PNG (ISO/IEC 15948) where decoding is in the hot path. Internal to io.
+// A fast decoder for the common kind of PNG (ISO/IEC 15948). Internal to this folder.
 #pragma once
 
 #include <optional>
@@ -8,12 +8,13 @@
 
 namespace bslam::image_files {
 
-// True for a PNG whose chunks are complete up to IEND and, where libdeflate is built in, have the right checksums.
+// Whether the bytes are a PNG whose chunks are complete up to IEND and, if built with libdeflate, have correct
+// checksums.
 bool is_whole_png(std::string_view bytes);
 
-// Pixels of an 8-bit grey PNG without interlacing, the common kind, at about twice the speed of libpng. `bytes` passed
-// is_whole_png. Empty for other kinds, for damaged data, and where libdeflate is not built in: the general decoder has
-// the word then.
+// Decodes an 8-bit grey PNG without interlacing at about twice the speed of libpng. `bytes` must have passed
+// is_whole_png. Empty for other kinds of PNG, for damaged data, and if built without libdeflate; the caller then uses
+// the general decoder.
 std::optional<image::Image> decode_grey_png(std::string_view bytes);
 
 }  // namespace bslam::image_files

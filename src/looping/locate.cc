@@ -114,12 +114,12 @@ std::vector<KeypointMatch> search_at(const camera::Rig& rig, const frame::Bundle
 // The landmarks that some camera sees from about where they are known from, in order of id: what is the same place
 // looks the same from there. From far aside it does not, and missing it says nothing.
 std::vector<LandmarkId> to_be_found(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place,
-                                    const SE3& T_rig_world, double max_turn) {
+                                    const SE3& T_rig_world, double max_viewing_angle) {
   std::vector<LandmarkId> out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (frame.cameras[c].keypoints.empty()) continue;
     for (const std::uint32_t i :
-         matching::visible_points(rig.camera(c), rig.cam_from_rig(c) * T_rig_world, place.points, max_turn)) {
+         matching::visible_points(rig.camera(c), rig.cam_from_rig(c) * T_rig_world, place.points, max_viewing_angle)) {
       out.push_back(place.landmarks[i]);
     }
   }
@@ -201,7 +201,7 @@ std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& ri
   out.inliers = solution.num_inliers;
   if (solution.num_inliers < options.min_inliers) return rejected(Rejection::kFewInliers);
   Location location{candidate, solution.T_rig_world, by_feature(frame, guided, solution.inlier), solution.num_inliers};
-  for (const double turn : {options.max_turn, matching::ProjectionSearchOptions{}.max_view_angle}) {
+  for (const double turn : {options.max_viewing_angle, matching::ProjectionSearchOptions{}.max_view_angle}) {
     const std::vector<LandmarkId> sought = to_be_found(rig, frame, place, solution.T_rig_world, turn);
     const auto is_sought = [&](const auto& match) { return std::ranges::binary_search(sought, match.second); };
     out.sought = static_cast<int>(sought.size());
@@ -209,7 +209,7 @@ std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& ri
     if (out.sought >= options.min_inliers)
       break;  // fewer: the place is seen from aside, and what is known from there has to do
   }
-  if (out.found < options.min_found_share * out.sought) return rejected(Rejection::kFewFound);
+  if (out.found < options.min_found_ratio * out.sought) return rejected(Rejection::kFewFound);
   return location;
 }
 

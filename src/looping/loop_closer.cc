@@ -16,7 +16,7 @@ bool is_revisit(const map::BundledMap& map, KeyframeId keyframe, const Location&
     return std::ranges::find(list, keyframe, &map::Observation::keyframe) != list.end();
   });
   const auto all = static_cast<double>(location.matches.size());
-  return all - static_cast<double>(known) >= options.min_news * all;
+  return all - static_cast<double>(known) >= options.min_new_landmark_ratio * all;
 }
 
 // Returns, among the candidate and its best covisible keyframes, without the keyframe's own neighbours, the one that is

@@ -188,7 +188,8 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
   const auto [first, last] = std::minmax(closure.keyframe, closure.with);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
   const double way = path_length(map, first, last) + median_depth(map, closure.keyframe);
-  return closure.apart <= options.max_apart && closure.moved <= share * way && closure.turned <= kMaxRotation;
+  return closure.apart <= options.max_distance_over_depth && closure.moved <= share * way &&
+         closure.turned <= kMaxRotation;
 }
 
 bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,
@@ -238,7 +239,7 @@ bool close_loop(const LoopClosure& closure, const Location& location, const Loop
   std::vector<SE3> T_window;
   for (const KeyframeId k : window)
     T_window.push_back(pose_of(graph.problem.S_world[static_cast<std::size_t>(graph.vertex(k))]));
-  if (closure.off_px <= options.near_px && !graph.problem.scale_free) {
+  if (closure.off_px <= options.max_bundle_error_px && !graph.problem.scale_free) {
     // The error is small, so bundle adjustment can remove it starting from the present map. The pose verified for a
     // single keyframe is no more accurate than the map.
     fuse(window, T_window, closure, location, options, features, draft);

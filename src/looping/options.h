@@ -10,31 +10,33 @@ namespace bslam::looping {
 
 struct RecognitionOptions {
   // minimum number of common words of a candidate, relative to the largest number of any keyframe
-  double common_share = 0.6;
-  double group_share = 0.75;  // minimum score of a group, relative to the best group
+  double min_common_word_ratio = 0.6;
+  double min_group_score_ratio = 0.75;  // minimum score of a group, relative to the best group
   // Factor on both fractions for frames without a pose prior, so that look-alike places become candidates too, even if
   // fewer keyframes observe them.
-  double rival_share = 0.25;
-  int group = 10;             // covisible keyframes whose scores are added up
-  int neighbour_weight = 15;  // minimum number of landmarks shared with a neighbour
+  double relocalisation_factor = 0.25;
+  int group = 10;                    // covisible keyframes whose scores are added up
+  int min_neighbour_landmarks = 15;  // minimum number of landmarks shared with a neighbour
   // Minimum fraction of a keyframe's landmarks that makes another keyframe its neighbour; neighbours are not
   // candidates.
-  double neighbour_share = 0.05;
+  double min_neighbour_ratio = 0.05;
   int max_candidates = 5;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("common_share", self.common_share, Range{0, 1}, "",
-            "minimum number of common words of a candidate, relative to the largest number");
-    visitor("group_share", self.group_share, Range{0, 1}, "",
-            "minimum score of a candidate group, relative to the best group");
-    visitor("rival_share", self.rival_share, Range{0, 1}, "",
-            "factor on both fractions for frames without a pose prior");
+    visitor("min_common_word_ratio", self.min_common_word_ratio, Range{0, 1}, "",
+            "minimum number of common words of a candidate, relative to the largest number",
+            OptionNote{.formerly = "common_share"});
+    visitor("min_group_score_ratio", self.min_group_score_ratio, Range{0, 1}, "",
+            "minimum score of a candidate group, relative to the best group", OptionNote{.formerly = "group_share"});
+    visitor("relocalisation_factor", self.relocalisation_factor, Range{0, 1}, "",
+            "factor on both fractions for frames without a pose prior", OptionNote{.formerly = "rival_share"});
     visitor("group", self.group, Range{1, 100}, "", "covisible keyframes whose scores are added up");
-    visitor("neighbour_weight", self.neighbour_weight, Range{1, 10000}, "",
-            "minimum number of landmarks shared with a neighbour; neighbours are not candidates");
-    visitor("neighbour_share", self.neighbour_share, Range{0, 1}, "",
-            "the same as a fraction of all landmarks of the keyframe");
+    visitor("min_neighbour_landmarks", self.min_neighbour_landmarks, Range{1, 10000}, "",
+            "minimum number of landmarks shared with a neighbour; neighbours are not candidates",
+            OptionNote{.formerly = "neighbour_weight"});
+    visitor("min_neighbour_ratio", self.min_neighbour_ratio, Range{0, 1}, "",
+            "the same as a fraction of all landmarks of the keyframe", OptionNote{.formerly = "neighbour_share"});
     visitor("max_candidates", self.max_candidates, Range{1, 100}, "", "maximum number of candidates to verify");
   }
 };
@@ -48,9 +50,9 @@ struct VerificationOptions {
   int min_inliers = 50;  // minimum number of inlier keypoints
   // Minimum fraction of the landmarks predicted visible that must be matched. Places that look partly alike match
   // fewer.
-  double min_found_share = 0.2;
+  double min_found_ratio = 0.2;
   // rad: landmarks observed so far only from directions that differ by more than this need not be matched.
-  double max_turn = 0.52;
+  double max_viewing_angle = 0.52;
   solver::AbsolutePoseOptions consensus;
 
   template <class Self, class Visitor>
@@ -61,49 +63,53 @@ struct VerificationOptions {
     visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "maximum descriptor distance of a match");
     visitor("ratio", self.ratio, Range{0.1, 1}, "", "maximum ratio of best to second best descriptor distance");
     visitor("radius", self.radius, Range{1e-4, 1}, "rad", "radius of the guided search at the estimated pose");
-    visitor("min_inliers", self.min_inliers, Range{6, 10000}, "", "minimum number of inlier keypoints");
-    visitor("min_found_share", self.min_found_share, Range{0, 1}, "",
-            "minimum fraction of the landmarks predicted visible that must be matched");
-    visitor("max_turn", self.max_turn, Range{0.01, 1.05}, "rad",
-            "largest angle to a known viewing direction at which a landmark is predicted visible");
+    visitor("min_inliers", self.min_inliers, Range{6, 10000}, "", "minimum number of inlier keypoints", kCommon);
+    visitor("min_found_ratio", self.min_found_ratio, Range{0, 1}, "",
+            "minimum fraction of the landmarks predicted visible that must be matched",
+            OptionNote{.formerly = "min_found_share"});
+    visitor("max_viewing_angle", self.max_viewing_angle, Range{0.01, 1.05}, "rad",
+            "largest angle to a known viewing direction at which a landmark is predicted visible",
+            OptionNote{.formerly = "max_turn"});
     visitor.section("consensus", self.consensus);
   }
 };
 
 struct LoopOptions {
   bool enabled = true;
-  int consistent_keyframes = 2;  // consecutive keyframes that must recognise the same place
-  int max_keyframe_gap = 3;      // largest id difference between two consecutive ones
-  double min_news = 0.25;        // minimum fraction of matched landmarks not already observed by the keyframe
+  int consistent_keyframes = 2;          // consecutive keyframes that must recognise the same place
+  int max_keyframe_gap = 3;              // largest id difference between two consecutive ones
+  double min_new_landmark_ratio = 0.25;  // minimum fraction of matched landmarks not already observed by the keyframe
   // Maximum distance to the matched keyframe over the median distance to the matched landmarks; farther away is no
   // revisit.
-  double max_apart = 0.2;
+  double max_distance_over_depth = 0.2;
   // Maximum correction relative to the path length since the place was last seen; a larger one is a false match, not
   // drift.
   double max_drift = 0.05;
-  double max_drift_free = 0.3;  // the same if the scale is not observable
-  double near_px = 4.0;         // reprojection error up to which bundle adjustment alone suffices
-  int edge_weight = 60;         // minimum number of shared landmarks for a covisibility edge of the pose graph
-  int window = 10;              // covisible keyframes of the newest one that are fused with the place
+  double max_drift_free = 0.3;       // the same if the scale is not observable
+  double max_bundle_error_px = 4.0;  // reprojection error up to which bundle adjustment alone suffices
+  int edge_weight = 60;              // minimum number of shared landmarks for a covisibility edge of the pose graph
+  int window = 10;                   // covisible keyframes of the newest one that are fused with the place
   mapping::LandmarkFusionOptions fusion{.radius = 0.01, .max_hamming = 60, .max_chi2 = 16.0};
   solver::PoseGraphOptions pose_graph;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("enabled", self.enabled, Range{}, "", "loop closing and merging of submaps");
+    visitor("enabled", self.enabled, Range{}, "", "loop closing and merging of submaps", kCommon);
     visitor("consistent_keyframes", self.consistent_keyframes, Range{1, 100}, "",
-            "consecutive keyframes that must recognise the same place");
+            "consecutive keyframes that must recognise the same place", kCommon);
     visitor("max_keyframe_gap", self.max_keyframe_gap, Range{1, 100}, "",
             "largest id difference between two consecutive ones");
-    visitor("min_news", self.min_news, Range{0, 1}, "",
-            "minimum fraction of matched landmarks not already observed by the keyframe");
-    visitor("max_apart", self.max_apart, Range{0, 100}, "",
-            "maximum distance to the matched keyframe over the median distance to the matched landmarks");
+    visitor("min_new_landmark_ratio", self.min_new_landmark_ratio, Range{0, 1}, "",
+            "minimum fraction of matched landmarks not already observed by the keyframe",
+            OptionNote{.formerly = "min_news"});
+    visitor("max_distance_over_depth", self.max_distance_over_depth, Range{0, 100}, "",
+            "maximum distance to the matched keyframe over the median distance to the matched landmarks",
+            OptionNote{.formerly = "max_apart"});
     visitor("max_drift", self.max_drift, Range{0, 10}, "",
             "maximum correction relative to the path length since the place was last seen");
     visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "the same if the scale is not observable");
-    visitor("near_px", self.near_px, Range{0, 1000}, "px",
-            "reprojection error up to which bundle adjustment alone suffices");
+    visitor("max_bundle_error_px", self.max_bundle_error_px, Range{0, 1000}, "px",
+            "reprojection error up to which bundle adjustment alone suffices", OptionNote{.formerly = "near_px"});
     visitor("edge_weight", self.edge_weight, Range{1, 10000}, "",
             "minimum number of shared landmarks for a covisibility edge of the pose graph");
     visitor("window", self.window, Range{0, 100}, "", "covisible keyframes that are fused with the place");
@@ -114,12 +120,13 @@ struct LoopOptions {
 
 struct RecoveryOptions {
   // Number of frames with enough features but without a pose after which a new submap is started.
-  int new_part_after = 50;
+  int new_submap_after = 50;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("new_part_after", self.new_part_after, Range{1, 1000000}, "frames",
-            "number of frames with features but without a pose after which a new submap is started");
+    visitor("new_submap_after", self.new_submap_after, Range{1, 1000000}, "frames",
+            "number of frames with features but without a pose after which a new submap is started",
+            OptionNote{.common = true, .formerly = "new_part_after"});
   }
 };
 

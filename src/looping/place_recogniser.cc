@@ -40,7 +40,7 @@ std::vector<map::Covisible> neighbours_of(const map::BundledMap& map, KeyframeId
   const auto landmarks =
       std::ranges::count_if(map.keyframe(keyframe).landmarks.values(), [](LandmarkId l) { return l.valid(); });
   const double enough =
-      std::max<double>(options.neighbour_weight, options.neighbour_share * static_cast<double>(landmarks));
+      std::max<double>(options.min_neighbour_landmarks, options.min_neighbour_ratio * static_cast<double>(landmarks));
   std::vector<map::Covisible> out;
   for (const map::Covisible& c : map.keyframe(keyframe).covisible) {
     if (c.weight >= enough) out.push_back(c);
@@ -97,13 +97,14 @@ std::vector<Candidate> BagOfWordsRecogniser::revisited(const map::BundledMap& ma
     min_score = any ? std::min(min_score, score) : score;
     any = true;
   }
-  return rank(map, *words, excluded, {options_.common_share, options_.group_share, min_score});
+  return rank(map, *words, excluded, {options_.min_common_word_ratio, options_.min_group_score_ratio, min_score});
 }
 
 std::vector<Candidate> BagOfWordsRecogniser::recognised(const map::BundledMap& map, const frame::BundledFrame& frame) {
   sync(map);
   return rank(map, *words_of(frame), {},
-              {options_.rival_share * options_.common_share, options_.rival_share * options_.group_share});
+              {options_.relocalisation_factor * options_.min_common_word_ratio,
+               options_.relocalisation_factor * options_.min_group_score_ratio});
 }
 
 std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, const place::WordVector& words,
@@ -116,12 +117,13 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
   for (const place::CommonWords& c : sharing) most = std::max(most, c.count);
   std::vector<Scored> scored;
   for (const place::CommonWords& c : sharing) {
-    if (c.count < bounds.common_share * most) continue;
+    if (c.count < bounds.min_common_word_ratio * most) continue;
     const double score = place::l1_score(words, *index_.words_of(c.keyframe));
     if (score >= bounds.min_score) scored.push_back({c.keyframe, score});
   }
   std::vector<Candidate> groups;
-  for (const Scored& s : scored) groups.push_back(group_of(map, s, scored, options_.group, options_.neighbour_weight));
+  for (const Scored& s : scored)
+    groups.push_back(group_of(map, s, scored, options_.group, options_.min_neighbour_landmarks));
   std::sort(groups.begin(), groups.end(), better);
   std::vector<Candidate> out;
   // A group covers its representative and the neighbours of it. Keyframes that share only a few landmarks, for example
@@ -129,7 +131,7 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
   std::vector<std::uint8_t> taken(map.keyframe_slots(), 0);
   for (const Candidate& g : groups) {
     if (out.size() == static_cast<std::size_t>(options_.max_candidates) ||
-        g.score < bounds.group_share * groups.front().score)
+        g.score < bounds.min_group_score_ratio * groups.front().score)
       break;
     if (taken[g.keyframe.index()]) continue;
     out.push_back(g);

@@ -51,8 +51,8 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   void sync(const map::BundledMap& map);
   Words words_of(const frame::BundledFrame& frame) const;
   struct Bounds {
-    double common_share, group_share;  // as in RecognitionOptions
-    double min_score = 0;              // of a single keyframe
+    double min_common_word_ratio, min_group_score_ratio;  // as in RecognitionOptions
+    double min_score = 0;                                 // of a single keyframe
   };
   std::vector<Candidate> rank(const map::BundledMap& map, const place::WordVector& words,
                               const std::vector<std::uint8_t>& excluded, const Bounds& bounds) const;

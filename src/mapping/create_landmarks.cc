@@ -115,7 +115,7 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
                                       free_b,
                                       features.sigma_px,
                                       features.scale_factor};
-  const matching::EpipolarOptions search{.near_m = 0.05 * depth,
+  const matching::EpipolarOptions search{.min_depth_m = 0.05 * depth,
                                          .sigmas = 2.0,
                                          .max_hamming = options.max_hamming,
                                          .ratio = options.ratio,
@@ -147,7 +147,7 @@ int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const 
   for (const map::Covisible& neighbour :
        draft.map().best_covisible(keyframe, static_cast<std::size_t>(options.neighbours))) {
     const Vector3d other = draft.map().keyframe(neighbour.keyframe).T_rig_world.inverse().translation();
-    if ((centre - other).norm() < options.min_baseline_share * depth) continue;
+    if ((centre - other).norm() < options.min_baseline_over_depth * depth) continue;
     for (std::size_t i = 0; i < draft.map().rig().size(); ++i) {
       for (std::size_t j = 0; j < draft.map().rig().size(); ++j) {
         made += create_between({keyframe, CameraIndex(i)}, {neighbour.keyframe, CameraIndex(j)}, depth, options,

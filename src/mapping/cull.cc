@@ -38,7 +38,7 @@ bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& o
     });
     observed_elsewhere += others >= options.redundant_views;
   }
-  return landmarks > 0 && observed_elsewhere > options.redundant_share * landmarks;
+  return landmarks > 0 && observed_elsewhere > options.redundant_ratio * landmarks;
 }
 
 }  // namespace
@@ -53,7 +53,7 @@ int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDra
     if (!l.alive) continue;
     const int age = newest.value() - l.born.value();
     if (age > options.probation) break;
-    const bool rarely_matched = l.expected > 3 && l.found < options.min_found_share * l.expected;
+    const bool rarely_matched = l.expected > 3 && l.found < options.min_found_ratio * l.expected;
     const bool few_keypoints = age >= options.probation && num_keypoints(map, id) < options.min_keypoints;
     if (rarely_matched || few_keypoints) bad.push_back(id);
   }

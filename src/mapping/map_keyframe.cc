@@ -21,7 +21,7 @@ void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const Fe
                                                 : select_local(draft.map(), keyframe, options.window);
     report.adjustment =
         adjustment::adjust_map(selection, options.local, features.sigma_px, features.scale_factor, draft, stop);
-    if (std::abs(report.scale.correction - 1.0) <= options.scale.settled || stop.stop_requested()) break;
+    if (std::abs(report.scale.correction - 1.0) <= options.scale.converged_change || stop.stop_requested()) break;
   }
   const bool single_submap = draft.map().roots().size() == 1;  // the scale is a property of the whole map
   if (single_submap && is_metric(report.scale, deviation_before, options.scale))

@@ -8,19 +8,19 @@
 namespace bslam::mapping {
 
 struct CreationOptions {
-  int neighbours = 6;                // covisible keyframes matched for new landmarks
-  double min_baseline_share = 0.01;  // minimum baseline relative to the median depth; a shorter one gives no depth
-  int max_hamming = 50;              // bits, maximum descriptor distance
-  double ratio = 0.8;                // maximum ratio of best to second best distance along the epipolar curve
-  double min_parallax = 0.012;       // rad, minimum angle between the rays of a new landmark
-  double max_depth_error = 0.15;     // maximum relative standard deviation of its depth
-  double max_chi2 = 5.991;           // maximum squared normalised error of each of its keypoints
+  int neighbours = 6;                     // covisible keyframes matched for new landmarks
+  double min_baseline_over_depth = 0.01;  // minimum baseline relative to the median depth; a shorter one gives no depth
+  int max_hamming = 50;                   // bits, maximum descriptor distance
+  double ratio = 0.8;                     // maximum ratio of best to second best distance along the epipolar curve
+  double min_parallax = 0.012;            // rad, minimum angle between the rays of a new landmark
+  double max_depth_error = 0.15;          // maximum relative standard deviation of its depth
+  double max_chi2 = 5.991;                // maximum squared normalised error of each of its keypoints
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes matched for new landmarks");
-    visitor("min_baseline_share", self.min_baseline_share, Range{0, 1}, "",
-            "minimum baseline relative to the median depth");
+    visitor("min_baseline_over_depth", self.min_baseline_over_depth, Range{0, 1}, "",
+            "minimum baseline relative to the median depth", OptionNote{.formerly = "min_baseline_share"});
     visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits",
             "maximum descriptor distance of a new landmark's features");
     visitor("ratio", self.ratio, Range{0.1, 1}, "",
@@ -51,22 +51,24 @@ struct FusionOptions {
 
 struct CullingOptions {
   int probation = 3;              // keyframes during which a new landmark is checked
-  double min_found_share = 0.25;  // minimum ratio of frames that matched it to frames that predicted it visible
+  double min_found_ratio = 0.25;  // minimum ratio of frames that matched it to frames that predicted it visible
   int min_keypoints = 3;          // minimum number of its keypoints after the probation
   // A keyframe is redundant if more than this fraction of its landmarks is observed by `redundant_views` other
   // keyframes.
-  double redundant_share = 0.9;
+  double redundant_ratio = 0.9;
   int redundant_views = 3;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("probation", self.probation, Range{1, 100}, "keyframes", "during which a new landmark is checked");
-    visitor("min_found_share", self.min_found_share, Range{0, 1}, "",
-            "minimum ratio of frames that matched a landmark to frames that predicted it visible");
+    visitor("min_found_ratio", self.min_found_ratio, Range{0, 1}, "",
+            "minimum ratio of frames that matched a landmark to frames that predicted it visible",
+            OptionNote{.formerly = "min_found_share"});
     visitor("min_keypoints", self.min_keypoints, Range{1, 100}, "",
             "minimum number of keypoints of a landmark after its probation");
-    visitor("redundant_share", self.redundant_share, Range{0, 1}, "",
-            "fraction of landmarks observed by others above which a keyframe is redundant");
+    visitor("redundant_ratio", self.redundant_ratio, Range{0, 1}, "",
+            "fraction of landmarks observed by others above which a keyframe is redundant",
+            OptionNote{.common = true, .formerly = "redundant_share"});
     visitor("redundant_views", self.redundant_views, Range{1, 100}, "",
             "number of other keyframes that must observe them");
   }
@@ -80,10 +82,11 @@ struct LocalWindowOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("free_keyframes", self.free_keyframes, Range{1, 1000}, "",
-            "keyframes adjusted: the newest and its best covisible ones");
+            "keyframes adjusted: the newest and its best covisible ones", kCommon);
     visitor("fixed_keyframes", self.fixed_keyframes, Range{1, 1000}, "",
             "other keyframes that observe their landmarks, held fixed");
-    visitor("max_landmarks", self.max_landmarks, Range{10, 1000000}, "", "maximum number of landmarks adjusted");
+    visitor("max_landmarks", self.max_landmarks, Range{10, 1000000}, "", "maximum number of landmarks adjusted",
+            kCommon);
   }
 };
 
@@ -95,7 +98,7 @@ struct ScaleOptions {
   int keyframes = 40;     // maximum number of keyframes used to estimate the scale
   int min_keyframes = 6;  // minimum number before the map can become metric; outliers are hard to detect among few
   int rounds = 4;         // rounds of scale estimation and adjustment per keyframe while the scale changes
-  double settled = 0.05;  // relative change of the scale below which no further round follows
+  double converged_change = 0.05;  // relative change of the scale below which no further round follows
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -107,8 +110,8 @@ struct ScaleOptions {
             "keyframes used to estimate the scale; submaps up to this size are adjusted as a whole");
     visitor("min_keyframes", self.min_keyframes, Range{2, 1000}, "", "minimum number of keyframes of a metric map");
     visitor("rounds", self.rounds, Range{1, 20}, "", "rounds of scale estimation and adjustment per keyframe");
-    visitor("settled", self.settled, Range{0, 1}, "",
-            "relative change of the scale below which no further round follows");
+    visitor("converged_change", self.converged_change, Range{0, 1}, "",
+            "relative change of the scale below which no further round follows", OptionNote{.formerly = "settled"});
   }
 };
 

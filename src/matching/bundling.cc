@@ -75,7 +75,7 @@ std::vector<Edge> match_pair(const camera::Rig& rig, std::span<const frame::Came
       &rig.camera(pair.a), &cameras[pair.a.index()].keypoints, rig.rig_from_cam(pair.a.index()), {}, 0, 0};
   const EpipolarView b{
       &rig.camera(pair.b), &cameras[pair.b.index()].keypoints, rig.rig_from_cam(pair.b.index()), {}, 0, 0};
-  const EpipolarOptions search{.near_m = options.near_m,
+  const EpipolarOptions search{.min_depth_m = options.min_depth_m,
                                .sigmas = options.sigmas,
                                .max_hamming = options.max_hamming,
                                .ratio = options.ratio,

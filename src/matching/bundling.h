@@ -16,7 +16,7 @@
 namespace bslam::matching {
 
 struct BundlingOptions {
-  double near_m = 0.15;        // closest point that is searched for
+  double min_depth_m = 0.15;   // closest point that is searched for
   int max_hamming = 64;        // descriptor distance of a match, of 256 bits
   double ratio = 0.9;          // best to second best descriptor distance elsewhere on the epipolar curve
   double sigmas = 3.0;         // distance from the epipolar curve before alignment, in standard deviations
@@ -26,7 +26,8 @@ struct BundlingOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("near_m", self.near_m, Range{0.01, 100}, "m", "closest point that is searched for across cameras");
+    visitor("min_depth_m", self.min_depth_m, Range{0.01, 100}, "m", "closest point that is searched for across cameras",
+            OptionNote{.common = true, .formerly = "near_m"});
     visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits",
             "largest descriptor distance of a cross-camera match");
     visitor("ratio", self.ratio, Range{0.1, 1}, "", "best to second best descriptor distance on the epipolar curve");

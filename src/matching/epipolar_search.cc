@@ -88,7 +88,7 @@ std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const Epip
   const double sine = std::sin(p.from);
   const double window = options.sigmas * both(p.sigma, sorted.max_sigma) / std::max(sine, 1e-9);
   if (!(window < kMaxWindow)) return std::nullopt;
-  const double nearest = angle_at_second(p.from, options.near_m, baseline);
+  const double nearest = angle_at_second(p.from, options.min_depth_m, baseline);
   const double farthest = angle_at_second(p.from, options.far_m, baseline);
   const feature::Descriptor& descriptor = a.keypoints->descriptor[p.keypoint];
   const int level = a.keypoints->level[p.keypoint];

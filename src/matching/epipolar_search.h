@@ -23,11 +23,11 @@ struct EpipolarView {
 };
 
 struct EpipolarOptions {
-  double near_m = 0.2;   // least distance of a point from the first camera, metres
-  double far_m = 1e9;    // largest distance, metres
-  double sigmas = 3.0;   // distance from the epipolar plane, in standard deviations of both keypoints
-  int max_hamming = 60;  // of 256 bits
-  double ratio = 0.85;   // best to second best descriptor distance at another place on the curve
+  double min_depth_m = 0.2;  // least distance of a point from the first camera, metres
+  double far_m = 1e9;        // largest distance, metres
+  double sigmas = 3.0;       // distance from the epipolar plane, in standard deviations of both keypoints
+  int max_hamming = 60;      // of 256 bits
+  double ratio = 0.85;       // best to second best descriptor distance at another place on the curve
   int max_level_difference = 2;
 };
 

@@ -20,13 +20,14 @@ struct AlignmentOptions {
   double max_shift_px = 2.0;  // from the guess, in pixels of the level: farther it is another corner
   double min_ncc = 0.8;       // normalised cross-correlation after alignment, below which it is not the same place
   double min_sigma_px =
-      0.12;               // least standard deviation claimed, in pixels of the level: interpolation and warp errors
-  double floor_px = 0.3;  // in level-0 pixels, added in quadrature: what calibrations leave unexplained, at most ...
-  double least_floor_px = 0.05;  // ... and at least, as far as tracking finds it (tracking/error_floor.h)
+      0.12;  // least standard deviation claimed, in pixels of the level: interpolation and warp errors
+  double calibration_error_px =
+      0.3;  // in level-0 pixels, added in quadrature: what calibrations leave unexplained, at most ...
+  double min_calibration_error_px = 0.05;  // ... and at least, as far as tracking finds it (tracking/error_floor.h)
 
   // Standard deviation of an aligned keypoint in level-0 pixels, from that of its alignment in pixels of the level.
   double sigma(double aligned_px, double level_scale) const {
-    return std::hypot(std::max(aligned_px, min_sigma_px) * level_scale, floor_px);
+    return std::hypot(std::max(aligned_px, min_sigma_px) * level_scale, calibration_error_px);
   }
 
   template <class Self, class Visitor>
@@ -37,10 +38,10 @@ struct AlignmentOptions {
     visitor("min_ncc", self.min_ncc, Range{0, 1}, "", "least normalised cross-correlation of an aligned patch");
     visitor("min_sigma_px", self.min_sigma_px, Range{0.01, 5}, "px of the level",
             "least standard deviation of an aligned keypoint");
-    visitor("floor_px", self.floor_px, Range{0, 10}, "px",
-            "error of the calibration, added in quadrature: at first and at most");
-    visitor("least_floor_px", self.least_floor_px, Range{0, 10}, "px",
-            "the least of it that is believed; tracking finds it");
+    visitor("calibration_error_px", self.calibration_error_px, Range{0, 10}, "px",
+            "error of the calibration, added in quadrature: at first and at most", OptionNote{.formerly = "floor_px"});
+    visitor("min_calibration_error_px", self.min_calibration_error_px, Range{0, 10}, "px",
+            "the least of it that is believed; tracking finds it", OptionNote{.formerly = "least_floor_px"});
   }
 };
 

@@ -14,10 +14,11 @@ namespace bslam::report {
 namespace {
 
 constexpr double kTitleFont = 20.0, kSubtitleFont = 13.0, kPanelFont = 14.0, kFont = 12.0;
-constexpr double kGlyphWidth = 0.57;  // of the font size: the mean of sans-serif faces, on the wide side
+constexpr double kGlyphWidth = 0.57;  // of the font size: an upper estimate of the mean for sans-serif fonts
 constexpr double kMarginLeft = 76.0, kMarginRight = 16.0, kMarginTop = 46.0, kMarginBottom = 44.0;
 constexpr double kPagePadding = 14.0, kTickEveryX = 70.0, kTickEveryY = 32.0;  // pixels
-constexpr double kSmallestStep = 0.4;  // of a line, in pixels: shorter ones cannot be seen and only make the file large
+constexpr double kSmallestStep =
+    0.4;  // pixels: shorter line segments are left out, since they are invisible and enlarge the file
 constexpr std::array<std::string_view, 8> kPalette = {kBlue,   kVermilion, kGreen,    kPurple,
                                                       kOrange, kSky,       "#8C510A", kBlack};
 
@@ -56,7 +57,7 @@ bool is_utf8(std::string_view text) {
   return true;
 }
 
-// Text for XML, which has no control characters and no bytes that are not UTF-8; file names may have both.
+// Text for XML, which allows neither control characters nor bytes that are not UTF-8. File names may contain both.
 std::string escaped(std::string_view text) {
   const bool utf8 = is_utf8(text);
   std::string out;
@@ -102,7 +103,7 @@ void add_line(std::string& out, double x0, double y0, double x1, double y1, std:
                  x0, y0, x1, y1, colour, width);
 }
 
-// Data ranges of a panel and their place on the page.
+// Data ranges of a panel and its position on the page.
 struct Axes {
   Extent x, y;
   Box box;
@@ -157,13 +158,20 @@ std::string tick_text(double value, double step) {
   return text.find_first_not_of("-0.") == std::string::npos ? "0" : text;
 }
 
+// The text, shortened at its end if it is wider than `width` pixels.
+std::string fitting(const std::string& text, double width) {
+  const auto most = static_cast<std::size_t>(std::max(3.0, width / (kGlyphWidth * kFont)));
+  return text.size() <= most ? text : text.substr(0, most - 2) + "..";
+}
+
 double step_of(const std::vector<double>& ticks) { return ticks.size() > 1 ? ticks[1] - ticks[0] : 1.0; }
 
 void add_axes(std::string& out, const Axes& axes, const Panel& panel) {
   const Box& b = axes.box;
   constexpr std::string_view kGrid = "#E3E3E3";
   const auto x_ticks = axis_ticks(axes.x.low, axes.x.high, std::max(2, static_cast<int>(b.width / kTickEveryX)));
-  const auto y_ticks = axis_ticks(axes.y.low, axes.y.high, std::max(2, static_cast<int>(b.height / kTickEveryY)));
+  auto y_ticks = axis_ticks(axes.y.low, axes.y.high, std::max(2, static_cast<int>(b.height / kTickEveryY)));
+  if (!panel.y_ticks.empty()) y_ticks.clear();
   for (const double t : x_ticks) {
     add_line(out, axes.px(t), b.y, axes.px(t), b.y + b.height, kGrid, 1);
     add_text(out, axes.px(t), b.y + b.height + 16, tick_text(t, step_of(x_ticks)), kFont, Anchor::kMiddle);
@@ -171,6 +179,10 @@ void add_axes(std::string& out, const Axes& axes, const Panel& panel) {
   for (const double t : y_ticks) {
     add_line(out, b.x, axes.py(t), b.x + b.width, axes.py(t), kGrid, 1);
     add_text(out, b.x - 6, axes.py(t) + 4, tick_text(t, step_of(y_ticks)), kFont, Anchor::kEnd);
+  }
+  for (const NamedTick& tick : panel.y_ticks) {
+    add_line(out, b.x, axes.py(tick.y), b.x + b.width, axes.py(tick.y), kGrid, 1);
+    add_text(out, b.x - 6, axes.py(tick.y) + 4, fitting(tick.name, kMarginLeft - 8), kFont, Anchor::kEnd);
   }
   add_text(out, b.x + 0.5 * b.width, b.y + b.height + 34, panel.x_label, kFont, Anchor::kMiddle);
   const double x = b.x - kMarginLeft + 14, y = b.y + 0.5 * b.height;
@@ -189,7 +201,7 @@ void add_series(std::string& out, const Axes& axes, const Series& series) {
   }
   std::string path;
   bool pen_down = false;
-  std::array<double, 2> last{};  // drawn, in pixels
+  std::array<double, 2> last{};  // last point that was drawn, in pixels
   for (const auto& p : series.points) {
     if (!finite(p)) {
       pen_down = false;
@@ -199,7 +211,7 @@ void add_series(std::string& out, const Axes& axes, const Series& series) {
     if (pen_down && std::hypot(now[0] - last[0], now[1] - last[1]) < kSmallestStep) continue;
     last = now;
     fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}{}", pen_down ? "L" : "M", now[0], now[1],
-                   pen_down ? "" : "h0");  // of no length: a lone point shows as a dot
+                   pen_down ? "" : "h0");  // a segment of zero length, so that an isolated point shows as a dot
     pen_down = true;
   }
   if (path.empty()) return;
@@ -210,7 +222,7 @@ void add_series(std::string& out, const Axes& axes, const Series& series) {
                  series.style == SeriesStyle::kDashed ? " stroke-dasharray=\"6 4\"" : "");
 }
 
-// Between the panel's title and its box, from left to right; what does not fit is left out.
+// Entries from left to right between the title and the plot area; those that do not fit are left out.
 void add_legend(std::string& out, const Panel& panel, const Box& box) {
   double x = box.x;
   const double y = box.y - 10;
@@ -299,7 +311,7 @@ std::vector<double> axis_ticks(double low, double high, int count) {
   }
   std::vector<double> ticks;
   const double first = std::ceil(low / step - 1e-9), last = std::floor(high / step + 1e-9);
-  if (!(std::abs(first) < 1e15) || !(last - first < 1000.0)) return {};  // a range too narrow for its place
+  if (!(std::abs(first) < 1e15) || !(last - first < 1000.0)) return {};  // a range too narrow to represent the ticks
   for (double k = first; k <= last; k += 1.0) ticks.push_back(k * step);
   return ticks;
 }

@@ -1,5 +1,5 @@
-// Plots as SVG text, without dependencies: panels in rows, with axes, ticks, lines and legends on a light ground.
-// Colours are those of Okabe and Ito, told apart by the colour-blind as well.
+// Plots as SVG text, without dependencies: rows of panels with axes, ticks, lines and legends on a white background.
+// The colours are those of Okabe and Ito, which colour-blind readers can tell apart as well.
 #pragma once
 
 #include <array>
@@ -12,21 +12,21 @@ namespace bslam::report {
 inline constexpr std::string_view kBlue = "#0072B2", kVermilion = "#D55E00", kGreen = "#009E73", kPurple = "#CC79A7",
                                   kSky = "#56B4E9", kOrange = "#E69F00", kBlack = "#222222", kGrey = "#777777";
 
-// Colour of the k-th of several like things (cameras, stages); repeats after eight.
+// Colour of the k-th camera or stage; repeats after eight.
 std::string_view series_colour(std::size_t k);
 
 enum class SeriesStyle { kLine, kDashed, kPoints };
 
-// Points in data units. A point that is not finite ends one piece of the line; the next begins a new one.
+// Points in data units. A point that is not finite interrupts the line.
 struct Series {
-  std::string label;  // in the legend; empty: not there
+  std::string label;  // shown in the legend unless empty
   std::vector<std::array<double, 2>> points;
   std::string colour{kBlue};
   SeriesStyle style = SeriesStyle::kLine;
-  double width_px = 1.6;  // of the line, or diameter of the points
+  double width_px = 1.6;  // width of the line, or diameter of the points
 };
 
-// A shaded stretch of the x axis.
+// A shaded interval of the x axis.
 struct Band {
   double from = 0.0, to = 0.0;
   std::string colour{kVermilion};
@@ -38,14 +38,20 @@ struct Mark {
   std::string colour{kGrey};
 };
 
-// A line of the legend for bands or marks, which have no label of their own.
+// A legend entry for bands or marks, which have no label of their own.
 struct LegendEntry {
   std::string label;
   std::string colour;
 };
 
-enum class AxisScale { kFree, kEqual };     // equal: one unit is as long on x as on y (maps)
-enum class AxisFloor { kFromData, kZero };  // where the y axis begins
+enum class AxisScale { kFree, kEqual };     // equal: x and y have the same scale, as in maps
+enum class AxisFloor { kFromData, kZero };  // lower end of the y axis
+
+// A tick of the y axis with a text in place of its value.
+struct NamedTick {
+  double y = 0.0;
+  std::string name;
+};
 
 struct Panel {
   std::string title{}, x_label{}, y_label{};
@@ -53,9 +59,10 @@ struct Panel {
   std::vector<Band> bands{};     // below them
   std::vector<Mark> marks{};
   std::vector<LegendEntry> extra_legend{};
+  std::vector<NamedTick> y_ticks{};  // replace the numbers of the y axis unless empty
   AxisScale scale = AxisScale::kFree;
   AxisFloor floor = AxisFloor::kFromData;
-  double share = 1.0;  // of its row's width, against the row's other panels
+  double share = 1.0;  // width relative to the other panels of the row
 };
 
 struct PanelRow {
@@ -69,15 +76,16 @@ struct Figure {
   std::vector<PanelRow> rows{};
 };
 
-// The whole figure as an SVG document. Same input, same bytes.
+// The figure as an SVG document. The same input gives the same bytes.
 std::string figure_svg(const Figure& figure);
 
-// Round numbers within [low, high], about `count` of them, 1, 2 or 5 times a power of ten apart. Empty where the range
-// is empty or not finite.
+// About `count` round numbers within [low, high], spaced by 1, 2 or 5 times a power of ten. Empty if the range is empty
+// or not finite.
 std::vector<double> axis_ticks(double low, double high, int count);
 
-// A long series as one point for each of `bins` equal stretches of x: the median of its points there, or their maximum.
-// A series of no more than `bins` points stays as it is; stretches without points break the line.
+// Reduces a long series to one point for each of `bins` equal intervals of x: the median or the maximum of the points
+// in the interval. A series of at most `bins` points is returned unchanged. Intervals without points interrupt the
+// line.
 enum class Reduction { kMedian, kMaximum };
 std::vector<std::array<double, 2>> reduced(const std::vector<std::array<double, 2>>& points, std::size_t bins,
                                            Reduction reduction);

@@ -43,7 +43,7 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-// Bearings on rays of pixels from the principal point to the border of the image, as far as the lens sees.
+// Bearings of pixels on lines from the principal point to the image border, up to the limit of the camera model.
 std::vector<Vector3d> fan_bearings(const camera::Camera& camera) {
   constexpr int kSide = 16, kInwards = 24, kEvery = 4;
   const double right = camera.width - 1, bottom = camera.height - 1;
@@ -58,7 +58,7 @@ std::vector<Vector3d> fan_bearings(const camera::Camera& camera) {
         const auto bearing = camera.unproject(centre + (pixel - centre) * step / kInwards);
         if (!bearing) continue;
         bearings.push_back(*bearing);
-        step -= kEvery - 1;  // the border itself, then every fourth on the way in
+        step -= kEvery - 1;  // the outermost valid pixel, then every fourth step inwards
       }
     }
   }
@@ -90,10 +90,10 @@ std::vector<Vector2d> convex_hull(std::vector<Vector2d> points) {
 struct DrawnCamera {
   std::string name, colour;
   Vector3d position, axis_end;    // of the optical axis
-  std::vector<Vector3d> frustum;  // ends of the rays it sees
+  std::vector<Vector3d> frustum;  // end points of viewing rays
 };
 
-// What a view shows of a point: metres to the right and up the page.
+// Projects a point to a view: metres to the right and metres up the page.
 using View = Vector2d (*)(const Vector3d&);
 Vector2d from_above(const Vector3d& p) { return {p.x(), p.z()}; }
 Vector2d from_right(const Vector3d& p) { return {p.z(), -p.y()}; }
@@ -154,7 +154,7 @@ std::string frustum_text(const DrawnCamera& camera, const Panel2d& panel) {
 std::string camera_text(const DrawnCamera& camera, const Panel2d& panel) {
   const Vector2d from = panel.to_px(camera.position), to = panel.to_px(camera.axis_end);
   std::string text;
-  if ((to - from).norm() > 8) {  // else it points at the reader
+  if ((to - from).norm() > 8) {  // otherwise the axis points towards the reader
     const Vector2d along = (to - from).normalized(), across(-along.y(), along.x());
     text += line_text(from, to - 6 * along, camera.colour, 1.8);
     text += fmt::format("<polygon points=\"{}\" fill=\"{}\"/>\n",
@@ -164,7 +164,7 @@ std::string camera_text(const DrawnCamera& camera, const Panel2d& panel) {
                             from.y(), camera.colour);
 }
 
-// Names beside the tips of the axes, moved down until none covers another.
+// Names next to the tips of the optical axes, moved down until they do not overlap.
 std::string names_text(const std::vector<DrawnCamera>& cameras, const Panel2d& panel) {
   constexpr double kLine = 14, kReach = 90;
   std::string text;
@@ -198,7 +198,7 @@ std::string body_text(const SE3& T_rig_body, const Panel2d& panel, double length
   return text + label_text(origin + Vector2d(-5, 12), kGrey, "end", 10, "body");
 }
 
-// A bar of a round length, about a fifth of a panel.
+// A scale bar of a round length, about a fifth of a panel wide.
 std::string scale_text(double px_per_m, double y) {
   double length = std::pow(10.0, std::floor(std::log10(kPanelWidth / 5 / px_per_m)));
   for (const double factor : {5.0, 2.0}) {

@@ -1,4 +1,4 @@
-// A rig drawn to scale, from above and from the side.
+// Draws a rig to scale, from above and from the side.
 #pragma once
 
 #include <string>
@@ -7,9 +7,10 @@
 
 namespace bslam::report {
 
-// The whole drawing as an SVG document, in the frame of camera 0: from above (x to the right, z up the page) and from
-// the right (z to the right, y down the page). Each camera with its view frustum, as its lens has it, its optical axis
-// and its name; the body frame where it is not camera 0; a scale. Same rig, same bytes.
+// An SVG document with two views in the frame of camera 0: from above (x to the right, z up the page) and from the
+// right (z to the right, y down the page). Every camera is drawn with its view frustum, including lens distortion, its
+// optical axis and its name. The body frame is drawn if it differs from camera 0, and a scale bar is added. The same
+// rig gives the same bytes.
 std::string rig_plot_svg(const camera::Rig& rig);
 
 }  // namespace bslam::report

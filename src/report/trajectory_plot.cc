@@ -16,12 +16,20 @@ namespace {
 using evaluation::Trajectory;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr TimeNs kGapIntervals = 3;  // median intervals between poses that count as a gap
+constexpr TimeNs kGapIntervals = 3;  // a gap is longer than this many median intervals between poses
 constexpr std::array<const char*, 3> kAxisNames = {"x", "y", "z"};
 
-// Axes of the two views: across and along, and the one that is up.
+// An axis of the world, in its own or in the opposite direction.
+struct Axis {
+  int index = 0;
+  double sign = 1.0;
+  double of(const Eigen::Vector3d& p) const { return sign * p[index]; }
+  std::string name() const { return (sign < 0 ? "-" : "") + std::string(kAxisNames[static_cast<std::size_t>(index)]); }
+};
+
+// The axes of the two views.
 struct ViewAxes {
-  int right = 0, forward = 1, up = 2;
+  Axis right{0}, forward{1}, up{2};
 };
 
 Eigen::Vector3d extent_of(const Trajectory& trajectory) {
@@ -30,27 +38,40 @@ Eigen::Vector3d extent_of(const Trajectory& trajectory) {
   return box.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(box.sizes());
 }
 
-ViewAxes view_axes(const Trajectory& trajectory) {
-  const Eigen::Vector3d extent = extent_of(trajectory);
-  if (extent.y() < 0.5 * extent.z()) return {.right = 0, .forward = 2, .up = 1};
+ViewAxes view_axes(WorldAxes world, const Eigen::Vector3d& extent) {
+  const bool camera = world == WorldAxes::kCamera || extent.y() < 0.5 * extent.z();
+  if (camera) return {.right = {0}, .forward = {2}, .up = {1, -1.0}};
   return {};
 }
 
-Series path_series(const Trajectory& trajectory, int horizontal, int vertical) {
+// Lengths below 0.1 m are given in millimetres.
+struct LengthUnit {
+  double per_metre = 1.0;
+  const char* name = "m";
+};
+
+LengthUnit unit_for(double length_m) { return length_m < 0.1 ? LengthUnit{1000.0, "mm"} : LengthUnit{}; }
+
+std::string length_text(double length_m) {
+  const LengthUnit unit = unit_for(length_m);
+  return fmt::format("{:.3g} {}", unit.per_metre * length_m, unit.name);
+}
+
+Series path_series(const Trajectory& trajectory, const Axis& horizontal, const Axis& vertical) {
   Series series;
   const TimeNs gap = kGapIntervals * evaluation::median_interval_ns(trajectory);
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     if (i > 0 && trajectory[i].time_ns - trajectory[i - 1].time_ns > gap) series.points.push_back({kNone, kNone});
     const Eigen::Vector3d& p = trajectory[i].T_world_frame.translation();
-    series.points.push_back({p[horizontal], p[vertical]});
+    series.points.push_back({horizontal.of(p), vertical.of(p)});
   }
   return series;
 }
 
-Panel view_panel(const TrajectoryPlotInput& input, std::string title, int horizontal, int vertical) {
+Panel view_panel(const TrajectoryPlotInput& input, std::string title, const Axis& horizontal, const Axis& vertical) {
   Panel panel{.title = std::move(title),
-              .x_label = fmt::format("{} [m]", kAxisNames[static_cast<std::size_t>(horizontal)]),
-              .y_label = fmt::format("{} [m]", kAxisNames[static_cast<std::size_t>(vertical)]),
+              .x_label = horizontal.name() + " [m]",
+              .y_label = vertical.name() + " [m]",
               .scale = AxisScale::kEqual};
   if (!input.ground_truth.empty()) {
     Series truth = path_series(input.ground_truth, horizontal, vertical);
@@ -79,12 +100,17 @@ Panel view_panel(const TrajectoryPlotInput& input, std::string title, int horizo
 }
 
 Panel error_panel(const TrajectoryPlotInput& input) {
-  Panel panel{.title = "Position error after alignment", .x_label = "time [s]", .y_label = "error [m]"};
+  double largest = 0.0;
+  for (const auto& e : input.errors) largest = std::max(largest, e.position_m);
+  const LengthUnit unit = unit_for(largest);
+  Panel panel{.title = "Position error after alignment",
+              .x_label = "time [s]",
+              .y_label = fmt::format("error [{}]", unit.name)};
   panel.floor = AxisFloor::kZero;
   Series error;
   error.label = "error";
   error.width_px = 1.4;
-  Trajectory times;  // for the median interval
+  Trajectory times;  // of the errors, for the median interval
   std::vector<double> values;
   for (const auto& e : input.errors) {
     times.push_back({e.time_ns, {}});
@@ -93,13 +119,13 @@ Panel error_panel(const TrajectoryPlotInput& input) {
   const TimeNs begin = input.errors.front().time_ns, gap = kGapIntervals * evaluation::median_interval_ns(times);
   for (std::size_t i = 0; i < input.errors.size(); ++i) {
     if (i > 0 && times[i].time_ns - times[i - 1].time_ns > gap) error.points.push_back({kNone, kNone});
-    error.points.push_back({to_seconds(times[i].time_ns - begin), values[i]});
+    error.points.push_back({to_seconds(times[i].time_ns - begin), unit.per_metre * values[i]});
   }
   const double end_s = to_seconds(input.errors.back().time_ns - begin);
   const double rmse = evaluation::statistics_of(std::move(values)).rmse;
   Series mean;
-  mean.label = fmt::format("rmse {:.4g} m", rmse);
-  mean.points = {{0.0, rmse}, {end_s, rmse}};
+  mean.label = "rmse " + length_text(rmse);
+  mean.points = {{0.0, unit.per_metre * rmse}, {end_s, unit.per_metre * rmse}};
   mean.colour = kVermilion;
   mean.style = SeriesStyle::kDashed;
   panel.series = {std::move(error), std::move(mean)};
@@ -112,22 +138,21 @@ TrajectoryPlotInput evaluation_plot_input(const evaluation::TrajectoryEvaluation
                                           const Trajectory& ground_truth, std::string title) {
   const auto& ate = evaluation.ate;
   return {.title = std::move(title),
-          .subtitle = fmt::format("ATE rmse {:.4g} m, median {:.4g} m, max {:.4g} m over {} poses; coverage {:.1f} %; "
-                                  "path {:.1f} m",
-                                  ate.rmse, ate.median, ate.max, ate.count, 100.0 * evaluation.coverage,
-                                  evaluation.gt_length_m),
+          .subtitle = fmt::format("ATE rmse {}, median {}, max {} over {} poses; coverage {:.1f} %; path {:.1f} m",
+                                  length_text(ate.rmse), length_text(ate.median), length_text(ate.max), ate.count,
+                                  100.0 * evaluation.coverage, evaluation.gt_length_m),
           .estimate = evaluation.aligned_estimate,
           .ground_truth = ground_truth,
           .errors = evaluation.errors};
 }
 
 std::string trajectory_plot_svg(const TrajectoryPlotInput& input) {
-  const ViewAxes axes = view_axes(input.ground_truth.empty() ? input.estimate : input.ground_truth);
-  const auto title = [&](const char* name, int along) {
-    return fmt::format("{} (along {})", name, kAxisNames[static_cast<std::size_t>(along)]);
-  };
   const Eigen::Vector3d extent = extent_of(input.ground_truth.empty() ? input.estimate : input.ground_truth);
-  const bool wide = extent[axes.right] >= extent[axes.forward];  // the side view shows the longer way
+  const ViewAxes axes = view_axes(input.axes, extent);
+  const auto title = [&](const char* name, const Axis& along) {
+    return fmt::format("{} (along {})", name, kAxisNames[static_cast<std::size_t>(along.index)]);
+  };
+  const bool wide = extent[axes.right.index] >= extent[axes.forward.index];  // the side view shows the longer direction
   Figure figure{.title = input.title, .subtitle = input.subtitle};
   PanelRow views{.height_px = 480.0};
   views.panels.push_back(view_panel(input, title("Top view", axes.up), axes.right, axes.forward));

@@ -1,4 +1,4 @@
-// Plots of an estimated trajectory, with ground truth or without.
+// Plots of an estimated trajectory, with or without ground truth.
 #pragma once
 
 #include <string>
@@ -8,20 +8,27 @@
 
 namespace bslam::report {
 
-struct TrajectoryPlotInput {
-  std::string title, subtitle;
-  evaluation::Trajectory estimate;            // in the world of the ground truth
-  evaluation::Trajectory ground_truth;        // may be empty
-  std::vector<evaluation::PoseError> errors;  // position error over time; may be empty
+// Direction of the axes of the world frame, which a trajectory itself does not contain.
+enum class WorldAxes {
+  kUnknown,  // z is up, unless the path extends less than half as far along y as along z: then as kCamera
+  kCamera,   // x to the right, y down, z forward, as in the world frame of a run
 };
 
-// What `bslam eval --plot` draws: the aligned estimate against the ground truth, and its error.
+struct TrajectoryPlotInput {
+  std::string title, subtitle;
+  evaluation::Trajectory estimate;            // in the world frame of the ground truth
+  evaluation::Trajectory ground_truth;        // may be empty
+  std::vector<evaluation::PoseError> errors;  // position error over time; may be empty
+  WorldAxes axes = WorldAxes::kUnknown;
+};
+
+// The input of the plot of `bslam eval --plot`: aligned estimate, ground truth and position error.
 TrajectoryPlotInput evaluation_plot_input(const evaluation::TrajectoryEvaluation& evaluation,
                                           const evaluation::Trajectory& ground_truth, std::string title);
 
-// SVG with the path from above and from the side (same scale on both axes) and, where there are errors, the position
-// error over time. Which axis is up is not in a trajectory: it is taken to be z, but y where the path extends less than
-// half as far along y as along z, as in the worlds of camera frames. Lines are broken where poses are missing.
+// An SVG document with the path seen from above and from the side, with equal scales on both axes and the upward
+// direction up the page, and with the position error over time if there is ground truth. Lines are interrupted where
+// poses are missing.
 std::string trajectory_plot_svg(const TrajectoryPlotInput& input);
 
 }  // namespace bslam::report

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A camera_type, our model, and the names of what stands beside fx fy cx cy, in our order.
+// A camera_type, the model of bslam, and the names of the parameters besides fx fy cx cy, in the order of bslam.
 struct BasaltModel {
   std::string_view type, model;
   std::vector<std::string> names;
@@ -62,7 +62,7 @@ Status read_model(const yaml::YamlMap& yaml, camera::CameraDescription& d) {
   d.model = model->model;
   d.intrinsics = *std::move(intrinsics);
   d.distortion = *std::move(shape);
-  if (d.model == camera::PinholeRadTan::kName) {  // files without the rational part fill it with zeros
+  if (d.model == camera::PinholeRadTan::kName) {  // files without the rational coefficients set them to zero
     d.distortion = needed_coefficients(camera::PinholeRadTan({}, d.distortion));
   }
   return {};
@@ -102,7 +102,7 @@ std::string camera_text(const camera::Camera& camera) {
   for (std::size_t i = 0; i < shape.size(); ++i) {
     numbers += fmt::format(", \"{}\": {}", model->names[i], format_double(shape[i]));
   }
-  if (model->type == "pinhole-radtan8") numbers += ", \"rpmax\": 0.0";  // 0: no bound on the radius
+  if (model->type == "pinhole-radtan8") numbers += ", \"rpmax\": 0.0";  // 0: no limit of the radius
   return fmt::format("      {{\"camera_type\": \"{}\", \"intrinsics\": {{{}}}}}", model->type, numbers);
 }
 
@@ -117,7 +117,7 @@ std::string place_text(const geometry::SE3& T) {
 }  // namespace
 
 Result<camera::RigReading> read_basalt_rig(const fs::path& file, const std::string& text) {
-  std::string spaced = text;  // JSON is YAML but for tabs
+  std::string spaced = text;  // JSON is valid YAML except for tabs
   std::replace(spaced.begin(), spaced.end(), '\t', ' ');
   const auto root = yaml::YamlMap::parse(file, std::move(spaced));
   if (!root) return root.error();

@@ -27,7 +27,8 @@ Status read_time_and_mask(const yaml::YamlMap& yaml, camera::CameraDescription& 
   if (yaml.has("mask")) {
     const auto mask = yaml.text("mask");
     if (!mask) return mask.error();
-    // Relative to the rig file, and absolute from here on, so that the rig may be written elsewhere.
+    // Paths in the file are relative to the rig file. They become absolute here, so that the rig can be written
+    // elsewhere.
     d.mask_file = (fs::absolute(yaml.file()).parent_path() / *mask).lexically_normal().string();
   }
   return {};
@@ -80,7 +81,8 @@ std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_
   yaml += fmt::format("    distortion: {}\n    T_body_cam:\n", number_list(camera::distortion(camera.model)));
   const Eigen::Matrix4d T = T_body_cam.matrix();
   for (int r = 0; r < 4; ++r) yaml += fmt::format("      - {}\n", number_list({T(r, 0), T(r, 1), T(r, 2), T(r, 3)}));
-  // Divided, not multiplied by 1e-9: the quotient is the double nearest to the decimal, so its text is short and exact.
+  // Divided instead of multiplied by 1e-9, since the quotient is the double closest to the decimal: its text is short
+  // and exact.
   yaml += fmt::format("    time_offset_s: {}\n", format_double(static_cast<double>(camera.time_offset_ns) / 1e9));
   return yaml + fmt::format("    mask: {}\n", camera.mask_file.empty() ? "null" : yaml::yaml_quoted(camera.mask_file));
 }
@@ -103,7 +105,7 @@ Result<camera::RigReading> read_bslam_rig(const fs::path& file, const std::strin
     auto camera = read_camera(map, reading.cameras.size());
     if (!camera) return camera.error();
     if (!names.insert(camera->camera.name).second) {
-      return map.error("name", camera->camera.name + " for a second camera", "a name of its own for every camera");
+      return map.error("name", camera->camera.name + " for a second camera", "different names for all cameras");
     }
     reading.cameras.push_back(*std::move(camera));
   }

@@ -1,4 +1,4 @@
-// Our own rig file: YAML with `bslam_rig: 1` (docs/cli.md).
+// Reads and writes the rig file of bslam: YAML with `bslam_rig: 1` (docs/cli.md).
 #pragma once
 
 #include <filesystem>
@@ -8,11 +8,12 @@
 
 namespace bslam::rig_formats {
 
-// Reads the text of a rig file; `file` is for errors and for masks relative to it. Refuses unknown and repeated keys.
+// Reads the text of a rig file. `file` is used in errors and to resolve relative paths of masks. Unknown and repeated
+// keys are errors.
 Result<camera::RigReading> read_bslam_rig(const std::filesystem::path& file, const std::string& text);
 
-// The rig in our format, which holds everything a rig has; reading it back gives the same bits. Mask files are written
-// as they stand in the rig.
+// The rig as YAML. The format stores everything a rig contains, and reading it back gives exactly the same rig. Paths
+// of masks are written unchanged.
 std::string rig_to_yaml(const camera::Rig& rig);
 
 }  // namespace bslam::rig_formats

@@ -21,9 +21,11 @@ using geometry::SE3;
 
 constexpr std::size_t kMaxBytes = std::size_t{1} << 24;
 constexpr const char* kInOrder = "the cameras of rig_config.json are those of cameras.txt in order of their ids";
-constexpr double kPixelShift = 0.5;  // COLMAP's origin is the corner of the top-left pixel, ours its centre
+constexpr double kPixelShift =
+    0.5;  // the origin is the corner of the top-left pixel in COLMAP, and its centre in bslam
 
-// One model of COLMAP: ours, how many focal lengths, how many coefficients follow cx cy, and how many ours has.
+// A model of COLMAP: the corresponding model of bslam, its number of focal lengths, the number of coefficients after cx
+// cy, and the number of coefficients in bslam.
 struct ColmapModel {
   std::string_view name, model;
   std::size_t focal_lengths, coefficients, ours;
@@ -36,7 +38,7 @@ constexpr std::array<ColmapModel, 7> kModels = {{{"SIMPLE_PINHOLE", camera::Pinh
                                                  {"FULL_OPENCV", camera::PinholeRadTan::kName, 2, 8, 8},
                                                  {"OPENCV_FISHEYE", camera::KannalaBrandt::kName, 2, 4, 4}}};
 
-// Where some text stands, for errors.
+// File and line of a text, for errors.
 struct Place {
   std::string file, key;
   Error error(std::string found, std::string expected) const {
@@ -65,7 +67,7 @@ Status read_parameters(const std::string& name, const std::vector<double>& p, co
   return {};
 }
 
-// The words of every line that is neither empty nor a comment, by the number of the line.
+// The words of every line that is neither empty nor a comment, by line number.
 std::map<std::size_t, std::vector<std::string>> lines_of(const std::string& text) {
   std::map<std::size_t, std::vector<std::string>> lines;
   std::istringstream stream(text);
@@ -117,7 +119,7 @@ Result<Cameras> read_cameras(const fs::path& file) {
   return cameras;
 }
 
-// q is w x y z. The sensor's pose is camera from rig.
+// The order of q is w x y z. The pose of a sensor is camera from rig.
 Result<SE3> rig_from_camera(const std::vector<double>& q, const std::vector<double>& t, const Place& at) {
   const auto T_cam_rig =
       camera::rigid_transform(geometry::Quaterniond(q[0], q[1], q[2], q[3]), {t[0], t[1], t[2]}, at.file, at.key);
@@ -167,11 +169,11 @@ Result<camera::RigReading> read_rigs_txt(const fs::path& file, const Cameras& ca
   return reading;
 }
 
-// Cameras of rig_config.json, in its order: as many as cameras.txt has.
+// The cameras of rig_config.json in the order of the file. Their number must be that of cameras.txt.
 Result<std::vector<yaml::YamlMap>> configured_cameras(const fs::path& file, std::size_t count) {
   const auto text = read_file(file, kMaxBytes);
   if (!text) return text.error();
-  std::string wrapped = "{\"rigs\": " + *text + "\n}";  // its root is a list, and JSON is YAML but for tabs
+  std::string wrapped = "{\"rigs\": " + *text + "\n}";  // the root is a list, and JSON is valid YAML except for tabs
   std::replace(wrapped.begin(), wrapped.end(), '\t', ' ');
   const auto yaml = yaml::YamlMap::parse(file, std::move(wrapped));
   if (!yaml) return yaml.error();
@@ -186,7 +188,7 @@ Result<std::vector<yaml::YamlMap>> configured_cameras(const fs::path& file, std:
   return configured;
 }
 
-// Names the cameras, in order of their ids, by the folders of their images.
+// Names the cameras, in the order of their ids, after the folders of their images.
 Status take_names(const std::vector<yaml::YamlMap>& configured, Cameras& cameras) {
   auto camera = cameras.begin();
   for (const yaml::YamlMap& yaml : configured) {
@@ -200,7 +202,7 @@ Status take_names(const std::vector<yaml::YamlMap>& configured, Cameras& cameras
   return {};
 }
 
-// One camera of rig_config.json over what cameras.txt says of it.
+// One camera of rig_config.json, whose values take precedence over those of cameras.txt.
 Status read_configured(const yaml::YamlMap& yaml, camera::CameraDescription d, camera::RigReading& reading) {
   const Place at{yaml.file(), yaml.key_path("camera_params")};
   if (yaml.has("camera_params")) {
@@ -231,14 +233,14 @@ Result<camera::RigReading> read_rig_config(const std::vector<yaml::YamlMap>& con
   return reading;
 }
 
-// Places by rigs.txt, names by rig_config.json as far as that can be read.
+// Poses from rigs.txt, and names from rig_config.json if that can be read.
 Result<camera::RigReading> read_solved(const fs::path& rigs, const fs::path& config, Cameras& cameras) {
   std::string note;
   std::error_code error;
   if (fs::exists(config, error)) {
     const auto configured = configured_cameras(config, cameras.size());
     const Status named = configured ? take_names(*configured, cameras) : Status(configured.error());
-    if (!named) note = "names are those of cameras.txt: " + named.error().message();
+    if (!named) note = "camera names are taken from cameras.txt: " + named.error().message();
   }
   auto reading = read_rigs_txt(rigs, cameras);
   if (reading && !note.empty()) reading->notes.push_back(note);

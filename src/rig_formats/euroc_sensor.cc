@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxSensorBytes = std::size_t{1} << 20;
 constexpr std::array kModels = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName};
 
-// EuRoC's names of the distortion models and ours.
+// Names of distortion models in EuRoC and in bslam.
 std::optional<std::string> model_name(const std::string& distortion_model) {
   if (distortion_model == "none") return std::string(camera::Pinhole::kName);
   if (distortion_model == "radial-tangential" || distortion_model == "radtan") {
@@ -53,7 +53,7 @@ Status read_model(const yaml::YamlMap& yaml, camera::CameraDescription& out) {
   if (*distortion_model == "none" && !yaml.has("distortion_coefficients")) return {};
   auto distortion = yaml.numbers("distortion_coefficients");
   if (!distortion) return distortion.error();
-  // Files without distortion often keep the coefficients and set them to 0.
+  // Files without distortion often contain coefficients that are 0.
   const bool zero = std::all_of(distortion->begin(), distortion->end(), [](double v) { return v == 0; });
   if (!(*distortion_model == "none" && zero)) out.distortion = *std::move(distortion);
   return {};

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using geometry::SE3;
 
-// How many numbers `intrinsics` has, and what they are.
+// The number of values in `intrinsics` and their names.
 struct KalibrModel {
   std::string_view name;
   std::size_t count;
@@ -52,14 +52,14 @@ Status read_pinhole(const yaml::YamlMap& yaml, const std::string& distortion_mod
   return {};
 }
 
-// The models by way of a sphere take no distortion, or none that does anything.
+// The sphere models accept no distortion, except for coefficients that are all 0.
 Status read_sphere(const yaml::YamlMap& yaml, const KalibrModel& model, const std::vector<double>& numbers,
                    camera::CameraDescription& d) {
   if (std::any_of(d.distortion.begin(), d.distortion.end(), [](double v) { return v != 0; })) {
     return yaml.error("distortion_coeffs", fmt::format("{} with distortion", model.name),
                       fmt::format("{} without; calibrate again as ds-none, eucm-none or pinhole-equi", model.name));
   }
-  if (model.name == "omni") {  // Mei's xi: m = (x, y) / (z + xi |p|)
+  if (model.name == "omni") {  // the model of Mei with parameter xi: m = (x, y) / (z + xi |p|)
     const double xi = numbers[0];
     if (!(xi >= 0)) return yaml.error("intrinsics", fmt::format("xi {}", xi), "xi of at least 0");
     d.model = camera::Unified::kName;
@@ -116,14 +116,14 @@ Result<std::optional<SE3>> body_from_camera(const yaml::YamlMap& yaml) {
   return std::optional(T_cam_imu->inverse());
 }
 
-// Two statements about one camera may differ by what a calibration rounds, not by more.
+// Two transforms given for one camera may only differ by rounding.
 bool agree(const SE3& a, const SE3& b) {
   constexpr double kMetres = 0.01, kRadians = 0.01;
   const SE3 difference = a.inverse() * b;
   return difference.translation().norm() < kMetres && geometry::so3_log(difference.rotation()).norm() < kRadians;
 }
 
-// T_body_cam of camera n; `before` is that of camera n - 1.
+// T_body_cam of camera n. `before` is T_body_cam of camera n - 1.
 Result<SE3> place_of(const yaml::YamlMap& yaml, const std::optional<SE3>& before) {
   const auto of_body = body_from_camera(yaml);
   if (!of_body) return of_body.error();
@@ -160,7 +160,7 @@ Result<camera::RigCamera> read_camera(const yaml::YamlMap& yaml, const std::stri
           yaml.key_path("distortion_coeffs"), yaml.key_path("T_cam_imu"), yaml.key_path("timeshift_cam_imu")});
 }
 
-// ---- out
+// Writing.
 
 struct KalibrNumbers {
   std::string_view model, distortion_model;
@@ -261,7 +261,7 @@ Result<std::string> openvins_rig_text(const camera::Rig& rig, const std::string&
   std::string text = "%YAML:1.0\n\n";
   for (std::size_t i = 0; i < rig.size(); ++i) {
     KalibrNumbers numbers = numbers_of(rig.camera(i).model);
-    if (numbers.distortion_model == "none") {  // which it does not know: no distortion is one of zeros
+    if (numbers.distortion_model == "none") {  // OpenVINS does not know "none", so zero coefficients are written
       numbers.distortion_model = "radtan";
       numbers.coefficients.assign(4, 0.0);
     }

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxCalibBytes = std::size_t{1} << 20;
 
-// One line's numbers as a projection.
+// Converts the numbers of a line to a projection.
 Result<KittiProjection> projection_of(const std::string& key, std::istringstream& rest, const fs::path& file) {
   const auto error = [&](std::string found, std::string expected) {
     return Error{file.string(), key, std::move(found), std::move(expected)};
@@ -37,7 +37,7 @@ Result<KittiProjection> projection_of(const std::string& key, std::istringstream
   if (P[1] != 0 || P[4] != 0 || P[8] != 0 || P[9] != 0 || P[10] != 1) {
     return error("a 3x3 part that is not rectified", "fx 0 cx, 0 fy cy, 0 0 1");
   }
-  // P = K [I | t] with t = K^-1 p4; the camera stands at -t.
+  // P = K [I | t] with t = K^-1 p4; the camera centre is -t.
   const geometry::Vector3d t((P[3] - cx * P[11]) / fx, (P[7] - cy * P[11]) / fy, P[11]);
   return KittiProjection{key[1] - '0', {fx, fy, cx, cy}, -t};
 }
@@ -59,7 +59,7 @@ Result<std::vector<KittiProjection>> read_kitti_calib(const fs::path& file) {
     if (!projection) return projection.error();
     const bool again = std::any_of(projections.begin(), projections.end(),
                                    [&](const KittiProjection& p) { return p.camera == projection->camera; });
-    if (again) return Error{file.string(), key, "it twice", "it once"};
+    if (again) return Error{file.string(), key, "the line twice", "it once"};
     projections.push_back(*projection);
   }
   if (projections.empty()) return Error{file.string(), "", "no projection", "lines P0: to P3:"};
@@ -95,8 +95,8 @@ Result<std::vector<camera::RigCamera>> read_kitti_cameras(const fs::path& calib_
     cameras.push_back(*camera);
   }
   if (cameras.empty()) {
-    return Error{calib_file.string(), "", "no images beside it",
-                 "image_0 to image_3 with images: the calibration does not tell the resolution"};
+    return Error{calib_file.string(), "", "no images in its folder",
+                 "image_0 to image_3 with images, since the calibration does not contain the resolution"};
   }
   return cameras;
 }

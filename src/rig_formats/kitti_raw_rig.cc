@@ -20,7 +20,7 @@ using geometry::SE3;
 
 constexpr int kCameras = 4;
 
-// Lines "KEY: numbers"; that of the date is left out.
+// Lines "KEY: numbers", except for the line with the date.
 struct Table {
   std::string file;
   std::map<std::string, std::vector<double>> rows;
@@ -49,7 +49,7 @@ Result<Table> table_of(const fs::path& file, const std::string& text) {
       if (!value) return Error{file.string(), key, word, "a finite number"};
       numbers.push_back(*value);
     }
-    if (!table.rows.emplace(key, numbers).second) return Error{file.string(), key, "it twice", "it once"};
+    if (!table.rows.emplace(key, numbers).second) return Error{file.string(), key, "the line twice", "it once"};
   }
   return table;
 }
@@ -60,7 +60,7 @@ struct Choice {
   std::string because;
 };
 
-// By the size of images that lie with the calibration, in one of the layouts people have.
+// Chosen by the size of images in the folder of the calibration, in one of the usual folder layouts.
 std::optional<Choice> by_images(const fs::path& folder, const Table& table) {
   for (int c = 0; c < kCameras; ++c) {
     const auto raw = table.numbers(fmt::format("S_0{}", c), 2);
@@ -71,8 +71,8 @@ std::optional<Choice> by_images(const fs::path& folder, const Table& table) {
       const auto size = image_files::first_image_size(image_files::images_in(images));
       if (!size) continue;
       const std::vector<double> sides = {static_cast<double>(size->width), static_cast<double>(size->height)};
-      if (sides == *raw) return Choice{KittiRig::kRaw, "the images beside it have their size"};
-      if (sides == *rectified) return Choice{KittiRig::kRectified, "the images beside it have their size"};
+      if (sides == *raw) return Choice{KittiRig::kRaw, "the images in its folder have their size"};
+      if (sides == *rectified) return Choice{KittiRig::kRectified, "the images in its folder have their size"};
     }
   }
   return std::nullopt;
@@ -89,7 +89,7 @@ Choice choose(const fs::path& file, const Table& table) {
   const fs::path folder = fs::absolute(file).parent_path();
   if (const auto choice = by_images(folder, table)) return *choice;
   for (fs::path part = folder; part.has_relative_path(); part = part.parent_path()) {
-    if (const auto rig = by_name(part)) return {*rig, "of the folder " + part.filename().string()};
+    if (const auto rig = by_name(part)) return {*rig, "because of the folder " + part.filename().string()};
   }
   bool raw = false, rectified = false;
   std::error_code error;
@@ -98,8 +98,8 @@ Choice choose(const fs::path& file, const Table& table) {
     raw = raw || rig == KittiRig::kRaw;
     rectified = rectified || rig == KittiRig::kRectified;
   }
-  if (raw && !rectified) return {KittiRig::kRaw, "only folders _extract lie beside it"};
-  return {KittiRig::kRectified, rectified ? "folders _sync lie beside it" : "nothing beside it tells"};
+  if (raw && !rectified) return {KittiRig::kRaw, "there are only folders _extract next to it"};
+  return {KittiRig::kRectified, rectified ? "there are folders _sync next to it" : "by default"};
 }
 
 Result<SE3> describe_raw(const Table& table, const std::string& n, camera::CameraDescription& d) {
@@ -128,7 +128,7 @@ Result<SE3> describe_rectified(const Table& table, const std::string& n, camera:
   }
   d.model = camera::Pinhole::kName;
   d.intrinsics = {fx, fy, cx, cy};
-  // P = K [I | t]: the camera stands at -t.
+  // P = K [I | t]: the camera centre is -t.
   const geometry::Vector3d t((P[3] - cx * P[11]) / fx, (P[7] - cy * P[11]) / fy, P[11]);
   return SE3(geometry::Quaterniond::Identity(), -t);
 }
@@ -163,7 +163,7 @@ Result<camera::RigReading> read_kitti_raw_rig(const fs::path& file, const std::s
   if (reading.cameras.empty())
     return Error{table->file, "", "no camera", raw ? "K_00 to K_03" : "P_rect_00 to P_rect_03"};
   reading.notes.push_back(
-      fmt::format("the {} cameras of KITTI raw are meant: {}", raw ? "unrectified" : "rectified", choice.because));
+      fmt::format("read as the {} cameras of KITTI raw: {}", raw ? "unrectified" : "rectified", choice.because));
   return reading;
 }
 

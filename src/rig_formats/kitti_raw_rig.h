@@ -1,4 +1,4 @@
-// KITTI raw's calib_cam_to_cam.txt (Geiger et al., IJRR 2013).
+// Reads calib_cam_to_cam.txt of KITTI raw (Geiger et al., IJRR 2013).
 #pragma once
 
 #include <filesystem>
@@ -9,9 +9,9 @@
 namespace bslam::rig_formats {
 
 // Cameras 00 to 03. The file describes two rigs: the raw cameras (S, K, D and R, T: reference camera to camera) and the
-// rectified ones (S_rect, P_rect). Which one is meant follows from where it lies: images beside it of the size S or
-// S_rect; else a folder of its path, or beside it, ending in _extract (raw) or _sync (rectified); else the rectified
-// ones. A note says which. The body frame is camera 00, of the chosen rig.
+// rectified ones (S_rect, P_rect). Which of them is read depends on the images in the same folder, if their size is S
+// or S_rect; else on a folder in the path or next to the file whose name ends in _extract (raw) or _sync (rectified);
+// else the rectified ones are read. A note tells which. The body frame is camera 00 of the chosen rig.
 Result<camera::RigReading> read_kitti_raw_rig(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace bslam::rig_formats

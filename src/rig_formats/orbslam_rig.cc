@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 using geometry::Matrix3d;
 using geometry::SE3;
 
-// The files say "data:[1, 2]", which OpenCV reads and YAML does not.
+// The files contain "data:[1, 2]" without a space, which OpenCV accepts although it is not valid YAML.
 std::string with_spaces(std::string text) {
   constexpr std::string_view kTight = "data:[";
   for (std::size_t at = text.find(kTight); at != std::string::npos; at = text.find(kTight, at + kTight.size())) {
@@ -88,8 +88,8 @@ Status read_model(const yaml::YamlMap& yaml, const std::string& type, const std:
 struct OrbslamFile {
   const yaml::YamlMap& yaml;
   std::string type = "PinHole";
-  std::string prefix;                    // of camera 1
-  std::vector<std::int64_t> resolution;  // of both
+  std::string prefix;                    // of the keys of camera 1
+  std::vector<std::int64_t> resolution;  // of both cameras
   SE3 T_body_cam1;
   camera::RigReading reading = {};
 
@@ -105,7 +105,7 @@ struct OrbslamFile {
   }
 };
 
-// Raw cameras with the rotations that rectify them: p_rectified = R p, and RIGHT stands a baseline to the right there.
+// Raw cameras with rectifying rotations, p_rectified = R p. In the rectified frame, RIGHT is a baseline to the right.
 Status read_rectification(OrbslamFile& file, double baseline) {
   std::optional<SE3> T_rectified_left;
   for (const std::string side : {"LEFT", "RIGHT"}) {
@@ -134,11 +134,11 @@ Status read_rectification(OrbslamFile& file, double baseline) {
     }
     if (const Status status = file.add(d, T_left_raw, side + "."); !status) return status;
   }
-  file.reading.notes.push_back("the raw images of LEFT and RIGHT are meant, not the rectified ones of Camera");
+  file.reading.notes.push_back("read as the raw cameras LEFT and RIGHT, not as the rectified ones");
   return {};
 }
 
-// Metres between rectified cameras, where the file tells.
+// The baseline of rectified cameras in metres, if the file contains it.
 Result<std::optional<double>> baseline_of(const yaml::YamlMap& yaml, const std::string& prefix) {
   for (const char* key : {"Stereo.b", "Camera.bf"}) {
     if (!yaml.has(key)) continue;
@@ -179,7 +179,7 @@ Status read_cameras(OrbslamFile& file) {
   }
   if (!*baseline) return {};
   if (yaml.has("RGBD.DepthMapFactor") || yaml.has("DepthMapFactor")) {
-    file.reading.notes.push_back("an RGB-D file: its baseline is virtual, one camera is read");
+    file.reading.notes.push_back("this is an RGB-D file, whose baseline is virtual: only one camera is read");
     return {};
   }
   return file.add(first, SE3(geometry::Quaterniond::Identity(), {**baseline, 0, 0}), file.prefix);
@@ -199,7 +199,7 @@ std::string model_text(const camera::CameraModel& model, int number) {
   return text + "\n";
 }
 
-// dt is f: ORB-SLAM3 reads floats, and OpenCV gives it what dt names.
+// The type dt is f (float), since ORB-SLAM3 reads the matrix as floats and OpenCV does not convert.
 std::string matrix_text(const char* key, const SE3& T) {
   return fmt::format("{}: !!opencv-matrix\n  rows: 4\n  cols: 4\n  dt: f\n  data: {}\n\n", key,
                      number_list(camera::rows_of(T)));

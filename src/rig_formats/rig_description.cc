@@ -19,7 +19,8 @@ using geometry::SE3;
 using geometry::Vector2d;
 using geometry::Vector3d;
 
-// Angle from the optical axis to the outermost pixel with a bearing on the way from the principal point to `pixel`.
+// Angle between the optical axis and the last pixel with a valid bearing on the line from the principal point to
+// `pixel`.
 double angle_towards(const camera::Camera& camera, const Vector2d& pixel) {
   constexpr int kSteps = 256;
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
@@ -41,7 +42,7 @@ std::string vector_text(const Vector3d& v) {
   return fmt::format("({:.4f}, {:.4f}, {:.4f})", shown[0], shown[1], shown[2]);
 }
 
-// Where the optical axis points, seen from camera 0.
+// The direction of the optical axis, seen from camera 0.
 std::string direction_in_words(const Vector3d& axis) {
   constexpr double kStraight = 1.0;  // degrees
   const double right = degrees(std::atan2(axis.x(), axis.z()));
@@ -52,7 +53,7 @@ std::string direction_in_words(const Vector3d& axis) {
   }
   if (std::abs(down) >= kStraight)
     words.push_back(fmt::format("{:.1f} deg {}", std::abs(down), down > 0 ? "down" : "up"));
-  return words.empty() ? "looks the same way" : fmt::format("looks {}", fmt::join(words, ", "));
+  return words.empty() ? "same viewing direction" : fmt::format("looks {}", fmt::join(words, ", "));
 }
 
 std::string describe_camera(const camera::Rig& rig, std::size_t i) {
@@ -82,7 +83,8 @@ double baseline(const camera::Rig& rig, std::size_t i, std::size_t j) {
 }
 
 std::string overlap_table(const camera::Rig& rig) {
-  std::string text = "overlap, per cent of the row's image that the column's camera sees:\n        ";
+  std::string text =
+      "overlap: percentage of the view of the camera in the row that the camera in the column sees as well\n        ";
   for (std::size_t j = 0; j < rig.size(); ++j) text += fmt::format("{:>5}", j);
   for (std::size_t i = 0; i < rig.size(); ++i) {
     text += fmt::format("\n  {:>6}", i);
@@ -112,13 +114,13 @@ std::string displacement_in_words(const Vector3d& displacement) {
                                {displacement.z(), "in front", "behind"}}};
   std::stable_sort(axes.begin(), axes.end(),
                    [](const Axis& a, const Axis& b) { return std::abs(a.along) > std::abs(b.along); });
-  const double least = std::max(1e-4, 0.01 * displacement.norm());  // what is smaller is noise of the calibration
+  const double least = std::max(1e-4, 0.01 * displacement.norm());  // smaller components are noise of the calibration
   std::vector<std::string> words;
   for (const Axis& axis : axes) {
     if (std::abs(axis.along) < least) continue;
     words.push_back(length_in_words(std::abs(axis.along)) + " " + (axis.along > 0 ? axis.positive : axis.negative));
   }
-  return words.empty() ? "at the same place" : fmt::format("{}", fmt::join(words, ", "));
+  return words.empty() ? "at the same position" : fmt::format("{}", fmt::join(words, ", "));
 }
 
 std::string describe_rig(const camera::Rig& rig) {

@@ -1,4 +1,4 @@
-// A rig in words, for people.
+// Descriptions of rigs for users.
 #pragma once
 
 #include <string>
@@ -8,17 +8,18 @@
 
 namespace bslam::rig_formats {
 
-// Angles the image spans through its optical axis, radians. A side or corner outside of the model's domain counts up to
-// where the model ends.
+// Angles of view in radians, measured along lines through the principal point. If the border of the image is outside of
+// the domain of the camera model, the angle ends where the domain ends.
 struct FieldOfView {
   double horizontal = 0, vertical = 0, diagonal = 0;
 };
 FieldOfView field_of_view(const camera::Camera& camera);
 
-// "11.0 cm to the right, 2.0 cm below": a displacement in the frame of camera 0 (x right, y down, z forward), metres.
+// "11.0 cm to the right, 2.0 cm below". `displacement` is in metres, in the frame of camera 0 (x right, y down, z
+// forward).
 std::string displacement_in_words(const geometry::Vector3d& displacement);
 
-// Several lines: each camera with its model, resolution, fields of view and place; baselines; overlap.
+// Several lines: model, resolution, fields of view and pose of every camera; baselines; overlaps.
 std::string describe_rig(const camera::Rig& rig);
 
 }  // namespace bslam::rig_formats

@@ -42,7 +42,7 @@ Result<camera::RigReading> read_colmap_file(const fs::path& file, const std::str
   return read_colmap_rig(fs::absolute(file).parent_path());
 }
 
-// True where some line begins with `key` and a colon.
+// Whether any line begins with `key` and a colon.
 bool has_line(std::string_view text, std::string_view key) {
   const std::string start = std::string(key) + ":";
   return text.starts_with(start) || text.find("\n" + start) != std::string_view::npos;
@@ -56,7 +56,7 @@ bool is_upper_word(std::string_view word) {
   });
 }
 
-// The first line that is no comment: "ID MODEL ..." of cameras.txt, "ID COUNT CAMERA ..." of rigs.txt.
+// Examines the first line that is not a comment: "ID MODEL ..." in cameras.txt, "ID COUNT CAMERA ..." in rigs.txt.
 bool is_colmap_text(std::string_view text) {
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -79,8 +79,8 @@ struct FormatEntry {
   Result<camera::RigReading> (*read)(const fs::path& file, const std::string& text);
 };
 
-// The first that recognises a file reads it, so that an error speaks of the format that was meant. OpenVINS's variant
-// is read as Kalibr's.
+// The first format that recognises a file reads it, so that errors refer to the right format. The variant of OpenVINS
+// is read by the reader of Kalibr.
 constexpr std::array<FormatEntry, 9> kFormats = {{
     {RigFormat::kBslam, "bslam", "a bslam rig (bslam_rig: 1)",
      [](std::string_view t) { return has_line(t, "bslam_rig"); }, read_bslam_rig},
@@ -129,14 +129,14 @@ Result<RigFile> read_folder(const fs::path& folder) {
   if (fs::exists(folder / "cameras.txt", error)) return as_file(read_colmap_rig(folder), RigFormat::kColmap);
   if (fs::exists(folder / "calib_cam_to_cam.txt", error)) return read_rig_file(folder / "calib_cam_to_cam.txt");
   if (fs::exists(folder / "rig.yaml", error)) return read_rig_file(folder / "rig.yaml");
-  return Error{folder.string(), "", "a folder without calibration",
+  return Error{folder.string(), "", "a folder without a calibration",
                "mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt, cameras.txt or rig.yaml in it"};
 }
 
 Status make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) return Error{folder.string(), "", error.message(), "a folder that can be made"};
+  if (error) return Error{folder.string(), "", error.message(), "a folder that can be created"};
   return {};
 }
 
@@ -156,7 +156,7 @@ Status write_colmap(const camera::Rig& rig, const fs::path& folder) {
 }
 
 Status write_as(const camera::Rig& rig, RigFormat format, const fs::path& out) {
-  constexpr double kRateHz = 20.0;  // EuRoC's files carry one; nothing reads it
+  constexpr double kRateHz = 20.0;  // files of EuRoC contain a rate, which is not used
   switch (format) {
     case RigFormat::kEuroc:
       return write_euroc_sensors(rig, out, kRateHz);
@@ -209,9 +209,9 @@ Result<RigFile> read_rig_file(const fs::path& path) {
     if (format.recognises(*text)) return as_file(format.read(path, *text), format.format);
     names += (names.empty() ? "" : ", ") + std::string(format.description);
   }
-  // Broken YAML is more worth saying than an unknown format.
+  // A syntax error is more helpful than an unknown format.
   if (const auto yaml = yaml::YamlMap::parse(path, *text); !yaml && !yaml.error().key.empty()) return yaml.error();
-  return Error{path.string(), "", "no rig of a known format", "one of: " + names};
+  return Error{path.string(), "", "no calibration in a known format", "one of: " + names};
 }
 
 Result<camera::Rig> read_rig(const fs::path& path) {
@@ -229,7 +229,8 @@ Result<std::vector<std::string>> write_rig_as(const camera::Rig& rig, RigFormat 
   for (std::size_t i = 0; i < rig.size() && !keeps_names; ++i) {
     const std::string name = fmt::format("cam{}", i);
     if (rig.camera(i).name == name) continue;
-    notes.push_back(fmt::format("{} holds no names: {} becomes {}", format_name(format), rig.camera(i).name, name));
+    notes.push_back(
+        fmt::format("{} stores no camera names: {} becomes {}", format_name(format), rig.camera(i).name, name));
   }
   return notes;
 }

@@ -16,20 +16,21 @@ Status check_camera(const camera::Camera& camera, const std::string& out, const 
   };
   const std::string format(limits.format);
   if (!camera.mask_file.empty()) {
-    return error("a mask, which " + format + " cannot hold", "a camera without, or --drop mask");
+    return error("a mask, which " + format + " cannot store", "cameras without masks, or --drop mask");
   }
   if (limits.time_offsets == Holds::kNothing && camera.time_offset_ns != 0) {
-    return error("a time offset, which " + format + " cannot hold", "a camera without, or --drop time-offset");
+    return error("a time offset, which " + format + " cannot store",
+                 "cameras without time offsets, or --drop time-offset");
   }
   const std::string_view model = camera::model_name(camera.model);
   if (std::find(limits.models.begin(), limits.models.end(), model) == limits.models.end()) {
-    return error(fmt::format("model {}, which {} cannot hold", model, format),
+    return error(fmt::format("model {}, which {} cannot store", model, format),
                  fmt::format("one of: {}", fmt::join(limits.models, ", ")));
   }
   const std::size_t count = needed_coefficients(camera.model).size();
   if (model == camera::PinholeRadTan::kName && count > limits.most_coefficients) {
     return error(fmt::format("{} coefficients", count),
-                 fmt::format("at most {}, as {} cannot hold more", limits.most_coefficients, format));
+                 fmt::format("at most {}, since {} cannot store more", limits.most_coefficients, format));
   }
   return {};
 }
@@ -39,7 +40,7 @@ Status check_camera(const camera::Camera& camera, const std::string& out, const 
 Status check_limits(const camera::Rig& rig, const std::string& out, const RigLimits& limits) {
   if (rig.size() > limits.most_cameras) {
     return Error{out, "", fmt::format("{} cameras", rig.size()),
-                 fmt::format("at most {}, as {} cannot hold more", limits.most_cameras, limits.format)};
+                 fmt::format("at most {}, since {} cannot store more", limits.most_cameras, limits.format)};
   }
   const TimeNs offset = rig.camera(std::size_t{0}).time_offset_ns;
   for (std::size_t i = 0; i < rig.size(); ++i) {
@@ -47,11 +48,13 @@ Status check_limits(const camera::Rig& rig, const std::string& out, const RigLim
     if (const Status status = check_camera(camera, out, limits); !status) return status;
     if (limits.time_offsets == Holds::kOneForAll && camera.time_offset_ns != offset) {
       return Error{out, camera.name, "a time offset of its own",
-                   fmt::format("one for all cameras, as {} holds no more, or --drop time-offset", limits.format)};
+                   fmt::format("one time offset for all cameras, since {} cannot store more, or --drop time-offset",
+                               limits.format)};
     }
   }
   if (!limits.body_frame && rig.body_from_cam(0).matrix() != Eigen::Matrix4d::Identity()) {
-    return Error{out, rig.camera(std::size_t{0}).name, fmt::format("a body frame, which {} cannot hold", limits.format),
+    return Error{out, rig.camera(std::size_t{0}).name,
+                 fmt::format("a body frame, which {} cannot store", limits.format),
                  "camera 0 as the body, or --drop body"};
   }
   return {};

@@ -1,4 +1,4 @@
-// What a calibration format can hold, declared once a format, so that whatever does not fit is refused by name.
+// Declares for every calibration format what it can store, so that anything else is an error that names the reason.
 #pragma once
 
 #include <limits>
@@ -14,22 +14,23 @@ namespace bslam::rig_formats {
 enum class Holds { kNothing, kOneForAll, kEach };
 
 struct RigLimits {
-  std::string_view format;               // for errors
-  std::vector<std::string_view> models;  // as named in our rig file
+  std::string_view format;               // name in errors
+  std::vector<std::string_view> models;  // names as in the rig file of bslam
   Holds time_offsets = Holds::kNothing;
-  bool body_frame = true;             // else the body is camera 0
-  std::size_t most_coefficients = 8;  // of pinhole-radtan
+  bool body_frame = true;             // whether the body frame may differ from camera 0
+  std::size_t most_coefficients = 8;  // number of coefficients of pinhole-radtan
   std::size_t most_cameras = std::numeric_limits<std::size_t>::max();
 };
 
-// Error for the first thing of the rig that the format cannot hold: a mask, a time offset, a model, radial-tangential
-// coefficients beyond its count, a body frame other than camera 0, too many cameras. `out` is the file for the error.
+// Error for the first part of the rig that the format cannot store: a mask, a time offset, a model, too many
+// radial-tangential coefficients, a body frame other than camera 0, too many cameras. `out` is the file named in the
+// error.
 Status check_limits(const camera::Rig& rig, const std::string& out, const RigLimits& limits);
 
-// The coefficients without trailing zeros that change nothing: radial-tangential ones shortened to 5 or 4.
+// The distortion coefficients without trailing zeros: radial-tangential ones are shortened to 5 or 4.
 std::vector<double> needed_coefficients(const camera::CameraModel& model);
 
-// "[1.0, 2.5]": each number as the shortest text that reads back as the same double.
+// "[1.0, 2.5]", with the shortest text for each number that is read back as the same double.
 std::string number_list(const std::vector<double>& values);
 
 }  // namespace bslam::rig_formats

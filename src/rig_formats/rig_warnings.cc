@@ -19,18 +19,18 @@ constexpr double kLeastBaseline = 1e-3, kLargestBaseline = 5.0;  // metres
 
 Vector3d axis_of(const camera::Rig& rig, std::size_t i) { return rig.rig_from_cam(i).rotation() * Vector3d::UnitZ(); }
 
-// What would bring all baselines that are too long to the size of rigs.
+// A question about the unit that would explain the length of the baselines.
 std::string unit_question(const camera::Rig& rig) {
   double longest = 0.0;
   for (std::size_t i = 1; i < rig.size(); ++i) longest = std::max(longest, rig.rig_from_cam(i).translation().norm());
-  return longest >= 10.0 && longest <= 5000.0 ? "are they millimetres? (metres are expected)" : "are the units metres?";
+  return longest >= 10.0 && longest <= 5000.0 ? "are they millimetres? (metres are expected)" : "is the unit metres?";
 }
 
 geometry::SE3 between(const camera::Rig& rig, std::size_t i, std::size_t j) {
   return rig.cam_from_rig(i) * rig.rig_from_cam(j);
 }
 
-// One for all pairs, as one wrong unit puts all of them apart.
+// One warning for all pairs, since a wrong unit affects all of them.
 void warn_of_long_baselines(const camera::Rig& rig, std::vector<std::string>& warnings) {
   std::string first;
   int others = -1;
@@ -43,8 +43,8 @@ void warn_of_long_baselines(const camera::Rig& rig, std::vector<std::string>& wa
   }
   if (others < 0) return;
   const std::string rest = others == 0   ? ""
-                           : others == 1 ? ", another pair likewise"
-                                         : fmt::format(", {} other pairs likewise", others);
+                           : others == 1 ? ", and another pair is too far apart as well"
+                                         : fmt::format(", and {} other pairs are too far apart as well", others);
   warnings.push_back(fmt::format("{}{}: {}", first, rest, unit_question(rig)));
 }
 
@@ -56,20 +56,20 @@ void warn_of_short_baseline(const camera::Rig& rig, std::size_t i, std::size_t j
   if (one_pose) {
     warnings.push_back(fmt::format("cameras {} and {} have the same extrinsics: is a transform missing?", i, j));
   } else {
-    warnings.push_back(fmt::format("cameras {} and {} are {} apart: is their transform missing, or not in metres?", i,
-                                   j, length_in_words(length)));
+    warnings.push_back(fmt::format("cameras {} and {} are {} apart: is a transform missing, or not in metres?", i, j,
+                                   length_in_words(length)));
   }
 }
 
 void warn_of_principal_point(const camera::Camera& camera, std::size_t i, std::vector<std::string>& warnings) {
-  constexpr double kFarOff = 0.2;  // of the side, from the middle
+  constexpr double kFarOff = 0.2;  // distance from the centre, relative to the side of the image
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   const std::string point = fmt::format("camera {}: principal point ({:.1f}, {:.1f})", i, k.cx, k.cy);
   const std::string image = fmt::format("{} x {} image", camera.width, camera.height);
   if (!camera.contains({k.cx, k.cy})) {
-    warnings.push_back(point + " outside of the " + image + ": is the resolution that of the calibration?");
+    warnings.push_back(point + " is outside of the " + image + ": was the camera calibrated at another resolution?");
   } else if (std::abs(k.cx / camera.width - 0.5) > kFarOff || std::abs(k.cy / camera.height - 0.5) > kFarOff) {
-    warnings.push_back(point + " far from the middle of the " + image + ": was it scaled or cropped?");
+    warnings.push_back(point + " is far from the centre of the " + image + ": was it scaled or cropped?");
   }
 }
 
@@ -79,8 +79,8 @@ void warn_of_lens(const camera::Camera& camera, std::size_t i, std::vector<std::
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   const double ratio = std::max(k.fx / k.fy, k.fy / k.fx);
   if (ratio > kSquare) {
-    warnings.push_back(fmt::format("camera {}: focal lengths {:.1f} and {:.1f}: pixels are seldom that far from square",
-                                   i, k.fx, k.fy));
+    warnings.push_back(fmt::format(
+        "camera {}: focal lengths {:.1f} and {:.1f} differ unusually: are pixels not square?", i, k.fx, k.fy));
   }
   const double horizontal = degrees(field_of_view(camera).horizontal);
   const bool plane = std::holds_alternative<camera::Pinhole>(camera.model) ||
@@ -98,10 +98,10 @@ void warn_of_lens(const camera::Camera& camera, std::size_t i, std::vector<std::
     }
   }
   const double share = static_cast<double>(answered) / (kColumns * kRows);
-  const double corners = plane ? kLeastAnswered : 0.5;  // a fisheye may leave much of the image dark
+  const double corners = plane ? kLeastAnswered : 0.5;  // large parts of a fisheye image may be dark
   if (share < corners) {
     warnings.push_back(
-        fmt::format("camera {}: the lens model answers for {:.0f} % of the image: are the coefficients "
+        fmt::format("camera {}: the camera model is valid for only {:.0f} % of the image: are the coefficients "
                     "those of model {}?",
                     i, 100 * share, camera::model_name(camera.model)));
   }
@@ -115,10 +115,10 @@ void warn_of_time(const camera::Camera& camera, std::size_t i, std::vector<std::
       "camera {}: a time offset of {:g} s: is it given in milliseconds? (seconds are expected)", i, offset_s));
 }
 
-constexpr double kSameWay = 0.5;  // radians between the views of cameras that look the same way
+constexpr double kSameWay = 0.5;  // radians; largest angle between similar viewing directions
 
-// Do the cameras that look the same way, of which there are some, stand apart along `axis` of their images (0: beside
-// each other, 1: one above the other)?
+// Whether there are cameras with similar viewing directions, and all of their baselines are along `axis` of the image
+// (0: side by side, 1: above each other).
 bool all_apart_along(const camera::Rig& rig, int axis) {
   constexpr double kAlong = 0.9;
   bool some = false;
@@ -133,10 +133,10 @@ bool all_apart_along(const camera::Rig& rig, int axis) {
   return some;
 }
 
-// The signs of T_cam_body where T_body_cam is meant.
+// Signs that the file contains T_cam_body instead of T_body_cam.
 void warn_of_direction(const camera::Rig& rig, std::vector<std::string>& warnings) {
   constexpr double kInTheWay = 0.5, kOutOfTheWay = 0.25;
-  constexpr const char* kQuestion = ": is T_cam_body given where T_body_cam is meant?";
+  constexpr const char* kQuestion = ": was T_cam_body given instead of T_body_cam?";
   const camera::Rig inverse = with_inverse_extrinsics(rig);
   const auto spread = [](const camera::Rig& r) {
     double most = 0.0;
@@ -144,20 +144,22 @@ void warn_of_direction(const camera::Rig& rig, std::vector<std::string>& warning
     return most;
   };
   if (rig.size() > 1 && spread(rig) < kLeastBaseline && spread(inverse) > kLeastBaseline) {
-    warnings.push_back(std::string("all cameras are in one place, and with inverted transforms they are not") +
+    warnings.push_back(std::string("all cameras are at the same position, but not with inverted transforms") +
                        kQuestion);
   } else if (obstruction(rig) > kInTheWay && obstruction(inverse) < kOutOfTheWay) {
-    warnings.push_back(std::string("the cameras look through each other, and with inverted transforms they do not") +
+    warnings.push_back(std::string("the cameras are in the view of each other, but not with inverted transforms") +
                        kQuestion);
   } else if (obstruction(rig) > kInTheWay) {
-    warnings.push_back("the cameras look through each other: check directions and axes (x right, y down, z forward)");
-  } else if (all_apart_along(rig, 1) && all_apart_along(inverse, 0)) {
     warnings.push_back(
-        std::string("the cameras stand above each other, and with inverted transforms beside each other") + kQuestion);
+        "the cameras are in the view of each other: check the direction of transforms and the axes (x right, y down, z "
+        "forward)");
+  } else if (all_apart_along(rig, 1) && all_apart_along(inverse, 0)) {
+    warnings.push_back(std::string("the cameras are above each other, but side by side with inverted transforms") +
+                       kQuestion);
   }
 }
 
-// Cameras that look the same way stand beside each other; others look away from each other.
+// Cameras with similar viewing directions should be side by side, and others should face away from each other.
 double pair_obstruction(const camera::Rig& rig, std::size_t i, std::size_t j) {
   const Vector3d baseline = rig.rig_from_cam(j).translation() - rig.rig_from_cam(i).translation();
   if (baseline.norm() < kLeastBaseline) return 0.0;

@@ -1,4 +1,4 @@
-// What of a rig is hardly meant: slips of units, frames and directions that a calibration file cannot be refused for.
+// Plausibility checks of a rig: likely mistakes of units, frame conventions and axes, which are not errors.
 #pragma once
 
 #include <string>
@@ -8,19 +8,21 @@
 
 namespace bslam::rig_formats {
 
-// A line each:
-// - two cameras at one place (below 1 mm), with one pose, or further apart than 5 m;
-// - a principal point outside of the image or far from its middle, pixels far from square;
-// - a field of view no lens of the model has; a lens model that answers for part of the image alone;
-// - cameras that look through each other; extrinsics that would make more sense inverted: all cameras in one place, in
-//   each other's view, or above each other where inverted they stand beside each other.
+// One line for each of:
+// - two cameras closer than 1 mm, with equal poses, or further apart than 5 m;
+// - a principal point outside of the image or far from its centre, and pixels that are far from square;
+// - a field of view that is implausible for the camera model, and a model that is valid for a part of the image only;
+// - a time offset of half a second or more;
+// - cameras in the view of each other, and extrinsics that are more plausible when inverted: all cameras at the same
+//   position, in the view of each other, or above each other instead of side by side.
 std::vector<std::string> rig_warnings(const camera::Rig& rig);
 
-// How much cameras stand in each other's way, 0 to 1, mean over pairs: for cameras that look the same way the share of
-// their baseline along the view, for others how far each looks across the other instead of away from it.
+// How much the cameras are in the view of each other, from 0 to 1, averaged over all pairs. For cameras with similar
+// viewing directions, this is the component of the unit baseline along the view; for others, how much they face each
+// other.
 double obstruction(const camera::Rig& rig);
 
-// The rig as it is if its file holds T_cam_body where T_body_cam is meant.
+// The rig with inverted extrinsics, as if its file contained T_cam_body instead of T_body_cam.
 camera::Rig with_inverse_extrinsics(const camera::Rig& rig);
 
 // "1.20 m", "11.0 cm", "0.4 mm"

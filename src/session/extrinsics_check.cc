@@ -21,19 +21,19 @@ namespace {
 
 using geometry::SE3;
 
-constexpr int kFrames = 6;            // of the data set, spread over it
-constexpr int kFarthest = 60;         // bits between descriptors of one point
-constexpr double kRatio = 0.85;       // to the second best
-constexpr double kTolerancePx = 2.0;  // of a calibration and its features
+constexpr int kFrames = 6;            // frames tested, spread over the data set
+constexpr int kMaxHamming = 60;       // bits; largest descriptor distance of a match
+constexpr double kRatio = 0.85;       // largest ratio of best to second best descriptor distance
+constexpr double kTolerancePx = 2.0;  // of calibration and feature localisation together
 constexpr int kLeastAgreeing = 25;
-constexpr double kLeastShare = 0.4;       // of the matches; chance reaches some per cent
-constexpr int kMany = 300;                // matches: enough to expect that some convention fits
-constexpr double kMost = 0.6;             // of the matches: fewer, and another pose may fit more
-constexpr double kClearly = 1.3;          // times more than as given
-constexpr double kNoBaseline = 1e-6;      // metres
-constexpr double kLeastParallax = 0.005;  // radians, of the matches another pose is found from
+constexpr double kLeastShare = 0.4;   // share of consistent matches; chance reaches a few per cent
+constexpr int kMany = 300;            // matches; with more than these some convention is expected to fit
+constexpr double kMost = 0.6;         // share of consistent matches below which another pose is searched for
+constexpr double kClearly = 1.3;      // factor between numbers of consistent matches that counts as a clear difference
+constexpr double kNoBaseline = 1e-6;  // metres
+constexpr double kLeastParallax = 0.005;  // radians; for the estimation of another pose
 
-// For every descriptor of `a` its best in `b`, or -1.
+// For every descriptor of `a` the index of its best match in `b`, or -1.
 std::vector<int> best_matches(const feature::Detections& a, const feature::Detections& b) {
   std::vector<int> best(a.size(), -1);
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -47,7 +47,7 @@ std::vector<int> best_matches(const feature::Detections& a, const feature::Detec
         second = std::min(second, distance);
       }
     }
-    if (least > kFarthest || least > kRatio * second) best[i] = -1;
+    if (least > kMaxHamming || least > kRatio * second) best[i] = -1;
   }
   return best;
 }
@@ -56,7 +56,7 @@ struct PixelPair {
   Eigen::Vector2d a, b;
 };
 
-// Mutual best matches, without any geometry: it is what is to be tested.
+// Mutual best matches. No geometric constraint is used, since the geometry is what is tested.
 std::vector<PixelPair> match(const feature::Detections& a, const feature::Detections& b) {
   const std::vector<int> forward = best_matches(a, b), backward = best_matches(b, a);
   std::vector<PixelPair> pairs;
@@ -68,7 +68,7 @@ std::vector<PixelPair> match(const feature::Detections& a, const feature::Detect
   return pairs;
 }
 
-// Under a convention: which calibration the first and the second image have, and the transform between them.
+// A convention applied to a pair: the calibrations of the first and second image, and the transform between them.
 struct Hypothesis {
   const camera::Camera *first, *second;
   SE3 T_second_first;
@@ -107,7 +107,7 @@ int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
   for (const PixelPair& pair : pairs) {
     const auto a = h.first->unproject(pair.a), b = h.second->unproject(pair.b);
     if (!a || !b) continue;
-    const bool far = geometry::angle_between(pose.R_b_a * *a, *b) < tolerance;  // in front or behind cannot be told
+    const bool far = geometry::angle_between(pose.R_b_a * *a, *b) < tolerance;  // too far away to have a depth
     agreeing +=
         far || (apart && solver::epipolar_angle(pose, {*a, *b}) < tolerance && solver::in_front_of_both(pose, {*a, *b}))
             ? 1
@@ -116,7 +116,7 @@ int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
   return agreeing;
 }
 
-// The pose of camera j that the matches of all frames fit, calibrated or not.
+// The relative pose of camera j estimated from the matches of all frames, independent of the calibrated one.
 std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::size_t j,
                                     std::span<const PixelPair> pairs) {
   const camera::Camera &ci = rig.camera(i), &cj = rig.camera(j);
@@ -140,7 +140,7 @@ std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::
 }
 
 std::optional<Convention> verdict_of(const PairEvidence& evidence) {
-  const auto best = std::max_element(evidence.agreeing.begin(), evidence.agreeing.end());  // the first of equals
+  const auto best = std::max_element(evidence.agreeing.begin(), evidence.agreeing.end());  // the first among equal ones
   if (*best < kLeastAgreeing || *best < kLeastShare * evidence.matches) return std::nullopt;
   if (*best < kClearly * evidence.agreeing[0]) return Convention::kAsGiven;
   return static_cast<Convention>(best - evidence.agreeing.begin());
@@ -153,9 +153,9 @@ std::string_view convention_in_words(Convention convention) {
     case Convention::kAsGiven:
       return "as given";
     case Convention::kInverse:
-      return "with every transform inverted (T_cam_body is given, T_body_cam meant)";
+      return "with every transform inverted (T_cam_body instead of T_body_cam)";
     case Convention::kPairInverse:
-      return "with the transform between the two inverted, or the two exchanged";
+      return "with the transform between the two inverted, or the two cameras exchanged";
     case Convention::kSwapped:
       return "with the two cameras exchanged";
     case Convention::kSwappedInverse:
@@ -194,8 +194,8 @@ struct View {
   feature::Detections keypoints;  // empty without an image
 };
 
-// By camera and frame.
-std::vector<std::vector<View>> look(const dataset::Dataset& dataset, std::span<const image::Image> masks) {
+// Keypoints by camera and frame.
+std::vector<std::vector<View>> extract_views(const dataset::Dataset& dataset, std::span<const image::Image> masks) {
   const camera::Rig& rig = dataset.rig;
   std::vector<std::vector<View>> views(rig.size());
   feature::Extractor extractor({});
@@ -220,7 +220,7 @@ Result<std::vector<PairEvidence>> check_extrinsics(const dataset::Dataset& datas
   const camera::Rig& rig = dataset.rig;
   const auto masks = image_files::read_masks(rig);
   if (!masks) return masks.error();
-  const std::vector<std::vector<View>> views = look(dataset, *masks);
+  const std::vector<std::vector<View>> views = extract_views(dataset, *masks);
   std::vector<PairEvidence> evidence;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
@@ -242,24 +242,25 @@ std::string describe(const PairEvidence& pair) {
   const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
   if (pair.other) {
     return fmt::format(
-        "{} of {} matches fit the second turned by {:.1f} degrees from how it is given, in a direction {:.0f} degrees "
-        "from the given one; {} as given",
+        "{} of {} matches are consistent with a pose of the second camera that is rotated by {:.1f} degrees from the "
+        "calibrated one, with a baseline whose direction differs by {:.0f} degrees; {} with the calibration as given",
         pair.other->agreeing, pair.matches, pair.other->turned_deg, pair.other->displaced_deg,
         agreeing(Convention::kAsGiven));
   }
-  if (pair.instants == 0) return "never taken together: nothing to compare";
+  if (pair.instants == 0) return "no images taken at the same time: nothing to compare";
   if (!pair.verdict && pair.matches > kMany)
-    return fmt::format("{} matches, and no convention fits enough of them", pair.matches);
-  if (!pair.verdict) return fmt::format("too little in common to tell ({} matches)", pair.matches);
-  std::string text =
-      fmt::format("{} of {} matches fit {}", agreeing(*pair.verdict), pair.matches, convention_in_words(*pair.verdict));
-  if (*pair.verdict != Convention::kAsGiven) return text + fmt::format(", {} as given", agreeing(Convention::kAsGiven));
+    return fmt::format("{} matches, but too few are consistent with any convention", pair.matches);
+  if (!pair.verdict) return fmt::format("too few matches to judge ({})", pair.matches);
+  std::string text = fmt::format("{} of {} matches are consistent with the calibration {}", agreeing(*pair.verdict),
+                                 pair.matches, convention_in_words(*pair.verdict));
+  if (*pair.verdict != Convention::kAsGiven)
+    return text + fmt::format("; {} with it as given", agreeing(Convention::kAsGiven));
   if (agreeing(Convention::kAsGiven) < kMost * pair.matches)
-    text += "; few: many wrong matches, or intrinsics that are a little off";
+    text += "; this is few: many matches are wrong, or the intrinsics are inaccurate";
   return text;
 }
 
-// Where none is at fault: what nothing was found out about.
+// For rigs without a fault: the pairs and cameras that could not be judged.
 std::string unjudged(std::span<const PairEvidence> evidence) {
   std::size_t pairs = 0;
   std::set<std::size_t> cameras, judged;
@@ -269,35 +270,38 @@ std::string unjudged(std::span<const PairEvidence> evidence) {
   }
   std::erase_if(cameras, [&](std::size_t c) { return judged.contains(c); });
   if (pairs == 0) return "";
-  return fmt::format("; {} of {} pairs could not be judged{}", pairs, evidence.size(),
-                     cameras.empty() ? "" : fmt::format(": nothing is known of camera {}", fmt::join(cameras, ", ")));
+  return fmt::format(
+      "; {} of {} pairs could not be judged{}", pairs, evidence.size(),
+      cameras.empty() ? "" : fmt::format(", among them all pairs of camera {}", fmt::join(cameras, ", ")));
 }
 
 }  // namespace
 
 std::string describe_evidence(std::span<const PairEvidence> evidence) {
-  std::string text = "against the images:\n";
-  std::map<Convention, std::vector<std::string>> slips;  // pairs
+  std::string text = "test against the images:\n";
+  std::map<Convention, std::vector<std::string>> mistakes;  // pairs
   int fitting = 0, elsewhere = 0;
   for (const PairEvidence& pair : evidence) {
-    text += fmt::format("  {} and {}: {}\n", pair.first, pair.second, describe(pair));
+    text += fmt::format("  cameras {} and {}: {}\n", pair.first, pair.second, describe(pair));
     elsewhere += pair.other ? 1 : 0;
     if (pair.verdict == Convention::kAsGiven) ++fitting;
     if (pair.verdict && pair.verdict != Convention::kAsGiven) {
-      slips[*pair.verdict].push_back(fmt::format("{} and {}", pair.first, pair.second));
+      mistakes[*pair.verdict].push_back(fmt::format("{} and {}", pair.first, pair.second));
     }
   }
-  if (!slips.empty()) {
-    const auto most = std::ranges::max_element(slips, {}, [](const auto& slip) { return slip.second.size(); });
+  if (!mistakes.empty()) {
+    const auto most = std::ranges::max_element(mistakes, {}, [](const auto& mistake) { return mistake.second.size(); });
     const auto& pairs = most->second;
     const std::string others =
-        fitting > 0 ? fmt::format("; {} of {} pairs fit as given", fitting, evidence.size()) : "";
-    return text + fmt::format("warning: the images of cameras {} do not fit the extrinsics; they fit {}{}\n",
-                              fmt::join(pairs, ", "), convention_in_words(most->first), others);
+        fitting > 0 ? fmt::format("; {} of {} pairs are consistent as given", fitting, evidence.size()) : "";
+    return text +
+           fmt::format(
+               "warning: the images of cameras {} contradict the extrinsics; they are consistent with them {}{}\n",
+               fmt::join(pairs, ", "), convention_in_words(most->first), others);
   }
-  if (elsewhere > 0) return text + "warning: the images do not fit the extrinsics, nor any common slip of them\n";
-  if (fitting == 0) return text + "  nothing can be said of the extrinsics\n";
-  return text + "  the extrinsics fit as given" + unjudged(evidence) + "\n";
+  if (elsewhere > 0) return text + "warning: the images contradict the extrinsics, and no common mistake explains it\n";
+  if (fitting == 0) return text + "  the extrinsics could not be judged\n";
+  return text + "  the extrinsics are consistent with the images" + unjudged(evidence) + "\n";
 }
 
 }  // namespace bslam::session

@@ -1,5 +1,5 @@
-// Are the extrinsics of a rig those of its images? Tested by the epipolar geometry of features that two cameras see at
-// one instant, under the calibration as it is and under the slips people make with it.
+// Tests the extrinsics of a rig against its images. Features that two cameras see at the same time must satisfy their
+// epipolar geometry. It is tested under the calibration as given and under common mistakes such as inverted transforms.
 #pragma once
 
 #include <array>
@@ -16,46 +16,45 @@
 
 namespace bslam::session {
 
-// What may be meant by the numbers of a calibration file.
+// Interpretations of the transforms of a calibration file.
 enum class Convention {
   kAsGiven,
-  kInverse,        // T_cam_body stands where T_body_cam is meant
-  kPairInverse,    // the same of the transform between the two cameras
-  kSwapped,        // the images of the two cameras, or their calibrations, are exchanged
-  kSwappedInverse  // both
+  kInverse,        // every transform is inverted: the file holds T_cam_body instead of T_body_cam
+  kPairInverse,    // the transform between the two cameras is inverted
+  kSwapped,        // the images or the calibrations of the two cameras are exchanged
+  kSwappedInverse  // exchanged cameras and inverted transforms
 };
 constexpr int kConventions = 5;
 std::string_view convention_in_words(Convention convention);
 
-// The pose of the second camera seen from the first that clearly more matches fit than any convention, where there is
-// one.
+// A relative pose of the two cameras that is consistent with clearly more matches than any convention.
 struct OtherPose {
-  int agreeing = 0;       // matches that fit it
-  double turned_deg = 0;  // of the second camera from how it is given
-  double displaced_deg =
-      0;  // between the directions in which it lies from the first, found and given; 0 without baseline
+  int agreeing = 0;          // matches consistent with it
+  double turned_deg = 0;     // angle between the estimated and the given orientation of the second camera
+  double displaced_deg = 0;  // angle between the estimated and the given direction of the baseline; 0 without baseline
 };
 
-// One pair of cameras.
+// Evidence on one pair of cameras.
 struct PairEvidence {
   std::size_t first = 0, second = 0;
-  int instants = 1;                             // at which both were taken
-  int matches = 0;                              // features found in both images, over all frames
-  std::array<int, kConventions> agreeing = {};  // of them, those that fit a convention
-  // The one that most fit, where enough do and clearly more than as given; empty: too little to tell, or `other`.
+  int instants = 1;                             // times at which both cameras have an image
+  int matches = 0;                              // feature matches, over all frames
+  std::array<int, kConventions> agreeing = {};  // matches consistent with each convention
+  // The convention with most consistent matches, if there are enough of them and, for any but kAsGiven, clearly more
+  // than as given. Empty if there is too little evidence or if `other` is set.
   std::optional<Convention> verdict = {};
   std::optional<OtherPose> other = {};
 };
 
-// Judges the pair (i, j) by keypoints of images taken at the same instants, one entry per frame for each camera.
+// Judges the pair (i, j) by keypoints of images taken at the same times. `of_i` and `of_j` have one entry per frame.
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Detections> of_i,
                         std::span<const feature::Detections> of_j);
 
-// Judges every pair of cameras by a few frames spread over the data set, as far as both were taken at one instant.
-// Masks count. Errors: a mask that cannot be read.
+// Judges every pair of cameras by a few frames spread over the data set, using images taken at the same time. Masked
+// pixels are ignored. Errors: a mask that cannot be read.
 Result<std::vector<PairEvidence>> check_extrinsics(const dataset::Dataset& dataset);
 
-// A line for every pair, and one for what to do.
+// The report for users: one line per pair and a conclusion.
 std::string describe_evidence(std::span<const PairEvidence> evidence);
 
 }  // namespace bslam::session

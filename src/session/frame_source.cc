@@ -11,8 +11,8 @@
 namespace bslam::session {
 namespace {
 
-// On Linux the nice value is that of the calling thread. Where it cannot be set nothing but time is lost.
-void give_way() {
+// On Linux the nice value belongs to the calling thread. Failure only costs time and is ignored.
+void lower_priority() {
 #if defined(__linux__)
   constexpr int kNice = 10;
   [[maybe_unused]] const int failed = setpriority(PRIO_PROCESS, 0, kNice);
@@ -23,7 +23,7 @@ void give_way() {
 
 FrameSource::FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReadAhead priority)
     : dataset_(dataset), ahead_(ahead), reader_([this, priority](std::stop_token stop) {
-        if (priority == ReadAhead::kGivesWay) give_way();
+        if (priority == ReadAhead::kGivesWay) lower_priority();
         read(std::move(stop));
       }) {}
 

@@ -1,4 +1,4 @@
-// Frames of a data set, read ahead by a thread of its own, in order.
+// Reads the frames of a data set ahead of time, in order, in a thread of its own.
 #pragma once
 
 #include <condition_variable>
@@ -12,22 +12,22 @@
 
 namespace bslam::session {
 
-// Does reading ahead give way to the threads that work on the frame in hand? Where stages run beside these it must not:
-// they would starve it.
+// Priority of the reading thread: equal to that of the other threads, or lower. A lower priority is meant for
+// sequential runs; threads of background stages would starve the reader.
 enum class ReadAhead { kAsAll, kGivesWay };
 
 class FrameSource {
  public:
   struct Item {
     image::ImageBundle images;
-    double read_ms = 0;  // reading and decoding
+    double read_ms = 0;  // time for reading and decoding
   };
 
-  // Borrows `dataset`; keeps at most `ahead` frames read and not yet taken.
+  // Keeps a reference to `dataset`. At most `ahead` frames wait to be taken.
   FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReadAhead priority = ReadAhead::kAsAll);
   ~FrameSource() = default;
 
-  // The next frame; empty after the last. Throws what the reading thread threw.
+  // The next frame, or nothing after the last one. Rethrows exceptions of the reading thread.
   std::optional<Item> next();
 
  private:
@@ -37,10 +37,10 @@ class FrameSource {
   const std::size_t ahead_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::deque<Item> ready_;  // guarded by mutex_, as the two below
+  std::deque<Item> ready_;  // guarded by mutex_, like the next two members
   bool finished_ = false;
   std::exception_ptr failure_;
-  std::jthread reader_;  // last: stops before the rest goes
+  std::jthread reader_;  // declared last, so that it stops before the other members are destroyed
 };
 
 }  // namespace bslam::session

@@ -14,7 +14,8 @@ Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedM
   map::FeatureModel features = config.feature_model();
   features.scale_factor = a.map.pyramid().scale_factor;
   for (const storage::SavedMap* saved : {&a, &b}) {
-    if (saved->map.scale() != map::Scale::kMetric) return Error{saved->file, "scale", "not metric", "maps of one unit"};
+    if (saved->map.scale() != map::Scale::kMetric)
+      return Error{saved->file, "scale", "a map without metric scale", "metric maps, since only these can be merged"};
     if (const Status s = storage::fits(*saved, a.map.rig(), a.map.pyramid(), vocabulary.get()); !s) return s.error();
   }
   map::BundledMap both = a.map;

@@ -1,4 +1,4 @@
-// Maps of separate runs made one over the places they share.
+// Merges maps of separate runs that show common places.
 #pragma once
 
 #include "map/bundled_map.h"
@@ -10,14 +10,14 @@ namespace bslam::session {
 
 struct MergeResult {
   map::BundledMap map;
-  int joined = 0;         // parts hung below others
-  int loops = 0;          // further places recognised, and fused
-  std::size_t parts = 0;  // that are left: 1 where all of it lies in one world
+  int joined = 0;         // submaps that were merged into others
+  int loops = 0;          // further loop closures
+  std::size_t parts = 0;  // submaps left; 1 if everything lies in one world frame
 };
 
-// Everything of `b` goes into `a`; every keyframe of `b` is asked which place of the rest it shows, as loop closing
-// asks in a run; in the end all is adjusted together. Maps without a common place lie side by side as parts. Both are
-// of one rig and of the vocabulary's words. Errors: scales that are not metric, whose units differ.
+// Adds the keyframes and landmarks of `b` to `a`, searches a loop closure for every keyframe of `b`, and finally runs a
+// global bundle adjustment. Maps without a common place become separate submaps. Both maps must be of the same rig and
+// vocabulary. Errors: a map of another rig or vocabulary, or without metric scale.
 Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedMap& b,
                                const place::VocabularyPtr& vocabulary, const system::Config& config);
 

@@ -63,7 +63,7 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
   return pairs;
 }
 
-// What is probably wrong, masks that cannot be used among it.
+// Likely mistakes in the calibration, and masks that cannot be used.
 std::vector<std::string> warnings_of(const camera::Rig& rig) {
   std::vector<std::string> warnings = rig_formats::rig_warnings(rig);
   for (std::size_t i = 0; i < rig.size(); ++i) {
@@ -112,7 +112,7 @@ Result<std::string> report_rig(const RigReportRequest& request) {
   }
   std::optional<std::vector<PairEvidence>> evidence;
   if (!request.images.empty()) {
-    // Cameras that fire late are no reason to stop.
+    // Wide enough to group the images of cameras that fire late.
     constexpr double kTolerance_s = 0.1;
     const auto dataset =
         dataset::open_dataset({.path = request.images, .rig_file = request.file, .sync_tolerance_s = kTolerance_s});

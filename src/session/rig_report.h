@@ -1,4 +1,4 @@
-// What `bslam rig info` tells of a calibration.
+// The report of `bslam rig info` on a calibration.
 #pragma once
 
 #include <string>
@@ -9,12 +9,13 @@ namespace bslam::session {
 
 struct RigReportRequest {
   std::string file;         // a calibration, or the folder of a data set
-  bool json = false;        // else text
-  std::string svg = {};     // draw into this file; empty: nowhere
-  std::string images = {};  // a data set to test the extrinsics against; empty: none
+  bool json = false;        // text otherwise
+  std::string svg = {};     // draw the rig into this file unless empty
+  std::string images = {};  // test the extrinsics against this data set unless empty
 };
 
-// Text or JSON for stdout: format, cameras, places, overlaps, notes, warnings. Errors: what cannot be read or written.
+// Text or JSON for stdout: format, cameras, poses, overlaps, notes, warnings. Errors: a file that cannot be read or
+// written.
 Result<std::string> report_rig(const RigReportRequest& request);
 
 }  // namespace bslam::session

@@ -17,7 +17,7 @@ namespace {
 using namespace report;  // figures
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kBins = 450;  // of time, about one for two pixels
+constexpr std::size_t kBins = 450;  // intervals of time, about one for every two pixels
 
 using Points = std::vector<std::array<double, 2>>;
 
@@ -30,7 +30,7 @@ Series time_series(std::string label, Points points, std::string_view colour, do
   return series;
 }
 
-// One of the counts of a camera in every frame; a gap where it has no image.
+// One of the counts of a camera over all frames, with gaps at frames without an image of it.
 Points camera_points(const RunRecord& record, std::size_t camera, int tracking::CameraCounts::*count) {
   Points points;
   for (const RunFrame& frame : record.frames) {
@@ -42,7 +42,7 @@ Points camera_points(const RunRecord& record, std::size_t camera, int tracking::
   return reduced(points, kBins, Reduction::kMedian);
 }
 
-// What all panels share: the same range of time, and where tracking was lost.
+// A panel with the time range of the run and the intervals in which tracking was lost.
 Panel time_panel(const RunRecord& record, std::string title, std::string y_label) {
   Panel panel{.title = std::move(title), .x_label = "time [s]", .y_label = std::move(y_label)};
   panel.floor = AxisFloor::kZero;
@@ -54,7 +54,7 @@ Panel time_panel(const RunRecord& record, std::string title, std::string y_label
     panel.bands.push_back({.from = interval.from_s - half_interval, .to = interval.to_s + half_interval});
   }
   if (!panel.bands.empty()) panel.extra_legend.push_back({"lost", std::string(kVermilion)});
-  if (!record.frames.empty()) {  // no line, but the range of x
+  if (!record.frames.empty()) {  // invisible points that set the range of x
     panel.series.push_back(time_series("", {{record.frames.front().time_s, 0.0}}, "none", 0.0));
     panel.series.push_back(time_series("", {{record.frames.back().time_s, 0.0}}, "none", 0.0));
   }
@@ -101,16 +101,26 @@ Panel inlier_panel(const RunRecord& record) {
   return panel;
 }
 
-// A bar for every stretch of time in which a camera was not sound, at the height of its number, in the colour of why;
-// empty where all were. Bars too near to each other to be told apart are one.
-std::optional<Panel> camera_state_panel(const RunRecord& record) {
+// Colours of the reasons of faults, distinct from those of the cameras (Paul Tol's muted palette).
+std::string_view reason_colour(std::size_t k) {
+  constexpr std::array<std::string_view, 6> kColours = {"#882255", "#44AA99", "#999933",
+                                                        "#332288", "#AA4499", "#DDCC77"};
+  return kColours[k % kColours.size()];
+}
+
+// A bar for every interval in which a camera was degraded or out, in the row of the camera and the colour of the
+// reason. Bars that are too close to be distinguished are merged. Empty if there were no faults.
+std::optional<Panel> camera_fault_panel(const RunRecord& record) {
   if (record.frames.empty()) return std::nullopt;
   const double begin_s = record.frames.front().time_s, end_s = record.frames.back().time_s,
                apart_s = (end_s - begin_s) / kBins;
-  Panel panel = time_panel(record, "Cameras that were not sound", "camera");
+  Panel panel = time_panel(record, "Camera faults", "");
   panel.floor = AxisFloor::kFromData;
   panel.series.push_back(
       time_series("", {{begin_s, -0.5}, {end_s, static_cast<double>(record.cameras.size()) - 0.5}}, "none", 0.0));
+  for (std::size_t i = 0; i < record.cameras.size(); ++i) {
+    panel.y_ticks.push_back({static_cast<double>(i), record.cameras[i].name});
+  }
   const std::size_t without = panel.series.size();
   for (std::size_t i = 0; i < record.cameras.size(); ++i) {
     const double y = static_cast<double>(i);
@@ -121,12 +131,11 @@ std::optional<Panel> camera_state_panel(const RunRecord& record) {
       auto series = std::ranges::find(panel.series, why, &Series::label);
       if (series == panel.series.end()) {
         const std::size_t k = panel.series.size() - without;
-        series = panel.series.insert(
-            series, time_series(why, {}, series_colour(k == 0 ? 0 : k + 1), 6.0));  // 1 is that of lost frames
+        series = panel.series.insert(series, time_series(why, {}, reason_colour(k), 6.0));
       }
       Points& bars = series->points;
       auto* const last =
-          bars.empty() ? nullptr : &bars[bars.size() - 2];  // the end of the bar before; after it the line is broken
+          bars.empty() ? nullptr : &bars[bars.size() - 2];  // end of the previous bar; a line break follows it
       if (last != nullptr && (*last)[1] == y && interval.from_s - (*last)[0] < apart_s) {
         (*last)[0] = interval.to_s;
       } else {
@@ -145,13 +154,13 @@ Points stage_points(const StageSeries& stage) {
 }
 
 Panel frame_time_panel(const RunRecord& record) {
-  Panel panel = time_panel(record, "Time for a frame, and its stages", "time [ms]");
+  Panel panel = time_panel(record, "Processing time per frame, by stage", "time [ms]");
   Points total;
   for (const RunFrame& frame : record.frames) {
     total.push_back({frame.time_s, frame.record ? frame.record->frame_ms : kNone});
   }
   if (total.size() > kBins) {
-    panel.series.push_back(time_series("frame, largest", reduced(total, kBins, Reduction::kMaximum), "#BBBBBB", 1.0));
+    panel.series.push_back(time_series("frame, maximum", reduced(total, kBins, Reduction::kMaximum), "#BBBBBB", 1.0));
   }
   panel.series.push_back(time_series("frame", reduced(total, kBins, Reduction::kMedian), kBlack, 1.8));
   std::size_t k = 0;
@@ -164,7 +173,7 @@ Panel frame_time_panel(const RunRecord& record) {
 }
 
 Panel background_panel(const RunRecord& record, std::span<const StageSeries* const> stages) {
-  Panel panel = time_panel(record, "Stages beside the frames, each call", "time [ms]");
+  Panel panel = time_panel(record, "Background stages: time per call", "time [ms]");
   std::size_t k = 0;
   for (const StageSeries* stage : stages) {
     Series series = time_series(stage->name, stage_points(*stage), series_colour(k++), 4.0);
@@ -176,9 +185,10 @@ Panel background_panel(const RunRecord& record, std::span<const StageSeries* con
 
 std::string subtitle_of(const RunRecord& record) {
   const auto tracked = std::ranges::count(record.frames, FrameOutcome::kTracked, &RunFrame::outcome);
-  return fmt::format("{}{}; {} of {} frames tracked; {} keyframes, {} landmarks", record.mode,
-                     record.complete ? "" : ", interrupted", tracked, record.frames.size(), record.map.keyframes,
-                     record.map.landmarks);
+  const std::string submaps = record.parts.size() > 1 ? fmt::format(" in {} submaps", record.parts.size()) : "";
+  return fmt::format("{}{}; {} of {} frames tracked{}; {} keyframes, {} landmarks", record.mode,
+                     record.complete ? "" : ", interrupted", tracked, record.frames.size(), submaps,
+                     record.map.keyframes, record.map.landmarks);
 }
 
 }  // namespace
@@ -188,7 +198,7 @@ std::string run_plot_svg(const RunRecord& record) {
                 .subtitle = subtitle_of(record)};
   figure.rows.push_back({.height_px = 230.0, .panels = {keypoint_panel(record)}});
   figure.rows.push_back({.height_px = 270.0, .panels = {inlier_panel(record)}});
-  if (auto states = camera_state_panel(record)) {
+  if (auto states = camera_fault_panel(record)) {
     figure.rows.push_back(
         {.height_px = 90.0 + 20.0 * static_cast<double>(record.cameras.size()), .panels = {*std::move(states)}});
   }

@@ -1,4 +1,4 @@
-// Plots of a run over time: features, inliers and faults of each camera, time of frames and stages.
+// Plots of a run over time: features, inliers and faults of every camera, and processing times.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace bslam::session {
 
-// SVG, one panel below the other over the same time: keypoints by camera; landmarks matched (thin) and inliers (bold)
-// by camera, keyframes as dots at the foot, loops and relocalisations as lines; where some were not sound,
-// which and why; the caller's time for a frame with the
-// stages in it; the stages beside it. Stretches in which tracking was lost are shaded. Long runs are drawn as medians
-// (the frame time also as maxima) over equal stretches of time.
+// An SVG document with panels that share the time axis: keypoints per camera; matched landmarks (thin) and inliers
+// (bold) per camera, with keyframes as dots at the bottom and loop closures and relocalisations as vertical lines;
+// camera faults with their reasons, if there were any; processing time per frame, by stage; time per call of the
+// background stages. Intervals without tracking are shaded. Long runs are drawn as medians over equal intervals of
+// time, the processing time also as maxima.
 std::string run_plot_svg(const RunRecord& record);
 
 }  // namespace bslam::session

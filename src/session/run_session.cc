@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t kReadAhead = 4;  // frames
 
-// The recorded pace: when each frame is due, from when the first was.
+// Replays the recorded pace: when each frame is due, relative to the first.
 class Metronome {
  public:
   using Clock = std::chrono::steady_clock;
@@ -36,7 +36,8 @@ class Metronome {
   Clock::time_point start_;
 };
 
-// Frames of the recorded run, in order; an interrupted one has fewer than the data set, one that was late has gaps.
+// Frames of the recorded run, in order. There are fewer than in the data set if the run was interrupted or dropped
+// frames.
 std::vector<FrameId> recorded_frames(const execution::Journal& journal) {
   std::vector<FrameId> frames;
   for (const execution::JournalEntry& e : journal.entries) {
@@ -45,7 +46,7 @@ std::vector<FrameId> recorded_frames(const execution::Journal& journal) {
   return frames;
 }
 
-// Feeds the frames one after the other; returns what was fed. Stops early where asked to.
+// Feeds the frames to the system in order and returns a list of them. Stops early if the run is interrupted.
 Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const SessionOptions& options,
                                      system::System& system) {
   std::vector<InputFrame> inputs;
@@ -74,8 +75,8 @@ Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const Sess
 
 namespace {
 
-// The whole calibration with the extrinsics of `found`, the rig of the cameras in use.
-camera::Rig put_in(const camera::Rig& found, const dataset::Dataset& dataset) {
+// The calibration of all cameras, with the extrinsics of `found` for the cameras in use.
+camera::Rig with_refined_extrinsics(const camera::Rig& found, const dataset::Dataset& dataset) {
   return dataset.whole_rig ? dataset.whole_rig->with_extrinsics_of(found, dataset.cameras_used) : found;
 }
 
@@ -117,7 +118,7 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
                     .wall_s = wall_s},
                    system.take_frames());
   result.map = system.snapshot();
-  if (system.extrinsics_refined()) result.refined_rig = put_in(result.map->rig(), dataset);
+  if (system.extrinsics_refined()) result.refined_rig = with_refined_extrinsics(result.map->rig(), dataset);
   result.journal = system.journal();
   return result;
 }
@@ -126,7 +127,7 @@ namespace {
 
 using Files = std::vector<std::pair<std::string, std::string>>;  // name, bytes
 
-// At least the file of the first part, also where there is none.
+// One file per submap; the file of the first is written even if there is none.
 void add_trajectories(const std::vector<system::PartTrajectory>& parts, const std::string& stem,
                       evaluation::PoseState state, Files& files) {
   const std::string header = evaluation::trajectory_header("cam0", state);
@@ -136,12 +137,12 @@ void add_trajectories(const std::vector<system::PartTrajectory>& parts, const st
   }
 }
 
-}  // namespace
-
-Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder) {
+// The results first and the plots, which are large, last: if the disk is full, the results matter more.
+Files output_files(const SessionResult& result, const system::Config& config) {
   system::Config copy = config;
   const OptionTable table(copy);
   Files files;
+  files.emplace_back("summary.json", report::summary_text(result.record));
   add_trajectories(result.trajectories, "trajectory", evaluation::PoseState::kFinal, files);
   add_trajectories(result.live, "trajectory_live", evaluation::PoseState::kLive, files);
   files.emplace_back("config.yaml", yaml::config_to_yaml(table));
@@ -152,13 +153,21 @@ Status write_outputs(const SessionResult& result, const system::Config& config, 
                                                                     .subtitle = {},
                                                                     .estimate = path,
                                                                     .ground_truth = {},
-                                                                    .errors = {}}));
+                                                                    .errors = {},
+                                                                    .axes = report::WorldAxes::kCamera}));
   files.emplace_back("run.svg", run_plot_svg(result.record));
-  files.emplace_back("summary.json", summary_text(result.record));  // last: where it is, the rest is
-  for (const auto& [name, bytes] : files) {
-    if (const Status status = write_atomically(folder / name, bytes); !status) return status;
+  return files;
+}
+
+}  // namespace
+
+Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder) {
+  Status first_failure;
+  for (const auto& [name, bytes] : output_files(result, config)) {
+    const Status status = write_atomically(folder / name, bytes);
+    if (!status && first_failure.ok()) first_failure = status;
   }
-  return {};
+  return first_failure;
 }
 
 }  // namespace bslam::session

@@ -1,4 +1,4 @@
-// An offline run: a data set through the system, and what comes out of it as a record and as files.
+// An offline run: feeds a data set to the SLAM system and writes the results as files.
 #pragma once
 
 #include <filesystem>
@@ -15,36 +15,37 @@
 
 namespace bslam::session {
 
-enum class Pace { kFast, kRealtime };  // as fast as it goes, or at the recorded pace
-enum class Late { kBlock, kDrop };  // at the recorded pace: keep every frame, or leave out those there is no time for
+enum class Pace { kFast, kRealtime };  // as fast as possible, or at the recorded pace
+enum class Late { kBlock, kDrop };     // at the recorded pace: process every frame, or drop frames that are late
 
 struct SessionOptions {
   system::Config config;
   Pace pace = Pace::kFast;
   Late late = Late::kBlock;
-  double start_up_s = 0;                     // spent before the session, for the record
-  std::stop_token interrupted;               // ends the run soon, with what exists so far
-  std::optional<execution::Journal> replay;  // of a run to be repeated: its frames, and no more than those
-  place::VocabularyPtr vocabulary;           // null: no place is recognised
-  std::optional<map::BundledMap> map;        // of an earlier run with this rig, to go on in
-  std::function<void(std::size_t done, std::size_t all)> progress;  // after every frame; may be empty
+  double start_up_s = 0;                     // time spent before the session, for the record
+  std::stop_token interrupted;               // a stop request ends the run early and keeps the results so far
+  std::optional<execution::Journal> replay;  // of a run to repeat: exactly its frames are processed
+  place::VocabularyPtr vocabulary;           // null: no place recognition
+  std::optional<map::BundledMap> map;        // of an earlier run with this rig, to be continued
+  std::function<void(std::size_t done, std::size_t all)> progress;  // called after every frame; may be empty
 };
 
 struct SessionResult {
   RunRecord record;
-  std::vector<system::PartTrajectory> trajectories,
-      live;  // the first are those of trajectory.tum and trajectory_live.tum
+  // One per submap. The first ones are written to trajectory.tum and trajectory_live.tum.
+  std::vector<system::PartTrajectory> trajectories, live;
   map::MapSnapshot map;
-  // Where extrinsics were refined: all cameras of the calibration, those in use with what was found.
+  // If extrinsics were refined: the calibration of all cameras, with refined extrinsics for those in use.
   std::optional<camera::Rig> refined_rig;
   execution::Journal journal;
 };
 
-// Errors: a mask that cannot be read or has another size than its camera's images; a journal that is not of this run.
+// Errors: a mask that cannot be read or differs in size from the images of its camera; a journal of another run.
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options);
 
-// trajectory.tum, trajectory_live.tum (further parts of the map: ..._part2.tum), summary.json, config.yaml,
-// trajectory.svg, run.svg and, where extrinsics were refined, rig_refined.yaml, each whole or not at all.
+// Writes summary.json, trajectory.tum, trajectory_live.tum (further submaps: ..._part2.tum), config.yaml,
+// rig_refined.yaml if extrinsics were refined, trajectory.svg and run.svg, in this order. Each file is written
+// completely or not at all. If one cannot be written, the others are still tried, and the first error is returned.
 Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder);
 
 }  // namespace bslam::session

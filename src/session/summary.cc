@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// So many decimals and no more: beyond them the figures are noise. NaN becomes null.
+// Rounded to the given number of decimals, since further digits are noise. NaN becomes null.
 ordered_json rounded(double value, int decimals) {
   if (!std::isfinite(value)) return nullptr;
   const double unit = std::pow(10.0, decimals);

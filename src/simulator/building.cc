@@ -34,9 +34,11 @@ constexpr std::array kRooms = {
              0.40f},
 };
 
-constexpr std::array kDoors = {
-    Door{Axis::kY, 8.0, 4.6}, Door{Axis::kY, 12.0, 4.6},    Door{Axis::kX, kMiddle, 14.0}, Door{Axis::kY, 11.5, 9.1},
-    Door{Axis::kY, 7.5, 9.1}, Door{Axis::kX, kMiddle, 5.5}, Door{Axis::kY, 16.0, 11.2},  // to the store, off the tour
+constexpr std::array kDoors =
+    {
+        Door{Axis::kY, 8.0, 4.6},   Door{Axis::kY, 12.0, 4.6}, Door{Axis::kX, kMiddle, 14.0},
+        Door{Axis::kY, 11.5, 9.1},  Door{Axis::kY, 7.5, 9.1},  Door{Axis::kX, kMiddle, 5.5},
+        Door{Axis::kY, 16.0, 11.2},  // to the store room, which the tour does not visit
 };
 
 void add_room(Building& b, const RoomPlan& p, Random& random) {
@@ -70,7 +72,7 @@ void add_room(Building& b, const RoomPlan& p, Random& random) {
 
 Building make_building(std::uint64_t seed) {
   Building b;
-  constexpr double kCornerRadius = 1.6;  // metres: turns at walking pace stay below 60 degrees a second
+  constexpr double kCornerRadius = 1.6;  // metres; turns at walking pace stay below 60 degrees per second
   b.tour = rounded_loop({{5.5, 4.6}, {14.0, 4.6}, {14.0, 9.1}, {5.5, 9.1}}, kCornerRadius, Building::kTourStep);
   for (std::size_t i = 0; i < kRooms.size(); ++i) {
     Random random(seed, "room", i);

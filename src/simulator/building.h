@@ -1,5 +1,5 @@
-// The built-in world: one floor of a building, 20 m x 14 m, seven furnished rooms joined by doors, with a closed tour
-// through six of them. World frame: x east, y north, z up, the floor at z = 0.
+// The built-in world: one floor of a building, 20 m x 14 m, with seven furnished rooms connected by doors, and a closed
+// tour through six of them. World frame: x east, y north, z up, with the floor at z = 0.
 #pragma once
 
 #include <string>
@@ -12,10 +12,10 @@ namespace bslam::simulator {
 
 struct Lamp {
   Vector3d position;
-  double intensity;  // irradiance at 1 m facing it; 1 is about a well lit white wall
+  double intensity;  // irradiance of a surface facing the lamp at 1 m; 1 is about that of a well lit white wall
 };
 
-// Inner extent of a room, metres.
+// Interior of a room, in metres.
 struct Room {
   std::string name;
   Vector2d low, high;
@@ -26,18 +26,19 @@ struct Building {
   std::vector<Room> rooms;
   std::vector<Surface> surfaces;
   std::vector<Lamp> lamps;
-  // The closed tour in the plane: points kTourStep apart, the last one a step before the first. Walls and furniture
-  // stay kTourClearance away from every point at most kTourSway beside it and at a height in [kTourLow, kTourHigh].
+  // The closed tour in the plane: points at a distance of kTourStep, the last one a step before the first. Walls and
+  // furniture keep a distance of kTourClearance from all points that are within kTourSway of the tour at a height in
+  // [kTourLow, kTourHigh].
   std::vector<Vector2d> tour;
 
   static constexpr double kTourStep = 0.05, kTourClearance = 0.35, kTourSway = synthetic::kMaxSway, kTourLow = 1.1,
                           kTourHigh = 1.85;  // m
 };
 
-// Rooms, doors and tour are the same for every seed; materials, furniture and pictures follow from it.
+// Rooms, doors and tour are the same for every seed, which determines materials, furniture and pictures.
 Building make_building(std::uint64_t seed);
 
-// The worlds there are: this building, and those of simulation/repeated_world.h.
+// The available worlds: this building, and those of simulator/repeated_world.h.
 enum class WorldKind { kBuilding, kCorridor, kTwinRooms };
 Building make_building(WorldKind kind, std::uint64_t seed);
 

@@ -1,4 +1,4 @@
-// Ray queries of Embree 3 and Embree 4 under one name: between them only the way options are passed has changed.
+// Ray queries of Embree 3 and Embree 4 with one interface. The versions differ only in how options are passed.
 #pragma once
 
 #if __has_include(<embree4/rtcore.h>)
@@ -13,7 +13,7 @@ namespace bslam::simulator {
 
 inline void occluded(RTCScene scene, RTCRay& ray) { rtcOccluded1(scene, &ray, nullptr); }
 inline void intersect(RTCScene scene, RTCRayHit& query) { rtcIntersect1(scene, &query, nullptr); }
-// Eight rays that start and point alike; `valid` is -1 for those that take part, else 0.
+// Intersects eight rays with similar origins and directions. `valid` is -1 for active rays, else 0.
 inline void intersect_coherent(const int* valid, RTCScene scene, RTCRayHit8& query) {
   RTCIntersectArguments arguments;
   rtcInitIntersectArguments(&arguments);
@@ -33,7 +33,7 @@ inline void intersect(RTCScene scene, RTCRayHit& query) {
   rtcInitIntersectContext(&context);
   rtcIntersect1(scene, &context, &query);
 }
-// Eight rays that start and point alike; `valid` is -1 for those that take part, else 0.
+// Intersects eight rays with similar origins and directions. `valid` is -1 for active rays, else 0.
 inline void intersect_coherent(const int* valid, RTCScene scene, RTCRayHit8& query) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);

@@ -15,7 +15,7 @@ using simulator::FaultType;
 
 constexpr std::size_t kMaxBytes = 1 << 20;
 
-// The list as a map with one key, which is what YamlMap reads.
+// Wraps the list in a map with one key, since YamlMap reads maps.
 Result<yaml::YamlMap> parse_list(const std::filesystem::path& file, const std::string& text) {
   try {
     const YAML::Node list = YAML::Load(text);
@@ -61,7 +61,7 @@ Result<Fault> read_fault(const yaml::YamlMap& map, std::size_t num_cameras) {
     const auto delay = map.number("delay_s");
     if (!delay) return delay.error();
     if (*type != FaultType::kDelayed)
-      return map.error("delay_s", fmt::format("it with type {}", *name), "it with type delayed");
+      return map.error("delay_s", fmt::format("a delay for type {}", *name), "a delay for type delayed only");
     if (!(*delay >= 0)) return map.error("delay_s", fmt::format("{}", *delay), "0 s or more");
     fault.delay_s = *delay;
   }

@@ -1,4 +1,4 @@
-// What can go wrong with a camera of the simulated rig for a while.
+// Temporary faults of cameras of the simulated rig.
 #pragma once
 
 #include <optional>
@@ -8,19 +8,19 @@
 namespace bslam::simulator {
 
 enum class FaultType {
-  kBlack,        // pictures without any light
-  kFrozen,       // the last picture before, again and again, under new stamps
+  kBlack,        // images without any light
+  kFrozen,       // the previous image is repeated with new time stamps
   kOverExposed,  // far too much light
-  kDropped,      // no pictures
-  kDelayed,      // pictures show the world as it was `delay_s` before their stamp
-  kBlurred,      // out of focus, as behind a drop or a smeared lens
+  kDropped,      // no images
+  kDelayed,      // images show the world `delay_s` before their time stamps
+  kBlurred,      // out of focus, as behind a drop of water or a smeared lens
 };
 
 struct Fault {
   FaultType type = FaultType::kBlack;
-  std::vector<int> cameras = {};  // positions in the rig
-  double from_s = 0, to_s = 0;    // since the first image; from is in, to is out
-  double delay_s = 0.1;           // of kDelayed
+  std::vector<int> cameras = {};  // indices in the rig
+  double from_s = 0, to_s = 0;    // seconds after the first image; the interval includes from_s but not to_s
+  double delay_s = 0.1;           // for kDelayed only
 };
 
 // Names in files: black, frozen, over_exposed, dropped, delayed, blurred.

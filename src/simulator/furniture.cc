@@ -9,7 +9,7 @@ namespace {
 
 using std::numbers::pi;
 
-// A rectangle of floor, axis-parallel.
+// An axis-parallel rectangle of floor.
 struct Footprint {
   Vector2d low, high;
 
@@ -19,14 +19,14 @@ struct Footprint {
   double distance(const Vector2d& p) const { return (p - p.cwiseMax(low).cwiseMin(high)).norm(); }
 };
 
-// Footprint of a box with full sizes `size`, turned by yaw.
+// The footprint of a box with side lengths `size`, rotated by yaw.
 Footprint footprint_of(const Vector2d& centre, const Vector2d& size, double yaw) {
   const double c = std::abs(std::cos(yaw)), s = std::abs(std::sin(yaw));
   const Vector2d half = 0.5 * Vector2d(c * size.x() + s * size.y(), s * size.x() + c * size.y());
   return {centre - half, centre + half};
 }
 
-// Places things in one room; holds what stands there already.
+// Places furniture in a room and keeps track of occupied floor.
 class Furnisher {
  public:
   Furnisher(Building& building, const Room& room, const std::vector<WallStretch>& walls,
@@ -53,7 +53,7 @@ class Furnisher {
   }
   double shade() { return random_.uniform(0.15, 0.8); }
 
-  // A box to add. Filled in braces, so that random numbers are drawn in the order written.
+  // A box to add. Initialised with braces, which guarantees the order of random draws.
   struct Piece {
     Vector2d centre;
     double bottom;
@@ -66,7 +66,7 @@ class Furnisher {
     add_box(building_.surfaces, {{p.centre.x(), p.centre.y(), p.bottom}, p.size, p.yaw}, p.sides, p.top);
   }
 
-  // Free floor: inside the room, away from doors, from the tour and from what stands there.
+  // Whether the floor is free: inside the room, and away from doors, the tour and other furniture.
   bool is_free(const Footprint& f, double gap) const {
     if ((f.low.array() < room_.low.array()).any() || (f.high.array() > room_.high.array()).any()) return false;
     for (const Vector2d& door : doors_) {
@@ -78,7 +78,7 @@ class Furnisher {
     return std::none_of(taken_.begin(), taken_.end(), [&](const Footprint& o) { return f.overlaps(o, gap); });
   }
 
-  // A free place for a thing of that size with its back to a wall; false where none was found.
+  // Finds free floor for an object of this size with its back to a wall. Returns false if there is none.
   bool find_at_wall(const Vector2d& size, Vector2d& centre, double& yaw) {
     for (int trial = 0; trial < 60; ++trial) {
       const WallStretch& w = walls_[random_.below(static_cast<std::uint32_t>(walls_.size()))];
@@ -107,7 +107,7 @@ class Furnisher {
     return true;
   }
 
-  // Boards between two sides, books and small things on them.
+  // Boards between two side panels, with books and small objects on them.
   void add_shelf() {
     const Vector3d size{random_.uniform(0.8, 1.5), random_.uniform(0.25, 0.36), random_.uniform(1.1, 2.1)};
     Vector2d centre;
@@ -126,7 +126,7 @@ class Furnisher {
     }
   }
 
-  // One board's row of books, upright or leaning back to the wall, and boxes.
+  // A row of books and boxes on a board. Books are upright or lean against the wall.
   void add_row(const Vector2d& centre, const Vector2d& x, const Vector2d& y, double yaw, const Vector3d& shelf,
                double bottom, double headroom) {
     double at = -0.5 * shelf.x() + 0.05;
@@ -177,7 +177,7 @@ class Furnisher {
     add_clutter(centre, size.z(), 0.42 * size.head<2>(), yaw, 6);
   }
 
-  // Small boxes, piles of books and a standing picture on a surface of half extents `half` at height `bottom`.
+  // Small boxes, piles of books and a picture frame on a surface with half extents `half` at height `bottom`.
   void add_clutter(const Vector2d& centre, double bottom, const Vector2d& half, double yaw, int count) {
     const Vector2d x(std::cos(yaw), std::sin(yaw)), y(-x.y(), x.x());
     for (int i = 0; i < count; ++i) {
@@ -263,7 +263,7 @@ class Furnisher {
     }
   }
 
-  // Pictures, posters and windows side by side along a stretch of wall.
+  // Pictures, posters and windows side by side along a section of wall.
   void add_pictures(const WallStretch& wall) {
     const Vector2d normal(-wall.direction.y(), wall.direction.x());
     const double yaw = std::atan2(wall.direction.y(), wall.direction.x());
@@ -294,7 +294,7 @@ class Furnisher {
     building_.surfaces.push_back({{corner.x(), corner.y(), bottom}, {edge.x(), edge.y(), 0}, {0, 0, size.z()}, face});
   }
 
-  // Metres between the tour's line and anything that stands: clearance and sway, and the tour's own step.
+  // Metres between the tour and furniture: clearance, sway and a margin for the step of the tour.
   static constexpr double kTourGap = Building::kTourClearance + Building::kTourSway + 0.1;
 
   Building& building_;
@@ -309,7 +309,7 @@ class Furnisher {
 
 void furnish(Building& building, const Room& room, const std::vector<WallStretch>& walls,
              const std::vector<Vector2d>& door_centres, Random& random) {
-  // A copy: adding to the building may move its rooms.
+  // A copy, since adding to the building may reallocate its rooms.
   const Room here = room;
   Furnisher(building, here, walls, door_centres, random).furnish();
 }

@@ -8,15 +8,15 @@
 
 namespace bslam::simulator {
 
-// A stretch of wall seen from inside a room: along `direction` (unit) from `start`, `length` metres, the room to its
-// left (normal = z x direction). Doors are already cut out.
+// A section of wall between doors, seen from inside a room: from `start` along the unit vector `direction`, `length`
+// metres long, with the room on its left (normal = z x direction).
 struct WallStretch {
   Vector2d start, direction;
   double length;
-  bool outer;  // windows go here
+  bool outer;  // an outer wall, which may have windows
 };
 
-// Fills one room: adds surfaces and lamps to `building`, clear of its tour and of `door_centres` (in the plane).
+// Furnishes one room: adds surfaces and lamps to `building`, away from its tour and from `door_centres` (in the plane).
 void furnish(Building& building, const Room& room, const std::vector<WallStretch>& walls,
              const std::vector<Vector2d>& door_centres, Random& random);
 

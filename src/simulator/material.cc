@@ -10,12 +10,12 @@ namespace {
 
 using Seed = std::uint32_t;
 
-constexpr float kEdge = 0.004f;  // metres over which painted edges go from one shade to the other
+constexpr float kEdge = 0.004f;  // metres; width of the transition at painted edges
 
-// A cell of a regular grid and the place in it.
+// A cell of a regular grid and a position in it.
 struct Cell {
   std::int32_t column, row;
-  float x, y;  // metres from the cell's low corner
+  float x, y;  // metres from the lower corner of the cell
 };
 
 Cell cell_at(float x, float y, float width, float height) {
@@ -25,14 +25,14 @@ Cell cell_at(float x, float y, float width, float height) {
   return c;
 }
 
-// 1 inside a shape whose signed distance is negative, soft edge.
+// 1 inside a shape, where the signed distance is negative, with a soft edge.
 float inside(float signed_distance) { return smooth_step(0.5f * kEdge, -0.5f * kEdge, signed_distance); }
 
 float box_distance(float x, float y, float half_width, float half_height) {
   return std::max(std::abs(x) - half_width, std::abs(y) - half_height);
 }
 
-// A random figure about the origin that fits into a circle of `radius`: coverage in [0, 1].
+// Coverage in [0, 1] of a random shape around the origin that fits into a circle of `radius`.
 float motif(float x, float y, float radius, Seed seed) {
   const float turn = 6.2832f * unit(hash(1, 0, seed)), c = std::cos(turn), s = std::sin(turn);
   const float u = c * x + s * y, v = c * y - s * x, r = std::sqrt(x * x + y * y);
@@ -58,7 +58,7 @@ float motif(float x, float y, float radius, Seed seed) {
   }
 }
 
-// Motifs scattered over cells of `size` metres: positive and negative coverage, 0 between them.
+// Motifs scattered over cells of `size` metres: positive or negative coverage, 0 between them.
 float scattered_motifs(float x, float y, float size, float density, Seed seed) {
   const Cell c = cell_at(x, y, size, size);
   const Seed own = hash(c.column, c.row, seed);
@@ -71,7 +71,8 @@ float scattered_motifs(float x, float y, float size, float density, Seed seed) {
   return motif(c.x - cx, c.y - cy, radius, own) * (strength < 0 ? strength - 0.4f : strength + 0.4f) / 1.4f;
 }
 
-// Writing: cells of `height` metres with 5 x 7 random dots each, words of random length; 1 where there is ink.
+// Imitates writing: cells of `height` metres with 5 x 7 random dots, grouped to words of random length. 1 where there
+// is ink.
 float glyphs(float x, float y, float height, Seed seed) {
   const float width = 0.75f * height;
   const Cell c = cell_at(x, y, width, 1.6f * height);
@@ -133,7 +134,7 @@ float tile(const Texture& t, float x, float y) {
   return mix(0.45f * t.shade, a, smooth_step(0.0f, 0.004f, edge - kJoint)) + 0.02f * speckle(x, y, t.seed + 4);
 }
 
-// Grain along x of a board whose own seed is given.
+// Wood grain along x for a board with seed `own`.
 float grain(float x, float y, Seed own) {
   const float bend = 0.02f * value_noise(2.0f * x, 9 * y, own);
   const float lines = fractal_noise(3.5f * x, 75 * (y + bend), own + 1, 3, 0.7f);
@@ -190,7 +191,7 @@ float ceiling(const Texture& t, float x, float y) {
   return mix(0.55f * t.shade, a, smooth_step(0.006f, 0.010f, edge)) + 0.03f * speckle(x, y, t.seed + 2);
 }
 
-// What is on a picture, without its frame; x, y from its low corner.
+// The content of a picture without its frame; x, y are measured from its lower corner.
 float artwork(const Texture& t, float x, float y, float width, float height) {
   const float size = std::min(width, height);
   float a = mix(0.25f, 0.85f, unit(hash(1, 5, t.seed))) * (1 + 0.3f * fractal_noise(4 * x, 4 * y, t.seed, 3));

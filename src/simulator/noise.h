@@ -1,4 +1,4 @@
-// Lattice noise for procedural textures: pure functions of position and seed.
+// Lattice noise for procedural textures, as pure functions of position and seed.
 #pragma once
 
 #include <cmath>
@@ -6,7 +6,7 @@
 
 namespace bslam::simulator {
 
-// 32 well mixed bits of a lattice point.
+// A hash of a lattice point.
 inline std::uint32_t hash(std::int32_t x, std::int32_t y, std::uint32_t seed) {
   std::uint32_t h = seed + static_cast<std::uint32_t>(x) * 0x9e3779b1u + static_cast<std::uint32_t>(y) * 0x85ebca77u;
   h = (h ^ (h >> 15)) * 0x2c1b3c6du;
@@ -23,7 +23,7 @@ inline std::int32_t floor_int(float x) {
   return i - (static_cast<float>(i) > x ? 1 : 0);
 }
 
-// 0 below `low`, 1 above `high`, smooth between.
+// 0 below `low`, 1 above `high`, and smooth in between.
 inline float smooth_step(float low, float high, float x) {
   float t = (x - low) / (high - low);
   t = t < 0 ? 0.0f : t > 1 ? 1.0f : t;
@@ -43,14 +43,15 @@ inline float value_noise(float x, float y, std::uint32_t seed) {
   return 2 * mix(top, bottom, fy) - 1;
 }
 
-// Sum of octaves, each of half the size and `gain` times the amplitude of the one before; about [-1, 1].
+// Sum of octaves, each with half the feature size and `gain` times the amplitude of the previous one; roughly in [-1,
+// 1].
 inline float fractal_noise(float x, float y, std::uint32_t seed, int octaves, float gain = 0.6f) {
   float sum = 0, amplitude = 1, total = 0;
   for (int i = 0; i < octaves; ++i) {
     sum += amplitude * value_noise(x, y, seed + static_cast<std::uint32_t>(i) * 0x51ed27u);
     total += amplitude;
     amplitude *= gain;
-    x = 2.03f * x + 13.7f;  // not exactly 2: lattices of the octaves shall not coincide
+    x = 2.03f * x + 13.7f;  // not exactly 2, so that the lattices of the octaves do not coincide
     y = 2.03f * y + 7.1f;
   }
   return sum / total;

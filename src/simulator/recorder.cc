@@ -10,9 +10,9 @@ namespace bslam::simulator {
 namespace {
 
 constexpr double kBlurPixels = 5.0;     // standard deviation of a smeared lens's pictures
-constexpr double kOverExposure = 14.0;  // times the usual light: little is left below saturation
+constexpr double kOverExposure = 14.0;  // factor on the light, which saturates most pixels
 
-// The last fault in the list that hits a camera at a time, or nothing.
+// The last fault in the list that affects a camera at a time, or null.
 const Fault* fault_at(const std::vector<Fault>& faults, std::size_t camera, double time_s) {
   for (auto fault = faults.rbegin(); fault != faults.rend(); ++fault) {
     const bool hit =
@@ -22,7 +22,7 @@ const Fault* fault_at(const std::vector<Fault>& faults, std::size_t camera, doub
   return nullptr;
 }
 
-// `last`: the same camera's shot before, or nothing.
+// `last` is the previous shot of the same camera, or null.
 void apply(const Fault& fault, const Shot* last, Shot& shot) {
   shot.fault = fault.type;
   switch (fault.type) {
@@ -58,7 +58,7 @@ TimeNs frame_stamp(const RecordingOptions& options, std::size_t frame) {
 }
 
 std::size_t frame_count(const RecordingOptions& options) {
-  constexpr double kRounding = 1e-9;  // 0.3 s at 10 Hz are three frames, whatever 0.3 * 10 may be
+  constexpr double kRounding = 1e-9;  // 0.3 s at 10 Hz are three frames in spite of rounding
   return std::max<std::size_t>(1, static_cast<std::size_t>(options.duration_s * options.rate_hz + kRounding));
 }
 

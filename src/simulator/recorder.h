@@ -1,4 +1,4 @@
-// A simulated recording: which pictures there are, what each of them shows, and the pictures themselves.
+// Simulated recordings: the list of images and the conditions under which they are taken, and the images themselves.
 #pragma once
 
 #include <cstdint>
@@ -19,38 +19,39 @@ struct RecordingOptions {
   double duration_s = 20.0;
   double rate_hz = 20.0;
   double exposure_s = 0.005;
-  TimeNs start_ns = 1'000'000'000;  // stamp of the first images; the trajectory begins there
-  std::vector<Fault> faults = {};   // where two hit one picture, the later one in the list holds
+  TimeNs start_ns = 1'000'000'000;  // time stamp of the first images, at which the trajectory begins
+  std::vector<Fault> faults = {};   // if several affect an image, the last one in the list applies
 };
 
-// One picture of one camera.
+// One image of one camera.
 struct Shot {
   std::size_t frame = 0, camera = 0;
-  TimeNs stamp_ns = 0;          // as recorded
-  double scene_time_s = 0;      // middle of the exposure, seconds of the trajectory
-  std::uint64_t noise_key = 0;  // equal keys and scenes give equal bytes
-  double exposure = 1.0;        // light against the usual
-  double blur_px = 0.0;         // standard deviation
-  bool written = true;          // false: the picture is missing
+  TimeNs stamp_ns = 0;          // recorded time stamp
+  double scene_time_s = 0;      // time of the trajectory in the middle of the exposure, seconds
+  std::uint64_t noise_key = 0;  // equal keys and scenes give equal images
+  double exposure = 1.0;        // factor on the light
+  double blur_px = 0.0;         // standard deviation of the blur
+  bool written = true;          // false: the image is missing
   std::optional<FaultType> fault;
 };
 
-// Stamp of frame k: start + k / rate, rounded to nanoseconds. There are floor(duration * rate), at least one.
+// Time stamp of frame k: start + k / rate, rounded to nanoseconds. The number of frames is floor(duration * rate), but
+// at least one.
 TimeNs frame_stamp(const RecordingOptions& options, std::size_t frame);
 std::size_t frame_count(const RecordingOptions& options);
 
-// Every shot of the recording, missing ones included, frame by frame and camera by camera. A camera's time offset moves
-// what its picture shows: true time = stamp + offset. Faults name cameras of the rig.
+// All shots of the recording including missing ones, ordered by frame, then by camera. The time offset of a camera
+// shifts the content of its images: true time = stamp + offset. Faults must refer to cameras of the rig.
 std::vector<Shot> plan_shots(const camera::Rig& rig, const RecordingOptions& options);
 
-// Takes the pictures.
+// Renders the images.
 class Recorder {
  public:
-  // The world must outlive the recorder. Prepares the cameras with the threads of `pool`.
+  // The world must outlive the recorder. `pool` is used to prepare the cameras.
   Recorder(const World& world, camera::Rig rig, synthetic::Trajectory trajectory, const ImagingOptions& imaging,
            double exposure_s, ThreadPool& pool);
 
-  // Depends on nothing but the shot. Safe to call from many threads.
+  // Depends on the shot only. May be called from several threads.
   image::Image picture(const Shot& shot) const;
 
   // T_world_cam of a camera at a time of the trajectory.

@@ -10,12 +10,12 @@ constexpr int kSubSamples = ImagingOptions::kExposurePoses;
 constexpr int kGreySteps = 1 << 15;
 constexpr int kPacket = RayPacket::kSize;
 
-// Offsets of the sub-samples from the pixel's centre; they average to it.
+// Offsets of the sub-samples from the centre of the pixel. Their mean is the centre.
 constexpr double kOffsetX[kSubSamples] = {-0.25, 0.25, -0.25, 0.25};
 constexpr double kOffsetY[kSubSamples] = {-0.25, -0.25, 0.25, 0.25};
 
-// Which quarter of the exposure a sub-sample belongs to. Place and time are made as independent as four samples allow,
-// and what remains is reversed from row to row, so that motion blurs evenly.
+// The quarter of the exposure at which a sub-sample is taken. Position and time are as independent as four samples
+// permit, and the remaining correlation is reversed from row to row, so that motion blur is symmetric.
 constexpr int kQuarter[2][kSubSamples] = {{0, 2, 3, 1}, {3, 1, 0, 2}};
 
 std::uint64_t mix_bits(std::uint64_t x) {
@@ -24,7 +24,7 @@ std::uint64_t mix_bits(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-// Nearly normal, mean 0, standard deviation 1: the sum of four uniform numbers, which is enough for noise of pixels.
+// Approximately normal with mean 0 and standard deviation 1: the sum of four uniform numbers suffices for pixel noise.
 float normal_from(std::uint64_t bits) {
   const auto sum =
       static_cast<std::int32_t>((bits & 0xffff) + ((bits >> 16) & 0xffff) + ((bits >> 32) & 0xffff) + (bits >> 48));
@@ -32,7 +32,8 @@ float normal_from(std::uint64_t bits) {
   return kScale * static_cast<float>(sum - 2 * 65535);
 }
 
-// Means over 2 radius + 1 values `step` apart, the outermost repeated, of `count` values from `first` on.
+// Replaces `count` values, which are `step` apart and start at `first`, by means over 2 radius + 1 of them. Border
+// values are repeated.
 void box_blur(float* first, int count, int step, int radius, std::vector<float>& line) {
   line.resize(static_cast<std::size_t>(count));
   const auto at = [&](int i) { return static_cast<std::ptrdiff_t>(std::clamp(i, 0, count - 1)); };
@@ -46,7 +47,7 @@ void box_blur(float* first, int count, int step, int radius, std::vector<float>&
   }
 }
 
-// Three boxes each way are nearly a Gaussian.
+// Three box filters in each direction approximate a Gaussian.
 void blur(std::vector<float>& light, int width, int height, int stride, double sigma) {
   constexpr int kBoxes = 3;
   const int radius = static_cast<int>(std::lround((std::sqrt(12 * sigma * sigma / kBoxes + 1) - 1) / 2));
@@ -94,7 +95,7 @@ Renderer::Renderer(const World& world, const camera::Camera& camera, const Imagi
 
 image::Image Renderer::render(const ExposurePoses& T_world_cam, std::uint64_t noise_key, double exposure,
                               double blur_px) const {
-  image::Image out(width_, height_);  // all 0 to begin with
+  image::Image out(width_, height_);  // initialised with 0
   if (exposure <= 0) return out;
   const auto stride = static_cast<std::size_t>(padded_width_);
   std::vector<float> light(stride * static_cast<std::size_t>(height_));

@@ -7,11 +7,11 @@
 namespace bslam::simulator {
 namespace {
 
-constexpr double kHeight = 2.70;  // metres, of every room here
+constexpr double kHeight = 2.70;  // metres; height of all rooms
 
-enum class Turn { kNone, kHalf };  // about the z axis through the origin
+enum class Turn { kNone, kHalf };  // rotation about the z axis through the origin
 
-// Adds surfaces and lamps of `part`, turned, then moved by `shift`.
+// Adds the surfaces and lamps of `part`, rotated and then translated by `shift`.
 void add_copy(const Building& part, Turn turn, const Vector2d& shift, Building& to) {
   const double sign = turn == Turn::kHalf ? -1.0 : 1.0;
   const auto turned = [&](const Vector3d& v) { return Vector3d(sign * v.x(), sign * v.y(), v.z()); };
@@ -35,7 +35,7 @@ void add_floor_and_ceiling(Building& b, const Vector2d& low, const Vector2d& siz
       {at_height(low, kHeight), {0, size.y(), 0}, {size.x(), 0, 0}, texture(Material::kCeiling, 0.68f, random)});
 }
 
-// From `start` along `direction`, without overlap: pieces set side by side share their edges.
+// Adds a wall from `start` along `direction`. Adjacent walls share their edges and do not overlap.
 void add_wall(Building& b, const Vector2d& start, const Vector2d& direction, double length, const Texture& look) {
   b.surfaces.push_back(
       {at_height(start + length * direction, 0), at_height(-length * direction, 0), Vector3d(0, 0, kHeight), look});
@@ -57,7 +57,7 @@ void add_closed_door(Building& b, double centre, double wall, Random& random) {
   add_box(b.surfaces, {{centre, y, kTop}, {kLeaf + 2 * kCasing, 2 * kThickness, kCasing}}, casing, casing);
 }
 
-// One piece of the corridor from its south wall to the middle, beginning at x = 0.
+// One segment of the corridor from its south wall to the middle, starting at x = 0.
 Building corridor_side(Random& random) {
   constexpr double kWall = -0.5 * kWidth, kPeriod = kCorridorPeriod, kDoor = 0.5 * kPeriod;
   Building b;
@@ -65,18 +65,18 @@ Building corridor_side(Random& random) {
   add_floor_and_ceiling(b, room.low, room.high - room.low, Material::kTile, random);
   add_wall(b, room.low, {1, 0}, kPeriod, texture(Material::kPlaster, 0.58f, random));
   add_closed_door(b, kDoor, kWall, random);
-  for (double x = 0; x <= kPeriod; x += Building::kTourStep) {  // the lane, and the middle, which is to stay free
+  for (double x = 0; x <= kPeriod; x += Building::kTourStep) {  // the lane, and the middle, which must stay free
     b.tour.emplace_back(x, -kLane);
     b.tour.emplace_back(x, 0);
   }
-  constexpr double kBeside = 0.54;  // metres, from the middle of the door to where its casing has ended
+  constexpr double kBeside = 0.54;  // metres from the middle of the door to the end of its casing
   furnish(b, room,
           {{room.low, {1, 0}, kDoor - kBeside, false}, {{kDoor + kBeside, kWall}, {1, 0}, kDoor - kBeside, false}},
           {{kDoor, kWall}}, random);
   return b;
 }
 
-// The wall at x = 0 and what hangs there.
+// The wall at x = 0 and the pictures on it.
 Building corridor_end(const std::vector<Vector2d>& tour, Random& random) {
   Building b;
   b.tour = tour;
@@ -92,7 +92,7 @@ Room first_twin() {
   return {"first", {-kHalfPassage - kSide, -0.5 * kSide}, {-kHalfPassage - kHalfWall, 0.5 * kSide}, kHeight};
 }
 
-// Walls, floor, ceiling and furniture of a room whose walls' centre lines are at `low` and `high`.
+// Walls, floor, ceiling and furniture of a room. The centre lines of its walls are at `low` and `high`.
 void add_room(Building& b, const Room& room, const Vector2d& low, const Vector2d& high, std::span<const Door> doors,
               Random& random) {
   const Vector2d overlap = Vector2d::Constant(kOverlap);
@@ -127,7 +127,7 @@ Building make_corridor(std::uint64_t seed) {
 }
 
 Building make_twin_rooms(std::uint64_t seed) {
-  constexpr double kBesideMiddle = 0.1;  // metres: the ways there and back through the passage
+  constexpr double kBesideMiddle = 0.1;  // metres between the middle of the passage and the path in either direction
   const std::vector<Vector2d> corners = {
       {-3.6, -kBesideMiddle}, {3.6, -kBesideMiddle}, {5.2, -1.7}, {6.9, 0},  {5.2, 1.7},
       {3.6, kBesideMiddle},   {-3.6, kBesideMiddle}, {-5.2, 1.7}, {-6.9, 0}, {-5.2, -1.7}};

@@ -1,19 +1,19 @@
-// Worlds whose places look exactly alike: what place recognition must not fall for. Materials, furniture and pictures
-// follow from the seed; what is repeated is repeated to the texel.
+// Worlds with places that look exactly alike, for tests of place recognition. The seed determines materials, furniture
+// and pictures. Repeated parts are identical in every texel.
 #pragma once
 
 #include "simulator/building.h"
 
 namespace bslam::simulator {
 
-// A corridor, 18 m x 5 m, of six equal pieces of kCorridorPeriod along x, each with a closed door, pictures and
-// furniture on either side. Turned by half a turn about its middle it is the same corridor again, so that the way back
-// looks like the way there. The tour goes along one side and back along the other.
+// A corridor, 18 m x 5 m, of six equal segments of length kCorridorPeriod along x, each with a closed door, pictures
+// and furniture on both sides. It is symmetric under a rotation by 180 degrees about its centre, so that it looks the
+// same in both directions. The tour leads along one side and back along the other.
 Building make_corridor(std::uint64_t seed);
 constexpr double kCorridorPeriod = 3.0;  // m
 
-// Two rooms of 6.5 m x 6.5 m, the second being the first turned by half a turn about the origin, joined by a passage
-// that is like nothing else. The tour goes through the passage, round the second room, back and round the first.
+// Two rooms of 6.5 m x 6.5 m, connected by a unique passage. The second room is the first one rotated by 180 degrees
+// about the origin. The tour leads through the passage, around the second room, back, and around the first room.
 Building make_twin_rooms(std::uint64_t seed);
 
 }  // namespace bslam::simulator

@@ -20,8 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kWorldVersion = 1;            // of the pictures a request gives: to be raised when they change
-constexpr int kListsVersion = 2;            // the same of the other files
+constexpr int kWorldVersion = 1;  // version of the images; to be incremented whenever the images of a request change
+constexpr int kListsVersion = 2;  // the same for the other files
 constexpr double kGroundTruthRate = 200.0;  // Hz
 constexpr const char* kPartial = ".partial";
 constexpr const char* kComplete = ".complete";
@@ -40,7 +40,7 @@ Status check(const SimulationRequest& r) {
   for (const Fault& f : r.recording.faults) {
     if (f.from_s >= r.recording.duration_s) {
       return Error{"", "faults", fmt::format("{} from {} s on", fault_name(f.type), f.from_s),
-                   fmt::format("a beginning within the {} s of the recording", r.recording.duration_s)};
+                   fmt::format("a begin within the {} s of the recording", r.recording.duration_s)};
     }
   }
   if (!within(r.imaging.noise, 0, 1000)) return refuse("noise", r.imaging.noise, "a factor from 0 to 1000");
@@ -50,7 +50,7 @@ Status check(const SimulationRequest& r) {
     return refuse("laps", r.tour.laps, "a number from 0 to 1000, 0 for as many as suit");
   if (r.tour.laps > 0 && r.tour.speed_mps > 0) {
     return Error{"", "speed", fmt::format("{} with {} laps", r.tour.speed_mps, r.tour.laps),
-                 "a pace or a number of laps"};
+                 "either a speed or a number of laps"};
   }
   return {};
 }
@@ -58,11 +58,11 @@ Status check(const SimulationRequest& r) {
 Status make_folder(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
-  if (code) return Error{folder.string(), "", code.message(), "a folder that can be made"};
+  if (code) return Error{folder.string(), "", code.message(), "a folder that can be created"};
   return {};
 }
 
-// What stands in the marker file `name` of `folder`; empty where there is none.
+// The content of the marker file `name` in `folder`; empty if it does not exist.
 std::string marker(const fs::path& folder, const char* name) {
   const auto text = read_file(folder / name, 1024);
   return text ? text->substr(0, text->find('\n')) : std::string();
@@ -72,7 +72,7 @@ std::string complete_mark(const std::string& digest) { return fmt::format("{} li
 
 enum class FolderState { kFresh, kSamePartly, kSameComplete };
 
-// Looks at the folder and makes it ready; with `overwrite` an earlier recording of ours is removed.
+// Examines and prepares the folder. With `overwrite`, an earlier simulated recording is removed.
 Result<FolderState> prepare_folder(const SimulationRequest& request, const std::string& digest) {
   const fs::path& folder = request.folder;
   std::error_code code;
@@ -82,11 +82,11 @@ Result<FolderState> prepare_folder(const SimulationRequest& request, const std::
   if (const Status s = make_folder(folder); !s) return s.error();
   const std::string complete = marker(folder, kComplete), partial = marker(folder, kPartial);
   if (complete == complete_mark(digest)) return FolderState::kSameComplete;
-  if (complete.starts_with(digest)) return FolderState::kSamePartly;  // the lists are of another version
+  if (complete.starts_with(digest)) return FolderState::kSamePartly;  // the lists have another version
   const bool ours = !complete.empty() || !partial.empty();
   if (partial == digest && complete.empty()) return FolderState::kSamePartly;
   if (!fs::is_empty(folder, code) && !request.overwrite) {
-    return Error{folder.string(), "", ours ? "the recording of another request" : "a folder that is not empty",
+    return Error{folder.string(), "", ours ? "the recording of another simulation" : "a folder that is not empty",
                  "a new or empty folder, or --overwrite"};
   }
   if (ours) fs::remove_all(folder / "mav0", code);
@@ -106,17 +106,17 @@ fs::path picture_file(const fs::path& folder, const Shot& shot) {
 }
 
 Status write_picture(const fs::path& file, const image::Image& picture) {
-  // OpenCV has no view of constant pixels; it only reads these.
+  // OpenCV has no matrix of constant pixels. These are only read.
   const cv::Mat pixels(picture.height(), picture.width(), CV_8UC1, const_cast<std::uint8_t*>(picture.row(0)));
   std::vector<unsigned char> png;
   constexpr int kFast = 1;
   if (!cv::imencode(".png", pixels, png, {cv::IMWRITE_PNG_COMPRESSION, kFast})) {
-    return Error{file.string(), "", "an image that PNG cannot hold", "a grey image"};
+    return Error{file.string(), "", "an image that cannot be stored as PNG", "a grey image"};
   }
   return write_atomically(file, {reinterpret_cast<const char*>(png.data()), png.size()});
 }
 
-// All pictures that are not there yet. True: all are; false: asked to stop.
+// Writes all images that do not exist yet. Returns false if a stop was requested before all were written.
 Result<bool> write_pictures(const SimulationRequest& request, const std::vector<Shot>& shots, const Recorder& recorder,
                             ThreadPool& pool, const SimulationProgress& progress, const std::stop_token& stop) {
   std::mutex mutex;
@@ -179,7 +179,7 @@ std::string body_truth(const SimulationRequest& request, const synthetic::Trajec
 Status write_lists(const SimulationRequest& request, const std::vector<Shot>& shots, const Recorder& recorder) {
   const fs::path& folder = request.folder;
   const camera::Rig& rig = request.rig;
-  const bool sensors = rig_formats::euroc_holds_models(rig);  // rig.yaml does all
+  const bool sensors = rig_formats::euroc_holds_models(rig);  // rig.yaml supports all models
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (Status s = write_atomically(camera_folder(folder, c) / "data.csv", image_list(shots, c)); !s) return s;
     const fs::path sensor = camera_folder(folder, c) / "sensor.yaml";
@@ -199,7 +199,7 @@ Status write_lists(const SimulationRequest& request, const std::vector<Shot>& sh
   const TimeNs offset = rig.camera(std::size_t{0}).time_offset_ns;
   for (const Shot& shot : shots) {
     if (shot.camera != 0) continue;
-    // The pose at the true time of the stamp, whatever a fault made the picture show.
+    // The pose at the true time of the stamp, regardless of faults.
     const TimeNs time_ns = shot.stamp_ns + offset;
     of_camera0.push_back({time_ns, recorder.T_world_cam(0, to_seconds(time_ns - request.recording.start_ns))});
   }
@@ -244,7 +244,7 @@ Result<SimulationOutcome> write_simulation(const SimulationRequest& request, Thr
     if (const Status s = make_folder(camera_folder(request.folder, c) / "data"); !s) return s.error();
   }
   const std::vector<Shot> shots = plan_shots(request.rig, request.recording);
-  if (*state == FolderState::kFresh) {  // pictures of those names are not ours to keep
+  if (*state == FolderState::kFresh) {  // existing images may be of another recording
     std::error_code code;
     for (const Shot& shot : shots) fs::remove(picture_file(request.folder, shot), code);
   }

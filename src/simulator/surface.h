@@ -1,4 +1,4 @@
-// Textured rectangles: all that the built-in world is made of.
+// Textured rectangles, of which the built-in world consists.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,27 +13,27 @@ namespace bslam::simulator {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// The rectangle origin + a u + b v with a, b in [0, 1]; u and v are perpendicular edges in metres, world frame; u x v
-// points to the side that is seen and lit.
+// The rectangle origin + a u + b v with a, b in [0, 1]. u and v are perpendicular edges in metres, in the world frame.
+// u x v points to the visible and lit side.
 struct Surface {
   Vector3d origin, u, v;
   Texture texture;
-  // Where the rectangle lies in its pattern, metres: pieces of one wall share the texture and differ in this.
+  // Position of the rectangle in its pattern, metres. Pieces of a wall have the same texture and differ in this.
   Vector2d pattern_origin = Vector2d::Zero();
 };
 
-// Distance from a point to the nearest surface in metres; infinity where there is none.
+// Distance from a point to the nearest surface in metres; infinity if there are no surfaces.
 double distance_to_surfaces(const std::vector<Surface>& surfaces, const Vector3d& point);
 
-// A box standing on its footprint: centre of the bottom face, full sizes along its own x, y, z, turned by yaw about z.
+// A box: centre of its bottom face, side lengths along its own x, y, z, and rotation by yaw about z.
 struct Box {
   Vector3d bottom_centre;
   Vector3d size;
   double yaw = 0.0;  // radians
 };
 
-// Appends the sides and the top of `box`, and its bottom where that is above the floor; each face gets a seed of its
-// own derived from the texture's.
+// Appends the sides and the top of `box`, and its bottom if that is above the floor. The seed of every face is derived
+// from the seed of the texture.
 void add_box(std::vector<Surface>& surfaces, const Box& box, const Texture& sides, const Texture& top);
 
 }  // namespace bslam::simulator

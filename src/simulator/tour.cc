@@ -20,10 +20,10 @@ using synthetic::Trajectory;
 
 constexpr double kWalkingPace = 1.2;  // metres per second
 constexpr double kFastestPace = 1.5;
-constexpr double kTurnRound_s = 4.0, kHalt_s = 1.0;  // seconds: of turning on the spot; of halting before
-constexpr double kTangentReach = 0.4;  // metres of path on either side that give the direction of looking
+constexpr double kTurnRound_s = 4.0, kHalt_s = 1.0;  // seconds for turning on the spot, and for stopping before
+constexpr double kTangentReach = 0.4;  // metres of path on either side that determine the viewing direction
 
-// A closed polyline by arc length.
+// A closed polyline, parametrised by arc length.
 class Loop {
  public:
   explicit Loop(const std::vector<Vector2d>& points) : points_(points) {
@@ -46,11 +46,13 @@ class Loop {
 
  private:
   const std::vector<Vector2d>& points_;
-  std::vector<double> at_;  // arc length at each point, and the whole
+  std::vector<double> at_;  // arc length at each point, and total length
 };
 
-// Seconds of walking one way.
-double walking_s(const TourOptions& o) { return o.back ? std::max(0.1, 0.5 * (o.duration_s - kTurnRound_s)) : o.duration_s; }
+// Duration of walking in one direction, seconds.
+double walking_s(const TourOptions& o) {
+  return o.back ? std::max(0.1, 0.5 * (o.duration_s - kTurnRound_s)) : o.duration_s;
+}
 
 double laps_of(const TourOptions& o, double length) {
   if (o.laps > 0) return o.laps;
@@ -60,15 +62,15 @@ double laps_of(const TourOptions& o, double length) {
   return most < 1 ? wanted : std::clamp(std::round(wanted), 1.0, most);
 }
 
-// Where a tour is at a time: in laps walked, and how far it has turned round.
+// Progress of a tour: laps walked, and rotation while turning around.
 struct Progress {
-  double laps = 0, turned = 0;  // turned: radians
+  double laps = 0, turned = 0;  // turned is in radians
 };
 
 Progress there_and_back(const TourOptions& o, double laps, double time_s) {
   const double walk = walking_s(o);
   const double turning = std::clamp((time_s - walk) / kTurnRound_s, 0.0, 1.0);
-  // A walker comes to a halt within kHalt_s, and gets going the same way.
+  // The speed falls to zero within kHalt_s and rises in the same way.
   const double away = walk - std::clamp(std::abs(time_s - 0.5 * o.duration_s) - 0.5 * kTurnRound_s, 0.0, 2 * walk);
   const double halt = std::min(kHalt_s, walk), left = walk - away;
   const double eased = left < halt ? 0.5 * left * left / halt : left - 0.5 * halt;
@@ -98,7 +100,7 @@ Trajectory make_tour(const simulator::Building& building, const TourOptions& opt
                                            : Progress{laps * step / static_cast<double>(pieces), 0};
     const double lap = std::floor(progress.laps), phase = progress.laps - lap;
     const Offsets o = offsets_at(base, own[static_cast<std::size_t>(lap + 1)], phase);
-    // The pace swells and ebbs by a tenth, the same way in every lap.
+    // The speed varies by a tenth, equally in every lap.
     const double arc = loop.length() * (phase + 0.1 / (6 * pi) * std::sin(6 * pi * phase));
     const Vector2d tangent = loop.tangent(arc), place = loop(arc) + o.aside * Vector2d(-tangent.y(), tangent.x());
     double yaw = std::atan2(tangent.y(), tangent.x());

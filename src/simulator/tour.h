@@ -1,4 +1,4 @@
-// Walks through the built-in building, as trajectories of the rig's body.
+// Walks through the built-in building, as trajectories of the body frame of the rig.
 #pragma once
 
 #include "simulator/building.h"
@@ -8,14 +8,15 @@ namespace bslam::simulator {
 
 struct TourOptions {
   double duration_s = 20.0;
-  int laps = 0;            // whole laps within the duration; 0: as many as suit a walking pace
-  double speed_mps = 0;    // mean pace; 0: from duration and laps. With a pace but no laps the tour may end anywhere
-  std::uint64_t seed = 1;  // of sway and looking around
-  bool back = false;       // the laps, or what there is time for, in half of the time; then it turns round and walks them back
+  int laps = 0;  // complete laps within the duration; 0: as many as a walking pace allows
+  double speed_mps =
+      0;  // mean speed; 0: determined by duration and laps. With a speed but no laps, the tour may end anywhere
+  std::uint64_t seed = 1;  // seed of sway and viewing directions
+  bool back = false;       // turns around after half of the duration and returns along the same path
 };
 
-// The tour through the building: rounds of it at walking pace, each with a sway of its own, starting and (with whole
-// laps) ending at the same pose. Durations too short for a lap drive a part of one.
+// The tour through the building: laps at walking pace, each with different sway. With complete laps, the tour ends at
+// the pose at which it starts. If the duration is too short for a lap, the tour covers a part of one.
 synthetic::Trajectory make_tour(const simulator::Building& building, const TourOptions& options);
 
 }  // namespace bslam::simulator

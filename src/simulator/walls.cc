@@ -7,7 +7,7 @@
 namespace bslam::simulator {
 namespace {
 
-// A rectangle of a face between two places along it and two heights.
+// Adds a rectangle of a face, between two positions along it and two heights.
 void add_wall_piece(Building& b, const Face& f, double from, double to, double low, double high,
                     const Texture& texture) {
   b.surfaces.push_back({at_height(f.start + to * f.direction, low), at_height((from - to) * f.direction, 0),
@@ -62,7 +62,7 @@ void add_door(Building& b, const Door& d, Random& random) {
   for (const double side : {-1.0, 1.0}) {
     Texture jamb = wood;
     jamb.seed += side > 0 ? 1 : 2;
-    const Vector2d inwards = -side * across;  // edge whose normal looks into the opening
+    const Vector2d inwards = -side * across;  // normal that points into the opening
     b.surfaces.push_back({at_height(c + side * half * along - depth * inwards, -kOverlap),
                           at_height(2 * depth * inwards, 0), Vector3d(0, 0, kDoorHeight + 2 * kOverlap), jamb});
     const Vector2d post = c + side * (half + 0.5 * kCasing) * along;

@@ -13,11 +13,11 @@
 namespace bslam::simulator {
 namespace {
 
-constexpr float kAmbient = 0.42f;      // light from everywhere, before enclosing surfaces take theirs
-constexpr double kAmbientReach = 1.2;  // metres within which surfaces enclose a place
-constexpr double kLampRadius = 0.14;   // metres: its shadows are that soft
-constexpr double kOffSurface = 0.006;  // metres: rays start that far off their surface
-constexpr double kLeastLight = 0.012;  // of a lamp at a place: less is not worth its shadow
+constexpr float kAmbient = 0.42f;      // ambient light before occlusion by nearby surfaces
+constexpr double kAmbientReach = 1.2;  // metres within which surfaces occlude ambient light
+constexpr double kLampRadius = 0.14;   // metres; determines the softness of shadows
+constexpr double kOffSurface = 0.006;  // metres between a surface and the origin of rays that start on it
+constexpr double kLeastLight = 0.012;  // irradiance by a lamp below which its shadow is not computed
 const Vector3d kLampPoints[] = {{1, 0.2, 0}, {-0.3, 0.9, 0.1}, {-0.9, -0.4, -0.1}, {0.2, -0.9, 0}, {0, 0, -0.2}};
 constexpr float kLampLight = 2.2f, kDaylight = 0.75f;
 
@@ -45,7 +45,8 @@ RTCRay make_ray(const Vector3d& origin, const Vector3d& direction, double near, 
 
 }  // namespace
 
-// Owns Embree's handles. One quad a surface, in order, so that primID is the surface's index.
+// Owns the handles of Embree. There is one quad per surface in the same order, so that primID is the index of the
+// surface.
 struct World::Scene {
   explicit Scene(const std::vector<Surface>& surfaces) : device(rtcNewDevice("threads=1,set_affinity=0")) {
     BSLAM_ASSERT(device != nullptr, "Embree gives a device");
@@ -94,15 +95,15 @@ World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
 std::optional<double> World::texel_of(const Surface& s, double finest) const {
-  constexpr double kTexelPerDistance = 0.002;  // radians: about a pixel of the default cameras
-  constexpr double kCoarsest = 4.0;            // times the finest
+  constexpr double kTexelPerDistance = 0.002;  // radians; about one pixel of the default cameras
+  constexpr double kCoarsest = 4.0;            // largest texel size relative to the smallest
   const Vector3d n = unit_normal(s);
   bool seen = building_.tour.empty();
   double nearest = seen ? 0.0 : std::numeric_limits<double>::infinity();
   for (const Vector2d& place : building_.tour) {
     for (const double z : {Building::kTourLow, Building::kTourHigh}) {
       const Vector3d d = Vector3d(place.x(), place.y(), z) - s.origin;
-      constexpr double kRoom = 2 * Building::kTourSway;  // metres: cameras are beside the tour
+      constexpr double kRoom = 2 * Building::kTourSway;  // metres; cameras may be this far from the tour
       if (d.dot(n) < -kRoom) continue;
       seen = true;
       const double a = std::clamp(d.dot(s.u) / s.u.squaredNorm(), 0.0, 1.0);
@@ -211,7 +212,7 @@ void World::bake_light(const WorldOptions& options, ThreadPool& pool, const std:
           light_[at] = *constant;
           continue;
         }
-        // A little inside the edges, where the neighbouring surface does not cover the sample.
+        // Samples are slightly inside the edges, so that neighbouring surfaces do not cover them.
         const auto inset = [](std::int32_t k, std::int32_t count) {
           return std::clamp(static_cast<double>(k) / (count - 1), 0.02, 0.98);
         };
@@ -223,7 +224,7 @@ void World::bake_light(const WorldOptions& options, ThreadPool& pool, const std:
 }
 
 float World::light_at(const Vector3d& point, const Vector3d& n, int ambient_rays) const {
-  // All samples use the same pattern of rays: noise from sample to sample would look like stains.
+  // All samples use the same pattern of rays, since noise between samples would be visible as stains.
   const Vector3d start = point + kOffSurface * n;
   double light = 0;
   for (const Lamp& lamp : building_.lamps) {
@@ -237,7 +238,7 @@ float World::light_at(const Vector3d& point, const Vector3d& n, int ambient_rays
   }
   int open = 0;
   const Vector3d side = n.unitOrthogonal(), up = n.cross(side);
-  for (int k = 0; k < ambient_rays; ++k) {  // cosine-weighted directions on a golden spiral
+  for (int k = 0; k < ambient_rays; ++k) {  // cosine-weighted directions on a Fibonacci spiral
     const double r2 = (k + 0.5) / ambient_rays, r = std::sqrt(r2), angle = 2.399963 * k;
     const Vector3d d = r * std::cos(angle) * side + r * std::sin(angle) * up + std::sqrt(1 - r2) * n;
     if (!blocked(start, start + kAmbientReach * d)) ++open;
@@ -258,7 +259,7 @@ std::optional<Hit> World::cast(const Vector3d& origin, const Vector3d& direction
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   intersect(scene_->scene, query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  // Embree works in floats; place and distance follow in doubles from the surface's plane.
+  // Embree uses floats. Position and distance are computed in doubles from the plane of the surface.
   const Surface& s = building_.surfaces[query.hit.primID];
   const Vector3d n = s.u.cross(s.v);
   const double distance = (s.origin - origin).dot(n) / direction.dot(n);
@@ -327,7 +328,7 @@ void World::radiance(const Eigen::Vector3f& origin, const RayPacket& rays, float
     }
     const Baked& b = baked_[query.hit.primID[i]];
     const float cosine = std::abs(b.normal.x() * rays.x[i] + b.normal.y() * rays.y[i] + b.normal.z() * rays.z[i]);
-    // A slanted ray's footprint is longer one way only: the mean of both ways.
+    // The footprint of an oblique ray is longer in one direction; its geometric mean is used.
     const float texels = query.ray.tfar[i] * scale * b.texels_per_m / std::sqrt(std::max(cosine, 0.02f));
     out[i] = lookup(b, query.hit.u[i], query.hit.v[i], level_of(texels, b.levels));
   }

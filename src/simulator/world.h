@@ -1,4 +1,4 @@
-// The lit, textured world that rays are cast into: geometry in Embree, albedo baked with its pyramid, light baked.
+// The textured and lit world for ray casting: geometry in Embree, precomputed albedo pyramids and precomputed light.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +14,19 @@
 namespace bslam::simulator {
 
 struct WorldOptions {
-  double texel = 0.005;       // metres a texel spans near the tour; surfaces farther from it have coarser ones
+  double texel = 0.005;       // metres per texel near the tour; surfaces farther away have larger texels
   double light_texel = 0.10;  // metres between samples of the light
-  int ambient_rays = 24;      // rays a light sample sends out to find how enclosed it is
+  int ambient_rays = 24;      // rays per light sample for ambient occlusion
 };
 
-// Where a ray met a surface: at origin + a u + b v of surface `surface`.
+// Intersection of a ray with surface `surface`, at origin + a u + b v.
 struct Hit {
   std::size_t surface;
   double a, b;
   double distance;  // metres
 };
 
-// Eight rays of one origin; directions are unit vectors, world frame.
+// Eight rays with a common origin. Directions are unit vectors in the world frame.
 struct RayPacket {
   static constexpr int kSize = 8;
   alignas(32) float x[kSize], y[kSize], z[kSize];
@@ -34,8 +34,8 @@ struct RayPacket {
 
 class World {
  public:
-  // Builds and bakes everything with the threads of `pool`; what comes out does not depend on their number. Asked to
-  // stop it is there soon, unfinished and of no use.
+  // Builds the scene and precomputes albedo and light with the threads of `pool`, whose number does not affect the
+  // result. If a stop is requested, returns soon with an incomplete world that must not be used.
   World(Building building, const WorldOptions& options, ThreadPool& pool, std::stop_token stop = {});
   ~World();
   World(World&&) noexcept;
@@ -43,39 +43,38 @@ class World {
 
   const Building& building() const { return building_; }
 
-  // First surface a ray meets; empty where it leaves the world. `direction` is a unit vector.
+  // The first intersection of a ray, or nothing if it leaves the world. `direction` is a unit vector.
   std::optional<Hit> cast(const Vector3d& origin, const Vector3d& direction) const;
 
-  // Light a surface sends back at a place, averaged over `footprint` metres; 0.15 is about mid grey.
+  // Radiance of a surface at a point, averaged over `footprint` metres. 0.15 is about medium grey.
   float radiance(const Hit& hit, double footprint) const;
 
-  // The same for eight rays at once: what comes from where they end, averaged over `spread` radians of each ray.
-  // `detail` in [0, 1) decides between two texture levels, so that averaging over evenly spread details blends them.
-  // Safe to call from many threads.
+  // The radiance at the end of eight rays, averaged over `spread` radians around each. `detail` in [0, 1) selects one
+  // of two texture levels; averaging over uniformly distributed values blends them. May be called from several threads.
   void radiance(const Eigen::Vector3f& origin, const RayPacket& rays, float spread, float detail, float* out) const;
 
  private:
   struct Scene;
   static constexpr int kLevels = 10;
 
-  // Baked data of one surface within the shared arrays.
+  // Position of the precomputed data of a surface in the shared arrays.
   struct Baked {
     Eigen::Vector3f normal;
     std::int32_t width, height;  // texels of the finest level
     float texels_per_m;
-    bool hidden;  // not to be seen from anywhere on the tour: without detail or shadows
+    bool hidden;  // not visible from the tour: has neither details nor shadows
     std::int32_t levels;
     std::uint32_t texel[kLevels];            // first texel of each level
-    std::int32_t light_width, light_height;  // samples, on the edges too
+    std::int32_t light_width, light_height;  // numbers of samples, including those on the edges
     std::uint32_t light;                     // first sample
   };
 
-  // Metres a texel of a surface may span; nothing where the surface turns its back on all of the tour.
+  // Texel size of a surface in metres, or nothing if its visible side faces away from the whole tour.
   std::optional<double> texel_of(const Surface& surface, double finest) const;
   void lay_out(const WorldOptions& options);
   void bake_albedo(ThreadPool& pool, const std::stop_token& stop);
   void bake_light(const WorldOptions& options, ThreadPool& pool, const std::stop_token& stop);
-  // Light that arrives at a point of a surface with normal `n`.
+  // Irradiance at a point of a surface with normal `n`.
   float light_at(const Vector3d& point, const Vector3d& n, int ambient_rays) const;
   bool blocked(const Vector3d& from, const Vector3d& to) const;
   float lookup(const Baked& baked, float a, float b, int level) const;

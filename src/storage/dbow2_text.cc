@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kBytes = sizeof(feature::Descriptor);
 
-// A node as its line tells it; number 0 is the root, which has none.
+// A node as given by its line. Node 0 is the root, which has no line.
 struct TextNode {
   std::int32_t parent = -1;
   std::int32_t level = 0;
@@ -28,7 +28,7 @@ struct TextNode {
   feature::Descriptor descriptor{};
 };
 
-class Words {  // of a line, separated by blanks
+class Words {  // the words of a line, separated by blanks
  public:
   explicit Words(std::string_view line) : rest_(line) {}
 
@@ -53,7 +53,7 @@ class Words {  // of a line, separated by blanks
   std::string_view rest_;
 };
 
-// The whole word as a number within limits.
+// The complete word as a number within limits.
 template <class T>
 std::optional<T> number(std::string_view word, T low, T high) {
   T value{};
@@ -89,7 +89,7 @@ Result<Shape> parse_shape(std::string_view line) {
   return Shape{*branching, *levels};
 }
 
-// The line of one node, and its place below the nodes so far.
+// Parses the line of a node and checks that it can be added to the preceding nodes.
 Result<TextNode> parse_node(std::string_view text, std::size_t line, const Shape& shape,
                             const std::vector<TextNode>& nodes) {
   Words words(text);
@@ -122,9 +122,9 @@ Result<TextNode> parse_node(std::string_view text, std::size_t line, const Shape
   return node;
 }
 
-// Breadth-first; the children of a node in the order of their lines.
+// Breadth-first order, with the children of a node in the order of their lines.
 place::VocabularyContent arrange(const std::vector<TextNode>& nodes, const Shape& shape) {
-  std::vector<std::size_t> first(nodes.size() + 1, 0);  // child of a node, in `children`
+  std::vector<std::size_t> first(nodes.size() + 1, 0);  // index in `children` of the first child of a node
   for (std::size_t i = 0; i < nodes.size(); ++i) first[i + 1] = first[i] + static_cast<std::size_t>(nodes[i].children);
   std::vector<std::size_t> children(nodes.size() - 1), at = first;
   for (std::size_t i = 1; i < nodes.size(); ++i) children[at[static_cast<std::size_t>(nodes[i].parent)]++] = i;

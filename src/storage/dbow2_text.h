@@ -1,4 +1,4 @@
-// The text format of DBoW2's vocabularies. Internal to io; see vocabulary_file.h.
+// Reads vocabularies in the text format of DBoW2. Internal to this folder; see vocabulary_file.h.
 #pragma once
 
 #include <string_view>
@@ -8,10 +8,10 @@
 
 namespace bslam::storage {
 
-// True where the first line is four whole numbers.
+// Whether the first line consists of four integers.
 bool is_dbow2_text(std::string_view text);
 
-// Errors (file left empty) name the line.
+// Errors name the line; Error.file is left empty.
 Result<place::VocabularyPtr> parse_dbow2_text(std::string_view text);
 
 }  // namespace bslam::storage

@@ -1,4 +1,4 @@
-// Numbers as bytes and back, little endian whatever the machine, for saved maps. Internal to io.
+// Writes and reads numbers as little-endian bytes on any machine, for saved maps. Internal to this folder.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace bslam::storage {
 template <class T>
 concept Number = std::integral<T> || std::floating_point<T>;
 
-// Turns `count` numbers between the order of this machine and that of the file, in place.
+// Converts `count` numbers between the byte order of this machine and that of the file, in place.
 template <Number T>
 void swap_to_little_endian([[maybe_unused]] char* bytes, [[maybe_unused]] std::size_t count) {
   if constexpr (std::endian::native == std::endian::big) {
@@ -42,7 +42,7 @@ class ByteWriter {
   void number(T value) {
     numbers(&value, 1);
   }
-  // A 32-bit number of things or bytes, which come next.
+  // The 32-bit number of elements or bytes that follow.
   void count(std::size_t n);
   void text(std::string_view text);
 
@@ -53,17 +53,18 @@ class ByteWriter {
   std::string bytes_;
 };
 
-// Reads one section of a file. The first thing that is wrong is kept as an Error and ends the reading: from there on
-// everything reads as 0 or empty and nothing more is kept. The Error names where it was, as told by enter and leave.
+// Reads one section of a file. The first error is kept and ends the reading: all further values are 0 or empty. The
+// Error names the element that was being read, as declared by enter and leave.
 class ByteReader {
  public:
   ByteReader(std::string_view bytes, std::string section) : rest_(bytes), section_(std::move(section)) {}
 
   bool ok() const { return !error_.has_value(); }
-  const Error& error() const { return *error_; }  // `file` is left empty
+  const Error& error() const { return *error_; }  // Error.file is left empty
   std::size_t remaining() const { return rest_.size(); }
 
-  // From here on the reader is in part `index` of its kind ("keyframe", 3) of what it was in.
+  // Declares that the following bytes belong to element `index` of a kind, such as ("keyframe", 3), until leave is
+  // called. Calls can be nested.
   void enter(std::string_view kind, std::size_t index) { place_.emplace_back(kind, index); }
   void leave() { place_.pop_back(); }
 
@@ -85,17 +86,17 @@ class ByteReader {
     numbers(&value, 1);
     return value;
   }
-  // A number of things of at least `bytes_each` bytes. Fails where the rest cannot hold that many, so that room may be
-  // made for as many as it says.
+  // The number of elements that follow, each of at least `bytes_each` bytes. It is an error if the remaining bytes
+  // cannot contain that many, so that memory can be reserved for the returned number.
   std::size_t count(std::size_t bytes_each);
   std::string text();
 
-  // Fails where `holds` is false; returns ok().
+  // It is an error if `holds` is false. Returns ok().
   bool require(bool holds, std::string_view found, std::string_view expected) {
     if (!holds) fail(found, expected);
     return ok();
   }
-  // Fails where bytes are left; returns ok().
+  // It is an error if there are remaining bytes. Returns ok().
   bool finish();
 
  private:

@@ -15,7 +15,7 @@ using camera::Camera;
 using map::BundledKeyframe;
 using map::BundledMap;
 
-// COLMAP's name of a model; empty where it has none.
+// The name of a camera model in COLMAP; empty if COLMAP does not have it.
 std::string_view colmap_name(const camera::CameraModel& model) {
   if (std::holds_alternative<camera::Pinhole>(model)) return "PINHOLE";
   if (std::holds_alternative<camera::KannalaBrandt>(model)) return "OPENCV_FISHEYE";
@@ -23,7 +23,7 @@ std::string_view colmap_name(const camera::CameraModel& model) {
   return camera::distortion(model).size() == 4 ? "OPENCV" : "FULL_OPENCV";
 }
 
-// Model, size and parameters.
+// Model, size and parameters in the format of cameras.txt.
 std::string colmap_camera(const Camera& camera) {
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   const std::vector<double> d = camera::distortion(camera.model);
@@ -36,9 +36,9 @@ std::string colmap_camera(const Camera& camera) {
   return line;
 }
 
-// Where the images of the model stand in it.
+// Image ids of the COLMAP model.
 struct Images {
-  // Numbers from 1 per keyframe slot and camera; 0 = none.
+  // Ids from 1 for every keyframe slot and camera; 0 if there is no image.
   explicit Images(const BundledMap& map) : cameras(map.rig().size()), id(map.keyframe_slots() * cameras, 0) {
     std::size_t next = 1;
     for (const KeyframeId k : map.keyframe_ids()) {
@@ -54,15 +54,21 @@ struct Images {
   std::vector<std::size_t> id;
 };
 
-void append_image(const BundledMap& map, KeyframeId k, std::size_t c, std::size_t image, std::string& out) {
+std::string image_name(const BundledMap& map, KeyframeId k, std::size_t c, const ImageNamer& name) {
+  const Camera& camera = map.rig().camera(c);
+  const TimeNs stamp_ns = map.keyframe(k).frame->cameras[c].time_ns - camera.time_offset_ns;
+  return name ? name(c, stamp_ns) : fmt::format("{}/{}.png", camera.name, stamp_ns);
+}
+
+void append_image(const BundledMap& map, KeyframeId k, std::size_t c, std::size_t image, const ImageNamer& name,
+                  std::string& out) {
   const BundledKeyframe& keyframe = map.keyframe(k);
   const frame::CameraFrame& seen = keyframe.frame->cameras[c];
   const geometry::SE3 T_cam_world = map.cam_from_world(k, CameraIndex(c));
   const geometry::Quaterniond& q = T_cam_world.rotation();
   const geometry::Vector3d& t = T_cam_world.translation();
-  const Camera& camera = map.rig().camera(c);
-  fmt::format_to(std::back_inserter(out), "{} {} {} {} {} {} {} {} {} {}/{}.png\n", image, q.w(), q.x(), q.y(), q.z(),
-                 t.x(), t.y(), t.z(), c + 1, camera.name, seen.time_ns - camera.time_offset_ns);
+  fmt::format_to(std::back_inserter(out), "{} {} {} {} {} {} {} {} {} {}\n", image, q.w(), q.x(), q.y(), q.z(), t.x(),
+                 t.y(), t.z(), c + 1, image_name(map, k, c, name));
   for (std::size_t i = 0; i < seen.keypoints.size(); ++i) {
     const FeatureId f = keyframe.frame->bundled.feature(CameraIndex(c), KeypointIndex(i));
     const LandmarkId l = keyframe.landmarks[f.index()];
@@ -152,21 +158,22 @@ std::string landmarks_ply(const BundledMap& map) {
   return std::move(header) + std::move(out).take();
 }
 
-Result<ColmapModel> colmap_model(const BundledMap& map) {
+Result<ColmapModel> colmap_model(const BundledMap& map, const ImageNamer& name) {
   ColmapModel model{"# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n",
                     "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n",
                     "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n"};
   for (std::size_t c = 0; c < map.rig().size(); ++c) {
     const Camera& camera = map.rig().camera(c);
     if (colmap_name(camera.model).empty()) {
-      return Error{"", camera.name, std::string(camera::model_name(camera.model)), "a model that COLMAP has"};
+      return Error{"", camera.name, std::string(camera::model_name(camera.model)),
+                   "a camera model that COLMAP supports"};
     }
     model.cameras += fmt::format("{} {}\n", c + 1, colmap_camera(camera));
   }
   const Images images(map);
   for (const KeyframeId k : map.keyframe_ids()) {
     for (std::size_t c = 0; c < map.rig().size(); ++c) {
-      if (images.of(k, c) > 0) append_image(map, k, c, images.of(k, c), model.images);
+      if (images.of(k, c) > 0) append_image(map, k, c, images.of(k, c), name, model.images);
     }
   }
   for (const LandmarkId l : map.landmark_ids()) append_point(map, l, images, model.points);

@@ -1,7 +1,8 @@
-// A map in formats of other programs, and in figures.
+// Exports maps to formats of other programs, and computes their statistics.
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -12,34 +13,39 @@
 
 namespace bslam::storage {
 
-// One part of a map: keyframes that hang together.
+// A submap: keyframes that are connected by one spanning tree.
 struct MapPart {
   KeyframeId root;
-  std::vector<KeyframeId> keyframes;                 // in order of time; of equal times in order of id
-  std::size_t landmarks = 0;                         // whose reference is one of them
-  Eigen::Vector3d extent = Eigen::Vector3d::Zero();  // metres, map: sides of the box around the keyframes' cameras 0
+  std::vector<KeyframeId> keyframes;                 // ordered by time, then by id
+  std::size_t landmarks = 0;                         // number of landmarks whose reference keyframe is one of these
+  Eigen::Vector3d extent = Eigen::Vector3d::Zero();  // metres: sides of the box around camera 0 of all keyframes, along
+                                                     // the axes of the world
 };
 
-// In order of their roots.
+// The submaps in the order of their root keyframes.
 std::vector<MapPart> map_parts(const map::BundledMap& map);
 
-// First and last time of the keyframes of a part.
+// Times of the first and the last keyframe of a submap.
 TimeNs first_time(const map::BundledMap& map, const MapPart& part);
 TimeNs last_time(const map::BundledMap& map, const MapPart& part);
 
-// T_world_cam0 of the keyframes of a part; of those of one time the first.
+// T_world_cam0 of the keyframes of a submap. Of keyframes with equal times only the first is included.
 evaluation::Trajectory keyframe_trajectory(const map::BundledMap& map, const MapPart& part);
 
-// All landmarks as a binary PLY: x, y, z as doubles and the number of keypoints that observe each.
+// All landmarks as a binary PLY: x, y, z as doubles, and the number of observing keypoints.
 std::string landmarks_ply(const map::BundledMap& map);
 
-// The text model of COLMAP (cameras.txt, images.txt, points3D.txt): one image for each present camera of each keyframe,
-// named CAMERA/STAMP.png with the stamp of the recording in ns, all its keypoints; every landmark a grey point.
-// COLMAP's pixels begin at the corner of the image, ours at the centre of the first pixel: 0.5 is added. Error (file
-// left empty) where a camera has a model that COLMAP has not.
+// The name of the image of a camera of the rig with a time stamp of the recording, relative to the image folder of
+// COLMAP.
+using ImageNamer = std::function<std::string(std::size_t camera, TimeNs stamp_ns)>;
+
+// The text model of COLMAP (cameras.txt, images.txt, points3D.txt): one image with all its keypoints for each present
+// camera of each keyframe, and a grey point for every landmark. Without `name`, images are called CAMERA/STAMP.png with
+// the time stamp in ns. 0.5 is added to pixel coordinates, since the origin is the corner of the top-left pixel in
+// COLMAP and its centre in bslam. Error (file left empty) if COLMAP does not support the model of a camera.
 struct ColmapModel {
   std::string cameras, images, points;
 };
-Result<ColmapModel> colmap_model(const map::BundledMap& map);
+Result<ColmapModel> colmap_model(const map::BundledMap& map, const ImageNamer& name = {});
 
 }  // namespace bslam::storage

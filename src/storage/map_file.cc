@@ -51,7 +51,7 @@ Error damaged(std::string_view part, std::string found, std::string expected) {
   return {"", std::string(part), std::move(found), std::move(expected)};
 }
 
-// The sections of a whole file whose checksums are right. Errors name no file.
+// The sections of a complete file, after their checksums have been verified. Error.file is left empty.
 Result<Sections> take_apart(std::string_view bytes) {
   if (!bytes.starts_with(kMagic)) return damaged("", "no saved map", fmt::format("a file that begins with {}", kMagic));
   if (bytes.size() < kHeaderBytes) return damaged("header", fmt::format("{} bytes", bytes.size()), "a whole header");
@@ -110,7 +110,7 @@ Result<SavedMap> build(const Sections& sections, std::string file) {
   return saved;
 }
 
-// ---- fits
+// Comparison of rigs.
 
 bool near(double a, double b) { return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a)); }
 
@@ -165,7 +165,7 @@ std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info) {
   bytes.reserve(total);
   for (std::string& s : sections) {
     bytes += s;
-    s = {};  // its memory goes before that of the next is filled
+    s = {};  // freed before the next section is decompressed
   }
   return bytes;
 }

@@ -1,4 +1,4 @@
-// Saved maps. The format: docs/map_file.md.
+// Writes and reads saved maps. The format is described in docs/map_file.md.
 #pragma once
 
 #include <cstdint>
@@ -13,38 +13,38 @@
 
 namespace bslam::storage {
 
-// What a file tells besides the map itself.
+// Metadata of a saved map.
 struct MapFileInfo {
-  std::uint64_t vocabulary = 0;  // Vocabulary::id() of the words of its keyframes; 0 = they have none
-  std::string version;           // of the program that wrote it
-  std::string data;              // name of the recording it was made of
+  std::uint64_t vocabulary = 0;  // Vocabulary::id() of the visual words of its keyframes; 0 if they have none
+  std::string version;           // version of the program that wrote the file
+  std::string data;              // name of the recording
 };
 
 struct SavedMap {
   std::string file;
   map::BundledMap map;
   MapFileInfo info;
-  std::size_t words_end = 0;  // one more than the highest word its keyframes name
+  std::size_t words_end = 0;  // one more than the highest word id of its keyframes
 };
 
-// What is alive in the map, its ids renumbered without gaps in their order. Without a vocabulary the words are left
-// out. The file appears whole or not at all.
+// Writes the keyframes and landmarks that are not removed, with consecutive ids in the same order. Words are left out
+// if there is no vocabulary. The file is written completely or not at all.
 Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std::filesystem::path& file);
 
-// The map as it was, poses to the bit; view direction, distance range and descriptor of landmarks are computed anew.
-// Version and gauge epoch begin at 0. Errors name the file, the section and the keyframe or landmark: not readable, no
-// map file, of another format version or feature kind, cut or damaged (checksums), contents that contradict one
-// another.
+// Reads a map with exactly the same poses. Viewing direction, distance range and descriptor of landmarks are
+// recomputed. Version and gauge epoch start at 0. Errors name the file, the section and the keyframe or landmark: a
+// file that cannot be read, is not a map, has another format version or kind of features, is truncated or damaged
+// (checksums), or is inconsistent.
 Result<SavedMap> read_map(const std::filesystem::path& file);
 
-// Whether a run with this rig, pyramid and vocabulary (null = none) can go on with the map: as many cameras, of the
-// same models, resolutions, intrinsics and distortion, and at the same place in the rig, numbers to 1e-9; its words
-// those of the vocabulary, where both have some. The Error names the camera and what differs of it.
+// Checks that a run with this rig, pyramid and vocabulary (null: none) can continue the map: equal number of cameras,
+// with equal models, resolutions, intrinsics, distortion and extrinsics up to 1e-9; equal vocabularies, if both have
+// one. The Error names the camera and the difference.
 Status fits(const SavedMap& saved, const camera::Rig& rig, const map::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary);
 
-// The bytes of a file, and back; `file` is for errors. Nothing is trusted: counts are checked against the bytes that
-// are there before room is made for them.
+// Conversion to and from the content of a file. `file` is the name used in errors. The content is not trusted: counts
+// are checked against the number of remaining bytes before memory is reserved.
 std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info);
 Result<SavedMap> map_from_bytes(std::string_view bytes, std::string file);
 

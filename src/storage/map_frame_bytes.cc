@@ -1,4 +1,4 @@
-// BundledFrames in saved maps.
+// Writes and reads the BundledFrames of saved maps.
 #include <cmath>
 #include <utility>
 
@@ -12,15 +12,15 @@ using feature::Keypoints;
 using feature::Patch;
 using frame::KeypointRef;
 
-// Pixel, level, angle, sigma, bearing, descriptor and patch of one keypoint. The bearing belongs to the pixel before it
-// was rounded to a float, so it cannot be computed from it again.
+// Pixel, level, angle, sigma, bearing, descriptor and patch of one keypoint. The bearing is stored, since it was
+// computed before the pixel was rounded to float and cannot be recomputed exactly.
 constexpr std::size_t kKeypointBytes = 8 + 1 + 4 + 4 + 24 + 32 + sizeof(Patch);
-constexpr std::size_t kMatchedBytes = 1 + 2 * (2 + 4) + 1;  // at the least
+constexpr std::size_t kMatchedBytes = 1 + 2 * (2 + 4) + 1;  // minimum
 constexpr double kUnitTolerance = 1e-6;
 constexpr double kMaxTwist = 1e6;             // rad/s, m/s
-constexpr TimeNs kMaxTime = TimeNs{1} << 62;  // so that differences do not overflow
+constexpr TimeNs kMaxTime = TimeNs{1} << 62;  // bounded so that differences do not overflow
 
-// Arrays of these are read and written as the numbers they consist of.
+// Arrays of these types are read and written as arrays of numbers.
 static_assert(sizeof(Eigen::Vector2f) == 2 * sizeof(float) && sizeof(Eigen::Vector3d) == 3 * sizeof(double));
 static_assert(sizeof(Descriptor) == 4 * sizeof(std::uint64_t) &&
               sizeof(Patch) == feature::kPatchSize * feature::kPatchSize);
@@ -66,7 +66,7 @@ Keypoints take_keypoints(ByteReader& in) {
   return k;
 }
 
-// Pixels may lie beside the image, but not so far that they cannot be meant.
+// Pixels may be outside of the image, but not by more than its size.
 bool check_keypoints(ByteReader& in, const Keypoints& k, const camera::Camera& camera, int levels) {
   const auto width = static_cast<float>(camera.width), height = static_cast<float>(camera.height);
   const auto within = [](float value, float size) { return value >= -size && value <= 2 * size; };  // false for NaN
@@ -132,7 +132,7 @@ void put_bundled(const frame::Bundled& bundled, ByteWriter& out) {
   }
 }
 
-// One matched feature. `taken` has a flag for every keypoint of every camera.
+// Reads one matched feature. `taken` has a flag for every keypoint of every camera, set when a feature uses it.
 std::vector<KeypointRef> take_group(ByteReader& in, const frame::BundledFrame& frame,
                                     std::vector<std::vector<std::uint8_t>>& taken) {
   const std::size_t size = in.number<std::uint8_t>();

@@ -14,15 +14,15 @@ using geometry::SE3;
 using geometry::Vector3d;
 
 constexpr double kUnitTolerance = 1e-12;
-constexpr double kMaxCoordinate = 1e30;  // metres, or units of a map without scale
+constexpr double kMaxCoordinate = 1e30;  // metres, or units of a map without metric scale
 constexpr int kMaxLevels = 32;
-constexpr std::size_t kCameraBytes = 3 * 4 + 2 * 4 + 4 * 8 + kTransformBytes + 8 + 4;  // at the least
+constexpr std::size_t kCameraBytes = 3 * 4 + 2 * 4 + 4 * 8 + kTransformBytes + 8 + 4;  // minimum
 constexpr std::size_t kObservationBytes = 4 + 4 + 1;
 constexpr std::size_t kLandmarkBytes = 3 * 8 + 4 + 2 + 4 + 3 * 4 + 4 + kObservationBytes;
 
-// SE3 normalises what it is made of, and that may change the last bits of a quaternion normalised before. But `q` came
-// out of a normalisation once, so that multiples of it differ only in how they are rounded, and one of the first few
-// becomes `q` again; where none does it was no SE3's, and is normalised.
+// The constructor of SE3 normalises its quaternion, which may change the last bits of one that is already normalised.
+// Since `q` is the result of a normalisation, its multiples differ only by rounding, and one of the first few
+// normalises to exactly `q`. If none does, `q` was not taken from an SE3 and is simply normalised.
 SE3 with_exact_rotation(const Quaterniond& q, const Vector3d& translation) {
   constexpr int kTries = 1 << 14;
   for (int i = 0; i < kTries; ++i) {
@@ -45,7 +45,7 @@ camera::CameraDescription take_description(ByteReader& in) {
   return d;
 }
 
-// The checks are those of every rig file; the numbers stay as they stand in this one.
+// Checks the same conditions as for rig files, without changing the numbers.
 std::optional<camera::RigCamera> take_rig_camera(ByteReader& in) {
   camera::CameraDescription d = take_description(in);
   const SE3 T_body_cam = take_transform(in);
@@ -69,7 +69,7 @@ std::optional<camera::RigCamera> take_rig_camera(ByteReader& in) {
 
 bool in_range(std::int32_t id, std::size_t end) { return id >= 0 && static_cast<std::size_t>(id) < end; }
 
-// Observations of one landmark, all of them possible in `map`.
+// Reads the observations of a landmark and checks that they exist in `map`.
 std::vector<map::Observation> take_observations(ByteReader& in, const map::BundledMap& map) {
   const std::size_t n = in.count(kObservationBytes);
   std::vector<map::Observation> observations;

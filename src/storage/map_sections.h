@@ -1,4 +1,4 @@
-// The sections of a saved map. Internal to io; see map_file.h.
+// Writes and reads the sections of a saved map. Internal to this folder; see map_file.h.
 #pragma once
 
 #include <cstddef>
@@ -14,24 +14,24 @@
 
 namespace bslam::storage {
 
-constexpr std::size_t kMaxCameras = 100;  // making a rig costs the square of it
+constexpr std::size_t kMaxCameras = 100;  // the cost of constructing a rig grows with its square
 
-// Ids in the file: those of what is alive, without gaps. Invalid for what was removed.
+// Ids in the file: consecutive for keyframes that are not removed, invalid for the others.
 struct FileIds {
   explicit FileIds(const map::BundledMap& map);
-  // The keyframe or, where it was removed, the newest one before it; else the first.
+  // The id of the keyframe or, if it was removed, of the newest one before it; of the first if there is none.
   KeyframeId nearest_older(KeyframeId k) const;
 
-  std::vector<KeyframeId> keyframe;  // per slot of the map
+  std::vector<KeyframeId> keyframe;  // per keyframe slot of the map
 };
 
-// ---- out
+// Writing.
 void put_rig(const camera::Rig& rig, ByteWriter& out);
 void put_info(const map::BundledMap& map, const MapFileInfo& info, ByteWriter& out);
 void put_keyframes(const map::BundledMap& map, const FileIds& ids, bool with_words, ByteWriter& out);
 void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& out);
 
-// ---- in. What is read is meaningful where the reader is ok afterwards.
+// Reading. Results are only valid if the reader is ok afterwards.
 std::optional<camera::Rig> take_rig(ByteReader& in);
 
 struct InfoSection {
@@ -41,22 +41,22 @@ struct InfoSection {
 };
 InfoSection take_info(ByteReader& in);
 
-// Adds the keyframes to an empty map, with their spanning trees. Returns one more than the highest word.
+// Adds the keyframes with their spanning trees to an empty map. Returns one more than the highest word id.
 std::size_t take_keyframes(ByteReader& in, bool with_words, map::BundledMap& map);
 
 void take_landmarks(ByteReader& in, map::BundledMap& map);
 
-// One BundledFrame, as part of a keyframe; map_frame_bytes.cc.
+// The BundledFrame of a keyframe; implemented in map_frame_bytes.cc.
 void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out);
 frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map::PyramidShape& pyramid,
                                bool with_words, std::size_t& words_end);
 
-// A transform as seven numbers: quaternion x y z w, translation; to the bit.
+// A transform as seven numbers, quaternion x y z w and translation. It is read back exactly.
 void put_transform(const geometry::SE3& transform, ByteWriter& out);
 geometry::SE3 take_transform(ByteReader& in);
 constexpr std::size_t kTransformBytes = 7 * sizeof(double);
 
-// Finite, and so small that nothing computed from it overflows.
+// Whether the point is finite and small enough that computations with it do not overflow.
 bool is_plausible(const Eigen::Vector3d& point);
 
 }  // namespace bslam::storage

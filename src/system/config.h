@@ -19,7 +19,7 @@ struct IoOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("sync_tolerance", self.sync_tolerance, Range{0, 1}, "s",
-            "images of different cameras within it make one frame");
+            "images of different cameras within it make one frame", kCommon);
   }
 };
 
@@ -42,10 +42,10 @@ struct Config {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("seed", self.seed, Range{0, 2147483647}, "", "of all randomness");
-    visitor("final_adjustment", self.final_adjustment, Range{}, "", "global bundle adjustment at the end");
-    visitor("localize_only", self.localize_only, Range{}, "", "poses in a loaded map, which stays as it is");
-    visitor("mode", self.mode, Range{}, "", "when stages run");
+    visitor("seed", self.seed, Range{0, 2147483647}, "", "of all randomness", kCommon);
+    visitor("final_adjustment", self.final_adjustment, Range{}, "", "global bundle adjustment at the end", kCommon);
+    visitor("localize_only", self.localize_only, Range{}, "", "poses in a loaded map, which stays as it is", kCommon);
+    visitor("mode", self.mode, Range{}, "", "when stages run", kCommon);
     visitor.section("io", self.io);
     visitor.section("execution", self.execution);
     visitor.section("health", self.health);

@@ -20,7 +20,7 @@ tracking::TrackerOptions tracker_options(const Config& config) {
           .features = config.features,
           .seed = static_cast<std::uint64_t>(config.seed),
           .localize_only = config.localize_only,
-          .new_submap_after = config.looping.recovery.new_part_after};
+          .new_submap_after = config.looping.recovery.new_submap_after};
 }
 
 execution::JournalStep journal_step(tracking::ProposedEdit::Kind kind) {
@@ -109,7 +109,7 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images) {
 BundledFrame Pipeline::extract(const image::ImageBundle& images, const tracking::FramePlan& plan) {
   BundledFrame frame = builder_.extract(images, pool_, plan.left_out, plan.budgets);
   frame.twist = plan.twist;
-  if (config_.tracking.own_times) return frame;
+  if (config_.tracking.use_capture_times) return frame;
   for (frame::CameraFrame& c : frame.cameras) c.time_ns = frame.time_ns;
   return frame;
 }

@@ -54,7 +54,7 @@ std::vector<std::uint8_t> contradicting(const FrameMatches& matches, const std::
   for (std::size_t c = 0; c < trust.size(); ++c) {
     if (!trust[c].established) continue;
     const auto found = static_cast<int>(matches[c].size());
-    out[c] = found >= options.min_expected && inliers_per_camera[c] < options.conflict_share * found;
+    out[c] = found >= options.min_expected && inliers_per_camera[c] < options.conflict_inlier_ratio * found;
   }
   return out;
 }
@@ -72,7 +72,8 @@ solver::PoseSolution believe_the_steadiest(const camera::Rig& rig, const FrameMa
     first += camera.size();
     if (static_cast<int>(camera.size()) < options.min_expected) continue;
     const solver::PoseSolution alone = solver::solve_pose(rig, own, predicted, pose);
-    if (!alone.ok || alone.num_inliers < options.sound_share * static_cast<double>(camera.size())) continue;
+    if (!alone.ok || alone.num_inliers < options.healthy_reobservation_ratio * static_cast<double>(camera.size()))
+      continue;
     const geometry::Vector6d off = (alone.T_rig_world * predicted.inverse()).log();
     const double distance = off.head<3>().norm() + kRadiansPerMetre * off.tail<3>().norm();
     if (distance >= least) continue;
@@ -91,10 +92,10 @@ std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity
   std::vector<std::uint8_t> out(continuity.size(), 0);
   const auto counts = [&](const Expectation& e) { return e.expected >= options.min_expected; };
   const bool sound = std::ranges::any_of(
-      continuity, [&](const Expectation& e) { return counts(e) && e.share() >= options.sound_share; });
+      continuity, [&](const Expectation& e) { return counts(e) && e.share() >= options.healthy_reobservation_ratio; });
   for (std::size_t c = 0; sound && c < out.size(); ++c) {
-    out[c] =
-        counts(continuity[c]) && continuity[c].share() < options.lost_share && trust[c].share >= options.steady_share;
+    out[c] = counts(continuity[c]) && continuity[c].share() < options.min_reobservation_ratio &&
+             trust[c].share >= options.previous_reobservation_ratio;
   }
   return out;
 }
@@ -108,7 +109,7 @@ void doubt(CameraTrust& camera, const Expectation& view, TimeNs time_ns, const C
   if (!std::exchange(camera.doubted, true)) camera.judged_ns = camera.since_ns = time_ns;
   const bool judged = view.expected >= options.min_expected;
   if (judged) {
-    camera.seeing = view.share() >= options.seen_share ? camera.seeing + 1 : 0;
+    camera.seeing = view.share() >= options.readmission_ratio ? camera.seeing + 1 : 0;
     camera.judged_ns = time_ns;
   }
   const bool forgotten = to_seconds(time_ns - camera.judged_ns) >= options.forget_after_s;
@@ -120,7 +121,7 @@ bool due_for_retry(const CameraTrust& camera, TimeNs time_ns, const ConsensusOpt
 }
 
 void retry(CameraTrust& camera, const Expectation& wide, TimeNs time_ns, const ConsensusOptions& options) {
-  if (wide.expected >= options.min_expected && wide.share() >= options.seen_share) {
+  if (wide.expected >= options.min_expected && wide.share() >= options.readmission_ratio) {
     camera.since_ns = time_ns;
   } else {
     camera = trusted(camera.established);

@@ -38,8 +38,8 @@ CameraReason exposure(const image::Image& image, const HealthOptions& options) {
       bright += image.row(y)[x] >= options.bright_level;
     }
   }
-  if (dark >= options.dark_share * samples) return CameraReason::kBlack;
-  if (bright >= options.bright_share * samples) return CameraReason::kOverExposed;
+  if (dark >= options.black_pixel_ratio * samples) return CameraReason::kBlack;
+  if (bright >= options.over_exposed_pixel_ratio * samples) return CameraReason::kOverExposed;
   return CameraReason::kNone;
 }
 
@@ -75,7 +75,7 @@ std::optional<bool> is_blurred(const image::Image& image, const HealthOptions& o
   for (int x = 0; x < image.width(); x += step)
     count_edges(image.row(0) + x, image.width(), image.height(), options.sharp_slope, edges);
   if (edges.all < kMinEdges) return std::nullopt;
-  return edges.sharp < options.sharp_share * edges.all;
+  return edges.sharp < options.min_sharp_edge_ratio * edges.all;
 }
 
 }  // namespace

@@ -12,27 +12,29 @@
 namespace bslam::tracking {
 
 struct HealthOptions {
-  int dark_level = 16;        // grey value; a picture with hardly anything above it is black
-  int bright_level = 250;     // grey value; a picture mostly above it is over-exposed
-  double dark_share = 0.995;  // of the pixels
-  double bright_share = 0.6;
+  int dark_level = 16;               // grey value; a picture with hardly anything above it is black
+  int bright_level = 250;            // grey value; a picture mostly above it is over-exposed
+  double black_pixel_ratio = 0.995;  // of the pixels
+  double over_exposed_pixel_ratio = 0.6;
   double sharp_slope =
       0.28;  // share of an edge's contrast that a sharp one has between two pixels; Gaussian blur of 3 px leaves 0.27
-  double sharp_share = 0.1;  // of the edges; with fewer sharp ones a picture is blurred
-  int readmit_after = 3;     // good pictures in a row before a camera that was out counts again, while there are others
+  double min_sharp_edge_ratio = 0.1;  // of the edges; with fewer sharp ones a picture is blurred
+  int readmit_after = 3;  // good pictures in a row before a camera that was out counts again, while there are others
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("dark_level", self.dark_level, Range{0, 255}, "",
-            "grey value: a picture with hardly anything above it is black");
+            "grey value: a picture with hardly anything above it is black", kCommon);
     visitor("bright_level", self.bright_level, Range{0, 255}, "",
-            "grey value: a picture mostly above it is over-exposed");
-    visitor("dark_share", self.dark_share, Range{0, 1}, "", "of the pixels, that makes a picture black");
-    visitor("bright_share", self.bright_share, Range{0, 1}, "", "of the pixels, that makes a picture over-exposed");
+            "grey value: a picture mostly above it is over-exposed", kCommon);
+    visitor("black_pixel_ratio", self.black_pixel_ratio, Range{0, 1}, "", "of the pixels, that makes a picture black",
+            OptionNote{.formerly = "dark_share"});
+    visitor("over_exposed_pixel_ratio", self.over_exposed_pixel_ratio, Range{0, 1}, "",
+            "of the pixels, that makes a picture over-exposed", OptionNote{.formerly = "bright_share"});
     visitor("sharp_slope", self.sharp_slope, Range{0, 1}, "",
             "share of an edge's contrast that a sharp one has between two pixels");
-    visitor("sharp_share", self.sharp_share, Range{0, 1}, "",
-            "of the edges; with fewer sharp ones a picture is blurred");
+    visitor("min_sharp_edge_ratio", self.min_sharp_edge_ratio, Range{0, 1}, "",
+            "of the edges; with fewer sharp ones a picture is blurred", OptionNote{.formerly = "sharp_share"});
     visitor("readmit_after", self.readmit_after, Range{1, 1000}, "",
             "good pictures in a row before a camera that was out counts again");
   }

@@ -19,8 +19,8 @@ double error_floor(double before, std::vector<double> squared_errors, std::vecto
                    const matching::AlignmentOptions& options) {
   if (squared_errors.size() < kLeastMatches) return before;
   const double found = median(std::move(squared_errors)) / (2 * std::numbers::ln2) - median(std::move(variances));
-  const double least = std::min(options.least_floor_px, options.floor_px);
-  const double now = std::clamp(found, least * least, options.floor_px * options.floor_px);
+  const double least = std::min(options.min_calibration_error_px, options.calibration_error_px);
+  const double now = std::clamp(found, least * least, options.calibration_error_px * options.calibration_error_px);
   return std::sqrt((1 - kRate) * before * before + kRate * now);
 }
 
@@ -30,7 +30,7 @@ std::vector<double> error_floors(std::span<const double> before, const map::Bund
   if (output.result.status != TrackStatus::kTracking) return {};
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   std::vector<double> floors(before.begin(), before.end());
-  floors.resize(rig.size(), options.floor_px);
+  floors.resize(rig.size(), options.calibration_error_px);
   for (std::size_t c = 0; c < output.matches.size(); ++c) {
     const geometry::SE3 T_cam_world = rig.cam_from_rig(c) * output.result.T_rig_world;
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
@@ -51,7 +51,7 @@ std::vector<double> error_floors(std::span<const double> before, const map::Bund
 std::vector<matching::AlignmentOptions> alignment_by_camera(const matching::AlignmentOptions& options,
                                                             std::span<const double> floors, std::size_t cameras) {
   std::vector<matching::AlignmentOptions> out(cameras, options);
-  for (std::size_t c = 0; c < std::min(cameras, floors.size()); ++c) out[c].floor_px = floors[c];
+  for (std::size_t c = 0; c < std::min(cameras, floors.size()); ++c) out[c].calibration_error_px = floors[c];
   return out;
 }
 

@@ -17,9 +17,10 @@
 namespace bslam::tracking {
 
 // Floors in level-0 pixels after `frame` was tracked with `output`; `before`: those it was tracked with (empty: nothing
-// is known, options.floor_px everywhere). They follow what frames say within some ten of them, between
-// options.least_floor_px and options.floor_px. A camera with few matches keeps its own; after a lost frame nothing is
-// known, as what made it lost may have come to stay. Keyframes keep the standard deviations of their time.
+// is known, options.calibration_error_px everywhere). They follow what frames say within some ten of them, between
+// options.min_calibration_error_px and options.calibration_error_px. A camera with few matches keeps its own; after a
+// lost frame nothing is known, as what made it lost may have come to stay. Keyframes keep the standard deviations of
+// their time.
 std::vector<double> error_floors(std::span<const double> before, const map::BundledMap& map,
                                  const frame::BundledFrame& frame, const TrackOutput& output,
                                  const matching::AlignmentOptions& options);
@@ -27,7 +28,8 @@ std::vector<double> error_floors(std::span<const double> before, const map::Bund
 double error_floor(double before, std::vector<double> squared_errors, std::vector<double> variances,
                    const matching::AlignmentOptions& options);
 
-// The options of each of `cameras` cameras: with the floors in place of options.floor_px (`floors` empty: as they are).
+// The options of each of `cameras` cameras: with the floors in place of options.calibration_error_px (`floors` empty:
+// as they are).
 std::vector<matching::AlignmentOptions> alignment_by_camera(const matching::AlignmentOptions& options,
                                                             std::span<const double> floors, std::size_t cameras);
 

@@ -113,7 +113,7 @@ Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig
   const auto found = solver::generalised_scale(view.pose.T_b_a, cameras);
   if (found && found->deviation <= options.max_scale_deviation)
     return {found->T_b_a.translation().norm(), found->deviation};
-  return {options.guessed_depth / depth, std::numeric_limits<double>::infinity()};
+  return {options.assumed_median_depth / depth, std::numeric_limits<double>::infinity()};
 }
 
 }  // namespace

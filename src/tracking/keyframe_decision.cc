@@ -50,7 +50,8 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
   for (std::size_t c = 0; c < inliers.size(); ++c) {
     const auto keypoints = static_cast<double>(frame.cameras[c].keypoints.size());
     const auto found = static_cast<double>(inliers[c].size());
-    evidence.starved |= found < options.keyframe.starved_camera && found < options.keyframe.starved_share * keypoints;
+    evidence.starved |=
+        found < options.keyframe.min_camera_inliers && found < options.keyframe.min_camera_inlier_ratio * keypoints;
   }
   evidence.fresh_depth = fresh_depth(frame, inliers, options.initialisation);
   return evidence;

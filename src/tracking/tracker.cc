@@ -97,7 +97,7 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const PictureFaults& f
   FramePlan plan;
   std::vector<std::uint8_t> out(rig_.size());
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = faults.outage[c] != CameraReason::kNone;
-  const bool motion_matters = options_.tracking.own_times && !state.track.twist;
+  const bool motion_matters = options_.tracking.use_capture_times && !state.track.twist;
   plan.left_out = motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
   for (std::size_t c = 0; c < out.size(); ++c) plan.postponed.push_back(plan.left_out[c] && !out[c]);
   std::vector<std::uint8_t> failing = doubted(state.track, rig_.size());

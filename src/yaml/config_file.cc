@@ -14,7 +14,7 @@ namespace bslam::yaml {
 namespace {
 
 constexpr std::size_t kMaxConfigBytes = std::size_t{1} << 22;
-constexpr int kMaxDepth = 16;  // a file whose aliases form a circle ends here
+constexpr int kMaxDepth = 16;  // also ends the recursion of a file with cyclic aliases
 
 Error with_file(Error error, std::string file) {
   error.file = std::move(file);
@@ -38,16 +38,17 @@ class ConfigReader {
 
  private:
   Status apply_section(const YAML::Node& map, const std::string& key, int depth) {
-    if (depth == kMaxDepth) return Error{file_, key, "maps too deep", "settings"};
+    if (depth == kMaxDepth) return Error{file_, key, "maps nested too deeply", "settings"};
     if (const Option* option = table_.find(key)) return Error{file_, key, "a map", expected_text(*option)};
     return apply(map, key + ".", depth + 1);
   }
 
   Status apply_value(const YAML::Node& value, const std::string& key) {
-    if (!seen_.insert(key).second) return Error{file_, key, "the key twice", "it once"};
     const Option* option = table_.find(key);
+    if (!seen_.insert(option != nullptr ? option->key : key).second)
+      return Error{file_, key, "the key twice", "it once"};
     if (option == nullptr && is_section(key)) {
-      if (value.IsNull()) return {};  // a section with everything commented out
+      if (value.IsNull()) return {};  // a section whose entries are all commented out
       return Error{file_, key, describe(value), "a map of settings"};
     }
     if (option != nullptr && !value.IsScalar()) return Error{file_, key, describe(value), expected_text(*option)};
@@ -78,9 +79,9 @@ std::vector<std::string_view> split_key(std::string_view key) {
 std::string comment(const Option& option) {
   std::string text;
   for (const std::string& part : {option.help, option.unit, expected_text(option)}) {
-    if (!part.empty()) text += (text.empty() ? "  # " : "; ") + part;
+    if (!part.empty()) text += (text.empty() ? "" : "; ") + part;
   }
-  return text;
+  return std::string("  # ") + (option.common ? "" : "[advanced] ") + text;
 }
 
 }  // namespace
@@ -102,10 +103,11 @@ Status apply_setting(OptionTable& table, std::string_view assignment) {
   return status ? status : with_file(status.error(), "--set");
 }
 
-std::string config_to_yaml(const OptionTable& table) {
+std::string config_to_yaml(const OptionTable& table, Selection selection) {
   std::string yaml;
-  std::vector<std::string_view> open;  // sections the last line stands in
+  std::vector<std::string_view> open;  // sections that contain the last line
   for (const Option& option : table.options()) {
+    if (selection == Selection::kCommon && !option.common) continue;
     std::vector<std::string_view> parts = split_key(option.key);
     const std::string_view name = parts.back();
     parts.pop_back();

@@ -13,7 +13,7 @@ namespace bslam::yaml {
 
 Result<YamlMap> YamlMap::parse(const std::filesystem::path& file, std::string text) {
   if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);  // byte order mark
-  if (text.starts_with("%YAML:")) text[0] = '#';           // a comment instead, so that lines keep their numbers
+  if (text.starts_with("%YAML:")) text[0] = '#';           // turned into a comment, which keeps the line numbers
   try {
     YAML::Node root = YAML::Load(text);
     if (!root.IsDefined() || root.IsNull()) root = YAML::Node(YAML::NodeType::Map);
@@ -21,12 +21,12 @@ Result<YamlMap> YamlMap::parse(const std::filesystem::path& file, std::string te
     return YamlMap(file.string(), "", root);
   } catch (const YAML::Exception& e) {
     const std::string line = e.mark.is_null() ? "" : fmt::format("line {}", e.mark.line + 1);
-    return Error{file.string(), line, "no YAML (" + e.msg + ")", "YAML"};
+    return Error{file.string(), line, "invalid YAML (" + e.msg + ")", "YAML"};
   }
 }
 
 YAML::Node YamlMap::at(std::string_view key) const {
-  const YAML::Node& node = node_;  // const, or a missing key would be added
+  const YAML::Node& node = node_;  // const, since otherwise yaml-cpp would add a missing key
   return node[std::string(key)];
 }
 
@@ -40,7 +40,10 @@ Status YamlMap::allow_only(const std::vector<std::string>& known) const {
   for (const auto& entry : node_) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : describe(entry.first);
     if (std::find(known.begin(), known.end(), key) == known.end()) {
-      return error(key, "an unknown key", "perhaps " + nearest_name(key, known));
+      Error unknown = error(key, "an unknown key", "");
+      const std::string nearest = nearest_name(key, known);
+      unknown.sentence = nearest.empty() ? "unknown key" : "unknown key; did you mean '" + nearest + "'?";
+      return unknown;
     }
     if (!seen.insert(key).second) return error(key, "the key twice", "it once");
   }

@@ -1,4 +1,4 @@
-// Reading YAML with errors that name the file and the key. Internal to io: yaml-cpp stays out of other headers.
+// Reads YAML with errors that name the file and the key. This is the only header that includes yaml-cpp.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -13,17 +13,17 @@
 
 namespace bslam::yaml {
 
-// One map of a YAML document and the place where it stands. Getters answer an Error for a missing key, another type,
-// and numbers that are not finite.
+// One map of a YAML document and its path in the document. Getters return an Error for missing keys, values of another
+// type, and numbers that are not finite.
 class YamlMap {
  public:
-  // Parses a document whose root is a map (an empty one counts as such). A first line `%YAML:1.0`, as OpenCV and EuRoC
-  // write it, is not YAML and is left out. Syntax errors carry the line.
+  // Parses a document whose root is a map or that is empty. A first line `%YAML:1.0`, which OpenCV and EuRoC write
+  // although it is not valid YAML, is ignored. Syntax errors name the line.
   static Result<YamlMap> parse(const std::filesystem::path& file, std::string text);
 
-  // Present and not null.
+  // Whether the key is present and its value is not null.
   bool has(std::string_view key) const;
-  // Refuses keys other than these, naming the nearest one, and repeated ones.
+  // Errors: a key that is not in `known`, with a suggestion if one is close; a repeated key.
   Status allow_only(const std::vector<std::string>& known) const;
 
   Result<double> number(std::string_view key) const;
@@ -35,7 +35,7 @@ class YamlMap {
   Result<YamlMap> map(std::string_view key) const;
   Result<std::vector<YamlMap>> maps(std::string_view key) const;  // a list of maps, at least one
 
-  // For a key of this map; an empty key stands for the map itself.
+  // An Error at a key of this map. An empty key refers to the map itself.
   Error error(std::string_view key, std::string found, std::string expected) const;
   std::string key_path(std::string_view key) const;
 
@@ -48,11 +48,11 @@ class YamlMap {
   YAML::Node at(std::string_view key) const;
   Result<std::vector<double>> number_list(const YAML::Node& list, const std::string& key) const;
 
-  std::string file_, prefix_;  // the prefix is empty or ends in a dot
+  std::string file_, prefix_;  // the prefix is empty or ends with a dot
   YAML::Node node_;
 };
 
-// What a node is, in a few words, for the `found` of an Error.
+// A short description of a node, for the `found` of an Error.
 std::string describe(const YAML::Node& node);
 
 // Text as a double-quoted YAML scalar.

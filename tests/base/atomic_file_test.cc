@@ -53,7 +53,8 @@ TEST(AtomicFile, MayBeReadByOthersAsUsual) {
 
 TEST(ReadFile, RefusesWhatIsNoReadableFile) {
   const support::TemporaryFolder folder;
-  EXPECT_EQ(read_file(folder.path() / "none", 10).error().found, "No such file or directory");
+  EXPECT_EQ(read_file(folder.path() / "none", 10).error().message(),
+            "cannot open " + (folder.path() / "none").string() + ": No such file or directory");
   EXPECT_EQ(read_file(folder.path(), 10).error().found, "a folder");
   ASSERT_EQ(::mkfifo((folder.path() / "pipe").c_str(), 0600), 0);
   EXPECT_FALSE(read_file(folder.path() / "pipe", 10));

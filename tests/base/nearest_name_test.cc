@@ -22,5 +22,12 @@ TEST(NearestName, FindsTheNameThatWasMeant) {
   EXPECT_EQ(nearest_name("anything", {}), "");
 }
 
+TEST(NearestName, SuggestsNoFarName) {
+  const std::vector<std::string> known = {"bundling.near_m", "features.per_image", "seed"};
+  EXPECT_EQ(nearest_name("nfeatures", known), "");
+  EXPECT_EQ(nearest_name("frobnicate", known), "");
+  EXPECT_EQ(nearest_name("sed", known), "seed");
+}
+
 }  // namespace
 }  // namespace bslam

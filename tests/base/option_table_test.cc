@@ -95,7 +95,9 @@ TEST(OptionTable, SaysWhatItExpects) {
   EXPECT_EQ(table.set("inner.sigma_px", "9").error().expected, "a number in [0.05, 5.0]");
   EXPECT_EQ(table.set("pace", "slow").error().expected, "one of: fast, realtime");
   EXPECT_EQ(table.set("inner.sigma", "1").error().message(),
-            "inner.sigma: found an unknown key, expected perhaps inner.sigma_px");
+            "unknown setting 'inner.sigma'; did you mean 'inner.sigma_px'?");
+  EXPECT_EQ(table.set("frobnication", "1").error().message(),
+            "unknown setting 'frobnication'; 'bslam settings --common' lists those that are commonly changed");
 }
 
 TEST(OptionTable, ValuesReadBackExactly) {
@@ -104,6 +106,45 @@ TEST(OptionTable, ValuesReadBackExactly) {
   OptionTable table(options);
   for (const Option& option : table.options()) EXPECT_TRUE(table.set(option.key, value_text(option)));
   EXPECT_EQ(options.inner.sigma_px, 0.1 + 0.2);
+}
+
+struct RenamedOptions {
+  int new_name = 1, other = 2;
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("new_name", self.new_name, Range{0, 9}, "", "", OptionNote{.common = true, .formerly = "old_name"});
+    visitor("other", self.other, Range{}, "", "");
+  }
+};
+
+struct RenamedInSection {
+  RenamedOptions section;
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor.section("section", self.section);
+  }
+};
+
+TEST(OptionTable, AcceptsAFormerNameWithAWarning) {
+  RenamedInSection options;
+  OptionTable table(options);
+  EXPECT_EQ(table.keys(), (std::vector<std::string>{"section.new_name", "section.other"}));
+  ASSERT_TRUE(table.set("section.new_name", "3"));
+  EXPECT_TRUE(table.warnings().empty());
+  ASSERT_TRUE(table.set("section.old_name", "4"));
+  ASSERT_TRUE(table.set("section.old_name", "5"));
+  EXPECT_EQ(options.section.new_name, 5);
+  EXPECT_EQ(table.warnings(), std::vector<std::string>{
+                                  "setting 'section.old_name' is now called 'section.new_name'; the old name will stop "
+                                  "working in the next release"});
+  EXPECT_EQ(table.set("section.old_name", "10").error().key, "section.new_name");
+}
+
+TEST(OptionTable, KnowsWhichOptionsAreCommon) {
+  RenamedInSection options;
+  const OptionTable table(options);
+  EXPECT_TRUE(table.find("section.new_name")->common);
+  EXPECT_FALSE(table.find("section.other")->common);
 }
 
 struct TwiceOptions {

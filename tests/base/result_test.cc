@@ -12,6 +12,13 @@ TEST(Error, SaysFileKeyFoundAndExpectedInOneLine) {
             "rig.yaml: cameras[0].model: found telepathic, expected pinhole");
 }
 
+TEST(Error, PrefersASentenceAndRepeatsNothingItNames) {
+  EXPECT_EQ((Error{"rig.yaml", "cameras", "", "", "every camera needs a name"}.message()),
+            "rig.yaml: cameras: every camera needs a name");
+  EXPECT_EQ((Error{"a.yaml", "", "No such file", "a file", "cannot open a.yaml: No such file"}.message()),
+            "cannot open a.yaml: No such file");
+}
+
 TEST(Error, LeavesOutWhatIsEmpty) {
   EXPECT_EQ((Error{"f", "", "nothing", ""}.message()), "f: found nothing");
   EXPECT_EQ((Error{"", "k", "", "a number"}.message()), "k: expected a number");

@@ -161,7 +161,7 @@ TEST_F(SmallEuroc, TakesAnotherRig) {
   ASSERT_TRUE(without);
   ASSERT_EQ(without->warnings.size(), 1u);
   EXPECT_NE(
-      without->warnings[0].find("gives time offsets (cam0 500 ms, cam1 500 ms), which are not used without --rig"),
+      without->warnings[0].find("contains time offsets (cam0 500 ms, cam1 500 ms), which are only used with --rig"),
       std::string::npos);
   EXPECT_EQ(dataset->first_time_ns, support::kSmallStart + 500'000'000);
   EXPECT_EQ(read_frame(*dataset, 0).images[1].time_ns, support::kSmallStart + 500'000'000);
@@ -207,7 +207,7 @@ TEST_F(SmallEuroc, AFileInsteadOfAFolder) {
 
 TEST_F(SmallEuroc, NoCameraInIt) {
   fs::remove_all(data() / "mav0");
-  expect_error(data(), "no data set of a known layout");
+  expect_error(data(), "no data set of a known format");
   fs::create_directories(data() / "mav0");
   expect_error(data() / "mav0", "no camera");
 }
@@ -330,7 +330,7 @@ TEST_F(SmallEuroc, CamerasWithNoCommonTime) {
   for (int k = 0; k < 20; ++k)
     list += std::to_string(9'000'000'000'000'000'000 + k) + "," + support::small_image_name(k) + "\n";
   support::write_text(camera(1) / "data.csv", list);
-  expect_error(data(), "no image within 2 ms of one of cam0");
+  expect_error(data(), "no image within 2 ms of an image of cam0");
 }
 
 TEST_F(SmallEuroc, CamerasThatAlternateNeedALargerTolerance) {

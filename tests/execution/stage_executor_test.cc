@@ -169,7 +169,7 @@ TEST(StageExecutorLagged, ShowsAResultThatManyFramesAfterItsBegin) {
 TEST(StageExecutorLagged, CommitsEarlyWhereALaneIsFull) {
   ExecutionSetup s = setup(hashing_stages(1));
   s.options.lag_map = s.options.lag_loop = 1000;
-  s.options.pending_keyframes = 2;
+  s.options.max_pending_keyframes = 2;
   WorldRun run(execution::Mode::kLagged, std::move(s));
   for (int i = 0; i < 3; ++i) run.frame_with_keyframe();  // one runs, two wait
   EXPECT_EQ(count(run.gate.journal(), JournalStep::kMap), 0u);
@@ -305,7 +305,7 @@ TEST(StageExecutorParallel, NeverRunsFurtherAheadThanItsQueuesAreLong) {
       };
     }
     ExecutionSetup s = setup(functions);
-    s.options.pending_keyframes = room;
+    s.options.max_pending_keyframes = room;
     WorldRun run(execution::Mode::kParallel, std::move(s));
     for (int enqueued = 1; enqueued <= 40; ++enqueued) {
       run.frame_with_keyframe();
@@ -324,7 +324,7 @@ TEST(StageExecutorParallel, MayEndAtAnyMoment) {
   for (int i = 0; i < 50; ++i) {
     for (const execution::Mode mode : {execution::Mode::kParallel, execution::Mode::kLagged}) {
       ExecutionSetup s = setup(hashing_stages(static_cast<std::uint64_t>(i), 2, 30'000));
-      s.options.pending_keyframes = 1 + static_cast<int>(random.below(3));
+      s.options.max_pending_keyframes = 1 + static_cast<int>(random.below(3));
       s.options.lag_map = 1 + static_cast<int>(random.below(3));
       WorldRun run(mode, std::move(s));
       const int end = static_cast<int>(random.below(15));
@@ -350,7 +350,7 @@ TEST(StageExecutorParallel, BringsAnExceptionOfAnyLaneToTheCaller) {
         return real(task, base, stop);
       };
       ExecutionSetup s = setup(functions);
-      s.options.pending_keyframes = 1;
+      s.options.max_pending_keyframes = 1;
       WorldRun run(mode, std::move(s));
       EXPECT_THROW(
           {

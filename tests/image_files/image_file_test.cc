@@ -134,7 +134,7 @@ TEST(ImageFile, ReadsMasksOfTheCamerasSize) {
   ASSERT_TRUE(cv::imwrite((folder.path() / "black.png").string(), cv::Mat::zeros(10, 30, CV_8U)));
   camera.mask_file = (folder.path() / "black.png").string();
   ASSERT_FALSE(read_mask(camera));
-  EXPECT_EQ(read_mask(camera).error().found, "nothing but 0, which hides all of c");
+  EXPECT_EQ(read_mask(camera).error().found, "only zeros, which mask all of c");
 }
 
 }  // namespace

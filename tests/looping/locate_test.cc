@@ -144,13 +144,13 @@ TEST(Locate, WhatLooksDifferentFromAsideIsNotMissed) {
   const HallMap& world = exact_walk(4);
   const SimulatedFrame seen = hall(rig_of(4)).frame(FrameId(1000), kStepS * 11 + 0.5);
   VerificationOptions options;
-  const SimulatedFrame changed = redecorated(changed_aside(seen, world, options.max_turn), 0.66, 1);
+  const SimulatedFrame changed = redecorated(changed_aside(seen, world, options.max_viewing_angle), 0.66, 1);
   LocateReport report;
   const auto location =
       locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report);
   ASSERT_TRUE(location) << report.found << " of " << report.sought;
   expect_true_pose(*location, seen.T_world_rig.inverse());
-  options.max_turn = 1.05;
+  options.max_viewing_angle = 1.05;
   EXPECT_FALSE(
       locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
@@ -161,7 +161,7 @@ TEST(Locate, AViewFromFarAsideIsHeldAgainstAllThatIsInView) {
   const HallMap& world = exact_walk(4);
   const SimulatedFrame seen = redecorated(hall(rig_of(4)).frame(FrameId(1000), kStepS * 11 + 0.5), 0.85, 1);
   VerificationOptions options;
-  options.max_turn = 1e-4;
+  options.max_viewing_angle = 1e-4;
   LocateReport report;
   EXPECT_FALSE(locate(world.map, world.map.rig(), seen.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);

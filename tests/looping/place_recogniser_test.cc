@@ -8,7 +8,7 @@ namespace bslam::looping {
 namespace {
 
 // Accepts every keyframe that shares a word.
-const RecognitionOptions kLoose{.common_share = 0, .group_share = 0, .max_candidates = 100};
+const RecognitionOptions kLoose{.min_common_word_ratio = 0, .min_group_score_ratio = 0, .max_candidates = 100};
 
 void expect_equal(const std::vector<Candidate>& a, const std::vector<Candidate>& b) {
   ASSERT_EQ(a.size(), b.size());
@@ -72,10 +72,11 @@ TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
   for (int i = 6; i < 9; ++i)
     world.add(redecorated(simulator.frame(FrameId(i), kRoundS + 0.3 * (i - 6)), 0.8, 1), {}, 2);
   const KeyframeId newest(8);
-  ASSERT_GE(world.map.best_covisible(newest, 1).front().weight, RecognitionOptions().neighbour_weight);
+  ASSERT_GE(world.map.best_covisible(newest, 1).front().weight, RecognitionOptions().min_neighbour_landmarks);
   EXPECT_TRUE(recogniser()->revisited(world.map, newest).empty());
   // Without neighbours there is no such bound: the place becomes a candidate, ranked after the former neighbours.
-  const RecognitionOptions unbound{.common_share = 0, .group_share = 0, .neighbour_weight = 10000};
+  const RecognitionOptions unbound{
+      .min_common_word_ratio = 0, .min_group_score_ratio = 0, .min_neighbour_landmarks = 10000};
   const std::vector<Candidate> without = recogniser(unbound)->revisited(world.map, newest);
   EXPECT_TRUE(std::ranges::any_of(without, [](const Candidate& c) { return c.keyframe.value() < 3; }));
 }

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <string>
 
 #include "report/well_formed_xml.h"
 
@@ -40,6 +42,44 @@ TEST(TrajectoryPlot, LooksAlongYInAWorldOfCameraAxes) {
   EXPECT_TRUE(contains(svg, "Top view (along y)"));
   EXPECT_FALSE(contains(svg, "ground truth"));
   EXPECT_FALSE(contains(svg, "Position error"));
+}
+
+// The vertical positions on the page of the points named start and end in the side view.
+std::array<double, 2> ends_of_side_view(const std::string& svg) {
+  const std::size_t side = svg.find("Side view");
+  const auto y_after = [&](std::size_t at) { return std::stod(svg.substr(svg.find("cy=\"", at) + 4)); };
+  const std::size_t start = svg.find("<circle", side);
+  return {y_after(start), y_after(start + 1)};
+}
+
+TEST(TrajectoryPlot, DrawsAClimbUpwards) {
+  TrajectoryPlotInput camera{.axes = WorldAxes::kCamera};
+  TrajectoryPlotInput body;
+  for (int i = 0; i <= 20; ++i) {  // 4 m forward and 1 m up
+    const double s = 0.05 * i;
+    camera.estimate.push_back({from_seconds(s), {geometry::Quaterniond::Identity(), {0, -s, 4 * s}}});
+    body.estimate.push_back({from_seconds(s), {geometry::Quaterniond::Identity(), {4 * s, 2 * s, s}}});
+  }
+  for (const TrajectoryPlotInput& input : {camera, body}) {
+    const auto [start, end] = ends_of_side_view(trajectory_plot_svg(input));
+    EXPECT_LT(end, start);  // pixels are counted from the top of the page
+  }
+  EXPECT_TRUE(contains(trajectory_plot_svg(camera), ">-y [m]<"));
+}
+
+TEST(TrajectoryPlot, GivesSmallErrorsInMillimetres) {
+  const evaluation::Trajectory truth = circle(false);
+  evaluation::Trajectory estimate = truth;
+  for (std::size_t i = 0; i < estimate.size(); i += 2) {
+    estimate[i].T_world_frame = {geometry::Quaterniond::Identity(),
+                                 estimate[i].T_world_frame.translation() + geometry::Vector3d(0, 0, 0.001)};
+  }
+  const auto evaluation = evaluation::evaluate(estimate, truth, {});
+  ASSERT_TRUE(evaluation.ok());
+  const std::string svg = trajectory_plot_svg(evaluation_plot_input(*evaluation, truth, "errors"));
+  EXPECT_TRUE(contains(svg, "error [mm]"));
+  EXPECT_TRUE(contains(svg, "ATE rmse 0.5 mm"));
+  EXPECT_FALSE(contains(svg, "error [m]"));
 }
 
 TEST(TrajectoryPlot, DrawsATrajectoryThatIsEmpty) { EXPECT_EQ(xml_fault(trajectory_plot_svg({})), ""); }

@@ -99,7 +99,7 @@ TEST_F(ColmapRig, TakesNamesByIdAndPlacesFromRigsTxt) {
   const auto broken = read_folder(kCameras, kRigs, "[{\"cameras\": ");
   ASSERT_TRUE(broken) << broken.error().message();
   EXPECT_EQ(broken->rig.camera(index(0)).name, "camera_2");
-  EXPECT_NE(broken->notes.back().find("names are those of cameras.txt"), std::string::npos);
+  EXPECT_NE(broken->notes.back().find("camera names are taken from cameras.txt"), std::string::npos);
   EXPECT_EQ(read_folder(kCameras, "", R"([{"cameras": [{"image_prefix": "left/"}]}])").error().key, "rigs[0].cameras");
 }
 

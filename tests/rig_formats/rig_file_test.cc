@@ -151,7 +151,7 @@ TEST_F(OwnRigFile, NamesTheKeyAndWhatIsWrong) {
 }
 
 TEST_F(OwnRigFile, NamesTheNearestKeyAndTheKnownModels) {
-  EXPECT_EQ(read_with("time_offset_s", "time_ofset_s").error().expected, "perhaps time_offset_s");
+  EXPECT_EQ(read_with("time_offset_s", "time_ofset_s").error().sentence, "unknown key; did you mean 'time_offset_s'?");
   EXPECT_EQ(read_with("pinhole-radtan", "telepathic").error().expected,
             "one of: pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere");
 }
@@ -169,11 +169,11 @@ TEST_F(OwnRigFile, SyntaxErrorsCarryTheLine) {
 }
 
 TEST_F(OwnRigFile, OfNoKnownFormatIsSaidSo) {
-  EXPECT_EQ(read("something: else\n").error().found, "no rig of a known format");
+  EXPECT_EQ(read("something: else\n").error().found, "no calibration in a known format");
   EXPECT_FALSE(read(""));
   EXPECT_FALSE(read_rig(folder_.path() / "none.yaml"));
   fs::create_directories(folder_.path() / "empty");
-  EXPECT_EQ(read_rig(folder_.path() / "empty").error().found, "a folder without calibration");
+  EXPECT_EQ(read_rig(folder_.path() / "empty").error().found, "a folder without a calibration");
 }
 
 TEST_F(OwnRigFile, ComesBackExactly) {
@@ -265,7 +265,7 @@ TEST_F(EurocSensor, CannotHoldAnOffset) {
 TEST_F(EurocSensor, CannotHoldASphereModel) {
   const Status status = write_euroc_sensors(mixed_rig(), folder_.path(), 20.0);
   ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().found, "model double-sphere, which EuRoC sensor files cannot hold");
+  EXPECT_EQ(status.error().found, "model double-sphere, which EuRoC sensor files cannot store");
 }
 
 // ---- KITTI
@@ -306,9 +306,10 @@ TEST_F(OwnRigFile, KittiCalibrationIsChecked) {
   EXPECT_EQ(broken("P0: 700 0 600 0 0 ten 180 0 0 0 1 0\n").found, "ten");
   EXPECT_EQ(broken("P0: -700 0 600 0 0 710 180 0 0 0 1 0\n").expected, "both above 0");
   EXPECT_EQ(broken("P0: 700 1 600 0 0 710 180 0 0 0 1 0\n").key, "P0");
-  EXPECT_EQ(broken("P0: 700 0 600 0 0 710 180 0 0 0 1 0\nP0: 700 0 600 0 0 710 180 0 0 0 1 0\n").found, "it twice");
+  EXPECT_EQ(broken("P0: 700 0 600 0 0 710 180 0 0 0 1 0\nP0: 700 0 600 0 0 710 180 0 0 0 1 0\n").found,
+            "the line twice");
   EXPECT_EQ(broken("nothing\n").found, "no projection");
-  EXPECT_EQ(broken("P3: 700 0 600 0 0 710 180 0 0 0 1 0\n").found, "no images beside it");
+  EXPECT_EQ(broken("P3: 700 0 600 0 0 710 180 0 0 0 1 0\n").found, "no images in its folder");
 }
 
 // ---- in words
@@ -317,7 +318,7 @@ TEST(RigDescription, SpeaksOfDisplacements) {
   EXPECT_EQ(displacement_in_words({0.11, 0, 0}), "11.0 cm to the right");
   EXPECT_EQ(displacement_in_words({-1.2, 0.02, -0.3}), "1.20 m to the left, 30.0 cm behind, 2.0 cm below");
   EXPECT_EQ(displacement_in_words({0, -0.005, 0.001}), "5.0 mm above, 1.0 mm in front");
-  EXPECT_EQ(displacement_in_words({0, 0, 0}), "at the same place");
+  EXPECT_EQ(displacement_in_words({0, 0, 0}), "at the same position");
 }
 
 TEST(RigDescription, MeasuresFieldsOfView) {

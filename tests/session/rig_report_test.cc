@@ -20,14 +20,14 @@ using geometry::SE3;
 
 camera::Camera pinhole(double f) { return {"p", camera::Pinhole({f, f, 319.5, 239.5}), 640, 480, 0, ""}; }
 
-// A stereo pair in a body frame turned and shifted against it.
+// A stereo pair whose body frame is rotated and translated relative to camera 0.
 camera::Rig stereo() {
   const SE3 T_body_cam0(geometry::so3_exp({0.4, -1.0, 0.7}), {0.2, -0.1, 0.3});
   const SE3 step(geometry::so3_exp({0.02, -0.05, 0.01}), {0.12, 0.01, -0.01});
   return camera::Rig({{pinhole(300), T_body_cam0}, {pinhole(330), T_body_cam0 * step}});
 }
 
-// Keypoints of points ahead, with a descriptor of its own for each, and as many of one camera alone.
+// Keypoints of random points in front of the cameras; every point has a descriptor of its own.
 std::array<feature::Detections, 2> views_of(const camera::Rig& rig) {
   Random random(1);
   std::array<feature::Detections, 2> views;
@@ -51,7 +51,7 @@ PairEvidence judged(const camera::Rig& calibration, const std::array<feature::De
   return judge_pair(calibration, 0, 1, std::span(&views[0], 1), std::span(&views[1], 1));
 }
 
-TEST(ExtrinsicsCheck, FindsWhatIsMeant) {
+TEST(ExtrinsicsCheck, FindsTheConventionThatWasMeant) {
   const camera::Rig rig = stereo();
   const auto views = views_of(rig);
   EXPECT_EQ(judged(rig, views).verdict, Convention::kAsGiven);
@@ -66,7 +66,7 @@ TEST(ExtrinsicsCheck, FindsWhatIsMeant) {
   EXPECT_EQ(judged(rig_formats::with_inverse_extrinsics(swapped), views).verdict, Convention::kSwappedInverse);
 }
 
-TEST(ExtrinsicsCheck, SaysNothingWhereNothingFits) {
+TEST(ExtrinsicsCheck, HasNoVerdictIfNoConventionFits) {
   const camera::Rig rig = stereo();
   auto views = views_of(rig);
   EXPECT_FALSE(judged(rig, {views[0], feature::Detections()}).verdict);
@@ -86,7 +86,8 @@ TEST(ExtrinsicsCheck, SaysHowFarACameraIsTurned) {
   EXPECT_GT(evidence.other->agreeing, 140);
   EXPECT_NEAR(evidence.other->turned_deg, 4.0, 0.05);
   EXPECT_LT(evidence.other->displaced_deg, 2.0);
-  EXPECT_NE(describe_evidence(std::array{evidence}).find("warning: the images do not fit"), std::string::npos);
+  EXPECT_NE(describe_evidence(std::array{evidence}).find("warning: the images contradict the extrinsics"),
+            std::string::npos);
 }
 
 TEST(ExtrinsicsCheck, SaysHowFarACameraIsDisplaced) {
@@ -100,7 +101,7 @@ TEST(ExtrinsicsCheck, SaysHowFarACameraIsDisplaced) {
   EXPECT_NEAR(evidence.other->displaced_deg, 80.5, 2.0);  // between (12, 1, -1) and (1, 12, -1) cm
 }
 
-// Too few that fit as given for a verdict are still held against another pose.
+// Too few matches consistent with the calibration for a verdict are not yet evidence of another pose.
 TEST(ExtrinsicsCheck, IsNotAlarmedByAFewMoreMatchesElsewhere) {
   const camera::Rig rig = stereo();
   auto views = views_of(rig);
@@ -118,7 +119,8 @@ TEST(ExtrinsicsCheck, SaysHowManyPairsItCouldJudge) {
       .first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
   const PairEvidence apart{.first = 0, .second = 2, .matches = 10};
   const std::string said = describe_evidence(std::array{good, apart});
-  EXPECT_NE(said.find("1 of 2 pairs could not be judged: nothing is known of camera 2\n"), std::string::npos) << said;
+  EXPECT_NE(said.find("1 of 2 pairs could not be judged, among them all pairs of camera 2\n"), std::string::npos)
+      << said;
   const PairEvidence also{
       .first = 1, .second = 2, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
   EXPECT_NE(describe_evidence(std::array{good, apart, also}).find("1 of 3 pairs could not be judged\n"),
@@ -128,19 +130,21 @@ TEST(ExtrinsicsCheck, SaysHowManyPairsItCouldJudge) {
 TEST(ExtrinsicsCheck, SpeaksOfTheMostFrequentFault) {
   PairEvidence good{
       .first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
-  EXPECT_NE(describe_evidence(std::array{good}).find("the extrinsics fit as given"), std::string::npos);
+  EXPECT_NE(describe_evidence(std::array{good}).find("the extrinsics are consistent with the images"),
+            std::string::npos);
   PairEvidence bad = good;
   bad.agreeing = {2, 90, 0, 0, 0};
   bad.verdict = Convention::kInverse;
   const std::string mixed = describe_evidence(std::array{good, bad});
   EXPECT_NE(
       mixed.find(
-          "warning: the images of cameras 0 and 1 do not fit the extrinsics; they fit with every transform inverted"),
+          "warning: the images of cameras 0 and 1 contradict the extrinsics; they are consistent with them with every "
+          "transform inverted"),
       std::string::npos)
       << mixed;
-  EXPECT_NE(mixed.find("; 1 of 2 pairs fit as given"), std::string::npos) << mixed;
+  EXPECT_NE(mixed.find("; 1 of 2 pairs are consistent as given"), std::string::npos) << mixed;
   bad.verdict.reset();
-  EXPECT_NE(describe_evidence(std::array{bad}).find("nothing can be said"), std::string::npos);
+  EXPECT_NE(describe_evidence(std::array{bad}).find("the extrinsics could not be judged"), std::string::npos);
 }
 
 class RigReport : public testing::Test {
@@ -195,17 +199,17 @@ TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   const std::string images = (folder_ / "data").string();
   const auto good = report_rig({.file = images, .images = images});
   ASSERT_TRUE(good) << good.error().message();
-  EXPECT_NE(good->find("the extrinsics fit as given"), std::string::npos) << *good;
+  EXPECT_NE(good->find("the extrinsics are consistent with the images"), std::string::npos) << *good;
   const camera::Rig rig = rig_formats::read_rig(images).value();
   ASSERT_TRUE(rig_formats::write_rig(rig_formats::with_inverse_extrinsics(rig), folder_ / "wrong.yaml"));
   const auto wrong = report_rig({.file = (folder_ / "wrong.yaml").string(), .images = images});
-  EXPECT_NE(wrong->find("they fit with"), std::string::npos) << *wrong;
+  EXPECT_NE(wrong->find("they are consistent with"), std::string::npos) << *wrong;
   std::vector<camera::RigCamera> late{{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1)}};
   late[1].camera.time_offset_ns = 15'000'000;
   ASSERT_TRUE(rig_formats::write_rig(camera::Rig(late), folder_ / "late.yaml"));
   const auto apart = report_rig({.file = (folder_ / "late.yaml").string(), .images = images});
   ASSERT_TRUE(apart) << apart.error().message();
-  EXPECT_NE(apart->find("never taken together"), std::string::npos) << *apart;
+  EXPECT_NE(apart->find("no images taken at the same time"), std::string::npos) << *apart;
 }
 
 }  // namespace

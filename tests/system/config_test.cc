@@ -2,8 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
 #include <set>
+#include <sstream>
+#include <string>
+#include <vector>
 
+#include "base/number_text.h"
 #include "base/option_table.h"
 
 namespace bslam::system {
@@ -46,6 +54,47 @@ TEST(Config, DefaultsLieWithinTheirRangesAndKeysAreUnique) {
     EXPECT_TRUE(table.set(option.key, value_text(option)).ok()) << option.key;
     EXPECT_FALSE(option.help.empty()) << option.key;
   }
+}
+
+// The settings and defaults in the tables of docs/settings.md; units follow the defaults after a space.
+std::map<std::string, std::string> documented_settings() {
+  std::map<std::string, std::string> settings;
+  std::ifstream page(std::filesystem::path(__FILE__).parent_path() / "../../docs/settings.md");
+  for (std::string line; std::getline(page, line);) {
+    if (!line.starts_with("| `")) continue;
+    const std::size_t end = line.find("` | ");
+    std::istringstream rest(line.substr(end + 4));
+    rest >> settings[line.substr(3, end - 3)];
+  }
+  return settings;
+}
+
+TEST(Config, TheSettingsPageListsTheCommonOptionsWithTheirDefaults) {
+  std::map<std::string, std::string> documented = documented_settings();
+  Config config;
+  const OptionTable table(config);
+  for (const Option& option : table.options()) {
+    if (!option.common) continue;
+    const auto found = documented.find(option.key);
+    ASSERT_NE(found, documented.end()) << option.key << " is missing on the page";
+    const auto value = parse_double(value_text(option)), shown = parse_double(found->second);
+    EXPECT_TRUE(value && shown ? *value == *shown : value_text(option) == found->second)
+        << option.key << ": " << found->second << " instead of " << value_text(option);
+    documented.erase(found);
+  }
+  for (const auto& [key, value] : documented) ADD_FAILURE() << key << " is not a common option";
+}
+
+TEST(Config, FormerNamesAreNotInUse) {
+  Config config;
+  OptionTable table(config);
+  const std::vector<std::string> keys = table.keys();
+  for (const Option& option : table.options()) {
+    if (option.former_key.empty()) continue;
+    EXPECT_EQ(std::ranges::count(keys, option.former_key), 0) << option.former_key;
+    EXPECT_TRUE(table.set(option.former_key, value_text(option)).ok()) << option.former_key;
+  }
+  EXPECT_FALSE(table.warnings().empty());
 }
 
 TEST(Config, ReadsTheModeByName) {

@@ -51,7 +51,7 @@ class SystemLoopParts : public ::testing::Test {
   static Playback carried() { return play(closed_walk(), {{0, kFirst}, {36, kWalk}}); }
   static Config config() {
     Config out = small_config(execution::Mode::kSequential);
-    out.looping.recovery.new_part_after = static_cast<int>(kAfter);
+    out.looping.recovery.new_submap_after = static_cast<int>(kAfter);
     return out;
   }
 };
@@ -131,7 +131,7 @@ TEST(SystemLoopLagged, GivesTheSameMapWithAnyNumberOfThreads) {
 TEST(SystemLoopReplay, RepeatsAParallelRunWithLoopsToTheBit) {
   const Playback walk = play(closed_walk(), {{0, 16}, {36, kWalk}});  // joined, then closed
   Config config = small_config(execution::Mode::kParallel);
-  config.looping.recovery.new_part_after = 3;
+  config.looping.recovery.new_submap_after = 3;
   for (int i = 0; i < 2; ++i) {
     System recorded(closed_walk().rig(), config, with_vocabulary());
     process_all(recorded, walk.frames);

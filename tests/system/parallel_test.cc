@@ -35,7 +35,7 @@ TEST(SystemParallel, MayEndAtAnyFrameWithoutBeingFinished) {
 TEST(SystemParallel, WaitsForAPendingKeyframeAtMost) {
   const RenderedTour tour(2, 12);
   Config config = small_config(execution::Mode::kParallel);
-  config.execution.pending_keyframes = 1;
+  config.execution.max_pending_keyframes = 1;
   config.tracking.keyframe.min_interval = 1;
   config.tracking.keyframe.min_overlap = 1.0;  // a keyframe with every frame that lost one landmark
   System system(tour.rig(), config);

@@ -77,7 +77,7 @@ TEST_F(SystemSavedMap, LocalisingLeavesItAsItIs) {
        {execution::Mode::kSequential, execution::Mode::kParallel, execution::Mode::kLagged}) {
     Config config = small_config(mode);
     config.localize_only = true;
-    config.looping.recovery.new_part_after = 1;
+    config.looping.recovery.new_submap_after = 1;
     System system(beside().rig(), config, resources());
     process_all(system, beside().frames());
     system.finish();
@@ -98,7 +98,7 @@ TEST_F(SystemSavedMap, WhereThePlaceIsNotInItLocalisingHasNoPose) {
   process_all(part, play(closed_walk(), {{0, 16}}).frames);
   Config config = small_config(execution::Mode::kSequential);
   config.localize_only = true;
-  config.looping.recovery.new_part_after = 1;
+  config.looping.recovery.new_submap_after = 1;
   Resources of_part = with_vocabulary();
   of_part.map = *part.snapshot();
   System system(closed_walk().rig(), config, std::move(of_part));

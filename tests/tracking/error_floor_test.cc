@@ -7,12 +7,12 @@
 namespace bslam::tracking {
 namespace {
 
-const matching::AlignmentOptions kOptions{.floor_px = 0.3, .least_floor_px = 0.05};
+const matching::AlignmentOptions kOptions{.calibration_error_px = 0.3, .min_calibration_error_px = 0.05};
 constexpr double kAlignment = 0.1;  // px
 
 // What frames of `count` keypoints say one after the other, whose calibration is off by `floor` pixels and alignment by
 // kAlignment.
-double after(int frames, double floor, int count, double before = kOptions.floor_px) {
+double after(int frames, double floor, int count, double before = kOptions.calibration_error_px) {
   Random random(1, "floor");
   const double sigma = std::hypot(floor, kAlignment);
   for (int f = 0; f < frames; ++f) {
@@ -37,12 +37,12 @@ TEST(ErrorFloor, FollowsWithinSomeTenFrames) {
 }
 
 TEST(ErrorFloor, StaysWithinItsBounds) {
-  EXPECT_NEAR(after(100, 0.0, 300), kOptions.least_floor_px, 0.01);
-  EXPECT_GE(after(100, 0.0, 300), kOptions.least_floor_px);
-  EXPECT_DOUBLE_EQ(after(100, 3.0, 300), kOptions.floor_px);
+  EXPECT_NEAR(after(100, 0.0, 300), kOptions.min_calibration_error_px, 0.01);
+  EXPECT_GE(after(100, 0.0, 300), kOptions.min_calibration_error_px);
+  EXPECT_DOUBLE_EQ(after(100, 3.0, 300), kOptions.calibration_error_px);
 }
 
-TEST(ErrorFloor, NeedsEnoughKeypoints) { EXPECT_EQ(after(10, 0.0, 10), kOptions.floor_px); }
+TEST(ErrorFloor, NeedsEnoughKeypoints) { EXPECT_EQ(after(10, 0.0, 10), kOptions.calibration_error_px); }
 
 class FloorsOfAFrame : public ::testing::Test {
  protected:
@@ -70,8 +70,8 @@ TEST_F(FloorsOfAFrame, FallWhereErrorsAreSmallerThanClaimed) {
   const auto floors = error_floors({}, world.map, frame, output, kOptions);
   ASSERT_EQ(floors.size(), 4u);
   for (std::size_t c = 0; c < 4; ++c) {
-    EXPECT_LT(floors[c], kOptions.floor_px) << "camera " << c;
-    EXPECT_GT(floors[c], kOptions.least_floor_px) << "camera " << c;
+    EXPECT_LT(floors[c], kOptions.calibration_error_px) << "camera " << c;
+    EXPECT_GT(floors[c], kOptions.min_calibration_error_px) << "camera " << c;
   }
 }
 
@@ -97,10 +97,10 @@ TEST_F(FloorsOfAFrame, AreForgottenWithALostFrame) {
 
 TEST(AlignmentByCamera, PutsTheFloorsInTheirPlaces) {
   const auto some = alignment_by_camera(kOptions, std::vector<double>{0.1, 0.2}, 2);
-  EXPECT_EQ(some[0].floor_px, 0.1);
-  EXPECT_EQ(some[1].floor_px, 0.2);
-  EXPECT_EQ(some[1].least_floor_px, kOptions.least_floor_px);
-  EXPECT_EQ(alignment_by_camera(kOptions, {}, 3)[2].floor_px, kOptions.floor_px);
+  EXPECT_EQ(some[0].calibration_error_px, 0.1);
+  EXPECT_EQ(some[1].calibration_error_px, 0.2);
+  EXPECT_EQ(some[1].min_calibration_error_px, kOptions.min_calibration_error_px);
+  EXPECT_EQ(alignment_by_camera(kOptions, {}, 3)[2].calibration_error_px, kOptions.calibration_error_px);
 }
 
 }  // namespace

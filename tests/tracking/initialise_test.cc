@@ -159,7 +159,7 @@ TEST_F(StartUpToScale, GuessesTheDepthWhereTwoFramesDoNotTellTheScale) {
   map::MapDraft draft = empty_draft(sim);
   InitialisationOptions options;
   options.max_scale_deviation = 1e-3;
-  options.guessed_depth = 2.0;
+  options.assumed_median_depth = 2.0;
   const auto started = start(sim.frame(FrameId(0), 0.0), sim.frame(FrameId(1), 0.3), draft, options);
   ASSERT_TRUE(started.has_value());
   EXPECT_EQ(started->scale, map::Scale::kUnobservable);

@@ -344,7 +344,7 @@ TEST(LostReason, EachHasWordsOfItsOwn) {
 }
 
 // Errors of the positions, over frames in which the rig turns and the side cameras fire late.
-double mean_error_with_late_sides(bool own_times) {
+double mean_error_with_late_sides(bool use_capture_times) {
   const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 2.0, 0.25);
   synthetic::FeatureSimulatorOptions late = room();
   late.capture_offset_s = {0, 0, 0.03, 0.03};
@@ -354,7 +354,7 @@ double mean_error_with_late_sides(bool own_times) {
   constexpr int kFrames = 30;
   for (int i = 1; i <= kFrames; ++i) {
     auto seen = sim.frame(FrameId(i), 0.05 * i);
-    for (frame::CameraFrame& c : seen.frame.cameras) c.time_ns = own_times ? c.time_ns : seen.frame.time_ns;
+    for (frame::CameraFrame& c : seen.frame.cameras) c.time_ns = use_capture_times ? c.time_ns : seen.frame.time_ns;
     const TrackOutput out = tracker.track(seen.frame);
     EXPECT_EQ(out.result.status, TrackStatus::kTracking) << i;
     error += map::distance_m(out.result.T_rig_world, seen.T_world_rig.inverse()) / kFrames;

@@ -99,15 +99,18 @@ TEST_F(CommandLine, TellsItsVersionAndHelpOnEveryVerb) {
 TEST_F(CommandLine, NamesWhatIsMisspeltAndWhatWasMeant) {
   const std::string base = "run " + data() + " --out " + out("refused");
   const std::pair<std::string, std::string> cases[] = {
-      {"rum " + data(), "rum: found an unknown verb, expected perhaps run"},
-      {"rum " + data() + " --out x", "rum: found an unknown verb, expected perhaps run"},
-      {data() + " --out x", "an unknown verb"},
-      {"--seed 3 " + base, "--seed: found an unknown option, expected it after the verb"},
+      {"rum " + data(), "bslam: unknown command 'rum'; did you mean 'run'?\n"},
+      {"rum " + data() + " --out x", "unknown command 'rum'; did you mean 'run'?"},
+      {data() + " --out x", "; see bslam --help"},
+      {"--seed 3 " + base, "option '--seed' must follow the command"},
       {"map info", "FILE is required (see bslam map info --help)"},
-      {"rig infoo x", "infoo: found an unknown verb, expected perhaps info"},
-      {base + " --mdoe lagged", "--mdoe: found an unknown option, expected perhaps --mode"},
-      {"run " + data() + " --ouT=x", "--ouT: found an unknown option, expected perhaps --out"},
+      {"rig infoo x", "unknown command 'infoo'; did you mean 'info'?"},
+      {base + " --mdoe lagged", "unknown option '--mdoe'; did you mean '--mode'?"},
+      {"run " + data() + " --ouT=x", "unknown option '--ouT'; did you mean '--out'?"},
       {base + " --mode sideways", "--mode: found sideways, expected one of: sequential, lagged, parallel"},
+      {base + " --set features.per_imge=1", "unknown setting 'features.per_imge'; did you mean 'features.per_image'?"},
+      {base + " --set nfeatures=1", "unknown setting 'nfeatures'; 'bslam settings --common' lists"},
+      {base + " --config /no/such", "bslam: cannot open /no/such: No such file or directory\n"},
       {base + " --seed -1", "--seed: Value -1 not in range 0 to 2147483647"},
       {"run", "DATA is required (see bslam run --help)\n"}};
   for (const auto& [arguments, said] : cases) {
@@ -123,6 +126,23 @@ TEST_F(CommandLine, PrintsSettingsThatItReads) {
   EXPECT_NE(all.out.find("levels: 5"), std::string::npos);
   std::ofstream(out("settings.yaml")) << all.out;
   EXPECT_EQ(run("settings --config " + out("settings.yaml")).out, all.out);
+}
+
+TEST_F(CommandLine, PrintsTheCommonSettingsAlone) {
+  const std::string common = run("settings --common").out;
+  EXPECT_NE(common.find("per_image: "), std::string::npos);
+  EXPECT_EQ(common.find("[advanced]"), std::string::npos);
+  EXPECT_LT(common.size(), run("settings").out.size() / 3);
+}
+
+TEST_F(CommandLine, TheLogLevelSelectsWhatIsPrinted) {
+  const std::string command = "run " + data() + " --end 0.3 --overwrite --progress never --out " + out("logged");
+  EXPECT_EQ(run(command).err.find("info: "), std::string::npos);
+  const Ran info = run(command + " --log-level info");
+  EXPECT_NE(info.err.find("info: stage extract: "), std::string::npos) << info.err;
+  EXPECT_EQ(info.err.find("debug: "), std::string::npos);
+  EXPECT_NE(run(command + " --log-level debug").err.find("debug: frame 0 at 0.000 s: "), std::string::npos);
+  EXPECT_EQ(run(command + " --log-level error").err, "");
 }
 
 TEST_F(CommandLine, RefusesWhatMakesNoSense) {
@@ -220,6 +240,12 @@ TEST_F(CommandLine, ASavedMapIsDescribedExportedAndGoneOnIn) {
   for (const char* file : {"points.ply", "keyframes.tum", "rig.yaml", "cameras.txt", "images.txt", "points3D.txt"}) {
     EXPECT_GT(fs::file_size(folder_ / "exported" / file), 50u) << file;
   }
+  const std::string named = "map export " + out("saved.map") + " --images " + data() + " --out " + out("named");
+  ASSERT_EQ(run(named).status, 0);
+  std::istringstream images(slurp(folder_ / "named/images.txt"));
+  std::size_t existing = 0;
+  for (std::string word; images >> word;) existing += word.ends_with(".png") && fs::exists(data() + "/" + word);
+  EXPECT_GE(existing, 2u);
   const std::string poses = slurp(folder_ / "exported/keyframes.tum");
   EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 1 + told["keyframes"].get<int>());
   expect_refused("map export " + out("saved.map") + " --out " + out("exported"));
@@ -318,6 +344,8 @@ TEST_F(CommandLine, ARunSaysThatItsCalibrationIsProbablyWrong) {
   ASSERT_TRUE(rig_formats::write_rig(upside_down, out("upside_down.yaml")));
   const Ran turned = run("run " + data() + options + out("upside_down.yaml") + " --out " + out("upside_down"));
   EXPECT_NE(turned.err.find("keypoints are inliers: check this camera's extrinsics"), std::string::npos) << turned.err;
+  EXPECT_NE(turned.err.find("bslam rig info " + out("upside_down.yaml") + " --images " + data()), std::string::npos)
+      << turned.err;
   const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
   EXPECT_EQ(right.err, "");
 }

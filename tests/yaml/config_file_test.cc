@@ -31,7 +31,8 @@ struct Features {
   bool mask = false;
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("per_image", self.per_image, Range{50, 20000}, "", "keypoints wanted in one image");
+    visitor("per_image", self.per_image, Range{50, 20000}, "", "keypoints wanted in one image",
+            OptionNote{.common = true, .formerly = "per_picture"});
     visitor.section("deep", self.deep);
     visitor("mask", self.mask, Range{}, "", "use masks");
   }
@@ -94,7 +95,9 @@ TEST_F(ConfigFile, NamesFileKeyAndWhatIsWrong) {
     EXPECT_EQ(status.error().key, c.key);
     EXPECT_EQ(status.error().found, c.found);
   }
-  EXPECT_EQ(apply("features:\n  per_imge: 1\n").error().expected, "perhaps features.per_image");
+  EXPECT_EQ(apply("features:\n  per_imge: 1\n").error().message(),
+            (folder_.path() / "config.yaml").string() +
+                ": unknown setting 'features.per_imge'; did you mean 'features.per_image'?");
 }
 
 TEST_F(ConfigFile, RefusesWhatIsNoYamlMap) {
@@ -128,10 +131,26 @@ TEST_F(ConfigFile, SaysWhatEverySettingMeans) {
             "features:\n"
             "  per_image: 1200  # keypoints wanted in one image; an integer in [50, 20000]\n"
             "  deep:\n"
-            "    gain: 1.5  # gain of the deep part; 1/s; a number in [-100.0, 100.0]\n"
-            "  mask: false  # use masks; true or false\n"
-            "late: block  # what to do with late frames; one of: block, drop\n"
-            "vocabulary: \"\"  # file; text\n");
+            "    gain: 1.5  # [advanced] gain of the deep part; 1/s; a number in [-100.0, 100.0]\n"
+            "  mask: false  # [advanced] use masks; true or false\n"
+            "late: block  # [advanced] what to do with late frames; one of: block, drop\n"
+            "vocabulary: \"\"  # [advanced] file; text\n");
+}
+
+TEST_F(ConfigFile, PrintsTheCommonSettingsAlone) {
+  EXPECT_EQ(config_to_yaml(table_, Selection::kCommon),
+            "features:\n"
+            "  per_image: 1200  # keypoints wanted in one image; an integer in [50, 20000]\n");
+}
+
+TEST_F(ConfigFile, AcceptsFormerNamesWithAWarning) {
+  ASSERT_TRUE(apply("features:\n  per_picture: 800\n"));
+  EXPECT_EQ(settings_.features.per_image, 800);
+  ASSERT_EQ(table_.warnings().size(), 1u);
+  EXPECT_NE(table_.warnings()[0].find("'features.per_picture' is now called 'features.per_image'"), std::string::npos);
+  EXPECT_TRUE(apply_setting(table_, "features.per_picture=900"));
+  EXPECT_EQ(settings_.features.per_image, 900);
+  EXPECT_EQ(apply("features:\n  per_picture: 800\n  per_image: 700\n").error().found, "the key twice");
 }
 
 TEST_F(ConfigFile, SettingsOfTheCommandLine) {

@@ -1,0 +1,27 @@
+// The log lines of `bslam run` on stderr, selected by --log-level.
+#pragma once
+
+#include <string>
+
+#include "report/run_record.h"
+
+namespace bslam::cli {
+
+// Each level includes those before it.
+enum class LogVerbosity {
+  kError,    // only errors, which end the run
+  kWarning,  // warnings about input and results
+  kInfo,     // processing time of every stage
+  kDebug,    // outcome of every frame
+};
+
+// Of "error", "warning", "info" or "debug".
+LogVerbosity log_verbosity(const std::string& name);
+
+// On stderr: one line per stage with the number of calls and the median, 95 % and largest time per call.
+void print_stage_statistics(const report::RunRecord& record);
+
+// On stderr: one line per frame with its outcome, its inliers and its processing time.
+void print_frames(const report::RunRecord& record);
+
+}  // namespace bslam::cli
