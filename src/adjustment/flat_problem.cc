@@ -17,14 +17,13 @@ std::vector<int> pose_positions(const map::BundledMap& map, const std::vector<Ke
   return position;
 }
 
-// Adds the observations of one landmark; true where two or more keyframes of the problem see it: a landmark in one alone
-// says nothing about poses.
-bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& position, double sigma_px,
-                  double scale_factor, FlatProblem& flat) {
+// Adds the observations of one landmark; true where two or more keyframes of the problem see it: a landmark in one
+// alone says nothing about poses.
+bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& position,
+                  const feature::FeatureModel& features, FlatProblem& flat) {
   const auto observations = map.observations(id);
-  const auto seen = std::count_if(observations.begin(), observations.end(), [&](const map::Observation& o) {
-    return position[o.keyframe.index()] != kAbsent;
-  });
+  const auto seen = std::count_if(observations.begin(), observations.end(),
+                                  [&](const map::Observation& o) { return position[o.keyframe.index()] != kAbsent; });
   if (seen < 2) return false;
   const int point = static_cast<int>(flat.landmarks.size());
   std::size_t reference = kNone;
@@ -36,7 +35,7 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
     for (const frame::KeypointRef r : frame.bundled.keypoints(o.feature)) {
       const feature::Keypoints& keypoints = frame.keypoints(r.camera);
       const std::size_t k = r.keypoint.index();
-      const double detected = sigma_px * std::pow(scale_factor, keypoints.level[k]);
+      const double detected = features.sigma(keypoints.level[k]);
       const float sigma = o.aligned ? keypoints.sigma[k] : static_cast<float>(detected);
       if (o.aligned && map.landmark(id).reference == map::LandmarkReference{o.keyframe, r}) {
         reference = flat.problem.observations.size();
@@ -48,7 +47,8 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
     }
   }
   // The reference says what the landmark is: that it was detected, not aligned, is no error.
-  if (reference != kNone) flat.problem.observations[reference].sigma = std::min(flat.problem.observations[reference].sigma, least);
+  if (reference != kNone)
+    flat.problem.observations[reference].sigma = std::min(flat.problem.observations[reference].sigma, least);
   flat.landmarks.push_back(id);
   flat.problem.points.push_back(map.landmark(id).position);
   return true;
@@ -70,7 +70,7 @@ std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector
 
 }  // namespace
 
-FlatProblem flatten(const map::BundledMap& map, const Selection& selection, double sigma_px, double scale_factor) {
+FlatProblem flatten(const map::BundledMap& map, const Selection& selection, const feature::FeatureModel& features) {
   FlatProblem flat;
   flat.problem.rig = &map.rig();
   flat.keyframes = selection.free_keyframes;
@@ -78,11 +78,12 @@ FlatProblem flatten(const map::BundledMap& map, const Selection& selection, doub
   std::sort(flat.keyframes.begin(), flat.keyframes.end());
   for (const KeyframeId k : flat.keyframes) {
     flat.problem.T_rig_world.push_back(map.keyframe(k).T_rig_world);
-    flat.problem.pose_free.push_back(std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), k));
+    flat.problem.pose_free.push_back(
+        std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), k));
   }
   flat.problem.motion = motions(map, flat.keyframes);
   const std::vector<int> position = pose_positions(map, flat.keyframes);
-  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, position, sigma_px, scale_factor, flat);
+  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, position, features, flat);
   return flat;
 }
 

@@ -28,8 +28,8 @@ struct FlatProblem {
   std::vector<ObservationSource> sources;  // per observation
 };
 
-// Landmarks that fewer than two of the keyframes see are left out. `sigma_px`: standard deviation of a keypoint that is
-// not aligned to its landmark's patch, on its level; `scale_factor` between levels. The map outlives the problem.
-FlatProblem flatten(const map::BundledMap& map, const Selection& selection, double sigma_px, double scale_factor);
+// Landmarks that fewer than two of the keyframes see are left out. `features` tells the
+// standard deviation of a keypoint that is not aligned to its landmark's patch. The map outlives the problem.
+FlatProblem flatten(const map::BundledMap& map, const Selection& selection, const feature::FeatureModel& features);
 
 }  // namespace bslam::adjustment

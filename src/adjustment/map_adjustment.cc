@@ -10,8 +10,8 @@ namespace {
 
 using solver::ReprojectionProblem;
 
-// Bound of a sum over `keypoints` keypoints that is as improbable as `bound` is for one (Wilson and Hilferty's cube root,
-// scaled so that one keypoint has the bound itself).
+// Bound of a sum over `keypoints` keypoints that is as improbable as `bound` is for one (Wilson and Hilferty's cube
+// root, scaled so that one keypoint has the bound itself).
 double sum_bound(double bound, int keypoints) {
   const auto quantile = [](double degrees) {
     const double v = 2.0 / (9.0 * degrees);
@@ -20,8 +20,8 @@ double sum_bound(double bound, int keypoints) {
   return bound * quantile(2.0 * keypoints) / quantile(2.0);
 }
 
-// An observation is a feature with all its keypoints, and is judged as a whole: the more cameras, the likelier it is that
-// chance alone takes one of them over its own bound.
+// An observation is a feature with all its keypoints, and is judged as a whole: the more cameras, the likelier it is
+// that chance alone takes one of them over its own bound.
 std::vector<ObservationSource> bad_observations(const FlatProblem& flat, double bound) {
   const std::vector<double> chi2 = solver::squared_errors(flat.problem);
   std::vector<ObservationSource> bad;
@@ -29,7 +29,9 @@ std::vector<ObservationSource> bad_observations(const FlatProblem& flat, double 
     const ObservationSource source = flat.sources[i];
     double sum = 0;
     int keypoints = 0;
-    for (; i < chi2.size() && flat.sources[i].landmark == source.landmark && flat.sources[i].keyframe == source.keyframe; ++i) {
+    for (;
+         i < chi2.size() && flat.sources[i].landmark == source.landmark && flat.sources[i].keyframe == source.keyframe;
+         ++i) {
       sum += chi2[i];
       ++keypoints;
     }
@@ -39,7 +41,8 @@ std::vector<ObservationSource> bad_observations(const FlatProblem& flat, double 
 }
 
 // Landmarks that one keyframe alone sees are no part of the problem: they keep their place in that keyframe.
-void carry_single_views(const map::BundledMap& map, KeyframeId k, const geometry::SE3& T_rig_world, map::SetPoses& poses) {
+void carry_single_views(const map::BundledMap& map, KeyframeId k, const geometry::SE3& T_rig_world,
+                        map::SetPoses& poses) {
   const geometry::SE3 T_new_old = T_rig_world.inverse() * map.keyframe(k).T_rig_world;
   for (const LandmarkId l : map.keyframe(k).landmarks) {
     if (!l.valid() || map.observations(l).size() != 1) continue;
@@ -62,12 +65,13 @@ map::SetPoses poses_of(const map::BundledMap& map, const FlatProblem& flat) {
 
 }  // namespace
 
-AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options, double sigma_px, double scale_factor,
-                            map::MapDraft& draft, std::stop_token stop) {
+AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options,
+                            const feature::FeatureModel& features, map::MapDraft& draft, std::stop_token stop) {
   AdjustmentReport report;
-  FlatProblem flat = flatten(draft.map(), selection, sigma_px, scale_factor);
+  FlatProblem flat = flatten(draft.map(), selection, features);
   report.observations = flat.problem.observations.size();
-  const bool any_fixed = std::any_of(flat.problem.pose_free.begin(), flat.problem.pose_free.end(), [](std::uint8_t f) { return !f; });
+  const bool any_fixed =
+      std::any_of(flat.problem.pose_free.begin(), flat.problem.pose_free.end(), [](std::uint8_t f) { return !f; });
   if (selection.free_keyframes.empty() || !any_fixed || flat.problem.observations.empty()) return report;
 
   solver::BundleOptions solve{

@@ -129,7 +129,8 @@ struct RigProblem {
 };
 
 // Each group floats on its own: one keyframe of it is held, which takes nothing from what its others say about the rig.
-RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& options, const map::FeatureModel& features) {
+RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& options,
+                  const feature::FeatureModel& features) {
   adjustment::Selection selection;
   const std::vector<KeyframeId> keyframes = choose_keyframes(map, static_cast<std::size_t>(options.keyframes));
   selection.landmarks = choose_landmarks(map, keyframes, static_cast<std::size_t>(options.landmarks));
@@ -137,7 +138,7 @@ RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& option
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     (out.group[i] == i ? selection.fixed_keyframes : selection.free_keyframes).push_back(keyframes[i]);
   }
-  out.flat = adjustment::flatten(map, selection, features.sigma_px, features.scale_factor);
+  out.flat = adjustment::flatten(map, selection, features);
   return out;
 }
 
@@ -203,7 +204,7 @@ bool settled(const solver::RigAdjustment& adjusted, const std::vector<geometry::
 
 // A map made with wrong extrinsics has kept those observations that fit them, and adjusting it stops short of the
 // truth. So what was refused is looked for again under the extrinsics found.
-solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const map::FeatureModel& features,
+solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const feature::FeatureModel& features,
                                        const solver::RigAdjusterOptions& options, RigProblem& problem,
                                        const std::stop_token& stop) {
   std::vector<geometry::SE3> T_cam_rig;
@@ -223,12 +224,11 @@ solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const map::Fe
 
 }  // namespace
 
-RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options, double sigma_px,
-                         double scale_factor, std::stop_token stop) {
+RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options,
+                         const feature::FeatureModel& features, std::stop_token stop) {
   RigRefinement out;
   // Where the map has no metric scale, millimetres of the calibration mean nothing in it.
   if (map.rig().size() < 2 || map.num_keyframes() == 0 || map.scale() != map::Scale::kMetric) return out;
-  const map::FeatureModel features{sigma_px, scale_factor};
   RigProblem problem = choose(map, options, features);
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();

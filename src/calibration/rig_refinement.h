@@ -61,10 +61,10 @@ struct RigRefinement {
   std::size_t keyframes = 0, landmarks = 0;  // used
 };
 
-// Chooses and adjusts; the map stays as it is. `sigma_px` and `scale_factor` as for adjust_map. Deterministic. Takes
+// Chooses and adjusts; the map stays as it is. `features` as for adjust_map. Deterministic. Takes
 // time: seconds with the default options.
-RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options, double sigma_px,
-                         double scale_factor, std::stop_token stop = {});
+RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options,
+                         const feature::FeatureModel& features, std::stop_token stop = {});
 
 // The rig with the extrinsics found; camera 0 stays where it is in the body. As it was where nothing was found.
 camera::Rig refined(const camera::Rig& rig, const RigRefinement& refinement);

@@ -19,15 +19,20 @@ bool shows_news(const map::BundledMap& map, KeyframeId keyframe, const Location&
   return all - static_cast<double>(known) >= options.min_news * all;
 }
 
-// Of the candidate and its best covisible keyframes, but for the keyframe's own neighbours, the one taken nearest to where
-// the keyframe is found to be.
-KeyframeId nearest_of_place(const map::BundledMap& map, KeyframeId keyframe, const Location& location, const LoopingOptions& options) {
+// Of the candidate and its best covisible keyframes, but for the keyframe's own neighbours, the one taken nearest to
+// where the keyframe is found to be.
+KeyframeId nearest_of_place(const map::BundledMap& map, KeyframeId keyframe, const Location& location,
+                            const LoopingOptions& options) {
   const Eigen::Vector3d here = location.T_rig_world.inverse().translation();
-  const auto distance = [&](KeyframeId k) { return (map.keyframe(k).T_rig_world.inverse().translation() - here).norm(); };
+  const auto distance = [&](KeyframeId k) {
+    return (map.keyframe(k).T_rig_world.inverse().translation() - here).norm();
+  };
   const auto own = neighbours_of(map, keyframe, options.recognition);
   KeyframeId best = location.with;
-  for (const map::Covisible& c : map.best_covisible(location.with, static_cast<std::size_t>(options.verification.neighbours))) {
-    const bool known = c.keyframe == keyframe || std::ranges::binary_search(own, c.keyframe, {}, &map::Covisible::keyframe);
+  for (const map::Covisible& c :
+       map.best_covisible(location.with, static_cast<std::size_t>(options.verification.neighbours))) {
+    const bool known =
+        c.keyframe == keyframe || std::ranges::binary_search(own, c.keyframe, {}, &map::Covisible::keyframe);
     if (!known && distance(c.keyframe) < distance(best)) best = c.keyframe;
   }
   return best;
@@ -35,18 +40,20 @@ KeyframeId nearest_of_place(const map::BundledMap& map, KeyframeId keyframe, con
 
 }  // namespace
 
-LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options, const map::FeatureModel& features,
-                       std::uint64_t seed)
+LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options,
+                       const feature::FeatureModel& features, std::uint64_t seed)
     : recogniser_(std::move(recogniser)), options_(options), features_(features), seed_(seed) {}
 
-std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const {
+std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map,
+                                           const Candidate& candidate) const {
   const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
-  return locate(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
+  return locate(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification,
+                features_, random);
 }
 
-// Parts may lie anywhere, so that nothing but the pictures speaks against a wrong place: no other of the rest of the map may
-// look as right. A twin that fewer keyframes show is no candidate beside the place itself: it is asked for as a frame is
-// that nothing is known of.
+// Parts may lie anywhere, so that nothing but the pictures speaks against a wrong place: no other of the rest of the
+// map may look as right. A twin that fewer keyframes show is no candidate beside the place itself: it is asked for as a
+// frame is that nothing is known of.
 bool LoopCloser::undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const {
   const std::shared_ptr<const frame::BundledFrame> frame = map.keyframe(keyframe).frame;
   const camera::Rig rig = map.rig_of(keyframe);

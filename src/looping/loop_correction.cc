@@ -6,6 +6,7 @@
 
 #include "base/median.h"
 #include "looping/essential_graph.h"
+#include "map/scene_depth.h"
 #include "solver/reprojection.h"
 
 namespace bslam::looping {
@@ -63,14 +64,6 @@ double way_between(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
   return length;
 }
 
-double median_depth(const map::BundledMap& map, KeyframeId k) {
-  std::vector<double> depths;
-  for (const LandmarkId l : map.keyframe(k).landmarks) {
-    if (l.valid()) depths.push_back((map.keyframe(k).T_rig_world * map.landmark(l).position).norm());
-  }
-  return depths.empty() ? 0.0 : median(std::move(depths));
-}
-
 // The keyframe and its best covisible ones: what is moved at once and fused with the place.
 std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyframe, int size) {
   std::vector<KeyframeId> window = {keyframe};
@@ -82,7 +75,7 @@ std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyfram
 
 // What the keyframe was found to see becomes its own, then what its window sees as well, looked for at the poses given.
 void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_world, const LoopClosure& closure,
-          const Location& location, const LoopOptions& options, const map::FeatureModel& features,
+          const Location& location, const LoopOptions& options, const feature::FeatureModel& features,
           map::MapDraft& draft) {
   const std::vector<LandmarkId> place =
       landmarks_about(draft.map(), closure.with, options.window, static_cast<int>(draft.map().num_landmarks()));
@@ -183,12 +176,12 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
   if (closure.joined) return map.scale() == map::Scale::kMetric;
   const auto [first, last] = std::minmax(closure.keyframe, closure.with);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
-  const double way = way_between(map, first, last) + median_depth(map, closure.keyframe);
+  const double way = way_between(map, first, last) + map::median_depth(map, closure.keyframe);
   return closure.apart <= options.max_apart && closure.moved <= share * way && closure.turned <= kMaxTurn;
 }
 
 bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,
-                const map::FeatureModel& features, map::MapDraft& draft) {
+                const feature::FeatureModel& features, map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
   if (map.scale() != map::Scale::kMetric) return false;
   const KeyframeId here = map.root_of(closure.keyframe), there = map.root_of(closure.with);
@@ -216,7 +209,7 @@ bool join_parts(const LoopClosure& closure, const Location& location, const Loop
 }
 
 bool close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options,
-                const map::FeatureModel& features, map::MapDraft& draft) {
+                const feature::FeatureModel& features, map::MapDraft& draft) {
   const map::BundledMap before = draft.map();
   EssentialGraph graph = essential_graph(before, before.root_of(closure.keyframe), options.edge_weight);
   std::vector<KeyframeId> window = window_of(before, closure.keyframe, options.window);

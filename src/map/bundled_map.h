@@ -14,6 +14,7 @@
 
 #include "base/id.h"
 #include "camera/rig.h"
+#include "feature/feature_model.h"
 #include "map/bundled_keyframe.h"
 #include "map/cow_vector.h"
 #include "map/landmark.h"
@@ -24,20 +25,15 @@ namespace bslam::map {
 // kUnobservable: the rig could tell the length of the map's unit, and its motion has not allowed it so far.
 enum class Scale { kMetric, kUpToScale, kUnobservable };
 
-// The pyramid keypoints were found on: what a landmark's distance range is made of.
-struct PyramidShape {
-  double scale_factor = 1.2;  // between neighbouring levels
-  int levels = 8;
-};
-
 class BundledMap {
  public:
-  explicit BundledMap(std::shared_ptr<const camera::Rig> rig, PyramidShape pyramid = {})
+  explicit BundledMap(std::shared_ptr<const camera::Rig> rig, feature::PyramidShape pyramid = {})
       : rig_(std::move(rig)), pyramid_(pyramid) {}
 
   // ---- reading
   const camera::Rig& rig() const { return *rig_; }
-  const PyramidShape& pyramid() const { return pyramid_; }
+  // The pyramid keypoints were found on.
+  const feature::PyramidShape& pyramid() const { return pyramid_; }
   MapVersion version() const { return version_; }
   Scale scale() const { return scale_; }
   // Relative standard deviation of the length of the map's unit; 0 where cameras that overlap know it, infinite where
@@ -56,9 +52,15 @@ class BundledMap {
   bool alive(LandmarkId l) const { return l.valid() && l.index() < landmarks_.size() && landmarks_[l.index()].alive; }
 
   const BundledKeyframe& keyframe(KeyframeId k) const { return keyframes_[k.index()]; }  // also removed ones
-  const Landmark& landmark(LandmarkId l) const { return landmarks_[l.index()]; }  // of removed ones `alive` alone means something
-  LandmarkId merged_into(LandmarkId l) const { return merged_into_[l.index()]; }  // of removed ones; invalid where it was not
-  std::span<const Observation> observations(LandmarkId l) const { return observations_[l.index()]; }  // in order of keyframe
+  const Landmark& landmark(LandmarkId l) const {
+    return landmarks_[l.index()];
+  }  // of removed ones `alive` alone means something
+  LandmarkId merged_into(LandmarkId l) const {
+    return merged_into_[l.index()];
+  }  // of removed ones; invalid where it was not
+  std::span<const Observation> observations(LandmarkId l) const {
+    return observations_[l.index()];
+  }  // in order of keyframe
   LandmarkId landmark_of(KeyframeId k, FeatureId f) const { return keyframes_[k.index()].landmarks[f.index()]; }
 
   // Alive ids in ascending order.
@@ -78,8 +80,8 @@ class BundledMap {
   // T_rig_world of a keyframe, alive or removed (then carried by its parent).
   geometry::SE3 resolved_pose(KeyframeId k) const;
 
-  // The rig as it stood while a keyframe was taken, and how it moved from the time of the keyframe to that of camera c's image
-  // (the identity where they are one).
+  // The rig as it stood while a keyframe was taken, and how it moved from the time of the keyframe to that of camera
+  // c's image (the identity where they are one).
   camera::Rig rig_of(KeyframeId k) const;
   geometry::SE3 motion_until(KeyframeId k, CameraIndex c) const;
   // Pose of a keyframe's camera at the time of its own image.
@@ -92,14 +94,16 @@ class BundledMap {
   const feature::Keypoints& keypoints(KeyframeId k, CameraIndex c) const { return keyframe(k).frame->keypoints(c); }
 
   // First broken rule in words, or nothing. Rules: observations and keyframes' landmark tables mirror one another; no
-  // alive landmark without observations or observed by a removed keyframe, no feature twice; the reference is one of the
-  // landmark's observations; covisibility is symmetric, its weights are the shared landmarks; the spanning trees hold all alive
-  // keyframes, parents alive or root; counters are right.
+  // alive landmark without observations or observed by a removed keyframe, no feature twice; the reference is one of
+  // the landmark's observations; covisibility is symmetric, its weights are the shared landmarks; the spanning trees
+  // hold all alive keyframes, parents alive or root; counters are right.
   std::optional<std::string> check_invariants() const;
 
-  // ---- changing (on a private copy only). Functions that return bool change nothing and return false where the landmark
-  // or keyframe they name is not alive, or for the reason they give.
-  void set_scale(Scale scale) { set_scale(scale, scale == Scale::kMetric ? 0.0 : std::numeric_limits<double>::infinity()); }
+  // ---- changing (on a private copy only). Functions that return bool change nothing and return false where the
+  // landmark or keyframe they name is not alive, or for the reason they give.
+  void set_scale(Scale scale) {
+    set_scale(scale, scale == Scale::kMetric ? 0.0 : std::numeric_limits<double>::infinity());
+  }
   void set_scale(Scale scale, double deviation) {
     scale_ = scale;
     scale_deviation_ = deviation;
@@ -110,13 +114,13 @@ class BundledMap {
   void begin_gauge_epoch() { ++gauge_epoch_; }
 
   // Appends a keyframe observing the given landmarks (alive, distinct features, distinct landmarks); its parent becomes
-  // the keyframe with which it shares most (ties: newer), else `fallback_parent`; where that is not alive it becomes the
-  // root of a new part.
+  // the keyframe with which it shares most (ties: newer), else `fallback_parent`; where that is not alive it becomes
+  // the root of a new part.
   KeyframeId add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                           std::span<const std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent);
-  // Appends a landmark with one or more observations (keyframes distinct and alive, features free); the first keypoint of
-  // the first is the reference unless another is named (keyframe valid). It is born with the newest keyframe unless another
-  // is named. Calls refresh_landmark.
+  // Appends a landmark with one or more observations (keyframes distinct and alive, features free); the first keypoint
+  // of the first is the reference unless another is named (keyframe valid). It is born with the newest keyframe unless
+  // another is named. Calls refresh_landmark.
   LandmarkId add_landmark(const Eigen::Vector3d& position, std::span<const Observation> observations,
                           const LandmarkReference& reference = {}, KeyframeId born = {});
   // False also where the keyframe observes the landmark already or the feature is taken.
@@ -125,14 +129,14 @@ class BundledMap {
   // remaining observation follows it. False also where the keyframe does not observe the landmark.
   bool remove_observation(LandmarkId l, KeyframeId k);
   bool remove_landmark(LandmarkId l);
-  // `from` ends in `into`: observations move (where the keyframe has none of `into` yet), counters add. False also where
-  // the two are one.
+  // `from` ends in `into`: observations move (where the keyframe has none of `into` yet), counters add. False also
+  // where the two are one.
   bool merge_landmarks(LandmarkId from, LandmarkId into);
   // Its observations go, children get the best of their covisible keyframes as parent that keeps a tree. False also for
   // the root.
   bool remove_keyframe(KeyframeId k);
-  // Hangs the part of `child` under `parent`, `child` becoming the root of its part first. False also where both are of one
-  // part already.
+  // Hangs the part of `child` under `parent`, `child` becoming the root of its part first. False also where both are of
+  // one part already.
   bool join_parts(KeyframeId child, KeyframeId parent);
   // All keyframes and landmarks of a part go. False where `root` is none.
   bool remove_part(KeyframeId root);
@@ -145,20 +149,22 @@ class BundledMap {
   bool add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes view direction, distance range and descriptor from the observations.
   bool refresh_landmark(LandmarkId l);
-  // Gives up the memory of removed landmarks among the next `slots` of a round over all slots, where no neighbour that shares it
-  // is alive.
+  // Gives up the memory of removed landmarks among the next `slots` of a round over all slots, where no neighbour that
+  // shares it is alive.
   void free_removed(std::size_t slots);
 
  private:
   BundledKeyframe& edit(KeyframeId k) { return keyframes_.mutate(k.index(), owner_.tag()); }
   Landmark& edit(LandmarkId l) { return landmarks_.mutate(l.index(), owner_.tag()); }
   geometry::SE3 rig_from_cam(const BundledKeyframe& k, CameraIndex c) const;
-  std::size_t num_keypoints(Observation o) const { return keyframe(o.keyframe).frame->bundled.keypoints(o.feature).size(); }
+  std::size_t num_keypoints(Observation o) const {
+    return keyframe(o.keyframe).frame->bundled.keypoints(o.feature).size();
+  }
 
   // bundled_map.cc. `link` and `unlink` keep list, table, counter and covisibility in step; nothing else does.
   void link(LandmarkId l, Observation o);
   void unlink(LandmarkId l, Observation o);
-  void let_go(KeyframeId k);  // without observations and children left
+  void let_go(KeyframeId k);                        // without observations and children left
   void bury(LandmarkId l, LandmarkId merged_into);  // without observations left
 
   // covisibility.cc
@@ -171,7 +177,7 @@ class BundledMap {
   void make_root(KeyframeId k);  // of its part
 
   std::shared_ptr<const camera::Rig> rig_;
-  PyramidShape pyramid_;
+  feature::PyramidShape pyramid_;
   MapVersion version_{0};
   Scale scale_ = Scale::kMetric;
   double scale_deviation_ = 0;

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/options.h"
-#include "map/feature_model.h"
+#include "feature/feature_model.h"
 #include "map/map_edit.h"
 
 namespace bslam::mapping {
@@ -39,11 +39,12 @@ enum class Keep { kMoreObserved, kSearched };
 // Looks for `landmarks` in every camera of `target` as if that were at `T_rig_world`. Those it observes already are
 // left out.
 FusionReport fuse_into(KeyframeId target, const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& landmarks,
-                       Keep keep, const LandmarkFusionOptions& options, const map::FeatureModel& features,
+                       Keep keep, const LandmarkFusionOptions& options, const feature::FeatureModel& features,
                        map::MapDraft& draft);
 // The same at its pose in the draft.
 FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
-                       const LandmarkFusionOptions& options, const map::FeatureModel& features, map::MapDraft& draft);
+                       const LandmarkFusionOptions& options, const feature::FeatureModel& features,
+                       map::MapDraft& draft);
 
 // The landmarks a keyframe observes, in order of id.
 std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId k);

@@ -125,6 +125,6 @@ struct MappingOptions {
   }
 };
 
-using map::FeatureModel;
+using feature::FeatureModel;
 
 }  // namespace bslam::mapping

@@ -10,9 +10,10 @@
 namespace bslam::mapping {
 namespace {
 
-constexpr double kLongestStep = 3.0;  // factor of one correction: farther away the equations say little but the direction
-constexpr double kSettled = 3.0;      // standard deviations of a correction that leaves the map as it is
-constexpr double kSignificant = 0.5;   // standard deviations from which a correction is worth it
+constexpr double kLongestStep =
+    3.0;                          // factor of one correction: farther away the equations say little but the direction
+constexpr double kSettled = 3.0;  // standard deviations of a correction that leaves the map as it is
+constexpr double kSignificant = 0.5;  // standard deviations from which a correction is worth it
 
 // One keyframe, the oldest, is held: more would keep the map in the shape the scale is read from.
 adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId keyframe, int limit) {
@@ -38,12 +39,13 @@ adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId ke
 
 }  // namespace
 
-ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features, map::MapDraft& draft) {
+ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features,
+                          map::MapDraft& draft) {
   ScaleReport report;
   const map::BundledMap& map = draft.map();
   if (map.scale() != map::Scale::kUnobservable) return report;
   const adjustment::Selection selection = select_observers(map, keyframe, options.keyframes);
-  const auto flat = adjustment::flatten(map, selection, features.sigma_px, features.scale_factor);
+  const auto flat = adjustment::flatten(map, selection, features);
   const auto found = solver::rig_scale(flat.problem);
   if (!found) return report;
   report.observed = true;
@@ -51,7 +53,8 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   report.keyframes = static_cast<int>(flat.keyframes.size());
   if (found->deviation <= options.max_correcting_deviation) {
     const double correction = std::clamp(found->scale, 1.0 / kLongestStep, kLongestStep);
-    if (std::abs(correction - 1.0) > kSignificant * found->deviation) {  // every scaling is a correction, which others wait for
+    if (std::abs(correction - 1.0) >
+        kSignificant * found->deviation) {  // every scaling is a correction, which others wait for
       report.correction = correction;
       draft.scale_part(map.root_of(keyframe), correction);
     }

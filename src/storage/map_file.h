@@ -40,7 +40,7 @@ Result<SavedMap> read_map(const std::filesystem::path& file);
 // Whether a run with this rig, pyramid and vocabulary (null = none) can go on with the map: as many cameras, of the
 // same models, resolutions, intrinsics and distortion, and at the same place in the rig, numbers to 1e-9; its words
 // those of the vocabulary, where both have some. The Error names the camera and what differs of it.
-Status fits(const SavedMap& saved, const camera::Rig& rig, const map::PyramidShape& pyramid,
+Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary);
 
 // The bytes of a file, and back; `file` is for errors. Nothing is trusted: counts are checked against the bytes that

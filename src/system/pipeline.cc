@@ -252,7 +252,7 @@ void Pipeline::keep_candidate(BundledFrame frame) {
 
 std::optional<tracking::TrackResult> Pipeline::locate_early(const map::BundledMap& map,
                                                             const tracking::BetweenKeyframes& early) {
-  return tracking::pose_between(map, early, {config_.features.sigma_px}, config_.tracking, pool_);
+  return tracking::pose_between(map, early, config_.feature_model(), config_.tracking, pool_);
 }
 
 tracking::TrackOutput Pipeline::follow(const BundledFrame& frame, const map::BundledMap& map) {
@@ -265,8 +265,7 @@ tracking::TrackOutput Pipeline::follow(const BundledFrame& frame, const map::Bun
                                    .pyramids = builder_.pyramids(),
                                    .alignment = alignment,
                                    .state = state_,
-                                   .noise = {config_.features.sigma_px},
-                                   .scale_factor = config_.features.scale_factor,
+                                   .features = config_.feature_model(),
                                    .seed = static_cast<std::uint64_t>(config_.seed)};
   return tracking::track(input, frame, config_.tracking, pool_);
 }

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "base/median.h"
-#include "feature/hamming.h"
+#include "feature/descriptor_matching.h"
 #include "solver/generalised_scale.h"
 
 namespace bslam::tracking {
@@ -14,54 +14,29 @@ using frame::BundledFrame;
 using frame::KeypointRef;
 using geometry::SE3;
 
-constexpr int kMaxHamming = 50;        // bits, of 256: without any prediction only clear matches count
+constexpr int kMaxHamming = 50;  // bits, of 256: without any prediction only clear matches count
 constexpr double kRatio = 0.8;
-constexpr double kWindow = 0.25;       // radians a bearing may move between the two frames
+constexpr double kWindow = 0.25;  // radians a bearing may move between the two frames
 constexpr int kMinInliers = 50;
 
-struct KeypointPair {
-  KeypointIndex a, b;
-};
-
-// Best match of keypoint `i` of a among those of b in the window; false where it is not clear.
-bool best_in_window(const feature::Keypoints& a, std::size_t i, const feature::Keypoints& b, std::size_t& match) {
+// Matches of one camera between two frames.
+std::vector<feature::DescriptorMatch> match_frames(const feature::Keypoints& a, const feature::Keypoints& b) {
   const double min_cosine = std::cos(kWindow);
-  int best = 257, second = 257;
-  for (std::size_t j = 0; j < b.size(); ++j) {
-    if (std::abs(a.level[i] - b.level[j]) > 1 || a.bearing[i].dot(b.bearing[j]) < min_cosine) continue;
-    const int distance = feature::hamming(a.descriptor[i], b.descriptor[j]);
-    if (distance < best) {
-      second = best;
-      best = distance;
-      match = j;
-    } else if (distance < second) {
-      second = distance;
-    }
-  }
-  return best <= kMaxHamming && best < kRatio * second;
-}
-
-// Mutual best matches of one camera between two frames.
-std::vector<KeypointPair> match_frames(const feature::Keypoints& a, const feature::Keypoints& b) {
-  std::vector<KeypointPair> pairs;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t j = 0, back = 0;
-    if (best_in_window(a, i, b, j) && best_in_window(b, j, a, back) && back == i) {
-      pairs.push_back({KeypointIndex(i), KeypointIndex(j)});
-    }
-  }
-  return pairs;
+  const auto in_window = [&](std::size_t i, std::size_t j) {
+    return std::abs(a.level[i] - b.level[j]) <= 1 && a.bearing[i].dot(b.bearing[j]) >= min_cosine;
+  };
+  return feature::mutual_matches(a.descriptor, b.descriptor, kMaxHamming, kRatio, in_window);
 }
 
 struct TwoView {
   std::size_t camera = 0;
-  std::vector<KeypointPair> pairs;
+  std::vector<feature::DescriptorMatch> pairs;
   solver::RelativePose pose;
 };
 
 // What every camera has matched.
 struct FramePairs {
-  std::vector<std::vector<KeypointPair>> keypoints;
+  std::vector<std::vector<feature::DescriptorMatch>> keypoints;
   std::vector<std::vector<solver::BearingPair>> bearings;
 };
 
@@ -71,18 +46,21 @@ FramePairs match_cameras(const BundledFrame& first, const BundledFrame& second) 
     const feature::Keypoints &a = first.cameras[c].keypoints, &b = second.cameras[c].keypoints;
     const auto& pairs = out.keypoints.emplace_back(match_frames(a, b));
     auto& bearings = out.bearings.emplace_back();
-    for (const KeypointPair& p : pairs) bearings.push_back({a.bearing[p.a.index()], b.bearing[p.b.index()]});
+    for (const feature::DescriptorMatch& p : pairs)
+      bearings.push_back({a.bearing[p.a.index()], b.bearing[p.b.index()]});
   }
   return out;
 }
 
 // The camera with the widest parallax among those that see enough.
-std::optional<TwoView> best_two_view(const FramePairs& pairs, const InitialisationOptions& options, std::uint64_t seed) {
+std::optional<TwoView> best_two_view(const FramePairs& pairs, const InitialisationOptions& options,
+                                     std::uint64_t seed) {
   std::optional<TwoView> best;
   for (std::size_t c = 0; c < pairs.keypoints.size(); ++c) {
     TwoView view{c, pairs.keypoints[c], {}};
     if (view.pairs.size() < static_cast<std::size_t>(options.min_monocular)) continue;
-    const auto pose = solver::relative_pose(pairs.bearings[c], {.min_inliers = kMinInliers}, Random(seed, "two views", c));
+    const auto pose =
+        solver::relative_pose(pairs.bearings[c], {.min_inliers = kMinInliers}, Random(seed, "two views", c));
     if (!pose || pose->num_inliers < options.min_monocular_points) continue;
     view.pose = *pose;
     if (!best || view.pose.median_parallax > best->pose.median_parallax) best = view;
@@ -96,7 +74,8 @@ struct Unit {
   double deviation = std::numeric_limits<double>::infinity();
 };
 
-Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig& rig, const InitialisationOptions& options) {
+Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig& rig,
+                 const InitialisationOptions& options) {
   std::vector<double> depths;
   for (std::size_t i = 0; i < view.pairs.size(); ++i) {
     if (view.pose.inlier[i]) depths.push_back(view.pose.points_a[i].norm());
@@ -108,7 +87,8 @@ Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig
     cameras.push_back({rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]});
   }
   const auto found = solver::generalised_scale(view.pose.T_b_a, cameras);
-  if (found && found->deviation <= options.max_scale_deviation) return {found->T_b_a.translation().norm(), found->deviation};
+  if (found && found->deviation <= options.max_scale_deviation)
+    return {found->T_b_a.translation().norm(), found->deviation};
   return {options.guessed_depth / depth, std::numeric_limits<double>::infinity()};
 }
 
@@ -125,7 +105,8 @@ bool comparable(const BundledFrame& first, const BundledFrame& second, const Ini
 std::optional<StartedMap> start_metric(const BundledFrame& frame, std::span<const image::Pyramid> pyramids,
                                        const InitialisationOptions& options, map::MapDraft& draft) {
   int metric = 0;
-  for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) metric += has_sound_depth(frame.bundled.point(FeatureId(f)), options);
+  for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f)
+    metric += has_sound_depth(frame.bundled.point(FeatureId(f)), options);
   if (metric < options.min_matched) return std::nullopt;
   StartedMap out;
   out.keyframes.push_back(make_keyframe(frame, {}, SE3(), pyramids, KeyframeId(), options, draft));
@@ -133,8 +114,8 @@ std::optional<StartedMap> start_metric(const BundledFrame& frame, std::span<cons
 }
 
 std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const BundledFrame& frame,
-                                            std::span<const image::Pyramid> pyramids, const InitialisationOptions& options,
-                                            Random random, map::MapDraft& draft) {
+                                            std::span<const image::Pyramid> pyramids,
+                                            const InitialisationOptions& options, Random random, map::MapDraft& draft) {
   const camera::Rig& rig = draft.map().rig();
   const FramePairs pairs = match_cameras(*first.frame, frame);
   const auto view = best_two_view(pairs, options, random.next());

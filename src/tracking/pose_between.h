@@ -16,7 +16,7 @@ struct BetweenKeyframes {
 
 // Empty where the map does not support a pose of the frame, or a keyframe's part is gone.
 std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early,
-                                        const matching::DetectionNoise& noise, const TrackingOptions& options,
+                                        const feature::FeatureModel& features, const TrackingOptions& options,
                                         ThreadPool& pool);
 
 }  // namespace bslam::tracking
