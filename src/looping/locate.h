@@ -1,6 +1,6 @@
-// Geometric verification: is this frame where a keyframe of the map was taken, and what is its pose then? Landmarks
-// seen by any camera then are matched to keypoints of any camera now. Loop closing and relocalisation are this one step
-// with different triggers.
+// Geometric verification of a place: was the frame taken near a candidate keyframe of the map, and at which pose?
+// Landmarks that any camera saw from there are matched to keypoints of any camera of the frame. Loop closing and
+// relocalisation both use it.
 #pragma once
 
 #include <optional>
@@ -22,13 +22,13 @@ struct Location {
   double scale = 1;  // of the place relative to the map about the frame (looping/relative_scale.h)
 };
 
-// Why a candidate is no place the frame was taken at.
+// Why a candidate was rejected.
 enum class Rejection { kNone, kFewMatches, kNoConsensus, kFewInliers, kFewFound };
 
 struct LocateReport {
   Rejection rejection = Rejection::kNone;
   int matches = 0, inliers = 0;
-  int sought = 0, found = 0;  // landmarks that should be found from there, and are
+  int sought = 0, found = 0;  // landmarks expected in view at the pose found, and matched
 };
 
 // Empty where geometry does not confirm the candidate (alive in `map`). `rig`: as it stood while the frame was taken,

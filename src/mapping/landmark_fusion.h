@@ -1,4 +1,5 @@
-// Landmarks looked for in one keyframe: what is found there becomes an observation, or one landmark with the one there.
+// Searches for landmarks in one keyframe. A match becomes an observation or, where the keypoint shows another landmark,
+// the two landmarks are merged.
 #pragma once
 
 #include <vector>
@@ -33,7 +34,7 @@ struct FusionReport {
   }
 };
 
-// Which of two landmarks found to be one keeps its place.
+// Which of two merged landmarks keeps its position.
 enum class Keep { kMoreObserved, kSearched };
 
 // Looks for `landmarks` in every camera of `target` as if that were at `T_rig_world`. Those it observes already are

@@ -1,4 +1,5 @@
-// Starting a map: at once from matched features with metric points, or up to scale from two frames of one camera.
+// Initialisation of a map: from one frame whose cameras overlap, in metres, or from two frames of one camera, up to
+// scale.
 #pragma once
 
 #include <memory>
@@ -9,7 +10,7 @@
 
 namespace bslam::tracking {
 
-// The frame a start up to scale compares later ones with, and what is needed of it to become a keyframe.
+// The reference frame of a monocular initialisation, with what is needed to make it a keyframe.
 struct StartCandidate {
   std::shared_ptr<const frame::BundledFrame> frame;
   std::vector<image::Pyramid> pyramids;
@@ -18,22 +19,23 @@ struct StartCandidate {
 struct StartedMap {
   std::vector<NewKeyframe> keyframes;  // one (metric) or two (up to scale), in the draft
   map::Scale scale = map::Scale::kMetric;
-  double scale_deviation = 0;          // relative; infinite where the length of the map's unit is not known, or a guess
+  double scale_deviation = 0;  // relative; infinite where the length of the map's unit is not known, or a guess
 };
 
-// Writes the first keyframe, at the origin, where the frame has enough features of metric depth.
+// Writes the first keyframe, at the origin. Empty where the frame has too few matched features of sound metric depth.
 std::optional<StartedMap> start_metric(const frame::BundledFrame& frame, std::span<const image::Pyramid> pyramids,
                                        const InitialisationOptions& options, map::MapDraft& draft);
 
-// Do the two frames share enough matches in some camera for a start up to scale to be tried?
-bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& second, const InitialisationOptions& options);
+// Whether some camera has enough matches between the two frames to try a monocular initialisation.
+bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& second,
+                const InitialisationOptions& options);
 
-// Writes two keyframes where some camera sees enough parallax between `first` and `frame`: the first at the origin. With
-// one camera the median depth of the points in the first is 1, and stays so. With several, none overlapping, the scale is what
-// their matches tell of it (solver/generalised_scale.h), else the guessed depth: unobservable either way, until mapping has
-// measured it.
+// Writes two keyframes where some camera sees enough parallax between `first` and `frame`: the first at the origin.
+// With one camera the median depth of the points in the first is 1, and stays so. With several, none overlapping, the
+// scale is what their matches tell of it (solver/generalised_scale.h), else the guessed depth: unobservable either way,
+// until mapping has measured it.
 std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const frame::BundledFrame& frame,
-                                            std::span<const image::Pyramid> pyramids, const InitialisationOptions& options,
-                                            Random random, map::MapDraft& draft);
+                                            std::span<const image::Pyramid> pyramids,
+                                            const InitialisationOptions& options, Random random, map::MapDraft& draft);
 
 }  // namespace bslam::tracking

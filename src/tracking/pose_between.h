@@ -1,5 +1,4 @@
-// Poses of frames that came before there was a map: between the two keyframes of a start up to scale, found in the map
-// as it became.
+// Poses of the frames between the two keyframes of a monocular initialisation, estimated once the map exists.
 #pragma once
 
 #include <optional>
