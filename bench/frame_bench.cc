@@ -41,7 +41,7 @@ void SearchByProjection(benchmark::State& state) {
   for (const LandmarkId id : world().map.landmark_ids()) {
     if (points.size() == 3000) break;
     const map::Landmark& l = world().map.landmark(id);
-    points.push_back({l.position, l.view_direction, l.min_distance, l.max_distance, &l.descriptor, 0});
+    points.push_back({l.position, l.view_direction, l.min_distance, l.max_distance, &l.descriptor});
   }
   std::size_t matches = 0;
   for (auto _ : state) {

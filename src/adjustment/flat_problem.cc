@@ -19,8 +19,8 @@ std::vector<int> pose_positions(const map::BundledMap& map, const std::vector<Ke
 
 // Adds the observations of one landmark. Returns false if fewer than two keyframes of the problem observe it, since
 // such a landmark does not constrain the poses.
-bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& position, double sigma_px,
-                  double scale_factor, FlatProblem& flat) {
+bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& position,
+                  const feature::FeatureModel& features, FlatProblem& flat) {
   const auto observations = map.observations(id);
   const auto seen = std::count_if(observations.begin(), observations.end(),
                                   [&](const map::Observation& o) { return position[o.keyframe.index()] != kAbsent; });
@@ -35,7 +35,7 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
     for (const frame::KeypointRef r : frame.bundled.keypoints(o.feature)) {
       const feature::Keypoints& keypoints = frame.keypoints(r.camera);
       const std::size_t k = r.keypoint.index();
-      const double detected = sigma_px * std::pow(scale_factor, keypoints.level[k]);
+      const double detected = features.sigma(keypoints.level[k]);
       const float sigma = o.aligned ? keypoints.sigma[k] : static_cast<float>(detected);
       if (o.aligned && map.landmark(id).reference == map::LandmarkReference{o.keyframe, r}) {
         reference = flat.problem.observations.size();
@@ -71,7 +71,7 @@ std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector
 
 }  // namespace
 
-FlatProblem flatten(const map::BundledMap& map, const Selection& selection, double sigma_px, double scale_factor) {
+FlatProblem flatten(const map::BundledMap& map, const Selection& selection, const feature::FeatureModel& features) {
   FlatProblem flat;
   flat.problem.rig = &map.rig();
   flat.keyframes = selection.free_keyframes;
@@ -84,7 +84,7 @@ FlatProblem flatten(const map::BundledMap& map, const Selection& selection, doub
   }
   flat.problem.motion = motions(map, flat.keyframes);
   const std::vector<int> position = pose_positions(map, flat.keyframes);
-  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, position, sigma_px, scale_factor, flat);
+  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, position, features, flat);
   return flat;
 }
 

@@ -31,9 +31,8 @@ struct FlatProblem {
   std::vector<ObservationSource> sources;  // per observation
 };
 
-// Builds the problem. Landmarks observed by fewer than two of the keyframes are left out. `sigma_px` is the standard
-// deviation, in pixels of its pyramid level, of a keypoint that is not aligned to its landmark's patch; `scale_factor`
-// is the ratio between levels. The map must outlive the problem.
-FlatProblem flatten(const map::BundledMap& map, const Selection& selection, double sigma_px, double scale_factor);
+// Builds the problem. Landmarks observed by fewer than two of the keyframes are left out. `features` gives the
+// standard deviation of a keypoint that is not aligned to its landmark's patch. The map must outlive the problem.
+FlatProblem flatten(const map::BundledMap& map, const Selection& selection, const feature::FeatureModel& features);
 
 }  // namespace bslam::adjustment

@@ -66,10 +66,10 @@ map::SetPoses poses_of(const map::BundledMap& map, const FlatProblem& flat) {
 
 }  // namespace
 
-AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options, double sigma_px,
-                            double scale_factor, map::MapDraft& draft, std::stop_token stop) {
+AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options,
+                            const feature::FeatureModel& features, map::MapDraft& draft, std::stop_token stop) {
   AdjustmentReport report;
-  FlatProblem flat = flatten(draft.map(), selection, sigma_px, scale_factor);
+  FlatProblem flat = flatten(draft.map(), selection, features);
   report.observations = flat.problem.observations.size();
   const bool any_fixed =
       std::any_of(flat.problem.pose_free.begin(), flat.problem.pose_free.end(), [](std::uint8_t f) { return !f; });

@@ -36,9 +36,9 @@ struct AdjustmentReport {
 };
 
 // Adjusts the free keyframes and the landmarks, using the observations of all cameras, in two rounds. Writes poses,
-// positions and the removal of outlier observations to the draft. `sigma_px` is the standard deviation, in pixels of
-// its pyramid level, of a keypoint that is not aligned to its landmark's patch.
-AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options, double sigma_px,
-                            double scale_factor, map::MapDraft& draft, std::stop_token stop = {});
+// positions and the removal of outlier observations to the draft. `features` gives the standard deviation of a
+// keypoint that is not aligned to its landmark's patch.
+AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options,
+                            const feature::FeatureModel& features, map::MapDraft& draft, std::stop_token stop = {});
 
 }  // namespace bslam::adjustment

@@ -1,6 +1,7 @@
 // An immutable array whose copies share its elements: copying costs no more than copying a pointer.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <utility>
@@ -33,6 +34,9 @@ class SharedArray {
   const T* begin() const { return data_; }
   const T* end() const { return data_ + size_; }
   std::vector<T> copy() const { return {begin(), end()}; }
+  friend bool operator==(const SharedArray& a, const SharedArray& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end());
+  }
 
  private:
   std::shared_ptr<const std::vector<T>> values_;

@@ -54,46 +54,60 @@ void sort_observations(adjustment::FlatProblem& flat) {
   for (std::size_t i = 0; i < all.size(); ++i) std::tie(flat.problem.observations[i], flat.sources[i]) = all[i];
 }
 
-// Adds what one image shows of `points`.
-void search_image(const map::BundledMap& map, std::size_t pose, CameraIndex camera, const geometry::SE3& T_cam_world,
-                  std::span<const matching::SearchPoint> points, const std::vector<Observation>& seen,
-                  const map::FeatureModel& features, adjustment::FlatProblem& flat) {
+// What the images of one keyframe are not searched for.
+std::vector<matching::SearchExclusions> known_in(const map::BundledMap& map, KeyframeId keyframe,
+                                                 std::span<const std::vector<Observation>> seen, std::size_t points) {
+  std::vector<matching::SearchExclusions> out(seen.size());
+  for (std::size_t c = 0; c < seen.size(); ++c) {
+    out[c].keypoints = taken_keypoints(map, keyframe, CameraIndex(c), seen[c]);
+    out[c].points.resize(points);
+    for (const Observation& o : seen[c]) out[c].points[static_cast<std::size_t>(o.point)] = 1;
+  }
+  return out;
+}
+
+// Adds what the images of one keyframe, the cameras posed at `T_cam_world`, show of `points`.
+void search_keyframe(const map::BundledMap& map, std::size_t pose, std::span<const geometry::SE3> T_cam_world,
+                     std::span<const matching::SearchPoint> points, std::span<const std::vector<Observation>> seen,
+                     const feature::FeatureModel& features, adjustment::FlatProblem& flat) {
   const KeyframeId keyframe = flat.keyframes[pose];
-  const frame::CameraFrame& image = map.keyframe(keyframe).frame->cameras[camera.index()];
+  const frame::BundledFrame& frame = *map.keyframe(keyframe).frame;
   const matching::ProjectionSearchOptions options{
-      .radius = kRadius, .max_hamming = kMaxHamming, .ratio = kRatio, .scale_factor = features.scale_factor};
-  const camera::Camera& model = map.rig().camera(camera);
-  const auto taken = taken_keypoints(map, keyframe, camera, seen);
-  const auto found = matching::search_by_projection(model, image, T_cam_world, points, taken, options);
-  for (const matching::ProjectionMatch& m : found.matches) {
-    const auto projected = model.project(T_cam_world * points[m.point].position);
-    const Eigen::Vector2f pixel = image.keypoints.pixel[m.keypoint.index()];
-    const double sigma = features.sigma(image.keypoints.level[m.keypoint.index()]);
-    if (!projected || (pixel.cast<double>() - *projected).squaredNorm() > kMaxChi2 * sigma * sigma) continue;
-    flat.problem.observations.push_back(
-        {static_cast<int>(pose), static_cast<int>(m.point), camera, pixel, static_cast<float>(sigma)});
-    flat.sources.push_back({flat.landmarks[m.point], keyframe});
+      .radius = kRadius, .max_hamming = kMaxHamming, .ratio = kRatio, .scale_factor = features.pyramid.scale_factor};
+  const auto results = matching::search_cameras(map.rig(), frame, T_cam_world, points,
+                                                known_in(map, keyframe, seen, points.size()), options);
+  for (std::size_t c = 0; c < results.size(); ++c) {
+    const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
+    for (const matching::ProjectionMatch& m : results[c].matches) {
+      const auto projected = map.rig().camera(c).project(T_cam_world[c] * points[m.point].position);
+      const Eigen::Vector2f pixel = keypoints.pixel[m.keypoint.index()];
+      const double sigma = features.sigma(keypoints.level[m.keypoint.index()]);
+      if (!projected || (pixel.cast<double>() - *projected).squaredNorm() > kMaxChi2 * sigma * sigma) continue;
+      flat.problem.observations.push_back(
+          {static_cast<int>(pose), static_cast<int>(m.point), CameraIndex(c), pixel, static_cast<float>(sigma)});
+      flat.sources.push_back({flat.landmarks[m.point], keyframe});
+    }
   }
 }
 
 }  // namespace
 
 int recover_observations(const map::BundledMap& map, std::span<const geometry::SE3> T_cam_rig,
-                         const map::FeatureModel& features, adjustment::FlatProblem& flat) {
+                         const feature::FeatureModel& features, adjustment::FlatProblem& flat) {
   const solver::ReprojectionProblem& problem = flat.problem;
   const std::size_t cameras = T_cam_rig.size(), before = problem.observations.size();
   const auto seen = observations_by_image(problem);
   std::vector<matching::SearchPoint> points = map::search_points(map, flat.landmarks);
   for (std::size_t i = 0; i < points.size(); ++i) points[i].position = problem.points[i];
+  std::vector<geometry::SE3> T_cam_world(cameras);
   for (std::size_t pose = 0; pose < flat.keyframes.size(); ++pose) {
     for (std::size_t c = 0; c < cameras; ++c) {
-      const std::size_t image = pose * cameras + c;
-      for (const Observation& o : seen[image]) points[static_cast<std::size_t>(o.point)].skip = 1;
-      const geometry::SE3 T_rig_world =
-          problem.motion.empty() ? problem.T_rig_world[pose] : problem.motion[image] * problem.T_rig_world[pose];
-      search_image(map, pose, CameraIndex(c), T_cam_rig[c] * T_rig_world, points, seen[image], features, flat);
-      for (const Observation& o : seen[image]) points[static_cast<std::size_t>(o.point)].skip = 0;
+      const geometry::SE3 T_rig_world = problem.motion.empty()
+                                            ? problem.T_rig_world[pose]
+                                            : problem.motion[pose * cameras + c] * problem.T_rig_world[pose];
+      T_cam_world[c] = T_cam_rig[c] * T_rig_world;
     }
+    search_keyframe(map, pose, T_cam_world, points, std::span(seen).subspan(pose * cameras, cameras), features, flat);
   }
   sort_observations(flat);
   return static_cast<int>(flat.problem.observations.size() - before);

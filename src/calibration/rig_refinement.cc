@@ -131,7 +131,8 @@ struct RigProblem {
 };
 
 // Each group has its own gauge freedom. One keyframe per group is fixed, which does not constrain the extrinsics.
-RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& options, const map::FeatureModel& features) {
+RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& options,
+                  const feature::FeatureModel& features) {
   adjustment::Selection selection;
   const std::vector<KeyframeId> keyframes = choose_keyframes(map, static_cast<std::size_t>(options.keyframes));
   selection.landmarks = choose_landmarks(map, keyframes, static_cast<std::size_t>(options.landmarks));
@@ -139,7 +140,7 @@ RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& option
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     (out.group[i] == i ? selection.fixed_keyframes : selection.free_keyframes).push_back(keyframes[i]);
   }
-  out.flat = adjustment::flatten(map, selection, features.sigma_px, features.scale_factor);
+  out.flat = adjustment::flatten(map, selection, features);
   return out;
 }
 
@@ -207,7 +208,7 @@ bool settled(const solver::ExtrinsicAdjustment& adjusted, const std::vector<geom
 
 // A map built with wrong extrinsics contains mostly the observations that agree with them, so adjusting it once stops
 // short of the truth. Therefore the rejected observations are searched again with the new extrinsics.
-solver::ExtrinsicAdjustment adjust_in_passes(const map::BundledMap& map, const map::FeatureModel& features,
+solver::ExtrinsicAdjustment adjust_in_passes(const map::BundledMap& map, const feature::FeatureModel& features,
                                              const solver::ExtrinsicAdjustmentOptions& options, RigProblem& problem,
                                              const std::stop_token& stop) {
   std::vector<geometry::SE3> T_cam_rig;
@@ -227,12 +228,11 @@ solver::ExtrinsicAdjustment adjust_in_passes(const map::BundledMap& map, const m
 
 }  // namespace
 
-RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options, double sigma_px,
-                         double scale_factor, std::stop_token stop) {
+RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options,
+                         const feature::FeatureModel& features, std::stop_token stop) {
   RigRefinement out;
   // Without metric scale, calibration errors in millimetres have no meaning in the map.
   if (map.rig().size() < 2 || map.num_keyframes() == 0 || map.scale() != map::Scale::kMetric) return out;
-  const map::FeatureModel features{sigma_px, scale_factor};
   RigProblem problem = choose(map, options, features);
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();

@@ -63,10 +63,10 @@ struct RigRefinement {
   std::size_t keyframes = 0, landmarks = 0;  // numbers used
 };
 
-// Selects keyframes and landmarks and adjusts them; the map is not changed. `sigma_px` and `scale_factor` are as in
-// adjust_map. Deterministic. Takes seconds with the default options.
-RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options, double sigma_px,
-                         double scale_factor, std::stop_token stop = {});
+// Selects keyframes and landmarks and adjusts them; the map is not changed. `features` as in adjust_map. Deterministic.
+// Takes seconds with the default options.
+RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options,
+                         const feature::FeatureModel& features, std::stop_token stop = {});
 
 // Returns the rig with the estimated extrinsics; camera 0 keeps its pose in the body. Returns `rig` unchanged if
 // nothing was estimated.

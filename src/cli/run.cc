@@ -116,9 +116,7 @@ Result<std::optional<map::BundledMap>> read_map(const std::string& file, const c
   if (file.empty()) return std::optional<map::BundledMap>();
   auto saved = storage::read_map(file);
   if (!saved) return saved.error();
-  if (const Status s = storage::fits(*saved, rig, {config.features.scale_factor, config.features.levels}, &vocabulary);
-      !s)
-    return s.error();
+  if (const Status s = storage::fits(*saved, rig, config.feature_model().pyramid, &vocabulary); !s) return s.error();
   if (saved->map.num_keyframes() == 0) return Error{file, "keyframes", "none", "a map with keyframes"};
   return std::optional(std::move(saved->map));
 }

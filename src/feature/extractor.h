@@ -6,6 +6,7 @@
 
 #include "base/options.h"
 #include "camera/camera.h"
+#include "feature/feature_model.h"
 #include "feature/keypoints.h"
 #include "image/image.h"
 #include "image/pyramid.h"
@@ -25,6 +26,8 @@ struct FeatureOptions {
   int fast_threshold_min = 5;  // the least it adapts to in dark or blurred regions
   double sigma_px =
       0.4;  // standard deviation of a keypoint on its level before sub-pixel alignment (measured: 0.25 - 0.35)
+
+  FeatureModel model() const { return {sigma_px, {scale_factor, levels}}; }
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "feature/hamming.h"
+#include "feature/descriptor_matching.h"
 #include "map/search_points.h"
 #include "matching/projection_search.h"
 #include "solver/pose_solver.h"
@@ -28,26 +28,6 @@ std::vector<feature::Descriptor> feature_descriptors(const frame::BundledFrame& 
   return out;
 }
 
-struct Nearest {
-  std::size_t index = 0;
-  int distance = 257, second = 257;
-};
-
-Nearest nearest(const feature::Descriptor& descriptor, const std::vector<feature::Descriptor>& among) {
-  Nearest out;
-  for (std::size_t i = 0; i < among.size(); ++i) {
-    const int distance = feature::hamming(descriptor, among[i]);
-    if (distance < out.distance) {
-      out.second = out.distance;
-      out.distance = distance;
-      out.index = i;
-    } else if (distance < out.second) {
-      out.second = distance;
-    }
-  }
-  return out;
-}
-
 // Matches by appearance alone: clear ones, and of several landmarks that choose one feature the nearest.
 std::vector<KeypointMatch> match_descriptors(const map::BundledMap& map, const frame::BundledFrame& frame,
                                              const std::vector<LandmarkId>& landmarks,
@@ -59,8 +39,9 @@ std::vector<KeypointMatch> match_descriptors(const map::BundledMap& map, const f
   };
   std::vector<Choice> of_feature(descriptors.size());
   for (const LandmarkId l : landmarks) {
-    const Nearest n = nearest(map.landmark(l).descriptor, descriptors);
-    if (n.distance > options.max_hamming || n.distance >= options.ratio * n.second) continue;
+    const feature::NearestDescriptor n =
+        feature::nearest_descriptor(map.landmark(l).descriptor, descriptors, [](std::size_t) { return true; });
+    if (!n.is_clear(options.max_hamming, options.ratio)) continue;
     if (n.distance < of_feature[n.index].distance) of_feature[n.index] = {l, n.distance};
   }
   std::vector<KeypointMatch> out;
@@ -73,7 +54,7 @@ std::vector<KeypointMatch> match_descriptors(const map::BundledMap& map, const f
 
 std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                      const std::vector<KeypointMatch>& matches,
-                                                     const map::FeatureModel& features) {
+                                                     const feature::FeatureModel& features) {
   std::vector<solver::PoseObservation> out;
   out.reserve(matches.size());
   for (const KeypointMatch& m : matches) {
@@ -94,18 +75,17 @@ struct Sought {
 // All landmarks looked for where the pose puts them. `rig`: as it was while the cameras of the frame fired.
 std::vector<KeypointMatch> search_at(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place,
                                      const SE3& T_rig_world, double radius, const VerificationOptions& options,
-                                     const map::FeatureModel& features) {
+                                     const feature::FeatureModel& features) {
   const matching::ProjectionSearchOptions search{.radius = radius,
                                                  .max_hamming = options.max_hamming,
                                                  .ratio = 1.0,
                                                  .level_slack = 2,
-                                                 .scale_factor = features.scale_factor};
+                                                 .scale_factor = features.pyramid.scale_factor};
+  const auto results =
+      matching::search_cameras(rig, frame, matching::camera_poses(rig, T_rig_world), place.points, {}, search);
   std::vector<KeypointMatch> out;
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    if (frame.cameras[c].keypoints.empty()) continue;
-    const auto found = matching::search_by_projection(rig.camera(c), frame.cameras[c],
-                                                      rig.cam_from_rig(c) * T_rig_world, place.points, {}, search);
-    for (const matching::ProjectionMatch& m : found.matches)
+  for (std::size_t c = 0; c < results.size(); ++c) {
+    for (const matching::ProjectionMatch& m : results[c].matches)
       out.push_back({{CameraIndex(c), m.keypoint}, place.landmarks[m.point]});
   }
   return out;
@@ -171,7 +151,7 @@ std::vector<LandmarkId> landmarks_about(const map::BundledMap& map, KeyframeId k
 
 std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& rig, const frame::BundledFrame& frame,
                                KeyframeId candidate, const VerificationOptions& options,
-                               const map::FeatureModel& features, Random random, LocateReport* report) {
+                               const feature::FeatureModel& features, Random random, LocateReport* report) {
   LocateReport unused;
   LocateReport& out = report != nullptr ? *report : unused;
   const auto rejected = [&](Rejection why) {

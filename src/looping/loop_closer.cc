@@ -41,7 +41,7 @@ KeyframeId closest_keyframe_of_place(const map::BundledMap& map, KeyframeId keyf
 }  // namespace
 
 LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options,
-                       const map::FeatureModel& features, std::uint64_t seed)
+                       const feature::FeatureModel& features, std::uint64_t seed)
     : recogniser_(std::move(recogniser)), options_(options), features_(features), seed_(seed) {}
 
 std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map,

@@ -26,7 +26,7 @@ struct LoopClosure {
 class LoopCloser {
  public:
   LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options,
-             const map::FeatureModel& features, std::uint64_t seed);
+             const feature::FeatureModel& features, std::uint64_t seed);
 
   // If `keyframe` (alive) closes a loop, writes the correction to the draft; otherwise leaves the draft unchanged.
   // Keyframes must come in order: an id that does not increase means a new map, and resets the history.
@@ -39,7 +39,7 @@ class LoopCloser {
 
   const std::unique_ptr<PlaceRecogniser> recogniser_;
   const LoopingOptions options_;
-  const map::FeatureModel features_;
+  const feature::FeatureModel features_;
   const std::uint64_t seed_;
   RecognitionHistory history_;
   KeyframeId last_;  // the last keyframe passed to close()

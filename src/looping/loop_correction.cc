@@ -6,6 +6,7 @@
 
 #include "base/median.h"
 #include "looping/essential_graph.h"
+#include "map/scene_depth.h"
 #include "solver/reprojection.h"
 
 namespace bslam::looping {
@@ -64,14 +65,6 @@ double path_length(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
   return length;
 }
 
-double median_depth(const map::BundledMap& map, KeyframeId k) {
-  std::vector<double> depths;
-  for (const LandmarkId l : map.keyframe(k).landmarks) {
-    if (l.valid()) depths.push_back((map.keyframe(k).T_rig_world * map.landmark(l).position).norm());
-  }
-  return depths.empty() ? 0.0 : median(std::move(depths));
-}
-
 // The keyframe and its best covisible keyframes: they are moved together and fused with the place.
 std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyframe, int size) {
   std::vector<KeyframeId> window = {keyframe};
@@ -84,7 +77,7 @@ std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyfram
 // Fuses the window with the place. The keyframe's landmarks are merged with the landmarks it was matched to; then the
 // landmarks of the place are projected into all keyframes of the window at the given poses.
 void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_world, const LoopClosure& closure,
-          const Location& location, const LoopOptions& options, const map::FeatureModel& features,
+          const Location& location, const LoopOptions& options, const feature::FeatureModel& features,
           map::MapDraft& draft) {
   const std::vector<LandmarkId> place =
       landmarks_about(draft.map(), closure.with, options.window, static_cast<int>(draft.map().num_landmarks()));
@@ -187,13 +180,13 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
   if (closure.joined) return map.scale() == map::Scale::kMetric;
   const auto [first, last] = std::minmax(closure.keyframe, closure.with);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
-  const double way = path_length(map, first, last) + median_depth(map, closure.keyframe);
+  const double way = path_length(map, first, last) + map::median_depth(map, closure.keyframe);
   return closure.apart <= options.max_distance_over_depth && closure.moved <= share * way &&
          closure.turned <= kMaxRotation;
 }
 
 bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,
-                const map::FeatureModel& features, map::MapDraft& draft) {
+                const feature::FeatureModel& features, map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
   if (map.scale() != map::Scale::kMetric) return false;
   const KeyframeId here = map.root_of(closure.keyframe), there = map.root_of(closure.with);
@@ -221,7 +214,7 @@ bool join_parts(const LoopClosure& closure, const Location& location, const Loop
 }
 
 bool close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options,
-                const map::FeatureModel& features, map::MapDraft& draft) {
+                const feature::FeatureModel& features, map::MapDraft& draft) {
   const map::BundledMap before = draft.map();
   EssentialGraph graph = essential_graph(before, before.root_of(closure.keyframe), options.edge_weight);
   std::vector<KeyframeId> window = window_of(before, closure.keyframe, options.window);

@@ -19,12 +19,12 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
 // Moves the younger submap to the pose given by the verification, merges it into the older one, and fuses duplicate
 // landmarks. Returns false and changes nothing if the scale is not metric, because each submap then has its own scale.
 bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,
-                const map::FeatureModel& features, map::MapDraft& draft);
+                const feature::FeatureModel& features, map::MapDraft& draft);
 
 // Fuses the landmarks at both ends of the loop and, if the error exceeds what bundle adjustment can remove, distributes
 // it over the loop by pose-graph optimisation. Returns false if the optimisation fails; the draft must not be committed
 // then.
 bool close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options,
-                const map::FeatureModel& features, map::MapDraft& draft);
+                const feature::FeatureModel& features, map::MapDraft& draft);
 
 }  // namespace bslam::looping

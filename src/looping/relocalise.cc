@@ -5,7 +5,7 @@
 namespace bslam::looping {
 std::optional<Location> relocalise(PlaceRecogniser& recogniser, const map::BundledMap& map,
                                    const frame::BundledFrame& frame, const VerificationOptions& options,
-                                   const map::FeatureModel& features, Random random) {
+                                   const feature::FeatureModel& features, Random random) {
   std::vector<Location> found;
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   for (const Candidate& candidate : recogniser.recognised(map, frame)) {

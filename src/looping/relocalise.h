@@ -12,6 +12,6 @@ namespace bslam::looping {
 // places contradict each other, since look-alike rooms cannot be distinguished from a single frame.
 std::optional<Location> relocalise(PlaceRecogniser& recogniser, const map::BundledMap& map,
                                    const frame::BundledFrame& frame, const VerificationOptions& options,
-                                   const map::FeatureModel& features, Random random);
+                                   const feature::FeatureModel& features, Random random);
 
 }  // namespace bslam::looping

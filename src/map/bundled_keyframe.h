@@ -17,8 +17,8 @@ struct Covisible {
   int weight = 0;
 };
 
-// The two tables are shared between versions apart from the rest, so that a change of pose copies neither; both read like
-// a const std::vector.
+// The two tables are shared between versions apart from the rest, so that a change of pose copies neither; both read
+// like a const std::vector.
 struct BundledKeyframe {
   std::shared_ptr<const frame::BundledFrame> frame;  // null once removed
   geometry::SE3 T_rig_world;                         // while alive
@@ -30,7 +30,9 @@ struct BundledKeyframe {
   // Motion of the rig while its cameras fired, as BundledFrame::twist, in the unit of the map.
   geometry::Vector6d twist = geometry::Vector6d::Zero();
   bool alive = false;
-  double unit = 1.0;  // by how much its part was scaled since it was added: what was measured against it then grows along
+  // Accumulated scale factor of its submap since the keyframe was added. A length stored when it was u is multiplied by
+  // unit / u.
+  double unit = 1.0;
 };
 
 }  // namespace bslam::map

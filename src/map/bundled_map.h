@@ -14,6 +14,7 @@
 
 #include "base/id.h"
 #include "camera/rig.h"
+#include "feature/feature_model.h"
 #include "map/bundled_keyframe.h"
 #include "map/cow_vector.h"
 #include "map/landmark.h"
@@ -25,20 +26,15 @@ namespace bslam::map {
 // metric scale, but its motion has not made it observable so far.
 enum class Scale { kMetric, kUpToScale, kUnobservable };
 
-// The image pyramid in which keypoints were detected. It determines the distance range of a landmark.
-struct PyramidShape {
-  double scale_factor = 1.2;  // ratio between neighbouring levels
-  int levels = 8;
-};
-
 class BundledMap {
  public:
-  explicit BundledMap(std::shared_ptr<const camera::Rig> rig, PyramidShape pyramid = {})
+  explicit BundledMap(std::shared_ptr<const camera::Rig> rig, feature::PyramidShape pyramid = {})
       : rig_(std::move(rig)), pyramid_(pyramid) {}
 
   // ---- Reading
   const camera::Rig& rig() const { return *rig_; }
-  const PyramidShape& pyramid() const { return pyramid_; }
+  // The pyramid keypoints were found on.
+  const feature::PyramidShape& pyramid() const { return pyramid_; }
   MapVersion version() const { return version_; }
   Scale scale() const { return scale_; }
   // Relative standard deviation of the map scale: 0 if overlapping cameras observe it, infinite if nothing is known.
@@ -183,7 +179,7 @@ class BundledMap {
   void make_root(KeyframeId k);  // makes k the root of its submap
 
   std::shared_ptr<const camera::Rig> rig_;
-  PyramidShape pyramid_;
+  feature::PyramidShape pyramid_;
   MapVersion version_{0};
   Scale scale_ = Scale::kMetric;
   double scale_deviation_ = 0;

@@ -67,9 +67,9 @@ bool BundledMap::refresh_landmark(LandmarkId l) {
   const frame::KeypointRef r = entry.reference.keypoint;
   const int level = k.frame->keypoints(r.camera).level[r.keypoint.index()];
   const double distance = (entry.position - centre_map(k, r.camera)).norm();
-  const double max_distance = distance * std::pow(pyramid_.scale_factor, level);
+  const double max_distance = distance * pyramid_.scale(level);
   entry.max_distance = static_cast<float>(max_distance);
-  entry.min_distance = static_cast<float>(max_distance / std::pow(pyramid_.scale_factor, pyramid_.levels - 1));
+  entry.min_distance = static_cast<float>(max_distance / pyramid_.scale(pyramid_.levels - 1));
   return true;
 }
 

@@ -1,6 +1,7 @@
 #include "map/local_view.h"
 
 #include <algorithm>
+#include <iterator>
 
 namespace bslam::map {
 namespace {
@@ -19,6 +20,21 @@ std::vector<Covisible> vote(const BundledMap& map, std::span<const LandmarkId> s
     return a.weight != b.weight ? a.weight > b.weight : a.keyframe > b.keyframe;
   });
   return ranked;
+}
+
+// The first of each id, in order.
+std::vector<LandmarkId> each_once(std::span<const LandmarkId> ids) {
+  std::vector<LandmarkId> out;
+  if (ids.empty()) return out;
+  const auto [low, high] = std::ranges::minmax(ids);
+  std::vector<bool> listed(high.index() - low.index() + 1);
+  for (const LandmarkId l : ids) {
+    const std::size_t i = l.index() - low.index();
+    if (listed[i]) continue;
+    listed[i] = true;
+    out.push_back(l);
+  }
+  return out;
 }
 
 }  // namespace
@@ -41,16 +57,12 @@ LocalView make_local_view(const BundledMap& map, std::span<const LandmarkId> see
     for (const Covisible& c : map.best_covisible(k, static_cast<std::size_t>(options.neighbours))) take(c.keyframe);
   }
 
-  std::vector<std::uint8_t> listed(map.landmark_slots(), 0);
-  const auto list = [&](LandmarkId l) {
-    if (!l.valid() || listed[l.index()]) return;
-    listed[l.index()] = 1;
-    view.landmarks.push_back(l);
-  };
-  for (const LandmarkId l : seeds) list(l);
+  std::vector<LandmarkId> observed(seeds.begin(), seeds.end());
   for (const KeyframeId k : view.keyframes) {
-    for (const LandmarkId l : map.keyframe(k).landmarks) list(l);
+    std::ranges::copy_if(map.keyframe(k).landmarks, std::back_inserter(observed),
+                         [](LandmarkId l) { return l.valid(); });
   }
+  view.landmarks = each_once(observed);
   return view;
 }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/median.h"
+#include "map/scene_depth.h"
 #include "matching/epipolar_search.h"
 #include "matching/point_estimation.h"
 
@@ -19,15 +19,6 @@ constexpr double kMaxScaleRatio = 2.0;
 // Every how many keypoints one is projected to test whether two cameras share a view.
 constexpr std::size_t kProbeStep = 16;
 constexpr double kMinShared = 0.1;
-
-double median_depth(const map::BundledMap& map, KeyframeId k) {
-  const map::BundledKeyframe& keyframe = map.keyframe(k);
-  std::vector<double> depths;
-  for (const LandmarkId l : keyframe.landmarks) {
-    if (l.valid()) depths.push_back((keyframe.T_rig_world * map.landmark(l).position).norm());
-  }
-  return depths.empty() ? 0.0 : median(std::move(depths));
-}
 
 // Flags, per keypoint of one camera, those whose feature has no landmark.
 std::vector<std::uint8_t> free_keypoints(const map::BundledKeyframe& keyframe, CameraIndex c) {
@@ -60,23 +51,23 @@ bool shares_view(const map::BundledMap& map, View a, View b, double depth) {
 }
 
 void append(const map::BundledMap& map, KeyframeId k, FeatureId f, std::vector<matching::PointObservation>& out,
-            double sigma_px, double scale_factor) {
+            const feature::FeatureModel& features) {
   const map::BundledKeyframe& keyframe = map.keyframe(k);
   for (const KeypointRef r : keyframe.frame->bundled.keypoints(f)) {
     const feature::Keypoints& keypoints = keyframe.frame->keypoints(r.camera);
     const std::size_t i = r.keypoint.index();
     out.push_back({&map.rig().camera(r.camera), cam_from_world(map, {k, r.camera}), keypoints.pixel[i].cast<double>(),
-                   keypoints.bearing[i], sigma_px * std::pow(scale_factor, keypoints.level[i])});
+                   keypoints.bearing[i], features.sigma(keypoints.level[i])});
   }
 }
 
 // Tests whether the ratio of the distances agrees with the ratio of the pyramid levels.
 bool sizes_agree(const Vector3d& point, View a, KeypointIndex ka, View b, KeypointIndex kb, const map::BundledMap& map,
-                 double scale_factor) {
+                 const feature::PyramidShape& pyramid) {
   const double da = (cam_from_world(map, a) * point).norm(), db = (cam_from_world(map, b) * point).norm();
   const int levels =
       map.keypoints(a.keyframe, a.camera).level[ka.index()] - map.keypoints(b.keyframe, b.camera).level[kb.index()];
-  const double ratio = da / db * std::pow(scale_factor, levels);
+  const double ratio = da / db * pyramid.scale(levels);
   return ratio < kMaxScaleRatio && ratio > 1.0 / kMaxScaleRatio;
 }
 
@@ -86,14 +77,14 @@ std::optional<Vector3d> new_point(const map::BundledMap& map, View a, const matc
   const FeatureId fa = map.keyframe(a.keyframe).frame->bundled.feature(a.camera, match.a);
   const FeatureId fb = map.keyframe(b.keyframe).frame->bundled.feature(b.camera, match.b);
   std::vector<matching::PointObservation> observations;
-  append(map, a.keyframe, fa, observations, features.sigma_px, features.scale_factor);
-  append(map, b.keyframe, fb, observations, features.sigma_px, features.scale_factor);
+  append(map, a.keyframe, fa, observations, features);
+  append(map, b.keyframe, fb, observations, features);
   const auto estimated = matching::estimate_point(observations, options.min_parallax);
   if (!estimated || estimated->worst_chi2 > options.max_chi2) return std::nullopt;
   const Vector3d from_a = estimated->point - cam_from_world(map, a).inverse().translation();
   const Vector3d ray = from_a.normalized();
   if (std::sqrt(ray.dot(estimated->covariance * ray)) > options.max_depth_error * from_a.norm()) return std::nullopt;
-  if (!sizes_agree(estimated->point, a, match.a, b, match.b, map, features.scale_factor)) return std::nullopt;
+  if (!sizes_agree(estimated->point, a, match.a, b, match.b, map, features.pyramid)) return std::nullopt;
   return estimated->point;
 }
 
@@ -103,18 +94,10 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
   if (!shares_view(map, a, b, depth)) return 0;
   const std::vector<std::uint8_t> free_a = free_keypoints(map.keyframe(a.keyframe), a.camera);
   const std::vector<std::uint8_t> free_b = free_keypoints(map.keyframe(b.keyframe), b.camera);
-  const matching::EpipolarView view_a{&map.rig().camera(a.camera),
-                                      &map.keypoints(a.keyframe, a.camera),
-                                      cam_from_world(map, a).inverse(),
-                                      free_a,
-                                      features.sigma_px,
-                                      features.scale_factor};
-  const matching::EpipolarView view_b{&map.rig().camera(b.camera),
-                                      &map.keypoints(b.keyframe, b.camera),
-                                      cam_from_world(map, b).inverse(),
-                                      free_b,
-                                      features.sigma_px,
-                                      features.scale_factor};
+  const matching::EpipolarView view_a{&map.rig().camera(a.camera), &map.keypoints(a.keyframe, a.camera),
+                                      cam_from_world(map, a).inverse(), free_a, &features};
+  const matching::EpipolarView view_b{&map.rig().camera(b.camera), &map.keypoints(b.keyframe, b.camera),
+                                      cam_from_world(map, b).inverse(), free_b, &features};
   const matching::EpipolarOptions search{.min_depth_m = 0.05 * depth,
                                          .sigmas = 2.0,
                                          .max_hamming = options.max_hamming,
@@ -140,7 +123,7 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
 
 int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features,
                      map::MapDraft& draft) {
-  const double depth = median_depth(draft.map(), keyframe);
+  const double depth = map::median_depth(draft.map(), keyframe);
   if (depth <= 0) return 0;
   int made = 0;
   const Vector3d centre = draft.map().keyframe(keyframe).T_rig_world.inverse().translation();

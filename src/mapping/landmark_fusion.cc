@@ -13,7 +13,7 @@ using geometry::SE3;
 // The keypoint agrees with the landmark's projection.
 bool agrees(const map::BundledMap& map, LandmarkId l, const camera::Camera& camera, const SE3& T_cam_world,
             const feature::Keypoints& keypoints, std::size_t k, const LandmarkFusionOptions& options,
-            const map::FeatureModel& features) {
+            const feature::FeatureModel& features) {
   const auto pixel = camera.project(T_cam_world * map.landmark(l).position);
   if (!pixel) return false;
   const double sigma = features.sigma(keypoints.level[k]);
@@ -56,36 +56,32 @@ std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId k) {
 }
 
 FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
-                       const LandmarkFusionOptions& options, const map::FeatureModel& features, map::MapDraft& draft) {
+                       const LandmarkFusionOptions& options, const feature::FeatureModel& features,
+                       map::MapDraft& draft) {
   const SE3 T_rig_world = draft.map().keyframe(target).T_rig_world;
   return fuse_into(target, T_rig_world, landmarks, keep, options, features, draft);
 }
 
 FusionReport fuse_into(KeyframeId target, const SE3& T_rig_world, const std::vector<LandmarkId>& landmarks, Keep keep,
-                       const LandmarkFusionOptions& options, const map::FeatureModel& features, map::MapDraft& draft) {
+                       const LandmarkFusionOptions& options, const feature::FeatureModel& features,
+                       map::MapDraft& draft) {
   FusionReport report;
   const auto frame = draft.map().keyframe(target).frame;  // kept: edits may copy the keyframe
   const camera::Rig rig = draft.map().rig_of(target);
   const std::vector<LandmarkId> absent = absent_from(draft.map(), target, landmarks);
-  std::vector<matching::SearchPoint> points = map::search_points(draft.map(), absent);
-  std::vector<feature::Descriptor> descriptors(points.size());  // likewise
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    descriptors[i] = *points[i].descriptor;
-    points[i].descriptor = &descriptors[i];
-  }
   const matching::ProjectionSearchOptions search{.radius = options.radius,
                                                  .max_hamming = options.max_hamming,
                                                  .ratio = 1.0,
-                                                 .scale_factor = features.scale_factor};
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
-    const auto found =
-        matching::search_by_projection(rig.camera(c), frame->cameras[c], T_cam_world, points, {}, search);
-    for (const matching::ProjectionMatch& m : found.matches) {
+                                                 .scale_factor = features.pyramid.scale_factor};
+  const std::vector<SE3> T_cam_world = matching::camera_poses(rig, T_rig_world);
+  const auto results =
+      matching::search_cameras(rig, *frame, T_cam_world, map::search_points(draft.map(), absent), {}, search);
+  for (std::size_t c = 0; c < results.size(); ++c) {
+    for (const matching::ProjectionMatch& m : results[c].matches) {
       const LandmarkId l = draft.map().resolve(absent[m.point]);
       if (!l.valid()) continue;
       const feature::Keypoints& keypoints = frame->cameras[c].keypoints;
-      if (!agrees(draft.map(), l, rig.camera(c), T_cam_world, keypoints, m.keypoint.index(), options, features))
+      if (!agrees(draft.map(), l, rig.camera(c), T_cam_world[c], keypoints, m.keypoint.index(), options, features))
         continue;
       join(l, target, frame->bundled.feature(CameraIndex(c), m.keypoint), keep, draft, report);
     }

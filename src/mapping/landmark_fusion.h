@@ -1,10 +1,11 @@
-// Landmarks looked for in one keyframe: what is found there becomes an observation, or one landmark with the one there.
+// Searches for landmarks in one keyframe. A match becomes an observation or, where the keypoint shows another landmark,
+// the two landmarks are merged.
 #pragma once
 
 #include <vector>
 
 #include "base/options.h"
-#include "map/feature_model.h"
+#include "feature/feature_model.h"
 #include "map/map_edit.h"
 
 namespace bslam::mapping {
@@ -33,17 +34,18 @@ struct FusionReport {
   }
 };
 
-// Which of two landmarks found to be one keeps its place.
+// Which of two merged landmarks keeps its position.
 enum class Keep { kMoreObserved, kSearched };
 
 // Looks for `landmarks` in every camera of `target` as if that were at `T_rig_world`. Those it observes already are
 // left out.
 FusionReport fuse_into(KeyframeId target, const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& landmarks,
-                       Keep keep, const LandmarkFusionOptions& options, const map::FeatureModel& features,
+                       Keep keep, const LandmarkFusionOptions& options, const feature::FeatureModel& features,
                        map::MapDraft& draft);
 // The same at its pose in the draft.
 FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
-                       const LandmarkFusionOptions& options, const map::FeatureModel& features, map::MapDraft& draft);
+                       const LandmarkFusionOptions& options, const feature::FeatureModel& features,
+                       map::MapDraft& draft);
 
 // The landmarks a keyframe observes, in order of id.
 std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId k);

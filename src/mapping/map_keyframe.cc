@@ -19,8 +19,7 @@ void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const Fe
     const adjustment::Selection selection = needs_whole_submap(draft.map(), keyframe, options.scale)
                                                 ? select_submap(draft.map(), keyframe)
                                                 : select_local(draft.map(), keyframe, options.window);
-    report.adjustment =
-        adjustment::adjust_map(selection, options.local, features.sigma_px, features.scale_factor, draft, stop);
+    report.adjustment = adjustment::adjust_map(selection, options.local, features, draft, stop);
     if (std::abs(report.scale.correction - 1.0) <= options.scale.converged_change || stop.stop_requested()) break;
   }
   const bool single_submap = draft.map().roots().size() == 1;  // the scale is a property of the whole map
@@ -43,8 +42,7 @@ MappingReport map_keyframe(KeyframeId keyframe, const MappingOptions& options, c
 
 adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features,
                                              map::MapDraft& draft, std::stop_token stop) {
-  return adjustment::adjust_map(select_all(draft.map()), options.global, features.sigma_px, features.scale_factor,
-                                draft, stop);
+  return adjustment::adjust_map(select_all(draft.map()), options.global, features, draft, stop);
 }
 
 }  // namespace bslam::mapping

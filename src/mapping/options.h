@@ -138,6 +138,6 @@ struct MappingOptions {
   }
 };
 
-using map::FeatureModel;
+using feature::FeatureModel;
 
 }  // namespace bslam::mapping

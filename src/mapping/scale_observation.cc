@@ -47,7 +47,7 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   const map::BundledMap& map = draft.map();
   if (map.scale() != map::Scale::kUnobservable) return report;
   const adjustment::Selection selection = select_observers(map, keyframe, options.keyframes);
-  const auto flat = adjustment::flatten(map, selection, features.sigma_px, features.scale_factor);
+  const auto flat = adjustment::flatten(map, selection, features);
   const auto found = solver::rig_scale(flat.problem);
   if (!found) return report;
   report.observed = true;

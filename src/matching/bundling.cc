@@ -71,10 +71,8 @@ bool align_edge(const camera::Rig& rig, std::span<const frame::CameraFrame> came
 std::vector<Edge> match_pair(const camera::Rig& rig, std::span<const frame::CameraFrame> cameras,
                              std::span<const image::Pyramid> pyramids, CameraPair pair, const BundlingOptions& options,
                              std::span<const AlignmentOptions> alignment) {
-  const EpipolarView a{
-      &rig.camera(pair.a), &cameras[pair.a.index()].keypoints, rig.rig_from_cam(pair.a.index()), {}, 0, 0};
-  const EpipolarView b{
-      &rig.camera(pair.b), &cameras[pair.b.index()].keypoints, rig.rig_from_cam(pair.b.index()), {}, 0, 0};
+  const EpipolarView a{&rig.camera(pair.a), &cameras[pair.a.index()].keypoints, rig.rig_from_cam(pair.a.index()), {}};
+  const EpipolarView b{&rig.camera(pair.b), &cameras[pair.b.index()].keypoints, rig.rig_from_cam(pair.b.index()), {}};
   const EpipolarOptions search{.min_depth_m = options.min_depth_m,
                                .sigmas = options.sigmas,
                                .max_hamming = options.max_hamming,

@@ -38,11 +38,6 @@ struct BundlingOptions {
   }
 };
 
-// Standard deviation of a detected, not aligned keypoint: `sigma_px` on its level, in level-0 pixels.
-struct DetectionNoise {
-  double sigma_px = 0.4;
-};
-
 // Matches the cameras of every overlapping pair, aligns the second keypoint of a match to the patch of the first,
 // merges pairs into features of several cameras (at most one keypoint per camera, else the weaker edge goes) and
 // triangulates them. Takes a frame as extracted and returns it with the keypoints of matched features at their aligned

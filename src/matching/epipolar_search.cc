@@ -30,8 +30,7 @@ struct BaselineFrame {
 };
 
 double sigma_px(const EpipolarView& view, std::size_t k) {
-  if (view.detector_sigma_px <= 0) return view.keypoints->sigma[k];
-  return view.detector_sigma_px * std::pow(view.scale_factor, view.keypoints->level[k]);
+  return view.features == nullptr ? view.keypoints->sigma[k] : view.features->sigma(view.keypoints->level[k]);
 }
 
 std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame) {

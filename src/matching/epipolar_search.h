@@ -7,6 +7,7 @@
 
 #include "base/id.h"
 #include "camera/camera.h"
+#include "feature/feature_model.h"
 #include "feature/keypoints.h"
 #include "geometry/se3.h"
 
@@ -18,8 +19,9 @@ struct EpipolarView {
   const feature::Keypoints* keypoints = nullptr;
   geometry::SE3 T_common_cam;
   std::span<const std::uint8_t> usable;  // per keypoint, 0 = leave out; empty = all
-  double detector_sigma_px = 0;  // on a keypoint's level; 0 = take each keypoint's own, which holds within a frame
-  double scale_factor = 1.2;     // of the pyramid
+  // Gives the keypoints' standard deviations where the views are of different frames. Null: each keypoint's own, which
+  // holds between cameras of one frame.
+  const feature::FeatureModel* features = nullptr;
 };
 
 struct EpipolarOptions {

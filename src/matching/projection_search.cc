@@ -73,7 +73,7 @@ Candidate best_candidate(const feature::Keypoints& keypoints, const feature::Des
 
 ProjectionSearchResult search_by_projection(const camera::Camera& camera, const frame::CameraFrame& frame,
                                             const geometry::SE3& T_cam_common, std::span<const SearchPoint> points,
-                                            std::span<const std::uint8_t> taken,
+                                            const SearchExclusions& exclusions,
                                             const ProjectionSearchOptions& options) {
   ProjectionSearchResult result;
   const feature::Keypoints& keypoints = frame.keypoints;
@@ -84,7 +84,7 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
   std::vector<std::pair<int, std::uint32_t>> owner(keypoints.size(), {kNone, 0});  // (hamming, position in matches)
   for (std::size_t i = 0; i < points.size(); ++i) {
     const SearchPoint& p = points[i];
-    if (p.skip) continue;
+    if (!exclusions.points.empty() && exclusions.points[i]) continue;
     const auto sight = sight_of(camera, T_cam_common, p, min_cosine);
     if (!sight) continue;
     result.visible.push_back(static_cast<std::uint32_t>(i));
@@ -94,7 +94,7 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
     frame.grid.near(keypoints, sight->pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
                     centre - options.level_slack, centre + options.level_slack, near);
     if (near.empty()) continue;
-    const Candidate c = best_candidate(keypoints, *p.descriptor, near, taken);
+    const Candidate c = best_candidate(keypoints, *p.descriptor, near, exclusions.keypoints);
     if (c.best > options.max_hamming) continue;
     if (c.best_level == c.second_level && c.best > options.ratio * c.second) continue;
     auto& [owned, position] = owner[c.keypoint];
@@ -109,12 +109,38 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
   return result;
 }
 
+std::vector<ProjectionSearchResult> search_cameras(const camera::Rig& rig, const frame::BundledFrame& frame,
+                                                   std::span<const geometry::SE3> T_cam_common,
+                                                   std::span<const SearchPoint> points,
+                                                   std::span<const SearchExclusions> exclusions,
+                                                   const ProjectionSearchOptions& options, ThreadPool* pool) {
+  const SearchExclusions nothing;
+  std::vector<ProjectionSearchResult> out(rig.size());
+  const auto search = [&](std::size_t c) {
+    if (frame.cameras[c].keypoints.empty()) return;
+    out[c] = search_by_projection(rig.camera(c), frame.cameras[c], T_cam_common[c], points,
+                                  exclusions.empty() ? nothing : exclusions[c], options);
+  };
+  if (pool != nullptr) {
+    pool->for_each(rig.size(), search);
+  } else {
+    for (std::size_t c = 0; c < rig.size(); ++c) search(c);
+  }
+  return out;
+}
+
+std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::SE3& T_rig_common) {
+  std::vector<geometry::SE3> out;
+  for (std::size_t c = 0; c < rig.size(); ++c) out.push_back(rig.cam_from_rig(c) * T_rig_common);
+  return out;
+}
+
 std::vector<std::uint32_t> visible_points(const camera::Camera& camera, const geometry::SE3& T_cam_common,
                                           std::span<const SearchPoint> points, double max_view_angle) {
   const double min_cosine = std::cos(max_view_angle);
   std::vector<std::uint32_t> out;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (points[i].skip || !sight_of(camera, T_cam_common, points[i], min_cosine)) continue;
+    if (!sight_of(camera, T_cam_common, points[i], min_cosine)) continue;
     out.push_back(static_cast<std::uint32_t>(i));
   }
   return out;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/id.h"
+#include "base/thread_pool.h"
 #include "camera/camera.h"
 #include "frame/bundled_frame.h"
 #include "geometry/se3.h"
@@ -21,7 +22,12 @@ struct SearchPoint {
   float min_distance = 0;       // metres: seen on the coarsest level
   float max_distance = 0;       // metres: seen on level 0
   const feature::Descriptor* descriptor = nullptr;
-  std::uint8_t skip = 0;  // not to be looked for in this camera
+};
+
+// What is left out of the search in one camera, as flags. Empty: nothing is.
+struct SearchExclusions {
+  std::vector<std::uint8_t> keypoints;
+  std::vector<std::uint8_t> points;
 };
 
 struct ProjectionSearchOptions {
@@ -44,11 +50,21 @@ struct ProjectionSearchResult {
   std::vector<std::uint32_t> visible;    // points that project into the image within distance and view angle
 };
 
-// `T_cam_common` maps points to the camera. Keypoints with taken[k] != 0 are left out (`taken` may be empty).
+// Looks for the points in one camera. `T_cam_common` maps points to the camera.
 ProjectionSearchResult search_by_projection(const camera::Camera& camera, const frame::CameraFrame& frame,
                                             const geometry::SE3& T_cam_common, std::span<const SearchPoint> points,
-                                            std::span<const std::uint8_t> taken,
-                                            const ProjectionSearchOptions& options);
+                                            const SearchExclusions& exclusions, const ProjectionSearchOptions& options);
+
+// Looks for the points in every camera of a frame that has keypoints; one result per camera. `T_cam_common` holds a
+// pose per camera, `exclusions` as well or nothing. Cameras are searched in parallel where a pool is given.
+std::vector<ProjectionSearchResult> search_cameras(const camera::Rig& rig, const frame::BundledFrame& frame,
+                                                   std::span<const geometry::SE3> T_cam_common,
+                                                   std::span<const SearchPoint> points,
+                                                   std::span<const SearchExclusions> exclusions,
+                                                   const ProjectionSearchOptions& options, ThreadPool* pool = nullptr);
+
+// Poses of the cameras of a rig at `T_rig_common`.
+std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::SE3& T_rig_common);
 
 // Of the points, those a camera should see, by the rules of ProjectionSearchResult::visible. `max_view_angle` in
 // radians.

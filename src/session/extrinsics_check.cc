@@ -8,8 +8,8 @@
 #include <set>
 
 #include "dataset/frame_reader.h"
+#include "feature/descriptor_matching.h"
 #include "feature/extractor.h"
-#include "feature/hamming.h"
 #include "frame/capture_times.h"
 #include "geometry/so3.h"
 #include "geometry/triangulation.h"
@@ -33,37 +33,12 @@ constexpr double kClearly = 1.3;      // factor between numbers of consistent ma
 constexpr double kNoBaseline = 1e-6;  // metres
 constexpr double kLeastParallax = 0.005;  // radians; for the estimation of another pose
 
-// For every descriptor of `a` the index of its best match in `b`, or -1.
-std::vector<int> best_matches(const feature::Detections& a, const feature::Detections& b) {
-  std::vector<int> best(a.size(), -1);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    int least = 257, second = 257;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const int distance = feature::hamming(a.descriptor[i], b.descriptor[j]);
-      if (distance < least) {
-        second = least, least = distance;
-        best[i] = static_cast<int>(j);
-      } else {
-        second = std::min(second, distance);
-      }
-    }
-    if (least > kMaxHamming || least > kRatio * second) best[i] = -1;
-  }
-  return best;
-}
-
-struct PixelPair {
-  Eigen::Vector2d a, b;
-};
-
 // Mutual best matches. No geometric constraint is used, since the geometry is what is tested.
 std::vector<PixelPair> match(const feature::Detections& a, const feature::Detections& b) {
-  const std::vector<int> forward = best_matches(a, b), backward = best_matches(b, a);
   std::vector<PixelPair> pairs;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (forward[i] < 0) continue;
-    const auto j = static_cast<std::size_t>(forward[i]);
-    if (backward[j] == static_cast<int>(i)) pairs.push_back({a.pixel[i].cast<double>(), b.pixel[j].cast<double>()});
+  for (const feature::DescriptorMatch& m : feature::mutual_matches(a.descriptor, b.descriptor, kFarthest, kRatio,
+                                                                   [](std::size_t, std::size_t) { return true; })) {
+    pairs.push_back({a.pixel[m.a.index()].cast<double>(), b.pixel[m.b.index()].cast<double>()});
   }
   return pairs;
 }

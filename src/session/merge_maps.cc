@@ -11,8 +11,8 @@ namespace bslam::session {
 
 Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedMap& b,
                                const place::VocabularyPtr& vocabulary, const system::Config& config) {
-  map::FeatureModel features = config.feature_model();
-  features.scale_factor = a.map.pyramid().scale_factor;
+  feature::FeatureModel features = config.feature_model();
+  features.pyramid = a.map.pyramid();
   for (const storage::SavedMap* saved : {&a, &b}) {
     if (saved->map.scale() != map::Scale::kMetric)
       return Error{saved->file, "scale", "a map without metric scale", "metric maps, since only these can be merged"};

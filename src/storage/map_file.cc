@@ -196,7 +196,7 @@ Result<SavedMap> read_map(const std::filesystem::path& file) {
   return map_from_bytes(*bytes, file.string());
 }
 
-Status fits(const SavedMap& saved, const camera::Rig& rig, const map::PyramidShape& pyramid,
+Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary) {
   if (saved.map.rig().size() != rig.size()) {
     return Error{saved.file, "rig", fmt::format("{} cameras", saved.map.rig().size()),
@@ -205,7 +205,7 @@ Status fits(const SavedMap& saved, const camera::Rig& rig, const map::PyramidSha
   for (std::size_t i = 0; i < rig.size(); ++i) {
     if (Status status = compare_camera(saved, rig, i); !status) return status;
   }
-  const map::PyramidShape& own = saved.map.pyramid();
+  const feature::PyramidShape& own = saved.map.pyramid();
   if (own.levels != pyramid.levels || own.scale_factor != pyramid.scale_factor) {
     return Error{saved.file, "pyramid", fmt::format("{} levels, factor {}", own.levels, own.scale_factor),
                  fmt::format("{} levels, factor {} as features.levels and features.scale_factor say", pyramid.levels,

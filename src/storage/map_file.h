@@ -40,7 +40,7 @@ Result<SavedMap> read_map(const std::filesystem::path& file);
 // Checks that a run with this rig, pyramid and vocabulary (null: none) can continue the map: equal number of cameras,
 // with equal models, resolutions, intrinsics, distortion and extrinsics up to 1e-9; equal vocabularies, if both have
 // one. The Error names the camera and the difference.
-Status fits(const SavedMap& saved, const camera::Rig& rig, const map::PyramidShape& pyramid,
+Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary);
 
 // Conversion to and from the content of a file. `file` is the name used in errors. The content is not trusted: counts

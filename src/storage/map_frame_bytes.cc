@@ -196,7 +196,7 @@ void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist
   put_bundled(frame.bundled, out);
 }
 
-frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map::PyramidShape& pyramid,
+frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                                bool with_words, std::size_t& words_end) {
   frame::BundledFrame frame;
   frame.id = FrameId(in.number<std::int32_t>());

@@ -35,7 +35,7 @@ void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& o
 std::optional<camera::Rig> take_rig(ByteReader& in);
 
 struct InfoSection {
-  map::PyramidShape pyramid;
+  feature::PyramidShape pyramid;
   map::Scale scale = map::Scale::kMetric;
   MapFileInfo info;
 };
@@ -48,7 +48,7 @@ void take_landmarks(ByteReader& in, map::BundledMap& map);
 
 // The BundledFrame of a keyframe; implemented in map_frame_bytes.cc.
 void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out);
-frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const map::PyramidShape& pyramid,
+frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                                bool with_words, std::size_t& words_end);
 
 // A transform as seven numbers, quaternion x y z w and translation. It is read back exactly.

@@ -38,7 +38,7 @@ struct Config {
   looping::LoopingOptions looping;
   calibration::RigRefinementOptions extrinsics;
 
-  mapping::FeatureModel feature_model() const { return {features.sigma_px, features.scale_factor}; }
+  feature::FeatureModel feature_model() const { return features.model(); }
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

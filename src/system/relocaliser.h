@@ -19,7 +19,7 @@ class PlaceRelocaliser : public tracking::Relocaliser {
  private:
   const std::unique_ptr<looping::PlaceRecogniser> recogniser_;
   const looping::VerificationOptions options_;
-  const map::FeatureModel features_;
+  const feature::FeatureModel features_;
   const std::uint64_t seed_;
 };
 

@@ -20,8 +20,7 @@ bool disowns_map(const tracking::TrackResult& result) {
 }
 
 map::BundledMap empty_map(const camera::Rig& rig, const Config& config) {
-  return map::BundledMap(std::make_shared<const camera::Rig>(rig),
-                         {config.features.scale_factor, config.features.levels});
+  return map::BundledMap(std::make_shared<const camera::Rig>(rig), config.feature_model().pyramid);
 }
 
 void add_pose(std::vector<PartTrajectory>& parts, KeyframeId root, TimeNs time_ns, const geometry::SE3& T_world_cam0) {
@@ -156,8 +155,7 @@ void System::check_extrinsics(map::MapDraft& draft, const std::stop_token& stop)
   const auto& options = config_.extrinsics;
   if ((!options.check && !options.refine) || stop.stop_requested()) return;
   const Stopwatch watch;
-  extrinsics_ =
-      calibration::refine_rig(draft.map(), options, config_.features.sigma_px, config_.features.scale_factor, stop);
+  extrinsics_ = calibration::refine_rig(draft.map(), options, config_.feature_model(), stop);
   if (options.refine && extrinsics_.done) {
     draft.set_rig(calibration::refined(draft.map().rig(), extrinsics_));
     mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);

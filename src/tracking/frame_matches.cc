@@ -15,42 +15,48 @@ std::size_t count(const FrameMatches& matches) {
   return n;
 }
 
+namespace {
+
+// What each camera is not searched for: the keypoints and landmarks of its matches. Landmarks are looked up quickly
+// where `landmarks` begins in order of id and they are in that part.
+std::vector<matching::SearchExclusions> matched_already(const frame::BundledFrame& frame,
+                                                        std::span<const LandmarkId> landmarks,
+                                                        const FrameMatches& known) {
+  const auto sorted_end = std::is_sorted_until(landmarks.begin(), landmarks.end());
+  std::vector<matching::SearchExclusions> out(known.size());
+  for (std::size_t c = 0; c < known.size(); ++c) {
+    out[c].keypoints.resize(frame.cameras[c].keypoints.size());
+    out[c].points.resize(landmarks.size());
+    for (const Match& m : known[c]) {
+      out[c].keypoints[m.keypoint.index()] = 1;
+      auto at = std::lower_bound(landmarks.begin(), sorted_end, m.landmark);
+      if (at == sorted_end || *at != m.landmark) at = std::find(sorted_end, landmarks.end(), m.landmark);
+      if (at != landmarks.end()) out[c].points[static_cast<std::size_t>(at - landmarks.begin())] = 1;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
 MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
                            std::span<const LandmarkId> landmarks, const FrameMatches& known,
                            const matching::ProjectionSearchOptions& options, ThreadPool& pool) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  const std::vector<matching::SearchPoint> points = map::search_points(map, landmarks);
-  std::vector<std::uint32_t> place_of(map.landmark_slots(), 0);  // position in `points` + 1
-  for (std::size_t i = 0; i < landmarks.size(); ++i) place_of[landmarks[i].index()] = static_cast<std::uint32_t>(i + 1);
-
+  const auto results =
+      matching::search_cameras(rig, frame, matching::camera_poses(rig, T_rig_world), map::search_points(map, landmarks),
+                               matched_already(frame, landmarks, known), options, &pool);
   MatchSearch out;
-  out.found.resize(rig.size());
-  std::vector<std::vector<std::uint32_t>> visible(rig.size());
-  pool.for_each(rig.size(), [&](std::size_t c) {
-    const frame::CameraFrame& camera_frame = frame.cameras[c];
-    if (camera_frame.keypoints.empty()) return;
-    std::vector<matching::SearchPoint> own = points;
-    std::vector<std::uint8_t> taken(camera_frame.keypoints.size(), 0);
-    if (!known.empty()) {
-      for (const Match& m : known[c]) {
-        taken[m.keypoint.index()] = 1;
-        if (const std::uint32_t place = place_of[m.landmark.index()]) own[place - 1].skip = 1;
-      }
-    }
-    auto result = matching::search_by_projection(rig.camera(c), camera_frame, rig.cam_from_rig(c) * T_rig_world, own,
-                                                 taken, options);
-    visible[c] = std::move(result.visible);
-    for (const matching::ProjectionMatch& m : result.matches) out.found[c].push_back({m.keypoint, landmarks[m.point]});
-    std::sort(out.found[c].begin(), out.found[c].end(),
-              [](const Match& a, const Match& b) { return a.keypoint < b.keypoint; });
-  });
-  std::vector<std::uint8_t> seen(landmarks.size(), 0);
-  for (const auto& list : visible) {
-    out.visible_by_camera.push_back(static_cast<int>(list.size()));
-    for (const std::uint32_t i : list) seen[i] = 1;
+  std::vector<std::uint8_t> visible(landmarks.size(), 0);
+  for (const matching::ProjectionSearchResult& result : results) {
+    std::vector<Match>& found = out.found.emplace_back();
+    for (const matching::ProjectionMatch& m : result.matches) found.push_back({m.keypoint, landmarks[m.point]});
+    std::sort(found.begin(), found.end(), [](const Match& a, const Match& b) { return a.keypoint < b.keypoint; });
+    out.visible_by_camera.push_back(static_cast<int>(result.visible.size()));
+    for (const std::uint32_t i : result.visible) visible[i] = 1;
   }
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (seen[i]) out.visible.push_back(landmarks[i]);
+  for (std::size_t i = 0; i < visible.size(); ++i) {
+    if (visible[i]) out.visible.push_back(landmarks[i]);
   }
   return out;
 }
@@ -79,7 +85,8 @@ std::optional<matching::AlignedKeypoint> align_to_reference(const map::BundledMa
   const SE3 T_ref_world = map.cam_from_world(reference.keyframe, reference.keypoint.camera);
   // Smaller pictures have fewer levels than those of the reference may have had.
   const std::size_t level = keypoints.level[k];
-  const double scale = level < pyramid.size() ? pyramid.scale_x[level] : std::pow(map.pyramid().scale_factor, level);
+  const double scale =
+      level < pyramid.size() ? pyramid.scale_x[level] : map.pyramid().scale(static_cast<double>(level));
   const auto warp = matching::patch_warp(rig.camera(reference.keypoint.camera), camera,
                                          T_cam_world * T_ref_world.inverse(), T_ref_world * landmark.position, scale);
   if (!warp) return std::nullopt;
@@ -91,7 +98,7 @@ std::optional<matching::AlignedKeypoint> align_to_reference(const map::BundledMa
 AlignedMatches align_matches(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
                              FrameMatches& matches, std::span<const image::Pyramid> pyramids,
                              std::span<const matching::AlignmentOptions> alignment,
-                             const matching::DetectionNoise& noise, ThreadPool& pool) {
+                             const feature::FeatureModel& features, ThreadPool& pool) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   AlignedMatches out(matches.size());
   pool.for_each(matches.size(), [&](std::size_t c) {
@@ -107,7 +114,7 @@ AlignedMatches align_matches(const map::BundledMap& map, const frame::BundledFra
       if (bearing) {
         out[c].push_back({aligned->pixel.cast<float>(), *bearing, static_cast<float>(aligned->sigma)});
       } else {
-        const double sigma = noise.sigma_px * pyramids[c].scale_x[keypoints.level[k]];
+        const double sigma = features.sigma_px * pyramids[c].scale_x[keypoints.level[k]];
         out[c].push_back({keypoints.pixel[k], keypoints.bearing[k], static_cast<float>(sigma)});
       }
     }
@@ -151,14 +158,14 @@ std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& ma
 
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                        const FrameMatches& matches,
-                                                       const matching::DetectionNoise& noise) {
+                                                       const feature::FeatureModel& features) {
   std::vector<solver::PoseObservation> out;
   out.reserve(count(matches));
   for (std::size_t c = 0; c < matches.size(); ++c) {
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     for (const Match& m : matches[c]) {
       const std::size_t k = m.keypoint.index();
-      const double sigma = noise.sigma_px * std::pow(map.pyramid().scale_factor, keypoints.level[k]);
+      const double sigma = features.sigma(keypoints.level[k]);
       out.push_back({CameraIndex(c), map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>(), sigma});
     }
   }

@@ -61,7 +61,7 @@ AlignedMatches align_matches(const map::BundledMap& map, const frame::BundledFra
                              const geometry::SE3& T_rig_world, FrameMatches& matches,
                              std::span<const image::Pyramid> pyramids,
                              std::span<const matching::AlignmentOptions> alignment,
-                             const matching::DetectionNoise& noise, ThreadPool& pool);
+                             const feature::FeatureModel& features, ThreadPool& pool);
 
 // `frame` with the matched keypoints at their aligned positions where inlier[i] != 0, counted over all cameras.
 frame::BundledFrame refined(const frame::BundledFrame& frame, const FrameMatches& matches,
@@ -75,7 +75,7 @@ std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& ma
 // the detector does.
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                        const FrameMatches& matches,
-                                                       const matching::DetectionNoise& noise);
+                                                       const feature::FeatureModel& features);
 
 // The matches whose observation is an inlier.
 FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier);

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "base/median.h"
-#include "feature/hamming.h"
+#include "feature/descriptor_matching.h"
 #include "solver/generalised_scale.h"
 
 namespace bslam::tracking {
@@ -19,49 +19,24 @@ constexpr double kRatio = 0.8;
 constexpr double kWindow = 0.25;  // radians a bearing may move between the two frames
 constexpr int kMinInliers = 50;
 
-struct KeypointPair {
-  KeypointIndex a, b;
-};
-
-// Best match of keypoint `i` of a among those of b in the window; false where it is not clear.
-bool best_in_window(const feature::Keypoints& a, std::size_t i, const feature::Keypoints& b, std::size_t& match) {
+// Matches of one camera between two frames.
+std::vector<feature::DescriptorMatch> match_frames(const feature::Keypoints& a, const feature::Keypoints& b) {
   const double min_cosine = std::cos(kWindow);
-  int best = 257, second = 257;
-  for (std::size_t j = 0; j < b.size(); ++j) {
-    if (std::abs(a.level[i] - b.level[j]) > 1 || a.bearing[i].dot(b.bearing[j]) < min_cosine) continue;
-    const int distance = feature::hamming(a.descriptor[i], b.descriptor[j]);
-    if (distance < best) {
-      second = best;
-      best = distance;
-      match = j;
-    } else if (distance < second) {
-      second = distance;
-    }
-  }
-  return best <= kMaxHamming && best < kRatio * second;
-}
-
-// Mutual best matches of one camera between two frames.
-std::vector<KeypointPair> match_frames(const feature::Keypoints& a, const feature::Keypoints& b) {
-  std::vector<KeypointPair> pairs;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t j = 0, back = 0;
-    if (best_in_window(a, i, b, j) && best_in_window(b, j, a, back) && back == i) {
-      pairs.push_back({KeypointIndex(i), KeypointIndex(j)});
-    }
-  }
-  return pairs;
+  const auto in_window = [&](std::size_t i, std::size_t j) {
+    return std::abs(a.level[i] - b.level[j]) <= 1 && a.bearing[i].dot(b.bearing[j]) >= min_cosine;
+  };
+  return feature::mutual_matches(a.descriptor, b.descriptor, kMaxHamming, kRatio, in_window);
 }
 
 struct TwoView {
   std::size_t camera = 0;
-  std::vector<KeypointPair> pairs;
+  std::vector<feature::DescriptorMatch> pairs;
   solver::RelativePose pose;
 };
 
 // What every camera has matched.
 struct FramePairs {
-  std::vector<std::vector<KeypointPair>> keypoints;
+  std::vector<std::vector<feature::DescriptorMatch>> keypoints;
   std::vector<std::vector<solver::BearingPair>> bearings;
 };
 
@@ -71,7 +46,8 @@ FramePairs match_cameras(const BundledFrame& first, const BundledFrame& second) 
     const feature::Keypoints &a = first.cameras[c].keypoints, &b = second.cameras[c].keypoints;
     const auto& pairs = out.keypoints.emplace_back(match_frames(a, b));
     auto& bearings = out.bearings.emplace_back();
-    for (const KeypointPair& p : pairs) bearings.push_back({a.bearing[p.a.index()], b.bearing[p.b.index()]});
+    for (const feature::DescriptorMatch& p : pairs)
+      bearings.push_back({a.bearing[p.a.index()], b.bearing[p.b.index()]});
   }
   return out;
 }

@@ -1,4 +1,5 @@
-// Starting a map: at once from matched features with metric points, or up to scale from two frames of one camera.
+// Initialisation of a map: from one frame whose cameras overlap, in metres, or from two frames of one camera, up to
+// scale.
 #pragma once
 
 #include <memory>
@@ -9,7 +10,7 @@
 
 namespace bslam::tracking {
 
-// The frame a start up to scale compares later ones with, and what is needed of it to become a keyframe.
+// The reference frame of a monocular initialisation, with what is needed to make it a keyframe.
 struct StartCandidate {
   std::shared_ptr<const frame::BundledFrame> frame;
   std::vector<image::Pyramid> pyramids;
@@ -21,7 +22,7 @@ struct StartedMap {
   double scale_deviation = 0;  // relative; infinite where the length of the map's unit is not known, or a guess
 };
 
-// Writes the first keyframe, at the origin, where the frame has enough features of metric depth.
+// Writes the first keyframe, at the origin. Empty where the frame has too few matched features of sound metric depth.
 std::optional<StartedMap> start_metric(const frame::BundledFrame& frame, std::span<const image::Pyramid> pyramids,
                                        const InitialisationOptions& options, map::MapDraft& draft);
 

@@ -1,5 +1,5 @@
-// From a tracked frame to a keyframe: what tracking learnt about which keypoints belong together goes into the Bundled
-// table, and matched features with a sound metric point become landmarks at once.
+// Makes a keyframe of a tracked frame. Keypoints that tracking matched to one landmark become one feature of the
+// Bundled table, and matched features with an accurate metric point become landmarks at once.
 #pragma once
 
 #include <memory>

@@ -35,7 +35,7 @@ TrackResult result_at(const map::BundledMap& map, const frame::BundledFrame& fra
 }  // namespace
 
 std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early,
-                                        const matching::DetectionNoise& noise, const TrackingOptions& options,
+                                        const feature::FeatureModel& features, const TrackingOptions& options,
                                         ThreadPool& pool) {
   const KeyframeId before = map.surviving(early.before), after = map.surviving(early.after);
   if (!before.valid() || !after.valid()) return std::nullopt;
@@ -53,10 +53,10 @@ std::optional<TrackResult> pose_between(const map::BundledMap& map, const Betwee
                            {.radius = radius,
                             .max_hamming = options.matching.max_hamming,
                             .ratio = options.matching.ratio,
-                            .scale_factor = map.pyramid().scale_factor},
+                            .scale_factor = features.pyramid.scale_factor},
                            pool)
                 .found;
-    solution = solver::solve_pose(map.rig(), pose_observations(map, frame, found, noise), T, options.pose);
+    solution = solver::solve_pose(map.rig(), pose_observations(map, frame, found, features), T, options.pose);
     const auto needed = options.min_inlier_share * static_cast<double>(count(found));
     if (!solution.ok || solution.num_inliers < options.min_inliers || solution.num_inliers < needed)
       return std::nullopt;

@@ -1,5 +1,4 @@
-// Poses of frames that came before there was a map: between the two keyframes of a start up to scale, found in the map
-// as it became.
+// Poses of the frames between the two keyframes of a monocular initialisation, estimated once the map exists.
 #pragma once
 
 #include <optional>
@@ -16,7 +15,7 @@ struct BetweenKeyframes {
 
 // Empty where the map does not support a pose of the frame, or a keyframe's part is gone.
 std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early,
-                                        const matching::DetectionNoise& noise, const TrackingOptions& options,
+                                        const feature::FeatureModel& features, const TrackingOptions& options,
                                         ThreadPool& pool);
 
 }  // namespace bslam::tracking

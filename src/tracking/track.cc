@@ -76,7 +76,7 @@ matching::ProjectionSearchOptions search_options(const TrackInput& input, const 
   return {.radius = radius,
           .max_hamming = matching.max_hamming,
           .ratio = matching.ratio,
-          .scale_factor = input.scale_factor};
+          .scale_factor = input.features.pyramid.scale_factor};
 }
 
 // Motion while the cameras of a frame fire: that since the last frame, going on with the acceleration it had against
@@ -110,7 +110,7 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
                            .found;
   std::vector<std::uint8_t> left_out = out.left_out;
   drop(left_out, found);
-  auto observations = pose_observations(map, frame, found, input.noise);
+  auto observations = pose_observations(map, frame, found, input.features);
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
   const solver::MotionModel motion = motion_model(input, frame);
   auto solution = solver::solve_pose(map.rig(), observations, predicted, motion, options.pose);
@@ -121,7 +121,7 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
       const auto wrong = contradicting(found, steadiest.inliers_per_camera, input.state.cameras, options.consensus);
       for (std::size_t c = 0; c < wrong.size(); ++c) left_out[c] |= wrong[c];
       drop(left_out, found);
-      observations = pose_observations(map, frame, found, input.noise);
+      observations = pose_observations(map, frame, found, input.features);
       solution = solver::solve_pose(map.rig(), observations, steadiest.T_rig_world, motion, options.pose);
     }
   }
@@ -151,7 +151,7 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   MatchSearch search = find_landmarks(map, frame, out.T_rig_world, view.landmarks, {}, wide, pool);
   drop(out.left_out, search.found);
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return false;
-  const auto observations = pose_observations(map, frame, search.found, input.noise);
+  const auto observations = pose_observations(map, frame, search.found, input.features);
   const auto solution =
       solver::ransac_pose(frame::rig_of(map.rig(), frame), observations, out.T_rig_world, options.pose, {},
                           Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
@@ -220,7 +220,7 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   out.matches = merge(coarse.matches, search.found);
   out.visible = std::move(search.visible);
   out.aligned =
-      align_matches(map, frame, coarse.T_rig_world, out.matches, input.pyramids, input.alignment, input.noise, pool);
+      align_matches(map, frame, coarse.T_rig_world, out.matches, input.pyramids, input.alignment, input.features, pool);
   const solver::MotionModel motion = motion_model(input, frame);
   out.solution = solver::solve_pose(map.rig(), pose_observations(map, out.matches, out.aligned), coarse.T_rig_world,
                                     motion, options.pose);

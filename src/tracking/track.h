@@ -81,8 +81,7 @@ struct TrackInput {
   std::span<const image::Pyramid> pyramids;               // per camera
   std::span<const matching::AlignmentOptions> alignment;  // per camera
   const TrackerState& state;
-  matching::DetectionNoise noise;
-  double scale_factor = 1.2;  // of the pyramid
+  feature::FeatureModel features = {};
   std::uint64_t seed = 1;
 };
 

@@ -146,7 +146,7 @@ void Tracker::committed(const map::CommitReport& report, TrackOutcome& outcome) 
 }
 
 std::optional<TrackResult> Tracker::locate_early(const map::BundledMap& map, const BetweenKeyframes& early) const {
-  return pose_between(map, early, {options_.features.sigma_px}, options_.tracking, pool_);
+  return pose_between(map, early, options_.features.model(), options_.tracking, pool_);
 }
 
 TrackOutput Tracker::follow(const Input& input, const FrontEndState& state) const {
@@ -159,8 +159,7 @@ TrackOutput Tracker::follow(const Input& input, const FrontEndState& state) cons
                                .pyramids = input.pyramids,
                                .alignment = alignment,
                                .state = state.track,
-                               .noise = {options_.features.sigma_px},
-                               .scale_factor = options_.features.scale_factor,
+                               .features = options_.features.model(),
                                .seed = options_.seed};
   return tracking::track(track_input, input.frame, options_.tracking, pool_);
 }

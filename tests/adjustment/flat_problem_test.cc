@@ -29,7 +29,7 @@ std::vector<float> sigmas_of_one_landmark(map::BundledMap& map, const std::vecto
   const frame::KeypointRef keypoint = map.keyframe(r.keyframe).frame->bundled.keypoints(r.feature).front();
   const LandmarkId l = map.add_landmark({0, 0, 5}, observations, {r.keyframe, keypoint});
   const FlatProblem flat =
-      flatten(map, {.free_keyframes = map.keyframe_ids(), .fixed_keyframes = {}, .landmarks = {l}}, kDetected, 1.2);
+      flatten(map, {.free_keyframes = map.keyframe_ids(), .fixed_keyframes = {}, .landmarks = {l}}, {kDetected, {}});
   std::vector<float> out;
   for (const auto& o : flat.problem.observations) out.push_back(o.sigma);
   return out;

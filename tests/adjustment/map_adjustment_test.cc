@@ -9,14 +9,14 @@ namespace {
 
 using geometry::SE3;
 
-constexpr double kSigmaPx = 0.7, kScaleFactor = 1.2;
+constexpr feature::FeatureModel kFeatures{.sigma_px = 0.7, .pyramid = {}};
 
 // The images of cameras with an entry in `late_s` are captured that much later than the frame.
 map::SimulatedMap true_map(camera::Rig rig, int keyframes, std::vector<double> late_s = {}, bool knows_motion = false) {
   synthetic::FeatureSimulatorOptions options;
   options.landmarks = 2500;
   options.max_keypoints = 500;
-  options.sigma_px = kSigmaPx;
+  options.sigma_px = kFeatures.sigma_px;
   options.capture_offset_s = std::move(late_s);
   map::SimulatedMap out(synthetic::FeatureSimulator(std::move(rig), synthetic::make_orbit({}), options));
   out.knows_motion = knows_motion;
@@ -72,7 +72,7 @@ TEST(AdjustMap, BringsPerturbedPosesAndPointsNearTheTruth) {
     perturb(selection, start);
     map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
     const AdjustmentReport report =
-        adjust_map(selection, {.robust_iterations = 10, .final_iterations = 10}, kSigmaPx, kScaleFactor, draft);
+        adjust_map(selection, {.robust_iterations = 10, .final_iterations = 10}, kFeatures, draft);
     ASSERT_TRUE(report.done) << cameras << " cameras";
     EXPECT_LT(report.final_cost, report.initial_cost);
     EXPECT_LT(mean_pose_error_m(world, draft.map()), 0.4 * mean_pose_error_m(world, start)) << cameras << " cameras";
@@ -92,7 +92,7 @@ double error_of_a_rig_with_late_cameras(bool knows_motion) {
   map::BundledMap start = world.map;
   perturb(selection, start);
   map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
-  adjust_map(selection, {.robust_iterations = 10, .final_iterations = 10}, kSigmaPx, kScaleFactor, draft);
+  adjust_map(selection, {.robust_iterations = 10, .final_iterations = 10}, kFeatures, draft);
   return mean_pose_error_m(world, draft.map());
 }
 
@@ -113,7 +113,7 @@ TEST(AdjustMap, LeavesAloneWhatIsFixedOrNotSelected) {
   map::BundledMap start = world.map;
   perturb(selection, start);
   map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
-  ASSERT_TRUE(adjust_map(selection, {}, kSigmaPx, kScaleFactor, draft).done);
+  ASSERT_TRUE(adjust_map(selection, {}, kFeatures, draft).done);
   for (const int k : {0, 1, 4}) {
     const SE3 &before = start.keyframe(KeyframeId(k)).T_rig_world,
               &after = draft.map().keyframe(KeyframeId(k)).T_rig_world;
@@ -156,7 +156,7 @@ TEST(AdjustMap, RemovesPlantedOutliers) {
   }
   ASSERT_GT(planted.size(), 10u);
   map::MapDraft draft = world.draft();
-  const AdjustmentReport report = adjust_map(everything(world.map, 1), {}, kSigmaPx, kScaleFactor, draft);
+  const AdjustmentReport report = adjust_map(everything(world.map, 1), {}, kFeatures, draft);
   ASSERT_TRUE(report.done);
   EXPECT_GE(report.outliers, planted.size());
   std::size_t left = 0;
@@ -172,13 +172,13 @@ TEST(AdjustMap, DoesNothingWithoutAFixedOrAFreeKeyframe) {
   map::SimulatedMap world = true_map(synthetic::ring_rig(2), 3);
   for (const int fixed : {0, 3}) {
     map::MapDraft draft = world.draft();
-    EXPECT_FALSE(adjust_map(everything(world.map, fixed), {}, kSigmaPx, kScaleFactor, draft).done);
+    EXPECT_FALSE(adjust_map(everything(world.map, fixed), {}, kFeatures, draft).done);
     EXPECT_TRUE(std::move(draft).finish().edit.operations.empty());
   }
   Selection nothing = everything(world.map, 1);
   nothing.landmarks.clear();
   map::MapDraft draft = world.draft();
-  EXPECT_FALSE(adjust_map(nothing, {}, kSigmaPx, kScaleFactor, draft).done);
+  EXPECT_FALSE(adjust_map(nothing, {}, kFeatures, draft).done);
 }
 
 TEST(AdjustMap, AskedToStopItKeepsTheMapSound) {
@@ -186,7 +186,7 @@ TEST(AdjustMap, AskedToStopItKeepsTheMapSound) {
   std::stop_source stop;
   stop.request_stop();
   map::MapDraft draft = world.draft();
-  adjust_map(everything(world.map, 1), {}, kSigmaPx, kScaleFactor, draft, stop.get_token());
+  adjust_map(everything(world.map, 1), {}, kFeatures, draft, stop.get_token());
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
   EXPECT_LT(mean_pose_error_m(world, draft.map()), 0.02);
 }
@@ -195,8 +195,8 @@ TEST(AdjustMap, IsDeterministic) {
   map::SimulatedMap world = true_map(synthetic::ring_rig(3), 4);
   const Selection selection = everything(world.map, 1);
   map::MapDraft a = world.draft(), b = world.draft();
-  adjust_map(selection, {}, kSigmaPx, kScaleFactor, a);
-  adjust_map(selection, {}, kSigmaPx, kScaleFactor, b);
+  adjust_map(selection, {}, kFeatures, a);
+  adjust_map(selection, {}, kFeatures, b);
   for (const KeyframeId k : world.map.keyframe_ids()) {
     EXPECT_EQ(a.map().keyframe(k).T_rig_world.translation(), b.map().keyframe(k).T_rig_world.translation());
   }

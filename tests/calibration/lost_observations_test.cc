@@ -11,7 +11,7 @@
 namespace bslam::calibration {
 namespace {
 
-constexpr map::FeatureModel kFeatures{0.7, 1.2};
+constexpr feature::FeatureModel kFeatures{0.7, 1.2};
 
 map::SimulatedMap true_map() {
   synthetic::FeatureSimulatorOptions options;
@@ -27,7 +27,7 @@ adjustment::FlatProblem everything(const map::BundledMap& map) {
   adjustment::Selection selection;
   selection.free_keyframes = map.keyframe_ids();
   selection.landmarks = map.landmark_ids();
-  return adjustment::flatten(map, selection, kFeatures.sigma_px, kFeatures.scale_factor);
+  return adjustment::flatten(map, selection, kFeatures);
 }
 
 std::vector<geometry::SE3> extrinsics(const camera::Rig& rig) {

@@ -12,7 +12,8 @@ namespace {
 
 using geometry::SE3;
 
-constexpr double kSigmaPx = 0.7, kScaleFactor = 1.2, kDegree = std::numbers::pi / 180;
+constexpr feature::FeatureModel kFeatures{.sigma_px = 0.7, .pyramid = {}};
+constexpr double kDegree = std::numbers::pi / 180;
 
 // Adds an error of one degree and one centimetre to T_cam_rig of one camera.
 camera::Rig with_error(const camera::Rig& rig, std::size_t camera) {
@@ -31,7 +32,7 @@ map::SimulatedMap mapped(const camera::Rig& truth, const camera::Rig& calibrated
   synthetic::FeatureSimulatorOptions options;
   options.landmarks = 2500;
   options.max_keypoints = 250;
-  options.sigma_px = kSigmaPx;
+  options.sigma_px = kFeatures.sigma_px;
   map::SimulatedMap out(synthetic::FeatureSimulator(truth, synthetic::make_orbit({.duration_s = 60}), options));
   out.map = map::BundledMap(std::make_shared<const camera::Rig>(calibrated));
   for (int i = 0; i < keyframes; ++i) out.add_keyframe(FrameId(i), step_s * i);
@@ -40,7 +41,7 @@ map::SimulatedMap mapped(const camera::Rig& truth, const camera::Rig& calibrated
     (k.value() == 0 ? all.fixed_keyframes : all.free_keyframes).push_back(k);
   all.landmarks = out.map.landmark_ids();
   map::MapDraft draft = out.draft();
-  EXPECT_TRUE(adjustment::adjust_map(all, {}, kSigmaPx, kScaleFactor, draft).done);
+  EXPECT_TRUE(adjustment::adjust_map(all, {}, kFeatures, draft).done);
   out.map = draft.map();
   return out;
 }
@@ -56,7 +57,7 @@ TEST(RefineRig, RecoversTheCameraThatWasWrongFromTheStart) {
   for (std::size_t c = 0; c < 3; ++c) ASSERT_FALSE(truth.overlap(c, 3) && truth.overlap_share(c, 3) > 0.2);
   for (const std::size_t wrong : {1u, 3u}) {
     const map::SimulatedMap world = mapped(truth, with_error(truth, wrong), 30, 0.3);
-    const RigRefinement result = refine_rig(world.map, {}, kSigmaPx, kScaleFactor);
+    const RigRefinement result = refine_rig(world.map, {}, kFeatures);
     ASSERT_TRUE(result.done);
     ASSERT_EQ(result.cameras.size(), truth.size());
     for (std::size_t c = 0; c < truth.size(); ++c) {
@@ -76,7 +77,7 @@ TEST(RefineRig, RecoversTheCameraThatWasWrongFromTheStart) {
 TEST(RefineRig, SuspectsNoneWhereTheCalibrationIsRight) {
   for (const int cameras : {2, 4}) {
     const camera::Rig truth = synthetic::ring_rig(cameras);
-    const RigRefinement result = refine_rig(mapped(truth, truth, 16, 0.5).map, {}, kSigmaPx, kScaleFactor);
+    const RigRefinement result = refine_rig(mapped(truth, truth, 16, 0.5).map, {}, kFeatures);
     ASSERT_TRUE(result.done);
     for (const CameraRefinement& camera : result.cameras) {
       EXPECT_FALSE(camera.suspect) << camera.change_deg << " deg, " << camera.change_mm << " mm";
@@ -91,7 +92,7 @@ TEST(RefineRig, SuspectsNoneWhereTheCalibrationIsRight) {
 TEST(RefineRig, KeepsToItsLimitsAndStillFindsTheError) {
   const camera::Rig truth = synthetic::default_rig();
   const map::SimulatedMap world = mapped(truth, with_error(truth, 2), 50, 0.3);
-  const RigRefinement result = refine_rig(world.map, {.keyframes = 30, .landmarks = 800}, kSigmaPx, kScaleFactor);
+  const RigRefinement result = refine_rig(world.map, {.keyframes = 30, .landmarks = 800}, kFeatures);
   ASSERT_TRUE(result.done);
   EXPECT_EQ(result.keyframes, 30u);
   EXPECT_LE(result.landmarks, 800u);
@@ -107,7 +108,7 @@ TEST(RefineRig, HoldingSeveralKeyframesTellsNoLength) {
   const camera::Rig stereo = synthetic::ring_rig(2);
   const map::SimulatedMap world = mapped(stereo, stereo, 36, 0.33);
   const RigRefinementOptions options{.keyframes = 20, .landmarks = 100};  // too few to connect all keyframes
-  const RigRefinement result = refine_rig(world.map, options, kSigmaPx, kScaleFactor);
+  const RigRefinement result = refine_rig(world.map, options, kFeatures);
   ASSERT_TRUE(result.done);
   EXPECT_EQ(result.keyframes, 20u);
   EXPECT_GT(result.cameras[1].std_mm, 0.95 * options.calibration_mm);
@@ -118,19 +119,18 @@ TEST(RefineRig, HoldingSeveralKeyframesTellsNoLength) {
 
 TEST(RefineRig, AnswersNothingWhereTheMapCannotTell) {
   const camera::Rig one = synthetic::ring_rig(1), two = synthetic::ring_rig(2);
-  EXPECT_FALSE(refine_rig(mapped(one, one, 4, 0.5).map, {}, kSigmaPx, kScaleFactor).done);
-  EXPECT_FALSE(refine_rig(map::BundledMap(std::make_shared<const camera::Rig>(two)), {}, kSigmaPx, kScaleFactor).done);
+  EXPECT_FALSE(refine_rig(mapped(one, one, 4, 0.5).map, {}, kFeatures).done);
+  EXPECT_FALSE(refine_rig(map::BundledMap(std::make_shared<const camera::Rig>(two)), {}, kFeatures).done);
   map::SimulatedMap world = mapped(two, two, 4, 0.5);
-  EXPECT_TRUE(refine_rig(world.map, {}, kSigmaPx, kScaleFactor).done);
+  EXPECT_TRUE(refine_rig(world.map, {}, kFeatures).done);
   world.map.set_scale(map::Scale::kUpToScale);
-  EXPECT_FALSE(refine_rig(world.map, {}, kSigmaPx, kScaleFactor).done);
+  EXPECT_FALSE(refine_rig(world.map, {}, kFeatures).done);
 }
 
 TEST(RefineRig, IsDeterministic) {
   const camera::Rig truth = synthetic::ring_rig(3);
   const map::SimulatedMap world = mapped(truth, with_error(truth, 1), 12, 0.5);
-  const RigRefinement a = refine_rig(world.map, {}, kSigmaPx, kScaleFactor),
-                      b = refine_rig(world.map, {}, kSigmaPx, kScaleFactor);
+  const RigRefinement a = refine_rig(world.map, {}, kFeatures), b = refine_rig(world.map, {}, kFeatures);
   ASSERT_TRUE(a.done);
   for (std::size_t c = 0; c < truth.size(); ++c) {
     EXPECT_EQ(a.cameras[c].T_cam_rig_after.matrix(), b.cameras[c].T_cam_rig_after.matrix());

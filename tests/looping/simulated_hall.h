@@ -41,7 +41,7 @@ inline synthetic::FeatureSimulatorOptions hall_options() {
   return options;
 }
 
-const inline map::FeatureModel kFeatures{.sigma_px = hall_options().sigma_px};
+const inline feature::FeatureModel kFeatures{.sigma_px = hall_options().sigma_px};
 
 constexpr double kRoundS = 48;  // duration of a lap of 44 m
 constexpr double kStepS = 1.0;  // between two keyframes

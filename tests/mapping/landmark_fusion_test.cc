@@ -9,7 +9,7 @@ namespace bslam::mapping {
 namespace {
 
 using map::SimulatedMap;
-const map::FeatureModel kFeatures{.sigma_px = synthetic::FeatureSimulatorOptions().sigma_px};
+const feature::FeatureModel kFeatures{.sigma_px = synthetic::FeatureSimulatorOptions().sigma_px, .pyramid = {}};
 constexpr KeyframeId kFirst(0), kSecond(1), kThird(2);
 
 synthetic::FeatureSimulator simulator(camera::Rig rig) {

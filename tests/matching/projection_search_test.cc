@@ -27,8 +27,8 @@ class SearchByProjection : public ::testing::Test {
       descriptors.push_back({random.next(), random.next(), random.next(), random.next()});
       const double max_distance = distance * std::pow(1.2, level);
       points.push_back({T_cam_common.inverse() * in_camera, T_cam_common.rotation().inverse() * in_camera.normalized(),
-                        static_cast<float>(max_distance / std::pow(1.2, 7)), static_cast<float>(max_distance), nullptr,
-                        0});
+                        static_cast<float>(max_distance / std::pow(1.2, 7)), static_cast<float>(max_distance),
+                        nullptr});
       const Eigen::Vector2d off = pixel + 2 * Eigen::Vector2d(random.normal(), random.normal());
       feature::Descriptor seen = descriptors.back();
       for (int b = 0; b < 15; ++b) seen[random.below(4)] ^= std::uint64_t{1} << random.below(64);
@@ -45,7 +45,7 @@ class SearchByProjection : public ::testing::Test {
     frame.grid = frame::FeatureGrid(frame.keypoints, camera.width, camera.height);
   }
   ProjectionSearchResult search(const ProjectionSearchOptions& options = {}) const {
-    return search_by_projection(camera, frame, T_cam_common, points, taken, options);
+    return search_by_projection(camera, frame, T_cam_common, points, exclusions, options);
   }
 
   camera::Camera camera{"pinhole", camera::Pinhole({400, 400, 319.5, 239.5}), 640, 480, 0, ""};
@@ -53,7 +53,7 @@ class SearchByProjection : public ::testing::Test {
   frame::CameraFrame frame;
   std::vector<SearchPoint> points;
   std::vector<feature::Descriptor> descriptors;
-  std::vector<std::uint8_t> taken;
+  SearchExclusions exclusions;
 };
 
 TEST_F(SearchByProjection, FindsTheRightKeypointsEachOnce) {
@@ -84,9 +84,10 @@ TEST_F(SearchByProjection, GivesAKeypointToThePointThatFitsBest) {
 }
 
 TEST_F(SearchByProjection, LeavesOutWhatIsSkippedOrTaken) {
-  for (std::size_t i = 0; i < 100; ++i) points[i].skip = 1;
-  taken.assign(kPoints, 0);
-  for (std::size_t i = 100; i < 200; ++i) taken[i] = 1;
+  exclusions.points.assign(kPoints, 0);
+  for (std::size_t i = 0; i < 100; ++i) exclusions.points[i] = 1;
+  exclusions.keypoints.assign(kPoints, 0);
+  for (std::size_t i = 100; i < 200; ++i) exclusions.keypoints[i] = 1;
   const ProjectionSearchResult result = search();
   EXPECT_EQ(result.visible.size(), kPoints - 100);  // a taken keypoint does not make its point invisible
   for (const ProjectionMatch& m : result.matches) EXPECT_GE(m.keypoint.index(), 200u);
@@ -131,6 +132,34 @@ TEST_F(SearchByProjection, IgnoresWhatIsBehindOrOutside) {
 TEST_F(SearchByProjection, FindsNothingInACameraWithoutImage) {
   frame = frame::CameraFrame();
   EXPECT_TRUE(search().matches.empty());
+}
+
+// Two cameras at one place see the same; the third has no image.
+TEST_F(SearchByProjection, OfAllCamerasIsThatOfEach) {
+  const camera::Rig rig({{camera, SE3()}, {camera, SE3()}, {camera, SE3()}});
+  frame::BundledFrame bundled;
+  bundled.cameras = {frame, frame, frame::CameraFrame()};
+  std::vector<SearchExclusions> of_each(3);
+  of_each[1].points.assign(kPoints, 0);
+  std::fill_n(of_each[1].points.begin(), 50, std::uint8_t{1});
+  const std::vector<SE3> poses = camera_poses(rig, T_cam_common);
+  ThreadPool pool(2);
+  for (ThreadPool* threads : {static_cast<ThreadPool*>(nullptr), &pool}) {
+    const auto results = search_cameras(rig, bundled, poses, points, of_each, {}, threads);
+    ASSERT_EQ(results.size(), 3u);
+    for (std::size_t c = 0; c < 2; ++c) {
+      exclusions = of_each[c];
+      const ProjectionSearchResult alone = search();
+      EXPECT_EQ(results[c].visible, alone.visible);
+      ASSERT_EQ(results[c].matches.size(), alone.matches.size());
+      for (std::size_t i = 0; i < alone.matches.size(); ++i) {
+        EXPECT_EQ(results[c].matches[i].point, alone.matches[i].point);
+        EXPECT_EQ(results[c].matches[i].keypoint, alone.matches[i].keypoint);
+      }
+    }
+    EXPECT_LT(results[1].matches.size(), results[0].matches.size());
+    EXPECT_TRUE(results[2].matches.empty() && results[2].visible.empty());
+  }
 }
 
 }  // namespace

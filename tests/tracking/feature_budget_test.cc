@@ -169,7 +169,7 @@ class TrackedFrame : public ::testing::Test {
                            .pyramids = pyramids,
                            .alignment = alignment,
                            .state = tracker.state,
-                           .noise = {world.sim.options().sigma_px}};
+                           .features = {world.sim.options().sigma_px}};
     ThreadPool pool(2);
     output = track(input, frame, tracker.options, pool);
     frame = output.frame;

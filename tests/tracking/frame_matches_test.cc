@@ -77,7 +77,7 @@ TEST_F(FindLandmarks, WhatDoesNotAlignKeepsItsPlaceWithTheDetectorsNoise) {
   const feature::Keypoints& keypoints = seen.frame.cameras[0].keypoints;
   const AlignedMatches aligned =
       align_matches(world.map, seen.frame, seen.T_world_rig.inverse(), search.found, map::flat_pyramids(4),
-                    std::vector<matching::AlignmentOptions>(4), {.sigma_px = 0.9}, pool);
+                    std::vector<matching::AlignmentOptions>(4), {.sigma_px = 0.9, .pyramid = {}}, pool);
   ASSERT_EQ(aligned[0].size(), search.found[0].size());
   for (std::size_t i = 0; i < aligned[0].size(); ++i) {
     const std::size_t k = search.found[0][i].keypoint.index();

@@ -58,7 +58,7 @@ class SimulatedTracker {
                            .pyramids = pyramids_,
                            .alignment = alignment_,
                            .state = state,
-                           .noise = {world_.sim.options().sigma_px}};
+                           .features = {world_.sim.options().sigma_px}};
     TrackOutput out = tracking::track(input, frame, options, pool_);
     state = out.state;
     return out;

@@ -304,8 +304,7 @@ TEST_F(Track, IsTheSameWithAnyNumberOfThreads) {
     frame::BundledFrame frame = seen(2).frame;
     const TrackerState state = state_at_first(world());
     poses.push_back(
-        track({.map = world().map, .pyramids = pyramids, .alignment = alignment, .state = state, .noise = {}}, frame,
-              {}, pool)
+        track({.map = world().map, .pyramids = pyramids, .alignment = alignment, .state = state}, frame, {}, pool)
             .result.T_rig_world);
   }
   for (const SE3& T : poses) {
