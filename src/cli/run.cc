@@ -144,7 +144,7 @@ void print_before(const dataset::Dataset& dataset, LogVerbosity verbosity) {
   print_rig_warnings(dataset.rig);
 }
 
-void print_after(const report::RunRecord& record, const dataset::Dataset& dataset, const RunArguments& arguments) {
+void print_after(const session::RunRecord& record, const dataset::Dataset& dataset, const RunArguments& arguments) {
   const LogVerbosity verbosity = log_verbosity(arguments.log_level);
   if (verbosity >= LogVerbosity::kDebug) print_frames(record);
   if (verbosity >= LogVerbosity::kInfo) print_stage_statistics(record);

@@ -6,18 +6,18 @@
 #include <cstdio>
 #include <vector>
 
-#include "report/summary.h"
+#include "session/summary.h"
 
 namespace bslam::cli {
 namespace {
 
-std::string outcome_text(const report::FrameRecord& frame) {
-  switch (frame.outcome) {
-    case report::FrameOutcome::kTracked:
-      return frame.keyframe ? "tracked, keyframe" : "tracked";
-    case report::FrameOutcome::kLost:
-      return "lost (" + frame.lost_reason + ")";
-    case report::FrameOutcome::kDropped:
+std::string outcome_text(const session::RunFrame& frame) {
+  switch (frame.outcome()) {
+    case session::FrameOutcome::kTracked:
+      return frame.record->keyframe ? "tracked, keyframe" : "tracked";
+    case session::FrameOutcome::kLost:
+      return fmt::format("lost ({})", tracking::describe(frame.record->final_result().reason));
+    case session::FrameOutcome::kDropped:
       break;
   }
   return "dropped";
@@ -31,24 +31,28 @@ LogVerbosity log_verbosity(const std::string& name) {
   return name == "debug" ? LogVerbosity::kDebug : LogVerbosity::kWarning;
 }
 
-void print_stage_statistics(const report::RunRecord& record) {
-  for (const report::StageSeries& stage : record.stages) {
+void print_stage_statistics(const session::RunRecord& record) {
+  for (const session::StageSeries& stage : record.stages) {
     std::vector<double> durations_ms;
-    for (const report::StageSample& sample : stage.samples) durations_ms.push_back(sample.ms);
-    const report::DurationStatistics s = report::duration_statistics(std::move(durations_ms));
+    for (const session::StageSample& sample : stage.samples) durations_ms.push_back(sample.ms);
+    const session::DurationStatistics s = session::duration_statistics(std::move(durations_ms));
     if (s.count == 0) continue;
     fmt::print(stderr, "info: stage {}: {} calls, median {:.2f} ms, 95 % {:.2f} ms, maximum {:.2f} ms\n", stage.name,
                s.count, s.median, s.p95, s.max);
   }
 }
 
-void print_frames(const report::RunRecord& record) {
+void print_frames(const session::RunRecord& record) {
   for (std::size_t i = 0; i < record.frames.size(); ++i) {
-    const report::FrameRecord& frame = record.frames[i];
+    const session::RunFrame& frame = record.frames[i];
     int inliers = 0;
-    for (const report::CameraCounts& camera : frame.cameras) inliers += camera.inliers;
+    double frame_ms = 0;
+    if (frame.record) {
+      for (const tracking::CameraCounts& camera : frame.record->final_result().cameras) inliers += camera.inliers;
+      frame_ms = frame.record->frame_ms;
+    }
     fmt::print(stderr, "debug: frame {} at {:.3f} s: {}, {} inliers, {:.2f} ms\n", i, frame.time_s, outcome_text(frame),
-               inliers, frame.frame_ms);
+               inliers, frame_ms);
   }
 }
 

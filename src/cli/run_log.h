@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "report/run_record.h"
+#include "session/run_record.h"
 
 namespace bslam::cli {
 
@@ -19,9 +19,9 @@ enum class LogVerbosity {
 LogVerbosity log_verbosity(const std::string& name);
 
 // On stderr: one line per stage with the number of calls and the median, 95 % and largest time per call.
-void print_stage_statistics(const report::RunRecord& record);
+void print_stage_statistics(const session::RunRecord& record);
 
 // On stderr: one line per frame with its outcome, its inliers and its processing time.
-void print_frames(const report::RunRecord& record);
+void print_frames(const session::RunRecord& record);
 
 }  // namespace bslam::cli

@@ -24,7 +24,9 @@ struct Axis {
   int index = 0;
   double sign = 1.0;
   double of(const Eigen::Vector3d& p) const { return sign * p[index]; }
-  std::string name() const { return (sign < 0 ? "-" : "") + std::string(kAxisNames[static_cast<std::size_t>(index)]); }
+  std::string name() const {
+    return fmt::format("{}{}", sign < 0 ? "-" : "", kAxisNames[static_cast<std::size_t>(index)]);
+  }
 };
 
 // The axes of the two views.

@@ -33,10 +33,14 @@ constexpr double kClearly = 1.3;      // factor between numbers of consistent ma
 constexpr double kNoBaseline = 1e-6;  // metres
 constexpr double kLeastParallax = 0.005;  // radians; for the estimation of another pose
 
+struct PixelPair {
+  Eigen::Vector2d a, b;
+};
+
 // Mutual best matches. No geometric constraint is used, since the geometry is what is tested.
 std::vector<PixelPair> match(const feature::Detections& a, const feature::Detections& b) {
   std::vector<PixelPair> pairs;
-  for (const feature::DescriptorMatch& m : feature::mutual_matches(a.descriptor, b.descriptor, kFarthest, kRatio,
+  for (const feature::DescriptorMatch& m : feature::mutual_matches(a.descriptor, b.descriptor, kMaxHamming, kRatio,
                                                                    [](std::size_t, std::size_t) { return true; })) {
     pairs.push_back({a.pixel[m.a.index()].cast<double>(), b.pixel[m.b.index()].cast<double>()});
   }

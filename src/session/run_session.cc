@@ -142,7 +142,7 @@ Files output_files(const SessionResult& result, const system::Config& config) {
   system::Config copy = config;
   const OptionTable table(copy);
   Files files;
-  files.emplace_back("summary.json", report::summary_text(result.record));
+  files.emplace_back("summary.json", summary_text(result.record));
   add_trajectories(result.trajectories, "trajectory", evaluation::PoseState::kFinal, files);
   add_trajectories(result.live, "trajectory_live", evaluation::PoseState::kLive, files);
   files.emplace_back("config.yaml", yaml::config_to_yaml(table));
