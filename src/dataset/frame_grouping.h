@@ -1,4 +1,4 @@
-// Which images of different cameras make one frame.
+// Which images of a recording make one frame.
 #pragma once
 
 #include <span>
@@ -15,12 +15,8 @@ struct FrameGrouping {
   std::vector<int> unassigned;           // per camera: images in no frame
 };
 
-// Frames are the instants of camera 0. An image of another camera joins the nearest of them within `tolerance_ns`; of
-// two images of one camera the nearer stays. Where camera 0 has a gap, the others make frames of their own: an image
-// more than 3/4 of camera 0's median interval away from any of its images, with those of other cameras within the
-// tolerance after it. Images that lie near an instant of camera 0 but not within the tolerance belong to no frame, so
-// that cameras which do not fire together never double the frame rate. `images[i]`: camera i's, strictly increasing in
-// time; camera 0 has at least one.
+// By the rule of image/frame_grouping.h; camera 0 has a gap where it misses more than 3/4 of its median interval.
+// `images[i]`: camera i's, strictly increasing in time; camera 0 has at least one.
 FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> images, TimeNs tolerance_ns);
 
 }  // namespace bslam::dataset

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/timestamp.h"
+#include "image_files/image_size.h"
 
 namespace bslam::image_files {
 
@@ -33,11 +34,7 @@ struct NumberedImage {
 // The PNG and JPEG files of a folder whose names are numbers, by number; none where there is no such folder.
 std::vector<NumberedImage> images_in(const std::filesystem::path& folder);
 
-struct ImageSize {
-  int width = 0, height = 0;
-};
-
-// Size of the first image that can be read, of the first few.
+// Size that the first image tells, of the first few that do.
 std::optional<ImageSize> first_image_size(const std::vector<NumberedImage>& images);
 
 }  // namespace bslam::image_files

@@ -7,7 +7,7 @@
 #include "base/atomic_file.h"
 #include "base/stopwatch.h"
 #include "evaluation/trajectory_file.h"
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 #include "report/run_plot.h"
 #include "report/summary.h"
 #include "report/trajectory_plot.h"
@@ -80,7 +80,7 @@ camera::Rig put_in(const camera::Rig& found, const dataset::Dataset& dataset) {
 
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options) {
   const Stopwatch start_up;
-  auto masks = image_files::read_masks(dataset.rig);
+  auto masks = image_decoding::read_masks(dataset.rig);
   if (!masks) return masks.error();
   system::System system(dataset.rig, options.config,
                         {std::move(*masks), options.vocabulary, options.map, options.replay});
