@@ -8,7 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "base/random.h"
-#include "dataset/data_on_disk.h"
+#include "support/data_on_disk.h"
 
 namespace bslam::image_decoding {
 namespace {
@@ -113,16 +113,16 @@ TEST(ImageFile, SurvivesDamagedBytes) {
 }
 
 TEST(ImageFile, ReadsFiles) {
-  const TemporaryFolder folder;
-  write_picture(folder.path() / "a.png", 20, 10);
+  const support::TemporaryFolder folder;
+  support::write_picture(folder.path() / "a.png", 20, 10);
   EXPECT_EQ(read_image(folder.path() / "a.png").value().width(), 20);
   EXPECT_FALSE(read_image(folder.path() / "b.png"));
   EXPECT_FALSE(read_image(folder.path()));
 }
 
 TEST(ImageFile, ReadsMasksOfTheCamerasSize) {
-  const TemporaryFolder folder;
-  write_picture(folder.path() / "mask.png", 20, 10);
+  const support::TemporaryFolder folder;
+  support::write_picture(folder.path() / "mask.png", 20, 10);
   camera::Camera camera{"c", camera::Pinhole({10, 10, 10, 5}), 20, 10, 0, ""};
   EXPECT_TRUE(read_mask(camera).value().empty());
   camera.mask_file = (folder.path() / "mask.png").string();
