@@ -31,6 +31,7 @@ function(bslam_install)
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/bslamConfigVersion.cmake COMPATIBILITY SameMinorVersion)
   install(FILES ${PROJECT_BINARY_DIR}/bslamConfig.cmake ${PROJECT_BINARY_DIR}/bslamConfigVersion.cmake
           DESTINATION ${package})
+  file(RELATIVE_PATH BSLAM_PC_TO_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/bslam.pc.in ${PROJECT_BINARY_DIR}/bslam.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/bslam.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endfunction()

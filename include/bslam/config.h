@@ -33,13 +33,11 @@ class BSLAM_EXPORT Config {
  public:
   Config();
   Config(const Config& other);
-  Config(Config&& other) noexcept;
   Config& operator=(const Config& other);
-  Config& operator=(Config&& other) noexcept;
   ~Config();
 
-  // Errors, which leave the setting as it was: an unknown name (the nearest one is told), a value of another type or out
-  // of range.
+  // Errors, which leave the setting as it was: an unknown name (the nearest one is told), a value of another type or
+  // out of range.
   Status set(std::string_view name, std::string_view value);
   void set_mode(Mode mode);
   Status set_seed(int seed);  // of all randomness; not below 0

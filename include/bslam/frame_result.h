@@ -65,8 +65,8 @@ struct FrameResult {
   // tell another number for the same place after submaps were merged.
   Pose T_world_cam0, T_world_body;
   int submap = -1;  // of these poses: id of the submap's first keyframe
-  // The same pose's uncertainty, where it is known: of the small motion d with T_world_cam0(true) = T_world_cam0 exp(d),
-  // rotation first, in camera 0's axes. From image noise alone: drift of the map is not in it.
+  // The same pose's uncertainty, where it is known: of the small motion d with T_world_cam0(true) = T_world_cam0
+  // exp(d), rotation first, in camera 0's axes. From image noise alone: drift of the map is not in it.
   std::optional<Covariance6> covariance;
   std::optional<Velocity> velocity;  // of the body frame, in its own axes; empty where the motion is not known
 

@@ -51,8 +51,8 @@ class BSLAM_EXPORT MapView {
     std::size_t keyframes = 0;
   };
 
-  // A map of System::save_map or `bslam run --save-map`. Errors name file and section: not readable, no map, damaged, of
-  // another format version.
+  // A map of System::save_map or `bslam run --save-map`. Errors name file and section: not readable, no map, damaged,
+  // of another format version.
   static Result<MapView> load(const std::filesystem::path& file);
 
   int version() const;  // grows by one with every change of the map; 0 for a map that was loaded

@@ -54,10 +54,10 @@ struct SyncCounts {
 };
 
 // The rule is that of recorded data sets: bundles are the instants of camera 0, the nearest image of every other camera
-// within the tolerance belongs to it, and where camera 0 is silent the others make bundles of their own. A bundle is handed
-// out once no missing image can be expected for it: each camera has delivered a later image, is not due yet by its own
-// rate, is silent, or max_wait_s has passed. Time is that of the stamps, never of a clock, so the same sequence of pushes
-// gives the same bundles, as long as they are fetched in time.
+// within the tolerance belongs to it, and where camera 0 is silent the others make bundles of their own. A bundle is
+// handed out once no missing image can be expected for it: each camera has delivered a later image, is not due yet by
+// its own rate, is silent, or max_wait_s has passed. Time is that of the stamps, never of a clock, so the same sequence
+// of pushes gives the same bundles, as long as they are fetched in time.
 //
 // All functions may be called from any thread. Bundles come in order of time.
 class BSLAM_EXPORT Synchronizer {

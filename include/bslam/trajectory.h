@@ -22,8 +22,8 @@ using Trajectory = std::vector<TimedPose>;
 // Which of the rig's frames a pose is of: camera 0, or the frame its calibration gives the cameras in (often the IMU).
 enum class RigFrame { kCamera0, kBody };
 
-// Writes TUM's format: `t x y z qx qy qz qw` a line, seconds and metres with nine decimals, below a comment that names the
-// frame. The file appears whole or not at all. Error: it cannot be written.
+// Writes TUM's format: `t x y z qx qy qz qw` a line, seconds and metres with nine decimals, below a comment that names
+// the frame. The file appears whole or not at all. Error: it cannot be written.
 BSLAM_EXPORT Status write_tum(const std::filesystem::path& file, const Trajectory& trajectory, RigFrame frame);
 
 }  // namespace bslam

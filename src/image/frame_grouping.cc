@@ -22,7 +22,8 @@ class Grouper {
       : times_(times), tolerance_(tolerance_ns), gap_(gap_ns) {
     out_.shared_with_camera0.assign(times.size(), 0);
     out_.unassigned.assign(times.size(), 0);
-    for (std::size_t k = 0; k < times[0].size(); ++k) out_.frames.push_back(frame_of({0, static_cast<int>(k), times[0][k]}));
+    for (std::size_t k = 0; k < times[0].size(); ++k)
+      out_.frames.push_back(frame_of({0, static_cast<int>(k), times[0][k]}));
     out_.shared_with_camera0[0] = static_cast<int>(times[0].size());
   }
 

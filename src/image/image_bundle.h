@@ -17,13 +17,16 @@ enum class ImageState {
 
 struct CameraImage {
   ImageState state = ImageState::kMissing;
-  TimeNs time_ns = 0;  // its own capture time, offset applied; meaningful where the state is kPresent
-  Image image;         // empty unless kPresent
+  TimeNs time_ns = 0;       // its own capture time, offset applied; meaningful where the state is kPresent
+  Image image;              // pixels of our own; empty unless kPresent, and where they are borrowed
+  ImageView borrowed = {};  // pixels of the caller, who keeps them while the frame is processed; empty: see `image`
+
+  ImageView view() const { return borrowed.empty() ? image.view() : borrowed; }
 };
 
 struct ImageBundle {
-  FrameId id;           // input frames are numbered from 0 without gaps
-  TimeNs time_ns = 0;   // of the frame: camera 0's image, or the earliest of the others where that is missing
+  FrameId id;          // input frames are numbered from 0 without gaps
+  TimeNs time_ns = 0;  // of the frame: camera 0's image, or the earliest of the others where that is missing
   std::vector<CameraImage> images;  // one per camera of the rig
 };
 

@@ -29,8 +29,7 @@ frame::BundledFrame FrameBuilder::extract(const image::ImageBundle& images, Thre
     camera.time_ns = input.time_ns;
     if (camera.state == image::ImageState::kPresent) {
       const std::optional<int> budget = budgets.empty() ? std::nullopt : std::optional(budgets[i]);
-      extractors_[i].extract(input.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], camera.keypoints,
-                             budget);
+      extractors_[i].extract(input.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], camera.keypoints, budget);
     } else {
       pyramids_[i].levels.clear();
     }

@@ -43,6 +43,10 @@ Result<SavedMap> read_map(const std::filesystem::path& file);
 Status fits(const SavedMap& saved, const camera::Rig& rig, const map::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary);
 
+// The map of a file for a run that goes on in it: it fits, and has keyframes.
+Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
+                                 const map::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
+
 // The bytes of a file, and back; `file` is for errors. Nothing is trusted: counts are checked against the bytes that
 // are there before room is made for them.
 std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info);

@@ -41,9 +41,10 @@ System::System(camera::Rig rig, Config config, Resources resources)
       config_(std::move(config)),
       loaded_(resources.map.has_value()),
       first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0),
+      history_frames_(resources.history_frames),
       pipeline_(rig_, config_, std::move(resources.masks), recogniser(resources.vocabulary, config_)),
       store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)),
-      gate_(store_) {
+      gate_(store_, history_frames_ == 0) {
   const map::MapSnapshot map = store_.snapshot();
   for (const KeyframeId k : map->keyframe_ids()) set_keyframe_time(k, map->keyframe(k).frame->time_ns);
   const auto note_loop = [this](const LoopRecord& loop) {
@@ -80,6 +81,16 @@ void System::set_keyframe_time(KeyframeId k, TimeNs time_ns) {
   keyframe_time_ns_[k.index()] = time_ns;
 }
 
+// Many at a time, so that the rest is moved seldom.
+void System::forget_old_records() {
+  if (history_frames_ == 0 || frames_.size() < 2 * history_frames_) return;
+  frames_.erase(frames_.begin(), frames_.end() - static_cast<std::ptrdiff_t>(history_frames_));
+  std::erase_if(early_, [&](const auto& early) { return early.frame->id < frames_.front().result.frame; });
+  const std::lock_guard lock(records_mutex_);
+  if (stage_runs_.size() > 2 * history_frames_)
+    stage_runs_.erase(stage_runs_.begin(), stage_runs_.end() - static_cast<std::ptrdiff_t>(history_frames_));
+}
+
 const FrameRecord& System::process(const image::ImageBundle& images) {
   const bool had_pose = pipeline_.state().status != tracking::TrackStatus::kNotStarted;
   Pipeline::Outcome outcome = pipeline_.process(images, *executor_);
@@ -93,6 +104,7 @@ const FrameRecord& System::process(const image::ImageBundle& images) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
+  forget_old_records();
   frames_.push_back(std::move(outcome.record));
   const bool failed = had_pose && disowns_map(frames_.back().result);
   const map::BundledMap& seen = *outcome.seen;

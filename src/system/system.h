@@ -31,6 +31,8 @@ struct Resources {
   std::optional<map::BundledMap> map =
       {};  // of an earlier run with this rig; the run goes on in it once it finds its place
   std::optional<execution::Journal> replay = {};  // its run is repeated whatever the mode
+  // Frames whose records are kept, at least; with a limit no journal is kept. 0: all.
+  std::size_t history_frames = 0;
 };
 
 // Poses of one part of the map. Parts that no common place joined have worlds of their own.
@@ -81,12 +83,14 @@ class System {
   void give_up_young_map();
   void locate_early_frames();
   void check_extrinsics(map::MapDraft& draft, const std::stop_token& stop);
+  void forget_old_records();
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
 
   const camera::Rig rig_;
   const Config config_;
   const bool loaded_;                // a map of an earlier run
   const KeyframeId first_keyframe_;  // of this run
+  const std::size_t history_frames_;
   Pipeline pipeline_;
   std::vector<FrameRecord> frames_;
   std::vector<tracking::BetweenKeyframes> early_;  // frames of before a start, by number

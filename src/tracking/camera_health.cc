@@ -70,8 +70,7 @@ std::optional<bool> is_blurred(const image::ImageView& image, const HealthOption
   constexpr int kLines = 30, kMinEdges = 40;  // rows looked at, and columns as far apart
   const int step = std::max(1, image.height / kLines);
   Edges edges;
-  for (int y = 0; y < image.height; y += step)
-    count_edges(image.row(y), 1, image.width, options.sharp_slope, edges);
+  for (int y = 0; y < image.height; y += step) count_edges(image.row(y), 1, image.width, options.sharp_slope, edges);
   for (int x = 0; x < image.width; x += step)
     count_edges(image.row(0) + x, image.stride, image.height, options.sharp_slope, edges);
   if (edges.all < kMinEdges) return std::nullopt;

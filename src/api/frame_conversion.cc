@@ -1,0 +1,121 @@
+#include "api/frame_conversion.h"
+
+#include "api/conversions.h"
+
+namespace bslam::api {
+namespace {
+
+using geometry::SE3;
+
+constexpr int kFewKeypoints = 30;  // in an image: a camera that sees less hardly helps
+
+TrackingStatus to_status(tracking::TrackStatus status) {
+  switch (status) {
+    case tracking::TrackStatus::kNotStarted:
+      return TrackingStatus::kNotStarted;
+    case tracking::TrackStatus::kTracking:
+      return TrackingStatus::kTracking;
+    case tracking::TrackStatus::kLost:
+      return TrackingStatus::kLost;
+  }
+  return TrackingStatus::kLost;
+}
+
+LostReason to_reason(tracking::LostReason reason) {
+  switch (reason) {
+    case tracking::LostReason::kNone:
+      return LostReason::kNone;
+    case tracking::LostReason::kNotStarted:
+      return LostReason::kNotStarted;
+    case tracking::LostReason::kNoImages:
+      return LostReason::kNoImages;
+    case tracking::LostReason::kFewFeatures:
+      return LostReason::kFewFeatures;
+    case tracking::LostReason::kFewMatches:
+      return LostReason::kFewMatches;
+    case tracking::LostReason::kFewInliers:
+      return LostReason::kFewInliers;
+    case tracking::LostReason::kUnstablePose:
+      return LostReason::kUnstablePose;
+    case tracking::LostReason::kNotFound:
+      return LostReason::kNotFound;
+  }
+  return LostReason::kNone;
+}
+
+void set_state(const system::FrameRecord& record, std::size_t c, CameraResult& out) {
+  const tracking::Outage outage = record.outages[c];
+  const bool used = outage == tracking::Outage::kNone;
+  if (record.blurred[c] && (used || outage == tracking::Outage::kInconsistent)) {  // blur explains that it sees little
+    out.state = used ? CameraState::kDegraded : CameraState::kOut;
+    out.reason = "blurred";
+  } else if (!used) {
+    out.state = CameraState::kOut;
+    out.reason = tracking::describe(outage);
+  } else if (out.keypoints < kFewKeypoints && !record.waiting[c]) {
+    out.state = CameraState::kDegraded;
+    out.reason = "few-features";
+  }
+}
+
+std::vector<CameraResult> to_cameras(const system::FrameRecord& record) {
+  std::vector<CameraResult> out(record.images.size());
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    const tracking::CameraCounts& n = record.result.cameras[c];
+    out[c].keypoints = n.keypoints;
+    out[c].matched = n.matched;
+    out[c].inliers = n.inliers;
+    set_state(record, c, out[c]);
+  }
+  return out;
+}
+
+// From the smooth poses of two frames in a row; empty where the rig was lost between them or they are far apart.
+std::optional<geometry::Vector6d> twist_between(const system::FrameRecord& before, const system::FrameRecord& now) {
+  using tracking::TrackStatus;
+  const double interval_s = to_seconds(now.result.time_ns - before.result.time_ns);
+  if (before.result.status != TrackStatus::kTracking || now.result.status != TrackStatus::kTracking)
+    return std::nullopt;
+  if (now.relocalisation || before.root != now.root) return std::nullopt;
+  if (!(interval_s > 0 && interval_s <= tracking::kMaxPrediction_s)) return std::nullopt;
+  return (now.T_rig_odom * before.T_rig_odom.inverse()).log() / interval_s;
+}
+
+}  // namespace
+
+FrameResult to_frame_result(const system::FrameRecord& record, const system::FrameRecord* before,
+                            const camera::Rig& rig) {
+  const tracking::TrackResult& result = record.result;
+  const SE3& T_body_rig = rig.body_from_cam(0);
+  const SE3 T_rig_body = T_body_rig.inverse();
+  FrameResult out;
+  out.frame = result.frame.value();
+  out.time_ns = result.time_ns;
+  out.status =
+      result.reason == tracking::LostReason::kNotStarted ? TrackingStatus::kNotStarted : to_status(result.status);
+  out.reason = to_reason(result.reason);
+  if (out.tracking()) {
+    const SE3 T_world_rig = result.T_rig_world.inverse();
+    out.T_world_cam0 = to_pose(T_world_rig);
+    out.T_world_body = to_pose(T_world_rig * T_rig_body);
+    out.submap = record.root.value();
+  }
+  if (const auto twist = before ? twist_between(*before, record) : std::nullopt) {
+    out.velocity = to_velocity(*twist, T_body_rig);
+  }
+  const SE3 T_odom_rig = record.T_rig_odom.inverse();
+  out.T_odom_cam0 = to_pose(T_odom_rig);
+  out.T_odom_body = to_pose(T_odom_rig * T_rig_body);
+  out.T_map_odom = to_pose(record.T_map_odom);
+  out.cameras = to_cameras(record);
+  out.unique_features = record.unique;
+  out.matched_features = record.matched;
+  out.keyframe = record.keyframe;
+  out.keyframe_id = result.reference.value();
+  out.relocalised = record.relocalisation.has_value();
+  for (const system::StageTime& s : record.stages) out.stages.push_back({s.stage, s.ms});
+  out.total_ms = record.frame_ms;
+  return out;
+}
+
+}  // namespace bslam::api
