@@ -114,9 +114,12 @@ TEST(Synchronizer, HandsOutACompleteBundleAtOnce) {
 TEST(Synchronizer, GroupsShuffledImagesAsARecordingIsGrouped) {
   std::vector<Shot> shots = regular(4, 60);
   const Times expected = as_recorded(shots, 4);
+  constexpr std::size_t kBlock = 10;  // images: within 150 ms
   Random random(5);
-  for (std::size_t i = 0; i + 8 < shots.size(); ++i) std::swap(shots[i], shots[i + random.below(8)]);
-  Feed feed(4, {.max_wait_s = 1, .reorder_s = 0.5});
+  for (std::size_t block = 0; block < shots.size(); block += kBlock) {
+    for (std::uint32_t i = kBlock - 1; i > 0; --i) std::swap(shots[block + i], shots[block + random.below(i + 1)]);
+  }
+  Feed feed(4, {.max_wait_s = 1, .reorder_s = 0.2});
   feed.push(shots);
   EXPECT_EQ(feed.close(), expected);
   EXPECT_TRUE(feed.dropped.empty());
@@ -143,7 +146,7 @@ TEST(Synchronizer, DoesNotWaitForACameraThatDied) {
     }
     Feed feed(3);
     feed.push(shots);
-    EXPECT_EQ(feed.bundles.size(), dead == 0 ? 99u : 100u);  // without camera 0 the newest might still be joined
+    EXPECT_EQ(feed.bundles.size(), 100u);
     EXPECT_EQ(feed.close(), as_recorded(shots, 3));
     EXPECT_TRUE(feed.dropped.empty());
   }
@@ -177,7 +180,7 @@ TEST(Synchronizer, TellsWhatItDropsAndWhy) {
   feed.push(regular(2, 10));
   feed.push({{1, 450 * kMs}});  // once more
   feed.push({{0, 430 * kMs}});  // its time is over
-  feed.push({{0, 500 * kMs}, {1, 480 * kMs}, {1, 500 * kMs}});
+  feed.push({{0, 500 * kMs}, {1, 460 * kMs}, {1, 500 * kMs}});
   feed.push({{1, 9'000'000 * kMs}});  // a broken clock
   feed.push({{0, 550 * kMs}, {1, 550 * kMs}});
   EXPECT_EQ(feed.close().size(), 12u);

@@ -13,7 +13,7 @@ namespace {
 using support::TemporaryFolder;
 using testing::TexturedWall;
 
-constexpr int kFrames = 30;
+constexpr int kFrames = 60;
 
 Config sequential() {
   Config config;
@@ -52,8 +52,8 @@ TEST_F(PublicSystem, TellsPoseAndVelocityInTheDocumentedFrames) {
   EXPECT_EQ(last.frame, kFrames - 1);
   EXPECT_EQ(last.time_ns, TexturedWall::kStart + (kFrames - 1) * TexturedWall::kInterval);
   const double travelled = TexturedWall::kSpeed * 0.05 * (kFrames - 1);
-  EXPECT_NEAR(last.T_world_cam0.translation[0], travelled, 0.02);
-  EXPECT_NEAR(last.T_world_cam0.translation[1], 0, 0.02);
+  EXPECT_NEAR(last.T_world_cam0.translation[0], travelled, 0.05);
+  EXPECT_NEAR(last.T_world_cam0.translation[1], 0, 0.05);
   ASSERT_TRUE(last.velocity);
   EXPECT_NEAR(last.velocity->linear[0], 0, 0.1);
   EXPECT_NEAR(last.velocity->linear[1], -TexturedWall::kSpeed, 0.1);  // camera 0's right is the body's -y
