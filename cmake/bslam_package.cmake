@@ -17,7 +17,9 @@ function(bslam_shared_library)
   set_target_properties(bslam_library PROPERTIES OUTPUT_NAME bslam EXPORT_NAME bslam VERSION ${PROJECT_VERSION}
                                                  SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
                                                  LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR} LINKER_LANGUAGE CXX)
-  target_link_options(bslam_library PRIVATE LINKER:--no-undefined)
+  if(NOT BSLAM_SANITIZE AND NOT BSLAM_FUZZ)  # whose symbols come with the program
+    target_link_options(bslam_library PRIVATE LINKER:--no-undefined)
+  endif()
 endfunction()
 
 function(bslam_install)
