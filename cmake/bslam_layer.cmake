@@ -1,17 +1,20 @@
 # bslam_layer(NAME [USES layer...] [LINKS target...]): the static library of src/NAME, made of its .cc files.
-# Which layers a layer may use is checked against its includes by scripts/check_layers.
+# Which layers a layer may use is checked against its includes by scripts/check_layers. The flags of our code stay with the
+# layer. Its code can go into the shared library, which exports only what include/bslam marks.
 function(bslam_layer name)
   cmake_parse_arguments(ARG "" "" "USES;LINKS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cc)
   list(TRANSFORM ARG_USES PREPEND bslam_)
   if(sources)
     add_library(bslam_${name} STATIC ${sources})
-    target_link_libraries(bslam_${name} PUBLIC ${ARG_USES} ${ARG_LINKS} bslam_flags)
-    target_include_directories(bslam_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src)
+    target_link_libraries(bslam_${name} PUBLIC ${ARG_USES} ${ARG_LINKS} PRIVATE bslam_flags)
+    target_include_directories(bslam_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
+    set_target_properties(bslam_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
+                                                   VISIBILITY_INLINES_HIDDEN ON)
   else()  # headers only
     add_library(bslam_${name} INTERFACE)
     target_link_libraries(bslam_${name} INTERFACE ${ARG_USES} ${ARG_LINKS})
-    target_include_directories(bslam_${name} INTERFACE ${PROJECT_SOURCE_DIR}/src)
+    target_include_directories(bslam_${name} INTERFACE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
   endif()
 endfunction()
 

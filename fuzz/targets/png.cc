@@ -2,7 +2,7 @@
 // right.
 #include <libdeflate.h>
 
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 #include "image_files/png_decoder.h"
 #include "target.h"
 
@@ -60,7 +60,7 @@ std::string small_png(int width, int height, int channels) {
 }
 
 void check(std::string_view bytes) {
-  const auto image = image_files::decode_grey(bytes);
+  const auto image = image_decoding::decode_grey(bytes);
   if (!image) return;
   require(image->width() > 0 && image->height() > 0, "an image has pixels");
   unsigned sum = 0;  // reads them all

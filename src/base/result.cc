@@ -1,6 +1,14 @@
 #include "base/result.h"
 
+#include <cstdio>
+#include <cstdlib>
+
 namespace bslam {
+
+void bad_result_access(const char* message) {
+  std::fprintf(stderr, "bslam: assertion failed: %s\n", message);
+  std::abort();
+}
 
 std::string Error::message() const {
   std::string text;

@@ -1,73 +1,7 @@
 // Errors as values: everything a user or a file can cause is returned as an Error, which the command line prints as one
-// line.
+// line. The types are those of the public header.
 #pragma once
 
-#include <optional>
-#include <string>
-#include <utility>
-#include <variant>
+#include <bslam/result.h>
 
 #include "base/assert.h"
-
-namespace bslam {
-
-// One problem with the user's input: where it is, what was found there and what was expected.
-struct Error {
-  std::string file;           // file, folder or command-line option; may be empty
-  std::string key;            // key, line or part within the file; may be empty
-  std::string found;          // what the input holds
-  std::string expected;       // what would be accepted
-  std::string sentence = {};  // message in place of "found X, expected Y", where a sentence reads better; may be empty
-
-  // One line: "FILE: KEY: found X, expected Y", or "FILE: KEY: SENTENCE". Empty parts are left out, and so are file and
-  // key where the sentence names them itself. Control characters are replaced by spaces.
-  std::string message() const;
-};
-
-// A value or an Error. Accessing the alternative that is not held is an assertion failure.
-template <class T>
-class [[nodiscard]] Result {
- public:
-  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}      // NOLINT: implicit on purpose
-  Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}  // NOLINT: implicit on purpose
-
-  bool ok() const { return state_.index() == 0; }
-  explicit operator bool() const { return ok(); }
-
-  const T& value() const& { return check(), std::get<0>(state_); }
-  T& value() & { return check(), std::get<0>(state_); }
-  T&& value() && { return check(), std::get<0>(std::move(state_)); }
-  const T& operator*() const& { return value(); }
-  T& operator*() & { return value(); }
-  T&& operator*() && { return std::move(*this).value(); }
-  const T* operator->() const { return &value(); }
-  T* operator->() { return &value(); }
-
-  const Error& error() const {
-    BSLAM_ASSERT(!ok(), "error() of a Result that holds a value");
-    return std::get<1>(state_);
-  }
-
- private:
-  void check() const { BSLAM_ASSERT(ok(), "value() of a Result that holds an error"); }
-  std::variant<T, Error> state_;
-};
-
-// Either success or an Error, for functions without a return value.
-class [[nodiscard]] Status {
- public:
-  Status() = default;
-  Status(Error error) : error_(std::move(error)) {}  // NOLINT: implicit on purpose
-
-  bool ok() const { return !error_.has_value(); }
-  explicit operator bool() const { return ok(); }
-  const Error& error() const {
-    BSLAM_ASSERT(!ok(), "error() of a Status that is ok");
-    return *error_;
-  }
-
- private:
-  std::optional<Error> error_;
-};
-
-}  // namespace bslam

@@ -8,7 +8,7 @@
 #include "cli/dataset_arguments.h"
 #include "cli/verbs.h"
 #include "dataset/frame_reader.h"
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 #include "system/pipeline.h"
 
 namespace bslam::cli {
@@ -56,7 +56,7 @@ int inspect(const InspectArguments& arguments) {
     return report_error({arguments.data.path, "--frame", std::to_string(arguments.frame),
                          "0 to " + std::to_string(dataset->frames.size() - 1)});
   }
-  auto masks = image_files::read_masks(dataset->rig);
+  auto masks = image_decoding::read_masks(dataset->rig);
   if (!masks) return report_error(masks.error());
   system::Pipeline pipeline(dataset->rig, *config, std::move(*masks));
   const auto frame = pipeline.make_frame(dataset::read_frame(*dataset, static_cast<std::size_t>(arguments.frame)));

@@ -52,13 +52,8 @@ Result<system::Config> resolve_run_config(const RunArguments& arguments) {
   if (arguments.no_final_ba) config.final_adjustment = false;
   if (arguments.no_loop) config.looping.loop.enabled = false;
   if (arguments.localize_only) config.localize_only = true;
-  if (config.localize_only && arguments.load_map.empty()) {
-    return Error{"", "--localize-only", "no --load-map", "--load-map FILE with the map for localisation"};
-  }
-  if (config.extrinsics.refine && (config.localize_only || !config.final_adjustment)) {
-    return Error{"command line", "extrinsics.refine",
-                 config.localize_only ? "true with --localize-only" : "true with --no-final-ba",
-                 "a run with the final bundle adjustment, which refines the extrinsics"};
+  if (const Status s = system::check_config(config, !arguments.load_map.empty()); !s) {
+    return Error{"command line", s.error().key, s.error().found, s.error().expected};
   }
   return resolved;
 }
@@ -114,11 +109,9 @@ Result<std::optional<execution::Journal>> read_journal(const std::string& file) 
 Result<std::optional<map::BundledMap>> read_map(const std::string& file, const camera::Rig& rig,
                                                 const system::Config& config, const place::Vocabulary& vocabulary) {
   if (file.empty()) return std::optional<map::BundledMap>();
-  auto saved = storage::read_map(file);
-  if (!saved) return saved.error();
-  if (const Status s = storage::fits(*saved, rig, config.feature_model().pyramid, &vocabulary); !s) return s.error();
-  if (saved->map.num_keyframes() == 0) return Error{file, "keyframes", "none", "a map with keyframes"};
-  return std::optional(std::move(saved->map));
+  auto map = storage::open_map(file, rig, config.feature_model().pyramid, &vocabulary);
+  if (!map) return map.error();
+  return std::optional(*std::move(map));
 }
 
 Status write_files(const session::SessionResult& result, const system::Config& config, const RunArguments& arguments,

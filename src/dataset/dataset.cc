@@ -14,7 +14,7 @@
 
 #include "dataset/frame_grouping.h"
 #include "dataset/recording.h"
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 #include "rig_formats/rig_file.h"
 
 namespace bslam::dataset {
@@ -150,7 +150,7 @@ Status check_images(const std::vector<image_files::ImageFile>& images, const cam
     if (!fs::exists(file.path, error)) continue;
     any = true;
     if (++read > kTries) break;
-    const auto image = image_files::read_image(file.path);
+    const auto image = image_decoding::read_image(file.path);
     if (!image) continue;
     if (image->width() == camera.width && image->height() == camera.height) return {};
     found = fmt::format("{}x{} pixels", image->width(), image->height());
@@ -171,7 +171,7 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Re
     chosen.warnings.insert(chosen.warnings.end(), list->warnings.begin(), list->warnings.end());
     const camera::Camera& camera = chosen.rig.camera(i);
     if (const Status status = check_images(list->images, camera); !status) return status.error();
-    if (const auto mask = image_files::read_mask(camera); !mask) return mask.error();
+    if (const auto mask = image_decoding::read_mask(camera); !mask) return mask.error();
     for (image_files::ImageFile& image : list->images) image.time_ns += camera.time_offset_ns;
     images.push_back(std::move(list->images));
   }

@@ -1,4 +1,4 @@
-// Groups images of different cameras into frames by time.
+// Groups the images of a recording into frames by time.
 #pragma once
 
 #include <span>
@@ -15,12 +15,8 @@ struct FrameGrouping {
   std::vector<int> unassigned;           // per camera: number of images in no frame
 };
 
-// Every image of camera 0 starts a frame. An image of another camera is added to the frame closest in time if that is
-// within `tolerance_ns`; if two images of a camera compete for a frame, the closer one is kept. In gaps of camera 0 the
-// other cameras form frames of their own: these start with an image that is more than 3/4 of the median interval of
-// camera 0 away from any of its images, and contain the images of other cameras within the tolerance after it. All
-// other images belong to no frame, so that unsynchronised cameras never double the frame rate. `images[i]` are the
-// images of camera i, strictly increasing in time. Camera 0 must have at least one.
+// By the rule of image/frame_grouping.h. Camera 0 has a gap where two of its images are more than 3/4 of its median
+// interval apart. `images[i]` are the images of camera i, strictly increasing in time. Camera 0 must have at least one.
 FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> images, TimeNs tolerance_ns);
 
 }  // namespace bslam::dataset

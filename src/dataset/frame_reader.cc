@@ -5,14 +5,14 @@
 #include <utility>
 
 #include "base/assert.h"
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 
 namespace bslam::dataset {
 
 namespace {
 
 Result<image::Image> read_of_camera(const std::filesystem::path& file, const camera::Camera& camera) {
-  auto image = image_files::read_image(file);
+  auto image = image_decoding::read_image(file);
   if (!image || (image->width() == camera.width && image->height() == camera.height)) return image;
   return Error{file.string(), "", fmt::format("{}x{} pixels", image->width(), image->height()),
                fmt::format("{}x{}, the resolution of {}", camera.width, camera.height, camera.name)};

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "base/atomic_file.h"
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 
 namespace bslam::dataset {
 namespace {
@@ -89,7 +89,7 @@ std::optional<image::Image> decode_webp(std::string_view bytes) {
 std::optional<image::Image> decode_any(std::string_view bytes) {
   if (bytes.starts_with("P5")) return decode_pgm(bytes);
   if (bytes.starts_with("RIFF") && bytes.size() > 12 && bytes.substr(8, 4) == "WEBP") return decode_webp(bytes);
-  return image_files::decode_grey(bytes);
+  return image_decoding::decode_grey(bytes);
 }
 
 image::Image shrink(const image::Image& image, int max_side) {

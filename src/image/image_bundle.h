@@ -18,7 +18,11 @@ enum class ImageState {
 struct CameraImage {
   ImageState state = ImageState::kMissing;
   TimeNs time_ns = 0;  // capture time of this image, with the camera's time offset applied; valid only if kPresent
-  Image image;         // empty unless kPresent
+  Image image;         // pixels owned by this struct; empty unless kPresent, and if they are borrowed
+  // Pixels owned by the caller, who keeps them while the frame is processed. Empty: the pixels are in `image`.
+  ImageView borrowed = {};
+
+  ImageView view() const { return borrowed.empty() ? image.view() : borrowed; }
 };
 
 struct ImageBundle {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <system_error>
 
+#include "base/atomic_file.h"
 #include "base/number_text.h"
-#include "image_files/image_file.h"
 
 namespace bslam::image_files {
 namespace {
@@ -58,9 +58,11 @@ std::vector<NumberedImage> images_in(const fs::path& folder) {
 }
 
 std::optional<ImageSize> first_image_size(const std::vector<NumberedImage>& images) {
-  constexpr std::size_t kTries = 5;
+  constexpr std::size_t kTries = 5, kMaxImageBytes = std::size_t{1} << 30;
   for (std::size_t i = 0; i < std::min(kTries, images.size()); ++i) {
-    if (const auto image = read_image(images[i].path)) return ImageSize{image->width(), image->height()};
+    const auto bytes = read_file(images[i].path, kMaxImageBytes);
+    const auto size = bytes ? image_size(*bytes) : std::nullopt;
+    if (size) return size;
   }
   return std::nullopt;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/timestamp.h"
+#include "image_files/image_size.h"
 
 namespace bslam::image_files {
 
@@ -34,11 +35,7 @@ struct NumberedImage {
 // The PNG and JPEG files of a folder whose names are numbers, ordered by number. None if the folder does not exist.
 std::vector<NumberedImage> images_in(const std::filesystem::path& folder);
 
-struct ImageSize {
-  int width = 0, height = 0;
-};
-
-// Size of the first readable image among the first few.
+// Size of the first image whose header can be read, among the first few.
 std::optional<ImageSize> first_image_size(const std::vector<NumberedImage>& images);
 
 }  // namespace bslam::image_files

@@ -30,7 +30,7 @@ frame::BundledFrame FrameBuilder::extract(const image::ImageBundle& images, Thre
     if (camera.state == image::ImageState::kPresent) {
       const std::optional<int> budget = budgets.empty() ? std::nullopt : std::optional(budgets[i]);
       feature::Detections detections;
-      extractors_[i].extract(input.image.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], detections, budget);
+      extractors_[i].extract(input.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], detections, budget);
       camera.keypoints = std::move(detections);
     } else {
       pyramids_[i].levels.clear();

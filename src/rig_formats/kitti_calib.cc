@@ -10,7 +10,6 @@
 #include "base/atomic_file.h"
 #include "base/number_text.h"
 #include "camera/camera_description.h"
-#include "image_files/image_file.h"
 #include "image_files/image_folder.h"
 
 namespace bslam::rig_formats {

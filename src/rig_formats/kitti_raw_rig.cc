@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "base/number_text.h"
-#include "image_files/image_file.h"
 #include "image_files/image_folder.h"
 
 namespace bslam::rig_formats {

@@ -13,7 +13,7 @@
 #include "frame/capture_times.h"
 #include "geometry/so3.h"
 #include "geometry/triangulation.h"
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 #include "solver/epipolar.h"
 
 namespace bslam::session {
@@ -197,7 +197,7 @@ std::vector<std::vector<View>> extract_views(const dataset::Dataset& dataset, st
 
 Result<std::vector<PairEvidence>> check_extrinsics(const dataset::Dataset& dataset) {
   const camera::Rig& rig = dataset.rig;
-  const auto masks = image_files::read_masks(rig);
+  const auto masks = image_decoding::read_masks(rig);
   if (!masks) return masks.error();
   const std::vector<std::vector<View>> views = extract_views(dataset, *masks);
   std::vector<PairEvidence> evidence;

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "base/atomic_file.h"
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 #include "report/rig_plot.h"
 #include "rig_formats/rig_description.h"
 #include "rig_formats/rig_file.h"
@@ -67,7 +67,7 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
 std::vector<std::string> warnings_of(const camera::Rig& rig) {
   std::vector<std::string> warnings = rig_formats::rig_warnings(rig);
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    const auto mask = image_files::read_mask(rig.camera(i));
+    const auto mask = image_decoding::read_mask(rig.camera(i));
     if (!mask) warnings.push_back("mask of " + rig.camera(i).name + ": " + mask.error().message());
   }
   return warnings;

@@ -7,7 +7,7 @@
 #include "base/atomic_file.h"
 #include "base/stopwatch.h"
 #include "evaluation/trajectory_file.h"
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 #include "report/trajectory_plot.h"
 #include "rig_formats/bslam_rig.h"
 #include "session/frame_source.h"
@@ -84,7 +84,7 @@ camera::Rig with_refined_extrinsics(const camera::Rig& found, const dataset::Dat
 
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options) {
   const Stopwatch start_up;
-  auto masks = image_files::read_masks(dataset.rig);
+  auto masks = image_decoding::read_masks(dataset.rig);
   if (!masks) return masks.error();
   system::System system(dataset.rig, options.config,
                         {std::move(*masks), options.vocabulary, options.map, options.replay});

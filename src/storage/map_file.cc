@@ -196,6 +196,15 @@ Result<SavedMap> read_map(const std::filesystem::path& file) {
   return map_from_bytes(*bytes, file.string());
 }
 
+Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
+                                 const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {
+  auto saved = read_map(file);
+  if (!saved) return saved.error();
+  if (const Status status = fits(*saved, rig, pyramid, vocabulary); !status) return status.error();
+  if (saved->map.num_keyframes() == 0) return Error{file.string(), "keyframes", "none", "a map with keyframes"};
+  return std::move(saved->map);
+}
+
 Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary) {
   if (saved.map.rig().size() != rig.size()) {

@@ -43,6 +43,10 @@ Result<SavedMap> read_map(const std::filesystem::path& file);
 Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary);
 
+// The map of a file, for a run that continues it: checked by fits(), and with at least one keyframe.
+Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
+                                 const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
+
 // Conversion to and from the content of a file. `file` is the name used in errors. The content is not trusted: counts
 // are checked against the number of remaining bytes before memory is reserved.
 std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/options.h"
+#include "base/result.h"
 #include "calibration/rig_refinement.h"
 #include "execution/options.h"
 #include "feature/extractor.h"
@@ -57,5 +58,8 @@ struct Config {
     visitor.section("extrinsics", self.extrinsics);
   }
 };
+
+// Settings that contradict each other, or the absence of a loaded map. The Error names the key, and no file.
+Status check_config(const Config& config, bool with_map);
 
 }  // namespace bslam::system

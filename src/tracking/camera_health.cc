@@ -15,25 +15,25 @@ constexpr int kSlow = 10;  // frames a sound camera may be without a picture, as
 constexpr int kSampleStep = 4;  // rows and columns: brightness does not hide between them
 
 // A hash of every pixel, eight at a time.
-std::uint64_t content(const image::Image& image) {
+std::uint64_t content(const image::ImageView& image) {
   std::uint64_t hash = 0x2545f4914f6cdd1dull;
-  for (int y = 0; y < image.height(); ++y) {
+  for (int y = 0; y < image.height; ++y) {
     const std::uint8_t* row = image.row(y);
     int x = 0;
-    for (; x + 8 <= image.width(); x += 8) {
+    for (; x + 8 <= image.width; x += 8) {
       std::uint64_t word = 0;
       std::memcpy(&word, row + x, 8);
       hash = std::rotl(hash ^ word, 27) * 0x9e3779b97f4a7c15ull;
     }
-    for (; x < image.width(); ++x) hash = std::rotl(hash ^ row[x], 27) * 0x9e3779b97f4a7c15ull;
+    for (; x < image.width; ++x) hash = std::rotl(hash ^ row[x], 27) * 0x9e3779b97f4a7c15ull;
   }
   return hash;
 }
 
-CameraReason exposure(const image::Image& image, const HealthOptions& options) {
+CameraReason exposure(const image::ImageView& image, const HealthOptions& options) {
   int samples = 0, dark = 0, bright = 0;
-  for (int y = 0; y < image.height(); y += kSampleStep) {
-    for (int x = 0; x < image.width(); x += kSampleStep, ++samples) {
+  for (int y = 0; y < image.height; y += kSampleStep) {
+    for (int x = 0; x < image.width; x += kSampleStep, ++samples) {
       dark += image.row(y)[x] <= options.dark_level;
       bright += image.row(y)[x] >= options.bright_level;
     }
@@ -66,14 +66,13 @@ void count_edges(const std::uint8_t* first, std::ptrdiff_t step, int pixels, dou
 }
 
 // True, false, or nothing where there are too few edges to tell.
-std::optional<bool> is_blurred(const image::Image& image, const HealthOptions& options) {
+std::optional<bool> is_blurred(const image::ImageView& image, const HealthOptions& options) {
   constexpr int kLines = 30, kMinEdges = 40;  // rows looked at, and columns as far apart
-  const int step = std::max(1, image.height() / kLines);
+  const int step = std::max(1, image.height / kLines);
   Edges edges;
-  for (int y = 0; y < image.height(); y += step)
-    count_edges(image.row(y), 1, image.width(), options.sharp_slope, edges);
-  for (int x = 0; x < image.width(); x += step)
-    count_edges(image.row(0) + x, image.width(), image.height(), options.sharp_slope, edges);
+  for (int y = 0; y < image.height; y += step) count_edges(image.row(y), 1, image.width, options.sharp_slope, edges);
+  for (int x = 0; x < image.width; x += step)
+    count_edges(image.row(0) + x, image.stride, image.height, options.sharp_slope, edges);
   if (edges.all < kMinEdges) return std::nullopt;
   return edges.sharp < options.min_sharp_edge_ratio * edges.all;
 }
@@ -102,8 +101,8 @@ std::vector<CameraReason> CameraMonitor::judge(const image::ImageBundle& images)
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const image::CameraImage& input = images.images[c];
     if (input.state != image::ImageState::kPresent) continue;
-    found[c] = exposure(input.image, options_);
-    const std::uint64_t now = content(input.image);
+    found[c] = exposure(input.view(), options_);
+    const std::uint64_t now = content(input.view());
     same[c] = cameras_[c].last == now;
     any_changed |= cameras_[c].last && !same[c];
     cameras_[c].last = now;
@@ -138,7 +137,7 @@ std::vector<std::uint8_t> CameraMonitor::blurred(const image::ImageBundle& image
     const image::CameraImage& input = images.images[c];
     if (input.state != image::ImageState::kPresent) continue;
     Camera& camera = cameras_[c];
-    if (const auto now = is_blurred(input.image, options_)) {
+    if (const auto now = is_blurred(input.view(), options_)) {
       camera.sharp = *now ? 0 : camera.sharp + 1;
       camera.blurred = *now || (camera.blurred && camera.sharp < options_.readmit_after);
     }

@@ -1,18 +1,16 @@
-#include "image_files/image_file.h"
-
-#include <fmt/format.h>
+#include "image_decoding/image_file.h"
 
 #include <algorithm>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <span>
 #include <string>
 #include <utility>
 
 #include "base/atomic_file.h"
+#include "image_files/mask.h"
 #include "image_files/png_decoder.h"
 
-namespace bslam::image_files {
+namespace bslam::image_decoding {
 namespace {
 
 constexpr std::size_t kMaxImageBytes = std::size_t{1} << 30;
@@ -43,8 +41,8 @@ std::optional<image::Image> decode_with_opencv(std::string_view bytes) {
 
 std::optional<image::Image> decode_grey(std::string_view bytes) {
   if (bytes.size() > kMaxImageBytes) return std::nullopt;
-  if (is_whole_png(bytes)) {
-    auto image = decode_grey_png(bytes);
+  if (image_files::is_whole_png(bytes)) {
+    auto image = image_files::decode_grey_png(bytes);
     return image ? std::move(image) : decode_with_opencv(bytes);
   }
   return is_whole_jpeg(bytes) ? decode_with_opencv(bytes) : std::nullopt;
@@ -62,17 +60,7 @@ Result<image::Image> read_mask(const camera::Camera& camera) {
   if (camera.mask_file.empty()) return image::Image();
   auto mask = read_image(camera.mask_file);
   if (!mask) return mask;
-  if (mask->width() != camera.width || mask->height() != camera.height) {
-    return Error{camera.mask_file, "", fmt::format("{}x{} pixels", mask->width(), mask->height()),
-                 fmt::format("{}x{}, the resolution of {}", camera.width, camera.height, camera.name)};
-  }
-  const std::span pixels(mask->row(0),
-                         static_cast<std::size_t>(mask->width()) * static_cast<std::size_t>(mask->height()));
-  if (std::ranges::all_of(pixels, [](std::uint8_t p) { return p == 0; })) {
-    return Error{camera.mask_file, "", "only zeros, which mask all of " + camera.name,
-                 "values above 0 where the image is to be used"};
-  }
-  return mask;
+  return image_files::checked_mask(*std::move(mask), camera);
 }
 
 Result<std::vector<image::Image>> read_masks(const camera::Rig& rig) {
@@ -85,4 +73,4 @@ Result<std::vector<image::Image>> read_masks(const camera::Rig& rig) {
   return masks;
 }
 
-}  // namespace bslam::image_files
+}  // namespace bslam::image_decoding

@@ -1,4 +1,4 @@
-// PNG and JPEG files as 8-bit grey images.
+// PNG and JPEG files of every kind as 8-bit grey images, by OpenCV where our own PNG decoder does not read them.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 #include "camera/rig.h"
 #include "image/image.h"
 
-namespace bslam::image_files {
+namespace bslam::image_decoding {
 
 // Decodes a PNG or JPEG in memory to grey values. Orientation tags are ignored, colours are converted to luminance, and
 // the upper eight of 16 bits are kept. Empty for other formats, and for truncated files or wrong checksums, of which
@@ -27,4 +27,4 @@ Result<image::Image> read_mask(const camera::Camera& camera);
 // The masks of all cameras of a rig, in order; errors as read_mask.
 Result<std::vector<image::Image>> read_masks(const camera::Rig& rig);
 
-}  // namespace bslam::image_files
+}  // namespace bslam::image_decoding

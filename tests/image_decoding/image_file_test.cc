@@ -1,4 +1,4 @@
-#include "image_files/image_file.h"
+#include "image_decoding/image_file.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "base/random.h"
 #include "support/data_on_disk.h"
 
-namespace bslam::image_files {
+namespace bslam::image_decoding {
 namespace {
 
 std::string encoded(const cv::Mat& picture, const std::string& extension, const std::vector<int>& parameters = {}) {
@@ -138,4 +138,4 @@ TEST(ImageFile, ReadsMasksOfTheCamerasSize) {
 }
 
 }  // namespace
-}  // namespace bslam::image_files
+}  // namespace bslam::image_decoding

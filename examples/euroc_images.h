@@ -1,0 +1,30 @@
+// The images of one camera of a data set in EuRoC's layout, by time.
+#pragma once
+
+#include <bslam/image_bundle.h>
+
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+// Time in nanoseconds -> file, from DATA/mav0/camN/data.csv ("time,name" a line below a comment).
+inline std::map<std::int64_t, std::string> list_images(const std::string& data, std::size_t camera) {
+  const std::string folder = data + "/mav0/cam" + std::to_string(camera);
+  std::map<std::int64_t, std::string> images;
+  std::ifstream csv(folder + "/data.csv");
+  for (std::string line; std::getline(csv, line);) {
+    const auto comma = line.find(',');
+    if (line.empty() || line[0] == '#' || comma == std::string::npos) continue;
+    while (line.back() == '\r' || line.back() == ' ') line.pop_back();
+    images[std::stoll(line)] = folder + "/data/" + line.substr(line.find_first_not_of(' ', comma + 1));
+  }
+  return images;
+}
+
+// The image as bslam takes it; cv::Mat counts its references, so a copy of it keeps the pixels. No data if unreadable.
+inline bslam::CameraImage read_image(const std::string& file, std::int64_t time_ns) {
+  const auto mat = std::make_shared<cv::Mat>(cv::imread(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION));
+  return {mat->data, mat->cols, mat->rows, static_cast<std::ptrdiff_t>(mat->step), time_ns, mat};
+}

@@ -1,0 +1,58 @@
+// Live cameras: one thread per camera delivers images, one runs SLAM. Here the cameras replay a data set in EuRoC's
+// layout at its own pace: live DATA [SPEED]
+#include <bslam/bslam.h>
+
+#include <chrono>
+#include <iostream>
+#include <thread>
+
+#include "euroc_images.h"
+
+int main(int argc, char** argv) {
+  const std::string data = argc > 1 ? argv[1] : ".";
+  const double speed = argc > 2 ? std::stod(argv[2]) : 1.0;
+  const auto rig = bslam::Rig::load(data);
+  if (!rig) return std::cerr << rig.error().message() << '\n', 1;
+
+  bslam::Startup startup;
+  startup.history_frames = 10000;  // memory is bounded by the map
+  startup.callbacks.log = [](bslam::LogLevel, std::string_view line) { std::cerr << line << '\n'; };
+  auto slam = bslam::System::create(*rig, bslam::Config(), startup);
+  if (!slam) return std::cerr << slam.error().message() << '\n', 1;
+
+  bslam::SyncOptions options;
+  options.on_drop = [](const bslam::DroppedImage& d) {
+    std::cerr << "camera " << d.camera << ": " << d.time_ns << " dropped: " << to_string(d.reason) << '\n';
+  };
+  auto synchronizer = bslam::Synchronizer::create(*rig, options);
+  if (!synchronizer) return std::cerr << synchronizer.error().message() << '\n', 1;
+
+  const auto replay = [&](std::size_t camera) {  // what the driver's callback does on a robot
+    const auto files = list_images(data, camera);
+    const auto start = std::chrono::steady_clock::now();
+    for (const auto& [time_ns, file] : files) {
+      const std::chrono::duration<double, std::nano> due(double(time_ns - files.begin()->first) / speed);
+      std::this_thread::sleep_until(start + std::chrono::duration_cast<std::chrono::nanoseconds>(due));
+      const bslam::CameraImage image = read_image(file, time_ns);
+      if (image.data != nullptr && !synchronizer->push(camera, image)) return;
+    }
+  };
+  std::vector<std::thread> cameras;
+  for (std::size_t c = 0; c < rig->size(); ++c) cameras.emplace_back(replay, c);
+  std::thread end([&] {
+    for (auto& camera : cameras) camera.join();
+    synchronizer->close();
+  });
+
+  int frames = 0, tracked = 0;
+  while (const auto bundle = synchronizer->wait()) {
+    const auto frame = slam->process(*bundle);
+    if (!frame) std::cerr << frame.error().message() << '\n';
+    frames += frame.ok();
+    tracked += frame && frame->tracking();
+  }
+  end.join();
+  const auto finished = slam->finish();
+  std::cout << tracked << " of " << frames << " frames have a pose, " << slam->map().num_keyframes() << " keyframes\n";
+  return finished && tracked > 0 ? 0 : 1;
+}

@@ -1,0 +1,78 @@
+// Errors as values. No function of bslam throws, prints or exits because of what it was given: it returns a Result.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "bslam/export.h"
+
+namespace bslam {
+
+// One thing that is wrong with the input: where it is, what was found there, and what was expected.
+struct BSLAM_EXPORT Error {
+  std::string file;      // file, folder, function or command-line option; may be empty
+  std::string key;       // key, line or part within it; may be empty
+  std::string found;     // what is there
+  std::string expected;  // what would be right
+  // Message in place of "found X, expected Y" where a sentence reads better; may be empty.
+  std::string sentence = {};
+
+  // One line: "FILE: KEY: found X, expected Y", or "FILE: KEY: SENTENCE". Empty parts are left out, and so are file and
+  // key where the sentence names them itself. Control characters are replaced by spaces.
+  std::string message() const;
+};
+
+// Prints `message` to stderr and aborts. Called only where a caller asks a Result for what it does not hold.
+[[noreturn]] BSLAM_EXPORT void bad_result_access(const char* message);
+
+// A value or an Error. Check ok() first: asking for the one that is not there is a bug of the caller and aborts.
+template <class T>
+class [[nodiscard]] Result {
+ public:
+  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}      // NOLINT: implicit on purpose
+  Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}  // NOLINT: implicit on purpose
+
+  bool ok() const { return state_.index() == 0; }
+  explicit operator bool() const { return ok(); }
+
+  const T& value() const& { return check(), std::get<0>(state_); }
+  T& value() & { return check(), std::get<0>(state_); }
+  T&& value() && { return check(), std::get<0>(std::move(state_)); }
+  const T& operator*() const& { return value(); }
+  T& operator*() & { return value(); }
+  T&& operator*() && { return std::move(*this).value(); }
+  const T* operator->() const { return &value(); }
+  T* operator->() { return &value(); }
+
+  const Error& error() const {
+    if (ok()) bad_result_access("error() of a Result that holds a value");
+    return std::get<1>(state_);
+  }
+
+ private:
+  void check() const {
+    if (!ok()) bad_result_access("value() of a Result that holds an error");
+  }
+  std::variant<T, Error> state_;
+};
+
+// Success or an Error, for functions without a value.
+class [[nodiscard]] Status {
+ public:
+  Status() = default;
+  Status(Error error) : error_(std::move(error)) {}  // NOLINT: implicit on purpose
+
+  bool ok() const { return !error_.has_value(); }
+  explicit operator bool() const { return ok(); }
+  const Error& error() const {
+    if (ok()) bad_result_access("error() of a Status that is ok");
+    return *error_;
+  }
+
+ private:
+  std::optional<Error> error_;
+};
+
+}  // namespace bslam

@@ -1,0 +1,94 @@
+#include "api/bundle_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace bslam::api {
+namespace {
+
+constexpr const char* kProcess = "System::process";
+constexpr TimeNs kMaxTime = 4'000'000'000'000'000'000;  // ns, with room for the time offset
+constexpr TimeNs kMaxSpread = 1'000'000'000;            // ns between the images of a bundle
+
+std::string camera_key(std::size_t c, const camera::Camera& camera) {
+  return fmt::format("images[{}] ({})", c, camera.name);
+}
+
+}  // namespace
+
+Status check_image(const CameraImage& image, const camera::Camera& camera, const char* name) {
+  if (image.data == nullptr) return Error{name, camera.name, "no pixels (data is null)", "an image"};
+  if (image.width != camera.width || image.height != camera.height) {
+    return Error{name, camera.name, fmt::format("{}x{} pixels", image.width, image.height),
+                 fmt::format("{}x{}, the resolution of the calibration", camera.width, camera.height)};
+  }
+  if (image.stride < image.width) {
+    return Error{name, camera.name, fmt::format("a stride of {} bytes", image.stride),
+                 fmt::format("at least {}, the width", image.width)};
+  }
+  if (image.time_ns < -kMaxTime || image.time_ns > kMaxTime) {
+    return Error{name, camera.name, fmt::format("time {} ns", image.time_ns), "nanoseconds within +-4e18"};
+  }
+  return {};
+}
+
+Result<image::ImageBundle> BundleReader::convert(const ImageBundle& bundle) const {
+  if (bundle.images.size() != rig_.size()) {
+    return Error{kProcess, "images", std::to_string(bundle.images.size()),
+                 fmt::format("{}, one per camera of the rig", rig_.size())};
+  }
+  image::ImageBundle out{next_, 0, std::vector<image::CameraImage>(rig_.size())};
+  bool any = false;
+  for (std::size_t c = 0; c < rig_.size(); ++c) {
+    const CameraImage& in = bundle.images[c];
+    if (in.data == nullptr) continue;
+    if (const Status status = check_image(in, rig_.camera(c), kProcess); !status) return status.error();
+    image::CameraImage& image = out.images[c];
+    image.state = image::ImageState::kPresent;
+    image.time_ns = in.time_ns + rig_.camera(c).time_offset_ns;
+    image.borrowed = {in.data, in.width, in.height, in.stride};
+    const bool leads = !any || (image.time_ns < out.time_ns && out.images[0].state != image::ImageState::kPresent);
+    if (leads) out.time_ns = image.time_ns;
+    any = true;
+  }
+  if (!any) return Error{kProcess, "images", "none", "the image of at least one camera"};
+  return out;
+}
+
+Status BundleReader::check_times(const image::ImageBundle& images) const {
+  if (last_ns_ && images.time_ns <= *last_ns_) {
+    return Error{kProcess, "time", fmt::format("{} ns", images.time_ns),
+                 fmt::format("one after {} ns, that of the bundle before", *last_ns_)};
+  }
+  for (std::size_t c = 0; c < images.images.size(); ++c) {
+    const image::CameraImage& image = images.images[c];
+    if (image.state != image::ImageState::kPresent) continue;
+    const std::string key = camera_key(c, rig_.camera(c));
+    if (std::abs(image.time_ns - images.time_ns) > kMaxSpread) {
+      return Error{kProcess, key,
+                   fmt::format("{} s from the time of the bundle", to_seconds(image.time_ns - images.time_ns)),
+                   "images within a second of each other"};
+    }
+    if (last_camera_ns_[c] && image.time_ns <= *last_camera_ns_[c]) {
+      return Error{kProcess, key, fmt::format("time {} ns", image.time_ns),
+                   fmt::format("one after {} ns, that of the camera's image before", *last_camera_ns_[c])};
+    }
+  }
+  return {};
+}
+
+Result<image::ImageBundle> BundleReader::read(const ImageBundle& bundle) {
+  auto images = convert(bundle);
+  if (!images) return images;
+  if (const Status status = check_times(*images); !status) return status.error();
+  last_ns_ = images->time_ns;
+  for (std::size_t c = 0; c < rig_.size(); ++c) {
+    if (images->images[c].state == image::ImageState::kPresent) last_camera_ns_[c] = images->images[c].time_ns;
+  }
+  next_ = next_.next();
+  return images;
+}
+
+}  // namespace bslam::api

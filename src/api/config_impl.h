@@ -1,0 +1,14 @@
+// What a public Config hides.
+#pragma once
+
+#include <bslam/config.h>
+
+#include "system/config.h"
+
+namespace bslam {
+
+struct Config::Impl {
+  system::Config config;
+};
+
+}  // namespace bslam

@@ -1,0 +1,29 @@
+// Between the plain numbers of the public headers and our own types.
+#pragma once
+
+#include <bslam/map_view.h>
+#include <bslam/pose.h>
+#include <bslam/trajectory.h>
+
+#include "evaluation/trajectory.h"
+#include "geometry/se3.h"
+#include "map/bundled_map.h"
+
+namespace bslam::api {
+
+Pose to_pose(const geometry::SE3& T);
+geometry::SE3 to_se3(const Pose& pose);
+
+// `covariance`: of a left perturbation of T_rig_world, rotation first.
+Covariance6 to_covariance(const geometry::Matrix6d& covariance);
+
+// Velocity of the rig (camera 0) that moves by `twist`, T_rig_world(t + dt) = exp(dt twist) T_rig_world(t), as that of
+// a frame fixed to it.
+Velocity to_velocity(const geometry::Vector6d& twist, const geometry::SE3& T_frame_rig);
+
+Scale to_scale(map::Scale scale);
+
+// Poses of camera 0 as those of a frame fixed to the rig.
+Trajectory to_trajectory(const evaluation::Trajectory& cam0, const geometry::SE3& T_rig_frame);
+
+}  // namespace bslam::api

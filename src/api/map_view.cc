@@ -1,0 +1,102 @@
+#include <bslam/map_view.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "api/conversions.h"
+#include "api/guard.h"
+#include "api/map_view_impl.h"
+#include "api/rig_impl.h"
+#include "storage/map_file.h"
+
+namespace bslam {
+namespace {
+
+// Root of the submap of every keyframe slot; -1 where it was removed.
+std::vector<int> submap_by_keyframe(const map::BundledMap& map) {
+  std::vector<int> out(map.keyframe_slots(), -1);
+  for (const KeyframeId root : map.roots()) {
+    for (const KeyframeId k : map.part_of(root)) out[k.index()] = root.value();
+  }
+  return out;
+}
+
+}  // namespace
+
+MapView api::make_map_view(map::MapSnapshot map) {
+  return MapView(std::make_shared<const MapView::Impl>(MapView::Impl{std::move(map)}));
+}
+
+MapView api::empty_map_view() {
+  const camera::Camera camera{"", camera::Pinhole({1, 1, 0, 0}), 1, 1, 0, ""};
+  const auto rig = std::make_shared<const camera::Rig>(std::vector<camera::RigCamera>{{camera, geometry::SE3()}});
+  return make_map_view(std::make_shared<const map::BundledMap>(rig));
+}
+
+MapView::MapView(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+
+Result<MapView> MapView::load(const std::filesystem::path& file) {
+  return api::guarded("MapView::load", [&]() -> Result<MapView> {
+    auto saved = storage::read_map(file);
+    if (!saved) return saved.error();
+    return api::make_map_view(std::make_shared<const map::BundledMap>(std::move(saved->map)));
+  });
+}
+
+int MapView::version() const { return impl_->map->version().value(); }
+Scale MapView::scale() const { return api::to_scale(impl_->map->scale()); }
+std::size_t MapView::num_keyframes() const { return impl_->map->num_keyframes(); }
+std::size_t MapView::num_landmarks() const { return impl_->map->num_landmarks(); }
+std::size_t MapView::num_observations() const { return impl_->map->num_observations(); }
+Rig MapView::rig() const { return api::make_rig(impl_->map->rig()); }
+
+std::vector<MapView::Keyframe> MapView::keyframes() const {
+  const map::BundledMap& map = *impl_->map;
+  const std::vector<int> submap = submap_by_keyframe(map);
+  std::vector<Keyframe> out;
+  out.reserve(map.num_keyframes());
+  for (const KeyframeId k : map.keyframe_ids()) {
+    const map::BundledKeyframe& keyframe = map.keyframe(k);
+    out.push_back({k.value(), keyframe.frame->time_ns, api::to_pose(keyframe.T_rig_world.inverse()),
+                   keyframe.parent.value(), submap[k.index()]});
+  }
+  return out;
+}
+
+std::vector<MapView::Landmark> MapView::landmarks() const {
+  const map::BundledMap& map = *impl_->map;
+  const std::vector<int> submap = submap_by_keyframe(map);
+  std::vector<Landmark> out;
+  out.reserve(map.num_landmarks());
+  for (const LandmarkId l : map.landmark_ids()) {
+    const auto& p = map.landmark(l).position;
+    const auto observations = map.observations(l);
+    out.push_back({l.value(),
+                   {p.x(), p.y(), p.z()},
+                   static_cast<int>(observations.size()),
+                   submap[observations.front().keyframe.index()]});
+  }
+  return out;
+}
+
+std::vector<MapView::CovisibilityEdge> MapView::covisibility(int min_landmarks) const {
+  const map::BundledMap& map = *impl_->map;
+  std::vector<CovisibilityEdge> out;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    for (const map::Covisible& neighbour : map.keyframe(k).covisible) {
+      if (neighbour.keyframe > k && neighbour.weight >= min_landmarks) {
+        out.push_back({k.value(), neighbour.keyframe.value(), neighbour.weight});
+      }
+    }
+  }
+  return out;
+}
+
+std::vector<MapView::Submap> MapView::submaps() const {
+  const map::BundledMap& map = *impl_->map;
+  std::vector<Submap> out;
+  for (const KeyframeId root : map.roots()) out.push_back({root.value(), map.part_of(root).size()});
+  return out;
+}
+
+}  // namespace bslam

@@ -1,0 +1,82 @@
+// Words for the enumerations of the public headers.
+#include <bslam/bslam.h>
+
+namespace bslam {
+
+std::string_view to_string(TrackingStatus status) {
+  switch (status) {
+    case TrackingStatus::kNotStarted:
+      return "not-started";
+    case TrackingStatus::kTracking:
+      return "tracking";
+    case TrackingStatus::kLost:
+      return "lost";
+  }
+  return "";
+}
+
+std::string_view to_string(LostReason reason) {
+  switch (reason) {
+    case LostReason::kNone:
+      return "";
+    case LostReason::kNotStarted:
+      return "not-started";
+    case LostReason::kNoImages:
+      return "no-images";
+    case LostReason::kFewFeatures:
+      return "few-features";
+    case LostReason::kFewMatches:
+      return "few-matches";
+    case LostReason::kFewInliers:
+      return "few-inliers";
+    case LostReason::kUnstablePose:
+      return "unstable-pose";
+    case LostReason::kNotFound:
+      return "not-found";
+  }
+  return "";
+}
+
+std::string_view to_string(CameraState state) {
+  switch (state) {
+    case CameraState::kOk:
+      return "ok";
+    case CameraState::kDegraded:
+      return "degraded";
+    case CameraState::kOut:
+      return "out";
+  }
+  return "";
+}
+
+std::string_view to_string(Scale scale) {
+  switch (scale) {
+    case Scale::kMetric:
+      return "metric";
+    case Scale::kUpToScale:
+      return "up-to-scale";
+    case Scale::kUnobservable:
+      return "unobservable";
+  }
+  return "";
+}
+
+std::string_view to_string(DropReason reason) {
+  switch (reason) {
+    case DropReason::kDuplicate:
+      return "duplicate";
+    case DropReason::kTooLate:
+      return "too-late";
+    case DropReason::kNoFrame:
+      return "no-frame";
+    case DropReason::kFarAhead:
+      return "far-ahead";
+    case DropReason::kOverflow:
+      return "overflow";
+  }
+  return "";
+}
+
+std::string_view version() { return BSLAM_VERSION; }
+
+}  // namespace bslam

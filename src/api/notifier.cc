@@ -1,0 +1,79 @@
+#include "api/notifier.h"
+
+#include <fmt/format.h>
+
+#include "api/map_view_impl.h"
+
+namespace bslam::api {
+
+void Notifier::log(LogLevel level, const std::string& line) const {
+  if (callbacks_.log) callbacks_.log(level, line);
+}
+
+void Notifier::started(const Rig& rig) {
+  if (!callbacks_.log) return;
+  for (const std::string& note : rig.notes()) log(LogLevel::kInfo, "rig: " + note);
+  for (const std::string& warning : rig.warnings()) log(LogLevel::kWarning, "rig: " + warning);
+}
+
+void Notifier::tell_status(const FrameResult& frame) {
+  if (frame.status == status_) return;
+  const double time_s = to_seconds(frame.time_ns);
+  if (frame.tracking()) {
+    log(LogLevel::kInfo, fmt::format("{:.3f} s: tracking, submap {}", time_s, frame.submap));
+  } else {
+    log(LogLevel::kWarning, fmt::format("{:.3f} s: {}: {}", time_s, to_string(frame.status), to_string(frame.reason)));
+  }
+  status_ = frame.status;
+}
+
+void Notifier::tell_cameras(const FrameResult& frame) {
+  if (cameras_.empty()) cameras_.resize(frame.cameras.size());
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    const CameraResult& now = frame.cameras[c];
+    const CameraResult before = cameras_[c];
+    if (now.state == before.state && now.reason == before.reason) continue;
+    cameras_[c] = now;
+    const LogLevel level = now.state == CameraState::kOk ? LogLevel::kInfo : LogLevel::kWarning;
+    log(level, fmt::format("{:.3f} s: camera {} ({}) is {}{}{}", to_seconds(frame.time_ns), c, rig_.camera(c).name,
+                           to_string(now.state), now.reason.empty() ? "" : ": ", now.reason));
+    if (callbacks_.camera) callbacks_.camera({c, frame.time_ns, before, now});
+  }
+}
+
+void Notifier::tell_loops(const system::System& system) {
+  const std::vector<system::LoopRecord> loops = system.loops();
+  for (; loops_ < loops.size(); ++loops_) {
+    const system::LoopRecord& loop = loops[loops_];
+    const looping::LoopClosure& closure = loop.closure;
+    log(LogLevel::kInfo, fmt::format("{:.3f} s: loop closed with {:.3f} s{}", to_seconds(loop.time_ns),
+                                     to_seconds(loop.with_time_ns), closure.joined ? ", submaps merged" : ""));
+    if (callbacks_.loop) {
+      callbacks_.loop({closure.keyframe.value(), closure.with.value(), loop.time_ns, loop.with_time_ns, closure.inliers,
+                       closure.joined});
+    }
+  }
+}
+
+void Notifier::tell_map(const system::System& system) {
+  map::MapSnapshot map = system.snapshot();
+  const int version = map->version().value();
+  if (version == map_version_) return;
+  map_version_ = version;
+  tell_loops(system);
+  if (callbacks_.map) callbacks_.map(make_map_view(std::move(map)));
+}
+
+void Notifier::processed(const FrameResult& frame, const system::System& system) {
+  tell_status(frame);
+  tell_cameras(frame);
+  if (frame.keyframe && callbacks_.keyframe) callbacks_.keyframe({frame.keyframe_id, frame});
+  tell_map(system);
+}
+
+void Notifier::finished(const system::System& system) {
+  tell_map(system);
+  tell_loops(system);
+}
+
+}  // namespace bslam::api

@@ -1,0 +1,183 @@
+#include <bslam/synchronizer.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <condition_variable>
+#include <cstring>
+#include <deque>
+#include <mutex>
+#include <utility>
+
+#include "api/bundle_reader.h"
+#include "api/guard.h"
+#include "api/image_sorter.h"
+#include "api/rig_impl.h"
+
+namespace bslam {
+namespace {
+
+constexpr double kMaxSeconds = 1e6;
+
+Status check_options(const SyncOptions& options) {
+  struct Number {
+    const char* name;
+    double value;
+  };
+  for (const Number& n : {Number{"tolerance_s", options.tolerance_s}, Number{"max_wait_s", options.max_wait_s},
+                          Number{"reorder_s", options.reorder_s}, Number{"silent_after_s", options.silent_after_s},
+                          Number{"max_ahead_s", options.max_ahead_s}}) {
+    if (n.value >= 0 && n.value <= kMaxSeconds) continue;
+    return Error{"SyncOptions", n.name, fmt::format("{}", n.value), "seconds, not below 0"};
+  }
+  if (options.max_images < 1) return Error{"SyncOptions", "max_images", "0", "at least 1"};
+  if (options.max_bundles < 1) return Error{"SyncOptions", "max_bundles", "0", "at least 1"};
+  return {};
+}
+
+// The image with memory of its own.
+CameraImage kept(const CameraImage& image) {
+  if (image.owner) return image;
+  const auto width = static_cast<std::size_t>(image.width), height = static_cast<std::size_t>(image.height);
+  const std::shared_ptr<std::uint8_t[]> pixels(new std::uint8_t[width * height]);
+  for (std::size_t y = 0; y < height; ++y) {
+    std::memcpy(pixels.get() + y * width, image.data + static_cast<std::ptrdiff_t>(y) * image.stride, width);
+  }
+  return {pixels.get(), image.width, image.height, image.width, image.time_ns, pixels};
+}
+
+Error moved_from() {
+  return {"Synchronizer::push", "", "a Synchronizer that was moved from", "one that create() made"};
+}
+
+}  // namespace
+
+struct Synchronizer::Impl {
+  Impl(const Rig& r, SyncOptions o) : rig(r.impl().rig), options(std::move(o)), sorter(rig.size(), options) {
+    counts.pushed.resize(rig.size());
+    counts.dropped.resize(rig.size());
+  }
+
+  Status push(std::size_t camera, const CameraImage& image);
+  void close();
+  void settle(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped, std::size_t limit);
+  std::optional<ImageBundle> take();
+
+  const camera::Rig rig;
+  const SyncOptions options;
+  std::mutex mutex;
+  std::condition_variable changed;
+  api::ImageSorter sorter;  // guarded by mutex, as the three below
+  std::deque<ImageBundle> ready;
+  SyncCounts counts;
+  bool closed = false;
+};
+
+// Makes bundles ready and counts; `dropped` also gets the images of bundles that nobody fetched. The mutex is held.
+void Synchronizer::Impl::settle(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped,
+                                std::size_t limit) {
+  counts.bundles += bundles.size();
+  for (ImageBundle& bundle : bundles) ready.push_back(std::move(bundle));
+  for (; ready.size() > limit; ready.pop_front()) {
+    --counts.bundles;
+    for (std::size_t c = 0; c < rig.size(); ++c) {
+      const CameraImage& image = ready.front().images[c];
+      if (image.data != nullptr) dropped.push_back({c, image.time_ns, DropReason::kOverflow});
+    }
+  }
+  for (const DroppedImage& d : dropped) ++counts.dropped[d.camera][static_cast<std::size_t>(d.reason)];
+}
+
+Status Synchronizer::Impl::push(std::size_t camera, const CameraImage& image) {
+  if (camera >= rig.size()) {
+    return Error{"Synchronizer::push", "camera", std::to_string(camera), fmt::format("one in [0, {}]", rig.size() - 1)};
+  }
+  if (const Status s = api::check_image(image, rig.camera(camera), "Synchronizer::push"); !s) return s;
+  CameraImage own = kept(image);
+  std::vector<DroppedImage> dropped;
+  {
+    const std::lock_guard lock(mutex);
+    if (closed) return Error{"Synchronizer::push", "", "a call after close()", "calls before it"};
+    ++counts.pushed[camera];
+    std::vector<ImageBundle> bundles;
+    sorter.push(camera, image.time_ns + rig.camera(camera).time_offset_ns, own, bundles, dropped);
+    settle(std::move(bundles), dropped, options.max_bundles);
+  }
+  changed.notify_all();
+  for (const DroppedImage& d : dropped) {
+    if (options.on_drop) options.on_drop(d);
+  }
+  return {};
+}
+
+void Synchronizer::Impl::close() {
+  std::vector<DroppedImage> dropped;
+  {
+    const std::lock_guard lock(mutex);
+    if (closed) return;
+    closed = true;
+    std::vector<ImageBundle> bundles;
+    sorter.flush(bundles, dropped);
+    settle(std::move(bundles), dropped, ready.max_size());
+  }
+  changed.notify_all();
+  for (const DroppedImage& d : dropped) {
+    if (options.on_drop) options.on_drop(d);
+  }
+}
+
+// The mutex is held.
+std::optional<ImageBundle> Synchronizer::Impl::take() {
+  if (ready.empty()) return std::nullopt;
+  ImageBundle bundle = std::move(ready.front());
+  ready.pop_front();
+  return bundle;
+}
+
+Synchronizer::Synchronizer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Synchronizer::Synchronizer(Synchronizer&& other) noexcept = default;
+Synchronizer& Synchronizer::operator=(Synchronizer&& other) noexcept = default;
+Synchronizer::~Synchronizer() = default;
+
+Result<Synchronizer> Synchronizer::create(const Rig& rig, SyncOptions options) {
+  return api::guarded("Synchronizer::create", [&]() -> Result<Synchronizer> {
+    if (const Status status = check_options(options); !status) return status.error();
+    return Synchronizer(std::make_unique<Impl>(rig, std::move(options)));
+  });
+}
+
+Status Synchronizer::push(std::size_t camera, const CameraImage& image) {
+  if (!impl_) return moved_from();
+  return api::guarded("Synchronizer::push", [&] { return impl_->push(camera, image); });
+}
+
+std::optional<ImageBundle> Synchronizer::pop() {
+  if (!impl_) return std::nullopt;
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->take();
+}
+
+std::optional<ImageBundle> Synchronizer::wait() {
+  if (!impl_) return std::nullopt;
+  std::unique_lock lock(impl_->mutex);
+  impl_->changed.wait(lock, [&] { return impl_->closed || !impl_->ready.empty(); });
+  return impl_->take();
+}
+
+void Synchronizer::close() {
+  if (!impl_) return;
+  const Status status = api::guarded("Synchronizer::close", [&]() -> Status {
+    impl_->close();
+    return {};
+  });
+  static_cast<void>(status);  // a callback's exception ends here: all that waited is ready
+}
+
+SyncCounts Synchronizer::counts() const {
+  if (!impl_) return {};
+  const std::lock_guard lock(impl_->mutex);
+  SyncCounts counts = impl_->counts;
+  counts.waiting = impl_->sorter.waiting();
+  return counts;
+}
+
+}  // namespace bslam

@@ -1,0 +1,199 @@
+#include "system/system.h"
+
+#include <bslam/system.h>
+
+#include <atomic>
+#include <optional>
+#include <utility>
+
+#include "api/bundle_reader.h"
+#include "api/config_impl.h"
+#include "api/conversions.h"
+#include "api/frame_conversion.h"
+#include "api/guard.h"
+#include "api/map_view_impl.h"
+#include "api/notifier.h"
+#include "api/rig_impl.h"
+#include "storage/map_file.h"
+#include "storage/vocabulary_file.h"
+
+namespace bslam {
+namespace {
+
+// Holds the right to call for one thread at a time.
+class Turn {
+ public:
+  explicit Turn(std::atomic<bool>& taken) : taken_(taken), mine_(!taken.exchange(true)) {}
+  ~Turn() {
+    if (mine_) taken_ = false;
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+  explicit operator bool() const { return mine_; }
+
+ private:
+  std::atomic<bool>& taken_;
+  const bool mine_;
+};
+
+Error out_of_turn(const char* name) {
+  return {name, "", "a call while another one is under way", "one thread at a time, and none from a callback"};
+}
+
+Error moved_from(const char* name) { return {name, "", "a System that was moved from", "one that create() made"}; }
+
+struct Resources {
+  system::Resources for_system;
+  std::uint64_t vocabulary = 0;  // its id; 0 = none
+};
+
+Result<Resources> load_resources(const Rig& rig, const system::Config& config, const Startup& startup) {
+  Resources out;
+  if (startup.place_recognition) {
+    auto vocabulary = storage::vocabulary_or_shipped(startup.vocabulary.string());
+    if (!vocabulary) return vocabulary.error();
+    out.for_system.vocabulary = *std::move(vocabulary);
+    out.vocabulary = out.for_system.vocabulary->id();
+  }
+  if (!startup.map.empty()) {
+    auto map =
+        storage::open_map(startup.map, rig.impl().rig, config.feature_model().pyramid, out.for_system.vocabulary.get());
+    if (!map) return map.error();
+    out.for_system.map = *std::move(map);
+  }
+  out.for_system.masks = rig.impl().masks;
+  out.for_system.history = startup.history_frames;
+  return out;
+}
+
+}  // namespace
+
+struct System::Impl {
+  Impl(const Rig& of, const system::Config& config, Resources resources, Callbacks callbacks)
+      : rig(of.impl().rig),
+        vocabulary(resources.vocabulary),
+        system(rig, config, std::move(resources.for_system)),
+        reader(rig),
+        notifier(std::move(callbacks), rig) {}
+
+  Result<FrameResult> process(const ImageBundle& bundle);
+  Status finish();
+  Result<std::vector<Trajectory>> trajectories(RigFrame frame) const;
+
+  const camera::Rig rig;
+  const std::uint64_t vocabulary;
+  system::System system;
+  api::BundleReader reader;
+  api::Notifier notifier;
+  bool finished = false;
+  std::optional<Error> failure;  // what ended the run
+  mutable std::atomic<bool> taken = false;
+};
+
+Result<FrameResult> System::Impl::process(const ImageBundle& bundle) {
+  if (failure) return *failure;
+  if (finished) return Error{"System::process", "", "a call after finish()", "calls before it"};
+  const auto images = reader.read(bundle);
+  if (!images) return images.error();
+  bool refused = false;  // the frame was not taken, and the run goes on without it
+  auto frame = api::guarded("System::process", [&]() -> Result<FrameResult> {
+    const auto record = system.process(*images);
+    refused = !record.ok();
+    if (refused) return record.error();
+    return api::to_frame_result(*record, rig);
+  });
+  if (!frame) {
+    if (!refused) failure = frame.error();
+    return frame;
+  }
+  const Status told = api::guarded("System::process: a callback", [&]() -> Status {
+    notifier.processed(*frame, system);
+    return {};
+  });
+  if (!told) return told.error();
+  return frame;
+}
+
+Status System::Impl::finish() {
+  if (failure) return *failure;
+  if (finished) return Error{"System::finish", "", "a second call", "one"};
+  finished = true;
+  const Status done = api::guarded("System::finish", [&]() -> Status {
+    system.finish();
+    return {};
+  });
+  if (!done) {
+    failure = done.error();
+    return done;
+  }
+  return api::guarded("System::finish: a callback", [&]() -> Status {
+    notifier.finished(system);
+    return {};
+  });
+}
+
+Result<std::vector<Trajectory>> System::Impl::trajectories(RigFrame frame) const {
+  const geometry::SE3 T_rig_frame = frame == RigFrame::kBody ? rig.body_from_cam(0).inverse() : geometry::SE3();
+  std::vector<Trajectory> out;
+  for (const system::PartTrajectory& part : system.trajectories()) {
+    out.push_back(api::to_trajectory(part.poses, T_rig_frame));
+  }
+  return out;
+}
+
+System::System(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+System::System(System&& other) noexcept = default;
+System& System::operator=(System&& other) noexcept = default;
+System::~System() = default;
+
+Result<System> System::create(const Rig& rig, const Config& config, Startup startup) {
+  return api::guarded("System::create", [&]() -> Result<System> {
+    const system::Config& settings = config.impl().config;
+    if (const Status status = system::check_config(settings, !startup.map.empty()); !status) return status.error();
+    auto resources = load_resources(rig, settings, startup);
+    if (!resources) return resources.error();
+    auto impl = std::make_unique<Impl>(rig, settings, *std::move(resources), std::move(startup.callbacks));
+    impl->notifier.started(rig);
+    return System(std::move(impl));
+  });
+}
+
+Result<FrameResult> System::process(const ImageBundle& images) {
+  if (!impl_) return moved_from("System::process");
+  const Turn turn(impl_->taken);
+  return turn ? impl_->process(images) : out_of_turn("System::process");
+}
+
+Status System::finish() {
+  if (!impl_) return moved_from("System::finish");
+  const Turn turn(impl_->taken);
+  return turn ? impl_->finish() : out_of_turn("System::finish");
+}
+
+void System::interrupt() {
+  if (impl_) impl_->system.interrupt();
+}
+
+MapView System::map() const { return impl_ ? api::make_map_view(impl_->system.snapshot()) : api::empty_map_view(); }
+
+Status System::save_map(const std::filesystem::path& file) const {
+  if (!impl_) return moved_from("System::save_map");
+  return api::guarded("System::save_map", [&]() -> Status {
+    return storage::write_map(*impl_->system.snapshot(), {impl_->vocabulary, BSLAM_VERSION, "live"}, file);
+  });
+}
+
+Result<std::vector<Trajectory>> System::trajectories(RigFrame frame) const {
+  if (!impl_) return moved_from("System::trajectories");
+  const Turn turn(impl_->taken);
+  if (!turn) return out_of_turn("System::trajectories");
+  return api::guarded("System::trajectories", [&] { return impl_->trajectories(frame); });
+}
+
+Result<Trajectory> System::trajectory(RigFrame frame) const {
+  auto all = trajectories(frame);
+  if (!all) return all.error();
+  return all->empty() ? Trajectory() : std::move(all->front());
+}
+
+}  // namespace bslam

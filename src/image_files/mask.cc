@@ -1,0 +1,24 @@
+#include "image_files/mask.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+namespace bslam::image_files {
+
+Result<image::Image> checked_mask(image::Image mask, const camera::Camera& camera) {
+  if (mask.width() != camera.width || mask.height() != camera.height) {
+    return Error{camera.mask_file, "", fmt::format("{}x{} pixels", mask.width(), mask.height()),
+                 fmt::format("{}x{}, the resolution of {}", camera.width, camera.height, camera.name)};
+  }
+  const std::span pixels(mask.row(0), static_cast<std::size_t>(mask.width()) * static_cast<std::size_t>(mask.height()));
+  if (std::ranges::all_of(pixels, [](std::uint8_t p) { return p == 0; })) {
+    return Error{camera.mask_file, "", "nothing but 0, which hides all of " + camera.name,
+                 "other values where the image counts"};
+  }
+  return mask;
+}
+
+}  // namespace bslam::image_files

@@ -1,0 +1,17 @@
+#include "system/config.h"
+
+namespace bslam::system {
+
+Status check_config(const Config& config, bool with_map) {
+  if (config.localize_only && !with_map) {
+    return Error{"", "localize_only", "true without a loaded map", "a map to localise in"};
+  }
+  if (config.extrinsics.refine && (config.localize_only || !config.final_adjustment)) {
+    return Error{"", "extrinsics.refine",
+                 config.localize_only ? "true with localize_only" : "true without final_adjustment",
+                 "the adjustment at the end of the run, which refines them"};
+  }
+  return {};
+}
+
+}  // namespace bslam::system

@@ -1,0 +1,118 @@
+#include <bslam/bslam.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "api/textured_wall.h"
+#include "support/data_on_disk.h"
+
+namespace bslam {
+namespace {
+
+using support::TemporaryFolder;
+using testing::TexturedWall;
+
+TEST(PublicPose, ComposesInvertsAndComesFromItsMatrix) {
+  Pose T_a_b;
+  T_a_b.rotation = {0, 0, std::sqrt(0.5), std::sqrt(0.5)};  // 90 degrees about z
+  T_a_b.translation = {1, 2, 3};
+  const auto p = T_a_b * std::array<double, 3>{1, 0, 0};
+  EXPECT_NEAR(p[0], 1, 1e-12);
+  EXPECT_NEAR(p[1], 3, 1e-12);
+  const Matrix4 identity = (T_a_b * T_a_b.inverse()).matrix();
+  for (int i = 0; i < 16; ++i) EXPECT_NEAR(identity[static_cast<std::size_t>(i)], i % 5 == 0, 1e-12);
+  const Matrix4 rows = T_a_b.matrix();
+  EXPECT_DOUBLE_EQ(rows[3], 1);
+  EXPECT_NEAR(rows[4], 1, 1e-12);  // row 1, column 0
+  EXPECT_NEAR(Pose::from_matrix(rows)->rotation[2], std::sqrt(0.5), 1e-12);
+  Matrix4 mirrored = rows;
+  mirrored[10] = -1;
+  EXPECT_FALSE(Pose::from_matrix(mirrored));
+}
+
+TEST(PublicRig, MadeInCodeTellsItsCalibration) {
+  CameraCalibration fisheye = TexturedWall::calibration(1);
+  fisheye.model = "kannala-brandt";
+  fisheye.distortion = {0.01, 0.002, 0, 0};
+  fisheye.time_offset_s = 0.004;
+  fisheye.mask.assign(static_cast<std::size_t>(fisheye.width) * static_cast<std::size_t>(fisheye.height), 255);
+  const Rig rig = Rig::make({TexturedWall::calibration(0), fisheye}).value();
+  const CameraCalibration back = rig.camera(1);
+  EXPECT_EQ(back.model, fisheye.model);
+  EXPECT_EQ(back.distortion, fisheye.distortion);
+  EXPECT_EQ(back.mask, fisheye.mask);
+  EXPECT_DOUBLE_EQ(back.time_offset_s, 0.004);
+  EXPECT_DOUBLE_EQ(back.T_body_cam.translation[0], TexturedWall::kBaseline);
+  EXPECT_EQ(rig.subset({1}).value().camera(0).name, "right");
+  EXPECT_TRUE(rig.camera(7).name.empty());
+}
+
+TEST(PublicRig, RefusesWhatIsNoCamera) {
+  const auto refused = [](auto change) {
+    CameraCalibration c = TexturedWall::calibration(0);
+    change(c);
+    return !Rig::make({c}).ok();
+  };
+  EXPECT_FALSE(refused([](CameraCalibration&) {}));
+  EXPECT_TRUE(refused([](CameraCalibration& c) { c.model = "spherical"; }));
+  EXPECT_TRUE(refused([](CameraCalibration& c) { c.width = 0; }));
+  EXPECT_TRUE(refused([](CameraCalibration& c) { c.intrinsics[0] = -1; }));
+  EXPECT_TRUE(refused([](CameraCalibration& c) { c.distortion = {1}; }));
+  EXPECT_TRUE(refused([](CameraCalibration& c) { c.mask = {1, 2}; }));
+  EXPECT_TRUE(refused([](CameraCalibration& c) { c.T_body_cam.translation[0] = 1e9; }));
+  EXPECT_TRUE(refused([](CameraCalibration& c) { c.T_body_cam.rotation = {0, 0, 0, 0}; }));
+  EXPECT_FALSE(Rig::make({}));
+  EXPECT_FALSE(TexturedWall::rig().subset({0, 0}));
+  EXPECT_FALSE(TexturedWall::rig().subset({2}));
+  EXPECT_FALSE(TexturedWall::rig().subset({}));
+}
+
+TEST(PublicRig, LoadsFilesFoldersAndMasks) {
+  const TemporaryFolder folder;
+  support::write_small_euroc(folder.path());
+  const auto euroc = Rig::load(folder.path());
+  ASSERT_TRUE(euroc) << euroc.error().message();
+  EXPECT_EQ(euroc->size(), 2u);
+  ASSERT_TRUE(euroc->save(folder.path() / "rig.yaml"));
+  std::string text = support::read_text(folder.path() / "rig.yaml");
+  EXPECT_EQ(Rig::load(folder.path() / "rig.yaml")->camera(1).T_body_cam.translation,
+            euroc->camera(1).T_body_cam.translation);
+  EXPECT_FALSE(Rig::load("/no/such/file"));
+}
+
+TEST(PublicConfig, SetsByNameAndRefusesWhatIsWrong) {
+  Config config;
+  EXPECT_TRUE(config.set("features.per_image", "777"));
+  EXPECT_EQ(*config.get("features.per_image"), "777");
+  const Status unknown = config.set("features.per_imag", "1");
+  ASSERT_FALSE(unknown);
+  EXPECT_NE(unknown.error().message().find("features.per_image"), std::string::npos);
+  EXPECT_FALSE(config.set("features.per_image", "many"));
+  EXPECT_FALSE(config.set("features.per_image", "-5"));
+  EXPECT_FALSE(config.set("mode", "sideways"));
+  EXPECT_FALSE(config.set_seed(-1));
+  EXPECT_FALSE(config.get("nothing"));
+  EXPECT_EQ(*config.get("features.per_image"), "777");
+  config.set_mode(Mode::kLagged);
+  EXPECT_EQ(*config.get("mode"), "lagged");
+}
+
+TEST(PublicConfig, IsAValueAndGoesThroughYaml) {
+  const TemporaryFolder folder;
+  Config a;
+  ASSERT_TRUE(a.set("seed", "9"));
+  Config b = a;
+  ASSERT_TRUE(b.set("seed", "10"));
+  EXPECT_EQ(*a.get("seed"), "9");
+  support::write_text(folder.path() / "c.yaml", b.to_yaml());
+  ASSERT_TRUE(a.load(folder.path() / "c.yaml"));
+  EXPECT_EQ(a.to_yaml(), b.to_yaml());
+  support::write_text(folder.path() / "bad.yaml", "seed: 3\nsed: 4\n");
+  EXPECT_FALSE(a.load(folder.path() / "bad.yaml"));
+  EXPECT_EQ(*a.get("seed"), "10");
+  EXPECT_EQ(a.settings().size(), Config().settings().size());
+  EXPECT_FALSE(a.settings().front().help.empty());
+}
+
+}  // namespace
+}  // namespace bslam

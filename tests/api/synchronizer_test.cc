@@ -1,0 +1,281 @@
+#include <bslam/synchronizer.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <thread>
+
+#include "base/random.h"
+#include "image/frame_grouping.h"
+
+namespace bslam {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr int kSide = 16;
+
+Rig rig_of(std::size_t cameras) {
+  std::vector<CameraCalibration> calibrations(cameras);
+  for (std::size_t c = 0; c < cameras; ++c) {
+    calibrations[c].name = "cam" + std::to_string(c);
+    calibrations[c].model = "pinhole";
+    calibrations[c].width = calibrations[c].height = kSide;
+    calibrations[c].intrinsics = {10, 10, 8, 8};
+  }
+  return Rig::make(calibrations).value();
+}
+
+struct Shot {
+  std::size_t camera = 0;
+  std::int64_t time_ns = 0;
+};
+
+const std::vector<std::uint8_t> g_pixels(kSide* kSide, 7);
+
+CameraImage image_at(std::int64_t time_ns) { return {g_pixels.data(), kSide, kSide, kSide, time_ns, nullptr}; }
+
+// Cameras that fire every `interval` ms together, in order of time.
+std::vector<Shot> regular(std::size_t cameras, int count, std::int64_t interval_ms = 50) {
+  std::vector<Shot> shots;
+  for (int k = 0; k < count; ++k) {
+    for (std::size_t c = 0; c < cameras; ++c) shots.push_back({c, k * interval_ms * kMs});
+  }
+  return shots;
+}
+
+using Times = std::vector<std::vector<std::int64_t>>;  // per bundle and camera, ms; -1 = none
+
+std::vector<std::int64_t> times_of(const ImageBundle& bundle) {
+  std::vector<std::int64_t> out;
+  for (const CameraImage& i : bundle.images) out.push_back(i.data == nullptr ? -1 : i.time_ns / kMs);
+  return out;
+}
+
+class Feed {
+ public:
+  explicit Feed(std::size_t cameras, SyncOptions options = {})
+      : synchronizer(Synchronizer::create(rig_of(cameras), with_log(std::move(options))).value()) {}
+
+  void push(const std::vector<Shot>& shots) {
+    for (const Shot& shot : shots) {
+      ASSERT_TRUE(synchronizer.push(shot.camera, image_at(shot.time_ns)));
+      fetch();
+    }
+  }
+  Times close() {
+    synchronizer.close();
+    fetch();
+    return bundles;
+  }
+  std::size_t count(DropReason reason) const {
+    return static_cast<std::size_t>(std::ranges::count(dropped, reason, &DroppedImage::reason));
+  }
+
+  Times bundles;
+  std::vector<DroppedImage> dropped;
+  Synchronizer synchronizer;
+
+ private:
+  SyncOptions with_log(SyncOptions options) {
+    options.on_drop = [this](const DroppedImage& d) { dropped.push_back(d); };
+    return options;
+  }
+  void fetch() {
+    while (const auto bundle = synchronizer.pop()) bundles.push_back(times_of(*bundle));
+  }
+};
+
+// The bundles of the same images as a recording.
+Times as_recorded(const std::vector<Shot>& shots, std::size_t cameras) {
+  std::vector<std::vector<TimeNs>> times(cameras);
+  for (const Shot& shot : shots) times[shot.camera].push_back(shot.time_ns);
+  for (auto& t : times) std::ranges::sort(t);
+  const TimeNs gap = image::gap_after(image::median_interval(times[0]), 2 * kMs);
+  Times out;
+  for (const image::GroupedFrame& frame : image::group_frames(times, 2 * kMs, gap).frames) {
+    out.emplace_back();
+    for (std::size_t c = 0; c < cameras; ++c) {
+      out.back().push_back(frame.images[c] < 0 ? -1 : times[c][static_cast<std::size_t>(frame.images[c])] / kMs);
+    }
+  }
+  return out;
+}
+
+TEST(Synchronizer, HandsOutACompleteBundleAtOnce) {
+  Feed feed(3);
+  feed.push(regular(3, 5));
+  EXPECT_EQ(feed.bundles.size(), 5u);
+  EXPECT_EQ(feed.bundles[4], (std::vector<std::int64_t>{200, 200, 200}));
+  EXPECT_TRUE(feed.dropped.empty());
+  EXPECT_EQ(feed.synchronizer.counts().waiting, 0u);
+}
+
+TEST(Synchronizer, GroupsShuffledImagesAsARecordingIsGrouped) {
+  std::vector<Shot> shots = regular(4, 60);
+  const Times expected = as_recorded(shots, 4);
+  constexpr std::size_t kBlock = 10;  // images: within 150 ms
+  Random random(5);
+  for (std::size_t block = 0; block < shots.size(); block += kBlock) {
+    for (std::uint32_t i = kBlock - 1; i > 0; --i) std::swap(shots[block + i], shots[block + random.below(i + 1)]);
+  }
+  Feed feed(4, {.max_wait_s = 1, .reorder_s = 0.2});
+  feed.push(shots);
+  EXPECT_EQ(feed.close(), expected);
+  EXPECT_TRUE(feed.dropped.empty());
+}
+
+TEST(Synchronizer, LostImagesLeaveTheirPlacesEmpty) {
+  std::vector<Shot> shots = regular(3, 80), kept;
+  Random random(6);
+  for (const Shot& shot : shots) {
+    if (shot.time_ns < 500 * kMs || random.below(10) > 0) kept.push_back(shot);
+  }
+  ASSERT_LT(kept.size(), shots.size());
+  Feed feed(3);
+  feed.push(kept);
+  EXPECT_EQ(feed.close(), as_recorded(kept, 3));
+  EXPECT_TRUE(feed.dropped.empty());
+}
+
+TEST(Synchronizer, DoesNotWaitForACameraThatDied) {
+  for (const std::size_t dead : {0u, 2u}) {
+    std::vector<Shot> shots;
+    for (const Shot& shot : regular(3, 100)) {
+      if (shot.camera != dead || shot.time_ns < 1000 * kMs) shots.push_back(shot);
+    }
+    Feed feed(3);
+    feed.push(shots);
+    EXPECT_EQ(feed.bundles.size(), 100u);
+    EXPECT_EQ(feed.close(), as_recorded(shots, 3));
+    EXPECT_TRUE(feed.dropped.empty());
+  }
+}
+
+TEST(Synchronizer, WaitsForACameraThatIsSilentNoLongerThanTold) {
+  Feed feed(2, {.max_wait_s = 0.12, .silent_after_s = 10});
+  std::vector<Shot> shots;
+  for (const Shot& shot : regular(2, 20)) {
+    if (shot.camera == 0 || shot.time_ns < 500 * kMs) shots.push_back(shot);
+  }
+  feed.push(shots);
+  EXPECT_EQ(feed.bundles.size(), 17u);  // up to 800 ms: 950 ms came, and 120 ms are waited
+  EXPECT_EQ(feed.synchronizer.counts().waiting, 3u);
+}
+
+TEST(Synchronizer, AcceptsCamerasOfDifferentRates) {
+  std::vector<Shot> shots;
+  for (int k = 0; k < 60; ++k) {
+    shots.push_back({0, k * 30 * kMs});
+    if (k % 3 == 0) shots.push_back({1, k * 30 * kMs});
+  }
+  Feed feed(2);
+  feed.push(shots);
+  EXPECT_EQ(feed.close(), as_recorded(shots, 2));
+  EXPECT_TRUE(feed.dropped.empty());
+}
+
+TEST(Synchronizer, TellsWhatItDropsAndWhy) {
+  Feed feed(2);
+  feed.push(regular(2, 10));
+  feed.push({{1, 450 * kMs}});  // once more
+  feed.push({{0, 430 * kMs}});  // its time is over
+  feed.push({{0, 500 * kMs}, {1, 460 * kMs}, {1, 500 * kMs}});
+  feed.push({{1, 9'000'000 * kMs}});  // a broken clock
+  feed.push({{0, 550 * kMs}, {1, 550 * kMs}});
+  EXPECT_EQ(feed.close().size(), 12u);
+  EXPECT_EQ(feed.dropped.size(), 4u);
+  EXPECT_EQ(feed.count(DropReason::kDuplicate), 1u);
+  EXPECT_EQ(feed.count(DropReason::kTooLate), 1u);
+  EXPECT_EQ(feed.count(DropReason::kNoFrame), 1u);
+  EXPECT_EQ(feed.count(DropReason::kFarAhead), 1u);
+  EXPECT_EQ(feed.synchronizer.counts().dropped[1][static_cast<std::size_t>(DropReason::kFarAhead)], 1u);
+}
+
+TEST(Synchronizer, BelievesAClockThatStaysAhead) {
+  Feed feed(1);
+  feed.push(regular(1, 5));
+  for (int k = 0; k < 6; ++k) feed.push({{0, (100'000 + 50 * k) * kMs}});
+  EXPECT_EQ(feed.bundles.size(), 9u);
+  EXPECT_EQ(feed.count(DropReason::kFarAhead), 2u);
+}
+
+TEST(Synchronizer, HoldsABoundedNumberOfImagesAndBundles) {
+  const auto drops = std::make_shared<std::size_t>(0);
+  SyncOptions options{.max_wait_s = 1000, .silent_after_s = 1000, .max_images = 5, .max_bundles = 3};
+  options.on_drop = [drops](const DroppedImage& d) { *drops += d.reason == DropReason::kOverflow; };
+  auto synchronizer = Synchronizer::create(rig_of(2), options).value();
+  for (int k = 0; k < 20; ++k) ASSERT_TRUE(synchronizer.push(0, image_at(k * 50 * kMs)));
+  EXPECT_EQ(synchronizer.counts().waiting, 5u);
+  EXPECT_EQ(synchronizer.counts().bundles, 3u);
+  EXPECT_EQ(*drops, 12u);
+  EXPECT_EQ(times_of(*synchronizer.pop()), (std::vector<std::int64_t>{600, -1}));
+}
+
+TEST(Synchronizer, KeepsThePixels) {
+  auto synchronizer = Synchronizer::create(rig_of(1)).value();
+  std::vector<std::uint8_t> pixels(2 * kSide * kSide, 1);
+  for (int y = 0; y < kSide; ++y) pixels[static_cast<std::size_t>(2 * kSide * y + 3)] = static_cast<std::uint8_t>(y);
+  ASSERT_TRUE(synchronizer.push(0, {pixels.data(), kSide, kSide, 2 * kSide, 0, nullptr}));
+  std::ranges::fill(pixels, std::uint8_t{0});
+  const ImageBundle bundle = synchronizer.pop().value();
+  const CameraImage& image = bundle.images[0];
+  for (int y = 0; y < kSide; ++y) {
+    EXPECT_EQ(image.data[y * image.stride + 3], y);
+    EXPECT_EQ(image.data[y * image.stride + 4], 1);
+  }
+}
+
+TEST(Synchronizer, AddsTheTimeOffsetsOfTheRig) {
+  CameraCalibration late = rig_of(1).camera(0);
+  late.time_offset_s = 0.03;
+  auto synchronizer = Synchronizer::create(Rig::make({rig_of(1).camera(0), late}).value()).value();
+  ASSERT_TRUE(synchronizer.push(0, image_at(100 * kMs)));
+  ASSERT_TRUE(synchronizer.push(1, image_at(70 * kMs)));
+  EXPECT_EQ(times_of(synchronizer.pop().value()), (std::vector<std::int64_t>{100, 70}));
+}
+
+TEST(Synchronizer, RefusesWhatCannotBeAnImage) {
+  auto synchronizer = Synchronizer::create(rig_of(1)).value();
+  EXPECT_FALSE(synchronizer.push(1, image_at(0)));
+  EXPECT_FALSE(synchronizer.push(0, {}));
+  EXPECT_FALSE(synchronizer.push(0, {g_pixels.data(), 8, kSide, kSide, 0, nullptr}));
+  EXPECT_FALSE(synchronizer.push(0, {g_pixels.data(), kSide, kSide, kSide - 1, 0, nullptr}));
+  EXPECT_FALSE(synchronizer.push(0, image_at(std::numeric_limits<std::int64_t>::max())));
+  synchronizer.close();
+  EXPECT_FALSE(synchronizer.push(0, image_at(0)));
+  EXPECT_FALSE(synchronizer.wait());
+  EXPECT_FALSE(Synchronizer::create(rig_of(1), {.tolerance_s = -1}));
+  EXPECT_FALSE(Synchronizer::create(rig_of(1), {.max_wait_s = std::numeric_limits<double>::quiet_NaN()}));
+  EXPECT_FALSE(Synchronizer::create(rig_of(1), {.max_bundles = 0}));
+}
+
+TEST(Synchronizer, TakesImagesFromAThreadPerCamera) {
+  constexpr int kCount = 200;
+  auto synchronizer = Synchronizer::create(rig_of(3), {.max_wait_s = 1000,
+                                                       .silent_after_s = 1000,
+                                                       .max_ahead_s = 1000,
+                                                       .max_images = kCount,
+                                                       .max_bundles = kCount})
+                          .value();
+  std::vector<std::thread> cameras;
+  for (std::size_t c = 0; c < 3; ++c) {
+    cameras.emplace_back([&synchronizer, c] {
+      for (int k = 0; k < kCount; ++k) EXPECT_TRUE(synchronizer.push(c, image_at(k * 50 * kMs)));
+    });
+  }
+  std::thread end([&] {
+    for (std::thread& camera : cameras) camera.join();
+    synchronizer.close();
+  });
+  int bundles = 0;
+  while (const auto bundle = synchronizer.wait()) {
+    EXPECT_EQ(times_of(*bundle), (std::vector<std::int64_t>(3, 50 * bundles)));
+    ++bundles;
+  }
+  end.join();
+  EXPECT_EQ(bundles, kCount);
+}
+
+}  // namespace
+}  // namespace bslam

@@ -1,0 +1,232 @@
+#include <bslam/bslam.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "api/textured_wall.h"
+#include "support/data_on_disk.h"
+
+namespace bslam {
+namespace {
+
+using support::TemporaryFolder;
+using testing::TexturedWall;
+
+constexpr int kFrames = 60;
+
+Config sequential() {
+  Config config;
+  config.set_mode(Mode::kSequential);
+  EXPECT_TRUE(config.set("features.per_image", "400"));
+  return config;
+}
+
+System make_system(Startup startup = {}) {
+  return System::create(TexturedWall::rig(), sequential(), std::move(startup)).value();
+}
+
+class PublicSystem : public ::testing::Test {
+ protected:
+  TexturedWall wall_;
+
+  void process(System& system, int from, int to) {
+    for (int k = from; k < to; ++k) {
+      const auto frame = system.process(wall_.bundle(k));
+      ASSERT_TRUE(frame) << frame.error().message();
+    }
+  }
+};
+
+TEST_F(PublicSystem, TellsPoseAndVelocityInTheDocumentedFrames) {
+  std::vector<CameraCalibration> cameras = {TexturedWall::calibration(0), TexturedWall::calibration(1)};
+  for (CameraCalibration& c : cameras) {  // body axes: x forward, y left, z up
+    Pose T_body_cam0;
+    T_body_cam0.rotation = {-0.5, 0.5, -0.5, 0.5};
+    c.T_body_cam = T_body_cam0 * c.T_body_cam;
+  }
+  auto system = System::create(Rig::make(cameras).value(), sequential()).value();
+  FrameResult last;
+  for (int k = 0; k < kFrames; ++k) last = system.process(wall_.bundle(k)).value();
+  ASSERT_TRUE(last.tracking());
+  EXPECT_EQ(last.frame, kFrames - 1);
+  EXPECT_EQ(last.time_ns, TexturedWall::kStart + (kFrames - 1) * TexturedWall::kInterval);
+  const double travelled = TexturedWall::kSpeed * 0.05 * (kFrames - 1);
+  EXPECT_NEAR(last.T_world_cam0.translation[0], travelled, 0.05);
+  EXPECT_NEAR(last.T_world_cam0.translation[1], 0, 0.05);
+  ASSERT_TRUE(last.velocity);
+  EXPECT_NEAR(last.velocity->linear[0], 0, 0.1);
+  EXPECT_NEAR(last.velocity->linear[1], -TexturedWall::kSpeed, 0.1);  // camera 0's right is the body's -y
+  EXPECT_NEAR(last.velocity->linear[2], 0, 0.1);
+  const Pose through_odom = last.T_map_odom * last.T_odom_body;
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(through_odom.translation[i], last.T_world_body.translation[i], 1e-9);
+  ASSERT_EQ(last.cameras.size(), 2u);
+  EXPECT_EQ(last.cameras[1].state, CameraState::kOk);
+  EXPECT_GT(last.cameras[1].inliers, 20);
+  EXPECT_FALSE(last.stages.empty());
+}
+
+TEST_F(PublicSystem, TheMapCanBeReadSavedAndGoneOnIn) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "map.bslam";
+  auto system = make_system();
+  process(system, 0, kFrames);
+  ASSERT_TRUE(system.finish());
+  ASSERT_TRUE(system.save_map(file));
+  EXPECT_FALSE(system.save_map("/no/such/folder/map"));
+
+  const auto map = MapView::load(file);
+  ASSERT_TRUE(map) << map.error().message();
+  EXPECT_EQ(map->scale(), Scale::kMetric);
+  EXPECT_EQ(map->rig().size(), 2u);
+  ASSERT_EQ(map->submaps().size(), 1u);
+  EXPECT_EQ(map->submaps()[0].keyframes, map->num_keyframes());
+  const auto landmarks = map->landmarks();
+  ASSERT_EQ(landmarks.size(), map->num_landmarks());
+  std::vector<double> depths;
+  for (const auto& l : landmarks) depths.push_back(l.position[2]);
+  std::ranges::nth_element(depths, depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2));
+  EXPECT_NEAR(depths[depths.size() / 2], TexturedWall::kDepth, 0.1);
+  const auto keyframes = map->keyframes();
+  ASSERT_GE(keyframes.size(), 2u);
+  EXPECT_EQ(keyframes[0].parent, -1);
+  EXPECT_FALSE(map->covisibility(1).empty());
+
+  const auto resumed = System::create(TexturedWall::rig(), sequential(), {.map = file});
+  ASSERT_TRUE(resumed) << resumed.error().message();
+  EXPECT_EQ(resumed->map().num_landmarks(), landmarks.size());
+  CameraCalibration other = TexturedWall::calibration(1);
+  other.intrinsics[0] += 1;
+  EXPECT_FALSE(System::create(Rig::make({TexturedWall::calibration(0), other}).value(), sequential(), {.map = file}));
+  EXPECT_FALSE(System::create(TexturedWall::rig().subset({0}).value(), sequential(), {.map = file}));
+  Config pyramid = sequential();
+  ASSERT_TRUE(pyramid.set("features.levels", "5"));
+  EXPECT_FALSE(System::create(TexturedWall::rig(), pyramid, {.map = file}));
+}
+
+TEST_F(PublicSystem, ReturnsErrorsForWhatACallerCanGetWrong) {
+  auto system = make_system();
+  process(system, 0, 3);
+  const auto refused = [&](auto change) {
+    ImageBundle bundle = wall_.bundle(3);
+    change(bundle);
+    return !system.process(bundle).ok();
+  };
+  EXPECT_TRUE(refused([](ImageBundle& b) { b.images.pop_back(); }));
+  EXPECT_TRUE(refused([](ImageBundle& b) { b.images.push_back(b.images[0]); }));
+  EXPECT_TRUE(refused([](ImageBundle& b) { b.images = {{}, {}}; }));
+  EXPECT_TRUE(refused([](ImageBundle& b) { b.images[1].width = 10; }));
+  EXPECT_TRUE(refused([](ImageBundle& b) { b.images[1].stride = 10; }));
+  EXPECT_TRUE(refused([](ImageBundle& b) { b.images[1].time_ns += 2'000'000'000; }));
+  EXPECT_TRUE(refused([&](ImageBundle& b) { b = wall_.bundle(2); }));
+  EXPECT_TRUE(refused([&](ImageBundle& b) { b = wall_.bundle(1); }));
+  EXPECT_TRUE(refused([&](ImageBundle& b) { b.images[1] = wall_.image(2, 1); }));
+  EXPECT_FALSE(refused([](ImageBundle& b) { b.images[1].data = nullptr; }));
+  EXPECT_EQ(system.process(wall_.bundle(4)).value().frame, 4);  // what was refused does not count
+  ASSERT_TRUE(system.finish());
+  EXPECT_FALSE(system.process(wall_.bundle(5)));
+  EXPECT_FALSE(system.finish());
+  System moved = std::move(system);
+  EXPECT_FALSE(system.process(wall_.bundle(6)));  // NOLINT: the state after a move is defined
+  EXPECT_EQ(system.map().num_keyframes(), 0u);
+  EXPECT_GT(moved.map().num_keyframes(), 0u);
+}
+
+TEST_F(PublicSystem, RefusesSettingsAndFilesThatDoNotFit) {
+  Config localise = sequential();
+  ASSERT_TRUE(localise.set("localize_only", "true"));
+  EXPECT_FALSE(System::create(TexturedWall::rig(), localise));
+  Config refine = sequential();
+  ASSERT_TRUE(refine.set("extrinsics.refine", "true"));
+  ASSERT_TRUE(refine.set("final_adjustment", "false"));
+  EXPECT_FALSE(System::create(TexturedWall::rig(), refine));
+  EXPECT_FALSE(System::create(TexturedWall::rig(), sequential(), {.map = "/no/such/file"}));
+  EXPECT_FALSE(System::create(TexturedWall::rig(), sequential(), {.vocabulary = "/no/such/file"}));
+}
+
+TEST_F(PublicSystem, CallsBackFromTheCallersThread) {
+  int keyframes = 0, maps = 0, lines = 0, cameras = 0, last_version = 0;
+  System* running = nullptr;
+  bool reentered = false;
+  Startup startup;
+  startup.callbacks.keyframe = [&](const KeyframeEvent& e) {
+    ++keyframes;
+    EXPECT_EQ(e.keyframe, e.frame.keyframe_id);
+    reentered |= running->process(wall_.bundle(kFrames)).ok();
+  };
+  startup.callbacks.map = [&](const MapView& map) {
+    ++maps;
+    EXPECT_GT(map.version(), last_version);
+    last_version = map.version();
+  };
+  startup.callbacks.camera = [&](const CameraEvent& e) {
+    ++cameras;
+    EXPECT_EQ(e.camera, 1u);
+  };
+  startup.callbacks.log = [&](LogLevel, std::string_view) { ++lines; };
+  auto system = make_system(startup);
+  running = &system;
+  process(system, 0, 10);
+  EXPECT_EQ(cameras, 0);
+  ImageBundle one = wall_.bundle(10);
+  one.images[1].data = nullptr;
+  EXPECT_EQ(system.process(one).value().cameras[1].state, CameraState::kOut);
+  EXPECT_EQ(cameras, 1);
+  ASSERT_TRUE(system.finish());
+  EXPECT_GT(keyframes, 0);
+  EXPECT_GT(maps, 0);
+  EXPECT_GT(lines, 1);
+  EXPECT_EQ(system.map().version(), last_version);
+  EXPECT_FALSE(reentered);
+}
+
+TEST_F(PublicSystem, ReturnsWhatACallbackThrowsAndGoesOn) {
+  Startup startup;
+  startup.callbacks.keyframe = [](const KeyframeEvent&) { throw std::runtime_error("full disk"); };
+  auto system = make_system(startup);
+  const auto first = system.process(wall_.bundle(0));
+  ASSERT_FALSE(first);
+  EXPECT_NE(first.error().message().find("full disk"), std::string::npos);
+  EXPECT_TRUE(system.process(wall_.bundle(1)).value().tracking());
+}
+
+TEST_F(PublicSystem, ForgetsFramesBeyondItsHistory) {
+  auto all = make_system(), few = make_system({.history_frames = 5});
+  process(all, 0, kFrames);
+  process(few, 0, kFrames);
+  ASSERT_TRUE(all.finish());
+  ASSERT_TRUE(few.finish());
+  const Trajectory whole = all.trajectory().value(), rest = few.trajectory().value();
+  ASSERT_EQ(whole.size(), static_cast<std::size_t>(kFrames));
+  ASSERT_GE(rest.size(), 5u);
+  ASSERT_LE(rest.size(), 10u);
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    const TimedPose &a = whole[whole.size() - rest.size() + i], &b = rest[i];
+    EXPECT_EQ(a.time_ns, b.time_ns);
+    EXPECT_EQ(a.T_world_frame.translation, b.T_world_frame.translation);
+  }
+}
+
+// Borrowed rows with a wide stride are the same images as packed ones.
+TEST_F(PublicSystem, ReadsImagesWhereTheyLie) {
+  auto borrowed = make_system(), packed = make_system();
+  for (int k = 0; k < 10; ++k) {
+    ImageBundle bundle = wall_.bundle(k);
+    const FrameResult a = borrowed.process(bundle).value();
+    std::vector<std::vector<std::uint8_t>> copies;
+    for (CameraImage& image : bundle.images) {
+      auto& copy = copies.emplace_back();
+      for (int y = 0; y < image.height; ++y) {
+        copy.insert(copy.end(), image.data + y * image.stride, image.data + y * image.stride + image.width);
+      }
+      image.data = copy.data();
+      image.stride = image.width;
+    }
+    const FrameResult b = packed.process(bundle).value();
+    EXPECT_EQ(a.T_world_cam0.translation, b.T_world_cam0.translation);
+    EXPECT_EQ(a.T_world_cam0.rotation, b.T_world_cam0.rotation);
+  }
+}
+
+}  // namespace
+}  // namespace bslam
