@@ -43,10 +43,12 @@ Scale to_scale(map::Scale scale) {
   return Scale::kMetric;
 }
 
-Trajectory to_trajectory(const evaluation::Trajectory& cam0, const SE3& T_rig_frame) {
+Trajectory to_trajectory(const evaluation::Trajectory& cam0, const std::optional<SE3>& T_rig_frame) {
   Trajectory out;
   out.reserve(cam0.size());
-  for (const evaluation::TimedPose& p : cam0) out.push_back({p.time_ns, to_pose(p.T_world_frame * T_rig_frame)});
+  for (const evaluation::TimedPose& p : cam0) {
+    out.push_back({p.time_ns, to_pose(T_rig_frame ? p.T_world_frame * *T_rig_frame : p.T_world_frame)});
+  }
   return out;
 }
 

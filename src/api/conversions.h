@@ -5,6 +5,8 @@
 #include <bslam/pose.h>
 #include <bslam/trajectory.h>
 
+#include <optional>
+
 #include "evaluation/trajectory.h"
 #include "geometry/se3.h"
 #include "map/bundled_map.h"
@@ -23,7 +25,7 @@ Velocity to_velocity(const geometry::Vector6d& twist, const geometry::SE3& T_fra
 
 Scale to_scale(map::Scale scale);
 
-// Poses of camera 0 as those of a frame fixed to the rig.
-Trajectory to_trajectory(const evaluation::Trajectory& cam0, const geometry::SE3& T_rig_frame);
+// Poses of camera 0, to the bit, or of another frame fixed to the rig where one is given.
+Trajectory to_trajectory(const evaluation::Trajectory& cam0, const std::optional<geometry::SE3>& T_rig_frame);
 
 }  // namespace bslam::api

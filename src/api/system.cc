@@ -133,7 +133,8 @@ Status System::Impl::finish() {
 }
 
 Result<std::vector<Trajectory>> System::Impl::trajectories(RigFrame frame) const {
-  const geometry::SE3 T_rig_frame = frame == RigFrame::kBody ? rig.body_from_cam(0).inverse() : geometry::SE3();
+  std::optional<geometry::SE3> T_rig_frame;
+  if (frame == RigFrame::kBody) T_rig_frame = rig.body_from_cam(0).inverse();
   std::vector<Trajectory> out;
   for (const system::PartTrajectory& part : system.trajectories()) {
     out.push_back(api::to_trajectory(part.poses, T_rig_frame));
