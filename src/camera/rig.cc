@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <ranges>
 #include <utility>
 
 #include "base/assert.h"
@@ -30,7 +29,8 @@ std::vector<double> Rig::measured_overlap(const std::vector<RigCamera>& cameras)
     std::vector<Vector3d> bearings;
     for (int r = 0; r < kRows; ++r) {
       for (int c = 0; c < kColumns; ++c) {
-        const Vector2d pixel((c + 0.5) * cameras[i].camera.width / kColumns - 0.5, (r + 0.5) * cameras[i].camera.height / kRows - 0.5);
+        const Vector2d pixel((c + 0.5) * cameras[i].camera.width / kColumns - 0.5,
+                             (r + 0.5) * cameras[i].camera.height / kRows - 0.5);
         if (const auto bearing = cameras[i].camera.unproject(pixel)) bearings.push_back(*bearing);
       }
     }
@@ -61,7 +61,9 @@ bool Rig::any_overlap(std::span<const std::uint8_t> left_out) const {
 }
 
 Rig Rig::subset(std::span<const int> indices) const {
-  if (std::ranges::equal(indices, std::views::iota(0, static_cast<int>(size())))) return *this;
+  int next = 0;
+  const bool in_order = std::ranges::all_of(indices, [&](int i) { return i == next++; });
+  if (in_order && indices.size() == size()) return *this;
   std::vector<RigCamera> chosen;
   for (const int i : indices) {
     BSLAM_ASSERT(i >= 0 && static_cast<std::size_t>(i) < size(), "camera index within the rig");
@@ -73,7 +75,8 @@ Rig Rig::subset(std::span<const int> indices) const {
 Rig Rig::with_extrinsics_of(const Rig& part, std::span<const int> indices) const {
   BSLAM_ASSERT(part.size() == indices.size(), "one index per camera of the part");
   std::vector<RigCamera> cameras = calibration_->cameras;
-  for (std::size_t i = 0; i < part.size(); ++i) cameras[static_cast<std::size_t>(indices[i])].T_body_cam = part.body_from_cam(i);
+  for (std::size_t i = 0; i < part.size(); ++i)
+    cameras[static_cast<std::size_t>(indices[i])].T_body_cam = part.body_from_cam(i);
   return Rig(std::move(cameras));
 }
 
