@@ -27,7 +27,8 @@ std::vector<float> sigmas_of_one_landmark(map::BundledMap& map, const std::vecto
   const map::Observation& r = observations[reference];
   const frame::KeypointRef keypoint = map.keyframe(r.keyframe).frame->bundled.keypoints(r.feature).front();
   const LandmarkId l = map.add_landmark({0, 0, 5}, observations, {r.keyframe, keypoint});
-  const FlatProblem flat = flatten(map, {.free_keyframes = map.keyframe_ids(), .fixed_keyframes = {}, .landmarks = {l}}, kDetected, 1.2);
+  const FlatProblem flat =
+      flatten(map, {.free_keyframes = map.keyframe_ids(), .fixed_keyframes = {}, .landmarks = {l}}, kDetected, 1.2);
   std::vector<float> out;
   for (const auto& o : flat.problem.observations) out.push_back(o.sigma);
   return out;
@@ -35,7 +36,8 @@ std::vector<float> sigmas_of_one_landmark(map::BundledMap& map, const std::vecto
 
 TEST(Flatten, TakesTheReferenceForAsGoodAsWhatIsAlignedToIt) {
   map::BundledMap map = keyframes_with({0.5f, 0.15f, 0.2f});
-  const std::vector<map::Observation> seen = {{KeyframeId(0), FeatureId(2)}, {KeyframeId(1), FeatureId(2)}, {KeyframeId(2), FeatureId(2)}};
+  const std::vector<map::Observation> seen = {
+      {KeyframeId(0), FeatureId(2)}, {KeyframeId(1), FeatureId(2)}, {KeyframeId(2), FeatureId(2)}};
   EXPECT_EQ(sigmas_of_one_landmark(map, seen, 0), (std::vector<float>{0.15f, 0.15f, 0.2f}));
 }
 

@@ -33,7 +33,8 @@ std::vector<double> variances_of(const solver::ReprojectionProblem& problem, std
 
 double pose_error(const scene::BundleScene& scene) {
   double sum = 0;
-  for (std::size_t i = 0; i < scene.T_rig_world.size(); ++i) sum += scene::centre_error(scene.problem.T_rig_world[i], scene.T_rig_world[i]);
+  for (std::size_t i = 0; i < scene.T_rig_world.size(); ++i)
+    sum += scene::centre_error(scene.problem.T_rig_world[i], scene.T_rig_world[i]);
   return sum;
 }
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "dataset/data_on_disk.h"
+#include "support/data_on_disk.h"
 
 namespace bslam {
 namespace {
@@ -17,7 +17,7 @@ int entries(const fs::path& folder) {
 }
 
 TEST(AtomicFile, WritesAndReadsAnyBytes) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   std::string bytes = "text\n";
   bytes.push_back('\0');
   for (int i = 0; i < 300000; ++i) bytes.push_back(static_cast<char>(i * 31));
@@ -27,14 +27,14 @@ TEST(AtomicFile, WritesAndReadsAnyBytes) {
 }
 
 TEST(AtomicFile, ReplacesAFile) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   ASSERT_TRUE(write_atomically(folder.path() / "file", "a longer text"));
   ASSERT_TRUE(write_atomically(folder.path() / "file", "short"));
   EXPECT_EQ(read_file(folder.path() / "file", 100).value(), "short");
 }
 
 TEST(AtomicFile, LeavesNothingBehindOnError) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   fs::create_directories(folder.path() / "taken" / "inside");
   const Status onto_folder = write_atomically(folder.path() / "taken", "text");
   ASSERT_FALSE(onto_folder);
@@ -44,7 +44,7 @@ TEST(AtomicFile, LeavesNothingBehindOnError) {
 }
 
 TEST(AtomicFile, MayBeReadByOthersAsUsual) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   const mode_t old = ::umask(022);
   ASSERT_TRUE(write_atomically(folder.path() / "file", "text"));
   ::umask(old);
@@ -52,7 +52,7 @@ TEST(AtomicFile, MayBeReadByOthersAsUsual) {
 }
 
 TEST(ReadFile, RefusesWhatIsNoReadableFile) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   EXPECT_EQ(read_file(folder.path() / "none", 10).error().found, "No such file or directory");
   EXPECT_EQ(read_file(folder.path(), 10).error().found, "a folder");
   ASSERT_EQ(::mkfifo((folder.path() / "pipe").c_str(), 0600), 0);
@@ -60,11 +60,11 @@ TEST(ReadFile, RefusesWhatIsNoReadableFile) {
 }
 
 TEST(ReadFile, RefusesWhatIsTooLarge) {
-  const TemporaryFolder folder;
-  write_text(folder.path() / "file", "12345");
+  const support::TemporaryFolder folder;
+  support::write_text(folder.path() / "file", "12345");
   EXPECT_TRUE(read_file(folder.path() / "file", 5));
   EXPECT_FALSE(read_file(folder.path() / "file", 4));
-  write_text(folder.path() / "empty", "");
+  support::write_text(folder.path() / "empty", "");
   EXPECT_EQ(read_file(folder.path() / "empty", 0).value(), "");
 }
 

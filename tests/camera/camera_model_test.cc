@@ -203,8 +203,9 @@ TEST(Unified, IsMeisModelWithoutDistortion) {
   for (int i = 0; i < 100; ++i) {
     const Vector3d p(random.normal(), random.normal(), random.uniform(0, 2));
     const double divisor = p.z() + xi * p.norm();
-    EXPECT_LT((camera.project(p).value() - Vector2d(320 + gamma * p.x() / divisor, 240 + gamma * p.y() / divisor)).norm(),
-              1e-10);
+    EXPECT_LT(
+        (camera.project(p).value() - Vector2d(320 + gamma * p.x() / divisor, 240 + gamma * p.y() / divisor)).norm(),
+        1e-10);
   }
 }
 

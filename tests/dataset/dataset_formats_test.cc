@@ -1,10 +1,10 @@
 // The layouts beside EuRoC, and real recordings where they are present.
 #include <gtest/gtest.h>
 
-#include "dataset/data_on_disk.h"
 #include "dataset/dataset.h"
 #include "dataset/frame_reader.h"
 #include "rig_formats/rig_file.h"
+#include "support/data_on_disk.h"
 
 namespace bslam::dataset {
 namespace {
@@ -18,23 +18,23 @@ class SmallKitti : public testing::Test {
     std::string times;
     for (int k = 0; k < 10; ++k) {
       times += std::to_string(k) + ".044989e-01\n";
-      for (const int c : {0, 1}) write_picture(image(k, c), 60, 20, k);
+      for (const int c : {0, 1}) support::write_picture(image(k, c), 60, 20, k);
     }
-    write_text(data() / "times.txt", times);
-    write_text(data() / "calib.txt",
-               "P0: 50 0 30 0 0 50 10 0 0 0 1 0\nP1: 50 0 30 -25 0 50 10 0 0 0 1 0\n"
-               "P2: 50 0 30 3 0 50 10 0 0 0 1 0\nP3: 50 0 30 -22 0 50 10 0 0 0 1 0\n");
+    support::write_text(data() / "times.txt", times);
+    support::write_text(data() / "calib.txt",
+                        "P0: 50 0 30 0 0 50 10 0 0 0 1 0\nP1: 50 0 30 -25 0 50 10 0 0 0 1 0\n"
+                        "P2: 50 0 30 3 0 50 10 0 0 0 1 0\nP3: 50 0 30 -22 0 50 10 0 0 0 1 0\n");
   }
   const fs::path& data() const { return folder_.path(); }
   fs::path image(int k, int c) const {
     return data() / ("image_" + std::to_string(c)) / ("00000" + std::to_string(k) + ".png");
   }
   Result<Dataset> open() const { return open_dataset({.path = data()}); }
-  TemporaryFolder folder_;
+  support::TemporaryFolder folder_;
 };
 
 TEST_F(SmallKitti, Opens) {
-  write_text(data() / "poses.txt", "");
+  support::write_text(data() / "poses.txt", "");
   const auto dataset = open();
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(dataset->format, DatasetFormat::kKitti);
@@ -55,7 +55,7 @@ TEST_F(SmallKitti, AMissingImageIsDamagedAndKeepsItsPlace) {
 }
 
 TEST_F(SmallKitti, ImagesWithoutATimeAreWarnedOf) {
-  write_picture(data() / "image_0" / "000010.png", 60, 20);
+  support::write_picture(data() / "image_0" / "000010.png", 60, 20);
   const auto dataset = open();
   ASSERT_TRUE(dataset);
   EXPECT_EQ(dataset->frames.size(), 10u);
@@ -63,9 +63,9 @@ TEST_F(SmallKitti, ImagesWithoutATimeAreWarnedOf) {
 }
 
 TEST_F(SmallKitti, IsChecked) {
-  write_text(data() / "times.txt", "0.0\nsoon\n");
+  support::write_text(data() / "times.txt", "0.0\nsoon\n");
   EXPECT_EQ(open().error().key, "line 2");
-  write_text(data() / "times.txt", "");
+  support::write_text(data() / "times.txt", "");
   EXPECT_EQ(open().error().found, "no times");
   fs::remove(data() / "times.txt");
   EXPECT_FALSE(open());
@@ -73,7 +73,7 @@ TEST_F(SmallKitti, IsChecked) {
 }
 
 TEST_F(SmallKitti, NeedsALineForEveryCamera) {
-  write_text(data() / "calib.txt", "P0: 50 0 30 0 0 50 10 0 0 0 1 0\n");
+  support::write_text(data() / "calib.txt", "P0: 50 0 30 0 0 50 10 0 0 0 1 0\n");
   EXPECT_FALSE(open());
   EXPECT_TRUE(open_dataset({.path = data(), .cameras = {0}}));
   fs::remove(data() / "calib.txt");
@@ -81,8 +81,8 @@ TEST_F(SmallKitti, NeedsALineForEveryCamera) {
 }
 
 TEST(FolderDataset, OpensWithARigFile) {
-  const TemporaryFolder folder;
-  write_small_euroc(folder.path() / "euroc");
+  const support::TemporaryFolder folder;
+  support::write_small_euroc(folder.path() / "euroc");
   const fs::path data = folder.path() / "plain";
   for (const char* camera : {"cam0", "cam1"}) {
     fs::create_directories(data);
@@ -93,8 +93,8 @@ TEST(FolderDataset, OpensWithARigFile) {
   const auto dataset = open_dataset({.path = data, .rig_file = folder.path() / "rig.yaml"});
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(dataset->format, DatasetFormat::kFolder);
-  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
-  EXPECT_EQ(dataset->first_time_ns, kSmallStart);
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
+  EXPECT_EQ(dataset->first_time_ns, support::kSmallStart);
   EXPECT_EQ(read_frame(*dataset, 3).images[1].state, ImageState::kPresent);
   EXPECT_EQ(open_dataset({.path = data}).error().expected, "a rig file (--rig FILE)");
   EXPECT_FALSE(open_dataset({.path = data, .format = DatasetFormat::kEuroc}));
@@ -102,7 +102,7 @@ TEST(FolderDataset, OpensWithARigFile) {
 }
 
 TEST(Dataset, SaysWhatLayoutsItLookedFor) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   const auto dataset = open_dataset({.path = folder.path()});
   ASSERT_FALSE(dataset);
   for (const char* word : {"euroc", "kitti", "folder"}) {
@@ -120,7 +120,7 @@ struct Recorded {
 class RecordedDataset : public testing::TestWithParam<Recorded> {};
 
 TEST_P(RecordedDataset, OpensWithItsFramesAndSizes) {
-  const auto path = shared_data(GetParam().name);
+  const auto path = support::shared_data(GetParam().name);
   if (!path) GTEST_SKIP() << "../shared/data/" << GetParam().name << " is not there";
   const auto dataset = open_dataset({.path = *path});
   ASSERT_TRUE(dataset) << dataset.error().message();
@@ -156,7 +156,7 @@ INSTANTIATE_TEST_SUITE_P(Sets, RecordedDataset,
 
 // Cameras 2 and 3 of this recording have 25 images each among the 160 of cameras 0 and 1.
 TEST(RealDataset, CamerasWithFewImagesJoinTheFramesOfTheOthers) {
-  const auto path = shared_data("kitti_0039");
+  const auto path = support::shared_data("kitti_0039");
   if (!path) GTEST_SKIP() << "../shared/data/kitti_0039 is not there";
   const auto dataset = open_dataset({.path = *path});
   ASSERT_TRUE(dataset);
@@ -169,7 +169,7 @@ TEST(RealDataset, CamerasWithFewImagesJoinTheFramesOfTheOthers) {
 
 // The stamps of these cameras differ by some microseconds, and every image keeps its own.
 TEST(RealDataset, ImagesKeepTheirOwnTimes) {
-  const auto path = shared_data("aria_gen2_4cam");
+  const auto path = support::shared_data("aria_gen2_4cam");
   if (!path) GTEST_SKIP() << "../shared/data/aria_gen2_4cam is not there";
   const auto dataset = open_dataset({.path = *path});
   ASSERT_TRUE(dataset);

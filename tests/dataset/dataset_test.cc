@@ -4,9 +4,9 @@
 
 #include <fstream>
 
-#include "dataset/data_on_disk.h"
 #include "dataset/frame_reader.h"
 #include "rig_formats/rig_file.h"
+#include "support/data_on_disk.h"
 
 namespace bslam::dataset {
 namespace {
@@ -17,20 +17,20 @@ using image::ImageState;
 // A small EuRoC data set to damage.
 class SmallEuroc : public testing::Test {
  protected:
-  void SetUp() override { write_small_euroc(data()); }
+  void SetUp() override { support::write_small_euroc(data()); }
 
   fs::path data() const { return folder_.path() / "small"; }
   fs::path camera(int c) const { return data() / "mav0" / ("cam" + std::to_string(c)); }
-  fs::path image(int k, int c = 0) const { return camera(c) / "data" / small_image_name(k); }
+  fs::path image(int k, int c = 0) const { return camera(c) / "data" / support::small_image_name(k); }
   Result<Dataset> open() const { return open_dataset({.path = data()}); }
 
   void edit(const fs::path& file, const std::string& from, const std::string& to) {
-    std::string text = read_text(file);
+    std::string text = support::read_text(file);
     const std::size_t at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
-    write_text(file, text.replace(at, from.size(), to));
+    support::write_text(file, text.replace(at, from.size(), to));
   }
-  std::string line(int k) const { return small_list({k}).substr(small_list({}).size()); }
+  std::string line(int k) const { return support::small_list({k}).substr(support::small_list({}).size()); }
 
   // Opening is refused; the message names the file.
   void expect_error(const fs::path& file, std::string_view found) const {
@@ -44,7 +44,7 @@ class SmallEuroc : public testing::Test {
   void expect_one_damaged() const {
     const auto dataset = open();
     ASSERT_TRUE(dataset) << dataset.error().message();
-    ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
+    ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
     for (std::size_t k = 0; k < dataset->frames.size(); ++k) {
       const image::ImageBundle bundle = read_frame(*dataset, k);
       EXPECT_EQ(bundle.images[0].state, k == 20 ? ImageState::kDamaged : ImageState::kPresent) << k;
@@ -53,7 +53,7 @@ class SmallEuroc : public testing::Test {
     }
   }
 
-  TemporaryFolder folder_;
+  support::TemporaryFolder folder_;
 };
 
 TEST_F(SmallEuroc, Opens) {
@@ -61,9 +61,9 @@ TEST_F(SmallEuroc, Opens) {
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(dataset->name, "small");
   EXPECT_EQ(dataset->format, DatasetFormat::kEuroc);
-  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
-  EXPECT_EQ(dataset->first_time_ns, kSmallStart);
-  EXPECT_EQ(dataset->frames[3].time_ns, kSmallStart + 3 * kSmallInterval);
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
+  EXPECT_EQ(dataset->first_time_ns, support::kSmallStart);
+  EXPECT_EQ(dataset->frames[3].time_ns, support::kSmallStart + 3 * support::kSmallInterval);
   EXPECT_EQ(dataset->cameras_used, (std::vector<int>{0, 1}));
   EXPECT_EQ(dataset->rig.camera(std::size_t{1}).name, "cam1");
   EXPECT_NEAR(dataset->rig.rig_from_cam(1).translation().x(), 0.1, 1e-12);
@@ -76,13 +76,13 @@ TEST_F(SmallEuroc, ReadsFrames) {
   ASSERT_TRUE(dataset);
   const image::ImageBundle bundle = read_frame(*dataset, 5);
   EXPECT_EQ(bundle.id, FrameId(5));
-  EXPECT_EQ(bundle.time_ns, kSmallStart + 5 * kSmallInterval);
+  EXPECT_EQ(bundle.time_ns, support::kSmallStart + 5 * support::kSmallInterval);
   ASSERT_EQ(bundle.images.size(), 2u);
   for (const image::CameraImage& image : bundle.images) {
     EXPECT_EQ(image.state, ImageState::kPresent);
     EXPECT_EQ(image.time_ns, bundle.time_ns);
-    EXPECT_EQ(image.image.width(), kSmallWidth);
-    EXPECT_EQ(image.image.height(), kSmallHeight);
+    EXPECT_EQ(image.image.width(), support::kSmallWidth);
+    EXPECT_EQ(image.image.height(), support::kSmallHeight);
   }
 }
 
@@ -94,7 +94,7 @@ TEST_F(SmallEuroc, OpensByItsMav0FolderToo) {
 }
 
 TEST_F(SmallEuroc, NamesItsGroundTruth) {
-  write_text(data() / "mav0" / "state_groundtruth_estimate0" / "data.csv", "#\n");
+  support::write_text(data() / "mav0" / "state_groundtruth_estimate0" / "data.csv", "#\n");
   EXPECT_EQ(open().value().ground_truth, data() / "mav0" / "state_groundtruth_estimate0" / "data.csv");
 }
 
@@ -110,7 +110,7 @@ TEST_F(SmallEuroc, TakesCamerasInTheOrderAsked) {
 }
 
 TEST_F(SmallEuroc, DoesNotLookAtCamerasNotAskedFor) {
-  write_text(camera(1) / "sensor.yaml", "broken: [");
+  support::write_text(camera(1) / "sensor.yaml", "broken: [");
   EXPECT_FALSE(open());
   const auto one = open_dataset({.path = data(), .cameras = {0}});
   ASSERT_TRUE(one);
@@ -129,8 +129,8 @@ TEST_F(SmallEuroc, KeepsTheRangeAskedFor) {
   const auto dataset = open_dataset({.path = data(), .begin_s = 0.1, .end_s = 0.25});
   ASSERT_TRUE(dataset) << dataset.error().message();
   ASSERT_EQ(dataset->frames.size(), 3u);
-  EXPECT_EQ(dataset->frames.front().time_ns, kSmallStart + 2 * kSmallInterval);
-  EXPECT_EQ(dataset->first_time_ns, kSmallStart);
+  EXPECT_EQ(dataset->frames.front().time_ns, support::kSmallStart + 2 * support::kSmallInterval);
+  EXPECT_EQ(dataset->first_time_ns, support::kSmallStart);
 }
 
 TEST_F(SmallEuroc, RefusesEmptyAndReversedRanges) {
@@ -143,7 +143,7 @@ TEST_F(SmallEuroc, RefusesEmptyAndReversedRanges) {
 }
 
 TEST_F(SmallEuroc, IgnoresARigBesideItUnlessAskedFor) {
-  write_text(data() / "rig.yaml", "bslam_rig: 1\ncameras: nonsense\n");
+  support::write_text(data() / "rig.yaml", "bslam_rig: 1\ncameras: nonsense\n");
   EXPECT_TRUE(open());
   EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
 }
@@ -153,18 +153,18 @@ TEST_F(SmallEuroc, TakesAnotherRig) {
   for (std::size_t at = 0; (at = yaml.find("time_offset_s: 0.0", at)) != std::string::npos; ++at) {
     yaml.replace(at, 18, "time_offset_s: 0.5");
   }
-  write_text(data() / "rig.yaml", yaml);
+  support::write_text(data() / "rig.yaml", yaml);
   const auto dataset = open_dataset({.path = data(), .rig_file = data() / "rig.yaml"});
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_TRUE(dataset->warnings.empty());
-  const auto rig_formats::without = open_dataset({.path = data()});
-  ASSERT_TRUE(rig_formats::without);
-  ASSERT_EQ(rig_formats::without->warnings.size(), 1u);
-  EXPECT_NE(rig_formats::without->warnings[0].find(
-                "gives time offsets (cam0 500 ms, cam1 500 ms), which are not used without --rig"),
-            std::string::npos);
-  EXPECT_EQ(dataset->first_time_ns, kSmallStart + 500'000'000);
-  EXPECT_EQ(read_frame(*dataset, 0).images[1].time_ns, kSmallStart + 500'000'000);
+  const auto without = open_dataset({.path = data()});
+  ASSERT_TRUE(without);
+  ASSERT_EQ(without->warnings.size(), 1u);
+  EXPECT_NE(
+      without->warnings[0].find("gives time offsets (cam0 500 ms, cam1 500 ms), which are not used without --rig"),
+      std::string::npos);
+  EXPECT_EQ(dataset->first_time_ns, support::kSmallStart + 500'000'000);
+  EXPECT_EQ(read_frame(*dataset, 0).images[1].time_ns, support::kSmallStart + 500'000'000);
   fs::remove_all(camera(1));
   EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
   EXPECT_TRUE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml", .cameras = {0}}));
@@ -173,21 +173,21 @@ TEST_F(SmallEuroc, TakesAnotherRig) {
 TEST_F(SmallEuroc, AMaskThatDoesNotFitIsAnError) {
   std::string yaml = rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value());
   yaml.replace(yaml.find("mask: null"), 10, "mask: mask.png");
-  write_text(data() / "rig.yaml", yaml);
+  support::write_text(data() / "rig.yaml", yaml);
   EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
-  write_picture(data() / "mask.png", 5, 5);
+  support::write_picture(data() / "mask.png", 5, 5);
   EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
-  write_picture(data() / "mask.png", kSmallWidth, kSmallHeight);
+  support::write_picture(data() / "mask.png", support::kSmallWidth, support::kSmallHeight);
   EXPECT_TRUE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
 }
 
 TEST_F(SmallEuroc, TellsWhereAnImageIsMissingFromAnInstant) {
   std::vector<int> some;
-  for (int k = 0; k < kSmallFrames; k += 2) some.push_back(k);
-  write_text(camera(1) / "data.csv", small_list(some));
+  for (int k = 0; k < support::kSmallFrames; k += 2) some.push_back(k);
+  support::write_text(camera(1) / "data.csv", support::small_list(some));
   const auto dataset = open();
   ASSERT_TRUE(dataset) << dataset.error().message();
-  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
   EXPECT_EQ(read_frame(*dataset, 2).images[1].state, ImageState::kPresent);
   EXPECT_EQ(read_frame(*dataset, 3).images[1].state, ImageState::kMissing);
 }
@@ -201,7 +201,7 @@ TEST_F(SmallEuroc, NoSuchFolder) {
 
 TEST_F(SmallEuroc, AFileInsteadOfAFolder) {
   fs::remove_all(data());
-  write_text(data(), "text");
+  support::write_text(data(), "text");
   expect_error(data(), "a file");
 }
 
@@ -218,7 +218,7 @@ TEST_F(SmallEuroc, SensorYamlIsMissing) {
 }
 
 TEST_F(SmallEuroc, WithoutASensorYamlTheRigBesideItCounts) {
-  write_text(data() / "rig.yaml", rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value()));
+  support::write_text(data() / "rig.yaml", rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value()));
   edit(data() / "rig.yaml", "cam1", "right");
   fs::remove(camera(0) / "sensor.yaml");
   expect_error(camera(0) / "sensor.yaml", "No such file");  // half of them is a damaged recording
@@ -229,7 +229,7 @@ TEST_F(SmallEuroc, WithoutASensorYamlTheRigBesideItCounts) {
 }
 
 TEST_F(SmallEuroc, SensorYamlIsNotYaml) {
-  write_text(camera(0) / "sensor.yaml", "a: [1, 2\n b}");
+  support::write_text(camera(0) / "sensor.yaml", "a: [1, 2\n b}");
   expect_error(camera(0) / "sensor.yaml", "no YAML");
   EXPECT_EQ(open().error().key, "line 2");
 }
@@ -275,13 +275,13 @@ TEST_F(SmallEuroc, ResolutionOfAnotherCamera) {
 }
 
 TEST_F(SmallEuroc, EveryImageOfACameraHasAnotherSize) {
-  for (int k = 0; k < kSmallFrames; ++k) write_picture(image(k, 1), 64, 48);
+  for (int k = 0; k < support::kSmallFrames; ++k) support::write_picture(image(k, 1), 64, 48);
   expect_error(camera(1) / "data", "64x48");
 }
 
 TEST_F(SmallEuroc, EmptyList) {
   for (const char* text : {"", "#timestamp [ns],filename\n", "\r\n\n"}) {
-    write_text(camera(0) / "data.csv", text);
+    support::write_text(camera(0) / "data.csv", text);
     expect_error(camera(0) / "data.csv", "no images");
   }
 }
@@ -304,7 +304,7 @@ TEST_F(SmallEuroc, ListWithoutFileNames) {
 
 TEST_F(SmallEuroc, TimestampsBeyondReason) {
   for (const char* time : {"-5", "99999999999999999999", "9223372036854775807", "1.5"}) {
-    write_text(camera(0) / "data.csv", std::string(time) + ",a.png\n");
+    support::write_text(camera(0) / "data.csv", std::string(time) + ",a.png\n");
     expect_error(camera(0) / "data.csv", time);
   }
 }
@@ -313,7 +313,7 @@ TEST_F(SmallEuroc, ATimestampTwiceIsDroppedWithAWarning) {
   edit(camera(0) / "data.csv", line(4), line(4) + line(4));
   const auto dataset = open();
   ASSERT_TRUE(dataset) << dataset.error().message();
-  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kSmallFrames));
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
   EXPECT_EQ(dataset->warnings.size(), 1u);
 }
 
@@ -327,17 +327,19 @@ TEST_F(SmallEuroc, TimestampsOutOfOrderAreSortedWithAWarning) {
 
 TEST_F(SmallEuroc, CamerasWithNoCommonTime) {
   std::string list;
-  for (int k = 0; k < 20; ++k) list += std::to_string(9'000'000'000'000'000'000 + k) + "," + small_image_name(k) + "\n";
-  write_text(camera(1) / "data.csv", list);
+  for (int k = 0; k < 20; ++k)
+    list += std::to_string(9'000'000'000'000'000'000 + k) + "," + support::small_image_name(k) + "\n";
+  support::write_text(camera(1) / "data.csv", list);
   expect_error(data(), "no image within 2 ms of one of cam0");
 }
 
 TEST_F(SmallEuroc, CamerasThatAlternateNeedALargerTolerance) {
   std::string list;
-  for (int k = 0; k < kSmallFrames; ++k) {
-    list += std::to_string(kSmallStart + k * kSmallInterval + kSmallInterval / 2) + "," + small_image_name(k) + "\n";
+  for (int k = 0; k < support::kSmallFrames; ++k) {
+    list += std::to_string(support::kSmallStart + k * support::kSmallInterval + support::kSmallInterval / 2) + "," +
+            support::small_image_name(k) + "\n";
   }
-  write_text(camera(1) / "data.csv", list);
+  support::write_text(camera(1) / "data.csv", list);
   expect_error(data(), "the nearest is 25 ms away");
   EXPECT_TRUE(open_dataset({.path = data(), .sync_tolerance_s = 0.026}));
 }
@@ -348,14 +350,14 @@ TEST_F(SmallEuroc, NoneOfTheListedImagesExists) {
 }
 
 TEST_F(SmallEuroc, OneImageIsTruncated) {
-  const std::string bytes = read_text(image(20));
+  const std::string bytes = support::read_text(image(20));
   ASSERT_GT(bytes.size(), 500u);
-  write_text(image(20), bytes.substr(0, 500));
+  support::write_text(image(20), bytes.substr(0, 500));
   expect_one_damaged();
 }
 
 TEST_F(SmallEuroc, OneImageIsEmpty) {
-  write_text(image(20), "");
+  support::write_text(image(20), "");
   expect_one_damaged();
 }
 
@@ -365,38 +367,38 @@ TEST_F(SmallEuroc, OneImageIsMissing) {
 }
 
 TEST_F(SmallEuroc, AnImageIsATextFile) {
-  write_text(image(20), "not an image");
+  support::write_text(image(20), "not an image");
   expect_one_damaged();
 }
 
 TEST_F(SmallEuroc, OneImageHasAnotherSize) {
-  write_picture(image(20), 31, 24);
+  support::write_picture(image(20), 31, 24);
   expect_one_damaged();
 }
 
 TEST_F(SmallEuroc, TheFirstImagesMayBeDamaged) {
-  for (int k = 0; k < 10; ++k) write_text(image(k), "not an image");
+  for (int k = 0; k < 10; ++k) support::write_text(image(k), "not an image");
   EXPECT_TRUE(open());
   fs::remove(image(0));
-  write_picture(image(1), 10, 10);
+  support::write_picture(image(1), 10, 10);
   EXPECT_TRUE(open_dataset({.path = data(), .cameras = {1}}));
 }
 
 TEST_F(SmallEuroc, ReadsListsFromOtherSystems) {
   std::string text = "#timestamp [ns],filename\r\n\r\n# a word\r\n";
-  for (int k = 0; k < kSmallFrames; ++k) {
+  for (int k = 0; k < support::kSmallFrames; ++k) {
     const std::string l = line(k);
-    text += "  " + l.substr(0, l.find(',')) + " , " + small_image_name(k) + " \r\n";
+    text += "  " + l.substr(0, l.find(',')) + " , " + support::small_image_name(k) + " \r\n";
   }
-  write_text(camera(0) / "data.csv", text + "\r\n\r\n");
+  support::write_text(camera(0) / "data.csv", text + "\r\n\r\n");
   const auto dataset = open();
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(read_frame(*dataset, 23).images[0].state, ImageState::kPresent);
 }
 
 TEST_F(SmallEuroc, IncompleteImagesPrintNothing) {
-  write_text(image(20), read_text(image(20)).substr(0, 300));
-  write_text(image(21), "");
+  support::write_text(image(20), support::read_text(image(20)).substr(0, 300));
+  support::write_text(image(21), "");
   const auto dataset = open();
   ASSERT_TRUE(dataset);
   testing::internal::CaptureStderr();

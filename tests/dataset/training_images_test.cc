@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "dataset/data_on_disk.h"
+#include "support/data_on_disk.h"
 
 namespace bslam::dataset {
 namespace {
@@ -10,10 +10,10 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST(TrainingImages, AreFoundInFoldersAndBelow) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   const fs::path root = folder.path();
   for (const char* name : {"b/z.png", "b/a.JPG", "a.pgm", "b/c/d.webp", "notes.txt", "b/e.png.bak", "f.jpeg"})
-    write_text(root / name, "x");
+    support::write_text(root / name, "x");
   fs::create_directories(root / "not_a_picture.png");
   const auto found = find_images({(root / "f.jpeg").string(), root.string()});
   ASSERT_TRUE(found.ok());
@@ -22,17 +22,17 @@ TEST(TrainingImages, AreFoundInFoldersAndBelow) {
 }
 
 TEST(TrainingImages, RefuseWhatIsNone) {
-  const TemporaryFolder folder;
-  write_text(folder.path() / "notes.txt", "x");
+  const support::TemporaryFolder folder;
+  support::write_text(folder.path() / "notes.txt", "x");
   EXPECT_EQ(find_images({(folder.path() / "none").string()}).error().file, (folder.path() / "none").string());
   EXPECT_FALSE(find_images({(folder.path() / "notes.txt").string()}).ok());
   EXPECT_TRUE(find_images({folder.path().string()}).value().empty());
 }
 
 TEST(TrainingImages, AreReadInAllFormats) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   for (const char* name : {"a.png", "b.jpg", "c.pgm", "d.webp"}) {
-    write_picture(folder.path() / name, 60, 40);
+    support::write_picture(folder.path() / name, 60, 40);
     const auto image = read_training_image(folder.path() / name, 0);
     ASSERT_TRUE(image.ok()) << name << ": " << image.error().message();
     EXPECT_EQ(image->width(), 60);
@@ -41,34 +41,34 @@ TEST(TrainingImages, AreReadInAllFormats) {
 }
 
 TEST(TrainingImages, AreRefusedWhenCut) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   for (const char* name : {"a.png", "b.jpg", "c.pgm", "d.webp"}) {
-    write_picture(folder.path() / name, 60, 40);
-    const std::string bytes = read_text(folder.path() / name);
-    write_text(folder.path() / name, bytes.substr(0, bytes.size() / 2));
+    support::write_picture(folder.path() / name, 60, 40);
+    const std::string bytes = support::read_text(folder.path() / name);
+    support::write_text(folder.path() / name, bytes.substr(0, bytes.size() / 2));
     EXPECT_FALSE(read_training_image(folder.path() / name, 0).ok()) << name;
   }
-  write_text(folder.path() / "e.png", "no picture");
+  support::write_text(folder.path() / "e.png", "no picture");
   EXPECT_EQ(read_training_image(folder.path() / "e.png", 0).error().file, (folder.path() / "e.png").string());
 }
 
 TEST(TrainingImages, OfPgmMayHaveComments) {
-  const TemporaryFolder folder;
-  write_text(folder.path() / "a.pgm", "P5 # made by hand\n3\n# rows\n2 255\nabcdef");
+  const support::TemporaryFolder folder;
+  support::write_text(folder.path() / "a.pgm", "P5 # made by hand\n3\n# rows\n2 255\nabcdef");
   const auto image = read_training_image(folder.path() / "a.pgm", 0);
   ASSERT_TRUE(image.ok());
   EXPECT_EQ(image->width(), 3);
   EXPECT_EQ(image->row(1)[2], 'f');
   for (const char* text : {"P5", "P5 3", "P5 3 2 65535\nabcdefabcdef", "P5 3 2 255\nabcde", "P5 -3 2 255\nabcdef",
                            "P5 99999999999 2 255\na", "P5 2000000000 2000000000 255\na", "P5 #"}) {
-    write_text(folder.path() / "a.pgm", text);
+    support::write_text(folder.path() / "a.pgm", text);
     EXPECT_FALSE(read_training_image(folder.path() / "a.pgm", 0).ok()) << text;
   }
 }
 
 TEST(TrainingImages, AreShrunkByAveraging) {
-  const TemporaryFolder folder;
-  write_picture(folder.path() / "a.png", 80, 40, 3);
+  const support::TemporaryFolder folder;
+  support::write_picture(folder.path() / "a.png", 80, 40, 3);
   const auto full = read_training_image(folder.path() / "a.png", 80).value();
   ASSERT_EQ(full.width(), 80);
   const auto half = read_training_image(folder.path() / "a.png", 40).value();

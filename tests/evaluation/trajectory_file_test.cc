@@ -9,11 +9,9 @@
 
 #include "base/random.h"
 
-namespace bslam::io {
+namespace bslam::evaluation {
 namespace {
 
-using evaluation::TimedPose;
-using evaluation::Trajectory;
 using geometry::Quaterniond;
 using geometry::SE3;
 using geometry::Vector3d;
@@ -207,4 +205,4 @@ TEST_F(TrajectoryFile, SurvivesEveryTruncation) {
 }
 
 }  // namespace
-}  // namespace bslam::io
+}  // namespace bslam::evaluation

@@ -7,7 +7,7 @@
 #include <optional>
 #include <thread>
 
-#include "system/stage_world.h"
+#include "execution/stage_world.h"
 
 namespace bslam::execution {
 namespace {

@@ -57,7 +57,8 @@ TEST(Extractor, FillsWhatKeypointsPromise) {
   for (std::size_t i = 0; i < k.size(); ++i) {
     const std::size_t level = k.level[i];
     ASSERT_LT(level, pyramid.size());
-    EXPECT_FLOAT_EQ(k.sigma[i], static_cast<float>(FeatureOptions().sigma_px * std::sqrt(pyramid.scale_x[level] * pyramid.scale_y[level])));
+    EXPECT_FLOAT_EQ(k.sigma[i], static_cast<float>(FeatureOptions().sigma_px *
+                                                   std::sqrt(pyramid.scale_x[level] * pyramid.scale_y[level])));
     const auto pixel = camera.project(3.0 * k.bearing[i]);
     ASSERT_TRUE(pixel.has_value());
     EXPECT_LT((*pixel - k.pixel[i].cast<double>()).norm(), 1e-3);
@@ -123,7 +124,8 @@ TEST(Extractor, ABudgetIsAsGoodAsTheOption) {
   image::Pyramid pyramid;
   Keypoints k;
   const int usual = FeatureOptions{}.per_image;
-  for (const auto& [budget, wanted] : {std::pair(std::optional(450), 450), {9000, 2 * usual}, {std::nullopt, usual}, {450, 450}}) {
+  for (const auto& [budget, wanted] :
+       {std::pair(std::optional(450), 450), {9000, 2 * usual}, {std::nullopt, usual}, {450, 450}}) {
     extractor.extract(view_of(image), {}, pinhole_camera(image.size()), pyramid, k, budget);
     expect_equal(k, extract(image, with(wanted)));
   }

@@ -10,10 +10,10 @@ namespace {
 using Flags = std::vector<std::uint8_t>;
 
 image::ImageBundle taken_at(const std::vector<TimeNs>& times) {
-  image::ImageBundle matching::bundle;
-  matching::bundle.time_ns = times[0];
-  for (const TimeNs t : times) matching::bundle.images.push_back({image::ImageState::kPresent, t, {}});
-  return matching::bundle;
+  image::ImageBundle bundle;
+  bundle.time_ns = times[0];
+  for (const TimeNs t : times) bundle.images.push_back({image::ImageState::kPresent, t, {}});
+  return bundle;
 }
 
 constexpr TimeNs kMs = 1'000'000;

@@ -8,7 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "base/random.h"
-#include "dataset/data_on_disk.h"
+#include "support/data_on_disk.h"
 
 namespace bslam::image_files {
 namespace {
@@ -41,7 +41,7 @@ bool equal(const image::Image& ours, const cv::Mat& theirs) {
   return true;
 }
 
-TEST(image_files::ImageFile, DecodesGreyPngExactly) {
+TEST(ImageFile, DecodesGreyPngExactly) {
   for (const auto& [width, height] : {std::pair(1, 1), {3, 5}, {640, 480}, {751, 33}}) {
     const cv::Mat picture = picture_of(width, height);
     for (const int strategy :
@@ -56,7 +56,7 @@ TEST(image_files::ImageFile, DecodesGreyPngExactly) {
   }
 }
 
-TEST(image_files::ImageFile, TakesTheUpperBitsOfSixteen) {
+TEST(ImageFile, TakesTheUpperBitsOfSixteen) {
   const cv::Mat picture = picture_of(40, 30, CV_16UC1);
   const auto image = decode_grey(encoded(picture, ".png"));
   ASSERT_TRUE(image);
@@ -65,14 +65,14 @@ TEST(image_files::ImageFile, TakesTheUpperBitsOfSixteen) {
   }
 }
 
-TEST(image_files::ImageFile, MakesColoursGrey) {
+TEST(ImageFile, MakesColoursGrey) {
   const cv::Mat picture(20, 30, CV_8UC3, cv::Scalar(200, 100, 50));  // blue, green, red
   const auto image = decode_grey(encoded(picture, ".png"));
   ASSERT_TRUE(image);
   EXPECT_NEAR(image->row(3)[4], 0.114 * 200 + 0.587 * 100 + 0.299 * 50, 1.01);
 }
 
-TEST(image_files::ImageFile, DecodesJpeg) {
+TEST(ImageFile, DecodesJpeg) {
   const cv::Mat picture = picture_of(64, 48);
   const std::string bytes = encoded(picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 100});
   const auto image = decode_grey(bytes);
@@ -81,7 +81,7 @@ TEST(image_files::ImageFile, DecodesJpeg) {
   EXPECT_TRUE(decode_grey(bytes + std::string(100, '\0')));  // as some recorders pad
 }
 
-TEST(image_files::ImageFile, RefusesEveryTruncation) {
+TEST(ImageFile, RefusesEveryTruncation) {
   for (const char* extension : {".png", ".jpg"}) {
     const std::string bytes = encoded(picture_of(64, 48), extension);
     for (std::size_t size = 0; size < bytes.size(); size += size < 100 ? 1 : 37) {
@@ -91,14 +91,14 @@ TEST(image_files::ImageFile, RefusesEveryTruncation) {
   }
 }
 
-TEST(image_files::ImageFile, RefusesWhatIsNoImage) {
+TEST(ImageFile, RefusesWhatIsNoImage) {
   EXPECT_FALSE(decode_grey(""));
   EXPECT_FALSE(decode_grey("not an image"));
   EXPECT_FALSE(decode_grey(std::string(5000, 'x')));
 }
 
 // Damage anywhere in a PNG: its checksums tell, or the picture is whole all the same; it never crashes or reads beyond.
-TEST(image_files::ImageFile, SurvivesDamagedBytes) {
+TEST(ImageFile, SurvivesDamagedBytes) {
   const cv::Mat picture = picture_of(48, 36);
   const std::string bytes = encoded(picture, ".png");
   Random random(3);
@@ -112,17 +112,17 @@ TEST(image_files::ImageFile, SurvivesDamagedBytes) {
   }
 }
 
-TEST(image_files::ImageFile, ReadsFiles) {
-  const TemporaryFolder folder;
-  write_picture(folder.path() / "a.png", 20, 10);
+TEST(ImageFile, ReadsFiles) {
+  const support::TemporaryFolder folder;
+  support::write_picture(folder.path() / "a.png", 20, 10);
   EXPECT_EQ(read_image(folder.path() / "a.png").value().width(), 20);
   EXPECT_FALSE(read_image(folder.path() / "b.png"));
   EXPECT_FALSE(read_image(folder.path()));
 }
 
-TEST(image_files::ImageFile, ReadsMasksOfTheCamerasSize) {
-  const TemporaryFolder folder;
-  write_picture(folder.path() / "mask.png", 20, 10);
+TEST(ImageFile, ReadsMasksOfTheCamerasSize) {
+  const support::TemporaryFolder folder;
+  support::write_picture(folder.path() / "mask.png", 20, 10);
   camera::Camera camera{"c", camera::Pinhole({10, 10, 10, 5}), 20, 10, 0, ""};
   EXPECT_TRUE(read_mask(camera).value().empty());
   camera.mask_file = (folder.path() / "mask.png").string();

@@ -19,7 +19,8 @@ class Consistency : public ::testing::Test {
     std::vector<Candidate> list;
     for (const int c : candidates) list.push_back({KeyframeId(c), 1.0});
     std::vector<KeyframeId> out;
-    for (const Candidate& c : consistent_candidates(map_, KeyframeId(keyframe), list, options, history_)) out.push_back(c.keyframe);
+    for (const Candidate& c : consistent_candidates(map_, KeyframeId(keyframe), list, options, history_))
+      out.push_back(c.keyframe);
     return out;
   }
   static std::vector<KeyframeId> ids(const std::vector<int>& values) { return {values.begin(), values.end()}; }

@@ -14,7 +14,8 @@ using Link = std::pair<KeyframeId, KeyframeId>;  // older, newer
 std::multiset<Link> links_of(const EssentialGraph& graph) {
   std::multiset<Link> out;
   for (const auto& edge : graph.problem.edges) {
-    out.insert(std::minmax(graph.keyframes[static_cast<std::size_t>(edge.a)], graph.keyframes[static_cast<std::size_t>(edge.b)]));
+    out.insert(std::minmax(graph.keyframes[static_cast<std::size_t>(edge.a)],
+                           graph.keyframes[static_cast<std::size_t>(edge.b)]));
   }
   return out;
 }
@@ -50,13 +51,15 @@ TEST(EssentialGraph, LinksParentsAndStrongNeighboursOnce) {
     const EssentialGraph graph = essential_graph(map, KeyframeId(0), weight);
     EXPECT_EQ(links_of(graph), expected_links(map, graph.keyframes, weight));
   }
-  EXPECT_EQ(essential_graph(map, KeyframeId(0), 100000).problem.edges.size(), map.num_keyframes() - 1);  // the tree alone
+  EXPECT_EQ(essential_graph(map, KeyframeId(0), 100000).problem.edges.size(),
+            map.num_keyframes() - 1);  // the tree alone
 }
 
 TEST(EssentialGraph, ItsEdgesAreMetByThePresentPosesAndItsRootAloneIsFixed) {
   const map::BundledMap& map = drifted_walk(2).map;
   EssentialGraph graph = essential_graph(map, KeyframeId(0), 60);
-  for (std::size_t v = 0; v < graph.keyframes.size(); ++v) EXPECT_EQ(graph.problem.fixed[v] != 0, graph.keyframes[v] == KeyframeId(0));
+  for (std::size_t v = 0; v < graph.keyframes.size(); ++v)
+    EXPECT_EQ(graph.problem.fixed[v] != 0, graph.keyframes[v] == KeyframeId(0));
   const solver::PoseGraphSummary summary = solver::optimise(graph.problem, {});
   EXPECT_LT(summary.initial_cost, 1e-12);
 }
@@ -75,7 +78,8 @@ TEST(EssentialGraph, LeavesOutOtherPartsAndRemovedKeyframes) {
   for (int i = 6; i < 10; ++i) world.add(simulator.frame(FrameId(i), kStepS * (i - 4)), {}, 0, {}, i == 6);
   map::MapDraft draft = world.draft();
   ASSERT_TRUE(draft.remove_keyframe(KeyframeId(3)));
-  const EssentialGraph first = essential_graph(draft.map(), KeyframeId(0), 60), second = essential_graph(draft.map(), KeyframeId(6), 60);
+  const EssentialGraph first = essential_graph(draft.map(), KeyframeId(0), 60),
+                       second = essential_graph(draft.map(), KeyframeId(6), 60);
   EXPECT_EQ(first.keyframes, (std::vector{KeyframeId(0), KeyframeId(1), KeyframeId(2), KeyframeId(4), KeyframeId(5)}));
   EXPECT_EQ(second.keyframes, (std::vector{KeyframeId(6), KeyframeId(7), KeyframeId(8), KeyframeId(9)}));
   EXPECT_EQ(links_of(first), expected_links(draft.map(), first.keyframes, 60));

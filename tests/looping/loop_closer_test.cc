@@ -21,7 +21,8 @@ LoopingOptions credulous() {
 // The stage beside a map that grows: hands it every keyframe until it closes a loop.
 class Watch {
  public:
-  explicit Watch(const LoopingOptions& options = {}, std::uint64_t seed = 1) : closer_(recogniser(), options, kFeatures, seed) {}
+  explicit Watch(const LoopingOptions& options = {}, std::uint64_t seed = 1)
+      : closer_(recogniser(), options, kFeatures, seed) {}
 
   // True while nothing was found; the draft is untouched then.
   bool operator()(const HallMap& world, KeyframeId k) {
@@ -46,7 +47,8 @@ class LoopCloserRig : public ::testing::TestWithParam<int> {};
 
 TEST_P(LoopCloserRig, ClosesTheLoopWhereTheEndSeesTheStartAndNotBefore) {
   Watch watch;
-  const HallMap world = walk(hall(rig_of(GetParam())), 5, rigid_drift(), [&](const HallMap& w, KeyframeId k) { return watch(w, k); });
+  const HallMap world =
+      walk(hall(rig_of(GetParam())), 5, rigid_drift(), [&](const HallMap& w, KeyframeId k) { return watch(w, k); });
   ASSERT_TRUE(watch.closure);
   const KeyframeId k = watch.closure->keyframe;
   EXPECT_EQ(k, world.map.newest_keyframe());
@@ -87,7 +89,8 @@ TEST(LoopCloser, RemembersNothingOfAMapThatWasLeftForAnother) {
   const HallMap& world = drifted_walk(2);
   Watch watch;
   EXPECT_TRUE(watch(world, KeyframeId(kRound)));
-  EXPECT_TRUE(watch(world, KeyframeId(kRound)));  // its ids do not go on, so it is another map, and this the first time there
+  EXPECT_TRUE(
+      watch(world, KeyframeId(kRound)));  // its ids do not go on, so it is another map, and this the first time there
   EXPECT_FALSE(watch(world, KeyframeId(kRound + 1)));
 }
 
@@ -95,7 +98,8 @@ TEST(LoopCloser, NothingIsClosedOnAWalkThatComesNowhereBack) {
   Watch watch;
   const FeatureSimulator simulator = hall(rig_of(4));
   HallMap world(simulator.rig());
-  for (int i = 0; i < 2 * kRound / 3; ++i) EXPECT_TRUE(watch(world, world.add(simulator.frame(FrameId(i), kStepS * i))));
+  for (int i = 0; i < 2 * kRound / 3; ++i)
+    EXPECT_TRUE(watch(world, world.add(simulator.frame(FrameId(i), kStepS * i))));
 }
 
 // Two rooms that look the same in all, 8 m apart: from the one into the other, what is asked for is no drift.
@@ -105,7 +109,9 @@ void two_rooms(int cameras, Watch& watch) {
   const SE3 next_door(Eigen::Quaterniond::Identity(), {0, 8, 0});
   for (int i = 0; i < 12; ++i) {
     const int room = i / 6;
-    if (!watch(world, world.add(simulator.frame(FrameId(i), kStepS * (i % 6)), {}, room, room == 1 ? next_door : SE3()))) return;
+    if (!watch(world,
+               world.add(simulator.frame(FrameId(i), kStepS * (i % 6)), {}, room, room == 1 ? next_door : SE3())))
+      return;
   }
 }
 

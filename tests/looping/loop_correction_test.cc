@@ -1,11 +1,11 @@
 // What a recognised place changes in a map that has drifted.
 #include "looping/loop_correction.h"
-#include "looping/relative_scale.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 
+#include "looping/relative_scale.h"
 #include "map/synthetic_map.h"
 #include "simulated_hall.h"
 
@@ -18,10 +18,12 @@ using map::Fingerprint;
 constexpr KeyframeId kLast(kRound + 1);
 
 std::optional<Location> locate_last(const HallMap& world) {
-  return locate(world.map, world.map.rig_of(kLast), *world.map.keyframe(kLast).frame, KeyframeId(1), {}, kFeatures, seeded(1));
+  return locate(world.map, world.map.rig_of(kLast), *world.map.keyframe(kLast).frame, KeyframeId(1), {}, kFeatures,
+                seeded(1));
 }
 
-// Metres between where the map has a keyframe and where it was, and the same for the landmarks it observes, in the mean.
+// Metres between where the map has a keyframe and where it was, and the same for the landmarks it observes, in the
+// mean.
 double error_of(const HallMap& world, const map::BundledMap& map, KeyframeId k) {
   return distance_m(map.keyframe(k).T_rig_world, world.truth(k));
 }
@@ -54,7 +56,8 @@ void expect_refreshed(const map::BundledMap& map) {
   for (const LandmarkId l : map.landmark_ids()) {
     again.refresh_landmark(l);
     const map::Landmark &ours = map.landmark(l), &anew = again.landmark(l);
-    stale += (ours.view_direction - anew.view_direction).norm() > 1e-6 || std::abs(ours.max_distance / anew.max_distance - 1) > 1e-5;
+    stale += (ours.view_direction - anew.view_direction).norm() > 1e-6 ||
+             std::abs(ours.max_distance / anew.max_distance - 1) > 1e-5;
   }
   EXPECT_EQ(stale, 0) << "of " << map.num_landmarks();
 }
@@ -129,7 +132,8 @@ TEST_P(CloseLoopRig, FusesWhatIsSeenOnBothEnds) {
 
   // Few are left twice in view of the last keyframe and the place.
   std::set<HallMap::Shown> then;
-  for (const LandmarkId l : landmarks_about(after, KeyframeId(1), 3, 100000)) then.insert(world.shown_by_landmark[l.index()]);
+  for (const LandmarkId l : landmarks_about(after, KeyframeId(1), 3, 100000))
+    then.insert(world.shown_by_landmark[l.index()]);
   int known = 0, twice = 0;
   for (const LandmarkId l : after.keyframe(kLast).landmarks) {
     if (!l.valid() || !then.contains(world.shown_by_landmark[l.index()])) continue;
@@ -164,7 +168,8 @@ TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
   close_loop(measure(loop.map(), kLast, *location), *location, {}, kFeatures, loop);
 
   map::MapDraft tracking("tracking", store.snapshot());
-  const KeyframeId newer = world.add(simulator.frame(FrameId(kRound + 2), kStepS * (kRound + 2)), rigid_drift());  // what it would be
+  const KeyframeId newer =
+      world.add(simulator.frame(FrameId(kRound + 2), kStepS * (kRound + 2)), rigid_drift());  // what it would be
   std::vector<std::pair<FeatureId, LandmarkId>> matches;
   std::vector<std::pair<FeatureId, LandmarkId>> own;
   for (std::size_t f = 0; f < world.map.keyframe(newer).landmarks.size(); ++f) {
@@ -183,7 +188,8 @@ TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
   const map::BundledMap& after = *report.published;
   EXPECT_EQ(after.check_invariants(), std::nullopt);
   EXPECT_EQ(after.gauge_epoch(), world.map.gauge_epoch() + 1);
-  EXPECT_LT(distance_m(after.keyframe(newer).T_rig_world * after.keyframe(kLast).T_rig_world.inverse(), T_newer_last), 1e-9);
+  EXPECT_LT(distance_m(after.keyframe(newer).T_rig_world * after.keyframe(kLast).T_rig_world.inverse(), T_newer_last),
+            1e-9);
   for (const KeyframeId k : {kLast, newer}) {
     EXPECT_LT(5 * error_of(world, after, k), error_of(world, world.map, k));
     EXPECT_LT(5 * landmark_error(world, after, k), landmark_error(world, world.map, k));
@@ -201,7 +207,8 @@ class ScaleDrift : public ::testing::Test {
   // How long the last steps are in the map, of how long they were.
   static double step_ratio(const map::BundledMap& map) {
     const KeyframeId a(kLast.value() - 4);
-    return distance_m(map.keyframe(a).T_rig_world, map.keyframe(kLast).T_rig_world) / distance_m(world().truth(a), world().truth(kLast));
+    return distance_m(map.keyframe(a).T_rig_world, map.keyframe(kLast).T_rig_world) /
+           distance_m(world().truth(a), world().truth(kLast));
   }
 };
 
@@ -232,10 +239,12 @@ class JoinParts : public ::testing::TestWithParam<int> {
     const FeatureSimulator simulator = hall(rig_of(GetParam()));
     for (int i = 0; i < 8; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
     const Sim3 elsewhere(Sim3::exp((geometry::Vector7d() << 0.2, -0.3, 1.9, 5, -7, 2, 0).finished()));
-    for (int i = 8; i < 18; ++i) world.add(simulator.frame(FrameId(i), kStepS * (i - 4) + 0.5), elsewhere, 0, {}, i == 8);
+    for (int i = 8; i < 18; ++i)
+      world.add(simulator.frame(FrameId(i), kStepS * (i - 4) + 0.5), elsewhere, 0, {}, i == 8);
   }
   std::optional<Location> located(int keyframe, int with) const {
-    return locate(world.map, world.map.rig_of(KeyframeId(keyframe)), *world.map.keyframe(KeyframeId(keyframe)).frame, KeyframeId(with), {}, kFeatures, seeded(1));
+    return locate(world.map, world.map.rig_of(KeyframeId(keyframe)), *world.map.keyframe(KeyframeId(keyframe)).frame,
+                  KeyframeId(with), {}, kFeatures, seeded(1));
   }
   void expect_joined(int keyframe, int with) {
     const auto location = located(keyframe, with);

@@ -63,13 +63,15 @@ TEST_P(RecogniserRig, NeighboursAreNeverCandidates) {
 
 INSTANTIATE_TEST_SUITE_P(Cameras, RecogniserRig, ::testing::Values(1, 2, 4));
 
-// The place looks other in most parts when it is seen again: less alike than the keyframes about here are to each other.
+// The place looks other in most parts when it is seen again: less alike than the keyframes about here are to each
+// other.
 TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
   const FeatureSimulator simulator = hall(rig_of(1));
   HallMap world(simulator.rig());
   for (int i = 0; i < 3; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
   for (int i = 3; i < 6; ++i) world.add(simulator.frame(FrameId(i), 20 + kStepS * i), {}, 1);
-  for (int i = 6; i < 9; ++i) world.add(redecorated(simulator.frame(FrameId(i), kRoundS + 0.3 * (i - 6)), 0.8, 1), {}, 2);
+  for (int i = 6; i < 9; ++i)
+    world.add(redecorated(simulator.frame(FrameId(i), kRoundS + 0.3 * (i - 6)), 0.8, 1), {}, 2);
   const KeyframeId newest(8);
   ASSERT_GE(world.map.best_covisible(newest, 1).front().weight, RecognitionOptions().neighbour_weight);
   EXPECT_TRUE(recogniser()->revisited(world.map, newest).empty());

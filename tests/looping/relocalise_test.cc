@@ -7,7 +7,8 @@
 namespace bslam::looping {
 namespace {
 
-std::optional<Location> relocalised(PlaceRecogniser& places, const HallMap& world, const SimulatedFrame& seen, std::uint64_t seed) {
+std::optional<Location> relocalised(PlaceRecogniser& places, const HallMap& world, const SimulatedFrame& seen,
+                                    std::uint64_t seed) {
   return relocalise(places, world.map, described(seen), {}, kFeatures, seeded(seed));
 }
 std::optional<Location> relocalised(const HallMap& world, const SimulatedFrame& seen) {
@@ -15,7 +16,8 @@ std::optional<Location> relocalised(const HallMap& world, const SimulatedFrame& 
 }
 
 bool is_true(const Location& location, const SE3& T_rig_world) {
-  return distance_m(location.T_rig_world, T_rig_world) < 0.03 && angle_rad(location.T_rig_world, T_rig_world) < 0.5 * kDegree;
+  return distance_m(location.T_rig_world, T_rig_world) < 0.03 &&
+         angle_rad(location.T_rig_world, T_rig_world) < 0.5 * kDegree;
 }
 
 TEST(Relocalise, FindsTheFrameFromAnyOfItsCameras) {
@@ -75,7 +77,8 @@ HallMap two_rooms(const FeatureSimulator& simulator, double share) {
   HallMap world(simulator.rig());
   const SE3 next_door(Eigen::Quaterniond::Identity(), {30, 0, 0});
   for (int i = 0; i < 8; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
-  for (int i = 8; i < 16; ++i) world.add(redecorated(simulator.frame(FrameId(i), kStepS * (i - 8)), share, 1), {}, 1, next_door);
+  for (int i = 8; i < 16; ++i)
+    world.add(redecorated(simulator.frame(FrameId(i), kStepS * (i - 8)), share, 1), {}, 1, next_door);
   return world;
 }
 

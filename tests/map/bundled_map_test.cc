@@ -106,8 +106,10 @@ TEST_F(BundledMapTest, JoinsOnlyWhatIsAliveAndOfTwoParts) {
 TEST_F(BundledMapTest, RemovesAPartAndLeavesTheRestAlone) {
   const KeyframeId a = add(matches(0, 10), {});
   const KeyframeId r = add({}, {}), s = add({}, r), t = add({}, s);
-  const LandmarkId own = map.add_landmark(random_point(random), std::vector<Observation>{{r, FeatureId(1)}, {t, FeatureId(1)}});
-  const LandmarkId shared = map.add_landmark(random_point(random), std::vector<Observation>{{a, FeatureId(20)}, {s, FeatureId(2)}});
+  const LandmarkId own =
+      map.add_landmark(random_point(random), std::vector<Observation>{{r, FeatureId(1)}, {t, FeatureId(1)}});
+  const LandmarkId shared =
+      map.add_landmark(random_point(random), std::vector<Observation>{{a, FeatureId(20)}, {s, FeatureId(2)}});
   const std::size_t observations = map.num_observations();
   EXPECT_FALSE(map.remove_part(s));
   EXPECT_TRUE(map.remove_part(r));
@@ -351,9 +353,13 @@ TEST_F(BundledMapTest, KnowsWhereALateCameraWas) {
   const KeyframeId k = map.add_keyframe(frame, T_rig_world, {}, KeyframeId());
   EXPECT_EQ(map.cam_from_world(k, CameraIndex(0)).matrix(), T_rig_world.matrix());
   const SE3 then = SE3::exp(0.03 * frame->twist) * T_rig_world;
-  EXPECT_TRUE(map.cam_from_world(k, CameraIndex(1)).matrix().isApprox((map.rig().cam_from_rig(CameraIndex(1)) * then).matrix(), 1e-12));
+  EXPECT_TRUE(map.cam_from_world(k, CameraIndex(1))
+                  .matrix()
+                  .isApprox((map.rig().cam_from_rig(CameraIndex(1)) * then).matrix(), 1e-12));
   const camera::Rig rig = map.rig_of(k);
-  EXPECT_TRUE((rig.cam_from_rig(CameraIndex(1)) * T_rig_world).matrix().isApprox(map.cam_from_world(k, CameraIndex(1)).matrix(), 1e-12));
+  EXPECT_TRUE((rig.cam_from_rig(CameraIndex(1)) * T_rig_world)
+                  .matrix()
+                  .isApprox(map.cam_from_world(k, CameraIndex(1)).matrix(), 1e-12));
   EXPECT_TRUE((rig.rig_from_cam(1) * rig.cam_from_rig(CameraIndex(1))).matrix().isApprox(SE3().matrix(), 1e-12));
 
   ASSERT_TRUE(map.scale_part(k, 3.0));

@@ -61,7 +61,9 @@ TEST(MapStore, FreesWhatWasRemovedAlsoWhereOthersWereFasterAndNeverForReaders) {
   store.commit(std::move(first));
   const CommitReport report = store.commit(std::move(second));
   EXPECT_TRUE(report.rebased);
-  const auto freed = [](const BundledMap& map) { return &map.landmark(LandmarkId(0)) == &map.landmark(LandmarkId(16)); };
+  const auto freed = [](const BundledMap& map) {
+    return &map.landmark(LandmarkId(0)) == &map.landmark(LandmarkId(16));
+  };
   EXPECT_TRUE(freed(*report.published));
   EXPECT_FALSE(freed(*reader));
   EXPECT_EQ(reader->landmark(LandmarkId(3)).position, Eigen::Vector3d(0, 0, 5));

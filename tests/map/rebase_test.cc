@@ -324,7 +324,8 @@ TEST_F(RebaseTest, OfTwoCorrectionsTheFirstHoldsAndNothingOfTheOther) {
 TEST_F(RebaseTest, ACorrectionBeginsAnEpochAlsoWhereItComesLater) {
   early->set_poses({{{kSecond, random_pose(random, 1)}}, {}});
   const KeyframeId child = add_keyframe(*early, {}, kThird);
-  const SE3 T_child_third = early->map().keyframe(child).T_rig_world * early->map().keyframe(kThird).T_rig_world.inverse();
+  const SE3 T_child_third =
+      early->map().keyframe(child).T_rig_world * early->map().keyframe(kThird).T_rig_world.inverse();
   const SE3 corrected = random_pose(random, 1);
   late->set_poses({{{kThird, corrected}}, {}, true});
   late->set_poses({{{kSecond, corrected}}, {}});  // an edit's own correction does not shut out its later poses

@@ -72,7 +72,8 @@ class CullKeyframes : public Cull {
   CullKeyframes() {
     for (int k = 0; k < 6; ++k) {
       auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
-      for (frame::CameraFrame& c : frame->cameras) std::fill(c.keypoints.level.begin(), c.keypoints.level.end(), std::uint8_t{2});
+      for (frame::CameraFrame& c : frame->cameras)
+        std::fill(c.keypoints.level.begin(), c.keypoints.level.end(), std::uint8_t{2});
       map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
     }
     for (int l = 0; l < 40; ++l) {
@@ -94,7 +95,9 @@ class CullKeyframes : public Cull {
   }
 };
 
-TEST_F(CullKeyframes, RedundantOnesGoButNotTheRootNorTheNewest) { EXPECT_EQ(culled(options), (std::vector<int>{1, 2})); }
+TEST_F(CullKeyframes, RedundantOnesGoButNotTheRootNorTheNewest) {
+  EXPECT_EQ(culled(options), (std::vector<int>{1, 2}));
+}
 
 TEST_F(CullKeyframes, StopsWhereOthersAreNeeded) {
   CullingOptions five;

@@ -81,7 +81,8 @@ TEST(RunPlot, IsTheSameForTheSameRecord) { EXPECT_EQ(run_plot_svg(short_run(40))
 TEST(RunPlot, StaysSmallForALongRun) {
   RunRecord record = short_run(20000);
   for (int i = 0; i < 10000; ++i) {  // a camera that flickers
-    record.cameras[1].states.push_back({i % 2 == 0 ? "ok" : "out", i % 2 == 0 ? "" : "no-images", 0.1 * i, 0.1 * i + 0.05});
+    record.cameras[1].states.push_back(
+        {i % 2 == 0 ? "ok" : "out", i % 2 == 0 ? "" : "no-images", 0.1 * i, 0.1 * i + 0.05});
   }
   const std::string svg = run_plot_svg(record);
   EXPECT_EQ(xml_fault(svg), "");

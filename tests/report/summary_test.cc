@@ -36,11 +36,13 @@ TEST(Summary, HasTheKeysOfTheContractInTheirOrder) {
                                                   "relocalisations", "maps_started", "parts", "time", "memory"}));
   EXPECT_EQ(keys(json["frames"]), (std::vector<std::string>{"input", "tracked", "lost", "dropped", "lost_intervals"}));
   EXPECT_EQ(json["frames"]["lost_intervals"].dump(), R"([{"from":1.25,"to":1.25,"reason":"too few matches"}])");
-  EXPECT_EQ(json["cameras"].dump(), R"([{"name":"cam0","images":400,"skipped":1,)"
-                                    R"("states":[{"state":"degraded","reason":"blurred","from":0.0,"to":1.5}],"extrinsics":null}])");
+  EXPECT_EQ(json["cameras"].dump(),
+            R"([{"name":"cam0","images":400,"skipped":1,)"
+            R"("states":[{"state":"degraded","reason":"blurred","from":0.0,"to":1.5}],"extrinsics":null}])");
   EXPECT_EQ(keys(json["features"]),
             (std::vector<std::string>{"keypoints_per_image", "unique", "monocular", "matched"}));
-  EXPECT_EQ(json["map"].dump(), R"({"keyframes":0,"landmarks":0,"observations":0,"scale":"metric","scale_std":null,"loaded":false})");
+  EXPECT_EQ(json["map"].dump(),
+            R"({"keyframes":0,"landmarks":0,"observations":0,"scale":"metric","scale_std":null,"loaded":false})");
   EXPECT_EQ(json["loops"].dump(), R"([{"at":43.1,"with":1.2,"inliers":83}])");
   EXPECT_EQ(json["relocalisations"].dump(), R"([{"at":12.4,"with":3.15,"inliers":60}])");
   EXPECT_EQ(keys(json["time"]), (std::vector<std::string>{"start_up_s", "wall_s", "frame_ms", "stages_ms"}));

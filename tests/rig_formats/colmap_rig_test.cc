@@ -10,9 +10,9 @@ class ColmapRig : public RigFormats {
   Result<RigFile> read_folder(const std::string& cameras, const std::string& rigs, const std::string& config) {
     std::error_code error;
     fs::remove_all(folder_.path() / "rig", error);
-    write_text(folder_.path() / "rig" / "cameras.txt", cameras);
-    if (!rigs.empty()) write_text(folder_.path() / "rig" / "rigs.txt", rigs);
-    if (!config.empty()) write_text(folder_.path() / "rig" / "rig_config.json", config);
+    support::write_text(folder_.path() / "rig" / "cameras.txt", cameras);
+    if (!rigs.empty()) support::write_text(folder_.path() / "rig" / "rigs.txt", rigs);
+    if (!config.empty()) support::write_text(folder_.path() / "rig" / "rig_config.json", config);
     return read_rig_file(folder_.path() / "rig");
   }
   static constexpr const char* kCameras =

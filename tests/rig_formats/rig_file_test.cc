@@ -4,10 +4,10 @@
 
 #include "base/random.h"
 #include "camera/test_cameras.h"
-#include "dataset/data_on_disk.h"
 #include "geometry/random_transforms.h"
 #include "rig_formats/euroc_sensor.h"
 #include "rig_formats/rig_description.h"
+#include "support/data_on_disk.h"
 
 namespace bslam::rig_formats {
 namespace {
@@ -52,7 +52,7 @@ void expect_equal(const camera::Rig& a, const camera::Rig& b) {
 class OwnRigFile : public testing::Test {
  protected:
   Result<camera::Rig> read(const std::string& text) {
-    write_text(folder_.path() / "rig.yaml", text);
+    support::write_text(folder_.path() / "rig.yaml", text);
     return read_rig(folder_.path() / "rig.yaml");
   }
   Result<camera::Rig> read_with(const std::string& from, const std::string& to) {
@@ -73,7 +73,7 @@ class OwnRigFile : public testing::Test {
       "    T_body_cam: [[0, -1, 0, 0.5], [1, 0, 0, -0.25], [0, 0, 1, 0.125], [0, 0, 0, 1]]\n"
       "    time_offset_s: -0.0015\n"
       "    mask: masks/left.png\n";
-  TemporaryFolder folder_;
+  support::TemporaryFolder folder_;
 };
 
 TEST_F(OwnRigFile, IsRead) {
@@ -207,7 +207,7 @@ TEST_F(OwnRigFile, KeepsOffsetsAndMasks) {
 class EurocSensor : public OwnRigFile {
  protected:
   Result<camera::Rig> sensor_with(const std::string& from, const std::string& to) {
-    std::string text = small_sensor_yaml(0.1);
+    std::string text = support::small_sensor_yaml(0.1);
     const std::size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
     return read(text.replace(at, from.size(), to));
@@ -277,8 +277,9 @@ constexpr const char* kCalib =
     "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n";
 
 TEST_F(OwnRigFile, KittiCalibrationPlacesCamerasByTheirProjections) {
-  write_text(folder_.path() / "calib.txt", kCalib);
-  for (const int c : {0, 1, 2}) write_picture(folder_.path() / ("image_" + std::to_string(c)) / "000000.png", 124, 37);
+  support::write_text(folder_.path() / "calib.txt", kCalib);
+  for (const int c : {0, 1, 2})
+    support::write_picture(folder_.path() / ("image_" + std::to_string(c)) / "000000.png", 124, 37);
   for (const fs::path& path : {folder_.path(), folder_.path() / "calib.txt"}) {
     const auto rig = read_rig(path);
     ASSERT_TRUE(rig) << rig.error().message();
@@ -296,9 +297,9 @@ TEST_F(OwnRigFile, KittiCalibrationPlacesCamerasByTheirProjections) {
 }
 
 TEST_F(OwnRigFile, KittiCalibrationIsChecked) {
-  write_picture(folder_.path() / "image_0" / "000000.png", 124, 37);
+  support::write_picture(folder_.path() / "image_0" / "000000.png", 124, 37);
   const auto broken = [&](const std::string& text) {
-    write_text(folder_.path() / "calib.txt", text);
+    support::write_text(folder_.path() / "calib.txt", text);
     return read_rig(folder_.path()).error();
   };
   EXPECT_EQ(broken("P0: 700 0 600 0 0 710 180 0 0 0 1\n").found, "11 numbers");

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "dataset/data_on_disk.h"
 #include "rig_formats/rig_file.h"
+#include "support/data_on_disk.h"
 
 namespace bslam::rig_formats {
 
@@ -19,7 +19,7 @@ inline std::size_t index(std::size_t i) { return i; }
 class RigFormats : public testing::Test {
  protected:
   Result<RigFile> read(const std::string& text, const std::string& name = "rig.yaml") {
-    write_text(folder_.path() / name, text);
+    support::write_text(folder_.path() / name, text);
     return read_rig_file(folder_.path() / name);
   }
   Result<RigFile> read_with(std::string text, const std::string& from, const std::string& to) {
@@ -27,7 +27,7 @@ class RigFormats : public testing::Test {
     EXPECT_NE(at, std::string::npos) << from;
     return read(text.replace(at, from.size(), to));
   }
-  TemporaryFolder folder_;
+  support::TemporaryFolder folder_;
 };
 
 }  // namespace bslam::rig_formats

@@ -535,7 +535,7 @@ TEST_F(RigFormats, KittiRawFollowsWhereItLies) {
   EXPECT_EQ(at("2011_09_26_drive_0039_sync")->rig.camera(index(0)).width, 1242);
   fs::create_directories(folder_.path() / "date" / "2011_09_26_drive_0039_extract");
   EXPECT_EQ(at("date")->rig.camera(index(0)).width, 1392);
-  write_picture(folder_.path() / "images" / "image_00" / "data" / "0000000000.png", 1392, 512);
+  support::write_picture(folder_.path() / "images" / "image_00" / "data" / "0000000000.png", 1392, 512);
   EXPECT_EQ(at("images")->rig.camera(index(0)).width, 1392);
   EXPECT_EQ(read_rig_file(folder_.path() / "images")->rig.size(), 2u);
 }

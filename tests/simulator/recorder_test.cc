@@ -1,4 +1,5 @@
 #include "simulator/recorder.h"
+#include "simulator/tour.h"
 
 #include <gtest/gtest.h>
 

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "data_on_disk.h"
-#include "small_map.h"
+#include "storage/small_map.h"
+#include "support/data_on_disk.h"
 #include "synthetic/rigs.h"
 
 namespace bslam::storage {
@@ -173,14 +173,14 @@ TEST(MapFile, KeepsPosesToTheBitThatNormalisingAgainWouldChange) {
 }
 
 TEST(MapFile, IsTheSameBytesWhenWrittenAgain) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   const fs::path a = folder.path() / "a.map", b = folder.path() / "b.map";
   ASSERT_TRUE(write_map(small_map(synthetic::default_rig()), small_info(), a));
   const auto saved = read_map(a);
   ASSERT_TRUE(saved) << saved.error().message();
   EXPECT_EQ(saved->file, a.string());
   ASSERT_TRUE(write_map(saved->map, saved->info, b));
-  EXPECT_TRUE(read_text(a) == read_text(b));
+  EXPECT_TRUE(support::read_text(a) == support::read_text(b));
 }
 
 TEST(MapFile, HoldsAnEmptyMap) {
@@ -198,9 +198,9 @@ TEST(MapFile, LeavesWordsOutWithoutTheirVocabulary) {
 }
 
 TEST(MapFile, RefusesWhatIsNoMap) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   const auto refused = [&](std::string_view content) {
-    write_text(folder.path() / "file", content);
+    support::write_text(folder.path() / "file", content);
     const auto saved = read_map(folder.path() / "file");
     EXPECT_FALSE(saved);
     EXPECT_EQ(saved.error().file, (folder.path() / "file").string());
@@ -219,7 +219,7 @@ TEST(MapFile, RefusesWhatIsNoMap) {
 }
 
 TEST(MapFile, IsWholeOrNotThere) {
-  const TemporaryFolder folder;
+  const support::TemporaryFolder folder;
   const map::BundledMap map = small_map(synthetic::ring_rig(1));
   EXPECT_FALSE(write_map(map, small_info(), folder.path() / "no" / "folder.map"));
   ASSERT_TRUE(write_map(map, small_info(), folder.path() / "a.map"));

@@ -4,10 +4,10 @@
 
 #include "base/random.h"
 #include "base/thread_pool.h"
-#include "dataset/data_on_disk.h"
 #include "place/train.h"
 #include "place/vocabulary_bytes.h"
 #include "storage/dbow2_text.h"
+#include "support/data_on_disk.h"
 
 namespace bslam::storage {
 namespace {
@@ -29,7 +29,7 @@ std::string good_text() {
 class VocabularyFile : public testing::Test {
  protected:
   Result<place::VocabularyPtr> read(const std::string& text) {
-    write_text(file_, text);
+    support::write_text(file_, text);
     return read_vocabulary(file_);
   }
   // `good_text` with the first `from` replaced.
@@ -40,7 +40,7 @@ class VocabularyFile : public testing::Test {
     return read(text.replace(at, from.size(), to));
   }
 
-  TemporaryFolder folder_;
+  support::TemporaryFolder folder_;
   std::filesystem::path file_ = folder_.path() / "words.bvoc";
 };
 
@@ -69,9 +69,9 @@ TEST_F(VocabularyFile, NamesTheFileThatIsNone) {
 }
 
 TEST_F(VocabularyFile, ReadsTheTextOfDbow2) {
-  const auto read_text = read(good_text());
-  ASSERT_TRUE(read_text.ok()) << read_text.error().message();
-  const place::Vocabulary& v = **read_text;
+  const auto vocabulary = read(good_text());
+  ASSERT_TRUE(vocabulary.ok()) << vocabulary.error().message();
+  const place::Vocabulary& v = **vocabulary;
   EXPECT_EQ(v.kind(), kDbow2Kind);
   EXPECT_NE(v.kind(), place::kDescriptorKind);
   EXPECT_EQ(v.branching(), 2);
@@ -84,12 +84,13 @@ TEST_F(VocabularyFile, ReadsTheTextOfDbow2) {
 
 // DBoW2 numbers nodes as it makes them, which is not breadth-first: children of the second node may stand first.
 TEST_F(VocabularyFile, ReadsNodesInAnyOrderOfParentsBeforeChildren) {
-  const auto read_text = read(std::string("2 2 0 0\n0 0 ") + bytes_text(0) + " 0\n0 0 " + bytes_text(255, 255) +
-                              " 0\n2 1 " + bytes_text(254, 255) + " 7\n1 1 " + bytes_text(1) + " 5\n2 1 " +
-                              bytes_text(253, 255) + " 8\n1 1 " + bytes_text(2) + " 6\n");
-  ASSERT_TRUE(read_text.ok()) << read_text.error().message();
-  EXPECT_EQ((*read_text)->content().weight, (std::vector<float>{5, 6, 7, 8}));
-  EXPECT_EQ((*read_text)->content().descriptor[2][0], 1u);
+  const auto vocabulary =
+      read(std::string("2 2 0 0\n0 0 ") + bytes_text(0) + " 0\n0 0 " + bytes_text(255, 255) + " 0\n2 1 " +
+           bytes_text(254, 255) + " 7\n1 1 " + bytes_text(1) + " 5\n2 1 " + bytes_text(253, 255) + " 8\n1 1 " +
+           bytes_text(2) + " 6\n");
+  ASSERT_TRUE(vocabulary.ok()) << vocabulary.error().message();
+  EXPECT_EQ((*vocabulary)->content().weight, (std::vector<float>{5, 6, 7, 8}));
+  EXPECT_EQ((*vocabulary)->content().descriptor[2][0], 1u);
 }
 
 TEST_F(VocabularyFile, RefusesTextThatMakesNoTree) {

@@ -12,7 +12,8 @@ namespace {
 // Another value the option takes; empty where the range leaves none.
 std::string other_value(const Option& option) {
   if (const auto* flag = std::get_if<bool*>(&option.field)) return **flag ? "false" : "true";
-  if (const auto* number = std::get_if<int*>(&option.field)) return std::to_string(**number + (**number + 1 <= option.range.high ? 1 : -1));
+  if (const auto* number = std::get_if<int*>(&option.field))
+    return std::to_string(**number + (**number + 1 <= option.range.high ? 1 : -1));
   if (const auto* number = std::get_if<double*>(&option.field)) {
     const double up = 1.0625 * **number + 0.001;
     return std::to_string(up <= option.range.high ? up : 0.5 * (option.range.low + **number));
@@ -32,7 +33,8 @@ TEST(Config, EveryOptionSurvivesAsText) {
     EXPECT_NE(value_text(option), before) << option.key;
   }
   for (const Option& option : from.options()) ASSERT_TRUE(to.set(option.key, value_text(option)).ok()) << option.key;
-  for (const Option& option : from.options()) EXPECT_EQ(value_text(*to.find(option.key)), value_text(option)) << option.key;
+  for (const Option& option : from.options())
+    EXPECT_EQ(value_text(*to.find(option.key)), value_text(option)) << option.key;
 }
 
 TEST(Config, DefaultsLieWithinTheirRangesAndKeysAreUnique) {
@@ -50,13 +52,13 @@ TEST(Config, ReadsTheModeByName) {
   Config config;
   OptionTable table(config);
   ASSERT_TRUE(table.set("mode", "sequential").ok());
-  EXPECT_EQ(config.mode, Mode::kSequential);
+  EXPECT_EQ(config.mode, execution::Mode::kSequential);
   ASSERT_TRUE(table.set("mode", "lagged").ok());
-  EXPECT_EQ(config.mode, Mode::kLagged);
+  EXPECT_EQ(config.mode, execution::Mode::kLagged);
   ASSERT_TRUE(table.set("mode", "parallel").ok());
-  EXPECT_EQ(config.mode, Mode::kParallel);
+  EXPECT_EQ(config.mode, execution::Mode::kParallel);
   EXPECT_FALSE(table.set("mode", "sometimes").ok());
-  EXPECT_EQ(config.mode, Mode::kParallel);
+  EXPECT_EQ(config.mode, execution::Mode::kParallel);
 }
 
 }  // namespace

@@ -33,13 +33,14 @@ void run(const RenderedTour& tour, System& system) {
   const auto& found = system.extrinsics().cameras;
   ASSERT_EQ(found.size(), 4u);
   EXPECT_NEAR(found[2].change_deg, 1.0, 0.1);
-  for (std::size_t c = 0; c < 4; ++c) EXPECT_EQ(found[c].suspect, c == 2) << "camera " << c << ": " << found[c].change_deg << " degrees";
+  for (std::size_t c = 0; c < 4; ++c)
+    EXPECT_EQ(found[c].suspect, c == 2) << "camera " << c << ": " << found[c].change_deg << " degrees";
 }
 
 TEST(SystemExtrinsics, ACameraThatWasTurnedIsNamedAndTheMapIsMadeAsAsked) {
   const RenderedTour tour(4, 40);
   const camera::Rig wrong = turned(tour.rig(), 2);
-  System system(wrong, small_config(Mode::kSequential));
+  System system(wrong, small_config(execution::Mode::kSequential));
   run(tour, system);
   EXPECT_FALSE(system.extrinsics_refined());
   EXPECT_EQ(angle_deg(system.snapshot()->rig().cam_from_rig(2), wrong.cam_from_rig(2)), 0.0);
@@ -47,21 +48,23 @@ TEST(SystemExtrinsics, ACameraThatWasTurnedIsNamedAndTheMapIsMadeAsAsked) {
 
 TEST(SystemExtrinsics, RefinedTheMapIsMadeWithWhatWasFound) {
   const RenderedTour tour(4, 40);
-  Config config = small_config(Mode::kSequential);
+  Config config = small_config(execution::Mode::kSequential);
   config.extrinsics.refine = true;
   System system(turned(tour.rig(), 2), config);
   run(tour, system);
   EXPECT_TRUE(system.extrinsics_refined());
   for (std::size_t c = 0; c < 4; ++c) {
-    // A pixel of these pictures is a third of a degree; of camera 3, which looks aside, less is known after two seconds.
-    EXPECT_LT(angle_deg(system.snapshot()->rig().cam_from_rig(c), tour.rig().cam_from_rig(c)), c == 3 ? 0.2 : 0.1) << "camera " << c;
+    // A pixel of these pictures is a third of a degree; of camera 3, which looks aside, less is known after two
+    // seconds.
+    EXPECT_LT(angle_deg(system.snapshot()->rig().cam_from_rig(c), tour.rig().cam_from_rig(c)), c == 3 ? 0.2 : 0.1)
+        << "camera " << c;
   }
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 }
 
 TEST(SystemExtrinsics, NotAskedForNothingIsSaid) {
   const RenderedTour tour(2, 16);
-  Config config = small_config(Mode::kSequential);
+  Config config = small_config(execution::Mode::kSequential);
   config.extrinsics.check = false;
   System system(tour.rig(), config);
   for (const image::ImageBundle& images : tour.frames()) system.process(images);

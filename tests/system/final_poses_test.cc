@@ -30,7 +30,8 @@ struct Scene {
       record.result.time_ns = 1'000'000'000 + static_cast<TimeNs>(i) * kInterval;
       record.result.status = tracking::TrackStatus::kTracking;
       record.result.reference = KeyframeId(0);
-      record.result.T_rig_reference = pose(from + to_seconds(kInterval) * static_cast<double>(i), turn_rate) * pose(0, turn_rate).inverse();
+      record.result.T_rig_reference =
+          pose(from + to_seconds(kInterval) * static_cast<double>(i), turn_rate) * pose(0, turn_rate).inverse();
       frames.push_back(std::move(record));
     }
     auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, 30, 10));
@@ -97,7 +98,8 @@ TEST(FinalPoses, ARigFoundElsewhereHasNotMovedThere) {
 
 TEST(FinalPoses, PartsOfTheMapHaveNoMotionBetweenThem) {
   Scene scene(0.3);
-  const KeyframeId other = scene.map.add_keyframe(map::synthetic_frame(scene.random, 2, 30, 10), SE3(), {}, KeyframeId());
+  const KeyframeId other =
+      scene.map.add_keyframe(map::synthetic_frame(scene.random, 2, 30, 10), SE3(), {}, KeyframeId());
   scene.frames[3].result.reference = other;
   EXPECT_TRUE(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).empty());
 }

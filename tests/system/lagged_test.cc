@@ -10,7 +10,7 @@ TEST(SystemLagged, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
   evaluation::Trajectory final, live;
   std::string journal;
   for (const int threads : {1, 1, 2, 4}) {
-    System system(tour.rig(), small_config(Mode::kLagged, threads));
+    System system(tour.rig(), small_config(execution::Mode::kLagged, threads));
     for (const image::ImageBundle& images : tour.frames()) system.process(images);
     system.finish();
     EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
@@ -30,7 +30,7 @@ TEST(SystemLagged, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
 TEST(SystemLagged, MayEndAtAnyFrameWithoutBeingFinishedParallel) {
   const RenderedTour tour(2, 12);
   for (std::size_t end = 0; end <= tour.frames().size(); ++end) {
-    System system(tour.rig(), small_config(Mode::kLagged));
+    System system(tour.rig(), small_config(execution::Mode::kLagged));
     for (std::size_t k = 0; k < end; ++k) system.process(tour.frames()[k]);
     EXPECT_EQ(system.frames().size(), end);
   }

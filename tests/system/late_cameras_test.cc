@@ -21,7 +21,8 @@ void play(System& system) {
   system.finish();
 }
 
-// How far the map has a late camera from where it truly was, from camera 0 at the time of the keyframe; m and rad together.
+// How far the map has a late camera from where it truly was, from camera 0 at the time of the keyframe; m and rad
+// together.
 double motion_error(const map::BundledMap& map) {
   std::vector<double> errors;
   for (const KeyframeId k : map.keyframe_ids()) {
@@ -34,25 +35,26 @@ double motion_error(const map::BundledMap& map) {
 }
 
 TEST(LateCameras, AreWhereTheFramesOnBothSidesHaveThem) {
-  Config live = small_config(Mode::kSequential);
+  Config live = small_config(execution::Mode::kSequential);
   live.final_adjustment = false;
   System before(tour().rig(), live);
   play(before);
-  System after(tour().rig(), small_config(Mode::kSequential));
+  System after(tour().rig(), small_config(execution::Mode::kSequential));
   play(after);
   const double tracked = motion_error(*before.snapshot()), known = motion_error(*after.snapshot());
-  std::printf("motion of late cameras: %.2f mm from the frames before, %.2f mm from those on both sides\n", 1e3 * tracked, 1e3 * known);
+  std::printf("motion of late cameras: %.2f mm from the frames before, %.2f mm from those on both sides\n",
+              1e3 * tracked, 1e3 * known);
   EXPECT_LT(known, 0.8 * tracked);
   EXPECT_EQ(after.snapshot()->check_invariants(), std::nullopt);
 }
 
 TEST(LateCameras, OfAnEarlierRunAreLeftWhereTheyWere) {
-  System first(tour().rig(), small_config(Mode::kSequential));
+  System first(tour().rig(), small_config(execution::Mode::kSequential));
   play(first);
   const map::MapSnapshot saved = first.snapshot();
   Resources resources;
   resources.map = *saved;
-  System second(tour().rig(), small_config(Mode::kSequential), std::move(resources));
+  System second(tour().rig(), small_config(execution::Mode::kSequential), std::move(resources));
   play(second);  // frames of the same numbers and times
   for (const KeyframeId k : saved->keyframe_ids()) {
     if (!second.snapshot()->alive(k)) continue;

@@ -21,7 +21,7 @@ void expect_loop(const System& system) {
 }
 
 TEST(SystemLoopSequential, WhereTheWalkIsBackTheMapIsClosedAndTheErrorGone) {
-  Config config = small_config(Mode::kSequential);
+  Config config = small_config(execution::Mode::kSequential);
   config.final_adjustment = false;
   Config off = config;
   off.looping.loop.enabled = false;
@@ -50,7 +50,7 @@ class SystemLoopParts : public ::testing::Test {
   static constexpr std::size_t kFirst = 16, kAfter = 3;  // frames of the first part; frames lost before the second
   static Playback carried() { return play(closed_walk(), {{0, kFirst}, {36, kWalk}}); }
   static Config config() {
-    Config out = small_config(Mode::kSequential);
+    Config out = small_config(execution::Mode::kSequential);
     out.looping.recovery.new_part_after = static_cast<int>(kAfter);
     return out;
   }
@@ -98,7 +98,7 @@ TEST_F(SystemLoopParts, TheLivePoseNeverJumpsWhereTheMapDoes) {
 }
 
 TEST(SystemLoopParallel, ClosesTheLoopWithinTheRun) {
-  System system(closed_walk().rig(), small_config(Mode::kParallel), with_vocabulary());
+  System system(closed_walk().rig(), small_config(execution::Mode::kParallel), with_vocabulary());
   process_all(system, closed_walk().frames());
   system.finish();
   EXPECT_EQ(tracked_frames(system), kWalk);
@@ -112,7 +112,7 @@ TEST(SystemLoopLagged, GivesTheSameMapWithAnyNumberOfThreads) {
   std::vector<PartTrajectory> final, live;
   map::MapSnapshot map;
   for (const int threads : {1, 2, 4}) {
-    System system(closed_walk().rig(), small_config(Mode::kLagged, threads), with_vocabulary());
+    System system(closed_walk().rig(), small_config(execution::Mode::kLagged, threads), with_vocabulary());
     process_all(system, closed_walk().frames());
     system.finish();
     expect_loop(system);
@@ -130,7 +130,7 @@ TEST(SystemLoopLagged, GivesTheSameMapWithAnyNumberOfThreads) {
 
 TEST(SystemLoopReplay, RepeatsAParallelRunWithLoopsToTheBit) {
   const Playback walk = play(closed_walk(), {{0, 16}, {36, kWalk}});  // joined, then closed
-  Config config = small_config(Mode::kParallel);
+  Config config = small_config(execution::Mode::kParallel);
   config.looping.recovery.new_part_after = 3;
   for (int i = 0; i < 2; ++i) {
     System recorded(closed_walk().rig(), config, with_vocabulary());
@@ -152,11 +152,11 @@ TEST(SystemLoopReplay, RepeatsAParallelRunWithLoopsToTheBit) {
 }
 
 // The runs go on in the map of the walk until shortly before its end, so that each of them comes to the loop soon.
-class SystemLoopEnd : public ::testing::TestWithParam<Mode> {};
+class SystemLoopEnd : public ::testing::TestWithParam<execution::Mode> {};
 
 TEST_P(SystemLoopEnd, MayComeAtAnyFrameByInterruptionOrWithoutParallel) {
   const Playback end = play(closed_walk(), {{48, 66}});
-  Config before = small_config(Mode::kSequential);
+  Config before = small_config(execution::Mode::kSequential);
   before.final_adjustment = false;
   System open(closed_walk().rig(), before, with_vocabulary());
   process_all(open, play(closed_walk(), {{0, 52}}).frames);
@@ -185,12 +185,12 @@ TEST_P(SystemLoopEnd, MayComeAtAnyFrameByInterruptionOrWithoutParallel) {
     EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
   }
   EXPECT_LT(closed, kRuns);
-  if (GetParam() == Mode::kLagged) {  // ends before the loop and after it, whatever the machine does
+  if (GetParam() == execution::Mode::kLagged) {  // ends before the loop and after it, whatever the machine does
     EXPECT_GT(closed, 3u);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Modes, SystemLoopEnd, ::testing::Values(Mode::kParallel, Mode::kLagged));
+INSTANTIATE_TEST_SUITE_P(Modes, SystemLoopEnd, ::testing::Values(execution::Mode::kParallel, execution::Mode::kLagged));
 
 }  // namespace
 }  // namespace bslam::system

@@ -10,14 +10,15 @@ namespace {
 
 TEST(SystemParallel, TracksAllFramesAsWellAsSequential) {
   const RenderedTour tour(4, 16);
-  System system(tour.rig(), small_config(Mode::kParallel));
+  System system(tour.rig(), small_config(execution::Mode::kParallel));
   for (const image::ImageBundle& images : tour.frames()) system.process(images);
   system.finish();
   EXPECT_EQ(tracked_frames(system), tour.frames().size());
   EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
   EXPECT_LT(ate_m(live_poses(system), tour.truth()), 0.015);
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
-  const auto keyframes = std::count_if(system.frames().begin(), system.frames().end(), [](const auto& r) { return r.keyframe; });
+  const auto keyframes =
+      std::count_if(system.frames().begin(), system.frames().end(), [](const auto& r) { return r.keyframe; });
   EXPECT_LE(system.stage_runs().size(), static_cast<std::size_t>(keyframes));
   EXPECT_GT(system.stage_runs().size(), 0u);
 }
@@ -25,7 +26,7 @@ TEST(SystemParallel, TracksAllFramesAsWellAsSequential) {
 TEST(SystemParallel, MayEndAtAnyFrameWithoutBeingFinished) {
   const RenderedTour tour(2, 12);
   for (std::size_t end = 0; end <= tour.frames().size(); ++end) {
-    System system(tour.rig(), small_config(Mode::kParallel));
+    System system(tour.rig(), small_config(execution::Mode::kParallel));
     for (std::size_t k = 0; k < end; ++k) system.process(tour.frames()[k]);
     EXPECT_EQ(system.frames().size(), end);
   }
@@ -33,7 +34,7 @@ TEST(SystemParallel, MayEndAtAnyFrameWithoutBeingFinished) {
 
 TEST(SystemParallel, WaitsForAPendingKeyframeAtMost) {
   const RenderedTour tour(2, 12);
-  Config config = small_config(Mode::kParallel);
+  Config config = small_config(execution::Mode::kParallel);
   config.execution.pending_keyframes = 1;
   config.tracking.keyframe.min_interval = 1;
   config.tracking.keyframe.min_overlap = 1.0;  // a keyframe with every frame that lost one landmark
@@ -46,7 +47,7 @@ TEST(SystemParallel, WaitsForAPendingKeyframeAtMost) {
 
 TEST(SystemParallel, VersionsOfTheMapStayWholeForReadersInOtherThreads) {
   const RenderedTour tour(2, 12);
-  System system(tour.rig(), small_config(Mode::kParallel));
+  System system(tour.rig(), small_config(execution::Mode::kParallel));
   system.process(tour.frames()[0]);
   std::atomic<bool> done = false;
   std::atomic<int> broken = 0;
@@ -67,7 +68,7 @@ TEST(SystemParallel, VersionsOfTheMapStayWholeForReadersInOtherThreads) {
 
 TEST(SystemParallel, LeavesAYoungMapUpToScaleThatIsLost) {
   const RenderedTour tour(1, 12);
-  System system(tour.rig(), small_config(Mode::kParallel));
+  System system(tour.rig(), small_config(execution::Mode::kParallel));
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) system.process(tour.frames()[k++]);
   ASSERT_GT(tracked_frames(system), 0u);

@@ -12,8 +12,8 @@ TEST(SystemRelocalisation, CarriedInTheDarkTheRigIsFoundWhereItHasBeen) {
   for (std::size_t k = kDark; k < kLight; ++k) {
     for (image::CameraImage& i : walk.frames[k].images) blacken(i);
   }
-  System system(closed_walk().rig(), small_config(Mode::kSequential), with_vocabulary());
-  System blind(closed_walk().rig(), small_config(Mode::kSequential));
+  System system(closed_walk().rig(), small_config(execution::Mode::kSequential), with_vocabulary());
+  System blind(closed_walk().rig(), small_config(execution::Mode::kSequential));
   process_all(system, walk.frames);
   process_all(blind, walk.frames);
   for (const FrameRecord& record : system.frames()) {
@@ -35,7 +35,7 @@ TEST(SystemRelocalisation, CarriedInTheDarkTheRigIsFoundWhereItHasBeen) {
 
 TEST(SystemRelocalisation, WhereItHasNeverBeenThereIsNoPose) {
   const Playback walk = play(closed_walk(), {{0, 16}, {36, 46}});
-  System system(closed_walk().rig(), small_config(Mode::kSequential), with_vocabulary());
+  System system(closed_walk().rig(), small_config(execution::Mode::kSequential), with_vocabulary());
   process_all(system, walk.frames);
   for (const FrameRecord& record : system.frames()) {
     EXPECT_EQ(is_tracked(record), record.result.frame.index() < 16) << "frame " << record.result.frame.value();
@@ -49,7 +49,7 @@ TEST(SystemRelocalisation, WhereItHasNeverBeenThereIsNoPose) {
 class SystemSavedMap : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    System first(closed_walk().rig(), small_config(Mode::kSequential), with_vocabulary());
+    System first(closed_walk().rig(), small_config(execution::Mode::kSequential), with_vocabulary());
     process_all(first, closed_walk().frames());
     first.finish();
     saved_ = first.snapshot();
@@ -73,7 +73,8 @@ class SystemSavedMap : public ::testing::Test {
 };
 
 TEST_F(SystemSavedMap, LocalisingLeavesItAsItIs) {
-  for (const Mode mode : {Mode::kSequential, Mode::kParallel, Mode::kLagged}) {
+  for (const execution::Mode mode :
+       {execution::Mode::kSequential, execution::Mode::kParallel, execution::Mode::kLagged}) {
     Config config = small_config(mode);
     config.localize_only = true;
     config.looping.recovery.new_part_after = 1;
@@ -93,9 +94,9 @@ TEST_F(SystemSavedMap, LocalisingLeavesItAsItIs) {
 }
 
 TEST_F(SystemSavedMap, WhereThePlaceIsNotInItLocalisingHasNoPose) {
-  System part(closed_walk().rig(), small_config(Mode::kSequential), with_vocabulary());
+  System part(closed_walk().rig(), small_config(execution::Mode::kSequential), with_vocabulary());
   process_all(part, play(closed_walk(), {{0, 16}}).frames);
-  Config config = small_config(Mode::kSequential);
+  Config config = small_config(execution::Mode::kSequential);
   config.localize_only = true;
   config.looping.recovery.new_part_after = 1;
   Resources of_part = with_vocabulary();
@@ -108,7 +109,7 @@ TEST_F(SystemSavedMap, WhereThePlaceIsNotInItLocalisingHasNoPose) {
 }
 
 TEST_F(SystemSavedMap, ARunGoesOnInItAndCanBeRepeated) {
-  System system(beside().rig(), small_config(Mode::kParallel), resources());
+  System system(beside().rig(), small_config(execution::Mode::kParallel), resources());
   process_all(system, beside().frames());
   system.finish();
   EXPECT_EQ(tracked_frames(system), beside().frames().size());
@@ -124,7 +125,7 @@ TEST_F(SystemSavedMap, ARunGoesOnInItAndCanBeRepeated) {
   ASSERT_TRUE(journal.ok());
   Resources again = resources();
   again.replay = std::move(*journal);
-  System replayed(beside().rig(), small_config(Mode::kSequential), std::move(again));
+  System replayed(beside().rig(), small_config(execution::Mode::kSequential), std::move(again));
   process_all(replayed, beside().frames());
   replayed.finish();
   EXPECT_TRUE(identical(*system.snapshot(), *replayed.snapshot()));

@@ -12,6 +12,7 @@
 #include "evaluation/trajectory_error.h"
 #include "image/image_bundle.h"
 #include "simulator/recorder.h"
+#include "simulator/tour.h"
 #include "synthetic/rigs.h"
 #include "system/system.h"
 
@@ -125,7 +126,7 @@ inline void make_absent(image::CameraImage& input, image::ImageState state) {
 }
 
 // Settings for pictures of 320 x 204.
-inline Config small_config(Mode mode, int threads = 2) {
+inline Config small_config(execution::Mode mode, int threads = 2) {
   Config config;
   config.mode = mode;
   config.execution.threads = threads;

@@ -23,7 +23,7 @@ execution::Journal reread(const System& system) {
 TEST(SystemReplay, RepeatsAParallelRunToTheBit) {
   const RenderedTour tour(2, 14);
   for (int i = 0; i < 3; ++i) {
-    Config config = small_config(Mode::kParallel);
+    Config config = small_config(execution::Mode::kParallel);
     config.tracking.keyframe.min_interval = 1;
     config.tracking.keyframe.min_overlap = 1.0;  // many keyframes, so that much overlaps
     System recorded(tour.rig(), config);
@@ -44,11 +44,11 @@ TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
   mirror(frames.back().images[0]);
   for (std::size_t i = 0, first = frames.size(); i < tour.frames().size(); ++i)
     frames.push_back(tour.replayed(i, first));
-  System recorded(tour.rig(), small_config(Mode::kParallel));
+  System recorded(tour.rig(), small_config(execution::Mode::kParallel));
   for (const image::ImageBundle& images : frames) recorded.process(images);
   recorded.finish();
   EXPECT_EQ(recorded.maps_started(), 2);
-  System replayed(tour.rig(), small_config(Mode::kParallel), {.replay = reread(recorded)});
+  System replayed(tour.rig(), small_config(execution::Mode::kParallel), {.replay = reread(recorded)});
   for (const image::ImageBundle& images : frames) replayed.process(images);
   replayed.finish();
   expect_same(recorded, replayed);
@@ -62,10 +62,10 @@ TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
 
 TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
   const RenderedTour tour(2, 10);
-  System recorded(tour.rig(), small_config(Mode::kSequential));
+  System recorded(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : tour.frames()) recorded.process(images);
   recorded.finish();
-  Config other = small_config(Mode::kSequential);
+  Config other = small_config(execution::Mode::kSequential);
   other.tracking.keyframe.min_interval = 1;
   other.tracking.keyframe.min_overlap = 1.0;
   System replayed(tour.rig(), other, {.replay = reread(recorded)});
@@ -75,7 +75,7 @@ TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
   };
   EXPECT_THROW(replay(), execution::ReplayMismatch);
 
-  Config without = small_config(Mode::kSequential);
+  Config without = small_config(execution::Mode::kSequential);
   without.final_adjustment = false;
   System shorter(tour.rig(), without, {.replay = reread(recorded)});
   for (const image::ImageBundle& images : tour.frames()) shorter.process(images);
@@ -84,7 +84,8 @@ TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
 
 TEST(SystemReplay, RepeatsAnInterruptedRunParallel) {
   const RenderedTour tour(2, 10);
-  for (const Mode mode : {Mode::kSequential, Mode::kParallel, Mode::kLagged}) {
+  for (const execution::Mode mode :
+       {execution::Mode::kSequential, execution::Mode::kParallel, execution::Mode::kLagged}) {
     System recorded(tour.rig(), small_config(mode));
     for (std::size_t k = 0; k < 7; ++k) recorded.process(tour.frames()[k]);
     std::jthread([&] { recorded.interrupt(); }).join();

@@ -24,10 +24,10 @@ Outcome run(const RenderedTour& tour, const Config& config) {
 
 TEST(SystemSequential, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
   const RenderedTour tour(4, 16);
-  const Outcome first = run(tour, small_config(Mode::kSequential, 1));
+  const Outcome first = run(tour, small_config(execution::Mode::kSequential, 1));
   EXPECT_EQ(first.final.size(), tour.frames().size());
   for (const int threads : {1, 2, 4}) {
-    const Outcome again = run(tour, small_config(Mode::kSequential, threads));
+    const Outcome again = run(tour, small_config(execution::Mode::kSequential, threads));
     EXPECT_TRUE(identical(first.final, again.final)) << threads << " threads";
     EXPECT_TRUE(identical(first.live, again.live)) << threads << " threads";
     EXPECT_EQ(first.landmarks, again.landmarks);
@@ -39,7 +39,7 @@ TEST(SystemSequential, TracksWithOneToEightCameras) {
   const std::size_t count = 20;
   const RenderedTour tour(8, count);
   for (int n = 1; n <= 8; ++n) {
-    System system(tour.rig_of(n), small_config(Mode::kSequential));
+    System system(tour.rig_of(n), small_config(execution::Mode::kSequential));
     for (std::size_t k = 0; k < count; ++k) system.process(tour.frame_of(k, n));
     system.finish();
     const auto align = n == 1 ? evaluation::AlignMode::kSim3 : evaluation::AlignMode::kSe3;
@@ -53,7 +53,7 @@ TEST(SystemSequential, TracksWithOneToEightCameras) {
 
 TEST(SystemSequential, KnowsTheTruePathLengthWithTwoCameras) {
   const RenderedTour tour(2, 24);
-  const Outcome outcome = run(tour, small_config(Mode::kSequential));
+  const Outcome outcome = run(tour, small_config(execution::Mode::kSequential));
   const double truth_m = evaluation::path_length_m(tour.truth());
   EXPECT_NEAR(evaluation::path_length_m(outcome.final), truth_m, 0.03 * truth_m);
 }
@@ -65,7 +65,7 @@ TEST(SystemSequential, ADamagedOrMissingImageCostsOnlyItsCamera) {
   for (const std::size_t k : {8u, 9u}) make_absent(frames[k].images[0], ImageState::kMissing);
   make_absent(frames[11].images[0], ImageState::kDamaged);
   make_absent(frames[11].images[1], ImageState::kDamaged);
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : frames) {
     const FrameRecord& record = system.process(images);
     EXPECT_EQ(record.result.status, TrackStatus::kTracking) << "frame " << images.id.value();
@@ -88,7 +88,7 @@ TEST(SystemSequential, IsLostInTheDarkAndRecovers) {
   for (const std::size_t k : {8u, 9u}) {
     for (image::CameraImage& i : frames[k].images) blacken(i);
   }
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : frames) {
     const FrameRecord& record = system.process(images);
     const bool dark = images.id.value() == 8 || images.id.value() == 9;
@@ -111,7 +111,7 @@ TEST(SystemSequential, RecordsEveryInputFrame) {
   for (const std::size_t k : {0u, 6u}) {
     for (image::CameraImage& i : frames[k].images) make_absent(i, ImageState::kMissing);
   }
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : frames) system.process(images);
   system.finish();
   ASSERT_EQ(system.frames().size(), frames.size());
@@ -146,7 +146,7 @@ TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {
   image::Image nothing(tour.rig().camera(1).width, tour.rig().camera(1).height);
   image::CameraImage black{ImageState::kPresent, 0, nothing};
   blacken(black);
-  System system(tour.rig(), small_config(Mode::kSequential), {.masks = {image::Image(), black.image}});
+  System system(tour.rig(), small_config(execution::Mode::kSequential), {.masks = {image::Image(), black.image}});
   for (const image::ImageBundle& images : tour.frames()) {
     const FrameRecord& record = system.process(images);
     EXPECT_GT(record.result.cameras[0].keypoints, 100);
@@ -158,7 +158,7 @@ TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {
 
 TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
   const RenderedTour tour(1, 16);
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) system.process(tour.frames()[k++]);
   ASSERT_GT(tracked_frames(system), 0u);
@@ -178,7 +178,7 @@ TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
 
 TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {
   const RenderedTour tour(1, 16);
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) system.process(tour.frames()[k++]);
   const std::size_t before = tracked_frames(system);
@@ -194,7 +194,7 @@ TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {
 
 TEST(SystemSequential, StartsUpToScaleSoonAfterADarkFirstFrame) {
   const RenderedTour tour(1, 16);
-  System system(tour.rig(), small_config(Mode::kSequential));
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
   image::ImageBundle dark = tour.frames()[0];
   blacken(dark.images[0]);
   system.process(dark);
@@ -205,7 +205,7 @@ TEST(SystemSequential, StartsUpToScaleSoonAfterADarkFirstFrame) {
 TEST(SystemSequential, AdjustsTheWholeMapAtTheEndOnlyWhereConfigured) {
   const RenderedTour tour(2, 8);
   for (const bool wanted : {false, true}) {
-    Config config = small_config(Mode::kSequential);
+    Config config = small_config(execution::Mode::kSequential);
     config.final_adjustment = wanted;
     System system(tour.rig(), config);
     for (const image::ImageBundle& images : tour.frames()) system.process(images);

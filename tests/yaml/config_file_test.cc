@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "dataset/data_on_disk.h"
+#include "support/data_on_disk.h"
 
 namespace bslam {
 
@@ -14,7 +14,7 @@ struct EnumNames<Late> {
   static constexpr std::array<EnumName<Late>, 2> kNames{{{Late::kBlock, "block"}, {Late::kDrop, "drop"}}};
 };
 
-namespace io {
+namespace yaml {
 namespace {
 
 struct Deep {
@@ -52,10 +52,10 @@ struct Settings {
 class ConfigFile : public testing::Test {
  protected:
   Status apply(std::string_view yaml) {
-    write_text(folder_.path() / "config.yaml", yaml);
+    support::write_text(folder_.path() / "config.yaml", yaml);
     return apply_config_file(table_, folder_.path() / "config.yaml");
   }
-  TemporaryFolder folder_;
+  support::TemporaryFolder folder_;
   Settings settings_;
   OptionTable table_{settings_};
 };
@@ -110,17 +110,17 @@ TEST_F(ConfigFile, ComesBackExactly) {
   settings_.features.per_image = 777;
   settings_.late = Late::kDrop;
   settings_.vocabulary = "a \"quoted\" \\ path: # with\nlines and äöü";
-  const std::string yaml = config_to_yaml(table_);
+  const std::string text = config_to_yaml(table_);
   Settings other;
   OptionTable other_table(other);
-  write_text(folder_.path() / "out.yaml", yaml);
+  support::write_text(folder_.path() / "out.yaml", text);
   const Status status = apply_config_file(other_table, folder_.path() / "out.yaml");
   ASSERT_TRUE(status) << status.error().message();
   EXPECT_EQ(other.features.deep.gain, 0.1 + 0.2);
   EXPECT_EQ(other.features.per_image, 777);
   EXPECT_EQ(other.late, Late::kDrop);
   EXPECT_EQ(other.vocabulary, settings_.vocabulary);
-  EXPECT_EQ(config_to_yaml(other_table), yaml);
+  EXPECT_EQ(config_to_yaml(other_table), text);
 }
 
 TEST_F(ConfigFile, SaysWhatEverySettingMeans) {
@@ -147,5 +147,5 @@ TEST_F(ConfigFile, SettingsOfTheCommandLine) {
 }
 
 }  // namespace
-}  // namespace io
+}  // namespace yaml
 }  // namespace bslam

@@ -9,7 +9,7 @@
 
 #include "base/timestamp.h"
 
-namespace bslam::dataset {
+namespace bslam::support {
 
 // A folder of its own under the system's temporary folder, removed with all its content.
 class TemporaryFolder {
@@ -50,4 +50,4 @@ std::string small_list(const std::vector<int>& frames);
 // A data set of ../shared/data beside the project, where it is present.
 std::optional<std::filesystem::path> shared_data(std::string_view name);
 
-}  // namespace bslam::dataset
+}  // namespace bslam::support

@@ -1,4 +1,4 @@
-#include "dataset/data_on_disk.h"
+#include "support/data_on_disk.h"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@
 
 #include "base/random.h"
 
-namespace bslam::dataset {
+namespace bslam::support {
 
 namespace fs = std::filesystem;
 
@@ -76,11 +76,11 @@ void write_small_euroc(const fs::path& folder, int cameras) {
 }
 
 std::optional<fs::path> shared_data(std::string_view name) {
-  // This file is PROJECT/tests/io/data_on_disk.cc.
+  // This file is PROJECT/tests/support/data_on_disk.cc.
   const fs::path project = fs::absolute(__FILE__).parent_path().parent_path().parent_path();
   const fs::path data = project.parent_path() / "shared" / "data" / name;
   std::error_code error;
   return fs::is_directory(data, error) ? std::optional(data) : std::nullopt;
 }
 
-}  // namespace bslam::dataset
+}  // namespace bslam::support

@@ -9,7 +9,7 @@
 #include "execution/stage_executor.h"
 #include "map/synthetic_map.h"
 
-namespace bslam::system {
+namespace bslam::execution {
 
 // Work that takes time without sleeping; its result has to go somewhere, or it would be left out.
 inline double busy(std::uint64_t rounds) {
@@ -88,4 +88,4 @@ inline execution::StageFunctions hashing_stages(std::uint64_t delay_seed, int lo
   return functions;
 }
 
-}  // namespace bslam::system
+}  // namespace bslam::execution
