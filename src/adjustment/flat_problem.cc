@@ -10,25 +10,24 @@ namespace {
 constexpr int kAbsent = -1;
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-// Position of each keyframe among the poses, or kAbsent.
+// Index of each keyframe among the poses, or kAbsent.
 std::vector<int> pose_positions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
   std::vector<int> position(map.keyframe_slots(), kAbsent);
   for (std::size_t i = 0; i < keyframes.size(); ++i) position[keyframes[i].index()] = static_cast<int>(i);
   return position;
 }
 
-// Adds the observations of one landmark; true where two or more keyframes of the problem see it: a landmark in one alone
-// says nothing about poses.
+// Adds the observations of one landmark. Returns false if fewer than two keyframes of the problem observe it, since
+// such a landmark does not constrain the poses.
 bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& position, double sigma_px,
                   double scale_factor, FlatProblem& flat) {
   const auto observations = map.observations(id);
-  const auto seen = std::count_if(observations.begin(), observations.end(), [&](const map::Observation& o) {
-    return position[o.keyframe.index()] != kAbsent;
-  });
+  const auto seen = std::count_if(observations.begin(), observations.end(),
+                                  [&](const map::Observation& o) { return position[o.keyframe.index()] != kAbsent; });
   if (seen < 2) return false;
   const int point = static_cast<int>(flat.landmarks.size());
   std::size_t reference = kNone;
-  float least = std::numeric_limits<float>::infinity();  // of those aligned to the reference
+  float least = std::numeric_limits<float>::infinity();  // among observations aligned to the reference patch
   for (const map::Observation& o : observations) {
     const int pose = position[o.keyframe.index()];
     if (pose == kAbsent) continue;
@@ -47,14 +46,16 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
       flat.sources.push_back({id, o.keyframe});
     }
   }
-  // The reference says what the landmark is: that it was detected, not aligned, is no error.
-  if (reference != kNone) flat.problem.observations[reference].sigma = std::min(flat.problem.observations[reference].sigma, least);
+  // The reference keypoint defines the landmark, so its detection error does not count as an error of the landmark.
+  if (reference != kNone)
+    flat.problem.observations[reference].sigma = std::min(flat.problem.observations[reference].sigma, least);
   flat.landmarks.push_back(id);
   flat.problem.points.push_back(map.landmark(id).position);
   return true;
 }
 
-// How the rig moved while each keyframe was taken; empty where all their cameras fired together.
+// Motion of the rig between each keyframe's time and the capture times of its images; empty if all images of all
+// keyframes were captured at the same time.
 std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
   std::vector<geometry::SE3> out;
   bool any = false;
@@ -78,7 +79,8 @@ FlatProblem flatten(const map::BundledMap& map, const Selection& selection, doub
   std::sort(flat.keyframes.begin(), flat.keyframes.end());
   for (const KeyframeId k : flat.keyframes) {
     flat.problem.T_rig_world.push_back(map.keyframe(k).T_rig_world);
-    flat.problem.pose_free.push_back(std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), k));
+    flat.problem.pose_free.push_back(
+        std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), k));
   }
   flat.problem.motion = motions(map, flat.keyframes);
   const std::vector<int> position = pose_positions(map, flat.keyframes);

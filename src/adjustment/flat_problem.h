@@ -1,4 +1,5 @@
-// Part of a map as the flat problem of the solver: what is adjusted, and where each of its observations comes from.
+// Converts a selection of the map to a bundle adjustment problem for the solver, and records where each observation
+// comes from.
 #pragma once
 
 #include <vector>
@@ -8,28 +9,31 @@
 
 namespace bslam::adjustment {
 
-// What takes part; ids alive, distinct, in ascending order. Observations by other keyframes are left out.
+// The variables of an adjustment. Ids are alive, distinct and in ascending order. Observations by other keyframes are
+// ignored.
 struct Selection {
   std::vector<KeyframeId> free_keyframes, fixed_keyframes;
   std::vector<LandmarkId> landmarks;
-  bool whole_map = false;  // the result is a correction of the map, which nothing begun before it may undo
+  // the result is a correction of the map, which must not be undone by work based on older versions
+  bool whole_map = false;
 };
 
-// Where an observation of the problem comes from in the map.
+// The landmark and keyframe that an observation of the problem belongs to.
 struct ObservationSource {
   LandmarkId landmark;
   KeyframeId keyframe;
 };
 
 struct FlatProblem {
-  solver::ReprojectionProblem problem;     // its rig is the map's
+  solver::ReprojectionProblem problem;     // uses the map's rig
   std::vector<KeyframeId> keyframes;       // per pose
   std::vector<LandmarkId> landmarks;       // per point
   std::vector<ObservationSource> sources;  // per observation
 };
 
-// Landmarks that fewer than two of the keyframes see are left out. `sigma_px`: standard deviation of a keypoint that is
-// not aligned to its landmark's patch, on its level; `scale_factor` between levels. The map outlives the problem.
+// Builds the problem. Landmarks observed by fewer than two of the keyframes are left out. `sigma_px` is the standard
+// deviation, in pixels of its pyramid level, of a keypoint that is not aligned to its landmark's patch; `scale_factor`
+// is the ratio between levels. The map must outlive the problem.
 FlatProblem flatten(const map::BundledMap& map, const Selection& selection, double sigma_px, double scale_factor);
 
 }  // namespace bslam::adjustment

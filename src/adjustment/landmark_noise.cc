@@ -5,7 +5,9 @@
 namespace bslam::adjustment {
 namespace {
 
-constexpr double kPrior = 4;  // degrees of freedom: the fewer, the more landmarks differ; from 4 to 20 results hardly change
+// Degrees of freedom of the prior. With fewer, the variances of landmarks differ more; results hardly change between 4
+// and 20.
+constexpr double kPrior = 4;
 
 }  // namespace
 

@@ -1,13 +1,15 @@
-// How well a landmark can be placed in images is its own: a corner on a wall to a twentieth of a pixel, one where a near edge
-// crosses a far one not at all, since it is no point. What alignment claims does not tell them apart, and the errors of the
-// latter do not average out: they slide along with the view, which draws the length of the map's unit after it.
+// Variance of the image measurements per landmark. How well a landmark can be localised depends on the landmark: a
+// corner on a wall to a twentieth of a pixel; an apparent corner where a near edge occludes a far one not at all,
+// because it is not a fixed point. The uncertainty estimated by patch alignment does not distinguish the two, and the
+// errors of the latter do not average out: such points slide with the viewpoint and bias the scale of the map.
 //
-// So each landmark gets a variance of its own, from how well its observations agree: with n of them, their squared normalised
-// errors adding up to S, and all landmarks on average m per degree of freedom,
+// Therefore each landmark gets a variance factor estimated from the residuals of its n observations. With S the sum of
+// their squared normalised errors and m the mean squared normalised error per degree of freedom over all landmarks,
 //     variance factor = (4 m + S) / (4 + 2 n - 3),
-// the point taking three of its 2 n degrees of freedom: the inverse of the mean of 1/variance after S, where before it the
-// variance is m with four degrees of freedom (scaled inverse chi-square; Gelman et al., Bayesian Data Analysis, section 2.6). It is
-// the weight of adjustment with Student's t distribution. Observations left out as outliers do not count, which bounds S.
+// where the point takes three of the 2 n degrees of freedom. This is the inverse of the posterior mean of 1/variance
+// under a scaled inverse chi-square prior with scale m and four degrees of freedom (Gelman et al., Bayesian Data
+// Analysis, section 2.6), and corresponds to the weights of adjustment with Student's t distribution. Observations
+// excluded as outliers do not count, which bounds S.
 #pragma once
 
 #include <span>
@@ -17,13 +19,13 @@
 
 namespace bslam::adjustment {
 
-// Variance factor of each point of the problem; 1 where fewer than two observations are left. `chi2`: the squared errors at its
-// present values; `skip` as for solver::adjust.
+// Returns the variance factor of each point; 1 if fewer than two observations remain. `chi2` holds the squared
+// normalised errors at the present values; `skip` is as in solver::adjust.
 std::vector<double> landmark_variances(const solver::ReprojectionProblem& problem, std::span<const double> chi2,
                                        std::span<const std::uint8_t> skip);
 
-// Adjusts the problem with the standard deviations of each point's observations times the root of its factor; they are
-// themselves as they were afterwards.
+// Adjusts the problem with the standard deviations of each point's observations multiplied by the square root of its
+// variance factor. The standard deviations are restored afterwards.
 solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
                                             const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
                                             std::stop_token stop);

@@ -10,8 +10,8 @@ namespace {
 
 using solver::ReprojectionProblem;
 
-// Bound of a sum over `keypoints` keypoints that is as improbable as `bound` is for one (Wilson and Hilferty's cube root,
-// scaled so that one keypoint has the bound itself).
+// Converts `bound`, an upper bound of the squared error of one keypoint, to the equally improbable bound of the sum
+// over `keypoints` keypoints (Wilson-Hilferty approximation, scaled to be exact for one keypoint).
 double sum_bound(double bound, int keypoints) {
   const auto quantile = [](double degrees) {
     const double v = 2.0 / (9.0 * degrees);
@@ -20,16 +20,18 @@ double sum_bound(double bound, int keypoints) {
   return bound * quantile(2.0 * keypoints) / quantile(2.0);
 }
 
-// An observation is a feature with all its keypoints, and is judged as a whole: the more cameras, the likelier it is that
-// chance alone takes one of them over its own bound.
-std::vector<ObservationSource> bad_observations(const FlatProblem& flat, double bound) {
+// Outliers are classified per observation, that is for all keypoints of a feature together: judged one by one, the
+// probability that one of them exceeds its bound by chance would grow with the number of cameras.
+std::vector<ObservationSource> outlier_observations(const FlatProblem& flat, double bound) {
   const std::vector<double> chi2 = solver::squared_errors(flat.problem);
   std::vector<ObservationSource> bad;
   for (std::size_t i = 0; i < chi2.size();) {
     const ObservationSource source = flat.sources[i];
     double sum = 0;
     int keypoints = 0;
-    for (; i < chi2.size() && flat.sources[i].landmark == source.landmark && flat.sources[i].keyframe == source.keyframe; ++i) {
+    for (;
+         i < chi2.size() && flat.sources[i].landmark == source.landmark && flat.sources[i].keyframe == source.keyframe;
+         ++i) {
       sum += chi2[i];
       ++keypoints;
     }
@@ -38,8 +40,10 @@ std::vector<ObservationSource> bad_observations(const FlatProblem& flat, double 
   return bad;
 }
 
-// Landmarks that one keyframe alone sees are no part of the problem: they keep their place in that keyframe.
-void carry_single_views(const map::BundledMap& map, KeyframeId k, const geometry::SE3& T_rig_world, map::SetPoses& poses) {
+// Landmarks observed by one keyframe only are not part of the problem; they keep their position relative to that
+// keyframe.
+void move_single_view_landmarks(const map::BundledMap& map, KeyframeId k, const geometry::SE3& T_rig_world,
+                                map::SetPoses& poses) {
   const geometry::SE3 T_new_old = T_rig_world.inverse() * map.keyframe(k).T_rig_world;
   for (const LandmarkId l : map.keyframe(k).landmarks) {
     if (!l.valid() || map.observations(l).size() != 1) continue;
@@ -52,7 +56,7 @@ map::SetPoses poses_of(const map::BundledMap& map, const FlatProblem& flat) {
   for (std::size_t i = 0; i < flat.keyframes.size(); ++i) {
     if (!flat.problem.pose_free[i]) continue;
     poses.keyframes.emplace_back(flat.keyframes[i], flat.problem.T_rig_world[i]);
-    carry_single_views(map, flat.keyframes[i], flat.problem.T_rig_world[i], poses);
+    move_single_view_landmarks(map, flat.keyframes[i], flat.problem.T_rig_world[i], poses);
   }
   for (std::size_t i = 0; i < flat.landmarks.size(); ++i) {
     if (flat.problem.points[i].allFinite()) poses.landmarks.emplace_back(flat.landmarks[i], flat.problem.points[i]);
@@ -62,12 +66,13 @@ map::SetPoses poses_of(const map::BundledMap& map, const FlatProblem& flat) {
 
 }  // namespace
 
-AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options, double sigma_px, double scale_factor,
-                            map::MapDraft& draft, std::stop_token stop) {
+AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options, double sigma_px,
+                            double scale_factor, map::MapDraft& draft, std::stop_token stop) {
   AdjustmentReport report;
   FlatProblem flat = flatten(draft.map(), selection, sigma_px, scale_factor);
   report.observations = flat.problem.observations.size();
-  const bool any_fixed = std::any_of(flat.problem.pose_free.begin(), flat.problem.pose_free.end(), [](std::uint8_t f) { return !f; });
+  const bool any_fixed =
+      std::any_of(flat.problem.pose_free.begin(), flat.problem.pose_free.end(), [](std::uint8_t f) { return !f; });
   if (selection.free_keyframes.empty() || !any_fixed || flat.problem.observations.empty()) return report;
 
   solver::BundleOptions solve{
@@ -84,7 +89,7 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
     const auto variances = landmark_variances(flat.problem, chi2, skip);
     adjust_with_variances(flat.problem, variances, solve, skip, stop);
   }
-  const std::vector<ObservationSource> bad = bad_observations(flat, options.outlier_chi2);
+  const std::vector<ObservationSource> bad = outlier_observations(flat, options.outlier_chi2);
   map::SetPoses poses = poses_of(draft.map(), flat);
   poses.correction = selection.whole_map;
   std::vector<LandmarkId> touched;

@@ -1,5 +1,5 @@
-// Bundle adjustment of part of a map: chooses nothing, only turns what was chosen into a flat problem and the answer into
-// operations of a draft. Local and global adjustment differ in what they choose.
+// Bundle adjustment of a selection of the map: builds the problem, solves it, and writes the result to a draft. Local
+// and global adjustment differ only in the selection.
 #pragma once
 
 #include <stop_token>
@@ -11,31 +11,34 @@
 namespace bslam::adjustment {
 
 struct AdjustmentOptions {
-  int robust_iterations = 5;   // with Huber kernel, before observations are judged
-  int final_iterations = 5;    // without it, on those that agree
-  double relative_decrease = 1e-4;  // of the cost, below which it has converged
+  int robust_iterations = 5;                    // with Huber kernel, before outliers are classified
+  int final_iterations = 5;                     // without robust kernel, on the inliers
+  double relative_decrease = 1e-4;              // of the cost; smaller means converged
   double outlier_chi2 = solver::kChi2TwoDof95;  // squared normalised error above which an observation is removed
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("robust_iterations", self.robust_iterations, Range{0, 200}, "", "steps with Huber kernel");
-    visitor("final_iterations", self.final_iterations, Range{0, 200}, "", "steps without it on the observations that agree");
-    visitor("relative_decrease", self.relative_decrease, Range{0, 0.1}, "", "of the cost, below which it has converged");
-    visitor("outlier_chi2", self.outlier_chi2, Range{0.1, 1e6}, "", "squared normalised error above which an observation goes");
+    visitor("robust_iterations", self.robust_iterations, Range{0, 200}, "", "iterations with Huber kernel");
+    visitor("final_iterations", self.final_iterations, Range{0, 200}, "",
+            "iterations without robust kernel, on the inliers");
+    visitor("relative_decrease", self.relative_decrease, Range{0, 0.1}, "",
+            "relative decrease of the cost below which the adjustment has converged");
+    visitor("outlier_chi2", self.outlier_chi2, Range{0.1, 1e6}, "",
+            "squared normalised error above which an observation is removed");
   }
 };
 
 struct AdjustmentReport {
-  bool done = false;            // false: nothing to adjust, or the solver failed; the draft is as it was
-  std::size_t observations = 0;             // keypoints
-  std::size_t outliers = 0;                 // features removed from their landmark
-  double initial_cost = 0, final_cost = 0;  // robust, before and after the robust round
+  bool done = false;                        // false: nothing to adjust, or the solver failed; the draft is unchanged
+  std::size_t observations = 0;             // number of keypoints
+  std::size_t outliers = 0;                 // number of features removed from their landmark
+  double initial_cost = 0, final_cost = 0;  // robust cost before and after the robust round
 };
 
-// Adjusts the free keyframes and the landmarks with all cameras' observations, two rounds, and writes poses, positions and
-// the removal of outlying observations to the draft. `sigma_px`: standard deviation of a keypoint that is not aligned to
-// its landmark's patch, on its level.
-AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options, double sigma_px, double scale_factor,
-                            map::MapDraft& draft, std::stop_token stop = {});
+// Adjusts the free keyframes and the landmarks, using the observations of all cameras, in two rounds. Writes poses,
+// positions and the removal of outlier observations to the draft. `sigma_px` is the standard deviation, in pixels of
+// its pyramid level, of a keypoint that is not aligned to its landmark's patch.
+AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options, double sigma_px,
+                            double scale_factor, map::MapDraft& draft, std::stop_token stop = {});
 
 }  // namespace bslam::adjustment

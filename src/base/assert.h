@@ -1,4 +1,5 @@
-// Assertions for what only we can cause. They stay on in release builds: a wrong map is worse than a stop.
+// Assertions check conditions that only a bug in bslam can violate. They stay enabled in release builds, because a
+// corrupt map is worse than a crash.
 #pragma once
 
 namespace bslam {

@@ -11,7 +11,7 @@
 namespace bslam {
 namespace {
 
-// Owns a file descriptor; -1 = none.
+// Owns a file descriptor; -1 means none.
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -42,7 +42,7 @@ bool write_all(int fd, std::string_view bytes) {
   return true;
 }
 
-// A new file beside `path` with a name of its own, which is put into `name`.
+// Creates a new file with a unique name next to `path`, stores that name in `name` and returns the file descriptor.
 int open_beside(const std::filesystem::path& path, std::filesystem::path& name) {
   for (int attempt = 0;; ++attempt) {
     name = path;
@@ -66,7 +66,8 @@ Status write_atomically(const std::filesystem::path& path, std::string_view byte
     ::unlink(part.c_str());
     return error;
   }
-  // The name is durable once the folder is; a file system that cannot flush folders is not an error.
+  // The rename is durable only after the folder is flushed too. Some file systems cannot flush folders, so a failure is
+  // ignored.
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (opened.get() >= 0) ::fsync(opened.get());
@@ -74,7 +75,7 @@ Status write_atomically(const std::filesystem::path& path, std::string_view byte
 }
 
 Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes) {
-  // Non-blocking, so that a pipe of that name is refused instead of waited for.
+  // Open without blocking, so that a named pipe is rejected instead of waited for.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return system_error(path, "a file that can be read");
@@ -82,10 +83,11 @@ Result<std::string> read_file(const std::filesystem::path& path, std::size_t max
     return Error{path.string(), "", S_ISDIR(status.st_mode) ? "a folder" : "no file", "a file"};
   const Error too_large{path.string(), "", "more than " + std::to_string(max_bytes) + " bytes", "a smaller file"};
   if (static_cast<std::size_t>(status.st_size) > max_bytes) return too_large;
-  std::string bytes(static_cast<std::size_t>(status.st_size) + 1, '\0');  // one more, to see the end without growing
+  // One byte more than the file size, so that the end of the file is detected without growing the buffer.
+  std::string bytes(static_cast<std::size_t>(status.st_size) + 1, '\0');
   std::size_t size = 0;
   for (;;) {
-    if (size == bytes.size()) bytes.resize(2 * size);  // it grew since
+    if (size == bytes.size()) bytes.resize(2 * size);  // the file has grown since fstat
     const ssize_t got = ::read(file.get(), bytes.data() + size, bytes.size() - size);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return system_error(path, "a file that can be read");

@@ -1,4 +1,4 @@
-// Whole files in and out: what is written appears under its name complete or not at all.
+// Reading whole files, and writing them atomically: a written file is either complete or absent.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +10,12 @@
 
 namespace bslam {
 
-// Writes `bytes` to a file beside `path`, flushes it to the disk and renames it. The folder exists; an existing file is
-// replaced. On error nothing is left behind and an existing file is as it was.
+// Writes `bytes` to a temporary file next to `path`, flushes it to disk and renames it to `path`. The folder must
+// exist; an existing file is replaced. On error no temporary file remains and an existing file is unchanged.
 Status write_atomically(const std::filesystem::path& path, std::string_view bytes);
 
-// The bytes of a regular file. Errors: it does not exist, cannot be read, is no regular file, or has over `max_bytes`.
+// Returns the bytes of a regular file. Errors: the file does not exist, cannot be read, is not a regular file, or is
+// larger than `max_bytes`.
 Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes);
 
 }  // namespace bslam

@@ -1,4 +1,4 @@
-// Strong identifiers: distinct types that do not mix, ordered, never recycled within a run.
+// Strong identifiers: distinct, ordered types that cannot be mixed up. An id is never reused within a run.
 #pragma once
 
 #include <compare>
@@ -23,17 +23,17 @@ class Id {
   friend constexpr auto operator<=>(Id, Id) = default;
 
  private:
-  std::int32_t value_ = -1;  // -1: no such thing
+  std::int32_t value_ = -1;  // -1: invalid
 };
 
-using CameraIndex = Id<struct CameraTag>;      // position of a camera in the rig of the run
-using KeypointIndex = Id<struct KeypointTag>;  // position in the Keypoints of one camera
+using CameraIndex = Id<struct CameraTag>;      // index of a camera in the rig
+using KeypointIndex = Id<struct KeypointTag>;  // index into the Keypoints of one camera
 using FeatureId = Id<struct FeatureTag>;       // unique feature within one BundledFrame
 using FrameId = Id<struct FrameTag>;           // input frame, in order of time
-using KeyframeId = Id<struct KeyframeTag>;     // given by MapStore at commit
-using LandmarkId = Id<struct LandmarkTag>;     // given by MapStore at commit
+using KeyframeId = Id<struct KeyframeTag>;     // assigned by MapStore at commit
+using LandmarkId = Id<struct LandmarkTag>;     // assigned by MapStore at commit
 using WordId = Id<struct WordTag>;             // word of the place-recognition vocabulary
-using MapVersion = Id<struct MapVersionTag>;   // one more with every commit
+using MapVersion = Id<struct MapVersionTag>;   // incremented by every commit
 
 }  // namespace bslam
 

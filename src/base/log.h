@@ -1,4 +1,4 @@
-// Where a library's words go: a sink the caller hands in. Nothing is printed by default.
+// Log output: libraries write to a sink supplied by the caller. Nothing is printed by default.
 #pragma once
 
 #include <functional>
@@ -8,7 +8,7 @@ namespace bslam {
 
 enum class LogLevel { kInfo, kWarning };
 
-// Called with a level, the stage that speaks and one line without its end; empty = silent.
+// Receives the level, the name of the stage, and one line of text without a newline. An empty sink discards everything.
 using LogSink = std::function<void(LogLevel, std::string_view stage, std::string_view line)>;
 
 }  // namespace bslam

@@ -1,4 +1,4 @@
-// The middle of some values.
+// The median of a list of values.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace bslam {
 
-// Of an even number the larger of the two in the middle. Not empty.
+// For an even number of values, returns the larger of the two middle ones. `values` must not be empty.
 template <class T>
 T median(std::vector<T> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -15,7 +15,7 @@ T median(std::vector<T> values) {
   return *middle;
 }
 
-// Of an even number the smaller of the two in the middle. Not empty.
+// For an even number of values, returns the smaller of the two middle ones. `values` must not be empty.
 template <class T>
 T lower_median(std::vector<T> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);

@@ -8,7 +8,7 @@
 namespace bslam {
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);  // distances of the prefix of `a` so far to every prefix of `b`
+  std::vector<std::size_t> row(b.size() + 1);  // distances of the current prefix of `a` to every prefix of `b`
   std::iota(row.begin(), row.end(), std::size_t{0});
   for (std::size_t i = 0; i < a.size(); ++i) {
     std::size_t diagonal = row[0];
@@ -23,7 +23,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }
 
 std::string nearest_name(std::string_view name, std::span<const std::string> known) {
-  constexpr std::size_t kLongest = 200;  // what is longer is no misspelling, and the cost is quadratic
+  // Longer names are not misspellings, and the cost is quadratic in the length.
+  constexpr std::size_t kLongest = 200;
   name = name.substr(0, kLongest);
   std::string nearest;
   std::size_t least = std::numeric_limits<std::size_t>::max();

@@ -1,4 +1,4 @@
-// What was meant by a misspelt name.
+// Suggests the intended name for a misspelt one.
 #pragma once
 
 #include <span>
@@ -7,11 +7,13 @@
 
 namespace bslam {
 
-// Least number of single-character insertions, deletions and replacements that turn `a` into `b` (Levenshtein, 1966).
+// Levenshtein distance (1966): the smallest number of single-character insertions, deletions and replacements that turn
+// `a` into `b`.
 std::size_t edit_distance(std::string_view a, std::string_view b);
 
-// The known name nearest to `name`, the first of equals. A name without dots is also compared with the last part of
-// dotted ones, so that "levels" finds "features.levels". Empty where nothing is known.
+// Returns the known name with the smallest edit distance to `name`; the first one on ties. A name without a dot is also
+// compared with the last component of dotted names, so that "levels" finds "features.levels". Returns an empty string
+// if `known` is empty.
 std::string nearest_name(std::string_view name, std::span<const std::string> known);
 
 }  // namespace bslam

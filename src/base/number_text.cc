@@ -8,7 +8,7 @@
 namespace bslam {
 namespace {
 
-// std::from_chars knows no leading plus sign.
+// std::from_chars does not accept a leading plus sign.
 std::string_view without_plus(std::string_view text) {
   const bool plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
   return plus ? text.substr(1) : text;

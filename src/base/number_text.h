@@ -1,4 +1,4 @@
-// Numbers as text and back, the same in every locale.
+// Conversion of numbers to and from text, independent of the locale.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,15 @@
 
 namespace bslam {
 
-// The whole text as a finite number ("1", "-2.5e-3", "+.5"); empty for anything else, NaN and infinity included.
+// Parses the whole text as a finite number ("1", "-2.5e-3", "+.5"). Returns nullopt otherwise, including for NaN and
+// infinity.
 std::optional<double> parse_double(std::string_view text);
 
-// The whole text as a decimal integer; empty for anything else and for what does not fit.
+// Parses the whole text as a decimal integer. Returns nullopt otherwise, including for values that do not fit.
 std::optional<std::int64_t> parse_integer(std::string_view text);
 
-// The shortest text that reads back as the same double, always with a decimal point (as YAML wants a float).
+// Returns the shortest text that parses back to the same double. It always has a decimal point, as YAML requires for
+// floats.
 std::string format_double(double value);
 
 }  // namespace bslam

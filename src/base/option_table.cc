@@ -34,7 +34,7 @@ std::string range_text(const Range& range, bool integer) {
 
 bool within(double value, const Range& range) { return value >= range.low && value <= range.high; }
 
-// Each parses and stores, or answers false and leaves the field alone.
+// Each overload parses `text` and stores the value, or returns false and leaves the field unchanged.
 bool store(bool* field, const Range&, std::string_view text) {
   if (text != "true" && text != "false") return false;
   *field = text == "true";

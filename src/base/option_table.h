@@ -1,4 +1,5 @@
-// A flat table over any struct of options with a `visit` (base/options.h): dotted keys, and values as text both ways.
+// A flat table over any struct of options that has a `visit` (base/options.h). Options are addressed by dotted keys,
+// and their values are converted to and from text.
 #pragma once
 
 #include <string>
@@ -13,25 +14,25 @@
 
 namespace bslam {
 
-// An enumeration's field without its type: values are positions in `names`.
+// A type-erased field of an enumeration type. Values are given as positions in `names`.
 struct EnumField {
   void* field = nullptr;
-  int (*get)(const void* field) = nullptr;  // -1 where the value has no name
+  int (*get)(const void* field) = nullptr;  // returns -1 if the value has no name
   void (*set)(void* field, int position) = nullptr;
   std::vector<std::string_view> names;
 };
 
 struct Option {
-  std::string key;  // "features.per_image"
+  std::string key;  // for example "features.per_image"
   std::variant<bool*, int*, double*, std::string*, EnumField> field;
-  Range range;  // numbers only
+  Range range;  // numeric options only
   std::string unit;
   std::string help;
 };
 
 class OptionTable {
  public:
-  // Borrows `options`, which must outlive the table and stay where it is. Every key occurs once.
+  // Keeps references into `options`, which must outlive the table and must not move. Every key must be unique.
   template <class Options>
   explicit OptionTable(Options& options) {
     Collector collector{*this, ""};
@@ -39,19 +40,20 @@ class OptionTable {
     check_keys();
   }
 
-  // In the order of `visit`.
+  // The options in the order of `visit`.
   const std::vector<Option>& options() const { return options_; }
   std::vector<std::string> keys() const;
   const Option* find(std::string_view key) const;
 
-  // Sets one option from text. Errors: unknown key (names the nearest one), text of another type, NaN or infinity,
-  // value out of range, unknown name of an enumeration. The field keeps its value on error; Error.file is left empty.
+  // Sets one option from text. Errors: an unknown key (the message suggests the nearest one), text of the wrong type,
+  // NaN or infinity, a value out of range, an unknown enumerator. On error the field is unchanged. Error::file is left
+  // empty.
   Status set(std::string_view key, std::string_view text);
 
  private:
   struct Collector {
     OptionTable& table;
-    std::string prefix;  // empty, or ending in a dot
+    std::string prefix;  // empty, or ends with a dot
 
     template <class Field>
     void operator()(std::string_view name, Field& field, Range range, std::string_view unit, std::string_view help) {
@@ -95,10 +97,10 @@ class OptionTable {
   std::vector<Option> options_;
 };
 
-// The value as text that `OptionTable::set` reads back exactly.
+// Returns the value as text that OptionTable::set parses back exactly.
 std::string value_text(const Option& option);
 
-// What the option takes, in words: "an integer in [1, 20]", "one of: fast, realtime".
+// Describes the accepted values, for example "an integer in [1, 20]" or "one of: fast, realtime".
 std::string expected_text(const Option& option);
 
 }  // namespace bslam

@@ -1,5 +1,6 @@
-// Options declared once: name, default, range, unit and help stand in the stage's struct; YAML, the command line and
-// the resolved configuration of a run all derive from one `visit` (see base/option_table.h).
+// Each option is declared once, in the struct of its stage, with its name, default, range, unit and help text. YAML
+// files, the command line and the resolved configuration of a run are all derived from the function `visit` (see
+// base/option_table.h).
 //
 //   enum class Pace { kFast, kRealtime };
 //   template <>
@@ -8,20 +9,20 @@
 //   };
 //
 //   struct FooOptions {
-//     int rounds = 4;  // solve rounds with re-classification between them
+//     int rounds = 4;  // solver rounds, with outlier classification between them
 //     Pace pace = Pace::kFast;
-//     BarOptions bar;  // options of a part, with a visit of its own
+//     BarOptions bar;  // nested options, with a `visit` of their own
 //     template <class Self, class Visitor>
 //     static void visit(Self& self, Visitor& visitor) {
-//       visitor("rounds", self.rounds, Range{1, 20}, "", "solve rounds with re-classification between them");
+//       visitor("rounds", self.rounds, Range{1, 20}, "", "solver rounds, with outlier classification between them");
 //       visitor("pace", self.pace, Range{}, "", "how images are fed");
 //       visitor.section("bar", self.bar);
 //     }
 //   };
 //
-// A visitor is called as `visitor(name, field, Range, unit, help)` for every leaf: a field of type bool, int, double,
-// std::string or an enumeration with EnumNames; and as `visitor.section(name, field)` for nested options, whose keys
-// become "name.key". Names are snake_case without dots. `Self` is const where the visitor only reads.
+// A visitor is called as `visitor(name, field, Range, unit, help)` for every option of type bool, int, double,
+// std::string or an enumeration with EnumNames, and as `visitor.section(name, field)` for nested options, whose keys
+// become "name.key". Names are snake_case without dots. `Self` is const if the visitor only reads.
 #pragma once
 
 #include <limits>
@@ -29,7 +30,7 @@
 
 namespace bslam {
 
-// Closed interval of values that make sense; anything outside is refused with the key's name. Numbers only.
+// Closed interval of valid values of a numeric option. Values outside are rejected with an error that names the key.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -41,7 +42,7 @@ struct EnumName {
   std::string_view name;
 };
 
-// To be specialised for enumerations that are options: `kNames`, an array of EnumName<E> with every value once.
+// Specialised for every enumeration used as an option: `kNames` is an array of EnumName<E> that lists every value once.
 template <class E>
 struct EnumNames;
 

@@ -9,7 +9,7 @@ std::string Error::message() const {
   }
   if (!found.empty()) text += "found " + found;
   if (!expected.empty()) text += std::string(found.empty() ? "" : ", ") + "expected " + expected;
-  if (text.ends_with(": ")) text.resize(text.size() - 2);  // a place alone says it all
+  if (text.ends_with(": ")) text.resize(text.size() - 2);  // the message has only a location
   for (char& c : text) {
     if (static_cast<unsigned char>(c) < 0x20) c = ' ';
   }

@@ -1,4 +1,4 @@
-// Errors as values: what the outside can cause is an Error; it reaches the command line as one line.
+// Errors as return values: Error describes a problem caused by user input or the environment. It is shown as one line.
 #pragma once
 
 #include <optional>
@@ -10,18 +10,18 @@
 
 namespace bslam {
 
-// One thing that is wrong with what the user gave: where, what was found there, what was expected.
+// One problem with the user's input: where it is, what was found, and what was expected.
 struct Error {
   std::string file;      // file, folder or command-line option; may be empty
-  std::string key;       // key, line or part within it; may be empty
-  std::string found;     // what is there
-  std::string expected;  // what would be right
+  std::string key;       // key, line or section within the file; may be empty
+  std::string found;     // the actual value
+  std::string expected;  // the expected value
 
-  // "FILE: KEY: found X, expected Y", in one line; empty parts are left out, control characters are replaced.
+  // "FILE: KEY: found X, expected Y" on one line. Empty fields are omitted and control characters are replaced.
   std::string message() const;
 };
 
-// A value or an Error. Asking for the one that is not there is an assertion failure.
+// Either a value or an Error. Accessing the one that is absent is an assertion failure.
 template <class T>
 class [[nodiscard]] Result {
  public:
@@ -50,7 +50,7 @@ class [[nodiscard]] Result {
   std::variant<T, Error> state_;
 };
 
-// Success or an Error, for functions without a value.
+// Either success or an Error, for functions without a return value.
 class [[nodiscard]] Status {
  public:
   Status() = default;

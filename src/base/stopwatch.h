@@ -1,4 +1,4 @@
-// The clock of the machine: read here, for the timing record only. No decision depends on it.
+// Wall-clock stopwatch, used only to record timings. No decision of the algorithm depends on it.
 #pragma once
 
 #include <chrono>

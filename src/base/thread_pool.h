@@ -1,4 +1,4 @@
-// Data parallelism with results in fixed slots: which thread does which item never changes a result.
+// Data-parallel loops. Each item writes to its own slot, so the result does not depend on which thread runs which item.
 #pragma once
 
 #include <condition_variable>
@@ -13,7 +13,7 @@ namespace bslam {
 
 class ThreadPool {
  public:
-  // `threads` threads work on a loop, the caller among them; 1 means the caller alone.
+  // `threads` is the number of threads that run a loop, including the caller; 1 means that the caller runs it alone.
   explicit ThreadPool(int threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -21,9 +21,9 @@ class ThreadPool {
 
   int size() const { return static_cast<int>(workers_.size()) + 1; }
 
-  // Calls body(i) once for every i in [0, count) and returns when all are done, also where some throw. `body` writes
-  // only to slots of its own index. The first exception thrown is rethrown here. One loop at a time; not to be called
-  // from within `body`.
+  // Calls body(i) exactly once for every i in [0, count) and returns when all calls have finished, even if some of them
+  // throw. `body` must only write to data that belongs to its own index. The first exception is rethrown. Only one loop
+  // may run at a time, and `body` must not call for_each.
   void for_each(std::size_t count, const std::function<void(std::size_t)>& body);
 
  private:
@@ -33,7 +33,7 @@ class ThreadPool {
   std::mutex mutex_;
   std::condition_variable_any wake_;
   std::condition_variable done_;
-  const std::function<void(std::size_t)>* body_ = nullptr;  // guarded by mutex_, as all below
+  const std::function<void(std::size_t)>* body_ = nullptr;  // guarded by mutex_, like all members below
   std::size_t next_ = 0, count_ = 0, running_ = 0;
   std::exception_ptr failure_;
   std::vector<std::jthread> workers_;

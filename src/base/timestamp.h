@@ -1,4 +1,4 @@
-// Time in data structures is integer nanoseconds; the clock of the machine is read in system/ only.
+// Times in data structures are integer nanoseconds. Only system/ reads the system clock.
 #pragma once
 
 #include <cstdint>

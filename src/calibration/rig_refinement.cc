@@ -18,11 +18,12 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kMillimetres = 1000.0;
-constexpr std::size_t kStretch = 10;  // keyframes in a row, so that those chosen share landmarks
-constexpr int kPasses = 4;            // at most; each finds anew what the extrinsics before it had refused
-constexpr int kMinShared = 15;        // landmarks two keyframes share, below which one does not hold the other
+constexpr std::size_t kStretch = 10;  // consecutive keyframes chosen together, so that they share landmarks
+// maximum number of passes; each searches again for observations that the previous extrinsics rejected
+constexpr int kPasses = 4;
+constexpr int kMinShared = 15;  // minimum number of shared landmarks for one keyframe to constrain another
 
-// All keyframes, or stretches of them with even gaps; in order of id.
+// Returns all keyframes, or evenly spaced stretches of consecutive ones if there are more than `limit`; in order of id.
 std::vector<KeyframeId> choose_keyframes(const map::BundledMap& map, std::size_t limit) {
   const std::vector<KeyframeId> all = map.keyframe_ids();
   if (all.size() <= limit) return all;
@@ -35,7 +36,7 @@ std::vector<KeyframeId> choose_keyframes(const map::BundledMap& map, std::size_t
   return out;
 }
 
-// A landmark as a candidate: in how many chosen keyframes, from which stretch on, by which cameras it is seen.
+// Observations of a landmark: the number of chosen keyframes, the first stretch, and the cameras that observe it.
 struct Candidate {
   int keyframes = 0;
   std::size_t stretch = 0;
@@ -61,12 +62,14 @@ std::vector<int> positions(const map::BundledMap& map, const std::vector<Keyfram
   return out;
 }
 
-// Every stretch and camera in turn gives the landmark that most keyframes see; in order of id.
+// Stretches and cameras take turns in choosing the landmark observed by the most keyframes; the result is in order of
+// id.
 std::vector<LandmarkId> choose_landmarks(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
                                          std::size_t limit) {
   const std::vector<int> position = positions(map, keyframes);
   const std::size_t stretches = (keyframes.size() + kStretch - 1) / kStretch, cameras = map.rig().size();
-  std::vector<std::vector<std::pair<int, LandmarkId>>> queues(stretches * cameras);  // fewer keyframes, to sort by
+  // negated number of keyframes, so that sorting puts the largest first
+  std::vector<std::vector<std::pair<int, LandmarkId>>> queues(stretches * cameras);
   for (const LandmarkId l : map.landmark_ids()) {
     const Candidate candidate = look_up(map, l, position);
     if (candidate.keyframes < 2) continue;
@@ -93,8 +96,8 @@ std::vector<LandmarkId> choose_landmarks(const map::BundledMap& map, const std::
   return out;
 }
 
-// Representative of each keyframe's group: keyframes that hold one another by shared landmarks, directly or by others.
-// It is the first of the group.
+// Assigns each keyframe to a group of keyframes connected, directly or indirectly, by shared landmarks. Returns, per
+// keyframe, the index of the first keyframe of its group.
 std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
                                 const std::vector<LandmarkId>& landmarks) {
   const std::vector<int> position = positions(map, keyframes);
@@ -122,13 +125,13 @@ std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<Ke
   return group;
 }
 
-// Part of the map as a flat problem, and the group of each of its poses.
+// The adjustment problem and the group of each of its poses.
 struct RigProblem {
   adjustment::FlatProblem flat;
   std::vector<std::size_t> group;
 };
 
-// Each group floats on its own: one keyframe of it is held, which takes nothing from what its others say about the rig.
+// Each group has its own gauge freedom. One keyframe per group is fixed, which does not constrain the extrinsics.
 RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& options, const map::FeatureModel& features) {
   adjustment::Selection selection;
   const std::vector<KeyframeId> keyframes = choose_keyframes(map, static_cast<std::size_t>(options.keyframes));
@@ -141,9 +144,10 @@ RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& option
   return out;
 }
 
-// Observations of a point by other groups than that of most (ties: the first) go: two held keyframes tied to each other
-// would tell lengths, which is for the extrinsics to tell.
-void part_groups(RigProblem& problem) {
+// Removes the observations of a point by groups other than the one with the most observations (the first one on ties).
+// Otherwise the point would connect two fixed keyframes, and their distance would constrain lengths, which the
+// extrinsics have to determine.
+void separate_groups(RigProblem& problem) {
   std::vector<solver::ReprojectionProblem::Observation>& observations = problem.flat.problem.observations;
   std::vector<int> count(problem.group.size());
   std::size_t kept = 0;
@@ -163,57 +167,58 @@ void part_groups(RigProblem& problem) {
   problem.flat.sources.resize(kept);
 }
 
-// Root of the largest eigenvalue.
-double worst_deviation(const Matrix3d& covariance) {
+// Square root of the largest eigenvalue.
+double largest_deviation(const Matrix3d& covariance) {
   return std::sqrt(
       Eigen::SelfAdjointEigenSolver<Matrix3d>(covariance, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff());
 }
 
-double in_sigmas(const Vector3d& change, const Matrix3d& covariance) {
+double mahalanobis_distance(const Vector3d& change, const Matrix3d& covariance) {
   return std::sqrt(change.dot(covariance.llt().solve(change)));
 }
 
-CameraRefinement judge(const solver::ExtrinsicEstimate& estimate, const RigRefinementOptions& options) {
+CameraRefinement evaluate_camera(const solver::ExtrinsicEstimate& estimate, const RigRefinementOptions& options) {
   CameraRefinement out;
   out.T_cam_rig_after = estimate.T_cam_rig;
   out.observed = estimate.observed;
   out.observations = estimate.observations;
-  const Vector3d turned = estimate.change.head<3>(), moved = estimate.change.tail<3>();
-  const Matrix3d of_rotation = estimate.covariance.topLeftCorner<3, 3>(),
-                 of_translation = estimate.covariance.bottomRightCorner<3, 3>();
-  out.change_deg = geometry::degrees(turned.norm());
-  out.change_mm = moved.norm() * kMillimetres;
-  out.std_deg = geometry::degrees(worst_deviation(of_rotation));
-  out.std_mm = worst_deviation(of_translation) * kMillimetres;
-  out.rotation_sigmas = in_sigmas(turned, of_rotation);
-  out.translation_sigmas = in_sigmas(moved, of_translation);
+  const Vector3d rotation = estimate.change.head<3>(), translation = estimate.change.tail<3>();
+  const Matrix3d rotation_covariance = estimate.covariance.topLeftCorner<3, 3>(),
+                 translation_covariance = estimate.covariance.bottomRightCorner<3, 3>();
+  out.change_deg = geometry::degrees(rotation.norm());
+  out.change_mm = translation.norm() * kMillimetres;
+  out.std_deg = geometry::degrees(largest_deviation(rotation_covariance));
+  out.std_mm = largest_deviation(translation_covariance) * kMillimetres;
+  out.rotation_sigmas = mahalanobis_distance(rotation, rotation_covariance);
+  out.translation_sigmas = mahalanobis_distance(translation, translation_covariance);
   out.suspect = (out.rotation_sigmas > options.suspect_sigmas && out.change_deg > options.suspect_deg) ||
                 (out.translation_sigmas > options.suspect_sigmas && out.change_mm > options.suspect_mm);
   return out;
 }
 
-// Have no extrinsics moved from `before` by more than their own uncertainty?
+// Returns true if no extrinsics have moved from `before` by more than their own uncertainty.
 bool settled(const solver::RigAdjustment& adjusted, const std::vector<geometry::SE3>& before) {
   for (std::size_t c = 1; c < before.size(); ++c) {
-    const geometry::Vector6d moved = solver::extrinsic_change(adjusted.cameras[c].T_cam_rig, before[c]);
-    if (moved.dot(adjusted.cameras[c].covariance.llt().solve(moved)) > static_cast<double>(moved.size())) return false;
+    const geometry::Vector6d change = solver::extrinsic_change(adjusted.cameras[c].T_cam_rig, before[c]);
+    if (change.dot(adjusted.cameras[c].covariance.llt().solve(change)) > static_cast<double>(change.size()))
+      return false;
   }
   return true;
 }
 
-// A map made with wrong extrinsics has kept those observations that fit them, and adjusting it stops short of the
-// truth. So what was refused is looked for again under the extrinsics found.
+// A map built with wrong extrinsics contains mostly the observations that agree with them, so adjusting it once stops
+// short of the truth. Therefore the rejected observations are searched again with the new extrinsics.
 solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const map::FeatureModel& features,
                                        const solver::RigAdjusterOptions& options, RigProblem& problem,
                                        const std::stop_token& stop) {
   std::vector<geometry::SE3> T_cam_rig;
   for (std::size_t c = 0; c < map.rig().size(); ++c) T_cam_rig.push_back(map.rig().cam_from_rig(c));
-  part_groups(problem);
+  separate_groups(problem);
   solver::RigAdjustment out = solver::adjust_rig(problem.flat.problem, options, T_cam_rig, stop);
   for (int pass = 1; pass < kPasses && out.done && !settled(out, T_cam_rig); ++pass) {
     for (std::size_t c = 0; c < T_cam_rig.size(); ++c) T_cam_rig[c] = out.cameras[c].T_cam_rig;
     if (recover_observations(map, T_cam_rig, features, problem.flat) == 0) break;
-    part_groups(problem);
+    separate_groups(problem);
     solver::RigAdjustment again = solver::adjust_rig(problem.flat.problem, options, T_cam_rig, stop);
     if (!again.done) break;
     out = std::move(again);
@@ -226,7 +231,7 @@ solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const map::Fe
 RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options, double sigma_px,
                          double scale_factor, std::stop_token stop) {
   RigRefinement out;
-  // Where the map has no metric scale, millimetres of the calibration mean nothing in it.
+  // Without metric scale, calibration errors in millimetres have no meaning in the map.
   if (map.rig().size() < 2 || map.num_keyframes() == 0 || map.scale() != map::Scale::kMetric) return out;
   const map::FeatureModel features{sigma_px, scale_factor};
   RigProblem problem = choose(map, options, features);
@@ -241,7 +246,7 @@ RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions&
   first.observed = adjusted.cameras.front().observed;
   first.observations = adjusted.cameras.front().observations;
   for (std::size_t c = 1; c < map.rig().size(); ++c) {
-    out.cameras.push_back(judge(adjusted.cameras[c], options));
+    out.cameras.push_back(evaluate_camera(adjusted.cameras[c], options));
   }
   return out;
 }

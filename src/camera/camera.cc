@@ -17,7 +17,8 @@ std::optional<Vector3d> Camera::unproject(const Vector2d& pixel) const {
 }
 
 double Camera::radians_per_pixel() const {
-  // Not from fx and fy: what these mean at the axis is the model's affair.
+  // Computed from the Jacobian rather than from fx and fy, because some models have another focal length on the optical
+  // axis.
   const auto axis = project_with_jacobian(Vector3d::UnitZ());
   BSLAM_ASSERT(axis, "a camera sees along its optical axis");
   return 2.0 / (axis->jacobian(0, 0) + axis->jacobian(1, 1));

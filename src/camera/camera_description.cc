@@ -6,14 +6,11 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <optional>
-#include <string_view>
 
 #include "base/number_text.h"
 #include "base/timestamp.h"
+#include "camera/model_table.h"
 
 namespace bslam::camera {
 namespace {
@@ -23,13 +20,13 @@ using geometry::SE3;
 using geometry::Vector3d;
 
 constexpr std::int64_t kMaxSidePx = 20000;
-constexpr double kMaxTranslation = 1e6;      // metres; a larger one is a slip of units or a broken file
+constexpr double kMaxTranslation = 1e6;      // metres; a larger value is a unit mistake or a broken file
 constexpr double kMaxTimeOffset = 1e6;       // seconds; keeps sums of nanoseconds far from overflow
-constexpr double kRotationTolerance = 1e-3;  // files round to four digits and more
+constexpr double kRotationTolerance = 1e-3;  // calibration files round to four or more digits
 
-// The rotation nearest to R whose quaternion lies on a grid, so fine that it does not matter (4e-15) and so coarse that
-// going to a matrix and back leads to the same point. The largest coefficient follows from the other three; of nearly
-// equal ones it is the first.
+// Returns the rotation nearest to R, with quaternion coefficients rounded to a grid. The grid is fine enough not to
+// matter (4e-15) and coarse enough that a conversion to a matrix and back gives the same quaternion. The largest
+// coefficient is computed from the other three; among nearly equal ones the first is taken.
 geometry::Quaterniond rounded_rotation(const Matrix3d& R) {
   constexpr double kGrid = 0x1p-48, kTie = 1e-9;
   const Eigen::JacobiSVD<Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -43,55 +40,26 @@ geometry::Quaterniond rounded_rotation(const Matrix3d& R) {
   return geometry::Quaterniond(q);
 }
 
-std::optional<camera::CameraModel> model_of(const CameraDescription& d) {
-  const camera::Intrinsics k{d.intrinsics[0], d.intrinsics[1], d.intrinsics[2], d.intrinsics[3]};
-  const std::size_t count = d.distortion.size();
-  if (d.model == camera::Pinhole::kName && count == 0) return camera::Pinhole(k);
-  if (d.model == camera::PinholeRadTan::kName && (count == 4 || count == 5 || count == 8)) {
-    return camera::PinholeRadTan(k, d.distortion);
+// "4, 5 or 8 coefficients for pinhole-radtan", "2, xi and alpha, for double-sphere".
+std::string parameters_expected(const ModelRow& row) {
+  if (row.parameters.empty()) return fmt::format("none for {}", row.name);
+  if (row.parameters.size() <= 2) {
+    std::string names(row.parameters[0].name);
+    if (row.parameters.size() == 2) names += fmt::format(" and {}", row.parameters[1].name);
+    return fmt::format("{}, {}, for {}", row.parameters.size(), names, row.name);
   }
-  if (d.model == camera::KannalaBrandt::kName && count == 4) {
-    return camera::KannalaBrandt(k, {d.distortion[0], d.distortion[1], d.distortion[2], d.distortion[3]});
-  }
-  if (d.model == camera::Unified::kName && count == 1) return camera::Unified(k, d.distortion[0]);
-  if (d.model == camera::ExtendedUnified::kName && count == 2) {
-    return camera::ExtendedUnified(k, d.distortion[0], d.distortion[1]);
-  }
-  if (d.model == camera::DoubleSphere::kName && count == 2) {
-    return camera::DoubleSphere(k, d.distortion[0], d.distortion[1]);
-  }
-  return std::nullopt;
+  const auto last = row.counts.end() - 1;
+  const std::string others = fmt::format("{}", fmt::join(row.counts.begin(), last, ", "));
+  return fmt::format("{}{}{} coefficients for {}", others, others.empty() ? "" : " or ", *last, row.name);
 }
 
-std::string coefficients_expected(const std::string& model) {
-  if (model == camera::Pinhole::kName) return "none for " + model;
-  if (model == camera::PinholeRadTan::kName) return "4, 5 or 8 coefficients for " + model;
-  if (model == camera::Unified::kName) return "1, alpha, for " + model;
-  if (model == camera::ExtendedUnified::kName) return "2, alpha and beta, for " + model;
-  if (model == camera::DoubleSphere::kName) return "2, xi and alpha, for " + model;
-  return "4 coefficients for " + model;
-}
-
-struct ParameterRange {
-  std::string_view model;
-  std::size_t index;
-  std::string_view name;
-  double above, least, most;  // above < value where `above` is finite; least <= value <= most
-};
-constexpr double kNone = -std::numeric_limits<double>::infinity();
-constexpr std::array<ParameterRange, 5> kRanges = {{{camera::Unified::kName, 0, "alpha", kNone, 0, 1},
-                                                    {camera::ExtendedUnified::kName, 0, "alpha", kNone, 0, 1},
-                                                    {camera::ExtendedUnified::kName, 1, "beta", 0, 0, 1e6},
-                                                    {camera::DoubleSphere::kName, 0, "xi", -1, -1, 1},
-                                                    {camera::DoubleSphere::kName, 1, "alpha", kNone, 0, 1}}};
-
-Status check_ranges(const CameraDescription& d, const DescriptionKeys& keys) {
-  for (const ParameterRange& range : kRanges) {
-    if (d.model != range.model || range.index >= d.distortion.size()) continue;
-    const double value = d.distortion[range.index];
-    if (value > range.above && value >= range.least && value <= range.most) continue;
-    return Error{keys.file, keys.distortion, fmt::format("{} {}", range.name, value),
-                 fmt::format("{} in {}{}, {}]", range.name, range.above == kNone ? '[' : '(', range.least, range.most)};
+Status check_ranges(const CameraDescription& d, const ModelRow& row, const DescriptionKeys& keys) {
+  for (std::size_t i = 0; i < std::min(d.distortion.size(), row.parameters.size()); ++i) {
+    const ModelParameter& parameter = row.parameters[i];
+    if (parameter.allows(d.distortion[i])) continue;
+    return Error{keys.file, keys.distortion, fmt::format("{} {}", parameter.name, d.distortion[i]),
+                 fmt::format("{} in {}{}, {}]", parameter.name, parameter.low_is_excluded ? '(' : '[', parameter.low,
+                             parameter.high)};
   }
   return {};
 }
@@ -124,14 +92,6 @@ Status check_numbers(const CameraDescription& d, const DescriptionKeys& keys) {
 }
 
 }  // namespace
-
-const std::vector<std::string>& known_models() {
-  static const std::vector<std::string> models = {
-      std::string(camera::Pinhole::kName),         std::string(camera::PinholeRadTan::kName),
-      std::string(camera::KannalaBrandt::kName),   std::string(camera::Unified::kName),
-      std::string(camera::ExtendedUnified::kName), std::string(camera::DoubleSphere::kName)};
-  return models;
-}
 
 Result<SE3> rigid_transform(const std::vector<double>& m, const std::string& file, const std::string& key) {
   const auto error = [&](std::string found, std::string expected) {
@@ -168,7 +128,8 @@ std::vector<double> rows_of(const SE3& T) {
 
 Result<SE3> rigid_transform(const geometry::Quaterniond& rotation, const Vector3d& translation, const std::string& file,
                             const std::string& key) {
-  constexpr double kUnit = 1e-14;  // a unit quaternion, written with all its digits, keeps its bits
+  // A unit quaternion that was written with all digits keeps its exact bits.
+  constexpr double kUnit = 1e-14;
   const double norm2 = rotation.squaredNorm();
   if (!(std::abs(std::sqrt(norm2) - 1) <= kRotationTolerance)) {
     return Error{file, key, fmt::format("a quaternion of norm {:.4g}", std::sqrt(norm2)), "a unit quaternion"};
@@ -190,30 +151,28 @@ Result<std::vector<std::int64_t>> whole_pixels(const std::vector<double>& sides,
   return whole;
 }
 
-Result<camera::RigCamera> make_camera(const CameraDescription& d, const DescriptionKeys& keys) {
-  const auto& models = known_models();
-  if (std::find(models.begin(), models.end(), d.model) == models.end()) {
-    return Error{keys.file, keys.model, d.model, fmt::format("one of: {}", fmt::join(models, ", "))};
+Result<RigCamera> make_camera(const CameraDescription& d, const DescriptionKeys& keys) {
+  const ModelRow* row = find_model(d.model);
+  if (row == nullptr) {
+    return Error{keys.file, keys.model, d.model, fmt::format("one of: {}", fmt::join(model_names(), ", "))};
   }
   if (const Status status = check_numbers(d, keys); !status) return status.error();
-  if (const Status status = check_ranges(d, keys); !status) return status.error();
-  const auto model = model_of(d);
-  if (!model) {
-    return Error{keys.file, keys.distortion, fmt::format("{} numbers", d.distortion.size()),
-                 coefficients_expected(d.model)};
+  if (const Status status = check_ranges(d, *row, keys); !status) return status.error();
+  if (!row->takes(d.distortion.size())) {
+    return Error{keys.file, keys.distortion, fmt::format("{} numbers", d.distortion.size()), parameters_expected(*row)};
   }
   const auto T_body_cam = rigid_transform(d.T_body_cam, keys.file, keys.T_body_cam);
   if (!T_body_cam) return T_body_cam.error();
-  const camera::Camera camera{d.name,
-                              *model,
-                              static_cast<int>(d.resolution[0]),
-                              static_cast<int>(d.resolution[1]),
-                              from_seconds(d.time_offset_s),
-                              d.mask_file};
+  const Camera camera{d.name,
+                      row->make({d.intrinsics[0], d.intrinsics[1], d.intrinsics[2], d.intrinsics[3]}, d.distortion),
+                      static_cast<int>(d.resolution[0]),
+                      static_cast<int>(d.resolution[1]),
+                      from_seconds(d.time_offset_s),
+                      d.mask_file};
   if (!camera.unproject({d.intrinsics[2], d.intrinsics[3]})) {
     return Error{keys.file, keys.distortion, "coefficients that bend every ray back", "those of a lens"};
   }
-  return camera::RigCamera{camera, *T_body_cam};
+  return RigCamera{camera, *T_body_cam};
 }
 
 }  // namespace bslam::camera

@@ -1,5 +1,5 @@
-// A camera as some calibration file describes it, before it is checked. Every reader of a rig format ends here, so that
-// the checks and their words are the same for all of them.
+// A camera as described by a calibration file, before validation. All readers of rig formats use it, so that the checks
+// and error messages are the same for every format.
 #pragma once
 
 #include <cstdint>
@@ -13,49 +13,48 @@ namespace bslam::camera {
 
 struct CameraDescription {
   std::string name;
-  std::string model;                     // one of known_models()
+  std::string model;                     // a name of model_table()
   std::vector<std::int64_t> resolution;  // width, height in pixels
   std::vector<double> intrinsics;        // fx fy cx cy
-  std::vector<double> distortion;        // coefficients, or what shapes the model, as camera::distortion() gives them
+  std::vector<double> distortion;        // distortion coefficients or shape parameters, in the order of distortion()
   std::vector<double> T_body_cam;        // (4, 4) row-major, metres
   double time_offset_s = 0.0;
   std::string mask_file;
 };
 
-// Where a description comes from: what its fields are called there, for errors.
+// The file a description was read from and the names of its fields there, for error messages.
 struct DescriptionKeys {
   std::string file;
   std::string model, resolution, intrinsics, distortion, T_body_cam, time_offset;
 };
 
-// The models a rig may have, as named in our rig file.
-const std::vector<std::string>& known_models();
+// Validates a description and converts it. Errors: an unknown model; a resolution outside [1, 20000]; a focal length
+// that is not positive; a wrong number of coefficients; parameters outside the range of the model; a model that
+// projects nothing; an invalid T_body_cam (see rigid_transform); a time offset beyond a million seconds.
+Result<RigCamera> make_camera(const CameraDescription& description, const DescriptionKeys& keys);
 
-// Checks and converts. Errors: unknown model; resolution not within [1, 20000]; focal lengths not above 0; a wrong
-// count of coefficients; parameters outside of their model's range; a lens that maps nothing; what rigid_transform
-// refuses; a time offset beyond a million seconds.
-Result<camera::RigCamera> make_camera(const CameraDescription& description, const DescriptionKeys& keys);
-
-// The rigid transform of sixteen numbers, the rows of a 4x4 matrix; `file` and `key` are for errors. Errors: another
-// count; a rotation that is off by more than 1e-3 or mirrored; a last row that is not 0 0 0 1; a translation beyond a
-// thousand kilometres. The rotation is replaced by the nearest true one, rounded to 4e-15, so that its own matrix
-// or quaternion is read as the same bits again: a calibration written and read, in whatever format, does not drift.
+// Converts sixteen numbers, the rows of a 4x4 matrix, to a rigid transform. `file` and `key` are used in errors.
+// Errors: a wrong number of values; a rotation that is mirrored or deviates from orthonormal by more than 1e-3; a last
+// row other than 0 0 0 1; a translation beyond a thousand kilometres. The rotation is replaced by the nearest
+// orthonormal one, rounded to 4e-15, so that repeatedly writing and reading a calibration, in any format, does not
+// change it.
 Result<geometry::SE3> rigid_transform(const std::vector<double>& rows, const std::string& file, const std::string& key);
 
-// The rows of its 4x4 matrix.
+// Returns the rows of the 4x4 matrix of T.
 std::vector<double> rows_of(const geometry::SE3& T);
 
-// The transform of a file that stores a quaternion (Hamilton) and a translation. Error: a norm off 1 by more than 1e-3.
+// Converts a Hamilton quaternion and a translation to a rigid transform. Error: the norm of the quaternion differs from
+// 1 by more than 1e-3.
 Result<geometry::SE3> rigid_transform(const geometry::Quaterniond& rotation, const geometry::Vector3d& translation,
                                       const std::string& file, const std::string& key);
 
-// Whole pixels as files write them, also with a decimal point. Error: a fraction.
+// Converts image sizes that files may write with a decimal point to integers. Error: a fractional value.
 Result<std::vector<std::int64_t>> whole_pixels(const std::vector<double>& sides, const std::string& file,
                                                const std::string& key);
 
-// What a reader of some format hands on: its cameras, and remarks on how the file was understood.
+// The result of reading a calibration file: its cameras, and notes on how the file was interpreted.
 struct RigReading {
-  std::vector<camera::RigCamera> cameras;
+  std::vector<RigCamera> cameras;
   std::vector<std::string> notes;
 };
 

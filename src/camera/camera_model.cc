@@ -11,7 +11,7 @@
 namespace bslam::camera {
 namespace {
 
-constexpr double kMinDepth = 1e-6;  // metres: closer to the plane of a pinhole nothing can be said
+constexpr double kMinDepth = 1e-6;  // metres; points closer to the plane of a pinhole camera are not projected
 
 Vector2d to_pixel(const Intrinsics& k, const Vector2d& m) { return {k.fx * m.x() + k.cx, k.fy * m.y() + k.cy}; }
 Vector2d from_pixel(const Intrinsics& k, const Vector2d& u) { return {(u.x() - k.cx) / k.fx, (u.y() - k.cy) / k.fy}; }
@@ -53,7 +53,8 @@ PinholeRadTan::PinholeRadTan(const Intrinsics& k, const std::vector<double>& dis
                "radial-tangential distortion has 4, 5 or 8 coefficients");
   count_ = static_cast<int>(distortion.size());
   std::copy(distortion.begin(), distortion.end(), d_.begin());
-  // The radial part r f(r) grows from 0; march until it stops. Beyond tan 89 degrees nothing ordinary is left.
+  // The distorted radius r f(r) increases from 0; find where it stops doing so. No practical lens exceeds tan(89
+  // degrees).
   max_radius_ = std::numeric_limits<double>::infinity();
   constexpr double kStep = 0.002, kLast = 57.0;
   for (double r = kStep, last = 0.0; r < kLast; r += kStep) {
@@ -104,7 +105,7 @@ std::optional<Vector3d> PinholeRadTan::unproject(const Vector2d& pixel) const {
   const Vector2d target = from_pixel(k_, pixel);
   Vector2d m = target;
   if (!(m.norm() < max_radius_)) m *= 0.9 * max_radius_ / m.norm();
-  for (int i = 0; i < 30; ++i) {  // Newton, kept inside the domain
+  for (int i = 0; i < 30; ++i) {  // Newton's method, restricted to the domain
     const Distorted d = distort(m);
     const Vector2d residual = d.point - target;
     if (residual.squaredNorm() < 1e-26) break;
@@ -147,7 +148,7 @@ std::optional<Projection> KannalaBrandt::project_with_jacobian(const Vector3d& p
   const double rho = point.head<2>().norm(), z = point.z();
   const double theta = std::atan2(rho, z), norm2 = point.squaredNorm();
   if (!(theta < max_theta_) || !(norm2 > kMinDepth * kMinDepth)) return std::nullopt;
-  if (rho < 1e-9 * std::sqrt(norm2)) {  // on the axis the model is a pinhole
+  if (rho < 1e-9 * std::sqrt(norm2)) {  // on the optical axis the model equals a pinhole
     return Pinhole(k_).project_with_jacobian(point);
   }
   const double t2 = theta * theta;
@@ -171,7 +172,7 @@ std::optional<Vector3d> KannalaBrandt::unproject(const Vector2d& pixel) const {
   const double r = m.norm();
   if (!(r < max_r_)) return std::nullopt;
   double low = 0.0, high = max_theta_, theta = std::min(r, 0.5 * max_theta_);
-  for (int i = 0; i < 60; ++i) {  // Newton with bisection as its guard: r(theta) grows on the domain
+  for (int i = 0; i < 60; ++i) {  // Newton's method safeguarded by bisection; r(theta) is monotonic on the domain
     const double t2 = theta * theta;
     const double value = theta * (1 + t2 * (d_[0] + t2 * (d_[1] + t2 * (d_[2] + t2 * d_[3])))) - r;
     if (std::abs(value) < 1e-14) break;

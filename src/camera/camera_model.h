@@ -1,15 +1,14 @@
-// Camera models: a closed set behind one interface. Points in the camera frame (x right, y down, z forward), metres;
-// pixels of the raw image, (0, 0) at the centre of the top-left pixel. Each model knows its true domain: outside of it
-// project and unproject answer nothing instead of something wrong.
+// Camera models: a closed set behind one interface. Points are in the camera frame (x right, y down, z forward) in
+// metres. Pixels refer to the raw image, with (0, 0) at the centre of the top-left pixel. Each model knows its valid
+// domain and returns nullopt outside of it.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <optional>
 #include <string_view>
 #include <variant>
 #include <vector>
-
-#include <Eigen/Core>
 
 namespace bslam::camera {
 
@@ -22,7 +21,7 @@ struct Projection {
   Matrix23d jacobian;  // d pixel / d point
 };
 
-// fx, fy, cx, cy in pixels of the raw image.
+// Focal lengths and principal point in pixels of the raw image.
 struct Intrinsics {
   double fx = 0, fy = 0, cx = 0, cy = 0;
 };
@@ -33,7 +32,7 @@ class Pinhole {
   explicit Pinhole(const Intrinsics& k) : k_(k) {}
   std::optional<Vector2d> project(const Vector3d& point) const;
   std::optional<Projection> project_with_jacobian(const Vector3d& point) const;
-  std::optional<Vector3d> unproject(const Vector2d& pixel) const;  // unit bearing
+  std::optional<Vector3d> unproject(const Vector2d& pixel) const;  // returns a unit vector
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {}; }
   static constexpr std::string_view kName = "pinhole";
@@ -43,8 +42,8 @@ class Pinhole {
 };
 
 // Pinhole with the radial-tangential (Brown-Conrady) distortion of OpenCV: k1 k2 p1 p2 [k3 [k4 k5 k6]]; with eight
-// coefficients the radial factor is rational. Domain: z > 0 and a normalised radius below the first one at which the
-// distorted radius stops growing (beyond it two directions share a pixel).
+// coefficients the radial factor is rational. Domain: z > 0, and a normalised radius below the first one at which the
+// distorted radius stops increasing (beyond it two directions project to the same pixel).
 class PinholeRadTan {
  public:
   // `distortion` has 4, 5 or 8 entries.
@@ -54,7 +53,7 @@ class PinholeRadTan {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {d_.begin(), d_.begin() + count_}; }
-  double max_radius() const { return max_radius_; }  // tan of the widest valid angle, or infinity
+  double max_radius() const { return max_radius_; }  // tangent of the largest valid angle, or infinity
   static constexpr std::string_view kName = "pinhole-radtan";
 
  private:
@@ -70,8 +69,9 @@ class PinholeRadTan {
   double max_radius_ = 0;
 };
 
-// Kannala-Brandt fisheye (PAMI 2006; OpenCV's fisheye, Kalibr's equidistant): r = theta (1 + k1 theta^2 + ... k4 theta^8).
-// Sees behind its plane: domain theta below the first angle at which r stops growing, at most pi.
+// Kannala-Brandt fisheye (PAMI 2006; OpenCV's fisheye, Kalibr's equidistant): r = theta (1 + k1 theta^2 + ... k4
+// theta^8). Domain: theta below the first angle at which r stops increasing, at most pi, so points with z <= 0 are
+// included.
 class KannalaBrandt {
  public:
   KannalaBrandt(const Intrinsics& k, const std::array<double, 4>& distortion);
@@ -89,10 +89,11 @@ class KannalaBrandt {
   double max_theta_ = 0, max_r_ = 0;
 };
 
-// Unified camera model (Geyer, Daniilidis 2000; Mei, Rives 2007, in the form of Usenko et al., 3DV 2018): a point goes to
-// the unit sphere and from there, through a centre behind it, to the plane: m = (x, y) / (alpha |p| + (1 - alpha) z) with
-// alpha in [0, 1]. alpha = 0 is a pinhole; Mei's xi is alpha / (1 - alpha), his focal length f (1 + xi). Domain: where
-// the projection is one to one, section 8 of docs/math.md; for alpha > 0 it sees behind its plane.
+// Unified camera model (Geyer, Daniilidis 2000; Mei, Rives 2007; in the form of Usenko et al., 3DV 2018): a point is
+// projected onto the unit sphere and from there, through a centre behind the sphere's centre, onto the plane: m = (x,
+// y) / (alpha |p| + (1 - alpha) z) with alpha in [0, 1]. alpha = 0 is a pinhole; Mei's xi is alpha / (1 - alpha) and
+// his focal length is f (1 + xi). Domain: where the projection is one-to-one (docs/math.md, section 8); for alpha > 0
+// it includes points with z <= 0.
 class Unified {
  public:
   Unified(const Intrinsics& k, double alpha);
@@ -108,8 +109,8 @@ class Unified {
   double alpha_ = 0;
 };
 
-// Extended unified camera model (Khomutenko, Garcia, Martinet, RA-L 2016): the sphere becomes an ellipsoid,
-// m = (x, y) / (alpha sqrt(beta (x^2 + y^2) + z^2) + (1 - alpha) z) with alpha in [0, 1], beta > 0.
+// Extended unified camera model (Khomutenko, Garcia, Martinet, RA-L 2016): an ellipsoid replaces the sphere, m = (x, y)
+// / (alpha sqrt(beta (x^2 + y^2) + z^2) + (1 - alpha) z) with alpha in [0, 1], beta > 0.
 class ExtendedUnified {
  public:
   ExtendedUnified(const Intrinsics& k, double alpha, double beta);
@@ -125,8 +126,9 @@ class ExtendedUnified {
   double alpha_ = 0, beta_ = 1;
 };
 
-// Double sphere model (Usenko, Demmel, Cremers, 3DV 2018): two unit spheres whose centres are xi apart, then the plane of
-// the unified model. xi in (-1, 1], alpha in [0, 1]. At the optical axis a focal length of f / (1 + xi).
+// Double sphere model (Usenko, Demmel, Cremers, 3DV 2018): a point is projected onto two unit spheres whose centres are
+// xi apart, then onto the plane as in the unified model. xi in (-1, 1], alpha in [0, 1]. The focal length on the
+// optical axis is f / (1 + xi).
 class DoubleSphere {
  public:
   DoubleSphere(const Intrinsics& k, double xi, double alpha);
@@ -144,10 +146,11 @@ class DoubleSphere {
 
 using CameraModel = std::variant<Pinhole, PinholeRadTan, KannalaBrandt, Unified, ExtendedUnified, DoubleSphere>;
 
-// Name as written in rig files.
+// Name of the model in rig files.
 std::string_view model_name(const CameraModel& model);
 const Intrinsics& intrinsics(const CameraModel& model);
-// The numbers beside fx fy cx cy, in the order of rig files: coefficients, or the shape of the sphere models.
+// The parameters besides fx fy cx cy, in the order of rig files: distortion coefficients, or shape parameters of the
+// sphere models.
 std::vector<double> distortion(const CameraModel& model);
 
 }  // namespace bslam::camera

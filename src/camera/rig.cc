@@ -23,7 +23,7 @@ Rig::Rig(std::vector<RigCamera> cameras) {
 
 std::vector<double> Rig::measured_overlap(const std::vector<RigCamera>& cameras) const {
   constexpr int kColumns = 24, kRows = 16;
-  constexpr std::array kDepths = {0.5, 2.0, 10.0, 100.0};  // metres, near to far
+  constexpr std::array kDepths = {0.5, 2.0, 10.0, 100.0};  // metres
   std::vector<double> overlap(size() * size(), 0.0);
   for (std::size_t i = 0; i < size(); ++i) {
     std::vector<Vector3d> bearings;

@@ -1,5 +1,6 @@
-// The rig: cameras and their constant extrinsics. Its frame is camera 0 (the paper's camera 1), so T_cam_rig of camera 0
-// is the identity; the paper's T_i1 is T_cam_rig of camera i, and c_i = T_i1 c_1 is cam_from_rig(i) * T_rig_world.
+// The rig: N cameras and their constant extrinsics. The rig frame is the frame of camera 0 (the paper's camera 1), so
+// T_cam_rig of camera 0 is the identity. The paper's T_i1 is T_cam_rig of camera i, and c_i = T_i1 c_1 is
+// cam_from_rig(i) * T_rig_world.
 #pragma once
 
 #include <memory>
@@ -15,47 +16,50 @@ namespace bslam::camera {
 
 struct RigCamera {
   Camera camera;
-  geometry::SE3 T_body_cam;  // as calibrated
+  geometry::SE3 T_body_cam;  // from the calibration file
 };
 
-// Immutable once made; copies share what does not differ between them.
+// Immutable; copies share the calibration.
 class Rig {
  public:
-  // At least one camera; the first is camera 0.
+  // Needs at least one camera; the first becomes camera 0.
   explicit Rig(std::vector<RigCamera> cameras);
 
   std::size_t size() const { return T_cam_rig_.size(); }
   const Camera& camera(CameraIndex i) const { return calibration_->cameras[i.index()].camera; }
   const Camera& camera(std::size_t i) const { return calibration_->cameras[i].camera; }
 
-  // T_cam_rig: maps rig (= camera 0) coordinates to those of camera i. Constant, as in the paper.
+  // T_cam_rig: maps coordinates in the rig frame (camera 0) to the frame of camera i. Constant, as in the paper.
   const geometry::SE3& cam_from_rig(std::size_t i) const { return T_cam_rig_[i]; }
   const geometry::SE3& cam_from_rig(CameraIndex i) const { return T_cam_rig_[i.index()]; }
   const geometry::SE3& rig_from_cam(std::size_t i) const { return T_rig_cam_[i]; }
 
-  // Body frame: input and output only.
+  // T_body_cam. The body frame is used for input and output only.
   const geometry::SE3& body_from_cam(std::size_t i) const { return calibration_->cameras[i].T_body_cam; }
 
-  // Do the views of cameras i and j share directions at some depth between near and far? Sampled from the calibration.
+  // Returns true if the fields of view of cameras i and j overlap at some depth. Sampled from the calibration.
   bool overlap(std::size_t i, std::size_t j) const { return overlap_share(i, j) > kMinOverlap; }
-  // Share of camera i's image that camera j sees, best over the sampled depths, in [0, 1].
+  // Fraction of camera i's image that camera j sees, in [0, 1]; the maximum over the sampled depths.
   double overlap_share(std::size_t i, std::size_t j) const { return calibration_->overlap[i * size() + j]; }
-  // True where some pair of cameras overlaps, so that a still rig sees metric depth. `left_out`: one per camera, those that do not
-  // count; or empty.
+  // Returns true if some pair of cameras overlaps, so that the rig observes metric depth without moving. `left_out` has
+  // one entry per camera, non-zero for cameras to ignore; it may be empty.
   bool any_overlap(std::span<const std::uint8_t> left_out = {}) const;
 
-  // The rig of some of the cameras, in the order given; the first becomes camera 0. Indices are valid and distinct.
+  // Returns the rig that consists of the given cameras, in the given order; the first becomes camera 0. The indices
+  // must be valid and distinct.
   Rig subset(std::span<const int> indices) const;
-  // The reverse: this rig with the extrinsics (T_body_cam) that its cameras `indices` have as the cameras of `part`.
+  // The inverse of `subset`: returns this rig with the extrinsics (T_body_cam) of the cameras `indices` taken from
+  // `part`.
   Rig with_extrinsics_of(const Rig& part, std::span<const int> indices) const;
 
-  // The rig as it stands while its cameras fire one after the other: camera i, `delay_s[i]` after the rig's own instant,
-  // has moved with the rig by exp(delay twist), so that T_cam_rig is T_i0 exp(delay twist) and the rig's pose is that of
-  // its own instant. `twist`: T_rig_world(t + dt) = exp(dt twist) T_rig_world(t), rad/s and m/s. Cheap.
+  // Returns the rig for cameras with different capture times, under a constant-velocity model. Camera i takes its image
+  // `delay_s[i]` seconds after the time of the rig; until then the rig moves by exp(delay twist), so T_cam_rig of
+  // camera i becomes T_i0 exp(delay twist), and the rig's pose refers to the time of the rig. `twist` (rad/s and m/s)
+  // is defined by T_rig_world(t + dt) = exp(dt twist) T_rig_world(t). Cheap.
   Rig moving(std::span<const double> delay_s, const geometry::Vector6d& twist) const;
 
  private:
-  static constexpr double kMinOverlap = 0.05;  // of the image: less is not worth a search
+  static constexpr double kMinOverlap = 0.05;  // fraction of the image; less overlap is not worth searching
   struct Calibration {
     std::vector<RigCamera> cameras;
     std::vector<double> overlap;  // (N, N) row-major

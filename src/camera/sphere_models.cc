@@ -1,5 +1,6 @@
-// The models that project by way of a sphere. All end in the same stage: a point at height `k` over the centre of a
-// sphere, `d` from it, goes to m = (x, y) / (alpha d + (1 - alpha) k). The equations: docs/math.md, section 8.
+// The camera models that project by way of a sphere. All share a last stage: a point at height `k` above the centre of
+// a sphere and at distance `d` from it is mapped to m = (x, y) / (alpha d + (1 - alpha) k). Equations: docs/math.md,
+// section 8.
 #include <cmath>
 
 #include "base/assert.h"
@@ -10,8 +11,8 @@ namespace {
 
 Vector2d from_pixel(const Intrinsics& k, const Vector2d& u) { return {(u.x() - k.cx) / k.fx, (u.y() - k.cy) / k.fy}; }
 
-// alpha d + (1 - alpha) k within the domain k > -w d, where the stage is one to one: up to alpha = 1/2 the divisor's
-// positive side, beyond it the angle at which the radius turns back.
+// Returns alpha d + (1 - alpha) k in the domain k > -w d, where the last stage is one-to-one: for alpha <= 1/2 where
+// the divisor is positive, for larger alpha up to the angle at which the image radius starts to decrease.
 std::optional<double> divisor(double alpha, double k, double d) {
   const double w = alpha > 0.5 ? (1 - alpha) / alpha : alpha / (1 - alpha);
   if (!(k > -w * d)) return std::nullopt;
@@ -19,7 +20,7 @@ std::optional<double> divisor(double alpha, double k, double d) {
   return n > 0 ? std::optional(n) : std::nullopt;
 }
 
-// Height of the direction (m_x, m_y, height) that the stage maps to a point at squared radius r2.
+// Returns the height h such that the last stage maps the direction (m_x, m_y, h) to a point m with squared radius r2.
 std::optional<double> height(double alpha, double r2) {
   const double root2 = 1 - (2 * alpha - 1) * r2;
   if (!(root2 > 0)) return std::nullopt;
@@ -32,7 +33,7 @@ std::optional<Vector2d> divided(const Intrinsics& intrinsics, const Vector3d& p,
   return pixel.allFinite() ? std::optional(pixel) : std::nullopt;
 }
 
-// The same with its derivative; `dn` is that of the divisor.
+// As above, with the Jacobian; `dn` is the derivative of the divisor `n`.
 std::optional<Projection> divided(const Intrinsics& intrinsics, const Vector3d& p, const std::optional<double>& n,
                                   const Eigen::RowVector3d& dn) {
   const auto pixel = divided(intrinsics, p, n);
@@ -120,7 +121,7 @@ std::optional<Vector3d> DoubleSphere::unproject(const Vector2d& pixel) const {
   const double r2 = m.squaredNorm();
   const auto z = height(alpha_, r2);
   if (!z) return std::nullopt;
-  // From the second sphere along (m, z) back to the first, whose centre is xi further on.
+  // Go from the second sphere along (m, z) back to the first sphere, whose centre is xi further along the axis.
   const double scale = (*z * xi_ + std::sqrt(*z * *z + (1 - xi_ * xi_) * r2)) / (*z * *z + r2);
   return Vector3d(scale * m.x(), scale * m.y(), scale * *z - xi_).normalized();
 }

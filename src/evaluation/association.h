@@ -1,4 +1,4 @@
-// Which poses of an estimate and of a ground truth belong together: nearest in time.
+// Association of the poses of an estimate with those of a ground truth by their timestamps.
 #pragma once
 
 #include <cstddef>
@@ -8,29 +8,29 @@
 
 namespace bslam::evaluation {
 
-// Positions in the two trajectories of poses at (nearly) the same time.
+// Indices of associated poses in the two trajectories.
 struct Association {
   std::size_t estimate = 0;
   std::size_t ground_truth = 0;
 };
 
-// Pairs nearest in time and no further apart than `max_dt_ns`, in order of time. Nothing is interpolated: a ground
-// truth of higher rate gives the sample nearest to each estimate, as the tools of the field do. The poses of the
-// shorter trajectory (of equal ones: the estimate) each look for the nearest of the longer, the earlier one where two
-// are equally near. Each estimate is used at most once; where several ground-truth poses ask for the same, the nearest
-// has it.
+// Returns pairs of poses at most `max_dt_ns` apart, in order of time. Nothing is interpolated: if the ground truth has
+// a higher rate, the nearest sample is used, as in common evaluation tools. Each pose of the shorter trajectory (the
+// estimate, if they are equally long) is paired with the pose of the longer one nearest in time; the earlier one on
+// ties. Each estimated pose is used at most once: if several ground-truth poses select it, the nearest is kept.
 std::vector<Association> associate(const Trajectory& estimate, const Trajectory& ground_truth, TimeNs max_dt_ns);
 
-// Position of the pose nearest in time to `time_ns`, the earlier one of two equally near. The trajectory is not empty.
+// Returns the index of the pose nearest in time to `time_ns`; the earlier one on ties. The trajectory must not be
+// empty.
 std::size_t nearest_in_time(const Trajectory& trajectory, TimeNs time_ns);
 
-// Median time between consecutive poses; 0 for fewer than two poses.
+// Median time between consecutive poses; 0 if there are fewer than two poses.
 TimeNs median_interval_ns(const Trajectory& trajectory);
 
 // Length of the path through all positions, in metres.
 double path_length_m(const Trajectory& trajectory);
 
-// The poses of another frame fixed to the moving one: T_world_other = T_world_frame * T_frame_other for each.
+// Converts the trajectory to another frame fixed to the moving one: T_world_other = T_world_frame * T_frame_other.
 Trajectory moved_to_frame(const Trajectory& trajectory, const geometry::SE3& T_frame_other);
 
 }  // namespace bslam::evaluation

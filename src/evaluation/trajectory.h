@@ -1,4 +1,4 @@
-// A trajectory: poses over time, in order of time.
+// A trajectory: timestamped poses, ordered by time.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ struct TimedPose {
   geometry::SE3 T_world_frame;  // pose of the moving frame (camera 0 or body) in the world
 };
 
-// Strictly increasing in time.
+// Times are strictly increasing.
 using Trajectory = std::vector<TimedPose>;
 
 }  // namespace bslam::evaluation

@@ -13,7 +13,8 @@ using geometry::Matrix3d;
 using geometry::Quaterniond;
 using geometry::Vector3d;
 
-constexpr double kNoExtent = 1e-12;  // of the largest covariance two such paths can have: rounding, not motion
+// relative to the largest possible covariance of the two paths; anything below is rounding error
+constexpr double kNoExtent = 1e-12;
 
 Vector3d mean_of(std::span<const Vector3d> points) {
   Vector3d sum = Vector3d::Zero();
@@ -35,7 +36,8 @@ std::optional<geometry::Sim3> align_positions(std::span<const Vector3d> src, std
     spread_src += (src[i] - mean_src).squaredNorm();
     spread_dst += (dst[i] - mean_dst).squaredNorm();
   }
-  // The covariance has rank one at most: any rotation that takes its one direction in src to that in dst is a minimum.
+  // The covariance has at most rank one: every rotation that maps its only direction in src to that in dst is a
+  // minimum.
   const Eigen::JacobiSVD<Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double strength = svd.singularValues().x();
   const bool has_direction = strength > kNoExtent * std::sqrt(spread_src * spread_dst);

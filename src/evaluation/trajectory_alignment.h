@@ -1,4 +1,4 @@
-// The alignment under which positions of two trajectories are compared.
+// Alignment of an estimated trajectory to the ground truth.
 #pragma once
 
 #include <optional>
@@ -8,10 +8,10 @@
 
 namespace bslam::evaluation {
 
-// T_dst_src minimising sum |dst_i - T src_i|^2 over SE(3), or Sim(3) where the scale is free. Unlike
-// geometry::align_points also for paths on one line and for standing still, where rotations about the line, or all, do
-// equally well: one of them is taken, and distances after alignment do not depend on which. Both spans have equal size,
-// at least one point. Empty where the scale is free and one of the paths has no extent.
+// Returns the T_dst_src that minimises sum |dst_i - T src_i|^2 over SE(3), or over Sim(3) if the scale is free. Unlike
+// geometry::align_points it also handles paths on a line and motionless trajectories, for which the rotation is not
+// unique: one of the optimal rotations is returned, and the distances after alignment do not depend on the choice. Both
+// spans have the same size, at least one. Returns nullopt if the scale is free and one of the paths has no extent.
 std::optional<geometry::Sim3> align_positions(std::span<const geometry::Vector3d> src,
                                               std::span<const geometry::Vector3d> dst, geometry::ScaleMode scale);
 

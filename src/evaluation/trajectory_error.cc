@@ -16,8 +16,9 @@ using geometry::SE3;
 using geometry::Sim3;
 using geometry::Vector3d;
 
-constexpr double kRpeTolerance = 0.1;  // of delta: how far the time of a pair may be off, where frames are sparse
-constexpr std::size_t kMinPairs = 3;   // a rotation and a translation need three points
+// Largest deviation of the time between the poses of a pair from delta, relative to delta; matters for sparse frames.
+constexpr double kRpeTolerance = 0.1;
+constexpr std::size_t kMinPairs = 3;  // a rotation and a translation need three points
 
 std::optional<Sim3> fit(const Trajectory& estimate, const Trajectory& ground_truth, std::span<const Association> pairs,
                         geometry::ScaleMode scale) {
@@ -36,7 +37,7 @@ RelativeErrors relative_errors(const Trajectory& aligned, const Trajectory& grou
   for (const Association& pair : pairs) compared.push_back(aligned[pair.estimate]);
   const TimeNs tolerance_ns = std::min(from_seconds(kRpeTolerance * delta_s), median_interval_ns(compared) / 2);
   std::vector<double> translation, rotation;
-  std::size_t last = 0;  // first pair at or after delta; moves on with i
+  std::size_t last = 0;  // index of the first pair at or after delta; increases with i
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const TimeNs target = compared[i].time_ns + delta_ns;
     last = std::max(last, i + 1);
@@ -57,8 +58,8 @@ RelativeErrors relative_errors(const Trajectory& aligned, const Trajectory& grou
           .rotation_deg = statistics_of(std::move(rotation))};
 }
 
-// How many of the instants start + k * step, k = 1 .. count, have a ground-truth pose within `tolerance_ns`. Stretches
-// without ground truth are jumped over: a stray time far away costs nothing.
+// Counts the times start + k * step, k = 1 .. count, that have a ground-truth pose within `tolerance_ns`. Stretches
+// without ground truth are skipped at once, so a single stray timestamp far away costs nothing.
 std::size_t count_covered(const Trajectory& ground_truth, TimeNs start, double step, TimeNs count,
                           TimeNs tolerance_ns) {
   std::size_t covered = 0;
@@ -66,7 +67,8 @@ std::size_t count_covered(const Trajectory& ground_truth, TimeNs start, double s
     const TimeNs t = start + std::llround(static_cast<double>(k) * step);
     const auto next = std::ranges::lower_bound(ground_truth, t - tolerance_ns, {}, &TimedPose::time_ns);
     if (next == ground_truth.end()) break;
-    const TimeNs wait = next->time_ns - tolerance_ns - t;  // until the next pose is near; <= 0: it is
+    // time until the next pose is within tolerance; it is already if <= 0
+    const TimeNs wait = next->time_ns - tolerance_ns - t;
     if (wait <= 0) {
       ++covered;
     } else {
@@ -76,7 +78,8 @@ std::size_t count_covered(const Trajectory& ground_truth, TimeNs start, double s
   return covered;
 }
 
-// Frames without a pose, where there is ground truth: in the estimate's gaps, before its first and after its last pose.
+// Counts frames with ground truth but without a pose: in the gaps of the estimate, before its first pose and after its
+// last.
 std::size_t count_missing_frames(const Trajectory& estimate, const Trajectory& ground_truth, TimeNs interval_ns,
                                  TimeNs max_dt_ns) {
   const TimeNs tolerance = std::min(max_dt_ns, interval_ns);
@@ -129,7 +132,7 @@ double coverage(const Trajectory& estimate, const Trajectory& ground_truth, std:
   if (estimate.empty() || ground_truth.empty()) return 0.0;
   const TimeNs interval = median_interval_ns(estimate);
   if (interval <= 0 || 4 * median_interval_ns(ground_truth) >= 3 * interval) {
-    std::size_t matched = 0;  // distinct ground-truth instants; pairs are in order of time
+    std::size_t matched = 0;  // number of distinct ground-truth times; the pairs are ordered by time
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       matched += i == 0 || pairs[i].ground_truth != pairs[i - 1].ground_truth;
     }

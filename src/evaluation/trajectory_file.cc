@@ -24,11 +24,11 @@ using geometry::Quaterniond;
 using geometry::SE3;
 using geometry::Vector3d;
 
-constexpr TimeNs kLargestTimeNs = 4'000'000'000'000'000'000;  // differences of two times stay within 64 bits
-constexpr double kRotationTolerance = 1e-2;                   // files with three decimals still are rotations
+constexpr TimeNs kLargestTimeNs = 4'000'000'000'000'000'000;  // differences of two times fit into 64 bits
+constexpr double kRotationTolerance = 1e-2;                   // accepts rotations written with three decimals
 constexpr std::size_t kTumFields = 8, kEurocFields = 8, kKittiFields = 12;
 
-// One line of data: its number, from 1, and its fields.
+// One line of data: its line number, starting at 1, and its fields.
 struct Line {
   std::size_t number = 0;
   std::vector<std::string_view> fields;
@@ -87,7 +87,7 @@ bool is_csv_title(std::string_view line) {
          ((line[0] >= 'a' && line[0] <= 'z') || (line[0] >= 'A' && line[0] <= 'Z'));
 }
 
-// The lines of data, without comments, blank lines and the title line of a csv file.
+// Splits a file into lines of data, without comments, blank lines and the title line of a csv file.
 std::vector<Line> data_lines(std::string_view bytes) {
   std::vector<Line> lines;
   if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);
@@ -110,7 +110,7 @@ std::optional<double> parse_number(std::string_view text) {
   return value;
 }
 
-// Appends digits to `value`; false where it would leave 64 bits.
+// Appends a decimal digit to `value`; returns false on overflow of 64 bits.
 bool append_digit(TimeNs& value, char digit) {
   constexpr TimeNs kMax = std::numeric_limits<TimeNs>::max();
   if (value > (kMax - 9) / 10) return false;
@@ -118,7 +118,7 @@ bool append_digit(TimeNs& value, char digit) {
   return true;
 }
 
-// `Count` finite numbers from field `first` on, or the Error that names the first that is none.
+// Parses `Count` finite numbers starting at field `first`; the Error names the first invalid one.
 template <std::size_t Count>
 Result<std::array<double, Count>> numbers(const std::filesystem::path& file, const Line& line, std::size_t first) {
   std::array<double, Count> values{};
@@ -177,7 +177,7 @@ Result<SE3> kitti_pose(const std::filesystem::path& file, const Line& line) {
   return SE3(R, T.col(3));
 }
 
-// The times of KITTI poses, one a line.
+// Reads the times that belong to KITTI poses, one per line.
 Result<std::vector<TimeNs>> read_times(const std::filesystem::path& file) {
   const auto bytes = read_bytes(file);
   if (!bytes) return bytes.error();
@@ -269,7 +269,7 @@ std::string seconds_text(TimeNs time_ns) {
 std::optional<TimeNs> parse_seconds(std::string_view text) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);
-  int exponent = 9;  // of the digits read, in nanoseconds
+  int exponent = 9;  // decimal exponent of the digits, in nanoseconds
   if (const std::size_t e = text.find_first_of("eE"); e != std::string_view::npos) {
     std::string_view power = text.substr(e + 1);
     if (power.starts_with('+')) power.remove_prefix(1);
@@ -287,7 +287,7 @@ std::optional<TimeNs> parse_seconds(std::string_view text) {
   if (point != std::string_view::npos) digits += text.substr(point + 1);
   if (digits.empty() || digits.find_first_not_of("0123456789") != std::string::npos) return std::nullopt;
 
-  // 0.DIGITS * 10^exponent: the first `exponent` digits are whole nanoseconds, the next one rounds.
+  // The value is 0.DIGITS * 10^exponent: the first `exponent` digits are whole nanoseconds, and the next one rounds.
   TimeNs value = 0;
   for (int k = 0; k < exponent; ++k) {
     const std::size_t at = static_cast<std::size_t>(k);

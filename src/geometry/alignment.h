@@ -1,4 +1,4 @@
-// Alignment of two point sets in the least-squares sense.
+// Least-squares alignment of two point sets.
 #pragma once
 
 #include <optional>
@@ -10,8 +10,9 @@ namespace bslam::geometry {
 
 enum class ScaleMode { kFixed, kFree };
 
-// T_dst_src minimising sum |dst_i - T src_i|^2 (Umeyama, PAMI 1991); scale 1 where fixed. Both spans have equal size.
-// Empty for fewer than three points or where the rotation is not determined (all points on one line).
+// Returns the T_dst_src that minimises sum |dst_i - T src_i|^2 (Umeyama, PAMI 1991). The scale is 1 if `scale` is
+// kFixed. Both spans have the same size. Returns nullopt for fewer than three points or if the points do not determine
+// the rotation (all on one line).
 std::optional<Sim3> align_points(std::span<const Vector3d> src, std::span<const Vector3d> dst, ScaleMode scale);
 
 }  // namespace bslam::geometry

@@ -26,7 +26,7 @@ class SE3 {
   Vector6d log() const;
   SE3 perturbed(const Vector6d& delta) const { return exp(delta) * *this; }
 
-  // Ad with T exp(xi) T^-1 = exp(Ad xi).
+  // Adjoint matrix Ad of this transform T: T exp(xi) T^-1 = exp(Ad xi).
   Matrix6d adjoint() const;
 
  private:
@@ -34,10 +34,10 @@ class SE3 {
   Vector3d translation_ = Vector3d::Zero();
 };
 
-// The same where lengths are `factor` times as long.
+// Returns T with its translation multiplied by `factor`.
 inline SE3 scaled(const SE3& T, double factor) { return {T.rotation(), factor * T.translation()}; }
 
-// Pose on the geodesic from `a` (share 0) to `b` (share 1); shares outside [0, 1] extrapolate.
+// Returns the pose on the geodesic from `a` (share 0) to `b` (share 1). Shares outside [0, 1] extrapolate.
 SE3 interpolate(const SE3& a, const SE3& b, double share);
 
 }  // namespace bslam::geometry

@@ -1,14 +1,13 @@
 #include "geometry/sim3.h"
 
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
-
-#include <Eigen/LU>
 
 namespace bslam::geometry {
 namespace {
 
-// Abscissae and weights on [-1, 1] of Gauss-Legendre quadrature with ten points, those above zero.
+// Positive abscissae and weights of ten-point Gauss-Legendre quadrature on [-1, 1].
 struct Node {
   double at, weight;
 };
@@ -18,8 +17,9 @@ constexpr std::array<Node, 5> kNodes{{{0.14887433898163121, 0.29552422471475287}
                                       {0.86506336668898451, 0.14945134915058059},
                                       {0.97390652851717172, 0.06667134430868814}}};
 
-// V with exp([omega, v, log scale]) = (scale, exp(omega), V v): the integral over x from 0 to 1 of exp(x log scale)
-// exp(x omega). Its closed form loses its digits wherever angle or log scale is small; the quadrature does not.
+// Returns the matrix V with exp([omega, v, log scale]) = (scale, exp(omega), V v): the integral of exp(x log scale)
+// exp(x omega) over x from 0 to 1. The closed form suffers from cancellation if the angle or the log scale is small;
+// the quadrature does not.
 Matrix3d translation_jacobian(const Vector3d& omega, double log_scale) {
   if (log_scale == 0.0) return so3_left_jacobian(omega);
   Matrix3d V = Matrix3d::Zero();

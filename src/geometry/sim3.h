@@ -1,4 +1,5 @@
-// Similarity transforms Sim(3): p_a = s R p_b + t, with T_a_b read as for SE3. Equations: docs/math.md, section 1.
+// Similarity transforms Sim(3): p_a = s R p_b + t for T_a_b, which maps b to a as for SE3. Equations: docs/math.md,
+// section 1.
 #pragma once
 
 #include "geometry/se3.h"
@@ -24,16 +25,17 @@ class Sim3 {
   Vector3d operator*(const Vector3d& point) const { return scale_ * (rotation_ * point) + translation_; }
 
   // Tangent vectors are [omega, v, log scale]. Perturbation is on the left: S <- exp(delta) * S. exp and log are exact
-  // to rounding for scales between 1/100 and 100 per step; with a log scale of 0 they are those of SE3 and the scale
-  // is 1.
+  // to rounding for scales between 1/100 and 100. With a log scale of 0 they equal those of SE3, and the scale is
+  // exactly 1.
   static Sim3 exp(const Vector7d& xi);
   Vector7d log() const;
   Sim3 perturbed(const Vector7d& delta) const { return exp(delta) * *this; }
 
-  // Ad with S exp(xi) S^-1 = exp(Ad xi).
+  // Adjoint matrix Ad of this transform S: S exp(xi) S^-1 = exp(Ad xi).
   Matrix7d adjoint() const;
 
-  // The rigid pose of a frame after the similarity moved the world around it: rotation and position, no scale.
+  // Transforms a pose by the similarity and drops the scale: returns the rigid pose of the frame in the transformed
+  // world.
   SE3 apply_to_pose(const SE3& T_b_frame) const {
     return SE3(rotation_ * T_b_frame.rotation(), *this * T_b_frame.translation());
   }

@@ -5,7 +5,7 @@
 namespace bslam::geometry {
 namespace {
 
-constexpr double kSmallAngle = 1e-4;  // below it the series are exact to double precision
+constexpr double kSmallAngle = 1e-4;  // below this angle the truncated series are exact to double precision
 
 }  // namespace
 
@@ -25,7 +25,8 @@ Quaterniond so3_exp(const Vector3d& omega) {
 }
 
 Vector3d so3_log(const Quaterniond& q) {
-  const double sign = q.w() < 0 ? -1.0 : 1.0;  // the shorter of the two rotations
+  // q and -q are the same rotation; this selects the one with the smaller angle
+  const double sign = q.w() < 0 ? -1.0 : 1.0;
   const double sine = q.vec().norm();
   const double cosine = sign * q.w();
   const double scale = sine < 0.5 * kSmallAngle ? 2.0 / cosine * (1.0 - sine * sine / (3.0 * cosine * cosine))

@@ -14,20 +14,20 @@ using Eigen::Vector3d;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-// For people to read.
+// Conversions for input and output.
 constexpr double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
 constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
-// [v]x, so that skew(v) * w = v x w.
+// Returns the skew-symmetric matrix [v]x, so that skew(v) * w = v x w.
 Matrix3d skew(const Vector3d& v);
 
-// exp: rotation vector -> unit quaternion, exact also near zero.
+// Exponential map: rotation vector to unit quaternion, accurate near zero as well.
 Quaterniond so3_exp(const Vector3d& omega);
 
-// log: unit quaternion -> rotation vector with norm in [0, pi].
+// Logarithm: unit quaternion to rotation vector with norm in [0, pi].
 Vector3d so3_log(const Quaterniond& q);
 
-// J_l with exp(omega + d) ~ exp(J_l(omega) d) exp(omega), and its inverse.
+// Left Jacobian J_l of SO(3), exp(omega + d) ~ exp(J_l(omega) d) exp(omega), and its inverse.
 Matrix3d so3_left_jacobian(const Vector3d& omega);
 Matrix3d so3_left_jacobian_inverse(const Vector3d& omega);
 

@@ -1,4 +1,4 @@
-// A point from two or more rays of known origin and direction.
+// Triangulation of a point from two or more rays.
 #pragma once
 
 #include <optional>
@@ -10,14 +10,15 @@ namespace bslam::geometry {
 
 struct Ray {
   Vector3d origin;     // metres, in any common frame
-  Vector3d direction;  // unit, same frame
+  Vector3d direction;  // unit vector, same frame
 };
 
-// Point with the least sum of squared distances to the rays, in their frame. Empty where the rays are parallel to
-// within `min_angle` radians for every pair with the first, or where the point lies behind one of the origins.
+// Returns the point with the smallest sum of squared distances to the rays, in their common frame. Returns nullopt if
+// the angle between the first ray and every other one is below `min_angle` (radians), or if the point lies behind the
+// origin of a ray.
 std::optional<Vector3d> triangulate_midpoint(std::span<const Ray> rays, double min_angle);
 
-// Angle between two unit vectors in radians, exact also near 0 and pi.
+// Returns the angle between two unit vectors in radians, accurate near 0 and pi as well.
 double angle_between(const Vector3d& a, const Vector3d& b);
 
 }  // namespace bslam::geometry

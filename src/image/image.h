@@ -1,4 +1,4 @@
-// 8-bit grey images: an owning one and a view.
+// 8-bit grey images: Image owns its pixels, ImageView refers to pixels owned elsewhere.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace bslam::image {
 
-// Borrowed pixels, row-major; `stride` bytes from one row to the next.
+// Non-owning view of row-major pixels. `stride` is the distance between rows in bytes.
 struct ImageView {
   const std::uint8_t* data = nullptr;
   int width = 0, height = 0;
@@ -23,7 +23,7 @@ class Image {
   Image() = default;
   Image(int width, int height) { resize(width, height); }
 
-  // Keeps its memory where that suffices; pixels are undefined after a change of size.
+  // Reuses the allocated memory if it is large enough. The pixels are undefined after a change of size.
   void resize(int width, int height) {
     width_ = width;
     height_ = height;

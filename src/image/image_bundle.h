@@ -1,4 +1,4 @@
-// N images taken together; any of them may be missing or damaged.
+// N images taken at the same time; any of them may be missing or damaged.
 #pragma once
 
 #include <vector>
@@ -11,19 +11,20 @@ namespace bslam::image {
 
 enum class ImageState {
   kPresent,
-  kMissing,  // no image of this camera belongs to this instant
-  kDamaged,  // there should be one, but it cannot be used: skipped and counted
+  kMissing,  // the camera has no image for this frame
+  kDamaged,  // the image exists but cannot be used; it is skipped and counted
 };
 
 struct CameraImage {
   ImageState state = ImageState::kMissing;
-  TimeNs time_ns = 0;  // its own capture time, offset applied; meaningful where the state is kPresent
+  TimeNs time_ns = 0;  // capture time of this image, with the camera's time offset applied; valid only if kPresent
   Image image;         // empty unless kPresent
 };
 
 struct ImageBundle {
-  FrameId id;           // input frames are numbered from 0 without gaps
-  TimeNs time_ns = 0;   // of the frame: camera 0's image, or the earliest of the others where that is missing
+  FrameId id;  // input frames are numbered consecutively from 0
+  // Time of the frame: the time of camera 0's image, or the earliest of the others if that one is missing.
+  TimeNs time_ns = 0;
   std::vector<CameraImage> images;  // one per camera of the rig
 };
 

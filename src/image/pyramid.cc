@@ -16,20 +16,21 @@ namespace bslam::image {
 namespace {
 
 constexpr int kSmallestSide = 32;
-constexpr int kTaps = 4;               // covers a tent of half-width 2: ratios up to 2
-constexpr int kStrip = 512;            // output columns worked on at a time, so that all scratch fits the stack and L1
-constexpr int kRowWeightSum = 1 << 8;  // of the vertical pass: a sum of bytes stays within 16 bits
-constexpr int kColumnWeightSum = 1 << 14;  // of the horizontal pass
-constexpr int kShift = 21;                 // of both passes together: 8 + 14 bits, less the one dropped between them
+constexpr int kTaps = 4;  // enough for a triangle filter of half-width 2, that is for ratios up to 2
+// Number of output columns processed at a time, so that all scratch memory fits on the stack and in the L1 cache.
+constexpr int kStrip = 512;
+constexpr int kRowWeightSum = 1 << 8;      // sum of the vertical weights; a weighted sum of bytes fits into 16 bits
+constexpr int kColumnWeightSum = 1 << 14;  // sum of the horizontal weights
+constexpr int kShift = 21;  // fixed-point bits of both passes together: 8 + 14, less the one dropped between them
 
-// Weights of the four input samples `first` ... `first` + 3 that make output sample `i`.
+// Weights of the input samples `first` ... `first` + 3 that contribute to output sample `i`.
 struct Taps {
   int first;
-  std::array<int, kTaps> weight;  // they add up to the sum asked for
+  std::array<int, kTaps> weight;  // the weights add up to `weight_sum`
 };
 
-// A tent as wide as the output pixel is (half-width = ratio) is what keeps detail finer than the output grid from
-// aliasing; it is bilinear interpolation where the ratio is 1. Samples beyond the edge repeat the last one.
+// Anti-aliasing with a triangle filter as wide as the output pixel (half-width = ratio); it is bilinear interpolation
+// if the ratio is 1. Samples beyond the border repeat the last one.
 Taps make_taps(int i, int inputs, int outputs, int weight_sum) {
   const double ratio = static_cast<double>(inputs) / outputs;
   const double centre = (i + 0.5) * ratio - 0.5;
@@ -51,7 +52,7 @@ Taps make_taps(int i, int inputs, int outputs, int weight_sum) {
   return taps;
 }
 
-// One strip of output columns: where each takes its samples from, relative to the strip's first input column.
+// One strip of output columns: the input position of each column, relative to the first input column of the strip.
 struct Strip {
   int input_begin = 0, input_count = 0, outputs = 0;
   std::array<std::int32_t, kStrip> first;
@@ -69,7 +70,7 @@ void make_strip(int begin, int end, int inputs, int outputs, Strip& strip) {
   }
 }
 
-// Vertical pass: `out` = half the weighted sum of four rows, 15 bits.
+// Vertical pass: `out` is half the weighted sum of four rows (15 bits).
 void blend_rows(const std::array<const std::uint8_t*, kTaps>& rows, const std::array<int, kTaps>& weight, int count,
                 std::int16_t* __restrict out) {
   const auto *r0 = rows[0], *r1 = rows[1], *r2 = rows[2], *r3 = rows[3];
@@ -81,13 +82,13 @@ void blend_rows(const std::array<const std::uint8_t*, kTaps>& rows, const std::a
   }
 }
 
-// Horizontal pass from `in` (15 bits) to grey values.
+// Horizontal pass: from `in` (15 bits) to grey values.
 void blend_columns(const Strip& strip, const std::int16_t* in, std::uint8_t* out) {
   int i = 0;
 #if defined(__SSE2__)
   const __m128i half = _mm_set1_epi32(1 << (kShift - 1));
   const auto samples = [&](int k) { return reinterpret_cast<const double*>(in + strip.first[k]); };
-  const auto pair = [&](int k) {  // two output pixels, each in two partial sums
+  const auto pair = [&](int k) {  // two output pixels, each as two partial sums
     const __m128d low = _mm_loadl_pd(_mm_setzero_pd(), samples(k));
     const __m128i both = _mm_castpd_si128(_mm_loadh_pd(low, samples(k + 1)));
     return _mm_castsi128_ps(
@@ -111,7 +112,7 @@ void blend_columns(const Strip& strip, const std::int16_t* in, std::uint8_t* out
 }
 
 void shrink(const Image& in, Image& out) {
-  // A strip spans at most kStrip times the ratio of input columns; ratios reach a little over 2 by rounding of sizes.
+  // A strip covers at most kStrip * ratio input columns. The ratio may slightly exceed 2 because sizes are rounded.
   alignas(16) std::array<std::int16_t, kStrip * 9 / 4 + kTaps> row;
   Strip strip;
   for (int begin = 0; begin < out.width(); begin += kStrip) {

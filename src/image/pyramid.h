@@ -1,4 +1,4 @@
-// Image pyramid: level 0 is the raw image, each level is smaller than the one before by a constant factor.
+// Image pyramid: level 0 is the raw image; each level is smaller than the previous one by a constant factor.
 #pragma once
 
 #include <vector>
@@ -7,10 +7,11 @@
 
 namespace bslam::image {
 
-// Pixel (x, y) of level l lies at pixel ((x + 0.5) * scale(l) - 0.5, ...) of level 0, as pixel centres are whole numbers.
+// Pixel (x, y) of level l lies at pixel ((x + 0.5) * scale(l) - 0.5, ...) of level 0, since pixel centres have integer
+// coordinates.
 struct Pyramid {
   std::vector<Image> levels;
-  std::vector<double> scale_x, scale_y;  // level-0 pixels per pixel of the level (exact: width_0 / width_l)
+  std::vector<double> scale_x, scale_y;  // pixels of level 0 per pixel of the level (exact: width_0 / width_l)
 
   std::size_t size() const { return levels.size(); }
   double to_base_x(std::size_t level, double x) const { return (x + 0.5) * scale_x[level] - 0.5; }
@@ -19,8 +20,9 @@ struct Pyramid {
   double from_base_y(std::size_t level, double y) const { return (y + 0.5) / scale_y[level] - 0.5; }
 };
 
-// Builds `levels` levels with ratio `factor` (> 1) into `pyramid`, whose memory is reused. Levels smaller than
-// 32 pixels a side are left out. Each level is resampled from the one before (area-true bilinear).
+// Builds up to `levels` levels with ratio `factor`, in (1, 2], into `pyramid`, whose memory is reused. Levels with a
+// side shorter than 32 pixels are omitted. Each level is resampled from the previous one with an anti-aliasing triangle
+// filter.
 void build_pyramid(const ImageView& base, int levels, double factor, Pyramid& pyramid);
 
 }  // namespace bslam::image

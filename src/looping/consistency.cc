@@ -5,14 +5,14 @@
 namespace bslam::looping {
 namespace {
 
-std::vector<KeyframeId> place_about(const map::BundledMap& map, KeyframeId k) {
+std::vector<KeyframeId> covisible_group(const map::BundledMap& map, KeyframeId k) {
   std::vector<KeyframeId> out = {k};
   for (const map::Covisible& c : map.keyframe(k).covisible) out.push_back(c.keyframe);
   std::sort(out.begin(), out.end());
   return out;
 }
 
-bool share(const std::vector<KeyframeId>& a, const std::vector<KeyframeId>& b) {
+bool intersect(const std::vector<KeyframeId>& a, const std::vector<KeyframeId>& b) {
   for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
     if (*i == *j) return true;
     *i < *j ? ++i : ++j;
@@ -22,14 +22,16 @@ bool share(const std::vector<KeyframeId>& a, const std::vector<KeyframeId>& b) {
 
 }  // namespace
 
-std::vector<Candidate> consistent_candidates(const map::BundledMap& map, KeyframeId keyframe, const std::vector<Candidate>& candidates,
-                                             const LoopOptions& options, RecognitionHistory& history) {
+std::vector<Candidate> consistent_candidates(const map::BundledMap& map, KeyframeId keyframe,
+                                             const std::vector<Candidate>& candidates, const LoopOptions& options,
+                                             RecognitionHistory& history) {
   RecognitionHistory next;
   std::vector<Candidate> out;
   for (const Candidate& candidate : candidates) {
-    RecognitionHistory::Place place{place_about(map, candidate.keyframe), 1, keyframe};
+    RecognitionHistory::Place place{covisible_group(map, candidate.keyframe), 1, keyframe};
     for (const RecognitionHistory::Place& before : history.places) {
-      if (keyframe.value() - before.last.value() <= options.max_keyframe_gap && share(place.keyframes, before.keyframes)) {
+      if (keyframe.value() - before.last.value() <= options.max_keyframe_gap &&
+          intersect(place.keyframes, before.keyframes)) {
         place.times = std::max(place.times, before.times + 1);
       }
     }
@@ -37,8 +39,10 @@ std::vector<Candidate> consistent_candidates(const map::BundledMap& map, Keyfram
     next.places.push_back(std::move(place));
   }
   for (RecognitionHistory::Place& before : history.places) {
-    const bool again = std::ranges::any_of(next.places, [&](const auto& p) { return share(p.keyframes, before.keyframes); });
-    if (!again && keyframe.value() - before.last.value() < options.max_keyframe_gap) next.places.push_back(std::move(before));
+    const bool again =
+        std::ranges::any_of(next.places, [&](const auto& p) { return intersect(p.keyframes, before.keyframes); });
+    if (!again && keyframe.value() - before.last.value() < options.max_keyframe_gap)
+      next.places.push_back(std::move(before));
   }
   history = std::move(next);
   return out;

@@ -1,4 +1,5 @@
-// One keyframe may look like another place by chance; several in a row hardly do.
+// Temporal consistency of place recognition: one keyframe may resemble another place by chance, several in a row hardly
+// do.
 #pragma once
 
 #include <vector>
@@ -7,18 +8,20 @@
 
 namespace bslam::looping {
 
-// Places recognised by the last keyframes; a value.
+// The places recognised by recent keyframes. A value type.
 struct RecognitionHistory {
   struct Place {
-    std::vector<KeyframeId> keyframes;  // the candidate and what is covisible with it, in order of id
-    int times = 0;                      // keyframes in a row that recognised it
-    KeyframeId last;                    // of them
+    std::vector<KeyframeId> keyframes;  // the candidate and its covisible keyframes, in order of id
+    int times = 0;                      // number of consecutive keyframes that recognised it
+    KeyframeId last;                    // the last of these keyframes
   };
   std::vector<Place> places;
 };
 
-// The candidates of `keyframe` whose place the keyframes before it recognised as well, often enough; notes them all.
-std::vector<Candidate> consistent_candidates(const map::BundledMap& map, KeyframeId keyframe, const std::vector<Candidate>& candidates,
-                                             const LoopOptions& options, RecognitionHistory& history);
+// Returns the candidates of `keyframe` whose place was recognised by enough consecutive keyframes, this one included.
+// Records all candidates in `history`.
+std::vector<Candidate> consistent_candidates(const map::BundledMap& map, KeyframeId keyframe,
+                                             const std::vector<Candidate>& candidates, const LoopOptions& options,
+                                             RecognitionHistory& history);
 
 }  // namespace bslam::looping

@@ -1,5 +1,5 @@
-// The essential graph of a part of the map: its spanning tree and its strong covisibility links, for pose-graph
-// optimisation.
+// The essential graph of a submap for pose-graph optimisation (as in ORB-SLAM): its spanning tree and its strong
+// covisibility edges.
 #pragma once
 
 #include <vector>
@@ -11,12 +11,12 @@ namespace bslam::looping {
 
 struct EssentialGraph {
   std::vector<KeyframeId> keyframes;  // per vertex, in order of id
-  solver::PoseGraphProblem problem;   // present poses; the root is fixed
+  solver::PoseGraphProblem problem;   // initialised with the current poses; the root is fixed
 
-  int vertex(KeyframeId k) const;  // -1 where it is not in the graph
+  int vertex(KeyframeId k) const;  // returns -1 if k is not in the graph
 };
 
-// Edges measure the relative poses of `map`. Scale is free where the map's is not metric.
+// The edges measure the relative poses in `map`. The scale is optimised unless the map is metric.
 EssentialGraph essential_graph(const map::BundledMap& map, KeyframeId root, int edge_weight);
 
 }  // namespace bslam::looping

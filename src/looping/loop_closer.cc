@@ -8,9 +8,9 @@
 namespace bslam::looping {
 namespace {
 
-// On an unbroken walk a candidate is joined to the keyframe by those between them, and what is found of it is what the
-// keyframe observes anyway. A place seen again shows landmarks that the keyframe does not know.
-bool shows_news(const map::BundledMap& map, KeyframeId keyframe, const Location& location, const LoopOptions& options) {
+// On a continuous path the candidate is linked to the keyframe by those in between, and the landmarks matched are
+// mostly ones that the keyframe observes already. A real revisit matches landmarks that it does not observe yet.
+bool is_revisit(const map::BundledMap& map, KeyframeId keyframe, const Location& location, const LoopOptions& options) {
   const auto known = std::ranges::count_if(location.matches, [&](const auto& match) {
     const std::span<const map::Observation> list = map.observations(match.second);
     return std::ranges::find(list, keyframe, &map::Observation::keyframe) != list.end();
@@ -19,15 +19,20 @@ bool shows_news(const map::BundledMap& map, KeyframeId keyframe, const Location&
   return all - static_cast<double>(known) >= options.min_news * all;
 }
 
-// Of the candidate and its best covisible keyframes, but for the keyframe's own neighbours, the one taken nearest to where
-// the keyframe is found to be.
-KeyframeId nearest_of_place(const map::BundledMap& map, KeyframeId keyframe, const Location& location, const LoopingOptions& options) {
+// Returns, among the candidate and its best covisible keyframes, without the keyframe's own neighbours, the one that is
+// closest to the verified position of the keyframe.
+KeyframeId closest_keyframe_of_place(const map::BundledMap& map, KeyframeId keyframe, const Location& location,
+                                     const LoopingOptions& options) {
   const Eigen::Vector3d here = location.T_rig_world.inverse().translation();
-  const auto distance = [&](KeyframeId k) { return (map.keyframe(k).T_rig_world.inverse().translation() - here).norm(); };
+  const auto distance = [&](KeyframeId k) {
+    return (map.keyframe(k).T_rig_world.inverse().translation() - here).norm();
+  };
   const auto own = neighbours_of(map, keyframe, options.recognition);
   KeyframeId best = location.with;
-  for (const map::Covisible& c : map.best_covisible(location.with, static_cast<std::size_t>(options.verification.neighbours))) {
-    const bool known = c.keyframe == keyframe || std::ranges::binary_search(own, c.keyframe, {}, &map::Covisible::keyframe);
+  for (const map::Covisible& c :
+       map.best_covisible(location.with, static_cast<std::size_t>(options.verification.neighbours))) {
+    const bool known =
+        c.keyframe == keyframe || std::ranges::binary_search(own, c.keyframe, {}, &map::Covisible::keyframe);
     if (!known && distance(c.keyframe) < distance(best)) best = c.keyframe;
   }
   return best;
@@ -35,19 +40,21 @@ KeyframeId nearest_of_place(const map::BundledMap& map, KeyframeId keyframe, con
 
 }  // namespace
 
-LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options, const map::FeatureModel& features,
-                       std::uint64_t seed)
+LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options,
+                       const map::FeatureModel& features, std::uint64_t seed)
     : recogniser_(std::move(recogniser)), options_(options), features_(features), seed_(seed) {}
 
-std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const {
+std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map,
+                                           const Candidate& candidate) const {
   const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
-  return locate(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification, features_, random);
+  return locate(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification,
+                features_, random);
 }
 
-// Parts may lie anywhere, so that nothing but the pictures speaks against a wrong place: no other of the rest of the map may
-// look as right. A twin that fewer keyframes show is no candidate beside the place itself: it is asked for as a frame is
-// that nothing is known of.
-bool LoopCloser::undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const {
+// Submaps can have any relative pose, so no pose prior can reject a wrong match, only appearance. Therefore no other
+// place in the rest of the map may match equally well. The candidates are searched as for relocalisation, with lower
+// thresholds, because a look-alike place observed by fewer keyframes would not be a candidate beside the right one.
+bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const {
   const std::shared_ptr<const frame::BundledFrame> frame = map.keyframe(keyframe).frame;
   const camera::Rig rig = map.rig_of(keyframe);
   map::BundledMap rest = map;
@@ -63,14 +70,14 @@ std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::Bundled
   const std::vector<Candidate> candidates = recogniser_->revisited(map, keyframe);
   for (const Candidate& candidate : consistent_candidates(map, keyframe, candidates, options_.loop, history_)) {
     auto location = verify(keyframe, map, candidate);
-    if (!location || !shows_news(map, keyframe, *location, options_.loop)) continue;
+    if (!location || !is_revisit(map, keyframe, *location, options_.loop)) continue;
     const auto scale = relative_scale(map, keyframe, *location);
     if (!scale) continue;
     location->scale = *scale;
-    location->with = nearest_of_place(map, keyframe, *location, options_);
+    location->with = closest_keyframe_of_place(map, keyframe, *location, options_);
     const LoopClosure closure = measure(map, keyframe, *location);
     if (!plausible(map, closure, options_.loop)) continue;
-    if (!closure.joined || undisputed(keyframe, map, *location)) return location;
+    if (!closure.joined || is_unambiguous(keyframe, map, *location)) return location;
   }
   return std::nullopt;
 }

@@ -1,5 +1,5 @@
-// Loop closing: a keyframe recognises a place seen before, geometry confirms it, and the map is bent so that both agree.
-// The same step joins two parts of the map.
+// Loop closing: a keyframe recognises a place seen before, geometric verification confirms it, and the map is
+// corrected. If the place is in another submap, the two submaps are merged.
 #pragma once
 
 #include <optional>
@@ -12,28 +12,29 @@ namespace bslam::looping {
 
 struct LoopClosure {
   KeyframeId keyframe, with;
-  int inliers = 0;          // keypoints that support the relative pose
-  double off_px = 0;        // median error of what the keyframe sees of the place, at its pose before
-  double apart = 0;         // distance to the place, of that to what is seen of it
-  double moved = 0;         // map units the keyframe's centre moved
-  double turned = 0;        // rad
-  double scaled = 1;        // other than 1 only where the scale is not observable
-  bool joined = false;      // two parts of the map became one
+  int inliers = 0;  // keypoints that support the relative pose
+  // median reprojection error in pixels of the matched landmarks, at the keyframe's pose before the correction
+  double off_px = 0;
+  double apart = 0;     // distance to the matched keyframe over the median distance to the matched landmarks
+  double moved = 0;     // translation of the keyframe's centre by the correction, in map units
+  double turned = 0;    // rotation by the correction, rad
+  double scaled = 1;    // scale correction; differs from 1 only if the scale is not observable
+  bool joined = false;  // two submaps were merged
 };
 
-// The loop stage: its options, its recogniser and what recognition remembers from one keyframe to the next.
+// The loop-closing stage: its options, its place recogniser, and the recognition history between keyframes.
 class LoopCloser {
  public:
-  LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options, const map::FeatureModel& features,
-             std::uint64_t seed);
+  LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options,
+             const map::FeatureModel& features, std::uint64_t seed);
 
-  // Writes the correction to the draft where `keyframe` (alive) closes a loop; the draft is untouched else. Keyframes come
-  // in order: one that does not come after the last is of another map, and nothing is remembered then.
+  // If `keyframe` (alive) closes a loop, writes the correction to the draft; otherwise leaves the draft unchanged.
+  // Keyframes must come in order: an id that does not increase means a new map, and resets the history.
   std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft);
 
  private:
   std::optional<Location> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const;
-  bool undisputed(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const;
+  bool is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const;
   std::optional<Location> find(KeyframeId keyframe, const map::BundledMap& map);
 
   const std::unique_ptr<PlaceRecogniser> recogniser_;
@@ -41,7 +42,7 @@ class LoopCloser {
   const map::FeatureModel features_;
   const std::uint64_t seed_;
   RecognitionHistory history_;
-  KeyframeId last_;  // asked about
+  KeyframeId last_;  // the last keyframe passed to close()
 };
 
 }  // namespace bslam::looping

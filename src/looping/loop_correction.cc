@@ -15,17 +15,17 @@ using Eigen::Vector3d;
 using geometry::SE3;
 using geometry::Sim3;
 
-constexpr double kMaxTurn = geometry::radians(20);  // rad: no drift turns a rig by more
+constexpr double kMaxRotation = geometry::radians(20);  // rad: larger rotations cannot be explained by drift
 
 Vector3d centre(const SE3& T_rig_world) { return T_rig_world.inverse().translation(); }
 
-// The rigid pose in world units that a vertex of the graph stands for.
+// Rigid pose in world units of a vertex of the pose graph.
 SE3 pose_of(const Sim3& S_rig_world) {
   return SE3(S_rig_world.rotation(), S_rig_world.translation() / S_rig_world.scale());
 }
 
-// Median error, in pixels, of what the keyframe sees of the place at the pose it has in the map.
-double error_px(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
+// Median reprojection error, in pixels, of the matched landmarks of the place at the keyframe's current pose.
+double reprojection_error_px(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
   const map::BundledKeyframe& entry = map.keyframe(keyframe);
   const camera::Rig rig = map.rig_of(keyframe);
   std::vector<double> errors;
@@ -39,8 +39,9 @@ double error_px(const map::BundledMap& map, KeyframeId keyframe, const Location&
   return errors.empty() ? 0.0 : median(std::move(errors));
 }
 
-// How far the frame is from the keyframe it is located with, of the distance to what both see.
-double apart(const map::BundledMap& map, const Location& location) {
+// Distance between the verified pose and the matched keyframe, divided by the median distance to the landmarks both
+// observe.
+double relative_distance(const map::BundledMap& map, const Location& location) {
   const Vector3d here = centre(location.T_rig_world);
   std::vector<double> distances;
   for (const auto& [feature, l] : location.matches) distances.push_back((map.landmark(l).position - here).norm());
@@ -48,8 +49,8 @@ double apart(const map::BundledMap& map, const Location& location) {
   return (here - centre(map.keyframe(location.with).T_rig_world)).norm() / median(std::move(distances));
 }
 
-// Length of the way from one keyframe to the other, through all keyframes of their part made between them.
-double way_between(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
+// Length of the path between two keyframes through all keyframes of their submap created in between.
+double path_length(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
   const KeyframeId root = map.root_of(to);
   double length = 0;
   Vector3d last = centre(map.keyframe(from).T_rig_world);
@@ -71,7 +72,7 @@ double median_depth(const map::BundledMap& map, KeyframeId k) {
   return depths.empty() ? 0.0 : median(std::move(depths));
 }
 
-// The keyframe and its best covisible ones: what is moved at once and fused with the place.
+// The keyframe and its best covisible keyframes: they are moved together and fused with the place.
 std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyframe, int size) {
   std::vector<KeyframeId> window = {keyframe};
   for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(size)))
@@ -80,7 +81,8 @@ std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyfram
   return window;
 }
 
-// What the keyframe was found to see becomes its own, then what its window sees as well, looked for at the poses given.
+// Fuses the window with the place. The keyframe's landmarks are merged with the landmarks it was matched to; then the
+// landmarks of the place are projected into all keyframes of the window at the given poses.
 void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_world, const LoopClosure& closure,
           const Location& location, const LoopOptions& options, const map::FeatureModel& features,
           map::MapDraft& draft) {
@@ -102,7 +104,7 @@ void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_w
   }
 }
 
-// Poses of the window as the place has it, and the landmarks that hang on them.
+// Moves the keyframes of the window, and the landmarks attached to them, to their poses relative to the place.
 void move_window(const std::vector<KeyframeId>& window, const EssentialGraph& graph, const std::vector<Sim3>& before,
                  map::MapDraft& draft) {
   map::SetPoses poses;
@@ -118,7 +120,8 @@ void move_window(const std::vector<KeyframeId>& window, const EssentialGraph& gr
   draft.set_poses(std::move(poses));
 }
 
-// One edge between each keyframe of the window and each with which the fusion gave it landmarks to share.
+// Adds an edge between each keyframe of the window and each keyframe with which the fusion gave it enough shared
+// landmarks.
 void add_loop_edges(const map::BundledMap& before, const map::BundledMap& fused, const std::vector<KeyframeId>& window,
                     const LoopClosure& closure, EssentialGraph& graph) {
   constexpr int kMinGained = 15;
@@ -139,7 +142,7 @@ void add_loop_edges(const map::BundledMap& before, const map::BundledMap& fused,
   }
 }
 
-// Every keyframe of the graph where the optimisation put it, every landmark moved with the keyframe of its reference.
+// Returns the optimised poses of all keyframes of the graph. Every landmark moves with the keyframe of its reference.
 map::SetPoses corrected(const map::BundledMap& map, const EssentialGraph& graph, const std::vector<Sim3>& before) {
   map::SetPoses poses;
   poses.correction = true;
@@ -155,7 +158,8 @@ map::SetPoses corrected(const map::BundledMap& map, const EssentialGraph& graph,
   return poses;
 }
 
-// Moved landmarks are seen from other directions and, where the scale has changed, from other distances.
+// Moved landmarks are seen from other directions and, if the scale changed, from other distances, so they are
+// refreshed.
 void move_map(map::SetPoses poses, map::MapDraft& draft) {
   std::vector<LandmarkId> moved;
   moved.reserve(poses.landmarks.size());
@@ -172,9 +176,9 @@ LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Locat
   out.moved = (centre(now) - centre(location.T_rig_world)).norm();
   out.turned =
       (now.rotation() * location.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
-  out.off_px = error_px(map, keyframe, location);
+  out.off_px = reprojection_error_px(map, keyframe, location);
   out.scaled = location.scale;
-  out.apart = apart(map, location);
+  out.apart = relative_distance(map, location);
   out.joined = map.root_of(keyframe) != map.root_of(location.with);
   return out;
 }
@@ -183,8 +187,8 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
   if (closure.joined) return map.scale() == map::Scale::kMetric;
   const auto [first, last] = std::minmax(closure.keyframe, closure.with);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
-  const double way = way_between(map, first, last) + median_depth(map, closure.keyframe);
-  return closure.apart <= options.max_apart && closure.moved <= share * way && closure.turned <= kMaxTurn;
+  const double way = path_length(map, first, last) + median_depth(map, closure.keyframe);
+  return closure.apart <= options.max_apart && closure.moved <= share * way && closure.turned <= kMaxRotation;
 }
 
 bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,
@@ -192,7 +196,7 @@ bool join_parts(const LoopClosure& closure, const Location& location, const Loop
   const map::BundledMap& map = draft.map();
   if (map.scale() != map::Scale::kMetric) return false;
   const KeyframeId here = map.root_of(closure.keyframe), there = map.root_of(closure.with);
-  const bool here_moves = there < here;  // the older part stays
+  const bool here_moves = there < here;  // the older submap keeps its pose
   const KeyframeId moving = here_moves ? here : there;
   const SE3 T_there_here = location.T_rig_world.inverse() * map.keyframe(closure.keyframe).T_rig_world;
   const SE3 motion = here_moves ? T_there_here : T_there_here.inverse();
@@ -222,10 +226,10 @@ bool close_loop(const LoopClosure& closure, const Location& location, const Loop
   std::vector<KeyframeId> window = window_of(before, closure.keyframe, options.window);
   std::erase_if(window, [&](KeyframeId k) { return graph.vertex(k) < 0; });
 
-  // The window where the place says it is. S_i' = T_i T_k^-1 S_k', in the units of the window.
+  // Poses of the window as given by the verification: S_i' = T_i T_k^-1 S_k', in the scale of the window.
   const std::vector<Sim3> S_before = graph.problem.S_world;
-  const double unit = 1.0 / closure.scaled;
-  const Sim3 S_keyframe(unit, location.T_rig_world.rotation(), unit * location.T_rig_world.translation());
+  const double scale = 1.0 / closure.scaled;
+  const Sim3 S_keyframe(scale, location.T_rig_world.rotation(), scale * location.T_rig_world.translation());
   const Sim3 S_keyframe_before(before.keyframe(closure.keyframe).T_rig_world);
   for (const KeyframeId k : window) {
     const auto v = static_cast<std::size_t>(graph.vertex(k));
@@ -235,8 +239,8 @@ bool close_loop(const LoopClosure& closure, const Location& location, const Loop
   for (const KeyframeId k : window)
     T_window.push_back(pose_of(graph.problem.S_world[static_cast<std::size_t>(graph.vertex(k))]));
   if (closure.off_px <= options.near_px && !graph.problem.scale_free) {
-    // One keyframe places itself by what it sees of the place no better than the map does by all it holds: bundle
-    // adjustment weighs them, from where the map is.
+    // The error is small, so bundle adjustment can remove it starting from the present map. The pose verified for a
+    // single keyframe is no more accurate than the map.
     fuse(window, T_window, closure, location, options, features, draft);
     return true;
   }

@@ -1,4 +1,4 @@
-// What a recognised place changes in the map.
+// Correction of the map after a loop closure.
 #pragma once
 
 #include <optional>
@@ -8,23 +8,23 @@
 
 namespace bslam::looping {
 
-// By how much the world about `keyframe` is off, if the location is right.
+// Measures the pose error of the map at `keyframe`, assuming that the verification is right.
 LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Location& location);
 
-// Is it a return to the place, and could the error have grown to that on the way from the place to the keyframe? What looks
-// the same but is somewhere else asks for corrections far beyond drift. Parts that are not joined yet can be anywhere, but
-// without a metric scale they cannot be joined.
+// Returns true if the keyframe returned to the place and drift on the path between them can explain the error. False
+// matches of look-alike places require corrections far beyond drift. Between submaps any correction is plausible, but
+// they can be merged only if the scale is metric.
 bool plausible(const map::BundledMap& map, const LoopClosure& closure, const LoopOptions& options);
 
-// Moves the part of one to where the other's says it is, and hangs it below. False, with nothing changed, where scales are
-// not metric: parts then have units of their own.
-bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
-                map::MapDraft& draft);
+// Moves the younger submap to the pose given by the verification, merges it into the older one, and fuses duplicate
+// landmarks. Returns false and changes nothing if the scale is not metric, because each submap then has its own scale.
+bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,
+                const map::FeatureModel& features, map::MapDraft& draft);
 
-// Fuses what is seen on both ends of the loop and, where the map is off by more than bundle adjustment mends by itself,
-// spreads the error over the loop by pose-graph optimisation. False, with the draft in no state to be committed, where that
-// fails.
-bool close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options, const map::FeatureModel& features,
-                map::MapDraft& draft);
+// Fuses the landmarks at both ends of the loop and, if the error exceeds what bundle adjustment can remove, distributes
+// it over the loop by pose-graph optimisation. Returns false if the optimisation fails; the draft must not be committed
+// then.
+bool close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options,
+                const map::FeatureModel& features, map::MapDraft& draft);
 
 }  // namespace bslam::looping

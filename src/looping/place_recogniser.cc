@@ -11,11 +11,14 @@ struct Scored {
   double score = 0;
 };
 
-bool better(const Candidate& a, const Candidate& b) { return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe; }
+bool better(const Candidate& a, const Candidate& b) {
+  return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe;
+}
 
-// Score of `at` with those of its best covisible keyframes among `scored` (in order of id) that share at least `weight` landmarks
-// with it, under the name of the one that scores most.
-Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vector<Scored>& scored, int size, int weight) {
+// Adds the scores of the best covisible keyframes of `at` that are in `scored` (sorted by id) and share at least
+// `weight` landmarks with it. The group is represented by its highest-scoring keyframe.
+Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vector<Scored>& scored, int size,
+                   int weight) {
   Candidate group{at.keyframe, at.score};
   double best = at.score;
   for (const map::Covisible& c : map.best_covisible(at.keyframe, static_cast<std::size_t>(size), weight)) {
@@ -32,9 +35,12 @@ Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vect
 
 }  // namespace
 
-std::vector<map::Covisible> neighbours_of(const map::BundledMap& map, KeyframeId keyframe, const RecognitionOptions& options) {
-  const auto landmarks = std::ranges::count_if(map.keyframe(keyframe).landmarks.values(), [](LandmarkId l) { return l.valid(); });
-  const double enough = std::max<double>(options.neighbour_weight, options.neighbour_share * static_cast<double>(landmarks));
+std::vector<map::Covisible> neighbours_of(const map::BundledMap& map, KeyframeId keyframe,
+                                          const RecognitionOptions& options) {
+  const auto landmarks =
+      std::ranges::count_if(map.keyframe(keyframe).landmarks.values(), [](LandmarkId l) { return l.valid(); });
+  const double enough =
+      std::max<double>(options.neighbour_weight, options.neighbour_share * static_cast<double>(landmarks));
   std::vector<map::Covisible> out;
   for (const map::Covisible& c : map.keyframe(keyframe).covisible) {
     if (c.weight >= enough) out.push_back(c);
@@ -47,14 +53,14 @@ BagOfWordsRecogniser::BagOfWordsRecogniser(place::VocabularyPtr vocabulary, cons
 
 void BagOfWordsRecogniser::describe(frame::BundledFrame& frame) const {
   for (frame::CameraFrame& c : frame.cameras) {
-    if (c.words.size() == c.keypoints.size()) continue;  // already
+    if (c.words.size() == c.keypoints.size()) continue;  // already done
     c.words.resize(c.keypoints.size());
     vocabulary_->words(c.keypoints.descriptor, c.words);
   }
 }
 
 BagOfWordsRecogniser::Words BagOfWordsRecogniser::words_of(const frame::BundledFrame& frame) const {
-  std::vector<WordId> words;  // one per unique feature: that of its first keypoint
+  std::vector<WordId> words;  // one per unique feature: the word of its first keypoint
   words.reserve(frame.bundled.size());
   for (std::size_t f = 0; f < frame.bundled.size(); ++f) {
     const frame::KeypointRef first = frame.bundled.keypoints(FeatureId(f)).front();
@@ -64,7 +70,7 @@ BagOfWordsRecogniser::Words BagOfWordsRecogniser::words_of(const frame::BundledF
   return std::make_shared<const place::WordVector>(*vocabulary_, words);
 }
 
-// Afterwards the index holds exactly the keyframes of `map`, whichever maps came before.
+// Updates the index to hold exactly the keyframes of `map`, regardless of which maps were used before.
 void BagOfWordsRecogniser::sync(const map::BundledMap& map) {
   known_.resize(std::max(known_.size(), map.keyframe_slots()));
   for (std::size_t i = 0; i < known_.size(); ++i) {
@@ -82,7 +88,7 @@ std::vector<Candidate> BagOfWordsRecogniser::revisited(const map::BundledMap& ma
   const Words words = index_.words_of(keyframe);
   std::vector<std::uint8_t> excluded(map.keyframe_slots(), 0);
   excluded[keyframe.index()] = 1;
-  // The paper's s_min: a place is recognised only where it looks more like here than the least alike of the neighbours.
+  // The paper's s_min: a candidate must score at least as high as the lowest-scoring neighbour.
   double min_score = 0;
   bool any = false;
   for (const map::Covisible& c : neighbours_of(map, keyframe, options_)) {
@@ -96,13 +102,16 @@ std::vector<Candidate> BagOfWordsRecogniser::revisited(const map::BundledMap& ma
 
 std::vector<Candidate> BagOfWordsRecogniser::recognised(const map::BundledMap& map, const frame::BundledFrame& frame) {
   sync(map);
-  return rank(map, *words_of(frame), {}, {options_.rival_share * options_.common_share, options_.rival_share * options_.group_share});
+  return rank(map, *words_of(frame), {},
+              {options_.rival_share * options_.common_share, options_.rival_share * options_.group_share});
 }
 
 std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, const place::WordVector& words,
-                                                  const std::vector<std::uint8_t>& excluded, const Bounds& bounds) const {
+                                                  const std::vector<std::uint8_t>& excluded,
+                                                  const Bounds& bounds) const {
   std::vector<place::CommonWords> sharing = index_.query(words);
-  std::erase_if(sharing, [&](const place::CommonWords& c) { return !excluded.empty() && excluded[c.keyframe.index()]; });
+  std::erase_if(sharing,
+                [&](const place::CommonWords& c) { return !excluded.empty() && excluded[c.keyframe.index()]; });
   int most = 0;
   for (const place::CommonWords& c : sharing) most = std::max(most, c.count);
   std::vector<Scored> scored;
@@ -115,10 +124,13 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
   for (const Scored& s : scored) groups.push_back(group_of(map, s, scored, options_.group, options_.neighbour_weight));
   std::sort(groups.begin(), groups.end(), better);
   std::vector<Candidate> out;
-  // What a candidate stands for: itself and its neighbours. A landmark or two in common, seen through a door, are not one place.
+  // A group covers its representative and the neighbours of it. Keyframes that share only a few landmarks, for example
+  // through a door, count as different places.
   std::vector<std::uint8_t> taken(map.keyframe_slots(), 0);
   for (const Candidate& g : groups) {
-    if (out.size() == static_cast<std::size_t>(options_.max_candidates) || g.score < bounds.group_share * groups.front().score) break;
+    if (out.size() == static_cast<std::size_t>(options_.max_candidates) ||
+        g.score < bounds.group_share * groups.front().score)
+      break;
     if (taken[g.keyframe.index()]) continue;
     out.push_back(g);
     taken[g.keyframe.index()] = 1;

@@ -1,4 +1,5 @@
-// Where in the map might this frame have been taken? Appearance alone; geometry decides afterwards (looping/locate.h).
+// Place recognition by appearance: finds keyframes that may show the same place as a frame. Geometric verification
+// follows in looping/locate.h.
 #pragma once
 
 #include <memory>
@@ -14,28 +15,29 @@ namespace bslam::looping {
 
 struct Candidate {
   KeyframeId keyframe;
-  double score = 0;  // of its group, falling
+  double score = 0;  // of its group; candidates are sorted by decreasing score
 };
 
-// The neighbours of a keyframe, those that share much with it and whose place it therefore knows, in order of id.
-std::vector<map::Covisible> neighbours_of(const map::BundledMap& map, KeyframeId keyframe, const RecognitionOptions& options);
+// Returns the neighbours of a keyframe, that is the keyframes that share enough landmarks with it, in order of id.
+std::vector<map::Covisible> neighbours_of(const map::BundledMap& map, KeyframeId keyframe,
+                                          const RecognitionOptions& options);
 
-// An interface, so that another detector can stand in. Answers depend on the arguments alone, never on earlier calls.
+// Interface that allows other detectors. Results depend on the arguments only, never on earlier calls.
 class PlaceRecogniser {
  public:
   virtual ~PlaceRecogniser() = default;
 
-  // Prepares a frame to be asked about or to become a keyframe; nothing where that was done already.
+  // Computes what is needed to query a frame or to add it as a keyframe. Does nothing if that was done already.
   virtual void describe(frame::BundledFrame& frame) const = 0;
 
-  // Keyframes of `map` that may show the place of `keyframe`, but for its neighbours: those that share much with it.
+  // Returns keyframes of `map` that may show the place of `keyframe`, excluding its neighbours.
   virtual std::vector<Candidate> revisited(const map::BundledMap& map, KeyframeId keyframe) = 0;
 
-  // Keyframes of `map` that may show the place of a described frame.
+  // Returns keyframes of `map` that may show the place of a frame prepared by describe().
   virtual std::vector<Candidate> recognised(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
 };
 
-// Bag of words: every unique feature of every camera votes with its word.
+// Bag of words: each unique feature of every camera contributes its word.
 class BagOfWordsRecogniser : public PlaceRecogniser {
  public:
   BagOfWordsRecogniser(place::VocabularyPtr vocabulary, const RecognitionOptions& options);
@@ -50,15 +52,16 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   Words words_of(const frame::BundledFrame& frame) const;
   struct Bounds {
     double common_share, group_share;  // as in RecognitionOptions
-    double min_score = 0;              // of one keyframe
+    double min_score = 0;              // of a single keyframe
   };
-  std::vector<Candidate> rank(const map::BundledMap& map, const place::WordVector& words, const std::vector<std::uint8_t>& excluded,
-                              const Bounds& bounds) const;
+  std::vector<Candidate> rank(const map::BundledMap& map, const place::WordVector& words,
+                              const std::vector<std::uint8_t>& excluded, const Bounds& bounds) const;
 
   const place::VocabularyPtr vocabulary_;
   const RecognitionOptions options_;
   place::InvertedIndex index_;
-  std::vector<std::shared_ptr<const frame::BundledFrame>> known_;  // per keyframe slot of the index; null = none
+  // frame of each keyframe in the index, by slot; null if not in the index
+  std::vector<std::shared_ptr<const frame::BundledFrame>> known_;
 };
 
 }  // namespace bslam::looping

@@ -1,4 +1,4 @@
-// The scale between two ends of a loop, where the rig does not observe it.
+// Relative scale between the two ends of a loop, for maps whose scale is not observable.
 #pragma once
 
 #include <optional>
@@ -7,9 +7,9 @@
 
 namespace bslam::looping {
 
-// Units of the place per unit of the map about `keyframe`: how far away landmarks are that both know, by the one and by the
-// other, in the median. Images cannot tell it where the keyframe is back at the very spot, distances can. 1 where the map is
-// metric; empty where too few landmarks tell.
+// Scale of the map at the place over the scale at `keyframe`: the median ratio of the distances to landmarks that both
+// ends have triangulated. Distances give the scale even if the keyframe returned to exactly the same position, where
+// reprojection does not. Returns 1 if the map is metric, nullopt if too few landmarks are common.
 std::optional<double> relative_scale(const map::BundledMap& map, KeyframeId keyframe, const Location& location);
 
 }  // namespace bslam::looping

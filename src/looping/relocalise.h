@@ -1,4 +1,4 @@
-// Relocalisation: the pose of a frame nothing is known of, in any part of the map, from any of its cameras.
+// Relocalisation: estimates the pose of a frame without a pose prior in any submap, using all cameras.
 #pragma once
 
 #include <optional>
@@ -8,9 +8,10 @@
 
 namespace bslam::looping {
 
-// The frame is described (PlaceRecogniser::describe). Empty where no place is confirmed, and where two are that
-// contradict each other: rooms that look alike cannot be told apart from one frame.
-std::optional<Location> relocalise(PlaceRecogniser& recogniser, const map::BundledMap& map, const frame::BundledFrame& frame,
-                                   const VerificationOptions& options, const map::FeatureModel& features, Random random);
+// The frame must be prepared by PlaceRecogniser::describe. Returns nullopt if no place is verified, or if two verified
+// places contradict each other, since look-alike rooms cannot be distinguished from a single frame.
+std::optional<Location> relocalise(PlaceRecogniser& recogniser, const map::BundledMap& map,
+                                   const frame::BundledFrame& frame, const VerificationOptions& options,
+                                   const map::FeatureModel& features, Random random);
 
 }  // namespace bslam::looping

@@ -22,7 +22,8 @@ void append_keyframes(BundledMap& onto, const BundledMap& other, AppendedIds& id
   BSLAM_ASSERT(hung, "the links of a map are trees");
 }
 
-// The new id of the newest keyframe that is not newer than `k`, which may be removed; else of the oldest.
+// Returns the new id of `k` or, if `k` was removed, that of the newest older keyframe that is alive; if there is none,
+// that of the oldest keyframe.
 KeyframeId nearest_older(const AppendedIds& ids, KeyframeId k) {
   for (std::size_t i = k.index() + 1; i-- > 0;) {
     if (ids.keyframes[i].valid()) return ids.keyframes[i];
@@ -36,11 +37,12 @@ KeyframeId nearest_older(const AppendedIds& ids, KeyframeId k) {
 }  // namespace
 
 bool hang_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeId> parents) {
-  std::vector<std::size_t> waiting_for(parents.size(), 0);  // children that do not hang yet
+  std::vector<std::size_t> waiting_for(parents.size(), 0);  // number of children not attached yet
   for (const KeyframeId parent : parents) {
     if (parent.valid()) ++waiting_for[parent.index() - first.index()];
   }
-  // From the leaves up: every parent is still a root when its children come, so that finding its root takes one step.
+  // Attach from the leaves up: every parent is still a root when its children are attached, so finding its root takes
+  // one step.
   std::vector<std::size_t> ready;
   for (std::size_t i = 0; i < parents.size(); ++i) {
     if (waiting_for[i] == 0) ready.push_back(i);

@@ -1,4 +1,4 @@
-// Maps put together: the keyframes and landmarks of one as further parts of another.
+// Merging of maps: the keyframes and landmarks of one map are appended to another as further submaps.
 #pragma once
 
 #include <span>
@@ -8,21 +8,22 @@
 
 namespace bslam::map {
 
-// Ids the keyframes and landmarks of the other map have got, by its slots; invalid where it had removed them. Landmarks
-// it had merged are not forwarded.
+// The new ids of the keyframes and landmarks of the appended map, indexed by their old ids; invalid for those that had
+// been removed. Landmarks that had been merged into another one are not forwarded.
 struct AppendedIds {
   std::vector<KeyframeId> keyframes;
   std::vector<LandmarkId> landmarks;
 };
 
-// Appends everything alive in `other`, in order of id, to `onto`: poses, spanning trees and observations as they are,
-// frames shared, what landmarks look like computed anew. Its parts share nothing with those of `onto`: they lie
-// wherever their own map has them until join_parts and a correction bring them together. Both maps are of one rig and
-// one pyramid; scale and gauge epoch stay those of `onto`.
+// Appends all alive keyframes and landmarks of `other` to `onto` in order of id: poses, spanning trees and observations
+// are kept, frames are shared, and landmark appearance is recomputed. The appended submaps share no landmarks with
+// those of `onto` and keep their own world frames until join_parts and a correction of the poses connect them. Both
+// maps must have the same rig and pyramid. The scale and gauge epoch of `onto` are kept.
 AppendedIds append_map(BundledMap& onto, const BundledMap& other);
 
-// Hangs keyframes `first`, `first` + 1, ..., each of which is a part of its own, below `parents`, which are among them;
-// those with an invalid one stay roots. False, with some of them hung, where the links close a circle.
+// Builds spanning trees from keyframes `first`, `first` + 1, ..., each of which must be a submap of its own: each one
+// is attached to its entry in `parents`, which refers to one of these keyframes; those with an invalid parent stay
+// roots. Returns false, with some keyframes already attached, if the links contain a cycle.
 bool hang_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeId> parents);
 
 }  // namespace bslam::map

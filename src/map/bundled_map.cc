@@ -7,7 +7,7 @@
 namespace bslam::map {
 namespace {
 
-// How the rig moved from the time of the keyframe to that of camera c's image.
+// Motion of the rig from the keyframe's time to the capture time of camera c's image.
 geometry::SE3 motion_of(const BundledKeyframe& k, CameraIndex c) {
   const double delay = k.frame->delay_s(c.index());
   return delay == 0.0 ? geometry::SE3() : geometry::SE3::exp(delay * k.twist);
@@ -70,7 +70,8 @@ geometry::SE3 BundledMap::resolved_pose(KeyframeId k) const {
   const BundledKeyframe* entry = &keyframe(k);
   if (entry->alive) return entry->T_rig_world;
   geometry::SE3 T_rig_ancestor;
-  for (; !entry->alive && entry->parent.valid(); entry = &keyframe(entry->parent)) T_rig_ancestor = T_rig_ancestor * entry->T_rig_parent;
+  for (; !entry->alive && entry->parent.valid(); entry = &keyframe(entry->parent))
+    T_rig_ancestor = T_rig_ancestor * entry->T_rig_parent;
   return T_rig_ancestor * entry->T_rig_world;
 }
 
@@ -79,7 +80,9 @@ geometry::SE3 BundledMap::rig_from_cam(const BundledKeyframe& k, CameraIndex c) 
   return k.frame->delay_s(c.index()) == 0.0 ? T_rig_cam : motion_of(k, c).inverse() * T_rig_cam;
 }
 
-camera::Rig BundledMap::rig_of(KeyframeId k) const { return frame::rig_of(*rig_, *keyframe(k).frame, keyframe(k).twist); }
+camera::Rig BundledMap::rig_of(KeyframeId k) const {
+  return frame::rig_of(*rig_, *keyframe(k).frame, keyframe(k).twist);
+}
 
 geometry::SE3 BundledMap::motion_until(KeyframeId k, CameraIndex c) const { return motion_of(keyframe(k), c); }
 
@@ -161,7 +164,7 @@ bool BundledMap::remove_observation(LandmarkId l, KeyframeId k) {
   unlink(l, Observation(*at));
   const auto rest = observations(l);
   if (rest.empty()) {
-    bury(l, {});
+    mark_removed(l, {});
   } else if (landmark(l).reference.keyframe == k) {
     const Observation oldest = rest.front();
     edit(l).reference = {oldest.keyframe, keyframe(oldest.keyframe).frame->bundled.keypoints(oldest.feature).front()};
@@ -172,7 +175,7 @@ bool BundledMap::remove_observation(LandmarkId l, KeyframeId k) {
 bool BundledMap::remove_landmark(LandmarkId l) {
   if (!alive(l)) return false;
   while (!observations(l).empty()) unlink(l, Observation(observations(l).back()));
-  bury(l, {});
+  mark_removed(l, {});
   return true;
 }
 
@@ -182,11 +185,11 @@ bool BundledMap::merge_landmarks(LandmarkId from, LandmarkId into) {
   const std::vector<Observation> moving(list.begin(), list.end());
   for (Observation o : moving) {
     unlink(from, o);
-    o.aligned = false;  // to the patch of another reference
+    o.aligned = false;  // it was aligned to the patch of another reference keypoint
     add_observation(into, o);
   }
   add_sightings(into, landmark(from).expected, landmark(from).found);
-  bury(from, into);
+  mark_removed(from, into);
   return true;
 }
 
@@ -200,7 +203,7 @@ bool BundledMap::remove_keyframe(KeyframeId k) {
   BundledKeyframe& entry = edit(k);
   const geometry::SE3& T_parent_world = keyframe(entry.parent).T_rig_world;
   entry.T_rig_parent = entry.T_rig_world * T_parent_world.inverse();
-  let_go(k);
+  mark_removed(k);
   return true;
 }
 
@@ -219,7 +222,7 @@ bool BundledMap::remove_part(KeyframeId root) {
   for (const LandmarkId l : table) {
     if (l.valid()) remove_observation(l, root);
   }
-  let_go(root);
+  mark_removed(root);
   return true;
 }
 
@@ -274,12 +277,13 @@ bool BundledMap::add_sightings(LandmarkId l, std::uint32_t expected, std::uint32
 }
 
 void BundledMap::free_removed(std::size_t slots) {
-  const std::size_t groups = landmarks_.size() / kGroup;  // full ones
-  for (std::size_t n = std::min(slots / kGroup, groups); n > 0; --n) {
-    if (freed_up_to_ >= groups) freed_up_to_ = 0;
-    const std::size_t group = freed_up_to_++;
+  const std::size_t groups = landmarks_.size() / kLandmarksPerChunk;  // blocks that are full
+  for (std::size_t n = std::min(slots / kLandmarksPerChunk, groups); n > 0; --n) {
+    if (next_chunk_to_free_ >= groups) next_chunk_to_free_ = 0;
+    const std::size_t group = next_chunk_to_free_++;
     bool gone = true;
-    for (std::size_t l = group * kGroup; gone && l < (group + 1) * kGroup; ++l) gone = !landmarks_[l].alive;
+    for (std::size_t l = group * kLandmarksPerChunk; gone && l < (group + 1) * kLandmarksPerChunk; ++l)
+      gone = !landmarks_[l].alive;
     if (!gone) continue;
     landmarks_.blank_chunk(group, owner_.tag());
     observations_.blank_block(group, owner_.tag());
@@ -309,7 +313,7 @@ std::vector<KeyframeId> BundledMap::part_of(KeyframeId root) const {
   return part;
 }
 
-void BundledMap::let_go(KeyframeId k) {
+void BundledMap::mark_removed(KeyframeId k) {
   BundledKeyframe& entry = edit(k);
   entry.frame.reset();
   entry.landmarks.clear();
@@ -318,7 +322,7 @@ void BundledMap::let_go(KeyframeId k) {
   --alive_keyframes_;
 }
 
-void BundledMap::bury(LandmarkId l, LandmarkId merged_into) {
+void BundledMap::mark_removed(LandmarkId l, LandmarkId merged_into) {
   edit(l).alive = false;
   if (merged_into.valid()) merged_into_.mutate(l.index(), owner_.tag()) = merged_into;
   --alive_landmarks_;

@@ -6,7 +6,7 @@
 namespace bslam::map {
 namespace {
 
-// Of two neighbours, the one with more weight; of equal ones the newer.
+// Orders neighbours by decreasing weight, newer first on ties.
 bool better(const Covisible& a, const Covisible& b) {
   return a.weight != b.weight ? a.weight > b.weight : a.keyframe > b.keyframe;
 }
@@ -40,7 +40,7 @@ void BundledMap::change_half_weight(KeyframeId at, KeyframeId neighbour, int cha
 }
 
 void BundledMap::connect_new_keyframe(KeyframeId k) {
-  std::vector<int> weight(k.index(), 0);  // per older keyframe
+  std::vector<int> weight(k.index(), 0);  // number of shared landmarks per older keyframe
   for (const LandmarkId l : keyframe(k).landmarks) {
     if (!l.valid()) continue;
     for (const Observation& o : observations(l)) {
@@ -68,7 +68,7 @@ void BundledMap::attach(KeyframeId child, KeyframeId parent) {
   children.insert(std::ranges::lower_bound(children, child), child);
 }
 
-// Turns the links round on the way up from `k`.
+// Reverses the parent links on the path from `k` to the root.
 void BundledMap::make_root(KeyframeId k) {
   KeyframeId child = k, parent = keyframe(k).parent;
   edit(k).parent = KeyframeId();
@@ -81,8 +81,9 @@ void BundledMap::make_root(KeyframeId k) {
   }
 }
 
-// The children are attached one after the other to the removed keyframe's parent or to a child attached before, always
-// the strongest link of those that are left; so no circle can close. Children without a link go to the parent.
+// The children are attached one at a time to the parent of the removed keyframe or to a child attached before, always
+// the one with the largest covisibility weight first, so no cycle can form. Children without covisible keyframes among
+// these are attached to the parent.
 void BundledMap::hand_over_children(KeyframeId removed) {
   const KeyframeId parent = keyframe(removed).parent;
   std::erase(edit(parent).children, removed);

@@ -1,9 +1,9 @@
-// Vectors whose copies share memory until one of them is changed (copy on write), and who may change which piece.
+// Copy-on-write vectors: copies share memory until one of them is modified.
 //
-// Every piece carries the tag of the copy that made it; a copy changes a piece in place if and only if the piece bears
-// its own tag, and makes its own piece otherwise. Reference counts decide about lifetime only, never about writing: a
-// count of one, as read by one thread, says nothing about what another thread read from the piece just before it let
-// go.
+// Every piece of memory carries the tag of the copy that created it. A copy modifies a piece in place only if the piece
+// has its own tag; otherwise it creates a private piece. Reference counts determine lifetime only and never permission
+// to write: a count of one, as read by one thread, says nothing about what another thread read from the piece just
+// before it released it.
 #pragma once
 
 #include <array>
@@ -18,9 +18,10 @@
 
 namespace bslam::map {
 
-// The tag of one copy of a family of values that share pieces. Copying takes the right to change pieces in place from
-// both sides, as all pieces are shared from then on; each side draws a new tag, unique in the family, at its next
-// change. So copying is safe from several threads at once, which is what drafts do with a published version.
+// The tag of one copy within a family of values that share pieces. Copying revokes the right of both sides to modify
+// existing pieces in place, since all of them are shared afterwards; each side draws a new tag, unique in the family,
+// at its next change. Copying is therefore safe from several threads at once, which is how drafts copy a published
+// version.
 class CowOwner {
  public:
   CowOwner() : family_(std::make_shared<std::atomic<std::uint64_t>>(0)) {}
@@ -42,7 +43,7 @@ class CowOwner {
   }
   ~CowOwner() = default;
 
-  // The tag of pieces that may be changed in place. Only for whoever may change the value.
+  // The tag of pieces that may be modified in place. Only the owner that may modify the value calls this.
   std::uint64_t tag() {
     if (shared_.load(std::memory_order_relaxed)) {
       tag_ = family_->fetch_add(1, std::memory_order_relaxed) + 1;
@@ -56,15 +57,15 @@ class CowOwner {
     if (!shared_.load(std::memory_order_relaxed)) shared_.store(true, std::memory_order_relaxed);
   }
 
-  std::shared_ptr<std::atomic<std::uint64_t>> family_;  // last tag given
+  std::shared_ptr<std::atomic<std::uint64_t>> family_;  // the last tag assigned
   std::uint64_t tag_ = 0;
-  // Relaxed order does: whoever copies or changes a value has it by a synchronised way already. It is atomic because
-  // several threads may copy one published value at a time.
+  // Relaxed memory order suffices: whoever copies or modifies a value has obtained it through a synchronised path. The
+  // flag is atomic because several threads may copy the same published value concurrently.
   mutable std::atomic<bool> shared_ = true;
 };
 
-// Two-level: nodes of chunks, so that a copy costs one shared pointer per 64 chunks. `tag` is that of the CowOwner
-// which lives, and is copied, beside the vector.
+// Two levels, nodes of chunks, so that a copy costs one shared pointer per 64 chunks. `tag` is the tag of the CowOwner
+// that is stored and copied together with the vector.
 template <class T, std::size_t kChunk>
 class CowVector {
  public:
@@ -73,7 +74,7 @@ class CowVector {
     return nodes_[i / kPerNode]->chunks[i / kChunk % kNode]->values[i % kChunk];
   }
 
-  // For writing: detaches the chunk of element i where it is not this copy's own.
+  // Mutable access: detaches the chunk of element i unless this copy owns it.
   T& mutate(std::size_t i, std::uint64_t tag) {
     std::shared_ptr<Node>& node = nodes_[i / kPerNode];
     detach(node, tag);
@@ -82,10 +83,10 @@ class CowVector {
     return chunk->values[i % kChunk];
   }
 
-  // Gives up the memory of a full chunk: its elements get default values, in a piece that all such chunks share.
+  // Releases the memory of a full chunk: its elements become default values in a piece shared by all such chunks.
   void blank_chunk(std::size_t chunk, std::uint64_t tag) {
     BSLAM_ASSERT((chunk + 1) * kChunk <= size_, "a chunk is full before it is given up");
-    static const std::shared_ptr<Chunk> kBlank = std::make_shared<Chunk>(Chunk{kNobody, {}});
+    static const std::shared_ptr<Chunk> kBlank = std::make_shared<Chunk>(Chunk{kNoOwner, {}});
     if (nodes_[chunk / kNode]->chunks[chunk % kNode] == kBlank) return;
     detach(nodes_[chunk / kNode], tag);
     nodes_[chunk / kNode]->chunks[chunk % kNode] = kBlank;
@@ -102,8 +103,8 @@ class CowVector {
   }
 
  private:
-  static constexpr std::uint64_t kNobody = ~std::uint64_t{0};  // a tag that is never given
-  static constexpr std::size_t kNode = 64;                     // chunks
+  static constexpr std::uint64_t kNoOwner = ~std::uint64_t{0};  // a tag that is never assigned
+  static constexpr std::size_t kNode = 64;                      // chunks per node
   static constexpr std::size_t kPerNode = kNode * kChunk;
   struct Chunk {
     std::uint64_t tag;
@@ -139,7 +140,7 @@ class CowArray {
   auto begin() const { return values().begin(); }
   auto end() const { return values().end(); }
 
-  // For writing: detaches the array where it is not this copy's own.
+  // Mutable access: detaches the array unless this copy owns it.
   std::vector<T>& mutate(std::uint64_t tag) {
     if (!piece_) {
       piece_ = std::make_shared<Piece>(Piece{tag, {}});

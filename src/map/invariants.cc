@@ -1,4 +1,4 @@
-// BundledMap::check_invariants: everything is recomputed from scratch and compared.
+// BundledMap::check_invariants: recomputes everything from scratch and compares.
 #include <algorithm>
 #include <map>
 #include <set>
@@ -24,7 +24,8 @@ Broken check_reference(const BundledMap& map, LandmarkId l) {
   return name(l) + " has its reference in " + name(reference.keyframe) + ", which is none of its observations";
 }
 
-// Lists of one landmark against the keyframes' tables; adds its keypoints to `keypoints`.
+// Checks the observations of one landmark against the landmark tables of the keyframes; adds the number of its
+// keypoints to `keypoints`.
 Broken check_landmark(const BundledMap& map, LandmarkId l, std::size_t& keypoints) {
   const auto list = map.observations(l);
   if (!map.landmark(l).alive) {
@@ -89,7 +90,7 @@ Broken check_covisibility(const BundledMap& map, KeyframeId k) {
   return {};
 }
 
-// Walks the trees down from their roots.
+// Checks that every keyframe is reachable from a root.
 Broken check_tree(const BundledMap& map) {
   const std::vector<KeyframeId> ids = map.keyframe_ids();
   std::vector<KeyframeId> stack;

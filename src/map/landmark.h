@@ -1,9 +1,8 @@
-// A landmark of the map and the features that observe it.
+// A landmark of the map and its observations.
 #pragma once
 
-#include <cstdint>
-
 #include <Eigen/Core>
+#include <cstdint>
 
 #include "base/id.h"
 #include "feature/keypoints.h"
@@ -11,31 +10,36 @@
 
 namespace bslam::map {
 
-// Unique feature `feature` of keyframe `keyframe` shows the landmark; each keypoint of the feature gives one residual.
+// Unique feature `feature` of keyframe `keyframe` observes the landmark; each keypoint of the feature gives one
+// residual.
 struct Observation {
   KeyframeId keyframe;
   FeatureId feature;
-  bool aligned = true;  // its keypoints were placed by the landmark's reference patch, so that their own sigma holds; else
-                        // they were found by descriptor alone, or belonged to a landmark merged into this one
+  // Whether the keypoints were aligned to the landmark's reference patch, so that their own sigma applies. Otherwise
+  // they were matched by descriptor only, or were aligned to a landmark that was merged into this one.
+  bool aligned = true;
   friend auto operator<=>(const Observation&, const Observation&) = default;
 };
 
-// The keypoint whose patch and level all other observations of a landmark are aligned to.
+// The keypoint whose patch and pyramid level are the reference for aligning all other observations of a landmark.
 struct LandmarkReference {
   KeyframeId keyframe;
   frame::KeypointRef keypoint;
   friend bool operator==(const LandmarkReference&, const LandmarkReference&) = default;
 };
 
-// What is known of one landmark, but for its observations, which are a column of their own.
+// The data of one landmark except its observations, which are stored in a separate column.
 struct Landmark {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();        // metres, map
-  Eigen::Vector3d view_direction = Eigen::Vector3d::Zero();  // mean unit vector from the cameras that see it to it, map
-  float min_distance = 0, max_distance = 0;  // metres: where its reference level's neighbours in scale can be found
-  feature::Descriptor descriptor{};          // medoid of its observations
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // metres, map
+  // mean unit vector from the observing cameras to the landmark, map frame
+  Eigen::Vector3d view_direction = Eigen::Vector3d::Zero();
+  // Metres. Distances at which the landmark can be matched within one pyramid level of its reference level.
+  float min_distance = 0, max_distance = 0;
+  feature::Descriptor descriptor{};  // the medoid of its observations' descriptors
   LandmarkReference reference;
-  KeyframeId born;                     // newest keyframe when it was made
-  std::uint32_t expected = 0, found = 0;  // frames in which it should have been seen, and was
+  KeyframeId born;  // newest keyframe when the landmark was created
+  // number of frames in which it was predicted visible, and in which it was matched
+  std::uint32_t expected = 0, found = 0;
   bool alive = false;
 };
 

@@ -4,7 +4,8 @@
 
 namespace bslam::map {
 
-MapDraft::MapDraft(std::string_view stage, MapSnapshot base) : edit_{stage, std::move(base), {}}, working_(*edit_.base) {}
+MapDraft::MapDraft(std::string_view stage, MapSnapshot base)
+    : edit_{stage, std::move(base), {}}, working_(*edit_.base) {}
 
 KeyframeId MapDraft::add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                                   std::vector<std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent) {
@@ -85,7 +86,8 @@ void MapDraft::set_twists(std::vector<std::pair<KeyframeId, geometry::Vector6d>>
 }
 
 void MapDraft::add_sightings(std::vector<Sighting> sightings) {
-  for (Sighting& s : sightings) s.landmark = working_.resolve(s.landmark);  // noted over several versions
+  // The counts were collected over several map versions.
+  for (Sighting& s : sightings) s.landmark = working_.resolve(s.landmark);
   std::erase_if(sightings, [&](const Sighting& s) { return !working_.add_sightings(s.landmark, s.expected, s.found); });
   if (sightings.empty()) return;
   edit_.operations.emplace_back(AddSightings{std::move(sightings)});

@@ -1,36 +1,39 @@
-// A proposed change of the map, as a value: what a stage hands to MapStore::commit.
+// A proposed change of the map, as a value: what a stage passes to MapStore::commit.
 //
-// Rebase rules, where other edits were committed between the edit's base and its commit (`newer` = made by those others):
-// | operation         | rule                                                                                         |
-// | AddKeyframe       | gets the next id; matches to removed landmarks are dropped, to merged ones are forwarded;    |
-// |                   | where its parent was moved since the base, it moves along; where the part of its parent was  |
-// |                   | removed, it begins one                                                                       |
-// | AddLandmark       | gets the next id; observations in removed keyframes or taken features are dropped; with none |
-// |                   | left the landmark is dropped; where the keyframe of its reference was moved since the base,  |
-// |                   | it moves along                                                                               |
-// | AddObservation    | forwarded along merges; dropped where landmark or keyframe is gone, the feature is taken or  |
-// |                   | the keyframe observes the landmark already                                                   |
-// | RemoveObservation | dropped where it is gone already, also by a merge                                            |
-// | RemoveLandmark    | dropped where it is gone already, also by a merge; and where a newer keyframe observes it    |
-// | MergeLandmarks    | both ends forwarded; dropped where they are one already or one is gone                       |
-// | RemoveKeyframe    | dropped where it is gone already or is the root                                              |
-// | SetPoses          | dropped where a correction was committed since the base: the next adjustment starts from it;  |
-// |                   | entries of removed keyframes and of removed or merged landmarks are dropped; newer keyframes |
-// |                   | move with their parent (chains with the nearest older ancestor), newer landmarks with the    |
-// |                   | keyframe of their reference                                                                  |
-// | SetTwists         | entries of removed keyframes are dropped; they grow as lengths about the keyframe have since |
-// |                   | the base                                                                                     |
-// | ScalePart         | scales what is newer along; dropped where the part is gone or has become part of another     |
-// | JoinParts         | a removed keyframe stands for its nearest ancestor; dropped where they are of one part       |
-// | RemovePart        | dropped where it is gone already or has become part of another                               |
-// | AddSightings      | forwarded along merges, entries dropped where gone                                           |
-// | RefreshLandmarks  | forwarded along merges, entries dropped where gone                                           |
-// | SetScale, SetRig  | the later one holds                                                                          |
-// An edit that corrects the map (SetPoses::correction, ScalePart) is refused as a whole where another correction was committed since
-// its base: half of it, landmarks merged and parts hung together that were not moved, would tear the map.
-// So the order in which a new keyframe and a correction of its surroundings are committed does not change where it ends
-// up. An operation of several entries counts as dropped where all of them are. An operation on something the edit itself
-// added is dropped where that was.
+// Rebase rules, for the case that other edits were committed between the edit's base version and its own commit.
+// "Newer" means created by those other edits.
+//
+// | operation         | rule                                                                                     |
+// | AddKeyframe       | gets the next id; matches to removed landmarks are dropped, those to merged ones         |
+// |                   | forwarded; if its parent has moved since the base, the keyframe moves with it; if the    |
+// |                   | submap of its parent was removed, the keyframe becomes the root of a new submap          |
+// | AddLandmark       | gets the next id; observations by removed keyframes or of features that already have a   |
+// |                   | landmark are dropped, and the landmark itself if none are left; if the keyframe of its   |
+// |                   | reference has moved since the base, the landmark moves with it                           |
+// | AddObservation    | forwarded along merges; dropped if the landmark or keyframe was removed, the feature     |
+// |                   | already has a landmark, or the keyframe already observes the landmark                    |
+// | RemoveObservation | dropped if the observation no longer exists, also because of a merge                     |
+// | RemoveLandmark    | dropped if it was already removed or merged, or if a newer keyframe observes it          |
+// | MergeLandmarks    | both ends are forwarded; dropped if they are already the same or one was removed         |
+// | RemoveKeyframe    | dropped if it was already removed or is a root                                           |
+// | SetPoses          | dropped if a correction was committed since the base (the next adjustment starts from    |
+// |                   | it); entries of removed keyframes and of removed or merged landmarks are dropped; newer  |
+// |                   | keyframes move with their parent (chains of them with the nearest ancestor that is not   |
+// |                   | newer), newer landmarks with the keyframe of their reference                             |
+// | SetTwists         | entries of removed keyframes are dropped; translational velocities are multiplied by the |
+// |                   | change of scale at the keyframe since the base                                           |
+// | ScalePart         | also scales newer keyframes and landmarks; dropped if the submap was removed or merged   |
+// | JoinParts         | a removed keyframe is replaced by its nearest alive ancestor; dropped if both are in the |
+// |                   | same submap                                                                              |
+// | RemovePart        | dropped if the submap was already removed or merged                                      |
+// | AddSightings      | forwarded along merges; entries of removed landmarks are dropped                         |
+// | RefreshLandmarks  | forwarded along merges; entries of removed landmarks are dropped                         |
+// | SetScale, SetRig  | the last one committed wins                                                              |
+// An edit that corrects the map (SetPoses::correction, ScalePart) is rejected as a whole if another correction was
+// committed since its base: applying only part of it, for example merged landmarks and joined submaps without the
+// corrected poses, would break the map. With these rules the final pose of a new keyframe does not depend on whether it
+// is committed before or after a correction of its surroundings. An operation with several entries counts as dropped if
+// all entries are dropped. An operation on something the edit itself added is dropped if that addition was.
 #pragma once
 
 #include <memory>
@@ -43,13 +46,13 @@
 
 namespace bslam::map {
 
-// Ids of things an edit adds are provisional: those the base version would give next.
+// Ids of things that an edit adds are provisional: the ids that the base version would assign next.
 struct AddKeyframe {
   KeyframeId provisional;
   std::shared_ptr<const frame::BundledFrame> frame;
   geometry::SE3 T_rig_world;
   std::vector<std::pair<FeatureId, LandmarkId>> matches;
-  KeyframeId parent;  // in the draft; invalid for the root of a part
+  KeyframeId parent;  // parent in the draft; invalid for the root of a submap
 };
 struct AddLandmark {
   LandmarkId provisional;
@@ -85,9 +88,9 @@ struct ScalePart {
   double factor = 1.0;
 };
 struct SetPoses {
-  std::vector<std::pair<KeyframeId, geometry::SE3>> keyframes;        // T_rig_world
+  std::vector<std::pair<KeyframeId, geometry::SE3>> keyframes;  // T_rig_world
   std::vector<std::pair<LandmarkId, Eigen::Vector3d>> landmarks;
-  bool correction = false;  // moves the map as a whole: begins a gauge epoch
+  bool correction = false;  // a correction of the whole map: begins a gauge epoch
 };
 struct SetTwists {
   std::vector<std::pair<KeyframeId, geometry::Vector6d>> keyframes;  // BundledKeyframe::twist
@@ -111,30 +114,33 @@ struct SetRig {
   std::shared_ptr<const camera::Rig> rig;
 };
 
-using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark, MergeLandmarks,
-                               RemoveKeyframe, JoinParts, RemovePart, ScalePart, SetPoses, SetTwists, AddSightings, RefreshLandmarks,
-                               SetScale, SetRig>;
+using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark,
+                               MergeLandmarks, RemoveKeyframe, JoinParts, RemovePart, ScalePart, SetPoses, SetTwists,
+                               AddSightings, RefreshLandmarks, SetScale, SetRig>;
 
 struct MapEdit {
-  std::string_view stage;  // a literal
+  std::string_view stage;  // a string literal
   MapSnapshot base;
   std::vector<Operation> operations;
 };
 
-// A snapshot with a private overlay: a stage writes to it, reads back what it wrote, and hands out the edit. One per run
-// of a stage; not shared between threads. Functions that return bool do as those of BundledMap; what changes nothing is
-// not recorded.
+// A snapshot with private changes: a stage writes to it, reads its own changes back, and finally extracts the edit. One
+// draft per run of a stage; not thread-safe. Functions that return bool behave like those of BundledMap; an operation
+// that changes nothing is not recorded.
 class MapDraft {
  public:
   MapDraft(std::string_view stage, MapSnapshot base);
 
-  const BundledMap& map() const { return working_; }  // the base with all that was written so far
+  const BundledMap& map() const { return working_; }  // the base version with all changes so far
   bool corrects() const { return working_.gauge_epoch() != edit_.base->gauge_epoch(); }
-  // A correction that newer ones have overtaken, `newest` being the newest version: committing it is refused.
-  bool overtaken(const BundledMap& newest) const { return corrects() && edit_.base->gauge_epoch() != newest.gauge_epoch(); }
+  // Returns true if the draft contains a correction and another correction has been committed since its base; `newest`
+  // is the newest version. Committing such a draft is rejected.
+  bool overtaken(const BundledMap& newest) const {
+    return corrects() && edit_.base->gauge_epoch() != newest.gauge_epoch();
+  }
 
-  // Matches may stem from an older version: those to merged landmarks are forwarded; those to removed ones, and later ones
-  // of a feature or landmark that occurs twice, are dropped.
+  // The matches may refer to an older version of the map: those to merged landmarks are forwarded; those to removed
+  // landmarks, and repeated features or landmarks after the first, are dropped.
   KeyframeId add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                           std::vector<std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent);
   LandmarkId add_landmark(const Eigen::Vector3d& position, std::vector<Observation> observations,
@@ -147,16 +153,16 @@ class MapDraft {
   bool join_parts(KeyframeId child, KeyframeId parent);
   bool remove_part(KeyframeId root);
   bool scale_part(KeyframeId root, double factor);
-  // Entries of what is not alive are left out.
+  // Entries of removed keyframes and landmarks are ignored.
   void set_poses(SetPoses poses);
   void set_twists(std::vector<std::pair<KeyframeId, geometry::Vector6d>> twists);
   void add_sightings(std::vector<Sighting> sightings);
   void refresh_landmarks(std::vector<LandmarkId> landmarks);
-  void set_scale(Scale scale);  // nothing more being known of it than its name says
+  void set_scale(Scale scale);  // with deviation 0 for kMetric, infinite otherwise
   void set_scale(Scale scale, double deviation);
   void set_rig(camera::Rig rig);  // the same cameras with other extrinsics
 
-  // The edit and the working copy, which MapStore publishes as it is where the base is still the newest version.
+  // The edit, and the working copy. MapStore publishes the copy unchanged if the base is still the newest version.
   struct Finished {
     MapEdit edit;
     BundledMap result;

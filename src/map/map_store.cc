@@ -3,7 +3,7 @@
 namespace bslam::map {
 namespace {
 
-constexpr std::size_t kSlotsPerCommit = 1024;  // of landmarks, looked at for what removed ones leave behind
+constexpr std::size_t kSlotsPerCommit = 1024;  // number of landmark slots checked for memory to release
 
 }  // namespace
 
@@ -49,7 +49,8 @@ CommitReport MapStore::commit(MapDraft draft) {
     const std::lock_guard lock(mutex_);
     current_ = report.published;
   }
-  return report;  // `current` lets the old version go only here, outside of the lock readers wait for
+  // The previous version in `current` is destroyed here, after the lock that readers wait for was released.
+  return report;
 }
 
 }  // namespace bslam::map

@@ -1,4 +1,4 @@
-// The one place where the map changes.
+// The only place where the map is modified.
 #pragma once
 
 #include <memory>
@@ -9,33 +9,34 @@
 
 namespace bslam::map {
 
-// What became of an edit: how it was applied, and the new version.
+// How an edit was applied, and the resulting version.
 struct CommitReport : RebaseReport {
   MapSnapshot published;
-  bool rebased = false;  // other edits had been committed since its base
-  bool refused = false;  // a correction that another one overtook: nothing of it was applied, nothing published
+  bool rebased = false;  // other edits had been committed since the base
+  // the edit was a correction with another correction committed since its base; nothing was applied or published
+  bool refused = false;
 };
 
-// Versions it hands out are const and are never changed, nor is anything that could change them handed out: a draft works
-// on its own copy. See cow_vector.h for why the memory they share is safe to read while drafts are written.
+// Published versions are const and never modified: a draft works on its own copy. cow_vector.h explains why memory
+// shared with drafts can be read safely while they are written.
 class MapStore {
  public:
   explicit MapStore(BundledMap initial);
 
-  // The newest version; from any thread.
+  // Returns the newest version. Thread-safe.
   MapSnapshot snapshot() const;
 
-  // Leaves all behind and publishes `initial`. No draft of an earlier version may be committed afterwards.
+  // Discards everything and publishes `initial`. Drafts of earlier versions must not be committed afterwards.
   void restart(BundledMap initial);
 
-  // Publishes the draft as the next version: its working copy as it is where its base is still the newest, with the
-  // provisional ids as given; else its operations, applied to the newest by the rebase rules of map_edit.h. From any
-  // thread; commits are one after the other.
+  // Publishes the draft as the next version. If its base is still the newest version, its working copy is published
+  // unchanged, and provisional ids become final; otherwise its operations are applied to the newest version by the
+  // rebase rules of map_edit.h. Thread-safe; commits are serialised.
   CommitReport commit(MapDraft draft);
 
  private:
-  mutable std::mutex mutex_;   // guards current_
-  std::mutex commit_mutex_;    // held by the writer
+  mutable std::mutex mutex_;  // guards current_
+  std::mutex commit_mutex_;   // held by the writer
   MapSnapshot current_;
 };
 

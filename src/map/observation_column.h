@@ -1,4 +1,4 @@
-// The observations of all landmarks: one list each, shared between versions of the map in blocks.
+// The observation lists of all landmarks, shared between map versions in blocks.
 #pragma once
 
 #include <array>
@@ -11,11 +11,11 @@
 
 namespace bslam::map {
 
-// Lists are in order of keyframe. Those of kBlock neighbouring landmarks lie in one array (compressed rows), so that
-// detaching a block costs one allocation and not one per landmark. `tag` as in CowVector.
+// Each list is ordered by keyframe. The lists of kBlock neighbouring landmarks are stored in one array (compressed
+// rows), so that detaching a block costs one allocation instead of one per landmark. `tag` is as in CowVector.
 class ObservationColumn {
  public:
-  // Valid until the next change.
+  // The span is valid until the next change.
   std::span<const Observation> operator[](std::size_t landmark) const {
     const Block& block = blocks_[landmark / kBlock];
     const std::size_t row = landmark % kBlock;
@@ -24,18 +24,18 @@ class ObservationColumn {
 
   // Appends a landmark without observations.
   void push_back(std::uint64_t tag);
-  // The landmark has no observation of that keyframe yet.
+  // The landmark must not have an observation by that keyframe yet.
   void insert(std::size_t landmark, Observation o, std::uint64_t tag);
-  // The landmark has this observation.
+  // The landmark must have this observation.
   void erase(std::size_t landmark, Observation o, std::uint64_t tag);
 
   static constexpr std::size_t kBlock = 16;
-  // Gives up the memory of a full block of landmarks without observations.
+  // Releases the memory of a full block of landmarks without observations.
   void blank_block(std::size_t block, std::uint64_t tag) { blocks_.blank_chunk(block, tag); }
 
  private:
   struct Block {
-    std::array<std::uint32_t, kBlock + 1> begin{};  // into entries
+    std::array<std::uint32_t, kBlock + 1> begin{};  // indices into entries
     std::vector<Observation> entries;
   };
   CowVector<Block, 1> blocks_;

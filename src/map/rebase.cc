@@ -10,30 +10,33 @@ namespace {
 
 using geometry::SE3;
 
-// How things that hang on a keyframe move in the map when its T_rig_world goes from `before` to `after` and the lengths
-// about it become `grown` times as long: both poses and points keep their place in the keyframe.
+// Motion of poses and points attached to a keyframe when its T_rig_world changes from `before` to `after` and lengths
+// about it are multiplied by `scale_change`: they keep their pose or position relative to the keyframe.
 struct Move {
   SE3 before, after;
-  double grown = 1.0;
+  double scale_change = 1.0;
   SE3 pose(const SE3& T_rig_world) const {
     const SE3 T_rig_keyframe = T_rig_world * before.inverse();
-    return geometry::scaled(T_rig_keyframe, grown) * after;
+    return geometry::scaled(T_rig_keyframe, scale_change) * after;
   }
-  Eigen::Vector3d point(const Eigen::Vector3d& position) const { return after.inverse() * (grown * (before * position)); }
+  Eigen::Vector3d point(const Eigen::Vector3d& position) const {
+    return after.inverse() * (scale_change * (before * position));
+  }
 };
 
-// Empty where nothing moves, so that what does not move keeps its bits.
+// Empty if nothing moves, so that unmoved poses and points stay bit-identical.
 using Motion = std::optional<Move>;
 
-Motion motion_between(const SE3& before, const SE3& after, double grown = 1.0) {
-  const bool still = before.rotation().coeffs() == after.rotation().coeffs() && before.translation() == after.translation();
-  if (still && grown == 1.0) return {};
-  return Move{before, after, grown};
+Motion motion_between(const SE3& before, const SE3& after, double scale_change = 1.0) {
+  const bool still =
+      before.rotation().coeffs() == after.rotation().coeffs() && before.translation() == after.translation();
+  if (still && scale_change == 1.0) return {};
+  return Move{before, after, scale_change};
 }
 
-geometry::Vector6d grown_along(const geometry::Vector6d& twist, double grown) {
+geometry::Vector6d apply_scale_change(const geometry::Vector6d& twist, double scale_change) {
   geometry::Vector6d out = twist;
-  out.tail<3>() *= grown;
+  out.tail<3>() *= scale_change;
   return out;
 }
 
@@ -46,21 +49,25 @@ class Rebase {
         others_landmarks_end_(map.landmark_slots()),
         same_epoch_(edit.base->gauge_epoch() == map.gauge_epoch()) {}
 
-  // Each applies one operation; false where it is dropped.
+  // Each overload applies one operation and returns false if it is dropped.
   bool operator()(const AddKeyframe& op);
   bool operator()(const AddLandmark& op);
   bool operator()(const AddObservation& op) {
     Observation observation = op.observation;
-    observation.keyframe = here(observation.keyframe);
+    observation.keyframe = map_id(observation.keyframe);
     return map_.add_observation(forward(op.landmark), observation);
   }
-  bool operator()(const RemoveObservation& op) { return map_.remove_observation(here(op.landmark), here(op.keyframe)); }
+  bool operator()(const RemoveObservation& op) {
+    return map_.remove_observation(map_id(op.landmark), map_id(op.keyframe));
+  }
   bool operator()(const RemoveLandmark& op);
   bool operator()(const MergeLandmarks& op) { return map_.merge_landmarks(forward(op.from), forward(op.into)); }
-  bool operator()(const RemoveKeyframe& op) { return map_.remove_keyframe(here(op.keyframe)); }
-  bool operator()(const JoinParts& op) { return map_.join_parts(map_.surviving(here(op.child)), map_.surviving(here(op.parent))); }
-  bool operator()(const RemovePart& op) { return map_.remove_part(here(op.root)); }
-  bool operator()(const ScalePart& op) { return map_.scale_part(here(op.root), op.factor); }
+  bool operator()(const RemoveKeyframe& op) { return map_.remove_keyframe(map_id(op.keyframe)); }
+  bool operator()(const JoinParts& op) {
+    return map_.join_parts(map_.surviving(map_id(op.child)), map_.surviving(map_id(op.parent)));
+  }
+  bool operator()(const RemovePart& op) { return map_.remove_part(map_id(op.root)); }
+  bool operator()(const ScalePart& op) { return map_.scale_part(map_id(op.root), op.factor); }
   bool operator()(const SetPoses& op);
   bool operator()(const SetTwists& op);
   bool operator()(const AddSightings& op);
@@ -73,46 +80,46 @@ class Rebase {
   void count(bool was_applied) { ++(was_applied ? report_.applied : report_.dropped); }
 
  private:
-  // Ids of the edit as ids of the map: what the edit added itself got another id at commit, or none.
-  KeyframeId here(KeyframeId k) const { return own(k) ? report_.keyframes[k.index() - base_.keyframe_slots()] : k; }
-  LandmarkId here(LandmarkId l) const {
+  // Converts ids of the edit to ids of the map: things that the edit added may get other ids at commit, or none.
+  KeyframeId map_id(KeyframeId k) const { return own(k) ? report_.keyframes[k.index() - base_.keyframe_slots()] : k; }
+  LandmarkId map_id(LandmarkId l) const {
     if (!l.valid() || l.index() < base_.landmark_slots()) return l;
     return report_.landmarks[l.index() - base_.landmark_slots()];
   }
-  LandmarkId forward(LandmarkId l) const { return map_.resolve(here(l)); }
+  LandmarkId forward(LandmarkId l) const { return map_.resolve(map_id(l)); }
   bool own(KeyframeId k) const { return k.valid() && k.index() >= base_.keyframe_slots(); }
 
   bool newer(KeyframeId k) const { return k.index() >= base_.keyframe_slots() && k.index() < others_keyframes_end_; }
 
   Motion motion_since_base(KeyframeId edit_id) const;
-  void carry_along(const std::unordered_map<KeyframeId, Motion>& motions);
+  void move_newer(const std::unordered_map<KeyframeId, Motion>& motions);
 
   const BundledMap& base_;
   BundledMap& map_;
-  const std::size_t others_keyframes_end_, others_landmarks_end_;  // slots; newer ones are the edit's own
-  const bool same_epoch_;  // no correction by others since the base
-  std::vector<Motion> own_motions_;                                // per keyframe the edit added, when it was
-  std::unordered_set<KeyframeId> written_;                         // keyframes the edit has set; ids of the edit
+  // number of slots before the edit; higher ids were added by the edit itself
+  const std::size_t others_keyframes_end_, others_landmarks_end_;
+  const bool same_epoch_;                   // no correction by others since the base
+  std::vector<Motion> own_motions_;         // motion of each keyframe the edit added, computed at its addition
+  std::unordered_set<KeyframeId> written_;  // keyframes whose pose the edit has set; ids of the edit
   RebaseReport report_;
 };
 
-// By which others moved a keyframe of the edit since the edit's base. What the edit itself has set stands in the map as
-// the edit meant it.
+// Returns by how much others moved a keyframe since the edit's base. Poses set by the edit itself have not moved.
 Motion Rebase::motion_since_base(KeyframeId edit_id) const {
   if (!edit_id.valid() || written_.contains(edit_id)) return {};
   if (own(edit_id)) return own_motions_[edit_id.index() - base_.keyframe_slots()];
-  const double grown = map_.keyframe(edit_id).unit / base_.keyframe(edit_id).unit;
-  return motion_between(base_.resolved_pose(edit_id), map_.resolved_pose(edit_id), grown);
+  const double scale_change = map_.keyframe(edit_id).unit / base_.keyframe(edit_id).unit;
+  return motion_between(base_.resolved_pose(edit_id), map_.resolved_pose(edit_id), scale_change);
 }
 
 bool Rebase::operator()(const AddKeyframe& op) {
   std::vector<std::pair<FeatureId, LandmarkId>> matches = op.matches;
-  for (auto& [feature, l] : matches) l = here(l);
+  for (auto& [feature, l] : matches) l = map_id(l);
   const Motion motion = motion_since_base(op.parent);
   const SE3 T_rig_world = motion ? motion->pose(op.T_rig_world) : op.T_rig_world;
-  const KeyframeId parent = map_.surviving(here(op.parent));
+  const KeyframeId parent = map_.surviving(map_id(op.parent));
   const KeyframeId added = map_.add_keyframe(op.frame, T_rig_world, usable_matches(map_, matches), parent);
-  if (motion) map_.set_twist(added, grown_along(op.frame->twist, motion->grown));
+  if (motion) map_.set_twist(added, apply_scale_change(op.frame->twist, motion->scale_change));
   report_.keyframes.push_back(added);
   own_motions_.push_back(motion);
   return true;
@@ -123,7 +130,7 @@ bool Rebase::operator()(const AddLandmark& op) {
   LandmarkReference reference;
   for (Observation o : op.observations) {
     const bool has_reference = o.keyframe == op.reference.keyframe;
-    o.keyframe = here(o.keyframe);
+    o.keyframe = map_id(o.keyframe);
     if (!map_.alive(o.keyframe) || map_.landmark_of(o.keyframe, o.feature).valid()) continue;
     observations.push_back(o);
     if (has_reference) reference = {o.keyframe, op.reference.keypoint};
@@ -139,7 +146,7 @@ bool Rebase::operator()(const AddLandmark& op) {
 }
 
 bool Rebase::operator()(const RemoveLandmark& op) {
-  const LandmarkId l = here(op.landmark);
+  const LandmarkId l = map_id(op.landmark);
   if (!map_.alive(l)) return false;
   for (const Observation& o : map_.observations(l)) {
     if (newer(o.keyframe)) return false;
@@ -150,24 +157,24 @@ bool Rebase::operator()(const RemoveLandmark& op) {
 bool Rebase::operator()(const SetPoses& op) {
   if (!same_epoch_) return false;
   bool any = false;
-  std::unordered_map<KeyframeId, Motion> motions;  // ids of the map
+  std::unordered_map<KeyframeId, Motion> motions;  // keyed by ids of the map
   for (const auto& [edit_id, T_rig_world] : op.keyframes) {
-    const KeyframeId k = here(edit_id);
+    const KeyframeId k = map_id(edit_id);
     if (!map_.alive(k)) continue;
     motions[k] = motion_between(map_.keyframe(k).T_rig_world, T_rig_world);
     written_.insert(edit_id);
     any |= map_.set_pose(k, T_rig_world);
   }
-  for (const auto& [edit_id, position] : op.landmarks) any |= map_.set_position(here(edit_id), position);
+  for (const auto& [edit_id, position] : op.landmarks) any |= map_.set_position(map_id(edit_id), position);
   if (op.correction && any) map_.begin_gauge_epoch();
-  carry_along(motions);
+  move_newer(motions);
   return any;
 }
 
-// Newer keyframes inherit the motion of their nearest ancestor that is not newer: as each keeps its pose relative to
-// its parent, T_rig_world_new = T_rig_parent * T_parent_world_new, the motion is the same all the way down. Newer
-// landmarks take that of their reference's keyframe.
-void Rebase::carry_along(const std::unordered_map<KeyframeId, Motion>& motions) {
+// Newer keyframes inherit the motion of their nearest ancestor that is not newer: since each one keeps its pose
+// relative to its parent, T_rig_world_new = T_rig_parent * T_parent_world_new, the motion is the same along the whole
+// chain. Newer landmarks inherit the motion of the keyframe of their reference.
+void Rebase::move_newer(const std::unordered_map<KeyframeId, Motion>& motions) {
   const auto motion_of = [&](KeyframeId k) -> Motion {
     while (newer(k)) k = map_.keyframe(k).parent;
     const auto entry = motions.find(k);
@@ -192,7 +199,7 @@ bool Rebase::operator()(const SetTwists& op) {
   bool any = false;
   for (const auto& [edit_id, twist] : op.keyframes) {
     const Motion motion = motion_since_base(edit_id);
-    any |= map_.set_twist(here(edit_id), grown_along(twist, motion ? motion->grown : 1.0));
+    any |= map_.set_twist(map_id(edit_id), apply_scale_change(twist, motion ? motion->scale_change : 1.0));
   }
   return any;
 }

@@ -14,9 +14,10 @@ using Eigen::Vector3d;
 using frame::KeypointRef;
 using geometry::SE3;
 
-constexpr double kMaxScaleRatio =
-    2.0;  // between the size a point should have in the two views and the levels it was found on
-constexpr std::size_t kProbeStep = 16;  // every so many keypoints are projected to see whether two cameras share a view
+// Largest ratio between the size change predicted from the distances of two views and the one of the pyramid levels.
+constexpr double kMaxScaleRatio = 2.0;
+// Every how many keypoints one is projected to test whether two cameras share a view.
+constexpr std::size_t kProbeStep = 16;
 constexpr double kMinShared = 0.1;
 
 double median_depth(const map::BundledMap& map, KeyframeId k) {
@@ -28,7 +29,7 @@ double median_depth(const map::BundledMap& map, KeyframeId k) {
   return depths.empty() ? 0.0 : median(std::move(depths));
 }
 
-// Keypoints of one camera whose feature has no landmark.
+// Flags, per keypoint of one camera, those whose feature has no landmark.
 std::vector<std::uint8_t> free_keypoints(const map::BundledKeyframe& keyframe, CameraIndex c) {
   const std::size_t n = keyframe.frame->keypoints(c).size();
   std::vector<std::uint8_t> free(n);
@@ -45,7 +46,7 @@ struct View {
 
 SE3 cam_from_world(const map::BundledMap& map, View v) { return map.cam_from_world(v.keyframe, v.camera); }
 
-// Does camera b see part of what camera a sees at about `depth` metres?
+// Returns true if camera b sees part of what camera a sees at a depth of about `depth` metres.
 bool shares_view(const map::BundledMap& map, View a, View b, double depth) {
   const feature::Keypoints& keypoints = map.keypoints(a.keyframe, a.camera);
   const camera::Camera& camera_b = map.rig().camera(b.camera);
@@ -69,7 +70,7 @@ void append(const map::BundledMap& map, KeyframeId k, FeatureId f, std::vector<m
   }
 }
 
-// The size on the image falls with distance; levels must tell the same story.
+// Tests whether the ratio of the distances agrees with the ratio of the pyramid levels.
 bool sizes_agree(const Vector3d& point, View a, KeypointIndex ka, View b, KeypointIndex kb, const map::BundledMap& map,
                  double scale_factor) {
   const double da = (cam_from_world(map, a) * point).norm(), db = (cam_from_world(map, b) * point).norm();
@@ -79,7 +80,7 @@ bool sizes_agree(const Vector3d& point, View a, KeypointIndex ka, View b, Keypoi
   return ratio < kMaxScaleRatio && ratio > 1.0 / kMaxScaleRatio;
 }
 
-// The landmark two features make, if they make one.
+// Triangulates two matched features. Returns nullopt if the point is not accurate or not consistent enough.
 std::optional<Vector3d> new_point(const map::BundledMap& map, View a, const matching::EpipolarMatch& match, View b,
                                   const CreationOptions& options, const FeatureModel& features) {
   const FeatureId fa = map.keyframe(a.keyframe).frame->bundled.feature(a.camera, match.a);
@@ -126,7 +127,7 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
     if (draft.map().landmark_of(a.keyframe, fa).valid() || draft.map().landmark_of(b.keyframe, fb).valid()) continue;
     const auto point = new_point(draft.map(), a, m, b, options, features);
     if (!point) continue;
-    // The newer view is the reference: what comes next looks more like it.
+    // The newer view is the reference, since future views will resemble it more.
     std::vector<map::Observation> observations = {{b.keyframe, fb, false}, {a.keyframe, fa, true}};
     std::sort(observations.begin(), observations.end());
     draft.add_landmark(*point, std::move(observations), {a.keyframe, {a.camera, m.a}});

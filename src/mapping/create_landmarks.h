@@ -1,4 +1,5 @@
-// New landmarks from features that have none: any camera of the new keyframe to any camera of its covisible neighbours.
+// Creates landmarks from features without one, by matching any camera of the new keyframe to any camera of its
+// covisible neighbours.
 #pragma once
 
 #include "map/map_edit.h"
@@ -6,7 +7,8 @@
 
 namespace bslam::mapping {
 
-// Returns how many landmarks were written to the draft.
-int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features, map::MapDraft& draft);
+// Returns the number of landmarks added to the draft.
+int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features,
+                     map::MapDraft& draft);
 
 }  // namespace bslam::mapping

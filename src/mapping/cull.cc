@@ -13,7 +13,7 @@ int num_keypoints(const map::BundledMap& map, LandmarkId l) {
   return n;
 }
 
-// Finest level on which an observation shows its landmark.
+// Finest pyramid level of the keypoints of an observation.
 int finest_level(const map::BundledMap& map, const map::Observation& o) {
   const frame::BundledFrame& frame = *map.keyframe(o.keyframe).frame;
   int finest = 255;
@@ -24,27 +24,28 @@ int finest_level(const map::BundledMap& map, const map::Observation& o) {
 }
 
 bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& options) {
-  int landmarks = 0, seen_elsewhere = 0;
+  int landmarks = 0, observed_elsewhere = 0;
   for (const LandmarkId l : map.keyframe(k).landmarks) {
     if (!l.valid()) continue;
     ++landmarks;
     const auto observations = map.observations(l);
     if (static_cast<int>(observations.size()) <= options.redundant_views) continue;
-    const auto own = std::find_if(observations.begin(), observations.end(), [&](const map::Observation& o) { return o.keyframe == k; });
+    const auto own = std::find_if(observations.begin(), observations.end(),
+                                  [&](const map::Observation& o) { return o.keyframe == k; });
     const int level = finest_level(map, *own);
     const auto others = std::count_if(observations.begin(), observations.end(), [&](const map::Observation& o) {
       return o.keyframe != k && finest_level(map, o) <= level + 1;
     });
-    seen_elsewhere += others >= options.redundant_views;
+    observed_elsewhere += others >= options.redundant_views;
   }
-  return landmarks > 0 && seen_elsewhere > options.redundant_share * landmarks;
+  return landmarks > 0 && observed_elsewhere > options.redundant_share * landmarks;
 }
 
 }  // namespace
 
 int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
-  // Landmarks are numbered in order of birth: the young ones are at the end.
+  // Landmark ids are in order of creation, so the recent ones are at the end.
   std::vector<LandmarkId> bad;
   for (std::size_t i = map.landmark_slots(); i-- > 0;) {
     const LandmarkId id(i);
@@ -52,9 +53,9 @@ int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDra
     if (!l.alive) continue;
     const int age = newest.value() - l.born.value();
     if (age > options.probation) break;
-    const bool hard_to_find = l.expected > 3 && l.found < options.min_found_share * l.expected;
-    const bool hardly_seen = age >= options.probation && num_keypoints(map, id) < options.min_keypoints;
-    if (hard_to_find || hardly_seen) bad.push_back(id);
+    const bool rarely_matched = l.expected > 3 && l.found < options.min_found_share * l.expected;
+    const bool few_keypoints = age >= options.probation && num_keypoints(map, id) < options.min_keypoints;
+    if (rarely_matched || few_keypoints) bad.push_back(id);
   }
   for (const LandmarkId l : bad) draft.remove_landmark(l);
   return static_cast<int>(bad.size());

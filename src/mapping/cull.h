@@ -1,5 +1,5 @@
-// What does not earn its place in the map goes: new landmarks that tracking cannot find again, and keyframes whose
-// landmarks others see as well.
+// Culling: removes new landmarks that tracking does not match again, and redundant keyframes whose landmarks are
+// observed by enough others.
 #pragma once
 
 #include "map/map_edit.h"
@@ -7,10 +7,12 @@
 
 namespace bslam::mapping {
 
-// Looks at landmarks made within the last keyframes before `newest`. Returns how many went.
+// Checks the landmarks created within the last `probation` keyframes up to `newest`. Returns the number of removed
+// landmarks.
 int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft);
 
-// Looks at the keyframes covisible with `newest`; neither the root nor the newest two go. Returns how many went.
+// Checks the keyframes covisible with `newest`; never removes the root or the last two keyframes before `newest`.
+// Returns the number of removed keyframes.
 int cull_keyframes(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft);
 
 }  // namespace bslam::mapping

@@ -1,5 +1,5 @@
-// Fusion: the landmarks of a new keyframe are looked for in its neighbours and theirs in it; what turns out to be one
-// landmark becomes one.
+// Landmark fusion: the landmarks of a new keyframe are projected into its neighbours, and theirs into it; landmarks
+// that match the same feature are merged.
 #pragma once
 
 #include "map/map_edit.h"

@@ -7,8 +7,8 @@ namespace {
 
 bool is_root(const map::BundledMap& map, KeyframeId k) { return !map.keyframe(k).parent.valid(); }
 
-// Landmarks seen by the keyframes, by how many of them, falling; at most `limit`, then in order of id.
-std::vector<LandmarkId> most_seen(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes, int limit) {
+// Returns the landmarks observed by the most of these keyframes, at most `limit`, in order of id.
+std::vector<LandmarkId> most_observed(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes, int limit) {
   std::vector<int> count(map.landmark_slots(), 0);
   std::vector<LandmarkId> out;
   for (const KeyframeId k : keyframes) {
@@ -25,7 +25,7 @@ std::vector<LandmarkId> most_seen(const map::BundledMap& map, const std::vector<
   return out;
 }
 
-// Other keyframes that see the landmarks, those that see most of them, at most `limit`, in order of id.
+// Returns the other keyframes that observe the most of these landmarks, at most `limit`, in order of id.
 std::vector<KeyframeId> other_observers(const map::BundledMap& map, const std::vector<LandmarkId>& landmarks,
                                         const std::vector<KeyframeId>& inside, int limit) {
   std::vector<int> count(map.keyframe_slots(), 0);
@@ -45,13 +45,13 @@ std::vector<KeyframeId> other_observers(const map::BundledMap& map, const std::v
   return out;
 }
 
-// Poses that must be held besides the root so that the gauge is fixed: without metric scale two in all.
-std::size_t held_poses(const map::BundledMap& map) { return map.scale() == map::Scale::kUpToScale ? 2 : 1; }
+// Number of poses to fix so that the gauge is determined: two if the scale is arbitrary, otherwise one.
+std::size_t num_fixed_poses(const map::BundledMap& map) { return map.scale() == map::Scale::kUpToScale ? 2 : 1; }
 
-// Fixes the oldest free keyframes until enough poses are held; sorts both lists.
+// Fixes the oldest free keyframes until enough poses are fixed; sorts both lists.
 void fix_gauge(const map::BundledMap& map, adjustment::Selection& selection) {
   std::sort(selection.free_keyframes.begin(), selection.free_keyframes.end());
-  while (selection.fixed_keyframes.size() < held_poses(map) && selection.free_keyframes.size() > 1) {
+  while (selection.fixed_keyframes.size() < num_fixed_poses(map) && selection.free_keyframes.size() > 1) {
     selection.fixed_keyframes.push_back(selection.free_keyframes.front());
     selection.free_keyframes.erase(selection.free_keyframes.begin());
   }
@@ -66,19 +66,20 @@ adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyfra
     window.push_back(c.keyframe);
   }
   adjustment::Selection selection;
-  selection.landmarks = most_seen(map, window, options.max_landmarks);
+  selection.landmarks = most_observed(map, window, options.max_landmarks);
   selection.fixed_keyframes = other_observers(map, selection.landmarks, window, options.fixed_keyframes);
-  for (const KeyframeId k : window) (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
+  for (const KeyframeId k : window)
+    (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
   fix_gauge(map, selection);
   return selection;
 }
 
-bool needs_whole_part(const map::BundledMap& map, KeyframeId keyframe, const ScaleOptions& options) {
+bool needs_whole_submap(const map::BundledMap& map, KeyframeId keyframe, const ScaleOptions& options) {
   if (map.scale() != map::Scale::kUnobservable) return false;
   return map.part_of(map.root_of(keyframe)).size() <= static_cast<std::size_t>(options.keyframes);
 }
 
-adjustment::Selection select_part(const map::BundledMap& map, KeyframeId keyframe) {
+adjustment::Selection select_submap(const map::BundledMap& map, KeyframeId keyframe) {
   adjustment::Selection selection;
   const KeyframeId root = map.root_of(keyframe);
   std::vector<KeyframeId> part = map.part_of(root);
@@ -87,7 +88,7 @@ adjustment::Selection select_part(const map::BundledMap& map, KeyframeId keyfram
     if (k != root) selection.free_keyframes.push_back(k);
   }
   selection.fixed_keyframes = {root};
-  selection.landmarks = most_seen(map, part, static_cast<int>(map.landmark_slots()));
+  selection.landmarks = most_observed(map, part, static_cast<int>(map.landmark_slots()));
   return selection;
 }
 

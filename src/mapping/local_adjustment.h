@@ -1,4 +1,4 @@
-// What local and global bundle adjustment choose: the paper's B_L, P_L and B_F, and everything.
+// Selection of the variables of local and global bundle adjustment: the paper's B_L, P_L and B_F, or the whole map.
 #pragma once
 
 #include "adjustment/map_adjustment.h"
@@ -6,18 +6,19 @@
 
 namespace bslam::mapping {
 
-// B_L: `keyframe` and its best covisible keyframes, free; P_L: the landmarks they see; B_F: further keyframes that see
-// them, fixed. The root is always fixed; a map of one camera, up to scale, needs a second pose held so that its scale cannot wander.
+// B_L: `keyframe` and its best covisible keyframes, free. P_L: the landmarks they observe. B_F: further keyframes that
+// observe these landmarks, fixed. The root is always fixed. With a single camera the scale is arbitrary, so a second
+// pose is fixed to prevent scale drift.
 adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyframe, const LocalWindowOptions& options);
 
-// Is the scale of the map unobservable, and the part of `keyframe` small enough to be adjusted as a whole? Everything else
-// held in place would hold the scale as well.
-bool needs_whole_part(const map::BundledMap& map, KeyframeId keyframe, const ScaleOptions& options);
+// Returns true if the scale of the map is not observable yet and the submap of `keyframe` is small enough to be
+// adjusted as a whole. Fixed keyframes would fix the scale as well.
+bool needs_whole_submap(const map::BundledMap& map, KeyframeId keyframe, const ScaleOptions& options);
 
-// All keyframes of the part of `keyframe` but its root, and the landmarks they see.
-adjustment::Selection select_part(const map::BundledMap& map, KeyframeId keyframe);
+// Selects all keyframes of the submap of `keyframe` except its root, and the landmarks they observe.
+adjustment::Selection select_submap(const map::BundledMap& map, KeyframeId keyframe);
 
-// All keyframes but the roots, all landmarks.
+// Selects all keyframes except the roots, and all landmarks.
 adjustment::Selection select_all(const map::BundledMap& map);
 
 }  // namespace bslam::mapping

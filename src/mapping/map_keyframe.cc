@@ -9,21 +9,23 @@
 namespace bslam::mapping {
 namespace {
 
-// Corrections of the scale leave what other cameras see out of place: adjustment puts it right, and the next measurement
-// starts from there.
-void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features, map::MapDraft& draft,
-                    const std::stop_token& stop, MappingReport& report) {
+// A scale correction leaves the observations of other cameras inconsistent; the adjustment repairs this, and the next
+// measurement of the scale starts from its result.
+void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
+                    map::MapDraft& draft, const std::stop_token& stop, MappingReport& report) {
   const double deviation_before = draft.map().scale_deviation();
   for (int round = 0; round < options.scale.rounds; ++round) {
     report.scale = observe_scale(keyframe, options.scale, features, draft);
-    const adjustment::Selection selection = needs_whole_part(draft.map(), keyframe, options.scale)
-                                                ? select_part(draft.map(), keyframe)
+    const adjustment::Selection selection = needs_whole_submap(draft.map(), keyframe, options.scale)
+                                                ? select_submap(draft.map(), keyframe)
                                                 : select_local(draft.map(), keyframe, options.window);
-    report.adjustment = adjustment::adjust_map(selection, options.local, features.sigma_px, features.scale_factor, draft, stop);
+    report.adjustment =
+        adjustment::adjust_map(selection, options.local, features.sigma_px, features.scale_factor, draft, stop);
     if (std::abs(report.scale.correction - 1.0) <= options.scale.settled || stop.stop_requested()) break;
   }
-  const bool one_part = draft.map().roots().size() == 1;  // the scale is said of all of them
-  if (one_part && is_metric(report.scale, deviation_before, options.scale)) draft.set_scale(map::Scale::kMetric, report.scale.deviation);
+  const bool single_submap = draft.map().roots().size() == 1;  // the scale is a property of the whole map
+  if (single_submap && is_metric(report.scale, deviation_before, options.scale))
+    draft.set_scale(map::Scale::kMetric, report.scale.deviation);
 }
 
 }  // namespace
@@ -39,9 +41,10 @@ MappingReport map_keyframe(KeyframeId keyframe, const MappingOptions& options, c
   return report;
 }
 
-adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features, map::MapDraft& draft,
-                                             std::stop_token stop) {
-  return adjustment::adjust_map(select_all(draft.map()), options.global, features.sigma_px, features.scale_factor, draft, stop);
+adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features,
+                                             map::MapDraft& draft, std::stop_token stop) {
+  return adjustment::adjust_map(select_all(draft.map()), options.global, features.sigma_px, features.scale_factor,
+                                draft, stop);
 }
 
 }  // namespace bslam::mapping

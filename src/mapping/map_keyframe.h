@@ -1,4 +1,4 @@
-// Local mapping: what a new keyframe adds to the map, and what it lets go.
+// Local mapping: what a new keyframe adds to the map and which old data is removed.
 #pragma once
 
 #include <stop_token>
@@ -17,13 +17,13 @@ struct MappingReport {
   adjustment::AdjustmentReport adjustment;
 };
 
-// Culls young landmarks, creates new ones, fuses duplicates, measures the scale where it is not known yet, adjusts the local
-// window and culls redundant keyframes, all in `draft`. `keyframe` is alive in it.
+// Culls recent landmarks, creates new ones, fuses duplicates, estimates the scale if it is not known yet, adjusts the
+// local window, and culls redundant keyframes; all changes are made in `draft`. `keyframe` must be alive in it.
 MappingReport map_keyframe(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
                            map::MapDraft& draft, std::stop_token stop = {});
 
-// Global bundle adjustment: all keyframes but the roots, all landmarks.
-adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features, map::MapDraft& draft,
-                                             std::stop_token stop = {});
+// Global bundle adjustment of all keyframes except the roots, and all landmarks.
+adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features,
+                                             map::MapDraft& draft, std::stop_token stop = {});
 
 }  // namespace bslam::mapping

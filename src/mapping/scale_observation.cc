@@ -10,11 +10,14 @@
 namespace bslam::mapping {
 namespace {
 
-constexpr double kLongestStep = 3.0;  // factor of one correction: farther away the equations say little but the direction
-constexpr double kSettled = 3.0;      // standard deviations of a correction that leaves the map as it is
-constexpr double kSignificant = 0.5;   // standard deviations from which a correction is worth it
+// Largest scale factor applied at once: the equations are linearised, and far from the solution only their direction is
+// right.
+constexpr double kMaxScaleStep = 3.0;
+constexpr double kMaxMetricCorrectionSigmas =
+    3.0;                                      // in standard deviations: a smaller correction leaves the map metric
+constexpr double kMinCorrectionSigmas = 0.5;  // in standard deviations: a smaller correction is not applied
 
-// One keyframe, the oldest, is held: more would keep the map in the shape the scale is read from.
+// Only the oldest keyframe is fixed: fixing more would constrain the very shape from which the scale is estimated.
 adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId keyframe, int limit) {
   adjustment::Selection out;
   out.free_keyframes.push_back(keyframe);
@@ -38,7 +41,8 @@ adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId ke
 
 }  // namespace
 
-ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features, map::MapDraft& draft) {
+ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features,
+                          map::MapDraft& draft) {
   ScaleReport report;
   const map::BundledMap& map = draft.map();
   if (map.scale() != map::Scale::kUnobservable) return report;
@@ -50,8 +54,9 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   report.deviation = found->deviation;
   report.keyframes = static_cast<int>(flat.keyframes.size());
   if (found->deviation <= options.max_correcting_deviation) {
-    const double correction = std::clamp(found->scale, 1.0 / kLongestStep, kLongestStep);
-    if (std::abs(correction - 1.0) > kSignificant * found->deviation) {  // every scaling is a correction, which others wait for
+    const double correction = std::clamp(found->scale, 1.0 / kMaxScaleStep, kMaxScaleStep);
+    // every scaling is a map correction, which invalidates the work of other stages
+    if (std::abs(correction - 1.0) > kMinCorrectionSigmas * found->deviation) {
       report.correction = correction;
       draft.scale_part(map.root_of(keyframe), correction);
     }
@@ -62,7 +67,8 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
 
 bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options) {
   return report.observed && report.keyframes >= options.min_keyframes && report.deviation <= options.max_deviation &&
-         deviation_before <= options.max_deviation && std::abs(report.correction - 1.0) <= kSettled * report.deviation;
+         deviation_before <= options.max_deviation &&
+         std::abs(report.correction - 1.0) <= kMaxMetricCorrectionSigmas * report.deviation;
 }
 
 }  // namespace bslam::mapping

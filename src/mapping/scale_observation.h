@@ -1,4 +1,5 @@
-// The metric scale of a map that started without: what the rig's motion has told so far.
+// Estimates the metric scale of a map that was initialised without it, from the motion of a rig without overlapping
+// cameras.
 #pragma once
 
 #include <limits>
@@ -9,18 +10,19 @@
 namespace bslam::mapping {
 
 struct ScaleReport {
-  bool observed = false;   // the images tell something
-  double correction = 1;   // by which the part was scaled in the draft
-  double deviation = std::numeric_limits<double>::infinity();  // relative standard deviation of the map's unit
-  int keyframes = 0;       // that told
+  bool observed = false;                                       // the images constrain the scale
+  double correction = 1;                                       // factor by which the submap was scaled in the draft
+  double deviation = std::numeric_limits<double>::infinity();  // relative standard deviation of the map scale
+  int keyframes = 0;                                           // number of keyframes used
 };
 
-// Where the draft's map is unobservable: measures the length of its unit by `keyframe` and its best covisible keyframes,
-// scales the part of the map they belong to by it, and writes the deviation to the draft. Nothing to do elsewhere.
-ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features, map::MapDraft& draft);
+// If the scale of the draft's map is kUnobservable, estimates it from `keyframe` and its best covisible keyframes,
+// scales their submap accordingly, and stores the deviation in the draft. Otherwise does nothing.
+ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features,
+                          map::MapDraft& draft);
 
-// May the map call itself metric? Where this measurement and the one of the keyframe before, whose deviation the map had,
-// are both certain enough, and this one left the map as long as it was.
+// Returns true if the map can be declared metric: this estimate and that of the previous keyframe, whose deviation is
+// `deviation_before`, are both accurate enough, and this one did not change the scale significantly.
 bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options);
 
 }  // namespace bslam::mapping

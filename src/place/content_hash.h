@@ -1,5 +1,5 @@
-// A 64-bit hash over a sequence of numbers, the same on every machine: the id of a vocabulary and the checksum of its
-// bytes. Guards against damage and mix-ups, not against intent.
+// A 64-bit hash over a sequence of numbers, identical on every machine. It is the id of a vocabulary and the checksum
+// of its bytes. It detects damage and mix-ups but is not cryptographic.
 #pragma once
 
 #include <bit>

@@ -43,7 +43,7 @@ std::vector<CommonWords> InvertedIndex::query(const WordVector& words) const {
   if (keyframes_.empty()) return shared;
   std::vector<int> count(keyframes_.rbegin()->first.index() + 1, 0);
   for (const WeightedWord& w : words.words()) {
-    if (w.word.index() >= by_word_.size()) break;  // sorted: no later word is in the index either
+    if (w.word.index() >= by_word_.size()) break;  // sorted: the index holds no later word either
     for (const KeyframeId keyframe : by_word_[w.word.index()]) ++count[keyframe.index()];
   }
   for (std::size_t k = 0; k < count.size(); ++k) {

@@ -1,4 +1,4 @@
-// Which keyframes show a word.
+// Inverted index: for each word, the keyframes that contain it.
 #pragma once
 
 #include <map>
@@ -13,32 +13,31 @@ namespace bslam::place {
 
 struct CommonWords {
   KeyframeId keyframe;
-  int count = 0;  // words it has in common with the query, at least 1
+  int count = 0;  // number of words shared with the query, at least 1
   friend bool operator==(const CommonWords&, const CommonWords&) = default;
 };
 
-// Keyframes by word. What it holds, and so every answer, depends on which keyframes are in it and not on the order in
-// which they came.
+// The content, and therefore every answer, depends on which keyframes were added, not on the order of adding.
 class InvertedIndex {
  public:
-  // `keyframe` is not in the index; `words` is not null.
+  // The keyframe must not be in the index yet; `words` must not be null.
   void add(KeyframeId keyframe, std::shared_ptr<const WordVector> words);
-  void remove(KeyframeId keyframe);  // nothing where it is not in the index
+  void remove(KeyframeId keyframe);  // does nothing if the keyframe is not in the index
   void clear();
 
   bool contains(KeyframeId keyframe) const { return keyframes_.contains(keyframe); }
   std::size_t size() const { return keyframes_.size(); }
 
-  // Null where the keyframe is not in the index.
+  // Returns null if the keyframe is not in the index.
   std::shared_ptr<const WordVector> words_of(KeyframeId keyframe) const;
 
-  // The keyframes that share a word with `words`, by id. Costs an addition for each pair of a word and a keyframe that
-  // has it, and a pass over the ids up to the largest.
+  // Returns all keyframes that share a word with `words`, ordered by id. The cost is one addition per pair of a query
+  // word and a keyframe that contains it, plus a pass over the ids up to the largest.
   std::vector<CommonWords> query(const WordVector& words) const;
 
  private:
   std::map<KeyframeId, std::shared_ptr<const WordVector>> keyframes_;
-  std::vector<std::vector<KeyframeId>> by_word_;  // sorted
+  std::vector<std::vector<KeyframeId>> by_word_;  // each list is sorted
 };
 
 }  // namespace bslam::place

@@ -12,8 +12,8 @@ namespace {
 
 using feature::Descriptor;
 
-// Counts set bits of descriptors, position by position. Eight counters of a byte each share a number, and are emptied
-// into wide ones before they overflow: 32 additions a descriptor instead of 256.
+// Counts the set bits of descriptors at each bit position. Eight one-byte counters are packed into one 64-bit number
+// and flushed into wide counters before they overflow, which takes 32 instead of 256 additions per descriptor.
 class BitCounter {
  public:
   void add(const Descriptor& d) {
@@ -41,7 +41,7 @@ class BitCounter {
  private:
   static constexpr std::size_t kBytes = sizeof(Descriptor);
 
-  // Entry v: bit i of v as byte i.
+  // Entry v holds bit i of v in byte i.
   static constexpr std::array<std::uint64_t, 256> kSpread = [] {
     std::array<std::uint64_t, 256> spread{};
     for (std::size_t v = 0; v < spread.size(); ++v) {
@@ -72,7 +72,7 @@ std::vector<Descriptor> seed_centres(std::span<const Descriptor> descriptors, in
       distance[i] = std::min(distance[i], static_cast<std::uint32_t>(feature::hamming(descriptors[i], centres.back())));
       sum += distance[i];
     }
-    if (sum == 0) break;  // every descriptor is a centre
+    if (sum == 0) break;  // every descriptor is already a centre
     std::uint64_t draw = std::min(sum - 1, static_cast<std::uint64_t>(random.uniform() * static_cast<double>(sum)));
     std::size_t chosen = 0;
     while (draw >= distance[chosen]) draw -= distance[chosen++];
@@ -81,7 +81,7 @@ std::vector<Descriptor> seed_centres(std::span<const Descriptor> descriptors, in
   return centres;
 }
 
-// Puts every descriptor to its nearest centre; true if any changed.
+// Assigns each descriptor to its nearest centre. Returns true if any assignment changed.
 bool assign(std::span<const Descriptor> descriptors, Clusters& clusters) {
   bool changed = false;
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
@@ -124,7 +124,8 @@ void move_centres(std::span<const Descriptor> descriptors, Clusters& clusters) {
   }
 }
 
-// Leaves the others the nearest of whom they were: an empty one is no descriptor's nearest centre.
+// Removes clusters without members. The assignments stay valid, since an empty cluster is no descriptor's nearest
+// centre.
 void drop_empty(Clusters& clusters) {
   std::vector<bool> used(clusters.centre.size());
   for (const std::uint8_t c : clusters.of) used[c] = true;

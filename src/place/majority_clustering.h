@@ -1,4 +1,4 @@
-// Clusters of binary descriptors around centres made by majority. Internal to place.
+// k-majority clustering of binary descriptors. Internal to place.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,18 @@
 namespace bslam::place {
 
 struct Clusters {
-  std::vector<feature::Descriptor> centre;  // none without members
-  std::vector<std::uint8_t> of;  // per descriptor: its cluster, the nearest centre, of equally near the first
+  std::vector<feature::Descriptor> centre;  // every cluster has members
+  std::vector<std::uint8_t> of;  // per descriptor: its cluster, that is the nearest centre (the first one on ties)
 };
 
-// At most `k` (2 to 64) clusters; fewer where there are fewer different descriptors, one where all are equal.
-// `descriptors` is not empty. Centres are seeded by k-means++ (Arthur and Vassilvitskii, SODA 2007; the Hamming
-// distance is the squared Euclidean one of bits); then each bit of a centre is that of most members, and where there
-// are as many with it as without it stays as it was. A centre that lost its members moves to the descriptor farthest
-// from its own.
+// Divides the descriptors into at most `k` (2 to 64) clusters; fewer if there are fewer distinct descriptors, one if
+// all are equal. `descriptors` must not be empty. Centres are initialised by k-means++ (Arthur and Vassilvitskii, SODA
+// 2007; the Hamming distance is the squared Euclidean distance of the bits). Each iteration sets each bit of a centre
+// to the majority of its members and keeps the previous bit on ties. A centre without members moves to the descriptor
+// that is farthest from its own centre.
 Clusters cluster_by_majority(std::span<const feature::Descriptor> descriptors, int k, int iterations, Random& random);
 
-// The bits most of the descriptors have; `tie` where there are as many with as without.
+// Returns the bitwise majority of the descriptors. On a tie the bit of `tie` is used.
 feature::Descriptor majority(std::span<const feature::Descriptor> descriptors, const feature::Descriptor& tie);
 
 }  // namespace bslam::place

@@ -2,7 +2,7 @@
 
 #include "place/vocabulary_bytes.h"
 
-// The assembler copies the file in: a compiler would take minutes over an array of millions of numbers.
+// The assembler includes the file; a compiler would need minutes for an array of millions of numbers.
 asm(".pushsection .rodata\n"
     ".balign 32\n"
     ".hidden bslam_shipped_vocabulary_begin\n"

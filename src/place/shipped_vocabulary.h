@@ -1,4 +1,4 @@
-// The vocabulary the program carries within itself (data/vocabulary.bvoc), so that none needs to be named.
+// The vocabulary embedded in the program (data/vocabulary.bvoc), used if no other one is given.
 #pragma once
 
 #include <string_view>
@@ -8,11 +8,11 @@
 
 namespace bslam::place {
 
-// Its bytes, as in the file.
+// The bytes of the embedded file.
 std::string_view shipped_vocabulary_bytes();
 
-// Reads it anew at each call, in a few milliseconds: hold on to it. An error means a build with another file than the
-// project's own.
+// Parses the embedded vocabulary at every call, which takes a few milliseconds; keep the result. An error means that
+// the program was built with an invalid vocabulary file.
 Result<VocabularyPtr> shipped_vocabulary();
 
 }  // namespace bslam::place

@@ -14,22 +14,23 @@ namespace {
 
 using feature::Descriptor;
 
-// A node's descriptors: a range of Training::order.
+// The descriptors of a tree node, as a range of Training::order.
 struct Cell {
   std::size_t begin = 0, end = 0;
   std::size_t size() const { return end - begin; }
 };
 
-// A node divided: its children's centres and cells; both empty where it stays a word.
+// The children of a divided node: their centres and cells. Both are empty if the node becomes a word.
 struct Division {
   std::vector<Descriptor> centre;
   std::vector<Cell> cell;
 };
 
 struct Training {
-  std::vector<Descriptor> descriptor;  // of all images, one after the other
-  std::vector<std::uint32_t> image;    // of each descriptor
-  std::vector<std::uint32_t> order;    // descriptors so that those of a node follow each other, ascending within it
+  std::vector<Descriptor> descriptor;  // of all images, concatenated
+  std::vector<std::uint32_t> image;    // index of the image of each descriptor
+  // permutation of the descriptors that keeps those of a node together, ascending within the node
+  std::vector<std::uint32_t> order;
 };
 
 Training gather(std::span<const std::vector<Descriptor>> images) {
@@ -46,7 +47,7 @@ Training gather(std::span<const std::vector<Descriptor>> images) {
   return t;
 }
 
-// Writes to its own cell of `order` only.
+// Reorders only its own cell of `order`.
 Division divide(Training& t, const Cell& cell, const TrainingOptions& options, Random random) {
   const std::span<std::uint32_t> order(t.order.data() + cell.begin, cell.size());
   std::vector<Descriptor> members(order.size());
@@ -74,7 +75,7 @@ float inverse_document_frequency(const Training& t, const Cell& cell, std::size_
   return static_cast<float>(std::log(static_cast<double>(images + 1) / static_cast<double>(shown_by)));
 }
 
-// Progress of several threads, told by one at a time.
+// Thread-safe progress counter.
 class Counter {
  public:
   Counter(const TrainingProgress& progress, std::size_t all) : progress_(progress), all_(all) {}
@@ -90,8 +91,8 @@ class Counter {
   std::size_t done_ = 0, all_;
 };
 
-// Level by level, which is the order of the nodes. Each node draws from a generator of its own, so that the nodes of a
-// level may be divided at once.
+// Builds the tree level by level, which is the order of the nodes. Each node uses its own random generator, so that the
+// nodes of a level can be divided in parallel.
 VocabularyContent grow(Training& t, std::size_t images, const TrainingOptions& options, Random& random,
                        ThreadPool& pool, const TrainingProgress& progress) {
   Counter counter(progress, t.order.size() * static_cast<std::size_t>(options.levels));

@@ -13,7 +13,7 @@
 namespace bslam::place {
 namespace {
 
-// The part of the content that no tree is needed to judge. Keys are those of the file format.
+// Checks everything that can be checked without building the tree. The keys in errors are those of the file format.
 Status check_numbers(const VocabularyContent& c) {
   const bool printable = std::all_of(c.kind.begin(), c.kind.end(), [](char k) { return k > ' ' && k <= '~'; });
   if (c.kind.empty() || c.kind.size() > 64 || !printable) {
@@ -45,17 +45,18 @@ Status check_numbers(const VocabularyContent& c) {
 
 Result<std::shared_ptr<const Vocabulary>> Vocabulary::make(VocabularyContent content) {
   if (const Status s = check_numbers(content); !s) return s.error();
-  std::shared_ptr<Vocabulary> vocabulary(new Vocabulary(std::move(content)));  // the constructor is private
+  // make_shared cannot call the private constructor
+  std::shared_ptr<Vocabulary> vocabulary(new Vocabulary(std::move(content)));
   if (const Status s = vocabulary->link(); !s) return s.error();
   vocabulary->id_ = vocabulary->hash();
   return std::shared_ptr<const Vocabulary>(std::move(vocabulary));
 }
 
-// Fills nodes_ and depth_ from the numbers of children.
+// Computes nodes_ and depth_ from the numbers of children.
 Status Vocabulary::link() {
   const std::size_t nodes = num_nodes();
   nodes_.resize(nodes);
-  std::size_t next = 1;       // first node that is no one's child so far
+  std::size_t next = 1;       // first node that is not yet a child of another node
   std::size_t level_end = 1;  // first node of the next level
   std::size_t words = 0;
   for (std::size_t i = 0; i < nodes; ++i) {
@@ -93,7 +94,7 @@ std::uint64_t Vocabulary::hash() const {
   return hash.value();
 }
 
-// Distance and position in one number: the least of them is the nearest child, and the first among equals.
+// Packs distance and child index into one number, so that the minimum is the nearest child, and the first one on ties.
 inline std::int32_t Vocabulary::nearest_child(const Node& node, const feature::Descriptor& descriptor) const {
   const feature::Descriptor* child = content_.descriptor.data() + (node.first - 1);
   std::int32_t best = (feature::hamming(descriptor, child[0]) << 8);
@@ -109,17 +110,17 @@ WordId Vocabulary::word(const feature::Descriptor& descriptor) const {
   return WordId(node->first);
 }
 
-// Some descriptors take each step of the descent together, so that the memory one will read next is fetched while the
-// others are compared.
+// Descends with a group of descriptors at the same time, so that the memory of one is prefetched while the others are
+// compared.
 void Vocabulary::words(std::span<const feature::Descriptor> descriptors, std::span<WordId> words) const {
   BSLAM_ASSERT(descriptors.size() == words.size(), "one word a descriptor");
-  constexpr std::size_t kTogether = 32;
+  constexpr std::size_t kBatch = 32;
   constexpr std::size_t kCacheLine = 64;
-  std::array<Node, kTogether> at;
-  for (std::size_t begin = 0; begin < words.size(); begin += kTogether) {
-    const std::size_t count = std::min(kTogether, words.size() - begin);
+  std::array<Node, kBatch> at;
+  for (std::size_t begin = 0; begin < words.size(); begin += kBatch) {
+    const std::size_t count = std::min(kBatch, words.size() - begin);
     at.fill(nodes_.front());
-    std::array<std::int32_t, kTogether> next{};
+    std::array<std::int32_t, kBatch> next{};
     for (int step = 0; step < depth_; ++step) {
       for (std::size_t i = 0; i < count; ++i) {
         if (at[i].count == 0) continue;

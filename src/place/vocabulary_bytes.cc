@@ -25,7 +25,7 @@ T number_at(const char* bytes) {
   return value;
 }
 
-// Lengths of the parts after the header; 64 bits hold any sum of them.
+// Sizes of the sections after the header. Their sum cannot overflow 64 bits.
 struct Lengths {
   std::uint64_t kind, nodes, words;
   std::uint64_t total() const { return kHeaderBytes + kind + nodes + 32 * (nodes - 1) + 4 * words + 8; }

@@ -14,7 +14,8 @@ WordVector::WordVector(const Vocabulary& vocabulary, std::span<const WordId> wor
     const std::size_t end = static_cast<std::size_t>(
         std::upper_bound(sorted.begin() + static_cast<std::ptrdiff_t>(begin), sorted.end(), sorted[begin]) -
         sorted.begin());
-    // The frequency is relative to the number of features, which the sum to 1 takes out again.
+    // The term frequency is not divided by the number of features, because the normalisation to sum 1 cancels that
+    // factor.
     const float weight = static_cast<float>(end - begin) * vocabulary.weight(sorted[begin]);
     if (weight > 0) words_.push_back({sorted[begin], weight});
     sum += weight > 0 ? weight : 0.0f;
@@ -23,7 +24,7 @@ WordVector::WordVector(const Vocabulary& vocabulary, std::span<const WordId> wor
   for (WeightedWord& w : words_) w.weight = static_cast<float>(w.weight / sum);
 }
 
-// Both sum to 1, so |a - b| is 2 minus twice the sum of the smaller weights of common words.
+// Both vectors sum to 1, so |a - b|_1 = 2 - 2 * (sum of the smaller weights of the common words).
 double l1_score(const WordVector& a, const WordVector& b) {
   double common = 0;
   auto i = a.words().begin(), j = b.words().begin();

@@ -1,4 +1,4 @@
-// The bag of words of a frame.
+// The bag-of-words vector of a frame.
 #pragma once
 
 #include <span>
@@ -14,14 +14,14 @@ struct WeightedWord {
   float weight = 0;
 };
 
-// Words with their weights, sorted by word, each once; the weights are positive and sum to 1 (or there are none).
-// Immutable.
+// Words with their weights, sorted by word without duplicates. The weights are positive and sum to 1, unless the vector
+// is empty. Immutable.
 class WordVector {
  public:
   WordVector() = default;
 
-  // tf-idf (Sivic and Zisserman, ICCV 2003) of the words of a frame's unique features, in any order; invalid ids and
-  // words of weight 0 are left out.
+  // Computes tf-idf weights (Sivic and Zisserman, ICCV 2003) of the words of a frame's unique features, given in any
+  // order. Invalid ids and words of weight 0 are ignored.
   WordVector(const Vocabulary& vocabulary, std::span<const WordId> words);
 
   std::span<const WeightedWord> words() const { return words_; }
@@ -32,8 +32,8 @@ class WordVector {
   std::vector<WeightedWord> words_;
 };
 
-// Similarity of two frames, 1 - 0.5 |a - b|_1 in [0, 1] (Nister and Stewenius, CVPR 2006): 1 for equal ones, 0 where no
-// word is common or one is empty.
+// Similarity of two frames, 1 - 0.5 |a - b|_1 in [0, 1] (Nister and Stewenius, CVPR 2006): 1 for equal vectors, 0 if
+// they have no word in common or one is empty.
 double l1_score(const WordVector& a, const WordVector& b);
 
 }  // namespace bslam::place

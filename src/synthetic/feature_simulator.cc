@@ -18,7 +18,7 @@ feature::Descriptor random_descriptor(Random& random) {
   return d;
 }
 
-// A smooth patch with gradients in both directions.
+// Returns a smooth patch with gradients in both directions.
 feature::Patch random_patch(Random& random) {
   constexpr int kCoarse = 4;
   std::array<double, kCoarse * kCoarse> node;
@@ -38,7 +38,7 @@ feature::Patch random_patch(Random& random) {
   return patch;
 }
 
-// A landmark on one of the six sides of the room, each as likely as its area.
+// Returns a landmark on one of the six sides of the room, uniformly distributed over their area.
 SimulatedLandmark random_landmark(const FeatureSimulatorOptions& o, Random& random) {
   const Vector3d size = o.room_high - o.room_low;
   const std::array<double, 3> area = {size.y() * size.z(), size.x() * size.z(), size.x() * size.y()};
@@ -112,7 +112,7 @@ std::optional<FeatureSimulator::View> FeatureSimulator::view(std::size_t landmar
       static_cast<int>(std::lround(std::log(l.base_distance / point.norm()) / std::log(options_.scale_factor)));
   if (level < 0 || level >= options_.levels) return std::nullopt;
   const auto projection = rig_.camera(camera).project_with_jacobian(point);
-  constexpr double kMargin = 8.0;  // pixels: extractors keep off the border
+  constexpr double kMargin = 8.0;  // pixels; feature extractors ignore the border too
   if (!projection || !rig_.camera(camera).contains(projection->pixel, kMargin)) return std::nullopt;
   const Vector2d direction = projection->jacobian * (T_cam_world.rotation() * l.tangent);
   return View{projection->pixel, level, std::atan2(direction.y(), direction.x())};
@@ -189,7 +189,8 @@ std::optional<frame::BundledPoint> FeatureSimulator::triangulate(const std::vect
   }
   const auto point = geometry::triangulate_midpoint(rays, FeatureSimulatorOptions::kMinAngle);
   if (!point) return std::nullopt;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // of the pixels, to first order
+  // first-order information matrix of the point, from the pixels
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   for (const frame::KeypointRef& ref : group) {
     const geometry::SE3& T_cam_rig = rig_.cam_from_rig(ref.camera);
     const auto projection = rig_.camera(ref.camera).project_with_jacobian(T_cam_rig * *point);

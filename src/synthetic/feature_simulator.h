@@ -1,5 +1,6 @@
-// Simulation without images: a rig moves through a room whose walls carry landmarks, and what its cameras would extract
-// and bundle comes out directly, with the truth beside it. For tests of tracking and mapping.
+// Feature-level simulation without images: a rig moves through a room with landmarks on its walls, and the simulator
+// directly returns the bundled features of a frame together with the ground truth. Used by tests of tracking and
+// mapping.
 #pragma once
 
 #include <cstdint>
@@ -16,50 +17,57 @@
 namespace bslam::synthetic {
 
 struct FeatureSimulatorOptions {
-  std::uint64_t scene_seed = 1;  // landmarks
-  std::uint64_t noise_seed = 1;  // detection, pixels, descriptors, outliers; the trajectory has a seed of its own
+  std::uint64_t scene_seed = 1;  // seed of the landmarks
+  // seed of detection, pixel noise, descriptors and outliers; the trajectory has its own seed
+  std::uint64_t noise_seed = 1;
 
-  Vector3d room_low = {-5, -4, 0}, room_high = {5, 4, 3};  // metres: landmarks lie on its walls, floor and ceiling
-  double scatter = 0.3;                                    // metres they lie inside of these at most
+  // metres; landmarks lie near the walls, floor and ceiling of this box
+  Vector3d room_low = {-5, -4, 0}, room_high = {5, 4, 3};
+  double scatter = 0.3;  // metres; maximum distance of a landmark from its wall, towards the inside
   int landmarks = 8000;
-  double nearest_base = 4.0, farthest_base = 14.0;  // metres: a landmark's distance at which it is found on level 0
+  double nearest_base = 4.0, farthest_base = 14.0;  // metres: distance at which a landmark is detected on level 0
 
-  int max_keypoints = 1000;  // true keypoints of one camera; landmarks come in order of their strength
-  double sigma_px = 0.7;     // standard deviation of a keypoint on its level
+  int max_keypoints = 1000;  // maximum number of inlier keypoints per camera; the strongest landmarks are kept
+  double sigma_px = 0.7;     // standard deviation of a keypoint, in pixels of its level
   int levels = 8;
   double scale_factor = 1.2;
-  double detection_share = 0.85;  // of visible landmarks found
-  double flipped_bits = 12.0;     // of a descriptor, in the mean, from one observation to the landmark's own
-  double outlier_share = 0.05;    // keypoints anywhere with any descriptor, of the true ones
-  double matched_share = 0.8;     // of landmarks found by several cameras that the Bundled table knows as matched
-  std::vector<double> capture_offset_s;  // per camera: its image is taken that much after the frame's time; empty = 0
+  double detection_share = 0.85;  // fraction of visible landmarks that are detected
+  // mean Hamming distance between the descriptor of an observation and that of the landmark
+  double flipped_bits = 12.0;
+  // outliers at random positions with random descriptors, relative to the number of inliers
+  double outlier_share = 0.05;
+  // fraction of landmarks detected by several cameras that the Bundled table contains as matched
+  double matched_share = 0.8;
+  // Capture time of each camera's image relative to the frame's time, in seconds; empty: all 0.
+  std::vector<double> capture_offset_s;
 
-  static constexpr double kMinAngle = 1e-4;  // radians: rays closer to parallel give no triangulated point
+  static constexpr double kMinAngle = 1e-4;  // radians: smallest angle between rays for which a point is triangulated
 };
 
 struct SimulatedLandmark {
   Vector3d position;     // metres, world
-  Vector3d tangent;      // unit, world: what keypoints take their angle from
+  Vector3d tangent;      // unit vector, world: defines the orientation of keypoints
   double base_distance;  // metres
   feature::Descriptor descriptor;
-  feature::Patch patch;  // the same from everywhere
+  feature::Patch patch;  // identical from all viewpoints
 };
 
 struct SimulatedFrame {
   frame::BundledFrame frame;
   geometry::SE3 T_world_body, T_world_rig;  // at the frame's time
-  std::vector<std::vector<int>> landmark;   // [camera][keypoint]: index of the landmark, -1 = outlier
+  std::vector<std::vector<int>> landmark;   // [camera][keypoint]: index of the landmark, -1 for outliers
 };
 
 class FeatureSimulator {
  public:
   FeatureSimulator(camera::Rig rig, Trajectory trajectory, const FeatureSimulatorOptions& options);
 
-  // What the rig sees at a time of the trajectory; the same for every call with these arguments. Cameras listed in
-  // `missing` give no image.
+  // Returns the features observed at a time of the trajectory, deterministically. Cameras listed in `missing` give no
+  // image.
   SimulatedFrame frame(FrameId id, double time_s, std::span<const int> missing = {}) const;
 
-  // The landmark's pixel in a camera at a time, without noise, where it is inside the image and on a level that exists.
+  // Returns the noise-free pixel, level and angle of a landmark in a camera; nullopt if it is outside the image or the
+  // pyramid.
   struct View {
     Vector2d pixel;
     int level;
@@ -73,7 +81,7 @@ class FeatureSimulator {
   const FeatureSimulatorOptions& options() const { return options_; }
 
  private:
-  // Fills one camera's keypoints and their landmarks.
+  // Adds one camera's keypoints and the landmark indices they belong to.
   void observe(std::size_t camera, const geometry::SE3& T_world_cam, Random& random, feature::Keypoints& keypoints,
                std::vector<int>& landmark) const;
   void add_outliers(std::size_t camera, Random& random, feature::Keypoints& keypoints,

@@ -16,9 +16,9 @@ using Eigen::Vector3d;
 using geometry::SE3;
 using std::numbers::pi;
 
-// T_body_cam of a camera at `position` that looks along `yaw`, level, up to small errors of mounting.
+// Returns T_body_cam of a level camera at `position` that looks along `yaw`, with small random mounting errors.
 SE3 mounted(const Vector3d& position, double yaw, Random& random) {
-  Eigen::Matrix3d R_body_cam;  // columns: camera x (right), y (down), z (forward) of a camera looking along body x
+  Eigen::Matrix3d R_body_cam;  // columns: x (right), y (down), z (forward) axis of a camera that looks along body x
   R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const auto small = [&](double size) -> Vector3d {
     const Vector3d unit{random.normal(), random.normal(), random.normal()};
@@ -30,7 +30,7 @@ SE3 mounted(const Vector3d& position, double yaw, Random& random) {
   return {turned, position + position_error};
 }
 
-// EuRoC's optics, scaled to the width and varied a little.
+// A camera like those of EuRoC, scaled to `width`, with slightly varied parameters.
 Camera radtan_camera(const std::string& name, int width, Random& random) {
   const int height = static_cast<int>(std::lround(width * 480.0 / 752.0));
   const double scale = width / 752.0;
@@ -42,7 +42,7 @@ Camera radtan_camera(const std::string& name, int width, Random& random) {
 }
 
 Camera fisheye_camera(const std::string& name, int width, Random& random) {
-  // r(95 degrees) fills half the width; coefficients like those of common wide lenses.
+  // The image radius at 95 degrees is half the image width; the coefficients are typical of wide-angle lenses.
   const std::array<double, 4> distortion = {-0.02 + random.uniform(-2e-3, 2e-3), 0.004 + random.uniform(-5e-4, 5e-4),
                                             -8e-4, 5e-5};
   const double theta = 95.0 * pi / 180.0, t2 = theta * theta;
@@ -77,7 +77,7 @@ camera::Rig ring_rig(int n, int width) {
   Random random(static_cast<std::uint64_t>(n), "ring rig");
   std::vector<RigCamera> cameras;
   for (int i = 0; i < n; ++i) {
-    // Places 0 and 1 share the front; the others lie at 1, 2, ... of n - 1 parts of the circle.
+    // Cameras 0 and 1 both look forward; the others are at multiples of 1/(n - 1) of the circle.
     const double yaw = i < 2 ? 0.0 : 2 * pi * (i - 1) / (n - 1);
     Vector3d position = around(yaw, 0.09);
     if (i < 2 && n >= 2) position += Vector3d(0, i == 0 ? 0.055 : -0.055, 0);

@@ -1,4 +1,4 @@
-// The sway of a walker about a smooth path: sums of sines with random phases.
+// Swaying motion of a walker about a smooth path: sums of sine waves with random phases.
 #pragma once
 
 #include <array>
@@ -10,10 +10,10 @@
 
 namespace bslam::synthetic {
 
-inline constexpr double kMaxSway = 0.12;     // metres to either side of the path
-inline constexpr double kKnotSpacing = 0.1;  // seconds between control poses: fine enough for the rhythm of steps
+inline constexpr double kMaxSway = 0.12;     // metres, maximum lateral deviation from the path
+inline constexpr double kKnotSpacing = 0.1;  // seconds between control poses; short enough to represent steps
 
-// A few sine waves with random phases, mean 0, at most 1 in size, over a phase in laps; whole numbers of waves a lap.
+// A sum of sine waves with random phases, with mean 0 and absolute value at most 1, periodic over one lap.
 class Waves {
  public:
   Waves(Random& random, std::array<int, 3> per_lap) : per_lap_(per_lap) {
@@ -32,7 +32,7 @@ class Waves {
   std::array<double, 3> phase_{};
 };
 
-// Sway of one lap about the path.
+// The sway of one lap about the path.
 struct Sway {
   explicit Sway(Random& random)
       : aside(random, {2, 3, 7}),
@@ -44,12 +44,12 @@ struct Sway {
   Waves aside, up, step, yaw, pitch, roll;
 };
 
-// What sway adds: `own` belongs to the lap and fades out at its ends, so that laps join and all begin alike.
+// Offsets from the path. `own` belongs to one lap and fades out at its ends, so that laps connect and start alike.
 struct Offsets {
   double aside, up, yaw, pitch, roll;
 };
 
-// `base` is common to all laps; `lap_phase` counts from 0 to 1 over a lap.
+// `base` is the same for all laps; `lap_phase` runs from 0 to 1 over a lap.
 Offsets offsets_at(const Sway& base, const Sway& own, double lap_phase);
 
 }  // namespace bslam::synthetic

@@ -1,4 +1,4 @@
-// The true motion of the simulated rig: a smooth curve of poses, known exactly at any time.
+// Ground-truth motion of the simulated rig: a smooth curve of poses that can be evaluated at any time.
 #pragma once
 
 #include <vector>
@@ -10,22 +10,22 @@ namespace bslam::synthetic {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Position and orientation the curve is drawn to. The body looks along x, y is to its left, z up.
+// Control pose of the spline. The body's x axis points forward, y left, z up.
 struct ControlPose {
   Vector3d position = Vector3d::Zero();  // metres, world
-  double yaw = 0, pitch = 0, roll = 0;   // radians, unwrapped: R_world_body = Rz(yaw) Ry(pitch) Rx(roll)
+  double yaw = 0, pitch = 0, roll = 0;   // radians, without wrap-around: R_world_body = Rz(yaw) Ry(pitch) Rx(roll)
 };
 
-// Uniform cubic B-spline over position and the three angles: twice continuously differentiable.
+// Uniform cubic B-spline over the position and the three angles; twice continuously differentiable.
 class Trajectory {
  public:
-  // Control pose i acts about the time (i - 1) * knot_spacing_s. At least four of them.
+  // Control pose i has its influence around the time (i - 1) * knot_spacing_s. Needs at least four.
   Trajectory(std::vector<ControlPose> control, double knot_spacing_s);
 
   double duration_s() const { return (static_cast<double>(control_.size()) - 3.0) * knot_spacing_s_; }
 
-  // Times in seconds from the start of the trajectory; outside of [0, duration] the motion goes on along the end
-  // pieces' polynomials, which serves exposures that reach a few milliseconds over the end.
+  // `time_s` counts from the start of the trajectory. Outside [0, duration] the polynomials of the end segments are
+  // extrapolated, which allows for images captured a few milliseconds beyond the end.
   geometry::SE3 T_world_body(double time_s) const;
   Vector3d velocity(double time_s) const;  // metres per second, world
   double yaw_rate(double time_s) const;    // radians per second
@@ -38,12 +38,12 @@ class Trajectory {
   double knot_spacing_s_;
 };
 
-// Circles about the vertical axis through `centre`, looking along the motion, with gentle sway: for rooms without a
-// tour.
+// Circles about the vertical axis through `centre`, looking along the direction of motion, with slight sway. For rooms
+// without a predefined tour.
 struct OrbitOptions {
   Vector3d centre = {0, 0, 1.5};  // metres
   double radius = 1.5;            // metres
-  double period_s = 12.0;         // of one round
+  double period_s = 12.0;         // of one circle
   double duration_s = 12.0;
   std::uint64_t seed = 1;
 };

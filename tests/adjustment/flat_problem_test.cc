@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kDetected = 0.4;
 
-// Keyframes of one camera; `sigma` of every keypoint of each.
+// Keyframes of one camera; `sigma` is the standard deviation of all keypoints of each keyframe.
 map::BundledMap keyframes_with(const std::vector<float>& sigma) {
   map::BundledMap out(map::synthetic_rig(1));
   Random random(1);

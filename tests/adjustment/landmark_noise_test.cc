@@ -11,7 +11,7 @@ namespace scene = solver::scene;
 
 bool noisy(std::size_t point) { return point % 3 == 0; }
 
-// Every third point is seen with six times the noise of the others, which nothing says.
+// Every third point has six times the noise of the others, while all have the same stated standard deviation.
 std::unique_ptr<scene::BundleScene> uneven_scene(std::uint64_t seed) {
   Random random(seed, "uneven");
   scene::BundleSpec spec;

@@ -11,7 +11,7 @@ using geometry::SE3;
 
 constexpr double kSigmaPx = 0.7, kScaleFactor = 1.2;
 
-// Cameras named in `late_s` fire that much after the frame.
+// The images of cameras with an entry in `late_s` are captured that much later than the frame.
 map::SimulatedMap true_map(camera::Rig rig, int keyframes, std::vector<double> late_s = {}, bool knows_motion = false) {
   synthetic::FeatureSimulatorOptions options;
   options.landmarks = 2500;
@@ -24,7 +24,7 @@ map::SimulatedMap true_map(camera::Rig rig, int keyframes, std::vector<double> l
   return out;
 }
 
-// All keyframes free but the first `fixed`, all landmarks.
+// Selects all keyframes, the first `fixed` of them as fixed, and all landmarks.
 Selection everything(const map::BundledMap& map, int fixed) {
   Selection s;
   for (const KeyframeId k : map.keyframe_ids()) (k.value() < fixed ? s.fixed_keyframes : s.free_keyframes).push_back(k);
@@ -32,7 +32,7 @@ Selection everything(const map::BundledMap& map, int fixed) {
   return s;
 }
 
-// Moves free keyframes by about five centimetres and one degree, landmarks by about half a metre.
+// Displaces free keyframes by about five centimetres and one degree, landmarks by about half a metre.
 void perturb(const Selection& selection, map::BundledMap& map) {
   Random random(5, "perturb");
   const auto noise = [&](double size) -> Eigen::Vector3d {
@@ -52,7 +52,7 @@ double mean_pose_error_m(const map::SimulatedMap& world, const map::BundledMap& 
   return sum / static_cast<double>(map.num_keyframes());
 }
 
-// Of landmarks that at least three keyframes see.
+// Over landmarks observed by at least three keyframes.
 double median_point_error_m(const map::SimulatedMap& world, const map::BundledMap& map) {
   std::vector<double> errors;
   for (const LandmarkId l : map.landmark_ids()) {
@@ -79,13 +79,13 @@ TEST(AdjustMap, BringsPerturbedPosesAndPointsNearTheTruth) {
     EXPECT_LT(mean_pose_error_m(world, draft.map()), 0.012) << cameras << " cameras";
     EXPECT_LT(median_point_error_m(world, draft.map()), 0.7 * median_point_error_m(world, start))
         << cameras << " cameras";
-    // 5 % of all observations lie beyond the 95 % bound by their noise alone.
+    // Noise alone takes 5 % of all observations beyond the 95 % bound.
     EXPECT_LT(static_cast<double>(report.outliers), 0.08 * static_cast<double>(report.observations));
     EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
   }
 }
 
-// Of four cameras two fire 40 ms late while the rig moves on.
+// Two of four cameras capture 40 ms late while the rig moves.
 double error_of_a_rig_with_late_cameras(bool knows_motion) {
   const map::SimulatedMap world = true_map(synthetic::default_rig(), 8, {0, 0, 0.04, 0.04}, knows_motion);
   const Selection selection = everything(world.map, 2);
@@ -130,7 +130,7 @@ TEST(AdjustMap, LeavesAloneWhatIsFixedOrNotSelected) {
     const KeyframeId only = start.observations(l).front().keyframe;
     if (start.observations(l).size() > 1) {
       EXPECT_EQ(start.landmark(l).position, draft.map().landmark(l).position);
-    } else {  // seen by one keyframe alone: it keeps its place in that keyframe
+    } else {  // observed by one keyframe only: it keeps its position relative to that keyframe
       const Eigen::Vector3d before = start.keyframe(only).T_rig_world * start.landmark(l).position;
       const Eigen::Vector3d after = draft.map().keyframe(only).T_rig_world * draft.map().landmark(l).position;
       EXPECT_LT((before - after).norm(), 1e-9);
@@ -142,7 +142,7 @@ TEST(AdjustMap, RemovesPlantedOutliers) {
   map::SimulatedMap world = true_map(synthetic::ring_rig(2), 5);
   const KeyframeId last(4);
   std::vector<LandmarkId>
-      planted;  // landmarks seen by four keyframes and, wrongly, by an outlier's feature of the last
+      planted;  // landmarks observed by four keyframes and, wrongly, by an outlier feature of the last one
   const frame::BundledFrame& frame = *world.map.keyframe(last).frame;
   std::vector<FeatureId> free;
   for (std::size_t f = 0; f < frame.bundled.size(); ++f) {

@@ -14,7 +14,7 @@ concept Comparable = requires(A a, B b) {
   a == b;
 };
 
-// Ids of different things do not mix, nor do ids and bare integers.
+// Ids of different types do not convert to each other or to integers.
 static_assert(!std::is_convertible_v<KeyframeId, LandmarkId>);
 static_assert(!std::is_constructible_v<KeyframeId, LandmarkId>);
 static_assert(!std::is_assignable_v<KeyframeId&, FrameId>);

@@ -30,8 +30,8 @@ TEST(Random, DiffersWhereSeedStageOrFrameDiffers) {
   EXPECT_EQ(first.size(), 10u * 5u * 10u);
 }
 
-// Worked out by another implementation of xoshiro256** and splitmix64 (Blackman and Vigna): the numbers that belong to
-// a seed never change between releases, compilers or machines.
+// Reference values from another implementation of xoshiro256** and splitmix64 (Blackman and Vigna): the numbers
+// generated from a seed never change between releases, compilers or machines.
 TEST(Random, MatchesTheReferenceGenerator) {
   Random random(42, "stage", 3);
   EXPECT_EQ(random.next(), 0x53378ba9305f38f5ull);
@@ -53,7 +53,7 @@ TEST(Random, UniformFillsTheUnitIntervalEvenly) {
   }
   double chi2 = 0;
   for (const int n : bins) chi2 += std::pow(n - kDraws / kBins, 2) / (kDraws / kBins);
-  EXPECT_LT(chi2, 43.8);  // 99.9 % of chi-square with 19 degrees of freedom
+  EXPECT_LT(chi2, 43.8);  // 99.9 % quantile of chi-square with 19 degrees of freedom
   EXPECT_NEAR(sum / kDraws, 0.5, 0.005);
 }
 
@@ -64,7 +64,7 @@ TEST(Random, BelowGivesEveryElementEvenly) {
   for (int i = 0; i < kDraws; ++i) ++counts.at(random.below(7));
   double chi2 = 0;
   for (const int n : counts) chi2 += std::pow(n - kDraws / 7.0, 2) / (kDraws / 7.0);
-  EXPECT_LT(chi2, 22.5);  // 99.9 % with 6 degrees of freedom
+  EXPECT_LT(chi2, 22.5);  // 99.9 % quantile with 6 degrees of freedom
   EXPECT_EQ(random.below(1), 0u);
 }
 

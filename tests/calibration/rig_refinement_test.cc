@@ -14,7 +14,7 @@ using geometry::SE3;
 
 constexpr double kSigmaPx = 0.7, kScaleFactor = 1.2, kDegree = std::numbers::pi / 180;
 
-// T_cam_rig of one camera off by a degree and a centimetre.
+// Adds an error of one degree and one centimetre to T_cam_rig of one camera.
 camera::Rig with_error(const camera::Rig& rig, std::size_t camera) {
   geometry::Vector6d error;
   error << kDegree * Eigen::Vector3d(2, -1, 2).normalized(), 0.01 * Eigen::Vector3d(-1, 2, 2).normalized();
@@ -26,7 +26,7 @@ camera::Rig with_error(const camera::Rig& rig, std::size_t camera) {
   return camera::Rig(std::move(cameras));
 }
 
-// The map that adjustment under the calibration given makes of what the true rig sees on its rounds.
+// Builds a map from the images of the true rig, adjusted with the given calibration.
 map::SimulatedMap mapped(const camera::Rig& truth, const camera::Rig& calibrated, int keyframes, double step_s) {
   synthetic::FeatureSimulatorOptions options;
   options.landmarks = 2500;
@@ -101,12 +101,12 @@ TEST(RefineRig, KeepsToItsLimitsAndStillFindsTheError) {
   EXPECT_LT(rotation_error_deg(result.cameras[2], truth.cam_from_rig(2)), 0.15);
 }
 
-// Stretches of the map that share little are held one by one; that must not tell how long the baseline is.
+// Groups of keyframes that share few landmarks are fixed separately; this must not constrain the length of the
+// baseline.
 TEST(RefineRig, HoldingSeveralKeyframesTellsNoLength) {
   const camera::Rig stereo = synthetic::ring_rig(2);
   const map::SimulatedMap world = mapped(stereo, stereo, 36, 0.33);
-  const RigRefinementOptions options{.keyframes = 20,
-                                     .landmarks = 100};  // so few that not all keyframes hold one another
+  const RigRefinementOptions options{.keyframes = 20, .landmarks = 100};  // too few to connect all keyframes
   const RigRefinement result = refine_rig(world.map, options, kSigmaPx, kScaleFactor);
   ASSERT_TRUE(result.done);
   EXPECT_EQ(result.keyframes, 20u);

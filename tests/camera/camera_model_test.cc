@@ -25,7 +25,7 @@ std::vector<Vector2d> pixels_of(const Camera& camera) {
   return pixels;
 }
 
-// Points within the model's domain, at depths near and far, some of them behind the plane of a wide lens.
+// Points in the model's domain at small and large depths, for wide lenses also behind the image plane.
 std::vector<Vector3d> points_of(const Camera& camera, Random random) {
   std::vector<Vector3d> points;
   while (points.size() < 300) {
@@ -48,7 +48,7 @@ TEST_P(CameraModelOf, PixelsComeBackFromTheirBearing) {
     ASSERT_TRUE(again) << pixel.transpose();
     EXPECT_LT((*again - pixel).norm(), 1e-6) << pixel.transpose();
   }
-  EXPECT_GT(answered, 400);  // of 441: at most the corners of a fisheye are dark
+  EXPECT_GT(answered, 400);  // of 441: at most the corners of a fisheye image are outside the domain
 }
 
 TEST_P(CameraModelOf, PointsComeBackUpToTheirDistance) {
@@ -84,7 +84,7 @@ TEST_P(CameraModelOf, JacobianHoldsOnTheOpticalAxis) {
   const Intrinsics& k = intrinsics(GetParam().model);
   EXPECT_LT((projection->pixel - Vector2d(k.cx, k.cy)).norm(), 1e-9);
   Matrix23d expected;
-  // The double sphere model measures its focal length from the further centre.
+  // The focal length of the double sphere model refers to the second sphere centre.
   const auto* sphere = std::get_if<DoubleSphere>(&GetParam().model);
   const double depth = sphere ? 2 * (1 + sphere->distortion()[0]) : 2;
   expected << k.fx / depth, 0, 0, 0, k.fy / depth, 0;
@@ -110,7 +110,7 @@ TEST_P(CameraModelOf, AnswersNothingForNonsense) {
   EXPECT_FALSE(GetParam().project_with_jacobian({0, 0, -1}));
 }
 
-// What two directions share a pixel, only one of them may be answered.
+// Of two directions with the same pixel, only one may be projected.
 TEST_P(CameraModelOf, NoTwoDirectionsShareAPixel) {
   Random random(4);
   for (int i = 0; i < 2000; ++i) {
@@ -133,14 +133,14 @@ TEST(Pinhole, SeesNothingOnOrBehindItsPlane) {
 
 TEST(PinholeRadTan, EndsWhereTheDistortedRadiusTurnsBack) {
   const PinholeRadTan camera({458.654, 457.296, 367.215, 248.375}, {-0.28340811, 0.07395907, 0, 0});
-  // r (1 + k1 r^2 + k2 r^4): 1 + 3 k1 r^2 + 5 k2 r^4 has no root here, so the lens never turns back.
+  // r (1 + k1 r^2 + k2 r^4): 1 + 3 k1 r^2 + 5 k2 r^4 has no root here, so the radius increases without limit.
   EXPECT_TRUE(std::isinf(camera.max_radius()));
   const PinholeRadTan barrel({458, 457, 367, 248}, {-0.28, 0, 0, 0});
   EXPECT_NEAR(barrel.max_radius(), std::sqrt(1 / (3 * 0.28)), 0.003);
   EXPECT_TRUE(barrel.project({1.0, 0, 1}));
   EXPECT_FALSE(barrel.project({1.2, 0, 1}));
   EXPECT_FALSE(barrel.project_with_jacobian({1.2, 0, 1}));
-  EXPECT_FALSE(barrel.unproject({367 + 458 * 0.8, 248}));  // beyond the largest radius the lens reaches, 0.727
+  EXPECT_FALSE(barrel.unproject({367 + 458 * 0.8, 248}));  // beyond the largest distorted radius, 0.727
 }
 
 TEST(PinholeRadTan, KeepsItsCoefficients) {
@@ -185,7 +185,7 @@ TEST(KannalaBrandt, IsSmoothAcrossTheAxis) {
 
 Vector3d at_angle(double theta) { return {std::sin(theta), 0, std::cos(theta)}; }
 
-// Widest angle from the axis at which a model answers, by bisection.
+// Largest angle from the axis at which a model projects, by bisection.
 template <class Model>
 double widest_angle(const Model& model) {
   double inside = 0.0, outside = kPi;
@@ -234,7 +234,7 @@ TEST(ExtendedUnified, WithBetaOneIsTheUnifiedModel) {
   }
 }
 
-// Equations 40 to 42 of the paper, written out.
+// Equations 40 to 42 of the paper.
 TEST(DoubleSphere, IsThatOfThePaper) {
   const double xi = -0.24, alpha = 0.567;
   const DoubleSphere camera({350, 349, 366, 249}, xi, alpha);
@@ -259,12 +259,12 @@ TEST(SphereModels, EndWhereTheirRadiusTurnsBack) {
       const DoubleSphere sphere(k, xi, alpha);
       const double end = widest_angle(sphere);
       double last = 0.0;
-      for (double theta = 0.001; theta < end; theta += 0.001) {  // the radius grows all the way
+      for (double theta = 0.001; theta < end; theta += 0.001) {  // the radius increases over the whole domain
         const double r = sphere.project(at_angle(theta)).value().x() - 320;
         EXPECT_GT(r, last);
         last = r;
       }
-      // The paper's bound, -w2, is on the safe side of the true one.
+      // The paper's bound, -w2, is stricter than the true one.
       const double w1 = alpha > 0.5 ? (1 - alpha) / alpha : alpha / (1 - alpha);
       const double w2 = (w1 + xi) / std::sqrt(2 * w1 * xi + xi * xi + 1);
       EXPECT_GT(end, std::acos(-w2) - 1e-6);

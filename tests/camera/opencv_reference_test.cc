@@ -1,4 +1,4 @@
-// Our projections against OpenCV's, where its calib3d module is linked.
+// Compares projections with OpenCV's if its calib3d module is available.
 #include <gtest/gtest.h>
 
 #include "base/random.h"
@@ -15,11 +15,11 @@ cv::Mat matrix_of(const Intrinsics& k) { return (cv::Mat_<double>(3, 3) << k.fx,
 TEST(CameraModel, ProjectsAsOpenCVDoes) {
   const cv::Mat zero = cv::Mat::zeros(3, 1, CV_64F);
   for (const Camera& camera : test_cameras()) {
-    if (is_sphere_model(camera.model)) continue;  // none of calib3d's
+    if (is_sphere_model(camera.model)) continue;  // calib3d has no such models
     Random random(1);
     std::vector<Vector2d> ours;
     std::vector<cv::Point3d> points;
-    while (points.size() < 200) {  // OpenCV's models end at the plane
+    while (points.size() < 200) {  // OpenCV's models require positive depth
       const Vector3d point(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(0.5, 3));
       const auto pixel = camera.project(point);
       if (!pixel || !camera.contains(*pixel)) continue;

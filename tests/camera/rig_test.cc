@@ -21,7 +21,7 @@ SE3 turned(double yaw, const Vector3d& position) { return SE3(geometry::so3_exp(
 
 double difference(const SE3& a, const SE3& b) { return (a.inverse() * b).log().norm(); }
 
-// Stereo ahead and one camera behind, with a body frame of its own.
+// A stereo pair facing forward and one camera facing backward, with a separate body frame.
 Rig three_cameras() {
   const SE3 T_body_rig(geometry::so3_exp({0.3, -1.2, 0.5}), {0.1, 0.2, 0.3});
   return Rig({{pinhole("left"), T_body_rig},
@@ -37,7 +37,7 @@ TEST(Rig, ComposesCameraPoses) {
     EXPECT_EQ(&rig.cam_from_rig(i), &rig.cam_from_rig(CameraIndex(i)));
   }
   EXPECT_LT((rig.rig_from_cam(1).translation() - Vector3d(0.11, 0, 0)).norm(), 1e-13);
-  // A point ahead of camera 0 is behind the one that looks back.
+  // A point in front of camera 0 is behind the camera that faces backward.
   EXPECT_LT(((rig.cam_from_rig(2) * Vector3d(0, 0, 1)) - Vector3d(0, 0, -1.2)).norm(), 1e-12);
 }
 
@@ -65,7 +65,7 @@ TEST(Rig, OppositeCamerasDoNotOverlap) {
   EXPECT_FALSE(rig.subset(apart).any_overlap());
 }
 
-// Two cameras side by side turned apart by an angle share what their fields of view, 93.7 degrees wide, have in common.
+// Two cameras side by side, rotated apart by an angle; their fields of view are 93.7 degrees wide.
 TEST(Rig, OverlapShrinksWithTheAngleBetweenCameras) {
   double last = 1.1;
   for (const double degrees : {0.0, 30.0, 60.0, 85.0, 120.0}) {
@@ -81,7 +81,7 @@ TEST(Rig, WideFisheyesOverlapSideways) {
   const Camera fisheye = test_cameras().back();
   const Rig rig({{fisheye, SE3()}, {fisheye, turned(kPi / 2, {0.05, 0, 0})}, {fisheye, turned(kPi, {0, 0, -0.1})}});
   EXPECT_TRUE(rig.overlap(0, 1));
-  EXPECT_TRUE(rig.overlap(0, 2));  // 220 degrees each, back to back: they share a ring
+  EXPECT_TRUE(rig.overlap(0, 2));  // 220 degrees, back to back: the fields of view overlap in a ring
 }
 
 TEST(Rig, SubsetKeepsTheOrderAndMovesTheRigFrame) {

@@ -1,4 +1,4 @@
-// Cameras of every model for tests: real calibrations and extreme lenses.
+// Cameras of every model for tests: published calibrations and extreme lenses.
 #pragma once
 
 #include <string>
@@ -33,7 +33,7 @@ inline std::vector<Camera> test_cameras() {
              KannalaBrandt({190.978, 190.973, 254.932, 256.897},
                            {0.0034823894, 0.0007150348, -0.0020532361, 0.00020293673}),
              512, 512),
-      // The published calibration of EuRoC's cam0 in the double sphere model, and lenses on both sides of alpha = 1/2.
+      // The published double sphere calibration of EuRoC's cam0, and lenses on both sides of alpha = 1/2.
       camera("double_sphere_euroc", DoubleSphere({349.75, 348.64, 365.9, 249.3}, -0.2409, 0.5670), 752, 480),
       camera("double_sphere_wide", DoubleSphere({150, 151, 319.5, 239.5}, 0.15, 0.6), 640, 480),
       camera("double_sphere_below_half", DoubleSphere({300, 301, 319.5, 239.5}, 0.1, 0.3), 640, 480),
@@ -41,7 +41,7 @@ inline std::vector<Camera> test_cameras() {
       camera("ucm_below_half", Unified({260, 259, 322, 238}, 0.4), 640, 480),
       camera("eucm", ExtendedUnified({235, 234, 318, 240}, 0.6, 1.1), 640, 480),
       camera("eucm_below_half", ExtendedUnified({235, 234, 318, 240}, 0.45, 0.9), 640, 480),
-      // 220 degrees across: it sees behind its plane.
+      // A field of view of 220 degrees, which includes points behind the image plane.
       camera("fisheye_wide", KannalaBrandt({130.0, 131.0, 319.5, 239.5}, {-0.01, 0.002, -0.0003, 0.00001}), 640, 480),
   };
 }

@@ -66,7 +66,7 @@ TEST(Trajectory, MovesToAnotherFrameOnTheSameBody) {
   const Trajectory body = moved_to_frame({{7, T_world_cam}}, T_body_cam.inverse());
   ASSERT_EQ(body.size(), 1u);
   EXPECT_EQ(body[0].time_ns, 7);
-  // The camera, seen from the body's pose, is where it was.
+  // The camera pose computed from the body pose is unchanged.
   EXPECT_LT(((body[0].T_world_frame * T_body_cam).matrix() - T_world_cam.matrix()).norm(), 1e-12);
 }
 

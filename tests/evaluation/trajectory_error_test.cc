@@ -17,7 +17,7 @@ using geometry::Vector3d;
 
 constexpr TimeNs kFrame = 50'000'000;  // 20 Hz
 
-// A winding path with turning orientation.
+// A winding path with changing orientation.
 Trajectory winding(std::size_t count, TimeNs interval_ns = kFrame, TimeNs start_ns = 1'403'636'579'763'555'584) {
   Trajectory trajectory;
   for (std::size_t i = 0; i < count; ++i) {
@@ -46,7 +46,7 @@ TEST(TrajectoryError, IsZeroAfterAlignmentOfAMovedCopy) {
   ASSERT_TRUE(result.ok());
   EXPECT_LT(result->ate.max, 1e-9);
   EXPECT_LT(result->rpe.translation_m.max, 1e-9);
-  EXPECT_LT(result->rpe.rotation_deg.max, 1e-5);  // an angle near zero has half the digits
+  EXPECT_LT(result->rpe.rotation_deg.max, 1e-5);  // an angle near zero has half of the digits
   EXPECT_EQ(result->ate.count, 200u);
   EXPECT_EQ(result->rpe.translation_m.count, 180u);
   EXPECT_DOUBLE_EQ(result->coverage, 1.0);
@@ -65,7 +65,7 @@ TEST(TrajectoryError, ReportsTheFittedScaleWhateverTheAlignment) {
     EXPECT_NEAR(*result->scale, 4.0, 1e-9);
     if (mode == AlignMode::kSim3) {
       EXPECT_LT(result->ate.max, 1e-9);
-      EXPECT_LT(result->rpe.translation_m.max, 1e-9);  // over the scaled poses
+      EXPECT_LT(result->rpe.translation_m.max, 1e-9);  // measured on the scaled poses
     } else {
       EXPECT_GT(result->ate.rmse, 0.5);
     }
@@ -89,12 +89,13 @@ TEST(TrajectoryError, HasTheStatisticsComputedByHand) {
   EXPECT_NEAR(result->ate.max, 0.4, 1e-15);
   EXPECT_EQ(result->ate.count, 4u);
   EXPECT_DOUBLE_EQ(result->gt_length_m, 3.0);
-  EXPECT_EQ(result->rpe.translation_m.count, 0u);  // nothing is a second apart
+  EXPECT_EQ(result->rpe.translation_m.count, 0u);  // no two poses are one second apart
   EXPECT_TRUE(std::isnan(result->rpe.translation_m.rmse));
 }
 
 TEST(RelativeError, MeasuresDriftOverDeltaByHand) {
-  // The estimate turns 1 degree too much about z and climbs 2 cm too much in each frame; over 4 frames 4 deg and 8 cm.
+  // In each frame the estimate rotates 1 degree too much about z and climbs 2 cm too much: over 4 frames 4 degrees and
+  // 8 cm.
   Trajectory truth, estimate;
   const SE3 step(Quaterniond::Identity(), Vector3d(0, 0, 0.1));
   const SE3 wrong(geometry::so3_exp(Vector3d(0, 0, std::numbers::pi / 180.0)), Vector3d(0, 0, 0.12));
@@ -119,7 +120,7 @@ TEST(RelativeError, MakesNoPairWhereTheFrameIsMissing) {
   estimate.erase(estimate.begin() + 40, estimate.begin() + 50);
   const auto result = evaluate(estimate, truth, {.align = AlignMode::kNone});
   ASSERT_TRUE(result.ok());
-  EXPECT_EQ(result->rpe.translation_m.count, 80u - 20u);  // ten have no beginning, ten no end
+  EXPECT_EQ(result->rpe.translation_m.count, 80u - 20u);  // ten pairs lack their first pose, ten their second
 }
 
 TEST(RelativeError, FollowsFramesWithUneasyTimes) {
@@ -143,7 +144,8 @@ TEST(Coverage, IsTheShareOfGroundTruthFramesWithAPose) {
 }
 
 TEST(Coverage, CountsFramesWhereADenserGroundTruthIs) {
-  // Truth at 200 Hz for frames 20 .. 179 and not in 100 .. 109; poses in 30 .. 199 without 60 .. 69 and 104 .. 111.
+  // Ground truth at 200 Hz for frames 20 .. 179 except 100 .. 109; poses for frames 30 .. 199 except 60 .. 69 and 104
+  // .. 111.
   const Trajectory dense = winding(2000, kFrame / 10);
   Trajectory truth, estimate;
   for (std::size_t i = 0; i < dense.size(); ++i) {
@@ -179,7 +181,7 @@ TEST(TrajectoryError, RefusesFewerThanThreePairs) {
   EXPECT_FALSE(evaluate(truth, {}, {}).ok());
 }
 
-// Ground truth that is exactly straight, as simulated worlds have, and an estimate with noise in all directions.
+// Ground truth exactly on a line, as in simulated worlds, and an estimate with noise in all directions.
 TEST(TrajectoryError, AlignsToAStraightLine) {
   const Vector3d direction = Vector3d(1, 2, -1).normalized();
   Trajectory truth, estimate;
@@ -196,7 +198,8 @@ TEST(TrajectoryError, AlignsToAStraightLine) {
   ASSERT_TRUE(result.ok());
   EXPECT_NEAR(*result->scale, 2.0, 0.01);
   EXPECT_GT(result->ate.rmse, 0.0);
-  EXPECT_LE(result->ate.rmse, std::sqrt(sideways / 50) + 1e-12);  // the best alignment is no worse than the true one
+  // the best alignment is at least as good as the true one
+  EXPECT_LE(result->ate.rmse, std::sqrt(sideways / 50) + 1e-12);
   const auto exact = evaluate(truth, truth, {});
   ASSERT_TRUE(exact.ok());
   EXPECT_LT(exact->ate.max, 1e-12);

@@ -16,7 +16,7 @@ using geometry::Quaterniond;
 using geometry::SE3;
 using geometry::Vector3d;
 
-// A folder of its own for each test, gone afterwards.
+// Creates a separate folder for each test and removes it afterwards.
 class TrajectoryFile : public testing::Test {
  protected:
   TrajectoryFile()
@@ -31,7 +31,7 @@ class TrajectoryFile : public testing::Test {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return folder_ / name;
   }
-  // The message for a file of these bytes, without the folder; empty where it is read.
+  // Returns the error message for a file with these bytes, without the folder; empty if it can be read.
   std::string error_of(const std::string& bytes) const {
     const auto result = read_trajectory(write("t.txt", bytes));
     if (result.ok()) return {};

@@ -1,4 +1,4 @@
-// Seeded transforms and points for tests.
+// Seeded random transforms and points for tests.
 #pragma once
 
 #include <numbers>
@@ -16,7 +16,7 @@ inline Vector3d random_direction(Random& random) {
   return Vector3d(random.normal(), random.normal(), random.normal()).normalized();
 }
 
-// A rotation vector with an angle uniform in [0, `most`).
+// Returns a rotation vector whose angle is uniform in [0, `most`).
 inline Vector3d random_rotation_vector(Random& random, double most = 0.999 * std::numbers::pi) {
   return random.uniform(0.0, most) * random_direction(random);
 }

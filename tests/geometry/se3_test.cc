@@ -84,7 +84,7 @@ TEST(SE3, PerturbsOnTheLeft) {
   EXPECT_LT(distance(T.perturbed(delta), SE3::exp(delta) * T), 1e-14);
 }
 
-// d (exp(delta) T p) / d delta = [-[T p]x, I], the form every residual uses.
+// d (exp(delta) T p) / d delta = [-[T p]x, I], the form used by every residual.
 TEST(SE3, PerturbedPointHasTheExpectedJacobian) {
   Random random(8);
   const SE3 T = random_se3(random);

@@ -57,7 +57,7 @@ TEST(Sim3, MovesAPoseWithTheWorldAroundIt) {
   const SE3 T_b_frame = random_se3(random);
   const SE3 T_a_frame = S.apply_to_pose(T_b_frame);
   EXPECT_LT((T_a_frame * Vector3d::Zero() - S * (T_b_frame * Vector3d::Zero())).norm(), 1e-12);
-  // What the frame sees keeps its direction; its distance is scaled.
+  // Directions of points in the frame are preserved; their distance is scaled.
   const Vector3d p_b = random_vector(random, 3);
   const Vector3d before = T_b_frame.inverse() * p_b, after = T_a_frame.inverse() * (S * p_b);
   EXPECT_LT((after - S.scale() * before).norm(), 1e-11);

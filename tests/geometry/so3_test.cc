@@ -11,11 +11,11 @@ namespace bslam::geometry {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// Angles on both sides of where the code changes from a series to the closed form, and near pi.
+// Angles on both sides of the switch between series and closed form, and near pi.
 constexpr double kAngles[] = {0.0,    1e-300,  1e-12, 1e-8, 5e-5, 9.99e-5, 1.01e-4,
                               9.9e-4, 1.01e-3, 0.1,   1.0,  2.0,  3.0,     kPi - 1e-6};
 
-// The exponential series itself, summed to convergence.
+// The power series of the exponential, summed to convergence.
 Matrix3d exp_by_series(const Vector3d& omega) {
   const Matrix3d W = skew(omega);
   Matrix3d sum = Matrix3d::Identity(), term = Matrix3d::Identity();

@@ -43,8 +43,8 @@ TEST(Pyramid, KeepsTheBaseAsItIs) {
   }
 }
 
-// A linear ramp stays the same ramp in coordinates of level 0, on every level: pixel centres are where they are said to
-// be (half a pixel of level 1 off would be 0.2 grey levels or more).
+// A linear ramp is the same ramp in level-0 coordinates on every level, which tests the positions of the pixel centres:
+// an error of half a pixel on level 1 would be 0.2 grey levels or more.
 TEST(Pyramid, LevelsLieWhereTheirCoordinatesSay) {
   for (const double factor : {1.2, 1.5, 2.0}) {
     const Image base = make_image(740, 430, [](int x, int y) { return 10 + 0.2137 * x + 0.1519 * y; });
@@ -79,7 +79,7 @@ TEST(Pyramid, KeepsConstantImages) {
   }
 }
 
-// Stripes finer than a level can show must fade, not come back as broad ones.
+// Stripes finer than the resolution of a level must fade instead of aliasing to wider ones.
 TEST(Pyramid, DoesNotAlias) {
   const Image base =
       make_image(600, 400, [](int x, int) { return 128 + 100 * std::cos(2 * std::numbers::pi * x / 2.2); });

@@ -7,14 +7,14 @@
 namespace bslam::looping {
 namespace {
 
-// A walk whose keyframes are covisible with their next neighbours; keyframes 3 to 6 are one place, 20 to 23 another.
+// A path whose keyframes are covisible with the adjacent ones; keyframes 3 to 6 are one place, 20 to 23 another.
 class Consistency : public ::testing::Test {
  protected:
   Consistency() {
     options.consistent_keyframes = 3;
     options.max_keyframe_gap = 3;
   }
-  // Those of a keyframe's candidates that are consistent.
+  // Returns the consistent candidates of a keyframe.
   std::vector<KeyframeId> told(int keyframe, const std::vector<int>& candidates) {
     std::vector<Candidate> list;
     for (const int c : candidates) list.push_back({KeyframeId(c), 1.0});
@@ -58,7 +58,7 @@ TEST_F(Consistency, PlacesAreCountedApart) {
 TEST_F(Consistency, ItOutlivesKeyframesThatDoNotSeeThePlace) {
   told(20, {3});
   told(22, {});
-  EXPECT_EQ(told(23, {4}), ids({}));  // the second
+  EXPECT_EQ(told(23, {4}), ids({}));  // the second one
   EXPECT_EQ(told(26, {5}), ids({5}));
 }
 

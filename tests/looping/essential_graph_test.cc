@@ -20,7 +20,7 @@ std::multiset<Link> links_of(const EssentialGraph& graph) {
   return out;
 }
 
-// What the graph should link: parents and strong covisibility, each pair once.
+// The expected edges of the graph: parents and strong covisibility, each pair once.
 std::multiset<Link> expected_links(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes, int weight) {
   std::set<Link> out;
   for (const KeyframeId k : keyframes) {
@@ -52,7 +52,7 @@ TEST(EssentialGraph, LinksParentsAndStrongNeighboursOnce) {
     EXPECT_EQ(links_of(graph), expected_links(map, graph.keyframes, weight));
   }
   EXPECT_EQ(essential_graph(map, KeyframeId(0), 100000).problem.edges.size(),
-            map.num_keyframes() - 1);  // the tree alone
+            map.num_keyframes() - 1);  // the spanning tree only
 }
 
 TEST(EssentialGraph, ItsEdgesAreMetByThePresentPosesAndItsRootAloneIsFixed) {

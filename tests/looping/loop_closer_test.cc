@@ -1,4 +1,4 @@
-// The loop stage as a whole, keyframe by keyframe.
+// The loop-closing stage as a whole, keyframe by keyframe.
 #include "looping/loop_closer.h"
 
 #include <gtest/gtest.h>
@@ -11,20 +11,20 @@ namespace {
 
 using map::Fingerprint;
 
-// Everything counts as drift.
+// Options that accept any correction as drift.
 LoopingOptions credulous() {
   LoopingOptions options;
   options.loop.max_drift = 10;
   return options;
 }
 
-// The stage beside a map that grows: hands it every keyframe until it closes a loop.
+// Runs the stage on a growing map, keyframe by keyframe, until it closes a loop.
 class Watch {
  public:
   explicit Watch(const LoopingOptions& options = {}, std::uint64_t seed = 1)
       : closer_(recogniser(), options, kFeatures, seed) {}
 
-  // True while nothing was found; the draft is untouched then.
+  // Returns true as long as no loop was closed; the draft is then unchanged.
   bool operator()(const HallMap& world, KeyframeId k) {
     map::MapDraft draft = world.draft();
     closure = closer_.close(k, draft);
@@ -53,7 +53,8 @@ TEST_P(LoopCloserRig, ClosesTheLoopWhereTheEndSeesTheStartAndNotBefore) {
   const KeyframeId k = watch.closure->keyframe;
   EXPECT_EQ(k, world.map.newest_keyframe());
   EXPECT_GT(k.value(), kRound - 12);
-  EXPECT_LT(distance_m(world.truth(k), world.truth(watch.closure->with)), 9.0);  // one may see what the other saw
+  // They are close enough to observe the same landmarks.
+  EXPECT_LT(distance_m(world.truth(k), world.truth(watch.closure->with)), 9.0);
   EXPECT_FALSE(watch.closure->joined);
   const double before = distance_m(world.map.keyframe(k).T_rig_world, world.truth(k));
   EXPECT_LT(5 * distance_m(watch.corrected->keyframe(k).T_rig_world, world.truth(k)), before);
@@ -89,8 +90,8 @@ TEST(LoopCloser, RemembersNothingOfAMapThatWasLeftForAnother) {
   const HallMap& world = drifted_walk(2);
   Watch watch;
   EXPECT_TRUE(watch(world, KeyframeId(kRound)));
-  EXPECT_TRUE(
-      watch(world, KeyframeId(kRound)));  // its ids do not go on, so it is another map, and this the first time there
+  // The ids do not increase, so this is a new map, and the first recognition of the place.
+  EXPECT_TRUE(watch(world, KeyframeId(kRound)));
   EXPECT_FALSE(watch(world, KeyframeId(kRound + 1)));
 }
 
@@ -102,7 +103,7 @@ TEST(LoopCloser, NothingIsClosedOnAWalkThatComesNowhereBack) {
     EXPECT_TRUE(watch(world, world.add(simulator.frame(FrameId(i), kStepS * i))));
 }
 
-// Two rooms that look the same in all, 8 m apart: from the one into the other, what is asked for is no drift.
+// Two identical-looking rooms, 8 m apart: after moving from one to the other, the required correction exceeds drift.
 void two_rooms(int cameras, Watch& watch) {
   const FeatureSimulator simulator = hall(rig_of(cameras));
   HallMap world(simulator.rig());
@@ -121,12 +122,12 @@ TEST(LoopCloser, RefusesACorrectionThatNoDriftExplains) {
     two_rooms(cameras, watch);
     EXPECT_FALSE(watch.closure);
     two_rooms(cameras, believer);
-    ASSERT_TRUE(believer.closure);  // it is the bound alone that refuses
+    ASSERT_TRUE(believer.closure);  // rejected by the drift bound only
     EXPECT_NEAR(believer.closure->moved, 8.0, 0.05);
   }
 }
 
-// After a part begins anew, its first keyframes that know an old place bring both together.
+// After tracking restarted in a new submap, the first keyframes that recognise an old place merge both submaps.
 TEST(LoopCloser, JoinsPartsAtAPlaceBothHaveSeen) {
   for (const int cameras : {1, 2, 4}) {
     const FeatureSimulator simulator = hall(rig_of(cameras));

@@ -1,4 +1,4 @@
-// What a recognised place changes in a map that has drifted.
+// Correction of a map with drift after a place was recognised.
 #include "looping/loop_correction.h"
 
 #include <gtest/gtest.h>
@@ -22,8 +22,8 @@ std::optional<Location> locate_last(const HallMap& world) {
                 seeded(1));
 }
 
-// Metres between where the map has a keyframe and where it was, and the same for the landmarks it observes, in the
-// mean.
+// Distance in metres between the estimated and the true position of a keyframe, and the mean of the same over its
+// landmarks.
 double error_of(const HallMap& world, const map::BundledMap& map, KeyframeId k) {
   return distance_m(map.keyframe(k).T_rig_world, world.truth(k));
 }
@@ -49,7 +49,7 @@ int weight_between(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
   return at != list.end() && at->keyframe == b ? at->weight : 0;
 }
 
-// View directions and distance ranges are those of the present positions.
+// Viewing directions and distance ranges match the present positions.
 void expect_refreshed(const map::BundledMap& map) {
   map::BundledMap again = map;
   int stale = 0;
@@ -97,7 +97,8 @@ TEST_P(CloseLoopRig, BringsTheKeyframesBack) {
     EXPECT_LT(5 * angle_rad(draft.map().keyframe(k).T_rig_world, world.truth(k)),
               angle_rad(world.map.keyframe(k).T_rig_world, world.truth(k)));
   }
-  EXPECT_LT(2 * mean_error(world, draft.map()), mean_error(world, world.map));  // the graph knows both ends only
+  // the graph has constraints at both ends only
+  EXPECT_LT(2 * mean_error(world, draft.map()), mean_error(world, world.map));
   EXPECT_EQ(error_of(world, draft.map(), KeyframeId(0)), error_of(world, world.map, KeyframeId(0)));
 }
 
@@ -125,12 +126,12 @@ TEST_P(CloseLoopRig, FusesWhatIsSeenOnBothEnds) {
     if (after.alive(l) || !after.resolve(l).valid()) continue;
     ++merged;
     wrong += world.shown_by_landmark[l.index()] != world.shown_by_landmark[after.resolve(l).index()];
-    EXPECT_LT(after.resolve(l), l);  // the place keeps its landmarks
+    EXPECT_LT(after.resolve(l), l);  // the landmarks of the place are kept
   }
   EXPECT_GT(merged, 100);
   EXPECT_LE(wrong, merged / 100);
 
-  // Few are left twice in view of the last keyframe and the place.
+  // Few landmarks in view of the last keyframe and the place are still duplicated.
   std::set<HallMap::Shown> then;
   for (const LandmarkId l : landmarks_about(after, KeyframeId(1), 3, 100000))
     then.insert(world.shown_by_landmark[l.index()]);
@@ -157,7 +158,7 @@ TEST_P(CloseLoopRig, GivesTheSameBytesAgain) {
 
 INSTANTIATE_TEST_SUITE_P(Cameras, CloseLoopRig, ::testing::Values(1, 2, 4));
 
-// A keyframe made while the loop was being closed, and its landmarks, come along.
+// A keyframe committed while the loop is closed moves with the correction, and so do its landmarks.
 TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
   const FeatureSimulator simulator = hall(rig_of(2));
   HallMap world = drifted_walk(2);
@@ -169,7 +170,7 @@ TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
 
   map::MapDraft tracking("tracking", store.snapshot());
   const KeyframeId newer =
-      world.add(simulator.frame(FrameId(kRound + 2), kStepS * (kRound + 2)), rigid_drift());  // what it would be
+      world.add(simulator.frame(FrameId(kRound + 2), kStepS * (kRound + 2)), rigid_drift());  // its expected pose
   std::vector<std::pair<FeatureId, LandmarkId>> matches;
   std::vector<std::pair<FeatureId, LandmarkId>> own;
   for (std::size_t f = 0; f < world.map.keyframe(newer).landmarks.size(); ++f) {
@@ -197,14 +198,14 @@ TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
   EXPECT_GT(weight_between(after, newer, KeyframeId(1)), 30);  // its matches were forwarded along the merges
 }
 
-// One camera does not observe the scale: what it built at the end is a tenth smaller.
+// A single camera does not observe the scale: at the end the map is a tenth too small.
 class ScaleDrift : public ::testing::Test {
  protected:
   static const HallMap& world() {
     static const HallMap walked = walk(hall(rig_of(1)), 2, scale_drift());
     return walked;
   }
-  // How long the last steps are in the map, of how long they were.
+  // Ratio of the lengths of the last steps in the map to their true lengths.
   static double step_ratio(const map::BundledMap& map) {
     const KeyframeId a(kLast.value() - 4);
     return distance_m(map.keyframe(a).T_rig_world, map.keyframe(kLast).T_rig_world) /
@@ -232,7 +233,7 @@ TEST_F(ScaleDrift, IsMeasuredAndRemoved) {
   expect_refreshed(draft.map());
 }
 
-// Two walks along one wall, of which the later began anew somewhere else.
+// Two paths along the same wall; before the second one tracking restarted at another pose.
 class JoinParts : public ::testing::TestWithParam<int> {
  protected:
   JoinParts() : world(rig_of(GetParam())) {

@@ -7,7 +7,7 @@
 namespace bslam::looping {
 namespace {
 
-// Everything that shares a word.
+// Accepts every keyframe that shares a word.
 const RecognitionOptions kLoose{.common_share = 0, .group_share = 0, .max_candidates = 100};
 
 void expect_equal(const std::vector<Candidate>& a, const std::vector<Candidate>& b) {
@@ -63,8 +63,7 @@ TEST_P(RecogniserRig, NeighboursAreNeverCandidates) {
 
 INSTANTIATE_TEST_SUITE_P(Cameras, RecogniserRig, ::testing::Values(1, 2, 4));
 
-// The place looks other in most parts when it is seen again: less alike than the keyframes about here are to each
-// other.
+// The place has changed so much that it is less similar than the neighbours of the keyframe are.
 TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
   const FeatureSimulator simulator = hall(rig_of(1));
   HallMap world(simulator.rig());
@@ -75,13 +74,13 @@ TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
   const KeyframeId newest(8);
   ASSERT_GE(world.map.best_covisible(newest, 1).front().weight, RecognitionOptions().neighbour_weight);
   EXPECT_TRUE(recogniser()->revisited(world.map, newest).empty());
-  // Without neighbours there is no such bound: the place comes up, behind those that were the neighbours.
+  // Without neighbours there is no such bound: the place becomes a candidate, ranked after the former neighbours.
   const RecognitionOptions unbound{.common_share = 0, .group_share = 0, .neighbour_weight = 10000};
   const std::vector<Candidate> without = recogniser(unbound)->revisited(world.map, newest);
   EXPECT_TRUE(std::ranges::any_of(without, [](const Candidate& c) { return c.keyframe.value() < 3; }));
 }
 
-// As of two rooms of which one sees a corner of the other through a door.
+// For example two rooms, one of which is partly visible from the other through a door.
 TEST(BagOfWordsRecogniser, OneLandmarkInCommonMakesNoOnePlace) {
   const FeatureSimulator simulator = hall(rig_of(1));
   HallMap world(simulator.rig());
@@ -131,7 +130,7 @@ TEST(BagOfWordsRecogniser, RemovedKeyframesVanish) {
 
 TEST(BagOfWordsRecogniser, NoticesAMapBegunAnew) {
   const FeatureSimulator simulator = hall(rig_of(1));
-  HallMap fresh(simulator.rig());  // the same ids show another part of the hall
+  HallMap fresh(simulator.rig());  // the same ids belong to another region of the hall
   for (int i = 0; i < 8; ++i) fresh.add(simulator.frame(FrameId(i), 24 + kStepS * i));
   const auto ours = recogniser();
   const auto frame = described(simulator.frame(FrameId(1000), 26.4));

@@ -43,7 +43,7 @@ TEST(Relocalise, FindsThePlaceTurnedRound) {
   EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse()));
 }
 
-// Frames of the hall, and of halls that look other in most or in all; any cameras.
+// Frames of the hall, and of halls in which most or all landmarks look different; various rigs.
 class RelocaliseRig : public ::testing::TestWithParam<int> {};
 
 TEST_P(RelocaliseRig, IsNeverWrong) {
@@ -72,7 +72,7 @@ TEST_P(RelocaliseRig, IsNeverWrong) {
 
 INSTANTIATE_TEST_SUITE_P(Cameras, RelocaliseRig, ::testing::Values(1, 2, 4));
 
-// A map of two rooms 30 m apart, the second decorated anew by that share.
+// A map of two rooms 30 m apart; in the second one the fraction `share` of the landmarks looks different.
 HallMap two_rooms(const FeatureSimulator& simulator, double share) {
   HallMap world(simulator.rig());
   const SE3 next_door(Eigen::Quaterniond::Identity(), {30, 0, 0});

@@ -1,5 +1,5 @@
-// Maps of a large hall made of simulated frames, with the truth beside them: a walk round it comes back to where it
-// began, and what was seen there long ago is mapped once more, at a place that has drifted away.
+// Maps of a large hall built from simulated frames together with the ground truth. The path returns to its start, where
+// the landmarks seen before are mapped a second time at drifted positions.
 #pragma once
 
 #include <cmath>
@@ -28,7 +28,7 @@ using synthetic::SimulatedFrame;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// 20 m x 20 m; landmarks are visible from at most 4.5 m, so that nobody sees the far side.
+// 20 m x 20 m; landmarks are visible up to 4.5 m, so the opposite side is never seen.
 inline synthetic::FeatureSimulatorOptions hall_options() {
   synthetic::FeatureSimulatorOptions options;
   options.room_low = {-10, -10, 0};
@@ -37,17 +37,17 @@ inline synthetic::FeatureSimulatorOptions hall_options() {
   options.nearest_base = 2.5;
   options.farthest_base = 4.5;
   options.max_keypoints = 400;
-  options.flipped_bits = 4;  // descriptors drawn at random lie between words far more often than real ones
+  options.flipped_bits = 4;  // random descriptors are close to word boundaries far more often than real ones
   return options;
 }
 
 const inline map::FeatureModel kFeatures{.sigma_px = hall_options().sigma_px};
 
-constexpr double kRoundS = 48;  // a round of 44 m
+constexpr double kRoundS = 48;  // duration of a lap of 44 m
 constexpr double kStepS = 1.0;  // between two keyframes
 constexpr int kRound = 48;      // keyframes
 
-// Rounds of 7 m radius, with a little sway; `turned` from the direction of motion, radians.
+// Laps with a radius of 7 m and slight sway; `turned` is the angle between viewing and motion direction, radians.
 inline synthetic::Trajectory rounds(double turned = 0.0) {
   std::vector<synthetic::ControlPose> control;
   for (int i = -1; i < 66; ++i) {
@@ -65,12 +65,12 @@ inline FeatureSimulator hall(camera::Rig rig, double turned = 0.0) {
   return FeatureSimulator(std::move(rig), rounds(turned), hall_options());
 }
 
-// Rigs of 1, 2 and 4 cameras; those of the last look to all sides.
+// Rigs of 1, 2 and 4 cameras; the last one looks in all directions.
 inline camera::Rig rig_of(int cameras) {
   return cameras == 4 ? synthetic::default_rig() : synthetic::ring_rig(cameras);
 }
 
-// The same for every rig.
+// The same landmarks for every rig.
 inline const std::vector<synthetic::SimulatedLandmark>& hall_landmarks() {
   static const FeatureSimulator simulator = hall(rig_of(1));
   return simulator.landmarks();
@@ -92,8 +92,8 @@ inline std::unique_ptr<BagOfWordsRecogniser> recogniser(const RecognitionOptions
   return std::make_unique<BagOfWordsRecogniser>(small_vocabulary(), options);
 }
 
-// The hall decorated anew: that share of its landmarks looks different, always the same ones in the same way for a
-// seed.
+// The hall with the fraction `share` of its landmarks replaced by different ones; the replacement depends on the seed
+// only.
 inline SimulatedFrame redecorated(SimulatedFrame seen, double share, std::uint64_t seed) {
   for (std::size_t c = 0; c < seen.landmark.size(); ++c) {
     for (std::size_t k = 0; k < seen.landmark[c].size(); ++k) {
@@ -114,9 +114,10 @@ class HallMap {
 
   explicit HallMap(const camera::Rig& rig) : map(std::make_shared<const camera::Rig>(rig)) {}
 
-  // A keyframe of what was seen in hall number `room`, `T_world_room` where that stands; it hangs on the newest, or
-  // begins a part. The estimate has gone astray by `error`, from the true world to that of the map. Landmarks not seen
-  // for `kMemory` keyframes, or from another part, are not known again: the map holds them twice.
+  // Adds a keyframe of the features seen in hall number `room`, whose pose is `T_world_room`; its parent is the newest
+  // keyframe, or it becomes the root of a submap. `error` is the drift of the estimate, from the true world to the
+  // world of the map. Landmarks last seen more than `kMemory` keyframes ago, or in another submap, are not matched
+  // again and are therefore duplicated.
   KeyframeId add(const SimulatedFrame& seen, const Sim3& error = {}, int room = 0, const SE3& T_world_room = {},
                  bool new_part = false) {
     if (new_part) known_.clear();
@@ -159,8 +160,8 @@ class HallMap {
   const Vector3d& truth(LandmarkId l) const { return true_place[l.index()]; }
 
   map::BundledMap map;
-  std::vector<SE3> T_rig_world;      // true, by keyframe
-  std::vector<Vector3d> true_place;  // by landmark
+  std::vector<SE3> T_rig_world;      // ground truth, by keyframe
+  std::vector<Vector3d> true_place;  // ground truth, by landmark
   std::vector<Shown> shown_by_landmark;
   BagOfWordsRecogniser describe{small_vocabulary(), {}};
 
@@ -172,10 +173,10 @@ class HallMap {
   std::map<Shown, Known> known_;
 };
 
-// A similarity `share` of the way from nothing to `whole`.
-inline Sim3 part_of(const Sim3& whole, double share) { return Sim3::exp(share * whole.log()); }
+// Returns the fraction `share` of the similarity `whole`.
+inline Sim3 fraction_of(const Sim3& whole, double share) { return Sim3::exp(share * whole.log()); }
 
-// What a walk round the hall goes astray by in the end.
+// Drift at the end of a lap.
 inline Sim3 rigid_drift() {
   return Sim3::exp((geometry::Vector7d() << 0.01, -0.012, 0.03, 0.35, -0.3, 0.25, 0).finished());
 }
@@ -183,8 +184,8 @@ inline Sim3 scale_drift() {
   return Sim3::exp((geometry::Vector7d() << 0.005, -0.006, 0.015, 0.2, -0.15, 0.1, std::log(0.9)).finished());
 }
 
-// A round and `more` keyframes, whose error grows to `drift` at the end. `after_each` may look at the map as it grows
-// and stop it by returning false.
+// One lap and `more` keyframes, whose drift grows to `drift` at the end. `after_each` is called with the growing map
+// and stops the walk by returning false.
 inline HallMap walk(const FeatureSimulator& simulator, int more, const Sim3& drift,
                     const std::function<bool(const HallMap&, KeyframeId)>& after_each = {}) {
   HallMap out(simulator.rig());
@@ -192,13 +193,13 @@ inline HallMap walk(const FeatureSimulator& simulator, int more, const Sim3& dri
   const int count = kRound + more;
   for (int i = 0; i < count; ++i) {
     const KeyframeId k =
-        out.add(simulator.frame(FrameId(i), kStepS * i), part_of(drift, static_cast<double>(i) / (count - 1)));
+        out.add(simulator.frame(FrameId(i), kStepS * i), fraction_of(drift, static_cast<double>(i) / (count - 1)));
     if (after_each && !after_each(out, k)) break;
   }
   return out;
 }
 
-// The walk without any drift, two thirds of a round: made once for each rig.
+// Two thirds of a lap without drift; created once per rig.
 inline const HallMap& exact_walk(int cameras) {
   static std::map<int, HallMap> made;
   const auto at = made.find(cameras);
@@ -209,7 +210,7 @@ inline const HallMap& exact_walk(int cameras) {
   return out;
 }
 
-// A whole round and a little more, so that the last keyframe sees what the first saw: made once for each rig and drift.
+// A little more than one lap, so that the last keyframe sees what the first one saw; created once per rig and drift.
 inline const HallMap& drifted_walk(int cameras) {
   static std::map<int, HallMap> made;
   const auto at = made.find(cameras);
@@ -217,7 +218,7 @@ inline const HallMap& drifted_walk(int cameras) {
                           : made.emplace(cameras, walk(hall(rig_of(cameras)), 2, rigid_drift())).first->second;
 }
 
-// The frame as the tracker hands it to relocalisation.
+// The frame as prepared by the tracker for relocalisation.
 inline frame::BundledFrame described(const SimulatedFrame& seen) {
   frame::BundledFrame frame = seen.frame;
   recogniser()->describe(frame);

@@ -7,7 +7,7 @@
 namespace bslam::map {
 namespace {
 
-// A map with several parts, and with gaps where things were removed.
+// A map with several submaps, from which keyframes and landmarks were removed.
 BundledMap worn_map(std::uint64_t seed) {
   MapStore store{BundledMap(synthetic_rig(2))};
   RandomEditor editor(seed);

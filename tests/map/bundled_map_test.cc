@@ -17,8 +17,8 @@ Matches matches(std::size_t from, std::size_t to) {
   return list;
 }
 
-// Keyframe 0 sees landmarks 0 ... 39 with the features of the same number, later ones as each test says. Features 0 ...
-// 9 have two keypoints.
+// Keyframe 0 observes landmarks 0 ... 39 with the features of the same number; each test adds further keyframes.
+// Features 0 ... 9 have two keypoints.
 class BundledMapTest : public testing::Test {
  protected:
   BundledMapTest() {
@@ -50,7 +50,7 @@ TEST_F(BundledMapTest, HangsAKeyframeBelowTheOneItSharesMostWith) {
   EXPECT_FALSE(map.keyframe(KeyframeId(0)).parent.valid());
   const KeyframeId a = add(matches(0, 10), {});
   EXPECT_EQ(map.keyframe(a).parent, KeyframeId(0));
-  const KeyframeId b = add(matches(5, 10), {});  // five with each: the newer one
+  const KeyframeId b = add(matches(5, 10), {});  // five shared with each: the newer one is the parent
   EXPECT_EQ(map.keyframe(b).parent, a);
   const KeyframeId c = add(matches(8, 30), {});
   EXPECT_EQ(map.keyframe(c).parent, KeyframeId(0));
@@ -67,7 +67,7 @@ TEST_F(BundledMapTest, BeginsAPartWithAKeyframeThatHangsOnNothing) {
   EXPECT_EQ(map.root_of(c), b);
   EXPECT_EQ(map.root_of(d), d);
   map.remove_keyframe(c);
-  EXPECT_FALSE(map.keyframe(add({}, c)).parent.valid());  // a removed keyframe carries nothing new
+  EXPECT_FALSE(map.keyframe(add({}, c)).parent.valid());  // a removed keyframe cannot become a parent
   expect_sound();
 }
 
@@ -98,7 +98,7 @@ TEST_F(BundledMapTest, JoinsOnlyWhatIsAliveAndOfTwoParts) {
   EXPECT_FALSE(map.join_parts(s, a));
   EXPECT_FALSE(map.join_parts(a, s));
   EXPECT_FALSE(map.join_parts(KeyframeId(), a));
-  EXPECT_TRUE(map.join_parts(a, r));  // the larger part may hang below the smaller one
+  EXPECT_TRUE(map.join_parts(a, r));  // the larger submap may be attached to the smaller one
   EXPECT_EQ(map.roots(), std::vector{r});
   expect_sound();
 }
@@ -120,9 +120,9 @@ TEST_F(BundledMapTest, RemovesAPartAndLeavesTheRestAlone) {
   EXPECT_EQ(map.roots(), std::vector{KeyframeId(0)});
   EXPECT_EQ(map.num_keyframes(), 2u);
   EXPECT_FALSE(map.alive(own));
-  ASSERT_TRUE(map.alive(shared));  // the other part sees it too
+  ASSERT_TRUE(map.alive(shared));  // the other submap observes it too
   EXPECT_EQ(map.observations(shared).size(), 1u);
-  EXPECT_EQ(map.num_observations(), observations - 3 * 2);  // three features of two keypoints each
+  EXPECT_EQ(map.num_observations(), observations - 3 * 2);  // three features with two keypoints each
   EXPECT_FALSE(map.remove_part(r));
   EXPECT_FALSE(map.remove_part(KeyframeId()));
   expect_sound();
@@ -225,7 +225,7 @@ TEST_F(BundledMapTest, MovesObservationsAndCountersWhenMerging) {
   for (const Observation& o : map.observations(LandmarkId(4))) {
     EXPECT_EQ(o.aligned, o.feature == FeatureId(4)) << "placed by the patch of the other landmark";
   }
-  EXPECT_FALSE(map.landmark_of(b, FeatureId(3)).valid());  // b sees landmark 4 with feature 4 already
+  EXPECT_FALSE(map.landmark_of(b, FeatureId(3)).valid());  // b already observes landmark 4 with feature 4
   EXPECT_TRUE(map.merge_landmarks(LandmarkId(4), LandmarkId(5)));
   EXPECT_EQ(map.resolve(LandmarkId(3)), LandmarkId(5));
   EXPECT_FALSE(map.merge_landmarks(LandmarkId(5), LandmarkId(5)));
@@ -238,10 +238,10 @@ TEST_F(BundledMapTest, FreesRemovedLandmarksAndKnowsWhereTheyLead) {
   const auto freed = [](const BundledMap& m) { return &m.landmark(LandmarkId(0)) == &m.landmark(LandmarkId(16)); };
   for (int l = 0; l < 31; ++l) map.remove_landmark(LandmarkId(l));
   map.free_removed(1000);
-  EXPECT_FALSE(freed(map));  // one of the second group is alive
+  EXPECT_FALSE(freed(map));  // one landmark of the second block is alive
   map.merge_landmarks(LandmarkId(31), LandmarkId(39));
   const BundledMap before = map;
-  map.free_removed(16);  // the first group
+  map.free_removed(16);  // the first block
   EXPECT_FALSE(freed(map));
   map.free_removed(16);
   EXPECT_TRUE(freed(map));
@@ -256,9 +256,10 @@ TEST_F(BundledMapTest, FreesRemovedLandmarksAndKnowsWhereTheyLead) {
 
 TEST_F(BundledMapTest, KeepsATreeWhenAKeyframeIsRemoved) {
   const KeyframeId a = add(matches(0, 20), {});
-  const KeyframeId b = add(matches(0, 6), a);    // below a; shares 6 with a, 6 with 0: the newer, a
-  const KeyframeId c = add(matches(4, 20), {});  // below a; shares 16 with a and 0, 2 with b
-  const KeyframeId d = add({}, a);               // below a without a link
+  // child of a; shares 6 with a and 6 with keyframe 0: the newer one, a, is the parent
+  const KeyframeId b = add(matches(0, 6), a);
+  const KeyframeId c = add(matches(4, 20), {});  // child of a; shares 16 with a and keyframe 0, 2 with b
+  const KeyframeId d = add({}, a);               // child of a without shared landmarks
   for (const KeyframeId k : {b, c, d}) EXPECT_EQ(map.keyframe(k).parent, a);
   const std::size_t before = map.num_keyframes();
   EXPECT_TRUE(map.remove_keyframe(a));
@@ -341,7 +342,7 @@ TEST_F(BundledMapTest, RefreshesWhatALandmarkLooksLike) {
   EXPECT_NEAR(map.landmark(l).min_distance, distance * std::pow(1.2, level - 7), 1e-5);
 }
 
-// A camera that fired late is where the rig had gone by then; a part that grows takes its motion along.
+// The pose of a camera with a late capture time follows the motion of the rig; scaling a submap scales that motion.
 TEST_F(BundledMapTest, KnowsWhereALateCameraWas) {
   auto frame = std::make_shared<frame::BundledFrame>(*synthetic_frame(random, 2, 30, 10));
   frame->time_ns = 1'000'000'000;

@@ -10,7 +10,7 @@
 namespace bslam::map {
 namespace {
 
-// A value made of the parts under test, as BundledMap is.
+// A value composed like BundledMap.
 struct Value {
   CowOwner owner;
   CowVector<int, 4> vector;
@@ -80,7 +80,7 @@ TEST(CowVector, ChangesInPlaceWhatItHasDetachedOnce) {
   value.set(50, -1);
   const int* own = &value.vector[50];
   EXPECT_NE(own, shared);
-  EXPECT_EQ(&value.vector[0], &copy.vector[0]);  // another chunk: still shared
+  EXPECT_EQ(&value.vector[0], &copy.vector[0]);  // in another chunk, hence still shared
   value.set(51, -1);
   EXPECT_EQ(&value.vector[50], own);
 }

@@ -17,7 +17,7 @@ TEST(MapStore, CountsVersionsAndGivesProvisionalIdsWhereNothingCameBetween) {
   MapDraft draft("test", store.snapshot());
   const KeyframeId k = draft.add_keyframe(synthetic_frame(random, 1, 10, 0), {}, {}, {});
   const LandmarkId l = draft.add_landmark({0, 0, 5}, {{k, FeatureId(3)}});
-  EXPECT_EQ(store.snapshot()->keyframe_slots(), 0u);  // nobody else sees the draft
+  EXPECT_EQ(store.snapshot()->keyframe_slots(), 0u);  // the draft is not visible to others
   const CommitReport report = store.commit(std::move(draft));
   EXPECT_FALSE(report.rebased);
   EXPECT_EQ(report.applied, 2u);
@@ -44,7 +44,7 @@ TEST(MapStore, GivesTheNextIdsWhereOthersWereFaster) {
   EXPECT_EQ(report.landmarks, std::vector{LandmarkId(1)});
   EXPECT_EQ(report.published->version(), MapVersion(2));
   EXPECT_EQ(report.published->landmark_of(KeyframeId(1), FeatureId(3)), LandmarkId(1));
-  EXPECT_EQ(report.published->roots(), (std::vector{KeyframeId(0), KeyframeId(1)}));  // each began a part
+  EXPECT_EQ(report.published->roots(), (std::vector{KeyframeId(0), KeyframeId(1)}));  // each is the root of a submap
   EXPECT_EQ(report.published->check_invariants().value_or("sound"), "sound");
 }
 
@@ -73,7 +73,7 @@ TEST(MapStore, FreesWhatWasRemovedAlsoWhereOthersWereFasterAndNeverForReaders) {
 TEST(MapStore, ServesReadersWhileTwoThreadsCommit) {
   constexpr int kCommits = 60;
   MapStore store{BundledMap(synthetic_rig(2))};
-  std::atomic<int> writers = 2, refused = 0;  // corrections that another correction overtook
+  std::atomic<int> writers = 2, refused = 0;  // corrections rejected because of another correction
   const auto write = [&](std::uint64_t seed) {
     RandomEditor editor(seed);
     for (int i = 0; i < kCommits; ++i) {
@@ -92,7 +92,7 @@ TEST(MapStore, ServesReadersWhileTwoThreadsCommit) {
       if (snapshot->version() < last) broken.push_back("versions go back");
       last = snapshot->version();
       if (const auto rule = snapshot->check_invariants()) broken.push_back(*rule);
-      const BundledMap copy = *snapshot;  // copying while others do
+      const BundledMap copy = *snapshot;  // copied while other threads copy
       if (copy.num_landmarks() != snapshot->num_landmarks()) broken.push_back("a copy differs");
     }
   }

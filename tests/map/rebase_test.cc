@@ -1,4 +1,4 @@
-// One test, or more, for every rebase rule of map_edit.h.
+// At least one test for every rebase rule of map_edit.h.
 #include "map/rebase.h"
 
 #include <gtest/gtest.h>
@@ -13,8 +13,8 @@ using geometry::SE3;
 
 constexpr KeyframeId kRoot{0}, kSecond{1}, kThird{2};
 
-// Keyframes 0, 1, 2 in a chain; landmark i < 30 is seen by all of them with feature i. `early` and `late` start from
-// the same version, `early` is committed first.
+// Keyframes 0, 1, 2 form a chain; landmark i < 30 is observed by all of them with feature i. `early` and `late` start
+// from the same version, and `early` is committed first.
 class RebaseTest : public testing::Test {
  protected:
   RebaseTest() {
@@ -35,7 +35,7 @@ class RebaseTest : public testing::Test {
   KeyframeId add_keyframe(MapDraft& draft, Matches list, KeyframeId fallback = {}) {
     return draft.add_keyframe(synthetic_frame(random, 2, 30, 10), random_pose(random, 0.5), std::move(list), fallback);
   }
-  // A part of one keyframe in the version both start from.
+  // Adds a submap of one keyframe to the version on which both drafts are based.
   KeyframeId begin_part() {
     MapDraft setup("setup", store.snapshot());
     const KeyframeId root = add_keyframe(setup, {});
@@ -44,7 +44,7 @@ class RebaseTest : public testing::Test {
     late.emplace("late", store.snapshot());
     return root;
   }
-  // Commits both; the report of the late one.
+  // Commits both drafts and returns the report of the late one.
   CommitReport commit() {
     store.commit(*std::move(early));
     CommitReport report = store.commit(*std::move(late));
@@ -70,7 +70,7 @@ TEST_F(RebaseTest, NewKeyframeForwardsMergedAndDropsRemovedMatches) {
   EXPECT_FALSE(report.published->landmark_of(k, FeatureId(0)).valid());
   EXPECT_EQ(report.published->landmark_of(k, FeatureId(1)), LandmarkId(11));
   EXPECT_EQ(report.published->landmark_of(k, FeatureId(2)), LandmarkId(3));
-  EXPECT_FALSE(report.published->landmark_of(k, FeatureId(3)).valid());  // landmark 3 is feature 2 already
+  EXPECT_FALSE(report.published->landmark_of(k, FeatureId(3)).valid());  // feature 2 already observes landmark 3
   EXPECT_EQ(report.published->landmark_of(k, FeatureId(4)), LandmarkId(4));
 }
 
@@ -98,7 +98,7 @@ TEST_F(RebaseTest, NewKeyframeThatBeganAPartBeginsOne) {
   early.emplace("early", store.snapshot());
   late.emplace("late", store.snapshot());
   add_keyframe(*early, same_numbers(0, 5));
-  const KeyframeId k = add_keyframe(*late, {}, kThird);  // gone before the edit began: nothing to hang on
+  const KeyframeId k = add_keyframe(*late, {}, kThird);  // removed before the edit began, so it cannot be the parent
   EXPECT_FALSE(late->map().keyframe(k).parent.valid());
   const CommitReport report = commit();
   EXPECT_FALSE(report.published->keyframe(report.keyframes.at(0)).parent.valid());
@@ -146,7 +146,7 @@ TEST_F(RebaseTest, NewLandmarkWithoutObservationsLeftIsDroppedWithAllThatNamesIt
   const LandmarkId next = late->add_landmark(random_point(random), {{kRoot, FeatureId(41)}});
   const CommitReport report = commit();
   EXPECT_FALSE(report.landmarks.at(0).valid());
-  EXPECT_EQ(report.landmarks.at(1), next);  // by chance: one was dropped, another came between
+  EXPECT_EQ(report.landmarks.at(1), next);  // equal only because one was dropped and another one was added
   EXPECT_EQ(report.dropped, 4u);
   EXPECT_EQ(report.applied, 1u);
   EXPECT_FALSE(report.published->landmark_of(kSecond, FeatureId(40)).valid());
@@ -303,7 +303,7 @@ TEST_F(RebaseTest, PosesAreDroppedAfterACorrection) {
   expect_near(report.published->keyframe(kThird).T_rig_world, corrected);
   expect_near(report.published->keyframe(kSecond).T_rig_world, before->keyframe(kSecond).T_rig_world);
   EXPECT_NE(report.published->landmark(report.landmarks.at(0)).position, Eigen::Vector3d(1, 2, 3));
-  EXPECT_EQ(report.dropped, 1u);  // the rest of the edit holds
+  EXPECT_EQ(report.dropped, 1u);  // the rest of the edit is applied
   EXPECT_EQ(report.applied, 2u);
   EXPECT_EQ(report.published->gauge_epoch(), before->gauge_epoch() + 1);
 }
@@ -328,7 +328,8 @@ TEST_F(RebaseTest, ACorrectionBeginsAnEpochAlsoWhereItComesLater) {
       early->map().keyframe(child).T_rig_world * early->map().keyframe(kThird).T_rig_world.inverse();
   const SE3 corrected = random_pose(random, 1);
   late->set_poses({{{kThird, corrected}}, {}, true});
-  late->set_poses({{{kSecond, corrected}}, {}});  // an edit's own correction does not shut out its later poses
+  // an edit's own correction does not cause its later poses to be dropped
+  late->set_poses({{{kSecond, corrected}}, {}});
   const CommitReport report = commit();
   EXPECT_EQ(report.dropped, 0u);
   EXPECT_EQ(report.published->gauge_epoch(), 1);

@@ -1,4 +1,4 @@
-// Maps made of random keypoints, for tests and benchmarks of the map: geometry is plausible, images do not exist.
+// Maps made of random keypoints without images, with plausible geometry, for tests and benchmarks of the map.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace bslam::map {
 
-// `cameras` pinhole cameras of 640 x 480, 0.1 m apart and each turned a little further.
+// `cameras` pinhole cameras of 640 x 480 pixels, 0.1 m apart, each rotated further than the previous one.
 inline std::shared_ptr<const camera::Rig> synthetic_rig(std::size_t cameras) {
   std::vector<camera::RigCamera> list;
   for (std::size_t i = 0; i < cameras; ++i) {
@@ -42,7 +42,7 @@ inline feature::Keypoints synthetic_keypoints(Random& random, std::size_t count)
   return keypoints;
 }
 
-// Keypoints 0 ... matched - 1 of cameras 0 and 1 are one feature each (ids 0 ... matched - 1), all others monocular.
+// Keypoints 0 ... matched - 1 of cameras 0 and 1 form matched features (with the same ids); all others are monocular.
 inline std::shared_ptr<const frame::BundledFrame> synthetic_frame(Random& random, std::size_t cameras,
                                                                   std::size_t keypoints, std::size_t matched) {
   auto frame = std::make_shared<frame::BundledFrame>();
@@ -68,7 +68,7 @@ inline Eigen::Vector3d random_point(Random& random) {
   return {random.uniform(-3, 3), random.uniform(-3, 3), random.uniform(4, 8)};
 }
 
-// Every bit of content, so that two maps with the same fingerprint are the same (FNV-1a).
+// Hash (FNV-1a) of the complete content of a map, so that maps with equal fingerprints are identical.
 class Fingerprint {
  public:
   explicit Fingerprint(const BundledMap& map) {
@@ -112,7 +112,7 @@ class Fingerprint {
   std::uint64_t hash_ = 14695981039346656037u;
 };
 
-// Makes random changes of every kind on a draft.
+// Makes random changes of every kind in a draft.
 class RandomEditor {
  public:
   explicit RandomEditor(std::uint64_t seed) : random_(seed, "random editor") {
@@ -165,7 +165,7 @@ class RandomEditor {
   KeyframeId keyframe(const MapDraft& draft) {
     return KeyframeId(std::size_t{random_.below(static_cast<std::uint32_t>(draft.map().keyframe_slots()))});
   }
-  // Mostly recent ones, as most old ones are gone; invalid while there are none.
+  // Mostly recent ones, since most old ones were removed; invalid if there is none.
   LandmarkId landmark(const MapDraft& draft) {
     const std::size_t slots = draft.map().landmark_slots();
     if (slots == 0) return {};
@@ -177,14 +177,14 @@ class RandomEditor {
     std::vector<std::pair<FeatureId, LandmarkId>> matches;
     for (int i = 0; i < 20; ++i) matches.emplace_back(feature(), landmark(draft));
     KeyframeId fallback = draft.map().newest_keyframe();
-    if (random_.below(4) == 0) {  // often the first of a new part; the one to hang on may be removed
+    if (random_.below(4) == 0) {  // often the first of a new submap; its parent may be removed
       matches.clear();
       fallback = random_.below(2) == 0 && fallback.valid() ? keyframe(draft) : KeyframeId();
     }
     draft.add_keyframe(frames_[random_.below(8)], random_pose(random_, 1), std::move(matches), fallback);
   }
   void remove_keyframe(MapDraft& draft) { draft.remove_keyframe(keyframe(draft)); }
-  void remove_part(MapDraft& draft) {  // the newest, where there are several
+  void remove_part(MapDraft& draft) {  // the newest one, if there are several
     const std::vector<KeyframeId> roots = draft.map().roots();
     if (roots.size() > 1) draft.remove_part(roots.back());
   }

@@ -7,7 +7,7 @@
 namespace bslam::mapping {
 namespace {
 
-// Keyframes of two cameras with `matched` two-camera features, then monocular ones; no geometry.
+// Keyframes of two cameras with `matched` two-camera features followed by monocular ones; no geometry.
 class Cull : public ::testing::Test {
  protected:
   static constexpr std::size_t kKeypoints = 60, kMatched = 20;
@@ -44,7 +44,7 @@ TEST_F(Cull, AfterItsProbationALandmarkNeedsThreeKeypoints) {
   const KeyframeId k0 = add_keyframe();
   const LandmarkId two = add_landmark({{k0, FeatureId(0)}}), one = add_landmark({{k0, monocular(0)}});
   const KeyframeId k1 = add_keyframe();
-  map.add_observation(two, {k1, monocular(1)});  // three keypoints now
+  map.add_observation(two, {k1, monocular(1)});  // now it has three keypoints
   for (int age = 1; age <= 3; ++age) {
     map::MapDraft d = draft();
     const KeyframeId newest = map.newest_keyframe();
@@ -66,7 +66,7 @@ TEST_F(Cull, OldLandmarksStay) {
   EXPECT_TRUE(d.map().alive(old));
 }
 
-// Keyframes 0 ... 5 all see the same landmarks, on equal levels.
+// Keyframes 0 ... 5 all observe the same landmarks on the same levels.
 class CullKeyframes : public Cull {
  protected:
   CullKeyframes() {
@@ -101,12 +101,13 @@ TEST_F(CullKeyframes, RedundantOnesGoButNotTheRootNorTheNewest) {
 
 TEST_F(CullKeyframes, StopsWhereOthersAreNeeded) {
   CullingOptions five;
-  five.redundant_views = 5;  // once one is gone, no landmark is seen by five others
+  five.redundant_views = 5;  // after one is removed, no landmark is observed by five others
   EXPECT_EQ(culled(five), (std::vector<int>{1}));
 }
 
 TEST_F(CullKeyframes, OneWithLandmarksOfItsOwnStays) {
-  for (int l = 0; l < 6; ++l) add_landmark({{KeyframeId(1), FeatureId(50 + l)}});  // 40 of 46 are seen elsewhere: 87 %
+  // 40 of 46 are observed elsewhere: 87 %
+  for (int l = 0; l < 6; ++l) add_landmark({{KeyframeId(1), FeatureId(50 + l)}});
   EXPECT_EQ(culled(options), (std::vector<int>{2}));
 }
 
@@ -117,7 +118,7 @@ TEST_F(CullKeyframes, ViewsFromFarAwayDoNotReplaceANearOne) {
     }
   };
   for (const int k : {2, 3, 4, 5}) coarse(k);
-  EXPECT_EQ(culled(options), (std::vector<int>{2}));  // 1 sees all on level 2, only the root does as well
+  EXPECT_EQ(culled(options), (std::vector<int>{2}));  // keyframe 1 observes all on level 2, as only the root does
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What a keyframe adds to the map: new landmarks, fused ones, the local window, and all of it together.
+// Local mapping: creation and fusion of landmarks, the local window, and the stage as a whole.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -21,14 +21,14 @@ synthetic::FeatureSimulator simulator(camera::Rig rig, double period_s = 12.0) {
   return synthetic::FeatureSimulator(std::move(rig), synthetic::make_orbit({.period_s = period_s}), options);
 }
 
-// Landmarks only for matched features: the monocular ones are left to mapping.
+// A map with landmarks for matched features only; the monocular ones are left to mapping.
 SimulatedMap stereo_map(camera::Rig rig, int keyframes, double period_s = 12.0) {
   SimulatedMap out(simulator(std::move(rig), period_s));
   for (int i = 0; i < keyframes; ++i) out.add_keyframe(FrameId(i), 0.3 * i, false);
   return out;
 }
 
-// The simulator's landmarks that the observations of a landmark show; -1 among them: an outlier.
+// The simulator's landmarks that the observations of a landmark belong to; contains -1 for an outlier.
 std::set<int> shown(const SimulatedMap& world, const map::BundledMap& map, LandmarkId l) {
   std::set<int> out;
   for (const map::Observation& o : map.observations(l))
@@ -54,7 +54,8 @@ TEST(CreateLandmarks, MakesLandmarksNearTheirTruePlaces) {
       const Eigen::Vector3d& place = world.truth_of(*truth.begin());
       const double distance = (place - world.frames[3].T_world_rig.translation()).norm();
       near +=
-          (draft.map().landmark(LandmarkId(i)).position - place).norm() < 0.3 * distance;  // two sigmas of the bound
+          // two standard deviations at the bound
+          (draft.map().landmark(LandmarkId(i)).position - place).norm() < 0.3 * distance;
     }
     EXPECT_GT(static_cast<double>(pure), 0.97 * made);
     EXPECT_GT(static_cast<double>(near), 0.92 * static_cast<double>(pure));
@@ -64,7 +65,8 @@ TEST(CreateLandmarks, MakesLandmarksNearTheirTruePlaces) {
 
 TEST(CreateLandmarks, JoinsAnyCameraThenToAnyCameraNow) {
   const SimulatedMap world =
-      stereo_map(synthetic::default_rig(), 5, 5.0);  // 72 degrees per second: sides follow the front
+      // 72 degrees per second: the side cameras soon see what the front cameras saw
+      stereo_map(synthetic::default_rig(), 5, 5.0);
   map::MapDraft draft = world.draft();
   const std::size_t before = draft.map().landmark_slots();
   create_landmarks(KeyframeId(4), {}, kFeatures, draft);
@@ -96,7 +98,7 @@ TEST(CreateLandmarks, NeverGivesAFeatureTwoLandmarks) {
   map::MapDraft draft = world.draft();
   create_landmarks(KeyframeId(3), {}, kFeatures, draft);
   const int again = create_landmarks(KeyframeId(3), {}, kFeatures, draft);
-  EXPECT_LT(again, 40);  // what was taken made others clear
+  EXPECT_LT(again, 40);  // new observations resolve earlier ambiguities
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
@@ -110,7 +112,7 @@ TEST(CreateLandmarks, ComparesWithNobodyWhereToldSo) {
 
 class FuseLandmarks : public ::testing::Test {
  protected:
-  // Every keyframe's landmarks are its own: all that two of them share exists twice.
+  // A map in which every keyframe has its own landmarks, so that every landmark shared by two keyframes is duplicated.
   static SimulatedMap doubled_map() {
     SimulatedMap world(simulator(synthetic::ring_rig(2)));
     world.add_keyframe(FrameId(0), 0.0);
@@ -236,7 +238,7 @@ TEST(MapKeyframe, GrowsAnAccurateMapKeyframeByKeyframe) {
       for (auto& [truth, l] : world.landmark_of) l = world.map.resolve(l);
       std::erase_if(world.landmark_of, [](const auto& entry) { return !entry.second.valid(); });
     }
-    EXPECT_GT(created, 200);  // of some 600 features a camera and keyframe, most of which show landmarks already
+    EXPECT_GT(created, 200);  // of about 600 features per camera and keyframe, most of which already have a landmark
     for (const KeyframeId k : world.map.keyframe_ids()) {
       EXPECT_LT(map::distance_m(world.map.keyframe(k).T_rig_world, world.true_pose(k)), 0.02)
           << "keyframe " << k.value();

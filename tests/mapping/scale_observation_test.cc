@@ -1,4 +1,4 @@
-// The scale of maps made by three cameras that share no view, against the truth of the simulation.
+// Metric scale of maps from three cameras without overlap, compared with the ground truth of the simulation.
 #include "mapping/scale_observation.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 using map::SimulatedMap;
 const FeatureModel kFeatures;
 
-// Ahead and 120 degrees to either side.
+// One camera facing forward and two at 120 degrees to either side.
 camera::Rig three_sides() {
   const std::vector<int> sides = {0, 2, 3};
   return synthetic::ring_rig(4).subset(sides);
@@ -28,7 +28,8 @@ synthetic::FeatureSimulatorOptions room(std::uint64_t seed) {
   return options;
 }
 
-// Keyframes at the truth, every 0.25 s, in a map that has no scale and whose unit is 1 / `factor` metres.
+// Keyframes at their true poses, 0.25 s apart, in a map with unobservable scale whose length unit is 1 / `factor`
+// metres.
 SimulatedMap ride(const synthetic::Trajectory& trajectory, const camera::Rig& rig, int keyframes, double factor,
                   std::uint64_t seed) {
   SimulatedMap world(synthetic::FeatureSimulator(rig, trajectory, room(seed)));
@@ -40,14 +41,14 @@ SimulatedMap ride(const synthetic::Trajectory& trajectory, const camera::Rig& ri
 
 synthetic::Trajectory orbit(std::uint64_t seed) { return synthetic::make_orbit({.seed = seed}); }
 
-// Ahead at 0.4 m/s, looking the same way all the time; too short a way for a landmark to go from one camera to another.
+// Forward at 0.4 m/s without rotation; too short for a landmark to pass from one camera to another.
 synthetic::Trajectory straight_line() {
   std::vector<synthetic::ControlPose> control;
   for (int i = 0; i < 8; ++i) control.push_back({{0.4 * i - 1.5, 0.3, 1.5}, 0.0, 0.0, 0.0});
   return synthetic::Trajectory(std::move(control), 1.0);
 }
 
-// How long the map is for its true length.
+// Ratio of lengths in the map to true lengths.
 double length_ratio(const SimulatedMap& world, const map::BundledMap& map) {
   double found = 0, truth = 0;
   const KeyframeId root(0);
@@ -65,7 +66,7 @@ TEST(ObserveScale, DeviationIsThatOfTheErrors) {
     const SimulatedMap world = ride(orbit(seed), three_sides(), 7, 1.0, seed);
     map::MapDraft draft = world.draft();
     map_keyframe(KeyframeId(6), {}, kFeatures,
-                 draft);  // the adjustment takes the map from the truth to what the pixels say
+                 draft);  // the adjustment moves the map from the truth to the optimum for the noisy pixels
     const ScaleReport report = observe_scale(KeyframeId(6), {}, kFeatures, draft);
     ASSERT_TRUE(report.observed);
     const double z = (length_ratio(world, draft.map()) - 1.0) / report.deviation;
@@ -83,7 +84,7 @@ TEST(ObserveScale, FindsTheUnitFromAFactorOfThreeEitherWay) {
     map::MapDraft draft = world.draft();
     const MappingReport report = map_keyframe(KeyframeId(7), {}, kFeatures, draft);
     EXPECT_TRUE(report.scale.observed);
-    EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);  // one measurement alone
+    EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);  // a single measurement is not enough
     EXPECT_NEAR(length_ratio(world, draft.map()), 1.0, 0.05) << factor;
     map_keyframe(KeyframeId(7), {}, kFeatures, draft);
     map_keyframe(KeyframeId(7), {}, kFeatures, draft);
@@ -130,14 +131,14 @@ TEST(ObserveScale, IsSilentAboutOneCameraAndOneKeyframe) {
 
 TEST(SelectPart, FreesAllButTheRootWhileTheScaleIsUnknown) {
   SimulatedMap world = ride(orbit(1), three_sides(), 5, 1.0, 1);
-  EXPECT_TRUE(needs_whole_part(world.map, KeyframeId(4), {.keyframes = 5}));
-  EXPECT_FALSE(needs_whole_part(world.map, KeyframeId(4), {.keyframes = 4}));
-  const adjustment::Selection s = select_part(world.map, KeyframeId(4));
+  EXPECT_TRUE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 5}));
+  EXPECT_FALSE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 4}));
+  const adjustment::Selection s = select_submap(world.map, KeyframeId(4));
   EXPECT_EQ(s.fixed_keyframes, std::vector<KeyframeId>{KeyframeId(0)});
   EXPECT_EQ(s.free_keyframes.size(), 4u);
   EXPECT_EQ(s.landmarks, world.map.landmark_ids());
   world.map.set_scale(map::Scale::kMetric);
-  EXPECT_FALSE(needs_whole_part(world.map, KeyframeId(4), {.keyframes = 5}));
+  EXPECT_FALSE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 5}));
 }
 
 TEST(IsMetric, AsksForTwoMeasurementsAndASettledMap) {

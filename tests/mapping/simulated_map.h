@@ -1,4 +1,4 @@
-// Maps made of simulated frames with the truth beside them: poses, places of landmarks and who sees what.
+// Maps built from simulated frames together with the ground truth: poses, landmark positions and correspondences.
 #pragma once
 
 #include <algorithm>
@@ -19,13 +19,13 @@ namespace bslam::map {
 using synthetic::FeatureSimulator;
 using synthetic::SimulatedFrame;
 
-// The simulator's landmark that a feature shows, or -1.
+// The simulator's landmark that a feature belongs to, or -1.
 inline int shown_by(const SimulatedFrame& frame, FeatureId f) {
   const frame::KeypointRef r = frame.frame.bundled.keypoints(f).front();
   return frame.landmark[r.camera.index()][r.keypoint.index()];
 }
 
-// What sub-pixel alignment sees of a simulated frame: images without any texture, so that nothing aligns.
+// Images without texture for a simulated frame, on which sub-pixel alignment has no effect.
 inline std::vector<image::Pyramid> flat_pyramids(std::size_t cameras) {
   image::Pyramid pyramid;
   for (int l = 0; l < 8; ++l) {
@@ -43,8 +43,8 @@ class SimulatedMap {
   explicit SimulatedMap(FeatureSimulator simulator)
       : sim(std::move(simulator)), map(std::make_shared<const camera::Rig>(sim.rig())) {}
 
-  // A keyframe of what the rig sees at `time_s`, at its true pose, with landmarks at their true places for every
-  // feature that shows one, or only for those of matched features with a point (`all` false: the others stay without).
+  // Adds a keyframe with the features at `time_s` at its true pose. Every feature of a simulated landmark gets a
+  // landmark at its true position; if `all` is false, only matched features with a triangulated point do.
   KeyframeId add_keyframe(FrameId id, double time_s, bool all = true) {
     SimulatedFrame& seen = frames.emplace_back(sim.frame(id, time_s));
     if (knows_motion) seen.frame.twist = true_twist(time_s);
@@ -76,7 +76,7 @@ class SimulatedMap {
   const Eigen::Vector3d& truth_of(int landmark) const {
     return sim.landmarks()[static_cast<std::size_t>(landmark)].position;
   }
-  // Of the rig over the ten milliseconds after `time_s`, rad/s and m/s.
+  // Mean twist of the rig over the ten milliseconds after `time_s`, rad/s and m/s.
   geometry::Vector6d true_twist(double time_s) const {
     constexpr double kStep = 0.01;
     const auto T_rig_world = [&](double t) {
@@ -90,13 +90,13 @@ class SimulatedMap {
 
   FeatureSimulator sim;
   BundledMap map;
-  bool knows_motion = false;           // keyframes to come are added with the rig's true twist
+  bool knows_motion = false;           // keyframes are added with the true twist of the rig
   std::vector<SimulatedFrame> frames;  // one per keyframe
   std::unordered_map<int, LandmarkId> landmark_of;
   std::unordered_map<int, int> truth_of_landmark;  // by id
 };
 
-// Metres between the centres and radians between the orientations of two poses T_rig_world.
+// Distance in metres between the centres, and angle in radians between the orientations, of two poses T_rig_world.
 inline double distance_m(const geometry::SE3& a, const geometry::SE3& b) {
   return (a.inverse().translation() - b.inverse().translation()).norm();
 }

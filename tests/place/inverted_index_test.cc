@@ -21,7 +21,7 @@ class InvertedIndexTest : public testing::Test {
     return vector_of(words);
   }
 
-  // Every keyframe compared with the query, word by word.
+  // Compares every keyframe with the query, word by word.
   std::vector<CommonWords> query_by_definition(const WordVector& words) const {
     std::vector<CommonWords> result;
     for (const auto& [keyframe, vector] : held_) {
@@ -72,7 +72,7 @@ TEST_F(InvertedIndexTest, ForgetsWhatWasRemoved) {
   InvertedIndex index;
   index.add(KeyframeId(3), vector_of({WordId(1), WordId(2)}));
   index.add(KeyframeId(5), vector_of({WordId(2), WordId(7)}));
-  index.remove(KeyframeId(4));  // not there
+  index.remove(KeyframeId(4));  // not in the index
   EXPECT_EQ(index.query(*vector_of({WordId(2)})), (std::vector<CommonWords>{{KeyframeId(3), 1}, {KeyframeId(5), 1}}));
   index.remove(KeyframeId(3));
   EXPECT_FALSE(index.contains(KeyframeId(3)));
@@ -81,7 +81,7 @@ TEST_F(InvertedIndexTest, ForgetsWhatWasRemoved) {
   index.clear();
   EXPECT_EQ(index.size(), 0u);
   EXPECT_TRUE(index.query(*vector_of({WordId(2), WordId(7)})).empty());
-  index.add(KeyframeId(5), vector_of({WordId(7)}));  // and may come again
+  index.add(KeyframeId(5), vector_of({WordId(7)}));  // can be added again
   EXPECT_EQ(index.query(*vector_of({WordId(7)})).size(), 1u);
 }
 

@@ -39,7 +39,7 @@ TEST(MajorityClustering, SeparatesWhatLiesApart) {
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
     EXPECT_EQ(clusters.of[i], clusters.of[i % 10]);
     EXPECT_EQ(clusters.centre[clusters.of[i]],
-              truth[i % 10]);  // a fifth of the flips of a hundred members hits no bit of most
+              truth[i % 10]);  // flipping a fifth of the bits of a hundred members changes no majority
   }
 }
 
@@ -60,7 +60,7 @@ TEST(MajorityClustering, PutsEveryMemberToItsNearestCentre) {
       ASSERT_EQ(clusters.of[i], nearest);
       used.insert(clusters.of[i]);
     }
-    EXPECT_EQ(used.size(), clusters.centre.size());  // none empty
+    EXPECT_EQ(used.size(), clusters.centre.size());  // no cluster is empty
   }
 }
 

@@ -1,4 +1,4 @@
-// Descriptors and vocabularies drawn from a seeded generator.
+// Seeded random descriptors and vocabularies for tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ inline feature::Descriptor random_descriptor(Random& random) {
   return {random.next(), random.next(), random.next(), random.next()};
 }
 
-// The same with `bits` bits changed.
+// Returns the descriptor with `bits` bits flipped.
 inline feature::Descriptor with_flips(feature::Descriptor d, int bits, Random& random) {
   for (int i = 0; i < bits; ++i) {
     const std::uint32_t bit = random.below(256);
@@ -24,7 +24,7 @@ inline feature::Descriptor with_flips(feature::Descriptor d, int bits, Random& r
   return d;
 }
 
-// A tree of random shape: children 2 to `branching`, on up to `levels` levels; some words end early.
+// Returns a random tree: 2 to `branching` children per node, up to `levels` levels; some words are on higher levels.
 inline VocabularyContent random_content(int branching, int levels, Random& random) {
   VocabularyContent c;
   c.branching = branching;

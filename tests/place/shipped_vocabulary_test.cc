@@ -21,8 +21,8 @@ TEST(ShippedVocabulary, IsOneForOurDescriptors) {
   EXPECT_LE(shipped_vocabulary_bytes().size(), 5000000u);
 }
 
-// A word is worth log2(words) bits if all are equally likely. Descriptors as they scatter around the centres of the
-// tree itself must come near that, and spread over most words.
+// A word carries log2(number of words) bits if all words are equally likely. Descriptors scattered around the tree's
+// own centres must come close to that and use most of the words.
 TEST(ShippedVocabulary, SpreadsDescriptorsOverItsWords) {
   const VocabularyPtr v = shipped_vocabulary().value();
   Random random(41);

@@ -15,10 +15,10 @@ namespace {
 using feature::Descriptor;
 using Images = std::vector<std::vector<Descriptor>>;
 
-// 20 clusters in two groups of ten: the groups lie far apart, the clusters of a group nearer.
+// 20 clusters in two distant groups of ten.
 struct TwoGroups {
   std::vector<Descriptor> centre;
-  Images images;  // image i shows the clusters c with c % 5 != i % 5
+  Images images;  // image i contains the clusters c with c % 5 != i % 5
 
   explicit TwoGroups(Random& random) {
     for (int g = 0; g < 2; ++g) {
@@ -63,7 +63,7 @@ TEST(Train, FindsExactlyTheClustersOnOneLevel) {
   std::set<WordId> words;
   for (const Descriptor& c : world.centre) words.insert(v->word(c));
   EXPECT_EQ(words.size(), 20u);
-  // Each cluster is shown by 32 of 40 images.
+  // Each cluster is contained in 32 of 40 images.
   for (const WordId w : words) EXPECT_NEAR(v->weight(w), std::log(41.0 / 32.0), 1e-6);
 }
 
@@ -132,7 +132,7 @@ TEST(Train, TellsItsProgress) {
                                     total = all;
                                   });
   ASSERT_TRUE(v.ok());
-  EXPECT_EQ(last, total);  // no node of these is a word before the last level
+  EXPECT_EQ(last, total);  // no node becomes a word before the last level
   EXPECT_EQ(total, 2u * 40u * 16u * 5u);
 }
 

@@ -11,14 +11,14 @@ namespace {
 
 class VocabularyBytes : public testing::Test {
  protected:
-  // Puts a number of N bytes at an offset.
+  // Overwrites the bytes at `offset` with a number.
   template <class T>
   static void put(std::string& bytes, std::size_t offset, T value) {
     std::memcpy(bytes.data() + offset, &value, sizeof(T));
   }
 
-  // The checksum that would be right for damaged bytes, if their content makes a vocabulary at all: it is read from the
-  // vocabulary the same numbers make. What is wrong with the structure must be refused before.
+  // Replaces the checksum of damaged bytes by the correct one, if their content forms a vocabulary at all. It is taken
+  // from a vocabulary made of the same numbers. A damaged structure must be rejected before the checksum.
   static void repair_checksum(std::string& bytes) {
     if (bytes.size() < 40) return;
     std::uint32_t field[6];
@@ -64,16 +64,16 @@ TEST_F(VocabularyBytes, AreRefusedWhenDamaged) {
   for (int round = 0; round < 2000; ++round) {
     std::string damaged = bytes_;
     switch (round % 4) {
-      case 0:  // a bit
+      case 0:  // flip a bit
         damaged[random_.below(static_cast<std::uint32_t>(damaged.size()))] ^= static_cast<char>(1 << random_.below(8));
         break;
-      case 1:  // cut
+      case 1:  // truncate
         damaged.resize(random_.below(static_cast<std::uint32_t>(damaged.size())));
         break;
-      case 2:  // a length or size of the header
+      case 2:  // change a length or size in the header
         put(damaged, 8 + 4 * random_.below(6), static_cast<std::uint32_t>(random_.next() >> random_.below(64)));
         break;
-      case 3:  // longer
+      case 3:  // append bytes
         damaged.append(1 + random_.below(100), static_cast<char>(random_.below(256)));
         break;
     }
@@ -84,7 +84,7 @@ TEST_F(VocabularyBytes, AreRefusedWhenDamaged) {
   }
 }
 
-// Who repairs the checksum gets a vocabulary of the numbers he wrote or an error, and nothing worse: words are in
+// With a repaired checksum, damaged bytes give either an error or a vocabulary of those numbers, whose words are in
 // range.
 TEST_F(VocabularyBytes, AreSafeWhenTheChecksumFitsTheDamage) {
   int accepted = 0, refused = 0;

@@ -15,7 +15,7 @@ namespace {
 
 using feature::Descriptor;
 
-// The descent as it is defined, over the content alone.
+// The definition of the descent, computed from the content only.
 WordId word_by_definition(const VocabularyContent& c, const Descriptor& d) {
   std::size_t node = 0;
   while (c.child_count[node] > 0) {
@@ -69,7 +69,7 @@ TEST(Vocabulary, GivesTiesToTheFirstChild) {
   c.descriptor = {Descriptor{3, 0, 0, 0}, Descriptor{1, 0, 0, 0}, Descriptor{2, 0, 0, 0}};
   c.weight = {1, 1, 1};
   const VocabularyPtr v = Vocabulary::make(c).value();
-  EXPECT_EQ(v->word(Descriptor{0, 0, 0, 0}), WordId(1));  // 2, 1, 1 bits away
+  EXPECT_EQ(v->word(Descriptor{0, 0, 0, 0}), WordId(1));  // Hamming distances 2, 1, 1
   EXPECT_EQ(v->word(Descriptor{1, 0, 0, 1}), WordId(1));
   EXPECT_EQ(v->word(Descriptor{3, 0, 0, 0}), WordId(0));
 }
@@ -114,7 +114,8 @@ TEST(Vocabulary, RefusesContentThatContradictsItself) {
   EXPECT_TRUE(refused([](VocabularyContent& c) { c.levels = kMaxLevels + 1; }));
   EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {}; }));
   EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {0, 2, 2, 0, 0}; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {2, 0, 0, 2, 0}; }));  // node 3 is no one's child
+  // node 3 is not the child of any node
+  EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {2, 0, 0, 2, 0}; }));
   EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {2, 3, 0, 0, 0}; }));
   EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {2, 2, 2, 0, 0}; }));
   EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {1, 2, 0, 0, 0}; }));
@@ -126,8 +127,8 @@ TEST(Vocabulary, RefusesContentThatContradictsItself) {
   EXPECT_TRUE(refused([](VocabularyContent& c) { c.weight[1] = std::numeric_limits<float>::quiet_NaN(); }));
 }
 
-// The kind names what the bits of a descriptor mean. Whoever changes the binary tests changes kDescriptorKind, trains
-// the shipped vocabulary anew and notes the new sum here: else words would be looked up that mean something else.
+// The kind identifies the meaning of the descriptor bits. A change of the BRIEF pattern requires a new kDescriptorKind,
+// a newly trained vocabulary, and the new hash here; otherwise words with another meaning would be looked up.
 TEST(Vocabulary, KindStandsForTheBinaryTests) {
   ContentHash hash;
   for (const feature::BinaryTest& t : feature::make_binary_tests()) {

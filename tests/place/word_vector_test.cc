@@ -17,7 +17,7 @@ std::vector<WordId> random_words(const Vocabulary& v, int count, Random& random)
   return words;
 }
 
-// 1 - 0.5 |a - b|_1, over all words.
+// 1 - 0.5 |a - b|_1, computed over all words.
 double score_by_definition(const WordVector& a, const WordVector& b) {
   std::map<WordId, double> difference;
   for (const WeightedWord& w : a.words()) difference[w.word] += w.weight;

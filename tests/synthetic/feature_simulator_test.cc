@@ -93,7 +93,7 @@ TEST(FeatureSimulator, MatchesOneLandmarkAndTriangulatesItWithinItsCovariance) {
     if (!point) continue;
     const Vector3d truth = T_rig_world * s.landmarks()[static_cast<std::size_t>(landmark)].position;
     const Vector3d error = point->point_rig - truth;
-    if (error.norm() > 0.3 * truth.norm()) continue;  // far points: the depth is beyond first order
+    if (error.norm() > 0.3 * truth.norm()) continue;  // distant points: the depth error is beyond first order
     sum += std::min(20.0, error.dot(point->covariance.inverse() * error));
     count += 3;
   }
