@@ -76,7 +76,7 @@ void extract_image(benchmark::State& state) {
   Extractor extractor(options);
   const camera::Camera camera = test_camera(test_images()[0].width(), test_images()[0].height());
   image::Pyramid pyramid;
-  Keypoints keypoints;
+  Detections keypoints;
   std::size_t i = 0, total = 0;
   for (auto _ : state) {
     extractor.extract(test_images()[i++ % test_images().size()].view(), {}, camera, pyramid, keypoints);

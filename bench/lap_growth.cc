@@ -82,7 +82,7 @@ Status play(const Arguments& arguments) {
       images.id = FrameId(next++);
       images.time_ns += time * period;
       for (image::CameraImage& i : images.images) i.time_ns += time * period;
-      system.process(images);
+      if (const auto processed = system.process(images); !processed) return processed.error();
       table.after_frame();
     }
   }

@@ -51,17 +51,19 @@ std::shared_ptr<const frame::BundledFrame> small_frame(Random& random, std::size
   frame->cameras.resize(cameras);
   for (frame::CameraFrame& c : frame->cameras) {
     c.state = image::ImageState::kPresent;
+    feature::Detections detections;
     for (std::size_t k = 0; k < keypoints; ++k) {
-      c.keypoints.pixel.emplace_back(static_cast<float>(random.uniform(0, 639)),
-                                     static_cast<float>(random.uniform(0, 479)));
-      c.keypoints.level.push_back(static_cast<std::uint8_t>(random.below(8)));
-      c.keypoints.angle.push_back(0.5f);
-      c.keypoints.sigma.push_back(1.0f);
-      c.keypoints.bearing.push_back(Eigen::Vector3d::UnitZ());
-      c.keypoints.descriptor.push_back({random.next(), random.next(), random.next(), random.next()});
-      c.keypoints.patch.emplace_back();
+      detections.pixel.emplace_back(static_cast<float>(random.uniform(0, 639)),
+                                    static_cast<float>(random.uniform(0, 479)));
+      detections.level.push_back(static_cast<std::uint8_t>(random.below(8)));
+      detections.angle.push_back(0.5f);
+      detections.sigma.push_back(1.0f);
+      detections.bearing.push_back(Eigen::Vector3d::UnitZ());
+      detections.descriptor.push_back({random.next(), random.next(), random.next(), random.next()});
+      detections.patch.emplace_back();
       c.words.emplace_back(static_cast<std::int32_t>(random.below(100)));
     }
+    c.keypoints = std::move(detections);
   }
   std::vector<std::vector<frame::KeypointRef>> groups;
   std::vector<std::optional<frame::BundledPoint>> points;

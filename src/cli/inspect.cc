@@ -59,9 +59,7 @@ int inspect(const InspectArguments& arguments) {
   auto masks = image_files::read_masks(dataset->rig);
   if (!masks) return report_error(masks.error());
   system::Pipeline pipeline(dataset->rig, *config, std::move(*masks));
-  std::vector<system::StageTime> stages;
-  const auto frame =
-      pipeline.make_frame(dataset::read_frame(*dataset, static_cast<std::size_t>(arguments.frame)), stages);
+  const auto frame = pipeline.make_frame(dataset::read_frame(*dataset, static_cast<std::size_t>(arguments.frame)));
   const Status written = write_atomically(arguments.out, to_json(frame, *dataset).dump(1) + "\n");
   if (!written) return report_error(written.error());
   std::printf("%zu keypoints, %zu unique features = %zu monocular + %zu matched\n%s\n", frame.num_keypoints(),

@@ -12,20 +12,21 @@
 namespace bslam::cli {
 namespace {
 
-void warn_of_outages(const report::CameraRecord& camera) {
+void warn_of_outages(const session::CameraRecord& camera) {
   constexpr std::size_t kShown = 3;
   std::string shown;
   std::size_t outages = 0;
-  for (const report::CameraInterval& s : camera.states) {
-    if (s.state == "ok" || ++outages > kShown) continue;
-    shown += fmt::format("{}{} {:.1f} - {:.1f} s ({})", shown.empty() ? "" : ", ", s.state, s.from_s, s.to_s, s.reason);
+  for (const session::CameraInterval& s : camera.states) {
+    if (s.status.state == tracking::CameraState::kOk || ++outages > kShown) continue;
+    shown += fmt::format("{}{} {:.1f} - {:.1f} s ({})", shown.empty() ? "" : ", ", tracking::describe(s.status.state),
+                         s.from_s, s.to_s, tracking::describe(s.status.reason));
   }
   if (outages == 0) return;
   if (outages > kShown) shown += fmt::format(" and {} times more", outages - kShown);
   fmt::print(stderr, "warning: {}: {}\n", camera.name, shown);
 }
 
-void warn_of_extrinsics(const report::CameraRecord& camera) {
+void warn_of_extrinsics(const session::CameraRecord& camera) {
   const auto& e = camera.extrinsics;
   if (!e || !e->suspect) return;
   fmt::print(stderr,
@@ -34,33 +35,26 @@ void warn_of_extrinsics(const report::CameraRecord& camera) {
              camera.name, e->change_deg, e->change_mm, e->refined ? "" : "; --set extrinsics.refine=true accepts that");
 }
 
-// Cameras that see well and agree with nothing: a few degrees off are called inconsistent, these may never get that
-// far.
-void warn_of_strangers(const report::RunRecord& record) {
-  constexpr double kNothing = 0.02, kSound = 0.1;  // of the keypoints
-  constexpr double kEnough = 1000;                 // keypoints
-  std::vector<double> keypoints(record.cameras.size()), inliers(record.cameras.size());
-  for (const report::FrameRecord& frame : record.frames) {
-    for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
-      keypoints[c] += frame.cameras[c].keypoints;
-      inliers[c] += frame.cameras[c].inliers;
-    }
+// A camera that at the end of the run still agrees with nothing the others see is probably not where the rig file puts
+// it.
+void warn_of_disagreement(const session::RunRecord& record, std::size_t camera) {
+  constexpr tracking::CameraStatus kDisagrees{tracking::CameraState::kDegraded, tracking::CameraReason::kInconsistent};
+  const std::vector<session::CameraInterval>& states = record.cameras[camera].states;
+  if (states.empty() || states.back().status != kDisagrees) return;
+  std::int64_t keypoints = 0, inliers = 0;
+  for (const session::RunFrame& frame : record.frames) {
+    if (!frame.record) continue;
+    keypoints += frame.record->final_result().cameras[camera].keypoints;
+    inliers += frame.record->final_result().cameras[camera].inliers;
   }
-  bool some_sound = false;
-  for (std::size_t c = 0; c < keypoints.size(); ++c)
-    some_sound |= keypoints[c] > kEnough && inliers[c] > kSound * keypoints[c];
-  for (std::size_t c = 0; some_sound && c < keypoints.size(); ++c) {
-    if (keypoints[c] < kEnough || inliers[c] > kNothing * keypoints[c]) continue;
-    fmt::print(stderr,
-               "warning: {}: next to nothing of what it saw ({:.0f} of {:.0f} keypoints) is where the other cameras "
-               "say; is it "
-               "where the rig file says? bslam rig info RIG --images DATA\n",
-               record.cameras[c].name, inliers[c], keypoints[c]);
-  }
+  fmt::print(stderr,
+             "warning: {}: only {} of {} keypoints are inliers: check this camera's extrinsics "
+             "(bslam rig info RIG --images DATA)\n",
+             record.cameras[camera].name, inliers, keypoints);
 }
 
-std::ptrdiff_t count(const report::RunRecord& record, report::FrameOutcome outcome) {
-  return std::ranges::count(record.frames, outcome, &report::FrameRecord::outcome);
+std::ptrdiff_t count(const session::RunRecord& record, session::FrameOutcome outcome) {
+  return std::ranges::count(record.frames, outcome, &session::RunFrame::outcome);
 }
 
 // Share of a camera's view that another one sees as well, the largest.
@@ -73,12 +67,13 @@ double largest_overlap(const camera::Rig& rig) {
 }
 
 // Cameras that overlap and still see next to nothing in common.
-void warn_if_nothing_matches(const report::RunRecord& record, const camera::Rig& rig) {
+void warn_if_nothing_matches(const session::RunRecord& record, const camera::Rig& rig) {
   constexpr double kMuchOverlap = 0.4, kLeastShare = 0.01;
   double matched = 0, unique = 0;
-  for (const report::FrameRecord& frame : record.frames) {
-    matched += frame.matched_features;
-    unique += frame.unique_features;
+  for (const session::RunFrame& frame : record.frames) {
+    if (!frame.record) continue;
+    matched += frame.record->matched;
+    unique += frame.record->unique;
   }
   if (unique == 0 || matched >= kLeastShare * unique || largest_overlap(rig) < kMuchOverlap) return;
   fmt::print(stderr,
@@ -98,25 +93,26 @@ void print_rig_warnings(const camera::Rig& rig) {
     fmt::print(stderr, "warning: {} more of the kind: bslam rig info\n", warnings.size() - kShown);
 }
 
-void print_warnings(const report::RunRecord& record, const camera::Rig& rig) {
-  for (const report::CameraRecord& camera : record.cameras) {
+void print_warnings(const session::RunRecord& record, const camera::Rig& rig) {
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    const session::CameraRecord& camera = record.cameras[c];
     if (camera.skipped > 0) {
       fmt::print(stderr, "warning: {}: {} of its images could not be read, the first: {}\n", camera.name,
                  camera.skipped, camera.first_skipped);
     }
     warn_of_outages(camera);
     warn_of_extrinsics(camera);
+    warn_of_disagreement(record, c);
   }
-  warn_of_strangers(record);
-  const auto dropped = count(record, report::FrameOutcome::kDropped);
+  const auto dropped = count(record, session::FrameOutcome::kDropped);
   if (dropped > 0) fmt::print(stderr, "warning: {} frames were dropped, there was no time for them\n", dropped);
   warn_if_nothing_matches(record, rig);
 }
 
-void print_result(const report::RunRecord& record, const std::string& out) {
+void print_result(const session::RunRecord& record, const std::string& out) {
   const std::string scale = record.map.keyframes > 0 ? ", scale " + record.map.scale : "";
   fmt::print("{}{} of {} frames have a pose, {} keyframes, {} landmarks{}; {:.1f} s\n{}\n",
-             record.complete ? "" : "interrupted: ", count(record, report::FrameOutcome::kTracked),
+             record.complete ? "" : "interrupted: ", count(record, session::FrameOutcome::kTracked),
              record.frames.size(), record.map.keyframes, record.map.landmarks, scale, record.wall_s, out);
 }
 

@@ -44,7 +44,7 @@ std::vector<feature::Descriptor> describe(const image::Image& image, feature::Ex
                         .time_offset_ns = 0,
                         .mask_file = {}};
   image::Pyramid pyramid;
-  feature::Keypoints keypoints;
+  feature::Detections keypoints;
   extractor.extract(image.view(), {}, camera, pyramid, keypoints);
   return keypoints.descriptor;
 }

@@ -146,10 +146,10 @@ class LaggedExecutor : public StageExecutor {
       failure_ = job->failure;
       rethrow();
     }
-    if (stage == Stage::kLoop && job->result.draft && !job->result.draft->overtaken(*gate_.newest()))
-      supersede_global();
+    if (const auto superseded = superseded_by(stage, job->result, *gate_.newest())) supersede(*superseded);
+    std::vector<StageStatistic> statistics = std::move(job->result.statistics);
     const bool committed = gate_.settle(job->task, job->base->version(), std::move(job->result), job->stop.get_token());
-    observe(setup_, {job->task, job->ms, committed});
+    observe(setup_, {job->task, job->ms, committed, std::move(statistics)});
     if (const auto next = following(job->task, setup_.functions); committed && next) push(*next);
     start_next(stage);
   }
@@ -161,13 +161,14 @@ class LaggedExecutor : public StageExecutor {
     return job.done;
   }
 
-  void supersede_global() {
-    Lane& l = lane(Stage::kGlobal);
+  // Drops what waits and stops what runs in a lane.
+  void supersede(Stage stage) {
+    Lane& l = lane(stage);
     l.waiting.clear();
     const std::shared_ptr<Job> job = std::exchange(l.running, nullptr);
     if (!job) return;
     const std::lock_guard lock(mutex_);
-    std::erase(worker(Stage::kGlobal).handed, job);
+    std::erase(worker(stage).handed, job);
     job->stop.request_stop();
     if (job->done) observe(setup_, {job->task, job->ms, false});  // else its worker tells
   }

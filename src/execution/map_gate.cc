@@ -2,7 +2,8 @@
 
 namespace bslam::execution {
 
-MapGate::MapGate(map::MapStore& store) : store_(store), newest_(store.snapshot()) {}
+MapGate::MapGate(map::MapStore& store, bool keep_journal)
+    : store_(store), keep_journal_(keep_journal), newest_(store.snapshot()) {}
 
 map::MapSnapshot MapGate::newest() const {
   const std::lock_guard lock(mutex_);
@@ -12,7 +13,7 @@ map::MapSnapshot MapGate::newest() const {
 map::MapSnapshot MapGate::begin_frame(FrameId frame) {
   frame_ = frame;
   const std::lock_guard lock(mutex_);
-  journal_.entries.push_back({JournalStep::kFrame, frame.value(), newest_->version(), std::nullopt});
+  if (keep_journal_) journal_.entries.push_back({JournalStep::kFrame, frame.value(), newest_->version(), std::nullopt});
   return newest_;
 }
 
@@ -67,7 +68,7 @@ map::CommitReport MapGate::publish(JournalStep step, std::int32_t input, map::Ma
 
 void MapGate::append(const JournalEntry& entry, map::MapSnapshot newest) {
   const std::lock_guard lock(mutex_);
-  journal_.entries.push_back(entry);
+  if (keep_journal_) journal_.entries.push_back(entry);
   if (newest) newest_.swap(newest);  // the old version goes with the argument, after the lock
 }
 

@@ -11,8 +11,8 @@ namespace bslam::execution {
 
 class MapGate {
  public:
-  // `store` outlives the gate; nobody else commits to it.
-  explicit MapGate(map::MapStore& store);
+  // `store` outlives the gate; nobody else commits to it. Without a journal, journal() stays empty and takes no memory.
+  explicit MapGate(map::MapStore& store, bool keep_journal = true);
 
   // The newest version the journal knows of. From any thread, never waiting for a commit under way.
   map::MapSnapshot newest() const;
@@ -40,6 +40,7 @@ class MapGate {
   void append(const JournalEntry& entry, map::MapSnapshot newest = nullptr);
 
   map::MapStore& store_;
+  const bool keep_journal_;
   std::mutex order_;  // held from the decision to commit until the journal has it
   FrameId frame_;     // of the caller's thread
   mutable std::mutex mutex_;

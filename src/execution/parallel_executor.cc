@@ -149,12 +149,13 @@ class ParallelExecutor : public StageExecutor {
     const map::MapSnapshot base = gate_.newest();
     StageResult result = setup_.functions[task.stage](task, base, stop);
     // Before the commit: what was not committed by now never is.
-    if (task.stage == Stage::kLoop && result.draft && !result.draft->overtaken(*gate_.newest())) {
+    if (const auto superseded = superseded_by(task.stage, result, *gate_.newest())) {
       const std::lock_guard lock(mutex_);
-      drop(lane(Stage::kGlobal));
+      drop(lane(*superseded));
     }
+    std::vector<StageStatistic> statistics = std::move(result.statistics);
     const bool committed = gate_.settle(task, base->version(), std::move(result), stop);
-    observe(setup_, {task, watch.ms(), committed});
+    observe(setup_, {task, watch.ms(), committed, std::move(statistics)});
     return committed;
   }
 

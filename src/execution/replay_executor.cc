@@ -102,7 +102,7 @@ class ReplayExecutor : public StageExecutor {
     tasks.pop_front();
     if (committed) {
       keep(gate_.newest());
-      if (task.stage == Stage::kLoop) waiting(Stage::kGlobal).clear();
+      if (const auto superseded = superseded_by(task.stage)) waiting(*superseded).clear();
       if (const auto next = following(task, setup_.functions)) waiting(next->stage).push_back(next->keyframe);
     }
     advance();

@@ -21,4 +21,13 @@ std::optional<StageTask> following(const StageTask& task, const StageFunctions& 
   return next;
 }
 
+std::optional<Stage> superseded_by(Stage stage) {
+  return stage == Stage::kLoop ? std::optional(Stage::kGlobal) : std::nullopt;
+}
+
+std::optional<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest) {
+  if (!result.draft || result.draft->overtaken(newest)) return std::nullopt;
+  return superseded_by(stage);
+}
+
 }  // namespace bslam::execution

@@ -8,6 +8,7 @@
 #include <optional>
 #include <stop_token>
 #include <string_view>
+#include <vector>
 
 #include "base/id.h"
 #include "map/map_store.h"
@@ -27,12 +28,19 @@ struct StageTask {
   friend bool operator==(const StageTask&, const StageTask&) = default;
 };
 
+// A figure that a stage tells of its run: landmarks it created, observations it adjusted, ...
+struct StageStatistic {
+  std::string_view name;  // a literal
+  double value = 0;
+};
+
 struct StageResult {
   std::optional<map::MapDraft>
       draft;  // of the version the stage was given; none: nothing to change, and nothing follows
   // Called when the draft is in the map and never otherwise, in order of the commits and before the next one, by
   // whatever thread commits. For what is to be told of the result; may be empty.
   std::function<void(const map::CommitReport&)> committed;
+  std::vector<StageStatistic> statistics = {};
 };
 
 // Once a stop is requested its result no longer counts: it may return anything as soon as it can. The keyframe may have
@@ -49,11 +57,18 @@ struct StageFunctions {
 // The task that a committed one calls for, if any.
 std::optional<StageTask> following(const StageTask& task, const StageFunctions& functions);
 
-// One run of a stage, for the timing record.
+// The stage whose tasks, waiting or running, are dropped when a result of `stage` goes into the map. A closed loop
+// moves the map, so a global adjustment of the map before it is worth nothing, and another one follows.
+std::optional<Stage> superseded_by(Stage stage);
+// The same before the commit of a result to `newest`, the newest version: empty where nothing will be committed.
+std::optional<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest);
+
+// One run of a stage, for whoever watches.
 struct StageRun {
   StageTask task;
   double ms = 0;
   bool committed = false;  // false: it had nothing to change, or was superseded
+  std::vector<StageStatistic> statistics = {};
 };
 
 // Called from any thread, also from several at once.

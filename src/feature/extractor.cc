@@ -52,7 +52,7 @@ struct Extractor::Scratch {
 
   void detect(const image::Pyramid& pyramid, const image::ImageView& mask, int wanted, const FeatureOptions& options);
   void describe(const image::Pyramid& pyramid, std::size_t level, const image::ImageView& mask,
-                const camera::Camera& camera, double sigma_px, Keypoints& keypoints);
+                const camera::Camera& camera, double sigma_px, Detections& detections);
 };
 
 namespace {
@@ -107,7 +107,7 @@ void Extractor::Scratch::detect(const image::Pyramid& pyramid, const image::Imag
 
 // Turns the chosen corners of a level into keypoints.
 void Extractor::Scratch::describe(const image::Pyramid& pyramid, std::size_t level, const image::ImageView& mask,
-                                  const camera::Camera& camera, double sigma_px, Keypoints& keypoints) {
+                                  const camera::Camera& camera, double sigma_px, Detections& detections) {
   if (chosen.empty()) return;
   const image::ImageView image = pyramid.levels[level].view();
   smoother.smooth(image, smoothed);
@@ -121,13 +121,13 @@ void Extractor::Scratch::describe(const image::Pyramid& pyramid, std::size_t lev
     const std::optional<Eigen::Vector3d> bearing = camera.unproject(pixel);
     if (!bearing) continue;
     const float angle = orientation(intensity_moments(sample_window(image, x, y)));
-    keypoints.pixel.push_back(pixel.cast<float>());
-    keypoints.level.push_back(static_cast<std::uint8_t>(level));
-    keypoints.angle.push_back(angle);
-    keypoints.sigma.push_back(sigma);
-    keypoints.bearing.push_back(*bearing);
-    keypoints.descriptor.push_back(describer.describe(sample_window(smooth, x, y), angle));
-    keypoints.patch.push_back(sample_patch(image, x, y));
+    detections.pixel.push_back(pixel.cast<float>());
+    detections.level.push_back(static_cast<std::uint8_t>(level));
+    detections.angle.push_back(angle);
+    detections.sigma.push_back(sigma);
+    detections.bearing.push_back(*bearing);
+    detections.descriptor.push_back(describer.describe(sample_window(smooth, x, y), angle));
+    detections.patch.push_back(sample_patch(image, x, y));
   }
 }
 
@@ -138,12 +138,12 @@ Extractor::Extractor(Extractor&&) noexcept = default;
 Extractor& Extractor::operator=(Extractor&&) noexcept = default;
 
 void Extractor::extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
-                        image::Pyramid& pyramid, Keypoints& keypoints, std::optional<int> budget) {
+                        image::Pyramid& pyramid, Detections& detections, std::optional<int> budget) {
   BSLAM_ASSERT(mask.empty() || (mask.width == image.width && mask.height == image.height),
                "mask and image differ in size");
   const int wanted = std::clamp(budget.value_or(options_.per_image), 0, most_of(options_));
-  keypoints.clear();
-  keypoints.reserve(static_cast<std::size_t>(wanted));
+  detections.clear();
+  detections.reserve(static_cast<std::size_t>(wanted));
   image::build_pyramid(image, options_.levels, options_.scale_factor, pyramid);
   if (wanted == 0) return;
   scratch_->smoothed.resize(image.width, image.height);  // room for all levels, also if this image has no keypoint
@@ -152,7 +152,7 @@ void Extractor::extract(const image::ImageView& image, const image::ImageView& m
     const LevelCorners& level = scratch_->levels[l];
     scratch_->distribution.choose(level.corners, level.ranked, level.region, scratch_->share[l],
                                   options_.fast_threshold, scratch_->chosen);
-    scratch_->describe(pyramid, l, mask, camera, options_.sigma_px, keypoints);
+    scratch_->describe(pyramid, l, mask, camera, options_.sigma_px, detections);
   }
 }
 

@@ -1,4 +1,4 @@
-// Oriented FAST and rotated BRIEF (Rublee et al., ICCV 2011): image -> Keypoints of one camera.
+// Oriented FAST and rotated BRIEF (Rublee et al., ICCV 2011): image -> detections of one camera.
 #pragma once
 
 #include <memory>
@@ -14,15 +14,17 @@ namespace bslam::feature {
 
 struct FeatureOptions {
   static constexpr int kInForOthers = 2;
-  int per_image = 1200;       // keypoints wanted in one image at most; kInForOthers times as many where other cameras are out
-  // Keypoints wanted in the images of all cameras together, 0: no bound. Three cameras just reach it: a third one takes nothing
-  // from the first two. Four take some 1.35 times as long as two (1.8 times without bound).
+  int per_image =
+      1200;  // keypoints wanted in one image at most; kInForOthers times as many where other cameras are out
+  // Keypoints wanted in the images of all cameras together, 0: no bound. Three cameras just reach it: a third one takes
+  // nothing from the first two. Four take some 1.35 times as long as two (1.8 times without bound).
   int per_rig = 3600;
-  int levels = 8;             // pyramid levels
-  double scale_factor = 1.2;  // ratio of one level to the next
-  int fast_threshold = 20;    // grey levels: what counts as a corner in a well lit image
-  int fast_threshold_min = 5; // the least it adapts to in dark or blurred regions
-  double sigma_px = 0.4;      // standard deviation of a keypoint on its level before sub-pixel alignment (measured: 0.25 - 0.35)
+  int levels = 8;              // pyramid levels
+  double scale_factor = 1.2;   // ratio of one level to the next
+  int fast_threshold = 20;     // grey levels: what counts as a corner in a well lit image
+  int fast_threshold_min = 5;  // the least it adapts to in dark or blurred regions
+  double sigma_px =
+      0.4;  // standard deviation of a keypoint on its level before sub-pixel alignment (measured: 0.25 - 0.35)
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -31,7 +33,8 @@ struct FeatureOptions {
     visitor("per_rig", self.per_rig, Range{0, 100000}, "", "keypoints wanted in all cameras together; 0: no bound");
     visitor("levels", self.levels, Range{1, 16}, "", "pyramid levels");
     visitor("scale_factor", self.scale_factor, Range{1.05, 2.0}, "", "ratio of one level to the next");
-    visitor("fast_threshold", self.fast_threshold, Range{2, 200}, "grey levels", "corner threshold in a well lit image");
+    visitor("fast_threshold", self.fast_threshold, Range{2, 200}, "grey levels",
+            "corner threshold in a well lit image");
     visitor("fast_threshold_min", self.fast_threshold_min, Range{1, 200}, "grey levels",
             "least corner threshold in dark or blurred regions");
     visitor("sigma_px", self.sigma_px, Range{0.05, 5.0}, "px", "standard deviation of a keypoint on its level");
@@ -47,12 +50,12 @@ class Extractor {
   Extractor(Extractor&&) noexcept;
   Extractor& operator=(Extractor&&) noexcept;
 
-  // Fills `keypoints` (cleared first) with at most `budget` entries (no more than kInForOthers * options.per_image; none
-  // given: options.per_image), spread evenly over the image, in an order that depends on image and number alone, and `pyramid` with
-  // the levels they were found on. Keypoints whose pixel has no bearing in `camera`, or where `mask` (same size as the image,
-  // or empty) is 0, are left out.
+  // Fills `detections` (cleared first) with at most `budget` entries (no more than kInForOthers * options.per_image;
+  // none given: options.per_image), spread evenly over the image, in an order that depends on image and number alone,
+  // and `pyramid` with the levels they were found on. Keypoints whose pixel has no bearing in `camera`, or where `mask`
+  // (same size as the image, or empty) is 0, are left out.
   void extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
-               image::Pyramid& pyramid, Keypoints& keypoints, std::optional<int> budget = {});
+               image::Pyramid& pyramid, Detections& detections, std::optional<int> budget = {});
 
  private:
   struct Scratch;

@@ -1,8 +1,12 @@
 #include "feature/keypoints.h"
 
+#include <utility>
+
+#include "base/assert.h"
+
 namespace bslam::feature {
 
-void Keypoints::clear() {
+void Detections::clear() {
   pixel.clear();
   level.clear();
   angle.clear();
@@ -12,7 +16,7 @@ void Keypoints::clear() {
   patch.clear();
 }
 
-void Keypoints::reserve(std::size_t n) {
+void Detections::reserve(std::size_t n) {
   pixel.reserve(n);
   level.reserve(n);
   angle.reserve(n);
@@ -20,6 +24,26 @@ void Keypoints::reserve(std::size_t n) {
   bearing.reserve(n);
   descriptor.reserve(n);
   patch.reserve(n);
+}
+
+Keypoints::Keypoints(Detections&& detected)
+    : level(std::move(detected.level)),
+      angle(std::move(detected.angle)),
+      descriptor(std::move(detected.descriptor)),
+      pixel(std::move(detected.pixel)),
+      bearing(std::move(detected.bearing)),
+      sigma(std::move(detected.sigma)),
+      patch(std::move(detected.patch)) {}
+
+Keypoints Keypoints::refined(Refinement&& refinement) const {
+  BSLAM_ASSERT(
+      refinement.pixel.size() == size() && refinement.bearing.size() == size() && refinement.sigma.size() == size(),
+      "a refinement has a position for every keypoint");
+  Keypoints out = *this;
+  out.pixel = std::move(refinement.pixel);
+  out.bearing = std::move(refinement.bearing);
+  out.sigma = std::move(refinement.sigma);
+  return out;
 }
 
 }  // namespace bslam::feature

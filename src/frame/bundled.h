@@ -1,13 +1,13 @@
 // The Bundled table of a frame: which keypoints of different cameras are one unique feature.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "base/id.h"
+#include "base/shared_array.h"
 
 namespace bslam::frame {
 
@@ -20,19 +20,20 @@ struct KeypointRef {
 
 // Triangulated point of a matched feature.
 struct BundledPoint {
-  Eigen::Vector3d point_rig;    // metres, camera 0
-  Eigen::Matrix3d covariance;   // metres^2
+  Eigen::Vector3d point_rig;   // metres, camera 0
+  Eigen::Matrix3d covariance;  // metres^2
 };
 
 // Every keypoint of the frame belongs to exactly one unique feature; a feature has at most one keypoint per camera;
 // unique = monocular + matched. Stored as a compressed table from FeatureId to keypoints, and its inverse. Matched
-// features come first, each with its keypoints in order of camera; monocular ones follow in order of camera and keypoint.
+// features come first, each with its keypoints in order of camera; monocular ones follow in order of camera and
+// keypoint. Immutable; copies share the table.
 class Bundled {
  public:
   Bundled() = default;
 
-  // `keypoint_counts`: keypoints per camera. `matched`: features of two or more keypoints, cameras distinct, no keypoint
-  // twice; `points` has one entry per matched feature. All remaining keypoints become monocular features.
+  // `keypoint_counts`: keypoints per camera. `matched`: features of two or more keypoints, cameras distinct, no
+  // keypoint twice; `points` has one entry per matched feature. All remaining keypoints become monocular features.
   Bundled(std::span<const std::size_t> keypoint_counts, std::span<const std::vector<KeypointRef>> matched,
           std::span<const std::optional<BundledPoint>> points);
 
@@ -52,11 +53,11 @@ class Bundled {
 
  private:
   static inline const std::optional<BundledPoint> kNone;
-  std::vector<KeypointRef> refs_;
-  std::vector<std::uint32_t> begin_;         // size() + 1
-  std::vector<FeatureId> feature_;           // per keypoint, cameras one after the other
-  std::vector<std::size_t> camera_begin_;    // per camera + 1
-  std::vector<std::optional<BundledPoint>> points_;
+  SharedArray<KeypointRef> refs_;
+  SharedArray<std::uint32_t> begin_;       // size() + 1
+  SharedArray<FeatureId> feature_;         // per keypoint, cameras one after the other
+  SharedArray<std::size_t> camera_begin_;  // per camera + 1
+  SharedArray<std::optional<BundledPoint>> points_;
   std::size_t num_matched_ = 0;
 };
 

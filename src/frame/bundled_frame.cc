@@ -1,6 +1,7 @@
 #include "frame/bundled_frame.h"
 
 #include <cmath>
+#include <utility>
 
 namespace bslam::frame {
 
@@ -13,6 +14,12 @@ std::size_t BundledFrame::num_keypoints() const {
 double BundledFrame::delay_s(std::size_t c) const {
   const CameraFrame& camera = cameras[c];
   return camera.state == image::ImageState::kPresent ? to_seconds(camera.time_ns - time_ns) : 0.0;
+}
+
+CameraFrame refined(CameraFrame part, feature::Refinement&& refinement, const camera::Camera& camera) {
+  part.keypoints = part.keypoints.refined(std::move(refinement));
+  part.grid = FeatureGrid(part.keypoints, camera.width, camera.height);
+  return part;
 }
 
 std::vector<double> delays_of(const BundledFrame& frame) {

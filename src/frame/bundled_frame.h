@@ -1,4 +1,5 @@
-// The paper's BundledFrame: what N cameras saw together. No pose, no images; immutable once it leaves tracking, shared.
+// The paper's BundledFrame: what N cameras saw together. No pose, no images. A value whose large arrays are shared by
+// its copies and never changed: each stage takes a frame and makes another one.
 #pragma once
 
 #include <vector>
@@ -16,10 +17,10 @@ namespace bslam::frame {
 // One camera's part of a frame.
 struct CameraFrame {
   image::ImageState state = image::ImageState::kMissing;
-  TimeNs time_ns = 0;             // its own capture time
-  feature::Keypoints keypoints;   // empty where the image is missing or damaged
-  FeatureGrid grid;
-  std::vector<WordId> words;      // per keypoint, of the vocabulary of the run; empty until somebody asks for them
+  TimeNs time_ns = 0;            // its own capture time
+  feature::Keypoints keypoints;  // empty where the image is missing or damaged
+  FeatureGrid grid;              // of the keypoints' pixels
+  std::vector<WordId> words;     // per keypoint, of the vocabulary of the run; empty until somebody asks for them
 };
 
 struct BundledFrame {
@@ -27,8 +28,8 @@ struct BundledFrame {
   TimeNs time_ns = 0;
   std::vector<CameraFrame> cameras;  // one per camera of the rig
   Bundled bundled;
-  // Motion of the rig while its cameras fired, rad/s and m/s (see camera::Rig::moving), as tracking knew it; zero as long as
-  // nothing is known. That of a keyframe is in the map.
+  // Velocity of the rig while its cameras fired, rad/s and m/s (see camera::Rig::moving), as tracking estimates it;
+  // zero where nothing is known. The map holds that of a keyframe.
   geometry::Vector6d twist = geometry::Vector6d::Zero();
 
   const feature::Keypoints& keypoints(CameraIndex c) const { return cameras[c.index()].keypoints; }
@@ -36,6 +37,9 @@ struct BundledFrame {
   // Time of camera c's image after that of the frame, in seconds; 0 where it has none.
   double delay_s(std::size_t c) const;
 };
+
+// A camera's part with its keypoints at other positions, and the grid of these.
+CameraFrame refined(CameraFrame part, feature::Refinement&& refinement, const camera::Camera& camera);
 
 // Per camera.
 std::vector<double> delays_of(const BundledFrame& frame);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace bslam::frame {
 namespace {
@@ -16,24 +17,27 @@ FeatureGrid::FeatureGrid(const feature::Keypoints& keypoints, int width, int hei
     : cells_per_px_x_(static_cast<float>(kColumns) / static_cast<float>(width)),
       cells_per_px_y_(static_cast<float>(kRows) / static_cast<float>(height)) {
   std::vector<std::uint32_t> cell(keypoints.size());
-  begin_.assign(kColumns * kRows + 1, 0);
+  std::vector<std::uint32_t> begin(kColumns * kRows + 1, 0);
   for (std::size_t k = 0; k < keypoints.size(); ++k) {
     const Eigen::Vector2f& p = keypoints.pixel[k];
     cell[k] = static_cast<std::uint32_t>(cell_of(p.y(), cells_per_px_y_, kRows) * kColumns +
                                          cell_of(p.x(), cells_per_px_x_, kColumns));
-    ++begin_[cell[k] + 1];
+    ++begin[cell[k] + 1];
   }
-  for (std::size_t i = 1; i < begin_.size(); ++i) begin_[i] += begin_[i - 1];
-  index_.resize(keypoints.size());
-  std::vector<std::uint32_t> fill(begin_.begin(), begin_.end() - 1);
-  for (std::size_t k = 0; k < keypoints.size(); ++k) index_[fill[cell[k]]++] = static_cast<std::uint32_t>(k);
+  for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+  std::vector<std::uint32_t> index(keypoints.size());
+  std::vector<std::uint32_t> fill(begin.begin(), begin.end() - 1);
+  for (std::size_t k = 0; k < keypoints.size(); ++k) index[fill[cell[k]]++] = static_cast<std::uint32_t>(k);
+  begin_ = std::move(begin);
+  index_ = std::move(index);
 }
 
 void FeatureGrid::near(const feature::Keypoints& keypoints, const Eigen::Vector2d& pixel, double radius, int low_level,
                        int high_level, std::vector<std::uint32_t>& out) const {
   if (index_.empty()) return;
   const float x = static_cast<float>(pixel.x()), y = static_cast<float>(pixel.y()), r = static_cast<float>(radius);
-  const int first_column = cell_of(x - r, cells_per_px_x_, kColumns), last_column = cell_of(x + r, cells_per_px_x_, kColumns);
+  const int first_column = cell_of(x - r, cells_per_px_x_, kColumns),
+            last_column = cell_of(x + r, cells_per_px_x_, kColumns);
   const int first_row = cell_of(y - r, cells_per_px_y_, kRows), last_row = cell_of(y + r, cells_per_px_y_, kRows);
   for (int row = first_row; row <= last_row; ++row) {
     const std::size_t from = begin_[static_cast<std::size_t>(row * kColumns + first_column)];

@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// A match of keypoints of two cameras, with the second one's aligned place.
+// A match of keypoints of two cameras, with the aligned position of the second.
 struct Edge {
   frame::KeypointRef a, b;
   int hamming = 0;
@@ -34,21 +34,22 @@ std::vector<CameraPair> overlapping_pairs(const camera::Rig& rig) {
   return pairs;
 }
 
-PointObservation observation(const camera::Rig& rig, std::span<const frame::CameraFrame> cameras,
-                             frame::KeypointRef ref) {
-  const feature::Keypoints& k = cameras[ref.camera.index()].keypoints;
+// `positions` are those of the keypoints of the reference's camera: Keypoints or a Refinement.
+template <class Positions>
+PointObservation observation(const camera::Rig& rig, const Positions& positions, frame::KeypointRef ref) {
   const std::size_t i = ref.keypoint.index();
-  return {&rig.camera(ref.camera), rig.cam_from_rig(ref.camera), k.pixel[i].cast<double>(), k.bearing[i], k.sigma[i]};
+  return {&rig.camera(ref.camera), rig.cam_from_rig(ref.camera), positions.pixel[i].template cast<double>(),
+          positions.bearing[i], positions.sigma[i]};
 }
 
-// Places keypoint b where the patch of keypoint a is seen. Empty where it does not look alike there.
+// Aligns keypoint b of an edge to the patch of keypoint a. False where it does not look alike there.
 bool align_edge(const camera::Rig& rig, std::span<const frame::CameraFrame> cameras,
                 std::span<const image::Pyramid> pyramids, std::span<const AlignmentOptions> alignment, Edge& edge) {
   const feature::Keypoints& ka = cameras[edge.a.camera.index()].keypoints;
   const feature::Keypoints& kb = cameras[edge.b.camera.index()].keypoints;
   const std::size_t ia = edge.a.keypoint.index(), ib = edge.b.keypoint.index();
   const geometry::SE3 T_b_a = rig.cam_from_rig(edge.b.camera) * rig.rig_from_cam(edge.a.camera.index());
-  const std::array<PointObservation, 2> pair = {observation(rig, cameras, edge.a), observation(rig, cameras, edge.b)};
+  const std::array<PointObservation, 2> pair = {observation(rig, ka, edge.a), observation(rig, kb, edge.b)};
   const double far_m = 1000.0 * T_b_a.translation().norm();
   const auto estimated = estimate_point(pair, 1e-4);
   const Vector3d point_a =
@@ -131,86 +132,82 @@ class Grouping {
   std::vector<std::vector<frame::KeypointRef>> groups_;
 };
 
-// Keypoints as aligned to one another, and the way back for those that turn out to belong to nothing.
-class Placement {
+// Positions of the keypoints of all cameras, aligned along the edges of features.
+class AlignedPositions {
  public:
-  explicit Placement(std::span<frame::CameraFrame> cameras) : cameras_(cameras) {
-    for (const frame::CameraFrame& c : cameras) state_.emplace_back(c.keypoints.size(), kAsDetected);
+  explicit AlignedPositions(std::span<const frame::CameraFrame> detected) : detected_(detected) {
+    for (const frame::CameraFrame& c : detected) {
+      positions_.push_back(c.keypoints.positions());
+      role_.emplace_back(c.keypoints.size(), kDetected);
+    }
   }
 
-  // Moves the second keypoint of an edge to where the patch of the first is seen; the first defines the feature, so its
-  // own place is exact. An edge whose first keypoint was moved itself would lead to where that no longer is.
-  void apply(const Edge& edge, std::span<const image::Pyramid> pyramids, std::span<const AlignmentOptions> alignment) {
-    if (state(edge.a) == kMoved || state(edge.b) != kAsDetected) return;
-    feature::Keypoints& ka = cameras_[edge.a.camera.index()].keypoints;
-    feature::Keypoints& kb = cameras_[edge.b.camera.index()].keypoints;
-    const std::size_t ia = edge.a.keypoint.index(), ib = edge.b.keypoint.index();
-    if (state(edge.a) == kAsDetected) remember(edge.a);
-    remember(edge.b);
-    state(edge.a) = kReference;
-    state(edge.b) = kMoved;
-    const double scale_a = pyramids[edge.a.camera.index()].scale_x[ka.level[ia]];
-    ka.sigma[ia] = std::min(ka.sigma[ia], static_cast<float>(alignment[edge.a.camera.index()].sigma(0.0, scale_a)));
-    kb.pixel[ib] = edge.aligned.pixel.cast<float>();
-    kb.bearing[ib] = edge.bearing;
-    kb.sigma[ib] = static_cast<float>(edge.aligned.sigma);
+  // Takes the aligned position of the edge's second keypoint. The first one defines the feature, so that its own
+  // position is exact. An edge whose first keypoint is aligned to another one would refer to where that no longer is.
+  void align(const Edge& edge, std::span<const image::Pyramid> pyramids, std::span<const AlignmentOptions> alignment) {
+    if (role(edge.a) == kAligned || role(edge.b) != kDetected) return;
+    role(edge.a) = kReference;
+    role(edge.b) = kAligned;
+    const std::size_t camera_a = edge.a.camera.index(), ia = edge.a.keypoint.index(), ib = edge.b.keypoint.index();
+    const double scale_a = pyramids[camera_a].scale_x[detected_[camera_a].keypoints.level[ia]];
+    feature::Refinement &a = positions_[camera_a], &b = positions_[edge.b.camera.index()];
+    a.sigma[ia] = std::min(a.sigma[ia], static_cast<float>(alignment[camera_a].sigma(0.0, scale_a)));
+    b.pixel[ib] = edge.aligned.pixel.cast<float>();
+    b.bearing[ib] = edge.bearing;
+    b.sigma[ib] = static_cast<float>(edge.aligned.sigma);
   }
 
-  void restore_all_but(std::span<const std::vector<frame::KeypointRef>> groups) {
+  const feature::Refinement& operator[](CameraIndex c) const { return positions_[c.index()]; }
+
+  // Aligned positions of the keypoints in `groups`, those of all others as detected.
+  std::vector<feature::Refinement> of_groups(std::span<const std::vector<frame::KeypointRef>> groups) && {
     for (const auto& group : groups) {
-      for (const frame::KeypointRef r : group) state(r) = kAsDetected;  // nothing to restore
+      for (const frame::KeypointRef r : group) role(r) = kDetected;  // what is left are the others
     }
-    for (const Before& b : before_) {
-      if (state(b.ref) == kAsDetected) continue;
-      feature::Keypoints& k = cameras_[b.ref.camera.index()].keypoints;
-      const std::size_t i = b.ref.keypoint.index();
-      k.pixel[i] = b.pixel;
-      k.bearing[i] = b.bearing;
-      k.sigma[i] = b.sigma;
+    for (std::size_t c = 0; c < positions_.size(); ++c) {
+      const feature::Keypoints& detected = detected_[c].keypoints;
+      for (std::size_t k = 0; k < detected.size(); ++k) {
+        if (role_[c][k] == kDetected) continue;
+        positions_[c].pixel[k] = detected.pixel[k];
+        positions_[c].bearing[k] = detected.bearing[k];
+        positions_[c].sigma[k] = detected.sigma[k];
+      }
     }
+    return std::move(positions_);
   }
 
  private:
-  enum State : std::uint8_t { kAsDetected, kReference, kMoved };
-  struct Before {
-    frame::KeypointRef ref;
-    Eigen::Vector2f pixel;
-    Vector3d bearing;
-    float sigma;
-  };
-  std::uint8_t& state(frame::KeypointRef r) { return state_[r.camera.index()][r.keypoint.index()]; }
-  void remember(frame::KeypointRef r) {
-    const feature::Keypoints& k = cameras_[r.camera.index()].keypoints;
-    const std::size_t i = r.keypoint.index();
-    before_.push_back({r, k.pixel[i], k.bearing[i], k.sigma[i]});
-  }
-  std::span<frame::CameraFrame> cameras_;
-  std::vector<std::vector<std::uint8_t>> state_;
-  std::vector<Before> before_;
+  enum Role : std::uint8_t { kDetected, kReference, kAligned };
+  std::uint8_t& role(frame::KeypointRef r) { return role_[r.camera.index()][r.keypoint.index()]; }
+
+  std::span<const frame::CameraFrame> detected_;
+  std::vector<feature::Refinement> positions_;   // per camera
+  std::vector<std::vector<std::uint8_t>> role_;  // per camera and keypoint
 };
 
 // All keypoints of the group look the same way, as far as their noise tells: a feature too far for a point.
-bool agrees_at_infinity(const camera::Rig& rig, std::span<const frame::CameraFrame> cameras, double max_chi2,
-                        std::span<const frame::KeypointRef> group) {
+bool agrees_at_infinity(const camera::Rig& rig, std::span<const PointObservation> group, CameraIndex first_camera,
+                        double max_chi2) {
   constexpr double kFar_m = 1e5;
-  const PointObservation first = observation(rig, cameras, group.front());
-  const Vector3d point_rig = rig.rig_from_cam(group.front().camera.index()) * (kFar_m * first.bearing);
-  return std::all_of(group.begin() + 1, group.end(), [&](frame::KeypointRef ref) {
-    const PointObservation o = observation(rig, cameras, ref);
+  const PointObservation& first = group.front();
+  const Vector3d point_rig = rig.rig_from_cam(first_camera.index()) * (kFar_m * first.bearing);
+  return std::all_of(group.begin() + 1, group.end(), [&](const PointObservation& o) {
     const auto pixel = o.camera->project(o.T_cam_common * point_rig);
     return pixel && (*pixel - o.pixel).squaredNorm() <= max_chi2 * (o.sigma * o.sigma + first.sigma * first.sigma);
   });
 }
 
-// Keypoints that do not meet in one point are no feature: the worst goes until the rest agrees. False where less than
-// two are left.
-bool keep_agreeing(const camera::Rig& rig, std::span<const frame::CameraFrame> cameras, double max_chi2,
+// Keypoints that do not meet in one point are no feature: the worst is removed until the rest agrees. False where fewer
+// than two are left.
+bool keep_agreeing(const camera::Rig& rig, const AlignedPositions& positions, double max_chi2,
                    std::vector<frame::KeypointRef>& group) {
   while (group.size() >= 2) {
     std::vector<PointObservation> observations;
-    for (const frame::KeypointRef ref : group) observations.push_back(observation(rig, cameras, ref));
+    for (const frame::KeypointRef ref : group) observations.push_back(observation(rig, positions[ref.camera], ref));
     const auto estimated = estimate_point(observations, 0.0);
-    if (!estimated) return agrees_at_infinity(rig, cameras, max_chi2, group);  // rays that diverge by their noise
+    if (!estimated) {  // rays that diverge by their noise
+      return agrees_at_infinity(rig, observations, group.front().camera, max_chi2);
+    }
     if (estimated->worst_chi2 <= max_chi2) return true;
     group.erase(group.begin() + static_cast<std::ptrdiff_t>(estimated->worst));
   }
@@ -224,7 +221,9 @@ std::optional<frame::BundledPoint> triangulate_group(const camera::Rig& rig,
                                                      std::span<const frame::KeypointRef> group, double min_parallax,
                                                      double max_chi2) {
   std::vector<PointObservation> observations;
-  for (const frame::KeypointRef ref : group) observations.push_back(observation(rig, cameras, ref));
+  for (const frame::KeypointRef ref : group) {
+    observations.push_back(observation(rig, cameras[ref.camera.index()].keypoints, ref));
+  }
   const auto estimated = estimate_point(observations, min_parallax);
   if (!estimated || estimated->worst_chi2 > max_chi2) return std::nullopt;
   return frame::BundledPoint{estimated->point, estimated->covariance};
@@ -240,29 +239,36 @@ frame::Bundled make_bundled(const camera::Rig& rig, std::span<const frame::Camer
   return frame::Bundled(counts, matched, points);
 }
 
-frame::Bundled bundle(const camera::Rig& rig, std::span<frame::CameraFrame> cameras,
-                      std::span<const image::Pyramid> pyramids, const BundlingOptions& options,
-                      std::span<const AlignmentOptions> alignment, ThreadPool& pool) {
+frame::BundledFrame bundle(const camera::Rig& rig, const frame::BundledFrame& extracted,
+                           std::span<const image::Pyramid> pyramids, const BundlingOptions& options,
+                           std::span<const AlignmentOptions> alignment, ThreadPool& pool) {
+  const std::span<const frame::CameraFrame> detected = extracted.cameras;
   const std::vector<CameraPair> pairs = overlapping_pairs(rig);
   std::vector<std::vector<Edge>> found(pairs.size());
   pool.for_each(pairs.size(),
-                [&](std::size_t p) { found[p] = match_pair(rig, cameras, pyramids, pairs[p], options, alignment); });
+                [&](std::size_t p) { found[p] = match_pair(rig, detected, pyramids, pairs[p], options, alignment); });
   std::vector<Edge> edges;
   for (const auto& list : found) edges.insert(edges.end(), list.begin(), list.end());
   std::stable_sort(edges.begin(), edges.end(), [](const Edge& p, const Edge& q) { return p.hamming < q.hamming; });
 
-  Grouping grouping(cameras);
-  Placement placement(cameras);
+  Grouping grouping(detected);
+  AlignedPositions positions(detected);
   for (const Edge& e : edges) {
-    if (grouping.join(e.a, e.b)) placement.apply(e, pyramids, alignment);
+    if (grouping.join(e.a, e.b)) positions.align(e, pyramids, alignment);
   }
   std::vector<std::vector<frame::KeypointRef>> kept;
   for (std::vector<frame::KeypointRef>& group : grouping.take()) {
-    if (keep_agreeing(rig, cameras, options.max_chi2, group)) kept.push_back(std::move(group));
+    if (keep_agreeing(rig, positions, options.max_chi2, group)) kept.push_back(std::move(group));
   }
-  placement.restore_all_but(kept);
+  std::vector<feature::Refinement> refinements = std::move(positions).of_groups(kept);
   std::sort(kept.begin(), kept.end());
-  return make_bundled(rig, cameras, kept, options.min_parallax, options.max_chi2);
+
+  frame::BundledFrame out = extracted;
+  for (std::size_t c = 0; c < out.cameras.size(); ++c) {
+    out.cameras[c] = frame::refined(out.cameras[c], std::move(refinements[c]), rig.camera(c));
+  }
+  out.bundled = make_bundled(rig, out.cameras, kept, options.min_parallax, options.max_chi2);
+  return out;
 }
 
 }  // namespace bslam::matching

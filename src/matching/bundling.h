@@ -42,13 +42,14 @@ struct DetectionNoise {
   double sigma_px = 0.4;
 };
 
-// Matches the cameras of every overlapping pair, aligns the second keypoint of a match to the patch of the first
-// (moving its pixel, bearing and sigma in `cameras`), merges pairs into features of several cameras (at most one
-// keypoint per camera, else the weaker edge goes) and triangulates them. `pyramids` and `alignment` hold one per
-// camera, the pyramids as extracted.
-frame::Bundled bundle(const camera::Rig& rig, std::span<frame::CameraFrame> cameras,
-                      std::span<const image::Pyramid> pyramids, const BundlingOptions& options,
-                      std::span<const AlignmentOptions> alignment, ThreadPool& pool);
+// Matches the cameras of every overlapping pair, aligns the second keypoint of a match to the patch of the first,
+// merges pairs into features of several cameras (at most one keypoint per camera, else the weaker edge goes) and
+// triangulates them. Takes a frame as extracted and returns it with the keypoints of matched features at their aligned
+// positions, the grids and the Bundled table. `rig` is the rig as it stood when the frame was taken (frame::rig_of);
+// `pyramids` and `alignment` hold one per camera, the pyramids as extracted.
+frame::BundledFrame bundle(const camera::Rig& rig, const frame::BundledFrame& extracted,
+                           std::span<const image::Pyramid> pyramids, const BundlingOptions& options,
+                           std::span<const AlignmentOptions> alignment, ThreadPool& pool);
 
 // The Bundled table for given groups of keypoints of the same thing (each with at most one keypoint per camera, in
 // order of camera): each gets its point where the rays allow and none of its keypoints misses it by more than

@@ -29,8 +29,9 @@ frame::BundledFrame FrameBuilder::extract(const image::ImageBundle& images, Thre
     camera.time_ns = input.time_ns;
     if (camera.state == image::ImageState::kPresent) {
       const std::optional<int> budget = budgets.empty() ? std::nullopt : std::optional(budgets[i]);
-      extractors_[i].extract(input.image.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], camera.keypoints,
-                             budget);
+      feature::Detections detections;
+      extractors_[i].extract(input.image.view(), masks_[i].view(), rig_.camera(i), pyramids_[i], detections, budget);
+      camera.keypoints = std::move(detections);
     } else {
       pyramids_[i].levels.clear();
     }

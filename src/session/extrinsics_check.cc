@@ -34,7 +34,7 @@ constexpr double kNoBaseline = 1e-6;      // metres
 constexpr double kLeastParallax = 0.005;  // radians, of the matches another pose is found from
 
 // For every descriptor of `a` its best in `b`, or -1.
-std::vector<int> best_matches(const feature::Keypoints& a, const feature::Keypoints& b) {
+std::vector<int> best_matches(const feature::Detections& a, const feature::Detections& b) {
   std::vector<int> best(a.size(), -1);
   for (std::size_t i = 0; i < a.size(); ++i) {
     int least = 257, second = 257;
@@ -57,7 +57,7 @@ struct PixelPair {
 };
 
 // Mutual best matches, without any geometry: it is what is to be tested.
-std::vector<PixelPair> match(const feature::Keypoints& a, const feature::Keypoints& b) {
+std::vector<PixelPair> match(const feature::Detections& a, const feature::Detections& b) {
   const std::vector<int> forward = best_matches(a, b), backward = best_matches(b, a);
   std::vector<PixelPair> pairs;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -164,8 +164,8 @@ std::string_view convention_in_words(Convention convention) {
   return "with the two cameras exchanged and every transform inverted";
 }
 
-PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Keypoints> of_i,
-                        std::span<const feature::Keypoints> of_j) {
+PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Detections> of_i,
+                        std::span<const feature::Detections> of_j) {
   const std::size_t instants = std::min(of_i.size(), of_j.size());
   PairEvidence evidence{.first = i, .second = j, .instants = static_cast<int>(instants)};
   std::vector<PixelPair> all;
@@ -191,7 +191,7 @@ namespace {
 
 struct View {
   TimeNs time_ns = 0;
-  feature::Keypoints keypoints;  // empty without an image
+  feature::Detections keypoints;  // empty without an image
 };
 
 // By camera and frame.
@@ -224,7 +224,7 @@ Result<std::vector<PairEvidence>> check_extrinsics(const dataset::Dataset& datas
   std::vector<PairEvidence> evidence;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
-      std::vector<feature::Keypoints> of_i, of_j;
+      std::vector<feature::Detections> of_i, of_j;
       for (std::size_t k = 0; k < views[i].size(); ++k) {
         if (std::abs(views[i][k].time_ns - views[j][k].time_ns) > frame::kTogetherNs) continue;
         of_i.push_back(views[i][k].keypoints);

@@ -48,8 +48,8 @@ struct PairEvidence {
 };
 
 // Judges the pair (i, j) by keypoints of images taken at the same instants, one entry per frame for each camera.
-PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Keypoints> of_i,
-                        std::span<const feature::Keypoints> of_j);
+PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Detections> of_i,
+                        std::span<const feature::Detections> of_j);
 
 // Judges every pair of cameras by a few frames spread over the data set, as far as both were taken at one instant.
 // Masks count. Errors: a mask that cannot be read.

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "dataset/dataset.h"
-#include "report/run_record.h"
+#include "session/run_record.h"
 #include "system/system.h"
 
 namespace bslam::session {
@@ -33,6 +33,6 @@ std::string scale_name(map::Scale scale);
 // Name of the file of the i-th part's poses: "trajectory.tum", "trajectory_part2.tum".
 std::string trajectory_file(const std::string& stem, std::size_t part);
 
-report::RunRecord build_record(const RecordInput& input);
+RunRecord build_record(const RecordInput& input);
 
 }  // namespace bslam::session

@@ -8,12 +8,12 @@
 #include "base/stopwatch.h"
 #include "evaluation/trajectory_file.h"
 #include "image_files/image_file.h"
-#include "report/run_plot.h"
-#include "report/summary.h"
 #include "report/trajectory_plot.h"
 #include "rig_formats/bslam_rig.h"
 #include "session/frame_source.h"
 #include "session/record_builder.h"
+#include "session/run_plot.h"
+#include "session/summary.h"
 #include "system/system.h"
 #include "yaml/config_file.h"
 
@@ -46,7 +46,8 @@ std::vector<FrameId> recorded_frames(const execution::Journal& journal) {
 }
 
 // Feeds the frames one after the other; returns what was fed. Stops early where asked to.
-std::vector<InputFrame> feed(const dataset::Dataset& dataset, const SessionOptions& options, system::System& system) {
+Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const SessionOptions& options,
+                                     system::System& system) {
   std::vector<InputFrame> inputs;
   const bool sequential = options.config.mode == execution::Mode::kSequential;
   FrameSource source(dataset, kReadAhead, sequential ? ReadAhead::kGivesWay : ReadAhead::kAsAll);
@@ -60,7 +61,9 @@ std::vector<InputFrame> feed(const dataset::Dataset& dataset, const SessionOptio
     const bool late = i + 1 < dataset.frames.size() && metronome.is_past(dataset.frames[i + 1].time_ns);
     const bool drop = options.replay ? !std::binary_search(recorded.begin(), recorded.end(), FrameId(i))
                                      : options.pace == Pace::kRealtime && options.late == Late::kDrop && late;
-    if (!drop) system.process(item->images);
+    if (!drop) {
+      if (const auto processed = system.process(item->images); !processed) return processed.error();
+    }
     inputs.push_back({item->images.time_ns, drop, item->read_ms});
     if (options.progress) options.progress(i + 1, dataset.frames.size());
   }
@@ -90,7 +93,9 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
   std::vector<InputFrame> inputs;
   try {
     const std::stop_callback on_interruption(options.interrupted, [&system] { system.interrupt(); });
-    inputs = feed(dataset, options, system);
+    auto fed = feed(dataset, options, system);
+    if (!fed) return fed.error();
+    inputs = std::move(*fed);
     system.finish();
   } catch (const execution::ReplayMismatch& mismatch) {
     return mismatch.error;
@@ -145,8 +150,8 @@ Status write_outputs(const SessionResult& result, const system::Config& config, 
                                                                     .estimate = path,
                                                                     .ground_truth = {},
                                                                     .errors = {}}));
-  files.emplace_back("run.svg", report::run_plot_svg(result.record));
-  files.emplace_back("summary.json", report::summary_text(result.record));  // last: where it is, the rest is
+  files.emplace_back("run.svg", run_plot_svg(result.record));
+  files.emplace_back("summary.json", summary_text(result.record));  // last: where it is, the rest is
   for (const auto& [name, bytes] : files) {
     if (const Status status = write_atomically(folder / name, bytes); !status) return status;
   }

@@ -9,7 +9,7 @@
 
 #include "dataset/dataset.h"
 #include "evaluation/trajectory.h"
-#include "report/run_record.h"
+#include "session/run_record.h"
 #include "system/config.h"
 #include "system/system.h"
 
@@ -31,7 +31,7 @@ struct SessionOptions {
 };
 
 struct SessionResult {
-  report::RunRecord record;
+  RunRecord record;
   std::vector<system::PartTrajectory> trajectories,
       live;  // the first are those of trajectory.tum and trajectory_live.tum
   map::MapSnapshot map;

@@ -32,22 +32,23 @@ void put_camera(const frame::CameraFrame& camera, bool with_words, ByteWriter& o
   out.number(camera.time_ns);
   out.count(n);
   if (n > 0) {
-    out.numbers(k.pixel.front().data(), 2 * n);
+    out.numbers(k.pixel.data()->data(), 2 * n);
     out.numbers(k.level.data(), n);
     out.numbers(k.angle.data(), n);
     out.numbers(k.sigma.data(), n);
-    out.numbers(k.bearing.front().data(), 3 * n);
-    out.numbers(k.descriptor.front().data(), 4 * n);
-    out.numbers(k.patch.front().data(), n * sizeof(Patch));
+    out.numbers(k.bearing.data()->data(), 3 * n);
+    out.numbers(k.descriptor.data()->data(), 4 * n);
+    out.numbers(k.patch.data()->data(), n * sizeof(Patch));
   }
   const bool has_words = with_words && camera.words.size() == n;
   out.number(static_cast<std::uint8_t>(has_words));
   for (std::size_t i = 0; has_words && i < n; ++i) out.number(camera.words[i].value());
 }
 
-void take_keypoints(ByteReader& in, Keypoints& k) {
+Keypoints take_keypoints(ByteReader& in) {
   const std::size_t n = in.count(kKeypointBytes);
-  if (n == 0) return;
+  if (n == 0) return {};
+  feature::Detections k;
   k.pixel.resize(n);
   k.level.resize(n);
   k.angle.resize(n);
@@ -55,13 +56,14 @@ void take_keypoints(ByteReader& in, Keypoints& k) {
   k.bearing.resize(n);
   k.descriptor.resize(n);
   k.patch.resize(n);
-  in.numbers(k.pixel.front().data(), 2 * n);
+  in.numbers(k.pixel.data()->data(), 2 * n);
   in.numbers(k.level.data(), n);
   in.numbers(k.angle.data(), n);
   in.numbers(k.sigma.data(), n);
-  in.numbers(k.bearing.front().data(), 3 * n);
-  in.numbers(k.descriptor.front().data(), 4 * n);
-  in.numbers(k.patch.front().data(), n * sizeof(Patch));
+  in.numbers(k.bearing.data()->data(), 3 * n);
+  in.numbers(k.descriptor.data()->data(), 4 * n);
+  in.numbers(k.patch.data()->data(), n * sizeof(Patch));
+  return k;
 }
 
 // Pixels may lie beside the image, but not so far that they cannot be meant.
@@ -105,7 +107,7 @@ void take_camera(ByteReader& in, const camera::Camera& calibration, int levels, 
   camera.state = static_cast<image::ImageState>(state);
   camera.time_ns = in.number<TimeNs>();
   if (!in.require(std::abs(camera.time_ns / 2) < kMaxTime / 2, "a time beyond all times", "nanoseconds")) return;
-  take_keypoints(in, camera.keypoints);
+  camera.keypoints = take_keypoints(in);
   if (!in.ok() || !check_keypoints(in, camera.keypoints, calibration, levels)) return;
   take_words(in, camera, with_words, words_end);
   if (!in.ok() || camera.keypoints.empty()) return;

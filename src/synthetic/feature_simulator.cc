@@ -59,7 +59,7 @@ SimulatedLandmark random_landmark(const FeatureSimulatorOptions& o, Random& rand
   return l;
 }
 
-void add_keypoint(feature::Keypoints& k, const Vector2d& pixel, int level, double angle, double sigma,
+void add_keypoint(feature::Detections& k, const Vector2d& pixel, int level, double angle, double sigma,
                   const Vector3d& bearing, const feature::Descriptor& descriptor, const feature::Patch& patch) {
   k.pixel.push_back(pixel.cast<float>());
   k.level.push_back(static_cast<std::uint8_t>(level));
@@ -94,8 +94,10 @@ SimulatedFrame FeatureSimulator::frame(FrameId id, double time_s, std::span<cons
     camera_frame.time_ns = from_seconds(time_s + offset);
     Random random(options_.noise_seed, "observe", id.index() * rig_.size() + c);
     const geometry::SE3 T_world_cam = trajectory_.T_world_body(time_s + offset) * rig_.body_from_cam(c);
-    observe(c, T_world_cam, random, camera_frame.keypoints, out.landmark[c]);
-    add_outliers(c, random, camera_frame.keypoints, out.landmark[c]);
+    feature::Detections detections;
+    observe(c, T_world_cam, random, detections, out.landmark[c]);
+    add_outliers(c, random, detections, out.landmark[c]);
+    camera_frame.keypoints = std::move(detections);
     camera_frame.grid = frame::FeatureGrid(camera_frame.keypoints, rig_.camera(c).width, rig_.camera(c).height);
   }
   Random random(options_.noise_seed, "bundle", id.index());
@@ -119,7 +121,7 @@ std::optional<FeatureSimulator::View> FeatureSimulator::view(std::size_t landmar
 }
 
 void FeatureSimulator::observe(std::size_t camera, const geometry::SE3& T_world_cam, Random& random,
-                               feature::Keypoints& keypoints, std::vector<int>& landmark) const {
+                               feature::Detections& keypoints, std::vector<int>& landmark) const {
   for (std::size_t i = 0; i < landmarks_.size() && keypoints.size() < static_cast<std::size_t>(options_.max_keypoints);
        ++i) {
     const auto seen = view(i, camera, T_world_cam);
@@ -141,7 +143,7 @@ void FeatureSimulator::observe(std::size_t camera, const geometry::SE3& T_world_
   }
 }
 
-void FeatureSimulator::add_outliers(std::size_t camera, Random& random, feature::Keypoints& keypoints,
+void FeatureSimulator::add_outliers(std::size_t camera, Random& random, feature::Detections& keypoints,
                                     std::vector<int>& landmark) const {
   const camera::Camera& c = rig_.camera(camera);
   const auto count = static_cast<int>(std::lround(options_.outlier_share * static_cast<double>(keypoints.size())));

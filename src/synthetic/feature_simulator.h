@@ -81,10 +81,10 @@ class FeatureSimulator {
   const FeatureSimulatorOptions& options() const { return options_; }
 
  private:
-  // Adds one camera's keypoints and the landmark indices they belong to.
-  void observe(std::size_t camera, const geometry::SE3& T_world_cam, Random& random, feature::Keypoints& keypoints,
+  // Adds one camera's detections and the landmark indices they belong to.
+  void observe(std::size_t camera, const geometry::SE3& T_world_cam, Random& random, feature::Detections& keypoints,
                std::vector<int>& landmark) const;
-  void add_outliers(std::size_t camera, Random& random, feature::Keypoints& keypoints,
+  void add_outliers(std::size_t camera, Random& random, feature::Detections& keypoints,
                     std::vector<int>& landmark) const;
   frame::Bundled bundle(const std::vector<frame::CameraFrame>& cameras, const std::vector<std::vector<int>>& landmark,
                         Random& random) const;

@@ -7,10 +7,12 @@ namespace {
 
 using geometry::SE3;
 using geometry::Vector6d;
+using tracking::FrameRecord;
 
-// Mean twist from the middle frame's time to `delay` after it, of the parabola through three poses: the mean twists of the two
-// intervals are those at their middles, and it is the one at half the delay.
-std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, const map::BundledMap& map, double delay_s) {
+// Mean twist from the middle frame's time to `delay` after it, of the parabola through three poses: the mean twists of
+// the two intervals are those at their middles, and it is the one at half the delay.
+std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, const map::BundledMap& map,
+                                      double delay_s) {
   const double before_s = to_seconds(frames[1].result.time_ns - frames[0].result.time_ns);
   const double after_s = to_seconds(frames[2].result.time_ns - frames[1].result.time_ns);
   const auto near = [](double interval_s) { return interval_s > 0 && interval_s <= tracking::kMaxPrediction_s; };
@@ -21,7 +23,7 @@ std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, co
   for (std::size_t i = 0; i < 3; ++i) {
     T[i] = T_rig_world_of(frames[i], map);
     if (!T[i]) return std::nullopt;
-    root[i] = map.root_of(frames[i].final_result().reference);
+    root[i] = map.root_of(frames[i].final_result().anchored.reference);
   }
   if (root[0] != root[1] || root[2] != root[1]) return std::nullopt;
   const Vector6d before = (*T[1] * T[0]->inverse()).log() / before_s;
@@ -33,13 +35,11 @@ std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, co
 
 std::optional<SE3> T_rig_world_of(const FrameRecord& record, const map::BundledMap& map) {
   const tracking::TrackResult& r = record.final_result();
-  if (r.status != tracking::TrackStatus::kTracking || !map.surviving(r.reference).valid()) return std::nullopt;
-  const double grown = map.keyframe(r.reference).unit / record.unit;  // the scale of the map may have been found since
-  return geometry::scaled(r.T_rig_reference, grown) * map.resolved_pose(r.reference);
+  return r.status == tracking::TrackStatus::kTracking ? r.anchored.resolve(map) : std::nullopt;
 }
 
 std::vector<std::pair<KeyframeId, Vector6d>> twists_from_neighbours(const map::BundledMap& map, KeyframeId first,
-                                                                     std::span<const FrameRecord> frames) {
+                                                                    std::span<const FrameRecord> frames) {
   std::vector<std::pair<KeyframeId, Vector6d>> out;
   for (const KeyframeId k : map.keyframe_ids()) {
     const frame::BundledFrame& seen = *map.keyframe(k).frame;

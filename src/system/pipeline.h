@@ -1,81 +1,61 @@
-// One frame through the stages of the caller's thread: extract, bundle, then start or track, then perhaps a keyframe.
+// One frame through the caller's thread: monitor the cameras, extract, bundle, track, commit. Policy is that of the
+// tracker (tracking/tracker.h); background stages are those of the executor.
 #pragma once
 
 #include <memory>
-#include <optional>
 
 #include "base/thread_pool.h"
 #include "execution/stage_executor.h"
-#include "looping/relocalise.h"
 #include "matching/frame_builder.h"
 #include "system/config.h"
-#include "system/frame_record.h"
-#include "tracking/initialise.h"
-#include "tracking/pose_between.h"
-#include "tracking/track.h"
+#include "tracking/tracker.h"
 
 namespace bslam::system {
 
+using tracking::FrameRecord;
+using tracking::Relocalisation;
+using tracking::StageTime;
+
 class Pipeline {
  public:
-  // `recogniser` may be null: then a lost rig is looked for only where it was lost.
+  // `rig` and `config` outlive it. Without a relocaliser a lost rig is searched for only where it was lost.
   Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
-           std::unique_ptr<looping::PlaceRecogniser> recogniser = nullptr);
+           std::unique_ptr<tracking::Relocaliser> relocaliser = nullptr);
 
   struct Outcome {
     FrameRecord record;
     map::MapSnapshot seen;              // version of the map the frame was tracked in
     std::vector<KeyframeId> keyframes;  // added to the map, in order: the background stages are due for them
-    bool began_part = false;            // the first of them begins a part of the map
-    std::vector<tracking::BetweenKeyframes> early;  // frames a start up to scale was made over, the first among them
+    bool started_submap = false;        // the first of them is the root of a new submap
+    std::vector<tracking::BetweenKeyframes> early;  // frames a start up to scale was made from, the first among them
   };
 
-  // Reads the version of the map that `executor` gives the frame and commits keyframes to it.
+  // Reads the version of the map that `executor` gives the frame, and commits keyframes through it. `images`: one per
+  // camera of the rig.
   Outcome process(const image::ImageBundle& images, execution::StageExecutor& executor);
 
-  // Extraction and bundling alone; cameras with left_out[i] != 0 are taken as without an image.
-  frame::BundledFrame make_frame(const image::ImageBundle& images, std::vector<StageTime>& stages,
-                                 std::span<const std::uint8_t> left_out = {});
+  // Extraction and bundling of a frame by itself.
+  frame::BundledFrame make_frame(const image::ImageBundle& images);
 
   // Forgets the map that was tracked; the next frames start another.
-  void restart();
+  void restart() { state_ = state_.restarted(); }
 
-  // Where a frame of before the start is in the map as it is now.
-  std::optional<tracking::TrackResult> locate_early(const map::BundledMap& map,
-                                                    const tracking::BetweenKeyframes& early);
-
-  const tracking::TrackerState& state() const { return state_; }
+  tracking::TrackStatus status() const { return state_.track.status; }
+  const tracking::Tracker& tracker() const { return tracker_; }
 
  private:
-  void trust_what_is_sharp_again(const std::vector<std::uint8_t>& blurred);
-  std::vector<std::uint8_t> left_out(const image::ImageBundle& images,
-                                     const std::vector<tracking::Outage>& outages) const;
-  std::vector<matching::AlignmentOptions> alignment() const;  // per camera, as it is known at present
-  void grow_along(const map::BundledMap& map);
-  void start(frame::BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome);
-  void keep_candidate(frame::BundledFrame frame);
-  void track(frame::BundledFrame frame, execution::StageExecutor& executor, Outcome& outcome);
-  tracking::TrackOutput follow(frame::BundledFrame& frame, const map::BundledMap& map);
-  bool find_again(frame::BundledFrame& frame, const map::BundledMap& map, Outcome& outcome);
-  void note_motion(const map::BundledMap& map, const tracking::TrackerState& before, FrameRecord& record);
-  void add_keyframe(frame::BundledFrame& frame, const tracking::TrackOutput& output, execution::StageExecutor& executor,
-                    Outcome& outcome);
+  frame::BundledFrame extract(const image::ImageBundle& images, const tracking::FramePlan& plan);
+  frame::BundledFrame bundle(const tracking::FramePlan& plan, const frame::BundledFrame& frame);
+  void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);
 
   const camera::Rig& rig_;
   const Config& config_;
   ThreadPool pool_;
   tracking::CameraMonitor monitor_;
-  std::vector<std::uint8_t> blurred_;  // cameras in the last frame
+  tracking::CameraStatusMonitor status_;
   matching::FrameBuilder builder_;
-  std::vector<double> feature_shares_;  // of the cameras in the next frame's feature budget; empty: even
-  std::vector<double> error_floors_;    // of the cameras, for the next frame; empty: nothing is known
-  tracking::TrackerState state_;
-  double unit_ = 1.0;  // of the state's reference keyframe when the state was made (map::BundledKeyframe::unit)
-  std::optional<tracking::StartCandidate> candidate_;
-  std::vector<std::shared_ptr<const frame::BundledFrame>> early_;  // the candidate and the frames since
-  const std::unique_ptr<looping::PlaceRecogniser> recogniser_;
-  int frames_lost_ = 0;  // with something to see, one after the other
-  geometry::SE3 T_rig_odom_, T_map_odom_;
+  tracking::Tracker tracker_;
+  tracking::FrontEndState state_;
 };
 
 }  // namespace bslam::system

@@ -1,16 +1,48 @@
 #include "system/stages.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "mapping/map_keyframe.h"
 
 namespace bslam::system {
 namespace {
 
+using Statistics = std::vector<execution::StageStatistic>;
+
+Statistics statistics(const adjustment::AdjustmentReport& report) {
+  return {{"observations", static_cast<double>(report.observations)},
+          {"outliers", static_cast<double>(report.outliers)},
+          {"initial cost", report.initial_cost},
+          {"final cost", report.final_cost}};
+}
+
+Statistics statistics(const mapping::MappingReport& report) {
+  Statistics out = {{"culled landmarks", static_cast<double>(report.culled_landmarks)},
+                    {"created landmarks", static_cast<double>(report.created)},
+                    {"fused observations", static_cast<double>(report.fusion.added)},
+                    {"merged landmarks", static_cast<double>(report.fusion.merged)},
+                    {"culled keyframes", static_cast<double>(report.culled_keyframes)},
+                    {"scale correction", report.scale.correction}};
+  std::ranges::copy(statistics(report.adjustment), std::back_inserter(out));
+  return out;
+}
+
+Statistics statistics(const looping::LoopClosure& closure) {
+  return {{"inliers", static_cast<double>(closure.inliers)},
+          {"reprojection error before [px]", closure.off_px},
+          {"translation correction", closure.moved},
+          {"rotation correction [rad]", closure.turned},
+          {"scale correction", closure.scaled}};
+}
+
 execution::StageResult map_keyframe(const Config& config, const execution::StageTask& task,
                                     const map::MapSnapshot& base, std::stop_token stop) {
   if (!base->alive(task.keyframe)) return {};
   map::MapDraft draft("map", base);
-  mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop));
-  return {std::move(draft), {}};
+  const mapping::MappingReport report =
+      mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop));
+  return {std::move(draft), {}, statistics(report)};
 }
 
 execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserver& observer,
@@ -21,13 +53,14 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
   if (!closure) return {};
   const auto time_of = [&](KeyframeId k) { return base->keyframe(k).frame->time_ns; };
   const LoopRecord record{*closure, time_of(closure->keyframe), time_of(closure->with)};
-  return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }};
+  return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }, statistics(*closure)};
 }
 
 execution::StageResult adjust_globally(const Config& config, const map::MapSnapshot& base, std::stop_token stop) {
   map::MapDraft draft("global", base);
-  mapping::adjust_globally(config.mapping, config.feature_model(), draft, std::move(stop));
-  return {std::move(draft), {}};
+  const adjustment::AdjustmentReport report =
+      mapping::adjust_globally(config.mapping, config.feature_model(), draft, std::move(stop));
+  return {std::move(draft), {}, statistics(report)};
 }
 
 }  // namespace

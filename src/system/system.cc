@@ -5,6 +5,7 @@
 #include "base/stopwatch.h"
 #include "mapping/map_keyframe.h"
 #include "system/final_poses.h"
+#include "system/relocaliser.h"
 
 namespace bslam::system {
 namespace {
@@ -23,11 +24,6 @@ map::BundledMap empty_map(const camera::Rig& rig, const Config& config) {
                          {config.features.scale_factor, config.features.levels});
 }
 
-std::unique_ptr<looping::PlaceRecogniser> recogniser(const place::VocabularyPtr& vocabulary, const Config& config) {
-  if (!vocabulary) return nullptr;
-  return std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition);
-}
-
 void add_pose(std::vector<PartTrajectory>& parts, KeyframeId root, TimeNs time_ns, const geometry::SE3& T_world_cam0) {
   auto part = std::ranges::find(parts, root, &PartTrajectory::root);
   if (part == parts.end()) part = parts.insert(parts.end(), {root, {}});
@@ -41,18 +37,21 @@ System::System(camera::Rig rig, Config config, Resources resources)
       config_(std::move(config)),
       loaded_(resources.map.has_value()),
       first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0),
-      pipeline_(rig_, config_, std::move(resources.masks), recogniser(resources.vocabulary, config_)),
+      pipeline_(rig_, config_, std::move(resources.masks), make_relocaliser(resources.vocabulary, config_)),
+      history_(resources.history),
       store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)),
-      gate_(store_) {
+      gate_(store_, history_ == 0) {
   const map::MapSnapshot map = store_.snapshot();
   for (const KeyframeId k : map->keyframe_ids()) set_keyframe_time(k, map->keyframe(k).frame->time_ns);
   const auto note_loop = [this](const LoopRecord& loop) {
     const std::lock_guard lock(records_mutex_);
     loops_.push_back(loop);
   };
-  const auto note_run = [this](const execution::StageRun& run) {
+  const auto note_run = [this, observer = std::move(resources.observer)](const execution::StageRun& run) {
+    const StageRecord record{run, keyframe_time(run.task.keyframe)};
+    if (observer) observer(record);
     const std::lock_guard lock(records_mutex_);
-    stage_runs_.push_back({run, keyframe_time_ns_[run.task.keyframe.index()]});
+    stage_runs_.push_back(record);
   };
   execution::ExecutionSetup setup{make_stages(config_, resources.vocabulary, note_loop), config_.execution, note_run};
   executor_ = resources.replay ? execution::make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
@@ -80,10 +79,12 @@ void System::set_keyframe_time(KeyframeId k, TimeNs time_ns) {
   keyframe_time_ns_[k.index()] = time_ns;
 }
 
-const FrameRecord& System::process(const image::ImageBundle& images) {
-  const bool had_pose = pipeline_.state().status != tracking::TrackStatus::kNotStarted;
+Result<FrameRecord> System::process(const image::ImageBundle& images) {
+  if (const Status valid = check_frame(images, rig_, last_input_); !valid) return valid.error();
+  last_input_ = FrameStamp{images.id, images.time_ns};
+  const bool had_pose = pipeline_.status() != tracking::TrackStatus::kNotStarted;
   Pipeline::Outcome outcome = pipeline_.process(images, *executor_);
-  maps_started_ += outcome.began_part;
+  maps_started_ += outcome.started_submap;
   std::ranges::move(outcome.early, std::back_inserter(early_));
   // A start up to scale makes two keyframes, both under the time of the frame that made it.
   for (const KeyframeId k : outcome.keyframes) set_keyframe_time(k, outcome.record.result.time_ns);
@@ -93,12 +94,31 @@ const FrameRecord& System::process(const image::ImageBundle& images) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
-  frames_.push_back(std::move(outcome.record));
-  const bool failed = had_pose && disowns_map(frames_.back().result);
+  frames_.push_back(outcome.record);
+  if (refuted_young_map(outcome, had_pose)) give_up_young_map();
+  FrameRecord record = frames_.back();
+  bound_history();
+  return record;
+}
+
+// Was a start up to scale that was made a moment ago a wrong one?
+bool System::refuted_young_map(const Pipeline::Outcome& outcome, bool had_pose) const {
   const map::BundledMap& seen = *outcome.seen;
-  if (failed && !loaded_ && seen.scale() != map::Scale::kMetric && seen.keyframe_slots() <= kYoungMap)
-    give_up_young_map();
-  return frames_.back();
+  return had_pose && !loaded_ && disowns_map(outcome.record.result) && seen.scale() != map::Scale::kMetric &&
+         seen.keyframe_slots() <= kYoungMap;
+}
+
+// Drops the oldest records once there are twice as many as asked for, so that a frame costs the same on average.
+void System::bound_history() {
+  if (history_ == 0 || frames_.size() < 2 * history_) return;
+  const auto drop_oldest = [this](auto& records) {
+    if (records.size() > history_)
+      records.erase(records.begin(), records.end() - static_cast<std::ptrdiff_t>(history_));
+  };
+  drop_oldest(frames_);
+  std::erase_if(early_, [&](const auto& early) { return early.frame->id < frames_.front().result.frame; });
+  const std::lock_guard lock(records_mutex_);
+  drop_oldest(stage_runs_);
 }
 
 void System::finish() {
@@ -108,7 +128,7 @@ void System::finish() {
     map::MapDraft draft("final", gate_.newest());
     const auto stop = interruption_.get_token();
     draft.set_twists(twists_from_neighbours(draft.map(), first_keyframe_, frames_));
-    mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
+    final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
     final_adjustment_ms_ = watch.ms();
     check_extrinsics(draft, stop);
     if (!stop.stop_requested()) executor_->commit(execution::JournalStep::kFinal, std::move(draft));
@@ -126,8 +146,7 @@ void System::locate_early_frames() {
         std::ranges::lower_bound(frames_, early.frame->id, {}, [](const FrameRecord& r) { return r.result.frame; });
     if (record == frames_.end() || record->result.frame != early.frame->id) continue;
     if (record->result.status == tracking::TrackStatus::kTracking) continue;
-    record->found_later = pipeline_.locate_early(*map, early);
-    if (record->found_later) record->unit = map->keyframe(record->found_later->reference).unit;
+    record->found_later = pipeline_.tracker().locate_early(*map, early);
   }
 }
 
@@ -171,7 +190,7 @@ std::vector<PartTrajectory> System::trajectories() const {
   for (const FrameRecord& record : frames_) {
     const tracking::TrackResult& r = record.final_result();
     if (const auto T_rig_world = T_rig_world_of(record, *map)) {
-      add_pose(out, map->root_of(r.reference), r.time_ns, T_rig_world->inverse());
+      add_pose(out, map->root_of(r.anchored.reference), r.time_ns, T_rig_world->inverse());
     }
   }
   std::stable_sort(out.begin(), out.end(),

@@ -1,28 +1,34 @@
 // The whole system: images in, poses out. Owns the map and the threads.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <stop_token>
 #include <vector>
 
+#include "adjustment/map_adjustment.h"
+#include "base/result.h"
 #include "camera/rig.h"
 #include "evaluation/trajectory.h"
 #include "execution/map_gate.h"
 #include "execution/stage_executor.h"
 #include "system/config.h"
-#include "system/frame_record.h"
+#include "system/input_check.h"
 #include "system/pipeline.h"
 #include "system/stages.h"
 
 namespace bslam::system {
 
-// One run of a background stage, for the timing record.
+// One run of a background stage: its time and its figures.
 struct StageRecord {
   execution::StageRun run;
   TimeNs time_ns = 0;  // of its keyframe
 };
+
+// Called after every run of a background stage, by any thread, also by several at once.
+using StageRecordObserver = std::function<void(const StageRecord&)>;
 
 // What a run may be given besides rig and configuration.
 struct Resources {
@@ -31,6 +37,10 @@ struct Resources {
   std::optional<map::BundledMap> map =
       {};  // of an earlier run with this rig; the run goes on in it once it finds its place
   std::optional<execution::Journal> replay = {};  // its run is repeated whatever the mode
+  StageRecordObserver observer = {};              // may be empty
+  // For runs without end: records of this many last frames and stage runs at least are kept, and no journal. 0: all
+  // are.
+  std::size_t history = 0;
 };
 
 // Poses of one part of the map. Parts that no common place joined have worlds of their own.
@@ -46,8 +56,10 @@ class System {
   System(camera::Rig rig, Config config, Resources resources = {});
   ~System();
 
-  // Poses of the frame with these images; frames come in order of time. One thread calls. Throws what a worker threw.
-  const FrameRecord& process(const image::ImageBundle& images);
+  // Tracks the next frame. `images`: one entry per camera of the rig, which may be missing. Errors, after which the run
+  // goes on as if there had been no such call: those of check_frame (system/input_check.h). One thread calls. Throws
+  // what a worker threw.
+  Result<FrameRecord> process(const image::ImageBundle& images);
 
   // Waits for the stages and, where configured, adjusts the whole map. Call once, after the last frame.
   void finish();
@@ -57,10 +69,15 @@ class System {
   void interrupt();
 
   map::MapSnapshot snapshot() const { return store_.snapshot(); }
+  // The last frames in order: all of the run, or at least Resources::history of them. Valid until the next
+  // process().
   const std::vector<FrameRecord>& frames() const { return frames_; }
   std::vector<StageRecord> stage_runs() const;
-  execution::Journal journal() const { return gate_.journal(); }  // what a replay needs
+  execution::Journal journal() const {
+    return gate_.journal();
+  }  // what a replay needs; empty where the history is bounded
   double final_adjustment_ms() const { return final_adjustment_ms_; }
+  const adjustment::AdjustmentReport& final_adjustment() const { return final_adjustment_; }
   // What finish() found about the extrinsics; not done where that was not asked for or not possible.
   const calibration::RigRefinement& extrinsics() const { return extrinsics_; }
   bool extrinsics_refined() const { return extrinsics_refined_; }  // and the map made with them
@@ -70,15 +87,17 @@ class System {
   std::vector<LoopRecord> loops() const;
   TimeNs keyframe_time(KeyframeId k) const;
 
-  // Every frame that has a pose, resolved against the present map: a trajectory for each part of the map that has some,
-  // the longest first.
+  // Every frame of frames() that has a pose, resolved against the present map: a trajectory for each part of the map
+  // that has some, the longest first.
   std::vector<PartTrajectory> trajectories() const;
   // The same as the caller was told at the time, never corrected, by parts as they were then; that of the longest final
   // trajectory first.
   std::vector<PartTrajectory> live_trajectories() const;
 
  private:
+  bool refuted_young_map(const Pipeline::Outcome& outcome, bool had_pose) const;
   void give_up_young_map();
+  void bound_history();
   void locate_early_frames();
   void check_extrinsics(map::MapDraft& draft, const std::stop_token& stop);
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
@@ -88,6 +107,8 @@ class System {
   const bool loaded_;                // a map of an earlier run
   const KeyframeId first_keyframe_;  // of this run
   Pipeline pipeline_;
+  const std::size_t history_;  // as in Resources
+  std::optional<FrameStamp> last_input_;
   std::vector<FrameRecord> frames_;
   std::vector<tracking::BetweenKeyframes> early_;  // frames of before a start, by number
   mutable std::mutex records_mutex_;
@@ -95,6 +116,7 @@ class System {
   std::vector<LoopRecord> loops_;
   std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId of the present map
   double final_adjustment_ms_ = 0, extrinsics_ms_ = 0;
+  adjustment::AdjustmentReport final_adjustment_;
   calibration::RigRefinement extrinsics_;
   bool extrinsics_refined_ = false;
   int maps_started_ = 0;

@@ -30,7 +30,7 @@ std::uint64_t content(const image::Image& image) {
   return hash;
 }
 
-Outage exposure(const image::Image& image, const HealthOptions& options) {
+CameraReason exposure(const image::Image& image, const HealthOptions& options) {
   int samples = 0, dark = 0, bright = 0;
   for (int y = 0; y < image.height(); y += kSampleStep) {
     for (int x = 0; x < image.width(); x += kSampleStep, ++samples) {
@@ -38,9 +38,9 @@ Outage exposure(const image::Image& image, const HealthOptions& options) {
       bright += image.row(y)[x] >= options.bright_level;
     }
   }
-  if (dark >= options.dark_share * samples) return Outage::kBlack;
-  if (bright >= options.bright_share * samples) return Outage::kOverExposed;
-  return Outage::kNone;
+  if (dark >= options.dark_share * samples) return CameraReason::kBlack;
+  if (bright >= options.bright_share * samples) return CameraReason::kOverExposed;
+  return CameraReason::kNone;
 }
 
 struct Edges {
@@ -80,40 +80,23 @@ std::optional<bool> is_blurred(const image::Image& image, const HealthOptions& o
 
 }  // namespace
 
-std::string_view describe(Outage outage) {
-  switch (outage) {
-    case Outage::kNone:
-      return "";
-    case Outage::kNoImage:
-      return "no-images";
-    case Outage::kBlack:
-      return "black";
-    case Outage::kOverExposed:
-      return "over-exposed";
-    case Outage::kFrozen:
-      return "frozen";
-    case Outage::kInconsistent:
-      return "inconsistent";
-  }
-  return "";
-}
-
 CameraMonitor::CameraMonitor(std::size_t cameras, const HealthOptions& options)
-    : options_(options), cameras_(cameras), failing_(cameras, 0) {}
+    : options_(options), cameras_(cameras) {}
 
-std::vector<Outage> CameraMonitor::judge(const image::ImageBundle& images) {
-  BSLAM_ASSERT(images.images.size() == cameras_.size(), "one image slot per camera");
-  std::vector<Outage> found = outages(images);
+PictureFaults CameraMonitor::examine(const image::ImageBundle& images) {
+  PictureFaults faults{judge(images), blurred(images), {}};
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    const CameraReason outage = faults.outage[c];
     int& missed = cameras_[c].missed;
-    missed = found[c] == Outage::kNoImage ? missed + 1 : 0;
-    failing_[c] = found[c] != Outage::kNone && (found[c] != Outage::kNoImage || missed > kSlow);
+    missed = outage == CameraReason::kNoImages ? missed + 1 : 0;
+    faults.failing.push_back(outage == CameraReason::kNoImages ? missed > kSlow : outage != CameraReason::kNone);
   }
-  return found;
+  return faults;
 }
 
-std::vector<Outage> CameraMonitor::outages(const image::ImageBundle& images) {
-  std::vector<Outage> found(cameras_.size(), Outage::kNoImage);
+std::vector<CameraReason> CameraMonitor::judge(const image::ImageBundle& images) {
+  BSLAM_ASSERT(images.images.size() == cameras_.size(), "one image slot per camera");
+  std::vector<CameraReason> found(cameras_.size(), CameraReason::kNoImages);
   std::vector<std::uint8_t> same(cameras_.size(), 0);
   bool any_changed = false;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
@@ -127,23 +110,23 @@ std::vector<Outage> CameraMonitor::outages(const image::ImageBundle& images) {
   }
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     Camera& camera = cameras_[c];
-    if (found[c] == Outage::kNoImage) continue;
+    if (found[c] == CameraReason::kNoImages) continue;
     // Frozen it stays while its picture is the same, also where no other is there to change.
-    const bool frozen = same[c] && (any_changed || camera.outage == Outage::kFrozen);
-    if (found[c] == Outage::kNone && frozen) found[c] = Outage::kFrozen;
-    if (found[c] != Outage::kNone) {
+    const bool frozen = same[c] && (any_changed || camera.outage == CameraReason::kFrozen);
+    if (found[c] == CameraReason::kNone && frozen) found[c] = CameraReason::kFrozen;
+    if (found[c] != CameraReason::kNone) {
       camera.outage = found[c];
       camera.good = 0;
-    } else if (camera.outage != Outage::kNone && ++camera.good < options_.readmit_after) {
+    } else if (camera.outage != CameraReason::kNone && ++camera.good < options_.readmit_after) {
       found[c] = camera.outage;
     } else {
-      camera.outage = Outage::kNone;
+      camera.outage = CameraReason::kNone;
     }
   }
-  if (std::ranges::find(found, Outage::kNone) != found.end()) return found;
+  if (std::ranges::find(found, CameraReason::kNone) != found.end()) return found;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {  // better than nothing
-    if (found[c] == Outage::kNoImage || cameras_[c].good == 0) continue;
-    found[c] = cameras_[c].outage = Outage::kNone;
+    if (found[c] == CameraReason::kNoImages || cameras_[c].good == 0) continue;
+    found[c] = cameras_[c].outage = CameraReason::kNone;
   }
   return found;
 }

@@ -3,12 +3,11 @@
 
 #include <cstdint>
 #include <optional>
-#include <span>
-#include <string_view>
 #include <vector>
 
 #include "base/options.h"
 #include "image/image_bundle.h"
+#include "tracking/camera_status.h"
 
 namespace bslam::tracking {
 
@@ -39,41 +38,41 @@ struct HealthOptions {
   }
 };
 
-// Why a camera is out; kNone = it is not. kInconsistent is tracking's word, the others are known from the pictures.
-enum class Outage : std::uint8_t { kNone, kNoImage, kBlack, kOverExposed, kFrozen, kInconsistent };
-
-std::string_view describe(Outage outage);  // as in the summary: "", "no-images", "black", ...
+// What the pictures of a frame say about the cameras; one entry per camera.
+struct PictureFaults {
+  std::vector<CameraReason> outage;   // why it is left out of the frame; kNone: it is used
+  std::vector<std::uint8_t> blurred;  // out of focus or smeared; used all the same
+  std::vector<std::uint8_t> failing;  // out, and not only without an image as slow cameras are now and then
+};
 
 class CameraMonitor {
  public:
   CameraMonitor(std::size_t cameras, const HealthOptions& options);
 
-  // One per camera, for the pictures of the next frame. A picture is frozen where it is to the byte the last one of its
+  // Looks at the pictures of the next frame: judge() and blurred(). `images`: one per camera.
+  PictureFaults examine(const image::ImageBundle& images);
+
+  // Why each camera is left out of the next frame. A picture is frozen where it is to the byte the last one of its
   // camera while another camera's has changed: a rig that stands still freezes nobody, and one camera alone cannot
   // tell. A camera without a picture is out for that frame and counts again with its next. Where all others are out as
   // well, one with a good picture counts at once.
-  std::vector<Outage> judge(const image::ImageBundle& images);
-  // One per camera: out of the frame judged last, and not only without a picture as slow cameras are now and then.
-  std::span<const std::uint8_t> failing() const { return failing_; }
-
-  // One per camera: out of focus or behind something that smears, told from how steep the edges of its picture are, in
+  std::vector<CameraReason> judge(const image::ImageBundle& images);
+  // Per camera: out of focus or behind something that smears, told from how steep the edges of its picture are, in
   // rows and columns, so that motion to one side is not blur. Such a camera is used, with what it has. A picture with
   // few edges says nothing; a camera was blurred until `readmit_after` pictures in a row are sharp.
   std::vector<std::uint8_t> blurred(const image::ImageBundle& images);
 
  private:
   struct Camera {
-    std::optional<std::uint64_t> last;  // content of its last picture
-    Outage outage = Outage::kNone;      // why it was out
-    int good = 0;                       // pictures since
+    std::optional<std::uint64_t> last;          // content of its last picture
+    CameraReason outage = CameraReason::kNone;  // why it was out
+    int good = 0;                               // pictures since
     bool blurred = false;
     int sharp = 0;   // pictures since it was
     int missed = 0;  // frames since its last picture
   };
-  std::vector<Outage> outages(const image::ImageBundle& images);
   const HealthOptions options_;
   std::vector<Camera> cameras_;
-  std::vector<std::uint8_t> failing_;
 };
 
 }  // namespace bslam::tracking

@@ -1,10 +1,9 @@
 #include "tracking/feature_budget.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-
-#include <Eigen/Cholesky>
 
 #include "solver/reprojection.h"
 
@@ -44,8 +43,8 @@ std::vector<Matrix6d> information_by_camera(const map::BundledMap& map, const fr
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     for (const Match& m : matches[c]) {
       const std::size_t k = m.keypoint.index();
-      const auto residual = solver::ReprojectionResidual::evaluate(rig, CameraIndex(c), T_rig_world, map.landmark(m.landmark).position,
-                                                                   keypoints.pixel[k].cast<double>());
+      const auto residual = solver::ReprojectionResidual::evaluate(
+          rig, CameraIndex(c), T_rig_world, map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>());
       if (!residual) continue;
       const double weight = 1.0 / (keypoints.sigma[k] * keypoints.sigma[k]);
       information[c].noalias() += weight * residual->J_pose.transpose() * residual->J_pose;
@@ -74,19 +73,21 @@ std::vector<double> feature_shares(std::span<const double> before, std::span<con
   return shares;
 }
 
-std::vector<double> feature_shares(std::span<const double> before, const map::BundledMap& map, const frame::BundledFrame& frame,
-                                   const TrackOutput& output) {
+std::vector<double> feature_shares(std::span<const double> before, const map::BundledMap& map,
+                                   const frame::BundledFrame& frame, const TrackOutput& output) {
   const bool tracking = output.result.status == TrackStatus::kTracking;
   std::vector<std::uint8_t> seeing;
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {  // a doubted camera was taken out of the frame
-    seeing.push_back(frame.cameras[c].state == image::ImageState::kPresent || (tracking && output.result.cameras[c].doubted));
+    seeing.push_back(frame.cameras[c].state == image::ImageState::kPresent ||
+                     (tracking && output.result.cameras[c].doubted));
   }
   if (!tracking) return feature_shares(before, {}, seeing);
   return feature_shares(before, information_by_camera(map, frame, output.matches, output.result.T_rig_world), seeing);
 }
 
-std::vector<int> feature_budgets(std::size_t cameras, std::span<const double> shares, std::span<const std::uint8_t> left_out,
-                                 std::span<const std::uint8_t> failing, const feature::FeatureOptions& options) {
+std::vector<int> feature_budgets(std::size_t cameras, std::span<const double> shares,
+                                 std::span<const std::uint8_t> left_out, std::span<const std::uint8_t> failing,
+                                 const feature::FeatureOptions& options) {
   std::vector<std::size_t> open;  // cameras that can take more
   for (std::size_t c = 0; c < cameras; ++c) {
     if (left_out.empty() || !left_out[c]) open.push_back(c);
@@ -107,7 +108,8 @@ std::vector<int> feature_budgets(std::size_t cameras, std::span<const double> sh
     double weight = 0;
     for (const std::size_t c : open) weight += share_of(shares, c);
     const auto wanted = [&](std::size_t c) { return least + left * share_of(shares, c) / weight; };
-    const auto filled = std::stable_partition(open.begin(), open.end(), [&](std::size_t c) { return wanted(c) < most; });
+    const auto filled =
+        std::stable_partition(open.begin(), open.end(), [&](std::size_t c) { return wanted(c) < most; });
     if (filled == open.end()) {
       for (const std::size_t c : open) budgets[c] = static_cast<int>(std::lround(wanted(c)));
       break;

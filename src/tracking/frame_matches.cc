@@ -88,13 +88,15 @@ std::optional<matching::AlignedKeypoint> align_to_reference(const map::BundledMa
 
 }  // namespace
 
-void align_matches(const map::BundledMap& map, const SE3& T_rig_world, FrameMatches& matches,
-                   std::span<const image::Pyramid> pyramids, std::span<const matching::AlignmentOptions> alignment,
-                   const matching::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool) {
+AlignedMatches align_matches(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                             FrameMatches& matches, std::span<const image::Pyramid> pyramids,
+                             std::span<const matching::AlignmentOptions> alignment,
+                             const matching::DetectionNoise& noise, ThreadPool& pool) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  AlignedMatches out(matches.size());
   pool.for_each(matches.size(), [&](std::size_t c) {
-    if (matches[c].empty()) return;
-    feature::Keypoints& keypoints = frame.cameras[c].keypoints;
+    out[c].reserve(matches[c].size());
+    const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
     for (Match& m : matches[c]) {
       const std::size_t k = m.keypoint.index();
@@ -103,61 +105,64 @@ void align_matches(const map::BundledMap& map, const SE3& T_rig_world, FrameMatc
       const auto bearing = aligned ? rig.camera(c).unproject(aligned->pixel) : std::nullopt;
       m.aligned = bearing.has_value();
       if (bearing) {
-        keypoints.pixel[k] = aligned->pixel.cast<float>();
-        keypoints.bearing[k] = *bearing;
-        keypoints.sigma[k] = static_cast<float>(aligned->sigma);
+        out[c].push_back({aligned->pixel.cast<float>(), *bearing, static_cast<float>(aligned->sigma)});
       } else {
-        keypoints.sigma[k] = static_cast<float>(noise.sigma_px * pyramids[c].scale_x[keypoints.level[k]]);
+        const double sigma = noise.sigma_px * pyramids[c].scale_x[keypoints.level[k]];
+        out[c].push_back({keypoints.pixel[k], keypoints.bearing[k], static_cast<float>(sigma)});
       }
     }
   });
+  return out;
+}
+
+frame::BundledFrame refined(const frame::BundledFrame& frame, const FrameMatches& matches,
+                            const AlignedMatches& aligned, std::span<const std::uint8_t> inlier,
+                            const camera::Rig& rig) {
+  frame::BundledFrame out = frame;
+  std::size_t observation = 0;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    if (matches[c].empty()) continue;
+    feature::Refinement positions = frame.cameras[c].keypoints.positions();
+    for (std::size_t i = 0; i < matches[c].size(); ++i) {
+      if (!inlier[observation++]) continue;
+      const std::size_t k = matches[c][i].keypoint.index();
+      positions.pixel[k] = aligned[c][i].pixel;
+      positions.bearing[k] = aligned[c][i].bearing;
+      positions.sigma[k] = aligned[c][i].sigma;
+    }
+    out.cameras[c] = frame::refined(out.cameras[c], std::move(positions), rig.camera(c));
+  }
+  return out;
+}
+
+std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const FrameMatches& matches,
+                                                       const AlignedMatches& aligned) {
+  std::vector<solver::PoseObservation> out;
+  out.reserve(count(matches));
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    for (std::size_t i = 0; i < matches[c].size(); ++i) {
+      const AlignedMatch& a = aligned[c][i];
+      out.push_back(
+          {CameraIndex(c), map.landmark(matches[c][i].landmark).position, a.pixel.cast<double>(), double{a.sigma}});
+    }
+  }
+  return out;
 }
 
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                        const FrameMatches& matches,
-                                                       std::optional<matching::DetectionNoise> unaligned) {
+                                                       const matching::DetectionNoise& noise) {
   std::vector<solver::PoseObservation> out;
   out.reserve(count(matches));
   for (std::size_t c = 0; c < matches.size(); ++c) {
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     for (const Match& m : matches[c]) {
       const std::size_t k = m.keypoint.index();
-      const double sigma = unaligned ? unaligned->sigma_px * std::pow(map.pyramid().scale_factor, keypoints.level[k])
-                                     : keypoints.sigma[k];
+      const double sigma = noise.sigma_px * std::pow(map.pyramid().scale_factor, keypoints.level[k]);
       out.push_back({CameraIndex(c), map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>(), sigma});
     }
   }
   return out;
-}
-
-std::vector<KeypointPlace> places(const frame::BundledFrame& frame, const FrameMatches& matches) {
-  std::vector<KeypointPlace> out;
-  out.reserve(count(matches));
-  for (std::size_t c = 0; c < matches.size(); ++c) {
-    const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
-    for (const Match& m : matches[c]) {
-      const std::size_t k = m.keypoint.index();
-      out.push_back({keypoints.pixel[k], keypoints.bearing[k], keypoints.sigma[k]});
-    }
-  }
-  return out;
-}
-
-void restore_outliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier,
-                      std::span<const KeypointPlace> before, frame::BundledFrame& frame) {
-  std::size_t i = 0;
-  for (std::size_t c = 0; c < matches.size(); ++c) {
-    feature::Keypoints& keypoints = frame.cameras[c].keypoints;
-    for (const Match& m : matches[c]) {
-      const std::size_t k = m.keypoint.index();
-      if (!inlier[i]) {
-        keypoints.pixel[k] = before[i].pixel;
-        keypoints.bearing[k] = before[i].bearing;
-        keypoints.sigma[k] = before[i].sigma;
-      }
-      ++i;
-    }
-  }
 }
 
 FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier) {

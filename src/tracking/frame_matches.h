@@ -44,31 +44,38 @@ MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame
 // `a` and `b` together; they share no keypoint.
 FrameMatches merge(const FrameMatches& a, const FrameMatches& b);
 
-// Moves each matched keypoint of `frame` to where the reference patch of its landmark is seen from `T_rig_world`, with
-// the standard deviation of that; a keypoint whose patch does not align keeps its place and gets the detector's.
-// `matches` are told which did. `pyramids` and `alignment`: one per camera.
-void align_matches(const map::BundledMap& map, const geometry::SE3& T_rig_world, FrameMatches& matches,
-                   std::span<const image::Pyramid> pyramids, std::span<const matching::AlignmentOptions> alignment,
-                   const matching::DetectionNoise& noise, frame::BundledFrame& frame, ThreadPool& pool);
-
-// Observations for the pose solver, camera by camera in the order of `matches`. Before alignment a keypoint's own
-// standard deviation is that between cameras of one frame; against the map it has the detector's: `unaligned`.
-std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
-                                                       const FrameMatches& matches,
-                                                       std::optional<matching::DetectionNoise> unaligned = {});
-
-// Where keypoints were before alignment.
-struct KeypointPlace {
+// Aligned position of a matched keypoint.
+struct AlignedMatch {
   Eigen::Vector2f pixel;
   Eigen::Vector3d bearing;
   float sigma = 0;
 };
 
-// The places of the matched keypoints, in the order of `matches`; and back to them where they turned out to be
-// outliers.
-std::vector<KeypointPlace> places(const frame::BundledFrame& frame, const FrameMatches& matches);
-void restore_outliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier,
-                      std::span<const KeypointPlace> before, frame::BundledFrame& frame);
+// Per camera, in the order of the matches.
+using AlignedMatches = std::vector<std::vector<AlignedMatch>>;
+
+// Aligns each matched keypoint of `frame` to the reference patch of its landmark as seen from `T_rig_world`. A keypoint
+// whose patch does not align keeps its position, with the detector's standard deviation. `matches` are told which did
+// align. `pyramids` and `alignment`: one per camera.
+AlignedMatches align_matches(const map::BundledMap& map, const frame::BundledFrame& frame,
+                             const geometry::SE3& T_rig_world, FrameMatches& matches,
+                             std::span<const image::Pyramid> pyramids,
+                             std::span<const matching::AlignmentOptions> alignment,
+                             const matching::DetectionNoise& noise, ThreadPool& pool);
+
+// `frame` with the matched keypoints at their aligned positions where inlier[i] != 0, counted over all cameras.
+frame::BundledFrame refined(const frame::BundledFrame& frame, const FrameMatches& matches,
+                            const AlignedMatches& aligned, std::span<const std::uint8_t> inlier,
+                            const camera::Rig& rig);
+
+// Observations for the pose solver, camera by camera in the order of `matches`: as aligned to the landmarks.
+std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const FrameMatches& matches,
+                                                       const AlignedMatches& aligned);
+// Before alignment: a keypoint's own standard deviation holds between the cameras of its frame, against the map that of
+// the detector does.
+std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                                       const FrameMatches& matches,
+                                                       const matching::DetectionNoise& noise);
 
 // The matches whose observation is an inlier.
 FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier);

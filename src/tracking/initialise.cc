@@ -14,9 +14,9 @@ using frame::BundledFrame;
 using frame::KeypointRef;
 using geometry::SE3;
 
-constexpr int kMaxHamming = 50;        // bits, of 256: without any prediction only clear matches count
+constexpr int kMaxHamming = 50;  // bits, of 256: without any prediction only clear matches count
 constexpr double kRatio = 0.8;
-constexpr double kWindow = 0.25;       // radians a bearing may move between the two frames
+constexpr double kWindow = 0.25;  // radians a bearing may move between the two frames
 constexpr int kMinInliers = 50;
 
 struct KeypointPair {
@@ -77,12 +77,14 @@ FramePairs match_cameras(const BundledFrame& first, const BundledFrame& second) 
 }
 
 // The camera with the widest parallax among those that see enough.
-std::optional<TwoView> best_two_view(const FramePairs& pairs, const InitialisationOptions& options, std::uint64_t seed) {
+std::optional<TwoView> best_two_view(const FramePairs& pairs, const InitialisationOptions& options,
+                                     std::uint64_t seed) {
   std::optional<TwoView> best;
   for (std::size_t c = 0; c < pairs.keypoints.size(); ++c) {
     TwoView view{c, pairs.keypoints[c], {}};
     if (view.pairs.size() < static_cast<std::size_t>(options.min_monocular)) continue;
-    const auto pose = solver::relative_pose(pairs.bearings[c], {.min_inliers = kMinInliers}, Random(seed, "two views", c));
+    const auto pose =
+        solver::relative_pose(pairs.bearings[c], {.min_inliers = kMinInliers}, Random(seed, "two views", c));
     if (!pose || pose->num_inliers < options.min_monocular_points) continue;
     view.pose = *pose;
     if (!best || view.pose.median_parallax > best->pose.median_parallax) best = view;
@@ -96,7 +98,8 @@ struct Unit {
   double deviation = std::numeric_limits<double>::infinity();
 };
 
-Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig& rig, const InitialisationOptions& options) {
+Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig& rig,
+                 const InitialisationOptions& options) {
   std::vector<double> depths;
   for (std::size_t i = 0; i < view.pairs.size(); ++i) {
     if (view.pose.inlier[i]) depths.push_back(view.pose.points_a[i].norm());
@@ -108,7 +111,8 @@ Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig
     cameras.push_back({rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]});
   }
   const auto found = solver::generalised_scale(view.pose.T_b_a, cameras);
-  if (found && found->deviation <= options.max_scale_deviation) return {found->T_b_a.translation().norm(), found->deviation};
+  if (found && found->deviation <= options.max_scale_deviation)
+    return {found->T_b_a.translation().norm(), found->deviation};
   return {options.guessed_depth / depth, std::numeric_limits<double>::infinity()};
 }
 
@@ -125,7 +129,8 @@ bool comparable(const BundledFrame& first, const BundledFrame& second, const Ini
 std::optional<StartedMap> start_metric(const BundledFrame& frame, std::span<const image::Pyramid> pyramids,
                                        const InitialisationOptions& options, map::MapDraft& draft) {
   int metric = 0;
-  for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) metric += has_sound_depth(frame.bundled.point(FeatureId(f)), options);
+  for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f)
+    metric += has_sound_depth(frame.bundled.point(FeatureId(f)), options);
   if (metric < options.min_matched) return std::nullopt;
   StartedMap out;
   out.keyframes.push_back(make_keyframe(frame, {}, SE3(), pyramids, KeyframeId(), options, draft));
@@ -133,8 +138,8 @@ std::optional<StartedMap> start_metric(const BundledFrame& frame, std::span<cons
 }
 
 std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const BundledFrame& frame,
-                                            std::span<const image::Pyramid> pyramids, const InitialisationOptions& options,
-                                            Random random, map::MapDraft& draft) {
+                                            std::span<const image::Pyramid> pyramids,
+                                            const InitialisationOptions& options, Random random, map::MapDraft& draft) {
   const camera::Rig& rig = draft.map().rig();
   const FramePairs pairs = match_cameras(*first.frame, frame);
   const auto view = best_two_view(pairs, options, random.next());

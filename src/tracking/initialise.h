@@ -18,7 +18,7 @@ struct StartCandidate {
 struct StartedMap {
   std::vector<NewKeyframe> keyframes;  // one (metric) or two (up to scale), in the draft
   map::Scale scale = map::Scale::kMetric;
-  double scale_deviation = 0;          // relative; infinite where the length of the map's unit is not known, or a guess
+  double scale_deviation = 0;  // relative; infinite where the length of the map's unit is not known, or a guess
 };
 
 // Writes the first keyframe, at the origin, where the frame has enough features of metric depth.
@@ -26,14 +26,15 @@ std::optional<StartedMap> start_metric(const frame::BundledFrame& frame, std::sp
                                        const InitialisationOptions& options, map::MapDraft& draft);
 
 // Do the two frames share enough matches in some camera for a start up to scale to be tried?
-bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& second, const InitialisationOptions& options);
+bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& second,
+                const InitialisationOptions& options);
 
-// Writes two keyframes where some camera sees enough parallax between `first` and `frame`: the first at the origin. With
-// one camera the median depth of the points in the first is 1, and stays so. With several, none overlapping, the scale is what
-// their matches tell of it (solver/generalised_scale.h), else the guessed depth: unobservable either way, until mapping has
-// measured it.
+// Writes two keyframes where some camera sees enough parallax between `first` and `frame`: the first at the origin.
+// With one camera the median depth of the points in the first is 1, and stays so. With several, none overlapping, the
+// scale is what their matches tell of it (solver/generalised_scale.h), else the guessed depth: unobservable either way,
+// until mapping has measured it.
 std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const frame::BundledFrame& frame,
-                                            std::span<const image::Pyramid> pyramids, const InitialisationOptions& options,
-                                            Random random, map::MapDraft& draft);
+                                            std::span<const image::Pyramid> pyramids,
+                                            const InitialisationOptions& options, Random random, map::MapDraft& draft);
 
 }  // namespace bslam::tracking

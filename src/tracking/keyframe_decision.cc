@@ -9,8 +9,9 @@
 namespace bslam::tracking {
 namespace {
 
-constexpr int kFewMatchedTracked = 100, kManyMatchedFree = 70;  // features; the rule of ORB-SLAM2's paper for near points
-constexpr double kStillParallax = 0.01;                         // radians: less is a rig at rest
+constexpr int kFewMatchedTracked = 100,
+              kManyMatchedFree = 70;     // features; the rule of ORB-SLAM2's paper for near points
+constexpr double kStillParallax = 0.01;  // radians: less is a rig at rest
 constexpr double kStillOverlap = 0.95;
 constexpr int kStarvedInterval = 8;  // frames: a camera that sees nothing new may not ask all the time
 
@@ -29,8 +30,9 @@ bool fresh_depth(const frame::BundledFrame& frame, const FrameMatches& inliers, 
 
 }  // namespace
 
-KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::BundledFrame& frame, const FrameMatches& inliers,
-                                   KeyframeId reference, const geometry::SE3& T_rig_world, const TrackingOptions& options) {
+KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                   const FrameMatches& inliers, KeyframeId reference, const geometry::SE3& T_rig_world,
+                                   const TrackingOptions& options) {
   KeyframeEvidence evidence;
   const Eigen::Vector3d centre_now = T_rig_world.inverse().translation();
   const Eigen::Vector3d centre_then = map.resolved_pose(reference).inverse().translation();

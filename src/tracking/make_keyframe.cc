@@ -83,28 +83,29 @@ Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const came
   return groups;
 }
 
-// Takes the patch of a keypoint afresh at its present place, where that lies well inside its level.
-void follow_with_patch(const image::Pyramid& pyramid, feature::Keypoints& keypoints, std::size_t k) {
+// The patch of keypoint `k` at its refined pixel; as detected where that is too close to the border of its level.
+feature::Patch patch_at_pixel(const image::Pyramid& pyramid, const feature::Keypoints& keypoints, std::size_t k) {
   constexpr double kMargin = feature::kPatchSize / 2 + 1;
   const std::size_t level = keypoints.level[k];
   const image::Image& image = pyramid.levels[level];
   const double x = pyramid.from_base_x(level, keypoints.pixel[k].x()),
                y = pyramid.from_base_y(level, keypoints.pixel[k].y());
-  if (x < kMargin || y < kMargin || x > image.width() - 1 - kMargin || y > image.height() - 1 - kMargin) return;
-  keypoints.patch[k] = feature::sample_patch(image.view(), static_cast<float>(x), static_cast<float>(y));
+  if (x < kMargin || y < kMargin || x > image.width() - 1 - kMargin || y > image.height() - 1 - kMargin) {
+    return keypoints.patch[k];
+  }
+  return feature::sample_patch(image.view(), static_cast<float>(x), static_cast<float>(y));
 }
 
-std::shared_ptr<BundledFrame> regrouped_frame(const BundledFrame& frame, const Groups& groups, const camera::Rig& rig,
-                                              std::span<const image::Pyramid> pyramids,
-                                              const InitialisationOptions& options) {
+// The frame as the map keeps it: patches follow the keypoints, the table holds what was learnt about them.
+std::shared_ptr<const BundledFrame> keyframe_of(const BundledFrame& frame, const Groups& groups, const camera::Rig& rig,
+                                                std::span<const image::Pyramid> pyramids,
+                                                const InitialisationOptions& options) {
   auto out = std::make_shared<BundledFrame>(frame);
   for (std::size_t c = 0; c < out->cameras.size(); ++c) {
-    frame::CameraFrame& camera = out->cameras[c];
-    if (camera.keypoints.empty()) continue;
-    for (std::size_t k = 0; k < camera.keypoints.size(); ++k) {  // alignment moved keypoints: their patches follow
-      follow_with_patch(pyramids[c], camera.keypoints, k);
-    }
-    camera.grid = frame::FeatureGrid(camera.keypoints, rig.camera(c).width, rig.camera(c).height);
+    feature::Keypoints& keypoints = out->cameras[c].keypoints;
+    std::vector<feature::Patch> patches(keypoints.size());
+    for (std::size_t k = 0; k < patches.size(); ++k) patches[k] = patch_at_pixel(pyramids[c], keypoints, k);
+    keypoints.patch = std::move(patches);
   }
   out->bundled = matching::make_bundled(rig, out->cameras, groups.matched, options.min_parallax, options.max_chi2);
   return out;
@@ -124,7 +125,7 @@ NewKeyframe make_keyframe(const BundledFrame& frame, const FrameMatches& matches
   const camera::Rig rig = frame::rig_of(draft.map().rig(), frame);
   const LandmarkTable table = landmark_table(frame, matches);
   const Groups groups = regroup(frame, table, rig, draft.map(), T_rig_world);
-  const std::shared_ptr<const BundledFrame> stored = regrouped_frame(frame, groups, rig, pyramids, options);
+  const std::shared_ptr<const BundledFrame> stored = keyframe_of(frame, groups, rig, pyramids, options);
 
   std::vector<std::pair<FeatureId, LandmarkId>> observed;
   std::vector<std::uint8_t> has_landmark(stored->bundled.size(), 0);

@@ -26,8 +26,7 @@ TrackResult result_at(const map::BundledMap& map, const frame::BundledFrame& fra
   out.status = TrackStatus::kTracking;
   out.reason = LostReason::kNone;
   out.T_rig_world = T_rig_world;
-  out.reference = reference;
-  out.T_rig_reference = T_rig_world * map.resolved_pose(reference).inverse();
+  out.anchored = map::AnchoredPose::at(map, reference, T_rig_world);
   for (const frame::CameraFrame& c : frame.cameras)
     out.cameras.push_back({static_cast<int>(c.keypoints.size()), 0, 0, false});
   return out;

@@ -1,5 +1,6 @@
 #include "tracking/track.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cstdlib>
 #include <numeric>
@@ -20,9 +21,7 @@ std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) 
 }
 
 // In the map as it is now.
-SE3 last_pose(const TrackInput& input) {
-  return input.state.T_rig_reference * input.map.resolved_pose(input.state.reference);
-}
+SE3 last_pose(const TrackInput& input) { return input.state.anchored.resolve(input.map).value(); }
 
 // The last pose moved on as far as the motion is known.
 SE3 predict(const TrackInput& input, TimeNs time_ns) {
@@ -55,12 +54,13 @@ bool supported(const solver::PoseSolution& solution, std::size_t num_matches, in
 }
 
 struct Coarse {
+  frame::BundledFrame frame;  // its twist is estimated along with the pose
   SE3 T_rig_world;
   FrameMatches matches;  // inliers
   LostReason reason = LostReason::kNone;
   std::vector<std::uint8_t> left_out = {};  // per camera: doubted before or now
-  std::vector<Expectation> again =
-      {};  // per camera: what of the last frame was seen again; empty after a wide search alone
+  // Per camera: what of the last frame was seen again; empty after a wide search alone.
+  std::vector<Expectation> again = {};
 };
 
 bool any(const std::vector<std::uint8_t>& flags) { return std::ranges::find(flags, std::uint8_t{1}) != flags.end(); }
@@ -99,10 +99,10 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
 }
 
 // Pose from what is found near where the pose so far puts it. False where that is too little.
-bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame,
-                             const std::vector<LandmarkId>& landmarks, const TrackingOptions& options, ThreadPool& pool,
-                             Coarse& out) {
+bool track_in_narrow_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks,
+                             const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
+  const frame::BundledFrame& frame = out.frame;
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   const SE3 predicted = out.T_rig_world;
   FrameMatches found = find_landmarks(map, frame, predicted, landmarks, {},
@@ -126,7 +126,7 @@ bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame
     }
   }
   if (!supported(solution, observations.size(), options.min_inliers, options)) return false;
-  frame.twist = motion.twist(solution.T_rig_world);
+  out.frame.twist = motion.twist(solution.T_rig_world);
   out.T_rig_world = solution.T_rig_world;
   out.matches = keep_inliers(found, solution.inlier);
   out.reason = LostReason::kNone;
@@ -140,11 +140,11 @@ bool track_in_narrow_windows(const TrackInput& input, frame::BundledFrame& frame
 
 // Pose from the landmarks about those of the last frame, looked for in wide windows, with a consensus. False where that
 // is too little.
-bool track_in_wide_windows(const TrackInput& input, const frame::BundledFrame& frame,
-                           const std::vector<LandmarkId>& landmarks, const TrackingOptions& options, ThreadPool& pool,
-                           Coarse& out) {
+bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks,
+                           const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
-  const map::LocalView view = map::make_local_view(map, landmarks, input.state.reference, options.local_view);
+  const frame::BundledFrame& frame = out.frame;
+  const map::LocalView view = map::make_local_view(map, landmarks, input.state.anchored.reference, options.local_view);
   auto wide = search_options(input, options.matching, options.matching.wide_radius);
   wide.level_slack = 2;
   wide.ratio = 0.8 * options.matching.ratio;
@@ -166,15 +166,16 @@ bool track_in_wide_windows(const TrackInput& input, const frame::BundledFrame& f
 // Pose from the landmarks of the last frame: near where the motion model puts them, and where that finds too little or
 // no motion is known, about where a search in wide windows does. Narrow windows about a motion that was only guessed
 // would find what seems to confirm the guess.
-Coarse track_last_frame(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
+Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
                         ThreadPool& pool) {
   const std::vector<LandmarkId> landmarks = seen_last(input.map, input.state);
-  Coarse out{predict(input, frame.time_ns), {}, LostReason::kFewMatches, doubted(input.state, input.map.rig().size())};
+  Coarse out{
+      frame, predict(input, frame.time_ns), {}, LostReason::kFewMatches, doubted(input.state, input.map.rig().size())};
   const bool tracking = input.state.status == TrackStatus::kTracking;
   const bool predicted = tracking && motion_since_last(input.state, frame.time_ns);
-  if (predicted && track_in_narrow_windows(input, frame, landmarks, options, pool, out)) return out;
-  const bool found = track_in_wide_windows(input, frame, landmarks, options, pool, out);
-  if (tracking && (found || !predicted)) track_in_narrow_windows(input, frame, landmarks, options, pool, out);
+  if (predicted && track_in_narrow_windows(input, landmarks, options, pool, out)) return out;
+  const bool found = track_in_wide_windows(input, landmarks, options, pool, out);
+  if (tracking && (found || !predicted)) track_in_narrow_windows(input, landmarks, options, pool, out);
   return out;
 }
 
@@ -184,7 +185,9 @@ bool any_due_for_retry(const TrackerState& state, TimeNs time_ns, const Consensu
 
 struct Fine {
   solver::PoseSolution solution;
-  FrameMatches matches;  // all, inliers and outliers
+  geometry::Vector6d twist;  // rad/s, m/s
+  FrameMatches matches;      // all, inliers and outliers
+  AlignedMatches aligned;    // of all matches
   std::vector<LandmarkId> visible;
   std::vector<Expectation> views;  // per camera, of the local view
   std::vector<Expectation> wide;   // the same in wide windows, where a doubted camera is due to be tried again
@@ -199,11 +202,11 @@ std::vector<Expectation> expectations(const MatchSearch& search) {
 }
 
 // Pose from all landmarks of the local view, with keypoints aligned to their landmarks' patches.
-Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::BundledFrame& frame,
-                      const TrackingOptions& options, ThreadPool& pool) {
+Fine track_local_view(const TrackInput& input, const Coarse& coarse, const TrackingOptions& options, ThreadPool& pool) {
   const map::BundledMap& map = input.map;
+  const frame::BundledFrame& frame = coarse.frame;
   const map::LocalView view =
-      map::make_local_view(map, landmarks_of(coarse.matches), input.state.reference, options.local_view);
+      map::make_local_view(map, landmarks_of(coarse.matches), input.state.anchored.reference, options.local_view);
   MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, coarse.matches,
                                       search_options(input, options.matching, options.matching.local_radius), pool);
   Fine out;
@@ -216,14 +219,24 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, frame::Bund
   drop(coarse.left_out, search.found);
   out.matches = merge(coarse.matches, search.found);
   out.visible = std::move(search.visible);
-  const std::vector<KeypointPlace> before = places(frame, out.matches);
-  align_matches(map, coarse.T_rig_world, out.matches, input.pyramids, input.alignment, input.noise, frame, pool);
+  out.aligned =
+      align_matches(map, frame, coarse.T_rig_world, out.matches, input.pyramids, input.alignment, input.noise, pool);
   const solver::MotionModel motion = motion_model(input, frame);
-  out.solution = solver::solve_pose(map.rig(), pose_observations(map, frame, out.matches), coarse.T_rig_world, motion,
-                                    options.pose);
-  frame.twist = motion.twist(out.solution.T_rig_world);
-  restore_outliers(out.matches, out.solution.inlier, before, frame);
+  out.solution = solver::solve_pose(map.rig(), pose_observations(map, out.matches, out.aligned), coarse.T_rig_world,
+                                    motion, options.pose);
+  out.twist = motion.twist(out.solution.T_rig_world);
   return out;
+}
+
+// The frame as tracking leaves it.
+frame::BundledFrame refined_frame(const camera::Rig& rig, const Coarse& coarse, const Fine& fine,
+                                  const InitialisationOptions& options) {
+  frame::BundledFrame frame = refined(coarse.frame, fine.matches, fine.aligned, fine.solution.inlier, rig);
+  frame.twist = fine.twist;
+  for (std::size_t c = 0; c < coarse.left_out.size(); ++c) {
+    if (coarse.left_out[c]) leave_out(rig, c, options.min_parallax, options.max_chi2, frame);
+  }
+  return frame;
 }
 
 std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const FrameMatches& matched,
@@ -296,10 +309,15 @@ TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, Lo
 
 namespace {
 
-TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, const Coarse& coarse, const Fine& fine,
-                    const TrackingOptions& options) {
+geometry::Matrix6d covariance_of(const solver::PoseSolution& solution) {
+  return solution.information.ldlt().solve(geometry::Matrix6d::Identity());
+}
+
+TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& fine, const TrackingOptions& options) {
   const map::BundledMap& map = input.map;
   TrackOutput out;
+  out.frame = refined_frame(map.rig(), coarse, fine, options.initialisation);
+  const frame::BundledFrame& frame = out.frame;
   out.matches = keep_inliers(fine.matches, fine.solution.inlier);
   TrackResult& result = out.result;
   result.frame = frame.id;
@@ -311,11 +329,9 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, c
 
   TrackerState& state = out.state;
   state = input.state;
-  state.reference = map.surviving(state.reference);
-  const SE3 T_ref_world = map.resolved_pose(state.reference);
-  state.T_rig_reference = result.T_rig_world * T_ref_world.inverse();
-  result.reference = state.reference;
-  result.T_rig_reference = state.T_rig_reference;
+  state.anchored = map::AnchoredPose::at(map, map.surviving(input.state.anchored.reference), result.T_rig_world);
+  result.anchored = state.anchored;
+  result.covariance = covariance_of(fine.solution);
 
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
   state.twist.reset();
@@ -327,7 +343,8 @@ TrackOutput tracked(const TrackInput& input, const frame::BundledFrame& frame, c
   note_trust(frame, coarse, fine, out.matches, options, out);
 
   ++state.frames_since_keyframe;
-  KeyframeEvidence evidence = keyframe_evidence(map, frame, out.matches, state.reference, result.T_rig_world, options);
+  KeyframeEvidence evidence =
+      keyframe_evidence(map, frame, out.matches, state.anchored.reference, result.T_rig_world, options);
   state.best_overlap = std::max(state.best_overlap, evidence.overlap);
   evidence.best_overlap = state.best_overlap;
   evidence.frames_since_keyframe = state.frames_since_keyframe;
@@ -359,7 +376,7 @@ std::string_view describe(LostReason reason) {
   return "";
 }
 
-TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
+TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
                   ThreadPool& pool) {
   const bool any_image = std::any_of(frame.cameras.begin(), frame.cameras.end(), [](const frame::CameraFrame& c) {
     return c.state == image::ImageState::kPresent;
@@ -367,22 +384,14 @@ TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const Tra
   if (!any_image) return lost(input.state, frame, LostReason::kNoImages);
   if (frame.num_keypoints() < static_cast<std::size_t>(options.min_inliers))
     return lost(input.state, frame, LostReason::kFewFeatures);
-  const geometry::Vector6d twist = frame.twist;
-  const auto fail = [&](LostReason reason) {
-    frame.twist = twist;  // what a pose without support said about the motion has none either
-    return lost(input.state, frame, reason);
-  };
   const Coarse coarse = track_last_frame(input, frame, options, pool);
-  if (coarse.reason != LostReason::kNone) return fail(coarse.reason);
-  Fine fine = track_local_view(input, coarse, frame, options, pool);
+  if (coarse.reason != LostReason::kNone) return lost(input.state, frame, coarse.reason);
+  const Fine fine = track_local_view(input, coarse, options, pool);
   if (!supported(fine.solution, count(fine.matches), options.min_inliers, options)) {
-    return fail(fine.solution.num_inliers < options.min_inliers ? LostReason::kFewInliers : LostReason::kUnstablePose);
+    const bool few = fine.solution.num_inliers < options.min_inliers;
+    return lost(input.state, frame, few ? LostReason::kFewInliers : LostReason::kUnstablePose);
   }
-  for (std::size_t c = 0; c < coarse.left_out.size(); ++c) {
-    if (coarse.left_out[c])
-      leave_out(input.map.rig(), c, options.initialisation.min_parallax, options.initialisation.max_chi2, frame);
-  }
-  return tracked(input, frame, coarse, fine, options);
+  return tracked(input, coarse, fine, options);
 }
 
 TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,
@@ -390,8 +399,7 @@ TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, Keyfr
   TrackerState state = before;
   state.status = TrackStatus::kTracking;
   state.time_ns = time_ns;
-  state.reference = keyframe;
-  state.T_rig_reference = SE3();
+  state.anchored = {.reference = keyframe, .T_rig_reference = SE3()};
   state.landmarks = std::move(landmarks);
   state.frames_since_keyframe = 0;
   state.best_overlap = 0;

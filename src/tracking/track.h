@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "map/anchored_pose.h"
 #include "map/map_edit.h"
 #include "tracking/camera_consensus.h"
 #include "tracking/frame_matches.h"
@@ -40,18 +41,20 @@ struct TrackResult {
   TimeNs time_ns = 0;
   TrackStatus status = TrackStatus::kNotStarted;
   LostReason reason = LostReason::kNotStarted;
-  geometry::SE3 T_rig_world;  // meaningful while tracking
-  KeyframeId reference;       // the pose is kept relative to this keyframe, so that corrections carry it along
-  geometry::SE3 T_rig_reference;
+  geometry::SE3 T_rig_world;   // meaningful while tracking
+  map::AnchoredPose anchored;  // the same pose, such that corrections of the map apply to it; no pose unless tracking
+  // Covariance of the pose, as a perturbation delta of T_rig_world = exp(delta) T_rig_world: rotation (rad) first, then
+  // translation (map units). From the keypoints of this frame with the landmarks held fixed. Empty where the pose was
+  // not estimated from the map: in a frame that started a map, or was located at the end of the run.
+  std::optional<geometry::Matrix6d> covariance;
   std::vector<CameraCounts> cameras;
 };
 
 // What the tracker carries from frame to frame; a value.
 struct TrackerState {
   TrackStatus status = TrackStatus::kNotStarted;
-  TimeNs time_ns = 0;    // of the last tracked frame
-  KeyframeId reference;  // as in TrackResult, of the last tracked frame
-  geometry::SE3 T_rig_reference;
+  TimeNs time_ns = 0;                       // of the last tracked frame
+  map::AnchoredPose anchored;               // pose of the last tracked frame
   std::optional<geometry::Vector6d> twist;  // T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); rad/s, m/s
   std::vector<LandmarkId> landmarks;        // inliers of the last tracked frame
   std::vector<CameraTrust> cameras;         // empty as long as no frame was tracked
@@ -67,6 +70,9 @@ struct TrackOutput {
   TrackResult result;
   TrackerState state;
   FrameMatches matches;  // inliers
+  // The frame as tracking leaves it: keypoints of the inliers aligned to their landmarks, the velocity of the rig as
+  // estimated, cameras that are not trusted without keypoints. Empty where the frame has no pose.
+  frame::BundledFrame frame;
   bool keyframe_due = false;
 };
 
@@ -80,8 +86,8 @@ struct TrackInput {
   std::uint64_t seed = 1;
 };
 
-// Finds the pose of `frame`, moving matched keypoints to their aligned places. The map has at least one keyframe.
-TrackOutput track(const TrackInput& input, frame::BundledFrame& frame, const TrackingOptions& options,
+// Finds the pose of `frame`. The map has at least one keyframe.
+TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
                   ThreadPool& pool);
 
 // A frame without a pose, and the state after it.

@@ -15,8 +15,9 @@ map::BundledMap keyframes_with(const std::vector<float>& sigma) {
   Random random(1);
   for (const float s : sigma) {
     auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 1, 5, 0));
-    for (auto& v : frame->cameras[0].keypoints.sigma) v = s;
-    for (auto& level : frame->cameras[0].keypoints.level) level = 0;
+    feature::Keypoints& keypoints = frame->cameras[0].keypoints;
+    keypoints.sigma = std::vector<float>(keypoints.size(), s);
+    keypoints.level = std::vector<std::uint8_t>(keypoints.size(), 0);
     out.add_keyframe(frame, geometry::SE3(), {}, out.newest_keyframe());
   }
   return out;

@@ -37,7 +37,7 @@ TEST(Extractor, AllocatesNothingOnceWarm) {
   const cv::Size size(640, 480);
   Extractor extractor{FeatureOptions{}};
   image::Pyramid pyramid;
-  Keypoints keypoints;
+  Detections keypoints;
   const camera::Camera camera = testing::pinhole_camera(size);
   const auto run = [&](const cv::Mat& view) {
     const long before = allocations;

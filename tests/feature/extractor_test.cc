@@ -26,16 +26,16 @@ cv::Mat test_view(double gain = 1, double noise = 2) {
   return render(scene, {0, 1, 0, 0, kSize}, 0, gain, 0, noise);
 }
 
-Keypoints extract(const cv::Mat& image, const FeatureOptions& options = {}, const cv::Mat& mask = {}) {
+Detections extract(const cv::Mat& image, const FeatureOptions& options = {}, const cv::Mat& mask = {}) {
   Extractor extractor(options);
   image::Pyramid pyramid;
-  Keypoints keypoints;
+  Detections keypoints;
   extractor.extract(view_of(image), mask.empty() ? image::ImageView{} : view_of(mask), pinhole_camera(image.size()),
                     pyramid, keypoints);
   return keypoints;
 }
 
-void expect_equal(const Keypoints& a, const Keypoints& b) {
+void expect_equal(const Detections& a, const Detections& b) {
   EXPECT_EQ(a.pixel, b.pixel);
   EXPECT_EQ(a.level, b.level);
   EXPECT_EQ(a.angle, b.angle);
@@ -45,12 +45,12 @@ void expect_equal(const Keypoints& a, const Keypoints& b) {
   EXPECT_EQ(a.patch, b.patch);
 }
 
-TEST(Extractor, FillsWhatKeypointsPromise) {
+TEST(Extractor, FillsWhatDetectionsPromise) {
   const cv::Mat image = test_view();
   FeatureOptions options;
   Extractor extractor(options);
   image::Pyramid pyramid;
-  Keypoints k;
+  Detections k;
   const camera::Camera camera = pinhole_camera(image.size());
   extractor.extract(view_of(image), {}, camera, pyramid, k);
   ASSERT_EQ(k.size(), 1200u);
@@ -74,10 +74,10 @@ TEST(Extractor, FillsWhatKeypointsPromise) {
 
 TEST(Extractor, GivesTheSameEveryTime) {
   const cv::Mat image = test_view(), other = test_view(0.4);
-  const Keypoints first = extract(image);
+  const Detections first = extract(image);
   Extractor extractor{FeatureOptions{}};
   image::Pyramid pyramid;
-  Keypoints k;
+  Detections k;
   for (const cv::Mat& m : {other, image, cv::Mat(other(cv::Rect(0, 0, 333, 211))), image}) {
     extractor.extract(view_of(m), {}, pinhole_camera(m.size()), pyramid, k);
   }
@@ -104,7 +104,7 @@ TEST(Extractor, GivesAboutTheNumberWanted) {
 }
 
 // Cells of a 12 x 8 grid that hold keypoints, and the most that one of them holds.
-std::pair<std::size_t, std::size_t> occupancy(const Keypoints& k) {
+std::pair<std::size_t, std::size_t> occupancy(const Detections& k) {
   std::vector<std::size_t> count(96, 0);
   for (const Eigen::Vector2f& p : k.pixel) {
     ++count[static_cast<std::size_t>(p.y() / 60) * 12 + static_cast<std::size_t>(p.x() / 62.7f)];
@@ -122,7 +122,7 @@ TEST(Extractor, ABudgetIsAsGoodAsTheOption) {
   };
   Extractor extractor{FeatureOptions{}};
   image::Pyramid pyramid;
-  Keypoints k;
+  Detections k;
   const int usual = FeatureOptions{}.per_image;
   for (const auto& [budget, wanted] :
        {std::pair(std::optional(450), 450), {9000, 2 * usual}, {std::nullopt, usual}, {450, 450}}) {
@@ -145,7 +145,7 @@ TEST(Extractor, TexturedPartDoesNotTakeAll) {
   cv::Mat image = test_view(0.25);
   const cv::Mat strong = test_view();
   strong(cv::Rect(0, 0, 250, 160)).copyTo(image(cv::Rect(0, 0, 250, 160)));
-  const Keypoints k = extract(image);
+  const Detections k = extract(image);
   const auto inside =
       std::count_if(k.pixel.begin(), k.pixel.end(), [](const auto& p) { return p.x() < 250 && p.y() < 160; });
   EXPECT_EQ(k.size(), 1200u);
@@ -154,7 +154,7 @@ TEST(Extractor, TexturedPartDoesNotTakeAll) {
 
 TEST(Extractor, AdaptsToDarkImages) {
   const cv::Mat dark = test_view(0.12, 1);  // no contrast above 28
-  const Keypoints k = extract(dark);
+  const Detections k = extract(dark);
   FeatureOptions fixed;
   fixed.fast_threshold_min = fixed.fast_threshold;
   const auto [filled, most] = occupancy(k);
@@ -168,7 +168,7 @@ TEST(Extractor, LeavesOutMaskedAndUnseenPixels) {
   const cv::Mat image = test_view();
   cv::Mat mask(image.size(), CV_8U, cv::Scalar(255));
   mask(cv::Rect(200, 100, 300, 250)) = 0;
-  const Keypoints k = extract(image, {}, mask);
+  const Detections k = extract(image, {}, mask);
   EXPECT_GT(k.size(), 1100u);  // what is masked is made up for elsewhere
   for (const Eigen::Vector2f& p : k.pixel) {
     EXPECT_NE(mask.at<std::uint8_t>(static_cast<int>(std::lround(p.y())), static_cast<int>(std::lround(p.x()))), 0);
@@ -178,7 +178,7 @@ TEST(Extractor, LeavesOutMaskedAndUnseenPixels) {
   camera.model = camera::PinholeRadTan({450, 450, 375.5, 239.5}, {-0.9, 0.0, 0.0, 0.0});
   Extractor extractor{FeatureOptions{}};
   image::Pyramid pyramid;
-  Keypoints seen;
+  Detections seen;
   extractor.extract(view_of(image), {}, camera, pyramid, seen);
   EXPECT_LT(seen.size(), 1000u);
   EXPECT_GT(seen.size(), 100u);
@@ -204,7 +204,7 @@ TEST(Extractor, SurvivesAnyImage) {
   extreme.levels = 16;
   extreme.scale_factor = 2.0;
   extreme.fast_threshold_min = 1;
-  const Keypoints k = extract(test_view(0.1, 20), extreme);
+  const Detections k = extract(test_view(0.1, 20), extreme);
   EXPECT_GT(k.size(), 5000u);
   EXPECT_LE(k.size(), 20000u);
 }

@@ -20,7 +20,7 @@ Features ours(const cv::Mat& view) {
   options.per_image = kFeatures;
   Extractor extractor(options);
   image::Pyramid pyramid;
-  Keypoints k;
+  Detections k;
   extractor.extract(view_of(view), {}, pinhole_camera(view.size()), pyramid, k);
   Features features;
   for (std::size_t i = 0; i < k.size(); ++i) {

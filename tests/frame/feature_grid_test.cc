@@ -12,14 +12,14 @@ namespace {
 
 constexpr int kWidth = 640, kHeight = 480;
 
-void add(feature::Keypoints& keypoints, double x, double y, Random& random) {
+void add(feature::Detections& keypoints, double x, double y, Random& random) {
   keypoints.pixel.emplace_back(static_cast<float>(x), static_cast<float>(y));
   keypoints.level.push_back(static_cast<std::uint8_t>(random.below(8)));
 }
 
 // Random positions, whole and half pixels on the borders of cells, corners of the image, and a little outside of it.
 feature::Keypoints random_keypoints(Random& random) {
-  feature::Keypoints keypoints;
+  feature::Detections keypoints;
   for (int i = 0; i < 600; ++i)
     add(keypoints, random.uniform(-0.5, kWidth - 0.5), random.uniform(-0.5, kHeight - 0.5), random);
   for (int i = 0; i < 200; ++i) add(keypoints, random.below(kWidth) - 0.5, random.below(kHeight) - 0.5, random);
@@ -65,8 +65,9 @@ TEST(FeatureGrid, FindsWhatBruteForceFinds) {
 
 TEST(FeatureGrid, AppendsToWhatIsThere) {
   Random random(2);
-  feature::Keypoints keypoints;
-  add(keypoints, 100, 100, random);
+  feature::Detections detections;
+  add(detections, 100, 100, random);
+  const feature::Keypoints keypoints(std::move(detections));
   const FeatureGrid grid(keypoints, kWidth, kHeight);
   std::vector<std::uint32_t> found = {7};
   grid.near(keypoints, {101, 99}, 1.0, 0, 7, found);

@@ -125,6 +125,7 @@ SimulatedFrame changed_aside(SimulatedFrame seen, const HallMap& world, double t
     known_from[world.shown_by_landmark[l.index()].second] = world.map.landmark(l).view_direction;
   const Eigen::Vector3d here = seen.T_world_rig.translation();
   for (std::size_t c = 0; c < seen.landmark.size(); ++c) {
+    std::vector<feature::Descriptor> descriptors = seen.frame.cameras[c].keypoints.descriptor.copy();
     for (std::size_t k = 0; k < seen.landmark[c].size(); ++k) {
       const auto at = known_from.find(seen.landmark[c][k]);
       if (at == known_from.end()) continue;
@@ -132,8 +133,9 @@ SimulatedFrame changed_aside(SimulatedFrame seen, const HallMap& world, double t
           (hall_landmarks()[static_cast<std::size_t>(at->first)].position - here).normalized();
       if (direction.dot(at->second) > std::cos(turn)) continue;
       Random random(1, "aside", static_cast<std::uint64_t>(at->first));
-      for (std::uint64_t& word : seen.frame.cameras[c].keypoints.descriptor[k]) word ^= random.next();
+      for (std::uint64_t& word : descriptors[k]) word ^= random.next();
     }
+    seen.frame.cameras[c].keypoints.descriptor = std::move(descriptors);
   }
   return seen;
 }

@@ -96,12 +96,14 @@ inline std::unique_ptr<BagOfWordsRecogniser> recogniser(const RecognitionOptions
 // only.
 inline SimulatedFrame redecorated(SimulatedFrame seen, double share, std::uint64_t seed) {
   for (std::size_t c = 0; c < seen.landmark.size(); ++c) {
+    std::vector<feature::Descriptor> descriptors = seen.frame.cameras[c].keypoints.descriptor.copy();
     for (std::size_t k = 0; k < seen.landmark[c].size(); ++k) {
       if (seen.landmark[c][k] < 0) continue;
       Random random(seed, "decoration", static_cast<std::uint64_t>(seen.landmark[c][k]));
       if (random.uniform() >= share) continue;
-      for (std::uint64_t& word : seen.frame.cameras[c].keypoints.descriptor[k]) word ^= random.next();
+      for (std::uint64_t& word : descriptors[k]) word ^= random.next();
     }
+    seen.frame.cameras[c].keypoints.descriptor = std::move(descriptors);
   }
   return seen;
 }

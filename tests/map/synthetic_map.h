@@ -25,8 +25,8 @@ inline std::shared_ptr<const camera::Rig> synthetic_rig(std::size_t cameras) {
   return std::make_shared<const camera::Rig>(std::move(list));
 }
 
-inline feature::Keypoints synthetic_keypoints(Random& random, std::size_t count) {
-  feature::Keypoints keypoints;
+inline feature::Detections synthetic_keypoints(Random& random, std::size_t count) {
+  feature::Detections keypoints;
   keypoints.reserve(count);
   for (std::size_t k = 0; k < count; ++k) {
     keypoints.pixel.emplace_back(static_cast<float>(random.uniform(0, 639)),

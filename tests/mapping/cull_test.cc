@@ -72,8 +72,7 @@ class CullKeyframes : public Cull {
   CullKeyframes() {
     for (int k = 0; k < 6; ++k) {
       auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
-      for (frame::CameraFrame& c : frame->cameras)
-        std::fill(c.keypoints.level.begin(), c.keypoints.level.end(), std::uint8_t{2});
+      for (frame::CameraFrame& c : frame->cameras) c.keypoints.level = std::vector<std::uint8_t>(c.keypoints.size(), 2);
       map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
     }
     for (int l = 0; l < 40; ++l) {
@@ -114,7 +113,7 @@ TEST_F(CullKeyframes, OneWithLandmarksOfItsOwnStays) {
 TEST_F(CullKeyframes, ViewsFromFarAwayDoNotReplaceANearOne) {
   const auto coarse = [&](int k) {
     for (frame::CameraFrame& c : const_cast<frame::BundledFrame&>(*map.keyframe(KeyframeId(k)).frame).cameras) {
-      std::fill(c.keypoints.level.begin(), c.keypoints.level.end(), std::uint8_t{6});
+      c.keypoints.level = std::vector<std::uint8_t>(c.keypoints.size(), 6);
     }
   };
   for (const int k : {2, 3, 4, 5}) coarse(k);

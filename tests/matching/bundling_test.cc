@@ -88,9 +88,8 @@ class Bundle : public ::testing::Test {
     return o;
   }
   frame::BundledFrame make() {
-    frame::BundledFrame frame = builder.extract(images, pool);
-    frame.bundled = bundle(rig, frame.cameras, builder.pyramids(), {}, alignment, pool);
-    return frame;
+    const frame::BundledFrame extracted = builder.extract(images, pool);
+    return bundle(rig, extracted, builder.pyramids(), {}, alignment, pool);
   }
   const camera::Rig rig = wall_rig();
   const std::vector<AlignmentOptions> alignment = std::vector<AlignmentOptions>(rig.size());
@@ -150,14 +149,38 @@ TEST_F(Bundle, KeepsTheRulesOfTheTable) {
 TEST_F(Bundle, IsTheSameWithAnyNumberOfThreads) {
   const frame::BundledFrame once = make();
   ThreadPool alone(1);
-  frame::BundledFrame again = builder.extract(images, alone);
-  again.bundled = bundle(rig, again.cameras, builder.pyramids(), {}, alignment, alone);
+  const frame::BundledFrame extracted = builder.extract(images, alone);
+  const frame::BundledFrame again = bundle(rig, extracted, builder.pyramids(), {}, alignment, alone);
   ASSERT_EQ(once.bundled.size(), again.bundled.size());
-  for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(once.cameras[c].keypoints.pixel, again.cameras[c].keypoints.pixel);
+  for (std::size_t c = 0; c < 3; ++c)
+    EXPECT_EQ(once.cameras[c].keypoints.pixel.copy(), again.cameras[c].keypoints.pixel.copy());
   for (std::size_t f = 0; f < once.bundled.num_matched(); ++f) {
     const auto a = once.bundled.keypoints(FeatureId(f)), b = again.bundled.keypoints(FeatureId(f));
     EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end()));
   }
+}
+
+// A keypoint is where it was detected unless it belongs to a matched feature, and what was detected stays as it is.
+TEST_F(Bundle, MovesTheKeypointsOfMatchedFeaturesAlone) {
+  const frame::BundledFrame extracted = builder.extract(images, pool);
+  std::vector<feature::Refinement> detected;
+  for (const frame::CameraFrame& c : extracted.cameras) detected.push_back(c.keypoints.positions());
+  const frame::BundledFrame frame = bundle(rig, extracted, builder.pyramids(), {}, alignment, pool);
+  std::size_t moved = 0;
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    const feature::Keypoints &before = extracted.cameras[c].keypoints, &after = frame.cameras[c].keypoints;
+    EXPECT_EQ(before.pixel.copy(), detected[c].pixel);
+    EXPECT_EQ(before.sigma.copy(), detected[c].sigma);
+    EXPECT_EQ(before.descriptor.data(), after.descriptor.data());  // shared, not copied
+    EXPECT_EQ(before.patch.data(), after.patch.data());
+    for (std::size_t k = 0; k < after.size(); ++k) {
+      const bool same = after.pixel[k] == before.pixel[k] && after.sigma[k] == before.sigma[k] &&
+                        after.bearing[k] == before.bearing[k];
+      moved += !same;
+      EXPECT_TRUE(same || frame.bundled.is_matched(frame.bundled.feature(CameraIndex(c), KeypointIndex(k))));
+    }
+  }
+  EXPECT_GT(moved, frame.bundled.num_matched());
 }
 
 TEST_F(Bundle, AMissingOrDamagedImageLeavesItsCameraEmpty) {

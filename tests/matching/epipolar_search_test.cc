@@ -24,11 +24,11 @@ Camera fisheye() {  // 190 degrees
 }
 
 struct Pair {
-  feature::Keypoints a, b;  // keypoint k of a shows what keypoint partner[k] of b shows, -1 = nothing
+  feature::Detections a, b;  // keypoint k of a shows what keypoint partner[k] of b shows, -1 = nothing
   std::vector<int> partner;
 };
 
-void add(const Camera& camera, const Vector2d& pixel, const feature::Descriptor& d, feature::Keypoints& k) {
+void add(const Camera& camera, const Vector2d& pixel, const feature::Descriptor& d, feature::Detections& k) {
   k.pixel.push_back(pixel.cast<float>());
   k.level.push_back(0);
   k.angle.push_back(0);
@@ -76,6 +76,21 @@ Pair seen_by(const Camera& a, const Camera& b, const SE3& T_common_a, const SE3&
   return out;
 }
 
+// A camera with its keypoints and pose.
+struct PosedCamera {
+  const Camera& camera;
+  const feature::Detections& detections;
+  const SE3& T_common_cam;
+};
+
+std::vector<EpipolarMatch> match(const PosedCamera& a, const PosedCamera& b, const EpipolarOptions& options = {},
+                                 std::span<const std::uint8_t> usable_a = {}) {
+  const feature::Keypoints keypoints_a{feature::Detections(a.detections)},
+      keypoints_b{feature::Detections(b.detections)};
+  return match_epipolar({&a.camera, &keypoints_a, a.T_common_cam, usable_a},
+                        {&b.camera, &keypoints_b, b.T_common_cam, {}}, options);
+}
+
 struct Score {
   std::size_t possible = 0, right = 0, wrong = 0;
 };
@@ -111,7 +126,7 @@ TEST(MatchEpipolar, RecoversTrueMatchesOfAnyCamerasInAnyDirection) {
   };
   for (const Case& c : cases) {
     const Pair pair = seen_by(c.a, c.b, c.T_common_a, c.T_common_b, 800);
-    const auto matches = match_epipolar({&c.a, &pair.a, c.T_common_a, {}}, {&c.b, &pair.b, c.T_common_b, {}}, {});
+    const auto matches = match({c.a, pair.a, c.T_common_a}, {c.b, pair.b, c.T_common_b});
     const Score s = score(pair, matches);
     EXPECT_GT(s.possible, 20u) << c.name;
     EXPECT_GT(static_cast<double>(s.right), 0.85 * static_cast<double>(s.possible)) << c.name;
@@ -126,7 +141,7 @@ TEST(MatchEpipolar, HasNoSeamAboutTheBaseline) {
     const double turn = 2 * std::numbers::pi * i / 12;
     const SE3 T_common_b(Eigen::Quaterniond::Identity(), 0.3 * Vector3d(std::cos(turn), std::sin(turn), 0.1));
     const Pair pair = seen_by(camera, camera, SE3(), T_common_b, 500);
-    const Score s = score(pair, match_epipolar({&camera, &pair.a, SE3(), {}}, {&camera, &pair.b, T_common_b, {}}, {}));
+    const Score s = score(pair, match({camera, pair.a, SE3()}, {camera, pair.b, T_common_b}));
     EXPECT_GT(static_cast<double>(s.right), 0.9 * static_cast<double>(s.possible)) << "baseline " << i;
   }
 }
@@ -134,7 +149,7 @@ TEST(MatchEpipolar, HasNoSeamAboutTheBaseline) {
 class MatchEpipolarSideBySide : public ::testing::Test {
  protected:
   std::vector<EpipolarMatch> match(const EpipolarOptions& options, std::span<const std::uint8_t> usable_a = {}) const {
-    return match_epipolar({&camera, &pair.a, SE3(), usable_a}, {&camera, &pair.b, T_common_b, {}}, options);
+    return matching::match({camera, pair.a, SE3()}, {camera, pair.b, T_common_b}, options, usable_a);
   }
   Camera camera = pinhole();
   SE3 T_common_b = turned(0, 0, {0.2, 0, 0});
@@ -155,7 +170,7 @@ TEST_F(MatchEpipolarSideBySide, UsesEveryKeypointOnceAndInOrder) {
 TEST_F(MatchEpipolarSideBySide, FindsTheSameFromEitherSide) {
   std::set<std::pair<int, int>> forth, back;
   for (const EpipolarMatch& m : match({})) forth.insert({m.a.value(), m.b.value()});
-  for (const EpipolarMatch& m : match_epipolar({&camera, &pair.b, T_common_b, {}}, {&camera, &pair.a, SE3(), {}}, {})) {
+  for (const EpipolarMatch& m : matching::match({camera, pair.b, T_common_b}, {camera, pair.a, SE3()})) {
     back.insert({m.b.value(), m.a.value()});
   }
   std::size_t both = 0;

@@ -18,7 +18,7 @@ class SearchByProjection : public ::testing::Test {
   static constexpr std::size_t kPoints = 300;
   SearchByProjection() {
     Random random(1, "search");
-    feature::Keypoints& k = frame.keypoints;
+    feature::Detections k;
     while (points.size() < kPoints) {
       const Eigen::Vector2d pixel(random.uniform(20, 619), random.uniform(20, 459));
       const double distance = random.uniform(2, 6);
@@ -41,7 +41,8 @@ class SearchByProjection : public ::testing::Test {
       k.patch.emplace_back();
     }
     for (std::size_t i = 0; i < kPoints; ++i) points[i].descriptor = &descriptors[i];
-    frame.grid = frame::FeatureGrid(k, camera.width, camera.height);
+    frame.keypoints = std::move(k);
+    frame.grid = frame::FeatureGrid(frame.keypoints, camera.width, camera.height);
   }
   ProjectionSearchResult search(const ProjectionSearchOptions& options = {}) const {
     return search_by_projection(camera, frame, T_cam_common, points, taken, options);
@@ -93,7 +94,9 @@ TEST_F(SearchByProjection, LeavesOutWhatIsSkippedOrTaken) {
 }
 
 TEST_F(SearchByProjection, LooksOnlyAroundTheLevelExpected) {
-  for (std::uint8_t& l : frame.keypoints.level) l = static_cast<std::uint8_t>(l + 2);
+  std::vector<std::uint8_t> levels = frame.keypoints.level.copy();
+  for (std::uint8_t& l : levels) l = static_cast<std::uint8_t>(l + 2);
+  frame.keypoints.level = std::move(levels);
   EXPECT_LT(search().matches.size(), kPoints / 20);
   EXPECT_GT(search({.level_slack = 2}).matches.size(), kPoints * 9 / 10);
 }

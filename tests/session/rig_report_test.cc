@@ -28,9 +28,9 @@ camera::Rig stereo() {
 }
 
 // Keypoints of points ahead, with a descriptor of its own for each, and as many of one camera alone.
-std::array<feature::Keypoints, 2> views_of(const camera::Rig& rig) {
+std::array<feature::Detections, 2> views_of(const camera::Rig& rig) {
   Random random(1);
-  std::array<feature::Keypoints, 2> views;
+  std::array<feature::Detections, 2> views;
   while (views[0].size() < 150) {
     const Eigen::Vector3d p(random.uniform(-3, 3), random.uniform(-2, 2), random.uniform(1, 5));
     feature::Descriptor descriptor;
@@ -47,7 +47,7 @@ std::array<feature::Keypoints, 2> views_of(const camera::Rig& rig) {
   return views;
 }
 
-PairEvidence judged(const camera::Rig& calibration, const std::array<feature::Keypoints, 2>& views) {
+PairEvidence judged(const camera::Rig& calibration, const std::array<feature::Detections, 2>& views) {
   return judge_pair(calibration, 0, 1, std::span(&views[0], 1), std::span(&views[1], 1));
 }
 
@@ -69,7 +69,7 @@ TEST(ExtrinsicsCheck, FindsWhatIsMeant) {
 TEST(ExtrinsicsCheck, SaysNothingWhereNothingFits) {
   const camera::Rig rig = stereo();
   auto views = views_of(rig);
-  EXPECT_FALSE(judged(rig, {views[0], feature::Keypoints()}).verdict);
+  EXPECT_FALSE(judged(rig, {views[0], feature::Detections()}).verdict);
   std::rotate(views[1].pixel.begin(), views[1].pixel.begin() + 1, views[1].pixel.end());  // every match is wrong
   const PairEvidence evidence = judged(rig, views);
   EXPECT_EQ(evidence.matches, 150);
@@ -104,7 +104,7 @@ TEST(ExtrinsicsCheck, SaysHowFarACameraIsDisplaced) {
 TEST(ExtrinsicsCheck, IsNotAlarmedByAFewMoreMatchesElsewhere) {
   const camera::Rig rig = stereo();
   auto views = views_of(rig);
-  for (feature::Keypoints& v : views) v.pixel.resize(40), v.descriptor.resize(40);
+  for (feature::Detections& v : views) v.pixel.resize(40), v.descriptor.resize(40);
   for (std::size_t i = 0; i < 16; ++i)
     views[1].pixel[i] += Eigen::Vector2f(17.0f * static_cast<float>(i % 5), 90.0f - 11.0f * static_cast<float>(i));
   const PairEvidence evidence = judged(rig, views);

@@ -89,7 +89,7 @@ TEST_F(Session, WritesAllItsFiles) {
   EXPECT_EQ(result->record.mode, "sequential");
   EXPECT_EQ(result->record.map.scale, "metric");
   EXPECT_EQ(result->record.maps_started, 1);
-  for (const report::CameraRecord& c : result->record.cameras) EXPECT_EQ(c.images, 8);
+  for (const CameraRecord& c : result->record.cameras) EXPECT_EQ(c.images, 8);
 
   const fs::path out = folder() / "out";
   EXPECT_FALSE(write_outputs(*result, o.config, out).ok());  // the folder is the caller's
@@ -230,8 +230,8 @@ TEST_F(Session, CountsADamagedImageAsSkippedAndGoesOn) {
       << result->record.cameras[1].first_skipped;
   EXPECT_EQ(result->record.cameras[1].images, 7);
   ASSERT_EQ(result->record.frames.size(), 8u);
-  EXPECT_FALSE(result->record.frames[4].cameras[1].has_image);
-  for (const report::FrameRecord& f : result->record.frames) EXPECT_EQ(f.outcome, report::FrameOutcome::kTracked);
+  EXPECT_EQ(result->record.frames[4].record->images[1], image::ImageState::kDamaged);
+  for (const RunFrame& f : result->record.frames) EXPECT_EQ(f.outcome(), FrameOutcome::kTracked);
 }
 
 TEST_F(Session, ReportsAMaskThatCannotBeRead) {

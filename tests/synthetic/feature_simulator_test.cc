@@ -119,8 +119,8 @@ TEST(FeatureSimulator, FindsLevelsByDistance) {
 TEST(FeatureSimulator, HasSeparateSeeds) {
   const camera::Rig rig = ring_rig(2);
   const SimulatedFrame a = simulator(rig).frame(FrameId(1), 1.0), b = simulator(rig).frame(FrameId(1), 1.0);
-  EXPECT_EQ(a.frame.cameras[0].keypoints.pixel, b.frame.cameras[0].keypoints.pixel);
-  EXPECT_EQ(a.frame.cameras[1].keypoints.descriptor, b.frame.cameras[1].keypoints.descriptor);
+  EXPECT_EQ(a.frame.cameras[0].keypoints.pixel.copy(), b.frame.cameras[0].keypoints.pixel.copy());
+  EXPECT_EQ(a.frame.cameras[1].keypoints.descriptor.copy(), b.frame.cameras[1].keypoints.descriptor.copy());
   FeatureSimulatorOptions other_noise, other_scene;
   other_noise.noise_seed = 2;
   other_scene.scene_seed = 2;
@@ -128,7 +128,8 @@ TEST(FeatureSimulator, HasSeparateSeeds) {
                          scene = simulator(rig, other_scene);
   EXPECT_EQ(base.landmarks()[0].position, noise.landmarks()[0].position);
   EXPECT_NE(base.landmarks()[0].position, scene.landmarks()[0].position);
-  EXPECT_NE(noise.frame(FrameId(1), 1.0).frame.cameras[0].keypoints.pixel, a.frame.cameras[0].keypoints.pixel);
+  EXPECT_NE(noise.frame(FrameId(1), 1.0).frame.cameras[0].keypoints.pixel.copy(),
+            a.frame.cameras[0].keypoints.pixel.copy());
 }
 
 TEST(FeatureSimulator, LeavesOutMissingCameras) {

@@ -60,7 +60,7 @@ inline Playback play(const RenderedTour& tour, std::initializer_list<std::pair<s
 }
 
 inline void process_all(System& system, const std::vector<image::ImageBundle>& frames) {
-  for (const image::ImageBundle& images : frames) system.process(images);
+  for (const image::ImageBundle& images : frames) must_process(system, images);
 }
 
 inline Resources with_vocabulary() { return {.vocabulary = place::shipped_vocabulary().value()}; }

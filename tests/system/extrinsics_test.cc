@@ -27,7 +27,7 @@ double angle_deg(const SE3& a, const SE3& b) { return a.rotation().angularDistan
 
 // Runs with camera 2 off by a degree.
 void run(const RenderedTour& tour, System& system) {
-  for (const image::ImageBundle& images : tour.frames()) system.process(images);
+  for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
   ASSERT_TRUE(system.extrinsics().done);
   const auto& found = system.extrinsics().cameras;
@@ -67,7 +67,7 @@ TEST(SystemExtrinsics, NotAskedForNothingIsSaid) {
   Config config = small_config(execution::Mode::kSequential);
   config.extrinsics.check = false;
   System system(tour.rig(), config);
-  for (const image::ImageBundle& images : tour.frames()) system.process(images);
+  for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
   EXPECT_FALSE(system.extrinsics().done);
   EXPECT_FALSE(system.extrinsics_refined());

@@ -29,8 +29,8 @@ struct Scene {
       record.result.frame = FrameId(i);
       record.result.time_ns = 1'000'000'000 + static_cast<TimeNs>(i) * kInterval;
       record.result.status = tracking::TrackStatus::kTracking;
-      record.result.reference = KeyframeId(0);
-      record.result.T_rig_reference =
+      record.result.anchored.reference = KeyframeId(0);
+      record.result.anchored.T_rig_reference =
           pose(from + to_seconds(kInterval) * static_cast<double>(i), turn_rate) * pose(0, turn_rate).inverse();
       frames.push_back(std::move(record));
     }
@@ -100,7 +100,7 @@ TEST(FinalPoses, PartsOfTheMapHaveNoMotionBetweenThem) {
   Scene scene(0.3);
   const KeyframeId other =
       scene.map.add_keyframe(map::synthetic_frame(scene.random, 2, 30, 10), SE3(), {}, KeyframeId());
-  scene.frames[3].result.reference = other;
+  scene.frames[3].result.anchored.reference = other;
   EXPECT_TRUE(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).empty());
 }
 

@@ -17,7 +17,7 @@ const RenderedTour& tour() {
 }
 
 void play(System& system) {
-  for (const image::ImageBundle& images : tour().frames()) system.process(images);
+  for (const image::ImageBundle& images : tour().frames()) must_process(system, images);
   system.finish();
 }
 

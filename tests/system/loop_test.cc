@@ -61,7 +61,7 @@ TEST_F(SystemLoopParts, APartBeganInANewPlaceIsJoinedWhereItComesToAnOldOne) {
   System system(closed_walk().rig(), config(), with_vocabulary());
   std::size_t two = 0;
   for (std::size_t k = 0; k < walk.frames.size(); ++k) {
-    const FrameRecord& record = system.process(walk.frames[k]);
+    const FrameRecord record = must_process(system, walk.frames[k]);
     const bool lost = k >= kFirst && k < kFirst + kAfter - 1;
     EXPECT_EQ(is_tracked(record), !lost) << "frame " << k;
     const std::vector<PartTrajectory> parts = system.trajectories();
@@ -175,7 +175,7 @@ TEST_P(SystemLoopEnd, MayComeAtAnyFrameByInterruptionOrWithoutParallel) {
     std::jthread interruption;
     for (std::size_t k = 0; k < frames; ++k) {
       if (i % 3 != 0 && k + 1 == frames) interruption = std::jthread([&] { system.interrupt(); });
-      system.process(end.frames[k]);
+      must_process(system, end.frames[k]);
     }
     closed += !system.loops().empty();
     if (i % 3 != 2) continue;  // it goes as it is

@@ -11,7 +11,7 @@ namespace {
 TEST(SystemParallel, TracksAllFramesAsWellAsSequential) {
   const RenderedTour tour(4, 16);
   System system(tour.rig(), small_config(execution::Mode::kParallel));
-  for (const image::ImageBundle& images : tour.frames()) system.process(images);
+  for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
   EXPECT_EQ(tracked_frames(system), tour.frames().size());
   EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
@@ -27,7 +27,7 @@ TEST(SystemParallel, MayEndAtAnyFrameWithoutBeingFinished) {
   const RenderedTour tour(2, 12);
   for (std::size_t end = 0; end <= tour.frames().size(); ++end) {
     System system(tour.rig(), small_config(execution::Mode::kParallel));
-    for (std::size_t k = 0; k < end; ++k) system.process(tour.frames()[k]);
+    for (std::size_t k = 0; k < end; ++k) must_process(system, tour.frames()[k]);
     EXPECT_EQ(system.frames().size(), end);
   }
 }
@@ -39,7 +39,7 @@ TEST(SystemParallel, WaitsForAPendingKeyframeAtMost) {
   config.tracking.keyframe.min_interval = 1;
   config.tracking.keyframe.min_overlap = 1.0;  // a keyframe with every frame that lost one landmark
   System system(tour.rig(), config);
-  for (const image::ImageBundle& images : tour.frames()) system.process(images);
+  for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
   EXPECT_EQ(tracked_frames(system), tour.frames().size());
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
@@ -48,7 +48,7 @@ TEST(SystemParallel, WaitsForAPendingKeyframeAtMost) {
 TEST(SystemParallel, VersionsOfTheMapStayWholeForReadersInOtherThreads) {
   const RenderedTour tour(2, 12);
   System system(tour.rig(), small_config(execution::Mode::kParallel));
-  system.process(tour.frames()[0]);
+  must_process(system, tour.frames()[0]);
   std::atomic<bool> done = false;
   std::atomic<int> broken = 0;
   std::thread reader([&] {
@@ -59,7 +59,7 @@ TEST(SystemParallel, VersionsOfTheMapStayWholeForReadersInOtherThreads) {
       last = map->version();
     }
   });
-  for (std::size_t k = 1; k < tour.frames().size(); ++k) system.process(tour.frames()[k]);
+  for (std::size_t k = 1; k < tour.frames().size(); ++k) must_process(system, tour.frames()[k]);
   system.finish();
   done = true;
   reader.join();
@@ -70,13 +70,13 @@ TEST(SystemParallel, LeavesAYoungMapUpToScaleThatIsLost) {
   const RenderedTour tour(1, 12);
   System system(tour.rig(), small_config(execution::Mode::kParallel));
   std::size_t k = 0;
-  while (k < 8 && tracked_frames(system) == 0) system.process(tour.frames()[k++]);
+  while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);
   ASSERT_GT(tracked_frames(system), 0u);
   image::ImageBundle elsewhere = tour.frames()[k++];
   mirror(elsewhere.images[0]);
-  system.process(elsewhere);
+  must_process(system, elsewhere);
   EXPECT_EQ(tracked_frames(system), 0u);
-  for (std::size_t i = 0; i < tour.frames().size(); ++i) system.process(tour.replayed(i, k));
+  for (std::size_t i = 0; i < tour.frames().size(); ++i) must_process(system, tour.replayed(i, k));
   system.finish();
   EXPECT_EQ(system.maps_started(), 2);
   EXPECT_EQ(system.frames().size(), k + tour.frames().size());

@@ -2,6 +2,8 @@
 // rigs of fewer are its first ones, of which the first two look ahead side by side.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -132,6 +134,13 @@ inline Config small_config(execution::Mode mode, int threads = 2) {
   config.execution.threads = threads;
   config.features.per_image = 500;
   return config;
+}
+
+// Processes a frame the system has no reason to refuse.
+inline FrameRecord must_process(System& system, const image::ImageBundle& images) {
+  const auto record = system.process(images);
+  EXPECT_TRUE(record.ok());
+  return record.value();
 }
 
 inline std::size_t tracked_frames(const System& system) {

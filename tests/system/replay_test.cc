@@ -27,10 +27,10 @@ TEST(SystemReplay, RepeatsAParallelRunToTheBit) {
     config.tracking.keyframe.min_interval = 1;
     config.tracking.keyframe.min_overlap = 1.0;  // many keyframes, so that much overlaps
     System recorded(tour.rig(), config);
-    for (const image::ImageBundle& images : tour.frames()) recorded.process(images);
+    for (const image::ImageBundle& images : tour.frames()) must_process(recorded, images);
     recorded.finish();
     System replayed(tour.rig(), config, {.replay = reread(recorded)});
-    for (const image::ImageBundle& images : tour.frames()) replayed.process(images);
+    for (const image::ImageBundle& images : tour.frames()) must_process(replayed, images);
     replayed.finish();
     EXPECT_EQ(tracked_frames(replayed), tour.frames().size());
     expect_same(recorded, replayed);
@@ -45,11 +45,11 @@ TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
   for (std::size_t i = 0, first = frames.size(); i < tour.frames().size(); ++i)
     frames.push_back(tour.replayed(i, first));
   System recorded(tour.rig(), small_config(execution::Mode::kParallel));
-  for (const image::ImageBundle& images : frames) recorded.process(images);
+  for (const image::ImageBundle& images : frames) must_process(recorded, images);
   recorded.finish();
   EXPECT_EQ(recorded.maps_started(), 2);
   System replayed(tour.rig(), small_config(execution::Mode::kParallel), {.replay = reread(recorded)});
-  for (const image::ImageBundle& images : frames) replayed.process(images);
+  for (const image::ImageBundle& images : frames) must_process(replayed, images);
   replayed.finish();
   expect_same(recorded, replayed);
   MapVersion newest{0};
@@ -63,14 +63,14 @@ TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
 TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
   const RenderedTour tour(2, 10);
   System recorded(tour.rig(), small_config(execution::Mode::kSequential));
-  for (const image::ImageBundle& images : tour.frames()) recorded.process(images);
+  for (const image::ImageBundle& images : tour.frames()) must_process(recorded, images);
   recorded.finish();
   Config other = small_config(execution::Mode::kSequential);
   other.tracking.keyframe.min_interval = 1;
   other.tracking.keyframe.min_overlap = 1.0;
   System replayed(tour.rig(), other, {.replay = reread(recorded)});
   const auto replay = [&] {
-    for (const image::ImageBundle& images : tour.frames()) replayed.process(images);
+    for (const image::ImageBundle& images : tour.frames()) must_process(replayed, images);
     replayed.finish();
   };
   EXPECT_THROW(replay(), execution::ReplayMismatch);
@@ -78,7 +78,7 @@ TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
   Config without = small_config(execution::Mode::kSequential);
   without.final_adjustment = false;
   System shorter(tour.rig(), without, {.replay = reread(recorded)});
-  for (const image::ImageBundle& images : tour.frames()) shorter.process(images);
+  for (const image::ImageBundle& images : tour.frames()) must_process(shorter, images);
   EXPECT_THROW(shorter.finish(), execution::ReplayMismatch);
 }
 
@@ -87,17 +87,17 @@ TEST(SystemReplay, RepeatsAnInterruptedRunParallel) {
   for (const execution::Mode mode :
        {execution::Mode::kSequential, execution::Mode::kParallel, execution::Mode::kLagged}) {
     System recorded(tour.rig(), small_config(mode));
-    for (std::size_t k = 0; k < 7; ++k) recorded.process(tour.frames()[k]);
+    for (std::size_t k = 0; k < 7; ++k) must_process(recorded, tour.frames()[k]);
     std::jthread([&] { recorded.interrupt(); }).join();
     recorded.finish();
     for (const execution::JournalEntry& e : recorded.journal().entries)
       EXPECT_NE(e.step, execution::JournalStep::kFinal);
     EXPECT_EQ(final_poses(recorded).size(), 7u);
     System replayed(tour.rig(), small_config(mode), {.replay = reread(recorded)});
-    for (std::size_t k = 0; k < 7; ++k) replayed.process(tour.frames()[k]);
+    for (std::size_t k = 0; k < 7; ++k) must_process(replayed, tour.frames()[k]);
     replayed.finish();
     expect_same(recorded, replayed);
-    EXPECT_THROW(replayed.process(tour.frames()[7]), execution::ReplayMismatch);
+    EXPECT_THROW(must_process(replayed, tour.frames()[7]), execution::ReplayMismatch);
   }
 }
 

@@ -16,7 +16,7 @@ struct Outcome {
 
 Outcome run(const RenderedTour& tour, const Config& config) {
   System system(tour.rig(), config);
-  for (const image::ImageBundle& images : tour.frames()) system.process(images);
+  for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
   return {final_poses(system), live_poses(system), system.snapshot()->num_landmarks(),
           system.snapshot()->num_observations()};
@@ -40,7 +40,7 @@ TEST(SystemSequential, TracksWithOneToEightCameras) {
   const RenderedTour tour(8, count);
   for (int n = 1; n <= 8; ++n) {
     System system(tour.rig_of(n), small_config(execution::Mode::kSequential));
-    for (std::size_t k = 0; k < count; ++k) system.process(tour.frame_of(k, n));
+    for (std::size_t k = 0; k < count; ++k) must_process(system, tour.frame_of(k, n));
     system.finish();
     const auto align = n == 1 ? evaluation::AlignMode::kSim3 : evaluation::AlignMode::kSe3;
     EXPECT_EQ(system.snapshot()->scale(), n == 1 ? map::Scale::kUpToScale : map::Scale::kMetric) << n << " cameras";
@@ -67,7 +67,7 @@ TEST(SystemSequential, ADamagedOrMissingImageCostsOnlyItsCamera) {
   make_absent(frames[11].images[1], ImageState::kDamaged);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : frames) {
-    const FrameRecord& record = system.process(images);
+    const FrameRecord record = must_process(system, images);
     EXPECT_EQ(record.result.status, TrackStatus::kTracking) << "frame " << images.id.value();
     for (std::size_t c = 0; c < 4; ++c) {
       const bool present = images.images[c].state == ImageState::kPresent;
@@ -90,14 +90,15 @@ TEST(SystemSequential, IsLostInTheDarkAndRecovers) {
   }
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : frames) {
-    const FrameRecord& record = system.process(images);
+    const FrameRecord record = must_process(system, images);
     const bool dark = images.id.value() == 8 || images.id.value() == 9;
     EXPECT_EQ(record.result.status, dark ? TrackStatus::kLost : TrackStatus::kTracking)
         << "frame " << images.id.value();
     EXPECT_EQ(record.result.reason, dark ? LostReason::kNoImages : LostReason::kNone);
-    EXPECT_EQ(record.outages,
-              std::vector<tracking::Outage>(2, dark ? tracking::Outage::kBlack : tracking::Outage::kNone))
-        << "frame " << images.id.value();
+    const tracking::CameraStatus status =
+        dark ? tracking::CameraStatus{tracking::CameraState::kOut, tracking::CameraReason::kBlack}
+             : tracking::CameraStatus{};
+    EXPECT_EQ(record.cameras, std::vector<tracking::CameraStatus>(2, status)) << "frame " << images.id.value();
   }
   system.finish();
   EXPECT_EQ(final_poses(system).size(), frames.size() - 2);
@@ -112,7 +113,7 @@ TEST(SystemSequential, RecordsEveryInputFrame) {
     for (image::CameraImage& i : frames[k].images) make_absent(i, ImageState::kMissing);
   }
   System system(tour.rig(), small_config(execution::Mode::kSequential));
-  for (const image::ImageBundle& images : frames) system.process(images);
+  for (const image::ImageBundle& images : frames) must_process(system, images);
   system.finish();
   ASSERT_EQ(system.frames().size(), frames.size());
   for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -148,7 +149,7 @@ TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {
   blacken(black);
   System system(tour.rig(), small_config(execution::Mode::kSequential), {.masks = {image::Image(), black.image}});
   for (const image::ImageBundle& images : tour.frames()) {
-    const FrameRecord& record = system.process(images);
+    const FrameRecord record = must_process(system, images);
     EXPECT_GT(record.result.cameras[0].keypoints, 100);
     EXPECT_EQ(record.result.cameras[1].keypoints, 0);
     EXPECT_EQ(record.result.reason, LostReason::kNotStarted);  // no matched features, no metric start
@@ -160,16 +161,16 @@ TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
   const RenderedTour tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
-  while (k < 8 && tracked_frames(system) == 0) system.process(tour.frames()[k++]);
+  while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);
   ASSERT_GT(tracked_frames(system), 0u);
   image::ImageBundle elsewhere = tour.frames()[k++];
   mirror(elsewhere.images[0]);
-  system.process(elsewhere);
+  must_process(system, elsewhere);
   EXPECT_EQ(tracked_frames(system), 0u);
   EXPECT_TRUE(final_poses(system).empty() && live_poses(system).empty());
   EXPECT_EQ(system.snapshot()->num_keyframes(), 0u);
 
-  for (std::size_t i = 0; i < tour.frames().size(); ++i) system.process(tour.replayed(i, k));
+  for (std::size_t i = 0; i < tour.frames().size(); ++i) must_process(system, tour.replayed(i, k));
   system.finish();
   EXPECT_EQ(system.maps_started(), 2);
   EXPECT_GT(final_poses(system).size(), 8u);
@@ -180,14 +181,14 @@ TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {
   const RenderedTour tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
-  while (k < 8 && tracked_frames(system) == 0) system.process(tour.frames()[k++]);
+  while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);
   const std::size_t before = tracked_frames(system);
   ASSERT_GT(before, 0u);
   image::ImageBundle dark = tour.frames()[k++];
   blacken(dark.images[0]);
-  EXPECT_EQ(system.process(dark).result.reason, LostReason::kNoImages);
+  EXPECT_EQ(must_process(system, dark).result.reason, LostReason::kNoImages);
   EXPECT_EQ(tracked_frames(system), before);
-  while (k < tour.frames().size()) system.process(tour.frames()[k++]);
+  while (k < tour.frames().size()) must_process(system, tour.frames()[k++]);
   EXPECT_EQ(system.maps_started(), 1);
   EXPECT_GT(tracked_frames(system), before + 4);
 }
@@ -197,9 +198,64 @@ TEST(SystemSequential, StartsUpToScaleSoonAfterADarkFirstFrame) {
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   image::ImageBundle dark = tour.frames()[0];
   blacken(dark.images[0]);
-  system.process(dark);
-  for (std::size_t i = 0; i < tour.frames().size(); ++i) system.process(tour.replayed(i, 1));
+  must_process(system, dark);
+  for (std::size_t i = 0; i < tour.frames().size(); ++i) must_process(system, tour.replayed(i, 1));
   EXPECT_GT(tracked_frames(system), 8u);
+}
+
+TEST(SystemSequential, RefusesAFrameThatIsNoneOfItsRigAndGoesOn) {
+  const RenderedTour tour(2, 6);
+  System system(tour.rig(), small_config(execution::Mode::kSequential)),
+      undisturbed(tour.rig(), small_config(execution::Mode::kSequential));
+  for (const image::ImageBundle& images : tour.frames()) {
+    image::ImageBundle wrong = images;
+    wrong.images.pop_back();
+    EXPECT_FALSE(system.process(wrong).ok());
+    must_process(system, images);
+    must_process(undisturbed, images);
+    EXPECT_FALSE(system.process(images).ok());  // its time has passed
+  }
+  EXPECT_EQ(system.frames().size(), tour.frames().size());
+  EXPECT_TRUE(identical(live_poses(system), live_poses(undisturbed)));
+}
+
+TEST(SystemSequential, KeepsAsMuchHistoryAsAskedFor) {
+  constexpr std::size_t kHistory = 4;
+  const RenderedTour tour(2, 16);
+  System all(tour.rig(), small_config(execution::Mode::kSequential)),
+      bounded(tour.rig(), small_config(execution::Mode::kSequential), {.history = kHistory});
+  for (const image::ImageBundle& images : tour.frames()) {
+    must_process(all, images);
+    const FrameRecord record = must_process(bounded, images);
+    EXPECT_LT(bounded.frames().size(), 2 * kHistory);
+    EXPECT_GE(bounded.frames().size(), std::min(kHistory, images.id.index() + 1));
+    EXPECT_EQ(bounded.frames().back().result.frame, record.result.frame);
+  }
+  all.finish();
+  bounded.finish();
+  EXPECT_TRUE(bounded.journal().entries.empty());
+  const evaluation::Trajectory whole = final_poses(all), last = final_poses(bounded);
+  ASSERT_GE(last.size(), kHistory);
+  EXPECT_TRUE(identical({whole.end() - static_cast<std::ptrdiff_t>(last.size()), whole.end()}, last));
+}
+
+TEST(SystemSequential, TellsAnObserverWhatItsStagesDid) {
+  const RenderedTour tour(2, 8);
+  std::vector<StageRecord> told;
+  System system(tour.rig(), small_config(execution::Mode::kSequential),
+                {.observer = [&](const StageRecord& record) { told.push_back(record); }});
+  for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
+  system.finish();
+  ASSERT_FALSE(told.empty());
+  ASSERT_EQ(told.size(), system.stage_runs().size());
+  double created = 0;
+  for (const StageRecord& record : told) {
+    for (const execution::StageStatistic& s : record.run.statistics)
+      created += s.name == "created landmarks" ? s.value : 0;
+  }
+  EXPECT_GT(created, 0);
+  EXPECT_TRUE(system.final_adjustment().done);
+  EXPECT_LT(system.final_adjustment().final_cost, system.final_adjustment().initial_cost);
 }
 
 TEST(SystemSequential, AdjustsTheWholeMapAtTheEndOnlyWhereConfigured) {
@@ -208,7 +264,7 @@ TEST(SystemSequential, AdjustsTheWholeMapAtTheEndOnlyWhereConfigured) {
     Config config = small_config(execution::Mode::kSequential);
     config.final_adjustment = wanted;
     System system(tour.rig(), config);
-    for (const image::ImageBundle& images : tour.frames()) system.process(images);
+    for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
     const MapVersion before = system.snapshot()->version();
     system.finish();
     EXPECT_EQ(system.snapshot()->version() > before, wanted);

@@ -114,11 +114,12 @@ class WrongPictures : public ::testing::Test {
     frame::CameraFrame& camera = seen.frame.cameras[to];
     const camera::Rig& rig = world().map.rig();
     camera.keypoints = seen.frame.cameras[from].keypoints;
+    feature::Refinement positions = camera.keypoints.positions();
     for (std::size_t k = 0; k < camera.keypoints.size(); ++k) {
-      const auto bearing = rig.camera(to).unproject(camera.keypoints.pixel[k].cast<double>());
-      if (bearing) camera.keypoints.bearing[k] = *bearing;
+      const auto bearing = rig.camera(to).unproject(positions.pixel[k].cast<double>());
+      if (bearing) positions.bearing[k] = *bearing;
     }
-    camera.grid = frame::FeatureGrid(camera.keypoints, rig.camera(to).width, rig.camera(to).height);
+    camera = frame::refined(camera, std::move(positions), rig.camera(to));
     seen.frame.bundled = matching::make_bundled(rig, seen.frame.cameras, {}, 5e-4, 7.81);
     return seen;
   }

@@ -35,19 +35,20 @@ image::ImageBundle frame(std::vector<image::Image> images) {
   return bundle;
 }
 
-using Outages = std::vector<Outage>;
+using Outages = std::vector<CameraReason>;
 
 TEST(CameraMonitor, PassesOrdinaryPictures) {
   CameraMonitor monitor(2, {});
   for (std::uint64_t k = 0; k < 5; ++k) {
-    EXPECT_EQ(monitor.judge(frame({good(2 * k), good(2 * k + 1)})), (Outages{Outage::kNone, Outage::kNone}));
+    EXPECT_EQ(monitor.judge(frame({good(2 * k), good(2 * k + 1)})),
+              (Outages{CameraReason::kNone, CameraReason::kNone}));
   }
 }
 
 TEST(CameraMonitor, TellsBlackOverExposedAndMissingApart) {
   CameraMonitor monitor(3, {});
   EXPECT_EQ(monitor.judge(frame({picture(1, 0, 12), picture(2, 251, 255), {}})),
-            (Outages{Outage::kBlack, Outage::kOverExposed, Outage::kNoImage}));
+            (Outages{CameraReason::kBlack, CameraReason::kOverExposed, CameraReason::kNoImages}));
 }
 
 TEST(CameraMonitor, ANightSceneWithLampsIsNotBlack) {
@@ -56,23 +57,23 @@ TEST(CameraMonitor, ANightSceneWithLampsIsNotBlack) {
     for (int x = 0; x < 8; ++x) night.row(y)[x] = 180;
   }
   CameraMonitor monitor(1, {});
-  EXPECT_EQ(monitor.judge(frame({night})), Outages{Outage::kNone});
+  EXPECT_EQ(monitor.judge(frame({night})), Outages{CameraReason::kNone});
 }
 
 TEST(CameraMonitor, FindsTheFrozenCameraAndNotARigThatStandsStill) {
   CameraMonitor monitor(2, {});
   monitor.judge(frame({good(1), good(2)}));
-  EXPECT_EQ(monitor.judge(frame({good(1), good(2)})), (Outages{Outage::kNone, Outage::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
+  EXPECT_EQ(monitor.judge(frame({good(1), good(2)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
 }
 
 TEST(CameraMonitor, AFrozenCameraStaysOutWhereTheOthersMissAFrame) {
   CameraMonitor monitor(2, {});
   monitor.judge(frame({good(1), good(2)}));
-  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
+  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
   for (int k = 0; k < 4; ++k)
-    EXPECT_EQ(monitor.judge(frame({{}, good(2)})), (Outages{Outage::kNoImage, Outage::kFrozen}));
-  EXPECT_EQ(monitor.judge(frame({good(4), good(2)})), (Outages{Outage::kNone, Outage::kFrozen}));
+    EXPECT_EQ(monitor.judge(frame({{}, good(2)})), (Outages{CameraReason::kNoImages, CameraReason::kFrozen}));
+  EXPECT_EQ(monitor.judge(frame({good(4), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
 }
 
 TEST(CameraMonitor, OnePixelIsChangeEnough) {
@@ -80,35 +81,35 @@ TEST(CameraMonitor, OnePixelIsChangeEnough) {
   image::Image almost = good(2);
   monitor.judge(frame({good(1), good(2)}));
   almost.row(kHeight - 1)[kWidth - 1] ^= 1;
-  EXPECT_EQ(monitor.judge(frame({good(3), almost})), (Outages{Outage::kNone, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(3), almost})), (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
 TEST(CameraMonitor, ReadmitsAfterGoodPicturesInARow) {
   CameraMonitor monitor(2, {.readmit_after = 3});
   monitor.judge(frame({picture(1, 0, 5), good(11)}));
-  EXPECT_EQ(monitor.judge(frame({good(1), good(12)})), (Outages{Outage::kBlack, Outage::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(2), good(13)})), (Outages{Outage::kBlack, Outage::kNone}));
-  EXPECT_EQ(monitor.judge(frame({picture(2, 0, 5), good(14)})), (Outages{Outage::kBlack, Outage::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(3), good(15)})), (Outages{Outage::kBlack, Outage::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(4), good(16)})), (Outages{Outage::kBlack, Outage::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(5), good(17)})), (Outages{Outage::kNone, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(1), good(12)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(2), good(13)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.judge(frame({picture(2, 0, 5), good(14)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(3), good(15)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(4), good(16)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(5), good(17)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
 TEST(CameraMonitor, ReadmitsAtOnceWhereNoOtherIsLeft) {
   CameraMonitor monitor(3, {.readmit_after = 3});
-  const Outages dark(3, Outage::kBlack);
+  const Outages dark(3, CameraReason::kBlack);
   EXPECT_EQ(monitor.judge(frame({picture(1, 0, 5), picture(2, 0, 5), picture(3, 0, 5)})), dark);
   EXPECT_EQ(monitor.judge(frame({picture(4, 0, 5), good(1), {}})),
-            (Outages{Outage::kBlack, Outage::kNone, Outage::kNoImage}));
+            (Outages{CameraReason::kBlack, CameraReason::kNone, CameraReason::kNoImages}));
   EXPECT_EQ(monitor.judge(frame({good(2), good(3), good(4)})),
-            (Outages{Outage::kBlack, Outage::kNone, Outage::kBlack}));
+            (Outages{CameraReason::kBlack, CameraReason::kNone, CameraReason::kBlack}));
 }
 
 TEST(CameraMonitor, ACameraThatComesNowAndThenIsTakenAsItComes) {
   CameraMonitor monitor(2, {});
   monitor.judge(frame({good(1), good(2)}));
-  EXPECT_EQ(monitor.judge(frame({good(3), {}})), (Outages{Outage::kNone, Outage::kNoImage}));
-  EXPECT_EQ(monitor.judge(frame({good(4), good(5)})), (Outages{Outage::kNone, Outage::kNone}));
+  EXPECT_EQ(monitor.judge(frame({good(3), {}})), (Outages{CameraReason::kNone, CameraReason::kNoImages}));
+  EXPECT_EQ(monitor.judge(frame({good(4), good(5)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
 // Tiles of 40 pixels whose edges are blurred by `across` and `along` pixels (standard deviations) in rows and columns.

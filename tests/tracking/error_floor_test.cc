@@ -48,7 +48,7 @@ class FloorsOfAFrame : public ::testing::Test {
  protected:
   FloorsOfAFrame() : tracker(world) {
     frame = world.sim.frame(FrameId(1), 0.1).frame;
-    for (frame::CameraFrame& c : frame.cameras) std::fill(c.keypoints.sigma.begin(), c.keypoints.sigma.end(), 0.35f);
+    for (frame::CameraFrame& c : frame.cameras) c.keypoints.sigma = std::vector<float>(c.keypoints.size(), 0.35f);
     output = tracker.track(frame);
   }
   static map::SimulatedMap make_world() {
@@ -77,8 +77,9 @@ TEST_F(FloorsOfAFrame, FallWhereErrorsAreSmallerThanClaimed) {
 
 TEST_F(FloorsOfAFrame, AreEachCamerasOwn) {
   Random random(1, "worse camera");
-  for (Eigen::Vector2f& pixel : frame.cameras[2].keypoints.pixel)
-    pixel += 0.6f * Eigen::Vector2d(random.normal(), random.normal()).cast<float>();
+  std::vector<Eigen::Vector2f> pixels = frame.cameras[2].keypoints.pixel.copy();
+  for (Eigen::Vector2f& pixel : pixels) pixel += 0.6f * Eigen::Vector2d(random.normal(), random.normal()).cast<float>();
+  frame.cameras[2].keypoints.pixel = std::move(pixels);
   const auto floors = error_floors({}, world.map, frame, output, kOptions);
   for (const std::size_t c : {0u, 1u, 3u}) EXPECT_LT(floors[c] + 0.01, floors[2]) << "camera " << c;
 }

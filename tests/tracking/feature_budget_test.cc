@@ -172,6 +172,7 @@ class TrackedFrame : public ::testing::Test {
                            .noise = {world.sim.options().sigma_px}};
     ThreadPool pool(2);
     output = track(input, frame, tracker.options, pool);
+    frame = output.frame;
   }
   map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 0.0, 1.0);
   std::vector<image::Pyramid> pyramids = map::flat_pyramids(4);
@@ -186,7 +187,7 @@ TEST_F(TrackedFrame, TellsWhatThePoseSolverKnows) {
   ASSERT_EQ(information.size(), 4u);
   Matrix6d all = Matrix6d::Zero();
   for (const Matrix6d& i : information) all += i;
-  const auto observations = pose_observations(world.map, frame, output.matches);
+  const auto observations = observations_of(world.map, frame, output.matches);
   solver::PoseSolverOptions accept_all;
   const auto solution =
       solver::solve_pose(frame::rig_of(world.map.rig(), frame), observations, output.result.T_rig_world, accept_all);

@@ -74,21 +74,52 @@ TEST_F(FindLandmarks, ACameraWithoutImageFindsNothing) {
 
 TEST_F(FindLandmarks, WhatDoesNotAlignKeepsItsPlaceWithTheDetectorsNoise) {
   MatchSearch search = find({});
-  frame::BundledFrame frame = seen.frame;
-  for (auto& s : frame.cameras[0].keypoints.sigma) s = 0.01f;
-  align_matches(world.map, seen.T_world_rig.inverse(), search.found, map::flat_pyramids(4),
-                std::vector<matching::AlignmentOptions>(4), {.sigma_px = 0.9}, frame, pool);
-  for (const Match& m : search.found[0]) {
-    const std::size_t k = m.keypoint.index();
-    EXPECT_EQ(frame.cameras[0].keypoints.pixel[k], seen.frame.cameras[0].keypoints.pixel[k]);
-    EXPECT_FALSE(m.aligned);
-    EXPECT_NEAR(frame.cameras[0].keypoints.sigma[k], 0.9 * std::pow(1.2, frame.cameras[0].keypoints.level[k]), 1e-4);
+  const feature::Keypoints& keypoints = seen.frame.cameras[0].keypoints;
+  const AlignedMatches aligned =
+      align_matches(world.map, seen.frame, seen.T_world_rig.inverse(), search.found, map::flat_pyramids(4),
+                    std::vector<matching::AlignmentOptions>(4), {.sigma_px = 0.9}, pool);
+  ASSERT_EQ(aligned[0].size(), search.found[0].size());
+  for (std::size_t i = 0; i < aligned[0].size(); ++i) {
+    const std::size_t k = search.found[0][i].keypoint.index();
+    EXPECT_EQ(aligned[0][i].pixel, keypoints.pixel[k]);
+    EXPECT_FALSE(search.found[0][i].aligned);
+    EXPECT_NEAR(aligned[0][i].sigma, 0.9 * std::pow(1.2, keypoints.level[k]), 1e-4);
   }
+}
+
+// Outliers stay where they were, the frame that was aligned stays as it is, and what does not move is shared.
+TEST_F(FindLandmarks, TheRefinedFrameHasTheInliersAtTheirAlignedPositions) {
+  const FrameMatches found = find({}).found;
+  AlignedMatches aligned(found.size());
+  std::vector<std::uint8_t> inlier;
+  for (std::size_t c = 0; c < found.size(); ++c) {
+    for (std::size_t i = 0; i < found[c].size(); ++i) {
+      aligned[c].push_back({{static_cast<float>(i), 7.0f}, Eigen::Vector3d::UnitX(), 0.11f});
+      inlier.push_back(i % 2 == 0);
+    }
+  }
+  const feature::Refinement before = seen.frame.cameras[0].keypoints.positions();
+  const frame::BundledFrame frame = refined(seen.frame, found, aligned, inlier, world.map.rig());
+  const feature::Keypoints &then = seen.frame.cameras[0].keypoints, &now = frame.cameras[0].keypoints;
+  EXPECT_EQ(then.pixel.copy(), before.pixel);
+  EXPECT_EQ(then.descriptor.data(), now.descriptor.data());
+  std::vector<std::uint8_t> moved(now.size(), 0);
+  for (std::size_t i = 0; i < found[0].size(); i += 2) {
+    const std::size_t k = found[0][i].keypoint.index();
+    moved[k] = 1;
+    EXPECT_EQ(now.pixel[k], aligned[0][i].pixel);
+    EXPECT_EQ(now.bearing[k], aligned[0][i].bearing);
+    EXPECT_EQ(now.sigma[k], aligned[0][i].sigma);
+    std::vector<std::uint32_t> near;
+    frame.cameras[0].grid.near(now, now.pixel[k].cast<double>(), 0.5, 0, 7, near);
+    EXPECT_TRUE(std::ranges::find(near, static_cast<std::uint32_t>(k)) != near.end());
+  }
+  for (std::size_t k = 0; k < now.size(); ++k) EXPECT_TRUE(moved[k] || now.pixel[k] == then.pixel[k]);
 }
 
 TEST_F(FindLandmarks, ObservationsFollowTheOrderOfTheMatches) {
   const MatchSearch search = find({});
-  const auto observations = pose_observations(world.map, seen.frame, search.found);
+  const auto observations = pose_observations(world.map, seen.frame, search.found, {});
   ASSERT_EQ(observations.size(), count(search.found));
   std::size_t i = 0;
   std::vector<std::uint8_t> every_third;

@@ -29,7 +29,7 @@ TEST_F(PoseBetween, IsThatOfTheFrame) {
     EXPECT_EQ(result->status, TrackStatus::kTracking);
     EXPECT_EQ(result->frame, FrameId(7));
     EXPECT_LT(map::distance_m(result->T_rig_world, seen.T_world_rig.inverse()), 0.02) << time_s;
-    const geometry::SE3 by_reference = result->T_rig_reference * world_.map.resolved_pose(result->reference);
+    const geometry::SE3 by_reference = result->anchored.resolve(world_.map).value();
     EXPECT_LT(map::distance_m(by_reference, result->T_rig_world), 1e-9);
     EXPECT_GT(result->cameras[0].inliers, 30);
   }

@@ -74,11 +74,26 @@ class SimulatedTracker {
   ThreadPool pool_;
 };
 
+// Observations of the matched keypoints as the frame has them, each with its own standard deviation.
+inline std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map,
+                                                            const frame::BundledFrame& frame,
+                                                            const FrameMatches& matches) {
+  std::vector<solver::PoseObservation> out;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    const feature::Keypoints& k = frame.cameras[c].keypoints;
+    for (const Match& m : matches[c]) {
+      const std::size_t i = m.keypoint.index();
+      out.push_back({CameraIndex(c), map.landmark(m.landmark).position, k.pixel[i].cast<double>(), k.sigma[i]});
+    }
+  }
+  return out;
+}
+
 // Moves a share of the keypoints by up to 25 pixels: they still look like their landmarks and are where those are not.
 inline void displace_keypoints(const camera::Rig& rig, double share, Random random, frame::BundledFrame& frame) {
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
-    feature::Keypoints& k = frame.cameras[c].keypoints;
-    for (std::size_t i = 0; i < k.size(); ++i) {
+    feature::Refinement k = frame.cameras[c].keypoints.positions();
+    for (std::size_t i = 0; i < k.pixel.size(); ++i) {
       if (random.uniform() >= share) continue;
       const Eigen::Vector2d moved =
           k.pixel[i].cast<double>() + Eigen::Vector2d(random.uniform(-25, 25), random.uniform(-25, 25));
@@ -87,7 +102,7 @@ inline void displace_keypoints(const camera::Rig& rig, double share, Random rand
       k.pixel[i] = moved.cast<float>();
       k.bearing[i] = *bearing;
     }
-    frame.cameras[c].grid = frame::FeatureGrid(k, rig.camera(c).width, rig.camera(c).height);
+    frame.cameras[c] = frame::refined(frame.cameras[c], std::move(k), rig.camera(c));
   }
 }
 

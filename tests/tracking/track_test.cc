@@ -22,7 +22,7 @@ struct RigCase {
 double squared_normalised_error(const map::BundledMap& map, const frame::BundledFrame& frame,
                                 const FrameMatches& matches, const SE3& T_rig_world, const SE3& true_T_rig_world) {
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
-  for (const solver::PoseObservation& o : pose_observations(map, frame, matches)) {
+  for (const solver::PoseObservation& o : observations_of(map, frame, matches)) {
     const Eigen::Vector3d p = true_T_rig_world * o.point_world;
     const SE3& T_cam_rig = map.rig().cam_from_rig(o.camera);
     const auto projection = map.rig().camera(o.camera).project_with_jacobian(T_cam_rig * p);
@@ -142,9 +142,9 @@ TEST_F(Track, KeepsThePoseRelativeToItsReference) {
   SimulatedTracker tracker(world());
   const TrackOutput out = tracker.track(seen(3).frame);
   ASSERT_EQ(out.result.status, TrackStatus::kTracking);
-  const SE3 again = out.result.T_rig_reference * world().map.resolved_pose(out.result.reference);
+  const SE3 again = out.result.anchored.resolve(world().map).value();
   EXPECT_LT(map::distance_m(again, out.result.T_rig_world), 1e-9);
-  EXPECT_EQ(out.state.reference, out.result.reference);
+  EXPECT_EQ(out.state.anchored.reference, out.result.anchored.reference);
   EXPECT_EQ(out.state.landmarks, landmarks_of(out.matches));
 }
 
@@ -269,17 +269,16 @@ TEST_F(Track, DoesNotTakeWhatStayedForProofThatNothingMoved) {
   auto shown = frame.frame;
   const auto& before = world().frames[0];
   for (std::size_t c = 0; c < shown.cameras.size(); ++c) {
-    feature::Keypoints& k = shown.cameras[c].keypoints;
+    feature::Refinement k = shown.cameras[c].keypoints.positions();
     const feature::Keypoints& old = before.frame.cameras[c].keypoints;
-    for (std::size_t i = 0; i < k.size(); ++i) {
+    for (std::size_t i = 0; i < k.pixel.size(); ++i) {
       const auto same = std::ranges::find(before.landmark[c], frame.landmark[c][i]);
       if (i % 5 > 1 || frame.landmark[c][i] < 0 || same == before.landmark[c].end()) continue;
       const auto o = static_cast<std::size_t>(same - before.landmark[c].begin());
       k.pixel[i] = old.pixel[o];
       k.bearing[i] = old.bearing[o];
     }
-    shown.cameras[c].grid =
-        frame::FeatureGrid(k, world().map.rig().camera(c).width, world().map.rig().camera(c).height);
+    shown.cameras[c] = frame::refined(shown.cameras[c], std::move(k), world().map.rig().camera(c));
   }
   EXPECT_GT(map::angle_rad(frame.T_world_rig, before.T_world_rig), 2 * tracker.options.matching.predicted_radius);
   expect_true(tracker.track(shown).result, frame.T_world_rig, "first motion");
@@ -323,12 +322,12 @@ TEST(TrackerState, StartsAfreshAtAKeyframe) {
   before.best_overlap = 300;
   before.sightings = {{LandmarkId(1), 1, 1}};
   const TrackerState state = state_at_keyframe(before, 50, KeyframeId(4), {LandmarkId(2), LandmarkId(3)});
-  EXPECT_EQ(state.reference, KeyframeId(4));
+  EXPECT_EQ(state.anchored.reference, KeyframeId(4));
   EXPECT_EQ(state.time_ns, 50);
   EXPECT_EQ(state.frames_since_keyframe, 0);
   EXPECT_EQ(state.best_overlap, 0);
   EXPECT_TRUE(state.sightings.empty());
-  EXPECT_EQ(state.T_rig_reference.translation().norm(), 0.0);
+  EXPECT_EQ(state.anchored.T_rig_reference.translation().norm(), 0.0);
   EXPECT_TRUE(state.twist.has_value());
   EXPECT_EQ(state.landmarks.size(), 2u);
 }

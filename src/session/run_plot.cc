@@ -1,4 +1,4 @@
-#include "report/run_plot.h"
+#include "session/run_plot.h"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,11 @@
 
 #include "report/figure.h"
 
-namespace bslam::report {
+namespace bslam::session {
 
 namespace {
+
+using namespace report;  // figures
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kBins = 450;  // of time, about one for two pixels
@@ -29,11 +31,13 @@ Series time_series(std::string label, Points points, std::string_view colour, do
 }
 
 // One of the counts of a camera in every frame; a gap where it has no image.
-Points camera_points(const RunRecord& record, std::size_t camera, int CameraCounts::*count) {
+Points camera_points(const RunRecord& record, std::size_t camera, int tracking::CameraCounts::*count) {
   Points points;
-  for (const FrameRecord& frame : record.frames) {
-    const bool seen = camera < frame.cameras.size() && frame.cameras[camera].has_image;
-    points.push_back({frame.time_s, seen ? static_cast<double>(frame.cameras[camera].*count) : kNone});
+  for (const RunFrame& frame : record.frames) {
+    const bool seen = frame.record && camera < frame.record->images.size() &&
+                      frame.record->images[camera] == image::ImageState::kPresent;
+    points.push_back(
+        {frame.time_s, seen ? static_cast<double>(frame.record->final_result().cameras[camera].*count) : kNone});
   }
   return reduced(points, kBins, Reduction::kMedian);
 }
@@ -63,15 +67,15 @@ std::string camera_name(const RunRecord& record, std::size_t camera) {
 
 std::size_t camera_count(const RunRecord& record) {
   std::size_t count = record.cameras.size();
-  for (const FrameRecord& frame : record.frames) count = std::max(count, frame.cameras.size());
+  for (const RunFrame& frame : record.frames) count = std::max(count, frame.record ? frame.record->images.size() : 0);
   return count;
 }
 
 Panel keypoint_panel(const RunRecord& record) {
   Panel panel = time_panel(record, "Keypoints by camera", "keypoints");
   for (std::size_t i = 0; i < camera_count(record); ++i) {
-    panel.series.push_back(
-        time_series(camera_name(record, i), camera_points(record, i, &CameraCounts::keypoints), series_colour(i), 1.5));
+    panel.series.push_back(time_series(
+        camera_name(record, i), camera_points(record, i, &tracking::CameraCounts::keypoints), series_colour(i), 1.5));
   }
   return panel;
 }
@@ -79,14 +83,15 @@ Panel keypoint_panel(const RunRecord& record) {
 Panel inlier_panel(const RunRecord& record) {
   Panel panel = time_panel(record, "Landmarks matched (thin) and inliers (bold) by camera", "landmarks");
   for (std::size_t i = 0; i < camera_count(record); ++i) {
-    panel.series.push_back(time_series("", camera_points(record, i, &CameraCounts::matched), series_colour(i), 0.7));
     panel.series.push_back(
-        time_series(camera_name(record, i), camera_points(record, i, &CameraCounts::inliers), series_colour(i), 2.0));
+        time_series("", camera_points(record, i, &tracking::CameraCounts::matched), series_colour(i), 0.7));
+    panel.series.push_back(time_series(
+        camera_name(record, i), camera_points(record, i, &tracking::CameraCounts::inliers), series_colour(i), 2.0));
   }
   Series keyframes = time_series("keyframe", {}, kBlack, 6.0);
   keyframes.style = SeriesStyle::kPoints;
-  for (const FrameRecord& frame : record.frames) {
-    if (frame.keyframe) keyframes.points.push_back({frame.time_s, 0.0});
+  for (const RunFrame& frame : record.frames) {
+    if (frame.record && frame.record->keyframe) keyframes.points.push_back({frame.time_s, 0.0});
   }
   if (!keyframes.points.empty()) panel.series.push_back(std::move(keyframes));
   for (const PlaceEvent& loop : record.loops) panel.marks.push_back({loop.at_s, std::string(kPurple)});
@@ -96,27 +101,32 @@ Panel inlier_panel(const RunRecord& record) {
   return panel;
 }
 
-// A bar for every stretch of time in which a camera was not sound, at the height of its number, in the colour of why; empty
-// where all were. Bars too near to each other to be told apart are one.
+// A bar for every stretch of time in which a camera was not sound, at the height of its number, in the colour of why;
+// empty where all were. Bars too near to each other to be told apart are one.
 std::optional<Panel> camera_state_panel(const RunRecord& record) {
   if (record.frames.empty()) return std::nullopt;
-  const double begin_s = record.frames.front().time_s, end_s = record.frames.back().time_s, apart_s = (end_s - begin_s) / kBins;
+  const double begin_s = record.frames.front().time_s, end_s = record.frames.back().time_s,
+               apart_s = (end_s - begin_s) / kBins;
   Panel panel = time_panel(record, "Cameras that were not sound", "camera");
   panel.floor = AxisFloor::kFromData;
-  panel.series.push_back(time_series("", {{begin_s, -0.5}, {end_s, static_cast<double>(record.cameras.size()) - 0.5}}, "none", 0.0));
+  panel.series.push_back(
+      time_series("", {{begin_s, -0.5}, {end_s, static_cast<double>(record.cameras.size()) - 0.5}}, "none", 0.0));
   const std::size_t without = panel.series.size();
   for (std::size_t i = 0; i < record.cameras.size(); ++i) {
     const double y = static_cast<double>(i);
     for (const CameraInterval& interval : record.cameras[i].states) {
-      if (interval.state == "ok") continue;
-      const std::string why = interval.reason.empty() ? interval.state : interval.state + ": " + interval.reason;
+      if (interval.status.state == tracking::CameraState::kOk) continue;
+      const std::string why =
+          fmt::format("{}: {}", tracking::describe(interval.status.state), tracking::describe(interval.status.reason));
       auto series = std::ranges::find(panel.series, why, &Series::label);
       if (series == panel.series.end()) {
         const std::size_t k = panel.series.size() - without;
-        series = panel.series.insert(series, time_series(why, {}, series_colour(k == 0 ? 0 : k + 1), 6.0));  // 1 is that of lost frames
+        series = panel.series.insert(
+            series, time_series(why, {}, series_colour(k == 0 ? 0 : k + 1), 6.0));  // 1 is that of lost frames
       }
       Points& bars = series->points;
-      auto* const last = bars.empty() ? nullptr : &bars[bars.size() - 2];  // the end of the bar before; after it the line is broken
+      auto* const last =
+          bars.empty() ? nullptr : &bars[bars.size() - 2];  // the end of the bar before; after it the line is broken
       if (last != nullptr && (*last)[1] == y && interval.from_s - (*last)[0] < apart_s) {
         (*last)[0] = interval.to_s;
       } else {
@@ -137,8 +147,8 @@ Points stage_points(const StageSeries& stage) {
 Panel frame_time_panel(const RunRecord& record) {
   Panel panel = time_panel(record, "Time for a frame, and its stages", "time [ms]");
   Points total;
-  for (const FrameRecord& frame : record.frames) {
-    total.push_back({frame.time_s, frame.outcome == FrameOutcome::kDropped ? kNone : frame.frame_ms});
+  for (const RunFrame& frame : record.frames) {
+    total.push_back({frame.time_s, frame.record ? frame.record->frame_ms : kNone});
   }
   if (total.size() > kBins) {
     panel.series.push_back(time_series("frame, largest", reduced(total, kBins, Reduction::kMaximum), "#BBBBBB", 1.0));
@@ -165,7 +175,7 @@ Panel background_panel(const RunRecord& record, std::span<const StageSeries* con
 }
 
 std::string subtitle_of(const RunRecord& record) {
-  const auto tracked = std::ranges::count(record.frames, FrameOutcome::kTracked, &FrameRecord::outcome);
+  const auto tracked = std::ranges::count(record.frames, FrameOutcome::kTracked, &RunFrame::outcome);
   return fmt::format("{}{}; {} of {} frames tracked; {} keyframes, {} landmarks", record.mode,
                      record.complete ? "" : ", interrupted", tracked, record.frames.size(), record.map.keyframes,
                      record.map.landmarks);
@@ -179,7 +189,8 @@ std::string run_plot_svg(const RunRecord& record) {
   figure.rows.push_back({.height_px = 230.0, .panels = {keypoint_panel(record)}});
   figure.rows.push_back({.height_px = 270.0, .panels = {inlier_panel(record)}});
   if (auto states = camera_state_panel(record)) {
-    figure.rows.push_back({.height_px = 90.0 + 20.0 * static_cast<double>(record.cameras.size()), .panels = {*std::move(states)}});
+    figure.rows.push_back(
+        {.height_px = 90.0 + 20.0 * static_cast<double>(record.cameras.size()), .panels = {*std::move(states)}});
   }
   figure.rows.push_back({.height_px = 270.0, .panels = {frame_time_panel(record)}});
   std::vector<const StageSeries*> background;
@@ -191,4 +202,4 @@ std::string run_plot_svg(const RunRecord& record) {
   return figure_svg(figure);
 }
 
-}  // namespace bslam::report
+}  // namespace bslam::session

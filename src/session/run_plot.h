@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "report/run_record.h"
+#include "session/run_record.h"
 
-namespace bslam::report {
+namespace bslam::session {
 
 // SVG, one panel below the other over the same time: keypoints by camera; landmarks matched (thin) and inliers (bold)
 // by camera, keyframes as dots at the foot, loops and relocalisations as lines; where some were not sound,
@@ -14,4 +14,4 @@ namespace bslam::report {
 // (the frame time also as maxima) over equal stretches of time.
 std::string run_plot_svg(const RunRecord& record);
 
-}  // namespace bslam::report
+}  // namespace bslam::session

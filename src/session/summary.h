@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "report/run_record.h"
+#include "session/run_record.h"
 
-namespace bslam::report {
+namespace bslam::session {
 
 // Order statistics of durations in ms; all NaN where there is none. A share between two samples is interpolated
 // linearly (as numpy.percentile does).
@@ -26,4 +26,4 @@ nlohmann::ordered_json summary_json(const RunRecord& record);
 // The bytes of the file: indented, with a final newline; text that is not UTF-8 is replaced.
 std::string summary_text(const RunRecord& record);
 
-}  // namespace bslam::report
+}  // namespace bslam::session

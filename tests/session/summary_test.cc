@@ -1,10 +1,10 @@
-#include "report/summary.h"
+#include "session/summary.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-namespace bslam::report {
+namespace bslam::session {
 namespace {
 
 using nlohmann::ordered_json;
@@ -15,20 +15,26 @@ std::vector<std::string> keys(const ordered_json& json) {
   return names;
 }
 
-FrameRecord frame(double time_s, FrameOutcome outcome, std::string reason = {}) {
-  FrameRecord record;
-  record.time_s = time_s;
-  record.outcome = outcome;
-  record.lost_reason = std::move(reason);
-  return record;
+using tracking::LostReason;
+
+// A frame with a pose, or one that was lost.
+RunFrame frame(double time_s, LostReason reason = LostReason::kNone) {
+  tracking::FrameRecord record;
+  const bool tracked = reason == LostReason::kNone;
+  record.result.status = tracked ? tracking::TrackStatus::kTracking : tracking::TrackStatus::kLost;
+  record.result.reason = reason;
+  return {time_s, record};
 }
+
+RunFrame dropped(double time_s) { return {time_s, std::nullopt}; }
 
 TEST(Summary, HasTheKeysOfTheContractInTheirOrder) {
   RunRecord record;
-  record.cameras = {{"cam0", 400, 1, {{"degraded", "blurred", 0.0, 1.5}}}};
+  record.cameras = {
+      {"cam0", 400, 1, {{{tracking::CameraState::kDegraded, tracking::CameraReason::kBlurred}, 0.0, 1.5}}}};
   record.loops = {{43.1, 1.2, 83}};
   record.relocalisations = {{12.4, 3.15, 60}};
-  record.frames = {frame(1.25, FrameOutcome::kLost, "too few matches")};
+  record.frames = {frame(1.25, LostReason::kFewMatches)};
   add_stage_sample(record, "extract", StagePlace::kFrame, {0.0, 9.1});
   const ordered_json json = summary_json(record);
   EXPECT_EQ(keys(json), (std::vector<std::string>{"schema", "version", "complete", "data", "mode", "seed",
@@ -66,8 +72,7 @@ TEST(Summary, TellsTheFramesTimesAndFileOfEveryPart) {
 
 TEST(Summary, CountsFramesByOutcome) {
   RunRecord record;
-  record.frames = {frame(0, FrameOutcome::kTracked), frame(1, FrameOutcome::kTracked), frame(2, FrameOutcome::kDropped),
-                   frame(3, FrameOutcome::kLost, "blur")};
+  record.frames = {frame(0), frame(1), dropped(2), frame(3, LostReason::kFewInliers)};
   const ordered_json json = summary_json(record)["frames"];
   EXPECT_EQ(json["input"], 4);
   EXPECT_EQ(json["tracked"], 2);
@@ -76,16 +81,16 @@ TEST(Summary, CountsFramesByOutcome) {
 }
 
 TEST(LostIntervals, JoinConsecutiveLostFrames) {
-  using enum FrameOutcome;
+  using enum LostReason;
   RunRecord record;
-  record.frames = {frame(0.0, kLost, "starting"),
-                   frame(0.1, kTracked),
-                   frame(0.2, kLost, "too few matches"),
-                   frame(0.3, kDropped),
-                   frame(0.4, kLost, "no place recognised"),
-                   frame(0.5, kTracked),
-                   frame(0.6, kDropped),
-                   frame(0.7, kLost, "black")};
+  record.frames = {frame(0.0, kNotStarted),
+                   frame(0.1),
+                   frame(0.2, kFewMatches),
+                   dropped(0.3),
+                   frame(0.4, kNotFound),
+                   frame(0.5),
+                   dropped(0.6),
+                   frame(0.7, kNoImages)};
   const auto intervals = lost_intervals(record);
   ASSERT_EQ(intervals.size(), 3u);
   EXPECT_EQ(intervals[0].to_s, 0.0);
@@ -96,16 +101,39 @@ TEST(LostIntervals, JoinConsecutiveLostFrames) {
   EXPECT_TRUE(lost_intervals({}).empty());
 }
 
+TEST(CameraIntervals, MergeEqualConsecutiveStatuses) {
+  using tracking::CameraReason, tracking::CameraState;
+  const tracking::CameraStatus ok, black{CameraState::kOut, CameraReason::kBlack},
+      blurred{CameraState::kOut, CameraReason::kBlurred};
+  std::vector<RunFrame> frames;
+  for (const tracking::CameraStatus status : {ok, ok, black, black, blurred, ok}) {
+    frames.push_back(frame(0.1 * static_cast<double>(frames.size())));
+    frames.back().record->cameras = {ok, status};
+    frames.push_back(dropped(frames.back().time_s + 0.05));
+  }
+  const auto intervals = camera_intervals(frames, 1);
+  ASSERT_EQ(intervals.size(), 4u);
+  EXPECT_EQ(intervals[1].status, black);
+  EXPECT_EQ(intervals[1].from_s, frames[4].time_s);
+  EXPECT_EQ(intervals[1].to_s, frames[6].time_s);
+  EXPECT_EQ(intervals[2].status, blurred);
+  EXPECT_EQ(intervals[3].status, ok);
+  EXPECT_EQ(camera_intervals(frames, 0).size(), 1u);
+}
+
 TEST(Summary, MeansFeaturesOverFramesAndImages) {
   RunRecord record;
-  FrameRecord first = frame(0, FrameOutcome::kTracked), second = frame(1, FrameOutcome::kLost);
-  first.cameras = {{true, 1000, 0, 0}, {true, 600, 0, 0}};
-  first.unique_features = 1500;
-  first.monocular_features = 1400;
-  first.matched_features = 100;
-  second.cameras = {{true, 500, 0, 0}, {false, 0, 0, 0}};
-  second.unique_features = second.monocular_features = 500;
-  record.frames = {first, second, frame(2, FrameOutcome::kDropped)};
+  RunFrame first = frame(0), second = frame(1, LostReason::kFewInliers);
+  using enum image::ImageState;
+  first.record->images = {kPresent, kPresent};
+  first.record->result.cameras = {{1000, 0, 0}, {600, 0, 0}};
+  first.record->unique = 1500;
+  first.record->monocular = 1400;
+  first.record->matched = 100;
+  second.record->images = {kPresent, kMissing};
+  second.record->result.cameras = {{500, 0, 0}, {0, 0, 0}};
+  second.record->unique = second.record->monocular = 500;
+  record.frames = {first, second, dropped(2)};
   EXPECT_EQ(summary_json(record)["features"].dump(),
             R"({"keypoints_per_image":700.0,"unique":1000.0,"monocular":950.0,"matched":50.0})");
 }
@@ -142,4 +170,4 @@ TEST(Summary, WritesTextThatParsesWhateverTheName) {
 }
 
 }  // namespace
-}  // namespace bslam::report
+}  // namespace bslam::session

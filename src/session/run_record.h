@@ -5,11 +5,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace bslam::report {
+#include "tracking/frame_record.h"
+
+namespace bslam::session {
 
 enum class FrameOutcome {
   kTracked,
@@ -17,24 +20,12 @@ enum class FrameOutcome {
   kDropped,  // never handed to the tracker: no time for it
 };
 
-// One camera in one frame.
-struct CameraCounts {
-  bool has_image = false;
-  int keypoints = 0;
-  int matched = 0;  // keypoints matched with landmarks of the map
-  int inliers = 0;  // of them, those the pose agrees with
-};
-
-struct FrameRecord {
+// One input frame of the run.
+struct RunFrame {
   double time_s = 0.0;
-  FrameOutcome outcome = FrameOutcome::kTracked;
-  std::string lost_reason;  // where lost: why, in a few words
-  bool keyframe = false;
-  std::vector<CameraCounts> cameras;  // one for each camera of the run; empty where dropped
-  int unique_features = 0;            // unique = monocular + matched, of the Bundled table
-  int monocular_features = 0;
-  int matched_features = 0;
-  double frame_ms = 0.0;  // of the caller, from handing over the images to having the pose
+  std::optional<tracking::FrameRecord> record;  // empty: dropped
+
+  FrameOutcome outcome() const;
 };
 
 // Where a stage runs, for the plots: those of every frame apart from those beside it.
@@ -52,9 +43,9 @@ struct StageSeries {
   std::vector<StageSample> samples{};
 };
 
+// A stretch of frames in which the status of a camera was the same.
 struct CameraInterval {
-  std::string state;   // ok, degraded, out
-  std::string reason;  // empty, or black, frozen, over-exposed, blurred, no-images, inconsistent, few-features
+  tracking::CameraStatus status;
   double from_s = 0.0, to_s = 0.0;
 };
 
@@ -70,7 +61,7 @@ struct CameraRecord {
   std::int64_t skipped = 0;  // listed in the data set, but not readable
   std::vector<CameraInterval> states;
   std::optional<ExtrinsicsRecord> extrinsics = {};  // none of camera 0, which is the rig
-  std::string first_skipped = {};  // file and cause of the first image that was not readable
+  std::string first_skipped = {};                   // file and cause of the first image that was not readable
 };
 
 struct MapRecord {
@@ -91,7 +82,7 @@ struct PlaceEvent {
 struct PartRecord {
   std::int64_t frames = 0;  // with a pose in it
   double from_s = 0.0, to_s = 0.0;
-  std::string trajectory;   // file of its final poses
+  std::string trajectory;  // file of its final poses
 };
 
 struct RunRecord {
@@ -99,7 +90,7 @@ struct RunRecord {
   bool complete = true;
   std::uint64_t seed = 1;
   std::vector<int> cameras_used;
-  std::vector<FrameRecord> frames;    // every input frame, in order of time
+  std::vector<RunFrame> frames;       // every input frame, in order of time
   std::vector<CameraRecord> cameras;  // in the order of cameras_used
   std::vector<StageSeries> stages;
   MapRecord map;
@@ -109,6 +100,9 @@ struct RunRecord {
   double start_up_s = 0.0, wall_s = 0.0;
   std::optional<double> peak_memory_mb;  // largest resident size of the process; empty where the system does not tell
 };
+
+// The statuses of camera `camera` over the frames that were not dropped, equal consecutive ones merged.
+std::vector<CameraInterval> camera_intervals(std::span<const RunFrame> frames, std::size_t camera);
 
 // Adds a call of a stage, making its series at the first.
 void add_stage_sample(RunRecord& record, std::string_view stage, StagePlace place, StageSample sample);
@@ -122,4 +116,4 @@ struct LostInterval {
 
 std::vector<LostInterval> lost_intervals(const RunRecord& record);
 
-}  // namespace bslam::report
+}  // namespace bslam::session

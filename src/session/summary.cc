@@ -1,10 +1,10 @@
-#include "report/summary.h"
+#include "session/summary.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace bslam::report {
+namespace bslam::session {
 
 namespace {
 
@@ -25,7 +25,7 @@ double mean_of(double sum, std::size_t count) {
 
 ordered_json frames_json(const RunRecord& record) {
   const auto count = [&](FrameOutcome outcome) {
-    return std::ranges::count(record.frames, outcome, &FrameRecord::outcome);
+    return std::ranges::count(record.frames, outcome, &RunFrame::outcome);
   };
   ordered_json intervals = ordered_json::array();
   for (const LostInterval& interval : lost_intervals(record)) {
@@ -58,14 +58,16 @@ ordered_json cameras_json(const RunRecord& record) {
   for (const CameraRecord& camera : record.cameras) {
     ordered_json states = ordered_json::array();
     for (const CameraInterval& interval : camera.states) {
-      states.push_back({{"state", interval.state},
-                        {"reason", interval.reason},
+      states.push_back({{"state", tracking::describe(interval.status.state)},
+                        {"reason", tracking::describe(interval.status.reason)},
                         {"from", seconds(interval.from_s)},
                         {"to", seconds(interval.to_s)}});
     }
-    cameras.push_back(
-        {{"name", camera.name}, {"images", camera.images}, {"skipped", camera.skipped}, {"states", states},
-         {"extrinsics", extrinsics_json(camera.extrinsics)}});
+    cameras.push_back({{"name", camera.name},
+                       {"images", camera.images},
+                       {"skipped", camera.skipped},
+                       {"states", states},
+                       {"extrinsics", extrinsics_json(camera.extrinsics)}});
   }
   return cameras;
 }
@@ -73,15 +75,16 @@ ordered_json cameras_json(const RunRecord& record) {
 ordered_json features_json(const RunRecord& record) {
   double keypoints = 0.0, unique = 0.0, monocular = 0.0, matched = 0.0;
   std::size_t images = 0, frames = 0;
-  for (const FrameRecord& frame : record.frames) {
-    if (frame.outcome == FrameOutcome::kDropped) continue;
+  for (const RunFrame& frame : record.frames) {
+    if (!frame.record) continue;
     ++frames;
-    unique += frame.unique_features;
-    monocular += frame.monocular_features;
-    matched += frame.matched_features;
-    for (const CameraCounts& camera : frame.cameras) {
-      images += camera.has_image;
-      keypoints += camera.has_image ? camera.keypoints : 0;
+    unique += frame.record->unique;
+    monocular += frame.record->monocular;
+    matched += frame.record->matched;
+    for (std::size_t c = 0; c < frame.record->images.size(); ++c) {
+      if (frame.record->images[c] != image::ImageState::kPresent) continue;
+      ++images;
+      keypoints += frame.record->final_result().cameras[c].keypoints;
     }
   }
   return {{"keypoints_per_image", rounded(mean_of(keypoints, images), 2)},
@@ -101,7 +104,10 @@ ordered_json events_json(const std::vector<PlaceEvent>& events) {
 ordered_json parts_json(const std::vector<PartRecord>& parts) {
   ordered_json list = ordered_json::array();
   for (const PartRecord& part : parts) {
-    list.push_back({{"frames", part.frames}, {"from", seconds(part.from_s)}, {"to", seconds(part.to_s)}, {"trajectory", part.trajectory}});
+    list.push_back({{"frames", part.frames},
+                    {"from", seconds(part.from_s)},
+                    {"to", seconds(part.to_s)},
+                    {"trajectory", part.trajectory}});
   }
   return list;
 }
@@ -113,8 +119,8 @@ ordered_json durations_json(const std::vector<double>& durations_ms) {
 
 ordered_json time_json(const RunRecord& record) {
   std::vector<double> frame_ms;
-  for (const FrameRecord& frame : record.frames) {
-    if (frame.outcome != FrameOutcome::kDropped) frame_ms.push_back(frame.frame_ms);
+  for (const RunFrame& frame : record.frames) {
+    if (frame.record) frame_ms.push_back(frame.record->frame_ms);
   }
   ordered_json stages = ordered_json::object();
   for (const StageSeries& series : record.stages) {
@@ -175,4 +181,4 @@ std::string summary_text(const RunRecord& record) {
   return summary_json(record).dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace bslam::report
+}  // namespace bslam::session

@@ -1,0 +1,43 @@
+// An immutable array whose copies share its elements: copying costs no more than copying a pointer.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace bslam {
+
+// Reads like a const std::vector. To change elements, copy them to a vector and make another array of it.
+template <class T>
+class SharedArray {
+ public:
+  using value_type = T;
+
+  SharedArray() = default;
+  // Takes over the elements. Implicit: a vector that is moved here is the array.
+  SharedArray(std::vector<T>&& values) {  // NOLINT(google-explicit-constructor)
+    if (values.empty()) return;
+    values.shrink_to_fit();  // some live as long as the map
+    values_ = std::make_shared<const std::vector<T>>(std::move(values));
+    data_ = values_->data();
+    size_ = values_->size();
+  }
+
+  std::size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  const T* data() const { return data_; }
+  const T& operator[](std::size_t i) const { return data_[i]; }
+  const T& front() const { return data_[0]; }
+  const T& back() const { return data_[size_ - 1]; }
+  const T* begin() const { return data_; }
+  const T* end() const { return data_ + size_; }
+  std::vector<T> copy() const { return {begin(), end()}; }
+
+ private:
+  std::shared_ptr<const std::vector<T>> values_;
+  const T* data_ = nullptr;  // of *values_
+  std::size_t size_ = 0;
+};
+
+}  // namespace bslam

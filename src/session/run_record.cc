@@ -1,0 +1,51 @@
+#include "session/run_record.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace bslam::session {
+
+FrameOutcome RunFrame::outcome() const {
+  if (!record) return FrameOutcome::kDropped;
+  const bool tracked = record->final_result().status == tracking::TrackStatus::kTracking;
+  return tracked ? FrameOutcome::kTracked : FrameOutcome::kLost;
+}
+
+std::vector<CameraInterval> camera_intervals(std::span<const RunFrame> frames, std::size_t camera) {
+  std::vector<CameraInterval> intervals;
+  for (const RunFrame& frame : frames) {
+    if (!frame.record) continue;
+    const tracking::CameraStatus status = frame.record->cameras[camera];
+    if (intervals.empty() || intervals.back().status != status)
+      intervals.push_back({status, frame.time_s, frame.time_s});
+    intervals.back().to_s = frame.time_s;
+  }
+  return intervals;
+}
+
+void add_stage_sample(RunRecord& record, std::string_view stage, StagePlace place, StageSample sample) {
+  auto series = std::ranges::find(record.stages, stage, &StageSeries::name);
+  if (series == record.stages.end()) {
+    record.stages.push_back({.name = std::string(stage), .place = place});
+    series = std::prev(record.stages.end());
+  }
+  series->samples.push_back(sample);
+}
+
+std::vector<LostInterval> lost_intervals(const RunRecord& record) {
+  std::vector<LostInterval> intervals;
+  bool open = false;
+  for (const RunFrame& frame : record.frames) {
+    if (!frame.record) continue;
+    const bool lost = frame.outcome() == FrameOutcome::kLost;
+    if (lost && !open) {
+      const std::string_view reason = tracking::describe(frame.record->final_result().reason);
+      intervals.push_back({frame.time_s, frame.time_s, std::string(reason)});
+    }
+    if (lost) intervals.back().to_s = frame.time_s;
+    open = lost;
+  }
+  return intervals;
+}
+
+}  // namespace bslam::session

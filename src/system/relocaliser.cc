@@ -1,0 +1,29 @@
+#include "system/relocaliser.h"
+
+#include "looping/relocalise.h"
+
+namespace bslam::system {
+
+PlaceRelocaliser::PlaceRelocaliser(std::unique_ptr<looping::PlaceRecogniser> recogniser, const Config& config)
+    : recogniser_(std::move(recogniser)),
+      options_(config.looping.verification),
+      features_(config.feature_model()),
+      seed_(static_cast<std::uint64_t>(config.seed)) {}
+
+void PlaceRelocaliser::describe(frame::BundledFrame& frame) const { recogniser_->describe(frame); }
+
+std::optional<tracking::FoundPlace> PlaceRelocaliser::locate(const map::BundledMap& map,
+                                                             const frame::BundledFrame& frame) {
+  const Random random(seed_, "relocalise", static_cast<std::uint64_t>(frame.id.value()));
+  auto found = looping::relocalise(*recogniser_, map, frame, options_, features_, random);
+  if (!found) return std::nullopt;
+  return tracking::FoundPlace{found->with, found->T_rig_world, std::move(found->matches), found->inliers};
+}
+
+std::unique_ptr<tracking::Relocaliser> make_relocaliser(const place::VocabularyPtr& vocabulary, const Config& config) {
+  if (!vocabulary) return nullptr;
+  auto recogniser = std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition);
+  return std::make_unique<PlaceRelocaliser>(std::move(recogniser), config);
+}
+
+}  // namespace bslam::system

@@ -1,0 +1,29 @@
+// Relocalisation by place recognition and geometric verification (looping/relocalise.h), for the tracker.
+#pragma once
+
+#include <memory>
+
+#include "looping/place_recogniser.h"
+#include "system/config.h"
+#include "tracking/relocaliser.h"
+
+namespace bslam::system {
+
+class PlaceRelocaliser : public tracking::Relocaliser {
+ public:
+  PlaceRelocaliser(std::unique_ptr<looping::PlaceRecogniser> recogniser, const Config& config);
+
+  void describe(frame::BundledFrame& frame) const override;
+  std::optional<tracking::FoundPlace> locate(const map::BundledMap& map, const frame::BundledFrame& frame) override;
+
+ private:
+  const std::unique_ptr<looping::PlaceRecogniser> recogniser_;
+  const looping::VerificationOptions options_;
+  const map::FeatureModel features_;
+  const std::uint64_t seed_;
+};
+
+// Null without a vocabulary: then nothing is recognised.
+std::unique_ptr<tracking::Relocaliser> make_relocaliser(const place::VocabularyPtr& vocabulary, const Config& config);
+
+}  // namespace bslam::system

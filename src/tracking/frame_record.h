@@ -1,0 +1,47 @@
+// What became of one input frame. The one record of it: callers of the system, the summary and the plots read this.
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "tracking/camera_status.h"
+#include "tracking/track.h"
+
+namespace bslam::tracking {
+
+struct StageTime {
+  std::string_view stage;  // a literal
+  double ms = 0;
+};
+
+// A lost rig was located in the map again.
+struct Relocalisation {
+  KeyframeId with;
+  int inliers = 0;  // keypoints
+};
+
+struct FrameRecord {
+  TrackResult result;                      // as returned when the frame was processed
+  std::optional<TrackResult> found_later;  // of a frame without a pose then: the pose found at the end of the run
+  std::vector<image::ImageState> images;   // per camera
+  std::vector<CameraStatus> cameras;       // per camera
+  std::optional<Relocalisation> relocalisation;
+  // Velocity of the rig: T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); angular (rad/s) first, then linear (map
+  // units/s). Empty where it is not known: without a pose, and in the first frame with one.
+  std::optional<geometry::Vector6d> twist;
+  // The smooth pose: the accumulated motion of the rig. Corrections of the map change T_map_odom and never this pose,
+  // which stands still while the rig is lost. T_rig_odom = T_rig_world * T_map_odom, with T_rig_world of `result`.
+  geometry::SE3 T_rig_odom, T_map_odom;
+  KeyframeId root;  // root keyframe of the submap in which `result` gives the pose
+  bool keyframe = false;
+  int unique = 0, monocular = 0, matched = 0;  // features; unique = monocular + matched
+
+  std::vector<StageTime> stages;  // in the caller's thread
+  double frame_ms = 0;            // from handing over the images to having the pose
+
+  // The result that counts at the end of the run.
+  const TrackResult& final_result() const { return found_later ? *found_later : result; }
+};
+
+}  // namespace bslam::tracking

@@ -1,0 +1,270 @@
+#include "tracking/tracker.h"
+
+#include <algorithm>
+
+#include "base/stopwatch.h"
+#include "frame/capture_times.h"
+#include "tracking/error_floor.h"
+#include "tracking/feature_budget.h"
+#include "tracking/make_keyframe.h"
+
+namespace bslam::tracking {
+namespace {
+
+using frame::BundledFrame;
+
+bool is_tracking(TrackStatus status) { return status == TrackStatus::kTracking; }
+
+// Was there enough to see for a pose?
+bool saw_something(const TrackResult& result) {
+  return result.reason != LostReason::kNoImages && result.reason != LostReason::kFewFeatures;
+}
+
+// The counts of each landmark added up, in order of id.
+std::vector<map::Sighting> folded(std::vector<map::Sighting> counts) {
+  std::stable_sort(counts.begin(), counts.end(),
+                   [](const map::Sighting& a, const map::Sighting& b) { return a.landmark < b.landmark; });
+  std::vector<map::Sighting> out;
+  for (const map::Sighting& s : counts) {
+    if (out.empty() || out.back().landmark != s.landmark) {
+      out.push_back(s);
+    } else {
+      out.back().expected += s.expected;
+      out.back().found += s.found;
+    }
+  }
+  return out;
+}
+
+// A camera that saw nothing because it was blurred is no longer suspect once it is sharp.
+void clear_blur_suspicion(const std::vector<std::uint8_t>& blurred, FrontEndState& state) {
+  for (std::size_t c = 0; c < state.blurred.size() && c < state.track.cameras.size(); ++c) {
+    CameraTrust& camera = state.track.cameras[c];
+    if (state.blurred[c] && !blurred[c] && camera.doubted) camera = trusted(camera.established);
+  }
+  state.blurred = blurred;
+}
+
+// Mapping may have rescaled the submap since the last frame: pose and velocity follow.
+void apply_scale_change(const map::BundledMap& map, TrackerState& state) {
+  if (state.twist) state.twist->tail<3>() *= state.anchored.scale_change(map);
+  state.anchored.rescale(map);
+}
+
+// Attributes what happened since the last frame either to the rig (T_rig_odom) or to a correction of the map
+// (T_map_odom).
+void note_motion(const map::BundledMap& map, const TrackerState& before, TrackOutcome& outcome) {
+  FrontEndState& state = outcome.next;
+  FrameRecord& record = outcome.record;
+  const bool continued = is_tracking(before.status) && before.anchored.known_in(map);
+  if (continued) state.T_map_odom = before.anchored.resolve(map)->inverse() * state.T_rig_odom;
+  if (!is_tracking(record.result.status)) return;
+  if (continued && !record.relocalisation) {
+    state.T_rig_odom = record.result.T_rig_world * state.T_map_odom;
+  } else {
+    state.T_map_odom = record.result.T_rig_world.inverse() * state.T_rig_odom;
+  }
+  record.root = map.root_of(record.result.anchored.reference);
+}
+
+// The part of the record that repeats the state.
+void record_motion(TrackOutcome& outcome) {
+  outcome.record.twist = outcome.next.track.twist;
+  outcome.record.T_rig_odom = outcome.next.T_rig_odom;
+  outcome.record.T_map_odom = outcome.next.T_map_odom;
+}
+
+}  // namespace
+
+FrontEndState FrontEndState::restarted() const {
+  FrontEndState state;
+  state.blurred = blurred;
+  state.T_rig_odom = T_rig_odom;
+  state.T_map_odom = T_map_odom;
+  return state;
+}
+
+Tracker::Tracker(const camera::Rig& rig, const TrackerOptions& options, ThreadPool& pool,
+                 std::unique_ptr<Relocaliser> relocaliser)
+    : rig_(rig), options_(options), pool_(pool), relocaliser_(std::move(relocaliser)) {}
+
+std::vector<matching::AlignmentOptions> Tracker::alignment(const FrontEndState& state) const {
+  return alignment_by_camera(options_.tracking.alignment, state.error_floors, rig_.size());
+}
+
+FramePlan Tracker::plan(const image::ImageBundle& images, const PictureFaults& faults, FrontEndState& state) const {
+  clear_blur_suspicion(faults.blurred, state);
+  FramePlan plan;
+  std::vector<std::uint8_t> out(rig_.size());
+  for (std::size_t c = 0; c < out.size(); ++c) out[c] = faults.outage[c] != CameraReason::kNone;
+  const bool motion_matters = options_.tracking.own_times && !state.track.twist;
+  plan.left_out = motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
+  for (std::size_t c = 0; c < out.size(); ++c) plan.postponed.push_back(plan.left_out[c] && !out[c]);
+  std::vector<std::uint8_t> failing = doubted(state.track, rig_.size());
+  for (std::size_t c = 0; c < failing.size(); ++c) failing[c] |= faults.failing[c];
+  plan.budgets = feature_budgets(rig_.size(), state.feature_shares, plan.left_out, failing, options_.features);
+  plan.alignment = alignment(state);
+  if (state.track.twist) plan.twist = *state.track.twist;
+  return plan;
+}
+
+FramePlan Tracker::plan() const {
+  FramePlan plan;
+  plan.left_out.assign(rig_.size(), 0);
+  plan.postponed = plan.left_out;
+  plan.budgets = feature_budgets(rig_.size(), {}, {}, plan.left_out, options_.features);
+  plan.alignment = alignment({});
+  return plan;
+}
+
+TrackOutcome Tracker::process(FrontEndState state, BundledFrame frame, std::span<const image::Pyramid> pyramids,
+                              const map::MapSnapshot& map) {
+  TrackOutcome outcome;
+  outcome.next = std::move(state);
+  outcome.record.unique = static_cast<int>(frame.bundled.size());
+  outcome.record.matched = static_cast<int>(frame.bundled.num_matched());
+  outcome.record.monocular = static_cast<int>(frame.bundled.num_monocular());
+  apply_scale_change(*map, outcome.next.track);
+  const Input input{frame, pyramids, map};
+  if (map->num_keyframes() == 0) {
+    start(input, outcome);
+  } else {
+    track(input, outcome);
+  }
+  record_motion(outcome);
+  return outcome;
+}
+
+void Tracker::committed(const map::CommitReport& report, TrackOutcome& outcome) const {
+  outcome.record.keyframe = true;
+  if (outcome.edit->kind == ProposedEdit::Kind::kStart) {
+    complete_start(report, outcome);
+  } else {
+    complete_keyframe(report, outcome);
+  }
+  record_motion(outcome);
+}
+
+std::optional<TrackResult> Tracker::locate_early(const map::BundledMap& map, const BetweenKeyframes& early) const {
+  return pose_between(map, early, {options_.features.sigma_px}, options_.tracking, pool_);
+}
+
+TrackOutput Tracker::follow(const Input& input, const FrontEndState& state) const {
+  if (!state.track.anchored.known_in(*input.map)) {  // no pose in this map so far
+    const bool blind = input.frame.num_keypoints() < static_cast<std::size_t>(options_.tracking.min_inliers);
+    return lost(state.track, input.frame, blind ? LostReason::kFewFeatures : LostReason::kNotFound);
+  }
+  const auto alignment = this->alignment(state);
+  const TrackInput track_input{.map = *input.map,
+                               .pyramids = input.pyramids,
+                               .alignment = alignment,
+                               .state = state.track,
+                               .noise = {options_.features.sigma_px},
+                               .scale_factor = options_.features.scale_factor,
+                               .seed = options_.seed};
+  return tracking::track(track_input, input.frame, options_.tracking, pool_);
+}
+
+void Tracker::track(const Input& input, TrackOutcome& outcome) {
+  const Stopwatch watch;
+  FrontEndState& state = outcome.next;
+  FrameRecord& record = outcome.record;
+  const TrackerState before = state.track;
+  TrackOutput output = follow(input, state);
+  record.stages.push_back({"track", watch.ms()});
+  if (!is_tracking(output.result.status) && saw_something(output.result) && relocalise(input, outcome)) {
+    output = follow(input, state);
+    if (!is_tracking(output.result.status)) record.relocalisation.reset();
+  }
+  if (is_tracking(output.result.status)) input.frame = output.frame;  // as tracking refined it
+  record.result = output.result;
+  state.feature_shares = feature_shares(state.feature_shares, *input.map, input.frame, output);
+  state.error_floors = error_floors(state.error_floors, *input.map, input.frame, output, options_.tracking.alignment);
+  if (!is_tracking(output.result.status)) return note_lost(input, before, outcome);
+  state.frames_lost = 0;
+  state.start_reference.reset();
+  state.waiting.clear();
+  state.track = std::move(output.state);
+  note_motion(*input.map, before, outcome);
+  if (options_.localize_only) {
+    state.track.sightings.clear();
+  } else if (output.keyframe_due) {
+    propose_keyframe(input, output, outcome);
+  }
+}
+
+// The rig is searched for from where it was last seen; where that lasts too long, a new submap is started.
+void Tracker::note_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome) {
+  FrontEndState& state = outcome.next;
+  const TrackResult result = outcome.record.result;
+  state.track = before;
+  state.track.status = TrackStatus::kLost;
+  state.track.twist.reset();
+  state.frames_lost += saw_something(result);
+  note_motion(*input.map, before, outcome);
+  const bool give_up = state.frames_lost >= options_.new_submap_after && !options_.localize_only;
+  if (!give_up || !saw_something(result)) return;
+  start(input, outcome);
+  if (!outcome.edit) outcome.record.result = result;
+}
+
+// True where a place was found: the state is there now, for tracking to confirm.
+bool Tracker::relocalise(const Input& input, TrackOutcome& outcome) {
+  if (!relocaliser_) return false;
+  const Stopwatch watch;
+  relocaliser_->describe(input.frame);
+  const std::optional<FoundPlace> place = relocaliser_->locate(*input.map, input.frame);
+  outcome.record.stages.push_back({"relocalise", watch.ms()});
+  if (!place) return false;
+  std::vector<LandmarkId> landmarks;
+  std::vector<int> seen(rig_.size(), 0);
+  for (const auto& [feature, l] : place->matches) {
+    landmarks.push_back(l);
+    for (const frame::KeypointRef r : input.frame.bundled.keypoints(feature)) ++seen[r.camera.index()];
+  }
+  std::sort(landmarks.begin(), landmarks.end());
+  TrackerState& state = outcome.next.track;
+  const auto trust = doubts_of(state.cameras, seen, options_.tracking.consensus);
+  state = state_at_keyframe({}, input.frame.time_ns, place->with, std::move(landmarks));
+  state.cameras = trust;
+  state.anchored = map::AnchoredPose::at(*input.map, place->with, place->T_rig_world);
+  outcome.record.relocalisation = Relocalisation{place->with, place->inliers};
+  return true;
+}
+
+void Tracker::propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const {
+  const Stopwatch watch;
+  map::MapDraft draft("track", input.map);
+  draft.add_sightings(folded(std::move(outcome.next.track.sightings)));
+  if (relocaliser_) relocaliser_->describe(input.frame);
+  NewKeyframe made = make_keyframe(input.frame, output.matches, output.result.T_rig_world, input.pyramids,
+                                   output.result.anchored.reference, options_.tracking.initialisation, draft);
+  outcome.edit = ProposedEdit{ProposedEdit::Kind::kKeyframe, std::move(draft), std::move(made.landmarks),
+                              input.map->landmark_slots()};
+  outcome.record.stages.push_back({"keyframe", watch.ms()});
+}
+
+void Tracker::complete_keyframe(const map::CommitReport& report, TrackOutcome& outcome) const {
+  TrackerState& state = outcome.next.track;
+  TrackResult& result = outcome.record.result;
+  // Mapping may have committed another scale while the frame was tracked.
+  if (state.twist) state.twist->tail<3>() *= result.anchored.scale_change(*report.published);
+  state = state_at_keyframe(state, result.time_ns, report.keyframes.front(),
+                            committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
+  result.anchored = state.anchored;
+}
+
+std::vector<LandmarkId> committed_landmarks(const std::vector<LandmarkId>& proposed, std::size_t base_landmarks,
+                                            const map::CommitReport& report) {
+  std::vector<LandmarkId> out;
+  for (const LandmarkId l : proposed) {
+    const LandmarkId id =
+        l.index() < base_landmarks ? report.published->resolve(l) : report.landmarks[l.index() - base_landmarks];
+    if (report.published->alive(id)) out.push_back(id);
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+}  // namespace bslam::tracking

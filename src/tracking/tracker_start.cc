@@ -1,0 +1,109 @@
+// Starting a map: the part of the tracker that runs while there is no map, or none in which the rig can be located.
+#include "base/stopwatch.h"
+#include "tracking/tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+using frame::BundledFrame;
+
+constexpr int kMetricPatience = 5;  // frames a rig whose cameras overlap waits for depth before it starts up to scale
+constexpr int kMaxStartAge = 40;    // frames after which a start up to scale gets another reference frame
+
+// Landmarks of a keyframe seen by each camera.
+std::vector<int> landmarks_by_camera(const map::BundledKeyframe& keyframe) {
+  std::vector<int> seen(keyframe.frame->cameras.size(), 0);
+  for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f) {
+    if (!keyframe.landmarks[f].valid()) continue;
+    for (const frame::KeypointRef r : keyframe.frame->bundled.keypoints(FeatureId(f))) ++seen[r.camera.index()];
+  }
+  return seen;
+}
+
+TrackResult not_started(const BundledFrame& frame) {
+  TrackResult result;
+  result.frame = frame.id;
+  result.time_ns = frame.time_ns;
+  result.status = TrackStatus::kLost;
+  result.reason = LostReason::kNotStarted;
+  for (const frame::CameraFrame& c : frame.cameras)
+    result.cameras.push_back({static_cast<int>(c.keypoints.size()), 0, 0});
+  return result;
+}
+
+}  // namespace
+
+void Tracker::start(const Input& input, TrackOutcome& outcome) const {
+  const Stopwatch watch;
+  outcome.record.result = not_started(input.frame);
+  map::MapDraft draft("start", input.map);
+  if (relocaliser_) relocaliser_->describe(input.frame);
+  if (std::optional<StartedMap> started = initialise(input, outcome.next, draft)) {
+    draft.set_scale(started->scale, started->scale_deviation);
+    outcome.edit = ProposedEdit{ProposedEdit::Kind::kStart, std::move(draft),
+                                std::move(started->keyframes.back().landmarks), input.map->landmark_slots()};
+  } else {
+    keep_reference_frame(input, outcome.next);
+  }
+  outcome.record.stages.push_back({"start", watch.ms()});
+}
+
+std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEndState& state,
+                                              map::MapDraft& draft) const {
+  const InitialisationOptions& options = options_.tracking.initialisation;
+  const bool overlap = rig_.any_overlap();
+  if (overlap) {
+    if (auto started = start_metric(input.frame, input.pyramids, options, draft)) return started;
+  }
+  // All submaps share one scale: beside a metric one no other is started.
+  if (input.map->num_keyframes() > 0 && input.map->scale() == map::Scale::kMetric) return std::nullopt;
+  const int patience = overlap ? kMetricPatience : 0;
+  if (!state.start_reference || input.frame.id.value() - state.start_reference->frame->id.value() < patience)
+    return std::nullopt;
+  const Random random(options_.seed, "start", static_cast<std::uint64_t>(input.frame.id.value()));
+  return start_up_to_scale(*state.start_reference, input.frame, input.pyramids, options, random, draft);
+}
+
+// Takes over the frame. The reference is replaced when it is old or its view is gone.
+void Tracker::keep_reference_frame(const Input& input, FrontEndState& state) const {
+  const InitialisationOptions& options = options_.tracking.initialisation;
+  if (state.start_reference && input.frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular))
+    return;  // too little to compare
+  const bool good = state.start_reference &&
+                    input.frame.id.value() - state.start_reference->frame->id.value() <= kMaxStartAge &&
+                    comparable(*state.start_reference->frame, input.frame, options);
+  const auto kept = std::make_shared<const BundledFrame>(std::move(input.frame));
+  if (!good) {
+    state.start_reference =
+        std::make_shared<const StartCandidate>(StartCandidate{kept, {input.pyramids.begin(), input.pyramids.end()}});
+    state.waiting.clear();
+  }
+  state.waiting.push_back(kept);
+}
+
+void Tracker::complete_start(const map::CommitReport& report, TrackOutcome& outcome) const {
+  FrontEndState& state = outcome.next;
+  TrackResult& result = outcome.record.result;
+  const KeyframeId last = report.keyframes.back();
+  const map::BundledKeyframe& keyframe = report.published->keyframe(last);
+  state.track = state_at_keyframe({}, result.time_ns, last,
+                                  committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
+  state.track.cameras =
+      doubts_of(std::vector<CameraTrust>(rig_.size()), landmarks_by_camera(keyframe), options_.tracking.consensus);
+  result.status = TrackStatus::kTracking;
+  result.reason = LostReason::kNone;
+  result.T_rig_world = keyframe.T_rig_world;
+  result.anchored = state.track.anchored;
+  outcome.record.root = report.published->root_of(last);
+  if (report.keyframes.size() == 2) {
+    const TimeNs first_ns = state.start_reference->frame->time_ns;
+    for (auto& early : state.waiting)
+      outcome.early.push_back({std::move(early), report.keyframes[0], report.keyframes[1], first_ns, result.time_ns});
+  }
+  state.start_reference.reset();
+  state.waiting.clear();
+  state.frames_lost = 0;
+  state.T_map_odom = result.T_rig_world.inverse() * state.T_rig_odom;
+}
+
+}  // namespace bslam::tracking

@@ -1,0 +1,114 @@
+#include "tracking/camera_status.h"
+
+#include <gtest/gtest.h>
+
+namespace bslam::tracking {
+namespace {
+
+using image::ImageState;
+
+constexpr CameraStatus kGood{};
+
+constexpr CameraStatus out(CameraReason reason) { return {CameraState::kOut, reason}; }
+constexpr CameraStatus degraded(CameraReason reason) { return {CameraState::kDegraded, reason}; }
+
+CameraEvidence good() { return {.image = ImageState::kPresent, .keypoints = 500, .inliers = 200}; }
+CameraEvidence no_image(ImageState why = ImageState::kMissing) {
+  return {.image = why, .outage = CameraReason::kNoImages};
+}
+
+// Status of the first of one camera, or of the first beside a good one.
+CameraStatus alone(const CameraEvidence& evidence) { return CameraStatusMonitor(1).update(std::vector{evidence})[0]; }
+
+TEST(CameraStatus, NamesWhatThePictureSays) {
+  EXPECT_EQ(alone(good()), kGood);
+  for (const CameraReason reason : {CameraReason::kBlack, CameraReason::kOverExposed, CameraReason::kFrozen}) {
+    CameraEvidence evidence = good();
+    evidence.outage = reason;
+    evidence.inconsistent = true;  // the picture explains more
+    EXPECT_EQ(alone(evidence), out(reason)) << describe(reason);
+  }
+}
+
+TEST(CameraStatus, ABlurredCameraIsDegradedAsLongAsWhatItSeesFits) {
+  CameraEvidence evidence = good();
+  evidence.blurred = true;
+  EXPECT_EQ(alone(evidence), degraded(CameraReason::kBlurred));
+  evidence.inconsistent = true;
+  EXPECT_EQ(alone(evidence), out(CameraReason::kBlurred));
+  evidence.blurred = false;
+  EXPECT_EQ(alone(evidence), out(CameraReason::kInconsistent));
+}
+
+TEST(CameraStatus, FewFeaturesDegradeACameraThatIsUsed) {
+  CameraEvidence evidence = good();
+  evidence.keypoints = evidence.inliers = 29;
+  EXPECT_EQ(alone(evidence), degraded(CameraReason::kFewFeatures));
+  evidence.keypoints = 0;
+  evidence.postponed = true;  // not looked at
+  EXPECT_EQ(alone(evidence), kGood);
+}
+
+// Statuses of a camera that has an image in the frames whose letter is x.
+std::string statuses(const std::string& images) {
+  CameraStatusMonitor monitor(1);
+  std::string told;
+  for (const char c : images) {
+    const CameraStatus status = monitor.update(std::vector{c == 'x' ? good() : no_image()})[0];
+    EXPECT_TRUE(status == kGood || status == out(CameraReason::kNoImages));
+    told += status == kGood ? '.' : 'O';
+  }
+  return told;
+}
+
+TEST(CameraStatus, ACameraOfEveryFrameIsOutWithoutAnImage) { EXPECT_EQ(statuses("xxx-xx--x"), "...O..OO."); }
+
+TEST(CameraStatus, ASlowCameraIsNotOutBetweenItsImages) {
+  EXPECT_EQ(statuses("x--x--x--x--x"), ".............");
+  EXPECT_EQ(statuses("--x--x--x"), ".........");
+  EXPECT_EQ(statuses("x--x--x-----x--x"), ".........OOO....");  // one image is missing
+  EXPECT_EQ(statuses("x--x--x-------"), ".........OOOOO");
+}
+
+TEST(CameraStatus, ACameraOfUnknownPeriodIsOutAfterSomeFrames) {
+  EXPECT_EQ(statuses("-------------"), "..........OOO");
+  EXPECT_EQ(statuses("x------------"), "...........OO");
+}
+
+TEST(CameraStatus, ADamagedImageIsDue) {
+  CameraStatusMonitor monitor(1);
+  for (const bool image : {true, false, true, false}) monitor.update(std::vector{image ? good() : no_image()});
+  EXPECT_EQ(monitor.update(std::vector{no_image(ImageState::kDamaged)})[0], out(CameraReason::kNoImages));
+}
+
+// Status of the second camera of two after `frames` frames in which it and the first had these shares of inliers.
+CameraStatus after(int frames, int inliers, int inliers_of_other) {
+  CameraStatusMonitor monitor(2);
+  CameraEvidence first = good(), second = good();
+  first.inliers = inliers_of_other;
+  second.inliers = inliers;
+  CameraStatus status;
+  for (int i = 0; i < frames; ++i) status = monitor.update(std::vector{first, second})[1];
+  return status;
+}
+
+TEST(CameraStatus, ACameraThatAgreesWithNothingIsInconsistent) {
+  EXPECT_EQ(after(12, 5, 200), degraded(CameraReason::kInconsistent));
+  EXPECT_EQ(after(12, 15, 200), kGood);  // with little
+  EXPECT_EQ(after(12, 5, 40), kGood);    // but no other does better
+  EXPECT_EQ(after(5, 5, 200), kGood);    // a new map does not show what all cameras see at once
+  EXPECT_EQ(after(12, 0, 0), kGood);     // lost
+}
+
+TEST(CameraStatus, NamesAreThoseOfTheSummary) {
+  EXPECT_EQ(describe(CameraState::kOk), "ok");
+  EXPECT_EQ(describe(CameraState::kDegraded), "degraded");
+  EXPECT_EQ(describe(CameraState::kOut), "out");
+  EXPECT_EQ(describe(CameraReason::kNone), "");
+  EXPECT_EQ(describe(CameraReason::kNoImages), "no-images");
+  EXPECT_EQ(describe(CameraReason::kOverExposed), "over-exposed");
+  EXPECT_EQ(describe(CameraReason::kFewFeatures), "few-features");
+}
+
+}  // namespace
+}  // namespace bslam::tracking

@@ -1,0 +1,252 @@
+#include "tracking/tracker.h"
+
+#include <gtest/gtest.h>
+
+#include "tracking/simulated_tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+using geometry::SE3;
+
+// A relocaliser that answers with a place it was told.
+class ToldPlace : public Relocaliser {
+ public:
+  explicit ToldPlace(const std::optional<FoundPlace>& place) : place_(place) {}
+  void describe(frame::BundledFrame&) const override {}
+  std::optional<FoundPlace> locate(const map::BundledMap&, const frame::BundledFrame&) override { return place_; }
+
+ private:
+  const std::optional<FoundPlace>& place_;
+};
+
+// A tracker and the map it makes, fed with simulated frames of the orbit.
+class TrackerRun {
+ public:
+  explicit TrackerRun(camera::Rig rig, const TrackerOptions& options = {})
+      : sim(simulator(std::move(rig))),
+        store(map::BundledMap(std::make_shared<const camera::Rig>(sim.rig()))),
+        tracker(sim.rig(), options, pool_, std::make_unique<ToldPlace>(place)),
+        pyramids_(map::flat_pyramids(sim.rig().size())) {}
+
+  frame::BundledFrame frame(int i) const { return sim.frame(FrameId(i), time_s(i)).frame; }
+  static double time_s(int i) { return 0.05 * i; }
+
+  TrackOutcome propose(frame::BundledFrame frame) {
+    frame.twist = state.track.twist.value_or(geometry::Vector6d::Zero());
+    return tracker.process(state, std::move(frame), pyramids_, store.snapshot());
+  }
+  FrameRecord process(frame::BundledFrame frame) {
+    TrackOutcome outcome = propose(std::move(frame));
+    if (outcome.edit) tracker.committed(store.commit(std::move(outcome.edit->draft)), outcome);
+    state = std::move(outcome.next);
+    return outcome.record;
+  }
+
+  synthetic::FeatureSimulator sim;
+  map::MapStore store;
+  std::optional<FoundPlace> place;
+  FrontEndState state;
+
+ private:
+  ThreadPool pool_{1};
+
+ public:
+  Tracker tracker;
+
+ private:
+  std::vector<image::Pyramid> pyramids_;
+};
+
+SE3 relative(const synthetic::FeatureSimulator& sim, int from, int to) {
+  const auto T_world_rig = [&](int i) { return sim.frame(FrameId(i), TrackerRun::time_s(i)).T_world_rig; };
+  return T_world_rig(to).inverse() * T_world_rig(from);
+}
+
+// A frame in which nothing can be recognised: every descriptor is replaced.
+frame::BundledFrame elsewhere(frame::BundledFrame frame) {
+  Random random(99);
+  for (frame::CameraFrame& c : frame.cameras) {
+    for (auto& d : c.keypoints.descriptor) d = {random.next(), random.next(), random.next(), random.next()};
+  }
+  return frame;
+}
+
+TEST(Tracker, StartsAMetricMapAndFollowsTheRigInIt) {
+  TrackerRun run(synthetic::ring_rig(2));
+  int keyframes = 0;
+  for (int i = 0; i < 12; ++i) {
+    const FrameRecord record = run.process(run.frame(i));
+    ASSERT_EQ(record.result.status, TrackStatus::kTracking) << "frame " << i << ": " << describe(record.result.reason);
+    EXPECT_LT(map::distance_m(record.result.T_rig_world, relative(run.sim, 0, i)), 0.03) << "frame " << i;
+    EXPECT_EQ(record.twist.has_value(), i > 0) << "frame " << i;
+    EXPECT_EQ(record.result.covariance.has_value(), i > 0) << "frame " << i;
+    EXPECT_EQ(record.unique, record.monocular + record.matched);
+    EXPECT_EQ(record.root, KeyframeId(0));
+    keyframes += record.keyframe;
+  }
+  EXPECT_EQ(run.store.snapshot()->num_keyframes(), static_cast<std::size_t>(keyframes));
+  EXPECT_EQ(run.store.snapshot()->check_invariants(), std::nullopt);
+}
+
+TEST(Tracker, OneCameraStartsUpToScaleAndLocatesTheFramesBeforeThat) {
+  TrackerRun run(synthetic::ring_rig(1));
+  TrackOutcome outcome;
+  int i = 0;
+  for (; i < 40 && !outcome.edit; ++i) {
+    outcome = run.propose(run.frame(i));
+    EXPECT_EQ(outcome.record.result.reason, LostReason::kNotStarted);
+    run.state = outcome.next;
+  }
+  ASSERT_TRUE(outcome.edit);
+  EXPECT_EQ(outcome.edit->kind, ProposedEdit::Kind::kStart);
+  run.tracker.committed(run.store.commit(std::move(outcome.edit->draft)), outcome);
+  EXPECT_EQ(outcome.record.result.status, TrackStatus::kTracking);
+  ASSERT_EQ(outcome.early.size(), static_cast<std::size_t>(i - 1));
+  const SE3 last = relative(run.sim, 0, i - 1);
+  const double scale =
+      outcome.record.result.T_rig_world.inverse().translation().norm() / last.inverse().translation().norm();
+  for (int k = 0; k < i - 1; ++k) {
+    const auto found = run.tracker.locate_early(*run.store.snapshot(), outcome.early[static_cast<std::size_t>(k)]);
+    ASSERT_TRUE(found) << "frame " << k;
+    EXPECT_LT(map::distance_m(found->T_rig_world, geometry::scaled(relative(run.sim, 0, k), scale)), 0.05 * scale);
+  }
+}
+
+TEST(Tracker, ItsOutcomeDependsOnItsArgumentsAlone) {
+  TrackerRun run(synthetic::ring_rig(2));
+  for (int i = 0; i < 4; ++i) run.process(run.frame(i));
+  const TrackOutcome once = run.propose(run.frame(4)), other = run.propose(elsewhere(run.frame(5))),
+                     again = run.propose(run.frame(4));
+  EXPECT_EQ(other.record.result.status, TrackStatus::kLost);
+  EXPECT_EQ(once.record.result.T_rig_world.translation(), again.record.result.T_rig_world.translation());
+  EXPECT_EQ(once.record.result.covariance, again.record.result.covariance);
+  EXPECT_EQ(once.next.track.landmarks, again.next.track.landmarks);
+  EXPECT_EQ(once.next.feature_shares, again.next.feature_shares);
+}
+
+TEST(Tracker, TheCovarianceIsThatOfItsErrors) {
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig(), room(1, 0.7, 0.1)), 1.0, 0.25);
+  SimulatedTracker tracker(world);
+  constexpr int kFrames = 20;
+  double normalised = 0;
+  for (int i = 1; i <= kFrames; ++i) {
+    const auto seen = world.sim.frame(FrameId(i), 0.05 * i);
+    const TrackResult result = tracker.track(seen.frame).result;
+    ASSERT_TRUE(result.covariance);
+    EXPECT_EQ(*result.covariance, result.covariance->transpose());
+    const geometry::Vector6d error = (result.T_rig_world * seen.T_world_rig).log();
+    normalised += error.dot(result.covariance->llt().solve(error)) / kFrames;
+  }
+  EXPECT_GT(normalised, 2.0);  // six on average
+  EXPECT_LT(normalised, 12.0);
+}
+
+TEST(Tracker, ALostRigIsFollowedAgainFromThePlaceItWasLocatedAt) {
+  TrackerRun run(synthetic::ring_rig(2));
+  for (int i = 0; i < 5; ++i) run.process(run.frame(i));
+  const SE3 T_rig_odom = run.state.T_rig_odom;
+  const FrameRecord lost = run.process(elsewhere(run.frame(5)));
+  EXPECT_EQ(lost.result.status, TrackStatus::kLost);
+  EXPECT_FALSE(lost.twist);
+  EXPECT_FALSE(lost.result.anchored.reference.valid());
+  EXPECT_EQ(lost.T_rig_odom.translation(), T_rig_odom.translation());
+
+  run.state.track.anchored = {};  // far from where it was: only the relocaliser can tell
+  const FrameRecord blind = run.process(run.frame(6));
+  EXPECT_EQ(blind.result.reason, LostReason::kNotFound);
+
+  const map::MapSnapshot map = run.store.snapshot();
+  FoundPlace place{KeyframeId(0), relative(run.sim, 0, 7), {}, 50};
+  const map::BundledKeyframe& keyframe = map->keyframe(KeyframeId(0));
+  for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f) {
+    if (map->alive(keyframe.landmarks[f]))
+      place.matches.emplace_back(FeatureId(place.matches.size()), keyframe.landmarks[f]);
+  }
+  run.place = place;
+  const FrameRecord found = run.process(run.frame(7));
+  ASSERT_EQ(found.result.status, TrackStatus::kTracking) << describe(found.result.reason);
+  EXPECT_LT(map::distance_m(found.result.T_rig_world, relative(run.sim, 0, 7)), 0.03);
+  ASSERT_TRUE(found.relocalisation);
+  EXPECT_EQ(found.relocalisation->with, KeyframeId(0));
+  EXPECT_LT(map::distance_m(found.T_rig_odom, T_rig_odom), 1e-9);  // the smooth pose does not jump
+  EXPECT_LT(map::distance_m(found.T_rig_odom, found.result.T_rig_world * found.T_map_odom), 1e-9);
+}
+
+TEST(Tracker, StartsANewSubmapWhereItStaysLost) {
+  TrackerOptions options;
+  options.new_submap_after = 3;
+  TrackerRun run(synthetic::ring_rig(2), options);
+  for (int i = 0; i < 3; ++i) run.process(run.frame(i));
+  run.state.track.anchored = {};
+  EXPECT_EQ(run.process(run.frame(3)).result.reason, LostReason::kNotFound);
+  EXPECT_EQ(run.process(run.frame(4)).result.reason, LostReason::kNotFound);
+  const FrameRecord started = run.process(run.frame(5));
+  EXPECT_EQ(started.result.status, TrackStatus::kTracking);
+  EXPECT_TRUE(started.keyframe);
+  EXPECT_EQ(run.store.snapshot()->roots().size(), 2u);
+  EXPECT_EQ(started.root, run.store.snapshot()->roots().back());
+}
+
+TEST(Tracker, LocalisingProposesNothing) {
+  TrackerRun made(synthetic::ring_rig(2));
+  for (int i = 0; i < 3; ++i) made.process(made.frame(i));
+  TrackerOptions options;
+  options.localize_only = true;
+  options.new_submap_after = 1;
+  TrackerRun run(synthetic::ring_rig(2), options);
+  run.state = made.state;
+  run.store.restart(*made.store.snapshot());
+  for (int i = 3; i < 30; ++i) {
+    const TrackOutcome outcome = run.propose(i < 20 ? run.frame(i) : elsewhere(run.frame(i)));
+    EXPECT_FALSE(outcome.edit) << "frame " << i;
+    EXPECT_EQ(outcome.record.result.status, i < 20 ? TrackStatus::kTracking : TrackStatus::kLost) << "frame " << i;
+    run.state = outcome.next;
+  }
+  EXPECT_TRUE(run.state.track.sightings.empty());
+}
+
+TEST(Tracker, FollowsTheScaleOfItsSubmap) {
+  TrackerRun run(synthetic::ring_rig(2));
+  for (int i = 0; i < 5; ++i) run.process(run.frame(i));
+  map::MapDraft draft("test", run.store.snapshot());
+  ASSERT_TRUE(draft.scale_part(KeyframeId(0), 2.0));
+  run.store.commit(std::move(draft));
+  const geometry::Vector6d before = *run.state.track.twist;
+  const FrameRecord record = run.process(run.frame(5));
+  ASSERT_EQ(record.result.status, TrackStatus::kTracking);
+  EXPECT_LT(map::distance_m(record.result.T_rig_world, geometry::scaled(relative(run.sim, 0, 5), 2.0)), 0.06);
+  EXPECT_NEAR(record.twist->tail<3>().norm() / before.tail<3>().norm(), 2.0, 0.4);
+}
+
+TEST(Tracker, PlansWithoutTheCamerasThatAreOut) {
+  TrackerRun run(synthetic::ring_rig(2));
+  image::ImageBundle images;
+  images.images.resize(2);
+  for (image::CameraImage& i : images.images) i.state = image::ImageState::kPresent;
+  const PictureFaults faults{{CameraReason::kNone, CameraReason::kBlack}, {0, 0}, {0, 1}};
+  const FramePlan plan = run.tracker.plan(images, faults, run.state);
+  EXPECT_EQ(plan.left_out, (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(plan.postponed, (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_GT(plan.budgets[0], 0);
+  EXPECT_EQ(plan.budgets[1], 0);
+  EXPECT_EQ(run.tracker.plan().left_out, (std::vector<std::uint8_t>{0, 0}));
+}
+
+TEST(Tracker, ABlurredCameraIsTrustedAgainOnceItIsSharp) {
+  TrackerRun run(synthetic::ring_rig(2));
+  for (int i = 0; i < 3; ++i) run.process(run.frame(i));
+  image::ImageBundle images;
+  images.images.resize(2);
+  run.state.track.cameras[1].doubted = true;
+  const auto plan = [&](std::uint8_t blurred) {
+    run.tracker.plan(images, {{CameraReason::kNone, CameraReason::kNone}, {0, blurred}, {0, 0}}, run.state);
+  };
+  plan(1);
+  EXPECT_TRUE(run.state.track.cameras[1].doubted);
+  plan(0);
+  EXPECT_FALSE(run.state.track.cameras[1].doubted);
+}
+
+}  // namespace
+}  // namespace bslam::tracking
