@@ -18,9 +18,14 @@ function(bslam_layer name)
   endif()
 endfunction()
 
-# bslam_test(NAME [USES layer...]): one executable of all tests/NAME/*.cc.
+# bslam_test(NAME [USES layer...] [LINKS target...] [SLOW suite...] [THREAD suite...] [DATA suite...]
+#            [TOGETHER group=suite+suite...]): one executable of all tests/NAME/*.cc, and one CTest entry for each of its
+# suites, so that what the tests of a suite share is made once. Suites of a TOGETHER group are one entry: they share a static
+# rendering. Labels: `slow` for SLOW, `thread` for THREAD (what ThreadSanitizer looks at), `data` for DATA (reads
+# recordings that may not be there); `fast` for all that are neither slow nor data.
 function(bslam_test name)
-  cmake_parse_arguments(ARG "" "" "USES;LINKS" ${ARGN})
+  set(labels SLOW THREAD DATA TOGETHER)
+  cmake_parse_arguments(ARG "" "" "USES;LINKS;${labels}" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cc)
   if(NOT sources)
     return()
@@ -29,8 +34,18 @@ function(bslam_test name)
   add_executable(test_${name} ${sources})
   target_link_libraries(test_${name} PRIVATE ${ARG_USES} ${ARG_LINKS} GTest::gtest GTest::gtest_main bslam_flags)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
-  include(GoogleTest)
-  gtest_discover_tests(test_${name} TEST_PREFIX ${name}/ DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+  set(list ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
+  list(JOIN CMAKE_CROSSCOMPILING_EMULATOR "," emulator)  # lists are handed on with commas
+  foreach(label ${labels})
+    list(JOIN ARG_${label} "," ${label})
+  endforeach()
+  add_custom_command(TARGET test_${name} POST_BUILD BYPRODUCTS ${list} VERBATIM
+    COMMAND ${CMAKE_COMMAND} -DEXECUTABLE=$<TARGET_FILE:test_${name}> -DEMULATOR=${emulator} -DPREFIX=${name}
+            -DOUTPUT=${list} -DSLOW=${SLOW} -DTHREAD=${THREAD} -DDATA=${DATA} -DTOGETHER=${TOGETHER}
+            -P ${PROJECT_SOURCE_DIR}/cmake/add_suites.cmake)
+  # The executable is linked again where the way its suites are listed has changed.
+  set_property(TARGET test_${name} APPEND PROPERTY LINK_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/add_suites.cmake)
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${list})
 endfunction()
 
 # Flags of our own code: warnings are errors, results do not depend on contraction of multiply and add.

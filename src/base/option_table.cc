@@ -17,6 +17,8 @@ template <class... Cases>
 struct Overloaded : Cases... {
   using Cases::operator()...;
 };
+template <class... Cases>  // clang before 17 does not deduce the arguments of an aggregate by itself
+Overloaded(Cases...)->Overloaded<Cases...>;
 
 std::string bound_text(double bound, bool integer) {
   return integer ? std::to_string(static_cast<long long>(bound)) : format_double(bound);

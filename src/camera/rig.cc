@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <ranges>
 #include <utility>
 
 #include "base/assert.h"
@@ -62,7 +61,9 @@ bool Rig::any_overlap(std::span<const std::uint8_t> left_out) const {
 }
 
 Rig Rig::subset(std::span<const int> indices) const {
-  if (std::ranges::equal(indices, std::views::iota(0, static_cast<int>(size())))) return *this;
+  int next = 0;
+  const bool in_order = std::ranges::all_of(indices, [&](int i) { return i == next++; });
+  if (in_order && indices.size() == size()) return *this;
   std::vector<RigCamera> chosen;
   for (const int i : indices) {
     BSLAM_ASSERT(i >= 0 && static_cast<std::size_t>(i) < size(), "camera index within the rig");

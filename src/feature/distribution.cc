@@ -93,21 +93,25 @@ void Distribution::thin_out(std::span<const Corner> corners, const Region& regio
   const int columns = region.width / side + 3;  // a border of empty squares on either side
   const int rows = region.height / side + 3;
   occupied_.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0);
-  tabulate(region.width, [&](int x) { return x / side + 1; }, column_of_);
-  tabulate(region.height, [&](int y) { return (y / side + 1) * columns; }, row_of_);
+  tabulate(
+      region.width, [&](int x) { return x / side + 1; }, column_of_);
+  tabulate(
+      region.height, [&](int y) { return (y / side + 1) * columns; }, row_of_);
   for (const Entry& entry : order_) {
     const int x = x_of(entry.pixel), y = y_of(entry.pixel);
     // Two corners in one square are closer than `spacing`: a square never holds two that were taken.
     std::uint32_t* square = occupied_.data() + row_of_[y - region.y] + column_of_[x - region.x];
     const auto blocks = [&](std::uint32_t other) {
-      return (other != 0) & (std::abs(x_of(other) - x) < side) & (std::abs(y_of(other) - y) < side);
+      const unsigned taken = other != 0;
+      const unsigned near_x = std::abs(x_of(other) - x) < side, near_y = std::abs(y_of(other) - y) < side;
+      return taken & near_x & near_y;
     };
     if (*square != 0) continue;
     const std::uint32_t *above = square - columns, *below = square + columns;
     // Without short cuts: eight branches nobody can predict cost more than eight comparisons.
-    bool blocked = blocks(square[-1]) | blocks(square[1]);
+    unsigned blocked = blocks(square[-1]) | blocks(square[1]);
     for (int k = -1; k <= 1; ++k) blocked |= blocks(above[k]) | blocks(below[k]);
-    if (blocked) continue;
+    if (blocked != 0) continue;
     *square = entry.pixel;
     ranked.push_back(entry.index);
   }
@@ -154,9 +158,13 @@ void Distribution::choose(std::span<const Corner> corners, std::span<const std::
   const int columns = std::max(1, static_cast<int>(std::lround(region.width / side)));
   const int rows = std::max(1, static_cast<int>(std::lround(region.height / side)));
   cells_.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), Cell{});
-  tabulate(region.width, [&](int x) { return x * columns / region.width; }, column_of_);
-  tabulate(region.height, [&](int y) { return y * rows / region.height * columns; }, row_of_);
-  const auto cell_of = [&](const Corner& c) -> Cell& { return cells_[row_of_[c.y - region.y] + column_of_[c.x - region.x]]; };
+  tabulate(
+      region.width, [&](int x) { return x * columns / region.width; }, column_of_);
+  tabulate(
+      region.height, [&](int y) { return y * rows / region.height * columns; }, row_of_);
+  const auto cell_of = [&](const Corner& c) -> Cell& {
+    return cells_[row_of_[c.y - region.y] + column_of_[c.x - region.x]];
+  };
   for (const std::uint32_t i : ranked) {
     Cell& cell = cell_of(corners[i]);
     ++cell.total;

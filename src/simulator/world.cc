@@ -43,6 +43,26 @@ RTCRay make_ray(const Vector3d& origin, const Vector3d& direction, double near, 
   return ray;
 }
 
+struct TexelGrid {
+  std::int32_t width, height;
+};
+
+// The next level of a texture pyramid. Texels hold square roots of albedo: each of `out` is the root of the mean square
+// of the four of `in` it covers, where the last row and column of `in` repeat.
+void halve(const std::uint8_t* in, const TexelGrid& fine, std::uint8_t* out, const TexelGrid& coarse) {
+  const auto square = [&](std::int32_t x, std::int32_t y) {
+    const std::int32_t v = in[std::min(y, fine.height - 1) * fine.width + std::min(x, fine.width - 1)];
+    return v * v;
+  };
+  for (std::int32_t y = 0; y < coarse.height; ++y) {
+    for (std::int32_t x = 0; x < coarse.width; ++x) {
+      const std::int32_t sum =
+          square(2 * x, 2 * y) + square(2 * x + 1, 2 * y) + square(2 * x, 2 * y + 1) + square(2 * x + 1, 2 * y + 1);
+      out[y * coarse.width + x] = static_cast<std::uint8_t>(0.5f * std::sqrt(static_cast<float>(sum)) + 0.5f);
+    }
+  }
+}
+
 }  // namespace
 
 // Owns the handles of Embree. There is one quad per surface in the same order, so that primID is the index of the
@@ -177,21 +197,9 @@ void World::bake_albedo(ThreadPool& pool, const std::stop_token& stop) {
   pool.for_each(baked_.size(), [&](std::size_t i) {
     const Baked& b = baked_[i];
     for (std::int32_t level = 1; level < b.levels; ++level) {
-      const std::int32_t fw = ((b.width - 1) >> (level - 1)) + 1, fh = ((b.height - 1) >> (level - 1)) + 1;
-      const std::int32_t w = ((b.width - 1) >> level) + 1, h = ((b.height - 1) >> level) + 1;
-      const std::uint8_t* fine = texels_.data() + b.texel[level - 1];
-      std::uint8_t* out = texels_.data() + b.texel[level];
-      const auto square = [&](std::int32_t x, std::int32_t y) {
-        const std::int32_t v = fine[std::min(y, fh - 1) * fw + std::min(x, fw - 1)];
-        return v * v;
-      };
-      for (std::int32_t y = 0; y < h; ++y) {
-        for (std::int32_t x = 0; x < w; ++x) {
-          const std::int32_t sum =
-              square(2 * x, 2 * y) + square(2 * x + 1, 2 * y) + square(2 * x, 2 * y + 1) + square(2 * x + 1, 2 * y + 1);
-          out[y * w + x] = static_cast<std::uint8_t>(0.5f * std::sqrt(static_cast<float>(sum)) + 0.5f);
-        }
-      }
+      const TexelGrid fine{((b.width - 1) >> (level - 1)) + 1, ((b.height - 1) >> (level - 1)) + 1};
+      const TexelGrid coarse{((b.width - 1) >> level) + 1, ((b.height - 1) >> level) + 1};
+      halve(texels_.data() + b.texel[level - 1], fine, texels_.data() + b.texel[level], coarse);
     }
   });
 }

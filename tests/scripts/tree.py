@@ -1,0 +1,38 @@
+"""What the tests of the checking scripts share: small source trees, and the scripts as modules."""
+import atexit
+import importlib.machinery
+import importlib.util
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / 'scripts'
+sys.dont_write_bytecode = True
+
+
+def load(name):
+    """The script as a module; its main() does not run."""
+    loader = importlib.machinery.SourceFileLoader(name, str(SCRIPTS / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
+    loader.exec_module(module)
+    return module
+
+
+class Tree:
+    """A temporary project: Tree({'src/a/b.h': 'text'}); removed when the program ends."""
+
+    def __init__(self, files):
+        self.root = pathlib.Path(tempfile.mkdtemp(prefix='bslam_scripts_'))
+        atexit.register(shutil.rmtree, self.root)
+        for name, text in files.items():
+            path = self.root / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+
+    def run(self, script, *arguments):
+        """(exit status, lines printed) of a script called on this tree."""
+        command = [sys.executable, str(SCRIPTS / script), '--root', str(self.root), *arguments]
+        done = subprocess.run(command, capture_output=True, text=True)
+        return done.returncode, (done.stdout + done.stderr).splitlines()
