@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "feature/binary_tests.h"
+#include "feature/brief_pattern.h"
 #include "feature/distribution.h"
 #include "feature/extractor.h"
 #include "feature/fast.h"
@@ -123,7 +123,7 @@ void spread_level_0(benchmark::State& state) {
   std::vector<std::uint32_t> ranked;
   detector.detect(image.view(), 17, 5, corners);
   for (auto _ : state) {
-    distribution.thin_out(corners, region, 9, ranked);
+    distribution.non_maximum_suppression(corners, region, 9, ranked);
     distribution.choose(corners, ranked, region, 380, 20, chosen);
   }
   state.counters["corners"] = static_cast<double>(corners.size());
@@ -189,7 +189,7 @@ void unproject_pixel(benchmark::State& state) {
 BENCHMARK(unproject_pixel);
 
 void make_tests(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(make_binary_tests());
+  for (auto _ : state) benchmark::DoNotOptimize(make_brief_pattern());
 }
 BENCHMARK(make_tests)->Unit(benchmark::kMicrosecond);
 

@@ -110,17 +110,17 @@ void CommitPoses(benchmark::State& state) {
 }
 BENCHMARK(CommitPoses)->Args({30, 3000})->Args({1000, 3000})->Args({1000, 100000})->Unit(benchmark::kMicrosecond);
 
-void CommitSightings(benchmark::State& state) {
-  std::vector<Sighting> sightings;
-  for (std::size_t i = 0; i < 1000; ++i) sightings.push_back({LandmarkId(50000 + 2 * i), 1, 1});
+void CommitVisibilityCounts(benchmark::State& state) {
+  std::vector<VisibilityCount> visibility_counts;
+  for (std::size_t i = 0; i < 1000; ++i) visibility_counts.push_back({LandmarkId(50000 + 2 * i), 1, 1});
   MapStore copy(fresh());
   for (auto _ : state) {
     MapDraft draft("tracking", copy.snapshot());
-    draft.add_sightings(sightings);
+    draft.add_visibility_counts(visibility_counts);
     copy.commit(std::move(draft));
   }
 }
-BENCHMARK(CommitSightings)->Unit(benchmark::kMicrosecond);
+BENCHMARK(CommitVisibilityCounts)->Unit(benchmark::kMicrosecond);
 
 // A run of mapping behind keyframe 500: 1,000 new landmarks with 3 observations each, 2,000 observations added, 1,000
 // removed, 100 merges, and an update of all modified landmarks.

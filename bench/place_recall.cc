@@ -17,8 +17,8 @@
 #include "base/median.h"
 #include "cli/config_arguments.h"
 #include "evaluation/trajectory_file.h"
-#include "looping/locate.h"
 #include "looping/place_recogniser.h"
+#include "looping/verify_place.h"
 #include "map/map_edit.h"
 #include "storage/map_file.h"
 #include "storage/vocabulary_file.h"
@@ -175,27 +175,27 @@ class Recall {
   Outcome answer(const View& now, const std::vector<KeyframeId>& places) {
     Outcome outcome = Outcome::kNoCandidate;
     note_.clear();
-    for (const looping::Candidate& candidate : recogniser_.revisited(map_, now.keyframe)) {
+    for (const looping::Candidate& candidate : recogniser_.query_keyframe(map_, now.keyframe)) {
       const auto old = std::ranges::find(views_, candidate.keyframe, &View::keyframe);
       if (old == views_.end() || !old_enough(now, old->time_ns)) continue;
       const bool right_place = std::ranges::find(places, candidate.keyframe) != places.end();
       if (outcome != Outcome::kRejected) outcome = right_place ? Outcome::kRejected : Outcome::kOtherCandidates;
-      looping::LocateReport report;
+      looping::VerificationReport report;
       const Random random(static_cast<std::uint64_t>(config_.seed), "loop",
                           static_cast<std::uint64_t>(now.keyframe.value()));
-      const auto location =
-          looping::locate(map_, map_.rig_of(now.keyframe), *map_.keyframe(now.keyframe).frame, candidate.keyframe,
-                          config_.looping.verification, config_.feature_model(), random, &report);
+      const auto place_match =
+          looping::verify_place(map_, map_.rig_of(now.keyframe), *map_.keyframe(now.keyframe).frame, candidate.keyframe,
+                                config_.looping.verification, config_.feature_model(), random, &report);
       note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} found {} of {}; ",
                            candidate.keyframe.value(), candidate.score, static_cast<int>(report.rejection),
                            report.matches, report.inliers, report.found, report.sought);
-      if (location) return is_right(now, *old, *location) ? Outcome::kRight : Outcome::kWrong;
+      if (place_match) return is_right(now, *old, *place_match) ? Outcome::kRight : Outcome::kWrong;
     }
     return outcome;
   }
 
-  bool is_right(const View& now, const View& old, const looping::Location& location) const {
-    const SE3 T_old_now = map_.keyframe(old.keyframe).T_rig_world * location.T_rig_world.inverse();
+  bool is_right(const View& now, const View& old, const looping::PlaceMatch& place_match) const {
+    const SE3 T_old_now = map_.keyframe(old.keyframe).T_rig_world * place_match.T_rig_world.inverse();
     const SE3 error = (old.T_world_rig.inverse() * now.T_world_rig).inverse() * T_old_now;
     return error.translation().norm() < kMaxOff * now.median_depth &&
            error.rotation().angularDistance(Eigen::Quaterniond::Identity()) < kMaxTurnOff;

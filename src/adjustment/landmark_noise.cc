@@ -36,8 +36,8 @@ std::vector<double> landmark_variances(const solver::ReprojectionProblem& proble
 }
 
 solver::LmSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
-                                            const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
-                                            std::stop_token stop) {
+                                        const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
+                                        std::stop_token stop) {
   std::vector<float> sigmas;
   sigmas.reserve(problem.observations.size());
   for (auto& o : problem.observations) {

@@ -22,7 +22,7 @@ double sum_bound(double bound, int keypoints) {
 
 // Outliers are classified per observation, that is for all keypoints of a feature together: judged one by one, the
 // probability that one of them exceeds its bound by chance would grow with the number of cameras.
-std::vector<ObservationSource> outlier_observations(const FlatProblem& flat, double bound) {
+std::vector<ObservationSource> outlier_observations(const BundleProblem& flat, double bound) {
   const std::vector<double> chi2 = solver::squared_errors(flat.problem);
   std::vector<ObservationSource> bad;
   for (std::size_t i = 0; i < chi2.size();) {
@@ -51,7 +51,7 @@ void move_single_view_landmarks(const map::BundledMap& map, KeyframeId k, const 
   }
 }
 
-map::SetPoses poses_of(const map::BundledMap& map, const FlatProblem& flat) {
+map::SetPoses poses_of(const map::BundledMap& map, const BundleProblem& flat) {
   map::SetPoses poses;
   for (std::size_t i = 0; i < flat.keyframes.size(); ++i) {
     if (!flat.problem.pose_free[i]) continue;
@@ -69,7 +69,7 @@ map::SetPoses poses_of(const map::BundledMap& map, const FlatProblem& flat) {
 AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options,
                             const feature::FeatureModel& features, map::MapDraft& draft, std::stop_token stop) {
   AdjustmentReport report;
-  FlatProblem flat = flatten(draft.map(), selection, features);
+  BundleProblem flat = build_problem(draft.map(), selection, features);
   report.observations = flat.problem.observations.size();
   const bool any_fixed =
       std::any_of(flat.problem.pose_free.begin(), flat.problem.pose_free.end(), [](std::uint8_t f) { return !f; });

@@ -4,7 +4,7 @@
 
 #include <stop_token>
 
-#include "adjustment/flat_problem.h"
+#include "adjustment/bundle_problem.h"
 #include "base/options.h"
 #include "map/map_edit.h"
 

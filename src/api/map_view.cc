@@ -16,7 +16,7 @@ namespace {
 std::vector<int> submap_by_keyframe(const map::BundledMap& map) {
   std::vector<int> out(map.keyframe_slots(), -1);
   for (const KeyframeId root : map.roots()) {
-    for (const KeyframeId k : map.part_of(root)) out[k.index()] = root.value();
+    for (const KeyframeId k : map.keyframes_of_submap(root)) out[k.index()] = root.value();
   }
   return out;
 }
@@ -95,7 +95,7 @@ std::vector<MapView::CovisibilityEdge> MapView::covisibility(int min_landmarks) 
 std::vector<MapView::Submap> MapView::submaps() const {
   const map::BundledMap& map = *impl_->map;
   std::vector<Submap> out;
-  for (const KeyframeId root : map.roots()) out.push_back({root.value(), map.part_of(root).size()});
+  for (const KeyframeId root : map.roots()) out.push_back({root.value(), map.keyframes_of_submap(root).size()});
   return out;
 }
 

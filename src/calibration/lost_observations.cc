@@ -47,7 +47,7 @@ std::vector<std::vector<Observation>> observations_by_image(const solver::Reproj
   return out;
 }
 
-void sort_observations(adjustment::FlatProblem& flat) {
+void sort_observations(adjustment::BundleProblem& flat) {
   std::vector<std::pair<Observation, adjustment::ObservationSource>> all;
   for (std::size_t i = 0; i < flat.sources.size(); ++i) all.emplace_back(flat.problem.observations[i], flat.sources[i]);
   std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return place_of(a.first) < place_of(b.first); });
@@ -69,7 +69,7 @@ std::vector<matching::SearchExclusions> known_in(const map::BundledMap& map, Key
 // Adds what the images of one keyframe, the cameras posed at `T_cam_world`, show of `points`.
 void search_keyframe(const map::BundledMap& map, std::size_t pose, std::span<const geometry::SE3> T_cam_world,
                      std::span<const matching::SearchPoint> points, std::span<const std::vector<Observation>> seen,
-                     const feature::FeatureModel& features, adjustment::FlatProblem& flat) {
+                     const feature::FeatureModel& features, adjustment::BundleProblem& flat) {
   const KeyframeId keyframe = flat.keyframes[pose];
   const frame::BundledFrame& frame = *map.keyframe(keyframe).frame;
   const matching::ProjectionSearchOptions options{
@@ -93,7 +93,7 @@ void search_keyframe(const map::BundledMap& map, std::size_t pose, std::span<con
 }  // namespace
 
 int recover_observations(const map::BundledMap& map, std::span<const geometry::SE3> T_cam_rig,
-                         const feature::FeatureModel& features, adjustment::FlatProblem& flat) {
+                         const feature::FeatureModel& features, adjustment::BundleProblem& flat) {
   const solver::ReprojectionProblem& problem = flat.problem;
   const std::size_t cameras = T_cam_rig.size(), before = problem.observations.size();
   const auto seen = observations_by_image(problem);

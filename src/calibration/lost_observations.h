@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "adjustment/flat_problem.h"
+#include "adjustment/bundle_problem.h"
 #include "feature/feature_model.h"
 
 namespace bslam::calibration {
@@ -13,6 +13,6 @@ namespace bslam::calibration {
 // keypoints without a landmark, in the map or the problem, are taken; only of keyframes that do not see the point with
 // that camera yet. Bounds are wide: whoever adjusts next judges. Returns how many were added.
 int recover_observations(const map::BundledMap& map, std::span<const geometry::SE3> T_cam_rig,
-                         const feature::FeatureModel& features, adjustment::FlatProblem& flat);
+                         const feature::FeatureModel& features, adjustment::BundleProblem& flat);
 
 }  // namespace bslam::calibration

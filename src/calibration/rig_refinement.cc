@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "adjustment/flat_problem.h"
+#include "adjustment/bundle_problem.h"
 #include "calibration/lost_observations.h"
 #include "solver/extrinsic_bundle_adjustment.h"
 
@@ -126,7 +126,7 @@ std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<Ke
 
 // The adjustment problem and the group of each of its poses.
 struct RigProblem {
-  adjustment::FlatProblem flat;
+  adjustment::BundleProblem flat;
   std::vector<std::size_t> group;
 };
 
@@ -140,7 +140,7 @@ RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& option
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     (out.group[i] == i ? selection.fixed_keyframes : selection.free_keyframes).push_back(keyframes[i]);
   }
-  out.flat = adjustment::flatten(map, selection, features);
+  out.flat = adjustment::build_problem(map, selection, features);
   return out;
 }
 

@@ -43,19 +43,19 @@ std::string vocabulary_name(std::uint64_t id) { return id == 0 ? "none" : fmt::f
 
 nlohmann::ordered_json to_json(const storage::SavedMap& saved, std::uintmax_t file_bytes) {
   const map::BundledMap& map = saved.map;
-  nlohmann::ordered_json cameras = nlohmann::ordered_json::array(), parts = nlohmann::ordered_json::array();
+  nlohmann::ordered_json cameras = nlohmann::ordered_json::array(), submaps = nlohmann::ordered_json::array();
   for (std::size_t c = 0; c < map.rig().size(); ++c) {
     const camera::Camera& camera = map.rig().camera(c);
     cameras.push_back({{"name", camera.name},
                        {"model", camera::model_name(camera.model)},
                        {"resolution", {camera.width, camera.height}}});
   }
-  for (const storage::MapPart& p : storage::map_parts(map)) {
-    parts.push_back({{"keyframes", p.keyframes.size()},
-                     {"landmarks", p.landmarks},
-                     {"extent_m", {p.extent.x(), p.extent.y(), p.extent.z()}},
-                     {"from", to_seconds(storage::first_time(map, p))},
-                     {"to", to_seconds(storage::last_time(map, p))}});
+  for (const storage::Submap& p : storage::submaps_of(map)) {
+    submaps.push_back({{"keyframes", p.keyframes.size()},
+                       {"landmarks", p.landmarks},
+                       {"extent_m", {p.extent.x(), p.extent.y(), p.extent.z()}},
+                       {"from", to_seconds(storage::first_time(map, p))},
+                       {"to", to_seconds(storage::last_time(map, p))}});
   }
   return {{"schema", 1},
           {"version", saved.info.version},
@@ -67,7 +67,7 @@ nlohmann::ordered_json to_json(const storage::SavedMap& saved, std::uintmax_t fi
           {"observations", map.num_observations()},
           {"scale", session::scale_name(map.scale())},
           {"vocabulary", vocabulary_name(saved.info.vocabulary)},
-          {"parts", std::move(parts)}};
+          {"parts", std::move(submaps)}};
 }
 
 void print_info(const storage::SavedMap& saved, std::uintmax_t file_bytes) {
@@ -84,13 +84,13 @@ void print_info(const storage::SavedMap& saved, std::uintmax_t file_bytes) {
                       map.num_landmarks(), map.num_observations(), session::scale_name(map.scale()),
                       vocabulary_name(saved.info.vocabulary));
   const std::string unit = map.scale() == map::Scale::kMetric ? "m" : "units";
-  const std::vector<storage::MapPart> parts = storage::map_parts(map);
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    const TimeNs from = storage::first_time(map, parts[i]), to = storage::last_time(map, parts[i]);
+  const std::vector<storage::Submap> submaps = storage::submaps_of(map);
+  for (std::size_t i = 0; i < submaps.size(); ++i) {
+    const TimeNs from = storage::first_time(map, submaps[i]), to = storage::last_time(map, submaps[i]);
     text +=
         fmt::format("submap {}: {} keyframes over {:.1f} x {:.1f} x {:.1f} {}, {} landmarks, {:.3f} s to {:.3f} s\n", i,
-                    parts[i].keyframes.size(), parts[i].extent.x(), parts[i].extent.y(), parts[i].extent.z(), unit,
-                    parts[i].landmarks, to_seconds(from), to_seconds(to));
+                    submaps[i].keyframes.size(), submaps[i].extent.x(), submaps[i].extent.y(), submaps[i].extent.z(),
+                    unit, submaps[i].landmarks, to_seconds(from), to_seconds(to));
   }
   std::fputs(text.c_str(), stdout);
 }
@@ -137,10 +137,10 @@ Status write_exports(const map::BundledMap& map, const storage::ImageNamer& name
   if (Status s = write_atomically(folder / "points.ply", storage::landmarks_ply(map)); !s) return s;
   if (Status s = rig_formats::write_rig(map.rig(), folder / "rig.yaml"); !s) return s;
   const std::string header = evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal);
-  const std::vector<storage::MapPart> parts = storage::map_parts(map);
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    const std::string name = parts.size() == 1 ? "keyframes.tum" : fmt::format("keyframes_{}.tum", i);
-    const auto trajectory = storage::keyframe_trajectory(map, parts[i]);
+  const std::vector<storage::Submap> submaps = storage::submaps_of(map);
+  for (std::size_t i = 0; i < submaps.size(); ++i) {
+    const std::string name = submaps.size() == 1 ? "keyframes.tum" : fmt::format("keyframes_{}.tum", i);
+    const auto trajectory = storage::keyframe_trajectory(map, submaps[i]);
     if (Status s = evaluation::write_trajectory(folder / name, trajectory, evaluation::TrajectoryFormat::kTum, header);
         !s)
       return s;
@@ -198,8 +198,8 @@ int map_merge(const MapArguments& arguments) {
   if (const Status s = storage::write_map(merged->map, info, arguments.out); !s) return report_error(s.error());
   fmt::print("{} keyframes, {} landmarks; merged {}, {}, {} left\n{}\n", merged->map.num_keyframes(),
              merged->map.num_landmarks(), counted(static_cast<std::size_t>(merged->joined), "submap"),
-             counted(static_cast<std::size_t>(merged->loops), "further loop closure"), counted(merged->parts, "submap"),
-             arguments.out);
+             counted(static_cast<std::size_t>(merged->loops), "further loop closure"),
+             counted(merged->submaps, "submap"), arguments.out);
   return kExitOk;
 }
 

@@ -79,7 +79,8 @@ Status prepare_folder(const RunArguments& arguments) {
     if (!is(arguments.data.rig) && !is(arguments.config.file)) std::filesystem::remove(folder / name, error);
   }
   for (const char* stem : {"trajectory", "trajectory_live"}) {
-    for (std::size_t part = 0; std::filesystem::remove(folder / session::trajectory_file(stem, part), error); ++part) {
+    for (std::size_t submap = 0; std::filesystem::remove(folder / session::trajectory_file(stem, submap), error);
+         ++submap) {
     }
   }
   return {};

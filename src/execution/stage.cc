@@ -26,7 +26,7 @@ std::optional<Stage> superseded_by(Stage stage) {
 }
 
 std::optional<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest) {
-  if (!result.draft || result.draft->overtaken(newest)) return std::nullopt;
+  if (!result.draft || result.draft->superseded(newest)) return std::nullopt;
   return superseded_by(stage);
 }
 

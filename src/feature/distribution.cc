@@ -76,8 +76,8 @@ Distribution::Distribution(std::size_t most_wanted) {
   cells_.reserve(most_wanted);  // more than there are unless a region is very narrow
 }
 
-void Distribution::thin_out(std::span<const Corner> corners, const Region& region, int spacing,
-                            std::vector<std::uint32_t>& ranked) {
+void Distribution::non_maximum_suppression(std::span<const Corner> corners, const Region& region, int spacing,
+                                           std::vector<std::uint32_t>& ranked) {
   // No more corners than 2 x 2 blocks: room for a level of this size, whatever it shows.
   const std::size_t room =
       static_cast<std::size_t>(region.width / 2 + 1) * static_cast<std::size_t>(region.height / 2 + 1);

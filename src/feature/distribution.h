@@ -30,7 +30,8 @@ class Distribution {
 
   // `ranked` becomes the indices of the best corners, best first, no two of which are closer than `spacing` pixels in
   // both axes: the greedy form of adaptive non-maximal suppression (Brown et al., CVPR 2005; Bailo et al., PRL 2018).
-  void thin_out(std::span<const Corner> corners, const Region& region, int spacing, std::vector<std::uint32_t>& ranked);
+  void non_maximum_suppression(std::span<const Corner> corners, const Region& region, int spacing,
+                               std::vector<std::uint32_t>& ranked);
 
   // Chooses at most `wanted` (no more than the constructor was told) of the `ranked` corners and writes them to
   // `chosen` in the order of `corners`. The region is divided into square cells of about kPerCell wanted corners each.
@@ -55,9 +56,10 @@ class Distribution {
   struct Entry {
     std::uint32_t pixel, index;  // of a corner: its pixel, packed and not 0
   };
-  std::vector<Entry> order_;  // by score; holds the pixels so that they are read in a row
+  std::vector<Entry> order_;             // by score; holds the pixels so that they are read in a row
   std::vector<std::uint32_t> occupied_;  // per square of side `spacing`: the pixel of the corner in it, or 0
-  std::vector<std::uint32_t> column_of_, row_of_;  // per pixel of the region's axes: its square's or cell's column, row's begin
+  std::vector<std::uint32_t> column_of_,
+      row_of_;  // per pixel of the region's axes: its square's or cell's column, row's begin
   std::vector<std::uint32_t> taken_, spare_;
 };
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/assert.h"
-#include "feature/binary_tests.h"
+#include "feature/brief_pattern.h"
 #include "feature/distribution.h"
 #include "feature/fast.h"
 #include "feature/orientation.h"
@@ -99,7 +99,7 @@ void Extractor::Scratch::detect(const image::Pyramid& pyramid, const image::Imag
         return !allowed(mask, pyramid.to_base_x(l, c.x), pyramid.to_base_y(l, c.y));
       });
     }
-    distribution.thin_out(level.corners, level.region, spacing, level.ranked);
+    distribution.non_maximum_suppression(level.corners, level.region, spacing, level.ranked);
     available[l] = level.ranked.size();
   }
   share_over_levels(area, available, static_cast<std::size_t>(wanted), share);

@@ -1,9 +1,8 @@
 #include "geometry/triangulation.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-
-#include <Eigen/LU>
 
 namespace bslam::geometry {
 

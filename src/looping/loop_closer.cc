@@ -10,27 +10,28 @@ namespace {
 
 // On a continuous path the candidate is linked to the keyframe by those in between, and the landmarks matched are
 // mostly ones that the keyframe observes already. A real revisit matches landmarks that it does not observe yet.
-bool is_revisit(const map::BundledMap& map, KeyframeId keyframe, const Location& location, const LoopOptions& options) {
-  const auto known = std::ranges::count_if(location.matches, [&](const auto& match) {
+bool is_revisit(const map::BundledMap& map, KeyframeId keyframe, const PlaceMatch& place_match,
+                const LoopOptions& options) {
+  const auto known = std::ranges::count_if(place_match.matches, [&](const auto& match) {
     const std::span<const map::Observation> list = map.observations(match.second);
     return std::ranges::find(list, keyframe, &map::Observation::keyframe) != list.end();
   });
-  const auto all = static_cast<double>(location.matches.size());
+  const auto all = static_cast<double>(place_match.matches.size());
   return all - static_cast<double>(known) >= options.min_new_landmark_ratio * all;
 }
 
 // Returns, among the candidate and its best covisible keyframes, without the keyframe's own neighbours, the one that is
 // closest to the verified position of the keyframe.
-KeyframeId closest_keyframe_of_place(const map::BundledMap& map, KeyframeId keyframe, const Location& location,
+KeyframeId closest_keyframe_of_place(const map::BundledMap& map, KeyframeId keyframe, const PlaceMatch& place_match,
                                      const LoopingOptions& options) {
-  const Eigen::Vector3d here = location.T_rig_world.inverse().translation();
+  const Eigen::Vector3d here = place_match.T_rig_world.inverse().translation();
   const auto distance = [&](KeyframeId k) {
     return (map.keyframe(k).T_rig_world.inverse().translation() - here).norm();
   };
   const auto own = neighbours_of(map, keyframe, options.recognition);
-  KeyframeId best = location.with;
+  KeyframeId best = place_match.matched_keyframe;
   for (const map::Covisible& c :
-       map.best_covisible(location.with, static_cast<std::size_t>(options.verification.neighbours))) {
+       map.best_covisible(place_match.matched_keyframe, static_cast<std::size_t>(options.verification.neighbours))) {
     const bool known =
         c.keyframe == keyframe || std::ranges::binary_search(own, c.keyframe, {}, &map::Covisible::keyframe);
     if (!known && distance(c.keyframe) < distance(best)) best = c.keyframe;
@@ -44,40 +45,40 @@ LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const Loopin
                        const feature::FeatureModel& features, std::uint64_t seed)
     : recogniser_(std::move(recogniser)), options_(options), features_(features), seed_(seed) {}
 
-std::optional<Location> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map,
-                                           const Candidate& candidate) const {
+std::optional<PlaceMatch> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map,
+                                             const Candidate& candidate) const {
   const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
-  return locate(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe, options_.verification,
-                features_, random);
+  return verify_place(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe,
+                      options_.verification, features_, random);
 }
 
 // Submaps can have any relative pose, so no pose prior can reject a wrong match, only appearance. Therefore no other
 // place in the rest of the map may match equally well. The candidates are searched as for relocalisation, with lower
 // thresholds, because a look-alike place observed by fewer keyframes would not be a candidate beside the right one.
-bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const {
+bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const PlaceMatch& place_match) const {
   const std::shared_ptr<const frame::BundledFrame> frame = map.keyframe(keyframe).frame;
   const camera::Rig rig = map.rig_of(keyframe);
   map::BundledMap rest = map;
-  rest.remove_part(map.root_of(keyframe));
+  rest.remove_submap(map.root_of(keyframe));
   const Random random(seed_, "rival", static_cast<std::uint64_t>(keyframe.value()));
-  return std::ranges::none_of(recogniser_->recognised(rest, *frame), [&](const Candidate& candidate) {
-    const auto other = locate(rest, rig, *frame, candidate.keyframe, options_.verification, features_, random);
-    return other && disputes(rest, location, *other);
+  return std::ranges::none_of(recogniser_->query_frame(rest, *frame), [&](const Candidate& candidate) {
+    const auto other = verify_place(rest, rig, *frame, candidate.keyframe, options_.verification, features_, random);
+    return other && contradicts(rest, place_match, *other);
   });
 }
 
-std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map) {
-  const std::vector<Candidate> candidates = recogniser_->revisited(map, keyframe);
+std::optional<PlaceMatch> LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map) {
+  const std::vector<Candidate> candidates = recogniser_->query_keyframe(map, keyframe);
   for (const Candidate& candidate : consistent_candidates(map, keyframe, candidates, options_.loop, history_)) {
-    auto location = verify(keyframe, map, candidate);
-    if (!location || !is_revisit(map, keyframe, *location, options_.loop)) continue;
-    const auto scale = relative_scale(map, keyframe, *location);
+    auto place_match = verify(keyframe, map, candidate);
+    if (!place_match || !is_revisit(map, keyframe, *place_match, options_.loop)) continue;
+    const auto scale = relative_scale(map, keyframe, *place_match);
     if (!scale) continue;
-    location->scale = *scale;
-    location->with = closest_keyframe_of_place(map, keyframe, *location, options_);
-    const LoopClosure closure = measure(map, keyframe, *location);
+    place_match->scale = *scale;
+    place_match->matched_keyframe = closest_keyframe_of_place(map, keyframe, *place_match, options_);
+    const LoopClosure closure = measure(map, keyframe, *place_match);
     if (!plausible(map, closure, options_.loop)) continue;
-    if (!closure.joined || is_unambiguous(keyframe, map, *location)) return location;
+    if (!closure.merged || is_unambiguous(keyframe, map, *place_match)) return place_match;
   }
   return std::nullopt;
 }
@@ -85,12 +86,12 @@ std::optional<Location> LoopCloser::find(KeyframeId keyframe, const map::Bundled
 std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft& draft) {
   if (last_.valid() && keyframe <= last_) history_ = {};
   last_ = keyframe;
-  const auto location = find(keyframe, draft.map());
-  if (!location) return std::nullopt;
-  const LoopClosure closure = measure(draft.map(), keyframe, *location);
+  const auto place_match = find(keyframe, draft.map());
+  if (!place_match) return std::nullopt;
+  const LoopClosure closure = measure(draft.map(), keyframe, *place_match);
   map::MapDraft attempt = draft;
-  const bool done = closure.joined ? join_parts(closure, *location, options_.loop, features_, attempt)
-                                   : close_loop(closure, *location, options_.loop, features_, attempt);
+  const bool done = closure.merged ? merge_submaps(closure, *place_match, options_.loop, features_, attempt)
+                                   : close_loop(closure, *place_match, options_.loop, features_, attempt);
   if (!done) return std::nullopt;
   draft = std::move(attempt);
   history_ = {};

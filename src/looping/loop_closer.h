@@ -5,21 +5,21 @@
 #include <optional>
 
 #include "looping/consistency.h"
-#include "looping/locate.h"
+#include "looping/verify_place.h"
 #include "map/map_edit.h"
 
 namespace bslam::looping {
 
 struct LoopClosure {
-  KeyframeId keyframe, with;
+  KeyframeId keyframe, matched_keyframe;
   int inliers = 0;  // keypoints that support the relative pose
   // median reprojection error in pixels of the matched landmarks, at the keyframe's pose before the correction
-  double off_px = 0;
-  double apart = 0;     // distance to the matched keyframe over the median distance to the matched landmarks
-  double moved = 0;     // translation of the keyframe's centre by the correction, in map units
-  double turned = 0;    // rotation by the correction, rad
-  double scaled = 1;    // scale correction; differs from 1 only if the scale is not observable
-  bool joined = false;  // two submaps were merged
+  double reprojection_error_px = 0;
+  double relative_distance = 0;  // distance to the matched keyframe over the median distance to the matched landmarks
+  double translation_correction = 0;  // translation of the keyframe's centre by the correction, in map units
+  double rotation_correction = 0;     // rotation by the correction, rad
+  double scale_correction = 1;        // scale correction; differs from 1 only if the scale is not observable
+  bool merged = false;                // two submaps were merged
 };
 
 // The loop-closing stage: its options, its place recogniser, and the recognition history between keyframes.
@@ -33,9 +33,9 @@ class LoopCloser {
   std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft);
 
  private:
-  std::optional<Location> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const;
-  bool is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const Location& location) const;
-  std::optional<Location> find(KeyframeId keyframe, const map::BundledMap& map);
+  std::optional<PlaceMatch> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const;
+  bool is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const PlaceMatch& place_match) const;
+  std::optional<PlaceMatch> find(KeyframeId keyframe, const map::BundledMap& map);
 
   const std::unique_ptr<PlaceRecogniser> recogniser_;
   const LoopingOptions options_;

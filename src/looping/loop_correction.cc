@@ -26,11 +26,11 @@ SE3 pose_of(const Sim3& S_rig_world) {
 }
 
 // Median reprojection error, in pixels, of the matched landmarks of the place at the keyframe's current pose.
-double reprojection_error_px(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
+double reprojection_error_px(const map::BundledMap& map, KeyframeId keyframe, const PlaceMatch& place_match) {
   const map::BundledKeyframe& entry = map.keyframe(keyframe);
   const camera::Rig rig = map.rig_of(keyframe);
   std::vector<double> errors;
-  for (const auto& [feature, l] : location.matches) {
+  for (const auto& [feature, l] : place_match.matches) {
     const frame::KeypointRef r = entry.frame->bundled.keypoints(feature).front();
     const Eigen::Vector2d pixel = entry.frame->keypoints(r.camera).pixel[r.keypoint.index()].cast<double>();
     const auto error =
@@ -42,12 +42,12 @@ double reprojection_error_px(const map::BundledMap& map, KeyframeId keyframe, co
 
 // Distance between the verified pose and the matched keyframe, divided by the median distance to the landmarks both
 // observe.
-double relative_distance(const map::BundledMap& map, const Location& location) {
-  const Vector3d here = centre(location.T_rig_world);
+double relative_distance(const map::BundledMap& map, const PlaceMatch& place_match) {
+  const Vector3d here = centre(place_match.T_rig_world);
   std::vector<double> distances;
-  for (const auto& [feature, l] : location.matches) distances.push_back((map.landmark(l).position - here).norm());
+  for (const auto& [feature, l] : place_match.matches) distances.push_back((map.landmark(l).position - here).norm());
   if (distances.empty()) return std::numeric_limits<double>::infinity();
-  return (here - centre(map.keyframe(location.with).T_rig_world)).norm() / median(std::move(distances));
+  return (here - centre(map.keyframe(place_match.matched_keyframe).T_rig_world)).norm() / median(std::move(distances));
 }
 
 // Length of the path between two keyframes through all keyframes of their submap created in between.
@@ -77,11 +77,11 @@ std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyfram
 // Fuses the window with the place. The keyframe's landmarks are merged with the landmarks it was matched to; then the
 // landmarks of the place are projected into all keyframes of the window at the given poses.
 void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_world, const LoopClosure& closure,
-          const Location& location, const LoopOptions& options, const feature::FeatureModel& features,
+          const PlaceMatch& place_match, const LoopOptions& options, const feature::FeatureModel& features,
           map::MapDraft& draft) {
-  const std::vector<LandmarkId> place =
-      landmarks_about(draft.map(), closure.with, options.window, static_cast<int>(draft.map().num_landmarks()));
-  for (const auto& [feature, there] : location.matches) {
+  const std::vector<LandmarkId> place = landmarks_around(draft.map(), closure.matched_keyframe, options.window,
+                                                         static_cast<int>(draft.map().num_landmarks()));
+  for (const auto& [feature, there] : place_match.matches) {
     const LandmarkId here = draft.map().landmark_of(closure.keyframe, feature);
     const LandmarkId now = draft.map().resolve(there);
     if (!now.valid() || here == now) continue;
@@ -125,7 +125,7 @@ void add_loop_edges(const map::BundledMap& before, const map::BundledMap& fused,
       if (b < 0 || std::binary_search(window.begin(), window.end(), c.keyframe)) continue;
       const auto known = std::ranges::find(old, c.keyframe, &map::Covisible::keyframe);
       const int gained = c.weight - (known == old.end() ? 0 : known->weight);
-      const bool the_loop = k == closure.keyframe && c.keyframe == closure.with;
+      const bool the_loop = k == closure.keyframe && c.keyframe == closure.matched_keyframe;
       if (gained < kMinGained && !the_loop) continue;
       const int a = graph.vertex(k);
       const auto& S = graph.problem.S_world;
@@ -163,36 +163,37 @@ void move_map(map::SetPoses poses, map::MapDraft& draft) {
 
 }  // namespace
 
-LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Location& location) {
-  LoopClosure out{.keyframe = keyframe, .with = location.with, .inliers = location.inliers};
+LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const PlaceMatch& place_match) {
+  LoopClosure out{
+      .keyframe = keyframe, .matched_keyframe = place_match.matched_keyframe, .inliers = place_match.inliers};
   const SE3& now = map.keyframe(keyframe).T_rig_world;
-  out.moved = (centre(now) - centre(location.T_rig_world)).norm();
-  out.turned =
-      (now.rotation() * location.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
-  out.off_px = reprojection_error_px(map, keyframe, location);
-  out.scaled = location.scale;
-  out.apart = relative_distance(map, location);
-  out.joined = map.root_of(keyframe) != map.root_of(location.with);
+  out.translation_correction = (centre(now) - centre(place_match.T_rig_world)).norm();
+  out.rotation_correction =
+      (now.rotation() * place_match.T_rig_world.rotation().conjugate()).angularDistance(Eigen::Quaterniond::Identity());
+  out.reprojection_error_px = reprojection_error_px(map, keyframe, place_match);
+  out.scale_correction = place_match.scale;
+  out.relative_distance = relative_distance(map, place_match);
+  out.merged = map.root_of(keyframe) != map.root_of(place_match.matched_keyframe);
   return out;
 }
 
 bool plausible(const map::BundledMap& map, const LoopClosure& closure, const LoopOptions& options) {
-  if (closure.joined) return map.scale() == map::Scale::kMetric;
-  const auto [first, last] = std::minmax(closure.keyframe, closure.with);
+  if (closure.merged) return map.scale() == map::Scale::kMetric;
+  const auto [first, last] = std::minmax(closure.keyframe, closure.matched_keyframe);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
   const double way = path_length(map, first, last) + map::median_depth(map, closure.keyframe);
-  return closure.apart <= options.max_distance_over_depth && closure.moved <= share * way &&
-         closure.turned <= kMaxRotation;
+  return closure.relative_distance <= options.max_distance_over_depth &&
+         closure.translation_correction <= share * way && closure.rotation_correction <= kMaxRotation;
 }
 
-bool join_parts(const LoopClosure& closure, const Location& location, const LoopOptions& options,
-                const feature::FeatureModel& features, map::MapDraft& draft) {
+bool merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, const LoopOptions& options,
+                   const feature::FeatureModel& features, map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
   if (map.scale() != map::Scale::kMetric) return false;
-  const KeyframeId here = map.root_of(closure.keyframe), there = map.root_of(closure.with);
+  const KeyframeId here = map.root_of(closure.keyframe), there = map.root_of(closure.matched_keyframe);
   const bool here_moves = there < here;  // the older submap keeps its pose
   const KeyframeId moving = here_moves ? here : there;
-  const SE3 T_there_here = location.T_rig_world.inverse() * map.keyframe(closure.keyframe).T_rig_world;
+  const SE3 T_there_here = place_match.T_rig_world.inverse() * map.keyframe(closure.keyframe).T_rig_world;
   const SE3 motion = here_moves ? T_there_here : T_there_here.inverse();
 
   map::SetPoses poses;
@@ -206,14 +207,15 @@ bool join_parts(const LoopClosure& closure, const Location& location, const Loop
   }
   const std::vector<KeyframeId> window = window_of(map, closure.keyframe, options.window);
   move_map(std::move(poses), draft);
-  draft.join_parts(here_moves ? closure.keyframe : closure.with, here_moves ? closure.with : closure.keyframe);
+  draft.merge_submaps(here_moves ? closure.keyframe : closure.matched_keyframe,
+                      here_moves ? closure.matched_keyframe : closure.keyframe);
   std::vector<SE3> T_window;
   for (const KeyframeId k : window) T_window.push_back(draft.map().keyframe(k).T_rig_world);
-  fuse(window, T_window, closure, location, options, features, draft);
+  fuse(window, T_window, closure, place_match, options, features, draft);
   return true;
 }
 
-bool close_loop(const LoopClosure& closure, const Location& location, const LoopOptions& options,
+bool close_loop(const LoopClosure& closure, const PlaceMatch& place_match, const LoopOptions& options,
                 const feature::FeatureModel& features, map::MapDraft& draft) {
   const map::BundledMap before = draft.map();
   EssentialGraph graph = essential_graph(before, before.root_of(closure.keyframe), options.edge_weight);
@@ -222,8 +224,8 @@ bool close_loop(const LoopClosure& closure, const Location& location, const Loop
 
   // Poses of the window as given by the verification: S_i' = T_i T_k^-1 S_k', in the scale of the window.
   const std::vector<Sim3> S_before = graph.problem.S_world;
-  const double scale = 1.0 / closure.scaled;
-  const Sim3 S_keyframe(scale, location.T_rig_world.rotation(), scale * location.T_rig_world.translation());
+  const double scale = 1.0 / closure.scale_correction;
+  const Sim3 S_keyframe(scale, place_match.T_rig_world.rotation(), scale * place_match.T_rig_world.translation());
   const Sim3 S_keyframe_before(before.keyframe(closure.keyframe).T_rig_world);
   for (const KeyframeId k : window) {
     const auto v = static_cast<std::size_t>(graph.vertex(k));
@@ -232,14 +234,14 @@ bool close_loop(const LoopClosure& closure, const Location& location, const Loop
   std::vector<SE3> T_window;
   for (const KeyframeId k : window)
     T_window.push_back(pose_of(graph.problem.S_world[static_cast<std::size_t>(graph.vertex(k))]));
-  if (closure.off_px <= options.max_bundle_error_px && !graph.problem.scale_free) {
+  if (closure.reprojection_error_px <= options.max_bundle_error_px && !graph.problem.scale_free) {
     // The error is small, so bundle adjustment can remove it starting from the present map. The pose verified for a
     // single keyframe is no more accurate than the map.
-    fuse(window, T_window, closure, location, options, features, draft);
+    fuse(window, T_window, closure, place_match, options, features, draft);
     return true;
   }
   move_window(window, graph, S_before, draft);
-  fuse(window, T_window, closure, location, options, features, draft);
+  fuse(window, T_window, closure, place_match, options, features, draft);
   add_loop_edges(before, draft.map(), window, closure, graph);
 
   const std::vector<Sim3> S_fused = graph.problem.S_world;

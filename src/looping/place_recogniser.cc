@@ -83,7 +83,7 @@ void BagOfWordsRecogniser::sync(const map::BundledMap& map) {
   }
 }
 
-std::vector<Candidate> BagOfWordsRecogniser::revisited(const map::BundledMap& map, KeyframeId keyframe) {
+std::vector<Candidate> BagOfWordsRecogniser::query_keyframe(const map::BundledMap& map, KeyframeId keyframe) {
   sync(map);
   const Words words = index_.words_of(keyframe);
   std::vector<std::uint8_t> excluded(map.keyframe_slots(), 0);
@@ -100,7 +100,7 @@ std::vector<Candidate> BagOfWordsRecogniser::revisited(const map::BundledMap& ma
   return rank(map, *words, excluded, {options_.min_common_word_ratio, options_.min_group_score_ratio, min_score});
 }
 
-std::vector<Candidate> BagOfWordsRecogniser::recognised(const map::BundledMap& map, const frame::BundledFrame& frame) {
+std::vector<Candidate> BagOfWordsRecogniser::query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) {
   sync(map);
   return rank(map, *words_of(frame), {},
               {options_.relocalisation_factor * options_.min_common_word_ratio,

@@ -1,5 +1,5 @@
 // Place recognition by appearance: finds keyframes that may show the same place as a frame. Geometric verification
-// follows in looping/locate.h.
+// follows in looping/verify_place.h.
 #pragma once
 
 #include <memory>
@@ -31,10 +31,10 @@ class PlaceRecogniser {
   virtual void describe(frame::BundledFrame& frame) const = 0;
 
   // Returns keyframes of `map` that may show the place of `keyframe`, excluding its neighbours.
-  virtual std::vector<Candidate> revisited(const map::BundledMap& map, KeyframeId keyframe) = 0;
+  virtual std::vector<Candidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) = 0;
 
   // Returns keyframes of `map` that may show the place of a frame prepared by describe().
-  virtual std::vector<Candidate> recognised(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
+  virtual std::vector<Candidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
 };
 
 // Bag of words: each unique feature of every camera contributes its word.
@@ -43,8 +43,8 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   BagOfWordsRecogniser(place::VocabularyPtr vocabulary, const RecognitionOptions& options);
 
   void describe(frame::BundledFrame& frame) const override;
-  std::vector<Candidate> revisited(const map::BundledMap& map, KeyframeId keyframe) override;
-  std::vector<Candidate> recognised(const map::BundledMap& map, const frame::BundledFrame& frame) override;
+  std::vector<Candidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) override;
+  std::vector<Candidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) override;
 
  private:
   using Words = std::shared_ptr<const place::WordVector>;

@@ -3,13 +3,13 @@
 
 #include <optional>
 
-#include "looping/locate.h"
+#include "looping/verify_place.h"
 
 namespace bslam::looping {
 
 // Scale of the map at the place over the scale at `keyframe`: the median ratio of the distances to landmarks that both
 // ends have triangulated. Distances give the scale even if the keyframe returned to exactly the same position, where
 // reprojection does not. Returns 1 if the map is metric, nullopt if too few landmarks are common.
-std::optional<double> relative_scale(const map::BundledMap& map, KeyframeId keyframe, const Location& location);
+std::optional<double> relative_scale(const map::BundledMap& map, KeyframeId keyframe, const PlaceMatch& place_match);
 
 }  // namespace bslam::looping

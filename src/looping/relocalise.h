@@ -3,15 +3,15 @@
 
 #include <optional>
 
-#include "looping/locate.h"
 #include "looping/place_recogniser.h"
+#include "looping/verify_place.h"
 
 namespace bslam::looping {
 
 // The frame must be prepared by PlaceRecogniser::describe. Returns nullopt if no place is verified, or if two verified
 // places contradict each other, since look-alike rooms cannot be distinguished from a single frame.
-std::optional<Location> relocalise(PlaceRecogniser& recogniser, const map::BundledMap& map,
-                                   const frame::BundledFrame& frame, const VerificationOptions& options,
-                                   const feature::FeatureModel& features, Random random);
+std::optional<PlaceMatch> relocalise(PlaceRecogniser& recogniser, const map::BundledMap& map,
+                                     const frame::BundledFrame& frame, const VerificationOptions& options,
+                                     const feature::FeatureModel& features, Random random);
 
 }  // namespace bslam::looping

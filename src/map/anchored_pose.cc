@@ -5,7 +5,7 @@ namespace bslam::map {
 using geometry::SE3;
 
 AnchoredPose AnchoredPose::at(const BundledMap& map, KeyframeId reference, const SE3& T_rig_world) {
-  return {reference, T_rig_world * map.resolved_pose(reference).inverse(), map.keyframe(reference).unit};
+  return {reference, T_rig_world * map.resolved_pose(reference).inverse(), map.keyframe(reference).scale};
 }
 
 std::optional<SE3> AnchoredPose::resolve(const BundledMap& map) const {
@@ -14,14 +14,14 @@ std::optional<SE3> AnchoredPose::resolve(const BundledMap& map) const {
 }
 
 double AnchoredPose::scale_change(const BundledMap& map) const {
-  return reference.valid() ? map.keyframe(reference).unit / scale : 1.0;
+  return reference.valid() ? map.keyframe(reference).scale / scale : 1.0;
 }
 
 void AnchoredPose::rescale(const BundledMap& map) {
   const double change = scale_change(map);
   if (change == 1.0) return;
   T_rig_reference = geometry::scaled(T_rig_reference, change);
-  scale = map.keyframe(reference).unit;
+  scale = map.keyframe(reference).scale;
 }
 
 }  // namespace bslam::map

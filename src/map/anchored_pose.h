@@ -11,13 +11,13 @@ namespace bslam::map {
 struct AnchoredPose {
   KeyframeId reference;           // invalid: no pose
   geometry::SE3 T_rig_reference;  // from the reference keyframe's rig frame at its time; lengths in map units
-  double scale = 1.0;             // BundledKeyframe::unit of the reference when T_rig_reference was taken
+  double scale = 1.0;             // BundledKeyframe::scale of the reference when T_rig_reference was taken
 
   // Anchors a pose in `map` to `reference`, which is alive there.
   static AnchoredPose at(const BundledMap& map, KeyframeId reference, const geometry::SE3& T_rig_world);
 
   // Is there a pose, and does `map` still hold the submap of its reference?
-  bool known_in(const BundledMap& map) const { return map.surviving(reference).valid(); }
+  bool known_in(const BundledMap& map) const { return map.nearest_alive_ancestor(reference).valid(); }
 
   // T_rig_world in `map`, at its present scale. Empty where the pose is not known in it.
   std::optional<geometry::SE3> resolve(const BundledMap& map) const;

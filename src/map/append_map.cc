@@ -18,7 +18,7 @@ void append_keyframes(BundledMap& onto, const BundledMap& other, AppendedIds& id
     const KeyframeId parent = other.keyframe(k).parent;
     parents.push_back(parent.valid() ? ids.keyframes[parent.index()] : KeyframeId());
   }
-  const bool hung = hang_keyframes(onto, first, parents);
+  const bool hung = attach_keyframes(onto, first, parents);
   BSLAM_ASSERT(hung, "the links of a map are trees");
 }
 
@@ -36,7 +36,7 @@ KeyframeId nearest_older(const AppendedIds& ids, KeyframeId k) {
 
 }  // namespace
 
-bool hang_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeId> parents) {
+bool attach_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeId> parents) {
   std::vector<std::size_t> waiting_for(parents.size(), 0);  // number of children not attached yet
   for (const KeyframeId parent : parents) {
     if (parent.valid()) ++waiting_for[parent.index() - first.index()];
@@ -50,7 +50,7 @@ bool hang_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeI
   for (std::size_t n = 0; n < ready.size(); ++n) {
     const KeyframeId parent = parents[ready[n]];
     if (!parent.valid()) continue;
-    map.join_parts(KeyframeId(first.index() + ready[n]), parent);
+    map.merge_submaps(KeyframeId(first.index() + ready[n]), parent);
     const std::size_t above = parent.index() - first.index();
     if (--waiting_for[above] == 0) ready.push_back(above);
   }
@@ -74,7 +74,7 @@ AppendedIds append_map(BundledMap& onto, const BundledMap& other) {
     const LandmarkReference reference{ids.keyframes[source.reference.keyframe.index()], source.reference.keypoint};
     const LandmarkId added =
         onto.add_landmark(source.position, observations, reference, nearest_older(ids, source.born));
-    onto.add_sightings(added, source.expected, source.found);
+    onto.add_visibility_counts(added, source.expected, source.found);
     ids.landmarks[l.index()] = added;
   }
   return ids;

@@ -17,13 +17,13 @@ struct AppendedIds {
 
 // Appends all alive keyframes and landmarks of `other` to `onto` in order of id: poses, spanning trees and observations
 // are kept, frames are shared, and landmark appearance is recomputed. The appended submaps share no landmarks with
-// those of `onto` and keep their own world frames until join_parts and a correction of the poses connect them. Both
+// those of `onto` and keep their own world frames until merge_submaps and a correction of the poses connect them. Both
 // maps must have the same rig and pyramid. The scale and gauge epoch of `onto` are kept.
 AppendedIds append_map(BundledMap& onto, const BundledMap& other);
 
 // Builds spanning trees from keyframes `first`, `first` + 1, ..., each of which must be a submap of its own: each one
 // is attached to its entry in `parents`, which refers to one of these keyframes; those with an invalid parent stay
 // roots. Returns false, with some keyframes already attached, if the links contain a cycle.
-bool hang_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeId> parents);
+bool attach_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeId> parents);
 
 }  // namespace bslam::map

@@ -32,7 +32,7 @@ struct BundledKeyframe {
   bool alive = false;
   // Accumulated scale factor of its submap since the keyframe was added. A length stored when it was u is multiplied by
   // unit / u.
-  double unit = 1.0;
+  double scale = 1.0;
 };
 
 }  // namespace bslam::map

@@ -53,7 +53,7 @@ KeyframeId BundledMap::root_of(KeyframeId k) const {
   return k;
 }
 
-KeyframeId BundledMap::surviving(KeyframeId k) const {
+KeyframeId BundledMap::nearest_alive_ancestor(KeyframeId k) const {
   while (k.valid() && !keyframe(k).alive) k = keyframe(k).parent;
   return k;
 }
@@ -188,7 +188,7 @@ bool BundledMap::merge_landmarks(LandmarkId from, LandmarkId into) {
     o.aligned = false;  // it was aligned to the patch of another reference keypoint
     add_observation(into, o);
   }
-  add_sightings(into, landmark(from).expected, landmark(from).found);
+  add_visibility_counts(into, landmark(from).expected, landmark(from).found);
   mark_removed(from, into);
   return true;
 }
@@ -207,17 +207,17 @@ bool BundledMap::remove_keyframe(KeyframeId k) {
   return true;
 }
 
-bool BundledMap::join_parts(KeyframeId child, KeyframeId parent) {
+bool BundledMap::merge_submaps(KeyframeId child, KeyframeId parent) {
   if (!alive(child) || !alive(parent) || root_of(child) == root_of(parent)) return false;
   make_root(child);
   attach(child, parent);
   return true;
 }
 
-bool BundledMap::remove_part(KeyframeId root) {
+bool BundledMap::remove_submap(KeyframeId root) {
   if (!alive(root) || keyframe(root).parent.valid()) return false;
-  const std::vector<KeyframeId> part = part_of(root);
-  for (std::size_t i = part.size(); i-- > 1;) remove_keyframe(part[i]);  // leaves first
+  const std::vector<KeyframeId> submap = keyframes_of_submap(root);
+  for (std::size_t i = submap.size(); i-- > 1;) remove_keyframe(submap[i]);  // leaves first
   const CowArray<LandmarkId> table = keyframe(root).landmarks;
   for (const LandmarkId l : table) {
     if (l.valid()) remove_observation(l, root);
@@ -226,15 +226,15 @@ bool BundledMap::remove_part(KeyframeId root) {
   return true;
 }
 
-bool BundledMap::scale_part(KeyframeId root, double factor) {
+bool BundledMap::scale_submap(KeyframeId root, double factor) {
   if (!alive(root) || keyframe(root).parent.valid()) return false;
   std::vector<std::uint8_t> inside(keyframes_.size(), 0);
-  for (const KeyframeId k : part_of(root)) inside[k.index()] = 1;
+  for (const KeyframeId k : keyframes_of_submap(root)) inside[k.index()] = 1;
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
-    const KeyframeId now = surviving(KeyframeId(i));
+    const KeyframeId now = nearest_alive_ancestor(KeyframeId(i));
     if (!now.valid() || !inside[now.index()]) continue;
     BundledKeyframe& entry = edit(KeyframeId(i));
-    entry.unit *= factor;
+    entry.scale *= factor;
     geometry::SE3& T = entry.alive ? entry.T_rig_world : entry.T_rig_parent;
     T = geometry::scaled(T, factor);
     entry.twist.tail<3>() *= factor;
@@ -268,7 +268,7 @@ bool BundledMap::set_position(LandmarkId l, const Eigen::Vector3d& position) {
   return true;
 }
 
-bool BundledMap::add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found) {
+bool BundledMap::add_visibility_counts(LandmarkId l, std::uint32_t expected, std::uint32_t found) {
   if (!alive(l)) return false;
   Landmark& entry = edit(l);
   entry.expected += expected;
@@ -304,13 +304,13 @@ void BundledMap::unlink(LandmarkId l, Observation o) {
   for (const Observation& other : observations(l)) change_weight(o.keyframe, other.keyframe, -1);
 }
 
-std::vector<KeyframeId> BundledMap::part_of(KeyframeId root) const {
-  std::vector<KeyframeId> part = {root};
-  for (std::size_t i = 0; i < part.size(); ++i) {
-    const std::vector<KeyframeId>& children = keyframe(part[i]).children;
-    part.insert(part.end(), children.begin(), children.end());
+std::vector<KeyframeId> BundledMap::keyframes_of_submap(KeyframeId root) const {
+  std::vector<KeyframeId> submap = {root};
+  for (std::size_t i = 0; i < submap.size(); ++i) {
+    const std::vector<KeyframeId>& children = keyframe(submap[i]).children;
+    submap.insert(submap.end(), children.begin(), children.end());
   }
-  return part;
+  return submap;
 }
 
 void BundledMap::mark_removed(KeyframeId k) {

@@ -69,10 +69,10 @@ class BundledMap {
   std::vector<KeyframeId> roots() const;
   KeyframeId root_of(KeyframeId k) const;
   // Alive keyframes of the submap with this root, parents before children.
-  std::vector<KeyframeId> part_of(KeyframeId root) const;
+  std::vector<KeyframeId> keyframes_of_submap(KeyframeId root) const;
   // Returns the keyframe itself if it is alive, otherwise its nearest alive ancestor; invalid if its submap was
   // removed.
-  KeyframeId surviving(KeyframeId k) const;
+  KeyframeId nearest_alive_ancestor(KeyframeId k) const;
 
   // Follows merges; returns an invalid id if the landmark was removed.
   LandmarkId resolve(LandmarkId l) const;
@@ -137,16 +137,16 @@ class BundledMap {
   bool remove_keyframe(KeyframeId k);
   // Joins two submaps: `child` becomes the root of its submap and is attached to `parent`. Also returns false if both
   // are in the same submap.
-  bool join_parts(KeyframeId child, KeyframeId parent);
+  bool merge_submaps(KeyframeId child, KeyframeId parent);
   // Removes all keyframes and landmarks of a submap. Returns false if `root` is not the root of a submap.
-  bool remove_part(KeyframeId root);
+  bool remove_submap(KeyframeId root);
   // Scales a submap about the origin by `factor`, including the relative poses of its removed keyframes, and begins a
   // gauge epoch. Returns false if `root` is not the root of a submap.
-  bool scale_part(KeyframeId root, double factor);
+  bool scale_submap(KeyframeId root, double factor);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
   bool set_twist(KeyframeId k, const geometry::Vector6d& twist);
   bool set_position(LandmarkId l, const Eigen::Vector3d& position);
-  bool add_sightings(LandmarkId l, std::uint32_t expected, std::uint32_t found);
+  bool add_visibility_counts(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes viewing direction, distance range and descriptor from the observations.
   bool refresh_landmark(LandmarkId l);
   // Releases the memory of removed landmarks. Each call visits the next `slots` landmarks in turn, and releases a block

@@ -10,8 +10,8 @@
 namespace bslam::map {
 
 struct LocalViewOptions {
-  int max_keyframes = 24;   // whose landmarks are looked for
-  int neighbours = 6;       // covisible keyframes taken along with each that shares landmarks with the frame
+  int max_keyframes = 24;  // whose landmarks are looked for
+  int neighbours = 6;      // covisible keyframes taken along with each that shares landmarks with the frame
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -21,8 +21,8 @@ struct LocalViewOptions {
 };
 
 struct LocalView {
-  std::vector<KeyframeId> keyframes;    // most shared landmarks first
-  std::vector<LandmarkId> landmarks;    // all they observe, each once, those of `seeds` first
+  std::vector<KeyframeId> keyframes;  // most shared landmarks first
+  std::vector<LandmarkId> landmarks;  // all they observe, each once, those of `seeds` first
 };
 
 // Keyframes that observe the `seeds` (alive landmarks, distinct), the best of them with their covisible neighbours, and

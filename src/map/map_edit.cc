@@ -53,21 +53,21 @@ bool MapDraft::remove_keyframe(KeyframeId k) {
   return true;
 }
 
-bool MapDraft::join_parts(KeyframeId child, KeyframeId parent) {
-  if (!working_.join_parts(child, parent)) return false;
-  edit_.operations.emplace_back(JoinParts{child, parent});
+bool MapDraft::merge_submaps(KeyframeId child, KeyframeId parent) {
+  if (!working_.merge_submaps(child, parent)) return false;
+  edit_.operations.emplace_back(MergeSubmaps{child, parent});
   return true;
 }
 
-bool MapDraft::remove_part(KeyframeId root) {
-  if (!working_.remove_part(root)) return false;
-  edit_.operations.emplace_back(RemovePart{root});
+bool MapDraft::remove_submap(KeyframeId root) {
+  if (!working_.remove_submap(root)) return false;
+  edit_.operations.emplace_back(RemoveSubmap{root});
   return true;
 }
 
-bool MapDraft::scale_part(KeyframeId root, double factor) {
-  if (!working_.scale_part(root, factor)) return false;
-  edit_.operations.emplace_back(ScalePart{root, factor});
+bool MapDraft::scale_submap(KeyframeId root, double factor) {
+  if (!working_.scale_submap(root, factor)) return false;
+  edit_.operations.emplace_back(ScaleSubmap{root, factor});
   return true;
 }
 
@@ -85,12 +85,14 @@ void MapDraft::set_twists(std::vector<std::pair<KeyframeId, geometry::Vector6d>>
   edit_.operations.emplace_back(SetTwists{std::move(twists)});
 }
 
-void MapDraft::add_sightings(std::vector<Sighting> sightings) {
+void MapDraft::add_visibility_counts(std::vector<VisibilityCount> visibility_counts) {
   // The counts were collected over several map versions.
-  for (Sighting& s : sightings) s.landmark = working_.resolve(s.landmark);
-  std::erase_if(sightings, [&](const Sighting& s) { return !working_.add_sightings(s.landmark, s.expected, s.found); });
-  if (sightings.empty()) return;
-  edit_.operations.emplace_back(AddSightings{std::move(sightings)});
+  for (VisibilityCount& s : visibility_counts) s.landmark = working_.resolve(s.landmark);
+  std::erase_if(visibility_counts, [&](const VisibilityCount& s) {
+    return !working_.add_visibility_counts(s.landmark, s.expected, s.found);
+  });
+  if (visibility_counts.empty()) return;
+  edit_.operations.emplace_back(AddVisibilityCounts{std::move(visibility_counts)});
 }
 
 void MapDraft::refresh_landmarks(std::vector<LandmarkId> landmarks) {

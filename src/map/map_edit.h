@@ -3,33 +3,33 @@
 // Rebase rules, for the case that other edits were committed between the edit's base version and its own commit.
 // "Newer" means created by those other edits.
 //
-// | operation         | rule                                                                                     |
-// | AddKeyframe       | gets the next id; matches to removed landmarks are dropped, those to merged ones         |
-// |                   | forwarded; if its parent has moved since the base, the keyframe moves with it; if the    |
-// |                   | submap of its parent was removed, the keyframe becomes the root of a new submap          |
-// | AddLandmark       | gets the next id; observations by removed keyframes or of features that already have a   |
-// |                   | landmark are dropped, and the landmark itself if none are left; if the keyframe of its   |
-// |                   | reference has moved since the base, the landmark moves with it                           |
-// | AddObservation    | forwarded along merges; dropped if the landmark or keyframe was removed, the feature     |
-// |                   | already has a landmark, or the keyframe already observes the landmark                    |
-// | RemoveObservation | dropped if the observation no longer exists, also because of a merge                     |
-// | RemoveLandmark    | dropped if it was already removed or merged, or if a newer keyframe observes it          |
-// | MergeLandmarks    | both ends are forwarded; dropped if they are already the same or one was removed         |
-// | RemoveKeyframe    | dropped if it was already removed or is a root                                           |
-// | SetPoses          | dropped if a correction was committed since the base (the next adjustment starts from    |
-// |                   | it); entries of removed keyframes and of removed or merged landmarks are dropped; newer  |
-// |                   | keyframes move with their parent (chains of them with the nearest ancestor that is not   |
-// |                   | newer), newer landmarks with the keyframe of their reference                             |
-// | SetTwists         | entries of removed keyframes are dropped; translational velocities are multiplied by the |
-// |                   | change of scale at the keyframe since the base                                           |
-// | ScalePart         | also scales newer keyframes and landmarks; dropped if the submap was removed or merged   |
-// | JoinParts         | a removed keyframe is replaced by its nearest alive ancestor; dropped if both are in the |
-// |                   | same submap                                                                              |
-// | RemovePart        | dropped if the submap was already removed or merged                                      |
-// | AddSightings      | forwarded along merges; entries of removed landmarks are dropped                         |
-// | RefreshLandmarks  | forwarded along merges; entries of removed landmarks are dropped                         |
-// | SetScale, SetRig  | the last one committed wins                                                              |
-// An edit that corrects the map (SetPoses::correction, ScalePart) is rejected as a whole if another correction was
+// | operation           | rule                                                                                     |
+// | AddKeyframe         | gets the next id; matches to removed landmarks are dropped, those to merged ones         |
+// |                     | forwarded; if its parent has moved since the base, the keyframe moves with it; if the    |
+// |                     | submap of its parent was removed, the keyframe becomes the root of a new submap          |
+// | AddLandmark         | gets the next id; observations by removed keyframes or of features that already have a   |
+// |                     | landmark are dropped, and the landmark itself if none are left; if the keyframe of its   |
+// |                     | reference has moved since the base, the landmark moves with it                           |
+// | AddObservation      | forwarded along merges; dropped if the landmark or keyframe was removed, the feature     |
+// |                     | already has a landmark, or the keyframe already observes the landmark                    |
+// | RemoveObservation   | dropped if the observation no longer exists, also because of a merge                     |
+// | RemoveLandmark      | dropped if it was already removed or merged, or if a newer keyframe observes it          |
+// | MergeLandmarks      | both ends are forwarded; dropped if they are already the same or one was removed         |
+// | RemoveKeyframe      | dropped if it was already removed or is a root                                           |
+// | SetPoses            | dropped if a correction was committed since the base (the next adjustment starts from    |
+// |                     | it); entries of removed keyframes and of removed or merged landmarks are dropped; newer  |
+// |                     | keyframes move with their parent (chains of them with the nearest ancestor that is not   |
+// |                     | newer), newer landmarks with the keyframe of their reference                             |
+// | SetTwists           | entries of removed keyframes are dropped; translational velocities are multiplied by the |
+// |                     | change of scale at the keyframe since the base                                           |
+// | ScaleSubmap         | also scales newer keyframes and landmarks; dropped if the submap was removed or merged   |
+// | MergeSubmaps        | a removed keyframe is replaced by its nearest alive ancestor; dropped if both are in the |
+// |                     | same submap                                                                              |
+// | RemoveSubmap        | dropped if the submap was already removed or merged                                      |
+// | AddVisibilityCounts | forwarded along merges; entries of removed landmarks are dropped                         |
+// | RefreshLandmarks    | forwarded along merges; entries of removed landmarks are dropped                         |
+// | SetScale, SetRig    | the last one committed wins                                                              |
+// An edit that corrects the map (SetPoses::correction, ScaleSubmap) is rejected as a whole if another correction was
 // committed since its base: applying only part of it, for example merged landmarks and joined submaps without the
 // corrected poses, would break the map. With these rules the final pose of a new keyframe does not depend on whether it
 // is committed before or after a correction of its surroundings. An operation with several entries counts as dropped if
@@ -77,13 +77,13 @@ struct MergeLandmarks {
 struct RemoveKeyframe {
   KeyframeId keyframe;
 };
-struct JoinParts {
+struct MergeSubmaps {
   KeyframeId child, parent;
 };
-struct RemovePart {
+struct RemoveSubmap {
   KeyframeId root;
 };
-struct ScalePart {
+struct ScaleSubmap {
   KeyframeId root;
   double factor = 1.0;
 };
@@ -95,12 +95,12 @@ struct SetPoses {
 struct SetTwists {
   std::vector<std::pair<KeyframeId, geometry::Vector6d>> keyframes;  // BundledKeyframe::twist
 };
-struct Sighting {
+struct VisibilityCount {
   LandmarkId landmark;
   std::uint32_t expected = 0, found = 0;
 };
-struct AddSightings {
-  std::vector<Sighting> sightings;
+struct AddVisibilityCounts {
+  std::vector<VisibilityCount> visibility_counts;
 };
 struct RefreshLandmarks {
   std::vector<LandmarkId> landmarks;
@@ -115,8 +115,8 @@ struct SetRig {
 };
 
 using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark,
-                               MergeLandmarks, RemoveKeyframe, JoinParts, RemovePart, ScalePart, SetPoses, SetTwists,
-                               AddSightings, RefreshLandmarks, SetScale, SetRig>;
+                               MergeLandmarks, RemoveKeyframe, MergeSubmaps, RemoveSubmap, ScaleSubmap, SetPoses,
+                               SetTwists, AddVisibilityCounts, RefreshLandmarks, SetScale, SetRig>;
 
 struct MapEdit {
   std::string_view stage;  // a string literal
@@ -135,7 +135,7 @@ class MapDraft {
   bool corrects() const { return working_.gauge_epoch() != edit_.base->gauge_epoch(); }
   // Returns true if the draft contains a correction and another correction has been committed since its base; `newest`
   // is the newest version. Committing such a draft is rejected.
-  bool overtaken(const BundledMap& newest) const {
+  bool superseded(const BundledMap& newest) const {
     return corrects() && edit_.base->gauge_epoch() != newest.gauge_epoch();
   }
 
@@ -150,13 +150,13 @@ class MapDraft {
   bool remove_landmark(LandmarkId l);
   bool merge_landmarks(LandmarkId from, LandmarkId into);
   bool remove_keyframe(KeyframeId k);
-  bool join_parts(KeyframeId child, KeyframeId parent);
-  bool remove_part(KeyframeId root);
-  bool scale_part(KeyframeId root, double factor);
+  bool merge_submaps(KeyframeId child, KeyframeId parent);
+  bool remove_submap(KeyframeId root);
+  bool scale_submap(KeyframeId root, double factor);
   // Entries of removed keyframes and landmarks are ignored.
   void set_poses(SetPoses poses);
   void set_twists(std::vector<std::pair<KeyframeId, geometry::Vector6d>> twists);
-  void add_sightings(std::vector<Sighting> sightings);
+  void add_visibility_counts(std::vector<VisibilityCount> visibility_counts);
   void refresh_landmarks(std::vector<LandmarkId> landmarks);
   void set_scale(Scale scale);  // with deviation 0 for kMetric, infinite otherwise
   void set_scale(Scale scale, double deviation);

@@ -25,7 +25,7 @@ void MapStore::restart(BundledMap initial) {
 CommitReport MapStore::commit(MapDraft draft) {
   const std::lock_guard writer(commit_mutex_);
   MapSnapshot current = snapshot();
-  if (draft.overtaken(*current)) {
+  if (draft.superseded(*current)) {
     CommitReport refused;
     refused.refused = true;
     refused.published = std::move(current);

@@ -63,14 +63,15 @@ class Rebase {
   bool operator()(const RemoveLandmark& op);
   bool operator()(const MergeLandmarks& op) { return map_.merge_landmarks(forward(op.from), forward(op.into)); }
   bool operator()(const RemoveKeyframe& op) { return map_.remove_keyframe(map_id(op.keyframe)); }
-  bool operator()(const JoinParts& op) {
-    return map_.join_parts(map_.surviving(map_id(op.child)), map_.surviving(map_id(op.parent)));
+  bool operator()(const MergeSubmaps& op) {
+    return map_.merge_submaps(map_.nearest_alive_ancestor(map_id(op.child)),
+                              map_.nearest_alive_ancestor(map_id(op.parent)));
   }
-  bool operator()(const RemovePart& op) { return map_.remove_part(map_id(op.root)); }
-  bool operator()(const ScalePart& op) { return map_.scale_part(map_id(op.root), op.factor); }
+  bool operator()(const RemoveSubmap& op) { return map_.remove_submap(map_id(op.root)); }
+  bool operator()(const ScaleSubmap& op) { return map_.scale_submap(map_id(op.root), op.factor); }
   bool operator()(const SetPoses& op);
   bool operator()(const SetTwists& op);
-  bool operator()(const AddSightings& op);
+  bool operator()(const AddVisibilityCounts& op);
   bool operator()(const RefreshLandmarks& op);
   bool operator()(const SetScale& op) { return map_.set_scale(op.scale, op.deviation), true; }
 
@@ -108,7 +109,7 @@ class Rebase {
 Motion Rebase::motion_since_base(KeyframeId edit_id) const {
   if (!edit_id.valid() || written_.contains(edit_id)) return {};
   if (own(edit_id)) return own_motions_[edit_id.index() - base_.keyframe_slots()];
-  const double scale_change = map_.keyframe(edit_id).unit / base_.keyframe(edit_id).unit;
+  const double scale_change = map_.keyframe(edit_id).scale / base_.keyframe(edit_id).scale;
   return motion_between(base_.resolved_pose(edit_id), map_.resolved_pose(edit_id), scale_change);
 }
 
@@ -117,7 +118,7 @@ bool Rebase::operator()(const AddKeyframe& op) {
   for (auto& [feature, l] : matches) l = map_id(l);
   const Motion motion = motion_since_base(op.parent);
   const SE3 T_rig_world = motion ? motion->pose(op.T_rig_world) : op.T_rig_world;
-  const KeyframeId parent = map_.surviving(map_id(op.parent));
+  const KeyframeId parent = map_.nearest_alive_ancestor(map_id(op.parent));
   const KeyframeId added = map_.add_keyframe(op.frame, T_rig_world, usable_matches(map_, matches), parent);
   if (motion) map_.set_twist(added, apply_scale_change(op.frame->twist, motion->scale_change));
   report_.keyframes.push_back(added);
@@ -204,9 +205,10 @@ bool Rebase::operator()(const SetTwists& op) {
   return any;
 }
 
-bool Rebase::operator()(const AddSightings& op) {
+bool Rebase::operator()(const AddVisibilityCounts& op) {
   bool any = false;
-  for (const Sighting& s : op.sightings) any |= map_.add_sightings(forward(s.landmark), s.expected, s.found);
+  for (const VisibilityCount& s : op.visibility_counts)
+    any |= map_.add_visibility_counts(forward(s.landmark), s.expected, s.found);
   return any;
 }
 

@@ -76,19 +76,19 @@ adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyfra
 
 bool needs_whole_submap(const map::BundledMap& map, KeyframeId keyframe, const ScaleOptions& options) {
   if (map.scale() != map::Scale::kUnobservable) return false;
-  return map.part_of(map.root_of(keyframe)).size() <= static_cast<std::size_t>(options.keyframes);
+  return map.keyframes_of_submap(map.root_of(keyframe)).size() <= static_cast<std::size_t>(options.keyframes);
 }
 
 adjustment::Selection select_submap(const map::BundledMap& map, KeyframeId keyframe) {
   adjustment::Selection selection;
   const KeyframeId root = map.root_of(keyframe);
-  std::vector<KeyframeId> part = map.part_of(root);
-  std::sort(part.begin(), part.end());
-  for (const KeyframeId k : part) {
+  std::vector<KeyframeId> submap = map.keyframes_of_submap(root);
+  std::sort(submap.begin(), submap.end());
+  for (const KeyframeId k : submap) {
     if (k != root) selection.free_keyframes.push_back(k);
   }
   selection.fixed_keyframes = {root};
-  selection.landmarks = most_observed(map, part, static_cast<int>(map.landmark_slots()));
+  selection.landmarks = most_observed(map, submap, static_cast<int>(map.landmark_slots()));
   return selection;
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "adjustment/flat_problem.h"
+#include "adjustment/bundle_problem.h"
 #include "solver/rig_scale.h"
 
 namespace bslam::mapping {
@@ -47,7 +47,7 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   const map::BundledMap& map = draft.map();
   if (map.scale() != map::Scale::kUnobservable) return report;
   const adjustment::Selection selection = select_observers(map, keyframe, options.keyframes);
-  const auto flat = adjustment::flatten(map, selection, features);
+  const auto flat = adjustment::build_problem(map, selection, features);
   const auto found = solver::rig_scale(flat.problem);
   if (!found) return report;
   report.observed = true;
@@ -58,7 +58,7 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
     // every scaling is a map correction, which invalidates the work of other stages
     if (std::abs(correction - 1.0) > kMinCorrectionSigmas * found->deviation) {
       report.correction = correction;
-      draft.scale_part(map.root_of(keyframe), correction);
+      draft.scale_submap(map.root_of(keyframe), correction);
     }
   }
   draft.set_scale(map::Scale::kUnobservable, found->deviation);

@@ -16,7 +16,7 @@
 namespace bslam::place {
 
 // Name of the descriptors computed by bslam's extractor. It must change whenever the pattern of
-// feature::make_binary_tests changes.
+// feature::make_brief_pattern changes.
 constexpr std::string_view kDescriptorKind = "orb256-bslam";
 
 // The data of a vocabulary. Nodes are in breadth-first order, and node 0 is the root. The children of a node follow

@@ -30,13 +30,13 @@ Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedM
     const auto closure = closer.close(k, draft);
     if (!closure) continue;
     store.commit(std::move(draft));
-    ++(closure->joined ? result.joined : result.loops);
+    ++(closure->merged ? result.joined : result.loops);
   }
   map::MapDraft draft("final", store.snapshot());
   mapping::adjust_globally(config.mapping, features, draft);
   store.commit(std::move(draft));
   result.map = *store.snapshot();
-  result.parts = result.map.roots().size();
+  result.submaps = result.map.roots().size();
   return result;
 }
 

@@ -10,9 +10,9 @@ namespace bslam::session {
 
 struct MergeResult {
   map::BundledMap map;
-  int joined = 0;         // submaps that were merged into others
-  int loops = 0;          // further loop closures
-  std::size_t parts = 0;  // submaps left; 1 if everything lies in one world frame
+  int joined = 0;           // submaps that were merged into others
+  int loops = 0;            // further loop closures
+  std::size_t submaps = 0;  // submaps left; 1 if everything lies in one world frame
 };
 
 // Adds the keyframes and landmarks of `b` to `a`, searches a loop closure for every keyframe of `b`, and finally runs a

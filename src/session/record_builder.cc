@@ -69,15 +69,15 @@ void add_places(const RecordInput& input, RunRecord& record) {
   for (const RunFrame& frame : record.frames) {
     if (!frame.record || !frame.record->relocalisation) continue;
     const tracking::Relocalisation& found = *frame.record->relocalisation;
-    const TimeNs with_ns = input.system.keyframe_time(found.with);
+    const TimeNs with_ns = input.system.keyframe_time(found.matched_keyframe);
     record.relocalisations.push_back(
         {seconds(input, frame.record->result.time_ns), seconds(input, with_ns), found.inliers});
   }
-  const auto& parts = input.trajectories;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    const evaluation::Trajectory& poses = parts[i].poses;
-    record.parts.push_back({static_cast<std::int64_t>(poses.size()), seconds(input, poses.front().time_ns),
-                            seconds(input, poses.back().time_ns), trajectory_file("trajectory", i)});
+  const auto& submaps = input.trajectories;
+  for (std::size_t i = 0; i < submaps.size(); ++i) {
+    const evaluation::Trajectory& poses = submaps[i].poses;
+    record.submaps.push_back({static_cast<std::int64_t>(poses.size()), seconds(input, poses.front().time_ns),
+                              seconds(input, poses.back().time_ns), trajectory_file("trajectory", i)});
   }
 }
 
@@ -113,8 +113,8 @@ std::string scale_name(map::Scale scale) {
   return "";
 }
 
-std::string trajectory_file(const std::string& stem, std::size_t part) {
-  return part == 0 ? stem + ".tum" : stem + "_part" + std::to_string(part + 1) + ".tum";
+std::string trajectory_file(const std::string& stem, std::size_t submap) {
+  return submap == 0 ? stem + ".tum" : stem + "_part" + std::to_string(submap + 1) + ".tum";
 }
 
 RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameRecord> frames) {

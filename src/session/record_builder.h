@@ -21,7 +21,7 @@ struct RecordInput {
   const system::Config& config;
   const std::vector<InputFrame>& inputs;  // in order; those not dropped match `frames` one by one
   const system::System& system;
-  const std::vector<system::PartTrajectory>& trajectories;  // final
+  const std::vector<system::SubmapTrajectory>& trajectories;  // final
   bool replayed = false;
   bool loaded = false;  // the run went on in a saved map
   bool complete = true;
@@ -32,7 +32,7 @@ struct RecordInput {
 std::string scale_name(map::Scale scale);
 
 // Name of the file of the i-th part's poses: "trajectory.tum", "trajectory_part2.tum".
-std::string trajectory_file(const std::string& stem, std::size_t part);
+std::string trajectory_file(const std::string& stem, std::size_t submap);
 
 // `frames`: all of the run, moved into the record.
 RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameRecord> frames);

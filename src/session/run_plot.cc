@@ -185,7 +185,7 @@ Panel background_panel(const RunRecord& record, std::span<const StageSeries* con
 
 std::string subtitle_of(const RunRecord& record) {
   const auto tracked = std::ranges::count(record.frames, FrameOutcome::kTracked, &RunFrame::outcome);
-  const std::string submaps = record.parts.size() > 1 ? fmt::format(" in {} submaps", record.parts.size()) : "";
+  const std::string submaps = record.submaps.size() > 1 ? fmt::format(" in {} submaps", record.submaps.size()) : "";
   return fmt::format("{}{}; {} of {} frames tracked{}; {} keyframes, {} landmarks", record.mode,
                      record.complete ? "" : ", interrupted", tracked, record.frames.size(), submaps,
                      record.map.keyframes, record.map.landmarks);

@@ -79,7 +79,7 @@ struct PlaceEvent {
 };
 
 // A part of the map that no common place joined to the others, with a world of its own.
-struct PartRecord {
+struct SubmapRecord {
   std::int64_t frames = 0;  // with a pose in it
   double from_s = 0.0, to_s = 0.0;
   std::string trajectory;  // file of its final poses
@@ -96,7 +96,7 @@ struct RunRecord {
   MapRecord map;
   std::vector<PlaceEvent> loops, relocalisations;
   int maps_started = 0;
-  std::vector<PartRecord> parts;  // most frames first
+  std::vector<SubmapRecord> submaps;  // most frames first
   double start_up_s = 0.0, wall_s = 0.0;
   std::optional<double> peak_memory_mb;  // largest resident size of the process; empty where the system does not tell
 };

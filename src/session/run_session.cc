@@ -128,11 +128,11 @@ namespace {
 using Files = std::vector<std::pair<std::string, std::string>>;  // name, bytes
 
 // One file per submap; the file of the first is written even if there is none.
-void add_trajectories(const std::vector<system::PartTrajectory>& parts, const std::string& stem,
+void add_trajectories(const std::vector<system::SubmapTrajectory>& submaps, const std::string& stem,
                       evaluation::PoseState state, Files& files) {
   const std::string header = evaluation::trajectory_header("cam0", state);
-  for (std::size_t i = 0; i < std::max<std::size_t>(parts.size(), 1); ++i) {
-    const evaluation::Trajectory poses = parts.empty() ? evaluation::Trajectory() : parts[i].poses;
+  for (std::size_t i = 0; i < std::max<std::size_t>(submaps.size(), 1); ++i) {
+    const evaluation::Trajectory poses = submaps.empty() ? evaluation::Trajectory() : submaps[i].poses;
     files.emplace_back(trajectory_file(stem, i), evaluation::tum_text(poses, header));
   }
 }

@@ -33,7 +33,7 @@ struct SessionOptions {
 struct SessionResult {
   RunRecord record;
   // One per submap. The first ones are written to trajectory.tum and trajectory_live.tum.
-  std::vector<system::PartTrajectory> trajectories, live;
+  std::vector<system::SubmapTrajectory> trajectories, live;
   map::MapSnapshot map;
   // If extrinsics were refined: the calibration of all cameras, with refined extrinsics for those in use.
   std::optional<camera::Rig> refined_rig;

@@ -101,13 +101,13 @@ ordered_json events_json(const std::vector<PlaceEvent>& events) {
   return list;
 }
 
-ordered_json parts_json(const std::vector<PartRecord>& parts) {
+ordered_json submaps_json(const std::vector<SubmapRecord>& submaps) {
   ordered_json list = ordered_json::array();
-  for (const PartRecord& part : parts) {
-    list.push_back({{"frames", part.frames},
-                    {"from", seconds(part.from_s)},
-                    {"to", seconds(part.to_s)},
-                    {"trajectory", part.trajectory}});
+  for (const SubmapRecord& submap : submaps) {
+    list.push_back({{"frames", submap.frames},
+                    {"from", seconds(submap.from_s)},
+                    {"to", seconds(submap.to_s)},
+                    {"trajectory", submap.trajectory}});
   }
   return list;
 }
@@ -172,7 +172,7 @@ ordered_json summary_json(const RunRecord& record) {
       {"loops", events_json(record.loops)},
       {"relocalisations", events_json(record.relocalisations)},
       {"maps_started", record.maps_started},
-      {"parts", parts_json(record.parts)},
+      {"parts", submaps_json(record.submaps)},
       {"time", time_json(record)},
       {"memory", {{"peak_mb", record.peak_memory_mb ? rounded(*record.peak_memory_mb, 1) : ordered_json(nullptr)}}}};
 }

@@ -14,7 +14,7 @@
 namespace bslam::storage {
 
 // A submap: keyframes that are connected by one spanning tree.
-struct MapPart {
+struct Submap {
   KeyframeId root;
   std::vector<KeyframeId> keyframes;                 // ordered by time, then by id
   std::size_t landmarks = 0;                         // number of landmarks whose reference keyframe is one of these
@@ -23,14 +23,14 @@ struct MapPart {
 };
 
 // The submaps in the order of their root keyframes.
-std::vector<MapPart> map_parts(const map::BundledMap& map);
+std::vector<Submap> submaps_of(const map::BundledMap& map);
 
 // Times of the first and the last keyframe of a submap.
-TimeNs first_time(const map::BundledMap& map, const MapPart& part);
-TimeNs last_time(const map::BundledMap& map, const MapPart& part);
+TimeNs first_time(const map::BundledMap& map, const Submap& submap);
+TimeNs last_time(const map::BundledMap& map, const Submap& submap);
 
 // T_world_cam0 of the keyframes of a submap. Of keyframes with equal times only the first is included.
-evaluation::Trajectory keyframe_trajectory(const map::BundledMap& map, const MapPart& part);
+evaluation::Trajectory keyframe_trajectory(const map::BundledMap& map, const Submap& submap);
 
 // All landmarks as a binary PLY: x, y, z as doubles, and the number of observing keypoints.
 std::string landmarks_ply(const map::BundledMap& map);

@@ -121,7 +121,7 @@ void take_landmark(ByteReader& in, map::BundledMap& map) {
     return;
   }
   const LandmarkId l = map.add_landmark(position, observations, reference, KeyframeId(born));
-  map.add_sightings(l, expected, found);
+  map.add_visibility_counts(l, expected, found);
 }
 
 }  // namespace
@@ -246,7 +246,7 @@ std::size_t take_keyframes(ByteReader& in, bool with_words, map::BundledMap& map
     parents.emplace_back(parent);
   }
   if (!in.finish()) return 0;
-  in.require(map::hang_keyframes(map, KeyframeId(0), parents), "parents in a circle", "trees");
+  in.require(map::attach_keyframes(map, KeyframeId(0), parents), "parents in a circle", "trees");
   return words_end;
 }
 

@@ -12,12 +12,12 @@ PlaceRelocaliser::PlaceRelocaliser(std::unique_ptr<looping::PlaceRecogniser> rec
 
 void PlaceRelocaliser::describe(frame::BundledFrame& frame) const { recogniser_->describe(frame); }
 
-std::optional<tracking::FoundPlace> PlaceRelocaliser::locate(const map::BundledMap& map,
-                                                             const frame::BundledFrame& frame) {
+std::optional<tracking::FoundPlace> PlaceRelocaliser::verify_place(const map::BundledMap& map,
+                                                                   const frame::BundledFrame& frame) {
   const Random random(seed_, "relocalise", static_cast<std::uint64_t>(frame.id.value()));
   auto found = looping::relocalise(*recogniser_, map, frame, options_, features_, random);
   if (!found) return std::nullopt;
-  return tracking::FoundPlace{found->with, found->T_rig_world, std::move(found->matches), found->inliers};
+  return tracking::FoundPlace{found->matched_keyframe, found->T_rig_world, std::move(found->matches), found->inliers};
 }
 
 std::unique_ptr<tracking::Relocaliser> make_relocaliser(const place::VocabularyPtr& vocabulary, const Config& config) {

@@ -14,7 +14,8 @@ class PlaceRelocaliser : public tracking::Relocaliser {
   PlaceRelocaliser(std::unique_ptr<looping::PlaceRecogniser> recogniser, const Config& config);
 
   void describe(frame::BundledFrame& frame) const override;
-  std::optional<tracking::FoundPlace> locate(const map::BundledMap& map, const frame::BundledFrame& frame) override;
+  std::optional<tracking::FoundPlace> verify_place(const map::BundledMap& map,
+                                                   const frame::BundledFrame& frame) override;
 
  private:
   const std::unique_ptr<looping::PlaceRecogniser> recogniser_;

@@ -30,10 +30,10 @@ Statistics statistics(const mapping::MappingReport& report) {
 
 Statistics statistics(const looping::LoopClosure& closure) {
   return {{"inliers", static_cast<double>(closure.inliers)},
-          {"reprojection error before [px]", closure.off_px},
-          {"translation correction", closure.moved},
-          {"rotation correction [rad]", closure.turned},
-          {"scale correction", closure.scaled}};
+          {"reprojection error before [px]", closure.reprojection_error_px},
+          {"translation correction", closure.translation_correction},
+          {"rotation correction [rad]", closure.rotation_correction},
+          {"scale correction", closure.scale_correction}};
 }
 
 execution::StageResult map_keyframe(const Config& config, const execution::StageTask& task,
@@ -52,7 +52,7 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
   const auto closure = closer.close(task.keyframe, draft);
   if (!closure) return {};
   const auto time_of = [&](KeyframeId k) { return base->keyframe(k).frame->time_ns; };
-  const LoopRecord record{*closure, time_of(closure->keyframe), time_of(closure->with)};
+  const LoopRecord record{*closure, time_of(closure->keyframe), time_of(closure->matched_keyframe)};
   return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }, statistics(*closure)};
 }
 

@@ -23,10 +23,11 @@ map::BundledMap empty_map(const camera::Rig& rig, const Config& config) {
   return map::BundledMap(std::make_shared<const camera::Rig>(rig), config.feature_model().pyramid);
 }
 
-void add_pose(std::vector<PartTrajectory>& parts, KeyframeId root, TimeNs time_ns, const geometry::SE3& T_world_cam0) {
-  auto part = std::ranges::find(parts, root, &PartTrajectory::root);
-  if (part == parts.end()) part = parts.insert(parts.end(), {root, {}});
-  part->poses.push_back({time_ns, T_world_cam0});
+void add_pose(std::vector<SubmapTrajectory>& submaps, KeyframeId root, TimeNs time_ns,
+              const geometry::SE3& T_world_cam0) {
+  auto submap = std::ranges::find(submaps, root, &SubmapTrajectory::root);
+  if (submap == submaps.end()) submap = submaps.insert(submaps.end(), {root, {}});
+  submap->poses.push_back({time_ns, T_world_cam0});
 }
 
 }  // namespace
@@ -183,29 +184,30 @@ TimeNs System::keyframe_time(KeyframeId k) const {
   return keyframe_time_ns_[k.index()];
 }
 
-std::vector<PartTrajectory> System::trajectories() const {
+std::vector<SubmapTrajectory> System::trajectories() const {
   const map::MapSnapshot map = store_.snapshot();
-  std::vector<PartTrajectory> out;
+  std::vector<SubmapTrajectory> out;
   for (const FrameRecord& record : frames_) {
     const tracking::TrackResult& r = record.final_result();
     if (const auto T_rig_world = T_rig_world_of(record, *map)) {
       add_pose(out, map->root_of(r.anchored.reference), r.time_ns, T_rig_world->inverse());
     }
   }
-  std::stable_sort(out.begin(), out.end(),
-                   [](const PartTrajectory& a, const PartTrajectory& b) { return a.poses.size() > b.poses.size(); });
+  std::stable_sort(out.begin(), out.end(), [](const SubmapTrajectory& a, const SubmapTrajectory& b) {
+    return a.poses.size() > b.poses.size();
+  });
   return out;
 }
 
-std::vector<PartTrajectory> System::live_trajectories() const {
-  std::vector<PartTrajectory> out;
+std::vector<SubmapTrajectory> System::live_trajectories() const {
+  std::vector<SubmapTrajectory> out;
   for (const FrameRecord& record : frames_) {
     if (record.result.status != tracking::TrackStatus::kTracking) continue;
     add_pose(out, record.root, record.result.time_ns, record.result.T_rig_world.inverse());
   }
-  const std::vector<PartTrajectory> final = trajectories();
+  const std::vector<SubmapTrajectory> final = trajectories();
   const KeyframeId main = final.empty() ? KeyframeId() : final.front().root;
-  std::stable_sort(out.begin(), out.end(), [&](const PartTrajectory& a, const PartTrajectory& b) {
+  std::stable_sort(out.begin(), out.end(), [&](const SubmapTrajectory& a, const SubmapTrajectory& b) {
     if ((a.root == main) != (b.root == main)) return a.root == main;
     return a.poses.size() > b.poses.size();
   });

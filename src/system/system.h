@@ -45,7 +45,7 @@ struct Resources {
 };
 
 // Poses of one part of the map. Parts that no common place joined have worlds of their own.
-struct PartTrajectory {
+struct SubmapTrajectory {
   KeyframeId root;
   evaluation::Trajectory poses;  // T_world_cam0
 };
@@ -92,10 +92,10 @@ class System {
 
   // Every frame of frames() that has a pose, resolved against the present map: a trajectory for each part of the map
   // that has some, the longest first.
-  std::vector<PartTrajectory> trajectories() const;
+  std::vector<SubmapTrajectory> trajectories() const;
   // The same as the caller was told at the time, never corrected, by parts as they were then; that of the longest final
   // trajectory first.
-  std::vector<PartTrajectory> live_trajectories() const;
+  std::vector<SubmapTrajectory> live_trajectories() const;
 
  private:
   bool refuted_young_map(const Pipeline::Outcome& outcome, bool had_pose) const;

@@ -59,9 +59,10 @@ std::vector<std::uint8_t> contradicting(const FrameMatches& matches, const std::
   return out;
 }
 
-solver::PoseSolution believe_the_steadiest(const camera::Rig& rig, const FrameMatches& matches,
-                                           std::span<const solver::PoseObservation> observations, const SE3& predicted,
-                                           const ConsensusOptions& options, const solver::PoseSolverOptions& pose) {
+solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, const FrameMatches& matches,
+                                                    std::span<const solver::PoseObservation> observations,
+                                                    const SE3& predicted, const ConsensusOptions& options,
+                                                    const solver::PoseSolverOptions& pose) {
   constexpr double kRadiansPerMetre = 1.0;  // turning as much as passing something a metre away
   constexpr double kAgrees = 25.0;          // squared normalised error at a camera's own pose
   solver::PoseSolution best;

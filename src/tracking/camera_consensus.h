@@ -49,10 +49,10 @@ std::vector<std::uint8_t> contradicting(const FrameMatches& matches, const std::
 // The pose where cameras contradict one another: of the poses estimated from one camera each, the one nearest to the
 // prediction of the motion model is refined with all observations that agree with it. `observations`: those of
 // `matches`, in their order.
-solver::PoseSolution believe_the_steadiest(const camera::Rig& rig, const FrameMatches& matches,
-                                           std::span<const solver::PoseObservation> observations,
-                                           const geometry::SE3& predicted, const ConsensusOptions& options,
-                                           const solver::PoseSolverOptions& pose);
+solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, const FrameMatches& matches,
+                                                    std::span<const solver::PoseObservation> observations,
+                                                    const geometry::SE3& predicted, const ConsensusOptions& options,
+                                                    const solver::PoseSolverOptions& pose);
 
 // Flags the cameras that lost what they saw from one frame to the next, while another camera did not. One that loses it
 // over several frames is not flagged: something near passes by. At least one camera is not flagged.

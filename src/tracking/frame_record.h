@@ -18,7 +18,7 @@ struct StageTime {
 
 // A lost rig was located in the map again.
 struct Relocalisation {
-  KeyframeId with;
+  KeyframeId matched_keyframe;
   int inliers = 0;  // keypoints
 };
 

@@ -102,8 +102,8 @@ bool comparable(const BundledFrame& first, const BundledFrame& second, const Ini
   return false;
 }
 
-std::optional<StartedMap> start_metric(const BundledFrame& frame, std::span<const image::Pyramid> pyramids,
-                                       const InitialisationOptions& options, map::MapDraft& draft) {
+std::optional<StartedMap> initialise_metric(const BundledFrame& frame, std::span<const image::Pyramid> pyramids,
+                                            const InitialisationOptions& options, map::MapDraft& draft) {
   int metric = 0;
   for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f)
     metric += has_sound_depth(frame.bundled.point(FeatureId(f)), options);
@@ -113,9 +113,10 @@ std::optional<StartedMap> start_metric(const BundledFrame& frame, std::span<cons
   return out;
 }
 
-std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const BundledFrame& frame,
-                                            std::span<const image::Pyramid> pyramids,
-                                            const InitialisationOptions& options, Random random, map::MapDraft& draft) {
+std::optional<StartedMap> initialise_monocular(const StartCandidate& first, const BundledFrame& frame,
+                                               std::span<const image::Pyramid> pyramids,
+                                               const InitialisationOptions& options, Random random,
+                                               map::MapDraft& draft) {
   const camera::Rig& rig = draft.map().rig();
   const FramePairs pairs = match_cameras(*first.frame, frame);
   const auto view = best_two_view(pairs, options, random.next());

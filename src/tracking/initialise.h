@@ -23,8 +23,8 @@ struct StartedMap {
 };
 
 // Writes the first keyframe, at the origin. Empty where the frame has too few matched features of sound metric depth.
-std::optional<StartedMap> start_metric(const frame::BundledFrame& frame, std::span<const image::Pyramid> pyramids,
-                                       const InitialisationOptions& options, map::MapDraft& draft);
+std::optional<StartedMap> initialise_metric(const frame::BundledFrame& frame, std::span<const image::Pyramid> pyramids,
+                                            const InitialisationOptions& options, map::MapDraft& draft);
 
 // Do the two frames share enough matches in some camera for a start up to scale to be tried?
 bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& second,
@@ -34,8 +34,9 @@ bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& sec
 // With one camera the median depth of the points in the first is 1, and stays so. With several, none overlapping, the
 // scale is what their matches tell of it (solver/generalised_scale.h), else the guessed depth: unobservable either way,
 // until mapping has measured it.
-std::optional<StartedMap> start_up_to_scale(const StartCandidate& first, const frame::BundledFrame& frame,
-                                            std::span<const image::Pyramid> pyramids,
-                                            const InitialisationOptions& options, Random random, map::MapDraft& draft);
+std::optional<StartedMap> initialise_monocular(const StartCandidate& first, const frame::BundledFrame& frame,
+                                               std::span<const image::Pyramid> pyramids,
+                                               const InitialisationOptions& options, Random random,
+                                               map::MapDraft& draft);
 
 }  // namespace bslam::tracking

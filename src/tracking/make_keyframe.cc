@@ -33,8 +33,41 @@ struct Groups {
   std::vector<LandmarkId> landmark;               // of each, invalid = none
 };
 
-// Keypoints that show one landmark are one feature; bundled keypoints without a landmark join the feature they were
-// bundled with, as far as its landmark has none in their camera and they see it where it is.
+using KeypointsByLandmark = std::map<LandmarkId, std::vector<KeypointRef>>;
+
+KeypointsByLandmark keypoints_by_landmark(const LandmarkTable& table) {
+  KeypointsByLandmark out;
+  for (std::size_t c = 0; c < table.size(); ++c) {
+    for (std::size_t k = 0; k < table[c].size(); ++k) {
+      if (table[c][k].valid()) out[table[c][k]].push_back({CameraIndex(c), KeypointIndex(k)});
+    }
+  }
+  return out;
+}
+
+// What a bundled feature shows.
+struct FeatureContent {
+  std::vector<KeypointRef> free;  // its keypoints without a landmark
+  LandmarkId owner;               // the landmark of the others; invalid: they have none
+  bool disputed = false;          // they show more than one
+};
+
+FeatureContent content_of(std::span<const KeypointRef> keypoints, const LandmarkTable& table) {
+  FeatureContent out;
+  for (const KeypointRef r : keypoints) {
+    const LandmarkId l = table[r.camera.index()][r.keypoint.index()];
+    if (!l.valid()) {
+      out.free.push_back(r);
+    } else {
+      out.disputed |= out.owner.valid() && out.owner != l;
+      out.owner = l;
+    }
+  }
+  return out;
+}
+
+// Keypoints matched to the same landmark become one feature. A bundled keypoint without a landmark joins the feature it
+// was bundled with if that feature's landmark has no keypoint in its camera yet and projects to where the keypoint is.
 Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const camera::Rig& rig,
                const map::BundledMap& map, const geometry::SE3& T_rig_world) {
   const auto agrees = [&](KeypointRef r, LandmarkId l) {
@@ -44,33 +77,17 @@ Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const came
                                                                 keypoints.pixel[k].cast<double>());
     return error && error->squaredNorm() <= solver::kChi2TwoDof95 * keypoints.sigma[k] * keypoints.sigma[k];
   };
-  std::map<LandmarkId, std::vector<KeypointRef>> by_landmark;
-  for (std::size_t c = 0; c < table.size(); ++c) {
-    for (std::size_t k = 0; k < table[c].size(); ++k) {
-      if (table[c][k].valid()) by_landmark[table[c][k]].push_back({CameraIndex(c), KeypointIndex(k)});
-    }
-  }
+  KeypointsByLandmark by_landmark = keypoints_by_landmark(table);
   Groups groups;
   for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) {
-    const auto keypoints = frame.bundled.keypoints(FeatureId(f));
-    std::vector<KeypointRef> free;
-    LandmarkId owner;
-    bool disputed = false;
-    for (const KeypointRef r : keypoints) {
-      const LandmarkId l = table[r.camera.index()][r.keypoint.index()];
-      if (!l.valid()) {
-        free.push_back(r);
-      } else {
-        disputed |= owner.valid() && owner != l;
-        owner = l;
-      }
-    }
-    if (!owner.valid() && free.size() >= 2) {
-      groups.matched.push_back(free);
+    const FeatureContent feature = content_of(frame.bundled.keypoints(FeatureId(f)), table);
+    if (!feature.owner.valid() && feature.free.size() >= 2) {
+      groups.matched.push_back(feature.free);
       groups.landmark.push_back(LandmarkId());
-    } else if (owner.valid() && !disputed) {
-      for (const KeypointRef r : free) {
-        if (!has_camera(by_landmark[owner], r.camera) && agrees(r, owner)) by_landmark[owner].push_back(r);
+    } else if (feature.owner.valid() && !feature.disputed) {
+      std::vector<KeypointRef>& known = by_landmark[feature.owner];
+      for (const KeypointRef r : feature.free) {
+        if (!has_camera(known, r.camera) && agrees(r, feature.owner)) known.push_back(r);
       }
     }
   }

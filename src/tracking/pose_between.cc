@@ -37,7 +37,7 @@ TrackResult result_at(const map::BundledMap& map, const frame::BundledFrame& fra
 std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early,
                                         const feature::FeatureModel& features, const TrackingOptions& options,
                                         ThreadPool& pool) {
-  const KeyframeId before = map.surviving(early.before), after = map.surviving(early.after);
+  const KeyframeId before = map.nearest_alive_ancestor(early.before), after = map.nearest_alive_ancestor(early.after);
   if (!before.valid() || !after.valid()) return std::nullopt;
   const frame::BundledFrame& frame = *early.frame;
   const SE3 T_before = map.resolved_pose(early.before), T_after = map.resolved_pose(early.after);

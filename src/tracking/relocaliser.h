@@ -10,7 +10,7 @@
 namespace bslam::tracking {
 
 struct FoundPlace {
-  KeyframeId with;                                        // alive
+  KeyframeId matched_keyframe;                            // alive
   geometry::SE3 T_rig_world;                              // of the frame
   std::vector<std::pair<FeatureId, LandmarkId>> matches;  // inliers
   int inliers = 0;                                        // keypoints
@@ -24,7 +24,7 @@ class Relocaliser {
   virtual void describe(frame::BundledFrame& frame) const = 0;
 
   // The pose of a described frame, searched for in the whole map. Empty where no place is confirmed.
-  virtual std::optional<FoundPlace> locate(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
+  virtual std::optional<FoundPlace> verify_place(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
 };
 
 }  // namespace bslam::tracking

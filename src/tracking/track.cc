@@ -116,7 +116,8 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   auto solution = solver::solve_pose(map.rig(), observations, predicted, motion, options.pose);
   if (any(contradicting(found, solution.inliers_per_camera, input.state.cameras, options.consensus))) {
     const SE3 led_to = predict(input, frame.time_ns);
-    const auto steadiest = believe_the_steadiest(rig, found, observations, led_to, options.consensus, options.pose);
+    const auto steadiest =
+        pose_of_most_consistent_camera(rig, found, observations, led_to, options.consensus, options.pose);
     if (steadiest.ok) {
       const auto wrong = contradicting(found, steadiest.inliers_per_camera, input.state.cameras, options.consensus);
       for (std::size_t c = 0; c < wrong.size(); ++c) left_out[c] |= wrong[c];
@@ -251,10 +252,11 @@ std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const 
 }
 
 // Each landmark that should have been seen counts once, also when several cameras should have.
-void note_sightings(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found, TrackerState& state) {
-  for (const LandmarkId l : found) state.sightings.push_back({l, 1, 1});
+void count_visibility(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found,
+                      TrackerState& state) {
+  for (const LandmarkId l : found) state.visibility_counts.push_back({l, 1, 1});
   for (const LandmarkId l : visible) {
-    if (!std::binary_search(found.begin(), found.end(), l)) state.sightings.push_back({l, 1, 0});
+    if (!std::binary_search(found.begin(), found.end(), l)) state.visibility_counts.push_back({l, 1, 0});
   }
 }
 
@@ -287,12 +289,6 @@ void note_trust(const frame::BundledFrame& frame, const Coarse& coarse, const Fi
 }
 
 }  // namespace
-
-std::vector<std::uint8_t> doubted(const TrackerState& state, std::size_t cameras) {
-  std::vector<std::uint8_t> out(cameras, 0);
-  for (std::size_t c = 0; c < state.cameras.size(); ++c) out[c] = state.cameras[c].doubted;
-  return out;
-}
 
 TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, LostReason reason) {
   TrackOutput out;
@@ -330,7 +326,8 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& f
 
   TrackerState& state = out.state;
   state = input.state;
-  state.anchored = map::AnchoredPose::at(map, map.surviving(input.state.anchored.reference), result.T_rig_world);
+  state.anchored =
+      map::AnchoredPose::at(map, map.nearest_alive_ancestor(input.state.anchored.reference), result.T_rig_world);
   result.anchored = state.anchored;
   result.covariance = covariance_of(fine.solution);
 
@@ -340,7 +337,7 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& f
   state.status = TrackStatus::kTracking;
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);
-  note_sightings(fine.visible, state.landmarks, state);
+  count_visibility(fine.visible, state.landmarks, state);
   note_trust(frame, coarse, fine, out.matches, options, out);
 
   ++state.frames_since_keyframe;
@@ -354,28 +351,6 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& f
 }
 
 }  // namespace
-
-std::string_view describe(LostReason reason) {
-  switch (reason) {
-    case LostReason::kNone:
-      return "";
-    case LostReason::kNotStarted:
-      return "not started";
-    case LostReason::kNoImages:
-      return "no usable image";
-    case LostReason::kFewFeatures:
-      return "too few features";
-    case LostReason::kFewMatches:
-      return "too few matches";
-    case LostReason::kFewInliers:
-      return "too few matches agree";
-    case LostReason::kUnstablePose:
-      return "pose not supported";
-    case LostReason::kNotFound:
-      return "place not found in the map";
-  }
-  return "";
-}
 
 TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
                   ThreadPool& pool) {
@@ -393,19 +368,6 @@ TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, con
     return lost(input.state, frame, few ? LostReason::kFewInliers : LostReason::kUnstablePose);
   }
   return tracked(input, coarse, fine, options);
-}
-
-TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,
-                               std::vector<LandmarkId> landmarks) {
-  TrackerState state = before;
-  state.status = TrackStatus::kTracking;
-  state.time_ns = time_ns;
-  state.anchored = {.reference = keyframe, .T_rig_reference = SE3()};
-  state.landmarks = std::move(landmarks);
-  state.frames_since_keyframe = 0;
-  state.best_overlap = 0;
-  state.sightings.clear();
-  return state;
 }
 
 }  // namespace bslam::tracking

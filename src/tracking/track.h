@@ -59,8 +59,8 @@ struct TrackerState {
   std::vector<LandmarkId> landmarks;        // inliers of the last tracked frame
   std::vector<CameraTrust> cameras;         // empty as long as no frame was tracked
   int frames_since_keyframe = 0;
-  int best_overlap = 0;                  // most landmarks of the reference found in a frame since it was made
-  std::vector<map::Sighting> sightings;  // not yet folded into the map
+  int best_overlap = 0;  // most landmarks of the reference found in a frame since it was made
+  std::vector<map::VisibilityCount> visibility_counts;  // not yet folded into the map
 };
 
 // Per camera: it contradicts the others or has seen nothing again, and waits to be believed anew.

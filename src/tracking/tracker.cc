@@ -21,11 +21,12 @@ bool saw_something(const TrackResult& result) {
 }
 
 // The counts of each landmark added up, in order of id.
-std::vector<map::Sighting> folded(std::vector<map::Sighting> counts) {
-  std::stable_sort(counts.begin(), counts.end(),
-                   [](const map::Sighting& a, const map::Sighting& b) { return a.landmark < b.landmark; });
-  std::vector<map::Sighting> out;
-  for (const map::Sighting& s : counts) {
+std::vector<map::VisibilityCount> folded(std::vector<map::VisibilityCount> counts) {
+  std::stable_sort(counts.begin(), counts.end(), [](const map::VisibilityCount& a, const map::VisibilityCount& b) {
+    return a.landmark < b.landmark;
+  });
+  std::vector<map::VisibilityCount> out;
+  for (const map::VisibilityCount& s : counts) {
     if (out.empty() || out.back().landmark != s.landmark) {
       out.push_back(s);
     } else {
@@ -186,7 +187,7 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   state.track = std::move(output.state);
   note_motion(*input.map, before, outcome);
   if (options_.localize_only) {
-    state.track.sightings.clear();
+    state.track.visibility_counts.clear();
   } else if (output.keyframe_due) {
     propose_keyframe(input, output, outcome);
   }
@@ -212,7 +213,7 @@ bool Tracker::relocalise(const Input& input, TrackOutcome& outcome) {
   if (!relocaliser_) return false;
   const Stopwatch watch;
   relocaliser_->describe(input.frame);
-  const std::optional<FoundPlace> place = relocaliser_->locate(*input.map, input.frame);
+  const std::optional<FoundPlace> place = relocaliser_->verify_place(*input.map, input.frame);
   outcome.record.stages.push_back({"relocalise", watch.ms()});
   if (!place) return false;
   std::vector<LandmarkId> landmarks;
@@ -224,17 +225,17 @@ bool Tracker::relocalise(const Input& input, TrackOutcome& outcome) {
   std::sort(landmarks.begin(), landmarks.end());
   TrackerState& state = outcome.next.track;
   const auto trust = doubts_of(state.cameras, seen, options_.tracking.consensus);
-  state = state_at_keyframe({}, input.frame.time_ns, place->with, std::move(landmarks));
+  state = state_at_keyframe({}, input.frame.time_ns, place->matched_keyframe, std::move(landmarks));
   state.cameras = trust;
-  state.anchored = map::AnchoredPose::at(*input.map, place->with, place->T_rig_world);
-  outcome.record.relocalisation = Relocalisation{place->with, place->inliers};
+  state.anchored = map::AnchoredPose::at(*input.map, place->matched_keyframe, place->T_rig_world);
+  outcome.record.relocalisation = Relocalisation{place->matched_keyframe, place->inliers};
   return true;
 }
 
 void Tracker::propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const {
   const Stopwatch watch;
   map::MapDraft draft("track", input.map);
-  draft.add_sightings(folded(std::move(outcome.next.track.sightings)));
+  draft.add_visibility_counts(folded(std::move(outcome.next.track.visibility_counts)));
   if (relocaliser_) relocaliser_->describe(input.frame);
   NewKeyframe made = make_keyframe(input.frame, output.matches, output.result.T_rig_world, input.pyramids,
                                    output.result.anchored.reference, options_.tracking.initialisation, draft);

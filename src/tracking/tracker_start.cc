@@ -53,7 +53,7 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   const InitialisationOptions& options = options_.tracking.initialisation;
   const bool overlap = rig_.any_overlap();
   if (overlap) {
-    if (auto started = start_metric(input.frame, input.pyramids, options, draft)) return started;
+    if (auto started = initialise_metric(input.frame, input.pyramids, options, draft)) return started;
   }
   // All submaps share one scale: beside a metric one no other is started.
   if (input.map->num_keyframes() > 0 && input.map->scale() == map::Scale::kMetric) return std::nullopt;
@@ -61,7 +61,7 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   if (!state.start_reference || input.frame.id.value() - state.start_reference->frame->id.value() < patience)
     return std::nullopt;
   const Random random(options_.seed, "start", static_cast<std::uint64_t>(input.frame.id.value()));
-  return start_up_to_scale(*state.start_reference, input.frame, input.pyramids, options, random, draft);
+  return initialise_monocular(*state.start_reference, input.frame, input.pyramids, options, random, draft);
 }
 
 // Takes over the frame. The reference is replaced when it is old or its view is gone.

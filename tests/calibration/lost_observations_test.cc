@@ -23,11 +23,11 @@ map::SimulatedMap true_map() {
   return out;
 }
 
-adjustment::FlatProblem everything(const map::BundledMap& map) {
+adjustment::BundleProblem everything(const map::BundledMap& map) {
   adjustment::Selection selection;
   selection.free_keyframes = map.keyframe_ids();
   selection.landmarks = map.landmark_ids();
-  return adjustment::flatten(map, selection, kFeatures);
+  return adjustment::build_problem(map, selection, kFeatures);
 }
 
 std::vector<geometry::SE3> extrinsics(const camera::Rig& rig) {
@@ -47,7 +47,7 @@ TEST(RecoverObservations, FindsWhatWasRefusedAndLittleElse) {
     ASSERT_TRUE(world.map.remove_observation(l, last));
   }
   ASSERT_GT(refused, 60u);
-  adjustment::FlatProblem flat = everything(world.map);
+  adjustment::BundleProblem flat = everything(world.map);
   const auto before = flat.problem.observations;
   const int added = recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, flat);
   EXPECT_GT(added, 0.8 * static_cast<double>(refused));
@@ -85,7 +85,7 @@ TEST(RecoverObservations, LooksUnderTheExtrinsicsGiven) {
       world.map.remove_observation(l, KeyframeId(5));
     }
   }
-  adjustment::FlatProblem right = everything(world.map), wrong = right;
+  adjustment::BundleProblem right = everything(world.map), wrong = right;
   std::vector<geometry::SE3> T_cam_rig = extrinsics(world.map.rig());
   const int found = recover_observations(world.map, T_cam_rig, kFeatures, right);
   geometry::Vector6d off;
@@ -98,7 +98,7 @@ TEST(RecoverObservations, LooksUnderTheExtrinsicsGiven) {
 
 TEST(RecoverObservations, TakesNoKeypointThatHasALandmark) {
   const map::SimulatedMap world = true_map();
-  adjustment::FlatProblem flat = everything(world.map);
+  adjustment::BundleProblem flat = everything(world.map);
   const std::size_t before = flat.problem.observations.size();
   recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, flat);
   for (std::size_t i = 0; i < flat.problem.observations.size(); ++i) {
@@ -120,8 +120,8 @@ TEST(RecoverObservations, TakesNoKeypointThatTheProblemHasGivenToAnotherPoint) {
       world.map.remove_observation(l, KeyframeId(5));
     }
   }
-  const adjustment::FlatProblem before = everything(world.map);
-  adjustment::FlatProblem once = before, flat = before;
+  const adjustment::BundleProblem before = everything(world.map);
+  adjustment::BundleProblem once = before, flat = before;
   ASSERT_GT(recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, once), 0);
   const auto known = [&](const auto& o) {
     return std::ranges::any_of(before.problem.observations, [&](const auto& b) {

@@ -79,7 +79,7 @@ std::size_t count(const Journal& journal, JournalStep step) {
 }
 
 // Background results that others had overtaken when they were committed.
-std::size_t overtaken(const Journal& journal) {
+std::size_t superseded(const Journal& journal) {
   MapVersion newest{0};
   std::size_t n = 0;
   for (const JournalEntry& e : journal.entries) {
@@ -133,7 +133,7 @@ TEST(StageExecutorSequential, LeavesOutWhatIsNotConfigured) {
 TEST(StageExecutorLagged, GivesTheSameMapsHoweverLongStagesTake) {
   WorldRun quick(execution::Mode::kLagged, setup(hashing_stages(0, 3, 0)));
   quick.whole();
-  EXPECT_GT(overtaken(quick.gate.journal()), 10u);
+  EXPECT_GT(superseded(quick.gate.journal()), 10u);
   for (const int load : {0, 1, 3}) {
     const Load others(load);
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
@@ -189,7 +189,7 @@ TEST(StageExecutorReplay, RepeatsParallelRunsToTheBit) {
     replayed.whole();
     ASSERT_EQ(replayed.journal(), recorded.journal()) << seed;
     ASSERT_EQ(replayed.seen, recorded.seen) << seed;
-    out_of_order += overtaken(*journal);
+    out_of_order += superseded(*journal);
     globals += count(*journal, JournalStep::kGlobal);
   }
   EXPECT_GT(out_of_order, 40u);  // there was something to repeat

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "feature/binary_tests.h"
+#include "feature/brief_pattern.h"
 #include "feature/hamming.h"
 #include "feature/orientation.h"
 #include "feature/smoothing.h"
@@ -146,8 +146,8 @@ TEST(Description, TurnsWithTheImage) {
   EXPECT_GT(median(different), 90);
 }
 
-TEST(BinaryTests, AreSpreadAndSayDifferentThings) {
-  const auto tests = make_binary_tests();
+TEST(BriefPattern, AreSpreadAndSayDifferentThings) {
+  const auto tests = make_brief_pattern();
   double worst = 0, square = 0;
   for (std::size_t i = 0; i < tests.size(); ++i) {
     for (const auto& [x, y] : {std::pair(tests[i].x1, tests[i].y1), std::pair(tests[i].x2, tests[i].y2)}) {
@@ -164,7 +164,7 @@ TEST(BinaryTests, AreSpreadAndSayDifferentThings) {
   EXPECT_LT(worst, 0.75);
 }
 
-TEST(BinaryTests, CoverAllAnglesWithoutAGap) {
+TEST(BriefPattern, CoverAllAnglesWithoutAGap) {
   const cv::Mat scene = testing::make_scene(64, 64, 1);
   const Describer describer;
   const Window window = sample_window(view_of(scene), 32, 32);

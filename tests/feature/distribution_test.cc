@@ -48,7 +48,7 @@ TEST(Distribution, SharesOverLevelsByArea) {
 TEST(Distribution, ThinsOutToTheBestOfANeighbourhood) {
   const std::vector<Corner> corners = random_corners(kRegion, 0.5, any_score);
   std::vector<std::uint32_t> ranked;
-  Distribution(1).thin_out(corners, kRegion, 9, ranked);
+  Distribution(1).non_maximum_suppression(corners, kRegion, 9, ranked);
   const auto close = [&](const Corner& a, const Corner& b) {
     return std::abs(a.x - b.x) < 9 && std::abs(a.y - b.y) < 9;
   };
@@ -70,7 +70,7 @@ std::vector<Corner> choose(const std::vector<Corner>& corners, std::size_t wante
   Distribution distribution(wanted);
   std::vector<std::uint32_t> ranked;
   std::vector<Corner> chosen;
-  distribution.thin_out(corners, kRegion, 5, ranked);
+  distribution.non_maximum_suppression(corners, kRegion, 5, ranked);
   distribution.choose(corners, ranked, kRegion, wanted, strong, chosen);
   return chosen;
 }

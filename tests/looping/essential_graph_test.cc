@@ -71,7 +71,7 @@ TEST(EssentialGraph, FreesTheScaleWhereItIsNotObserved) {
   EXPECT_TRUE(essential_graph(map, KeyframeId(0), 60).problem.scale_free);
 }
 
-TEST(EssentialGraph, LeavesOutOtherPartsAndRemovedKeyframes) {
+TEST(EssentialGraph, ExcludesOtherSubmapsAndRemovedKeyframes) {
   const FeatureSimulator simulator = hall(rig_of(1));
   HallMap world(simulator.rig());
   for (int i = 0; i < 6; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));

@@ -54,8 +54,8 @@ TEST_P(LoopCloserRig, ClosesTheLoopWhereTheEndSeesTheStartAndNotBefore) {
   EXPECT_EQ(k, world.map.newest_keyframe());
   EXPECT_GT(k.value(), kRound - 12);
   // They are close enough to observe the same landmarks.
-  EXPECT_LT(distance_m(world.truth(k), world.truth(watch.closure->with)), 9.0);
-  EXPECT_FALSE(watch.closure->joined);
+  EXPECT_LT(distance_m(world.truth(k), world.truth(watch.closure->matched_keyframe)), 9.0);
+  EXPECT_FALSE(watch.closure->merged);
   const double before = distance_m(world.map.keyframe(k).T_rig_world, world.truth(k));
   EXPECT_LT(5 * distance_m(watch.corrected->keyframe(k).T_rig_world, world.truth(k)), before);
   EXPECT_EQ(watch.corrected->check_invariants(), std::nullopt);
@@ -123,12 +123,12 @@ TEST(LoopCloser, RefusesACorrectionThatNoDriftExplains) {
     EXPECT_FALSE(watch.closure);
     two_rooms(cameras, believer);
     ASSERT_TRUE(believer.closure);  // rejected by the drift bound only
-    EXPECT_NEAR(believer.closure->moved, 8.0, 0.05);
+    EXPECT_NEAR(believer.closure->translation_correction, 8.0, 0.05);
   }
 }
 
 // After tracking restarted in a new submap, the first keyframes that recognise an old place merge both submaps.
-TEST(LoopCloser, JoinsPartsAtAPlaceBothHaveSeen) {
+TEST(LoopCloser, MergesSubmapsAtACommonPlace) {
   for (const int cameras : {1, 2, 4}) {
     const FeatureSimulator simulator = hall(rig_of(cameras));
     const Sim3 elsewhere(Sim3::exp((geometry::Vector7d() << 0.1, 0.3, -1.2, 15, -7, 2, 0).finished()));
@@ -140,7 +140,7 @@ TEST(LoopCloser, JoinsPartsAtAPlaceBothHaveSeen) {
       if (!watch(world, k)) break;
     }
     ASSERT_TRUE(watch.closure);
-    EXPECT_TRUE(watch.closure->joined);
+    EXPECT_TRUE(watch.closure->merged);
     EXPECT_EQ(watch.corrected->roots(), std::vector{KeyframeId(0)});
     EXPECT_EQ(watch.corrected->check_invariants(), std::nullopt);
     for (const KeyframeId k : watch.corrected->keyframe_ids()) {

@@ -17,9 +17,9 @@ using map::Fingerprint;
 
 constexpr KeyframeId kLast(kRound + 1);
 
-std::optional<Location> locate_last(const HallMap& world) {
-  return locate(world.map, world.map.rig_of(kLast), *world.map.keyframe(kLast).frame, KeyframeId(1), {}, kFeatures,
-                seeded(1));
+std::optional<PlaceMatch> locate_last(const HallMap& world) {
+  return verify_place(world.map, world.map.rig_of(kLast), *world.map.keyframe(kLast).frame, KeyframeId(1), {},
+                      kFeatures, seeded(1));
 }
 
 // Distance in metres between the estimated and the true position of a keyframe, and the mean of the same over its
@@ -64,26 +64,27 @@ void expect_refreshed(const map::BundledMap& map) {
 
 class CloseLoopRig : public ::testing::TestWithParam<int> {
  protected:
-  CloseLoopRig() : world(drifted_walk(GetParam())), location(locate_last(world)), draft(world.draft()) {}
+  CloseLoopRig() : world(drifted_walk(GetParam())), place_match(locate_last(world)), draft(world.draft()) {}
   void SetUp() override {
-    ASSERT_TRUE(location);
-    closure = measure(world.map, kLast, *location);
-    close_loop(closure, *location, {}, kFeatures, draft);
+    ASSERT_TRUE(place_match);
+    closure = measure(world.map, kLast, *place_match);
+    close_loop(closure, *place_match, {}, kFeatures, draft);
   }
 
   const HallMap& world;
-  const std::optional<Location> location;
+  const std::optional<PlaceMatch> place_match;
   map::MapDraft draft;
   LoopClosure closure;
 };
 
 TEST_P(CloseLoopRig, MeasuresTheDrift) {
   EXPECT_EQ(closure.keyframe, kLast);
-  EXPECT_EQ(closure.with, KeyframeId(1));
-  EXPECT_NEAR(closure.moved, error_of(world, world.map, kLast), 0.05);
-  EXPECT_NEAR(closure.turned, angle_rad(world.map.keyframe(kLast).T_rig_world, world.truth(kLast)), 0.1 * kDegree);
-  EXPECT_EQ(closure.scaled, 1.0);
-  EXPECT_FALSE(closure.joined);
+  EXPECT_EQ(closure.matched_keyframe, KeyframeId(1));
+  EXPECT_NEAR(closure.translation_correction, error_of(world, world.map, kLast), 0.05);
+  EXPECT_NEAR(closure.rotation_correction, angle_rad(world.map.keyframe(kLast).T_rig_world, world.truth(kLast)),
+              0.1 * kDegree);
+  EXPECT_EQ(closure.scale_correction, 1.0);
+  EXPECT_FALSE(closure.merged);
   EXPECT_GT(closure.inliers, 100);
   EXPECT_TRUE(plausible(world.map, closure, {}));
   LoopOptions strict;
@@ -133,7 +134,7 @@ TEST_P(CloseLoopRig, FusesWhatIsSeenOnBothEnds) {
 
   // Few landmarks in view of the last keyframe and the place are still duplicated.
   std::set<HallMap::Shown> then;
-  for (const LandmarkId l : landmarks_about(after, KeyframeId(1), 3, 100000))
+  for (const LandmarkId l : landmarks_around(after, KeyframeId(1), 3, 100000))
     then.insert(world.shown_by_landmark[l.index()]);
   int known = 0, twice = 0;
   for (const LandmarkId l : after.keyframe(kLast).landmarks) {
@@ -152,7 +153,7 @@ TEST_P(CloseLoopRig, LeavesAMapInOrder) {
 
 TEST_P(CloseLoopRig, GivesTheSameBytesAgain) {
   map::MapDraft again = world.draft();
-  close_loop(closure, *location, {}, kFeatures, again);
+  close_loop(closure, *place_match, {}, kFeatures, again);
   EXPECT_TRUE(Fingerprint(draft.map()) == Fingerprint(again.map()));
 }
 
@@ -162,11 +163,11 @@ INSTANTIATE_TEST_SUITE_P(Cameras, CloseLoopRig, ::testing::Values(1, 2, 4));
 TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
   const FeatureSimulator simulator = hall(rig_of(2));
   HallMap world = drifted_walk(2);
-  const auto location = locate_last(world);
-  ASSERT_TRUE(location);
+  const auto place_match = locate_last(world);
+  ASSERT_TRUE(place_match);
   map::MapStore store(world.map);
   map::MapDraft loop("loop", store.snapshot());
-  close_loop(measure(loop.map(), kLast, *location), *location, {}, kFeatures, loop);
+  close_loop(measure(loop.map(), kLast, *place_match), *place_match, {}, kFeatures, loop);
 
   map::MapDraft tracking("tracking", store.snapshot());
   const KeyframeId newer =
@@ -214,16 +215,16 @@ class ScaleDrift : public ::testing::Test {
 };
 
 TEST_F(ScaleDrift, IsMeasuredAndRemoved) {
-  auto location = locate_last(world());
-  ASSERT_TRUE(location);
-  const auto scale = relative_scale(world().map, kLast, *location);
+  auto place_match = locate_last(world());
+  ASSERT_TRUE(place_match);
+  const auto scale = relative_scale(world().map, kLast, *place_match);
   ASSERT_TRUE(scale);
-  location->scale = *scale;
-  const LoopClosure closure = measure(world().map, kLast, *location);
-  EXPECT_NEAR(closure.scaled, 1 / 0.9, 0.02);
+  place_match->scale = *scale;
+  const LoopClosure closure = measure(world().map, kLast, *place_match);
+  EXPECT_NEAR(closure.scale_correction, 1 / 0.9, 0.02);
   EXPECT_TRUE(plausible(world().map, closure, {}));
   map::MapDraft draft = world().draft();
-  close_loop(closure, *location, {}, kFeatures, draft);
+  close_loop(closure, *place_match, {}, kFeatures, draft);
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
   EXPECT_NEAR(step_ratio(world().map), 0.9, 0.02);
   EXPECT_NEAR(step_ratio(draft.map()), 1.0, 0.02);
@@ -234,27 +235,27 @@ TEST_F(ScaleDrift, IsMeasuredAndRemoved) {
 }
 
 // Two paths along the same wall; before the second one tracking restarted at another pose.
-class JoinParts : public ::testing::TestWithParam<int> {
+class MergeSubmaps : public ::testing::TestWithParam<int> {
  protected:
-  JoinParts() : world(rig_of(GetParam())) {
+  MergeSubmaps() : world(rig_of(GetParam())) {
     const FeatureSimulator simulator = hall(rig_of(GetParam()));
     for (int i = 0; i < 8; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
     const Sim3 elsewhere(Sim3::exp((geometry::Vector7d() << 0.2, -0.3, 1.9, 5, -7, 2, 0).finished()));
     for (int i = 8; i < 18; ++i)
       world.add(simulator.frame(FrameId(i), kStepS * (i - 4) + 0.5), elsewhere, 0, {}, i == 8);
   }
-  std::optional<Location> located(int keyframe, int with) const {
-    return locate(world.map, world.map.rig_of(KeyframeId(keyframe)), *world.map.keyframe(KeyframeId(keyframe)).frame,
-                  KeyframeId(with), {}, kFeatures, seeded(1));
+  std::optional<PlaceMatch> located(int keyframe, int with) const {
+    return verify_place(world.map, world.map.rig_of(KeyframeId(keyframe)),
+                        *world.map.keyframe(KeyframeId(keyframe)).frame, KeyframeId(with), {}, kFeatures, seeded(1));
   }
   void expect_joined(int keyframe, int with) {
-    const auto location = located(keyframe, with);
-    ASSERT_TRUE(location);
-    const LoopClosure closure = measure(world.map, KeyframeId(keyframe), *location);
-    EXPECT_TRUE(closure.joined);
+    const auto place_match = located(keyframe, with);
+    ASSERT_TRUE(place_match);
+    const LoopClosure closure = measure(world.map, KeyframeId(keyframe), *place_match);
+    EXPECT_TRUE(closure.merged);
     EXPECT_TRUE(plausible(world.map, closure, {}));
     map::MapDraft draft = world.draft();
-    ASSERT_TRUE(join_parts(closure, *location, {}, kFeatures, draft));
+    ASSERT_TRUE(merge_submaps(closure, *place_match, {}, kFeatures, draft));
     const map::BundledMap& after = draft.map();
     EXPECT_EQ(after.check_invariants(), std::nullopt);
     EXPECT_EQ(after.roots(), std::vector{KeyframeId(0)});
@@ -274,21 +275,21 @@ class JoinParts : public ::testing::TestWithParam<int> {
   HallMap world;
 };
 
-TEST_P(JoinParts, TheNewerPartMovesToTheOlder) { expect_joined(10, 6); }
-TEST_P(JoinParts, AlsoWhereTheOlderOneRecognisesIt) { expect_joined(6, 10); }
+TEST_P(MergeSubmaps, TheNewerSubmapMovesToTheOlder) { expect_joined(10, 6); }
+TEST_P(MergeSubmaps, AlsoWhereTheOlderOneRecognisesIt) { expect_joined(6, 10); }
 
-TEST_P(JoinParts, PartsOfUnknownScaleStayApart) {
+TEST_P(MergeSubmaps, SubmapsOfUnknownScaleAreNotMerged) {
   world.map.set_scale(map::Scale::kUpToScale);
-  const auto location = located(10, 6);
-  ASSERT_TRUE(location);
-  const LoopClosure closure = measure(world.map, KeyframeId(10), *location);
+  const auto place_match = located(10, 6);
+  ASSERT_TRUE(place_match);
+  const LoopClosure closure = measure(world.map, KeyframeId(10), *place_match);
   EXPECT_FALSE(plausible(world.map, closure, {}));
   map::MapDraft draft = world.draft();
-  EXPECT_FALSE(join_parts(closure, *location, {}, kFeatures, draft));
+  EXPECT_FALSE(merge_submaps(closure, *place_match, {}, kFeatures, draft));
   EXPECT_TRUE(Fingerprint(draft.map()) == Fingerprint(world.map));
 }
 
-INSTANTIATE_TEST_SUITE_P(Cameras, JoinParts, ::testing::Values(1, 2, 4));
+INSTANTIATE_TEST_SUITE_P(Cameras, MergeSubmaps, ::testing::Values(1, 2, 4));
 
 }  // namespace
 }  // namespace bslam::looping

@@ -23,7 +23,7 @@ class RecogniserRig : public ::testing::TestWithParam<int> {};
 TEST_P(RecogniserRig, RanksTheRevisitedPlaceFirst) {
   const HallMap& world = drifted_walk(GetParam());
   for (const int again : {kRound, kRound + 1}) {
-    const std::vector<Candidate> candidates = recogniser()->revisited(world.map, KeyframeId(again));
+    const std::vector<Candidate> candidates = recogniser()->query_keyframe(world.map, KeyframeId(again));
     ASSERT_FALSE(candidates.empty());
     EXPECT_LE(std::abs(candidates.front().keyframe.value() - (again - kRound)), 2);
     for (std::size_t i = 1; i < candidates.size(); ++i) EXPECT_LE(candidates[i].score, candidates[i - 1].score);
@@ -35,7 +35,7 @@ TEST_P(RecogniserRig, RanksTheTrueNeighbourhoodOfAFrameFirst) {
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (const int at : {2, 9, 17, 28}) {
     const auto frame = described(simulator.frame(FrameId(1000 + at), kStepS * at + 0.5));
-    const std::vector<Candidate> candidates = recogniser()->recognised(world.map, frame);
+    const std::vector<Candidate> candidates = recogniser()->query_frame(world.map, frame);
     ASSERT_FALSE(candidates.empty());
     EXPECT_LE(std::abs(candidates.front().keyframe.value() - at), 2);
   }
@@ -48,7 +48,7 @@ TEST_P(RecogniserRig, NeighboursAreNeverCandidates) {
   for (const KeyframeId k : world.map.keyframe_ids()) {
     const auto& table = world.map.keyframe(k).landmarks.values();
     const auto landmarks = std::ranges::count_if(table, [](LandmarkId l) { return l.valid(); });
-    for (const Candidate& c : loose->revisited(world.map, k)) {
+    for (const Candidate& c : loose->query_keyframe(world.map, k)) {
       ++candidates;
       EXPECT_NE(c.keyframe, k);
       for (const map::Covisible& n : world.map.keyframe(k).covisible) {
@@ -73,11 +73,11 @@ TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
     world.add(redecorated(simulator.frame(FrameId(i), kRoundS + 0.3 * (i - 6)), 0.8, 1), {}, 2);
   const KeyframeId newest(8);
   ASSERT_GE(world.map.best_covisible(newest, 1).front().weight, RecognitionOptions().min_neighbour_landmarks);
-  EXPECT_TRUE(recogniser()->revisited(world.map, newest).empty());
+  EXPECT_TRUE(recogniser()->query_keyframe(world.map, newest).empty());
   // Without neighbours there is no such bound: the place becomes a candidate, ranked after the former neighbours.
   const RecognitionOptions unbound{
       .min_common_word_ratio = 0, .min_group_score_ratio = 0, .min_neighbour_landmarks = 10000};
-  const std::vector<Candidate> without = recogniser(unbound)->revisited(world.map, newest);
+  const std::vector<Candidate> without = recogniser(unbound)->query_keyframe(world.map, newest);
   EXPECT_TRUE(std::ranges::any_of(without, [](const Candidate& c) { return c.keyframe.value() < 3; }));
 }
 
@@ -88,13 +88,13 @@ TEST(BagOfWordsRecogniser, OneLandmarkInCommonMakesNoOnePlace) {
   world.add(simulator.frame(FrameId(0), 0.0));
   world.add(simulator.frame(FrameId(1), 0.2), {}, 1);  // a room that looks the same
   const auto frame = described(simulator.frame(FrameId(7), 0.1));
-  ASSERT_EQ(recogniser(kLoose)->recognised(world.map, frame).size(), 2u);
+  ASSERT_EQ(recogniser(kLoose)->query_frame(world.map, frame).size(), 2u);
   const auto any_of = [&](KeyframeId k) {
     return *std::ranges::find_if(world.map.keyframe(k).landmarks.values(), [](LandmarkId l) { return l.valid(); });
   };
   ASSERT_TRUE(world.map.merge_landmarks(any_of(KeyframeId(1)), any_of(KeyframeId(0))));
   ASSERT_EQ(world.map.best_covisible(KeyframeId(0), 1).front().weight, 1);
-  EXPECT_EQ(recogniser(kLoose)->recognised(world.map, frame).size(), 2u);
+  EXPECT_EQ(recogniser(kLoose)->query_frame(world.map, frame).size(), 2u);
 }
 
 TEST(BagOfWordsRecogniser, AnswersDoNotDependOnTheMapsAskedAboutBefore) {
@@ -107,10 +107,10 @@ TEST(BagOfWordsRecogniser, AnswersDoNotDependOnTheMapsAskedAboutBefore) {
 
   const auto wandering = recogniser();
   for (int turn = 0; turn < 2; ++turn) {
-    expect_equal(wandering->revisited(world.map, last), recogniser()->revisited(world.map, last));
-    expect_equal(wandering->recognised(other.map, frame), recogniser()->recognised(other.map, frame));
-    expect_equal(wandering->revisited(thinned.map(), last), recogniser()->revisited(thinned.map(), last));
-    expect_equal(wandering->recognised(world.map, frame), recogniser()->recognised(world.map, frame));
+    expect_equal(wandering->query_keyframe(world.map, last), recogniser()->query_keyframe(world.map, last));
+    expect_equal(wandering->query_frame(other.map, frame), recogniser()->query_frame(other.map, frame));
+    expect_equal(wandering->query_keyframe(thinned.map(), last), recogniser()->query_keyframe(thinned.map(), last));
+    expect_equal(wandering->query_frame(world.map, frame), recogniser()->query_frame(world.map, frame));
   }
 }
 
@@ -121,10 +121,10 @@ TEST(BagOfWordsRecogniser, RemovedKeyframesVanish) {
   const auto found = [&](const std::vector<Candidate>& candidates, KeyframeId k) {
     return std::ranges::find(candidates, k, &Candidate::keyframe) != candidates.end();
   };
-  const KeyframeId best = ours->revisited(world.map, last).front().keyframe;
+  const KeyframeId best = ours->query_keyframe(world.map, last).front().keyframe;
   map::MapDraft draft = world.draft();
   if (!draft.remove_keyframe(best)) GTEST_FAIL() << "the best one is the root";
-  const std::vector<Candidate> after = ours->revisited(draft.map(), last);
+  const std::vector<Candidate> after = ours->query_keyframe(draft.map(), last);
   EXPECT_FALSE(after.empty());
   EXPECT_FALSE(found(after, best));
 }
@@ -135,17 +135,17 @@ TEST(BagOfWordsRecogniser, NoticesAMapBegunAnew) {
   for (int i = 0; i < 8; ++i) fresh.add(simulator.frame(FrameId(i), 24 + kStepS * i));
   const auto ours = recogniser();
   const auto frame = described(simulator.frame(FrameId(1000), 26.4));
-  ours->recognised(exact_walk(1).map, frame);
-  const std::vector<Candidate> candidates = ours->recognised(fresh.map, frame);
+  ours->query_frame(exact_walk(1).map, frame);
+  const std::vector<Candidate> candidates = ours->query_frame(fresh.map, frame);
   ASSERT_FALSE(candidates.empty());
   EXPECT_LE(std::abs(candidates.front().keyframe.value() - 2), 1);
-  expect_equal(candidates, recogniser()->recognised(fresh.map, frame));
+  expect_equal(candidates, recogniser()->query_frame(fresh.map, frame));
 }
 
 TEST(BagOfWordsRecogniser, AFrameWithoutImagesIsLikeNothing) {
   const std::vector<int> all = {0, 1};
   const auto frame = described(hall(rig_of(2)).frame(FrameId(1000), 3.0, all));
-  EXPECT_TRUE(recogniser()->recognised(exact_walk(2).map, frame).empty());
+  EXPECT_TRUE(recogniser()->query_frame(exact_walk(2).map, frame).empty());
 }
 
 }  // namespace

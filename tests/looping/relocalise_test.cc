@@ -7,17 +7,17 @@
 namespace bslam::looping {
 namespace {
 
-std::optional<Location> relocalised(PlaceRecogniser& places, const HallMap& world, const SimulatedFrame& seen,
-                                    std::uint64_t seed) {
+std::optional<PlaceMatch> relocalised(PlaceRecogniser& places, const HallMap& world, const SimulatedFrame& seen,
+                                      std::uint64_t seed) {
   return relocalise(places, world.map, described(seen), {}, kFeatures, seeded(seed));
 }
-std::optional<Location> relocalised(const HallMap& world, const SimulatedFrame& seen) {
+std::optional<PlaceMatch> relocalised(const HallMap& world, const SimulatedFrame& seen) {
   return relocalised(*recogniser(), world, seen, 1);
 }
 
-bool is_true(const Location& location, const SE3& T_rig_world) {
-  return distance_m(location.T_rig_world, T_rig_world) < 0.03 &&
-         angle_rad(location.T_rig_world, T_rig_world) < 0.5 * kDegree;
+bool is_true(const PlaceMatch& place_match, const SE3& T_rig_world) {
+  return distance_m(place_match.T_rig_world, T_rig_world) < 0.03 &&
+         angle_rad(place_match.T_rig_world, T_rig_world) < 0.5 * kDegree;
 }
 
 TEST(Relocalise, FindsTheFrameFromAnyOfItsCameras) {
@@ -29,18 +29,18 @@ TEST(Relocalise, FindsTheFrameFromAnyOfItsCameras) {
       if ((present >> c & 1) == 0) missing.push_back(c);
     }
     const SimulatedFrame seen = simulator.frame(FrameId(1000), kStepS * 12 + 0.4, missing);
-    const auto location = relocalised(world, seen);
-    ASSERT_TRUE(location) << "cameras " << present;
-    EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse())) << "cameras " << present;
+    const auto place_match = relocalised(world, seen);
+    ASSERT_TRUE(place_match) << "cameras " << present;
+    EXPECT_TRUE(is_true(*place_match, seen.T_world_rig.inverse())) << "cameras " << present;
   }
 }
 
 TEST(Relocalise, FindsThePlaceTurnedRound) {
   const HallMap& world = exact_walk(4);
   const SimulatedFrame seen = hall(rig_of(4), std::numbers::pi).frame(FrameId(1000), kStepS * 12 + 0.4);
-  const auto location = relocalised(world, seen);
-  ASSERT_TRUE(location);
-  EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse()));
+  const auto place_match = relocalised(world, seen);
+  ASSERT_TRUE(place_match);
+  EXPECT_TRUE(is_true(*place_match, seen.T_world_rig.inverse()));
 }
 
 // Frames of the hall, and of halls in which most or all landmarks look different; various rigs.
@@ -60,9 +60,9 @@ TEST_P(RelocaliseRig, IsNeverWrong) {
       if (random.uniform() < 0.4) missing.push_back(c);
     }
     const SimulatedFrame seen = simulator.frame(FrameId(1000 + static_cast<int>(seed)), time_s, missing);
-    if (const auto location = relocalised(*places, world, seen, seed)) {
+    if (const auto place_match = relocalised(*places, world, seen, seed)) {
       ++found;
-      EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse())) << "seed " << seed;
+      EXPECT_TRUE(is_true(*place_match, seen.T_world_rig.inverse())) << "seed " << seed;
     }
     EXPECT_FALSE(relocalised(*places, world, redecorated(seen, 1.0, seed), seed)) << "seed " << seed;
     EXPECT_FALSE(relocalised(*places, world, redecorated(seen, 0.875, seed), seed)) << "seed " << seed;
@@ -102,26 +102,26 @@ TEST(Relocalise, TellsRoomsApartThatDifferInHalfOfWhatIsSeen) {
     int found = 0;
     for (int i = 0; i < 10; ++i) {
       const SimulatedFrame seen = simulator.frame(FrameId(1000 + i), 1 + 0.4 * i);
-      const auto location = relocalised(*places, world, seen, static_cast<std::uint64_t>(i));
-      if (!location) continue;
+      const auto place_match = relocalised(*places, world, seen, static_cast<std::uint64_t>(i));
+      if (!place_match) continue;
       ++found;
-      EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse()));
+      EXPECT_TRUE(is_true(*place_match, seen.T_world_rig.inverse()));
     }
     EXPECT_GE(found, 8);
   }
 }
 
-TEST(Relocalise, FindsFramesInEveryPartOfTheMap) {
+TEST(Relocalise, FindsFramesInEverySubmap) {
   const FeatureSimulator simulator = hall(rig_of(2));
   HallMap world(simulator.rig());
   for (int i = 0; i < 6; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
   for (int i = 6; i < 12; ++i) world.add(simulator.frame(FrameId(i), 20 + kStepS * i), {}, 0, {}, i == 6);
   for (const double time_s : {2.5, 28.5}) {
     const SimulatedFrame seen = simulator.frame(FrameId(1000), time_s);
-    const auto location = relocalised(world, seen);
-    ASSERT_TRUE(location);
-    EXPECT_EQ(world.map.root_of(location->with), time_s < 10 ? KeyframeId(0) : KeyframeId(6));
-    EXPECT_TRUE(is_true(*location, seen.T_world_rig.inverse()));
+    const auto place_match = relocalised(world, seen);
+    ASSERT_TRUE(place_match);
+    EXPECT_EQ(world.map.root_of(place_match->matched_keyframe), time_s < 10 ? KeyframeId(0) : KeyframeId(6));
+    EXPECT_TRUE(is_true(*place_match, seen.T_world_rig.inverse()));
   }
 }
 

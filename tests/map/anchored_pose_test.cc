@@ -48,14 +48,14 @@ TEST(AnchoredPose, OutlivesItsKeyframeAndEndsWithItsSubmap) {
   Scene scene;
   ASSERT_TRUE(scene.map.remove_keyframe(scene.keyframes.back()));
   EXPECT_LT(difference(*scene.anchored.resolve(scene.map), scene.T_rig_world), 1e-12);
-  ASSERT_TRUE(scene.map.remove_part(scene.keyframes.front()));
+  ASSERT_TRUE(scene.map.remove_submap(scene.keyframes.front()));
   EXPECT_FALSE(scene.anchored.known_in(scene.map));
   EXPECT_FALSE(scene.anchored.resolve(scene.map));
 }
 
 TEST(AnchoredPose, FollowsTheScaleOfItsSubmap) {
   Scene scene;
-  ASSERT_TRUE(scene.map.scale_part(scene.keyframes.front(), 3.0));
+  ASSERT_TRUE(scene.map.scale_submap(scene.keyframes.front(), 3.0));
   EXPECT_DOUBLE_EQ(scene.anchored.scale_change(scene.map), 3.0);
   const SE3 expected = geometry::scaled(scene.T_rig_world, 3.0);
   EXPECT_LT(difference(*scene.anchored.resolve(scene.map), expected), 1e-12);

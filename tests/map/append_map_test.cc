@@ -79,7 +79,7 @@ TEST(AppendMap, LeavesTheMapItExtendsAsItWas) {
   const BundledMap first = worn_map(15), other = worn_map(16);
   BundledMap map = first;
   const AppendedIds ids = append_map(map, other);
-  for (const KeyframeId root : other.roots()) EXPECT_TRUE(map.remove_part(ids.keyframes[root.index()]));
+  for (const KeyframeId root : other.roots()) EXPECT_TRUE(map.remove_submap(ids.keyframes[root.index()]));
   EXPECT_EQ(map.keyframe_ids(), first.keyframe_ids());
   EXPECT_EQ(map.landmark_ids(), first.landmark_ids());
   EXPECT_EQ(map.roots(), first.roots());
@@ -91,9 +91,9 @@ TEST(HangKeyframes, RefusesACircle) {
   BundledMap map{synthetic_rig(1)};
   for (int i = 0; i < 4; ++i) map.add_keyframe(synthetic_frame(random, 1, 5, 0), {}, {}, {});
   const std::vector<KeyframeId> circle = {KeyframeId(), KeyframeId(2), KeyframeId(3), KeyframeId(1)};
-  EXPECT_FALSE(hang_keyframes(map, KeyframeId(0), circle));
+  EXPECT_FALSE(attach_keyframes(map, KeyframeId(0), circle));
   const std::vector<KeyframeId> itself = {KeyframeId(0), KeyframeId(), KeyframeId(), KeyframeId()};
-  EXPECT_FALSE(hang_keyframes(map, KeyframeId(0), itself));
+  EXPECT_FALSE(attach_keyframes(map, KeyframeId(0), itself));
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ TEST_F(BundledMapTest, HangsAKeyframeBelowTheOneItSharesMostWith) {
   expect_sound();
 }
 
-TEST_F(BundledMapTest, BeginsAPartWithAKeyframeThatHangsOnNothing) {
+TEST_F(BundledMapTest, BeginsASubmapWithAKeyframeWithoutParent) {
   const KeyframeId a = add(matches(0, 10), {});
   const KeyframeId b = add({}, {}), c = add({}, b), d = add({}, KeyframeId(77));
   EXPECT_EQ(map.roots(), (std::vector{KeyframeId(0), b, d}));
@@ -71,12 +71,12 @@ TEST_F(BundledMapTest, BeginsAPartWithAKeyframeThatHangsOnNothing) {
   expect_sound();
 }
 
-TEST_F(BundledMapTest, TurnsTheLinksRoundWhenPartsAreJoined) {
+TEST_F(BundledMapTest, ReversesTheLinksWhenSubmapsAreMerged) {
   const KeyframeId a = add(matches(0, 10), {});
   const KeyframeId r = add({}, {}), s = add({}, r), t = add({}, s), side = add({}, r), below = add({}, t);
   std::vector<SE3> poses;
   for (const KeyframeId k : map.keyframe_ids()) poses.push_back(map.keyframe(k).T_rig_world);
-  EXPECT_TRUE(map.join_parts(t, a));
+  EXPECT_TRUE(map.merge_submaps(t, a));
   EXPECT_EQ(map.keyframe(t).parent, a);
   EXPECT_EQ(map.keyframe(s).parent, t);
   EXPECT_EQ(map.keyframe(r).parent, s);
@@ -90,20 +90,20 @@ TEST_F(BundledMapTest, TurnsTheLinksRoundWhenPartsAreJoined) {
   expect_sound();
 }
 
-TEST_F(BundledMapTest, JoinsOnlyWhatIsAliveAndOfTwoParts) {
+TEST_F(BundledMapTest, MergesOnlyAliveKeyframesOfTwoSubmaps) {
   const KeyframeId a = add(matches(0, 10), {}), r = add({}, {}), s = add({}, r);
-  EXPECT_FALSE(map.join_parts(a, KeyframeId(0)));
-  EXPECT_FALSE(map.join_parts(r, s));
+  EXPECT_FALSE(map.merge_submaps(a, KeyframeId(0)));
+  EXPECT_FALSE(map.merge_submaps(r, s));
   map.remove_keyframe(s);
-  EXPECT_FALSE(map.join_parts(s, a));
-  EXPECT_FALSE(map.join_parts(a, s));
-  EXPECT_FALSE(map.join_parts(KeyframeId(), a));
-  EXPECT_TRUE(map.join_parts(a, r));  // the larger submap may be attached to the smaller one
+  EXPECT_FALSE(map.merge_submaps(s, a));
+  EXPECT_FALSE(map.merge_submaps(a, s));
+  EXPECT_FALSE(map.merge_submaps(KeyframeId(), a));
+  EXPECT_TRUE(map.merge_submaps(a, r));  // the larger submap may be attached to the smaller one
   EXPECT_EQ(map.roots(), std::vector{r});
   expect_sound();
 }
 
-TEST_F(BundledMapTest, RemovesAPartAndLeavesTheRestAlone) {
+TEST_F(BundledMapTest, RemovesOneSubmapOnly) {
   const KeyframeId a = add(matches(0, 10), {});
   const KeyframeId r = add({}, {}), s = add({}, r), t = add({}, s);
   const LandmarkId own =
@@ -111,11 +111,11 @@ TEST_F(BundledMapTest, RemovesAPartAndLeavesTheRestAlone) {
   const LandmarkId shared =
       map.add_landmark(random_point(random), std::vector<Observation>{{a, FeatureId(20)}, {s, FeatureId(2)}});
   const std::size_t observations = map.num_observations();
-  EXPECT_FALSE(map.remove_part(s));
-  EXPECT_TRUE(map.remove_part(r));
+  EXPECT_FALSE(map.remove_submap(s));
+  EXPECT_TRUE(map.remove_submap(r));
   for (const KeyframeId k : {r, s, t}) {
     EXPECT_FALSE(map.alive(k));
-    EXPECT_FALSE(map.surviving(k).valid());
+    EXPECT_FALSE(map.nearest_alive_ancestor(k).valid());
   }
   EXPECT_EQ(map.roots(), std::vector{KeyframeId(0)});
   EXPECT_EQ(map.num_keyframes(), 2u);
@@ -123,24 +123,24 @@ TEST_F(BundledMapTest, RemovesAPartAndLeavesTheRestAlone) {
   ASSERT_TRUE(map.alive(shared));  // the other submap observes it too
   EXPECT_EQ(map.observations(shared).size(), 1u);
   EXPECT_EQ(map.num_observations(), observations - 3 * 2);  // three features with two keypoints each
-  EXPECT_FALSE(map.remove_part(r));
-  EXPECT_FALSE(map.remove_part(KeyframeId()));
+  EXPECT_FALSE(map.remove_submap(r));
+  EXPECT_FALSE(map.remove_submap(KeyframeId()));
   expect_sound();
 }
 
-TEST_F(BundledMapTest, ScalesAPartWithItsRemovedKeyframesAndLeavesTheRestAlone) {
+TEST_F(BundledMapTest, ScalesASubmapWithItsRemovedKeyframesOnly) {
   const KeyframeId a = add(matches(0, 20), {}), gone = add(matches(0, 10), {});
   const KeyframeId r = add({}, {}), s = add({}, r);
   const LandmarkId theirs = map.add_landmark(random_point(random), std::vector<Observation>{{s, FeatureId(2)}});
   ASSERT_TRUE(map.remove_keyframe(gone));
   const BundledMap before = map;
-  EXPECT_FALSE(map.scale_part(a, 3.0));
-  EXPECT_TRUE(map.scale_part(KeyframeId(0), 3.0));
+  EXPECT_FALSE(map.scale_submap(a, 3.0));
+  EXPECT_TRUE(map.scale_submap(KeyframeId(0), 3.0));
   for (const KeyframeId k : {KeyframeId(0), a, gone}) {
     const SE3 old = before.resolved_pose(k);
     EXPECT_LT((map.resolved_pose(k).translation() - 3.0 * old.translation()).norm(), 1e-12);
     EXPECT_LT(map.resolved_pose(k).rotation().angularDistance(old.rotation()), 1e-7);
-    EXPECT_EQ(map.keyframe(k).unit, 3.0);
+    EXPECT_EQ(map.keyframe(k).scale, 3.0);
   }
   EXPECT_EQ(map.landmark(LandmarkId(5)).position, 3.0 * before.landmark(LandmarkId(5)).position);
   EXPECT_EQ(map.landmark(LandmarkId(5)).max_distance, 3.0f * before.landmark(LandmarkId(5)).max_distance);
@@ -152,13 +152,13 @@ TEST_F(BundledMapTest, ScalesAPartWithItsRemovedKeyframesAndLeavesTheRestAlone) 
 
 TEST_F(BundledMapTest, SurvivesInTheNearestAliveAncestor) {
   const KeyframeId a = add(matches(0, 20), {}), b = add(matches(0, 10), {}), c = add({}, b);
-  EXPECT_EQ(map.surviving(c), c);
+  EXPECT_EQ(map.nearest_alive_ancestor(c), c);
   map.remove_keyframe(c);
-  EXPECT_EQ(map.surviving(c), b);
+  EXPECT_EQ(map.nearest_alive_ancestor(c), b);
   map.remove_keyframe(b);
   map.remove_keyframe(a);
-  EXPECT_EQ(map.surviving(c), KeyframeId(0));
-  EXPECT_FALSE(map.surviving(KeyframeId()).valid());
+  EXPECT_EQ(map.nearest_alive_ancestor(c), KeyframeId(0));
+  EXPECT_FALSE(map.nearest_alive_ancestor(KeyframeId()).valid());
 }
 
 TEST_F(BundledMapTest, KeepsTheAgeALandmarkIsGiven) {
@@ -215,8 +215,8 @@ TEST_F(BundledMapTest, KeepsANamedReference) {
 TEST_F(BundledMapTest, MovesObservationsAndCountersWhenMerging) {
   const KeyframeId a = add({{FeatureId(3), LandmarkId(3)}}, {});
   const KeyframeId b = add({{FeatureId(3), LandmarkId(3)}, {FeatureId(4), LandmarkId(4)}}, {});
-  map.add_sightings(LandmarkId(3), 5, 3);
-  map.add_sightings(LandmarkId(4), 2, 1);
+  map.add_visibility_counts(LandmarkId(3), 5, 3);
+  map.add_visibility_counts(LandmarkId(4), 2, 1);
   EXPECT_TRUE(map.merge_landmarks(LandmarkId(3), LandmarkId(4)));
   EXPECT_FALSE(map.alive(LandmarkId(3)));
   EXPECT_EQ(map.landmark(LandmarkId(4)).expected, 7u);
@@ -363,7 +363,7 @@ TEST_F(BundledMapTest, KnowsWhereALateCameraWas) {
                   .isApprox(map.cam_from_world(k, CameraIndex(1)).matrix(), 1e-12));
   EXPECT_TRUE((rig.rig_from_cam(1) * rig.cam_from_rig(CameraIndex(1))).matrix().isApprox(SE3().matrix(), 1e-12));
 
-  ASSERT_TRUE(map.scale_part(k, 3.0));
+  ASSERT_TRUE(map.scale_submap(k, 3.0));
   EXPECT_TRUE(map.keyframe(k).twist.tail<3>().isApprox(3.0 * frame->twist.tail<3>()));
   EXPECT_EQ(map.keyframe(k).twist.head<3>(), frame->twist.head<3>());
 }

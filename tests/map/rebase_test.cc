@@ -36,7 +36,7 @@ class RebaseTest : public testing::Test {
     return draft.add_keyframe(synthetic_frame(random, 2, 30, 10), random_pose(random, 0.5), std::move(list), fallback);
   }
   // Adds a submap of one keyframe to the version on which both drafts are based.
-  KeyframeId begin_part() {
+  KeyframeId begin_submap() {
     MapDraft setup("setup", store.snapshot());
     const KeyframeId root = add_keyframe(setup, {});
     store.commit(std::move(setup));
@@ -91,7 +91,7 @@ TEST_F(RebaseTest, NewKeyframeFallsBackToAnAliveAncestor) {
   EXPECT_EQ(report.published->keyframe(report.keyframes.at(0)).parent, kSecond);
 }
 
-TEST_F(RebaseTest, NewKeyframeThatBeganAPartBeginsOne) {
+TEST_F(RebaseTest, NewRootKeyframeBeginsASubmap) {
   MapDraft setup("setup", store.snapshot());
   setup.remove_keyframe(kThird);
   store.commit(std::move(setup));
@@ -104,9 +104,9 @@ TEST_F(RebaseTest, NewKeyframeThatBeganAPartBeginsOne) {
   EXPECT_FALSE(report.published->keyframe(report.keyframes.at(0)).parent.valid());
 }
 
-TEST_F(RebaseTest, NewKeyframeOfARemovedPartBeginsOne) {
-  const KeyframeId root = begin_part();
-  early->remove_part(root);
+TEST_F(RebaseTest, NewKeyframeOfARemovedSubmapBeginsOne) {
+  const KeyframeId root = begin_submap();
+  early->remove_submap(root);
   add_keyframe(*late, {}, root);
   const CommitReport report = commit();
   EXPECT_EQ(report.published->roots(), (std::vector{kRoot, report.keyframes.at(0)}));
@@ -297,7 +297,7 @@ TEST_F(RebaseTest, PosesAreDroppedAfterACorrection) {
   early->set_poses({{{kThird, corrected}}, {}, true});
   const LandmarkId l = late->add_landmark(random_point(random), {{kSecond, FeatureId(40)}});
   late->set_poses({{{kSecond, random_pose(random, 1)}, {kThird, random_pose(random, 1)}}, {{l, {1, 2, 3}}}});
-  late->add_sightings({{LandmarkId(0), 1, 1}});
+  late->add_visibility_counts({{LandmarkId(0), 1, 1}});
   const MapSnapshot before = store.snapshot();
   const CommitReport report = commit();
   expect_near(report.published->keyframe(kThird).T_rig_world, corrected);
@@ -355,10 +355,10 @@ TEST_F(RebaseTest, PosesWithoutACorrectionStayInTheEpoch) {
   EXPECT_EQ(report.published->gauge_epoch(), 0);
 }
 
-TEST_F(RebaseTest, PartsAreJoinedWhereBothAreStillThereAndApart) {
-  const KeyframeId root = begin_part();
+TEST_F(RebaseTest, SubmapsAreMergedIfBothStillExistSeparately) {
+  const KeyframeId root = begin_submap();
   const KeyframeId newer = add_keyframe(*early, {}, root);
-  late->join_parts(root, kThird);
+  late->merge_submaps(root, kThird);
   const CommitReport report = commit();
   EXPECT_EQ(report.applied, 1u);
   EXPECT_EQ(report.published->keyframe(root).parent, kThird);
@@ -366,44 +366,44 @@ TEST_F(RebaseTest, PartsAreJoinedWhereBothAreStillThereAndApart) {
 }
 
 TEST_F(RebaseTest, JoiningIsDroppedWhereItHasBeenDone) {
-  const KeyframeId root = begin_part();
-  early->join_parts(root, kSecond);
-  late->join_parts(root, kThird);
+  const KeyframeId root = begin_submap();
+  early->merge_submaps(root, kSecond);
+  late->merge_submaps(root, kThird);
   const CommitReport report = commit();
   EXPECT_EQ(report.dropped, 1u);
   EXPECT_EQ(report.published->keyframe(root).parent, kSecond);
 }
 
 TEST_F(RebaseTest, JoiningStandsByTheAncestorOfWhatIsGone) {
-  const KeyframeId root = begin_part();
+  const KeyframeId root = begin_submap();
   early->remove_keyframe(kThird);
-  late->join_parts(root, kThird);
+  late->merge_submaps(root, kThird);
   const CommitReport report = commit();
   EXPECT_EQ(report.dropped, 0u);
   EXPECT_EQ(report.published->root_of(root), report.published->root_of(kSecond));
 }
 
-TEST_F(RebaseTest, JoiningIsDroppedWhereAPartIsGone) {
-  const KeyframeId root = begin_part();
-  early->remove_part(root);
-  late->join_parts(root, kSecond);
+TEST_F(RebaseTest, MergingIsDroppedIfASubmapWasRemoved) {
+  const KeyframeId root = begin_submap();
+  early->remove_submap(root);
+  late->merge_submaps(root, kSecond);
   EXPECT_EQ(commit().dropped, 1u);
 }
 
 TEST_F(RebaseTest, JoiningFollowsTheIdsOfTheEditsOwnKeyframes) {
   add_keyframe(*early, same_numbers(0, 3));
   const KeyframeId own = add_keyframe(*late, {});
-  late->join_parts(own, kSecond);
+  late->merge_submaps(own, kSecond);
   const CommitReport report = commit();
   EXPECT_NE(report.keyframes.at(0), own);
   EXPECT_EQ(report.published->keyframe(report.keyframes[0]).parent, kSecond);
   EXPECT_EQ(report.published->roots(), std::vector{kRoot});
 }
 
-TEST_F(RebaseTest, RemovalOfAPartTakesItsNewerKeyframesToo) {
-  const KeyframeId root = begin_part();
+TEST_F(RebaseTest, RemovalOfASubmapRemovesItsNewerKeyframes) {
+  const KeyframeId root = begin_submap();
   const KeyframeId newer = add_keyframe(*early, {}, root);
-  late->remove_part(root);
+  late->remove_submap(root);
   const CommitReport report = commit();
   EXPECT_EQ(report.applied, 1u);
   EXPECT_FALSE(report.published->alive(root));
@@ -411,15 +411,15 @@ TEST_F(RebaseTest, RemovalOfAPartTakesItsNewerKeyframesToo) {
   EXPECT_EQ(report.published->roots(), std::vector{kRoot});
 }
 
-TEST_F(RebaseTest, RemovalOfAPartIsDroppedWhereItIsGoneOrPartOfAnother) {
-  const KeyframeId root = begin_part();
-  early->join_parts(root, kThird);
-  late->remove_part(root);
+TEST_F(RebaseTest, RemovalOfASubmapIsDroppedIfItWasRemovedOrMerged) {
+  const KeyframeId root = begin_submap();
+  early->merge_submaps(root, kThird);
+  late->remove_submap(root);
   EXPECT_EQ(commit().dropped, 1u);
   EXPECT_TRUE(store.snapshot()->alive(root));
-  const KeyframeId other = begin_part();
-  early->remove_part(other);
-  late->remove_part(other);
+  const KeyframeId other = begin_submap();
+  early->remove_submap(other);
+  late->remove_submap(other);
   EXPECT_EQ(commit().dropped, 1u);
 }
 
@@ -453,12 +453,12 @@ TEST_F(RebaseTest, PosesOfTheEditsOwnAdditionsFollowTheirIds) {
   EXPECT_EQ(report.published->keyframe(k).T_rig_world.translation(), T_early_world.translation());
 }
 
-TEST_F(RebaseTest, SightingsAreForwardedAndAdded) {
-  early->add_sightings({{LandmarkId(1), 10, 5}});
+TEST_F(RebaseTest, VisibilityCountsAreForwardedAndAdded) {
+  early->add_visibility_counts({{LandmarkId(1), 10, 5}});
   early->merge_landmarks(LandmarkId(0), LandmarkId(1));
   early->remove_landmark(LandmarkId(2));
-  late->add_sightings({{LandmarkId(0), 2, 1}, {LandmarkId(2), 1, 1}});
-  late->add_sightings({{LandmarkId(2), 1, 1}});
+  late->add_visibility_counts({{LandmarkId(0), 2, 1}, {LandmarkId(2), 1, 1}});
+  late->add_visibility_counts({{LandmarkId(2), 1, 1}});
   const CommitReport report = commit();
   EXPECT_EQ(report.published->landmark(LandmarkId(1)).expected, 12u);
   EXPECT_EQ(report.published->landmark(LandmarkId(1)).found, 6u);
@@ -480,24 +480,24 @@ TEST_F(RebaseTest, RefreshesAreForwarded) {
   EXPECT_EQ(report.dropped, 1u);
 }
 
-TEST_F(RebaseTest, ScalingAPartTakesNewerKeyframesAndLandmarksAlong) {
+TEST_F(RebaseTest, ScalingASubmapScalesNewerKeyframesAndLandmarks) {
   const KeyframeId newer = add_keyframe(*early, same_numbers(0, 20));
   const LandmarkId point = early->add_landmark({1, 2, 3}, {{newer, FeatureId(25)}});
   const SE3 T_rig_world = early->map().keyframe(newer).T_rig_world;
-  late->scale_part(kRoot, 2.0);
+  late->scale_submap(kRoot, 2.0);
   const CommitReport report = commit();
   EXPECT_EQ(report.applied, 1u);
   EXPECT_EQ(report.published->keyframe(newer).T_rig_world.translation(), 2.0 * T_rig_world.translation());
   EXPECT_EQ(report.published->landmark(point).position, Eigen::Vector3d(2, 4, 6));
 }
 
-TEST_F(RebaseTest, WhatIsAddedToAPartThatWasScaledKeepsItsPlaceInIt) {
+TEST_F(RebaseTest, AdditionsToAScaledSubmapKeepTheirRelativePose) {
   const KeyframeId k = add_keyframe(*late, same_numbers(0, 20), kThird);
   late->remove_observation(LandmarkId(29), kThird);
   late->add_landmark({1, 2, 3}, {{kThird, FeatureId(29)}});
   late->add_landmark({3, 2, 1}, {{k, FeatureId(25)}});
   const SE3 T_rig_world = late->map().keyframe(k).T_rig_world;
-  early->scale_part(kRoot, 2.0);
+  early->scale_submap(kRoot, 2.0);
   const CommitReport report = commit();
   const SE3 now = report.published->keyframe(report.keyframes.front()).T_rig_world;
   expect_near(now, SE3(T_rig_world.rotation(), 2.0 * T_rig_world.translation()));
@@ -509,7 +509,7 @@ TEST_F(RebaseTest, WhatIsAddedToAPartThatWasScaledKeepsItsPlaceInIt) {
 TEST_F(RebaseTest, PosesInAnOldUnitAreDropped) {
   const SE3 before = early->map().keyframe(kSecond).T_rig_world;
   late->set_poses({{{kSecond, random_pose(random, 0.5)}}, {}, false});
-  early->scale_part(kRoot, 2.0);
+  early->scale_submap(kRoot, 2.0);
   const CommitReport report = commit();
   EXPECT_EQ(report.dropped, 1u);
   EXPECT_EQ(report.published->keyframe(kSecond).T_rig_world.translation(), 2.0 * before.translation());
@@ -517,8 +517,8 @@ TEST_F(RebaseTest, PosesInAnOldUnitAreDropped) {
 
 TEST_F(RebaseTest, OneOfTwoScalingsAtATimeIsRefused) {
   const SE3 before = early->map().keyframe(kSecond).T_rig_world;
-  early->scale_part(kRoot, 2.0);
-  late->scale_part(kRoot, 3.0);
+  early->scale_submap(kRoot, 2.0);
+  late->scale_submap(kRoot, 3.0);
   const CommitReport report = commit();
   EXPECT_TRUE(report.refused);
   EXPECT_EQ(report.published->keyframe(kSecond).T_rig_world.translation(), 2.0 * before.translation());
@@ -532,10 +532,10 @@ TEST_F(RebaseTest, ScaleIsWhatTheLaterEditSays) {
   EXPECT_EQ(report.applied, 1u);
 }
 
-TEST_F(RebaseTest, MotionGrowsWithThePartAndIsDroppedWithItsKeyframe) {
+TEST_F(RebaseTest, MotionScalesWithTheSubmapAndIsDroppedWithItsKeyframe) {
   geometry::Vector6d twist;
   twist << 0.1, 0.2, 0.3, 1.0, 2.0, 3.0;
-  early->scale_part(kRoot, 2.0);
+  early->scale_submap(kRoot, 2.0);
   early->remove_keyframe(kThird);
   const KeyframeId newer = add_keyframe(*late, same_numbers(0, 5));
   late->set_twists({{kSecond, twist}, {kThird, twist}, {newer, twist}});

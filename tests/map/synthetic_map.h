@@ -149,12 +149,12 @@ class RandomEditor {
       case 14:
         return set_poses(draft);
       case 15:
-        draft.join_parts(keyframe(draft), keyframe(draft));
+        draft.merge_submaps(keyframe(draft), keyframe(draft));
         return;
       case 16:
-        return remove_part(draft);
+        return remove_submap(draft);
       default:
-        draft.add_sightings({{landmark(draft), 3, 2}, {landmark(draft), 1, 1}});
+        draft.add_visibility_counts({{landmark(draft), 3, 2}, {landmark(draft), 1, 1}});
         draft.refresh_landmarks({landmark(draft), landmark(draft)});
         draft.set_twists({{keyframe(draft), random_.normal() * geometry::Vector6d::Ones()}});
         return;
@@ -184,9 +184,9 @@ class RandomEditor {
     draft.add_keyframe(frames_[random_.below(8)], random_pose(random_, 1), std::move(matches), fallback);
   }
   void remove_keyframe(MapDraft& draft) { draft.remove_keyframe(keyframe(draft)); }
-  void remove_part(MapDraft& draft) {  // the newest one, if there are several
+  void remove_submap(MapDraft& draft) {  // the newest one, if there are several
     const std::vector<KeyframeId> roots = draft.map().roots();
-    if (roots.size() > 1) draft.remove_part(roots.back());
+    if (roots.size() > 1) draft.remove_submap(roots.back());
   }
   void add_landmark(MapDraft& draft) {
     std::vector<Observation> observations;

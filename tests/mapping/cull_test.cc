@@ -31,9 +31,9 @@ TEST_F(Cull, LandmarksThatTrackingDoesNotFindAgainGo) {
   const KeyframeId k = add_keyframe();
   const LandmarkId found = add_landmark({{k, FeatureId(0)}}), missed = add_landmark({{k, FeatureId(1)}}),
                    hardly_tried = add_landmark({{k, FeatureId(2)}});
-  map.add_sightings(found, 8, 2);
-  map.add_sightings(missed, 8, 1);
-  map.add_sightings(hardly_tried, 3, 0);
+  map.add_visibility_counts(found, 8, 2);
+  map.add_visibility_counts(missed, 8, 1);
+  map.add_visibility_counts(hardly_tried, 3, 0);
   map::MapDraft d = draft();
   EXPECT_EQ(cull_landmarks(k, options, d), 1);
   EXPECT_TRUE(d.map().alive(found) && d.map().alive(hardly_tried));
@@ -59,7 +59,7 @@ TEST_F(Cull, AfterItsProbationALandmarkNeedsThreeKeypoints) {
 TEST_F(Cull, OldLandmarksStay) {
   const KeyframeId k = add_keyframe();
   const LandmarkId old = add_landmark({{k, monocular(0)}});
-  map.add_sightings(old, 100, 0);
+  map.add_visibility_counts(old, 100, 0);
   for (int i = 0; i < 5; ++i) add_keyframe();
   map::MapDraft d = draft();
   EXPECT_EQ(cull_landmarks(map.newest_keyframe(), options, d), 0);

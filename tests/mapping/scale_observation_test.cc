@@ -35,7 +35,7 @@ SimulatedMap ride(const synthetic::Trajectory& trajectory, const camera::Rig& ri
   SimulatedMap world(synthetic::FeatureSimulator(rig, trajectory, room(seed)));
   for (int i = 0; i < keyframes; ++i) world.add_keyframe(FrameId(i), 0.25 * i);
   world.map.set_scale(map::Scale::kUnobservable);
-  world.map.scale_part(KeyframeId(0), factor);
+  world.map.scale_submap(KeyframeId(0), factor);
   return world;
 }
 
@@ -129,7 +129,7 @@ TEST(ObserveScale, IsSilentAboutOneCameraAndOneKeyframe) {
   EXPECT_FALSE(observe_scale(KeyframeId(0), {}, kFeatures, start).observed);
 }
 
-TEST(SelectPart, FreesAllButTheRootWhileTheScaleIsUnknown) {
+TEST(SelectSubmap, FreesAllButTheRootWhileTheScaleIsUnknown) {
   SimulatedMap world = ride(orbit(1), three_sides(), 5, 1.0, 1);
   EXPECT_TRUE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 5}));
   EXPECT_FALSE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 4}));

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "feature/binary_tests.h"
+#include "feature/brief_pattern.h"
 #include "feature/hamming.h"
 #include "place/content_hash.h"
 #include "place/random_descriptors.h"
@@ -129,9 +129,9 @@ TEST(Vocabulary, RefusesContentThatContradictsItself) {
 
 // The kind identifies the meaning of the descriptor bits. A change of the BRIEF pattern requires a new kDescriptorKind,
 // a newly trained vocabulary, and the new hash here; otherwise words with another meaning would be looked up.
-TEST(Vocabulary, KindStandsForTheBinaryTests) {
+TEST(Vocabulary, KindIdentifiesTheBriefPattern) {
   ContentHash hash;
-  for (const feature::BinaryTest& t : feature::make_binary_tests()) {
+  for (const feature::BinaryTest& t : feature::make_brief_pattern()) {
     for (const int v : {t.x1, t.y1, t.x2, t.y2}) hash.add(static_cast<std::uint64_t>(v + 128));
   }
   EXPECT_EQ(kDescriptorKind, "orb256-bslam");

@@ -102,7 +102,7 @@ TEST_F(Session, WritesAllItsFiles) {
   EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 6);  // and nothing half-written
 }
 
-TEST_F(Session, EveryPartOfTheMapHasFilesOfItsOwn) {
+TEST_F(Session, EverySubmapHasFilesOfItsOwn) {
   SessionOptions o = options();
   auto result = run_session(dataset(), o);
   ASSERT_TRUE(result.ok());
@@ -128,9 +128,9 @@ TEST_F(Session, GoesOnInAMapOfAnEarlierRun) {
   ASSERT_TRUE(first.ok());
   EXPECT_FALSE(first->record.map.loaded);
   EXPECT_TRUE(first->record.relocalisations.empty());
-  ASSERT_EQ(first->record.parts.size(), 1u);
-  EXPECT_EQ(first->record.parts.front().frames, 8);
-  EXPECT_EQ(first->record.parts.front().trajectory, "trajectory.tum");
+  ASSERT_EQ(first->record.submaps.size(), 1u);
+  EXPECT_EQ(first->record.submaps.front().frames, 8);
+  EXPECT_EQ(first->record.submaps.front().trajectory, "trajectory.tum");
   o.map = *first->map;
   o.config.localize_only = true;
   const auto second = run_session(dataset(), o);

@@ -57,12 +57,12 @@ TEST(Summary, HasTheKeysOfTheContractInTheirOrder) {
   EXPECT_TRUE(json["memory"]["peak_mb"].is_null());
 }
 
-TEST(Summary, TellsTheFramesTimesAndFileOfEveryPart) {
+TEST(Summary, ReportsFramesTimesAndFileOfEverySubmap) {
   RunRecord record;
   EXPECT_EQ(summary_json(record)["parts"], ordered_json::array());
   record.map.loaded = true;
   record.maps_started = 2;
-  record.parts = {{60, 0.05, 7.5, "trajectory.tum"}, {12, 4.0, 5.25, "trajectory_part2.tum"}};
+  record.submaps = {{60, 0.05, 7.5, "trajectory.tum"}, {12, 4.0, 5.25, "trajectory_part2.tum"}};
   const ordered_json json = summary_json(record);
   EXPECT_EQ(json["map"]["loaded"], true);
   EXPECT_EQ(json["maps_started"], 2);

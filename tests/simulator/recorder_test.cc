@@ -1,5 +1,4 @@
 #include "simulator/recorder.h"
-#include "simulator/tour.h"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "simulator/tour.h"
 #include "small_world.h"
 #include "synthetic/rigs.h"
 

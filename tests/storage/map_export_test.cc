@@ -11,26 +11,26 @@
 namespace bslam::storage {
 namespace {
 
-TEST(MapParts, AreTheTreesInOrderOfTime) {
+TEST(Submaps, AreTheTreesInOrderOfTime) {
   const map::BundledMap map = small_map(synthetic::default_rig());
-  const std::vector<MapPart> parts = map_parts(map);
-  ASSERT_EQ(parts.size(), 2u);
-  EXPECT_EQ(parts[0].keyframes.size() + parts[1].keyframes.size(), map.num_keyframes());
-  EXPECT_EQ(parts[0].landmarks + parts[1].landmarks, map.num_landmarks());
-  EXPECT_EQ(parts[1].keyframes.size(), 2u);
-  for (const MapPart& part : parts) {
-    const auto trajectory = keyframe_trajectory(map, part);
-    ASSERT_EQ(trajectory.size(), part.keyframes.size());
+  const std::vector<Submap> submaps = submaps_of(map);
+  ASSERT_EQ(submaps.size(), 2u);
+  EXPECT_EQ(submaps[0].keyframes.size() + submaps[1].keyframes.size(), map.num_keyframes());
+  EXPECT_EQ(submaps[0].landmarks + submaps[1].landmarks, map.num_landmarks());
+  EXPECT_EQ(submaps[1].keyframes.size(), 2u);
+  for (const Submap& submap : submaps) {
+    const auto trajectory = keyframe_trajectory(map, submap);
+    ASSERT_EQ(trajectory.size(), submap.keyframes.size());
     for (std::size_t i = 0; i < trajectory.size(); ++i) {
-      EXPECT_EQ(map.root_of(part.keyframes[i]), part.root);
+      EXPECT_EQ(map.root_of(submap.keyframes[i]), submap.root);
       if (i > 0) {
         EXPECT_LT(trajectory[i - 1].time_ns, trajectory[i].time_ns);
       }
-      const geometry::SE3 round = trajectory[i].T_world_frame * map.keyframe(part.keyframes[i]).T_rig_world;
+      const geometry::SE3 round = trajectory[i].T_world_frame * map.keyframe(submap.keyframes[i]).T_rig_world;
       EXPECT_LT(round.log().norm(), 1e-12);
       EXPECT_LE(
           (trajectory[i].T_world_frame.translation() - trajectory[0].T_world_frame.translation()).cwiseAbs().maxCoeff(),
-          part.extent.maxCoeff() + 1e-12);
+          submap.extent.maxCoeff() + 1e-12);
     }
   }
 }

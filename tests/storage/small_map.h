@@ -42,7 +42,7 @@ inline map::BundledMap small_map(camera::Rig rig, const SmallMapOptions& options
   const std::vector<LandmarkId> landmarks = map.landmark_ids();
   for (std::size_t i = 0; i + 1 < landmarks.size(); i += 9) map.merge_landmarks(landmarks[i], landmarks[i + 1]);
   for (std::size_t i = 4; i < landmarks.size(); i += 7) map.remove_landmark(landmarks[i]);
-  for (std::size_t i = 0; i < landmarks.size(); i += 3) map.add_sightings(landmarks[i], 7, 5);
+  for (std::size_t i = 0; i < landmarks.size(); i += 3) map.add_visibility_counts(landmarks[i], 7, 5);
   map.remove_keyframe(KeyframeId(2));
 
   const std::vector<int> missing = {1};

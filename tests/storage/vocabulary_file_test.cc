@@ -84,10 +84,9 @@ TEST_F(VocabularyFile, ReadsTheTextOfDbow2) {
 
 // DBoW2 numbers nodes as it makes them, which is not breadth-first: children of the second node may stand first.
 TEST_F(VocabularyFile, ReadsNodesInAnyOrderOfParentsBeforeChildren) {
-  const auto vocabulary =
-      read(std::string("2 2 0 0\n0 0 ") + bytes_text(0) + " 0\n0 0 " + bytes_text(255, 255) + " 0\n2 1 " +
-           bytes_text(254, 255) + " 7\n1 1 " + bytes_text(1) + " 5\n2 1 " + bytes_text(253, 255) + " 8\n1 1 " +
-           bytes_text(2) + " 6\n");
+  const auto vocabulary = read(std::string("2 2 0 0\n0 0 ") + bytes_text(0) + " 0\n0 0 " + bytes_text(255, 255) +
+                               " 0\n2 1 " + bytes_text(254, 255) + " 7\n1 1 " + bytes_text(1) + " 5\n2 1 " +
+                               bytes_text(253, 255) + " 8\n1 1 " + bytes_text(2) + " 6\n");
   ASSERT_TRUE(vocabulary.ok()) << vocabulary.error().message();
   EXPECT_EQ((*vocabulary)->content().weight, (std::vector<float>{5, 6, 7, 8}));
   EXPECT_EQ((*vocabulary)->content().descriptor[2][0], 1u);

@@ -69,7 +69,7 @@ TEST(FinalPoses, MotionGoesThroughTheFramesBeforeAndAfter) {
 
 TEST(FinalPoses, MotionIsInTheUnitOfTheMap) {
   Scene scene(0.0);
-  ASSERT_TRUE(scene.map.scale_part(KeyframeId(0), 3.0));
+  ASSERT_TRUE(scene.map.scale_submap(KeyframeId(0), 3.0));
   const auto before = twists_from_neighbours(Scene(0.0).map, KeyframeId(0), scene.frames);
   const auto found = twists_from_neighbours(scene.map, KeyframeId(0), scene.frames);
   ASSERT_EQ(found.size(), 1u);
@@ -98,7 +98,7 @@ TEST(FinalPoses, ARigFoundElsewhereHasNotMovedThere) {
   EXPECT_EQ(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).size(), 1u);
 }
 
-TEST(FinalPoses, PartsOfTheMapHaveNoMotionBetweenThem) {
+TEST(FinalPoses, NoMotionBetweenSubmaps) {
   Scene scene(0.3);
   const KeyframeId other =
       scene.map.add_keyframe(map::synthetic_frame(scene.random, 2, 30, 10), SE3(), {}, KeyframeId());

@@ -15,7 +15,7 @@ void expect_loop(const System& system) {
   const LoopRecord loop = system.loops().front();
   EXPECT_GE(loop.time_ns, frames[kRound - 12].time_ns);
   EXPECT_LE(loop.with_time_ns, frames[12].time_ns);
-  EXPECT_FALSE(loop.closure.joined);
+  EXPECT_FALSE(loop.closure.merged);
   EXPECT_GE(loop.closure.inliers, 50);
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 }
@@ -45,7 +45,7 @@ TEST(SystemLoopSequential, WhereTheWalkIsBackTheMapIsClosedAndTheErrorGone) {
 }
 
 // Carried away with its eyes shut the rig begins anew, comes back to where it began first, and has one map then.
-class SystemLoopParts : public ::testing::Test {
+class SystemLoopSubmaps : public ::testing::Test {
  protected:
   static constexpr std::size_t kFirst = 16, kAfter = 3;  // frames of the first part; frames lost before the second
   static Playback carried() { return play(closed_walk(), {{0, kFirst}, {36, kWalk}}); }
@@ -56,7 +56,7 @@ class SystemLoopParts : public ::testing::Test {
   }
 };
 
-TEST_F(SystemLoopParts, APartBeganInANewPlaceIsJoinedWhereItComesToAnOldOne) {
+TEST_F(SystemLoopSubmaps, ASubmapBegunElsewhereIsMergedAtAKnownPlace) {
   const Playback walk = carried();
   System system(closed_walk().rig(), config(), with_vocabulary());
   std::size_t two = 0;
@@ -64,23 +64,23 @@ TEST_F(SystemLoopParts, APartBeganInANewPlaceIsJoinedWhereItComesToAnOldOne) {
     const FrameRecord record = must_process(system, walk.frames[k]);
     const bool lost = k >= kFirst && k < kFirst + kAfter - 1;
     EXPECT_EQ(is_tracked(record), !lost) << "frame " << k;
-    const std::vector<PartTrajectory> parts = system.trajectories();
-    two += parts.size() == 2;
-    EXPECT_EQ(parts.size(), system.loops().empty() && k >= kFirst + kAfter - 1 ? 2u : 1u) << "frame " << k;
+    const std::vector<SubmapTrajectory> submaps = system.trajectories();
+    two += submaps.size() == 2;
+    EXPECT_EQ(submaps.size(), system.loops().empty() && k >= kFirst + kAfter - 1 ? 2u : 1u) << "frame " << k;
     EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt) << "frame " << k;
   }
   EXPECT_GT(two, 10u);
   system.finish();
   EXPECT_EQ(system.maps_started(), 2);
   ASSERT_EQ(system.loops().size(), 1u);
-  EXPECT_TRUE(system.loops().front().closure.joined);
+  EXPECT_TRUE(system.loops().front().closure.merged);
   ASSERT_EQ(system.trajectories().size(), 1u);
   EXPECT_EQ(final_poses(system).size(), walk.frames.size() - (kAfter - 1));
   EXPECT_LT(ate_m(final_poses(system), walk.truth), 0.01);
   EXPECT_EQ(system.live_trajectories().size(), 2u);  // as it was told then
 }
 
-TEST_F(SystemLoopParts, TheLivePoseNeverJumpsWhereTheMapDoes) {
+TEST_F(SystemLoopSubmaps, TheLivePoseNeverJumpsWhereTheMapDoes) {
   const Playback walk = carried();
   System system(closed_walk().rig(), config(), with_vocabulary());
   process_all(system, walk.frames);
@@ -109,7 +109,7 @@ TEST(SystemLoopParallel, ClosesTheLoopWithinTheRun) {
 }
 
 TEST(SystemLoopLagged, GivesTheSameMapWithAnyNumberOfThreads) {
-  std::vector<PartTrajectory> final, live;
+  std::vector<SubmapTrajectory> final, live;
   map::MapSnapshot map;
   for (const int threads : {1, 2, 4}) {
     System system(closed_walk().rig(), small_config(execution::Mode::kLagged, threads), with_vocabulary());

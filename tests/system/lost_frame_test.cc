@@ -1,7 +1,7 @@
 // A frame that could not be tracked is looked for all over the map: what tracking tried with it must not matter then.
 #include <gtest/gtest.h>
 
-#include "looping/locate.h"
+#include "looping/verify_place.h"
 #include "tracking/simulated_tracker.h"
 
 namespace bslam::system {
@@ -41,9 +41,9 @@ class LostFrame : public ::testing::Test {
     ThreadPool pool(2);
     return tracking::track(input, frame, options, pool);
   }
-  std::optional<looping::Location> locate(const frame::BundledFrame& frame) const {
-    return looping::locate(world.map, world.map.rig(), frame, KeyframeId(0), {},
-                           {.sigma_px = world.sim.options().sigma_px}, Random(1, "locate"));
+  std::optional<looping::PlaceMatch> verify_place(const frame::BundledFrame& frame) const {
+    return looping::verify_place(world.map, world.map.rig(), frame, KeyframeId(0), {},
+                                 {.sigma_px = world.sim.options().sigma_px}, Random(1, "locate"));
   }
 
   const map::SimulatedMap world = tracking::true_map(tracking::simulator(synthetic::ring_rig(2)), 1.0, 0.25);
@@ -64,7 +64,7 @@ TEST_F(LostFrame, IsFoundLikeOneThatWasNeverTracked) {
     const feature::Keypoints &a = tried.cameras[c].keypoints, &b = fresh.cameras[c].keypoints;
     EXPECT_TRUE(a.pixel == b.pixel && a.bearing == b.bearing && a.sigma == b.sigma && a.patch == b.patch);
   }
-  const auto found = locate(tried), expected = locate(fresh);
+  const auto found = verify_place(tried), expected = verify_place(fresh);
   ASSERT_TRUE(found && expected);
   EXPECT_EQ(found->matches, expected->matches);
   EXPECT_EQ(found->inliers, expected->inliers);

@@ -23,7 +23,7 @@ TEST(SystemRelocalisation, CarriedInTheDarkTheRigIsFoundWhereItHasBeen) {
     EXPECT_EQ(is_tracked(blind.frames()[k]), k < kDark) << "frame " << k;  // nothing but the vocabulary finds it
   }
   ASSERT_TRUE(system.frames()[kLight].relocalisation);
-  EXPECT_LE(system.keyframe_time(system.frames()[kLight].relocalisation->with), walk.frames[24].time_ns);
+  EXPECT_LE(system.keyframe_time(system.frames()[kLight].relocalisation->matched_keyframe), walk.frames[24].time_ns);
   EXPECT_GE(system.frames()[kLight].relocalisation->inliers, 50);
   expect_told_where_it_is(system, walk.truth, walk.truth.front().T_world_frame);
   expect_smooth(system, walk.truth);

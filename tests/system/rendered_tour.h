@@ -158,12 +158,12 @@ inline double ate_m(const evaluation::Trajectory& estimate, const evaluation::Tr
 
 // Poses of the longest part of the map, final and as told at the time.
 inline evaluation::Trajectory final_poses(const System& system) {
-  const std::vector<PartTrajectory> parts = system.trajectories();
-  return parts.empty() ? evaluation::Trajectory() : parts.front().poses;
+  const std::vector<SubmapTrajectory> submaps = system.trajectories();
+  return submaps.empty() ? evaluation::Trajectory() : submaps.front().poses;
 }
 inline evaluation::Trajectory live_poses(const System& system) {
-  const std::vector<PartTrajectory> parts = system.live_trajectories();
-  return parts.empty() ? evaluation::Trajectory() : parts.front().poses;
+  const std::vector<SubmapTrajectory> submaps = system.live_trajectories();
+  return submaps.empty() ? evaluation::Trajectory() : submaps.front().poses;
 }
 
 inline bool identical(const evaluation::Trajectory& a, const evaluation::Trajectory& b) {
@@ -177,8 +177,8 @@ inline bool identical(const evaluation::Trajectory& a, const evaluation::Traject
   return true;
 }
 
-inline bool identical(const std::vector<PartTrajectory>& a, const std::vector<PartTrajectory>& b) {
-  return std::ranges::equal(a, b, [](const PartTrajectory& x, const PartTrajectory& y) {
+inline bool identical(const std::vector<SubmapTrajectory>& a, const std::vector<SubmapTrajectory>& b) {
+  return std::ranges::equal(a, b, [](const SubmapTrajectory& x, const SubmapTrajectory& y) {
     return x.root == y.root && identical(x.poses, y.poses);
   });
 }

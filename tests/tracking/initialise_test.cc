@@ -19,7 +19,7 @@ TEST(StartMetric, MakesLandmarksAtTheirTruePlaces) {
   const auto sim = simulator(synthetic::ring_rig(2));
   const auto seen = sim.frame(FrameId(0), 0.0);
   map::MapDraft draft = empty_draft(sim);
-  const auto started = start_metric(seen.frame, map::flat_pyramids(2), {}, draft);
+  const auto started = initialise_metric(seen.frame, map::flat_pyramids(2), {}, draft);
   ASSERT_TRUE(started.has_value());
   ASSERT_EQ(started->keyframes.size(), 1u);
   EXPECT_EQ(started->scale, map::Scale::kMetric);
@@ -42,7 +42,8 @@ TEST(StartMetric, WaitsForEnoughMatchedFeatures) {
   const auto sim = simulator(synthetic::ring_rig(2));
   const std::vector<int> missing = {1};
   map::MapDraft draft = empty_draft(sim);
-  EXPECT_FALSE(start_metric(sim.frame(FrameId(0), 0.0, missing).frame, map::flat_pyramids(2), {}, draft).has_value());
+  EXPECT_FALSE(
+      initialise_metric(sim.frame(FrameId(0), 0.0, missing).frame, map::flat_pyramids(2), {}, draft).has_value());
   EXPECT_EQ(draft.map().num_keyframes(), 0u);
 }
 
@@ -54,7 +55,7 @@ TEST(StartMetric, WaitsWhereNothingIsNearEnoughForDepth) {
   options.farthest_base = 160;
   const auto sim = simulator(synthetic::ring_rig(2), options);
   map::MapDraft draft = empty_draft(sim);
-  const auto started = start_metric(sim.frame(FrameId(0), 0.0).frame, map::flat_pyramids(2), {}, draft);
+  const auto started = initialise_metric(sim.frame(FrameId(0), 0.0).frame, map::flat_pyramids(2), {}, draft);
   EXPECT_TRUE(!started || draft.map().num_landmarks() >= 60u) << draft.map().num_landmarks() << " landmarks";
 }
 
@@ -64,8 +65,8 @@ class StartUpToScale : public ::testing::Test {
                                   map::MapDraft& draft, const InitialisationOptions& options = {}) {
     const StartCandidate candidate{std::make_shared<const frame::BundledFrame>(first.frame),
                                    map::flat_pyramids(first.frame.cameras.size())};
-    return start_up_to_scale(candidate, second.frame, map::flat_pyramids(first.frame.cameras.size()), options,
-                             Random(1), draft);
+    return initialise_monocular(candidate, second.frame, map::flat_pyramids(first.frame.cameras.size()), options,
+                                Random(1), draft);
   }
   // Ahead and 120 degrees to either side.
   static camera::Rig three_sides() {

@@ -11,7 +11,7 @@ class PoseBetween : public ::testing::Test {
  protected:
   PoseBetween() : world_(true_map(simulator(synthetic::ring_rig(1)), 1.2, 0.6)), pool_(1) {}
 
-  std::optional<TrackResult> locate(frame::BundledFrame frame) {
+  std::optional<TrackResult> verify_place(frame::BundledFrame frame) {
     const BetweenKeyframes early{std::make_shared<const frame::BundledFrame>(std::move(frame)), KeyframeId(0),
                                  KeyframeId(1), world_.frames[0].frame.time_ns, world_.frames[1].frame.time_ns};
     return pose_between(world_.map, early, {0.7}, {}, pool_);
@@ -24,7 +24,7 @@ class PoseBetween : public ::testing::Test {
 TEST_F(PoseBetween, IsThatOfTheFrame) {
   for (const double time_s : {0.1, 0.3, 0.5}) {
     const auto seen = world_.sim.frame(FrameId(7), time_s);
-    const auto result = locate(seen.frame);
+    const auto result = verify_place(seen.frame);
     ASSERT_TRUE(result) << time_s;
     EXPECT_EQ(result->status, TrackStatus::kTracking);
     EXPECT_EQ(result->frame, FrameId(7));
@@ -36,7 +36,7 @@ TEST_F(PoseBetween, IsThatOfTheFrame) {
 }
 
 TEST_F(PoseBetween, OfTheFirstKeyframeIsItsOwn) {
-  const auto result = locate(world_.frames[0].frame);
+  const auto result = verify_place(world_.frames[0].frame);
   ASSERT_TRUE(result);
   EXPECT_EQ(result->T_rig_world.matrix(), world_.map.keyframe(KeyframeId(0)).T_rig_world.matrix());
 }
@@ -44,14 +44,14 @@ TEST_F(PoseBetween, OfTheFirstKeyframeIsItsOwn) {
 TEST_F(PoseBetween, AlsoWhereTheSecondKeyframeWasCulled) {
   ASSERT_TRUE(world_.map.remove_keyframe(KeyframeId(1)));
   const auto seen = world_.sim.frame(FrameId(7), 0.3);
-  const auto result = locate(seen.frame);
+  const auto result = verify_place(seen.frame);
   ASSERT_TRUE(result);
   EXPECT_EQ(result->anchored.reference, KeyframeId(0));
   EXPECT_LT(map::distance_m(result->T_rig_world, seen.T_world_rig.inverse()), 0.02);
 }
 
 TEST_F(PoseBetween, IsNoneForAFrameOfAnotherPlace) {
-  EXPECT_FALSE(locate(simulator(synthetic::ring_rig(1), room(99)).frame(FrameId(7), 0.3).frame));
+  EXPECT_FALSE(verify_place(simulator(synthetic::ring_rig(1), room(99)).frame(FrameId(7), 0.3).frame));
 }
 
 }  // namespace

@@ -170,7 +170,7 @@ TEST_F(Track, NotesWhichLandmarksItShouldHaveSeenAndWhichItSaw) {
   const TrackOutput out = tracker.track(seen(1).frame);
   std::size_t found = 0, expected = 0;
   std::vector<LandmarkId> ids;
-  for (const map::Sighting& s : out.state.sightings) {
+  for (const map::VisibilityCount& s : out.state.visibility_counts) {
     found += s.found;
     expected += s.expected;
     ids.push_back(s.landmark);
@@ -319,13 +319,13 @@ TEST(TrackerState, StartsAfreshAtAKeyframe) {
   before.twist = geometry::Vector6d::Ones().eval();
   before.frames_since_keyframe = 7;
   before.best_overlap = 300;
-  before.sightings = {{LandmarkId(1), 1, 1}};
+  before.visibility_counts = {{LandmarkId(1), 1, 1}};
   const TrackerState state = state_at_keyframe(before, 50, KeyframeId(4), {LandmarkId(2), LandmarkId(3)});
   EXPECT_EQ(state.anchored.reference, KeyframeId(4));
   EXPECT_EQ(state.time_ns, 50);
   EXPECT_EQ(state.frames_since_keyframe, 0);
   EXPECT_EQ(state.best_overlap, 0);
-  EXPECT_TRUE(state.sightings.empty());
+  EXPECT_TRUE(state.visibility_counts.empty());
   EXPECT_EQ(state.anchored.T_rig_reference.translation().norm(), 0.0);
   EXPECT_TRUE(state.twist.has_value());
   EXPECT_EQ(state.landmarks.size(), 2u);

@@ -14,7 +14,7 @@ class ToldPlace : public Relocaliser {
  public:
   explicit ToldPlace(const std::optional<FoundPlace>& place) : place_(place) {}
   void describe(frame::BundledFrame&) const override {}
-  std::optional<FoundPlace> locate(const map::BundledMap&, const frame::BundledFrame&) override { return place_; }
+  std::optional<FoundPlace> verify_place(const map::BundledMap&, const frame::BundledFrame&) override { return place_; }
 
  private:
   const std::optional<FoundPlace>& place_;
@@ -205,14 +205,14 @@ TEST(Tracker, LocalisingProposesNothing) {
     EXPECT_EQ(outcome.record.result.status, i < 12 ? TrackStatus::kTracking : TrackStatus::kLost) << "frame " << i;
     run.state = outcome.next;
   }
-  EXPECT_TRUE(run.state.track.sightings.empty());
+  EXPECT_TRUE(run.state.track.visibility_counts.empty());
 }
 
 TEST(Tracker, FollowsTheScaleOfItsSubmap) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 5; ++i) run.process(run.frame(i));
   map::MapDraft draft("test", run.store.snapshot());
-  ASSERT_TRUE(draft.scale_part(KeyframeId(0), 2.0));
+  ASSERT_TRUE(draft.scale_submap(KeyframeId(0), 2.0));
   run.store.commit(std::move(draft));
   const geometry::Vector6d before = *run.state.track.twist;
   const FrameRecord record = run.process(run.frame(5));

@@ -1,4 +1,4 @@
-#include "adjustment/flat_problem.h"
+#include "adjustment/bundle_problem.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ std::vector<int> pose_positions(const map::BundledMap& map, const std::vector<Ke
 // Adds the observations of one landmark. Returns false if fewer than two keyframes of the problem observe it, since
 // such a landmark does not constrain the poses.
 bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& position,
-                  const feature::FeatureModel& features, FlatProblem& flat) {
+                  const feature::FeatureModel& features, BundleProblem& flat) {
   const auto observations = map.observations(id);
   const auto seen = std::count_if(observations.begin(), observations.end(),
                                   [&](const map::Observation& o) { return position[o.keyframe.index()] != kAbsent; });
@@ -71,8 +71,9 @@ std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector
 
 }  // namespace
 
-FlatProblem flatten(const map::BundledMap& map, const Selection& selection, const feature::FeatureModel& features) {
-  FlatProblem flat;
+BundleProblem build_problem(const map::BundledMap& map, const Selection& selection,
+                            const feature::FeatureModel& features) {
+  BundleProblem flat;
   flat.problem.rig = &map.rig();
   flat.keyframes = selection.free_keyframes;
   flat.keyframes.insert(flat.keyframes.end(), selection.fixed_keyframes.begin(), selection.fixed_keyframes.end());

@@ -22,7 +22,7 @@ struct BinaryTest {
 // natural images are correlated by distance alone, about exp(-distance / kCorrelationLength); so a pair is kept if its
 // correlation with all kept before stays below a bound, which rises slowly until there are 256. Integers only decide,
 // so that every machine makes the same tests.
-std::array<BinaryTest, kTestCount> make_binary_tests();
+std::array<BinaryTest, kTestCount> make_brief_pattern();
 
 // Correlation of two tests under that model, in [-1, 1].
 double test_correlation(const BinaryTest& a, const BinaryTest& b);

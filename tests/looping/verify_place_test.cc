@@ -1,5 +1,5 @@
 // Geometric verification: the right place gives the pose, any other a reason.
-#include "looping/locate.h"
+#include "looping/verify_place.h"
 
 #include <gtest/gtest.h>
 
@@ -14,51 +14,52 @@ namespace {
 constexpr double kFar = 0.006,
                  kTurned = 0.1 * kDegree;  // metres, radians: what noise of 0.7 px on 100 keypoints allows
 
-void expect_true_pose(const Location& location, const SE3& T_rig_world, double metres = kFar) {
-  EXPECT_LT(distance_m(location.T_rig_world, T_rig_world), metres);
-  EXPECT_LT(angle_rad(location.T_rig_world, T_rig_world), kTurned);
+void expect_true_pose(const PlaceMatch& place_match, const SE3& T_rig_world, double metres = kFar) {
+  EXPECT_LT(distance_m(place_match.T_rig_world, T_rig_world), metres);
+  EXPECT_LT(angle_rad(place_match.T_rig_world, T_rig_world), kTurned);
 }
 
-class LocateRig : public ::testing::TestWithParam<int> {};
+class VerifyPlaceRig : public ::testing::TestWithParam<int> {};
 
-TEST_P(LocateRig, FindsThePoseOfAFrameTakenWhereTheCandidateWas) {
+TEST_P(VerifyPlaceRig, FindsThePoseOfAFrameTakenWhereTheCandidateWas) {
   const HallMap& world = exact_walk(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (const int at : {3, 11, 25}) {
     const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at + 0.4);
-    LocateReport report;
-    const auto location =
-        locate(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
-    ASSERT_TRUE(location) << "rejected for " << static_cast<int>(report.rejection);
+    VerificationReport report;
+    const auto place_match =
+        verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
+    ASSERT_TRUE(place_match) << "rejected for " << static_cast<int>(report.rejection);
     EXPECT_EQ(report.rejection, Rejection::kNone);
-    EXPECT_EQ(location->with, KeyframeId(at));
-    EXPECT_EQ(location->inliers, report.inliers);
-    EXPECT_GT(location->inliers, 100);
-    expect_true_pose(*location, seen.T_world_rig.inverse());
+    EXPECT_EQ(place_match->matched_keyframe, KeyframeId(at));
+    EXPECT_EQ(place_match->inliers, report.inliers);
+    EXPECT_GT(place_match->inliers, 100);
+    expect_true_pose(*place_match, seen.T_world_rig.inverse());
   }
 }
 
-TEST_P(LocateRig, ItsMatchesAreDistinctAndTrue) {
+TEST_P(VerifyPlaceRig, ItsMatchesAreDistinctAndTrue) {
   const HallMap& world = exact_walk(GetParam());
   const SimulatedFrame seen = hall(rig_of(GetParam())).frame(FrameId(1000), kStepS * 8 + 0.5);
-  const auto location = locate(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(1));
-  ASSERT_TRUE(location);
+  const auto place_match =
+      verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(1));
+  ASSERT_TRUE(place_match);
   std::set<FeatureId> features;
   std::set<LandmarkId> landmarks;
   int wrong = 0;
-  for (const auto& [feature, l] : location->matches) {
+  for (const auto& [feature, l] : place_match->matches) {
     EXPECT_TRUE(features.insert(feature).second && landmarks.insert(l).second);
     wrong += map::shown_by(seen, feature) != world.shown_by_landmark[l.index()].second;
   }
-  EXPECT_TRUE(std::is_sorted(location->matches.begin(), location->matches.end()));
-  EXPECT_LE(wrong, static_cast<int>(location->matches.size() / 100));
+  EXPECT_TRUE(std::is_sorted(place_match->matches.begin(), place_match->matches.end()));
+  EXPECT_LE(wrong, static_cast<int>(place_match->matches.size() / 100));
 }
 
-TEST_P(LocateRig, SaysTheSameForTheSameSeed) {
+TEST_P(VerifyPlaceRig, SaysTheSameForTheSameSeed) {
   const HallMap& world = exact_walk(GetParam());
   const SimulatedFrame seen = hall(rig_of(GetParam())).frame(FrameId(1000), kStepS * 8 + 0.5);
-  const auto a = locate(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
-  const auto b = locate(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
+  const auto a = verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
+  const auto b = verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
   ASSERT_TRUE(a && b);
   EXPECT_EQ(a->T_rig_world.translation(), b->T_rig_world.translation());
   EXPECT_EQ(a->T_rig_world.rotation().coeffs(), b->T_rig_world.rotation().coeffs());
@@ -66,57 +67,58 @@ TEST_P(LocateRig, SaysTheSameForTheSameSeed) {
 }
 
 // The same geometry with other descriptors.
-TEST_P(LocateRig, AHallThatLooksDifferentIsNeverAccepted) {
+TEST_P(VerifyPlaceRig, AHallThatLooksDifferentIsNeverAccepted) {
   const HallMap& world = exact_walk(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (int at = 0; at < 30; ++at) {
     const SimulatedFrame other =
         redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 1.0, static_cast<std::uint64_t>(at));
-    LocateReport report;
-    EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures,
-                        seeded(static_cast<std::uint64_t>(at)), &report));
+    VerificationReport report;
+    EXPECT_FALSE(verify_place(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures,
+                              seeded(static_cast<std::uint64_t>(at)), &report));
     EXPECT_TRUE(report.rejection == Rejection::kFewMatches || report.rejection == Rejection::kNoConsensus);
   }
 }
 
 // One landmark in eight is of the kind that stands in every room: the geometry agrees, but too little of what should be
 // there is.
-TEST_P(LocateRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
+TEST_P(VerifyPlaceRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
   const HallMap& world = exact_walk(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   std::set<Rejection> reasons;
   for (int at = 0; at < 30; ++at) {
     const SimulatedFrame other =
         redecorated(simulator.frame(FrameId(1000 + at), kStepS * at), 0.875, static_cast<std::uint64_t>(at));
-    LocateReport report;
-    EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures,
-                        seeded(static_cast<std::uint64_t>(at)), &report));
+    VerificationReport report;
+    EXPECT_FALSE(verify_place(world.map, world.map.rig(), other.frame, KeyframeId(at), {}, kFeatures,
+                              seeded(static_cast<std::uint64_t>(at)), &report));
     reasons.insert(report.rejection);
   }
   // With fewer inliers asked for, it is the share that decides.
   VerificationOptions options;
   options.min_inliers = 15;
   const SimulatedFrame other = redecorated(simulator.frame(FrameId(2000), kStepS * 8), 0.875, 1);
-  LocateReport report;
-  EXPECT_FALSE(locate(world.map, world.map.rig(), other.frame, KeyframeId(8), options, kFeatures, seeded(1), &report));
+  VerificationReport report;
+  EXPECT_FALSE(
+      verify_place(world.map, world.map.rig(), other.frame, KeyframeId(8), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
   EXPECT_LT(report.found, report.sought / 4);
   EXPECT_FALSE(reasons.contains(Rejection::kNone));
 }
 
-TEST_P(LocateRig, AnotherPlaceOfTheHallIsNeverAccepted) {
+TEST_P(VerifyPlaceRig, AnotherPlaceOfTheHallIsNeverAccepted) {
   const HallMap& world = exact_walk(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (int at = 0; at < 12; ++at) {
     const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at);
-    LocateReport report;
-    EXPECT_FALSE(locate(world.map, world.map.rig(), seen.frame, KeyframeId(at + 20), {}, kFeatures,
-                        seeded(static_cast<std::uint64_t>(at)), &report));
+    VerificationReport report;
+    EXPECT_FALSE(verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(at + 20), {}, kFeatures,
+                              seeded(static_cast<std::uint64_t>(at)), &report));
     EXPECT_EQ(report.rejection, Rejection::kFewMatches);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Cameras, LocateRig, ::testing::Values(1, 2, 4));
+INSTANTIATE_TEST_SUITE_P(Cameras, VerifyPlaceRig, ::testing::Values(1, 2, 4));
 
 // Everything that is seen from more than `turn` aside of where the map knows it from looks different from there.
 SimulatedFrame changed_aside(SimulatedFrame seen, const HallMap& world, double turn) {
@@ -140,47 +142,48 @@ SimulatedFrame changed_aside(SimulatedFrame seen, const HallMap& world, double t
   return seen;
 }
 
-TEST(Locate, WhatLooksDifferentFromAsideIsNotMissed) {
+TEST(VerifyPlace, WhatLooksDifferentFromAsideIsNotMissed) {
   const HallMap& world = exact_walk(4);
   const SimulatedFrame seen = hall(rig_of(4)).frame(FrameId(1000), kStepS * 11 + 0.5);
   VerificationOptions options;
   const SimulatedFrame changed = redecorated(changed_aside(seen, world, options.max_viewing_angle), 0.66, 1);
-  LocateReport report;
-  const auto location =
-      locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report);
-  ASSERT_TRUE(location) << report.found << " of " << report.sought;
-  expect_true_pose(*location, seen.T_world_rig.inverse());
+  VerificationReport report;
+  const auto place_match =
+      verify_place(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report);
+  ASSERT_TRUE(place_match) << report.found << " of " << report.sought;
+  expect_true_pose(*place_match, seen.T_world_rig.inverse());
   options.max_viewing_angle = 1.05;
   EXPECT_FALSE(
-      locate(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
+      verify_place(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
 }
 
 // Where hardly anything can be compared from about the same direction, all that is in view counts.
-TEST(Locate, AViewFromFarAsideIsHeldAgainstAllThatIsInView) {
+TEST(VerifyPlace, AViewFromFarAsideIsHeldAgainstAllThatIsInView) {
   const HallMap& world = exact_walk(4);
   const SimulatedFrame seen = redecorated(hall(rig_of(4)).frame(FrameId(1000), kStepS * 11 + 0.5), 0.85, 1);
   VerificationOptions options;
   options.max_viewing_angle = 1e-4;
-  LocateReport report;
-  EXPECT_FALSE(locate(world.map, world.map.rig(), seen.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
+  VerificationReport report;
+  EXPECT_FALSE(
+      verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
   EXPECT_GT(report.sought, 100);
 }
 
 // The rig comes the other way: what the left camera saw is before the right one now.
-TEST(Locate, AnotherCameraThanThenFindsThePlace) {
+TEST(VerifyPlace, AnotherCameraThanThenFindsThePlace) {
   const HallMap& world = exact_walk(4);
   const FeatureSimulator back = hall(rig_of(4), std::numbers::pi);
   for (const int at : {5, 14, 22}) {
     const SimulatedFrame seen = back.frame(FrameId(1000 + at), kStepS * at + 0.3);
-    LocateReport report;
-    const auto location =
-        locate(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
-    ASSERT_TRUE(location) << "rejected for " << static_cast<int>(report.rejection);
-    expect_true_pose(*location, seen.T_world_rig.inverse());
+    VerificationReport report;
+    const auto place_match =
+        verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
+    ASSERT_TRUE(place_match) << "rejected for " << static_cast<int>(report.rejection);
+    expect_true_pose(*place_match, seen.T_world_rig.inverse());
     int by_another = 0;  // matches with landmarks that this camera has never seen
-    for (const auto& [feature, l] : location->matches) {
+    for (const auto& [feature, l] : place_match->matches) {
       std::set<CameraIndex> then;
       for (const map::Observation& o : world.map.observations(l)) {
         for (const frame::KeypointRef r : world.map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature))
@@ -192,21 +195,22 @@ TEST(Locate, AnotherCameraThanThenFindsThePlace) {
   }
 }
 
-TEST(Locate, FisheyesFindThePlaceTurnedRound) {
+TEST(VerifyPlace, FisheyesFindThePlaceTurnedRound) {
   const camera::Rig rig = synthetic::fisheye_rig(2);
   HallMap world(rig);
   const FeatureSimulator simulator = hall(rig), back = hall(rig, std::numbers::pi);
   for (int i = 0; i < 6; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
   const SimulatedFrame seen = back.frame(FrameId(1000), kStepS * 2 + 0.5);
-  const auto location = locate(world.map, world.map.rig(), seen.frame, KeyframeId(2), {}, kFeatures, seeded(1));
-  ASSERT_TRUE(location);
-  expect_true_pose(*location, seen.T_world_rig.inverse(), 0.015);  // 3 times fewer pixels a radian
+  const auto place_match =
+      verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(2), {}, kFeatures, seeded(1));
+  ASSERT_TRUE(place_match);
+  expect_true_pose(*place_match, seen.T_world_rig.inverse(), 0.015);  // 3 times fewer pixels a radian
 }
 
-TEST(Locate, LandmarksAboutAKeyframeAreThoseSeenMostOften) {
+TEST(VerifyPlace, LandmarksAboutAKeyframeAreThoseSeenMostOften) {
   const HallMap& world = exact_walk(1);
-  const std::vector<LandmarkId> all = landmarks_about(world.map, KeyframeId(9), 4, 100000),
-                                few = landmarks_about(world.map, KeyframeId(9), 4, 50);
+  const std::vector<LandmarkId> all = landmarks_around(world.map, KeyframeId(9), 4, 100000),
+                                few = landmarks_around(world.map, KeyframeId(9), 4, 50);
   const std::set<LandmarkId> distinct(all.begin(), all.end());
   EXPECT_EQ(distinct.size(), all.size());
   for (const LandmarkId l : world.map.keyframe(KeyframeId(9)).landmarks)

@@ -24,7 +24,7 @@ struct ObservationSource {
   KeyframeId keyframe;
 };
 
-struct FlatProblem {
+struct BundleProblem {
   solver::ReprojectionProblem problem;     // uses the map's rig
   std::vector<KeyframeId> keyframes;       // per pose
   std::vector<LandmarkId> landmarks;       // per point
@@ -33,6 +33,7 @@ struct FlatProblem {
 
 // Builds the problem. Landmarks observed by fewer than two of the keyframes are left out. `features` gives the
 // standard deviation of a keypoint that is not aligned to its landmark's patch. The map must outlive the problem.
-FlatProblem flatten(const map::BundledMap& map, const Selection& selection, const feature::FeatureModel& features);
+BundleProblem build_problem(const map::BundledMap& map, const Selection& selection,
+                            const feature::FeatureModel& features);
 
 }  // namespace bslam::adjustment

@@ -1,4 +1,4 @@
-#include "adjustment/flat_problem.h"
+#include "adjustment/bundle_problem.h"
 
 #include <gtest/gtest.h>
 
@@ -28,27 +28,27 @@ std::vector<float> sigmas_of_one_landmark(map::BundledMap& map, const std::vecto
   const map::Observation& r = observations[reference];
   const frame::KeypointRef keypoint = map.keyframe(r.keyframe).frame->bundled.keypoints(r.feature).front();
   const LandmarkId l = map.add_landmark({0, 0, 5}, observations, {r.keyframe, keypoint});
-  const FlatProblem flat =
-      flatten(map, {.free_keyframes = map.keyframe_ids(), .fixed_keyframes = {}, .landmarks = {l}}, {kDetected, {}});
+  const BundleProblem flat = build_problem(
+      map, {.free_keyframes = map.keyframe_ids(), .fixed_keyframes = {}, .landmarks = {l}}, {kDetected, {}});
   std::vector<float> out;
   for (const auto& o : flat.problem.observations) out.push_back(o.sigma);
   return out;
 }
 
-TEST(Flatten, TakesTheReferenceForAsGoodAsWhatIsAlignedToIt) {
+TEST(BuildProblem, TakesTheReferenceForAsGoodAsWhatIsAlignedToIt) {
   map::BundledMap map = keyframes_with({0.5f, 0.15f, 0.2f});
   const std::vector<map::Observation> seen = {
       {KeyframeId(0), FeatureId(2)}, {KeyframeId(1), FeatureId(2)}, {KeyframeId(2), FeatureId(2)}};
   EXPECT_EQ(sigmas_of_one_landmark(map, seen, 0), (std::vector<float>{0.15f, 0.15f, 0.2f}));
 }
 
-TEST(Flatten, LeavesTheReferenceWhereNothingIsAlignedToIt) {
+TEST(BuildProblem, LeavesTheReferenceWhereNothingIsAlignedToIt) {
   map::BundledMap map = keyframes_with({0.35f, 0.15f});
   const std::vector<map::Observation> seen = {{KeyframeId(0), FeatureId(1)}, {KeyframeId(1), FeatureId(1), false}};
   EXPECT_EQ(sigmas_of_one_landmark(map, seen, 0), (std::vector<float>{0.35f, static_cast<float>(kDetected)}));
 }
 
-TEST(Flatten, LeavesAReferenceThatIsBetter) {
+TEST(BuildProblem, LeavesAReferenceThatIsBetter) {
   map::BundledMap map = keyframes_with({0.1f, 0.15f});
   const std::vector<map::Observation> seen = {{KeyframeId(0), FeatureId(1)}, {KeyframeId(1), FeatureId(1)}};
   EXPECT_EQ(sigmas_of_one_landmark(map, seen, 0), (std::vector<float>{0.1f, 0.15f}));

@@ -1,4 +1,4 @@
-#include "looping/locate.h"
+#include "looping/verify_place.h"
 
 #include <algorithm>
 
@@ -131,7 +131,7 @@ std::vector<std::pair<FeatureId, LandmarkId>> by_feature(const frame::BundledFra
 
 }  // namespace
 
-std::vector<LandmarkId> landmarks_about(const map::BundledMap& map, KeyframeId keyframe, int neighbours, int limit) {
+std::vector<LandmarkId> landmarks_around(const map::BundledMap& map, KeyframeId keyframe, int neighbours, int limit) {
   std::vector<KeyframeId> keyframes = {keyframe};
   for (const map::Covisible& c : map.best_covisible(keyframe, static_cast<std::size_t>(neighbours)))
     keyframes.push_back(c.keyframe);
@@ -149,16 +149,17 @@ std::vector<LandmarkId> landmarks_about(const map::BundledMap& map, KeyframeId k
   return out;
 }
 
-std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& rig, const frame::BundledFrame& frame,
-                               KeyframeId candidate, const VerificationOptions& options,
-                               const feature::FeatureModel& features, Random random, LocateReport* report) {
-  LocateReport unused;
-  LocateReport& out = report != nullptr ? *report : unused;
+std::optional<PlaceMatch> verify_place(const map::BundledMap& map, const camera::Rig& rig,
+                                       const frame::BundledFrame& frame, KeyframeId candidate,
+                                       const VerificationOptions& options, const feature::FeatureModel& features,
+                                       Random random, VerificationReport* report) {
+  VerificationReport unused;
+  VerificationReport& out = report != nullptr ? *report : unused;
   const auto rejected = [&](Rejection why) {
     out.rejection = why;
     return std::nullopt;
   };
-  Sought place{landmarks_about(map, candidate, options.neighbours, options.max_landmarks), {}};
+  Sought place{landmarks_around(map, candidate, options.neighbours, options.max_landmarks), {}};
   const std::vector<KeypointMatch> matches = match_descriptors(map, frame, place.landmarks, options);
   out.matches = static_cast<int>(matches.size());
   if (out.matches < options.consensus.min_inliers) return rejected(Rejection::kFewMatches);
@@ -180,24 +181,27 @@ std::optional<Location> locate(const map::BundledMap& map, const camera::Rig& ri
   }
   out.inliers = solution.num_inliers;
   if (solution.num_inliers < options.min_inliers) return rejected(Rejection::kFewInliers);
-  Location location{candidate, solution.T_rig_world, by_feature(frame, guided, solution.inlier), solution.num_inliers};
+  PlaceMatch place_match{candidate, solution.T_rig_world, by_feature(frame, guided, solution.inlier),
+                         solution.num_inliers};
   for (const double turn : {options.max_viewing_angle, matching::ProjectionSearchOptions{}.max_view_angle}) {
     const std::vector<LandmarkId> sought = to_be_found(rig, frame, place, solution.T_rig_world, turn);
     const auto is_sought = [&](const auto& match) { return std::ranges::binary_search(sought, match.second); };
     out.sought = static_cast<int>(sought.size());
-    out.found = static_cast<int>(std::ranges::count_if(location.matches, is_sought));
+    out.found = static_cast<int>(std::ranges::count_if(place_match.matches, is_sought));
     if (out.sought >= options.min_inliers)
       break;  // fewer: the place is seen from aside, and what is known from there has to do
   }
   if (out.found < options.min_found_ratio * out.sought) return rejected(Rejection::kFewFound);
-  return location;
+  return place_match;
 }
 
-bool disputes(const map::BundledMap& map, const Location& best, const Location& other) {
+bool contradicts(const map::BundledMap& map, const PlaceMatch& best, const PlaceMatch& other) {
   constexpr double kRival = 0.6;        // of the best one's inliers: as good an answer
   constexpr double kSameCentre = 0.05;  // of the distance to what is seen
   constexpr double kSameTurn = 0.05;    // rad
-  if (other.inliers <= kRival * best.inliers || map.root_of(best.with) != map.root_of(other.with)) return false;
+  if (other.inliers <= kRival * best.inliers ||
+      map.root_of(best.matched_keyframe) != map.root_of(other.matched_keyframe))
+    return false;
   const Eigen::Vector3d centre = best.T_rig_world.inverse().translation(),
                         rival = other.T_rig_world.inverse().translation();
   double distance = 0;

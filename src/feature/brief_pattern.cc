@@ -1,4 +1,4 @@
-#include "feature/binary_tests.h"
+#include "feature/brief_pattern.h"
 
 #include <cmath>
 #include <numbers>
@@ -56,7 +56,7 @@ BinaryTest draw_test(Random& random) {
 
 }  // namespace
 
-std::array<BinaryTest, kTestCount> make_binary_tests() {
+std::array<BinaryTest, kTestCount> make_brief_pattern() {
   const GreyCorrelation model;
   Random random(kSeed, "binary tests");
   std::array<BinaryTest, kTestCount> tests;
@@ -88,7 +88,7 @@ double test_correlation(const BinaryTest& a, const BinaryTest& b) {
 }
 
 Describer::Describer() : rotated_(kRotations) {
-  const std::array<BinaryTest, kTestCount> tests = make_binary_tests();
+  const std::array<BinaryTest, kTestCount> tests = make_brief_pattern();
   for (int r = 0; r < kRotations; ++r) {
     const double angle = 2 * std::numbers::pi * r / kRotations;
     const double c = std::cos(angle), s = std::sin(angle);
