@@ -28,8 +28,9 @@ Status check_frame(const image::ImageBundle& images, const camera::Rig& rig, con
     const image::CameraImage& image = images.images[c];
     const camera::Camera& camera = rig.camera(c);
     if (image.state != image::ImageState::kPresent) continue;
-    if (image.image.width() == camera.width && image.image.height() == camera.height) continue;
-    return Error{frame, camera.name, "an image of " + size_text(image.image.width(), image.image.height()),
+    const image::ImageView pixels = image.view();
+    if (pixels.width == camera.width && pixels.height == camera.height) continue;
+    return Error{frame, camera.name, "an image of " + size_text(pixels.width, pixels.height),
                  size_text(camera.width, camera.height) + ", as in the calibration"};
   }
   return {};
