@@ -36,7 +36,7 @@ TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, Keyfr
   TrackerState state = before;
   state.status = TrackStatus::kTracking;
   state.time_ns = time_ns;
-  state.anchored = {.reference = keyframe, .T_rig_reference = SE3()};
+  state.anchored = {.reference = keyframe, .T_rig_reference = geometry::SE3()};
   state.landmarks = std::move(landmarks);
   state.frames_since_keyframe = 0;
   state.best_overlap = 0;

@@ -53,7 +53,8 @@ std::array<double, 2> ends_of_side_view(const std::string& svg) {
 }
 
 TEST(TrajectoryPlot, DrawsAClimbUpwards) {
-  TrajectoryPlotInput camera{.axes = WorldAxes::kCamera};
+  TrajectoryPlotInput camera;
+  camera.axes = WorldAxes::kCamera;
   TrajectoryPlotInput body;
   for (int i = 0; i <= 20; ++i) {  // 4 m forward and 1 m up
     const double s = 0.05 * i;

@@ -29,7 +29,7 @@ class LostFrame : public ::testing::Test {
   tracking::TrackOutput track(const frame::BundledFrame& frame, double min_inlier_share) {
     // Aligns to any picture, so that most keypoints move to where their landmarks are not.
     const std::vector<matching::AlignmentOptions> alignment(
-        pyramids.size(), {.iterations = 50, .max_shift_px = 10, .min_ncc = -1, .floor_px = 0.01});
+        pyramids.size(), {.iterations = 50, .max_shift_px = 10, .min_ncc = -1, .calibration_error_px = 0.01});
     tracking::TrackingOptions options;
     options.min_inlier_share = min_inlier_share;
     const tracking::TrackerState state = tracking::state_at_first(world);

@@ -69,7 +69,9 @@ SE3 relative(const synthetic::FeatureSimulator& sim, int from, int to) {
 frame::BundledFrame elsewhere(frame::BundledFrame frame) {
   Random random(99);
   for (frame::CameraFrame& c : frame.cameras) {
-    for (auto& d : c.keypoints.descriptor) d = {random.next(), random.next(), random.next(), random.next()};
+    std::vector<feature::Descriptor> descriptors(c.keypoints.size());
+    for (feature::Descriptor& d : descriptors) d = {random.next(), random.next(), random.next(), random.next()};
+    c.keypoints.descriptor = std::move(descriptors);
   }
   return frame;
 }
@@ -170,7 +172,7 @@ TEST(Tracker, ALostRigIsFollowedAgainFromThePlaceItWasLocatedAt) {
   ASSERT_EQ(found.result.status, TrackStatus::kTracking) << describe(found.result.reason);
   EXPECT_LT(map::distance_m(found.result.T_rig_world, relative(run.sim, 0, 7)), 0.03);
   ASSERT_TRUE(found.relocalisation);
-  EXPECT_EQ(found.relocalisation->with, KeyframeId(0));
+  EXPECT_EQ(found.relocalisation->matched_keyframe, KeyframeId(0));
   EXPECT_LT(map::distance_m(found.T_rig_odom, T_rig_odom), 1e-9);  // the smooth pose does not jump
   EXPECT_LT(map::distance_m(found.T_rig_odom, found.result.T_rig_world * found.T_map_odom), 1e-9);
 }
