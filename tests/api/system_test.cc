@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "api/textured_wall.h"
@@ -58,6 +59,14 @@ TEST_F(PublicSystem, TellsPoseAndVelocityInTheDocumentedFrames) {
   EXPECT_NEAR(last.velocity->linear[0], 0, 0.1);
   EXPECT_NEAR(last.velocity->linear[1], -TexturedWall::kSpeed, 0.1);  // camera 0's right is the body's -y
   EXPECT_NEAR(last.velocity->linear[2], 0, 0.1);
+  ASSERT_TRUE(last.covariance);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double deviation = std::sqrt((*last.covariance)[7 * i]);  // rad, then metres
+    EXPECT_GT(deviation, 1e-6);
+    EXPECT_LT(deviation, 0.05);
+    for (std::size_t j = 0; j < i; ++j)
+      EXPECT_NEAR((*last.covariance)[6 * i + j], (*last.covariance)[6 * j + i], 1e-12);
+  }
   const Pose through_odom = last.T_map_odom * last.T_odom_body;
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(through_odom.translation[i], last.T_world_body.translation[i], 1e-9);
   ASSERT_EQ(last.cameras.size(), 2u);
