@@ -49,8 +49,8 @@ void Notifier::tell_loops(const system::System& system) {
     log(LogLevel::kInfo, fmt::format("{:.3f} s: loop closed with {:.3f} s{}", to_seconds(loop.time_ns),
                                      to_seconds(loop.with_time_ns), closure.merged ? ", submaps merged" : ""));
     if (callbacks_.loop) {
-      callbacks_.loop({closure.keyframe.value(), closure.matched_keyframe.value(), loop.time_ns, loop.with_time_ns, closure.inliers,
-                       closure.merged});
+      callbacks_.loop({closure.keyframe.value(), closure.matched_keyframe.value(), loop.time_ns, loop.with_time_ns,
+                       closure.inliers, closure.merged});
     }
   }
 }

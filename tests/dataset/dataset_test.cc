@@ -230,7 +230,7 @@ TEST_F(SmallEuroc, WithoutASensorYamlTheRigBesideItCounts) {
 
 TEST_F(SmallEuroc, SensorYamlIsNotYaml) {
   support::write_text(camera(0) / "sensor.yaml", "a: [1, 2\n b}");
-  expect_error(camera(0) / "sensor.yaml", "no YAML");
+  expect_error(camera(0) / "sensor.yaml", "invalid YAML");
   EXPECT_EQ(open().error().key, "line 2");
 }
 

@@ -49,7 +49,7 @@ std::array<double, 2> ends_of_side_view(const std::string& svg) {
   const std::size_t side = svg.find("Side view");
   const auto y_after = [&](std::size_t at) { return std::stod(svg.substr(svg.find("cy=\"", at) + 4)); };
   const std::size_t start = svg.find("<circle", side);
-  return {y_after(start), y_after(start + 1)};
+  return {y_after(start), y_after(svg.find("<circle", start + 1))};
 }
 
 TEST(TrajectoryPlot, DrawsAClimbUpwards) {

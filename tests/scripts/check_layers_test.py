@@ -37,7 +37,7 @@ class CheckLayers(unittest.TestCase):
     def test_reports_a_layer_that_is_named_and_never_included(self):
         table = TABLE.replace('map USES geometry', 'map USES base geometry')
         status, lines = project({}, table).run('check_layers')
-        self.assertEqual((status, lines), (1, ['src/CMakeLists.txt: map uses base and includes nothing of it']))
+        self.assertEqual((status, lines), (1, ['src/CMakeLists.txt: map uses base but includes none of its headers']))
 
     def test_reports_a_layer_declared_below_its_user(self):
         status, lines = project({}, 'bslam_layer(map USES geometry)\n' + TABLE.replace('bslam_layer(map USES geometry)\n', '')).run('check_layers')

@@ -76,9 +76,7 @@ void write_small_euroc(const fs::path& folder, int cameras) {
 }
 
 std::optional<fs::path> shared_data(std::string_view name) {
-  // This file is PROJECT/tests/support/data_on_disk.cc.
-  const fs::path project = fs::absolute(__FILE__).parent_path().parent_path().parent_path();
-  const fs::path data = project.parent_path() / "shared" / "data" / name;
+  const fs::path data = fs::path(BSLAM_SOURCE_DIR).parent_path() / "shared" / "data" / name;
   std::error_code error;
   return fs::is_directory(data, error) ? std::optional(data) : std::nullopt;
 }

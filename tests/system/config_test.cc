@@ -59,7 +59,7 @@ TEST(Config, DefaultsLieWithinTheirRangesAndKeysAreUnique) {
 // The settings and defaults in the tables of docs/settings.md; units follow the defaults after a space.
 std::map<std::string, std::string> documented_settings() {
   std::map<std::string, std::string> settings;
-  std::ifstream page(std::filesystem::path(__FILE__).parent_path() / "../../docs/settings.md");
+  std::ifstream page(std::filesystem::path(BSLAM_SOURCE_DIR) / "docs/settings.md");
   for (std::string line; std::getline(page, line);) {
     if (!line.starts_with("| `")) continue;
     const std::size_t end = line.find("` | ");
