@@ -2,7 +2,7 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/solver/scene.h"
-#include "solver/absolute_pose.h"
+#include "estimators/absolute_pose.h"
 #include "solver/pose_graph.h"
 
 namespace bslam::solver {
@@ -61,7 +61,7 @@ void absolute(benchmark::State& state, scene::Models models) {
   const Rig rig = scene::make_rig(static_cast<std::size_t>(state.range(0)), models);
   Random random(2);
   const auto scene = scene::make_pose_scene(rig, 130, 1.0, 0.01 * static_cast<double>(state.range(1)), random);
-  for (auto _ : state) benchmark::DoNotOptimize(absolute_pose(rig, scene.observations, {}, {}, Random(3)));
+  for (auto _ : state) benchmark::DoNotOptimize(estimators::absolute_pose(rig, scene.observations, {}, {}, Random(3)));
 }
 BENCHMARK_CAPTURE(absolute, radtan, scene::Models::kRadTan)
     ->ArgsProduct({{1, 2, 4}, {30, 70, 100}})

@@ -3,7 +3,8 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/solver/scene.h"
-#include "solver/relative_pose.h"
+#include "estimators/pose_ransac.h"
+#include "estimators/relative_pose.h"
 
 namespace bslam::solver {
 namespace {
@@ -23,7 +24,8 @@ void ransac(benchmark::State& state) {
   Random random(2);
   const auto scene = scene::make_pose_scene(rig, 1500, 1.0, 0.01 * static_cast<double>(state.range(0)), random);
   const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.17, 0.5));
-  for (auto _ : state) benchmark::DoNotOptimize(ransac_pose(rig, scene.observations, guess, {}, {}, Random(3)));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(estimators::ransac_pose(rig, scene.observations, guess, {}, {}, Random(3)));
 }
 BENCHMARK(ransac)->Arg(30)->Arg(60)->Unit(benchmark::kMicrosecond)->Name("ransac_pose/outliers");
 
@@ -72,7 +74,7 @@ BENCHMARK(global_adjustment)->Arg(100)->Arg(400)->Unit(benchmark::kMillisecond);
 void two_views(benchmark::State& state) {
   Random random(5);
   const SE3 T_b_a = SE3::exp(scene::random_twist(random, 0.1, 0.4));
-  std::vector<BearingPair> pairs;
+  std::vector<estimators::BearingPair> pairs;
   while (pairs.size() < 1000) {
     const Vector3d point = random.uniform(2, 12) * scene::random_direction(random);
     if (point.z() < 0.5 * point.norm()) continue;
@@ -80,7 +82,7 @@ void two_views(benchmark::State& state) {
     const Vector3d seen = outlier ? scene::random_direction(random) : Vector3d((T_b_a * point).normalized());
     pairs.push_back({point.normalized(), (seen + 5e-4 * scene::random_direction(random)).normalized()});
   }
-  for (auto _ : state) benchmark::DoNotOptimize(relative_pose(pairs, {}, Random(6)));
+  for (auto _ : state) benchmark::DoNotOptimize(estimators::relative_pose(pairs, {}, Random(6)));
 }
 BENCHMARK(two_views)->Arg(0)->Arg(30)->Unit(benchmark::kMillisecond)->Name("relative_pose/outliers");
 

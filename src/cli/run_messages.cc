@@ -22,7 +22,7 @@ void warn_of_outages(const session::CameraRecord& camera) {
                          s.from_s, s.to_s, tracking::describe(s.status.reason));
   }
   if (outages == 0) return;
-  if (outages > kShown) shown += fmt::format(" and {} times more", outages - kShown);
+  if (outages > kShown) shown += fmt::format(" and {} more intervals", outages - kShown);
   fmt::print(stderr, "warning: {}: {}\n", camera.name, shown);
 }
 
@@ -30,13 +30,14 @@ void warn_of_extrinsics(const session::CameraRecord& camera) {
   const auto& e = camera.extrinsics;
   if (!e || !e->suspect) return;
   fmt::print(stderr,
-             "warning: {}: the images put it {:.2f} deg and {:.1f} mm away from where the rig file does, if its times "
-             "are right{}\n",
-             camera.name, e->change_deg, e->change_mm, e->refined ? "" : "; --set extrinsics.refine=true accepts that");
+             "warning: {}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm, provided that "
+             "its time offset is right{}\n",
+             camera.name, e->change_deg, e->change_mm,
+             e->refined ? "" : "; --set extrinsics.refine=true uses the estimated ones");
 }
 
-// A camera that at the end of the run still agrees with nothing the others see is probably not where the rig file puts
-// it.
+// Warns of a camera that is still inconsistent with the others at the end of the run: its extrinsics are probably
+// wrong.
 void warn_of_disagreement(const session::RunRecord& record, std::size_t camera, const std::string& check_command) {
   constexpr tracking::CameraStatus kDisagrees{tracking::CameraState::kDegraded, tracking::CameraReason::kInconsistent};
   const std::vector<session::CameraInterval>& states = record.cameras[camera].states;
@@ -55,7 +56,7 @@ std::ptrdiff_t count(const session::RunRecord& record, session::FrameOutcome out
   return std::ranges::count(record.frames, outcome, &session::RunFrame::outcome);
 }
 
-// Share of a camera's view that another one sees as well, the largest.
+// The largest fraction of one camera's field of view that another camera sees as well.
 double largest_overlap(const camera::Rig& rig) {
   double share = 0;
   for (std::size_t i = 0; i < rig.size(); ++i) {
@@ -64,7 +65,7 @@ double largest_overlap(const camera::Rig& rig) {
   return share;
 }
 
-// Cameras that overlap and still see next to nothing in common.
+// Warns if the fields of view of two cameras overlap, yet hardly any feature is matched between cameras.
 void warn_if_nothing_matches(const session::RunRecord& record, const camera::Rig& rig,
                              const std::string& check_command) {
   constexpr double kMuchOverlap = 0.4, kLeastShare = 0.01;
@@ -76,9 +77,8 @@ void warn_if_nothing_matches(const session::RunRecord& record, const camera::Rig
   }
   if (unique == 0 || matched >= kLeastShare * unique || largest_overlap(rig) < kMuchOverlap) return;
   fmt::print(stderr,
-             "warning: by the calibration cameras see much in common, but only {:.1f} % of the features match between "
-             "any two; "
-             "{} tests it\n",
+             "warning: the calibrated fields of view overlap, but only {:.1f} % of the features match between any two "
+             "cameras: check the calibration ({})\n",
              100 * matched / unique, check_command);
 }
 
@@ -89,7 +89,7 @@ void print_rig_warnings(const camera::Rig& rig) {
   const std::vector<std::string> warnings = rig_formats::rig_warnings(rig);
   for (std::size_t i = 0; i < std::min(kShown, warnings.size()); ++i) fmt::print(stderr, "warning: {}\n", warnings[i]);
   if (warnings.size() > kShown)
-    fmt::print(stderr, "warning: {} more of the kind: bslam rig info\n", warnings.size() - kShown);
+    fmt::print(stderr, "warning: {} more warnings about the calibration: bslam rig info\n", warnings.size() - kShown);
 }
 
 void print_warnings(const session::RunRecord& record, const camera::Rig& rig, const std::string& check_command) {
@@ -104,15 +104,18 @@ void print_warnings(const session::RunRecord& record, const camera::Rig& rig, co
     warn_of_disagreement(record, c, check_command);
   }
   const auto dropped = count(record, session::FrameOutcome::kDropped);
-  if (dropped > 0) fmt::print(stderr, "warning: {} frames were dropped, there was no time for them\n", dropped);
+  if (dropped > 0) fmt::print(stderr, "warning: {} frames dropped: processing is slower than real time\n", dropped);
   warn_if_nothing_matches(record, rig, check_command);
 }
 
 void print_result(const session::RunRecord& record, const std::string& out) {
+  const auto tracked = count(record, session::FrameOutcome::kTracked);
+  const std::string frames =
+      record.complete ? fmt::format("{} of {} frames have a pose", tracked, record.frames.size())
+                      : fmt::format("interrupted after {} frames; {} have a pose", record.frames.size(), tracked);
   const std::string scale = record.map.keyframes > 0 ? ", scale " + record.map.scale : "";
-  fmt::print("{}{} of {} frames have a pose, {} keyframes, {} landmarks{}; {:.1f} s\n{}\n",
-             record.complete ? "" : "interrupted: ", count(record, session::FrameOutcome::kTracked),
-             record.frames.size(), record.map.keyframes, record.map.landmarks, scale, record.wall_s, out);
+  fmt::print("{}, {} keyframes, {} landmarks{}; {:.1f} s\n{}\n", frames, record.map.keyframes, record.map.landmarks,
+             scale, record.wall_s, out);
 }
 
 }  // namespace bslam::cli

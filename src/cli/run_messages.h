@@ -1,4 +1,4 @@
-// What `bslam run` says on the terminal when it is done; everything is in the summary as well.
+// The terminal output of `bslam run`. Everything in it is part of the summary as well.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace bslam::cli {
 
-// On stderr, before the run: what is probably wrong with the calibration (rig_formats/rig_warnings.h), the first of it.
+// Prints the first plausibility warnings about the calibration (rig_formats/rig_warnings.h) to stderr, before the run.
 void print_rig_warnings(const camera::Rig& rig);
 
 // Prints warnings to stderr: cameras that were out or consistent with no other camera, images that could not be used,
@@ -16,7 +16,7 @@ void print_rig_warnings(const camera::Rig& rig);
 // matches. `check_command` tests the calibration against the images; it is printed for the user to copy.
 void print_warnings(const session::RunRecord& record, const camera::Rig& rig, const std::string& check_command);
 
-// On stdout: how many frames have a pose, the size of the map, where the files are.
+// Prints to stdout how many frames have a pose, the size of the map, and where the files are.
 void print_result(const session::RunRecord& record, const std::string& out);
 
 }  // namespace bslam::cli

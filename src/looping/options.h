@@ -2,8 +2,8 @@
 #pragma once
 
 #include "base/options.h"
+#include "estimators/absolute_pose.h"
 #include "mapping/landmark_fusion.h"
-#include "solver/absolute_pose.h"
 #include "solver/pose_graph.h"
 
 namespace bslam::looping {
@@ -53,7 +53,7 @@ struct VerificationOptions {
   double min_found_ratio = 0.2;
   // rad: landmarks observed so far only from directions that differ by more than this need not be matched.
   double max_viewing_angle = 0.52;
-  solver::AbsolutePoseOptions consensus;
+  estimators::AbsolutePoseOptions consensus;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

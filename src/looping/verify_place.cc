@@ -165,8 +165,8 @@ std::optional<PlaceMatch> verify_place(const map::BundledMap& map, const camera:
   if (out.matches < options.consensus.min_inliers) return rejected(Rejection::kFewMatches);
 
   const solver::PoseSolverOptions pose_options;
-  solver::PoseSolution solution = solver::absolute_pose(rig, observations_of(map, frame, matches, features),
-                                                        pose_options, options.consensus, random);
+  solver::PoseSolution solution = estimators::absolute_pose(rig, observations_of(map, frame, matches, features),
+                                                            pose_options, options.consensus, random);
   out.inliers = solution.num_inliers;
   if (!solution.ok) return rejected(Rejection::kNoConsensus);
 

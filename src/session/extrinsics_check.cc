@@ -8,13 +8,13 @@
 #include <set>
 
 #include "dataset/frame_reader.h"
+#include "estimators/epipolar.h"
 #include "feature/descriptor_matching.h"
 #include "feature/extractor.h"
 #include "frame/capture_times.h"
 #include "geometry/so3.h"
 #include "geometry/triangulation.h"
 #include "image_decoding/image_file.h"
-#include "solver/epipolar.h"
 
 namespace bslam::session {
 namespace {
@@ -81,16 +81,16 @@ int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
   const double tolerance = tolerance_of(*h.first, *h.second);
   const Eigen::Vector3d t = h.T_second_first.translation();
   const bool apart = t.norm() > kNoBaseline;
-  const solver::EpipolarPose pose{h.T_second_first.matrix3(), apart ? Eigen::Vector3d(t.normalized()) : t};
+  const estimators::EpipolarPose pose{h.T_second_first.matrix3(), apart ? Eigen::Vector3d(t.normalized()) : t};
   int agreeing = 0;
   for (const PixelPair& pair : pairs) {
     const auto a = h.first->unproject(pair.a), b = h.second->unproject(pair.b);
     if (!a || !b) continue;
     const bool far = geometry::angle_between(pose.R_b_a * *a, *b) < tolerance;  // too far away to have a depth
-    agreeing +=
-        far || (apart && solver::epipolar_angle(pose, {*a, *b}) < tolerance && solver::in_front_of_both(pose, {*a, *b}))
-            ? 1
-            : 0;
+    agreeing += far || (apart && estimators::epipolar_angle(pose, {*a, *b}) < tolerance &&
+                        estimators::in_front_of_both(pose, {*a, *b}))
+                    ? 1
+                    : 0;
   }
   return agreeing;
 }
@@ -99,15 +99,15 @@ int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
 std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::size_t j,
                                     std::span<const PixelPair> pairs) {
   const camera::Camera &ci = rig.camera(i), &cj = rig.camera(j);
-  std::vector<solver::BearingPair> bearings;
+  std::vector<estimators::BearingPair> bearings;
   for (const PixelPair& pair : pairs) {
     const auto a = ci.unproject(pair.a), b = cj.unproject(pair.b);
     if (a && b) bearings.push_back({*a, *b});
   }
   const int least = std::max(kLeastAgreeing, static_cast<int>(kLeastShare * static_cast<double>(bearings.size())));
-  const solver::RelativePoseOptions options{
+  const estimators::RelativePoseOptions options{
       .iterations = 2000, .inlier_angle = tolerance_of(ci, cj), .min_parallax = kLeastParallax, .min_inliers = least};
-  const auto found = solver::relative_pose(bearings, options, Random(1, "extrinsics check"));
+  const auto found = estimators::relative_pose(bearings, options, Random(1, "extrinsics check"));
   if (!found) return std::nullopt;
   const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
   OtherPose out{.agreeing = found->num_inliers};

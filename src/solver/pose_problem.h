@@ -72,25 +72,4 @@ SE3 refine_pose(const PoseProblem& problem, const SE3& T_rig_world, const PoseEq
 PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double first_bound,
                           const PoseSolverOptions& options);
 
-// The best of the poses offered, by the truncated cost over all items. Each better one is refined over the items that
-// agree with it, as a pose from a sample has the noise of three points (LO-RANSAC; Chum, Matas and Kittler, DAGM 2003).
-class PoseSearch {
- public:
-  // `problem` outlives this, which selects its items; `bound`: squared error of an item that agrees.
-  PoseSearch(PoseProblem& problem, double bound) : problem_(problem), bound_(bound) {}
-
-  // True where the pose is better than the best so far.
-  bool offer(const SE3& T_rig_world);
-  const SE3& best() const { return best_; }
-  double inlier_share();
-
- private:
-  PoseProblem& problem_;
-  double bound_, cost_ = std::numeric_limits<double>::infinity();
-  SE3 best_;
-};
-
-// Samples of three needed for one without outliers with the confidence asked for, at this share of inliers.
-double samples_needed(double inlier_share, double confidence);
-
 }  // namespace bslam::solver

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "base/options.h"
-#include "base/random.h"
 #include "solver/reprojection.h"
 
 namespace bslam::solver {
@@ -64,16 +63,5 @@ PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observa
 // The same with cameras that move as the model says; `rig` is the rig at rest.
 PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
                         const MotionModel& motion, const PoseSolverOptions& options);
-
-struct PoseRansacOptions {
-  int iterations = 200;       // samples at most
-  double inlier_chi2 = 25.0;  // squared normalised error that counts as agreement while sampling
-  double confidence = 0.999;  // of having drawn one sample without outliers, given the best share so far
-};
-
-// Seeded RANSAC for correspondences with many outliers: minimal samples of three observations, from any cameras, solved
-// by Newton's method from the guess; the best is refined by solve_pose. For motions between neighbouring frames.
-PoseSolution ransac_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
-                         const PoseSolverOptions& options, const PoseRansacOptions& ransac, Random random);
 
 }  // namespace bslam::solver

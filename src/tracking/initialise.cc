@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "base/median.h"
+#include "estimators/generalised_scale.h"
 #include "feature/descriptor_matching.h"
-#include "solver/generalised_scale.h"
 
 namespace bslam::tracking {
 namespace {
@@ -31,13 +31,13 @@ std::vector<feature::DescriptorMatch> match_frames(const feature::Keypoints& a, 
 struct TwoView {
   std::size_t camera = 0;
   std::vector<feature::DescriptorMatch> pairs;
-  solver::RelativePose pose;
+  estimators::RelativePose pose;
 };
 
 // What every camera has matched.
 struct FramePairs {
   std::vector<std::vector<feature::DescriptorMatch>> keypoints;
-  std::vector<std::vector<solver::BearingPair>> bearings;
+  std::vector<std::vector<estimators::BearingPair>> bearings;
 };
 
 FramePairs match_cameras(const BundledFrame& first, const BundledFrame& second) {
@@ -60,7 +60,7 @@ std::optional<TwoView> best_two_view(const FramePairs& pairs, const Initialisati
     TwoView view{c, pairs.keypoints[c], {}};
     if (view.pairs.size() < static_cast<std::size_t>(options.min_monocular)) continue;
     const auto pose =
-        solver::relative_pose(pairs.bearings[c], {.min_inliers = kMinInliers}, Random(seed, "two views", c));
+        estimators::relative_pose(pairs.bearings[c], {.min_inliers = kMinInliers}, Random(seed, "two views", c));
     if (!pose || pose->num_inliers < options.min_monocular_points) continue;
     view.pose = *pose;
     if (!best || view.pose.median_parallax > best->pose.median_parallax) best = view;
@@ -82,11 +82,11 @@ Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig
   }
   const double depth = median(depths);
   if (rig.size() == 1) return {1.0 / depth, std::numeric_limits<double>::infinity()};
-  std::vector<solver::CameraPairs> cameras;
+  std::vector<estimators::CameraPairs> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     cameras.push_back({rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]});
   }
-  const auto found = solver::generalised_scale(view.pose.T_b_a, cameras);
+  const auto found = estimators::generalised_scale(view.pose.T_b_a, cameras);
   if (found && found->deviation <= options.max_scale_deviation)
     return {found->T_b_a.translation().norm(), found->deviation};
   return {options.assumed_median_depth / depth, std::numeric_limits<double>::infinity()};

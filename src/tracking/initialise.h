@@ -5,7 +5,7 @@
 #include <memory>
 #include <optional>
 
-#include "solver/relative_pose.h"
+#include "estimators/relative_pose.h"
 #include "tracking/make_keyframe.h"
 
 namespace bslam::tracking {
@@ -32,8 +32,8 @@ bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& sec
 
 // Writes two keyframes where some camera sees enough parallax between `first` and `frame`: the first at the origin.
 // With one camera the median depth of the points in the first is 1, and stays so. With several, none overlapping, the
-// scale is what their matches tell of it (solver/generalised_scale.h), else the guessed depth: unobservable either way,
-// until mapping has measured it.
+// scale is what their matches tell of it (estimators/generalised_scale.h), else the guessed depth: unobservable either
+// way, until mapping has measured it.
 std::optional<StartedMap> initialise_monocular(const StartCandidate& first, const frame::BundledFrame& frame,
                                                std::span<const image::Pyramid> pyramids,
                                                const InitialisationOptions& options, Random random,

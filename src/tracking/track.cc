@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <numeric>
 
+#include "estimators/pose_ransac.h"
 #include "tracking/keyframe_decision.h"
 
 namespace bslam::tracking {
@@ -154,8 +155,8 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return false;
   const auto observations = pose_observations(map, frame, search.found, input.features);
   const auto solution =
-      solver::ransac_pose(frame::rig_of(map.rig(), frame), observations, out.T_rig_world, options.pose, {},
-                          Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
+      estimators::ransac_pose(frame::rig_of(map.rig(), frame), observations, out.T_rig_world, options.pose, {},
+                              Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
   out.reason = LostReason::kFewInliers;
   if (!supported(solution, observations.size(), options.min_inliers_wide, options)) return false;
   out.T_rig_world = solution.T_rig_world;

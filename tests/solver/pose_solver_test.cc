@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "estimators/pose_ransac.h"
 #include "solver/scene.h"
 
 namespace bslam::solver {
@@ -157,8 +158,8 @@ TEST(PoseRansac, SurvivesSixtyPercentOutliersAndAFarGuess) {
     for (int trial = 0; trial < 20; ++trial, ++trials) {
       const auto scene = scene::make_pose_scene(rig, 400, 1.0, 0.6, random);
       const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 10 * std::numbers::pi / 180, 0.5));
-      const PoseSolution s =
-          ransac_pose(rig, scene.observations, guess, {}, {}, Random(1, "t", static_cast<std::uint64_t>(trial)));
+      const PoseSolution s = estimators::ransac_pose(rig, scene.observations, guess, {}, {},
+                                                     Random(1, "t", static_cast<std::uint64_t>(trial)));
       const bool good = s.ok && scene::rotation_error(s.T_rig_world, scene.T_rig_world) < 5e-3 &&
                         scene::centre_error(s.T_rig_world, scene.T_rig_world) < 0.05;
       solved += good;
@@ -173,8 +174,8 @@ TEST(PoseRansac, RepeatsItselfToTheBit) {
   Random random(19);
   const auto scene = scene::make_pose_scene(rig, 300, 1.0, 0.5, random);
   const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.1, 0.4));
-  const PoseSolution a = ransac_pose(rig, scene.observations, guess, {}, {}, Random(5));
-  const PoseSolution b = ransac_pose(rig, scene.observations, guess, {}, {}, Random(5));
+  const PoseSolution a = estimators::ransac_pose(rig, scene.observations, guess, {}, {}, Random(5));
+  const PoseSolution b = estimators::ransac_pose(rig, scene.observations, guess, {}, {}, Random(5));
   EXPECT_EQ(a.T_rig_world.matrix(), b.T_rig_world.matrix());
   EXPECT_EQ(a.inlier, b.inlier);
   EXPECT_EQ(a.information, b.information);
@@ -184,8 +185,8 @@ TEST(PoseRansac, RefusesOutliersAlone) {
   const Rig rig = scene::make_rig(2, Models::kRadTan);
   Random random(23);
   const auto scene = scene::make_pose_scene(rig, 200, 1.0, 1.0, random);
-  EXPECT_FALSE(ransac_pose(rig, scene.observations, scene.T_rig_world, {}, {}, Random(1)).ok);
-  EXPECT_FALSE(ransac_pose(rig, {}, scene.T_rig_world, {}, {}, Random(1)).ok);
+  EXPECT_FALSE(estimators::ransac_pose(rig, scene.observations, scene.T_rig_world, {}, {}, Random(1)).ok);
+  EXPECT_FALSE(estimators::ransac_pose(rig, {}, scene.T_rig_world, {}, {}, Random(1)).ok);
 }
 
 }  // namespace

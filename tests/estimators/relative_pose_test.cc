@@ -1,14 +1,21 @@
-#include "solver/relative_pose.h"
+#include "estimators/relative_pose.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "estimators/epipolar.h"
 #include "geometry/triangulation.h"
-#include "solver/epipolar.h"
 #include "solver/scene.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
+
+namespace scene = solver::scene;
+using camera::Rig;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using geometry::SE3;
+
 namespace {
 
 enum class Shape { kGeneral, kPlane };
@@ -164,4 +171,4 @@ TEST(Epipolar, RefinementReachesTruthWithoutNoise) {
 }
 
 }  // namespace
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

@@ -3,9 +3,13 @@
 
 #include <span>
 
+#include "base/random.h"
 #include "solver/pose_solver.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
+
+using camera::Rig;
+using geometry::SE3;
 
 struct AbsolutePoseOptions {
   int iterations = 300;       // samples at most: enough for a third of inliers
@@ -27,7 +31,8 @@ struct AbsolutePoseOptions {
 // 2011, by OpenGV) as if their cameras stood in one place, then Newton's method to where they do. A solution is judged
 // by all observations and the best refined as by solve_pose. Not ok also where fewer than `min_inliers` distinct points
 // agree. Observations whose pixel has no bearing are never in a sample. Deterministic.
-PoseSolution absolute_pose(const Rig& rig, std::span<const PoseObservation> observations,
-                           const PoseSolverOptions& options, const AbsolutePoseOptions& ransac, Random random);
+solver::PoseSolution absolute_pose(const Rig& rig, std::span<const solver::PoseObservation> observations,
+                                   const solver::PoseSolverOptions& options, const AbsolutePoseOptions& ransac,
+                                   Random random);
 
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

@@ -1,4 +1,4 @@
-#include "solver/absolute_pose.h"
+#include "estimators/absolute_pose.h"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -7,13 +7,15 @@
 #include <opengv/absolute_pose/CentralAbsoluteAdapter.hpp>
 #include <opengv/absolute_pose/methods.hpp>
 
+#include "estimators/pose_ransac.h"
 #include "geometry/alignment.h"
 #include "solver/pose_problem.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
 namespace {
 
 using Eigen::Matrix3d;
+using Eigen::Vector3d;
 
 constexpr int kMinSamples = 30;  // noise makes some samples without outliers poor ones
 constexpr int kRedraws = 10;     // for a sample of three different points
@@ -25,10 +27,10 @@ struct Ray {
 };
 using Sample = std::array<const Ray*, 3>;
 
-std::vector<Ray> rays_of(const Rig& rig, std::span<const PoseObservation> observations) {
+std::vector<Ray> rays_of(const Rig& rig, std::span<const solver::PoseObservation> observations) {
   std::vector<Ray> out;
   out.reserve(observations.size());
-  for (const PoseObservation& o : observations) {
+  for (const solver::PoseObservation& o : observations) {
     const auto bearing = rig.camera(o.camera).unproject(o.pixel);
     const SE3& T_rig_cam = rig.rig_from_cam(o.camera.index());
     if (bearing) out.push_back({T_rig_cam.translation(), T_rig_cam.rotation() * *bearing, o.point_world});
@@ -108,7 +110,8 @@ void solve_sample(const Sample& sample, std::vector<SE3>& T_rig_world) {
   }
 }
 
-int count_distinct_points(std::span<const PoseObservation> observations, const std::vector<std::uint8_t>& inlier) {
+int count_distinct_points(std::span<const solver::PoseObservation> observations,
+                          const std::vector<std::uint8_t>& inlier) {
   std::vector<std::array<double, 3>> points;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const Vector3d& p = observations[i].point_world;
@@ -120,10 +123,11 @@ int count_distinct_points(std::span<const PoseObservation> observations, const s
 
 }  // namespace
 
-PoseSolution absolute_pose(const Rig& rig, std::span<const PoseObservation> observations,
-                           const PoseSolverOptions& options, const AbsolutePoseOptions& ransac, Random random) {
+solver::PoseSolution absolute_pose(const Rig& rig, std::span<const solver::PoseObservation> observations,
+                                   const solver::PoseSolverOptions& options, const AbsolutePoseOptions& ransac,
+                                   Random random) {
   const std::vector<Ray> rays = rays_of(rig, observations);
-  PoseProblem problem(rig, observations);
+  solver::PoseProblem problem(rig, observations);
   PoseSearch search(problem, ransac.inlier_chi2);
   std::vector<SE3> candidates;
   double needed = ransac.iterations;
@@ -133,9 +137,9 @@ PoseSolution absolute_pose(const Rig& rig, std::span<const PoseObservation> obse
     for (const SE3& T : candidates) better |= search.offer(T);
     if (better) needed = samples_needed(search.inlier_share(), ransac.confidence);
   }
-  PoseSolution out = solve_rounds(problem, search.best(), ransac.inlier_chi2, options);
+  solver::PoseSolution out = solver::solve_rounds(problem, search.best(), ransac.inlier_chi2, options);
   out.ok &= count_distinct_points(observations, out.inlier) >= ransac.min_inliers;
   return out;
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "solver/relative_pose.h"
+#include "estimators/relative_pose.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
 
 // Matches of one camera of the rig between the frames a and b; outliers may be among them.
 struct CameraPairs {
@@ -35,4 +35,4 @@ struct GeneralisedScale {
 std::optional<GeneralisedScale> generalised_scale(const geometry::SE3& T_b_a, std::span<const CameraPairs> cameras,
                                                   const GeneralisedScaleOptions& options = {});
 
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

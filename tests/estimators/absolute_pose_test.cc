@@ -1,4 +1,4 @@
-#include "solver/absolute_pose.h"
+#include "estimators/absolute_pose.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,12 @@
 
 #include "solver/scene.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
+
+namespace scene = solver::scene;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
 namespace {
 
 using scene::Models;
@@ -19,7 +24,7 @@ scene::PoseScene make_scene(const Rig& rig, int count, int inliers, double noise
     std::swap(out.observations[i], out.observations[random.below(i + 1)]);
   }
   for (int i = inliers; i < count; ++i) {
-    PoseObservation& o = out.observations[static_cast<std::size_t>(i)];
+    solver::PoseObservation& o = out.observations[static_cast<std::size_t>(i)];
     const auto& camera = rig.camera(o.camera);
     const Vector2d right = o.pixel;
     while ((o.pixel - right).norm() < 20) o.pixel = {random.uniform(0, camera.width), random.uniform(0, camera.height)};
@@ -33,7 +38,7 @@ scene::PoseScene make_scene(const Rig& rig, int count, int inliers, double noise
   return out;
 }
 
-bool near_truth(const PoseSolution& s, const scene::PoseScene& scene) {
+bool near_truth(const solver::PoseSolution& s, const scene::PoseScene& scene) {
   return scene::rotation_error(s.T_rig_world, scene.T_rig_world) < 0.01 &&
          scene::centre_error(s.T_rig_world, scene.T_rig_world) < 0.1;
 }
@@ -51,7 +56,7 @@ TEST_P(AbsolutePoseOnRig, FindsFortyInliersAmongAHundredAndThirtyWithoutAGuess) 
   int solved = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
     const auto scene = make_scene(rig, 130, 40, 1.0, random);
-    const PoseSolution s =
+    const solver::PoseSolution s =
         absolute_pose(rig, scene.observations, {}, {}, Random(2, "t", static_cast<std::uint64_t>(trial)));
     solved += s.ok && near_truth(s, scene);
     EXPECT_TRUE(!s.ok || near_truth(s, scene)) << "a wrong pose must not look sound, trial " << trial;
@@ -64,7 +69,7 @@ TEST_P(AbsolutePoseOnRig, IsExactWithoutNoiseAndOutliers) {
   Random random(3);
   for (int trial = 0; trial < 10; ++trial) {
     const auto scene = make_scene(rig, 40, 40, 0.0, random);
-    const PoseSolution s = absolute_pose(rig, scene.observations, {}, {}, Random(1));
+    const solver::PoseSolution s = absolute_pose(rig, scene.observations, {}, {}, Random(1));
     ASSERT_TRUE(s.ok);
     EXPECT_EQ(s.num_inliers, 40);
     EXPECT_LT(scene::rotation_error(s.T_rig_world, scene.T_rig_world), 1e-6);
@@ -100,7 +105,7 @@ TEST(AbsolutePose, SolvesRigsThatAreFarFromCentral) {
   int solved = 0;
   for (int trial = 0; trial < 40; ++trial) {
     const auto scene = make_scene(rig, 130, 40, 1.0, random);
-    const PoseSolution s =
+    const solver::PoseSolution s =
         absolute_pose(rig, scene.observations, {}, {}, Random(2, "t", static_cast<std::uint64_t>(trial)));
     solved += s.ok && near_truth(s, scene);
   }
@@ -112,7 +117,7 @@ TEST(AbsolutePose, CountsDistinctPoints) {
   const Rig rig = scene::make_rig(2, Models::kPinhole);
   Random random(6);
   const SE3 T_rig_world = SE3::exp(scene::random_twist(random, 0.5, 2.0));
-  std::vector<PoseObservation> observations;
+  std::vector<solver::PoseObservation> observations;
   for (int points = 0; points < 14;) {
     const Vector3d point = scene::random_visible_point(rig, T_rig_world, random);
     const auto left = scene::see(rig, 0, T_rig_world, point), right = scene::see(rig, 1, T_rig_world, point);
@@ -121,7 +126,7 @@ TEST(AbsolutePose, CountsDistinctPoints) {
     observations.push_back({CameraIndex(1), point, *right, 1.0});
     ++points;
   }
-  const PoseSolution few = absolute_pose(rig, observations, {}, {}, Random(1));
+  const solver::PoseSolution few = absolute_pose(rig, observations, {}, {}, Random(1));
   EXPECT_EQ(few.num_inliers, 28);
   EXPECT_FALSE(few.ok);
   AbsolutePoseOptions fourteen;
@@ -135,9 +140,9 @@ TEST(AbsolutePose, RefusesTooFewOrDegenerateObservations) {
   EXPECT_FALSE(absolute_pose(rig, {}, {}, {}, Random(1)).ok);
   const auto scene = make_scene(rig, 20, 20, 0.0, random);
   EXPECT_FALSE(absolute_pose(rig, std::span(scene.observations).first(2), {}, {}, Random(1)).ok);
-  std::vector<PoseObservation> one(30, scene.observations[0]);  // one point over and over
+  std::vector<solver::PoseObservation> one(30, scene.observations[0]);  // one point over and over
   EXPECT_FALSE(absolute_pose(rig, one, {}, {}, Random(1)).ok);
-  std::vector<PoseObservation> line;
+  std::vector<solver::PoseObservation> line;
   for (int i = 0; i < 40; ++i) {
     const Vector3d point = (2.0 + 0.5 * i) * Vector3d(0.2, -0.1, 1);
     line.push_back({CameraIndex(0), point, *rig.camera(0).project(point), 1.0});
@@ -150,18 +155,18 @@ TEST(AbsolutePose, RepeatsItselfToTheBitInAnyThread) {
   Random random(8);
   const auto scene = make_scene(rig, 130, 40, 1.0, random);
   const auto solve = [&] { return absolute_pose(rig, scene.observations, {}, {}, Random(5)); };
-  const PoseSolution expected = solve();
+  const solver::PoseSolution expected = solve();
   ASSERT_TRUE(expected.ok);
-  std::vector<PoseSolution> found(4);
+  std::vector<solver::PoseSolution> found(4);
   {
     std::vector<std::jthread> threads;
-    for (PoseSolution& s : found) threads.emplace_back([&] { s = solve(); });
+    for (solver::PoseSolution& s : found) threads.emplace_back([&] { s = solve(); });
   }
-  for (const PoseSolution& s : found) {
+  for (const solver::PoseSolution& s : found) {
     EXPECT_EQ(s.T_rig_world.matrix(), expected.T_rig_world.matrix());
     EXPECT_EQ(s.inlier, expected.inlier);
   }
 }
 
 }  // namespace
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

@@ -1,4 +1,4 @@
-#include "solver/relative_pose.h"
+#include "estimators/relative_pose.h"
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -10,13 +10,14 @@
 #include <opengv/relative_pose/methods.hpp>
 
 #include "base/median.h"
+#include "estimators/epipolar.h"
 #include "geometry/triangulation.h"
-#include "solver/epipolar.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
 namespace {
 
 using Eigen::Matrix3d;
+using Eigen::Vector3d;
 
 constexpr std::size_t kSampleSize = 5;
 constexpr double kConfidence = 0.999;  // of having drawn one sample without outliers
@@ -182,4 +183,4 @@ std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, co
   return out;
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

@@ -1,4 +1,4 @@
-#include "solver/epipolar.h"
+#include "estimators/epipolar.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -6,7 +6,7 @@
 
 #include "solver/lm.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
 namespace {
 
 using Eigen::Matrix3d;
@@ -60,7 +60,7 @@ SampsonTerm sampson(const EpipolarPose& pose, const Eigen::Matrix<double, 3, 2>&
   return out;
 }
 
-using Equations = NormalEquations<5>;
+using Equations = solver::NormalEquations<5>;
 
 Equations linearise(const EpipolarPose& pose, const Eigen::Matrix<double, 3, 2>& basis,
                     std::span<const BearingPair> pairs, const std::vector<std::uint8_t>& use, double knee) {
@@ -118,10 +118,11 @@ EpipolarPose refine_epipolar(const EpipolarPose& start, std::span<const BearingP
     return State{pose, tangent_basis(pose.t_b_a)};
   };
   const State state{start, tangent_basis(start.t_b_a)};
-  SmallProblem<5, State, decltype(equations_at), decltype(plus)> problem(state, equations_at(state), equations_at,
-                                                                         plus);
-  minimise(problem, {.iterations = 15, .relative_decrease = 0.0, .min_gain = 0.0, .rule = DampingRule::kOnFailure});
+  solver::SmallProblem<5, State, decltype(equations_at), decltype(plus)> problem(state, equations_at(state),
+                                                                                 equations_at, plus);
+  solver::minimise(
+      problem, {.iterations = 15, .relative_decrease = 0.0, .min_gain = 0.0, .rule = solver::DampingRule::kOnFailure});
   return problem.state().pose;
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

@@ -1,24 +1,25 @@
-// ransac_pose: see solver/pose_solver.h. Samples of three observations give six residuals for six unknowns.
+#include "estimators/pose_ransac.h"
+
 #include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
 
-#include "solver/pose_problem.h"
-
-namespace bslam::solver {
+namespace bslam::estimators {
 namespace {
 
-using Sample = std::array<const PoseProblem::Item*, 3>;
+using Sample = std::array<const solver::PoseProblem::Item*, 3>;
 
-// A pose that the three observations fit exactly, from the guess; often empty where one of them is an outlier.
+// Solves six residuals for the six unknowns: a pose that the three observations fit exactly, from the guess; often
+// empty where one of them is an outlier.
 std::optional<SE3> solve_minimal(const Rig& rig, const Sample& sample, const SE3& T_rig_world_guess) {
   constexpr double kSolved = 1e-3;  // normalised error of the three together
   const auto equations_at = [&](const SE3& T_rig_world) {
-    PoseEquations out;
-    for (const PoseProblem::Item* item : sample) {
-      const auto r = ReprojectionResidual::evaluate(rig, item->camera, T_rig_world, item->point_world, item->pixel);
-      if (!r) return PoseEquations{.cost = std::numeric_limits<double>::infinity()};
+    solver::PoseEquations out;
+    for (const solver::PoseProblem::Item* item : sample) {
+      const auto r =
+          solver::ReprojectionResidual::evaluate(rig, item->camera, T_rig_world, item->point_world, item->pixel);
+      if (!r) return solver::PoseEquations{.cost = std::numeric_limits<double>::infinity()};
       const double information = item->inverse_sigma * item->inverse_sigma;
       out.H += information * r->J_pose.transpose() * r->J_pose;
       out.b -= information * r->J_pose.transpose() * r->error;
@@ -27,19 +28,19 @@ std::optional<SE3> solve_minimal(const Rig& rig, const Sample& sample, const SE3
     return out;
   };
   const auto plus = [](const SE3& T, const geometry::Vector6d& delta) { return T.perturbed(delta); };
-  SmallProblem<6, SE3, decltype(equations_at), decltype(plus)> problem(
+  solver::SmallProblem<6, SE3, decltype(equations_at), decltype(plus)> problem(
       T_rig_world_guess, equations_at(T_rig_world_guess), equations_at, plus);
-  const LmSummary summary = minimise(problem, {.iterations = 15,
-                                               .relative_decrease = 0.0,
-                                               .step_tolerance = kSolved,
-                                               .min_gain = 0.0,
-                                               .rule = DampingRule::kOnFailure});
+  const solver::LmSummary summary = solver::minimise(problem, {.iterations = 15,
+                                                               .relative_decrease = 0.0,
+                                                               .step_tolerance = kSolved,
+                                                               .min_gain = 0.0,
+                                                               .rule = solver::DampingRule::kOnFailure});
   if (!summary.usable() || summary.final_cost > 0.5 * kSolved * kSolved) return std::nullopt;
   return problem.state();
 }
 
 // Three different items among those that project at the guess.
-Sample draw(std::span<const PoseProblem::Item* const> candidates, Random& random) {
+Sample draw(std::span<const solver::PoseProblem::Item* const> candidates, Random& random) {
   const auto n = static_cast<std::uint32_t>(candidates.size());
   std::array<std::uint32_t, 3> index{};
   do {
@@ -58,8 +59,8 @@ bool PoseSearch::offer(const SE3& T_rig_world) {
   best_ = T_rig_world;
   cost_ = cost;
   problem_.select(best_, bound_);
-  const PoseEquations equations = problem_.linearise(best_, Kernel::kHuber);
-  const SE3 refined = refine_pose(problem_, best_, equations, Kernel::kHuber, kSteps, kTolerance);
+  const solver::PoseEquations equations = problem_.linearise(best_, solver::Kernel::kHuber);
+  const SE3 refined = solver::refine_pose(problem_, best_, equations, solver::Kernel::kHuber, kSteps, kTolerance);
   const double refined_cost = problem_.truncated_cost(refined, bound_, cost_);
   if (refined_cost < cost_) {
     best_ = refined;
@@ -79,12 +80,13 @@ double samples_needed(double inlier_share, double confidence) {
   return std::log(1.0 - confidence) / std::log1p(-all_inliers);
 }
 
-PoseSolution ransac_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
-                         const PoseSolverOptions& options, const PoseRansacOptions& ransac, Random random) {
-  PoseProblem problem(rig, observations);
+solver::PoseSolution ransac_pose(const Rig& rig, std::span<const solver::PoseObservation> observations,
+                                 const SE3& T_rig_world_guess, const solver::PoseSolverOptions& options,
+                                 const PoseRansacOptions& ransac, Random random) {
+  solver::PoseProblem problem(rig, observations);
   problem.select(T_rig_world_guess, std::numeric_limits<double>::max());
-  std::vector<const PoseProblem::Item*> candidates;
-  for (const PoseProblem::Item& item : problem.items()) {
+  std::vector<const solver::PoseProblem::Item*> candidates;
+  for (const solver::PoseProblem::Item& item : problem.items()) {
     if (item.in_use) candidates.push_back(&item);
   }
   PoseSearch search(problem, ransac.inlier_chi2);
@@ -94,7 +96,7 @@ PoseSolution ransac_pose(const Rig& rig, std::span<const PoseObservation> observ
     const auto T = solve_minimal(rig, draw(candidates, random), T_rig_world_guess);
     if (T && search.offer(*T)) needed = samples_needed(search.inlier_share(), ransac.confidence);
   }
-  return solve_rounds(problem, search.best(), ransac.inlier_chi2, options);
+  return solver::solve_rounds(problem, search.best(), ransac.inlier_chi2, options);
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

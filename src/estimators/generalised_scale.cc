@@ -1,4 +1,4 @@
-#include "solver/generalised_scale.h"
+#include "estimators/generalised_scale.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 #include "solver/lm.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
 namespace {
 
 using Eigen::Vector3d;
@@ -21,7 +21,7 @@ constexpr double kMinSigma = 1e-5;       // radians: no bearing is better
 constexpr double kMinCondition = 1e-12;  // of the normal equations: below it a direction is not seen at all
 
 // `cost`: half the sum of squared angles, each at most the square of the knee.
-struct Sums : NormalEquations<6> {
+struct Sums : solver::NormalEquations<6> {
   double squared = 0.0;  // sum of squared angles of the inliers
   int inliers = 0;
 };
@@ -85,10 +85,12 @@ SE3 best_distance(const SE3& T_b_a, std::span<const CameraPairs> cameras, const 
 }
 
 SE3 refine(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) {
-  const auto equations_at = [&](const SE3& T) -> NormalEquations<6> { return evaluate(T, cameras, knee); };
+  const auto equations_at = [&](const SE3& T) -> solver::NormalEquations<6> { return evaluate(T, cameras, knee); };
   const auto plus = [](const SE3& T, const Vector6d& delta) { return T.perturbed(delta); };
-  SmallProblem<6, SE3, decltype(equations_at), decltype(plus)> problem(T_b_a, equations_at(T_b_a), equations_at, plus);
-  minimise(problem, {.iterations = 20, .relative_decrease = 0.0, .min_gain = 0.0, .rule = DampingRule::kOnFailure});
+  solver::SmallProblem<6, SE3, decltype(equations_at), decltype(plus)> problem(T_b_a, equations_at(T_b_a), equations_at,
+                                                                               plus);
+  solver::minimise(
+      problem, {.iterations = 20, .relative_decrease = 0.0, .min_gain = 0.0, .rule = solver::DampingRule::kOnFailure});
   return problem.state();
 }
 
@@ -113,4 +115,4 @@ std::optional<GeneralisedScale> generalised_scale(const SE3& T_b_a, std::span<co
   return out;
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

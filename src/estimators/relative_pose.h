@@ -8,7 +8,7 @@
 #include "base/random.h"
 #include "geometry/se3.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
 
 struct BearingPair {
   Eigen::Vector3d a, b;  // unit bearings of one point in the two images
@@ -34,4 +34,4 @@ struct RelativePose {
 std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
                                           Random random);
 
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

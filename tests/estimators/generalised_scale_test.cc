@@ -1,11 +1,18 @@
 // Distance between two frames of a rig, against the truth of random rooms.
-#include "solver/generalised_scale.h"
+#include "estimators/generalised_scale.h"
 
 #include <gtest/gtest.h>
 
 #include "solver/scene.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
+
+namespace scene = solver::scene;
+using camera::Rig;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using geometry::SE3;
+
 namespace {
 
 constexpr double kSigma = 1e-3;  // radians of a bearing
@@ -81,4 +88,4 @@ TEST(GeneralisedScale, IsNotDeterminedByCamerasInOnePlace) {
 }
 
 }  // namespace
-}  // namespace bslam::solver
+}  // namespace bslam::estimators

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "solver/relative_pose.h"
+#include "estimators/relative_pose.h"
 
-namespace bslam::solver {
+namespace bslam::estimators {
 
 // p_b = R_b_a p_a + t_b_a, with a translation of norm 1.
 struct EpipolarPose {
@@ -30,4 +30,4 @@ Eigen::Vector3d midpoint_in_a(const EpipolarPose& pose, const BearingPair& pair)
 EpipolarPose refine_epipolar(const EpipolarPose& start, std::span<const BearingPair> pairs,
                              const std::vector<std::uint8_t>& use, double knee);
 
-}  // namespace bslam::solver
+}  // namespace bslam::estimators
