@@ -94,8 +94,9 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
-  frames_.push_back(outcome.record);
-  if (refuted_young_map(outcome, had_pose)) give_up_young_map();
+  const bool refuted = refuted_young_map(outcome, had_pose);
+  frames_.push_back(std::move(outcome.record));
+  if (refuted) give_up_young_map();
   FrameRecord record = frames_.back();
   bound_history();
   return record;
