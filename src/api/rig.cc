@@ -8,11 +8,11 @@
 #include "api/guard.h"
 #include "api/rig_impl.h"
 #include "base/atomic_file.h"
+#include "calibration/rig_warnings.h"
 #include "camera/camera_description.h"
 #include "image_files/mask.h"
 #include "image_files/png_decoder.h"
 #include "rig_formats/rig_file.h"
-#include "rig_formats/rig_warnings.h"
 
 namespace bslam {
 namespace {
@@ -142,6 +142,6 @@ CameraCalibration Rig::camera(std::size_t i) const {
 
 std::vector<std::string> Rig::notes() const { return impl_->notes; }
 
-std::vector<std::string> Rig::warnings() const { return rig_formats::rig_warnings(impl_->rig); }
+std::vector<std::string> Rig::warnings() const { return calibration::rig_warnings(impl_->rig); }
 
 }  // namespace bslam

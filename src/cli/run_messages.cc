@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "rig_formats/rig_warnings.h"
+#include "calibration/rig_warnings.h"
 
 namespace bslam::cli {
 namespace {
@@ -86,7 +86,7 @@ void warn_if_nothing_matches(const session::RunRecord& record, const camera::Rig
 
 void print_rig_warnings(const camera::Rig& rig) {
   constexpr std::size_t kShown = 2;
-  const std::vector<std::string> warnings = rig_formats::rig_warnings(rig);
+  const std::vector<std::string> warnings = calibration::rig_warnings(rig);
   for (std::size_t i = 0; i < std::min(kShown, warnings.size()); ++i) fmt::print(stderr, "warning: {}\n", warnings[i]);
   if (warnings.size() > kShown)
     fmt::print(stderr, "warning: {} more warnings about the calibration: bslam rig info\n", warnings.size() - kShown);

@@ -8,7 +8,7 @@
 
 namespace bslam::cli {
 
-// Prints the first plausibility warnings about the calibration (rig_formats/rig_warnings.h) to stderr, before the run.
+// Prints the first plausibility warnings about the calibration (calibration/rig_warnings.h) to stderr, before the run.
 void print_rig_warnings(const camera::Rig& rig);
 
 // Prints warnings to stderr: cameras that were out or consistent with no other camera, images that could not be used,

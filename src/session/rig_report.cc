@@ -6,16 +6,18 @@
 #include <optional>
 
 #include "base/atomic_file.h"
+#include "calibration/convention_check.h"
+#include "calibration/rig_description.h"
+#include "calibration/rig_warnings.h"
+#include "dataset/frame_reader.h"
 #include "image_decoding/image_file.h"
 #include "report/rig_plot.h"
-#include "rig_formats/rig_description.h"
 #include "rig_formats/rig_file.h"
-#include "rig_formats/rig_warnings.h"
-#include "session/extrinsics_check.h"
 
 namespace bslam::session {
 namespace {
 
+using calibration::PairEvidence;
 using Json = nlohmann::ordered_json;
 
 Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -23,7 +25,7 @@ Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Json camera_json(const camera::Rig& rig, std::size_t i) {
   const camera::Camera& camera = rig.camera(i);
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
-  const rig_formats::FieldOfView view = rig_formats::field_of_view(camera);
+  const calibration::FieldOfView view = calibration::field_of_view(camera);
   const geometry::SE3& T = rig.body_from_cam(i);
   Json overlaps = Json::array();
   for (std::size_t j = 0; j < rig.size(); ++j) overlaps.push_back(i == j ? 1.0 : rig.overlap_share(i, j));
@@ -58,14 +60,14 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
                      {"fit_another", pair.other ? Json(pair.other->agreeing) : Json()},
                      {"another_turned_deg", pair.other ? Json(pair.other->turned_deg) : Json()},
                      {"another_displaced_deg", pair.other ? Json(pair.other->displaced_deg) : Json()},
-                     {"verdict", pair.verdict ? Json(convention_in_words(*pair.verdict)) : Json()}});
+                     {"verdict", pair.verdict ? Json(calibration::convention_in_words(*pair.verdict)) : Json()}});
   }
   return pairs;
 }
 
 // Likely mistakes in the calibration, and masks that cannot be used.
 std::vector<std::string> warnings_of(const camera::Rig& rig) {
-  std::vector<std::string> warnings = rig_formats::rig_warnings(rig);
+  std::vector<std::string> warnings = calibration::rig_warnings(rig);
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const auto mask = image_decoding::read_mask(rig.camera(i));
     if (!mask) warnings.push_back("mask of " + rig.camera(i).name + ": " + mask.error().message());
@@ -95,10 +97,26 @@ std::string as_json(const rig_formats::RigFile& file, const std::optional<std::v
 
 std::string as_text(const rig_formats::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
   std::string text =
-      fmt::format("format: {}\n", rig_formats::format_name(file.format)) + rig_formats::describe_rig(file.rig);
+      fmt::format("format: {}\n", rig_formats::format_name(file.format)) + calibration::describe_rig(file.rig);
   for (const std::string& note : file.notes) text += "note: " + note + "\n";
   for (const std::string& warning : warnings_of(file.rig)) text += "warning: " + warning + "\n";
-  return evidence ? text + describe_evidence(*evidence) : text;
+  return evidence ? text + calibration::describe_evidence(*evidence) : text;
+}
+
+// Tests the calibration against a few frames spread over a recording.
+Result<std::vector<PairEvidence>> check_against_images(const RigReportRequest& request) {
+  constexpr double kTolerance_s = 0.1;  // wide enough to group the images of cameras that fire late
+  constexpr std::size_t kFrames = 6;
+  const auto dataset =
+      dataset::open_dataset({.path = request.images, .rig_file = request.file, .sync_tolerance_s = kTolerance_s});
+  if (!dataset) return dataset.error();
+  const auto masks = image_decoding::read_masks(dataset->rig);
+  if (!masks) return masks.error();
+  const std::size_t size = dataset->frames.size(), count = std::min(kFrames, size);
+  std::vector<image::ImageBundle> frames;
+  for (std::size_t k = 0; k < count; ++k)
+    frames.push_back(dataset::read_frame(*dataset, (2 * k + 1) * size / (2 * count)));
+  return calibration::check_conventions(dataset->rig, frames, *masks);
 }
 
 }  // namespace
@@ -112,12 +130,7 @@ Result<std::string> report_rig(const RigReportRequest& request) {
   }
   std::optional<std::vector<PairEvidence>> evidence;
   if (!request.images.empty()) {
-    // Wide enough to group the images of cameras that fire late.
-    constexpr double kTolerance_s = 0.1;
-    const auto dataset =
-        dataset::open_dataset({.path = request.images, .rig_file = request.file, .sync_tolerance_s = kTolerance_s});
-    if (!dataset) return dataset.error();
-    auto checked = check_extrinsics(*dataset);
+    auto checked = check_against_images(request);
     if (!checked) return checked.error();
     evidence = std::move(*checked);
   }

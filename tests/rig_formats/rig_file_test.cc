@@ -6,7 +6,6 @@
 #include "camera/test_cameras.h"
 #include "geometry/random_transforms.h"
 #include "rig_formats/euroc_sensor.h"
-#include "rig_formats/rig_description.h"
 #include "support/data_on_disk.h"
 
 namespace bslam::rig_formats {
@@ -311,25 +310,6 @@ TEST_F(OwnRigFile, KittiCalibrationIsChecked) {
             "the line twice");
   EXPECT_EQ(broken("nothing\n").found, "no projection");
   EXPECT_EQ(broken("P3: 700 0 600 0 0 710 180 0 0 0 1 0\n").found, "no images in its folder");
-}
-
-// ---- in words
-
-TEST(RigDescription, SpeaksOfDisplacements) {
-  EXPECT_EQ(displacement_in_words({0.11, 0, 0}), "11.0 cm to the right");
-  EXPECT_EQ(displacement_in_words({-1.2, 0.02, -0.3}), "1.20 m to the left, 30.0 cm behind, 2.0 cm below");
-  EXPECT_EQ(displacement_in_words({0, -0.005, 0.001}), "5.0 mm above, 1.0 mm in front");
-  EXPECT_EQ(displacement_in_words({0, 0, 0}), "at the same position");
-}
-
-TEST(RigDescription, MeasuresFieldsOfView) {
-  const camera::Camera pinhole{"p", camera::Pinhole({50, 50, 49.5, 39.5}), 100, 80, 0, ""};
-  const FieldOfView view = field_of_view(pinhole);
-  EXPECT_NEAR(view.horizontal, 2 * std::atan(49.5 / 50), 1e-9);
-  EXPECT_NEAR(view.vertical, 2 * std::atan(39.5 / 50), 1e-9);
-  EXPECT_NEAR(view.diagonal, 2 * std::atan(std::hypot(49.5, 39.5) / 50), 1e-9);
-  const camera::Camera wide{"w", camera::KannalaBrandt({130, 130, 319.5, 239.5}, {0, 0, 0, 0}), 640, 480, 0, ""};
-  EXPECT_NEAR(field_of_view(wide).horizontal, 2 * 319.5 / 130, 1e-9);  // 281 degrees: more than half the sphere
 }
 
 }  // namespace

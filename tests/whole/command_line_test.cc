@@ -13,8 +13,8 @@
 #include <string>
 #include <thread>
 
+#include "calibration/rig_warnings.h"
 #include "rig_formats/rig_file.h"
-#include "rig_formats/rig_warnings.h"
 #include "simulator/simulation_writer.h"
 #include "synthetic/rigs.h"
 
@@ -323,7 +323,7 @@ TEST_F(CommandLine, InspectShowsABundledTableThatHoldsTogether) {
 
 TEST_F(CommandLine, ARunSaysThatItsCalibrationIsProbablyWrong) {
   const camera::Rig rig = rig_formats::read_rig(data() + "/rig.yaml").value();
-  ASSERT_TRUE(rig_formats::write_rig(rig_formats::with_inverse_extrinsics(rig), out("inverse.yaml")));
+  ASSERT_TRUE(rig_formats::write_rig(calibration::with_inverse_extrinsics(rig), out("inverse.yaml")));
   const std::string options = " --set features.per_image=500 --progress never --rig ";
   const Ran inverse = run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse"));
   EXPECT_NE(inverse.err.find("of the features match between any two"), std::string::npos) << inverse.err;

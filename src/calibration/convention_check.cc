@@ -1,4 +1,4 @@
-#include "session/extrinsics_check.h"
+#include "calibration/convention_check.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -7,21 +7,18 @@
 #include <map>
 #include <set>
 
-#include "dataset/frame_reader.h"
 #include "estimators/epipolar.h"
 #include "feature/descriptor_matching.h"
 #include "feature/extractor.h"
 #include "frame/capture_times.h"
 #include "geometry/so3.h"
 #include "geometry/triangulation.h"
-#include "image_decoding/image_file.h"
 
-namespace bslam::session {
+namespace bslam::calibration {
 namespace {
 
 using geometry::SE3;
 
-constexpr int kFrames = 6;            // frames tested, spread over the data set
 constexpr int kMaxHamming = 60;       // bits; largest descriptor distance of a match
 constexpr double kRatio = 0.85;       // largest ratio of best to second best descriptor distance
 constexpr double kTolerancePx = 2.0;  // of calibration and feature localisation together
@@ -174,20 +171,18 @@ struct View {
 };
 
 // Keypoints by camera and frame.
-std::vector<std::vector<View>> extract_views(const dataset::Dataset& dataset, std::span<const image::Image> masks) {
-  const camera::Rig& rig = dataset.rig;
+std::vector<std::vector<View>> extract_views(const camera::Rig& rig, std::span<const image::ImageBundle> frames,
+                                             std::span<const image::Image> masks) {
   std::vector<std::vector<View>> views(rig.size());
   feature::Extractor extractor({});
-  const std::size_t frames = std::min<std::size_t>(kFrames, dataset.frames.size());
-  for (std::size_t k = 0; k < frames; ++k) {
-    const image::ImageBundle bundle = dataset::read_frame(dataset, (2 * k + 1) * dataset.frames.size() / (2 * frames));
+  for (const image::ImageBundle& bundle : frames) {
     for (std::size_t c = 0; c < rig.size(); ++c) {
       const image::CameraImage& image = bundle.images[c];
       View& view = views[c].emplace_back();
       if (image.state != image::ImageState::kPresent) continue;
       view.time_ns = image.time_ns;
       image::Pyramid pyramid;
-      extractor.extract(image.image.view(), masks[c].view(), rig.camera(c), pyramid, view.keypoints);
+      extractor.extract(image.view(), masks[c].view(), rig.camera(c), pyramid, view.keypoints);
     }
   }
   return views;
@@ -195,11 +190,9 @@ std::vector<std::vector<View>> extract_views(const dataset::Dataset& dataset, st
 
 }  // namespace
 
-Result<std::vector<PairEvidence>> check_extrinsics(const dataset::Dataset& dataset) {
-  const camera::Rig& rig = dataset.rig;
-  const auto masks = image_decoding::read_masks(rig);
-  if (!masks) return masks.error();
-  const std::vector<std::vector<View>> views = extract_views(dataset, *masks);
+std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<const image::ImageBundle> frames,
+                                            std::span<const image::Image> masks) {
+  const std::vector<std::vector<View>> views = extract_views(rig, frames, masks);
   std::vector<PairEvidence> evidence;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
@@ -283,4 +276,4 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
   return text + "  the extrinsics are consistent with the images" + unjudged(evidence) + "\n";
 }
 
-}  // namespace bslam::session
+}  // namespace bslam::calibration

@@ -1,14 +1,14 @@
-#include "rig_formats/rig_warnings.h"
+#include "calibration/rig_warnings.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/rig_description.h"
 #include "geometry/triangulation.h"
-#include "rig_formats/rig_description.h"
 
-namespace bslam::rig_formats {
+namespace bslam::calibration {
 namespace {
 
 using geometry::degrees;
@@ -206,4 +206,4 @@ std::string length_in_words(double metres) {
   return fmt::format("{:.1f} mm", 1000 * metres);
 }
 
-}  // namespace bslam::rig_formats
+}  // namespace bslam::calibration

@@ -6,7 +6,7 @@
 
 #include "camera/rig.h"
 
-namespace bslam::rig_formats {
+namespace bslam::calibration {
 
 // One line for each of:
 // - two cameras closer than 1 mm, with equal poses, or further apart than 5 m;
@@ -28,4 +28,4 @@ camera::Rig with_inverse_extrinsics(const camera::Rig& rig);
 // "1.20 m", "11.0 cm", "0.4 mm"
 std::string length_in_words(double metres);
 
-}  // namespace bslam::rig_formats
+}  // namespace bslam::calibration

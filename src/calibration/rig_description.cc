@@ -1,4 +1,4 @@
-#include "rig_formats/rig_description.h"
+#include "calibration/rig_description.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,10 +8,10 @@
 #include <cmath>
 
 #include "base/timestamp.h"
+#include "calibration/rig_warnings.h"
 #include "geometry/triangulation.h"
-#include "rig_formats/rig_warnings.h"
 
-namespace bslam::rig_formats {
+namespace bslam::calibration {
 namespace {
 
 using geometry::degrees;
@@ -136,4 +136,4 @@ std::string describe_rig(const camera::Rig& rig) {
   return text + overlap_table(rig);
 }
 
-}  // namespace bslam::rig_formats
+}  // namespace bslam::calibration

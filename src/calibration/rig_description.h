@@ -6,7 +6,7 @@
 
 #include "camera/rig.h"
 
-namespace bslam::rig_formats {
+namespace bslam::calibration {
 
 // Angles of view in radians, measured along lines through the principal point. If the border of the image is outside of
 // the domain of the camera model, the angle ends where the domain ends.
@@ -22,4 +22,4 @@ std::string displacement_in_words(const geometry::Vector3d& displacement);
 // Several lines: model, resolution, fields of view and pose of every camera; baselines; overlaps.
 std::string describe_rig(const camera::Rig& rig);
 
-}  // namespace bslam::rig_formats
+}  // namespace bslam::calibration

@@ -1,4 +1,4 @@
-#include "rig_formats/rig_warnings.h"
+#include "calibration/rig_warnings.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "camera/test_cameras.h"
 
-namespace bslam::rig_formats {
+namespace bslam::calibration {
 namespace {
 
 using geometry::SE3;
@@ -107,4 +107,4 @@ TEST(RigWarnings, SpeakOfCamerasInEachOthersView) {
 }
 
 }  // namespace
-}  // namespace bslam::rig_formats
+}  // namespace bslam::calibration

@@ -1,5 +1,7 @@
-// Tests the extrinsics of a rig against its images. Features that two cameras see at the same time must satisfy their
-// epipolar geometry. It is tested under the calibration as given and under common mistakes such as inverted transforms.
+// Tests against images whether a calibration file was read in the convention that was meant. Features that two cameras
+// see at the same time must satisfy their epipolar geometry. It is tested under the calibration as given and under
+// common mistakes such as inverted transforms. Unlike the refinement of a rig (rig_refinement.h), it needs neither a
+// map nor a calibration that is nearly right.
 #pragma once
 
 #include <array>
@@ -10,11 +12,11 @@
 #include <string_view>
 #include <vector>
 
-#include "base/result.h"
-#include "dataset/dataset.h"
+#include "camera/rig.h"
 #include "feature/keypoints.h"
+#include "image/image_bundle.h"
 
-namespace bslam::session {
+namespace bslam::calibration {
 
 // Interpretations of the transforms of a calibration file.
 enum class Convention {
@@ -50,11 +52,12 @@ struct PairEvidence {
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Detections> of_i,
                         std::span<const feature::Detections> of_j);
 
-// Judges every pair of cameras by a few frames spread over the data set, using images taken at the same time. Masked
-// pixels are ignored. Errors: a mask that cannot be read.
-Result<std::vector<PairEvidence>> check_extrinsics(const dataset::Dataset& dataset);
+// Judges every pair of cameras (i, j), i < j, by the images that they took at the same time. A few frames spread over a
+// recording suffice. `masks` has one image per camera, empty or of its resolution; keypoints where it is 0 are ignored.
+std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<const image::ImageBundle> frames,
+                                            std::span<const image::Image> masks);
 
 // The report for users: one line per pair and a conclusion.
 std::string describe_evidence(std::span<const PairEvidence> evidence);
 
-}  // namespace bslam::session
+}  // namespace bslam::calibration
