@@ -67,7 +67,7 @@ BENCHMARK(Snapshot);
 
 void EmptyDraft(benchmark::State& state) {
   MapStore copy(fresh());
-  for (auto _ : state) copy.commit(MapDraft("empty", copy.snapshot()));
+  for (auto _ : state) copy.commit(MapDraft(copy.snapshot()));
 }
 BENCHMARK(EmptyDraft)->Unit(benchmark::kMicrosecond);
 
@@ -83,7 +83,7 @@ void CommitKeyframe(benchmark::State& state) {
     state.PauseTiming();
     MapStore copy(fresh());
     state.ResumeTiming();
-    MapDraft draft("tracking", copy.snapshot());
+    MapDraft draft(copy.snapshot());
     draft.add_keyframe(frames()[0], {}, matches, {});
     copy.commit(std::move(draft));
   }
@@ -103,7 +103,7 @@ void CommitPoses(benchmark::State& state) {
   }
   MapStore copy(fresh());
   for (auto _ : state) {
-    MapDraft draft("adjustment", copy.snapshot());
+    MapDraft draft(copy.snapshot());
     draft.set_poses(poses);
     copy.commit(std::move(draft));
   }
@@ -115,7 +115,7 @@ void CommitVisibilityCounts(benchmark::State& state) {
   for (std::size_t i = 0; i < 1000; ++i) visibility_counts.push_back({LandmarkId(50000 + 2 * i), 1, 1});
   MapStore copy(fresh());
   for (auto _ : state) {
-    MapDraft draft("tracking", copy.snapshot());
+    MapDraft draft(copy.snapshot());
     draft.add_visibility_counts(visibility_counts);
     copy.commit(std::move(draft));
   }
@@ -130,7 +130,7 @@ void CommitMappingRun(benchmark::State& state) {
     MapStore copy(fresh());
     Random random(4, "map bench");
     state.ResumeTiming();
-    MapDraft draft("mapping", copy.snapshot());
+    MapDraft draft(copy.snapshot());
     std::vector<LandmarkId> touched;
     for (std::size_t i = 0; i < 1000; ++i) {  // the last features of each keyframe are free
       std::vector<Observation> observations;
@@ -163,7 +163,7 @@ void RemoveKeyframe(benchmark::State& state) {
     state.PauseTiming();
     MapStore copy(fresh());
     state.ResumeTiming();
-    MapDraft draft("culling", copy.snapshot());
+    MapDraft draft(copy.snapshot());
     draft.remove_keyframe(KeyframeId(500));
     copy.commit(std::move(draft));
   }

@@ -4,8 +4,7 @@
 
 namespace bslam::map {
 
-MapDraft::MapDraft(std::string_view stage, MapSnapshot base)
-    : edit_{stage, std::move(base), {}}, working_(*edit_.base) {}
+MapDraft::MapDraft(MapSnapshot base) : edit_{std::move(base), {}}, working_(*edit_.base) {}
 
 KeyframeId MapDraft::add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                                   std::vector<std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent) {

@@ -37,7 +37,6 @@
 #pragma once
 
 #include <memory>
-#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -119,7 +118,6 @@ using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveO
                                SetTwists, AddVisibilityCounts, RefreshLandmarks, SetScale, SetRig>;
 
 struct MapEdit {
-  std::string_view stage;  // a string literal
   MapSnapshot base;
   std::vector<Operation> operations;
 };
@@ -129,7 +127,7 @@ struct MapEdit {
 // that changes nothing is not recorded.
 class MapDraft {
  public:
-  MapDraft(std::string_view stage, MapSnapshot base);
+  explicit MapDraft(MapSnapshot base);
 
   const BundledMap& map() const { return working_; }  // the base version with all changes so far
   bool corrects() const { return working_.gauge_epoch() != edit_.base->gauge_epoch(); }

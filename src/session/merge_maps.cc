@@ -26,13 +26,13 @@ Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedM
                              config.looping, features, static_cast<std::uint64_t>(config.seed));
   for (const KeyframeId k : ids.keyframes) {
     if (!store.snapshot()->alive(k)) continue;
-    map::MapDraft draft("loop", store.snapshot());
+    map::MapDraft draft(store.snapshot());
     const auto closure = closer.close(k, draft);
     if (!closure) continue;
     store.commit(std::move(draft));
     ++(closure->merged ? result.joined : result.loops);
   }
-  map::MapDraft draft("final", store.snapshot());
+  map::MapDraft draft(store.snapshot());
   mapping::adjust_globally(config.mapping, features, draft);
   store.commit(std::move(draft));
   result.map = *store.snapshot();

@@ -39,7 +39,7 @@ Statistics statistics(const looping::LoopClosure& closure) {
 execution::StageResult map_keyframe(const Config& config, const execution::StageTask& task,
                                     const map::MapSnapshot& base, std::stop_token stop) {
   if (!base->alive(task.keyframe)) return {};
-  map::MapDraft draft("map", base);
+  map::MapDraft draft(base);
   const mapping::MappingReport report =
       mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop));
   return {std::move(draft), {}, statistics(report)};
@@ -48,7 +48,7 @@ execution::StageResult map_keyframe(const Config& config, const execution::Stage
 execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserver& observer,
                                   const execution::StageTask& task, const map::MapSnapshot& base) {
   if (!base->alive(task.keyframe)) return {};
-  map::MapDraft draft("loop", base);
+  map::MapDraft draft(base);
   const auto closure = closer.close(task.keyframe, draft);
   if (!closure) return {};
   const auto time_of = [&](KeyframeId k) { return base->keyframe(k).frame->time_ns; };
@@ -57,7 +57,7 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
 }
 
 execution::StageResult adjust_globally(const Config& config, const map::MapSnapshot& base, std::stop_token stop) {
-  map::MapDraft draft("global", base);
+  map::MapDraft draft(base);
   const adjustment::AdjustmentReport report =
       mapping::adjust_globally(config.mapping, config.feature_model(), draft, std::move(stop));
   return {std::move(draft), {}, statistics(report)};

@@ -126,7 +126,7 @@ void System::finish() {
   executor_->drain();
   if (config_.final_adjustment && !config_.localize_only && !executor_->over()) {
     const Stopwatch watch;
-    map::MapDraft draft("final", gate_.newest());
+    map::MapDraft draft(gate_.newest());
     const auto stop = interruption_.get_token();
     draft.set_twists(twists_from_neighbours(draft.map(), first_keyframe_, frames_));
     final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);

@@ -234,7 +234,7 @@ bool Tracker::relocalise(const Input& input, TrackOutcome& outcome) {
 
 void Tracker::propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const {
   const Stopwatch watch;
-  map::MapDraft draft("track", input.map);
+  map::MapDraft draft(input.map);
   draft.add_visibility_counts(folded(std::move(outcome.next.track.visibility_counts)));
   if (relocaliser_) relocaliser_->describe(input.frame);
   NewKeyframe made = make_keyframe(input.frame, output.matches, output.result.T_rig_world, input.pyramids,

@@ -36,7 +36,7 @@ TrackResult not_started(const BundledFrame& frame) {
 void Tracker::start(const Input& input, TrackOutcome& outcome) const {
   const Stopwatch watch;
   outcome.record.result = not_started(input.frame);
-  map::MapDraft draft("start", input.map);
+  map::MapDraft draft(input.map);
   if (relocaliser_) relocaliser_->describe(input.frame);
   if (std::optional<StartedMap> started = initialise(input, outcome.next, draft)) {
     draft.set_scale(started->scale, started->scale_deviation);

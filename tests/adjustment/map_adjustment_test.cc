@@ -70,7 +70,7 @@ TEST(AdjustMap, BringsPerturbedPosesAndPointsNearTheTruth) {
     const Selection selection = everything(world.map, cameras == 1 ? 2 : 1);
     map::BundledMap start = world.map;
     perturb(selection, start);
-    map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
+    map::MapDraft draft(std::make_shared<const map::BundledMap>(start));
     const AdjustmentReport report =
         adjust_map(selection, {.robust_iterations = 10, .final_iterations = 10}, kFeatures, draft);
     ASSERT_TRUE(report.done) << cameras << " cameras";
@@ -91,7 +91,7 @@ double error_of_a_rig_with_late_cameras(bool knows_motion) {
   const Selection selection = everything(world.map, 2);
   map::BundledMap start = world.map;
   perturb(selection, start);
-  map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
+  map::MapDraft draft(std::make_shared<const map::BundledMap>(start));
   adjust_map(selection, {.robust_iterations = 10, .final_iterations = 10}, kFeatures, draft);
   return mean_pose_error_m(world, draft.map());
 }
@@ -112,7 +112,7 @@ TEST(AdjustMap, LeavesAloneWhatIsFixedOrNotSelected) {
   }
   map::BundledMap start = world.map;
   perturb(selection, start);
-  map::MapDraft draft("test", std::make_shared<const map::BundledMap>(start));
+  map::MapDraft draft(std::make_shared<const map::BundledMap>(start));
   ASSERT_TRUE(adjust_map(selection, {}, kFeatures, draft).done);
   for (const int k : {0, 1, 4}) {
     const SE3 &before = start.keyframe(KeyframeId(k)).T_rig_world,

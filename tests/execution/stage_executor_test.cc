@@ -94,7 +94,7 @@ TEST(Stage, OnlyALoopThatWillBeCommittedSupersedesGlobalAdjustment) {
   EXPECT_FALSE(superseded_by(Stage::kMap));
   EXPECT_FALSE(superseded_by(Stage::kGlobal));
   map::MapStore store{StageWorld().empty_map()};
-  const StageResult nothing, loop{map::MapDraft("loop", store.snapshot()), {}};
+  const StageResult nothing, loop{map::MapDraft(store.snapshot()), {}};
   EXPECT_FALSE(superseded_by(Stage::kLoop, nothing, *store.snapshot()));
   EXPECT_EQ(superseded_by(Stage::kLoop, loop, *store.snapshot()), Stage::kGlobal);
   EXPECT_FALSE(superseded_by(Stage::kMap, loop, *store.snapshot()));
@@ -256,7 +256,7 @@ TEST(StageExecutorReplay, SaysWhereTasksAreLeftBeforeTheFinalStep) {
   WorldRun run(journal, setup(hashing_stages(1)));
   run.frame_with_keyframe();
   run.executor->drain();
-  EXPECT_THROW(run.executor->commit(JournalStep::kFinal, map::MapDraft("final", run.gate.newest())), ReplayMismatch);
+  EXPECT_THROW(run.executor->commit(JournalStep::kFinal, map::MapDraft(run.gate.newest())), ReplayMismatch);
 }
 
 // A kGlobal that never ends by itself.

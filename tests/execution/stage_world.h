@@ -46,7 +46,7 @@ class StageWorld {
 
   // A keyframe with two landmarks of its own, placed by what the frame saw.
   KeyframeId add_keyframe(FrameId frame, const map::MapSnapshot& seen, execution::StageExecutor& executor) const {
-    map::MapDraft draft("track", seen);
+    map::MapDraft draft(seen);
     const auto hash = hash_of(*seen, static_cast<std::uint64_t>(frame.value()));
     Random random(hash);
     const KeyframeId k = draft.add_keyframe(frame_, map::random_pose(random, 0.2), {}, KeyframeId());

@@ -166,10 +166,10 @@ TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
   const auto place_match = locate_last(world);
   ASSERT_TRUE(place_match);
   map::MapStore store(world.map);
-  map::MapDraft loop("loop", store.snapshot());
+  map::MapDraft loop(store.snapshot());
   close_loop(measure(loop.map(), kLast, *place_match), *place_match, {}, kFeatures, loop);
 
-  map::MapDraft tracking("tracking", store.snapshot());
+  map::MapDraft tracking(store.snapshot());
   const KeyframeId newer =
       world.add(simulator.frame(FrameId(kRound + 2), kStepS * (kRound + 2)), rigid_drift());  // its expected pose
   std::vector<std::pair<FeatureId, LandmarkId>> matches;

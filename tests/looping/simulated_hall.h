@@ -157,7 +157,7 @@ class HallMap {
   }
 
   map::MapSnapshot snapshot() const { return std::make_shared<const map::BundledMap>(map); }
-  map::MapDraft draft() const { return map::MapDraft("test", snapshot()); }
+  map::MapDraft draft() const { return map::MapDraft(snapshot()); }
   const SE3& truth(KeyframeId k) const { return T_rig_world[k.index()]; }
   const Vector3d& truth(LandmarkId l) const { return true_place[l.index()]; }
 

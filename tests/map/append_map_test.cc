@@ -12,7 +12,7 @@ BundledMap worn_map(std::uint64_t seed) {
   MapStore store{BundledMap(synthetic_rig(2))};
   RandomEditor editor(seed);
   for (int batch = 0; batch < 8; ++batch) {
-    MapDraft draft("test", store.snapshot());
+    MapDraft draft(store.snapshot());
     for (int i = 0; i < 40; ++i) editor.change(draft);
     store.commit(std::move(draft));
   }

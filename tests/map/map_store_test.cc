@@ -14,7 +14,7 @@ TEST(MapStore, CountsVersionsAndGivesProvisionalIdsWhereNothingCameBetween) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};
   EXPECT_EQ(store.snapshot()->version(), MapVersion(0));
-  MapDraft draft("test", store.snapshot());
+  MapDraft draft(store.snapshot());
   const KeyframeId k = draft.add_keyframe(synthetic_frame(random, 1, 10, 0), {}, {}, {});
   const LandmarkId l = draft.add_landmark({0, 0, 5}, {{k, FeatureId(3)}});
   EXPECT_EQ(store.snapshot()->keyframe_slots(), 0u);  // the draft is not visible to others
@@ -31,7 +31,7 @@ TEST(MapStore, CountsVersionsAndGivesProvisionalIdsWhereNothingCameBetween) {
 TEST(MapStore, GivesTheNextIdsWhereOthersWereFaster) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};
-  MapDraft first("first", store.snapshot()), second("second", store.snapshot());
+  MapDraft first(store.snapshot()), second(store.snapshot());
   for (MapDraft* draft : {&first, &second}) {
     const KeyframeId k = draft->add_keyframe(synthetic_frame(random, 1, 10, 0), {}, {}, {});
     EXPECT_EQ(k, KeyframeId(0));
@@ -51,12 +51,12 @@ TEST(MapStore, GivesTheNextIdsWhereOthersWereFaster) {
 TEST(MapStore, FreesWhatWasRemovedAlsoWhereOthersWereFasterAndNeverForReaders) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};
-  MapDraft made("made", store.snapshot());
+  MapDraft made(store.snapshot());
   const KeyframeId k = made.add_keyframe(synthetic_frame(random, 1, 40, 0), {}, {}, {});
   for (int i = 0; i < 40; ++i) made.add_landmark({0, 0, 5}, {{k, FeatureId(i)}});
   store.commit(std::move(made));
   const MapSnapshot reader = store.snapshot();
-  MapDraft first("first", reader), second("second", reader);
+  MapDraft first(reader), second(reader);
   for (int i = 0; i < 32; ++i) (i < 16 ? first : second).remove_landmark(LandmarkId(i));
   store.commit(std::move(first));
   const CommitReport report = store.commit(std::move(second));
@@ -77,7 +77,7 @@ TEST(MapStore, ServesReadersWhileTwoThreadsCommit) {
   const auto write = [&](std::uint64_t seed) {
     RandomEditor editor(seed);
     for (int i = 0; i < kCommits; ++i) {
-      MapDraft draft("writer", store.snapshot());
+      MapDraft draft(store.snapshot());
       for (int n = 0; n < 20; ++n) editor.change(draft);
       refused += store.commit(std::move(draft)).refused;
     }

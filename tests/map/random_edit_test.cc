@@ -12,7 +12,7 @@ TEST(RandomEdits, KeepTheInvariants) {
     MapStore store{BundledMap(synthetic_rig(2))};
     RandomEditor editor(seed);
     for (int batch = 0; batch < 150; ++batch) {
-      MapDraft draft("test", store.snapshot());
+      MapDraft draft(store.snapshot());
       for (int i = 0; i < 40; ++i) editor.change(draft);
       const CommitReport report = store.commit(std::move(draft));
       ASSERT_FALSE(report.rebased);
@@ -29,7 +29,7 @@ TEST(RandomEdits, LeaveOldSnapshotsAsTheyWere) {
   std::vector<std::pair<MapSnapshot, Fingerprint>> kept;
   for (int batch = 0; batch < 60; ++batch) {
     kept.emplace_back(store.snapshot(), Fingerprint(*store.snapshot()));
-    MapDraft draft("test", store.snapshot());
+    MapDraft draft(store.snapshot());
     for (int i = 0; i < 30; ++i) editor.change(draft);
     store.commit(std::move(draft));
   }
@@ -40,7 +40,7 @@ TEST(RandomEdits, GiveTheSameMapWhenAppliedAgainToTheirBase) {
   MapStore store{BundledMap(synthetic_rig(2))};
   RandomEditor editor(6);
   for (int batch = 0; batch < 60; ++batch) {
-    MapDraft draft("test", store.snapshot());
+    MapDraft draft(store.snapshot());
     for (int i = 0; i < 40; ++i) editor.change(draft);
     auto [edit, result] = MapDraft(draft).finish();
     BundledMap again = *edit.base;
@@ -57,7 +57,7 @@ TEST(RandomEdits, KeepTheInvariantsWhenRebased) {
   for (int batch = 0; batch < 100; ++batch) {
     std::vector<MapDraft> drafts;
     for (int d = 0; d < 3; ++d) {
-      drafts.emplace_back("test", store.snapshot());
+      drafts.emplace_back(store.snapshot());
       for (int i = 0; i < 25; ++i) editor.change(drafts.back());
     }
     for (std::size_t d = 0; d < drafts.size(); ++d) {

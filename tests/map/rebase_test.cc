@@ -18,13 +18,13 @@ constexpr KeyframeId kRoot{0}, kSecond{1}, kThird{2};
 class RebaseTest : public testing::Test {
  protected:
   RebaseTest() {
-    MapDraft draft("setup", store.snapshot());
+    MapDraft draft(store.snapshot());
     add_keyframe(draft, {});
     for (std::size_t i = 0; i < 30; ++i) draft.add_landmark(random_point(random), {{kRoot, FeatureId(i)}});
     for (int i = 0; i < 2; ++i) add_keyframe(draft, same_numbers(0, 30));
     store.commit(std::move(draft));
-    early.emplace("early", store.snapshot());
-    late.emplace("late", store.snapshot());
+    early.emplace(store.snapshot());
+    late.emplace(store.snapshot());
   }
 
   static Matches same_numbers(std::size_t from, std::size_t to) {
@@ -37,11 +37,11 @@ class RebaseTest : public testing::Test {
   }
   // Adds a submap of one keyframe to the version on which both drafts are based.
   KeyframeId begin_submap() {
-    MapDraft setup("setup", store.snapshot());
+    MapDraft setup(store.snapshot());
     const KeyframeId root = add_keyframe(setup, {});
     store.commit(std::move(setup));
-    early.emplace("early", store.snapshot());
-    late.emplace("late", store.snapshot());
+    early.emplace(store.snapshot());
+    late.emplace(store.snapshot());
     return root;
   }
   // Commits both drafts and returns the report of the late one.
@@ -92,11 +92,11 @@ TEST_F(RebaseTest, NewKeyframeFallsBackToAnAliveAncestor) {
 }
 
 TEST_F(RebaseTest, NewRootKeyframeBeginsASubmap) {
-  MapDraft setup("setup", store.snapshot());
+  MapDraft setup(store.snapshot());
   setup.remove_keyframe(kThird);
   store.commit(std::move(setup));
-  early.emplace("early", store.snapshot());
-  late.emplace("late", store.snapshot());
+  early.emplace(store.snapshot());
+  late.emplace(store.snapshot());
   add_keyframe(*early, same_numbers(0, 5));
   const KeyframeId k = add_keyframe(*late, {}, kThird);  // removed before the edit began, so it cannot be the parent
   EXPECT_FALSE(late->map().keyframe(k).parent.valid());
@@ -175,10 +175,10 @@ TEST_F(RebaseTest, NewObservationIsForwardedOrDropped) {
   early->merge_landmarks(LandmarkId(0), LandmarkId(20));
   early->remove_landmark(LandmarkId(1));
   early->add_landmark(random_point(random), {{kRoot, FeatureId(42)}});
-  MapDraft setup("setup", store.snapshot());
+  MapDraft setup(store.snapshot());
   for (std::size_t i = 0; i < 30; ++i) setup.remove_observation(LandmarkId(i), kRoot);
   store.commit(std::move(setup));
-  late.emplace("late", store.snapshot());
+  late.emplace(store.snapshot());
   EXPECT_TRUE(late->add_observation(LandmarkId(0), {kRoot, FeatureId(40), false}));
   EXPECT_TRUE(late->add_observation(LandmarkId(1), {kRoot, FeatureId(41)}));
   EXPECT_TRUE(late->add_observation(LandmarkId(2), {kRoot, FeatureId(42)}));
@@ -429,7 +429,7 @@ TEST_F(RebaseTest, NewKeyframesEndUpTheSameWhicheverOfTwoEditsComesFirst) {
   std::vector<SE3> ends;
   for (const bool keyframe_first : {true, false}) {
     MapStore copy{BundledMap(*store.snapshot())};
-    MapDraft adding("tracking", copy.snapshot()), moving("mapping", copy.snapshot());
+    MapDraft adding(copy.snapshot()), moving(copy.snapshot());
     const KeyframeId k = adding.add_keyframe(frame, T_new_world, same_numbers(0, 3), {});
     moving.set_poses({{{kThird, T_third_new}}, {}});
     copy.commit(std::move(keyframe_first ? adding : moving));

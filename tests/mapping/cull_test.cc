@@ -19,7 +19,7 @@ class Cull : public ::testing::Test {
   LandmarkId add_landmark(const std::vector<map::Observation>& observations) {
     return map.add_landmark(map::random_point(random), observations);
   }
-  map::MapDraft draft() const { return map::MapDraft("test", std::make_shared<const map::BundledMap>(map)); }
+  map::MapDraft draft() const { return map::MapDraft(std::make_shared<const map::BundledMap>(map)); }
   static FeatureId monocular(int i) { return FeatureId(static_cast<std::int32_t>(kMatched) + i); }
 
   Random random{1, "cull"};

@@ -86,7 +86,7 @@ class SimulatedMap {
   }
   geometry::SE3 true_pose(KeyframeId k) const { return frames[k.index()].T_world_rig.inverse(); }
   MapSnapshot snapshot() const { return std::make_shared<const BundledMap>(map); }
-  MapDraft draft() const { return MapDraft("test", snapshot()); }
+  MapDraft draft() const { return MapDraft(snapshot()); }
 
   FeatureSimulator sim;
   BundledMap map;

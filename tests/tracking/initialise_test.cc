@@ -11,8 +11,7 @@ namespace {
 using geometry::SE3;
 
 map::MapDraft empty_draft(const synthetic::FeatureSimulator& sim) {
-  return map::MapDraft("start",
-                       std::make_shared<const map::BundledMap>(std::make_shared<const camera::Rig>(sim.rig())));
+  return map::MapDraft(std::make_shared<const map::BundledMap>(std::make_shared<const camera::Rig>(sim.rig())));
 }
 
 TEST(StartMetric, MakesLandmarksAtTheirTruePlaces) {

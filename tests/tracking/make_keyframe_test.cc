@@ -138,7 +138,7 @@ TEST_F(MakeKeyframe, TwoLandmarksNeverShareAFeature) {
 
 TEST_F(MakeKeyframe, ACommitGivesTheSameMap) {
   map::MapStore store(world.map);
-  map::MapDraft draft("test", store.snapshot());
+  map::MapDraft draft(store.snapshot());
   const NewKeyframe made = make(draft);
   const auto report = store.commit(std::move(draft));
   ASSERT_EQ(report.keyframes.size(), 1u);

@@ -213,7 +213,7 @@ TEST(Tracker, LocalisingProposesNothing) {
 TEST(Tracker, FollowsTheScaleOfItsSubmap) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 5; ++i) run.process(run.frame(i));
-  map::MapDraft draft("test", run.store.snapshot());
+  map::MapDraft draft(run.store.snapshot());
   ASSERT_TRUE(draft.scale_submap(KeyframeId(0), 2.0));
   run.store.commit(std::move(draft));
   const geometry::Vector6d before = *run.state.track.twist;
