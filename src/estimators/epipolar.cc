@@ -120,8 +120,11 @@ EpipolarPose refine_epipolar(const EpipolarPose& start, std::span<const BearingP
   const State state{start, tangent_basis(start.t_b_a)};
   solver::SmallProblem<5, State, decltype(equations_at), decltype(plus)> problem(state, equations_at(state),
                                                                                  equations_at, plus);
-  solver::minimise(
-      problem, {.iterations = 15, .relative_decrease = 0.0, .min_gain = 0.0, .rule = solver::DampingRule::kOnFailure});
+  solver::minimise(problem, {.iterations = 15,
+                             .relative_decrease = 0.0,
+                             .min_gain = 0.0,
+                             .rule = solver::DampingRule::kOnFailure,
+                             .unit_cost = knee * knee});
   return problem.state().pose;
 }
 

@@ -89,8 +89,11 @@ SE3 refine(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) 
   const auto plus = [](const SE3& T, const Vector6d& delta) { return T.perturbed(delta); };
   solver::SmallProblem<6, SE3, decltype(equations_at), decltype(plus)> problem(T_b_a, equations_at(T_b_a), equations_at,
                                                                                plus);
-  solver::minimise(
-      problem, {.iterations = 20, .relative_decrease = 0.0, .min_gain = 0.0, .rule = solver::DampingRule::kOnFailure});
+  solver::minimise(problem, {.iterations = 20,
+                             .relative_decrease = 0.0,
+                             .min_gain = 0.0,
+                             .rule = solver::DampingRule::kOnFailure,
+                             .unit_cost = knee * knee});
   return problem.state();
 }
 

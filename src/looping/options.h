@@ -54,6 +54,7 @@ struct VerificationOptions {
   // rad: landmarks observed so far only from directions that differ by more than this need not be matched.
   double max_viewing_angle = 0.52;
   estimators::AbsolutePoseOptions consensus;
+  solver::PoseSolverOptions pose;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -71,6 +72,7 @@ struct VerificationOptions {
             "largest angle to a known viewing direction at which a landmark is predicted visible",
             OptionNote{.formerly = "max_turn"});
     visitor.section("consensus", self.consensus);
+    visitor.section("pose", self.pose);
   }
 };
 

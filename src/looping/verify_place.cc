@@ -164,9 +164,8 @@ std::optional<PlaceMatch> verify_place(const map::BundledMap& map, const camera:
   out.matches = static_cast<int>(matches.size());
   if (out.matches < options.consensus.min_inliers) return rejected(Rejection::kFewMatches);
 
-  const solver::PoseSolverOptions pose_options;
   solver::PoseSolution solution = estimators::absolute_pose(rig, observations_of(map, frame, matches, features),
-                                                            pose_options, options.consensus, random);
+                                                            options.pose, options.consensus, random);
   out.inliers = solution.num_inliers;
   if (!solution.ok) return rejected(Rejection::kNoConsensus);
 
@@ -176,7 +175,7 @@ std::optional<PlaceMatch> verify_place(const map::BundledMap& map, const camera:
   for (const double radius : {options.radius, 0.5 * options.radius}) {
     guided = search_at(rig, frame, place, solution.T_rig_world, radius, options, features);
     solution =
-        solver::solve_pose(rig, observations_of(map, frame, guided, features), solution.T_rig_world, pose_options);
+        solver::solve_pose(rig, observations_of(map, frame, guided, features), solution.T_rig_world, options.pose);
     if (!solution.ok) return rejected(Rejection::kNoConsensus);
   }
   out.inliers = solution.num_inliers;

@@ -1,6 +1,7 @@
 #include "mapping/local_adjustment.h"
 
 #include <algorithm>
+#include <map>
 
 namespace bslam::mapping {
 namespace {
@@ -45,16 +46,24 @@ std::vector<KeyframeId> other_observers(const map::BundledMap& map, const std::v
   return out;
 }
 
-// Number of poses to fix so that the gauge is determined: two if the scale is arbitrary, otherwise one.
+// Number of poses of a submap to fix so that its gauge is determined: two if the scale is arbitrary, otherwise one.
 std::size_t num_fixed_poses(const map::BundledMap& map) { return map.scale() == map::Scale::kUpToScale ? 2 : 1; }
 
-// Fixes the oldest free keyframes until enough poses are fixed; sorts both lists.
+// Fixes the oldest free keyframes of each submap until enough of its poses are fixed, but not all keyframes; sorts both
+// lists.
 void fix_gauge(const map::BundledMap& map, adjustment::Selection& selection) {
+  std::map<KeyframeId, std::size_t> num_fixed;  // by root
+  for (const KeyframeId k : selection.fixed_keyframes) ++num_fixed[map.root_of(k)];
   std::sort(selection.free_keyframes.begin(), selection.free_keyframes.end());
-  while (selection.fixed_keyframes.size() < num_fixed_poses(map) && selection.free_keyframes.size() > 1) {
-    selection.fixed_keyframes.push_back(selection.free_keyframes.front());
-    selection.free_keyframes.erase(selection.free_keyframes.begin());
-  }
+  std::size_t num_free = selection.free_keyframes.size();
+  std::erase_if(selection.free_keyframes, [&](KeyframeId k) {
+    std::size_t& fixed = num_fixed[map.root_of(k)];
+    if (fixed >= num_fixed_poses(map) || num_free <= 1) return false;
+    ++fixed;
+    --num_free;
+    selection.fixed_keyframes.push_back(k);
+    return true;
+  });
   std::sort(selection.fixed_keyframes.begin(), selection.fixed_keyframes.end());
 }
 

@@ -11,9 +11,6 @@ namespace {
 
 constexpr int kDensePoses = 150;
 constexpr double kObservedShare = 0.5;  // of the prior's standard deviation
-// Of observations with two degrees of freedom cut at their 95 % bound c, the share 0.95 is left, with the variance (and
-// its slope) 1 - exp(-c/2) (1 + c/2) = 0.80 of the whole (docs/math.md, section 4).
-constexpr double kShareLeft = 0.95, kVarianceLeft = 0.80;
 
 struct Round {
   Kernel kernel;
@@ -27,7 +24,7 @@ double variance_factor(const BundleStructure& structure, std::size_t cameras, do
   const double residuals = 2.0 * static_cast<double>(structure.terms.size());
   const double unknowns = 3.0 * static_cast<double>(structure.num_points()) +
                           6.0 * static_cast<double>(structure.pose_of_slot.size() + cameras - 1);
-  const double expected = std::max(1.0, residuals - unknowns) * kVarianceLeft / kShareLeft;
+  const double expected = std::max(1.0, residuals - unknowns) * kVarianceLeft / kFractionLeft;
   return 2.0 * cost / expected;
 }
 
@@ -40,7 +37,7 @@ bool assess(BundleEquations& equations, const RigBlock& extrinsics, const Extrin
   Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(information->rows(), information->cols());
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(information->rows());
   extrinsics.add_prior(equations.state().rig, prior, gradient);
-  const double trust = kVarianceLeft / kShareLeft / std::max(1.0, out.variance_factor);
+  const double trust = kVarianceLeft / kFractionLeft / std::max(1.0, out.variance_factor);
   const Eigen::LLT<Eigen::MatrixXd> factor(trust * (*information - prior) + prior);
   if (factor.info() != Eigen::Success) return false;
   const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(prior.rows(), prior.cols()));

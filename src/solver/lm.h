@@ -26,6 +26,7 @@ struct LmOptions {
   double min_gain = 1e-3;           // actual over predicted decrease from which a step is accepted
   DampingRule rule = DampingRule::kNielsen;
   double first_damping = 1e-4;  // factor of the diagonal, at the start or after the first failure
+  double unit_cost = 1.0;       // cost of a residual as large as its noise; 1e-10 of it counts as nothing
 };
 
 enum class LmStop { kConverged, kIterations, kStopped, kFailed };
@@ -82,7 +83,7 @@ class Damping {
 // are built once per accepted step, not after the last one.
 template <LeastSquaresProblem Problem>
 LmSummary minimise(Problem& problem, const LmOptions& options, const std::stop_token& stop = {}) {
-  constexpr double kRounding = 1e-10;  // share of the cost that rounding alone may change, and absolute cost of nothing
+  constexpr double kRounding = 1e-10;  // fraction of the cost, and of unit_cost, that rounding alone may change
   LmSummary out;
   double& cost = out.final_cost;
   out.initial_cost = cost = problem.linearise();
@@ -100,7 +101,7 @@ LmSummary minimise(Problem& problem, const LmOptions& options, const std::stop_t
       cost -= *predicted;
       return end(LmStop::kConverged);
     }
-    if (predicted && *predicted <= kRounding * (1.0 + cost)) return end(LmStop::kConverged);
+    if (predicted && *predicted <= kRounding * (options.unit_cost + cost)) return end(LmStop::kConverged);
     const double trial = predicted ? problem.trial_cost() : std::numeric_limits<double>::infinity();
     const double decrease = cost - trial;
     if (!predicted || !(decrease >= options.min_gain * *predicted)) {

@@ -95,14 +95,16 @@ PoseProblem::PoseProblem(const Rig& rig, std::span<const PoseObservation> observ
 }
 
 // T exp(delta) = exp(Ad_T delta) T. With T_cam_rig = T_i0 exp(delay twist), the pose's change moves the camera directly
-// and by the change of the twist, gain * delta; the latter to first order in delay times twist.
+// and by the change of the twist, gain * J_l^-1(step) delta, which moves it by J_l(delay twist) times delay. Both left
+// Jacobians J_l(x) of SE(3) are replaced by Ad(exp(x / 2)), which differs in second order (docs/math.md, section 13).
 PoseProblem::CameraMotion PoseProblem::camera_motion(std::size_t i, const SE3& T_rig_world) const {
   const SE3& T_i0 = rig_->cam_from_rig(i);
   const double delay = motion_ != nullptr ? motion_->delay_s[i] : 0.0;
   if (delay == 0.0) return {T_i0, T_i0.adjoint()};
-  const SE3 half = SE3::exp(0.5 * delay * motion_->twist(T_rig_world));
+  const geometry::Vector6d step = motion_->step(T_rig_world);
+  const SE3 half = SE3::exp(0.5 * delay * (motion_->gain * step + motion_->offset));
   const SE3 T_cam_rig = T_i0 * half * half;
-  return {T_cam_rig, T_cam_rig.adjoint() + delay * motion_->gain * (T_i0 * half).adjoint()};
+  return {T_cam_rig, T_cam_rig.adjoint() + delay * motion_->gain * (T_i0 * half * SE3::exp(-0.5 * step)).adjoint()};
 }
 
 int PoseProblem::select(const SE3& T_rig_world, double bound) {

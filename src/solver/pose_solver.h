@@ -40,9 +40,9 @@ struct MotionModel {
   double gain = 0.0;                                       // 1/s
   geometry::Vector6d offset = geometry::Vector6d::Zero();  // rad/s, m/s
 
-  geometry::Vector6d twist(const SE3& T_rig_world) const {
-    return gain * (T_rig_world * T_before.inverse()).log() + offset;
-  }
+  // Logarithm of the motion since the frame before.
+  geometry::Vector6d step(const SE3& T_rig_world) const { return (T_rig_world * T_before.inverse()).log(); }
+  geometry::Vector6d twist(const SE3& T_rig_world) const { return gain * step(T_rig_world) + offset; }
 };
 
 struct PoseSolution {

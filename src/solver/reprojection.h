@@ -72,6 +72,11 @@ struct ReprojectionResidual {
                                             const Vector3d& point_world, const Vector2d& pixel);
 };
 
+// Of observations with two degrees of freedom that are cut off at their 95 % bound c, the fraction 0.95 is left, with
+// the variance (and its derivative) 1 - exp(-c/2) (1 + c/2) = 0.80 of the whole. Covariances from the inverse of the
+// normal equations of those that are left are too small by the ratio of the two (docs/math.md, section 4).
+constexpr double kFractionLeft = 0.95, kVarianceLeft = 0.80;
+
 // Bounds of chi-square at 95 %.
 constexpr double kChi2OneDof95 = 3.841, kChi2TwoDof95 = 5.991;
 

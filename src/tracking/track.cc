@@ -92,8 +92,8 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   }
   motion.gain = 1.0 / dt;
   if (!input.state.twist) return motion;
-  const double ahead =
-      0.5 * (dt + frame::farthest_delay_s(frame)) / dt;  // from the middle of the interval, in intervals
+  // From the middle of this interval to the middle of the delays, in distances of the middles of the two intervals.
+  const double ahead = (dt + frame::farthest_delay_s(frame)) / (dt + input.state.twist_interval_s);
   motion.gain = (1.0 + ahead) / dt;
   motion.offset = -ahead * *input.state.twist;
   return motion;
@@ -306,9 +306,10 @@ TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, Lo
 
 namespace {
 
+// The inverse of the information, corrected for the inliers that the bound on their errors has cut off.
 geometry::Matrix6d covariance_of(const solver::PoseSolution& solution) {
   const geometry::Matrix6d covariance = solution.information.ldlt().solve(geometry::Matrix6d::Identity());
-  return 0.5 * (covariance + covariance.transpose());
+  return 0.5 * solver::kFractionLeft / solver::kVarianceLeft * (covariance + covariance.transpose());
 }
 
 TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& fine, const TrackingOptions& options) {
@@ -334,7 +335,10 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& f
 
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
   state.twist.reset();
-  if (dt > 0 && dt <= kMaxPrediction_s) state.twist = (result.T_rig_world * last_pose(input).inverse()).log() / dt;
+  if (dt > 0 && dt <= kMaxPrediction_s) {
+    state.twist = (result.T_rig_world * last_pose(input).inverse()).log() / dt;
+    state.twist_interval_s = dt;
+  }
   state.status = TrackStatus::kTracking;
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);

@@ -56,6 +56,7 @@ struct TrackerState {
   TimeNs time_ns = 0;                       // of the last tracked frame
   map::AnchoredPose anchored;               // pose of the last tracked frame
   std::optional<geometry::Vector6d> twist;  // T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); rad/s, m/s
+  double twist_interval_s = 0;              // time between the two frames from which the twist was computed
   std::vector<LandmarkId> landmarks;        // inliers of the last tracked frame
   std::vector<CameraTrust> cameras;         // empty as long as no frame was tracked
   int frames_since_keyframe = 0;

@@ -39,7 +39,8 @@ void Tracker::start(const Input& input, TrackOutcome& outcome) const {
   map::MapDraft draft(input.map);
   if (relocaliser_) relocaliser_->describe(input.frame);
   if (std::optional<StartedMap> started = initialise(input, outcome.next, draft)) {
-    draft.set_scale(started->scale, started->scale_deviation);
+    // All submaps share the scale that the first one declared: where that is not metric, each has a unit of its own.
+    if (input.map->num_keyframes() == 0) draft.set_scale(started->scale, started->scale_deviation);
     outcome.edit = ProposedEdit{ProposedEdit::Kind::kStart, std::move(draft),
                                 std::move(started->keyframes.back().landmarks), input.map->landmark_slots()};
   } else {

@@ -81,7 +81,7 @@ TEST(PoseWithMotion, HasTheGradientOfItsCost) {
     const double gradient = (problem.linearise(at.perturbed(delta), Kernel::kNone).cost -
                              problem.linearise(at.perturbed(-delta), Kernel::kNone).cost) /
                             (2 * kStep);
-    EXPECT_NEAR(equations.b(k), -gradient, 0.02 * equations.b.cwiseAbs().maxCoeff()) << k;
+    EXPECT_NEAR(equations.b(k), -gradient, 1e-4 * equations.b.cwiseAbs().maxCoeff()) << k;
   }
 }
 

@@ -333,7 +333,7 @@ TEST(TrackerState, StartsAfreshAtAKeyframe) {
 
 TEST(LostReason, EachHasWordsOfItsOwn) {
   std::vector<std::string_view> words;
-  for (int i = 1; i <= static_cast<int>(LostReason::kUnstablePose); ++i)
+  for (int i = 1; i <= static_cast<int>(LostReason::kNotFound); ++i)
     words.push_back(describe(static_cast<LostReason>(i)));
   for (std::size_t i = 0; i < words.size(); ++i) {
     EXPECT_FALSE(words[i].empty());
