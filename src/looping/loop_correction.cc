@@ -97,13 +97,19 @@ void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_w
   }
 }
 
+// Moves a keyframe from one vertex of the pose graph to another; lengths about it change with the vertex's scale.
+void move_keyframe(KeyframeId k, const Sim3& before, const Sim3& after, map::SetPoses& poses) {
+  poses.keyframes.emplace_back(k, pose_of(after));
+  if (after.scale() != before.scale()) poses.scale_changes.emplace_back(k, before.scale() / after.scale());
+}
+
 // Moves the keyframes of the window, and the landmarks attached to them, to their poses relative to the place.
 void move_window(const std::vector<KeyframeId>& window, const EssentialGraph& graph, const std::vector<Sim3>& before,
                  map::MapDraft& draft) {
   map::SetPoses poses;
   for (const KeyframeId k : window) {
     const auto v = static_cast<std::size_t>(graph.vertex(k));
-    poses.keyframes.emplace_back(k, pose_of(graph.problem.S_world[v]));
+    move_keyframe(k, before[v], graph.problem.S_world[v], poses);
     for (const LandmarkId l : mapping::landmarks_of(draft.map(), k)) {
       const map::Landmark& landmark = draft.map().landmark(l);
       if (landmark.reference.keyframe != k) continue;
@@ -140,7 +146,7 @@ map::SetPoses corrected(const map::BundledMap& map, const EssentialGraph& graph,
   map::SetPoses poses;
   poses.correction = true;
   for (std::size_t v = 0; v < graph.keyframes.size(); ++v) {
-    poses.keyframes.emplace_back(graph.keyframes[v], pose_of(graph.problem.S_world[v]));
+    move_keyframe(graph.keyframes[v], before[v], graph.problem.S_world[v], poses);
   }
   for (const LandmarkId l : map.landmark_ids()) {
     const int v = graph.vertex(map.landmark(l).reference.keyframe);

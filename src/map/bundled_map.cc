@@ -250,6 +250,19 @@ bool BundledMap::scale_submap(KeyframeId root, double factor) {
   return true;
 }
 
+void BundledMap::scale_keyframes(std::span<const std::pair<KeyframeId, double>> factors) {
+  std::vector<double> factor_of(keyframes_.size(), 1.0);
+  for (const auto& [k, factor] : factors) factor_of[k.index()] = factor;
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    const KeyframeId now = nearest_alive_ancestor(KeyframeId(i));
+    if (!now.valid() || factor_of[now.index()] == 1.0) continue;
+    BundledKeyframe& entry = edit(KeyframeId(i));
+    entry.scale *= factor_of[now.index()];
+    entry.twist.tail<3>() *= factor_of[now.index()];
+    if (!entry.alive) entry.T_rig_parent = geometry::scaled(entry.T_rig_parent, factor_of[now.index()]);
+  }
+}
+
 bool BundledMap::set_twist(KeyframeId k, const geometry::Vector6d& twist) {
   if (!alive(k)) return false;
   edit(k).twist = twist;

@@ -143,6 +143,9 @@ class BundledMap {
   // Scales a submap about the origin by `factor`, including the relative poses of its removed keyframes, and begins a
   // gauge epoch. Returns false if `root` is not the root of a submap.
   bool scale_submap(KeyframeId root, double factor);
+  // Records that lengths about keyframes have changed by these factors: what is stored relative to one of them (frames,
+  // removed keyframes, its twist) follows. Poses and positions in the world are set separately.
+  void scale_keyframes(std::span<const std::pair<KeyframeId, double>> factors);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
   bool set_twist(KeyframeId k, const geometry::Vector6d& twist);
   bool set_position(LandmarkId l, const Eigen::Vector3d& position);

@@ -90,6 +90,8 @@ struct SetPoses {
   std::vector<std::pair<KeyframeId, geometry::SE3>> keyframes;  // T_rig_world
   std::vector<std::pair<LandmarkId, Eigen::Vector3d>> landmarks;
   bool correction = false;  // a correction of the whole map: begins a gauge epoch
+  // Factors by which lengths about a keyframe change (BundledMap::scale_keyframes); keyframes without one keep theirs.
+  std::vector<std::pair<KeyframeId, double>> scale_changes = {};
 };
 struct SetTwists {
   std::vector<std::pair<KeyframeId, geometry::Vector6d>> keyframes;  // BundledKeyframe::twist

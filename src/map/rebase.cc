@@ -93,7 +93,8 @@ class Rebase {
   bool newer(KeyframeId k) const { return k.index() >= base_.keyframe_slots() && k.index() < others_keyframes_end_; }
 
   Motion motion_since_base(KeyframeId edit_id) const;
-  void move_newer(const std::unordered_map<KeyframeId, Motion>& motions);
+  // Returns the changes of scale about the keyframes that it moved.
+  std::vector<std::pair<KeyframeId, double>> move_newer(const std::unordered_map<KeyframeId, Motion>& motions);
 
   const BundledMap& base_;
   BundledMap& map_;
@@ -158,33 +159,45 @@ bool Rebase::operator()(const RemoveLandmark& op) {
 bool Rebase::operator()(const SetPoses& op) {
   if (!same_epoch_) return false;
   bool any = false;
-  std::unordered_map<KeyframeId, Motion> motions;  // keyed by ids of the map
+  std::unordered_map<KeyframeId, double> scale_changes;  // keyed by ids of the map, as the next
+  for (const auto& [edit_id, factor] : op.scale_changes) scale_changes[map_id(edit_id)] = factor;
+  std::unordered_map<KeyframeId, Motion> motions;
   for (const auto& [edit_id, T_rig_world] : op.keyframes) {
     const KeyframeId k = map_id(edit_id);
     if (!map_.alive(k)) continue;
-    motions[k] = motion_between(map_.keyframe(k).T_rig_world, T_rig_world);
+    const auto scale_change = scale_changes.find(k);
+    motions[k] = motion_between(map_.keyframe(k).T_rig_world, T_rig_world,
+                                scale_change == scale_changes.end() ? 1.0 : scale_change->second);
     written_.insert(edit_id);
     any |= map_.set_pose(k, T_rig_world);
   }
   for (const auto& [edit_id, position] : op.landmarks) any |= map_.set_position(map_id(edit_id), position);
   if (op.correction && any) map_.begin_gauge_epoch();
-  move_newer(motions);
+  std::vector<std::pair<KeyframeId, double>> scaled = move_newer(motions);
+  for (const auto& [k, factor] : scale_changes) {
+    if (map_.alive(k)) scaled.emplace_back(k, factor);
+  }
+  if (!scaled.empty()) map_.scale_keyframes(scaled);
   return any;
 }
 
 // Newer keyframes inherit the motion of their nearest ancestor that is not newer: since each one keeps its pose
 // relative to its parent, T_rig_world_new = T_rig_parent * T_parent_world_new, the motion is the same along the whole
 // chain. Newer landmarks inherit the motion of the keyframe of their reference.
-void Rebase::move_newer(const std::unordered_map<KeyframeId, Motion>& motions) {
+std::vector<std::pair<KeyframeId, double>> Rebase::move_newer(const std::unordered_map<KeyframeId, Motion>& motions) {
   const auto motion_of = [&](KeyframeId k) -> Motion {
     while (newer(k)) k = map_.keyframe(k).parent;
     const auto entry = motions.find(k);
     return entry == motions.end() ? Motion() : entry->second;
   };
+  std::vector<std::pair<KeyframeId, double>> scaled;
   for (std::size_t i = base_.keyframe_slots(); i < others_keyframes_end_; ++i) {
     const KeyframeId k(i);
     if (!map_.alive(k)) continue;
-    if (const Motion motion = motion_of(k)) map_.set_pose(k, motion->pose(map_.keyframe(k).T_rig_world));
+    const Motion motion = motion_of(k);
+    if (!motion) continue;
+    map_.set_pose(k, motion->pose(map_.keyframe(k).T_rig_world));
+    if (motion->scale_change != 1.0) scaled.emplace_back(k, motion->scale_change);
   }
   for (std::size_t i = base_.landmark_slots(); i < others_landmarks_end_; ++i) {
     const LandmarkId l(i);
@@ -194,6 +207,7 @@ void Rebase::move_newer(const std::unordered_map<KeyframeId, Motion>& motions) {
     map_.set_position(l, motion->point(map_.landmark(l).position));
     map_.refresh_landmark(l);
   }
+  return scaled;
 }
 
 bool Rebase::operator()(const SetTwists& op) {

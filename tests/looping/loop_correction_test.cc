@@ -6,6 +6,7 @@
 #include <set>
 
 #include "looping/relative_scale.h"
+#include "map/anchored_pose.h"
 #include "map/synthetic_map.h"
 #include "simulated_hall.h"
 
@@ -232,6 +233,23 @@ TEST_F(ScaleDrift, IsMeasuredAndRemoved) {
   EXPECT_LT(5 * landmark_error(world(), draft.map(), kLast), landmark_error(world(), world().map, kLast));
   EXPECT_LT(2 * mean_error(world(), draft.map()), mean_error(world(), world().map));
   expect_refreshed(draft.map());
+}
+
+// Poses of frames between keyframes are stored relative to a keyframe; their lengths follow its change of scale.
+TEST_F(ScaleDrift, FramesFollowTheScaleOfTheirKeyframe) {
+  auto place_match = locate_last(world());
+  ASSERT_TRUE(place_match);
+  place_match->scale = relative_scale(world().map, kLast, *place_match).value();
+  const map::BundledMap& before = world().map;
+  const KeyframeId previous(kLast.value() - 1);
+  const auto anchored = map::AnchoredPose::at(before, previous, before.keyframe(kLast).T_rig_world);
+  map::MapDraft draft = world().draft();
+  ASSERT_TRUE(close_loop(measure(before, kLast, *place_match), *place_match, {}, kFeatures, draft));
+  const auto resolved = anchored.resolve(draft.map());
+  ASSERT_TRUE(resolved);
+  const double step_before = distance_m(before.keyframe(previous).T_rig_world, before.keyframe(kLast).T_rig_world);
+  const double step_after = distance_m(draft.map().keyframe(previous).T_rig_world, *resolved);
+  EXPECT_NEAR(step_after / step_before, 1 / 0.9, 0.02);
 }
 
 // Two paths along the same wall; before the second one tracking restarted at another pose.
