@@ -65,7 +65,7 @@ bool allowed(const image::ImageView& mask, double x, double y) {
   return mask.at(column, row) != 0;
 }
 
-int most_of(const FeatureOptions& options) { return FeatureOptions::kInForOthers * options.per_image; }
+int max_keypoints(const FeatureOptions& options) { return FeatureOptions::kMaxFactorIfOthersFail * options.per_image; }
 
 Region inner_region(const image::Image& level) {
   return {kBorder, kBorder, std::max(0, level.width() - 2 * kBorder), std::max(0, level.height() - 2 * kBorder)};
@@ -132,7 +132,7 @@ void Extractor::Scratch::describe(const image::Pyramid& pyramid, std::size_t lev
 }
 
 Extractor::Extractor(const FeatureOptions& options)
-    : options_(options), scratch_(std::make_unique<Scratch>(static_cast<std::size_t>(most_of(options)))) {}
+    : options_(options), scratch_(std::make_unique<Scratch>(static_cast<std::size_t>(max_keypoints(options)))) {}
 Extractor::~Extractor() = default;
 Extractor::Extractor(Extractor&&) noexcept = default;
 Extractor& Extractor::operator=(Extractor&&) noexcept = default;
@@ -141,7 +141,7 @@ void Extractor::extract(const image::ImageView& image, const image::ImageView& m
                         image::Pyramid& pyramid, Detections& detections, std::optional<int> budget) {
   BSLAM_ASSERT(mask.empty() || (mask.width == image.width && mask.height == image.height),
                "mask and image differ in size");
-  const int wanted = std::clamp(budget.value_or(options_.per_image), 0, most_of(options_));
+  const int wanted = std::clamp(budget.value_or(options_.per_image), 0, max_keypoints(options_));
   detections.clear();
   detections.reserve(static_cast<std::size_t>(wanted));
   image::build_pyramid(image, options_.levels, options_.scale_factor, pyramid);

@@ -14,9 +14,9 @@
 namespace bslam::feature {
 
 struct FeatureOptions {
-  static constexpr int kInForOthers = 2;
+  static constexpr int kMaxFactorIfOthersFail = 2;
   int per_image =
-      1200;  // keypoints wanted in one image at most; kInForOthers times as many where other cameras are out
+      1200;  // keypoints wanted in one image at most; kMaxFactorIfOthersFail times as many where other cameras are out
   // Keypoints wanted in the images of all cameras together, 0: no bound. Three cameras just reach it: a third one takes
   // nothing from the first two. Four take some 1.35 times as long as two (1.8 times without bound).
   int per_rig = 3600;
@@ -54,10 +54,10 @@ class Extractor {
   Extractor(Extractor&&) noexcept;
   Extractor& operator=(Extractor&&) noexcept;
 
-  // Fills `detections` (cleared first) with at most `budget` entries (no more than kInForOthers * options.per_image;
-  // none given: options.per_image), spread evenly over the image, in an order that depends on image and number alone,
-  // and `pyramid` with the levels they were found on. Keypoints whose pixel has no bearing in `camera`, or where `mask`
-  // (same size as the image, or empty) is 0, are left out.
+  // Fills `detections` (cleared first) with at most `budget` entries (no more than kMaxFactorIfOthersFail *
+  // options.per_image; none given: options.per_image), spread evenly over the image, in an order that depends on image
+  // and number alone, and `pyramid` with the levels they were found on. Keypoints whose pixel has no bearing in
+  // `camera`, or where `mask` (same size as the image, or empty) is 0, are left out.
   void extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
                image::Pyramid& pyramid, Detections& detections, std::optional<int> budget = {});
 

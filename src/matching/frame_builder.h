@@ -17,11 +17,11 @@ class FrameBuilder {
  public:
   FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions& options, std::vector<image::Image> masks);
 
-  // Keypoints of every present image; the Bundled table is still empty. Cameras with left_out[i] != 0 (or none where it
+  // Keypoints of every present image; the Bundled table is still empty. Cameras with skipped[i] != 0 (or none where it
   // is empty) are taken as without an image; from camera i no more than budgets[i] keypoints are taken (empty:
   // per_image of the options).
   frame::BundledFrame extract(const image::ImageBundle& images, ThreadPool& pool,
-                              std::span<const std::uint8_t> left_out = {}, std::span<const int> budgets = {});
+                              std::span<const std::uint8_t> skipped = {}, std::span<const int> budgets = {});
 
   // Of the frame extracted last; empty for cameras without an image.
   std::span<const image::Pyramid> pyramids() const { return pyramids_; }

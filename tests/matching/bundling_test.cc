@@ -146,7 +146,7 @@ TEST_F(Bundle, KeepsTheRulesOfTheTable) {
   EXPECT_TRUE(frame.cameras[3].keypoints.empty());
 }
 
-TEST_F(Bundle, IsTheSameWithAnyNumberOfThreads) {
+TEST_F(Bundle, DoesNotDependOnTheNumberOfThreads) {
   const frame::BundledFrame once = make();
   ThreadPool alone(1);
   const frame::BundledFrame extracted = builder.extract(images, alone);

@@ -26,12 +26,12 @@ std::vector<image::Pyramid> textured_pyramids(const camera::Rig& rig) {
 
 class LostFrame : public ::testing::Test {
  protected:
-  tracking::TrackOutput track(const frame::BundledFrame& frame, double min_inlier_share) {
+  tracking::TrackOutput track(const frame::BundledFrame& frame, double min_inlier_ratio) {
     // Aligns to any picture, so that most keypoints move to where their landmarks are not.
     const std::vector<matching::AlignmentOptions> alignment(
         pyramids.size(), {.iterations = 50, .max_shift_px = 10, .min_ncc = -1, .calibration_error_px = 0.01});
     tracking::TrackingOptions options;
-    options.min_inlier_share = min_inlier_share;
+    options.min_inlier_ratio = min_inlier_ratio;
     const tracking::TrackerState state = tracking::state_at_first(world);
     const tracking::TrackInput input{.map = world.map,
                                      .pyramids = pyramids,
