@@ -16,8 +16,8 @@ FrameBuilder::FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions
 
 frame::BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool& pool,
                                           std::span<const std::uint8_t> skipped, std::span<const int> budgets) {
-  BSLAM_ASSERT(images.images.size() == rig_.size(), "one image slot per camera of the rig");
-  BSLAM_ASSERT(budgets.empty() || budgets.size() == rig_.size(), "one budget per camera of the rig");
+  BSLAM_ASSERT(images.images.size() == rig_.size(), "there must be one image entry per camera of the rig");
+  BSLAM_ASSERT(budgets.empty() || budgets.size() == rig_.size(), "there must be one budget per camera of the rig");
   frame::BundledFrame frame;
   frame.id = images.id;
   frame.time_ns = images.time_ns;

@@ -7,7 +7,7 @@
 namespace bslam::matching {
 namespace {
 
-// Two cameras and pictures of squares with far more corners than are wanted.
+// Two cameras and images of squares with far more corners than the budget.
 class FrameBuilderTest : public ::testing::Test {
  protected:
   FrameBuilderTest() : pool(2), builder(rig, options(), {}) {
@@ -42,23 +42,23 @@ class FrameBuilderTest : public ::testing::Test {
   image::ImageBundle images;
 };
 
-TEST_F(FrameBuilderTest, TakesAsManyKeypointsAsTheOptionsSay) {
+TEST_F(FrameBuilderTest, ExtractsTheConfiguredNumberOfKeypoints) {
   const frame::BundledFrame frame = builder.extract(images, pool);
   EXPECT_EQ(keypoints(frame, 0), 400u);
   EXPECT_EQ(keypoints(frame, 1), 400u);
 }
 
-TEST_F(FrameBuilderTest, KeepsToTheBudgetOfEachCamera) {
+TEST_F(FrameBuilderTest, RespectsTheBudgetOfEachCamera) {
   const frame::BundledFrame frame = builder.extract(images, pool, {}, std::vector<int>{100, 300});
   EXPECT_EQ(keypoints(frame, 0), 100u);
   EXPECT_EQ(keypoints(frame, 1), 300u);
   const frame::BundledFrame other = builder.extract(images, pool, {}, std::vector<int>{350, 9000});
   EXPECT_EQ(keypoints(other, 0), 350u);
-  EXPECT_EQ(keypoints(other, 1), 800u);  // twice per_image at most
+  EXPECT_EQ(keypoints(other, 1), 800u);  // maximum: twice per_image
   EXPECT_EQ(keypoints(builder.extract(images, pool), 1), 400u);
 }
 
-TEST_F(FrameBuilderTest, LeavesOutWhatItIsTold) {
+TEST_F(FrameBuilderTest, SkipsCameras) {
   const frame::BundledFrame frame =
       builder.extract(images, pool, std::vector<std::uint8_t>{1, 0}, std::vector<int>{0, 250});
   EXPECT_EQ(frame.cameras[0].state, image::ImageState::kMissing);

@@ -52,13 +52,13 @@ TEST(CameraStatus, FewFeaturesDegradeACameraThatIsUsed) {
 // Statuses of a camera that has an image in the frames marked x; O: out.
 std::string statuses(const std::string& images) {
   CameraStatusMonitor monitor(1);
-  std::string told;
+  std::string text;
   for (const char c : images) {
     const CameraStatus status = monitor.update(std::vector{c == 'x' ? good() : no_image()})[0];
     EXPECT_TRUE(status == kGood || status == out(CameraReason::kNoImages));
-    told += status == kGood ? '.' : 'O';
+    text += status == kGood ? '.' : 'O';
   }
-  return told;
+  return text;
 }
 
 TEST(CameraStatus, ACameraOfFullRateIsOutWithoutAnImage) { EXPECT_EQ(statuses("xxx-xx--x"), "...O..OO."); }

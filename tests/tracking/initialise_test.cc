@@ -132,7 +132,7 @@ TEST_F(InitialiseMonocular, FailsForFramesOfTwoPlaces) {
 }
 
 TEST_F(InitialiseMonocular, ARotatingRigWithoutOverlapIsInitialisedAtApproximateScale) {
-  int told = 0;
+  int num_estimated = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const auto sim = simulator(three_sides(), room(seed, 0.25), {.seed = seed});
     ASSERT_FALSE(sim.rig().any_overlap());
@@ -146,12 +146,12 @@ TEST_F(InitialiseMonocular, ARotatingRigWithoutOverlapIsInitialisedAtApproximate
               truth = second.T_world_rig.inverse() * first.T_world_rig;
     EXPECT_LT(map::angle_rad(found, truth), 0.5 * kDegree);
     if (!std::isfinite(started->scale_deviation)) continue;
-    ++told;
+    ++num_estimated;
     EXPECT_LE(started->scale_deviation, 0.3);
     const double ratio = found.translation().norm() / truth.translation().norm();
     EXPECT_NEAR(ratio, 1.0, 4 * started->scale_deviation) << "seed " << seed;
   }
-  EXPECT_GE(told, 3);
+  EXPECT_GE(num_estimated, 3);
 }
 
 TEST_F(InitialiseMonocular, AssumesTheDepthIfTwoFramesDoNotDetermineTheScale) {
