@@ -36,7 +36,7 @@ bool MapGate::settle(const StageTask& task, MapVersion base, StageResult result,
   }
   BSLAM_ASSERT(result.draft->map().version() == base, "a stage's draft is of the version it was given");
   const map::CommitReport report = publish(journal_step(task.stage), task.keyframe.value(), std::move(*result.draft));
-  if (report.refused) return false;
+  if (report.rejected) return false;
   if (result.committed) result.committed(report);
   return true;
 }
@@ -58,7 +58,7 @@ Journal MapGate::journal() const {
 map::CommitReport MapGate::publish(JournalStep step, std::int32_t input, map::MapDraft draft) {
   const MapVersion base = draft.map().version();  // a draft keeps that of its base
   map::CommitReport report = store_.commit(std::move(draft));
-  if (report.refused) {
+  if (report.rejected) {
     append({step, input, base, std::nullopt});
   } else {
     append({step, input, base, report.published->version()}, report.published);

@@ -18,8 +18,8 @@ void append_keyframes(BundledMap& onto, const BundledMap& other, AppendedIds& id
     const KeyframeId parent = other.keyframe(k).parent;
     parents.push_back(parent.valid() ? ids.keyframes[parent.index()] : KeyframeId());
   }
-  const bool hung = attach_keyframes(onto, first, parents);
-  BSLAM_ASSERT(hung, "the links of a map are trees");
+  const bool attached = attach_keyframes(onto, first, parents);
+  BSLAM_ASSERT(attached, "the links of a map are trees");
 }
 
 // Returns the new id of `k` or, if `k` was removed, that of the newest older keyframe that is alive; if there is none,

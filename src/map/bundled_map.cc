@@ -199,7 +199,7 @@ bool BundledMap::remove_keyframe(KeyframeId k) {
   for (const LandmarkId l : table) {
     if (l.valid()) remove_observation(l, k);
   }
-  hand_over_children(k);
+  reassign_children(k);
   BundledKeyframe& entry = edit(k);
   const geometry::SE3& T_parent_world = keyframe(entry.parent).T_rig_world;
   entry.T_rig_parent = entry.T_rig_world * T_parent_world.inverse();

@@ -175,7 +175,7 @@ class BundledMap {
   void connect_new_keyframe(KeyframeId k);
   KeyframeId choose_parent(KeyframeId k, KeyframeId fallback) const;
   void attach(KeyframeId child, KeyframeId parent);
-  void hand_over_children(KeyframeId removed);
+  void reassign_children(KeyframeId removed);
   void make_root(KeyframeId k);  // makes k the root of its submap
 
   std::shared_ptr<const camera::Rig> rig_;

@@ -85,13 +85,13 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
   for (std::size_t i = 0; i < points.size(); ++i) {
     const SearchPoint& p = points[i];
     if (!exclusions.points.empty() && exclusions.points[i]) continue;
-    const auto sight = visible_projection(camera, T_cam_common, p, min_cosine);
-    if (!sight) continue;
+    const auto projected = visible_projection(camera, T_cam_common, p, min_cosine);
+    if (!projected) continue;
     result.visible.push_back(static_cast<std::uint32_t>(i));
-    const double level = predicted_level(p, sight->distance, log_factor);
+    const double level = predicted_level(p, projected->distance, log_factor);
     const int centre = static_cast<int>(std::lround(level));
     near.clear();
-    frame.grid.near(keypoints, sight->pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
+    frame.grid.near(keypoints, projected->pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
                     centre - options.level_slack, centre + options.level_slack, near);
     if (near.empty()) continue;
     const Candidate c = best_candidate(keypoints, *p.descriptor, near, exclusions.keypoints);

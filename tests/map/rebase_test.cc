@@ -48,8 +48,8 @@ class RebaseTest : public testing::Test {
   CommitReport commit() {
     store.commit(*std::move(early));
     CommitReport report = store.commit(*std::move(late));
-    EXPECT_TRUE(report.rebased || report.refused);
-    EXPECT_EQ(report.published->check_invariants().value_or("sound"), "sound");
+    EXPECT_TRUE(report.rebased || report.rejected);
+    EXPECT_EQ(report.published->check_invariants().value_or("valid"), "valid");
     return report;
   }
 
@@ -314,7 +314,7 @@ TEST_F(RebaseTest, OfTwoCorrectionsTheFirstHoldsAndNothingOfTheOther) {
   late->set_poses({{{kThird, random_pose(random, 1)}}, {}, true});
   ASSERT_TRUE(late->merge_landmarks(LandmarkId(0), LandmarkId(1)));
   const CommitReport report = commit();
-  EXPECT_TRUE(report.refused);
+  EXPECT_TRUE(report.rejected);
   EXPECT_EQ(report.published, store.snapshot());
   EXPECT_TRUE(report.published->alive(LandmarkId(0)));
   expect_near(report.published->keyframe(kThird).T_rig_world, corrected);
@@ -520,7 +520,7 @@ TEST_F(RebaseTest, OneOfTwoScalingsAtATimeIsRefused) {
   early->scale_submap(kRoot, 2.0);
   late->scale_submap(kRoot, 3.0);
   const CommitReport report = commit();
-  EXPECT_TRUE(report.refused);
+  EXPECT_TRUE(report.rejected);
   EXPECT_EQ(report.published->keyframe(kSecond).T_rig_world.translation(), 2.0 * before.translation());
 }
 

@@ -180,13 +180,13 @@ TEST_F(MatchEpipolarSideBySide, IsSymmetric) {
 
 TEST_F(MatchEpipolarSideBySide, RespectsTheDistanceRange) {
   // Depth is 400 px * 0.2 m / disparity.
-  for (const EpipolarMatch& m : match({.min_depth_m = 2.0, .far_m = 5.0})) {
+  for (const EpipolarMatch& m : match({.min_depth_m = 2.0, .max_depth_m = 5.0})) {
     const double disparity = pair.a.pixel[m.a.index()].x() - pair.b.pixel[m.b.index()].x();
     const double cosine = pair.a.bearing[m.a.index()].z();  // depth is distance times this
     EXPECT_GT(disparity * cosine, 80 / 5.0 - 4);
     EXPECT_LT(disparity * cosine, 80 / 2.0 + 4);
   }
-  const std::size_t all = match({}).size(), some = match({.min_depth_m = 2.0, .far_m = 5.0}).size();
+  const std::size_t all = match({}).size(), some = match({.min_depth_m = 2.0, .max_depth_m = 5.0}).size();
   EXPECT_GT(some, all / 10);
   EXPECT_LT(some, all / 2);
 }
