@@ -33,7 +33,7 @@ class BundledMap {
 
   // ---- Reading
   const camera::Rig& rig() const { return *rig_; }
-  // The pyramid keypoints were found on.
+  // The pyramid on which keypoints were detected.
   const feature::PyramidShape& pyramid() const { return pyramid_; }
   MapVersion version() const { return version_; }
   Scale scale() const { return scale_; }

@@ -49,7 +49,7 @@ CommitReport MapStore::commit(MapDraft draft) {
     const std::lock_guard lock(mutex_);
     current_ = report.published;
   }
-  // The previous version in `current` is destroyed here, after the lock that readers wait for was released.
+  // The previous version in `current` is destroyed here, after the mutex of the readers was released.
   return report;
 }
 

@@ -46,7 +46,7 @@ TEST_F(BundledMapTest, CountsKeypointsAsObservations) {
   expect_valid();
 }
 
-TEST_F(BundledMapTest, HangsAKeyframeBelowTheOneItSharesMostWith) {
+TEST_F(BundledMapTest, AttachesAKeyframeToTheOneItSharesMostLandmarksWith) {
   EXPECT_FALSE(map.keyframe(KeyframeId(0)).parent.valid());
   const KeyframeId a = add(matches(0, 10), {});
   EXPECT_EQ(map.keyframe(a).parent, KeyframeId(0));
@@ -59,7 +59,7 @@ TEST_F(BundledMapTest, HangsAKeyframeBelowTheOneItSharesMostWith) {
   expect_valid();
 }
 
-TEST_F(BundledMapTest, BeginsASubmapWithAKeyframeWithoutParent) {
+TEST_F(BundledMapTest, StartsASubmapWithAKeyframeWithoutParent) {
   const KeyframeId a = add(matches(0, 10), {});
   const KeyframeId b = add({}, {}), c = add({}, b), d = add({}, KeyframeId(77));
   EXPECT_EQ(map.roots(), (std::vector{KeyframeId(0), b, d}));
@@ -150,7 +150,7 @@ TEST_F(BundledMapTest, ScalesASubmapWithItsRemovedKeyframesOnly) {
   expect_valid();
 }
 
-TEST_F(BundledMapTest, SurvivesInTheNearestAliveAncestor) {
+TEST_F(BundledMapTest, ResolvesRemovedKeyframesToTheNearestAliveAncestor) {
   const KeyframeId a = add(matches(0, 20), {}), b = add(matches(0, 10), {}), c = add({}, b);
   EXPECT_EQ(map.nearest_alive_ancestor(c), c);
   map.remove_keyframe(c);
@@ -161,7 +161,7 @@ TEST_F(BundledMapTest, SurvivesInTheNearestAliveAncestor) {
   EXPECT_FALSE(map.nearest_alive_ancestor(KeyframeId()).valid());
 }
 
-TEST_F(BundledMapTest, KeepsTheAgeALandmarkIsGiven) {
+TEST_F(BundledMapTest, KeepsTheGivenBirthKeyframeOfALandmark) {
   const KeyframeId a = add({}, KeyframeId(0)), b = add({}, a);
   const std::vector<Observation> observations = {{b, FeatureId(3)}};
   EXPECT_EQ(map.landmark(map.add_landmark(random_point(random), observations, {}, a)).born, a);
@@ -179,7 +179,7 @@ TEST_F(BundledMapTest, OrdersCovisibleKeyframesByWeightThenAge) {
   EXPECT_EQ(map.best_covisible(a, 100, 4).size(), 2u);
 }
 
-TEST_F(BundledMapTest, RefusesAnObservationTwiceOrOfATakenFeature) {
+TEST_F(BundledMapTest, RejectsDuplicateObservationsAndUsedFeatures) {
   const KeyframeId a = add(matches(0, 5), {});
   EXPECT_FALSE(map.add_observation(LandmarkId(0), {a, FeatureId(20)}));
   EXPECT_FALSE(map.add_observation(LandmarkId(9), {a, FeatureId(4)}));
@@ -202,7 +202,7 @@ TEST_F(BundledMapTest, PassesTheReferenceToTheOldestRemainingObservation) {
   expect_valid();
 }
 
-TEST_F(BundledMapTest, KeepsANamedReference) {
+TEST_F(BundledMapTest, KeepsAGivenReference) {
   const KeyframeId a = add({}, {});
   const std::vector<Observation> observations = {{KeyframeId(0), FeatureId(45)}, {a, FeatureId(0)}};
   const LandmarkReference second_camera{a, {CameraIndex(1), KeypointIndex(0)}};
@@ -223,7 +223,7 @@ TEST_F(BundledMapTest, MovesObservationsAndCountersWhenMerging) {
   EXPECT_EQ(map.landmark(LandmarkId(4)).found, 4u);
   EXPECT_EQ(map.landmark_of(a, FeatureId(3)), LandmarkId(4));
   for (const Observation& o : map.observations(LandmarkId(4))) {
-    EXPECT_EQ(o.aligned, o.feature == FeatureId(4)) << "placed by the patch of the other landmark";
+    EXPECT_EQ(o.aligned, o.feature == FeatureId(4)) << "aligned to the reference patch of the other landmark";
   }
   EXPECT_FALSE(map.landmark_of(b, FeatureId(3)).valid());  // b already observes landmark 4 with feature 4
   EXPECT_TRUE(map.merge_landmarks(LandmarkId(4), LandmarkId(5)));
@@ -234,7 +234,7 @@ TEST_F(BundledMapTest, MovesObservationsAndCountersWhenMerging) {
   expect_valid();
 }
 
-TEST_F(BundledMapTest, FreesRemovedLandmarksAndKnowsWhereTheyLead) {
+TEST_F(BundledMapTest, FreesRemovedLandmarksButKeepsTheirMerges) {
   const auto freed = [](const BundledMap& m) { return &m.landmark(LandmarkId(0)) == &m.landmark(LandmarkId(16)); };
   for (int l = 0; l < 31; ++l) map.remove_landmark(LandmarkId(l));
   map.free_removed(1000);
@@ -270,7 +270,7 @@ TEST_F(BundledMapTest, KeepsATreeWhenAKeyframeIsRemoved) {
   expect_valid();
 }
 
-TEST_F(BundledMapTest, HandsChildrenToASiblingWithTheStrongerLink) {
+TEST_F(BundledMapTest, ReassignsChildrenToASiblingWithTheStrongerLink) {
   const KeyframeId a = add(matches(0, 20), {});
   const KeyframeId b = add(matches(0, 15), {}), c = add(matches(0, 14), a);
   const std::vector<Observation> both = {{b, FeatureId(40)}, {c, FeatureId(40)}};
@@ -288,7 +288,7 @@ TEST_F(BundledMapTest, HandsChildrenToASiblingWithTheStrongerLink) {
   expect_valid();
 }
 
-TEST_F(BundledMapTest, CarriesRemovedKeyframesByTheirParents) {
+TEST_F(BundledMapTest, MovesRemovedKeyframesWithTheirParents) {
   const KeyframeId a = add(matches(0, 20), {}), b = add(matches(0, 10), {});
   const SE3 T_b_a = map.keyframe(b).T_rig_world * map.keyframe(a).T_rig_world.inverse();
   const SE3 T_a_0 = map.keyframe(a).T_rig_world * map.keyframe(KeyframeId(0)).T_rig_world.inverse();
@@ -302,7 +302,7 @@ TEST_F(BundledMapTest, CarriesRemovedKeyframesByTheirParents) {
   EXPECT_FALSE(map.keyframe(a).frame);
 }
 
-TEST_F(BundledMapTest, RefreshesWhatALandmarkLooksLike) {
+TEST_F(BundledMapTest, RefreshesTheAppearanceOfALandmark) {
   const LandmarkId l(2);
   std::vector<KeyframeId> keyframes = {KeyframeId(0)};
   for (int i = 0; i < 30; ++i) keyframes.push_back(add({{FeatureId(2), l}}, {}));
@@ -343,7 +343,7 @@ TEST_F(BundledMapTest, RefreshesWhatALandmarkLooksLike) {
 }
 
 // The pose of a camera with a late capture time follows the motion of the rig; scaling a submap scales that motion.
-TEST_F(BundledMapTest, KnowsWhereALateCameraWas) {
+TEST_F(BundledMapTest, ComputesThePoseOfALateCamera) {
   auto frame = std::make_shared<frame::BundledFrame>(*synthetic_frame(random, 2, 30, 10));
   frame->time_ns = 1'000'000'000;
   for (frame::CameraFrame& c : frame->cameras) c.state = image::ImageState::kPresent;

@@ -10,14 +10,14 @@
 namespace bslam::map {
 namespace {
 
-TEST(MapStore, CountsVersionsAndGivesProvisionalIdsWhereNothingCameBetween) {
+TEST(MapStore, CountsVersionsAndKeepsProvisionalIdsWithoutOtherCommits) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};
   EXPECT_EQ(store.snapshot()->version(), MapVersion(0));
   MapDraft draft(store.snapshot());
   const KeyframeId k = draft.add_keyframe(synthetic_frame(random, 1, 10, 0), {}, {}, {});
   const LandmarkId l = draft.add_landmark({0, 0, 5}, {{k, FeatureId(3)}});
-  EXPECT_EQ(store.snapshot()->keyframe_slots(), 0u);  // the draft is not visible to others
+  EXPECT_EQ(store.snapshot()->keyframe_slots(), 0u);  // the draft is not visible to other threads
   const CommitReport report = store.commit(std::move(draft));
   EXPECT_FALSE(report.rebased);
   EXPECT_EQ(report.applied, 2u);
@@ -28,7 +28,7 @@ TEST(MapStore, CountsVersionsAndGivesProvisionalIdsWhereNothingCameBetween) {
   EXPECT_EQ(report.published->landmark_of(k, FeatureId(3)), l);
 }
 
-TEST(MapStore, GivesTheNextIdsWhereOthersWereFaster) {
+TEST(MapStore, AssignsTheNextIdsAfterOtherCommits) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};
   MapDraft first(store.snapshot()), second(store.snapshot());
@@ -48,7 +48,7 @@ TEST(MapStore, GivesTheNextIdsWhereOthersWereFaster) {
   EXPECT_EQ(report.published->check_invariants().value_or("valid"), "valid");
 }
 
-TEST(MapStore, FreesWhatWasRemovedAlsoWhereOthersWereFasterAndNeverForReaders) {
+TEST(MapStore, FreesRemovedLandmarksAlsoWhenRebasedButNotInOldSnapshots) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};
   MapDraft made(store.snapshot());

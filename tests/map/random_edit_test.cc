@@ -23,7 +23,7 @@ TEST(RandomEdits, KeepTheInvariants) {
   }
 }
 
-TEST(RandomEdits, LeaveOldSnapshotsAsTheyWere) {
+TEST(RandomEdits, DoNotChangeOldSnapshots) {
   MapStore store{BundledMap(synthetic_rig(2))};
   RandomEditor editor(5);
   std::vector<std::pair<MapSnapshot, Fingerprint>> kept;
@@ -36,7 +36,7 @@ TEST(RandomEdits, LeaveOldSnapshotsAsTheyWere) {
   for (const auto& [snapshot, fingerprint] : kept) EXPECT_TRUE(Fingerprint(*snapshot) == fingerprint);
 }
 
-TEST(RandomEdits, GiveTheSameMapWhenAppliedAgainToTheirBase) {
+TEST(RandomEdits, AreReproducibleWhenAppliedToTheirBase) {
   MapStore store{BundledMap(synthetic_rig(2))};
   RandomEditor editor(6);
   for (int batch = 0; batch < 60; ++batch) {
