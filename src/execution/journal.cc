@@ -37,7 +37,7 @@ std::optional<JournalStep> step_of(std::string_view name) {
 
 std::string id_text(std::int32_t id) { return id < 0 ? std::string(kNone) : std::to_string(id); }
 
-// A number that an id can hold; -1 for "-".
+// A number in the range of an id; -1 for "-".
 std::optional<std::int32_t> parse_id(std::string_view text) {
   if (text == kNone) return -1;
   const auto number = parse_integer(text);
