@@ -27,7 +27,7 @@ execution::JournalStep journal_step(tracking::ProposedEdit::Kind kind) {
   return kind == tracking::ProposedEdit::Kind::kStart ? execution::JournalStep::kStart : execution::JournalStep::kTrack;
 }
 
-// What is known about each camera once the frame is tracked.
+// Observations about each camera after the frame was tracked.
 std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images, const tracking::ImageFaults& faults,
                                                const tracking::FramePlan& plan, const tracking::TrackResult& result) {
   std::vector<tracking::CameraEvidence> out;
@@ -98,7 +98,7 @@ void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor&
   tracker_.committed(report, tracked);
   outcome.keyframes = report.keyframes;
   outcome.started_submap = edit.kind == tracking::ProposedEdit::Kind::kStart;
-  tracked.record.stages.back().ms += watch.ms();  // of the stage that proposed the edit
+  tracked.record.stages.back().ms += watch.ms();  // added to the time of the stage that proposed the edit
 }
 
 BundledFrame Pipeline::make_frame(const image::ImageBundle& images) {

@@ -77,7 +77,7 @@ TEST(ConventionCheck, SaysHowFarACameraIsTurned) {
   EXPECT_FALSE(evidence.verdict);
   ASSERT_TRUE(evidence.other);
   EXPECT_GT(evidence.other->agreeing, 140);
-  EXPECT_NEAR(evidence.other->turned_deg, 4.0, 0.05);
+  EXPECT_NEAR(evidence.other->rotated_deg, 4.0, 0.05);
   EXPECT_LT(evidence.other->displaced_deg, 2.0);
   EXPECT_NE(describe_evidence(std::array{evidence}).find("warning: the images contradict the extrinsics"),
             std::string::npos);
@@ -90,7 +90,7 @@ TEST(ConventionCheck, SaysHowFarACameraIsDisplaced) {
   const camera::Rig wrong({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(0) * above}});
   const PairEvidence evidence = judged(wrong, views_of(rig));
   ASSERT_TRUE(evidence.other);
-  EXPECT_LT(evidence.other->turned_deg, 0.1);
+  EXPECT_LT(evidence.other->rotated_deg, 0.1);
   EXPECT_NEAR(evidence.other->displaced_deg, 80.5, 2.0);  // between (12, 1, -1) and (1, 12, -1) cm
 }
 
