@@ -20,7 +20,7 @@
 namespace bslam::adjustment {
 
 // Returns the variance factor of each point; 1 if fewer than two observations remain. `chi2` holds the squared
-// normalised errors at the present values; `skip` is as in solver::adjust.
+// normalised errors at the current values; `skip` is as in solver::adjust.
 std::vector<double> landmark_variances(const solver::ReprojectionProblem& problem, std::span<const double> chi2,
                                        std::span<const std::uint8_t> skip);
 

@@ -61,10 +61,10 @@ TEST(PoseSolver, IsExactWithoutNoise) {
   EXPECT_LT(scene::centre_error(s.T_rig_world, scene.T_rig_world), 1e-5);
 }
 
-// The error of the pose, measured with the information returned, would follow a chi-square of six degrees of freedom,
-// were the 5 % of inliers beyond the bound not cut off: that makes the covariance larger by 0.95 / 0.80 (docs/math.md,
-// 4).
-TEST(PoseSolver, InformationAgreesWithTheSpreadOfTheError) {
+// The pose error normalised by the returned information would have a chi-square distribution with six degrees of
+// freedom if the 5 % of inliers beyond the bound were not cut off. This increases the covariance by 0.95 / 0.80
+// (docs/math.md, section 4).
+TEST(PoseSolver, InformationMatchesTheError) {
   const Rig rig = scene::make_rig(4, Models::kRadTan);
   Random random(11);
   double sum = 0.0;
@@ -75,12 +75,12 @@ TEST(PoseSolver, InformationAgreesWithTheSpreadOfTheError) {
     ASSERT_TRUE(s.ok);
     const geometry::Vector6d error = (s.T_rig_world * scene.T_rig_world.inverse()).log();
     sum += error.dot(s.information * error);
-    EXPECT_NEAR(s.mean_chi2, 1.7, 0.5);  // 2 less what the bound cuts off
+    EXPECT_NEAR(s.mean_chi2, 1.7, 0.5);  // 2 without the bound
   }
   EXPECT_NEAR(sum / kTrials, 6.0 * 0.95 / 0.80, 1.0);
 }
 
-TEST(PoseSolver, TakesBackWhatABadGuessMadeLookWrong) {
+TEST(PoseSolver, ReadmitsInliersRejectedAtAPoorInitialPose) {
   const Rig rig = scene::make_rig(4, Models::kRadTan);
   Random random(5);
   const auto scene = scene::make_pose_scene(rig, 300, 0.5, 0.0, random);
@@ -90,11 +90,11 @@ TEST(PoseSolver, TakesBackWhatABadGuessMadeLookWrong) {
   EXPECT_GT(s.num_inliers, 290);
 }
 
-TEST(PoseSolver, PassesOverPointsBehindTheCamera) {
+TEST(PoseSolver, IgnoresPointsBehindTheCamera) {
   const Rig rig = scene::make_rig(1, Models::kPinhole);
   Random random(9);
   auto scene = scene::make_pose_scene(rig, 200, 0.5, 0.0, random);
-  for (std::size_t i = 0; i < 40; ++i) {  // through the centre to the other side
+  for (std::size_t i = 0; i < 40; ++i) {  // mirrored at the camera centre
     auto& point = scene.observations[i].point_world;
     point = scene.T_rig_world.inverse() * -(scene.T_rig_world * point);
   }
@@ -118,7 +118,7 @@ TEST(PoseSolver, DoesNotDependOnTheOrderOfCameras) {
   EXPECT_EQ(a.T_rig_world.matrix(), b.T_rig_world.matrix());
 }
 
-TEST(PoseSolver, RefusesTooFewObservations) {
+TEST(PoseSolver, FailsWithTooFewObservations) {
   const Rig rig = scene::make_rig(2, Models::kPinhole);
   Random random(2);
   const auto scene = scene::make_pose_scene(rig, 9, 0.0, 0.0, random);
@@ -128,7 +128,7 @@ TEST(PoseSolver, RefusesTooFewObservations) {
   EXPECT_EQ(none.T_rig_world.matrix(), scene.T_rig_world.matrix());
 }
 
-TEST(PoseSolver, RefusesPointsAlongOneRay) {
+TEST(PoseSolver, FailsWithPointsAlongOneRay) {
   const Rig rig = scene::make_rig(1, Models::kPinhole);
   Random random(4);
   for (const double noise : {0.0, 1.0}) {
@@ -143,14 +143,14 @@ TEST(PoseSolver, RefusesPointsAlongOneRay) {
   }
 }
 
-TEST(PoseSolver, RefusesOutliersAlone) {
+TEST(PoseSolver, FailsWithOnlyOutliers) {
   const Rig rig = scene::make_rig(2, Models::kRadTan);
   Random random(6);
   const auto scene = scene::make_pose_scene(rig, 100, 1.0, 1.0, random);
   EXPECT_FALSE(solve_pose(rig, scene.observations, scene.T_rig_world, {}).ok);
 }
 
-TEST(PoseRansac, SurvivesSixtyPercentOutliersAndAFarGuess) {
+TEST(PoseRansac, SolvesWithSixtyPercentOutliersAndAPoorInitialPose) {
   Random random(17, "ransac");
   int solved = 0, trials = 0;
   for (const auto& [cameras, models] : {std::pair{1, Models::kPinhole}, {2, Models::kRadTan}, {4, Models::kMixed}}) {
@@ -163,13 +163,13 @@ TEST(PoseRansac, SurvivesSixtyPercentOutliersAndAFarGuess) {
       const bool good = s.ok && scene::rotation_error(s.T_rig_world, scene.T_rig_world) < 5e-3 &&
                         scene::centre_error(s.T_rig_world, scene.T_rig_world) < 0.05;
       solved += good;
-      EXPECT_TRUE(good || !s.ok || s.num_inliers < 100) << "a wrong pose must not look sound, trial " << trial;
+      EXPECT_TRUE(good || !s.ok || s.num_inliers < 100) << "a wrong pose must not be accepted, trial " << trial;
     }
   }
   EXPECT_EQ(solved, trials);
 }
 
-TEST(PoseRansac, RepeatsItselfToTheBit) {
+TEST(PoseRansac, IsDeterministic) {
   const Rig rig = scene::make_rig(3, Models::kMixed);
   Random random(19);
   const auto scene = scene::make_pose_scene(rig, 300, 1.0, 0.5, random);
@@ -181,7 +181,7 @@ TEST(PoseRansac, RepeatsItselfToTheBit) {
   EXPECT_EQ(a.information, b.information);
 }
 
-TEST(PoseRansac, RefusesOutliersAlone) {
+TEST(PoseRansac, FailsWithOnlyOutliers) {
   const Rig rig = scene::make_rig(2, Models::kRadTan);
   Random random(23);
   const auto scene = scene::make_pose_scene(rig, 200, 1.0, 1.0, random);
