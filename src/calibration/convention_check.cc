@@ -22,7 +22,7 @@ using geometry::SE3;
 constexpr int kMaxHamming = 60;       // bits; largest descriptor distance of a match
 constexpr double kRatio = 0.85;       // largest ratio of best to second best descriptor distance
 constexpr double kTolerancePx = 2.0;  // of calibration and feature localisation together
-constexpr int kLeastAgreeing = 25;
+constexpr int kMinAgreeing = 25;
 constexpr double kMinRatio = 0.4;     // minimum fraction of consistent matches; random matches reach a few per cent
 constexpr int kMany = 300;            // matches; with more than these some convention is expected to fit
 constexpr double kGoodRatio = 0.6;    // if the fraction of consistent matches is smaller, another pose is searched for
@@ -34,7 +34,7 @@ struct PixelPair {
   Eigen::Vector2d a, b;
 };
 
-// Mutual best matches. No geometric constraint is used, since the geometry is what is tested.
+// Mutual best matches. No geometric constraint is used, since the geometry itself is tested.
 std::vector<PixelPair> match(const feature::Detections& a, const feature::Detections& b) {
   std::vector<PixelPair> pairs;
   for (const feature::DescriptorMatch& m : feature::mutual_matches(a.descriptor, b.descriptor, kMaxHamming, kRatio,
@@ -101,9 +101,11 @@ std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::
     const auto a = ci.unproject(pair.a), b = cj.unproject(pair.b);
     if (a && b) bearings.push_back({*a, *b});
   }
-  const int least = std::max(kLeastAgreeing, static_cast<int>(kMinRatio * static_cast<double>(bearings.size())));
-  const estimators::RelativePoseOptions options{
-      .iterations = 2000, .inlier_angle = tolerance_of(ci, cj), .min_parallax = kMinParallax, .min_inliers = least};
+  const int min_inliers = std::max(kMinAgreeing, static_cast<int>(kMinRatio * static_cast<double>(bearings.size())));
+  const estimators::RelativePoseOptions options{.iterations = 2000,
+                                                .inlier_angle = tolerance_of(ci, cj),
+                                                .min_parallax = kMinParallax,
+                                                .min_inliers = min_inliers};
   const auto found = estimators::relative_pose(bearings, options, Random(1, "extrinsics check"));
   if (!found) return std::nullopt;
   const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
@@ -117,7 +119,7 @@ std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::
 
 std::optional<Convention> verdict_of(const PairEvidence& evidence) {
   const auto best = std::max_element(evidence.agreeing.begin(), evidence.agreeing.end());  // the first among equal ones
-  if (*best < kLeastAgreeing || *best < kMinRatio * evidence.matches) return std::nullopt;
+  if (*best < kMinAgreeing || *best < kMinRatio * evidence.matches) return std::nullopt;
   if (*best < kClearly * evidence.agreeing[0]) return Convention::kAsGiven;
   return static_cast<Convention>(best - evidence.agreeing.begin());
 }

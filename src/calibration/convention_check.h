@@ -1,5 +1,5 @@
 // Tests against images whether a calibration file was read in the convention that was meant. Features that two cameras
-// see at the same time must satisfy their epipolar geometry. It is tested under the calibration as given and under
+// observe at the same time must satisfy their epipolar geometry. It is tested under the calibration as given and under
 // common mistakes such as inverted transforms. Unlike the refinement of a rig (rig_refinement.h), it needs neither a
 // map nor a calibration that is nearly right.
 #pragma once

@@ -197,7 +197,7 @@ CameraRefinement evaluate_camera(const solver::ExtrinsicEstimate& estimate, cons
 }
 
 // Returns true if no extrinsics have moved from `before` by more than their own uncertainty.
-bool settled(const solver::ExtrinsicAdjustment& adjusted, const std::vector<geometry::SE3>& before) {
+bool converged(const solver::ExtrinsicAdjustment& adjusted, const std::vector<geometry::SE3>& before) {
   for (std::size_t c = 1; c < before.size(); ++c) {
     const geometry::Vector6d change = solver::extrinsic_change(adjusted.cameras[c].T_cam_rig, before[c]);
     if (change.dot(adjusted.cameras[c].covariance.llt().solve(change)) > static_cast<double>(change.size()))
@@ -215,7 +215,7 @@ solver::ExtrinsicAdjustment adjust_in_passes(const map::BundledMap& map, const f
   for (std::size_t c = 0; c < map.rig().size(); ++c) T_cam_rig.push_back(map.rig().cam_from_rig(c));
   separate_groups(problem);
   solver::ExtrinsicAdjustment out = solver::adjust_extrinsics(problem.flat.problem, options, T_cam_rig, stop);
-  for (int pass = 1; pass < kPasses && out.done && !settled(out, T_cam_rig); ++pass) {
+  for (int pass = 1; pass < kPasses && out.done && !converged(out, T_cam_rig); ++pass) {
     for (std::size_t c = 0; c < T_cam_rig.size(); ++c) T_cam_rig[c] = out.cameras[c].T_cam_rig;
     if (recover_observations(map, T_cam_rig, features, problem.flat) == 0) break;
     separate_groups(problem);

@@ -97,13 +97,13 @@ void warn_of_lens(const camera::Camera& camera, std::size_t i, std::vector<std::
       answered += camera.unproject(pixel) ? 1 : 0;
     }
   }
-  const double share = static_cast<double>(answered) / (kColumns * kRows);
+  const double valid_fraction = static_cast<double>(answered) / (kColumns * kRows);
   const double corners = plane ? kMinValidFraction : 0.5;  // large parts of a fisheye image may be dark
-  if (share < corners) {
+  if (valid_fraction < corners) {
     warnings.push_back(
         fmt::format("camera {}: the camera model is valid for only {:.0f} % of the image: are the coefficients "
-                    "those of model {}?",
-                    i, 100 * share, camera::model_name(camera.model)));
+                    "for model {}?",
+                    i, 100 * valid_fraction, camera::model_name(camera.model)));
   }
 }
 

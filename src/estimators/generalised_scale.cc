@@ -42,10 +42,10 @@ Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double kne
     Vector6d g = Vector6d::Zero();
     for (const BearingPair& pair : camera.pairs) {
       const Vector3d x = R * pair.a, normal = t.cross(x), other = pair.b.cross(t);
-      const double turned = pair.b.dot(normal);
+      const double rotated = pair.b.dot(normal);
       const double spread =
-          std::sqrt((normal - turned * pair.b).squaredNorm() + (other - x.dot(other) * x).squaredNorm());
-      const double angle = spread > 0.0 ? turned / spread : 0.0;
+          std::sqrt((normal - rotated * pair.b).squaredNorm() + (other - x.dot(other) * x).squaredNorm());
+      const double angle = spread > 0.0 ? rotated / spread : 0.0;
       if (!(std::abs(angle) < knee)) {
         out.cost += 0.5 * knee * knee;
         continue;

@@ -82,8 +82,8 @@ void solve_sample(std::span<const BearingPair> pairs, const std::array<std::size
 double truncated_cost(const EpipolarPose& pose, std::span<const BearingPair> pairs, double bound, double limit) {
   double cost = 0.0;
   for (const BearingPair& pair : pairs) {
-    const double share = epipolar_angle(pose, pair) / bound;
-    cost += share < 1.0 && in_front_of_both(pose, pair) ? share * share : 1.0;
+    const double error = epipolar_angle(pose, pair) / bound;
+    cost += error < 1.0 && in_front_of_both(pose, pair) ? error * error : 1.0;
     if (cost > limit) break;
   }
   return cost;
@@ -128,8 +128,8 @@ std::vector<Candidate> sample_candidates(std::span<const BearingPair> pairs, con
       const bool improved = best.empty() || cost < best.front().cost;
       keep(best, {pose, cost});
       if (!improved) continue;
-      const double share = count(inliers(pose, pairs, options.inlier_angle)) / static_cast<double>(pairs.size());
-      needed = std::log(1.0 - kConfidence) / std::log1p(-std::min(std::pow(share, 5), 1.0 - 1e-12));
+      const double inlier_ratio = count(inliers(pose, pairs, options.inlier_angle)) / static_cast<double>(pairs.size());
+      needed = std::log(1.0 - kConfidence) / std::log1p(-std::min(std::pow(inlier_ratio, 5), 1.0 - 1e-12));
     }
   }
   return best;

@@ -140,7 +140,7 @@ class BundledMap {
   bool merge_submaps(KeyframeId child, KeyframeId parent);
   // Removes all keyframes and landmarks of a submap. Returns false if `root` is not the root of a submap.
   bool remove_submap(KeyframeId root);
-  // Scales a submap about the origin by `factor`, including the relative poses of its removed keyframes, and begins a
+  // Scales a submap around the origin by `factor`, including the relative poses of its removed keyframes, and begins a
   // gauge epoch. Returns false if `root` is not the root of a submap.
   bool scale_submap(KeyframeId root, double factor);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);

@@ -19,8 +19,8 @@ struct ExtrinsicAdjustmentOptions {
   double relative_decrease = 1e-6;  // a round has converged if a step decreases the cost by a smaller fraction
 };
 
-// One camera. The six degrees of freedom are rotation about the camera's x, y, z (radians), then translation along them
-// (metres): the left perturbation of T_cam_rig, which rotates the camera around its own centre.
+// One camera. The six degrees of freedom are rotation around the camera's x, y, z (radians), then translation along
+// them (metres): the left perturbation of T_cam_rig, which rotates the camera around its own centre.
 struct ExtrinsicEstimate {
   SE3 T_cam_rig;
   geometry::Vector6d change = geometry::Vector6d::Zero();  // from the calibrated to the estimated extrinsics

@@ -126,11 +126,11 @@ TEST(Description, RotatesWithTheImage) {
   for (const double turn : {0.3, 1.0, 1.7, 2.6, -2.0, -0.8}) {
     Similarity warp = none;
     warp.angle = turn;
-    const cv::Mat turned = testing::render(scene, warp);
+    const cv::Mat rotated = testing::render(scene, warp);
     for (double y = 90; y < 210; y += 17.3) {
       for (double x = 90; x < 210; x += 17.3) {
-        const Described a = describe(describer, upright, {x, y}), b = describe(describer, turned, warp({x, y}));
-        const Described c = describe(describer, turned, warp({x + 25, y}));
+        const Described a = describe(describer, upright, {x, y}), b = describe(describer, rotated, warp({x, y}));
+        const Described c = describe(describer, rotated, warp({x + 25, y}));
         angle_error.push_back(std::abs(wrapped(b.angle - a.angle - turn)));
         same.push_back(hamming(a.descriptor, b.descriptor));
         different.push_back(hamming(a.descriptor, c.descriptor));

@@ -34,15 +34,15 @@ int any_score(int, int, Random& random) { return 6 + static_cast<int>(random.bel
 
 TEST(Distribution, DistributesOverLevelsByArea) {
   const std::array<double, 3> area{600, 300, 100};
-  std::array<std::size_t, 3> share{};
-  distribute_over_levels(area, std::array<std::size_t, 3>{5000, 5000, 5000}, 1000, share);
-  EXPECT_EQ(share, (std::array<std::size_t, 3>{600, 300, 100}));
-  distribute_over_levels(area, std::array<std::size_t, 3>{200, 5000, 5000}, 1000, share);
-  EXPECT_EQ(share, (std::array<std::size_t, 3>{200, 600, 200}));
-  distribute_over_levels(area, std::array<std::size_t, 3>{10, 0, 7}, 1000, share);
-  EXPECT_EQ(share, (std::array<std::size_t, 3>{10, 0, 7}));
-  distribute_over_levels(area, std::array<std::size_t, 3>{5000, 5000, 5000}, 1, share);
-  EXPECT_EQ(share[0] + share[1] + share[2], 1u);
+  std::array<std::size_t, 3> counts{};
+  distribute_over_levels(area, std::array<std::size_t, 3>{5000, 5000, 5000}, 1000, counts);
+  EXPECT_EQ(counts, (std::array<std::size_t, 3>{600, 300, 100}));
+  distribute_over_levels(area, std::array<std::size_t, 3>{200, 5000, 5000}, 1000, counts);
+  EXPECT_EQ(counts, (std::array<std::size_t, 3>{200, 600, 200}));
+  distribute_over_levels(area, std::array<std::size_t, 3>{10, 0, 7}, 1000, counts);
+  EXPECT_EQ(counts, (std::array<std::size_t, 3>{10, 0, 7}));
+  distribute_over_levels(area, std::array<std::size_t, 3>{5000, 5000, 5000}, 1, counts);
+  EXPECT_EQ(counts[0] + counts[1] + counts[2], 1u);
 }
 
 TEST(Distribution, SuppressesNonMaximaOfANeighbourhood) {

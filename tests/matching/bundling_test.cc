@@ -43,7 +43,7 @@ class Wall {
   std::array<double, 4093> tile_;
 };
 
-image::Image picture(const Wall& wall, const camera::Camera& camera, const SE3& T_rig_cam) {
+image::Image render(const Wall& wall, const camera::Camera& camera, const SE3& T_rig_cam) {
   image::Image image(camera.width, camera.height);
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -80,7 +80,7 @@ class Bundle : public ::testing::Test {
     const Wall wall;
     images.images.resize(4);
     for (std::size_t c = 0; c < 3; ++c)
-      images.images[c] = {image::ImageState::kPresent, 0, picture(wall, rig.camera(c), rig.rig_from_cam(c))};
+      images.images[c] = {image::ImageState::kPresent, 0, render(wall, rig.camera(c), rig.rig_from_cam(c))};
   }
   static feature::FeatureOptions options() {
     feature::FeatureOptions o;

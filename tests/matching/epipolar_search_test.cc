@@ -102,7 +102,7 @@ Score score(const Pair& pair, const std::vector<EpipolarMatch>& matches) {
   return s;
 }
 
-SE3 turned(double yaw, double pitch, const Vector3d& position) {
+SE3 rotated_pose(double yaw, double pitch, const Vector3d& position) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Vector3d::UnitY()) * Eigen::AngleAxisd(pitch, Vector3d::UnitX())),
           position};
 }
@@ -115,14 +115,15 @@ TEST(MatchEpipolar, RecoversTrueMatchesOfAnyCamerasInAnyDirection) {
     SE3 T_common_a, T_common_b;
   };
   const Case cases[] = {
-      {"pinholes side by side", pinhole(), pinhole(), SE3(), turned(0, 0, {0.11, 0, 0})},
-      {"one above the other", pinhole(), radtan(), SE3(), turned(0.05, 0.02, {0, 0.2, 0})},
-      {"radtan, converging", radtan(), radtan(), turned(0.2, 0, {0, 0, 0}), turned(-0.2, 0, {0.4, 0, 0.1})},
-      {"forward motion", radtan(), radtan(), SE3(), turned(0, 0, {0.05, 0, 0.3})},
-      {"fisheyes at right angles", fisheye(), fisheye(), SE3(), turned(0.5 * pi, 0, {0.1, 0, 0.1})},
-      {"fisheyes back to back", fisheye(), fisheye(), SE3(), turned(0.9 * pi, 0, {0.1, 0, -0.05})},
-      {"both looking back", fisheye(), radtan(), turned(pi, 0, {0, 0, 0}), turned(pi - 0.1, 0, {0.3, 0.1, 0})},
-      {"fisheye and pinhole sideways", fisheye(), pinhole(), SE3(), turned(-1.2, 0.3, {0, 0, 0.2})},
+      {"pinholes side by side", pinhole(), pinhole(), SE3(), rotated_pose(0, 0, {0.11, 0, 0})},
+      {"one above the other", pinhole(), radtan(), SE3(), rotated_pose(0.05, 0.02, {0, 0.2, 0})},
+      {"radtan, converging", radtan(), radtan(), rotated_pose(0.2, 0, {0, 0, 0}), rotated_pose(-0.2, 0, {0.4, 0, 0.1})},
+      {"forward motion", radtan(), radtan(), SE3(), rotated_pose(0, 0, {0.05, 0, 0.3})},
+      {"fisheyes at right angles", fisheye(), fisheye(), SE3(), rotated_pose(0.5 * pi, 0, {0.1, 0, 0.1})},
+      {"fisheyes back to back", fisheye(), fisheye(), SE3(), rotated_pose(0.9 * pi, 0, {0.1, 0, -0.05})},
+      {"both looking back", fisheye(), radtan(), rotated_pose(pi, 0, {0, 0, 0}),
+       rotated_pose(pi - 0.1, 0, {0.3, 0.1, 0})},
+      {"fisheye and pinhole sideways", fisheye(), pinhole(), SE3(), rotated_pose(-1.2, 0.3, {0, 0, 0.2})},
   };
   for (const Case& c : cases) {
     const Pair pair = seen_by(c.a, c.b, c.T_common_a, c.T_common_b, 800);
@@ -152,7 +153,7 @@ class MatchEpipolarSideBySide : public ::testing::Test {
     return matching::match({camera, pair.a, SE3()}, {camera, pair.b, T_common_b}, options, usable_a);
   }
   Camera camera = pinhole();
-  SE3 T_common_b = turned(0, 0, {0.2, 0, 0});
+  SE3 T_common_b = rotated_pose(0, 0, {0.2, 0, 0});
   Pair pair = seen_by(camera, camera, SE3(), T_common_b, 600);
 };
 
@@ -212,7 +213,7 @@ TEST_F(MatchEpipolarSideBySide, IgnoresAmbiguousAndUnusableKeypoints) {
 TEST_F(MatchEpipolarSideBySide, FindsNothingWithoutABaselineOrKeypoints) {
   T_common_b = SE3();
   EXPECT_TRUE(match({}).empty());
-  T_common_b = turned(0, 0, {0.2, 0, 0});
+  T_common_b = rotated_pose(0, 0, {0.2, 0, 0});
   pair.b.clear();
   EXPECT_TRUE(match({}).empty());
 }

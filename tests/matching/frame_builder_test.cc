@@ -13,14 +13,14 @@ class FrameBuilderTest : public ::testing::Test {
   FrameBuilderTest() : pool(2), builder(rig, options(), {}) {
     Random random(1, "squares");
     for (int c = 0; c < 2; ++c) {
-      image::Image picture(320, 240);
-      for (int y = 0; y < 240; ++y) std::fill_n(picture.row(y), 320, std::uint8_t{128});
+      image::Image image(320, 240);
+      for (int y = 0; y < 240; ++y) std::fill_n(image.row(y), 320, std::uint8_t{128});
       for (int i = 0; i < 600; ++i) {
         const auto x = static_cast<int>(random.below(308)), y = static_cast<int>(random.below(228));
         const auto grey = static_cast<std::uint8_t>(random.below(256));
-        for (int r = y; r < y + 12; ++r) std::fill_n(picture.row(r) + x, 12, grey);
+        for (int r = y; r < y + 12; ++r) std::fill_n(image.row(r) + x, 12, grey);
       }
-      images.images.push_back({image::ImageState::kPresent, 0, std::move(picture)});
+      images.images.push_back({image::ImageState::kPresent, 0, std::move(image)});
     }
   }
   static feature::FeatureOptions options() {

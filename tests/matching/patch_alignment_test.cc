@@ -67,8 +67,8 @@ TEST(AlignPatch, RecoversSubPixelShiftsUnderAffineWarpsAndLight) {
         random.uniform(0.85, 1.2);
     const Vector2d truth(80 + random.uniform(-0.5, 0.5), 60 + random.uniform(-0.5, 0.5));
     const auto target = image_of(texture, warp, truth, random.uniform(0.7, 1.1), random.uniform(-10, 20));
-    const Vector2d guess = truth + Vector2d(random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8));
-    const auto found = align_patch(patch_of(texture), warp, target, guess, {});
+    const Vector2d initial = truth + Vector2d(random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8));
+    const auto found = align_patch(patch_of(texture), warp, target, initial, {});
     if (!found) continue;
     ++aligned;
     errors.push_back((found->pixel - truth).norm());

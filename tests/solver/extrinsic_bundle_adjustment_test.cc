@@ -209,12 +209,13 @@ TEST(AdjustExtrinsics, DistinguishesMotionBetweenCamerasFromExtrinsics) {
                            *scene->rig.camera(late).project(scene->rig.cam_from_rig(late) * before);
     o.pixel += shift.cast<float>();
   }
-  ReprojectionProblem untold = scene->problem;
-  untold.motion.clear();
-  const ExtrinsicAdjustment told = adjust_extrinsics(scene->problem), not_told = adjust_extrinsics(untold);
-  ASSERT_TRUE(told.done && not_told.done);
-  EXPECT_LT(told.cameras[late].change.head<3>().norm(), 0.1 * kDegree);
-  EXPECT_NEAR(not_told.cameras[late].change.head<3>().norm(), 0.02, 0.1 * kDegree);
+  ReprojectionProblem unaware = scene->problem;
+  unaware.motion.clear();
+  const ExtrinsicAdjustment with_motion = adjust_extrinsics(scene->problem),
+                            without_motion = adjust_extrinsics(unaware);
+  ASSERT_TRUE(with_motion.done && without_motion.done);
+  EXPECT_LT(with_motion.cameras[late].change.head<3>().norm(), 0.1 * kDegree);
+  EXPECT_NEAR(without_motion.cameras[late].change.head<3>().norm(), 0.02, 0.1 * kDegree);
 }
 
 TEST(AdjustExtrinsics, DoesNotChangeTheProblemOnFailure) {

@@ -33,8 +33,8 @@ TEST(PoseWithMotion, EqualsTheTruthWithoutNoise) {
   Random random(2, "motion");
   for (int trial = 0; trial < 10; ++trial) {
     const MotionScene s = make_motion_scene(rig, 0.03, 0.0, random);
-    const SE3 guess = s.seen.T_rig_world.perturbed(scene::random_twist(random, 0.01, 0.03));
-    const PoseSolution solution = solve_pose(rig, s.seen.observations, guess, s.motion, {});
+    const SE3 initial = s.seen.T_rig_world.perturbed(scene::random_twist(random, 0.01, 0.03));
+    const PoseSolution solution = solve_pose(rig, s.seen.observations, initial, s.motion, {});
     ASSERT_TRUE(solution.ok) << trial;
     EXPECT_LT(scene::centre_error(solution.T_rig_world, s.seen.T_rig_world), 1e-4) << trial;
     EXPECT_LT(scene::rotation_error(solution.T_rig_world, s.seen.T_rig_world), 1e-5) << trial;

@@ -29,8 +29,8 @@ TEST_P(PoseSolverOnRig, RecoversTruthFromNoiseAndThirtyPercentOutliers) {
   Random random(7, "pose");
   for (int trial = 0; trial < 20; ++trial) {
     const auto scene = scene::make_pose_scene(rig, 400, 1.0, 0.3, random);
-    const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.03, 0.1));
-    const PoseSolution s = solve_pose(rig, scene.observations, guess, {});
+    const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 0.03, 0.1));
+    const PoseSolution s = solve_pose(rig, scene.observations, initial, {});
     ASSERT_TRUE(s.ok) << trial;
     EXPECT_LT(scene::rotation_error(s.T_rig_world, scene.T_rig_world), 3e-3) << trial;
     EXPECT_LT(scene::centre_error(s.T_rig_world, scene.T_rig_world), 0.03) << trial;
@@ -84,8 +84,8 @@ TEST(PoseSolver, ReadmitsInliersRejectedAtAPoorInitialPose) {
   const Rig rig = scene::make_rig(4, Models::kRadTan);
   Random random(5);
   const auto scene = scene::make_pose_scene(rig, 300, 0.5, 0.0, random);
-  const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.1, 0.3));
-  const PoseSolution s = solve_pose(rig, scene.observations, guess, {});
+  const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 0.1, 0.3));
+  const PoseSolution s = solve_pose(rig, scene.observations, initial, {});
   ASSERT_TRUE(s.ok);
   EXPECT_GT(s.num_inliers, 290);
 }
@@ -109,11 +109,11 @@ TEST(PoseSolver, DoesNotDependOnTheOrderOfCameras) {
   const Rig rig = scene::make_rig(4, Models::kMixed);
   Random random(13);
   auto scene = scene::make_pose_scene(rig, 300, 1.0, 0.2, random);
-  const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.02, 0.1));
-  const PoseSolution a = solve_pose(rig, scene.observations, guess, {});
+  const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 0.02, 0.1));
+  const PoseSolution a = solve_pose(rig, scene.observations, initial, {});
   std::stable_sort(scene.observations.begin(), scene.observations.end(),
                    [](const auto& x, const auto& y) { return x.camera > y.camera; });
-  const PoseSolution b = solve_pose(rig, scene.observations, guess, {});
+  const PoseSolution b = solve_pose(rig, scene.observations, initial, {});
   EXPECT_EQ(a.num_inliers, b.num_inliers);
   EXPECT_EQ(a.T_rig_world.matrix(), b.T_rig_world.matrix());
 }
@@ -157,8 +157,8 @@ TEST(PoseRansac, SolvesWithSixtyPercentOutliersAndAPoorInitialPose) {
     const Rig rig = scene::make_rig(static_cast<std::size_t>(cameras), models);
     for (int trial = 0; trial < 20; ++trial, ++trials) {
       const auto scene = scene::make_pose_scene(rig, 400, 1.0, 0.6, random);
-      const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 10 * std::numbers::pi / 180, 0.5));
-      const PoseSolution s = estimators::ransac_pose(rig, scene.observations, guess, {}, {},
+      const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 10 * std::numbers::pi / 180, 0.5));
+      const PoseSolution s = estimators::ransac_pose(rig, scene.observations, initial, {}, {},
                                                      Random(1, "t", static_cast<std::uint64_t>(trial)));
       const bool good = s.ok && scene::rotation_error(s.T_rig_world, scene.T_rig_world) < 5e-3 &&
                         scene::centre_error(s.T_rig_world, scene.T_rig_world) < 0.05;
@@ -173,9 +173,9 @@ TEST(PoseRansac, IsDeterministic) {
   const Rig rig = scene::make_rig(3, Models::kMixed);
   Random random(19);
   const auto scene = scene::make_pose_scene(rig, 300, 1.0, 0.5, random);
-  const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.1, 0.4));
-  const PoseSolution a = estimators::ransac_pose(rig, scene.observations, guess, {}, {}, Random(5));
-  const PoseSolution b = estimators::ransac_pose(rig, scene.observations, guess, {}, {}, Random(5));
+  const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 0.1, 0.4));
+  const PoseSolution a = estimators::ransac_pose(rig, scene.observations, initial, {}, {}, Random(5));
+  const PoseSolution b = estimators::ransac_pose(rig, scene.observations, initial, {}, {}, Random(5));
   EXPECT_EQ(a.T_rig_world.matrix(), b.T_rig_world.matrix());
   EXPECT_EQ(a.inlier, b.inlier);
   EXPECT_EQ(a.information, b.information);

@@ -43,9 +43,9 @@ struct Playback {
   evaluation::Trajectory truth;
 };
 
-inline Playback play(const RenderedTour& tour, std::initializer_list<std::pair<std::size_t, std::size_t>> stretches) {
+inline Playback play(const RenderedTour& tour, std::initializer_list<std::pair<std::size_t, std::size_t>> segments) {
   Playback out;
-  for (const auto& [first, end] : stretches) {
+  for (const auto& [first, end] : segments) {
     for (std::size_t k = first; k < end; ++k) {
       image::ImageBundle images = tour.frames()[k];
       const TimeNs later_ns = tour.frames()[out.frames.size()].time_ns - images.time_ns;

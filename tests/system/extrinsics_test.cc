@@ -12,7 +12,7 @@ using geometry::SE3;
 constexpr double kDegree = std::numbers::pi / 180;
 
 // The rig with one camera rotated by a degree around its vertical axis.
-camera::Rig turned(const camera::Rig& rig, std::size_t camera) {
+camera::Rig rotated(const camera::Rig& rig, std::size_t camera) {
   geometry::Vector6d turn = geometry::Vector6d::Zero();
   turn[1] = kDegree;
   std::vector<camera::RigCamera> cameras;
@@ -39,7 +39,7 @@ void run(const RenderedTour& tour, System& system) {
 
 TEST(SystemExtrinsics, ReportsTheRotatedCameraAndKeepsTheGivenExtrinsics) {
   const RenderedTour tour(4, 40);
-  const camera::Rig wrong = turned(tour.rig(), 2);
+  const camera::Rig wrong = rotated(tour.rig(), 2);
   System system(wrong, small_config(execution::Mode::kSequential));
   run(tour, system);
   EXPECT_FALSE(system.extrinsics_refined());
@@ -50,7 +50,7 @@ TEST(SystemExtrinsics, UsesTheRefinedExtrinsicsForTheMap) {
   const RenderedTour tour(4, 40);
   Config config = small_config(execution::Mode::kSequential);
   config.extrinsics.refine = true;
-  System system(turned(tour.rig(), 2), config);
+  System system(rotated(tour.rig(), 2), config);
   run(tour, system);
   EXPECT_TRUE(system.extrinsics_refined());
   for (std::size_t c = 0; c < 4; ++c) {

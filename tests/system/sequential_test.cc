@@ -241,15 +241,15 @@ TEST(SystemSequential, KeepsTheConfiguredHistory) {
 
 TEST(SystemSequential, ReportsStagesToTheObserver) {
   const RenderedTour tour(2, 8);
-  std::vector<StageRecord> told;
+  std::vector<StageRecord> reported;
   System system(tour.rig(), small_config(execution::Mode::kSequential),
-                {.observer = [&](const StageRecord& record) { told.push_back(record); }});
+                {.observer = [&](const StageRecord& record) { reported.push_back(record); }});
   for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
-  ASSERT_FALSE(told.empty());
-  ASSERT_EQ(told.size(), system.stage_runs().size());
+  ASSERT_FALSE(reported.empty());
+  ASSERT_EQ(reported.size(), system.stage_runs().size());
   double created = 0;
-  for (const StageRecord& record : told) {
+  for (const StageRecord& record : reported) {
     for (const execution::StageStatistic& s : record.run.statistics)
       created += s.name == "created landmarks" ? s.value : 0;
   }
