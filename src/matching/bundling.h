@@ -16,10 +16,10 @@
 namespace bslam::matching {
 
 struct BundlingOptions {
-  // minimum distance of a point
-  // maximum descriptor distance of a match, of 256 bits
-  // maximum ratio of best to second best descriptor distance on the epipolar curve
-  // maximum distance from the epipolar curve before alignment, standard deviations
+  double min_depth_m = 0.15;   // minimum distance of a point
+  int max_hamming = 64;        // maximum descriptor distance of a match, of 256 bits
+  double ratio = 0.9;          // maximum ratio of best to second best descriptor distance on the epipolar curve
+  double sigmas = 3.0;         // maximum distance from the epipolar curve before alignment, standard deviations
   double max_chi2 = 7.81;      // maximum squared normalised error of an aligned keypoint to its feature's point
   double min_parallax = 5e-4;  // rad, minimum parallax of a feature with a point (about a quarter pixel)
 
