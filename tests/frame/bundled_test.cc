@@ -114,8 +114,8 @@ TEST(BundledDeathTest, RejectsAKeypointInTwoFeatures) {
   const KeypointRef a{CameraIndex(0), KeypointIndex(0)}, b{CameraIndex(1), KeypointIndex(0)},
       c{CameraIndex(1), KeypointIndex(1)};
   const std::vector<std::vector<KeypointRef>> twice = {{a, b}, {a, c}}, same_camera = {{b, c}};
-  EXPECT_DEATH(Bundled(counts, twice, std::vector<std::optional<BundledPoint>>(2)), "exactly one");
-  EXPECT_DEATH(Bundled(counts, same_camera, std::vector<std::optional<BundledPoint>>(1)), "one keypoint per camera");
+  EXPECT_DEATH(Bundled(counts, twice, std::vector<std::optional<BundledPoint>>(2)), "two features");
+  EXPECT_DEATH(Bundled(counts, same_camera, std::vector<std::optional<BundledPoint>>(1)), "distinct cameras");
 }
 
 }  // namespace
