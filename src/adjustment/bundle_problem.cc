@@ -27,7 +27,7 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
   if (seen < 2) return false;
   const int point = static_cast<int>(flat.landmarks.size());
   std::size_t reference = kNone;
-  float least = std::numeric_limits<float>::infinity();  // among observations aligned to the reference patch
+  float min_sigma = std::numeric_limits<float>::infinity();  // among observations aligned to the reference patch
   for (const map::Observation& o : observations) {
     const int pose = position[o.keyframe.index()];
     if (pose == kAbsent) continue;
@@ -40,7 +40,7 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
       if (o.aligned && map.landmark(id).reference == map::LandmarkReference{o.keyframe, r}) {
         reference = flat.problem.observations.size();
       } else if (o.aligned) {
-        least = std::min(least, sigma);
+        min_sigma = std::min(min_sigma, sigma);
       }
       flat.problem.observations.push_back({pose, point, r.camera, keypoints.pixel[k], sigma});
       flat.sources.push_back({id, o.keyframe});
@@ -48,7 +48,7 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
   }
   // The reference keypoint defines the landmark, so its detection error does not count as an error of the landmark.
   if (reference != kNone)
-    flat.problem.observations[reference].sigma = std::min(flat.problem.observations[reference].sigma, least);
+    flat.problem.observations[reference].sigma = std::min(flat.problem.observations[reference].sigma, min_sigma);
   flat.landmarks.push_back(id);
   flat.problem.points.push_back(map.landmark(id).position);
   return true;

@@ -31,7 +31,7 @@ struct BundleProblem {
   std::vector<ObservationSource> sources;  // per observation
 };
 
-// Builds the problem. Landmarks observed by fewer than two of the keyframes are left out. `features` gives the
+// Builds the problem. Landmarks observed by fewer than two of the keyframes are ignored. `features` determines the
 // standard deviation of a keypoint that is not aligned to its landmark's patch. The map must outlive the problem.
 BundleProblem build_problem(const map::BundledMap& map, const Selection& selection,
                             const feature::FeatureModel& features);

@@ -36,7 +36,7 @@ struct AdjustmentReport {
 };
 
 // Adjusts the free keyframes and the landmarks, using the observations of all cameras, in two rounds. Writes poses,
-// positions and the removal of outlier observations to the draft. `features` gives the standard deviation of a
+// positions and the removal of outlier observations to the draft. `features` determines the standard deviation of a
 // keypoint that is not aligned to its landmark's patch.
 AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options,
                             const feature::FeatureModel& features, map::MapDraft& draft, std::stop_token stop = {});

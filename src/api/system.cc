@@ -92,7 +92,12 @@ struct System::Impl {
 
 Result<FrameResult> System::Impl::process(const ImageBundle& bundle) {
   if (failure) return *failure;
-  if (finished) return Error{"System::process", "", "a call after finish()", "calls before it"};
+  if (finished) {
+    Error error;
+    error.file = "System::process";
+    error.sentence = "process() was called after finish()";
+    return error;
+  }
   const auto images = reader.read(bundle);
   if (!images) return images.error();
   bool refused = false;  // the frame was not taken, and the run goes on without it

@@ -22,19 +22,19 @@ using geometry::SE3;
 constexpr int kMaxHamming = 60;       // bits; largest descriptor distance of a match
 constexpr double kRatio = 0.85;       // largest ratio of best to second best descriptor distance
 constexpr double kTolerancePx = 2.0;  // of calibration and feature localisation together
-constexpr int kLeastAgreeing = 25;
-constexpr double kLeastShare = 0.4;   // share of consistent matches; chance reaches a few per cent
+constexpr int kMinAgreeing = 25;
+constexpr double kMinRatio = 0.4;     // minimum fraction of consistent matches; random matches reach a few per cent
 constexpr int kMany = 300;            // matches; with more than these some convention is expected to fit
-constexpr double kMost = 0.6;         // share of consistent matches below which another pose is searched for
+constexpr double kGoodRatio = 0.6;    // if the fraction of consistent matches is smaller, another pose is searched for
 constexpr double kClearly = 1.3;      // factor between numbers of consistent matches that counts as a clear difference
 constexpr double kNoBaseline = 1e-6;  // metres
-constexpr double kLeastParallax = 0.005;  // radians; for the estimation of another pose
+constexpr double kMinParallax = 0.005;  // rad, for the estimation of another pose
 
 struct PixelPair {
   Eigen::Vector2d a, b;
 };
 
-// Mutual best matches. No geometric constraint is used, since the geometry is what is tested.
+// Mutual best matches. No geometric constraint is used, since the geometry itself is tested.
 std::vector<PixelPair> match(const feature::Detections& a, const feature::Detections& b) {
   std::vector<PixelPair> pairs;
   for (const feature::DescriptorMatch& m : feature::mutual_matches(a.descriptor, b.descriptor, kMaxHamming, kRatio,
@@ -101,14 +101,16 @@ std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::
     const auto a = ci.unproject(pair.a), b = cj.unproject(pair.b);
     if (a && b) bearings.push_back({*a, *b});
   }
-  const int least = std::max(kLeastAgreeing, static_cast<int>(kLeastShare * static_cast<double>(bearings.size())));
-  const estimators::RelativePoseOptions options{
-      .iterations = 2000, .inlier_angle = tolerance_of(ci, cj), .min_parallax = kLeastParallax, .min_inliers = least};
+  const int min_inliers = std::max(kMinAgreeing, static_cast<int>(kMinRatio * static_cast<double>(bearings.size())));
+  const estimators::RelativePoseOptions options{.iterations = 2000,
+                                                .inlier_angle = tolerance_of(ci, cj),
+                                                .min_parallax = kMinParallax,
+                                                .min_inliers = min_inliers};
   const auto found = estimators::relative_pose(bearings, options, Random(1, "extrinsics check"));
   if (!found) return std::nullopt;
   const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
   OtherPose out{.agreeing = found->num_inliers};
-  out.turned_deg = geometry::degrees(geometry::so3_log((found->T_b_a * given.inverse()).rotation()).norm());
+  out.rotated_deg = geometry::degrees(geometry::so3_log((found->T_b_a * given.inverse()).rotation()).norm());
   const Eigen::Vector3d lies = found->T_b_a.inverse().translation(), should_lie = given.inverse().translation();
   if (should_lie.norm() > kNoBaseline)
     out.displaced_deg = geometry::degrees(geometry::angle_between(lies, should_lie.normalized()));
@@ -117,7 +119,7 @@ std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::
 
 std::optional<Convention> verdict_of(const PairEvidence& evidence) {
   const auto best = std::max_element(evidence.agreeing.begin(), evidence.agreeing.end());  // the first among equal ones
-  if (*best < kLeastAgreeing || *best < kLeastShare * evidence.matches) return std::nullopt;
+  if (*best < kMinAgreeing || *best < kMinRatio * evidence.matches) return std::nullopt;
   if (*best < kClearly * evidence.agreeing[0]) return Convention::kAsGiven;
   return static_cast<Convention>(best - evidence.agreeing.begin());
 }
@@ -156,7 +158,7 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
   evidence.matches = static_cast<int>(all.size());
   evidence.verdict = verdict_of(evidence);
   const int fitting = *std::ranges::max_element(evidence.agreeing);
-  if (evidence.verdict && fitting >= kMost * evidence.matches) return evidence;
+  if (evidence.verdict && fitting >= kGoodRatio * evidence.matches) return evidence;
   evidence.other = other_pose(rig, i, j, all);
   if (evidence.other && evidence.other->agreeing < kClearly * fitting) evidence.other.reset();
   if (evidence.other) evidence.verdict.reset();
@@ -216,23 +218,23 @@ std::string describe(const PairEvidence& pair) {
     return fmt::format(
         "{} of {} matches are consistent with a pose of the second camera that is rotated by {:.1f} degrees from the "
         "calibrated one, with a baseline whose direction differs by {:.0f} degrees; {} with the calibration as given",
-        pair.other->agreeing, pair.matches, pair.other->turned_deg, pair.other->displaced_deg,
+        pair.other->agreeing, pair.matches, pair.other->rotated_deg, pair.other->displaced_deg,
         agreeing(Convention::kAsGiven));
   }
   if (pair.instants == 0) return "no images taken at the same time: nothing to compare";
   if (!pair.verdict && pair.matches > kMany)
     return fmt::format("{} matches, but too few are consistent with any convention", pair.matches);
-  if (!pair.verdict) return fmt::format("too few matches to judge ({})", pair.matches);
+  if (!pair.verdict) return fmt::format("too few matches for a decision ({})", pair.matches);
   std::string text = fmt::format("{} of {} matches are consistent with the calibration {}", agreeing(*pair.verdict),
                                  pair.matches, convention_in_words(*pair.verdict));
   if (*pair.verdict != Convention::kAsGiven)
     return text + fmt::format("; {} with it as given", agreeing(Convention::kAsGiven));
-  if (agreeing(Convention::kAsGiven) < kMost * pair.matches)
+  if (agreeing(Convention::kAsGiven) < kGoodRatio * pair.matches)
     text += "; this is few: many matches are wrong, or the intrinsics are inaccurate";
   return text;
 }
 
-// For rigs without a fault: the pairs and cameras that could not be judged.
+// For rigs without a fault: the pairs and cameras that could not be tested.
 std::string unjudged(std::span<const PairEvidence> evidence) {
   std::size_t pairs = 0;
   std::set<std::size_t> cameras, judged;
@@ -243,7 +245,7 @@ std::string unjudged(std::span<const PairEvidence> evidence) {
   std::erase_if(cameras, [&](std::size_t c) { return judged.contains(c); });
   if (pairs == 0) return "";
   return fmt::format(
-      "; {} of {} pairs could not be judged{}", pairs, evidence.size(),
+      "; {} of {} pairs could not be tested{}", pairs, evidence.size(),
       cameras.empty() ? "" : fmt::format(", among them all pairs of camera {}", fmt::join(cameras, ", ")));
 }
 
@@ -272,7 +274,7 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
                fmt::join(pairs, ", "), convention_in_words(most->first), others);
   }
   if (elsewhere > 0) return text + "warning: the images contradict the extrinsics, and no common mistake explains it\n";
-  if (fitting == 0) return text + "  the extrinsics could not be judged\n";
+  if (fitting == 0) return text + "  the extrinsics could not be tested\n";
   return text + "  the extrinsics are consistent with the images" + unjudged(evidence) + "\n";
 }
 

@@ -1,5 +1,5 @@
 // Tests against images whether a calibration file was read in the convention that was meant. Features that two cameras
-// see at the same time must satisfy their epipolar geometry. It is tested under the calibration as given and under
+// observe at the same time must satisfy their epipolar geometry. It is tested under the calibration as given and under
 // common mistakes such as inverted transforms. Unlike the refinement of a rig (rig_refinement.h), it needs neither a
 // map nor a calibration that is nearly right.
 #pragma once
@@ -32,7 +32,7 @@ std::string_view convention_in_words(Convention convention);
 // A relative pose of the two cameras that is consistent with clearly more matches than any convention.
 struct OtherPose {
   int agreeing = 0;          // matches consistent with it
-  double turned_deg = 0;     // angle between the estimated and the given orientation of the second camera
+  double rotated_deg = 0;    // angle between the estimated and the given orientation of the second camera
   double displaced_deg = 0;  // angle between the estimated and the given direction of the baseline; 0 without baseline
 };
 
@@ -48,12 +48,13 @@ struct PairEvidence {
   std::optional<OtherPose> other = {};
 };
 
-// Judges the pair (i, j) by keypoints of images taken at the same times. `of_i` and `of_j` have one entry per frame.
+// Tests the pair (i, j) with keypoints of images taken at the same times. `of_i` and `of_j` have one entry per frame.
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Detections> of_i,
                         std::span<const feature::Detections> of_j);
 
-// Judges every pair of cameras (i, j), i < j, by the images that they took at the same time. A few frames spread over a
-// recording suffice. `masks` has one image per camera, empty or of its resolution; keypoints where it is 0 are ignored.
+// Tests every pair of cameras (i, j), i < j, with the images that they took at the same time. A few frames spread over
+// a recording suffice. `masks` has one image per camera, empty or of its resolution; keypoints where it is 0 are
+// ignored.
 std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<const image::ImageBundle> frames,
                                             std::span<const image::Image> masks);
 

@@ -12,10 +12,10 @@ namespace {
 
 using Observation = solver::ReprojectionProblem::Observation;
 
-constexpr double kRadius = 0.012;   // radians about the projection
+constexpr double kRadius = 0.012;   // rad, search radius around the projection
 constexpr double kMaxChi2 = 100.0;  // ten standard deviations
 constexpr int kMaxHamming = 50;     // bits
-constexpr double kRatio = 0.8;      // to the second best
+constexpr double kRatio = 0.8;      // maximum ratio of best to second best descriptor distance
 
 std::tuple<int, int, CameraIndex> place_of(const Observation& o) { return {o.point, o.pose, o.camera}; }
 
@@ -23,7 +23,7 @@ bool pixel_before(const Observation& a, const Observation& b) {
   return std::pair(a.pixel.x(), a.pixel.y()) < std::pair(b.pixel.x(), b.pixel.y());
 }
 
-// Of one image: keypoints that belong to a landmark, in the map or among what the problem has `seen` already.
+// Keypoints of one image that belong to a landmark of the map or to an observation of the problem (`seen`).
 std::vector<std::uint8_t> taken_keypoints(const map::BundledMap& map, KeyframeId k, CameraIndex camera,
                                           std::vector<Observation> seen) {
   std::sort(seen.begin(), seen.end(), pixel_before);
@@ -38,7 +38,7 @@ std::vector<std::uint8_t> taken_keypoints(const map::BundledMap& map, KeyframeId
   return taken;
 }
 
-// What each image (pose, camera) shows already.
+// Observations of the problem per image (pose, camera).
 std::vector<std::vector<Observation>> observations_by_image(const solver::ReprojectionProblem& problem) {
   std::vector<std::vector<Observation>> out(problem.T_rig_world.size() * problem.rig->size());
   for (const Observation& o : problem.observations) {
@@ -54,7 +54,7 @@ void sort_observations(adjustment::BundleProblem& flat) {
   for (std::size_t i = 0; i < all.size(); ++i) std::tie(flat.problem.observations[i], flat.sources[i]) = all[i];
 }
 
-// What the images of one keyframe are not searched for.
+// Keypoints and points that are excluded from the search in the images of one keyframe.
 std::vector<matching::SearchExclusions> known_in(const map::BundledMap& map, KeyframeId keyframe,
                                                  std::span<const std::vector<Observation>> seen, std::size_t points) {
   std::vector<matching::SearchExclusions> out(seen.size());
@@ -66,7 +66,7 @@ std::vector<matching::SearchExclusions> known_in(const map::BundledMap& map, Key
   return out;
 }
 
-// Adds what the images of one keyframe, the cameras posed at `T_cam_world`, show of `points`.
+// Adds the observations of `points` in the images of one keyframe; `T_cam_world`: poses of its cameras.
 void search_keyframe(const map::BundledMap& map, std::size_t pose, std::span<const geometry::SE3> T_cam_world,
                      std::span<const matching::SearchPoint> points, std::span<const std::vector<Observation>> seen,
                      const feature::FeatureModel& features, adjustment::BundleProblem& flat) {

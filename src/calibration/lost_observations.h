@@ -1,4 +1,4 @@
-// Keypoints that show a landmark but were refused because the geometry they were judged by was wrong.
+// Recovers keypoints that show a landmark but were rejected because of wrong extrinsics.
 #pragma once
 
 #include <span>
@@ -8,10 +8,10 @@
 
 namespace bslam::calibration {
 
-// Looks for every point of the problem in every image of its keyframes, under the extrinsics `T_cam_rig` (one per
-// camera) and the problem's own poses and points, and adds what is found as observations, those not aligned. Only
-// keypoints without a landmark, in the map or the problem, are taken; only of keyframes that do not see the point with
-// that camera yet. Bounds are wide: whoever adjusts next judges. Returns how many were added.
+// Searches for every point of the problem in every image of its keyframes, with the extrinsics `T_cam_rig` (one per
+// camera) and the problem's poses and points, and adds the matches as observations that are not aligned. Only keypoints
+// without a landmark in the map and the problem are matched, and only in images in which the point is not observed yet.
+// The thresholds are wide; the next adjustment has to classify the observations. Returns the number of added ones.
 int recover_observations(const map::BundledMap& map, std::span<const geometry::SE3> T_cam_rig,
                          const feature::FeatureModel& features, adjustment::BundleProblem& flat);
 

@@ -84,7 +84,7 @@ double baseline(const camera::Rig& rig, std::size_t i, std::size_t j) {
 
 std::string overlap_table(const camera::Rig& rig) {
   std::string text =
-      "overlap: percentage of the view of the camera in the row that the camera in the column sees as well\n        ";
+      "overlap: percentage of the view of the camera in the row that the camera in the column also observes\n        ";
   for (std::size_t j = 0; j < rig.size(); ++j) text += fmt::format("{:>5}", j);
   for (std::size_t i = 0; i < rig.size(); ++i) {
     text += fmt::format("\n  {:>6}", i);
@@ -114,10 +114,11 @@ std::string displacement_in_words(const Vector3d& displacement) {
                                {displacement.z(), "in front", "behind"}}};
   std::stable_sort(axes.begin(), axes.end(),
                    [](const Axis& a, const Axis& b) { return std::abs(a.along) > std::abs(b.along); });
-  const double least = std::max(1e-4, 0.01 * displacement.norm());  // smaller components are noise of the calibration
+  const double min_length =
+      std::max(1e-4, 0.01 * displacement.norm());  // smaller components are noise of the calibration
   std::vector<std::string> words;
   for (const Axis& axis : axes) {
-    if (std::abs(axis.along) < least) continue;
+    if (std::abs(axis.along) < min_length) continue;
     words.push_back(length_in_words(std::abs(axis.along)) + " " + (axis.along > 0 ? axis.positive : axis.negative));
   }
   return words.empty() ? "at the same position" : fmt::format("{}", fmt::join(words, ", "));

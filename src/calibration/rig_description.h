@@ -9,7 +9,7 @@
 namespace bslam::calibration {
 
 // Angles of view in radians, measured along lines through the principal point. If the border of the image is outside of
-// the domain of the camera model, the angle ends where the domain ends.
+// the domain of the camera model, the angle ends at the border of the domain.
 struct FieldOfView {
   double horizontal = 0, vertical = 0, diagonal = 0;
 };

@@ -17,28 +17,28 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kMillimetres = 1000.0;
-constexpr std::size_t kStretch = 10;  // consecutive keyframes chosen together, so that they share landmarks
+constexpr std::size_t kSegment = 10;  // consecutive keyframes chosen together, so that they share landmarks
 // maximum number of passes; each searches again for observations that the previous extrinsics rejected
 constexpr int kPasses = 4;
 constexpr int kMinShared = 15;  // minimum number of shared landmarks for one keyframe to constrain another
 
-// Returns all keyframes, or evenly spaced stretches of consecutive ones if there are more than `limit`; in order of id.
+// Returns all keyframes, or evenly spaced segments of consecutive ones if there are more than `limit`; in order of id.
 std::vector<KeyframeId> choose_keyframes(const map::BundledMap& map, std::size_t limit) {
   const std::vector<KeyframeId> all = map.keyframe_ids();
   if (all.size() <= limit) return all;
-  const std::size_t stretches = std::max<std::size_t>(1, limit / kStretch);
+  const std::size_t segments = std::max<std::size_t>(1, limit / kSegment);
   std::vector<KeyframeId> out;
-  for (std::size_t s = 0; s < stretches; ++s) {
-    const std::size_t first = stretches == 1 ? 0 : s * (all.size() - kStretch) / (stretches - 1);
-    for (std::size_t k = first; k < std::min(first + kStretch, all.size()); ++k) out.push_back(all[k]);
+  for (std::size_t s = 0; s < segments; ++s) {
+    const std::size_t first = segments == 1 ? 0 : s * (all.size() - kSegment) / (segments - 1);
+    for (std::size_t k = first; k < std::min(first + kSegment, all.size()); ++k) out.push_back(all[k]);
   }
   return out;
 }
 
-// Observations of a landmark: the number of chosen keyframes, the first stretch, and the cameras that observe it.
+// Observations of a landmark: the number of chosen keyframes, the first segment, and the cameras that observe it.
 struct Candidate {
   int keyframes = 0;
-  std::size_t stretch = 0;
+  std::size_t segment = 0;
   std::vector<std::uint8_t> cameras;
 };
 
@@ -48,7 +48,7 @@ Candidate look_up(const map::BundledMap& map, LandmarkId landmark, const std::ve
   for (const map::Observation& o : map.observations(landmark)) {
     const int at = position[o.keyframe.index()];
     if (at < 0) continue;
-    if (out.keyframes++ == 0) out.stretch = static_cast<std::size_t>(at) / kStretch;
+    if (out.keyframes++ == 0) out.segment = static_cast<std::size_t>(at) / kSegment;
     for (const frame::KeypointRef r : map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature))
       out.cameras[r.camera.index()] = 1;
   }
@@ -61,19 +61,19 @@ std::vector<int> positions(const map::BundledMap& map, const std::vector<Keyfram
   return out;
 }
 
-// Stretches and cameras take turns in choosing the landmark observed by the most keyframes; the result is in order of
+// Segments and cameras alternate in choosing the landmark observed by the most keyframes; the result is in order of
 // id.
 std::vector<LandmarkId> choose_landmarks(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
                                          std::size_t limit) {
   const std::vector<int> position = positions(map, keyframes);
-  const std::size_t stretches = (keyframes.size() + kStretch - 1) / kStretch, cameras = map.rig().size();
+  const std::size_t segments = (keyframes.size() + kSegment - 1) / kSegment, cameras = map.rig().size();
   // negated number of keyframes, so that sorting puts the largest first
-  std::vector<std::vector<std::pair<int, LandmarkId>>> queues(stretches * cameras);
+  std::vector<std::vector<std::pair<int, LandmarkId>>> queues(segments * cameras);
   for (const LandmarkId l : map.landmark_ids()) {
     const Candidate candidate = look_up(map, l, position);
     if (candidate.keyframes < 2) continue;
     for (std::size_t c = 0; c < cameras; ++c) {
-      if (candidate.cameras[c] != 0) queues[candidate.stretch * cameras + c].emplace_back(-candidate.keyframes, l);
+      if (candidate.cameras[c] != 0) queues[candidate.segment * cameras + c].emplace_back(-candidate.keyframes, l);
     }
   }
   for (auto& queue : queues) std::sort(queue.begin(), queue.end());
@@ -197,7 +197,7 @@ CameraRefinement evaluate_camera(const solver::ExtrinsicEstimate& estimate, cons
 }
 
 // Returns true if no extrinsics have moved from `before` by more than their own uncertainty.
-bool settled(const solver::ExtrinsicAdjustment& adjusted, const std::vector<geometry::SE3>& before) {
+bool converged(const solver::ExtrinsicAdjustment& adjusted, const std::vector<geometry::SE3>& before) {
   for (std::size_t c = 1; c < before.size(); ++c) {
     const geometry::Vector6d change = solver::extrinsic_change(adjusted.cameras[c].T_cam_rig, before[c]);
     if (change.dot(adjusted.cameras[c].covariance.llt().solve(change)) > static_cast<double>(change.size()))
@@ -215,7 +215,7 @@ solver::ExtrinsicAdjustment adjust_in_passes(const map::BundledMap& map, const f
   for (std::size_t c = 0; c < map.rig().size(); ++c) T_cam_rig.push_back(map.rig().cam_from_rig(c));
   separate_groups(problem);
   solver::ExtrinsicAdjustment out = solver::adjust_extrinsics(problem.flat.problem, options, T_cam_rig, stop);
-  for (int pass = 1; pass < kPasses && out.done && !settled(out, T_cam_rig); ++pass) {
+  for (int pass = 1; pass < kPasses && out.done && !converged(out, T_cam_rig); ++pass) {
     for (std::size_t c = 0; c < T_cam_rig.size(); ++c) T_cam_rig[c] = out.cameras[c].T_cam_rig;
     if (recover_observations(map, T_cam_rig, features, problem.flat) == 0) break;
     separate_groups(problem);

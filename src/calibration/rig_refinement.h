@@ -1,4 +1,4 @@
-// Extrinsic self-calibration: part of a finished map is adjusted with free extrinsics. Their change tells whether the
+// Extrinsic self-calibration: a part of a finished map is adjusted with free extrinsics. Their change shows whether the
 // calibration agrees with the images, and can be accepted as a better calibration.
 #pragma once
 
@@ -14,8 +14,8 @@ namespace bslam::calibration {
 struct RigRefinementOptions {
   bool check = true;     // at the end of a run, report cameras whose estimated extrinsics differ from the calibration
   bool refine = false;   // at the end of a run, accept the estimated extrinsics
-  int keyframes = 120;   // maximum number, in stretches distributed over the map
-  int landmarks = 6000;  // maximum number, distributed over stretches and cameras
+  int keyframes = 120;   // maximum number, in segments of consecutive keyframes distributed over the map
+  int landmarks = 6000;  // maximum number, distributed over segments and cameras
   double calibration_deg = 2.0, calibration_mm = 30.0;  // standard deviations per axis of the calibrated extrinsics
   // A camera is suspect if its rotation or translation changed by more than both a number of standard deviations and an
   // absolute threshold. The latter allows for errors that the standard deviations do not include, such as slightly
@@ -47,7 +47,7 @@ struct CameraRefinement {
   double change_deg = 0, change_mm = 0;  // rotation angle, and displacement of the camera centre
   double std_deg = 0, std_mm = 0;  // standard deviations of T_cam_rig_after in the direction of largest uncertainty
   double rotation_sigmas = 0, translation_sigmas = 0;  // changes in standard deviations (Mahalanobis distance)
-  // Rotation about, then translation along the camera's axes: true if the images, and not only the calibration,
+  // Rotation around, then translation along the camera's axes: true if the images, and not only the calibration,
   // constrain it.
   std::array<bool, 6> observed = {};
   int observations = 0;  // number of keypoints

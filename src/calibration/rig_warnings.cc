@@ -15,7 +15,7 @@ using geometry::degrees;
 using geometry::Vector2d;
 using geometry::Vector3d;
 
-constexpr double kLeastBaseline = 1e-3, kLargestBaseline = 5.0;  // metres
+constexpr double kMinBaseline = 1e-3, kMaxBaseline = 5.0;  // metres
 
 Vector3d axis_of(const camera::Rig& rig, std::size_t i) { return rig.rig_from_cam(i).rotation() * Vector3d::UnitZ(); }
 
@@ -37,7 +37,7 @@ void warn_of_long_baselines(const camera::Rig& rig, std::vector<std::string>& wa
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
       const double length = between(rig, i, j).translation().norm();
-      if (length <= kLargestBaseline) continue;
+      if (length <= kMaxBaseline) continue;
       if (others++ < 0) first = fmt::format("cameras {} and {} are {} apart", i, j, length_in_words(length));
     }
   }
@@ -51,7 +51,7 @@ void warn_of_long_baselines(const camera::Rig& rig, std::vector<std::string>& wa
 void warn_of_short_baseline(const camera::Rig& rig, std::size_t i, std::size_t j, std::vector<std::string>& warnings) {
   const geometry::SE3 T_i_j = between(rig, i, j);
   const double length = T_i_j.translation().norm();
-  if (length >= kLeastBaseline) return;
+  if (length >= kMinBaseline) return;
   const bool one_pose = length < 1e-9 && geometry::so3_log(T_i_j.rotation()).norm() < 1e-9;
   if (one_pose) {
     warnings.push_back(fmt::format("cameras {} and {} have the same extrinsics: is a transform missing?", i, j));
@@ -74,7 +74,7 @@ void warn_of_principal_point(const camera::Camera& camera, std::size_t i, std::v
 }
 
 void warn_of_lens(const camera::Camera& camera, std::size_t i, std::vector<std::string>& warnings) {
-  constexpr double kNarrow = 8, kWide = 150, kLeastAnswered = 0.85, kSquare = 1.2;
+  constexpr double kNarrow = 8, kWide = 150, kMinValidFraction = 0.85, kSquare = 1.2;
   constexpr int kColumns = 24, kRows = 16;
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   const double ratio = std::max(k.fx / k.fy, k.fy / k.fx);
@@ -97,13 +97,13 @@ void warn_of_lens(const camera::Camera& camera, std::size_t i, std::vector<std::
       answered += camera.unproject(pixel) ? 1 : 0;
     }
   }
-  const double share = static_cast<double>(answered) / (kColumns * kRows);
-  const double corners = plane ? kLeastAnswered : 0.5;  // large parts of a fisheye image may be dark
-  if (share < corners) {
+  const double valid_fraction = static_cast<double>(answered) / (kColumns * kRows);
+  const double corners = plane ? kMinValidFraction : 0.5;  // large parts of a fisheye image may be dark
+  if (valid_fraction < corners) {
     warnings.push_back(
         fmt::format("camera {}: the camera model is valid for only {:.0f} % of the image: are the coefficients "
-                    "those of model {}?",
-                    i, 100 * share, camera::model_name(camera.model)));
+                    "for model {}?",
+                    i, 100 * valid_fraction, camera::model_name(camera.model)));
   }
 }
 
@@ -143,7 +143,7 @@ void warn_of_direction(const camera::Rig& rig, std::vector<std::string>& warning
     for (std::size_t i = 1; i < r.size(); ++i) most = std::max(most, r.rig_from_cam(i).translation().norm());
     return most;
   };
-  if (rig.size() > 1 && spread(rig) < kLeastBaseline && spread(inverse) > kLeastBaseline) {
+  if (rig.size() > 1 && spread(rig) < kMinBaseline && spread(inverse) > kMinBaseline) {
     warnings.push_back(std::string("all cameras are at the same position, but not with inverted transforms") +
                        kQuestion);
   } else if (obstruction(rig) > kInTheWay && obstruction(inverse) < kOutOfTheWay) {
@@ -162,7 +162,7 @@ void warn_of_direction(const camera::Rig& rig, std::vector<std::string>& warning
 // Cameras with similar viewing directions should be side by side, and others should face away from each other.
 double pair_obstruction(const camera::Rig& rig, std::size_t i, std::size_t j) {
   const Vector3d baseline = rig.rig_from_cam(j).translation() - rig.rig_from_cam(i).translation();
-  if (baseline.norm() < kLeastBaseline) return 0.0;
+  if (baseline.norm() < kMinBaseline) return 0.0;
   const Vector3d direction = baseline.normalized(), a = axis_of(rig, i), b = axis_of(rig, j);
   if (geometry::angle_between(a, b) < kSameWay) return std::abs(direction.dot((a + b).normalized()));
   return std::max(0.0, -direction.dot((b - a).normalized()));

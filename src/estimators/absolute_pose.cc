@@ -17,8 +17,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr int kMinSamples = 30;  // noise makes some samples without outliers poor ones
-constexpr int kRedraws = 10;     // for a sample of three different points
+constexpr int kMinSamples = 30;  // because of noise, some samples without outliers give poor poses
+constexpr int kRedraws = 10;     // attempts to draw a sample of three different points
 
 // An observation as a ray in the rig frame.
 struct Ray {
@@ -43,7 +43,7 @@ bool distinct_points(const Sample& s) {
          s[1]->point_world != s[2]->point_world;
 }
 
-// Three different rays, of different points where a few attempts find such: two cameras' views of one point say less.
+// Three different rays, preferably of different points, because two views of one point contain less information.
 Sample draw(std::span<const Ray> rays, Random& random) {
   const auto n = static_cast<std::uint32_t>(rays.size());
   Sample sample{};
@@ -58,11 +58,12 @@ Sample draw(std::span<const Ray> rays, Random& random) {
   return sample;
 }
 
-// Newton's method for the distances along the three rays at which the points found have the distances of those in the
-// world (docs/math.md, section 10), from those of a central rig. False where it does not arrive in front of all three.
+// Newton's method for the distances along the three rays at which the points have the same mutual distances as the
+// points in the world (docs/math.md, section 10), starting from the distances for a central rig. Returns false if it
+// does not converge to positive distances.
 bool solve_distances(const Sample& sample, Vector3d& along) {
   constexpr int kSteps = 8;
-  constexpr double kSolved = 1e-9;  // of the squared distances
+  constexpr double kSolved = 1e-9;  // relative tolerance of the squared distances
   for (int step = 0; step <= kSteps; ++step) {
     Vector3d error;
     Matrix3d J = Matrix3d::Zero();
@@ -82,7 +83,7 @@ bool solve_distances(const Sample& sample, Vector3d& along) {
   return false;
 }
 
-// Up to four poses of the rig that see the sample's points along its rays.
+// Up to four poses of the rig for which the sample's points lie on its rays.
 void solve_sample(const Sample& sample, std::vector<SE3>& T_rig_world) {
   T_rig_world.clear();
   opengv::bearingVectors_t bearings;
@@ -92,7 +93,8 @@ void solve_sample(const Sample& sample, std::vector<SE3>& T_rig_world) {
     points.push_back(ray->point_world);
   }
   const opengv::absolute_pose::CentralAbsoluteAdapter adapter(bearings, points);
-  for (const auto& T : opengv::absolute_pose::p3p_kneip(adapter)) {  // world from a central rig; roots may be complex
+  for (const auto& T :
+       opengv::absolute_pose::p3p_kneip(adapter)) {  // T_world_rig of a central rig; roots may be complex
     if (!T.allFinite()) continue;
     Vector3d along;
     for (int k = 0; k < 3; ++k) {
@@ -135,7 +137,7 @@ solver::PoseSolution absolute_pose(const Rig& rig, std::span<const solver::PoseO
     solve_sample(draw(rays, random), candidates);
     bool better = false;
     for (const SE3& T : candidates) better |= search.offer(T);
-    if (better) needed = samples_needed(search.inlier_share(), ransac.confidence);
+    if (better) needed = samples_needed(search.inlier_ratio(), ransac.confidence);
   }
   solver::PoseSolution out = solver::solve_rounds(problem, search.best(), ransac.inlier_chi2, options);
   out.ok &= count_distinct_points(observations, out.inlier) >= ransac.min_inliers;

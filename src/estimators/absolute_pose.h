@@ -1,4 +1,5 @@
-// The pose of the rig from matches of landmarks with any of its cameras, without a guess: relocalisation.
+// Estimates the pose of the rig from matches of landmarks in any of its cameras without an initial pose, for
+// relocalisation.
 #pragma once
 
 #include <span>
@@ -12,25 +13,26 @@ using camera::Rig;
 using geometry::SE3;
 
 struct AbsolutePoseOptions {
-  int iterations = 300;       // samples at most: enough for a third of inliers
-  double inlier_chi2 = 25.0;  // squared normalised error that counts as agreement while sampling
-  double confidence = 0.999;  // of having drawn one sample without outliers, given the best share so far
-  int min_inliers = 15;       // distinct points; wrong matches alone agreed in 6 at most, of 130, in 2,000 trials
+  int iterations = 300;       // maximum number of samples; sufficient for a third of inliers
+  double inlier_chi2 = 25.0;  // maximum squared normalised error of an inlier during sampling
+  double confidence = 0.999;  // probability of a sample without outliers at which sampling stops
+  int min_inliers = 15;  // minimum number of distinct points; in 2,000 trials, at most 6 of 130 wrong matches agreed
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("iterations", self.iterations, Range{1, 100000}, "", "samples of three observations at most");
+    visitor("iterations", self.iterations, Range{1, 100000}, "", "maximum number of samples of three observations");
     visitor("inlier_chi2", self.inlier_chi2, Range{1, 1000}, "",
-            "squared normalised error that counts as agreement while sampling");
-    visitor("confidence", self.confidence, Range{0.5, 0.999999}, "", "of having drawn one sample without outliers");
-    visitor("min_inliers", self.min_inliers, Range{4, 1000}, "", "distinct points a pose must agree with");
+            "maximum squared normalised error of an inlier during sampling");
+    visitor("confidence", self.confidence, Range{0.5, 0.999999}, "",
+            "probability of a sample without outliers at which sampling stops");
+    visitor("min_inliers", self.min_inliers, Range{4, 1000}, "", "minimum number of distinct inlier points of a pose");
   }
 };
 
 // Seeded RANSAC over minimal samples of three observations of different points, from any cameras: P3P (Kneip, CVPR
-// 2011, by OpenGV) as if their cameras stood in one place, then Newton's method to where they do. A solution is judged
-// by all observations and the best refined as by solve_pose. Not ok also where fewer than `min_inliers` distinct points
-// agree. Observations whose pixel has no bearing are never in a sample. Deterministic.
+// 2011, by OpenGV) for a central camera, then Newton's method for the true camera positions. Solutions are scored by
+// all observations, and the best one is refined as by solve_pose. The result is also not ok if fewer than `min_inliers`
+// distinct points agree. Observations whose pixel has no bearing are not sampled. Deterministic.
 solver::PoseSolution absolute_pose(const Rig& rig, std::span<const solver::PoseObservation> observations,
                                    const solver::PoseSolverOptions& options, const AbsolutePoseOptions& ransac,
                                    Random random);

@@ -13,7 +13,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Vector5d = Eigen::Matrix<double, 5, 1>;
 
-constexpr double kSmall = 1e-12;  // sine below which a bearing lies on the baseline and spans no plane
+constexpr double kSmall = 1e-12;  // sine below which a bearing lies on the baseline and defines no epipolar plane
 
 // Distances along R a and b at which the rays come closest, each times the squared sine between them.
 struct ScaledDistances {
@@ -26,7 +26,7 @@ ScaledDistances distances(const EpipolarPose& pose, const BearingPair& pair) {
   return {c * bt - ft, bt - c * ft, 1.0 - c * c};
 }
 
-// Two unit vectors that span the plane across t.
+// Two unit vectors that span the plane perpendicular to t.
 Eigen::Matrix<double, 3, 2> tangent_basis(const Vector3d& t) {
   Eigen::Matrix<double, 3, 2> basis;
   basis.col(0) = t.unitOrthogonal();
@@ -89,7 +89,7 @@ double epipolar_angle(const EpipolarPose& pose, const BearingPair& pair) {
   const Vector3d f = pose.R_b_a * pair.a;
   const double n = std::abs(pair.b.dot(pose.t_b_a.cross(f)));
   const double sine = std::min(pose.t_b_a.cross(f).norm(), pose.t_b_a.cross(pair.b).norm());
-  // A bearing on the baseline spans no plane; the other then has to lie on the baseline, too.
+  // A bearing on the baseline defines no epipolar plane; the other bearing must then lie on the baseline, too.
   if (!(sine > kSmall)) return std::max(pose.t_b_a.cross(f).norm(), pose.t_b_a.cross(pair.b).norm());
   return std::asin(std::min(1.0, n / sine));
 }
@@ -110,7 +110,7 @@ EpipolarPose refine_epipolar(const EpipolarPose& start, std::span<const BearingP
                              const std::vector<std::uint8_t>& use, double knee) {
   struct State {
     EpipolarPose pose;
-    Eigen::Matrix<double, 3, 2> basis;  // of the translation's two degrees of freedom
+    Eigen::Matrix<double, 3, 2> basis;  // basis of the translation's two degrees of freedom
   };
   const auto equations_at = [&](const State& s) { return linearise(s.pose, s.basis, pairs, use, knee); };
   const auto plus = [](const State& s, const Vector5d& delta) {

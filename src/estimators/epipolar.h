@@ -1,4 +1,4 @@
-// Two-view geometry of bearings on the sphere: valid for any angle, also behind an image plane (docs/math.md,
+// Two-view geometry of bearings on the sphere, valid for any field of view (docs/math.md,
 // section 6).
 #pragma once
 
@@ -16,16 +16,16 @@ struct EpipolarPose {
   Eigen::Vector3d t_b_a = Eigen::Vector3d::UnitX();
 };
 
-// Larger of the two angles between a bearing and the epipolar plane of the other, radians.
+// Larger of the two angles between a bearing and the epipolar plane of the other bearing, radians.
 double epipolar_angle(const EpipolarPose& pose, const BearingPair& pair);
 
-// Do the rays come closest to each other at positive distances along both?
+// Returns true if the closest points of the two rays are at positive distances.
 bool in_front_of_both(const EpipolarPose& pose, const BearingPair& pair);
 
-// Midpoint of where the rays come closest, in camera a, in units of the translation.
+// Midpoint between the closest points of the two rays, in camera a, in units of the translation.
 Eigen::Vector3d midpoint_in_a(const EpipolarPose& pose, const BearingPair& pair);
 
-// Pose with the least sum of squared Sampson angles over the pairs in `use`, by Levenberg-Marquardt over rotation (3)
+// Pose that minimises the squared Sampson angles of the pairs in `use`, by Levenberg-Marquardt over rotation (3)
 // and direction of translation (2), with a Huber kernel at `knee` radians.
 EpipolarPose refine_epipolar(const EpipolarPose& start, std::span<const BearingPair> pairs,
                              const std::vector<std::uint8_t>& use, double knee);

@@ -16,9 +16,9 @@ using geometry::Matrix6d;
 using geometry::SE3;
 using geometry::Vector6d;
 
-constexpr int kDistances = 41;           // tried, evenly in their logarithm
-constexpr double kMinSigma = 1e-5;       // radians: no bearing is better
-constexpr double kMinCondition = 1e-12;  // of the normal equations: below it a direction is not seen at all
+constexpr int kDistances = 41;           // number of distances evaluated, equidistant in their logarithm
+constexpr double kMinSigma = 1e-5;       // rad, minimum standard deviation of a bearing
+constexpr double kMinCondition = 1e-12;  // minimum condition of the normal equations; if smaller, it is not observable
 
 // `cost`: half the sum of squared angles, each at most the square of the knee.
 struct Sums : solver::NormalEquations<6> {
@@ -26,10 +26,10 @@ struct Sums : solver::NormalEquations<6> {
   int inliers = 0;
 };
 
-// Squared Sampson angle of every pair against the plane its camera's motion spans, cut off at the knee. With x = R a
+// Squared Sampson angle of every pair to the epipolar plane of its camera's motion, truncated at the knee. With x = R a
 // and the motion of the camera perturbed by [omega, v], b . (t x R a) changes by v . (x x b) + omega . ((t x x) x b).
-// What lengthens t alone changes no angle: without taking that part off v's, noise would pass for knowledge of the
-// distance.
+// A change of the length of t changes no angle. This component is removed from v's derivative; otherwise noise would
+// appear as information about the distance.
 Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) {
   Sums out;
   for (const CameraPairs& camera : cameras) {
@@ -42,10 +42,10 @@ Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double kne
     Vector6d g = Vector6d::Zero();
     for (const BearingPair& pair : camera.pairs) {
       const Vector3d x = R * pair.a, normal = t.cross(x), other = pair.b.cross(t);
-      const double turned = pair.b.dot(normal);
+      const double rotated = pair.b.dot(normal);
       const double spread =
-          std::sqrt((normal - turned * pair.b).squaredNorm() + (other - x.dot(other) * x).squaredNorm());
-      const double angle = spread > 0.0 ? turned / spread : 0.0;
+          std::sqrt((normal - rotated * pair.b).squaredNorm() + (other - x.dot(other) * x).squaredNorm());
+      const double angle = spread > 0.0 ? rotated / spread : 0.0;
       if (!(std::abs(angle) < knee)) {
         out.cost += 0.5 * knee * knee;
         continue;
@@ -68,16 +68,16 @@ Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double kne
 
 SE3 at_distance(const SE3& T, double distance) { return {T.rotation(), distance * T.translation().normalized()}; }
 
-// The distance along the given direction at which most agrees.
+// The distance along the given direction with the lowest cost.
 SE3 best_distance(const SE3& T_b_a, std::span<const CameraPairs> cameras, const GeneralisedScaleOptions& options) {
   SE3 best;
-  double least = std::numeric_limits<double>::infinity();
+  double min_cost = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kDistances; ++i) {
-    const double share = static_cast<double>(i) / (kDistances - 1);
-    const SE3 trial = at_distance(T_b_a, options.shortest * std::pow(options.longest / options.shortest, share));
+    const double fraction = static_cast<double>(i) / (kDistances - 1);
+    const SE3 trial = at_distance(T_b_a, options.shortest * std::pow(options.longest / options.shortest, fraction));
     const double cost = evaluate(trial, cameras, options.inlier_angle).cost;
-    if (cost < least) {
-      least = cost;
+    if (cost < min_cost) {
+      min_cost = cost;
       best = trial;
     }
   }

@@ -1,6 +1,6 @@
-// Metric motion of a rig between two frames, from matches within each of its cameras: one of them, the reference, knows
-// its motion up to scale, and where the others are on the rig gives the scale where the rig turns (generalised epipolar
-// constraint; Pless, "Using many cameras as one", CVPR 2003).
+// Metric motion of a rig between two frames from matches within each of its cameras. The motion of the reference camera
+// is known up to scale; the positions of the other cameras on the rig determine the scale if the rig rotates
+// (generalised epipolar constraint; Pless, "Using many cameras as one", CVPR 2003).
 #pragma once
 
 #include <optional>
@@ -11,27 +11,27 @@
 
 namespace bslam::estimators {
 
-// Matches of one camera of the rig between the frames a and b; outliers may be among them.
+// Matches of one camera of the rig between the frames a and b; they may contain outliers.
 struct CameraPairs {
-  geometry::SE3 T_cam_ref;  // identity for the reference itself
+  geometry::SE3 T_cam_ref;  // the identity for the reference camera
   std::vector<BearingPair> pairs;
 };
 
 struct GeneralisedScaleOptions {
-  double shortest = 0.005, longest = 5.0;  // metres the reference may have moved
-  double inlier_angle = 2e-3;              // radians between a bearing and the epipolar plane of the other
+  double shortest = 0.005, longest = 5.0;  // metres, range of the translation of the reference
+  double inlier_angle = 2e-3;              // rad, maximum angle between a bearing and the epipolar plane of the other
 };
 
 struct GeneralisedScale {
   geometry::SE3 T_b_a;     // reference camera, metres
-  double deviation = 0.0;  // relative standard deviation of the distance, by the residuals of the inliers
+  double deviation = 0.0;  // relative standard deviation of the distance, from the residuals of the inliers
   int num_inliers = 0;
 };
 
-// Tries distances all over the range along `T_b_a` (of the reference; only the direction of its translation counts),
-// then refines rotation and translation together from the best, so that the deviation holds what the reference does not
-// know of its motion. Empty where nothing tells the distance: one camera, all cameras in one place, a motion without
-// rotation.
+// `T_b_a`: motion of the reference, with a translation of any length. Evaluates distances over the whole range, then
+// refines rotation and translation together starting from the best one, so that the deviation includes the uncertainty
+// of the direction of motion. Returns nullopt if the distance is not observable: one camera, all cameras at one
+// position, or a motion without rotation.
 std::optional<GeneralisedScale> generalised_scale(const geometry::SE3& T_b_a, std::span<const CameraPairs> cameras,
                                                   const GeneralisedScaleOptions& options = {});
 

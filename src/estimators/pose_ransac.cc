@@ -10,10 +10,10 @@ namespace {
 
 using Sample = std::array<const solver::PoseProblem::Item*, 3>;
 
-// Solves six residuals for the six unknowns: a pose that the three observations fit exactly, from the guess; often
-// empty where one of them is an outlier.
-std::optional<SE3> solve_minimal(const Rig& rig, const Sample& sample, const SE3& T_rig_world_guess) {
-  constexpr double kSolved = 1e-3;  // normalised error of the three together
+// Solves six residuals for the six unknowns, starting from the initial pose: a pose that fits the three observations
+// exactly. Often returns nullopt if one of them is an outlier.
+std::optional<SE3> solve_minimal(const Rig& rig, const Sample& sample, const SE3& T_rig_world_initial) {
+  constexpr double kSolved = 1e-3;  // maximum norm of the normalised errors of all three
   const auto equations_at = [&](const SE3& T_rig_world) {
     solver::PoseEquations out;
     for (const solver::PoseProblem::Item* item : sample) {
@@ -29,7 +29,7 @@ std::optional<SE3> solve_minimal(const Rig& rig, const Sample& sample, const SE3
   };
   const auto plus = [](const SE3& T, const geometry::Vector6d& delta) { return T.perturbed(delta); };
   solver::SmallProblem<6, SE3, decltype(equations_at), decltype(plus)> problem(
-      T_rig_world_guess, equations_at(T_rig_world_guess), equations_at, plus);
+      T_rig_world_initial, equations_at(T_rig_world_initial), equations_at, plus);
   const solver::LmSummary summary = solver::minimise(problem, {.iterations = 15,
                                                                .relative_decrease = 0.0,
                                                                .step_tolerance = kSolved,
@@ -39,7 +39,7 @@ std::optional<SE3> solve_minimal(const Rig& rig, const Sample& sample, const SE3
   return problem.state();
 }
 
-// Three different items among those that project at the guess.
+// Three different items among those that project at the initial pose.
 Sample draw(std::span<const solver::PoseProblem::Item* const> candidates, Random& random) {
   const auto n = static_cast<std::uint32_t>(candidates.size());
   std::array<std::uint32_t, 3> index{};
@@ -69,32 +69,32 @@ bool PoseSearch::offer(const SE3& T_rig_world) {
   return true;
 }
 
-double PoseSearch::inlier_share() {
+double PoseSearch::inlier_ratio() {
   problem_.select(best_, bound_);
   return problem_.num_in_use() / static_cast<double>(problem_.items().size());
 }
 
-double samples_needed(double inlier_share, double confidence) {
-  const double all_inliers = std::pow(inlier_share, 3);
+double samples_needed(double inlier_ratio, double confidence) {
+  const double all_inliers = std::pow(inlier_ratio, 3);
   if (all_inliers >= 1.0) return 1.0;
   return std::log(1.0 - confidence) / std::log1p(-all_inliers);
 }
 
 solver::PoseSolution ransac_pose(const Rig& rig, std::span<const solver::PoseObservation> observations,
-                                 const SE3& T_rig_world_guess, const solver::PoseSolverOptions& options,
+                                 const SE3& T_rig_world_initial, const solver::PoseSolverOptions& options,
                                  const PoseRansacOptions& ransac, Random random) {
   solver::PoseProblem problem(rig, observations);
-  problem.select(T_rig_world_guess, std::numeric_limits<double>::max());
+  problem.select(T_rig_world_initial, std::numeric_limits<double>::max());
   std::vector<const solver::PoseProblem::Item*> candidates;
   for (const solver::PoseProblem::Item& item : problem.items()) {
     if (item.in_use) candidates.push_back(&item);
   }
   PoseSearch search(problem, ransac.inlier_chi2);
-  search.offer(T_rig_world_guess);
+  search.offer(T_rig_world_initial);
   double needed = ransac.iterations;
   for (int i = 0; candidates.size() >= 3 && i < ransac.iterations && i < needed; ++i) {
-    const auto T = solve_minimal(rig, draw(candidates, random), T_rig_world_guess);
-    if (T && search.offer(*T)) needed = samples_needed(search.inlier_share(), ransac.confidence);
+    const auto T = solve_minimal(rig, draw(candidates, random), T_rig_world_initial);
+    if (T && search.offer(*T)) needed = samples_needed(search.inlier_ratio(), ransac.confidence);
   }
   return solver::solve_rounds(problem, search.best(), ransac.inlier_chi2, options);
 }

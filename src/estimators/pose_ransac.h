@@ -1,4 +1,4 @@
-// Robust estimation of the rig's pose by RANSAC, and the search that all such estimators share.
+// Robust estimation of the rig's pose by RANSAC, and the scoring of hypotheses that all such estimators use.
 #pragma once
 
 #include <span>
@@ -12,17 +12,17 @@ namespace bslam::estimators {
 using camera::Rig;
 using geometry::SE3;
 
-// The best of the poses offered, by the truncated cost over all items. Each better one is refined over the items that
-// agree with it, as a pose from a sample has the noise of three points (LO-RANSAC; Chum, Matas and Kittler, DAGM 2003).
+// Keeps the best of the offered poses by the truncated cost over all items. Each better pose is refined over its
+// inliers, because a pose from a sample has the noise of three points (LO-RANSAC; Chum, Matas and Kittler, DAGM 2003).
 class PoseSearch {
  public:
-  // `problem` outlives this, which selects its items; `bound`: squared error of an item that agrees.
+  // `problem` must outlive the search, which selects its items. `bound`: maximum squared error of an inlier.
   PoseSearch(solver::PoseProblem& problem, double bound) : problem_(problem), bound_(bound) {}
 
-  // True where the pose is better than the best so far.
+  // Returns true if the pose is better than the best one so far.
   bool offer(const SE3& T_rig_world);
   const SE3& best() const { return best_; }
-  double inlier_share();
+  double inlier_ratio();
 
  private:
   solver::PoseProblem& problem_;
@@ -30,19 +30,20 @@ class PoseSearch {
   SE3 best_;
 };
 
-// Samples of three needed for one without outliers with the confidence asked for, at this share of inliers.
-double samples_needed(double inlier_share, double confidence);
+// Number of samples of three required to draw one without outliers with the given confidence at this inlier ratio.
+double samples_needed(double inlier_ratio, double confidence);
 
 struct PoseRansacOptions {
-  int iterations = 200;       // samples at most
-  double inlier_chi2 = 25.0;  // squared normalised error that counts as agreement while sampling
-  double confidence = 0.999;  // of having drawn one sample without outliers, given the best share so far
+  int iterations = 200;       // maximum number of samples
+  double inlier_chi2 = 25.0;  // maximum squared normalised error of an inlier during sampling
+  double confidence = 0.999;  // probability of a sample without outliers at which sampling stops
 };
 
-// Seeded RANSAC for correspondences with many outliers: minimal samples of three observations, from any cameras, solved
-// by Newton's method from the guess; the best is refined by solve_pose. For motions between neighbouring frames.
+// Seeded RANSAC for matches with many outliers: minimal samples of three observations from any cameras are solved by
+// Newton's method from the initial pose; the best pose is refined by solve_pose. For motions between consecutive
+// frames.
 solver::PoseSolution ransac_pose(const Rig& rig, std::span<const solver::PoseObservation> observations,
-                                 const SE3& T_rig_world_guess, const solver::PoseSolverOptions& options,
+                                 const SE3& T_rig_world_initial, const solver::PoseSolverOptions& options,
                                  const PoseRansacOptions& ransac, Random random);
 
 }  // namespace bslam::estimators

@@ -20,13 +20,13 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr std::size_t kSampleSize = 5;
-constexpr double kConfidence = 0.999;  // of having drawn one sample without outliers
-constexpr int kMinSamples = 50;        // a rival solution must have had its chance to be found
+constexpr double kConfidence = 0.999;  // probability of a sample without outliers at which sampling stops
+constexpr int kMinSamples = 50;        // required to find alternative solutions
 constexpr std::size_t kMaxRivals = 24;
-// Two solutions are rivals where they differ by more than this in rotation or direction of motion, and the worse has at
-// least this share of the better's inliers.
+// The solution is ambiguous if another one differs by more than this in rotation or direction of motion, and has at
+// least this fraction of the inliers of the best one.
 constexpr double kDistinctRotation = 0.02, kDistinctDirection = 0.2;  // radians
-constexpr double kRivalShare = 0.8;
+constexpr double kAmbiguousInlierRatio = 0.8;
 
 struct Candidate {
   EpipolarPose pose;
@@ -78,12 +78,12 @@ void solve_sample(std::span<const BearingPair> pairs, const std::array<std::size
   }
 }
 
-// Sum of truncated squared angles, in units of the inlier bound; stops once beyond `limit`.
+// Sum of truncated squared angles, in units of the inlier bound. Returns a partial sum once it exceeds `limit`.
 double truncated_cost(const EpipolarPose& pose, std::span<const BearingPair> pairs, double bound, double limit) {
   double cost = 0.0;
   for (const BearingPair& pair : pairs) {
-    const double share = epipolar_angle(pose, pair) / bound;
-    cost += share < 1.0 && in_front_of_both(pose, pair) ? share * share : 1.0;
+    const double error = epipolar_angle(pose, pair) / bound;
+    cost += error < 1.0 && in_front_of_both(pose, pair) ? error * error : 1.0;
     if (cost > limit) break;
   }
   return cost;
@@ -106,7 +106,7 @@ bool distinct(const EpipolarPose& x, const EpipolarPose& y) {
   return rotation > kDistinctRotation || direction > kDistinctDirection;
 }
 
-// Keeps the cheapest candidates, cheapest first.
+// Keeps the candidates of lowest cost, in order of cost.
 void keep(std::vector<Candidate>& best, const Candidate& candidate) {
   const auto at = std::upper_bound(best.begin(), best.end(), candidate,
                                    [](const Candidate& x, const Candidate& y) { return x.cost < y.cost; });
@@ -128,14 +128,14 @@ std::vector<Candidate> sample_candidates(std::span<const BearingPair> pairs, con
       const bool improved = best.empty() || cost < best.front().cost;
       keep(best, {pose, cost});
       if (!improved) continue;
-      const double share = count(inliers(pose, pairs, options.inlier_angle)) / static_cast<double>(pairs.size());
-      needed = std::log(1.0 - kConfidence) / std::log1p(-std::min(std::pow(share, 5), 1.0 - 1e-12));
+      const double inlier_ratio = count(inliers(pose, pairs, options.inlier_angle)) / static_cast<double>(pairs.size());
+      needed = std::log(1.0 - kConfidence) / std::log1p(-std::min(std::pow(inlier_ratio, 5), 1.0 - 1e-12));
     }
   }
   return best;
 }
 
-// Least squares over the inliers, and over those it then has.
+// Least squares over the inliers, repeated with the inliers of the result.
 EpipolarPose refine_and_reselect(const EpipolarPose& start, std::span<const BearingPair> pairs, double bound) {
   EpipolarPose pose = start;
   for (int round = 0; round < 3; ++round) pose = refine_epipolar(pose, pairs, inliers(pose, pairs, bound), bound);
@@ -177,7 +177,7 @@ std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, co
   if (out.num_inliers < options.min_inliers || out.median_parallax < options.min_parallax) return std::nullopt;
   const bool ambiguous = std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) {
     return distinct(c.pose, best.pose) &&
-           count(inliers(c.pose, pairs, options.inlier_angle)) >= kRivalShare * out.num_inliers;
+           count(inliers(c.pose, pairs, options.inlier_angle)) >= kAmbiguousInlierRatio * out.num_inliers;
   });
   if (ambiguous) return std::nullopt;
   return out;

@@ -1,4 +1,4 @@
-// Relative pose of one central camera between two images, from bearings: how a map starts when nothing is metric yet.
+// Relative pose of one central camera between two images from bearings, for monocular initialisation.
 #pragma once
 
 #include <optional>
@@ -15,22 +15,23 @@ struct BearingPair {
 };
 
 struct RelativePoseOptions {
-  int iterations = 300;        // RANSAC samples at most
-  double inlier_angle = 2e-3;  // radians between a bearing and the epipolar plane of the other
-  double min_parallax = 0.02;  // radians: median angle between the rays of the inliers; below it: nothing
+  int iterations = 300;        // maximum number of RANSAC samples
+  double inlier_angle = 2e-3;  // rad, maximum angle between a bearing and the epipolar plane of the other
+  double min_parallax = 0.02;  // rad, minimum median angle between the rays of the inliers
   int min_inliers = 50;
 };
 
 struct RelativePose {
   geometry::SE3 T_b_a;                    // translation of norm 1
   std::vector<std::uint8_t> inlier;       // per pair
-  std::vector<Eigen::Vector3d> points_a;  // triangulated in camera a, where inlier
+  std::vector<Eigen::Vector3d> points_a;  // triangulated points of the inliers in camera a, per pair
   int num_inliers = 0;
   double median_parallax = 0.0;  // radians
 };
 
 // Five-point algorithm (Nister, PAMI 2004, by OpenGV) in a seeded RANSAC, refined over all inliers; points behind a
-// camera are no inliers. Empty where support or parallax does not suffice or two solutions fit about equally well.
+// camera are outliers. Returns nullopt if there are too few inliers or too little parallax, or if the solution is
+// ambiguous.
 std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
                                           Random random);
 

@@ -37,7 +37,7 @@ std::optional<JournalStep> step_of(std::string_view name) {
 
 std::string id_text(std::int32_t id) { return id < 0 ? std::string(kNone) : std::to_string(id); }
 
-// A number that an id can hold; -1 for "-".
+// A number in the range of an id; -1 for "-".
 std::optional<std::int32_t> parse_id(std::string_view text) {
   if (text == kNone) return -1;
   const auto number = parse_integer(text);
@@ -54,7 +54,7 @@ std::string_view take(std::string_view& rest, char separator) {
   return taken;
 }
 
-// The entry of a line; empty where the line is none or has another number.
+// The entry of a line. Returns nullopt if it is invalid or has another number.
 std::optional<JournalEntry> parse_entry(std::string_view line, std::size_t number) {
   std::array<std::string_view, kFields> fields;
   for (std::string_view& field : fields) field = take(line, ' ');
@@ -67,8 +67,8 @@ std::optional<JournalEntry> parse_entry(std::string_view line, std::size_t numbe
   return entry;
 }
 
-// What should stand in the place of an entry after others that led to version `newest` at frame `frame`; empty:
-// nothing.
+// Describes the entry expected after entries that led to version `newest` at frame `frame`. Returns an empty string if
+// `entry` is valid.
 std::string objection(const JournalEntry& entry, MapVersion newest, std::int32_t frame) {
   if (entry.step == JournalStep::kFrame && entry.input <= frame) return "a frame after " + std::to_string(frame);
   if (entry.input < 0 && entry.step != JournalStep::kFinal) return "the id of a frame or keyframe";

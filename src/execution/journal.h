@@ -1,4 +1,4 @@
-// The order in which the map was read and changed: enough to run the same stages on the same versions again.
+// Records the order in which the map was read and changed, so that a run can be repeated with the same versions.
 #pragma once
 
 #include <cstdint>
@@ -14,24 +14,24 @@
 namespace bslam::execution {
 
 enum class JournalStep {
-  kFrame,  // a frame began; base = the version it sees
-  kStart,  // the frame started a map
+  kFrame,  // a frame began; base: the version it uses
+  kStart,  // the frame initialised a map
   kTrack,  // the frame became a keyframe
   kMap,    // a background stage ended
   kLoop,
   kGlobal,
   kFinal,    // the adjustment at the end
-  kRestart,  // the map was left for an empty one
+  kRestart,  // the map was replaced by an empty one
 };
 
 JournalStep journal_step(Stage stage);
-std::optional<Stage> background_stage(JournalStep step);  // of kMap, kLoop and kGlobal
+std::optional<Stage> background_stage(JournalStep step);  // nullopt unless kMap, kLoop or kGlobal
 
 struct JournalEntry {
   JournalStep step = JournalStep::kFrame;
-  std::int32_t input = -1;              // keyframe of a background stage, else frame; -1: before the first frame
-  MapVersion base;                      // version it worked on
-  std::optional<MapVersion> committed;  // version it made, if any
+  std::int32_t input = -1;              // id of the keyframe of a background stage, else of the frame; -1: no frame yet
+  MapVersion base;                      // version that was read
+  std::optional<MapVersion> committed;  // version that was created, if any
   friend bool operator==(const JournalEntry&, const JournalEntry&) = default;
 };
 
@@ -41,19 +41,19 @@ std::string step_text(JournalStep step, std::int32_t input);
 // "map 7 12 14": step, input, base and committed version, "-" for none.
 std::string entry_text(const JournalEntry& entry);
 
-// Entries in order of their commits; a frame's comes after the commits of all versions it may see. Stages whose result
-// was discarded are not in it.
+// Entries in order of their commits. The entry of a frame follows the commits of all versions that it may use. Stages
+// whose result was discarded have no entry.
 struct Journal {
-  std::string name;  // of the file it was read from, for messages
+  std::string name;  // name of its file, for messages
   std::vector<JournalEntry> entries;
 };
 
-// "bslam-journal 1", then a line per entry: its number from 0 and the entry's text.
+// "bslam-journal 1", then one line per entry: its number from 0 and the entry's text.
 std::string journal_text(const Journal& journal);
 
-// Errors, with the line: no journal or another version of it; a line that is no entry; a number or a frame out of turn;
-// a committed version that is not the one after the last; a base that did not exist yet; a step that must commit and
-// did not, or must not and did.
+// Errors, with the line: not a journal, or another version of the format; an invalid entry; a number or frame that is
+// not in order; a committed version that does not follow the last one; a base that did not exist yet; a missing or
+// unexpected commit of a step.
 Result<Journal> parse_journal(std::string_view text, std::string name);
 
 }  // namespace bslam::execution

@@ -11,11 +11,11 @@
 namespace bslam::execution {
 namespace {
 
-// One run of a stage. The worker fills in what it answers, then sets `done`.
+// One run of a stage. The worker stores the result or the failure, then sets `done`.
 struct Job {
   StageTask task;
   map::MapSnapshot base;
-  int started = 0;  // frames begun until then
+  int started = 0;  // number of frames begun until then
   std::stop_source stop;
   StageResult result;
   std::exception_ptr failure;
@@ -23,9 +23,9 @@ struct Job {
   bool done = false;  // guarded by the executor's mutex
 };
 
-// What runs a lane's jobs, one after the other: it decides nothing.
+// Runs the jobs of a stage one after the other.
 struct Worker {
-  std::deque<std::shared_ptr<Job>> handed;  // more than one only while a superseded one comes to its end
+  std::deque<std::shared_ptr<Job>> queue;  // at most one job, which waits if a superseded one is still running
   std::shared_ptr<Job> running;
   std::jthread thread;
 };
@@ -43,8 +43,8 @@ class LaggedExecutor : public StageExecutor {
     rethrow();
     ++now_;
     for (const Stage stage : kStages) {
-      const auto& running = lane(stage).running;
-      if (running && now_ >= running->started + lag(stage)) settle(stage);
+      const auto& running = queue(stage).running;
+      if (running && now_ >= running->started + lag(stage)) finish_running(stage);
     }
     return gate_.begin_frame(frame);
   }
@@ -61,8 +61,8 @@ class LaggedExecutor : public StageExecutor {
 
   void drain() override {
     rethrow();
-    for (const Stage stage : kStages) {  // a lane is fed by the one before it alone
-      while (lane(stage).running) settle(stage);
+    for (const Stage stage : kStages) {  // a stage only creates tasks of later stages
+      while (queue(stage).running) finish_running(stage);
     }
   }
 
@@ -75,7 +75,7 @@ class LaggedExecutor : public StageExecutor {
     const std::lock_guard lock(mutex_);
     interrupted_ = true;
     for (Worker& w : workers_) {
-      w.handed.clear();
+      w.queue.clear();
       if (w.running) w.running->stop.request_stop();
     }
     changed_.notify_all();
@@ -87,13 +87,14 @@ class LaggedExecutor : public StageExecutor {
   }
 
  private:
-  // The caller's view of a lane; its thread alone looks at it.
-  struct Lane {
+  // Tasks of a stage; used by the caller's thread only.
+  struct StageQueue {
     std::deque<StageTask> waiting;
-    std::shared_ptr<Job> running;  // begun and not committed yet, whether its worker is there or not
+    std::shared_ptr<Job>
+        running;  // started and not committed yet; its worker may not have begun it or have finished it
   };
 
-  Lane& lane(Stage stage) { return lanes_[static_cast<std::size_t>(stage)]; }
+  StageQueue& queue(Stage stage) { return queues_[static_cast<std::size_t>(stage)]; }
   Worker& worker(Stage stage) { return workers_[static_cast<std::size_t>(stage)]; }
 
   int lag(Stage stage) const {
@@ -112,34 +113,35 @@ class LaggedExecutor : public StageExecutor {
     if (failure_) std::rethrow_exception(failure_);
   }
 
-  // Whether a lane is full is a matter of counts: then its task under way is committed early.
+  // If the queue is full, its running task is committed early. This depends on counts only, so it is deterministic.
   void push(const StageTask& task) {
-    Lane& l = lane(task.stage);
-    if (l.waiting.size() >= static_cast<std::size_t>(setup_.options.max_pending_keyframes)) settle(task.stage);
-    l.waiting.push_back(task);
-    if (!l.running) start_next(task.stage);
+    StageQueue& q = queue(task.stage);
+    if (q.waiting.size() >= static_cast<std::size_t>(setup_.options.max_pending_keyframes)) finish_running(task.stage);
+    q.waiting.push_back(task);
+    if (!q.running) start_next(task.stage);
   }
 
   void start_next(Stage stage) {
-    Lane& l = lane(stage);
-    if (l.waiting.empty()) return;
-    l.running = std::make_shared<Job>();
-    l.running->task = l.waiting.front();
-    l.running->base = gate_.newest();
-    l.running->started = now_;
-    l.waiting.pop_front();
+    StageQueue& q = queue(stage);
+    if (q.waiting.empty()) return;
+    q.running = std::make_shared<Job>();
+    q.running->task = q.waiting.front();
+    q.running->base = gate_.newest();
+    q.running->started = now_;
+    q.waiting.pop_front();
     const std::lock_guard lock(mutex_);
-    if (interrupted_) return;  // nobody will do it, and nobody will wait for it
-    worker(stage).handed.push_back(l.running);
+    if (interrupted_) return;  // no worker will run it, and wait_for() does not wait
+    worker(stage).queue.push_back(q.running);
     changed_.notify_all();
   }
 
-  // Waits for the lane's task under way and commits it, then what follows and the lane's next one start.
-  void settle(Stage stage) {
-    Lane& l = lane(stage);
-    const std::shared_ptr<Job> job = std::exchange(l.running, nullptr);
+  // Waits for the running task of a stage and commits it. Then starts the task that follows and the next one of the
+  // stage.
+  void finish_running(Stage stage) {
+    StageQueue& q = queue(stage);
+    const std::shared_ptr<Job> job = std::exchange(q.running, nullptr);
     if (!wait_for(*job)) {
-      l.waiting.clear();
+      q.waiting.clear();
       return;
     }
     if (job->failure) {
@@ -148,29 +150,30 @@ class LaggedExecutor : public StageExecutor {
     }
     if (const auto superseded = superseded_by(stage, job->result, *gate_.newest())) supersede(*superseded);
     std::vector<StageStatistic> statistics = std::move(job->result.statistics);
-    const bool committed = gate_.settle(job->task, job->base->version(), std::move(job->result), job->stop.get_token());
+    const bool committed =
+        gate_.commit_stage(job->task, job->base->version(), std::move(job->result), job->stop.get_token());
     observe(setup_, {job->task, job->ms, committed, std::move(statistics)});
     if (const auto next = following(job->task, setup_.functions); committed && next) push(*next);
     start_next(stage);
   }
 
-  // False where interrupted before it was done.
+  // Returns false if interrupted before the job was done.
   bool wait_for(const Job& job) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return job.done || interrupted_; });
     return job.done;
   }
 
-  // Drops what waits and stops what runs in a lane.
+  // Drops the waiting tasks of a stage and stops its running one.
   void supersede(Stage stage) {
-    Lane& l = lane(stage);
-    l.waiting.clear();
-    const std::shared_ptr<Job> job = std::exchange(l.running, nullptr);
+    StageQueue& q = queue(stage);
+    q.waiting.clear();
+    const std::shared_ptr<Job> job = std::exchange(q.running, nullptr);
     if (!job) return;
     const std::lock_guard lock(mutex_);
-    std::erase(worker(stage).handed, job);
+    std::erase(worker(stage).queue, job);
     job->stop.request_stop();
-    if (job->done) observe(setup_, {job->task, job->ms, false});  // else its worker tells
+    if (job->done) observe(setup_, {job->task, job->ms, false});  // else its worker reports it
   }
 
   void work(Worker& w) {
@@ -190,25 +193,25 @@ class LaggedExecutor : public StageExecutor {
     }
   }
 
-  // The next job; none where interrupted.
+  // Returns the next job, or null if interrupted.
   std::shared_ptr<Job> take(Worker& w) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return interrupted_ || !w.handed.empty(); });
+    changed_.wait(lock, [&] { return interrupted_ || !w.queue.empty(); });
     if (interrupted_) return nullptr;
-    w.running = std::move(w.handed.front());
-    w.handed.pop_front();
+    w.running = std::move(w.queue.front());
+    w.queue.pop_front();
     return w.running;
   }
 
   MapGate& gate_;
   const ExecutionSetup setup_;
-  int now_ = 0;  // frames begun; of the caller's thread, as the two below
-  std::array<Lane, kStages.size()> lanes_;
+  int now_ = 0;  // number of frames begun; this and the next two members belong to the caller's thread
+  std::array<StageQueue, kStages.size()> queues_;
   std::exception_ptr failure_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  bool interrupted_ = false;                    // guarded by mutex_, as what the workers are handed and run
-  std::array<Worker, kStages.size()> workers_;  // last: they end before the rest goes
+  bool interrupted_ = false;                    // guarded by mutex_, as the jobs of the workers
+  std::array<Worker, kStages.size()> workers_;  // last member, so that the threads are joined first
 };
 
 }  // namespace

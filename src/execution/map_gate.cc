@@ -27,16 +27,16 @@ map::CommitReport MapGate::commit(JournalStep step, map::MapDraft draft) {
   return publish(step, frame_.value(), std::move(draft));
 }
 
-bool MapGate::settle(const StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop) {
+bool MapGate::commit_stage(const StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop) {
   const std::lock_guard order(order_);
   if (stop.stop_requested()) return false;
   if (!result.draft) {
     append({journal_step(task.stage), task.keyframe.value(), base, std::nullopt});
     return false;
   }
-  BSLAM_ASSERT(result.draft->map().version() == base, "a stage's draft is of the version it was given");
+  BSLAM_ASSERT(result.draft->map().version() == base, "a stage's draft must be based on the version passed to it");
   const map::CommitReport report = publish(journal_step(task.stage), task.keyframe.value(), std::move(*result.draft));
-  if (report.refused) return false;
+  if (report.rejected) return false;
   if (result.committed) result.committed(report);
   return true;
 }
@@ -56,9 +56,9 @@ Journal MapGate::journal() const {
 }
 
 map::CommitReport MapGate::publish(JournalStep step, std::int32_t input, map::MapDraft draft) {
-  const MapVersion base = draft.map().version();  // a draft keeps that of its base
+  const MapVersion base = draft.map().version();  // a draft has the version of its base
   map::CommitReport report = store_.commit(std::move(draft));
-  if (report.refused) {
+  if (report.rejected) {
     append({step, input, base, std::nullopt});
   } else {
     append({step, input, base, report.published->version()}, report.published);
@@ -69,7 +69,7 @@ map::CommitReport MapGate::publish(JournalStep step, std::int32_t input, map::Ma
 void MapGate::append(const JournalEntry& entry, map::MapSnapshot newest) {
   const std::lock_guard lock(mutex_);
   if (keep_journal_) journal_.entries.push_back(entry);
-  if (newest) newest_.swap(newest);  // the old version goes with the argument, after the lock
+  if (newest) newest_.swap(newest);  // the old version is destroyed with the argument, after the lock
 }
 
 }  // namespace bslam::execution

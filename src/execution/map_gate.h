@@ -1,4 +1,4 @@
-// Serialises snapshot reads and commits of the map, and journals them in an order that a replay can repeat.
+// Serialises snapshot reads and commits of the map, and records them in a journal that can be replayed.
 #pragma once
 
 #include <mutex>
@@ -10,28 +10,29 @@ namespace bslam::execution {
 
 class MapGate {
  public:
-  // `store` outlives the gate; nobody else commits to it. Without a journal, journal() stays empty and takes no memory.
+  // `store` must outlive the gate, and all commits must go through the gate. Without a journal, journal() is empty and
+  // uses no memory.
   explicit MapGate(map::MapStore& store, bool keep_journal = true);
 
-  // The newest version the journal knows of. From any thread, never waiting for a commit under way.
+  // The newest version recorded in the journal. Thread-safe; does not wait for a running commit.
   map::MapSnapshot newest() const;
 
-  // Begins a frame and returns the version it sees: the newest, or the one given. Caller's thread only.
+  // Begins a frame that uses the newest version, which is returned, or the version `seen`. Caller's thread only.
   map::MapSnapshot begin_frame(FrameId frame);
   void begin_frame(FrameId frame, const map::MapSnapshot& seen);
-  FrameId frame() const { return frame_; }  // begun last; caller's thread only
+  FrameId frame() const { return frame_; }  // the last frame begun; caller's thread only
 
   // Commits an edit of the caller's thread.
   map::CommitReport commit(JournalStep step, map::MapDraft draft);
 
-  // Commits the result of a background stage. If a stop was requested before its turn comes, the result is discarded as
-  // if the stage had never run. Returns whether it was committed. From any thread.
-  bool settle(const StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop);
+  // Commits the result of a background stage and returns true if it was committed. If a stop was requested before, the
+  // result is discarded as if the stage had never run. Thread-safe.
+  bool commit_stage(const StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop);
 
   // Replaces the map by another one; version numbers continue.
   void restart(map::BundledMap initial);
 
-  // What was done so far; from any thread.
+  // The journal so far. Thread-safe.
   Journal journal() const;
 
  private:
@@ -40,10 +41,10 @@ class MapGate {
 
   map::MapStore& store_;
   const bool keep_journal_;
-  std::mutex order_;  // held from the decision to commit until the journal has it
-  FrameId frame_;     // of the caller's thread
+  std::mutex order_;  // held from the decision to commit until the journal contains the commit
+  FrameId frame_;     // used by the caller's thread only
   mutable std::mutex mutex_;
-  map::MapSnapshot newest_;  // guarded by mutex_, as the one below: both change together
+  map::MapSnapshot newest_;  // guarded by mutex_, as journal_; both change together
   Journal journal_;
 };
 

@@ -62,49 +62,49 @@ class ParallelExecutor : public StageExecutor {
   }
 
  private:
-  struct Lane {
+  struct StageQueue {
     std::deque<StageTask> waiting;
-    std::optional<std::stop_source> running;  // of the task under way, until what follows of it is enqueued
+    std::optional<std::stop_source> running;  // of the running task, until the task that follows it is enqueued
   };
 
-  Lane& lane(Stage stage) { return lanes_[static_cast<std::size_t>(stage)]; }
+  StageQueue& queue(Stage stage) { return queues_[static_cast<std::size_t>(stage)]; }
 
   void rethrow() const {
     const std::lock_guard lock(mutex_);
     if (failure_) std::rethrow_exception(failure_);
   }
 
-  // The functions below: with mutex_ held.
+  // The functions below require mutex_.
 
   bool idle() const {
-    for (const Lane& l : lanes_) {
-      if (!l.waiting.empty() || l.running) return false;
+    for (const StageQueue& q : queues_) {
+      if (!q.waiting.empty() || q.running) return false;
     }
     return true;
   }
 
-  void drop(Lane& l) {
-    l.waiting.clear();
-    if (l.running) l.running->request_stop();
+  void drop(StageQueue& q) {
+    q.waiting.clear();
+    if (q.running) q.running->request_stop();
   }
 
-  // Every wait ends where this was called, so that nobody waits for a lane that will never move.
+  // Ends every wait, because no task will be run any more.
   void close() {
     closed_ = true;
-    for (Lane& l : lanes_) drop(l);
+    for (StageQueue& q : queues_) drop(q);
     changed_.notify_all();
   }
 
   void push(const StageTask& task, std::unique_lock<std::mutex>& lock) {
-    Lane& l = lane(task.stage);
+    StageQueue& q = queue(task.stage);
     const auto room = static_cast<std::size_t>(setup_.options.max_pending_keyframes);
-    changed_.wait(lock, [&] { return closed_ || l.waiting.size() < room; });
+    changed_.wait(lock, [&] { return closed_ || q.waiting.size() < room; });
     if (closed_) return;
-    l.waiting.push_back(task);
+    q.waiting.push_back(task);
     changed_.notify_all();
   }
 
-  // The functions below: without mutex_.
+  // The functions below must be called without mutex_.
 
   void work(Stage stage) {
     std::stop_token stop;
@@ -120,27 +120,27 @@ class ParallelExecutor : public StageExecutor {
     }
   }
 
-  // The next task of a lane and the token it is stopped by; none where closed.
+  // Returns the next task of a stage and its stop token, or nullopt if closed.
   std::optional<StageTask> take(Stage stage, std::stop_token& stop) {
-    Lane& l = lane(stage);
+    StageQueue& q = queue(stage);
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || !l.waiting.empty(); });
+    changed_.wait(lock, [&] { return closed_ || !q.waiting.empty(); });
     if (closed_) return std::nullopt;
-    const StageTask task = l.waiting.front();
-    l.waiting.pop_front();
-    stop = l.running.emplace().get_token();
-    changed_.notify_all();  // there is room
+    const StageTask task = q.waiting.front();
+    q.waiting.pop_front();
+    stop = q.running.emplace().get_token();
+    changed_.notify_all();  // the queue has space
     return task;
   }
 
   void finish(const StageTask& task, bool committed, const std::exception_ptr& failure, const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    if (failure && !stop.stop_requested()) {  // what a stopped task would have answered does not count, however it ends
+    if (failure && !stop.stop_requested()) {  // failures of a stopped task are ignored
       failure_ = failure;
       close();
     }
     if (const auto next = following(task, setup_.functions); committed && next) push(*next, lock);
-    lane(task.stage).running.reset();
+    queue(task.stage).running.reset();
     changed_.notify_all();
   }
 
@@ -148,13 +148,13 @@ class ParallelExecutor : public StageExecutor {
     const Stopwatch watch;
     const map::MapSnapshot base = gate_.newest();
     StageResult result = setup_.functions[task.stage](task, base, stop);
-    // Before the commit: what was not committed by now never is.
+    // Before the commit, so that no result of a superseded task is committed after it.
     if (const auto superseded = superseded_by(task.stage, result, *gate_.newest())) {
       const std::lock_guard lock(mutex_);
-      drop(lane(*superseded));
+      drop(queue(*superseded));
     }
     std::vector<StageStatistic> statistics = std::move(result.statistics);
-    const bool committed = gate_.settle(task, base->version(), std::move(result), stop);
+    const bool committed = gate_.commit_stage(task, base->version(), std::move(result), stop);
     observe(setup_, {task, watch.ms(), committed, std::move(statistics)});
     return committed;
   }
@@ -163,10 +163,10 @@ class ParallelExecutor : public StageExecutor {
   const ExecutionSetup setup_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::array<Lane, kStages.size()> lanes_;  // guarded by mutex_, as the two below
+  std::array<StageQueue, kStages.size()> queues_;  // this and the next two members are guarded by mutex_
   bool closed_ = false;
   std::exception_ptr failure_;
-  std::array<std::jthread, kStages.size()> workers_;  // last: they end before the rest goes
+  std::array<std::jthread, kStages.size()> workers_;  // last member, so that the threads are joined first
 };
 
 }  // namespace

@@ -68,7 +68,7 @@ class ReplayExecutor : public StageExecutor {
                           this_run + ", as this run does"});
   }
 
-  // What the caller's thread does is what it did then.
+  // Throws if the call of the caller's thread differs from the current entry.
   void expect(JournalStep step, std::int32_t input, std::optional<MapVersion> base = std::nullopt) const {
     const bool fits = !at_end() && entry().step == step && entry().input == input && (!base || entry().base == *base);
     if (!fits) fail(step_text(step, input) + (base ? " on version " + std::to_string(base->value()) : ""));
@@ -81,7 +81,7 @@ class ReplayExecutor : public StageExecutor {
     }
   }
 
-  // Stages that ended before the next thing the caller's thread did.
+  // Runs the stages that were committed before the next call of the caller's thread.
   void run_background() {
     while (!over()) {
       const std::optional<Stage> stage = background_stage(entry().step);
@@ -127,8 +127,8 @@ class ReplayExecutor : public StageExecutor {
   const Journal journal_;
   MapGate& gate_;
   const ExecutionSetup setup_;
-  std::size_t next_ = 0;                         // entry
-  std::map<MapVersion, std::size_t> last_use_;   // entry that needs a version last
+  std::size_t next_ = 0;                         // index of the current entry
+  std::map<MapVersion, std::size_t> last_use_;   // index of the last entry that uses a version
   std::map<MapVersion, map::MapSnapshot> kept_;  // versions still needed
   std::array<std::deque<KeyframeId>, kStages.size()> waiting_;
   std::stop_source stop_;

@@ -1,4 +1,4 @@
-// The executor of each mode, and what they share. Internal to src/execution.
+// The executor of each mode, and common functions. Internal to src/execution.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@ std::unique_ptr<StageExecutor> make_sequential_executor(MapGate& gate, Execution
 std::unique_ptr<StageExecutor> make_parallel_executor(MapGate& gate, ExecutionSetup setup);
 std::unique_ptr<StageExecutor> make_lagged_executor(MapGate& gate, ExecutionSetup setup);
 
-// Runs a task in the calling thread and commits its result. Returns whether there was something to commit.
+// Runs a task in the calling thread and commits its result. Returns true if the result was committed.
 bool run_to_commit(const StageTask& task, const map::MapSnapshot& base, MapGate& gate, const ExecutionSetup& setup,
                    const std::stop_token& stop);
 

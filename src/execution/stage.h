@@ -1,5 +1,5 @@
-// Background stages (mapping, loop closing, global adjustment) as functions over values: their input, their result, and
-// which stage follows. A StageExecutor decides when and in which thread they run.
+// Background stages (mapping, loop closing, global adjustment) as functions of values: their input, their result, and
+// the stage that follows. A StageExecutor decides when and in which thread they run.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@
 
 namespace bslam::execution {
 
-// Each stage has a queue of its own, first in, first out, and runs one task at a time. A new keyframe is a task of
-// kMap; a commit of kMap makes one of kLoop, a commit of kLoop one of kGlobal.
+// Each stage has its own first-in, first-out queue and runs one task at a time. A new keyframe creates a task of kMap,
+// a commit of kMap a task of kLoop, and a commit of kLoop a task of kGlobal.
 enum class Stage { kMap, kLoop, kGlobal };
 inline constexpr std::array<Stage, 3> kStages = {Stage::kMap, Stage::kLoop, Stage::kGlobal};
 
@@ -24,30 +24,30 @@ std::string_view stage_name(Stage stage);
 
 struct StageTask {
   Stage stage = Stage::kMap;
-  KeyframeId keyframe;  // that caused it
+  KeyframeId keyframe;  // the keyframe that caused the task
   friend bool operator==(const StageTask&, const StageTask&) = default;
 };
 
-// A figure a stage reports about its run: landmarks created, observations adjusted, ...
+// A statistic of one run of a stage: landmarks created, observations adjusted, ...
 struct StageStatistic {
-  std::string_view name;  // a literal
+  std::string_view name;  // must be a string literal
   double value = 0;
 };
 
 struct StageResult {
-  std::optional<map::MapDraft>
-      draft;  // of the version the stage was given; none: nothing to change, and nothing follows
-  // Called when the draft is in the map and never otherwise, in order of the commits and before the next one, by
-  // whatever thread commits. For what is to be told of the result; may be empty.
+  // Draft of the version passed to the stage; nullopt: nothing is changed, and no stage follows.
+  std::optional<map::MapDraft> draft;
+  // Called after the draft was committed, in the committing thread and before the next commit; never called if it was
+  // not committed. May be empty.
   std::function<void(const map::CommitReport&)> committed;
   std::vector<StageStatistic> statistics = {};
 };
 
-// Once a stop is requested its result no longer counts: it may return anything as soon as it can. The keyframe may have
-// been removed from the version given.
+// After a stop request the result is discarded, so that the function should return early with any result. The keyframe
+// may have been removed from the version passed to the function.
 using StageFunction = std::function<StageResult(const StageTask&, const map::MapSnapshot&, std::stop_token)>;
 
-// By stage; an empty function: the stage never runs, and nothing follows.
+// Functions by stage. If a function is empty, the stage never runs and no stage follows.
 struct StageFunctions {
   std::array<StageFunction, kStages.size()> by_stage;
   const StageFunction& operator[](Stage s) const { return by_stage[static_cast<std::size_t>(s)]; }
@@ -57,21 +57,21 @@ struct StageFunctions {
 // The task that follows the commit of another one, if any.
 std::optional<StageTask> following(const StageTask& task, const StageFunctions& functions);
 
-// The stage whose tasks, waiting or running, are dropped when a result of `stage` goes into the map. A closed loop
-// moves the map, so a global adjustment of the map before it is worth nothing, and another one follows.
+// The stage whose waiting and running tasks are dropped when a result of `stage` is committed. A loop closure corrects
+// the map, so that a global adjustment of an earlier version is useless, and another one follows.
 std::optional<Stage> superseded_by(Stage stage);
-// The same before the commit of a result to `newest`, the newest version: empty where nothing will be committed.
+// The same before the commit of a result; `newest` is the newest version. Returns nullopt if nothing will be committed.
 std::optional<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest);
 
-// One run of a stage, for whoever watches.
+// Report of one run of a stage for the observer.
 struct StageRun {
   StageTask task;
   double ms = 0;
-  bool committed = false;  // false: it had nothing to change, or was superseded
+  bool committed = false;  // false: there was nothing to change, or it was superseded
   std::vector<StageStatistic> statistics = {};
 };
 
-// Called from any thread, also from several at once.
+// Must be thread-safe: called from any thread, also concurrently.
 using StageObserver = std::function<void(const StageRun&)>;
 
 }  // namespace bslam::execution

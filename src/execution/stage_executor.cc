@@ -6,7 +6,7 @@
 namespace bslam::execution {
 
 std::unique_ptr<StageExecutor> make_stage_executor(Mode mode, MapGate& gate, ExecutionSetup setup) {
-  BSLAM_ASSERT(setup.functions[Stage::kMap], "keyframes are mapped");
+  BSLAM_ASSERT(setup.functions[Stage::kMap], "the mapping stage must be configured");
   switch (mode) {
     case Mode::kSequential:
       return make_sequential_executor(gate, std::move(setup));
@@ -23,7 +23,7 @@ bool run_to_commit(const StageTask& task, const map::MapSnapshot& base, MapGate&
   const Stopwatch watch;
   StageResult result = setup.functions[task.stage](task, base, stop);
   std::vector<StageStatistic> statistics = std::move(result.statistics);
-  const bool committed = gate.settle(task, base->version(), std::move(result), stop);
+  const bool committed = gate.commit_stage(task, base->version(), std::move(result), stop);
   observe(setup, {task, watch.ms(), committed, std::move(statistics)});
   return committed;
 }

@@ -1,5 +1,5 @@
-// Decides when and in which thread background stages run, never what they compute. The caller's thread reads and
-// changes the map through an executor only.
+// Decides when and in which thread background stages run, not what they compute. The caller's thread reads and changes
+// the map through an executor only.
 #pragma once
 
 #include <memory>
@@ -11,36 +11,36 @@
 
 namespace bslam::execution {
 
-// All functions but interrupt() and over() are for one thread, the caller's. Any of its calls may throw what a stage
-// threw in a worker; after that all of them do. An executor may be destroyed at any time: running stages are stopped,
-// waiting tasks are dropped.
+// All functions except interrupt() and over() must be called from one thread, the caller's. Any of these calls may
+// rethrow an exception of a stage; after that all of them do. An executor may be destroyed at any time: running stages
+// are stopped, waiting tasks are dropped.
 class StageExecutor {
  public:
   virtual ~StageExecutor() = default;
 
-  // The version of the map that the frame sees. Call once a frame, in order.
+  // Returns the version of the map that the frame uses. Must be called once per frame, in order.
   virtual map::MapSnapshot begin_frame(FrameId frame) = 0;
 
-  // An edit of the caller's thread.
+  // Commits an edit of the caller's thread.
   virtual map::CommitReport commit(JournalStep step, map::MapDraft draft) = 0;
 
-  // Hands a committed keyframe to the stages. May block while too many tasks are waiting.
+  // Passes a committed keyframe to the stages. May block while too many tasks are waiting.
   virtual void enqueue(KeyframeId keyframe) = 0;
 
-  // Returns when all tasks enqueued, and those that followed them, are done and committed.
+  // Returns when all enqueued tasks, and the tasks that follow them, are done and committed.
   virtual void drain() = 0;
 
   // Drains, then replaces the map by another one.
   virtual void restart(map::BundledMap initial) = 0;
 
-  // The run is over; call after drain. Throws where a replayed run should have gone on.
+  // Ends the run; must be called after drain. Throws if the journal of a replayed run has further entries.
   virtual void end() {}
 
-  // From any thread: running stages are stopped and their results discarded, waiting tasks are dropped. From then on
+  // Thread-safe. Running stages are stopped and their results discarded, waiting tasks are dropped. From then on
   // only edits of the caller's thread change the map.
   virtual void interrupt() = 0;
 
-  // No stages will run any more: interrupted, or a replayed run ended here.
+  // Thread-safe. Returns true if no stages will run any more: after an interrupt or at the end of a replayed run.
   virtual bool over() const = 0;
 };
 
@@ -50,24 +50,26 @@ struct ExecutionSetup {
   StageObserver observer;  // may be empty
 };
 
-// The executor of a mode. `gate` outlives it.
-//   sequential: each stage runs to its commit in the caller's thread, within enqueue().
-//   parallel:   one thread per stage; a task works on the newest version at its start and is committed as soon as it is
-//   done. lagged:     one thread per stage, but the caller's thread fixes the base of a task when it starts, and
-//   commits its result
-//               at the beginning of the frame `lag` frames later, waiting for it if necessary; then the next task of
-//               the stage starts. So results do not depend on threads; an exception appears when the result was due.
-// Which results drop tasks of other stages: superseded_by (execution/stage.h).
+// clang-format off
+// Creates the executor of a mode. `gate` must outlive it. Commits may drop tasks of other stages; see superseded_by in
+// execution/stage.h.
+// - sequential: each stage is run and committed in the caller's thread, within enqueue().
+// - parallel: one thread per stage. A task uses the newest version at its start and is committed when it is done.
+// - lagged: one thread per stage. The caller's thread determines the base version of a task when it starts, and commits
+//   its result at the beginning of the frame `lag` frames later, waiting for it if necessary; then the next task of the
+//   stage starts. Results therefore do not depend on the timing of threads. An exception is rethrown when the result is
+//   due.
+// clang-format on
 std::unique_ptr<StageExecutor> make_stage_executor(Mode mode, MapGate& gate, ExecutionSetup setup);
 
-// A run that is not the one its journal tells of; `error` names the first entry that differs.
+// Thrown if a replayed run differs from its journal; `error` contains the first entry that differs.
 struct ReplayMismatch : std::runtime_error {
   explicit ReplayMismatch(Error e) : std::runtime_error(e.message()), error(std::move(e)) {}
   Error error;
 };
 
-// Repeats a recorded run: every stage in the caller's thread, on the recorded version, committed in the recorded order.
-// Calls throw ReplayMismatch where the run differs from the journal.
+// Creates an executor that repeats a recorded run: every stage runs in the caller's thread, on the recorded version,
+// and is committed in the recorded order. Calls throw ReplayMismatch if the run differs from the journal.
 std::unique_ptr<StageExecutor> make_replay_executor(Journal journal, MapGate& gate, ExecutionSetup setup);
 
 }  // namespace bslam::execution

@@ -8,14 +8,14 @@
 namespace bslam::feature {
 namespace {
 
-constexpr int kReachSquared = 14 * 14;       // of a test's end: stays within the window when rotated and rounded
-constexpr int kShortestSquared = 4 * 4;      // closer ends than the smoothing is wide tell noise
+constexpr int kReachSquared = 14 * 14;       // maximum squared offset: within the window after rotation and rounding
+constexpr int kShortestSquared = 4 * 4;      // minimum squared distance of the pixels: the width of the smoothing
 constexpr double kCorrelationLength = 12.0;  // pixels
 constexpr std::uint64_t kSeed = 1;
 
 int squared(int x, int y) { return x * x + y * y; }
 
-// Correlation of grey values by squared distance, 1 = 2^14, so that choices do not hang on the last bit of exp.
+// Correlation of grey values by squared distance; 1 is 2^14, so that the selection does not depend on rounding of exp.
 class GreyCorrelation {
  public:
   GreyCorrelation() {
@@ -36,8 +36,8 @@ class GreyCorrelation {
   std::array<std::int32_t, 4 * kReachSquared + 1> by_distance_;
 };
 
-// About normal, standard deviation 6.2: a fifth of the 31 pixels the tests span. A sum of uniform integers, as the
-// normal distribution itself would need functions whose last bit differs between machines.
+// Approximately normal with standard deviation 6.2, a fifth of the 31 pixels of the pattern. A sum of uniform integers,
+// because the normal distribution requires functions whose rounding differs between machines.
 int draw_offset(Random& random) {
   int sum = 0;
   for (int k = 0; k < 4; ++k) sum += static_cast<int>(random.below(1073));
@@ -62,7 +62,7 @@ std::array<BinaryTest, kTestCount> make_brief_pattern() {
   std::array<BinaryTest, kTestCount> tests;
   std::array<std::int64_t, kTestCount> variance;
   std::int64_t bound_squared = 100;  // of the correlation, in thousandths
-  for (std::size_t count = 0, refused = 0; count < tests.size();) {
+  for (std::size_t count = 0, rejected = 0; count < tests.size();) {
     const BinaryTest test = draw_test(random);
     const std::int64_t own = model.covariance(test, test);
     bool is_new = true;
@@ -73,10 +73,10 @@ std::array<BinaryTest, kTestCount> make_brief_pattern() {
     if (is_new) {
       tests[count] = test;
       variance[count++] = own;
-      refused = 0;
-    } else if (++refused == 20) {
+      rejected = 0;
+    } else if (++rejected == 20) {
       bound_squared += 10;
-      refused = 0;
+      rejected = 0;
     }
   }
   return tests;

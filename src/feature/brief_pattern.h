@@ -1,4 +1,4 @@
-// Rotated binary tests (Rublee et al., ICCV 2011, section 4) with a set of tests of our own.
+// Rotated binary tests (Rublee et al., ICCV 2011, section 4) with a custom test pattern.
 #pragma once
 
 #include <array>
@@ -12,16 +12,17 @@ namespace bslam::feature {
 
 constexpr int kTestCount = 256;
 
-// Is the first pixel darker than the second? Offsets from the keypoint in pixels, upright.
+// The test is true if the first pixel is darker than the second. Offsets from the upright keypoint in pixels.
 struct BinaryTest {
   std::int8_t x1, y1, x2, y2;
 };
 
-// The tests of every descriptor: normally distributed pairs (Calonder et al., ECCV 2010) of which only those are kept
-// that say something new. Two tests are correlated as far as the four pixels they compare are, and grey values of
-// natural images are correlated by distance alone, about exp(-distance / kCorrelationLength); so a pair is kept if its
-// correlation with all kept before stays below a bound, which rises slowly until there are 256. Integers only decide,
-// so that every machine makes the same tests.
+// The tests of every descriptor: normally distributed pairs (Calonder et al., ECCV 2010), of which only weakly
+// correlated ones are kept. The correlation of two tests follows from that of the four pixels they compare. The
+// correlation of grey values of natural images depends on their distance only, about exp(-distance /
+// kCorrelationLength). A pair is kept if its correlation with all pairs kept before is below a bound, which is
+// increased slowly until there are 256. The selection uses integers only, so that the tests are the same on all
+// machines.
 std::array<BinaryTest, kTestCount> make_brief_pattern();
 
 // Correlation of two tests under that model, in [-1, 1].
@@ -32,15 +33,16 @@ class Describer {
  public:
   Describer();
 
-  // `window` of the smoothed level; `angle` in radians.
+  // `window`: of the smoothed level. `angle`: radians.
   Descriptor describe(const Window& window, float angle) const;
 
-  // 64 steps of 5.6 degrees: an end of a test is misplaced by 0.7 pixels at most, about what rounding to pixels costs.
+  // 64 steps of 5.6 degrees: the maximum displacement of a test's pixel is 0.7 pixels, about the error of rounding to
+  // pixels.
   static constexpr int kRotations = 64;
 
  private:
   struct Offsets {
-    std::uint16_t first, second;  // into a Window
+    std::uint16_t first, second;  // indices into a Window
   };
   std::vector<std::array<Offsets, kTestCount>> rotated_;
 };

@@ -1,4 +1,4 @@
-// Matching of descriptors by comparing all with all.
+// Brute-force matching of descriptors.
 #pragma once
 
 #include <cstddef>
@@ -11,17 +11,17 @@
 
 namespace bslam::feature {
 
-// The descriptor nearest to another one, and the distance of the second nearest; in bits.
+// The nearest neighbour of a descriptor and the distance of the second nearest one, in bits.
 struct NearestDescriptor {
-  static constexpr int kNone = 257;  // beyond any distance
-  std::size_t index = 0;             // the first of equally near ones
+  static constexpr int kNone = 257;  // larger than any distance
+  std::size_t index = 0;             // the first one on ties
   int distance = kNone, second = kNone;
 
-  // Close, and clearly closer than any other.
+  // Returns true if the nearest descriptor is close and passes the ratio test.
   bool is_clear(int max_distance, double ratio) const { return distance <= max_distance && distance < ratio * second; }
 };
 
-// Among the descriptors with allowed(i).
+// Searches the descriptors i for which allowed(i) is true.
 template <class Allowed>
 NearestDescriptor nearest_descriptor(const Descriptor& descriptor, std::span<const Descriptor> among,
                                      const Allowed& allowed) {
@@ -44,8 +44,8 @@ struct DescriptorMatch {
   KeypointIndex a, b;
 };
 
-// Clear matches of which each is the nearest of the other, in order of `a`. `allowed(i, j)` says whether descriptor i
-// of `a` may match j of `b`.
+// Mutual nearest neighbours that pass the ratio test, in order of `a`. `allowed(i, j)` returns true if descriptor i of
+// `a` may match descriptor j of `b`.
 template <class Allowed>
 std::vector<DescriptorMatch> mutual_matches(std::span<const Descriptor> a, std::span<const Descriptor> b,
                                             int max_distance, double ratio, const Allowed& allowed) {

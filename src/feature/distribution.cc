@@ -10,12 +10,12 @@
 namespace bslam::feature {
 namespace {
 
-// A pixel in one number that is not 0.
+// Packs a pixel into one number that is not 0.
 std::uint32_t packed(const Corner& c) { return (static_cast<std::uint32_t>(c.y) << 16) + c.x + 1; }
 int x_of(std::uint32_t pixel) { return static_cast<int>((pixel - 1) & 0xFFFF); }
 int y_of(std::uint32_t pixel) { return static_cast<int>((pixel - 1) >> 16); }
 
-// Begins of the runs of equal score where corners stand by descending score: [255 - score] is that of `score`.
+// First indices of the corners of equal score in descending order of score; [255 - score] belongs to `score`.
 std::array<std::uint32_t, 257> score_runs(std::span<const Corner> corners) {
   std::array<std::uint32_t, 257> begin{};
   for (const Corner& c : corners) ++begin[256 - c.score];
@@ -23,17 +23,18 @@ std::array<std::uint32_t, 257> score_runs(std::span<const Corner> corners) {
   return begin;
 }
 
-// of[i] = index(i) for the `length` pixels of an axis: a table, as every corner would divide otherwise.
+// of[i] = index(i) for the `length` pixels of an axis: a lookup table that avoids a division per corner.
 template <class Index>
 void tabulate(int length, const Index& index, std::vector<std::uint32_t>& of) {
   of.resize(static_cast<std::size_t>(std::max(length, 0)));
   for (int i = 0; i < length; ++i) of[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(index(i));
 }
 
-// Smallest number n for which count(n) >= wanted; count rises and reaches `wanted` at `most` at the latest.
+// Smallest number n <= max for which count(n) >= wanted, by bisection. `count` must be monotonic and count(max) >=
+// wanted.
 template <class Count>
-std::uint32_t least_sufficient(std::uint32_t most, std::size_t wanted, const Count& count) {
-  std::uint32_t low = 0, high = most;
+std::uint32_t min_sufficient(std::uint32_t max, std::size_t wanted, const Count& count) {
+  std::uint32_t low = 0, high = max;
   while (low < high) {
     const std::uint32_t middle = low + (high - low) / 2;
     if (count(middle) >= wanted) {
@@ -47,38 +48,39 @@ std::uint32_t least_sufficient(std::uint32_t most, std::size_t wanted, const Cou
 
 }  // namespace
 
-void share_over_levels(std::span<const double> area, std::span<const std::size_t> available, std::size_t wanted,
-                       std::span<std::size_t> share) {
-  BSLAM_ASSERT(area.size() == available.size() && area.size() == share.size(), "one entry per level in each");
-  std::fill(share.begin(), share.end(), 0);
+void distribute_over_levels(std::span<const double> area, std::span<const std::size_t> available, std::size_t wanted,
+                            std::span<std::size_t> counts) {
+  BSLAM_ASSERT(area.size() == available.size() && area.size() == counts.size(),
+               "all arguments must have one entry per level");
+  std::fill(counts.begin(), counts.end(), 0);
   std::size_t left = wanted;
-  // Each round gives what is left to the levels that still have corners; a round either fills a level or is the last.
+  // Each round distributes the rest over the levels that still have corners. It fills a level or is the last round.
   for (std::size_t round = 0; round <= area.size() && left > 0; ++round) {
     double open_area = 0;
-    for (std::size_t l = 0; l < area.size(); ++l) open_area += share[l] < available[l] ? area[l] : 0.0;
+    for (std::size_t l = 0; l < area.size(); ++l) open_area += counts[l] < available[l] ? area[l] : 0.0;
     if (open_area <= 0) return;
-    double owed = 0;  // rounding carried from level to level, so that the shares add up
+    double owed = 0;  // rounding error carried from level to level, so that the sum is correct
     const auto to_give = static_cast<double>(left);
     for (std::size_t l = 0; l < area.size(); ++l) {
-      if (share[l] >= available[l]) continue;
+      if (counts[l] >= available[l]) continue;
       owed += to_give * area[l] / open_area;
       const double whole = std::floor(owed + 0.5);
       owed -= whole;
-      const std::size_t part = std::min({static_cast<std::size_t>(whole), available[l] - share[l], left});
-      share[l] += part;
+      const std::size_t part = std::min({static_cast<std::size_t>(whole), available[l] - counts[l], left});
+      counts[l] += part;
       left -= part;
     }
   }
 }
 
-Distribution::Distribution(std::size_t most_wanted) {
-  taken_.reserve(most_wanted);
-  cells_.reserve(most_wanted);  // more than there are unless a region is very narrow
+Distribution::Distribution(std::size_t max_wanted) {
+  taken_.reserve(max_wanted);
+  cells_.reserve(max_wanted);  // sufficient unless a region is very narrow
 }
 
 void Distribution::non_maximum_suppression(std::span<const Corner> corners, const Region& region, int spacing,
                                            std::vector<std::uint32_t>& ranked) {
-  // No more corners than 2 x 2 blocks: room for a level of this size, whatever it shows.
+  // There is at most one corner per 2 x 2 block; reserves memory for any image of this size.
   const std::size_t room =
       static_cast<std::size_t>(region.width / 2 + 1) * static_cast<std::size_t>(region.height / 2 + 1);
   order_.reserve(room);
@@ -87,10 +89,10 @@ void Distribution::non_maximum_suppression(std::span<const Corner> corners, cons
   ranked.reserve(room);
   std::array<std::uint32_t, 257> next = score_runs(corners);
   order_.resize(corners.size());
-  // In reading order, which equal scores keep.
+  // In row-major order, which is kept for equal scores.
   for (std::uint32_t i = 0; i < corners.size(); ++i) order_[next[255 - corners[i].score]++] = {packed(corners[i]), i};
   const int side = std::max(1, spacing);
-  const int columns = region.width / side + 3;  // a border of empty squares on either side
+  const int columns = region.width / side + 3;  // one empty square on either side
   const int rows = region.height / side + 3;
   occupied_.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0);
   tabulate(
@@ -99,7 +101,7 @@ void Distribution::non_maximum_suppression(std::span<const Corner> corners, cons
       region.height, [&](int y) { return (y / side + 1) * columns; }, row_of_);
   for (const Entry& entry : order_) {
     const int x = x_of(entry.pixel), y = y_of(entry.pixel);
-    // Two corners in one square are closer than `spacing`: a square never holds two that were taken.
+    // Two corners in one square are closer than `spacing`, so a square contains at most one selected corner.
     std::uint32_t* square = occupied_.data() + row_of_[y - region.y] + column_of_[x - region.x];
     const auto blocks = [&](std::uint32_t other) {
       const unsigned taken = other != 0;
@@ -108,7 +110,7 @@ void Distribution::non_maximum_suppression(std::span<const Corner> corners, cons
     };
     if (*square != 0) continue;
     const std::uint32_t *above = square - columns, *below = square + columns;
-    // Without short cuts: eight branches nobody can predict cost more than eight comparisons.
+    // No short-circuit evaluation: eight unpredictable branches are slower than eight comparisons.
     unsigned blocked = blocks(square[-1]) | blocks(square[1]);
     for (int k = -1; k <= 1; ++k) blocked |= blocks(above[k]) | blocks(below[k]);
     if (blocked != 0) continue;
@@ -118,11 +120,12 @@ void Distribution::non_maximum_suppression(std::span<const Corner> corners, cons
 }
 
 void Distribution::set_limits(std::size_t wanted) {
-  const auto equal_share = static_cast<std::uint32_t>((wanted + cells_.size() - 1) / cells_.size());
+  const auto equal_count = static_cast<std::uint32_t>((wanted + cells_.size() - 1) / cells_.size());
   std::uint32_t most = 0;
   std::size_t eligible = 0;
   for (Cell& cell : cells_) {
-    cell.limit = std::max(cell.strong, std::min(cell.total, equal_share));  // eligible before weak ones fill up
+    cell.limit =
+        std::max(cell.strong, std::min(cell.total, equal_count));  // taken before weak ones beyond the equal number
     eligible += cell.limit;
     most = std::max(most, cell.total);
   }
@@ -133,16 +136,16 @@ void Distribution::set_limits(std::size_t wanted) {
   };
   if (eligible >= wanted) {
     const auto capped = [](const Cell& c, std::uint32_t n) { return std::min(c.limit, n); };
-    const std::uint32_t n = least_sufficient(
-        most, wanted, [&](std::uint32_t k) { return sum([&](const Cell& c) { return capped(c, k); }); });
+    const std::uint32_t n =
+        min_sufficient(most, wanted, [&](std::uint32_t k) { return sum([&](const Cell& c) { return capped(c, k); }); });
     for (Cell& cell : cells_) {
       cell.sure = n > 0 ? capped(cell, n - 1) : 0;
       cell.limit = capped(cell, n);
     }
   } else {
     const auto filled = [](const Cell& c, std::uint32_t n) { return std::max(c.limit, std::min(c.total, n)); };
-    const std::uint32_t n = least_sufficient(
-        most, wanted, [&](std::uint32_t k) { return sum([&](const Cell& c) { return filled(c, k); }); });
+    const std::uint32_t n =
+        min_sufficient(most, wanted, [&](std::uint32_t k) { return sum([&](const Cell& c) { return filled(c, k); }); });
     for (Cell& cell : cells_) {
       cell.sure = n > 0 ? filled(cell, n - 1) : cell.limit;
       cell.limit = filled(cell, n);
@@ -185,7 +188,7 @@ void Distribution::choose(std::span<const Corner> corners, std::span<const std::
   const std::size_t room = wanted - std::min(wanted, taken_.size());
   spare_.resize(std::min(room, spare_.size()));
   taken_.insert(taken_.end(), spare_.begin(), spare_.end());
-  std::sort(taken_.begin(), taken_.end());  // corners stand in reading order
+  std::sort(taken_.begin(), taken_.end());  // corners are in row-major order
   for (const std::uint32_t i : taken_) chosen.push_back(corners[i]);
 }
 

@@ -15,23 +15,24 @@
 namespace bslam::feature {
 namespace {
 
-// The order of things follows measurements on views under known warps (tests/feature/repeatability_test.cc and frames
-// of EuRoC and of a synthetic data set; mean over 12 kinds of change, least to most textured scene):
+// The order of the steps follows measurements on views under known warps (tests/feature/repeatability_test.cc and
+// frames of EuRoC and of a synthetic data set; mean over 12 kinds of change, from the least to the most textured
+// scene):
 // - corners detected on the softened instead of the plain level: recall of matches 0.44 -> 0.47, 0.54 -> 0.57,
 //   0.64 -> 0.65, precision 0.83 -> 0.86, 0.91 -> 0.92, 0.95 -> 0.96;
 // - orientation and tests sampled at the refined position instead of the nearest pixel: recall 0.47 -> 0.50,
 //   0.57 -> 0.61, 0.65 -> 0.69, precision 0.86 -> 0.87, 0.92 -> 0.93, 0.96.
 
-// What is read around a keypoint, whose refined position is one pixel from its corner at most.
+// Pixels read around a corner; the maximum distance of the refined position from the corner is one pixel.
 constexpr int kBorder = kWindowReach + 1;
 
-// Corners closer than this part of the mean distance between keypoints of their level add little to one another.
+// Minimum distance between corners relative to the mean distance between keypoints of their level.
 constexpr double kSpacing = 0.2;
 
-// The corners of one level, from detection to choice.
+// The corners of one level, from detection to selection.
 struct LevelCorners {
   std::vector<Corner> corners;        // all, in reading order
-  std::vector<std::uint32_t> ranked;  // indices of those thinned out, best first
+  std::vector<std::uint32_t> ranked;  // indices after non-maximum suppression, best first
   Region region;
 };
 
@@ -44,11 +45,11 @@ struct Extractor::Scratch {
   FastDetector detector;
   Distribution distribution;
   Smoother smoother;
-  image::Image softened, smoothed;  // of the level at hand
+  image::Image softened, smoothed;  // of the current level
   std::vector<LevelCorners> levels;
   std::vector<Corner> chosen;
   std::vector<double> area;
-  std::vector<std::size_t> available, share;
+  std::vector<std::size_t> available, keypoints_per_level;
 
   void detect(const image::Pyramid& pyramid, const image::ImageView& mask, int wanted, const FeatureOptions& options);
   void describe(const image::Pyramid& pyramid, std::size_t level, const image::ImageView& mask,
@@ -57,7 +58,7 @@ struct Extractor::Scratch {
 
 namespace {
 
-// Is the level-0 pixel nearest to (x, y) one to be used?
+// Returns true if the level-0 pixel nearest to (x, y) is not masked.
 bool allowed(const image::ImageView& mask, double x, double y) {
   if (mask.empty()) return true;
   const int column = std::clamp(static_cast<int>(std::lround(x)), 0, mask.width - 1);
@@ -65,7 +66,7 @@ bool allowed(const image::ImageView& mask, double x, double y) {
   return mask.at(column, row) != 0;
 }
 
-int most_of(const FeatureOptions& options) { return FeatureOptions::kInForOthers * options.per_image; }
+int max_keypoints(const FeatureOptions& options) { return FeatureOptions::kMaxFactorIfOthersFail * options.per_image; }
 
 Region inner_region(const image::Image& level) {
   return {kBorder, kBorder, std::max(0, level.width() - 2 * kBorder), std::max(0, level.height() - 2 * kBorder)};
@@ -73,21 +74,21 @@ Region inner_region(const image::Image& level) {
 
 }  // namespace
 
-// Corners of all levels, thinned out, and how many keypoints each level is to give.
+// Detects the corners of all levels, suppresses non-maxima, and determines the number of keypoints of each level.
 void Extractor::Scratch::detect(const image::Pyramid& pyramid, const image::ImageView& mask, int wanted,
                                 const FeatureOptions& options) {
   const std::size_t count = pyramid.size();
   levels.resize(std::max(levels.size(), count));
   area.assign(count, 0.0);
   available.assign(count, 0);
-  share.assign(count, 0);
+  keypoints_per_level.assign(count, 0);
   double total_area = 0;
   for (std::size_t l = 0; l < count; ++l) {
     levels[l].region = inner_region(pyramid.levels[l]);
     area[l] = levels[l].region.area();
     total_area += area[l];
   }
-  // Levels are shares of one density, so the distance between keypoints is the same on all, in pixels of the level.
+  // All levels have the same density, so the distance between keypoints in pixels of the level is the same on all.
   const int spacing = static_cast<int>(std::lround(kSpacing * std::sqrt(total_area / wanted)));
   const int threshold = std::min(options.fast_threshold_min, options.fast_threshold);
   for (std::size_t l = 0; l < count; ++l) {
@@ -102,10 +103,10 @@ void Extractor::Scratch::detect(const image::Pyramid& pyramid, const image::Imag
     distribution.non_maximum_suppression(level.corners, level.region, spacing, level.ranked);
     available[l] = level.ranked.size();
   }
-  share_over_levels(area, available, static_cast<std::size_t>(wanted), share);
+  distribute_over_levels(area, available, static_cast<std::size_t>(wanted), keypoints_per_level);
 }
 
-// Turns the chosen corners of a level into keypoints.
+// Computes keypoints from the selected corners of a level.
 void Extractor::Scratch::describe(const image::Pyramid& pyramid, std::size_t level, const image::ImageView& mask,
                                   const camera::Camera& camera, double sigma_px, Detections& detections) {
   if (chosen.empty()) return;
@@ -132,7 +133,7 @@ void Extractor::Scratch::describe(const image::Pyramid& pyramid, std::size_t lev
 }
 
 Extractor::Extractor(const FeatureOptions& options)
-    : options_(options), scratch_(std::make_unique<Scratch>(static_cast<std::size_t>(most_of(options)))) {}
+    : options_(options), scratch_(std::make_unique<Scratch>(static_cast<std::size_t>(max_keypoints(options)))) {}
 Extractor::~Extractor() = default;
 Extractor::Extractor(Extractor&&) noexcept = default;
 Extractor& Extractor::operator=(Extractor&&) noexcept = default;
@@ -140,17 +141,17 @@ Extractor& Extractor::operator=(Extractor&&) noexcept = default;
 void Extractor::extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
                         image::Pyramid& pyramid, Detections& detections, std::optional<int> budget) {
   BSLAM_ASSERT(mask.empty() || (mask.width == image.width && mask.height == image.height),
-               "mask and image differ in size");
-  const int wanted = std::clamp(budget.value_or(options_.per_image), 0, most_of(options_));
+               "mask and image must have the same size");
+  const int wanted = std::clamp(budget.value_or(options_.per_image), 0, max_keypoints(options_));
   detections.clear();
   detections.reserve(static_cast<std::size_t>(wanted));
   image::build_pyramid(image, options_.levels, options_.scale_factor, pyramid);
   if (wanted == 0) return;
-  scratch_->smoothed.resize(image.width, image.height);  // room for all levels, also if this image has no keypoint
+  scratch_->smoothed.resize(image.width, image.height);  // memory for all levels, even if this image has no keypoint
   scratch_->detect(pyramid, mask, wanted, options_);
   for (std::size_t l = 0; l < pyramid.size(); ++l) {
     const LevelCorners& level = scratch_->levels[l];
-    scratch_->distribution.choose(level.corners, level.ranked, level.region, scratch_->share[l],
+    scratch_->distribution.choose(level.corners, level.ranked, level.region, scratch_->keypoints_per_level[l],
                                   options_.fast_threshold, scratch_->chosen);
     scratch_->describe(pyramid, l, mask, camera, options_.sigma_px, detections);
   }

@@ -26,7 +26,7 @@ CircleOffsets circle_offsets(std::ptrdiff_t stride) {
   return offsets;
 }
 
-// Largest minimum, over the arcs of 9, of what `less` orders: two arcs that share 8 pixels are looked at together.
+// Largest minimum over all arcs of 9 pixels; pairs of arcs with 8 common pixels are evaluated together.
 // `Low` and `High` are minimum and maximum (or the reverse, for dark corners) of a scalar or a vector of pixels.
 template <class Pixels, class Low, class High>
 inline Pixels best_arc(const Pixels (&p)[kCircle], Low low, High high) {
@@ -42,7 +42,7 @@ inline Pixels best_arc(const Pixels (&p)[kCircle], Low low, High high) {
   return best;
 }
 
-// Scores of one pixel by kind.
+// Scores of one pixel as a dark and as a bright corner.
 struct Kinds {
   std::uint8_t dark, bright;
 };
@@ -106,8 +106,8 @@ BlockKinds kinds_of(const __m128i (&p)[kCircle], __m128i centre) {
   return {_mm_subs_epu8(best_arc(p, low_of, high_of), centre), _mm_subs_epu8(centre, best_arc(p, high_of, low_of))};
 }
 
-// 16 pixels at a time. An arc of 9 holds two neighbours of the four pixels at 0, 90, 180 and 270 degrees, which alone
-// rules out most blocks.
+// 16 pixels at a time. An arc of 9 contains two adjacent ones of the four pixels at 0, 90, 180 and 270 degrees; this
+// test rejects most blocks.
 __m128i score_block(const std::uint8_t* pixel, const CircleOffsets& offsets, __m128i threshold) {
   const __m128i centre = load(pixel);
   const __m128i ceiling = _mm_adds_epu8(centre, threshold), floor = _mm_subs_epu8(centre, threshold);
@@ -125,8 +125,8 @@ __m128i score_block(const std::uint8_t* pixel, const CircleOffsets& offsets, __m
   return _mm_andnot_si128(weak, score);
 }
 
-// Calls block(x) for blocks of kLanes pixels that cover [begin, end), at least one wide; the last overlaps the one
-// before.
+// Calls block(x) for blocks of kLanes pixels that cover [begin, end), which must contain at least one block. The last
+// block may overlap the one before.
 template <class Block>
 void for_blocks(int begin, int end, const Block& block) {
   for (int x = begin; x + kLanes < end; x += kLanes) block(x);
@@ -192,15 +192,16 @@ const FastKernels& fast_kernels() {
 
 void FastDetector::detect(const image::ImageView& image, int border, int threshold, std::vector<Corner>& corners) {
   BSLAM_ASSERT(border > kRadius, "the circle of a corner and of its neighbours must lie inside of the image");
-  BSLAM_ASSERT(image.width <= 0xFFFF && image.height <= 0xFFFF, "image too large for the coordinates of corners");
-  BSLAM_ASSERT(threshold >= 0 && threshold <= 254, "FAST threshold outside of 0 to 254");
+  BSLAM_ASSERT(image.width <= 0xFFFF && image.height <= 0xFFFF,
+               "the image must be smaller than 65536 pixels in each axis");
+  BSLAM_ASSERT(threshold >= 0 && threshold <= 254, "the FAST threshold must be in [0, 254]");
   corners.clear();
   const int begin = border, end = image.width - border, last = image.height - border;
   if (begin >= end || border >= last) return;
   const std::size_t width = static_cast<std::size_t>(image.width);
   scores_.assign(3 * width, 0);
   columns_.resize(width);
-  // Two maxima never lie within one 2 x 2 block: with this much room no image of the size needs more.
+  // There is at most one maximum per 2 x 2 block; reserves memory for any image of this size.
   corners.reserve((width / 2 + 1) * (static_cast<std::size_t>(image.height) / 2 + 1));
   const auto scores_of = [&](int y) { return scores_.data() + static_cast<std::size_t>(y % 3) * width; };
   for (int y = border - 1; y <= last; ++y) {

@@ -16,31 +16,32 @@ struct Corner {
   std::uint8_t score;
 };
 
-// What the detector is made of, in one instruction set. All sets give the same bits.
+// The functions of the detector for one instruction set. All instruction sets give identical results.
 struct FastKernels {
-  // scores[x] for x in [begin, end) of the image row `row`, 0 where the score is at most `threshold`. Reads the three
-  // rows above and below, and three pixels to either side.
+  // Writes scores[x] for x in [begin, end) of the image row `row`, 0 if the score is at most `threshold`. Reads the
+  // three rows above and below, and three pixels to either side.
   void (*score_row)(const std::uint8_t* row, std::ptrdiff_t stride, int begin, int end, int threshold,
                     std::uint8_t* scores);
-  // The same at threshold 0 and apart by kind: corners darker than the circle in `dark`, brighter ones in `bright`.
+  // The same at threshold 0, separately for corners darker than the circle (`dark`) and brighter ones (`bright`).
   void (*kinds_row)(const std::uint8_t* row, std::ptrdiff_t stride, int begin, int end, std::uint8_t* dark,
                     std::uint8_t* bright);
-  // Writes to `out` the x in [begin, end) at which `scores` is positive and the maximum of its 3 x 3 neighbourhood, and
-  // the first in reading order among equals. Reads one entry to either side. Returns how many; `out` has room.
+  // Writes to `out` the x in [begin, end) at which `scores` is positive and the maximum of its 3 x 3 neighbourhood (on
+  // ties the first in row-major order), and returns their number. Reads one entry to either side. `out` must be large
+  // enough.
   std::size_t (*local_maxima)(const std::uint8_t* above, const std::uint8_t* scores, const std::uint8_t* below,
                               int begin, int end, std::uint16_t* out);
 };
 
 const FastKernels& scalar_fast_kernels();
-const FastKernels& fast_kernels();  // the fastest this processor has
+const FastKernels& fast_kernels();  // the fastest available on this processor
 
-// Detects with 3 x 3 non-maximum suppression; keeps its memory from image to image.
+// Detection with 3 x 3 non-maximum suppression. Reuses its memory between images.
 class FastDetector {
  public:
   explicit FastDetector(const FastKernels& kernels = fast_kernels()) : kernels_(&kernels) {}
 
-  // `corners` (cleared first) become those with a score above `threshold` at least `border` (>= 4) pixels inside of
-  // `image`, row by row.
+  // Fills `corners` (cleared first) with the corners whose score exceeds `threshold`, at least `border` (>= 4) pixels
+  // from the border of `image`, row by row.
   void detect(const image::ImageView& image, int border, int threshold, std::vector<Corner>& corners);
 
  private:

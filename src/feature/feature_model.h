@@ -1,13 +1,13 @@
-// What all stages must know of the features: on which scales they are found and how large a keypoint's error is.
+// Properties of the features that all stages use: the scales of the pyramid and the standard deviation of a keypoint.
 #pragma once
 
 #include <cmath>
 
 namespace bslam::feature {
 
-// The pyramid keypoints are found on.
+// The pyramid on which keypoints are detected.
 struct PyramidShape {
-  double scale_factor = 1.2;  // between neighbouring levels
+  double scale_factor = 1.2;  // scale factor between adjacent levels
   int levels = 8;
 
   // Level-0 pixels per pixel of a level.
@@ -15,7 +15,7 @@ struct PyramidShape {
 };
 
 struct FeatureModel {
-  double sigma_px = 0.4;  // standard deviation of a detected keypoint, not aligned, per axis, in pixels of its level
+  double sigma_px = 0.4;  // standard deviation of a detected (not aligned) keypoint per axis, in pixels of its level
   PyramidShape pyramid = {};
 
   // The same in level-0 pixels.

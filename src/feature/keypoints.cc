@@ -38,7 +38,7 @@ Keypoints::Keypoints(Detections&& detected)
 Keypoints Keypoints::refined(Refinement&& refinement) const {
   BSLAM_ASSERT(
       refinement.pixel.size() == size() && refinement.bearing.size() == size() && refinement.sigma.size() == size(),
-      "a refinement has a position for every keypoint");
+      "a refinement must have a position for every keypoint");
   Keypoints out = *this;
   out.pixel = std::move(refinement.pixel);
   out.bearing = std::move(refinement.bearing);

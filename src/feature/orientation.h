@@ -16,7 +16,7 @@ struct Moments {
 Moments intensity_moments(const Window& window);
 Moments intensity_moments_scalar(const Window& window);
 
-// Angle of the centroid in radians, (-pi, pi], x towards y; 0 where there is none.
+// Angle of the centroid in radians, (-pi, pi], x towards y; 0 if there is none.
 float orientation(const Moments& moments);
 
 }  // namespace bslam::feature

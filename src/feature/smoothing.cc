@@ -29,7 +29,7 @@ using Rows = std::array<const std::uint8_t*, 2 * Kernel::kHalf + 1>;
 
 template <class Kernel>
 void down(const Rows<Kernel>& in, int width, std::uint16_t* __restrict out) {
-  const Rows<Kernel> rows = in;  // a copy the compiler knows `out` does not change
+  const Rows<Kernel> rows = in;  // a copy, which cannot alias `out`
   for (int x = 0; x < width; ++x) {
     out[x] = static_cast<std::uint16_t>(Kernel::sum([&](int k) -> unsigned { return rows[k][x]; }));
   }
@@ -51,7 +51,7 @@ void Smoother::filter(const image::ImageView& in, image::Image& out) {
   constexpr int kHalf = Kernel::kHalf;
   if (out.width() != in.width || out.height() != in.height) out.resize(in.width, in.height);
   if (in.empty()) return;
-  row_.reserve(static_cast<std::size_t>(in.width + 2 * Smooth::kHalf));  // the wider kernel may be the next
+  row_.reserve(static_cast<std::size_t>(in.width + 2 * Smooth::kHalf));  // memory for the wider kernel
   row_.resize(static_cast<std::size_t>(in.width + 2 * kHalf));
   for (int y = 0; y < in.height; ++y) {
     Rows<Kernel> rows;

@@ -1,4 +1,5 @@
-// Low passes that corners are detected on and that binary tests are made on. Edges are repeated.
+// Low-pass filters for the images in which corners are detected and binary tests are evaluated. Border pixels are
+// repeated.
 #pragma once
 
 #include <cstdint>
@@ -8,15 +9,15 @@
 
 namespace bslam::feature {
 
-// Keeps its memory from image to image. `out` takes the size of `in`.
+// Reuses its memory between images. `out` is resized to the size of `in`.
 class Smoother {
  public:
-  // 1 2 1 in both axes. Corners found on this come back more often in another view than corners of the level itself:
-  // noise decides less about which pixel of a weak corner is the best (extractor.cc has the figures).
+  // 1 2 1 in both axes. Corners detected in the result are more repeatable than corners of the level itself, because
+  // noise has less influence on the maximum of a weak corner (measurements: extractor.cc).
   void soften(const image::ImageView& in, image::Image& out);
 
-  // 1 2 3 4 3 2 1 in both axes: two boxes of 4; standard deviation 1.58 pixels, that of a Gaussian of sigma 2 cut off
-  // after 7 taps.
+  // 1 2 3 4 3 2 1 in both axes: two boxes of 4. The standard deviation is 1.58 pixels, as for a Gaussian of sigma 2
+  // truncated to 7 taps.
   void smooth(const image::ImageView& in, image::Image& out);
 
  private:

@@ -9,15 +9,15 @@ namespace {
 constexpr int kHalf = 2, kSide = 2 * kHalf + 1;
 constexpr float kLargest = 1.0f;  // pixels
 
-// Weights exp(-d^2 / (2 * 1.2^2)) keep neighbouring corners out, but draw the centroid towards the middle of the
-// window; the gain undoes that for a score that falls off like a Gaussian of sigma 0.85: 1 + 0.85^2 / 1.2^2.
+// Weights exp(-d^2 / (2 * 1.2^2)) suppress adjacent corners, but bias the centroid towards the middle of the window.
+// The gain corrects this for scores that decrease like a Gaussian of sigma 0.85: 1 + 0.85^2 / 1.2^2.
 constexpr float kGain = 1.5f;
 constexpr std::array<float, kSide> kWeight{0.2494f, 0.7066f, 1.0f, 0.7066f, 0.2494f};
 
 }  // namespace
 
 Eigen::Vector2f refine(const image::ImageView& level, int x, int y, const FastKernels& kernels) {
-  constexpr int kBlock = 16, kBefore = 8;  // a full block of pixels costs vector units no more than five pixels
+  constexpr int kBlock = 16, kBefore = 8;  // a full vector of pixels is as fast as five pixels
   using Rows = std::array<std::array<std::uint8_t, kBlock>, kSide>;
   Rows dark, bright;
   for (int j = 0; j < kSide; ++j) {

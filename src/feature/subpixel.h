@@ -1,4 +1,4 @@
-// Position of a corner to a fraction of a pixel.
+// Sub-pixel position of a corner.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,15 +8,16 @@
 
 namespace bslam::feature {
 
-// Offset in pixels of the level, from the corner's pixel to the centroid of the FAST scores (at threshold 0, of the
-// corner's own kind: dark or bright) of the 5 x 5 pixels around it, within +-1 in each axis; zero if it lies beyond.
+// Offset in pixels of the level from the corner's pixel to the centroid of the FAST scores (at threshold 0, of the same
+// kind as the corner: dark or bright) of the 5 x 5 pixels around it, within +-1 in each axis; zero if it is larger.
 //
-// Why this and not the usual: on views of one scene under known warps (tests/feature/subpixel_test.cc) the median error
-// of a pair's positions falls from 0.71 px for whole pixels to 0.28-0.29 px, against 0.34-0.42 for a quadratic fit to
-// the 3 x 3 scores, 0.32-0.50 for one to a difference of Gaussians, and 0.71 for Foerstner's gradient method or a fit
-// to the Harris response: FAST fires at a small distance from the place that those look for.
+// Comparison with common methods: on views of one scene under known warps (tests/feature/subpixel_test.cc) the median
+// error of a pair's positions decreases from 0.71 px for whole pixels to 0.28-0.29 px. It is 0.34-0.42 px for a
+// quadratic fit to the 3 x 3 scores, 0.32-0.50 px for a quadratic fit to a difference of Gaussians, and 0.71 px for
+// Foerstner's gradient method or a fit to the Harris response: FAST responds at a small distance from the positions
+// that these find.
 //
-// `x`, `y` lie at least 11 pixels inside of `level`.
+// `x`, `y` must be at least 11 pixels from the border of `level`.
 Eigen::Vector2f refine(const image::ImageView& level, int x, int y, const FastKernels& kernels = fast_kernels());
 
 }  // namespace bslam::feature

@@ -5,7 +5,7 @@
 namespace bslam::feature {
 namespace {
 
-// Bilinear sampling at a fixed fraction of a pixel: whole part and weights that add up to kOne^2.
+// Bilinear sampling at a fixed fraction of a pixel: integer part, and weights with the sum kOne^2.
 template <int kOne>
 struct Phase {
   int x, y;

@@ -1,5 +1,5 @@
-// Windows of a level around a sub-pixel position: what orientation and binary tests read, and the patch a keypoint
-// keeps.
+// Windows of a level around a sub-pixel position: the window for orientation and binary tests, and the patch that is
+// stored with a keypoint.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ constexpr int kWindowReach = kWindowRadius + 2;
 // Samples the window around (x, y), pixels of the level, bilinearly (to a sixteenth of a pixel).
 Window sample_window(const image::ImageView& level, float x, float y);
 
-// Samples the patch around (x, y) bilinearly (to 1/128 of a pixel), as keypoints.h describes it.
+// Samples the patch around (x, y) bilinearly (to 1/128 of a pixel); see Patch in keypoints.h.
 Patch sample_patch(const image::ImageView& level, float x, float y);
 
 }  // namespace bslam::feature

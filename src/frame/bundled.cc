@@ -9,7 +9,7 @@ namespace bslam::frame {
 Bundled::Bundled(std::span<const std::size_t> keypoint_counts, std::span<const std::vector<KeypointRef>> matched,
                  std::span<const std::optional<BundledPoint>> points)
     : points_(std::vector(points.begin(), points.end())), num_matched_(matched.size()) {
-  BSLAM_ASSERT(points.size() == matched.size(), "one point slot per matched feature");
+  BSLAM_ASSERT(points.size() == matched.size(), "there must be one point entry per matched feature");
   std::vector<std::size_t> camera_begin = {0};
   for (const std::size_t count : keypoint_counts) camera_begin.push_back(camera_begin.back() + count);
   std::vector<FeatureId> feature(camera_begin.back());
@@ -20,15 +20,15 @@ Bundled::Bundled(std::span<const std::size_t> keypoint_counts, std::span<const s
   const auto close_feature = [&] { begin.push_back(static_cast<std::uint32_t>(refs.size())); };
   const auto add = [&](KeypointRef ref) {
     FeatureId& slot = feature[camera_begin[ref.camera.index()] + ref.keypoint.index()];
-    BSLAM_ASSERT(!slot.valid(), "a keypoint belongs to exactly one unique feature");
+    BSLAM_ASSERT(!slot.valid(), "a keypoint must not belong to two features");
     slot = FeatureId(begin.size() - 1);
     refs.push_back(ref);
   };
   for (const std::vector<KeypointRef>& group : matched) {
-    BSLAM_ASSERT(group.size() >= 2, "a matched feature has two or more keypoints");
+    BSLAM_ASSERT(group.size() >= 2, "a matched feature must have two or more keypoints");
     for (std::size_t i = 0; i < group.size(); ++i) {
       BSLAM_ASSERT(i == 0 || group[i - 1].camera < group[i].camera,
-                   "at most one keypoint per camera, in order of camera");
+                   "the keypoints of a feature must be in order of distinct cameras");
       add(group[i]);
     }
     close_feature();

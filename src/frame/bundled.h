@@ -1,4 +1,4 @@
-// The Bundled table of a frame: which keypoints of different cameras are one unique feature.
+// Feature table of a frame: groups the keypoints of all cameras that show the same point into one feature.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,16 +24,17 @@ struct BundledPoint {
   Eigen::Matrix3d covariance;  // metres^2
 };
 
-// Every keypoint of the frame belongs to exactly one unique feature; a feature has at most one keypoint per camera;
-// unique = monocular + matched. Stored as a compressed table from FeatureId to keypoints, and its inverse. Matched
-// features come first, each with its keypoints in order of camera; monocular ones follow in order of camera and
-// keypoint. Immutable; copies share the table.
+// The Bundled table. Every keypoint of the frame belongs to exactly one unique feature; a feature has at most one
+// keypoint per camera. A feature is matched if it has two or more keypoints, else monocular. Stored as a compressed
+// table from FeatureId to keypoints, and its inverse. Matched features come first, each with its keypoints in order of
+// camera; monocular ones follow in order of camera and keypoint. Immutable; copies share the table.
 class Bundled {
  public:
   Bundled() = default;
 
-  // `keypoint_counts`: keypoints per camera. `matched`: features of two or more keypoints, cameras distinct, no
-  // keypoint twice; `points` has one entry per matched feature. All remaining keypoints become monocular features.
+  // `keypoint_counts`: keypoints per camera. `matched`: features of two or more keypoints in order of distinct cameras;
+  // no keypoint may occur twice. `points`: one entry per matched feature. All other keypoints become monocular
+  // features.
   Bundled(std::span<const std::size_t> keypoint_counts, std::span<const std::vector<KeypointRef>> matched,
           std::span<const std::optional<BundledPoint>> points);
 
@@ -48,14 +49,14 @@ class Bundled {
   FeatureId feature(CameraIndex c, KeypointIndex k) const { return feature_[camera_begin_[c.index()] + k.index()]; }
   FeatureId feature(KeypointRef r) const { return feature(r.camera, r.keypoint); }
 
-  // Empty for monocular features and matched ones whose rays do not meet in front of the cameras.
+  // Nullopt for monocular features, and for matched ones without a valid triangulated point.
   const std::optional<BundledPoint>& point(FeatureId f) const { return is_matched(f) ? points_[f.index()] : kNone; }
 
  private:
   static inline const std::optional<BundledPoint> kNone;
   SharedArray<KeypointRef> refs_;
   SharedArray<std::uint32_t> begin_;       // size() + 1
-  SharedArray<FeatureId> feature_;         // per keypoint, cameras one after the other
+  SharedArray<FeatureId> feature_;         // per keypoint, camera by camera
   SharedArray<std::size_t> camera_begin_;  // per camera + 1
   SharedArray<std::optional<BundledPoint>> points_;
   std::size_t num_matched_ = 0;

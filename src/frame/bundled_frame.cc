@@ -16,10 +16,10 @@ double BundledFrame::delay_s(std::size_t c) const {
   return camera.state == image::ImageState::kPresent ? to_seconds(camera.time_ns - time_ns) : 0.0;
 }
 
-CameraFrame refined(CameraFrame part, feature::Refinement&& refinement, const camera::Camera& camera) {
-  part.keypoints = part.keypoints.refined(std::move(refinement));
-  part.grid = FeatureGrid(part.keypoints, camera.width, camera.height);
-  return part;
+CameraFrame refined(CameraFrame camera_frame, feature::Refinement&& refinement, const camera::Camera& camera) {
+  camera_frame.keypoints = camera_frame.keypoints.refined(std::move(refinement));
+  camera_frame.grid = FeatureGrid(camera_frame.keypoints, camera.width, camera.height);
+  return camera_frame;
 }
 
 std::vector<double> delays_of(const BundledFrame& frame) {

@@ -6,8 +6,8 @@
 namespace bslam::frame {
 
 std::vector<std::uint8_t> without_late_cameras(const camera::Rig& rig, const image::ImageBundle& images,
-                                               std::span<const std::uint8_t> left_out) {
-  std::vector<std::uint8_t> out(left_out.begin(), left_out.end());
+                                               std::span<const std::uint8_t> skipped) {
+  std::vector<std::uint8_t> out(skipped.begin(), skipped.end());
   std::vector<std::uint8_t> absent = out;
   for (std::size_t c = 0; c < out.size(); ++c) {
     const image::CameraImage& image = images.images[c];
@@ -18,7 +18,7 @@ std::vector<std::uint8_t> without_late_cameras(const camera::Rig& rig, const ima
   std::vector<std::uint8_t> gone = absent;
   for (std::size_t c = 0; c < out.size(); ++c) gone[c] |= out[c];
   const bool some = std::ranges::find(gone, std::uint8_t{0}) != gone.end();
-  if (!some || (rig.any_overlap(absent) && !rig.any_overlap(gone))) return {left_out.begin(), left_out.end()};
+  if (!some || (rig.any_overlap(absent) && !rig.any_overlap(gone))) return {skipped.begin(), skipped.end()};
   return out;
 }
 

@@ -1,4 +1,4 @@
-// Cameras that do not fire together.
+// Cameras with different capture times.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@
 
 namespace bslam::frame {
 
-// Two images this close in time were taken together: a rig turning at 1 rad/s moves them by a pixel.
+// Maximum difference of capture times that counts as simultaneous: at 1 rad/s the image moves by about a pixel.
 constexpr TimeNs kTogetherNs = 2'000'000;
 
-// Flags the cameras to leave out as long as the motion of the rig is unknown: those not `left_out` whose image was not
-// taken together with the frame. None where without them nothing were left, or no overlapping views of a rig that has
-// such.
+// Flags the cameras to skip while the motion of the rig is unknown: those in `skipped`, and those whose image was not
+// captured at the time of the frame. Returns `skipped` if otherwise no image would remain, or if no overlapping views
+// would remain although there are some.
 std::vector<std::uint8_t> without_late_cameras(const camera::Rig& rig, const image::ImageBundle& images,
-                                               std::span<const std::uint8_t> left_out);
+                                               std::span<const std::uint8_t> skipped);
 
 }  // namespace bslam::frame

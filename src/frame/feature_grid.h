@@ -1,4 +1,4 @@
-// The paper's 64 x 48 grid of one camera: keypoints near a pixel without looking at all of them.
+// The paper's 64 x 48 grid of one camera, for finding the keypoints near a pixel.
 #pragma once
 
 #include <cstdint>

@@ -18,8 +18,8 @@ void append_keyframes(BundledMap& onto, const BundledMap& other, AppendedIds& id
     const KeyframeId parent = other.keyframe(k).parent;
     parents.push_back(parent.valid() ? ids.keyframes[parent.index()] : KeyframeId());
   }
-  const bool hung = attach_keyframes(onto, first, parents);
-  BSLAM_ASSERT(hung, "the links of a map are trees");
+  const bool attached = attach_keyframes(onto, first, parents);
+  BSLAM_ASSERT(attached, "the parent links of a map must form trees");
 }
 
 // Returns the new id of `k` or, if `k` was removed, that of the newest older keyframe that is alive; if there is none,
@@ -58,10 +58,10 @@ bool attach_keyframes(BundledMap& map, KeyframeId first, std::span<const Keyfram
 }
 
 AppendedIds append_map(BundledMap& onto, const BundledMap& other) {
-  BSLAM_ASSERT(onto.rig().size() == other.rig().size(), "maps that are put together are of one rig");
+  BSLAM_ASSERT(onto.rig().size() == other.rig().size(), "both maps must have the same rig");
   BSLAM_ASSERT(
       onto.pyramid().levels == other.pyramid().levels && onto.pyramid().scale_factor == other.pyramid().scale_factor,
-      "maps that are put together are of one pyramid");
+      "both maps must have the same pyramid");
   AppendedIds ids{std::vector<KeyframeId>(other.keyframe_slots()), std::vector<LandmarkId>(other.landmark_slots())};
   append_keyframes(onto, other, ids);
   for (const LandmarkId l : other.landmark_ids()) {

@@ -21,7 +21,7 @@ struct AppendedIds {
 // maps must have the same rig and pyramid. The scale and gauge epoch of `onto` are kept.
 AppendedIds append_map(BundledMap& onto, const BundledMap& other);
 
-// Builds spanning trees from keyframes `first`, `first` + 1, ..., each of which must be a submap of its own: each one
+// Builds spanning trees from keyframes `first`, `first` + 1, ..., each of which must be a separate submap: each one
 // is attached to its entry in `parents`, which refers to one of these keyframes; those with an invalid parent stay
 // roots. Returns false, with some keyframes already attached, if the links contain a cycle.
 bool attach_keyframes(BundledMap& map, KeyframeId first, std::span<const KeyframeId> parents);

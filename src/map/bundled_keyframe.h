@@ -1,4 +1,4 @@
-// The paper's BundledKeyframe: a BundledFrame with a pose and its place in the map.
+// The paper's BundledKeyframe: a BundledFrame with a pose and its links in the map.
 #pragma once
 
 #include <memory>
@@ -17,8 +17,8 @@ struct Covisible {
   int weight = 0;
 };
 
-// The two tables are shared between versions apart from the rest, so that a change of pose copies neither; both read
-// like a const std::vector.
+// `landmarks` and `covisible` are shared between versions separately from the other members, so that a change of the
+// pose copies neither. Both can be read like a const std::vector.
 struct BundledKeyframe {
   std::shared_ptr<const frame::BundledFrame> frame;  // null once removed
   geometry::SE3 T_rig_world;                         // while alive
@@ -27,7 +27,7 @@ struct BundledKeyframe {
   KeyframeId parent;                                 // spanning tree; invalid for the root
   std::vector<KeyframeId> children;                  // in order of id
   geometry::SE3 T_rig_parent;                        // once removed: its pose relative to `parent`
-  // Motion of the rig while its cameras fired, as BundledFrame::twist, in the unit of the map.
+  // Velocity of the rig during the capture, as BundledFrame::twist, in the unit of the map.
   geometry::Vector6d twist = geometry::Vector6d::Zero();
   bool alive = false;
   // Accumulated scale factor of its submap since the keyframe was added. A length stored when it was u is multiplied by

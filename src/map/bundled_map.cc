@@ -109,9 +109,9 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
 
   for (const auto& [feature, l] : matches) {
     BSLAM_ASSERT(alive(l) && !table[feature.index()].valid(),
-                 "a new keyframe's matches are alive and features distinct");
+                 "the matches of a new keyframe must be alive and their features distinct");
     const auto list = observations(l);
-    BSLAM_ASSERT(list.empty() || list.back().keyframe != k, "a new keyframe's matches are distinct landmarks");
+    BSLAM_ASSERT(list.empty() || list.back().keyframe != k, "the matches of a new keyframe must be distinct landmarks");
     table[feature.index()] = l;
     observations_.insert(l.index(), {k, feature}, owner_.tag());
     observations_total_ += num_keypoints({k, feature});
@@ -125,7 +125,7 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
 
 LandmarkId BundledMap::add_landmark(const Eigen::Vector3d& position, std::span<const Observation> observations,
                                     const LandmarkReference& reference, KeyframeId born) {
-  BSLAM_ASSERT(!observations.empty(), "a landmark has an observation");
+  BSLAM_ASSERT(!observations.empty(), "a landmark must have an observation");
   const LandmarkId l(landmarks_.size());
   Landmark entry;
   entry.position = position;
@@ -142,7 +142,7 @@ LandmarkId BundledMap::add_landmark(const Eigen::Vector3d& position, std::span<c
   ++alive_landmarks_;
   for (const Observation& o : observations) {
     const bool added = add_observation(l, o);
-    BSLAM_ASSERT(added, "a new landmark's keyframes are alive and distinct, its features free");
+    BSLAM_ASSERT(added, "the keyframes of a new landmark must be alive and distinct, and its features unused");
   }
   refresh_landmark(l);
   return l;
@@ -199,7 +199,7 @@ bool BundledMap::remove_keyframe(KeyframeId k) {
   for (const LandmarkId l : table) {
     if (l.valid()) remove_observation(l, k);
   }
-  hand_over_children(k);
+  reassign_children(k);
   BundledKeyframe& entry = edit(k);
   const geometry::SE3& T_parent_world = keyframe(entry.parent).T_rig_world;
   entry.T_rig_parent = entry.T_rig_world * T_parent_world.inverse();

@@ -33,7 +33,7 @@ class BundledMap {
 
   // ---- Reading
   const camera::Rig& rig() const { return *rig_; }
-  // The pyramid keypoints were found on.
+  // The pyramid on which keypoints were detected.
   const feature::PyramidShape& pyramid() const { return pyramid_; }
   MapVersion version() const { return version_; }
   Scale scale() const { return scale_; }
@@ -140,7 +140,7 @@ class BundledMap {
   bool merge_submaps(KeyframeId child, KeyframeId parent);
   // Removes all keyframes and landmarks of a submap. Returns false if `root` is not the root of a submap.
   bool remove_submap(KeyframeId root);
-  // Scales a submap about the origin by `factor`, including the relative poses of its removed keyframes, and begins a
+  // Scales a submap around the origin by `factor`, including the relative poses of its removed keyframes, and begins a
   // gauge epoch. Returns false if `root` is not the root of a submap.
   bool scale_submap(KeyframeId root, double factor);
   // Records that lengths about keyframes have changed by these factors: what is stored relative to one of them (frames,
@@ -178,7 +178,7 @@ class BundledMap {
   void connect_new_keyframe(KeyframeId k);
   KeyframeId choose_parent(KeyframeId k, KeyframeId fallback) const;
   void attach(KeyframeId child, KeyframeId parent);
-  void hand_over_children(KeyframeId removed);
+  void reassign_children(KeyframeId removed);
   void make_root(KeyframeId k);  // makes k the root of its submap
 
   std::shared_ptr<const camera::Rig> rig_;

@@ -84,7 +84,7 @@ void BundledMap::make_root(KeyframeId k) {
 // The children are attached one at a time to the parent of the removed keyframe or to a child attached before, always
 // the one with the largest covisibility weight first, so no cycle can form. Children without covisible keyframes among
 // these are attached to the parent.
-void BundledMap::hand_over_children(KeyframeId removed) {
+void BundledMap::reassign_children(KeyframeId removed) {
   const KeyframeId parent = keyframe(removed).parent;
   std::erase(edit(parent).children, removed);
   std::vector<KeyframeId> waiting = std::exchange(edit(removed).children, {});

@@ -2,8 +2,8 @@
 //
 // Every piece of memory carries the tag of the copy that created it. A copy modifies a piece in place only if the piece
 // has its own tag; otherwise it creates a private piece. Reference counts determine lifetime only and never permission
-// to write: a count of one, as read by one thread, says nothing about what another thread read from the piece just
-// before it released it.
+// to write: a count of one, as read by one thread, does not exclude a race with reads of another thread just before it
+// released the piece.
 #pragma once
 
 #include <array>
@@ -59,8 +59,8 @@ class CowOwner {
 
   std::shared_ptr<std::atomic<std::uint64_t>> family_;  // the last tag assigned
   std::uint64_t tag_ = 0;
-  // Relaxed memory order suffices: whoever copies or modifies a value has obtained it through a synchronised path. The
-  // flag is atomic because several threads may copy the same published value concurrently.
+  // Relaxed memory order suffices: a thread that copies or modifies a value obtained it through a synchronised path.
+  // The flag is atomic because several threads may copy the same published value concurrently.
   mutable std::atomic<bool> shared_ = true;
 };
 
@@ -85,7 +85,7 @@ class CowVector {
 
   // Releases the memory of a full chunk: its elements become default values in a piece shared by all such chunks.
   void blank_chunk(std::size_t chunk, std::uint64_t tag) {
-    BSLAM_ASSERT((chunk + 1) * kChunk <= size_, "a chunk is full before it is given up");
+    BSLAM_ASSERT((chunk + 1) * kChunk <= size_, "only a full chunk can be released");
     static const std::shared_ptr<Chunk> kBlank = std::make_shared<Chunk>(Chunk{kNoOwner, {}});
     if (nodes_[chunk / kNode]->chunks[chunk % kNode] == kBlank) return;
     detach(nodes_[chunk / kNode], tag);

@@ -21,7 +21,7 @@ Broken check_reference(const BundledMap& map, LandmarkId l) {
     const auto refs = map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature);
     if (std::ranges::find(refs, reference.keypoint) != refs.end()) return {};
   }
-  return name(l) + " has its reference in " + name(reference.keyframe) + ", which is none of its observations";
+  return name(l) + " has its reference in " + name(reference.keyframe) + ", which is not one of its observations";
 }
 
 // Checks the observations of one landmark against the landmark tables of the keyframes; adds the number of its
@@ -50,7 +50,7 @@ Broken check_table(const BundledMap& map, KeyframeId k) {
   const BundledKeyframe& entry = map.keyframe(k);
   if (!entry.alive) {
     if (entry.frame || !entry.landmarks.empty() || !entry.covisible.empty() || !entry.children.empty()) {
-      return name(k) + " is removed and keeps what it should have let go";
+      return name(k) + " is removed but still has a frame, landmarks, covisible keyframes or children";
     }
     return {};
   }
@@ -81,7 +81,7 @@ Broken check_covisibility(const BundledMap& map, KeyframeId k) {
   for (const Covisible& c : map.keyframe(k).covisible) {
     if (expected == weight.end() || expected->first != c.keyframe || expected->second != c.weight) {
       return name(k) + " has weight " + std::to_string(c.weight) + " with " + name(c.keyframe) +
-             " out of place or wrong";
+             ", which is wrong or not in order of id";
     }
     ++expected;
   }
@@ -107,12 +107,12 @@ Broken check_tree(const BundledMap& map) {
     for (const KeyframeId child : children) {
       if (!map.alive(child)) return name(k) + " has removed child " + name(child);
       if (map.keyframe(child).parent != k)
-        return name(child) + " is a child of " + name(k) + " but names another parent";
+        return name(child) + " is a child of " + name(k) + " but has a different parent";
       stack.push_back(child);
     }
   }
   for (const KeyframeId k : ids) {
-    if (!reached.contains(k)) return name(k) + " does not hang in a spanning tree";
+    if (!reached.contains(k)) return name(k) + " is in no spanning tree";
   }
   return {};
 }

@@ -1,4 +1,4 @@
-// What a landmark looks like, from where: view direction, distance range, descriptor.
+// Appearance of a landmark: viewing direction, distance range, descriptor.
 #include <algorithm>
 #include <cmath>
 
@@ -8,10 +8,10 @@
 namespace bslam::map {
 namespace {
 
-// Descriptors compared for the medoid, the newest ones: the cost grows with the square.
+// Maximum number of descriptors for the medoid, of the newest observations; the cost is quadratic.
 constexpr std::size_t kMaxDescriptors = 24;
 
-// The one with the least median distance to the others; of equal ones the first. Not empty.
+// The descriptor with the smallest median distance to the others; on ties the first. `descriptors` must not be empty.
 feature::Descriptor medoid(std::span<const feature::Descriptor> descriptors) {
   const std::size_t n = descriptors.size();
   std::array<std::array<int, kMaxDescriptors>, kMaxDescriptors> distance;
@@ -23,8 +23,8 @@ feature::Descriptor medoid(std::span<const feature::Descriptor> descriptors) {
   std::size_t best = 0;
   int best_median = 257;
   for (std::size_t i = 0; i < n; ++i) {
-    // The zero to itself is the smallest, so that the lower median of the others stands at n / 2. Counting first
-    // whether it beats the best is cheaper than finding it, and only a few do.
+    // The distance 0 to itself is the smallest, so that the lower median of the others is at n / 2. The median is only
+    // computed if it is smaller than the best one, which is determined by counting.
     const std::span row = std::span(distance[i]).first(n);
     if (static_cast<std::size_t>(std::ranges::count_if(row, [&](int d) { return d < best_median; })) <= n / 2) continue;
     const auto middle = row.begin() + static_cast<std::ptrdiff_t>(n / 2);
@@ -61,8 +61,8 @@ bool BundledMap::refresh_landmark(LandmarkId l) {
   }
   entry.descriptor = medoid(std::span(ring).first(std::min(count, kMaxDescriptors)));
 
-  // Found on level n at distance d, a patch looks as on level 0 at distance d * scale^n, and as on the highest level at
-  // that divided by the scale of the whole pyramid.
+  // A patch detected on level n at distance d appears on level 0 at distance d * scale^n, and on the highest level at
+  // that distance divided by the scale of the highest level.
   const BundledKeyframe& k = keyframe(entry.reference.keyframe);
   const frame::KeypointRef r = entry.reference.keypoint;
   const int level = k.frame->keypoints(r.camera).level[r.keypoint.index()];

@@ -6,7 +6,7 @@
 namespace bslam::map {
 namespace {
 
-// Keyframes by the number of seeds they observe, falling; ties: newer first.
+// Keyframes by decreasing number of observed seeds, newer first on ties.
 std::vector<Covisible> vote(const BundledMap& map, std::span<const LandmarkId> seeds) {
   std::vector<int> votes(map.keyframe_slots(), 0);
   for (const LandmarkId l : seeds) {
@@ -22,7 +22,7 @@ std::vector<Covisible> vote(const BundledMap& map, std::span<const LandmarkId> s
   return ranked;
 }
 
-// The first of each id, in order.
+// The first occurrence of each id, in order.
 std::vector<LandmarkId> each_once(std::span<const LandmarkId> ids) {
   std::vector<LandmarkId> out;
   if (ids.empty()) return out;

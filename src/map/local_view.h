@@ -1,4 +1,4 @@
-// The part of a map near the rig, as the tracker needs it.
+// The part of a map near the rig, used by tracking.
 #pragma once
 
 #include <span>
@@ -10,23 +10,24 @@
 namespace bslam::map {
 
 struct LocalViewOptions {
-  int max_keyframes = 24;  // whose landmarks are looked for
-  int neighbours = 6;      // covisible keyframes taken along with each that shares landmarks with the frame
+  int max_keyframes = 24;  // maximum number of keyframes whose landmarks are searched for
+  int neighbours = 6;      // covisible keyframes added for each keyframe that shares landmarks with the frame
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("max_keyframes", self.max_keyframes, Range{1, 1000}, "", "keyframes whose landmarks are looked for");
-    visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes taken along with each of them");
+    visitor("max_keyframes", self.max_keyframes, Range{1, 1000}, "",
+            "maximum number of keyframes whose landmarks are searched for");
+    visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes added for each of them");
   }
 };
 
 struct LocalView {
   std::vector<KeyframeId> keyframes;  // most shared landmarks first
-  std::vector<LandmarkId> landmarks;  // all they observe, each once, those of `seeds` first
+  std::vector<LandmarkId> landmarks;  // all landmarks they observe, each once, beginning with the seeds
 };
 
-// Keyframes that observe the `seeds` (alive landmarks, distinct), the best of them with their covisible neighbours, and
-// `reference` in any case; then all their landmarks.
+// Keyframes that observe the `seeds` (distinct, alive landmarks), covisible neighbours of the best of them, and always
+// `reference`; and all their landmarks.
 LocalView make_local_view(const BundledMap& map, std::span<const LandmarkId> seeds, KeyframeId reference,
                           const LocalViewOptions& options);
 

@@ -1,4 +1,4 @@
-// A proposed change of the map, as a value: what a stage passes to MapStore::commit.
+// A proposed change of the map, as a value, that a stage passes to MapStore::commit.
 //
 // Rebase rules, for the case that other edits were committed between the edit's base version and its own commit.
 // "Newer" means created by those other edits.

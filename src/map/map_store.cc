@@ -26,10 +26,10 @@ CommitReport MapStore::commit(MapDraft draft) {
   const std::lock_guard writer(commit_mutex_);
   MapSnapshot current = snapshot();
   if (draft.superseded(*current)) {
-    CommitReport refused;
-    refused.refused = true;
-    refused.published = std::move(current);
-    return refused;
+    CommitReport rejected;
+    rejected.rejected = true;
+    rejected.published = std::move(current);
+    return rejected;
   }
   auto [edit, result] = std::move(draft).finish();
   CommitReport report;
@@ -49,7 +49,7 @@ CommitReport MapStore::commit(MapDraft draft) {
     const std::lock_guard lock(mutex_);
     current_ = report.published;
   }
-  // The previous version in `current` is destroyed here, after the lock that readers wait for was released.
+  // The previous version in `current` is destroyed here, after the mutex of the readers was released.
   return report;
 }
 

@@ -14,7 +14,7 @@ struct CommitReport : RebaseReport {
   MapSnapshot published;
   bool rebased = false;  // other edits had been committed since the base
   // the edit was a correction with another correction committed since its base; nothing was applied or published
-  bool refused = false;
+  bool rejected = false;
 };
 
 // Published versions are const and never modified: a draft works on its own copy. cow_vector.h explains why memory

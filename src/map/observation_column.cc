@@ -24,7 +24,7 @@ void ObservationColumn::erase(std::size_t landmark, Observation o, std::uint64_t
   const std::size_t row = landmark % kBlock;
   const auto first = block.entries.begin() + block.begin[row], last = block.entries.begin() + block.begin[row + 1];
   const auto at = std::lower_bound(first, last, o);
-  BSLAM_ASSERT(at != last && *at == o, "an observation that is erased is there");
+  BSLAM_ASSERT(at != last && *at == o, "the erased observation must exist");
   block.entries.erase(at);
   for (std::size_t r = row + 1; r <= kBlock; ++r) --block.begin[r];
 }

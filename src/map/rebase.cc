@@ -11,7 +11,7 @@ namespace {
 using geometry::SE3;
 
 // Motion of poses and points attached to a keyframe when its T_rig_world changes from `before` to `after` and lengths
-// about it are multiplied by `scale_change`: they keep their pose or position relative to the keyframe.
+// around it are multiplied by `scale_change`: they keep their pose or position relative to the keyframe.
 struct Move {
   SE3 before, after;
   double scale_change = 1.0;
@@ -106,7 +106,7 @@ class Rebase {
   RebaseReport report_;
 };
 
-// Returns by how much others moved a keyframe since the edit's base. Poses set by the edit itself have not moved.
+// Returns the motion of a keyframe by other edits since the edit's base. Poses set by the edit itself have not moved.
 Motion Rebase::motion_since_base(KeyframeId edit_id) const {
   if (!edit_id.valid() || written_.contains(edit_id)) return {};
   if (own(edit_id)) return own_motions_[edit_id.index() - base_.keyframe_slots()];

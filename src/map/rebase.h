@@ -11,7 +11,7 @@ namespace bslam::map {
 struct RebaseReport {
   std::size_t applied = 0;  // number of operations
   std::size_t dropped = 0;  // number of operations whose objects no longer exist
-  // Final ids of what the edit added, in order of the operations; invalid if dropped.
+  // Final ids of the added keyframes and landmarks, in order of the operations; invalid if dropped.
   std::vector<KeyframeId> keyframes;
   std::vector<LandmarkId> landmarks;
 };

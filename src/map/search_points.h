@@ -1,4 +1,4 @@
-// Landmarks as search by projection wants them.
+// Converts landmarks to the input of search by projection.
 #pragma once
 
 #include <span>
@@ -9,7 +9,8 @@
 
 namespace bslam::map {
 
-// One point per landmark (alive), in their order. Descriptors point into `map`: valid until it changes.
+// One point per landmark, in the same order. The landmarks must be alive. Descriptors point into `map`; they are valid
+// until it changes.
 std::vector<matching::SearchPoint> search_points(const BundledMap& map, std::span<const LandmarkId> landmarks);
 
 }  // namespace bslam::map

@@ -17,7 +17,7 @@ struct Edge {
   frame::KeypointRef a, b;
   int hamming = 0;
   AlignedKeypoint aligned;
-  Vector3d bearing;  // of the aligned pixel
+  Vector3d bearing;  // bearing of the aligned pixel
 };
 
 struct CameraPair {
@@ -34,7 +34,7 @@ std::vector<CameraPair> overlapping_pairs(const camera::Rig& rig) {
   return pairs;
 }
 
-// `positions` are those of the keypoints of the reference's camera: Keypoints or a Refinement.
+// `positions`: Keypoints or Refinement of the camera of `ref`.
 template <class Positions>
 PointObservation observation(const camera::Rig& rig, const Positions& positions, frame::KeypointRef ref) {
   const std::size_t i = ref.keypoint.index();
@@ -42,7 +42,7 @@ PointObservation observation(const camera::Rig& rig, const Positions& positions,
           positions.bearing[i], positions.sigma[i]};
 }
 
-// Aligns keypoint b of an edge to the patch of keypoint a. False where it does not look alike there.
+// Aligns keypoint b of an edge to the patch of keypoint a. Returns false if the alignment fails.
 bool align_edge(const camera::Rig& rig, std::span<const frame::CameraFrame> cameras,
                 std::span<const image::Pyramid> pyramids, std::span<const AlignmentOptions> alignment, Edge& edge) {
   const feature::Keypoints& ka = cameras[edge.a.camera.index()].keypoints;
@@ -86,8 +86,8 @@ std::vector<Edge> match_pair(const camera::Rig& rig, std::span<const frame::Came
   return edges;
 }
 
-// Groups of keypoints joined by edges, the strongest first; an edge that would bring two keypoints of one camera
-// together is left out.
+// Groups of keypoints joined by edges, which must be added in order of strength. An edge that would join two keypoints
+// of one camera is ignored.
 class Grouping {
  public:
   explicit Grouping(std::span<const frame::CameraFrame> cameras) {
@@ -97,8 +97,8 @@ class Grouping {
   }
 
   bool join(frame::KeypointRef a, frame::KeypointRef b) {
-    int& ga = group_of_[slot(a)];
-    int& gb = group_of_[slot(b)];
+    int& ga = group_of_[index_of(a)];
+    int& gb = group_of_[index_of(b)];
     if (ga >= 0 && ga == gb) return false;
     std::vector<frame::KeypointRef> merged = members(ga, a);
     const std::vector<frame::KeypointRef> other = members(gb, b);
@@ -110,7 +110,7 @@ class Grouping {
     if (gb >= 0) groups_[static_cast<std::size_t>(gb)].clear();
     const int target = ga >= 0 ? ga : static_cast<int>(groups_.size());
     if (ga < 0) groups_.emplace_back();
-    for (const frame::KeypointRef r : merged) group_of_[slot(r)] = target;
+    for (const frame::KeypointRef r : merged) group_of_[index_of(r)] = target;
     groups_[static_cast<std::size_t>(target)] = std::move(merged);
     return true;
   }
@@ -121,7 +121,7 @@ class Grouping {
   }
 
  private:
-  std::size_t slot(frame::KeypointRef r) const { return begin_[r.camera.index()] + r.keypoint.index(); }
+  std::size_t index_of(frame::KeypointRef r) const { return begin_[r.camera.index()] + r.keypoint.index(); }
   std::vector<frame::KeypointRef> members(int group, frame::KeypointRef self) const {
     return group < 0 ? std::vector<frame::KeypointRef>{self} : groups_[static_cast<std::size_t>(group)];
   }
@@ -140,8 +140,9 @@ class AlignedPositions {
     }
   }
 
-  // Takes the aligned position of the edge's second keypoint. The first one defines the feature, so that its own
-  // position is exact. An edge whose first keypoint is aligned to another one would refer to where that no longer is.
+  // Sets the aligned position of the edge's second keypoint. The first one defines the feature, so that its position is
+  // exact. An edge whose first keypoint is aligned to another keypoint is ignored, because it refers to the old
+  // position.
   void align(const Edge& edge, std::span<const image::Pyramid> pyramids, std::span<const AlignmentOptions> alignment) {
     if (role(edge.a) == kAligned || role(edge.b) != kDetected) return;
     role(edge.a) = kReference;
@@ -157,10 +158,10 @@ class AlignedPositions {
 
   const feature::Refinement& operator[](CameraIndex c) const { return positions_[c.index()]; }
 
-  // Aligned positions of the keypoints in `groups`, those of all others as detected.
+  // Aligned positions of the keypoints in `groups`, detected positions of all other keypoints.
   std::vector<feature::Refinement> of_groups(std::span<const std::vector<frame::KeypointRef>> groups) && {
     for (const auto& group : groups) {
-      for (const frame::KeypointRef r : group) role(r) = kDetected;  // what is left are the others
+      for (const frame::KeypointRef r : group) role(r) = kDetected;  // the remaining roles are outside the groups
     }
     for (std::size_t c = 0; c < positions_.size(); ++c) {
       const feature::Keypoints& detected = detected_[c].keypoints;
@@ -183,7 +184,8 @@ class AlignedPositions {
   std::vector<std::vector<std::uint8_t>> role_;  // per camera and keypoint
 };
 
-// All keypoints of the group look the same way, as far as their noise tells: a feature too far for a point.
+// Returns true if all keypoints of the group have the same direction within their noise: the feature is too far for a
+// point.
 bool agrees_at_infinity(const camera::Rig& rig, std::span<const PointObservation> group, CameraIndex first_camera,
                         double max_chi2) {
   constexpr double kFar_m = 1e5;
@@ -195,15 +197,15 @@ bool agrees_at_infinity(const camera::Rig& rig, std::span<const PointObservation
   });
 }
 
-// Keypoints that do not meet in one point are no feature: the worst is removed until the rest agrees. False where fewer
-// than two are left.
+// Removes the keypoint with the largest error until the rest agrees with one point. Returns false if fewer than two
+// remain.
 bool keep_agreeing(const camera::Rig& rig, const AlignedPositions& positions, double max_chi2,
                    std::vector<frame::KeypointRef>& group) {
   while (group.size() >= 2) {
     std::vector<PointObservation> observations;
     for (const frame::KeypointRef ref : group) observations.push_back(observation(rig, positions[ref.camera], ref));
     const auto estimated = estimate_point(observations, 0.0);
-    if (!estimated) {  // rays that diverge by their noise
+    if (!estimated) {  // the rays diverge because of their noise
       return agrees_at_infinity(rig, observations, group.front().camera, max_chi2);
     }
     if (estimated->worst_chi2 <= max_chi2) return true;

@@ -12,10 +12,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kMaxWindow = 0.25;  // radians about the baseline: wider means next to the epipole
-constexpr double kSamePlace = 4.0;   // standard deviations: the same corner found on two levels
+constexpr double kMaxWindow = 0.25;  // rad around the baseline; wider windows occur near the epipole
+constexpr double kSamePlace = 4.0;   // standard deviations; closer keypoints are the same corner on two levels
 
-// A bearing seen from the baseline: angle about it, angle from it (at this camera), angular standard deviation.
+// A bearing relative to the baseline: angle around it, angle to it (at this camera), angular standard deviation.
 struct Polar {
   double about = 0, from = 0, sigma = 0;
   std::uint32_t keypoint = 0;
@@ -47,13 +47,13 @@ std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame
   return out;
 }
 
-// Angle from the baseline at the second camera of a point at `distance` along a ray that leaves the first under `from`.
+// Angle to the baseline at the second camera of a point at `distance` on the ray with angle `from` at the first camera.
 double angle_at_second(double from, double distance, double baseline) {
   return std::atan2(distance * std::sin(from), distance * std::cos(from) - baseline);
 }
 
-// Keypoints of b in order of their angle about the baseline; those near the seam stand at both ends, so that windows
-// need not wrap around.
+// Keypoints of b in order of their angle around the baseline. Those near +-pi are repeated at the other end, so that
+// windows do not wrap around.
 struct SortedView {
   std::vector<Polar> polar;
   double max_sigma = 0;
@@ -81,14 +81,14 @@ struct Best {
   std::uint32_t keypoint = 0;
 };
 
-// The keypoint of b that fits keypoint `p` of a best, where it is clearly better than any at another place.
+// The keypoint of b most similar to keypoint `p` of a, if it is clearly more similar than keypoints at other positions.
 std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const EpipolarView& b, const SortedView& sorted,
                                double baseline, const EpipolarOptions& options, std::vector<const Polar*>& candidates) {
   const double sine = std::sin(p.from);
   const double window = options.sigmas * both(p.sigma, sorted.max_sigma) / std::max(sine, 1e-9);
   if (!(window < kMaxWindow)) return std::nullopt;
   const double nearest = angle_at_second(p.from, options.min_depth_m, baseline);
-  const double farthest = angle_at_second(p.from, options.far_m, baseline);
+  const double farthest = angle_at_second(p.from, options.max_depth_m, baseline);
   const feature::Descriptor& descriptor = a.keypoints->descriptor[p.keypoint];
   const int level = a.keypoints->level[p.keypoint];
   candidates.clear();
@@ -134,7 +134,7 @@ std::vector<EpipolarMatch> match_epipolar(const EpipolarView& a, const EpipolarV
     const auto best = best_match(p, a, b, sorted, length, options, candidates);
     if (!best) continue;
     auto& [distance, position] = owner[best->keypoint];
-    if (best->hamming >= distance) continue;  // an earlier keypoint of a fits as well or better
+    if (best->hamming >= distance) continue;  // an earlier keypoint of a is at least as similar
     if (distance < kNone) matches[position].hamming = -1;
     distance = best->hamming;
     position = static_cast<std::uint32_t>(matches.size());

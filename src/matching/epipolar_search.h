@@ -18,18 +18,18 @@ struct EpipolarView {
   const camera::Camera* camera = nullptr;
   const feature::Keypoints* keypoints = nullptr;
   geometry::SE3 T_common_cam;
-  std::span<const std::uint8_t> usable;  // per keypoint, 0 = leave out; empty = all
-  // Gives the keypoints' standard deviations where the views are of different frames. Null: each keypoint's own, which
-  // holds between cameras of one frame.
+  std::span<const std::uint8_t> usable;  // per keypoint, 0: ignored; empty: all are used
+  // Determines the standard deviations of the keypoints if the views belong to different frames. Null: the keypoints'
+  // own standard deviations, which are valid between cameras of one frame.
   const feature::FeatureModel* features = nullptr;
 };
 
 struct EpipolarOptions {
-  double min_depth_m = 0.2;  // least distance of a point from the first camera, metres
-  double far_m = 1e9;        // largest distance, metres
-  double sigmas = 3.0;       // distance from the epipolar plane, in standard deviations of both keypoints
-  int max_hamming = 60;      // of 256 bits
-  double ratio = 0.85;       // best to second best descriptor distance at another place on the curve
+  double min_depth_m = 0.2;  // minimum distance of a point from the first camera, metres
+  double max_depth_m = 1e9;  // maximum distance, metres
+  double sigmas = 3.0;       // maximum distance from the epipolar plane, in standard deviations of both keypoints
+  int max_hamming = 60;      // maximum descriptor distance, of 256 bits
+  double ratio = 0.85;       // maximum ratio of best to second best descriptor distance elsewhere on the curve
   int max_level_difference = 2;
 };
 
@@ -38,9 +38,10 @@ struct EpipolarMatch {
   int hamming = 0;
 };
 
-// Best matches in order of `a`, each keypoint of b with the one of a that fits it best. All points of one epipolar
-// plane have the same angle about the baseline, so the keypoints of b sorted by that angle give each keypoint of a its
-// candidates in a narrow window. Empty where the baseline is shorter than a micrometre.
+// Best matches in order of `a`; each keypoint of b is matched to the most similar one of a only. All points of an
+// epipolar plane have the same angle around the baseline. The keypoints of b are sorted by that angle, so that the
+// candidates of a keypoint of a lie in a narrow window. Returns no matches if the baseline is shorter than a
+// micrometre.
 std::vector<EpipolarMatch> match_epipolar(const EpipolarView& a, const EpipolarView& b, const EpipolarOptions& options);
 
 }  // namespace bslam::matching

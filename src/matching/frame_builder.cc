@@ -15,9 +15,9 @@ FrameBuilder::FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions
 }
 
 frame::BundledFrame FrameBuilder::extract(const image::ImageBundle& images, ThreadPool& pool,
-                                          std::span<const std::uint8_t> left_out, std::span<const int> budgets) {
-  BSLAM_ASSERT(images.images.size() == rig_.size(), "one image slot per camera of the rig");
-  BSLAM_ASSERT(budgets.empty() || budgets.size() == rig_.size(), "one budget per camera of the rig");
+                                          std::span<const std::uint8_t> skipped, std::span<const int> budgets) {
+  BSLAM_ASSERT(images.images.size() == rig_.size(), "there must be one image entry per camera of the rig");
+  BSLAM_ASSERT(budgets.empty() || budgets.size() == rig_.size(), "there must be one budget per camera of the rig");
   frame::BundledFrame frame;
   frame.id = images.id;
   frame.time_ns = images.time_ns;
@@ -25,7 +25,7 @@ frame::BundledFrame FrameBuilder::extract(const image::ImageBundle& images, Thre
   pool.for_each(rig_.size(), [&](std::size_t i) {
     const image::CameraImage& input = images.images[i];
     frame::CameraFrame& camera = frame.cameras[i];
-    camera.state = !left_out.empty() && left_out[i] ? image::ImageState::kMissing : input.state;
+    camera.state = !skipped.empty() && skipped[i] ? image::ImageState::kMissing : input.state;
     camera.time_ns = input.time_ns;
     if (camera.state == image::ImageState::kPresent) {
       const std::optional<int> budget = budgets.empty() ? std::nullopt : std::optional(budgets[i]);

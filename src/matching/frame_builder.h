@@ -1,4 +1,4 @@
-// Images of N cameras -> BundledFrame: extraction per camera in parallel, then bundling.
+// Extraction of the keypoints of all cameras of a frame, in parallel.
 #pragma once
 
 #include <vector>
@@ -11,19 +11,19 @@
 
 namespace bslam::matching {
 
-// Holds the extractors' scratch memory and the pyramids of the frame in hand, which sub-pixel alignment in tracking
-// needs; the next extraction replaces them. Masks: one per camera, empty = none.
+// Owns the extractors and the pyramids of the last extracted frame, which are needed for sub-pixel alignment in
+// tracking and replaced by the next extraction. Masks: one per camera; an empty image means no mask.
 class FrameBuilder {
  public:
   FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions& options, std::vector<image::Image> masks);
 
-  // Keypoints of every present image; the Bundled table is still empty. Cameras with left_out[i] != 0 (or none where it
-  // is empty) are taken as without an image; from camera i no more than budgets[i] keypoints are taken (empty:
+  // Extracts the keypoints of all images; the Bundled table of the result is empty. Cameras with skipped[i] != 0
+  // (empty: no camera) are treated as if they had no image. budgets[i]: maximum number of keypoints of camera i (empty:
   // per_image of the options).
   frame::BundledFrame extract(const image::ImageBundle& images, ThreadPool& pool,
-                              std::span<const std::uint8_t> left_out = {}, std::span<const int> budgets = {});
+                              std::span<const std::uint8_t> skipped = {}, std::span<const int> budgets = {});
 
-  // Of the frame extracted last; empty for cameras without an image.
+  // Pyramids of the last extracted frame; empty for cameras without an image.
   std::span<const image::Pyramid> pyramids() const { return pyramids_; }
 
  private:

@@ -16,7 +16,7 @@ struct Template {
   std::array<float, kSamples> value, gx, gy;
   float variance = 0;  // sum of squares of `value`
   Eigen::Matrix2f inverse_hessian;
-  float weakest = 0;  // smaller eigenvalue of the Hessian
+  float min_eigenvalue = 0;  // smaller eigenvalue of the Hessian
 };
 
 std::optional<Template> make_template(const feature::Patch& patch) {
@@ -49,8 +49,9 @@ std::optional<Template> make_template(const feature::Patch& patch) {
     yy += t.gy[i] * t.gy[i];
   }
   const float half_trace = 0.5f * (xx + yy), det = xx * yy - xy * xy;
-  t.weakest = half_trace - std::sqrt(std::max(0.0f, half_trace * half_trace - det));
-  if (!(t.weakest > 1.0f * kSamples)) return std::nullopt;  // less than a grey level per pixel: an edge or nothing
+  t.min_eigenvalue = half_trace - std::sqrt(std::max(0.0f, half_trace * half_trace - det));
+  // Root mean square gradient below one grey value per pixel in some direction: an edge or no texture.
+  if (!(t.min_eigenvalue > 1.0f * kSamples)) return std::nullopt;
   t.inverse_hessian << yy / det, -xy / det, -xy / det, xx / det;
   return t;
 }
@@ -65,7 +66,7 @@ float bilinear(const image::Image& image, float x, float y) {
   return top + fy * (bottom - top);
 }
 
-// Level whose pixels are closest in size to the patch's when seen through the warp.
+// Returns the level whose pixel size is closest to the size of a patch pixel in the target, `scale`.
 std::size_t best_level(const image::Pyramid& pyramid, double scale) {
   const auto ratio = [&](std::size_t l) { return std::max(pyramid.scale_x[l] / scale, scale / pyramid.scale_x[l]); };
   std::size_t best = 0;
@@ -75,7 +76,7 @@ std::size_t best_level(const image::Pyramid& pyramid, double scale) {
   return best;
 }
 
-constexpr float kHalf = 0.5f * (kInner - 1);  // offset of the outermost samples
+constexpr float kHalf = 0.5f * (kInner - 1);  // distance of the outermost samples from the centre, pixels
 
 // A warp in pixels of a level of the target.
 struct LevelWarp {
@@ -89,7 +90,8 @@ LevelWarp on_level(const PatchWarp& warp, const image::Pyramid& pyramid, std::si
           (per_pixel.asDiagonal() * warp.quadratic).cast<float>()};
 }
 
-// Samples of the target at the warped patch positions around (x, y), pixels of the level. False outside the image.
+// Samples the target at the warped patch positions around (x, y), pixels of the level. Returns false if some position
+// is outside the image.
 bool sample_target(const image::Image& image, const LevelWarp& warp, float x, float y,
                    std::array<float, kSamples>& out) {
   constexpr float kRounding = 0.01f;
@@ -103,7 +105,7 @@ bool sample_target(const image::Image& image, const LevelWarp& warp, float x, fl
   std::size_t i = 0;
   for (int r = 0; r < kInner; ++r) {
     const float dx = -kHalf, dy = static_cast<float>(r) - kHalf;
-    // From column to column the position moves by a step that grows by 2 Q_xx.
+    // The step from column to column increases by 2 Q_xx per column.
     Eigen::Vector2f p =
         Eigen::Vector2f(x, y) + A * Eigen::Vector2f(dx, dy) + Q * Eigen::Vector3f(dx * dx, dx * dy, dy * dy);
     Eigen::Vector2f step = A.col(0) + (2 * dx + 1) * Q.col(0) + dy * Q.col(1);
@@ -114,10 +116,10 @@ bool sample_target(const image::Image& image, const LevelWarp& warp, float x, fl
   return true;
 }
 
-// One comparison of target samples with the template.
+// Result of comparing target samples with the template.
 struct Comparison {
   float gain = 0, ncc = 0, residual_variance = 0;
-  Eigen::Vector2f shift;  // of the template, in its pixels, that would explain the difference
+  Eigen::Vector2f shift;  // shift of the template, in its pixels, that minimises the difference
 };
 
 Comparison compare(const Template& t, const std::array<float, kSamples>& samples) {
@@ -142,22 +144,24 @@ Comparison compare(const Template& t, const std::array<float, kSamples>& samples
     squares += r * r;
   }
   c.shift = t.inverse_hessian * Eigen::Vector2f(bx, by);
-  c.residual_variance = squares / (kSamples - 4);
+  c.residual_variance = squares / (kSamples - 4);  // four estimated parameters: shift (2), gain, offset
   return c;
 }
 
-// Coefficients of x^2, x y and y^2 of a camera's projection of point + basis * (x, y), by differences over the patch.
+// Coefficients of x^2, x y and y^2 of a camera's projection of point + basis * (x, y), by central differences over the
+// patch. `centre`: projection of `point`. Returns nullopt if a point of the patch cannot be projected.
 std::optional<Eigen::Matrix<double, 2, 3>> second_order(const camera::Camera& camera, const Eigen::Vector3d& point,
                                                         const Eigen::Matrix<double, 3, 2>& basis,
                                                         const Eigen::Vector2d& centre) {
   constexpr double h = kHalf;
-  const auto bend = [&](const Eigen::Vector2d& step) -> std::optional<Eigen::Vector2d> {
+  const auto half_second_difference = [&](const Eigen::Vector2d& step) -> std::optional<Eigen::Vector2d> {
     const Eigen::Vector3d move = basis * step;
     const auto ahead = camera.project(point + move), behind = camera.project(point - move);
     if (!ahead || !behind) return std::nullopt;
     return ((*ahead + *behind - 2 * centre) / (2 * h * h)).eval();
   };
-  const auto xx = bend({h, 0}), yy = bend({0, h}), all = bend({h, h});
+  const auto xx = half_second_difference({h, 0}), yy = half_second_difference({0, h}),
+             all = half_second_difference({h, h});
   if (!xx || !yy || !all) return std::nullopt;
   Eigen::Matrix<double, 2, 3> out;
   out << *xx, *all - *xx - *yy, *yy;
@@ -173,25 +177,25 @@ std::optional<PatchWarp> patch_warp(const camera::Camera& reference_camera, cons
   const auto at_reference = reference_camera.project_with_jacobian(point_reference);
   const auto at_target = target_camera.project_with_jacobian(point_target);
   if (!at_reference || !at_target) return std::nullopt;
-  Eigen::Matrix<double, 3, 2> plane;  // basis of the one that faces the reference camera ...
+  Eigen::Matrix<double, 3, 2> plane;  // basis of the plane that faces the reference camera
   plane.col(0) = point_reference.unitOrthogonal();
   plane.col(1) = point_reference.normalized().cross(plane.col(0));
   const Eigen::Matrix2d reference = at_reference->jacobian * plane;
   if (!(std::abs(reference.determinant()) > 1e-12)) return std::nullopt;
-  plane *= reference_scale * reference.inverse();  // ... that moves the reference pixel by one pixel of its level
-  Eigen::Matrix<double, 3, 2> moved;
-  moved << T_target_reference.rotation() * plane.col(0), T_target_reference.rotation() * plane.col(1);
-  const auto bend_reference = second_order(reference_camera, point_reference, plane, at_reference->pixel);
-  const auto bend_target = second_order(target_camera, point_target, moved, at_target->pixel);
-  if (!bend_reference || !bend_target) return std::nullopt;
+  plane *= reference_scale * reference.inverse();  // a unit step is one pixel of the reference level, to first order
+  Eigen::Matrix<double, 3, 2> plane_target;        // the same basis in the frame of the target camera
+  plane_target << T_target_reference.rotation() * plane.col(0), T_target_reference.rotation() * plane.col(1);
+  const auto quadratic_reference = second_order(reference_camera, point_reference, plane, at_reference->pixel);
+  const auto quadratic_target = second_order(target_camera, point_target, plane_target, at_target->pixel);
+  if (!quadratic_reference || !quadratic_target) return std::nullopt;
   PatchWarp warp;
-  warp.linear = at_target->jacobian * moved;
-  warp.quadratic = *bend_target - warp.linear / reference_scale * *bend_reference;
+  warp.linear = at_target->jacobian * plane_target;
+  warp.quadratic = *quadratic_target - warp.linear / reference_scale * *quadratic_reference;
   return warp;
 }
 
 std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const PatchWarp& warp,
-                                           const image::Pyramid& target, const Eigen::Vector2d& guess,
+                                           const image::Pyramid& target, const Eigen::Vector2d& initial,
                                            const AlignmentOptions& options) {
   const double scale = std::sqrt(std::abs(warp.linear.determinant()));
   if (!(scale > 0.2 && scale < 20.0) || target.size() == 0) return std::nullopt;
@@ -200,8 +204,8 @@ std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Pa
   const std::size_t level = best_level(target, scale);
   const image::Image& image = target.levels[level];
   const LevelWarp on_image = on_level(warp, target, level);
-  const Eigen::Vector2f start(static_cast<float>(target.from_base_x(level, guess.x())),
-                              static_cast<float>(target.from_base_y(level, guess.y())));
+  const Eigen::Vector2f start(static_cast<float>(target.from_base_x(level, initial.x())),
+                              static_cast<float>(target.from_base_y(level, initial.y())));
   Eigen::Vector2f at = start;
   std::array<float, kSamples> samples;
   bool converged = false;
@@ -217,7 +221,7 @@ std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Pa
   if (!converged || !(c.ncc > options.min_ncc)) return std::nullopt;
   AlignedKeypoint out;
   out.pixel = {target.to_base_x(level, at.x()), target.to_base_y(level, at.y())};
-  out.sigma = options.sigma(std::sqrt(c.residual_variance / t->weakest), scale);
+  out.sigma = options.sigma(std::sqrt(c.residual_variance / t->min_eigenvalue), scale);
   out.ncc = c.ncc;
   return out;
 }

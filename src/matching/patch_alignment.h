@@ -1,5 +1,6 @@
-// Sub-pixel alignment of a keypoint to a reference patch: where in this image lies what the reference keypoint saw.
-// Removes the 0.3 - 1 px localisation noise of a detector, which is what limits stereo depth and with it the scale.
+// Sub-pixel alignment of a keypoint to a reference patch: finds the position in this image that shows the same surface
+// as the reference keypoint. Removes the 0.3 - 1 px localisation noise of a detector, which otherwise limits the
+// accuracy of stereo depth and of the scale.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,38 +17,41 @@
 namespace bslam::matching {
 
 struct AlignmentOptions {
-  int iterations = 10;        // inverse-compositional steps at most
-  double max_shift_px = 2.0;  // from the guess, in pixels of the level: farther it is another corner
-  double min_ncc = 0.8;       // normalised cross-correlation after alignment, below which it is not the same place
-  double min_sigma_px =
-      0.12;  // least standard deviation claimed, in pixels of the level: interpolation and warp errors
-  double calibration_error_px =
-      0.3;  // in level-0 pixels, added in quadrature: what calibrations leave unexplained, at most ...
-  double min_calibration_error_px = 0.05;  // ... and at least, as far as tracking finds it (tracking/error_floor.h)
+  int iterations = 10;        // maximum number of inverse-compositional steps
+  double max_shift_px = 2.0;  // px of the level, maximum distance from the initial position; farther is another corner
+  double min_ncc = 0.8;       // minimum normalised cross-correlation after alignment
+  // px of the level, minimum standard deviation of an aligned keypoint: errors of interpolation and warp
+  double min_sigma_px = 0.12;
+  // Level-0 pixels, added in quadrature: initial value and upper bound of the calibration error estimated by tracking
+  // (tracking/calibration_error.h).
+  double calibration_error_px = 0.3;
+  double min_calibration_error_px = 0.05;  // its lower bound
 
-  // Standard deviation of an aligned keypoint in level-0 pixels, from that of its alignment in pixels of the level.
+  // Standard deviation of an aligned keypoint in level-0 pixels. `aligned_px`: standard deviation of its alignment in
+  // pixels of the level.
   double sigma(double aligned_px, double level_scale) const {
     return std::hypot(std::max(aligned_px, min_sigma_px) * level_scale, calibration_error_px);
   }
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("iterations", self.iterations, Range{1, 50}, "", "alignment steps at most");
+    visitor("iterations", self.iterations, Range{1, 50}, "", "maximum number of alignment steps");
     visitor("max_shift_px", self.max_shift_px, Range{0.1, 10}, "px of the level",
-            "largest shift from the detected corner");
-    visitor("min_ncc", self.min_ncc, Range{0, 1}, "", "least normalised cross-correlation of an aligned patch");
+            "maximum shift from the detected corner");
+    visitor("min_ncc", self.min_ncc, Range{0, 1}, "", "minimum normalised cross-correlation of an aligned patch");
     visitor("min_sigma_px", self.min_sigma_px, Range{0.01, 5}, "px of the level",
-            "least standard deviation of an aligned keypoint");
+            "minimum standard deviation of an aligned keypoint");
     visitor("calibration_error_px", self.calibration_error_px, Range{0, 10}, "px",
-            "error of the calibration, added in quadrature: at first and at most", OptionNote{.formerly = "floor_px"});
+            "initial value and upper bound of the calibration error estimated by tracking",
+            OptionNote{.formerly = "floor_px"});
     visitor("min_calibration_error_px", self.min_calibration_error_px, Range{0, 10}, "px",
-            "the least of it that is believed; tracking finds it", OptionNote{.formerly = "least_floor_px"});
+            "lower bound of the calibration error estimated by tracking", OptionNote{.formerly = "least_floor_px"});
   }
 };
 
 // The map from offsets in pixels of the reference level to offsets in level-0 pixels of the target image, to second
-// order (docs/math.md, section 18). The second order matters: it is even in the offset, so that leaving it out
-// displaces the whole patch, in stereo pairs of fisheyes always by the same share of the disparity.
+// order (docs/math.md, section 18). The second order is even in the offset, so that neglecting it displaces the whole
+// patch; in stereo pairs of fisheyes this is a systematic error proportional to the disparity.
 struct PatchWarp {
   Eigen::Matrix2d linear = Eigen::Matrix2d::Identity();
   Eigen::Matrix<double, 2, 3> quadratic = Eigen::Matrix<double, 2, 3>::Zero();  // of x^2, x y, y^2; per pixel
@@ -58,23 +62,24 @@ struct PatchWarp {
   }
 };
 
-// That of a small surface around the landmark that faces the reference camera. `reference_scale` = level-0 pixels per
-// pixel of the reference level. Empty where one of the cameras does not project the patch.
+// The warp by a small plane through the landmark that faces the reference camera. `point_reference`: the landmark in
+// the frame of the reference camera. `reference_scale`: level-0 pixels per pixel of the reference level. Returns
+// nullopt if one of the cameras cannot project the patch.
 std::optional<PatchWarp> patch_warp(const camera::Camera& reference_camera, const camera::Camera& target_camera,
                                     const geometry::SE3& T_target_reference, const Eigen::Vector3d& point_reference,
                                     double reference_scale);
 
 struct AlignedKeypoint {
   Eigen::Vector2d pixel;  // level-0 pixels of the target image
-  double sigma = 0;       // px, level 0, per axis (of the weaker direction)
+  double sigma = 0;       // level-0 pixels per axis, in the direction of the largest standard deviation
   double ncc = 0;
 };
 
-// Aligns `patch` in `target` by an inverse-compositional Lucas-Kanade step for translation with gain and offset (Baker
-// and Matthews, IJCV 2004), starting at `guess` (level-0 pixels). `warp` as from patch_warp. Empty where it leaves the
-// image, moves too far, does not converge or does not look alike.
+// Aligns `patch` in `target` by inverse-compositional Lucas-Kanade steps for translation with gain and offset (Baker
+// and Matthews, IJCV 2004), starting at `initial` (level-0 pixels). `warp`: see patch_warp. Returns nullopt if the
+// patch leaves the image, moves farther than max_shift_px, does not converge, or correlates too little with the result.
 std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const PatchWarp& warp,
-                                           const image::Pyramid& target, const Eigen::Vector2d& guess,
+                                           const image::Pyramid& target, const Eigen::Vector2d& initial,
                                            const AlignmentOptions& options);
 
 }  // namespace bslam::matching

@@ -1,4 +1,4 @@
-// A point from its pixels in two or more posed cameras: linear start, then the least reprojection error.
+// Triangulation of a point from its pixels in two or more posed cameras: linear, then refined by reprojection error.
 #pragma once
 
 #include <optional>
@@ -21,11 +21,11 @@ struct EstimatedPoint {
   Eigen::Vector3d point;       // metres, common frame
   Eigen::Matrix3d covariance;  // metres^2
   double worst_chi2 = 0;       // largest squared normalised error of an observation
-  std::size_t worst = 0;       // whose it is
-  double parallax = 0;         // radians: largest angle between the rays to the point
+  std::size_t worst = 0;       // index of that observation
+  double parallax = 0;         // rad, largest angle between the rays to the point
 };
 
-// Empty where fewer than two observations are given, the rays are parallel to within `min_parallax` radians, or the
+// Returns nullopt if there are fewer than two observations, the parallax is less than `min_parallax` radians, or the
 // point does not project into one of the cameras.
 std::optional<EstimatedPoint> estimate_point(std::span<const PointObservation> observations, double min_parallax);
 

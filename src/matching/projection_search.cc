@@ -20,32 +20,32 @@ struct Candidate {
   std::uint32_t keypoint = 0;
 };
 
-// A little beyond the range a landmark was seen in, levels overlap.
+// The range of distances is extended by 20 %, because levels overlap.
 bool in_range(const SearchPoint& p, double distance) {
   return p.max_distance <= 0 || (distance > 0.8 * p.min_distance && distance < 1.2 * p.max_distance);
 }
 
-// Level on which the point is expected at this distance.
+// Level on which the point is predicted at this distance.
 double predicted_level(const SearchPoint& p, double distance, double log_factor) {
   return p.max_distance > 0 ? std::log(p.max_distance / distance) / log_factor : 0.0;
 }
 
-struct Sight {
+struct Projection {
   Vector2d pixel;
   double distance;  // metres
 };
 
-// Of a point, where it lies in the image and within its distances and the cone about the directions it is known from.
-std::optional<Sight> sight_of(const camera::Camera& camera, const geometry::SE3& T_cam_common, const SearchPoint& p,
-                              double min_cosine) {
+// Projection of a point. Returns nullopt if it is outside the image, its distances, or its cone of viewing directions.
+std::optional<Projection> visible_projection(const camera::Camera& camera, const geometry::SE3& T_cam_common,
+                                             const SearchPoint& p, double min_cosine) {
   const Vector3d in_camera = T_cam_common * p.position;
   const double distance = in_camera.norm();
   if (!in_range(p, distance)) return std::nullopt;
   const auto pixel = camera.project(in_camera);
   if (!pixel || !camera.contains(*pixel)) return std::nullopt;
-  const bool aside = in_camera.dot(T_cam_common.rotation() * p.view_direction) < min_cosine * distance;
-  if (aside && p.view_direction != Vector3d::Zero()) return std::nullopt;
-  return Sight{*pixel, distance};
+  const bool outside_cone = in_camera.dot(T_cam_common.rotation() * p.view_direction) < min_cosine * distance;
+  if (outside_cone && p.view_direction != Vector3d::Zero()) return std::nullopt;
+  return Projection{*pixel, distance};
 }
 
 Candidate best_candidate(const feature::Keypoints& keypoints, const feature::Descriptor& descriptor,
@@ -85,13 +85,13 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
   for (std::size_t i = 0; i < points.size(); ++i) {
     const SearchPoint& p = points[i];
     if (!exclusions.points.empty() && exclusions.points[i]) continue;
-    const auto sight = sight_of(camera, T_cam_common, p, min_cosine);
-    if (!sight) continue;
+    const auto projected = visible_projection(camera, T_cam_common, p, min_cosine);
+    if (!projected) continue;
     result.visible.push_back(static_cast<std::uint32_t>(i));
-    const double level = predicted_level(p, sight->distance, log_factor);
+    const double level = predicted_level(p, projected->distance, log_factor);
     const int centre = static_cast<int>(std::lround(level));
     near.clear();
-    frame.grid.near(keypoints, sight->pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
+    frame.grid.near(keypoints, projected->pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
                     centre - options.level_slack, centre + options.level_slack, near);
     if (near.empty()) continue;
     const Candidate c = best_candidate(keypoints, *p.descriptor, near, exclusions.keypoints);
@@ -99,7 +99,7 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
     if (c.best_level == c.second_level && c.best > options.ratio * c.second) continue;
     auto& [owned, position] = owner[c.keypoint];
     if (c.best >= owned) continue;
-    if (owned < kNone) result.matches[position].hamming = -1;  // this point fits better
+    if (owned < kNone) result.matches[position].hamming = -1;  // this point is more similar
     owned = c.best;
     position = static_cast<std::uint32_t>(result.matches.size());
     result.matches.push_back(
@@ -140,7 +140,7 @@ std::vector<std::uint32_t> visible_points(const camera::Camera& camera, const ge
   const double min_cosine = std::cos(max_view_angle);
   std::vector<std::uint32_t> out;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!sight_of(camera, T_cam_common, points[i], min_cosine)) continue;
+    if (!visible_projection(camera, T_cam_common, points[i], min_cosine)) continue;
     out.push_back(static_cast<std::uint32_t>(i));
   }
   return out;

@@ -1,5 +1,5 @@
-// Search by projection: where in one camera's keypoints are these points of known place? Over plain spans, so that
-// tracker, mapper and loop closer share it.
+// Search by projection: matches points of known position to the keypoints of a camera. Used by tracking, mapping and
+// loop closing.
 #pragma once
 
 #include <cstdint>
@@ -14,29 +14,28 @@
 
 namespace bslam::matching {
 
-// A point to look for.
+// A point to search for.
 struct SearchPoint {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // metres, common frame
-  Eigen::Vector3d view_direction =
-      Eigen::Vector3d::Zero();  // mean unit vector towards it, common frame; zero = unknown
-  float min_distance = 0;       // metres: seen on the coarsest level
-  float max_distance = 0;       // metres: seen on level 0
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();        // metres, common frame
+  Eigen::Vector3d view_direction = Eigen::Vector3d::Zero();  // mean unit vector to it, common frame; zero: unknown
+  float min_distance = 0;                                    // metres, distance at which it is on the coarsest level
+  float max_distance = 0;                                    // metres, distance at which it is on level 0
   const feature::Descriptor* descriptor = nullptr;
 };
 
-// What is left out of the search in one camera, as flags. Empty: nothing is.
+// Flags of keypoints and points that are excluded from the search in one camera. Empty: none.
 struct SearchExclusions {
   std::vector<std::uint8_t> keypoints;
   std::vector<std::uint8_t> points;
 };
 
 struct ProjectionSearchOptions {
-  double radius = 0.02;          // radians about the prediction at level 0; grows with the predicted level
-  int max_hamming = 80;          // of 256 bits
-  double ratio = 0.9;            // best to second best on the same level
-  int level_slack = 1;           // levels around the predicted one
-  double max_view_angle = 1.05;  // radians between the present and the mean viewing direction
-  double scale_factor = 1.2;     // of the pyramid
+  double radius = 0.02;          // rad, search radius at level 0; proportional to the scale of the predicted level
+  int max_hamming = 80;          // maximum descriptor distance, of 256 bits
+  double ratio = 0.9;            // maximum ratio of best to second best descriptor distance on the same level
+  int level_slack = 1;           // maximum difference to the predicted level
+  double max_view_angle = 1.05;  // rad, maximum angle between the current and the mean viewing direction
+  double scale_factor = 1.2;     // scale factor of the pyramid
 };
 
 struct ProjectionMatch {
@@ -47,16 +46,17 @@ struct ProjectionMatch {
 
 struct ProjectionSearchResult {
   std::vector<ProjectionMatch> matches;  // in order of point; each point and each keypoint at most once
-  std::vector<std::uint32_t> visible;    // points that project into the image within distance and view angle
+  std::vector<std::uint32_t> visible;    // points in the image, within the distance range and view angle
 };
 
-// Looks for the points in one camera. `T_cam_common` maps points to the camera.
+// Searches for the points in one camera. `T_cam_common` maps points to the camera frame.
 ProjectionSearchResult search_by_projection(const camera::Camera& camera, const frame::CameraFrame& frame,
                                             const geometry::SE3& T_cam_common, std::span<const SearchPoint> points,
                                             const SearchExclusions& exclusions, const ProjectionSearchOptions& options);
 
-// Looks for the points in every camera of a frame that has keypoints; one result per camera. `T_cam_common` holds a
-// pose per camera, `exclusions` as well or nothing. Cameras are searched in parallel where a pool is given.
+// Searches for the points in all cameras of a frame; one result per camera, empty if the camera has no keypoints.
+// `T_cam_common`: one pose per camera. `exclusions`: one entry per camera, or empty. Cameras are searched in parallel
+// if a pool is given.
 std::vector<ProjectionSearchResult> search_cameras(const camera::Rig& rig, const frame::BundledFrame& frame,
                                                    std::span<const geometry::SE3> T_cam_common,
                                                    std::span<const SearchPoint> points,
@@ -66,8 +66,7 @@ std::vector<ProjectionSearchResult> search_cameras(const camera::Rig& rig, const
 // Poses of the cameras of a rig at `T_rig_common`.
 std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::SE3& T_rig_common);
 
-// Of the points, those a camera should see, by the rules of ProjectionSearchResult::visible. `max_view_angle` in
-// radians.
+// Indices of the points predicted visible in a camera; see ProjectionSearchResult::visible. `max_view_angle`: radians.
 std::vector<std::uint32_t> visible_points(const camera::Camera& camera, const geometry::SE3& T_cam_common,
                                           std::span<const SearchPoint> points, double max_view_angle);
 

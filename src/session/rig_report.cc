@@ -58,7 +58,7 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
                      {"fit_swapped", pair.agreeing[3]},
                      {"fit_swapped_inverted", pair.agreeing[4]},
                      {"fit_another", pair.other ? Json(pair.other->agreeing) : Json()},
-                     {"another_turned_deg", pair.other ? Json(pair.other->turned_deg) : Json()},
+                     {"another_turned_deg", pair.other ? Json(pair.other->rotated_deg) : Json()},
                      {"another_displaced_deg", pair.other ? Json(pair.other->displaced_deg) : Json()},
                      {"verdict", pair.verdict ? Json(calibration::convention_in_words(*pair.verdict)) : Json()}});
   }

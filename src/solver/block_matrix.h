@@ -1,4 +1,4 @@
-// Symmetric sparse matrix in dense blocks, of which the lower triangle is kept: the normal equations of poses.
+// Symmetric sparse matrix of dense blocks, stored as its lower triangle, for the normal equations of poses.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,8 @@ namespace bslam::solver {
 
 class BlockMatrix {
  public:
-  // `sizes`: the number of rows of each block row. `pattern` is numbered and outlives this. All entries start at zero.
+  // `sizes`: number of rows of each block row. `pattern` must be numbered and must outlive the matrix. All entries are
+  // zero.
   BlockMatrix(const BlockPattern& pattern, std::span<const int> sizes);
 
   int rows() const { return offset_.back(); }
@@ -20,7 +21,7 @@ class BlockMatrix {
   int offset(int block_row) const { return offset_[static_cast<std::size_t>(block_row)]; }
   void set_zero() { std::fill(values_.begin(), values_.end(), 0.0); }
 
-  // A block, by its number in the pattern; of those on the diagonal only the lower triangle is read.
+  // A block by its number in the pattern. Only the lower triangle of diagonal blocks is used.
   Eigen::Map<const Eigen::MatrixXd> block(int number) const;
   // Its leading (N, N) part.
   template <int N>
@@ -30,7 +31,7 @@ class BlockMatrix {
     return Leading(values_.data() + place.first, Eigen::OuterStride<>(place.rows));
   }
 
-  // Writes the lower triangle and leaves the rest of `out` as it is.
+  // Writes the lower triangle and leaves the rest of `out` unchanged.
   void copy_to(Eigen::MatrixXd& out) const;
   // The non-zero entries of the lower triangle, compressed by columns; copy_to then writes the values.
   Eigen::SparseMatrix<double> sparse_structure() const;
@@ -38,7 +39,7 @@ class BlockMatrix {
 
  private:
   struct Place {
-    std::size_t first = 0;  // in values_, column-major
+    std::size_t first = 0;  // index in values_, column-major
     int rows = 0, columns = 0;
   };
   template <class Visit>

@@ -1,4 +1,4 @@
-// Which 6x6 blocks of a symmetric matrix are not zero: the covisibility of free poses in the reduced camera system.
+// Pattern of the nonzero blocks of a symmetric matrix: the covisibility of free poses in the reduced camera system.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,8 @@
 
 namespace bslam::solver {
 
-// Lower triangle with its diagonal. First mark, then number, then ask: an answer costs a few instructions, no search.
+// Lower triangle including the diagonal. Call mark() for all blocks, then number(), then index(), which needs no
+// search.
 class BlockPattern {
  public:
   struct Position {
@@ -17,7 +18,7 @@ class BlockPattern {
 
   int size() const { return size_; }
   void mark(int row, int column) { bits_[bit(row, column) / 64] |= std::uint64_t{1} << (bit(row, column) % 64); }
-  // Gives every marked block its number: column by column, downwards within a column.
+  // Numbers the marked blocks column by column, downwards within a column.
   void number();
   // Number of a marked block.
   int index(int row, int column) const;
@@ -30,7 +31,7 @@ class BlockPattern {
 
   int size_;
   std::vector<std::uint64_t> bits_;
-  std::vector<int> before_;  // marked blocks before each word of bits_
+  std::vector<int> before_;  // number of marked blocks before each word of bits_
   std::vector<Position> positions_;
 };
 

@@ -13,7 +13,7 @@ LmSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std
   const auto count = [&](std::uint8_t free) {
     return std::count(problem.pose_free.begin(), problem.pose_free.end(), free);
   };
-  BSLAM_ASSERT(problem.pose_free.empty() || count(0) > 0, "at least one pose is fixed: it holds the gauge");
+  BSLAM_ASSERT(problem.pose_free.empty() || count(0) > 0, "at least one pose must be fixed");
   const BundleStructure structure = make_structure(problem, skip);
   if (structure.num_points() == 0) return {};
   const Kernel kernel = options.robust ? Kernel::kHuber : Kernel::kNone;

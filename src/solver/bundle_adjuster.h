@@ -1,5 +1,5 @@
-// Bundle adjustment over rig poses and points by Levenberg-Marquardt and the Schur complement. Local and global bundle
-// adjustment are the same problem with other variables free. Independent of the map.
+// Bundle adjustment of rig poses and points by Levenberg-Marquardt and the Schur complement, for local and global
+// bundle adjustment. Independent of the map.
 #pragma once
 
 #include <span>
@@ -12,7 +12,7 @@
 
 namespace bslam::solver {
 
-// Observations refer to poses and points by position. Poses are those of the rig: N cameras add no unknowns.
+// Observations refer to poses and points by index. Poses are poses of the rig, so that N cameras add no unknowns.
 struct ReprojectionProblem {
   struct Observation {
     int pose = 0, point = 0;
@@ -22,8 +22,8 @@ struct ReprojectionProblem {
   };
   const Rig* rig = nullptr;
   std::vector<SE3> T_rig_world;
-  // (poses, cameras) row-major: the motion of the rig between the time of a pose and that of a camera's image,
-  // T_cam_world = T_cam_rig motion T_rig_world. Constant; empty where all cameras have the same time.
+  // (poses, cameras) row-major: the motion of the rig from the time of a pose to the capture time of a camera's image,
+  // T_cam_world = T_cam_rig motion T_rig_world. Constant; empty if all cameras have the same capture time.
   std::vector<SE3> motion;
   std::vector<std::uint8_t> pose_free;    // per pose
   std::vector<Vector3d> points;           // metres, world; all free
@@ -31,26 +31,26 @@ struct ReprojectionProblem {
 };
 
 struct BundleOptions {
-  int iterations = 10;              // accepted or rejected steps at most
-  double relative_decrease = 1e-4;  // of the cost, below which it has converged
-  bool robust = true;               // Huber kernel at the 95 % bound
-  int dense_poses = 150;            // free poses up to which the reduced camera system is solved densely
+  int iterations = 10;              // maximum number of steps, accepted or rejected
+  double relative_decrease = 1e-4;  // converged if a step decreases the cost by a smaller fraction
+  bool robust = true;               // use a Huber kernel with the 95 % bound as threshold
+  int dense_poses = 150;            // maximum number of free poses for a dense reduced camera system
 };
 
-// Improves the free poses and all points in place; on LmStop::kFailed the problem is unchanged (also where no
-// observation is left). At least one pose is fixed; two fixed poses hold the scale of a map whose scale is not
-// observable. Left out, also of the costs, are the observations flagged in `skip` (one flag per observation, or empty),
-// those that do not project or have a squared error above kMaxChi2 at the start, and points with fewer than two
-// observations left. A stop request ends it after the current step and keeps the improvement so far. Deterministic to
-// the bit.
+// Optimises the free poses and all points in place; on LmStop::kFailed, also if no observations remain, the problem is
+// unchanged. At least one pose must be fixed; two if the scale is not observable. The following observations are
+// ignored, also in the costs: those flagged in `skip` (one flag per observation, or empty), those that do not project
+// or have a squared error above kMaxChi2 at the initial values, and those of points with fewer than two remaining
+// observations. A stop request ends the optimisation after the current step and keeps the improvement so far. Bitwise
+// deterministic.
 LmSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip = {},
                  std::stop_token stop = {});
 
-// Squared normalised error of each observation at the problem's values; infinite where it does not project.
+// Squared normalised error of each observation at the problem's values; infinite if it does not project.
 std::vector<double> squared_errors(const ReprojectionProblem& problem);
-// Flags the errors that are not at most `bound`.
+// Flags the errors that exceed `bound` or are NaN.
 std::vector<std::uint8_t> beyond(const std::vector<double>& chi2, double bound);
-// The errors at other values: one pose, point and T_cam_rig for each of the problem's poses, points and cameras.
+// The errors at the given values: one pose, point and T_cam_rig for each of the problem's poses, points and cameras.
 std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span<const SE3> T_rig_world,
                                    std::span<const Vector3d> points, std::span<const SE3> T_cam_rig);
 

@@ -6,8 +6,9 @@
 namespace bslam::solver {
 namespace {
 
-// Damping of an information matrix: large enough to factorise points without parallax, small beside a prior. A change
-// of all lengths together is held by the prior alone and moves every point, each of which damping resists.
+// Damping of an information matrix: large enough to factorise points without parallax, small compared to a prior. It
+// must be small because a common scale of all lengths is constrained by the prior only, but changes every point, each
+// of which is damped.
 constexpr double kInformationDamping = 1e-13;
 
 // L with L L^T = V + damping * diag(V).
@@ -152,7 +153,7 @@ void BundleEquations::add_to_pose(const GroupSums& sums, const Vector3d& point_r
   const Matrix3d P = geometry::skew(point_rig);
   const Matrix3d PM = P * sums.M;
   pose.H.topLeftCorner<3, 3>().noalias() -= PM * P;
-  pose.H.bottomLeftCorner<3, 3>() += PM.transpose();  // the upper triangle is not kept
+  pose.H.bottomLeftCorner<3, 3>() += PM.transpose();  // the upper triangle is not stored
   pose.H.bottomRightCorner<3, 3>() += sums.M;
   pose.b.head<3>() += point_rig.cross(sums.m);
   pose.b.tail<3>() += sums.m;
@@ -199,7 +200,7 @@ double BundleEquations::linearise() {
   return 0.5 * sum + rig_.prior_cost(state_.rig);
 }
 
-// Subtracts what the point says from the reduced system: S_ab -= U_a U_b^T, r_a -= U_a (L^-1 b), U = W L^-T.
+// Eliminates the point from the reduced system: S_ab -= U_a U_b^T, r_a -= U_a (L^-1 b), U = W L^-T.
 void BundleEquations::eliminate_point(std::size_t point, double damping) {
   const Matrix3d L = damped_cholesky(point_blocks_[point].V, damping);
   L_[point] = L;

@@ -1,5 +1,5 @@
 // Bundle adjustment as a least-squares problem (solver/lm.h): poses, points and the parameters of the rig, with the
-// points eliminated by the Schur complement (docs/math.md, section 5). The only assembly and elimination of this
+// points eliminated by the Schur complement (docs/math.md, section 5). Used by all bundle adjustments of this
 // folder.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace bslam::solver {
 
-// The variables: all points and poses of the problem, of which those that the structure uses move.
+// All points and poses of the problem. Only those in the structure are variables.
 struct BundleState {
   std::vector<SE3> T_rig_world;
   std::vector<Vector3d> points;  // metres, world
@@ -28,12 +28,12 @@ class BundleEquations {
   using Matrix6d = geometry::Matrix6d;
   using Vector6d = geometry::Vector6d;
 
-  // `problem`, `structure` and `rig_blocks` outlive this; the values are those of `start`. Without rig blocks the rig
-  // is constant. More free poses than `dense_poses` are solved sparsely.
+  // `problem`, `structure` and `rig_blocks` must outlive the equations. `start`: initial values. Without rig blocks the
+  // rig is constant. Systems with more free poses than `dense_poses` are solved sparsely.
   BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure, const RigBlocks& rig_blocks,
                   Kernel kernel, int dense_poses, BundleState start);
 
-  // The problem that solver/lm.h minimises: half the sum of kernel costs, and the priors of the rig blocks.
+  // Interface for solver/lm.h. The cost is half the sum of kernel costs plus the priors of the rig blocks.
   double linearise();
   std::optional<double> solve(double damping);
   double trial_cost() { return cost(trial_); }
@@ -42,12 +42,12 @@ class BundleEquations {
   const BundleState& state() const { return state_; }
   BundleState& state() { return state_; }
 
-  // Squared normalised error of each term of the structure at the current values; infinite where it does not project.
+  // Squared normalised error of each term of the structure at the current values; infinite if it does not project.
   std::vector<double> squared_errors();
-  // The equations of poses and rig where linearise() was called last, with the points eliminated.
+  // The equations of poses and rig of the last linearise(), with the points eliminated.
   ReducedSystem& reduce(double damping);
-  // Information about the rig's unknowns with poses and points marginalised out, priors included; empty where it is
-  // singular.
+  // Information matrix of the rig's unknowns with poses and points marginalised out, including priors. Returns nullopt
+  // if it is singular.
   std::optional<Eigen::MatrixXd> rig_information();
 
   struct PoseBlock {
@@ -58,7 +58,7 @@ class BundleEquations {
     Matrix3d V;
     Vector3d b;
   };
-  // The blocks of linearise(): of each free pose, of each point of the structure, of the rig.
+  // The blocks computed by linearise(): per free pose, per point of the structure, and of the rig.
   const std::vector<PoseBlock>& pose_blocks() const { return pose_blocks_; }
   const std::vector<PointBlock>& point_blocks() const { return point_blocks_; }
   const RigTerms& rig_terms() const { return rig_; }
@@ -70,7 +70,7 @@ class BundleEquations {
     Matrix3d R;
     Vector3d t;  // metres
   };
-  // What the observations of one group say about their point in the rig frame.
+  // Sums over the observations of one group, for their point in the rig frame.
   struct GroupSums {
     Matrix3d M = Matrix3d::Zero();  // sum of w A^T A, A = J_h R_cam_rig / sigma
     Vector3d m = Vector3d::Zero();  // sum of w A^T e / sigma

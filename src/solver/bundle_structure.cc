@@ -8,29 +8,29 @@ namespace {
 using Observation = ReprojectionProblem::Observation;
 
 void check(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
-  BSLAM_ASSERT(problem.rig != nullptr, "a problem needs a rig");
-  BSLAM_ASSERT(problem.pose_free.size() == problem.T_rig_world.size(), "pose_free has an entry per pose");
-  BSLAM_ASSERT(skip.empty() || skip.size() == problem.observations.size(), "skip has an entry per observation");
+  BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
+  BSLAM_ASSERT(problem.pose_free.size() == problem.T_rig_world.size(), "pose_free must have one entry per pose");
+  BSLAM_ASSERT(skip.empty() || skip.size() == problem.observations.size(), "skip must have one entry per observation");
   BSLAM_ASSERT(problem.motion.empty() || problem.motion.size() == problem.T_rig_world.size() * problem.rig->size(),
-               "motion has an entry per pose and camera");
+               "motion must have one entry per pose and camera");
   const auto num_poses = static_cast<int>(problem.T_rig_world.size());
   const auto num_points = static_cast<int>(problem.points.size());
   const Observation* last = nullptr;
   for (const Observation& o : problem.observations) {
     BSLAM_ASSERT(o.pose >= 0 && o.pose < num_poses && o.point >= 0 && o.point < num_points,
-                 "an observation refers to a pose and a point of the problem");
+                 "an observation must refer to a pose and a point of the problem");
     BSLAM_ASSERT(o.camera.valid() && o.camera.index() < problem.rig->size(),
-                 "an observation names a camera of the rig");
-    BSLAM_ASSERT(o.sigma > 0, "a standard deviation is positive");
+                 "an observation must refer to a camera of the rig");
+    BSLAM_ASSERT(o.sigma > 0, "standard deviations must be positive");
     BSLAM_ASSERT(
         last == nullptr || last->point < o.point ||
             (last->point == o.point && (last->pose < o.pose || (last->pose == o.pose && last->camera <= o.camera))),
-        "observations are sorted by point, pose and camera");
+        "observations must be sorted by point, pose and camera");
     last = &o;
   }
 }
 
-// Terms, groups and points, every pose still without its slot.
+// Terms, groups and points; the slots of poses are not set yet.
 void gather(const ReprojectionProblem& problem, const std::vector<double>& chi2, std::span<const std::uint8_t> skip,
             BundleStructure& out) {
   const auto& observations = problem.observations;

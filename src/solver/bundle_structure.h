@@ -1,4 +1,4 @@
-// The observations of a ReprojectionProblem that take part in an adjustment, laid out for its loops: by point, and
+// The observations of a ReprojectionProblem that are used in an adjustment, sorted for its loops: by point, and
 // within a point by pose.
 #pragma once
 
@@ -18,20 +18,20 @@ struct BundleStructure {
   };
   struct Group {  // observations of one point by all cameras of one pose
     int pose = 0;
-    int slot = -1;  // position of a free pose in the reduced camera system; -1: the pose is fixed
+    int slot = -1;  // index of a free pose in the reduced camera system; -1: the pose is fixed
     std::size_t first_term = 0;
   };
   struct Point {
-    int point = 0;  // in the problem
+    int point = 0;  // index in the problem
     std::size_t first_group = 0;
-    std::size_t first_pair = 0;  // in pair_block
+    std::size_t first_pair = 0;  // index in pair_block
   };
 
   std::vector<Term> terms;
-  std::vector<Group> groups;  // and one more that ends the last
-  std::vector<Point> points;  // and one more that ends the last
+  std::vector<Group> groups;  // with a sentinel at the end
+  std::vector<Point> points;  // with a sentinel at the end
   std::vector<int> pose_of_slot;
-  std::vector<int> frame_sizes;  // per slot: unknowns of the frame, of which the pose's six come first
+  std::vector<int> frame_sizes;  // per slot: number of unknowns of the frame, beginning with the six of the pose
   BlockPattern pattern{0};
   // Block number of each pair of free groups (a, b), b <= a, of each point, in the order of a, then b.
   std::vector<int> pair_block;
@@ -43,8 +43,9 @@ struct BundleStructure {
   }
 };
 
-// Leaves out the observations flagged in `skip`, those whose squared normalised error in `chi2` is not below kMaxChi2,
-// points with fewer than two observations left, which say nothing about a pose, and free poses without observations.
+// Ignores the observations flagged in `skip`, those whose squared normalised error in `chi2` is not below kMaxChi2,
+// points with fewer than two remaining observations, which contain no information about a pose, and free poses without
+// observations.
 BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2,
                                std::span<const std::uint8_t> skip);
 // The same with the errors at the problem's values.

@@ -10,16 +10,16 @@ namespace bslam::solver {
 namespace {
 
 constexpr int kDensePoses = 150;
-constexpr double kObservedShare = 0.5;  // of the prior's standard deviation
+constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed one, relative to the prior's
 
 struct Round {
   Kernel kernel;
-  double max_chi2;  // of observations that take part
+  double max_chi2;  // maximum squared normalised error of observations that are used
 };
 constexpr std::array kRounds = {Round{Kernel::kHuber, kMaxChi2}, Round{Kernel::kHuber, 16 * kChi2TwoDof95},
                                 Round{Kernel::kNone, kChi2TwoDof95}, Round{Kernel::kNone, kChi2TwoDof95}};
 
-// Mean squared error over that of the cut distribution, with the unknowns subtracted from the observations.
+// Mean squared error over its expectation for the truncated distribution, corrected for the number of unknowns.
 double variance_factor(const BundleStructure& structure, std::size_t cameras, double cost) {
   const double residuals = 2.0 * static_cast<double>(structure.terms.size());
   const double unknowns = 3.0 * static_cast<double>(structure.num_points()) +
@@ -28,7 +28,8 @@ double variance_factor(const BundleStructure& structure, std::size_t cameras, do
   return 2.0 * cost / expected;
 }
 
-// Covariances and what is observed, at the current values; false where the information is singular.
+// Computes covariances and observed degrees of freedom at the current values. Returns false if the information is
+// singular.
 bool assess(BundleEquations& equations, const RigBlock& extrinsics, const ExtrinsicAdjustmentOptions& options,
             ExtrinsicAdjustment& out) {
   equations.linearise();
@@ -37,8 +38,8 @@ bool assess(BundleEquations& equations, const RigBlock& extrinsics, const Extrin
   Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(information->rows(), information->cols());
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(information->rows());
   extrinsics.add_prior(equations.state().rig, prior, gradient);
-  const double trust = kVarianceLeft / kFractionLeft / std::max(1.0, out.variance_factor);
-  const Eigen::LLT<Eigen::MatrixXd> factor(trust * (*information - prior) + prior);
+  const double scale = kVarianceLeft / kFractionLeft / std::max(1.0, out.variance_factor);
+  const Eigen::LLT<Eigen::MatrixXd> factor(scale * (*information - prior) + prior);
   if (factor.info() != Eigen::Success) return false;
   const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(prior.rows(), prior.cols()));
   for (std::size_t c = 1; c < out.cameras.size(); ++c) {
@@ -47,7 +48,7 @@ bool assess(BundleEquations& equations, const RigBlock& extrinsics, const Extrin
     camera.covariance = covariance.block<6, 6>(at, at);
     for (int k = 0; k < 6; ++k) {
       const double sigma = k < 3 ? options.sigma_rotation : options.sigma_translation;
-      camera.observed[static_cast<std::size_t>(k)] = std::sqrt(camera.covariance(k, k)) < kObservedShare * sigma;
+      camera.observed[static_cast<std::size_t>(k)] = std::sqrt(camera.covariance(k, k)) < kObservedRatio * sigma;
     }
   }
   return true;
@@ -66,10 +67,10 @@ void report_cameras(const BundleStructure& structure, const RigValues& rig, cons
 
 ExtrinsicAdjustment adjust_extrinsics(ReprojectionProblem& problem, const ExtrinsicAdjustmentOptions& options,
                                       std::span<const SE3> start, std::stop_token stop) {
-  BSLAM_ASSERT(problem.rig != nullptr, "a problem needs a rig");
-  BSLAM_ASSERT(options.sigma_rotation > 0 && options.sigma_translation > 0, "a standard deviation is positive");
+  BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
+  BSLAM_ASSERT(options.sigma_rotation > 0 && options.sigma_translation > 0, "standard deviations must be positive");
   const std::size_t cameras = problem.rig->size();
-  BSLAM_ASSERT(start.empty() || start.size() == cameras, "a start has extrinsics for every camera");
+  BSLAM_ASSERT(start.empty() || start.size() == cameras, "the initial extrinsics must have one entry per camera");
   ExtrinsicAdjustment out{.cameras = std::vector<ExtrinsicEstimate>(cameras)};
   out.cameras.front().observed.fill(true);
   if (cameras < 2) return out;

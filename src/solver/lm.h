@@ -1,4 +1,4 @@
-// Levenberg-Marquardt: the loop behind every optimisation of this folder (docs/math.md, section 3).
+// Levenberg-Marquardt algorithm, used by all optimisations of this folder (docs/math.md, section 3).
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -14,37 +14,37 @@
 namespace bslam::solver {
 
 enum class DampingRule {
-  kNielsen,    // follows the ratio of actual to predicted decrease (Nielsen, IMM-REP-1999-05)
-  kOnFailure,  // none (Gauss-Newton) until a step fails; then ten times more after a failure, ten times less after a
+  kNielsen,    // depends on the ratio of actual to predicted decrease (Nielsen, IMM-REP-1999-05)
+  kOnFailure,  // no damping (Gauss-Newton) until a step fails; then times 10 after a failure, times 1/10 after a
                // success
 };
 
 struct LmOptions {
-  int iterations = 10;              // steps at most, accepted or rejected
-  double relative_decrease = 1e-4;  // converged where a step lowers the cost by a smaller share
-  double step_tolerance = 0.0;      // standard deviations: a shorter undamped step is the last and is not evaluated
-  double min_gain = 1e-3;           // actual over predicted decrease from which a step is accepted
+  int iterations = 10;              // maximum number of steps, accepted or rejected
+  double relative_decrease = 1e-4;  // converged if a step decreases the cost by a smaller fraction
+  double step_tolerance = 0.0;      // standard deviations; converged if an undamped step is shorter
+  double min_gain = 1e-3;           // minimum ratio of actual to predicted decrease of an accepted step
   DampingRule rule = DampingRule::kNielsen;
-  double first_damping = 1e-4;  // factor of the diagonal, at the start or after the first failure
+  double first_damping = 1e-4;  // factor of the diagonal, initially or after the first failure
   double unit_cost = 1.0;       // cost of a residual as large as its noise; 1e-10 of it counts as nothing
 };
 
 enum class LmStop { kConverged, kIterations, kStopped, kFailed };
 
 struct LmSummary {
-  LmStop stop = LmStop::kFailed;  // kFailed: the cost is not finite at the start, or no step could be solved for
+  LmStop stop = LmStop::kFailed;  // kFailed: the initial cost is not finite, or no linear system could be solved
   double initial_cost = 0, final_cost = 0;
-  int iterations = 0;  // steps tried
+  int iterations = 0;  // number of steps, accepted or rejected
   bool usable() const { return stop != LmStop::kFailed; }
 };
 
-// A problem holds its current values and those of a trial step.
+// A problem stores its current values and those of a trial step.
 template <class P>
 concept LeastSquaresProblem = requires(P p, double damping) {
-  // Builds the normal equations H delta = b at the current values and returns the cost there.
+  // Builds the normal equations H delta = b at the current values and returns their cost.
   { p.linearise() } -> std::same_as<double>;
   // Solves (H + damping D) delta = b, D the diagonal of H, for the trial values. Returns the decrease of the cost that
-  // the quadratic model predicts; empty where the system cannot be solved.
+  // the quadratic model predicts, or nullopt if the system cannot be solved.
   { p.solve(damping) } -> std::same_as<std::optional<double>>;
   { p.trial_cost() } -> std::same_as<double>;
   p.accept();  // the trial values become the current ones
@@ -61,9 +61,9 @@ class Damping {
   // `gain`: actual over predicted decrease.
   void accept(double gain) {
     constexpr double kMin = 1e-10;  // keeps the blocks of points without parallax invertible
-    const double bend = 2.0 * gain - 1.0;
+    const double relative_gain = 2.0 * gain - 1.0;
     if (rule_ == DampingRule::kNielsen) {
-      value_ = std::max(kMin, value_ * std::max(1.0 / 3.0, 1.0 - bend * bend * bend));
+      value_ = std::max(kMin, value_ * std::max(1.0 / 3.0, 1.0 - relative_gain * relative_gain * relative_gain));
     } else {
       value_ = value_ > first_ ? 0.1 * value_ : 0.0;
     }
@@ -79,8 +79,8 @@ class Damping {
   double first_, value_, growth_ = 2.0;
 };
 
-// Improves the current values until it converges, has used up its iterations, or is asked to stop. The normal equations
-// are built once per accepted step, not after the last one.
+// Minimises the cost until convergence, the maximum number of iterations, or a stop request. The normal equations are
+// built once per accepted step, except for the last one.
 template <LeastSquaresProblem Problem>
 LmSummary minimise(Problem& problem, const LmOptions& options, const std::stop_token& stop = {}) {
   constexpr double kRounding = 1e-10;  // fraction of the cost, and of unit_cost, that rounding alone may change
@@ -119,7 +119,7 @@ LmSummary minimise(Problem& problem, const LmOptions& options, const std::stop_t
   return end(any_solved ? LmStop::kIterations : LmStop::kFailed);
 }
 
-// H delta = b in N unknowns, and the cost where it was built.
+// H delta = b in N unknowns, and the cost at the values of the linearisation.
 template <int N>
 struct NormalEquations {
   Eigen::Matrix<double, N, N> H = Eigen::Matrix<double, N, N>::Zero();
@@ -127,18 +127,18 @@ struct NormalEquations {
   double cost = 0.0;
 };
 
-// A problem of a few unknowns, whose equations come in the same pass as its cost: `linearise(state)` returns
+// A problem of a few unknowns whose equations are computed together with its cost: `linearise(state)` returns
 // NormalEquations<N>, `plus(state, delta)` the state after a step.
 template <int N, class State, class Linearise, class Plus>
 class SmallProblem {
  public:
-  // `at_start`: the equations at the start.
+  // `at_start`: the equations at the initial state `start`.
   SmallProblem(const State& start, const NormalEquations<N>& at_start, Linearise linearise, Plus plus)
       : linearise_(std::move(linearise)), plus_(std::move(plus)), state_(start), trial_(start), equations_(at_start) {}
 
   double linearise() { return equations_.cost; }  // built by trial_cost()
   std::optional<double> solve(double damping) {
-    constexpr double kRidge = 1e-9;  // of the largest diagonal entry: holds what the data do not determine
+    constexpr double kRidge = 1e-9;  // of the largest diagonal entry; regularises undetermined directions
     Eigen::Matrix<double, N, N> damped = equations_.H;
     damped.diagonal() *= 1.0 + damping;
     damped.diagonal().array() += kRidge * equations_.H.diagonal().maxCoeff();

@@ -20,7 +20,7 @@ using Poses = std::vector<Sim3>;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-// Which vertices do not move: the fixed ones, and the first of every connected part without any.
+// Flags the constant vertices: the fixed ones, and the first vertex of every connected component without any.
 std::vector<std::uint8_t> held_vertices(const PoseGraphProblem& problem) {
   std::vector<int> parent(problem.S_world.size());
   std::iota(parent.begin(), parent.end(), 0);
@@ -30,7 +30,7 @@ std::vector<std::uint8_t> held_vertices(const PoseGraphProblem& problem) {
   };
   for (const Edge& edge : problem.edges) {
     const int a = root(edge.a), b = root(edge.b);
-    parent[at(std::max(a, b))] = std::min(a, b);  // a root is the first vertex of its part
+    parent[at(std::max(a, b))] = std::min(a, b);  // a root is the first vertex of its component
   }
   std::vector<std::uint8_t> held = problem.fixed, anchored(parent.size(), 0);
   for (std::size_t v = 0; v < parent.size(); ++v) anchored[at(root(static_cast<int>(v)))] |= problem.fixed[v] != 0;
@@ -39,7 +39,7 @@ std::vector<std::uint8_t> held_vertices(const PoseGraphProblem& problem) {
 }
 
 // Block column of each vertex in the order of elimination (approximate minimum degree on vertices, which are a sixth or
-// seventh of the unknowns); -1 where it is held.
+// seventh of the unknowns); -1 if it is constant.
 std::vector<int> elimination_order(const PoseGraphProblem& problem) {
   const std::vector<std::uint8_t> held = held_vertices(problem);
   std::vector<int> column(held.size(), -1);
@@ -57,7 +57,7 @@ std::vector<int> elimination_order(const PoseGraphProblem& problem) {
   }
   Eigen::SparseMatrix<double> graph(count, count);
   graph.setFromTriplets(links.begin(), links.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;  // position -> what stood there before
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;  // new index -> old index
   Eigen::AMDOrdering<int>()(graph, order);
   std::vector<int> position(at(count));
   for (int k = 0; k < count; ++k) position[at(order.indices()(k))] = k;
@@ -77,7 +77,7 @@ BlockPattern pattern_of(const PoseGraphProblem& problem, const std::vector<int>&
   return pattern;
 }
 
-// The normal equations H delta = b in blocks of N unknowns a vertex: rotation, translation and, where N is 7, log
+// The normal equations H delta = b in blocks of N unknowns per vertex: rotation, translation and, if N is 7, log
 // scale.
 template <int N>
 class PoseGraphEquations {
@@ -85,7 +85,7 @@ class PoseGraphEquations {
   using Vector = Eigen::Matrix<double, N, 1>;
   using Matrix = Eigen::Matrix<double, N, N>;
 
-  // `problem` outlives this; the vertices start at its values.
+  // `problem` must outlive the equations and contains the initial values.
   PoseGraphEquations(const PoseGraphProblem& problem, const PoseGraphOptions& options)
       : problem_(problem),
         S_world_(problem.S_world),
@@ -122,7 +122,7 @@ class PoseGraphEquations {
   }
 
   std::optional<double> solve(double damping) {
-    if (rhs_.size() == 0) return 0.0;  // every vertex is held
+    if (rhs_.size() == 0) return 0.0;  // all vertices are constant
     H_.copy_to(sparse_);
     const Eigen::VectorXd diagonal = sparse_.diagonal();
     sparse_.diagonal() = (1.0 + damping) * diagonal;
@@ -144,7 +144,7 @@ class PoseGraphEquations {
  private:
   struct Residual {
     Vector error;    // normalised
-    Sim3 S_b_b;      // S_b_a(measured) S_a_world S_world_b: identity where the edge is met
+    Sim3 S_b_b;      // S_b_a(measured) S_a_world S_world_b: the identity if the error is zero
     Vector weights;  // 1 / sigma of each component
   };
 
@@ -198,18 +198,18 @@ class PoseGraphEquations {
 
   const PoseGraphProblem& problem_;
   Poses S_world_, trial_;
-  std::vector<int> column_;  // per vertex, -1: held
+  std::vector<int> column_;  // per vertex, -1: constant
   BlockPattern pattern_;
   BlockMatrix H_;
   Eigen::VectorXd rhs_;
   Vector inverse_sigma_;
   std::vector<Sim3> S_b_a_;  // per edge, the measurement's inverse
   Eigen::SparseMatrix<double> sparse_;
-  // The order of elimination is that of the blocks. Eigen's own code, MPL-2.
+  // Eliminates in the order of the blocks. Uses Eigen's MPL-2 code only.
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor_;
 };
 
-// Gauss-Newton, damped once a step fails. On success the problem takes the new values.
+// Gauss-Newton with damping after a failed step. Writes the result to the problem on success.
 template <int N>
 LmSummary optimise_with(PoseGraphProblem& problem, const PoseGraphOptions& options, const std::stop_token& stop) {
   PoseGraphEquations<N> equations(problem, options);
@@ -224,14 +224,16 @@ LmSummary optimise_with(PoseGraphProblem& problem, const PoseGraphOptions& optio
 
 void check(const PoseGraphProblem& problem) {
   const auto count = static_cast<int>(problem.S_world.size());
-  BSLAM_ASSERT(problem.fixed.size() == problem.S_world.size(), "every vertex is fixed or not");
+  BSLAM_ASSERT(problem.fixed.size() == problem.S_world.size(), "fixed must have one entry per vertex");
   const auto rigid = [](const Sim3& S) { return !(S.scale() < 1.0) && !(S.scale() > 1.0); };
   for (const Edge& edge : problem.edges) {
-    BSLAM_ASSERT(edge.a >= 0 && edge.a < count && edge.b >= 0 && edge.b < count, "an edge names vertices of the graph");
-    BSLAM_ASSERT(edge.a != edge.b && edge.weight > 0, "an edge has two ends and a positive weight");
-    BSLAM_ASSERT(problem.scale_free || rigid(edge.S_a_b), "a measured scale only where it is free");
+    BSLAM_ASSERT(edge.a >= 0 && edge.a < count && edge.b >= 0 && edge.b < count,
+                 "an edge must refer to vertices of the graph");
+    BSLAM_ASSERT(edge.a != edge.b && edge.weight > 0, "an edge must have two different vertices and a positive weight");
+    BSLAM_ASSERT(problem.scale_free || rigid(edge.S_a_b), "measured scales must be 1 unless the scale is free");
   }
-  for (const Sim3& S : problem.S_world) BSLAM_ASSERT(problem.scale_free || rigid(S), "scale 1 where it is not free");
+  for (const Sim3& S : problem.S_world)
+    BSLAM_ASSERT(problem.scale_free || rigid(S), "scales must be 1 unless the scale is free");
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ struct CameraPose {
 
 CameraPose camera_pose(const SE3& T_cam_world) { return {T_cam_world.matrix3(), T_cam_world.translation()}; }
 
-// Squared normalised error; infinite where the point does not project.
+// Squared normalised error; infinite if the point does not project.
 template <class Model>
 double squared_error(const Model& model, const CameraPose& pose, const PoseProblem::Item& item) {
   const auto error = residual_error(model, pose.R * item.point_world + pose.t, item.pixel);
@@ -36,7 +36,7 @@ void accumulate(const Residual& residual, const Vector3d& point_cam, double weig
   out.b += wJt.col(0) * residual.error.x() + wJt.col(1) * residual.error.y();
 }
 
-// `admit(item, chi2)` says whether an item is in use, and may change that.
+// `admit(item, chi2)` returns whether an item is used, and may change it.
 template <class Model, class Items, class Admit>
 void accumulate_camera(const Model& model, const CameraPose& pose, Items items, Kernel kernel, const Admit& admit,
                        PoseEquations& out) {
@@ -70,7 +70,7 @@ struct AdmitWithinBound {
   }
 };
 
-// A camera's equations in those of the rig.
+// Converts a camera's equations to those of the rig.
 void add_in_rig(const Matrix6d& J, const PoseEquations& camera, PoseEquations& rig) {
   rig.H += J.transpose() * camera.H * J;
   rig.b += J.transpose() * camera.b;
@@ -82,8 +82,8 @@ void add_in_rig(const Matrix6d& J, const PoseEquations& camera, PoseEquations& r
 PoseProblem::PoseProblem(const Rig& rig, std::span<const PoseObservation> observations, const MotionModel* motion)
     : rig_(&rig), motion_(motion), items_(observations.size()), first_(rig.size() + 1, 0) {
   for (const PoseObservation& o : observations) {
-    BSLAM_ASSERT(o.camera.valid() && o.camera.index() < rig.size(), "an observation names a camera of the rig");
-    BSLAM_ASSERT(o.sigma > 0, "a standard deviation is positive");
+    BSLAM_ASSERT(o.camera.valid() && o.camera.index() < rig.size(), "an observation must refer to a camera of the rig");
+    BSLAM_ASSERT(o.sigma > 0, "standard deviations must be positive");
     ++first_[o.camera.index() + 1];
   }
   for (std::size_t i = 0; i < rig.size(); ++i) first_[i + 1] += first_[i];

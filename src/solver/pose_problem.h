@@ -1,4 +1,4 @@
-// The observations of one rig pose, laid out camera by camera for the loops of motion-only bundle adjustment.
+// The observations of one rig pose, sorted by camera for the loops of motion-only bundle adjustment.
 #pragma once
 
 #include <limits>
@@ -20,17 +20,17 @@ class PoseProblem {
     Vector2d pixel;        // raw image
     double inverse_sigma;  // 1 / px
     CameraIndex camera;
-    int observation;  // its place in the caller's order
+    int observation;  // index in the caller's order
     bool in_use;
   };
 
-  // `rig` and `motion` outlive this; without a motion all cameras fire together.
+  // `rig` and `motion` must outlive the problem. Without a motion all cameras have the same capture time.
   PoseProblem(const Rig& rig, std::span<const PoseObservation> observations, const MotionModel* motion = nullptr);
 
   const Rig& rig() const { return *rig_; }
   std::span<const Item> items() const { return items_; }
 
-  // Which items take part: those whose squared error at a pose is at most `bound`. Returns how many changed.
+  // Uses the items whose squared error at a pose is at most `bound`. Returns the number of items that changed.
   int select(const SE3& T_rig_world, double bound);
   int num_in_use() const { return num_in_use_; }
 
@@ -38,7 +38,7 @@ class PoseProblem {
   PoseEquations linearise(const SE3& T_rig_world, Kernel kernel) const;
   PoseEquations reselect_and_linearise(const SE3& T_rig_world, Kernel kernel, double bound, int& changed);
 
-  // Sum of min(squared error, bound) over all items (MSAC); stops early, with what it has, once beyond `limit`.
+  // Sum of min(squared error, bound) over all items (MSAC). Returns a partial sum once it exceeds `limit`.
   double truncated_cost(const SE3& T_rig_world, double bound, double limit) const;
 
  private:
@@ -47,8 +47,8 @@ class PoseProblem {
     return {items_.data() + first_[i], items_.data() + first_[i + 1]};
   }
 
-  // T_cam_rig of camera i at the time of its image, and how its pose follows that of the rig: exp(J delta) with J of
-  // (6, 6).
+  // T_cam_rig of camera i at the capture time of its image, and the (6, 6) Jacobian J of its pose: a perturbation delta
+  // of the rig pose perturbs the camera pose by exp(J delta).
   struct CameraMotion {
     SE3 T_cam_rig;
     geometry::Matrix6d J;
@@ -58,17 +58,17 @@ class PoseProblem {
   const Rig* rig_;
   const MotionModel* motion_;
   std::vector<Item> items_;         // by camera, within a camera in the caller's order
-  std::vector<std::size_t> first_;  // per camera and one more
+  std::vector<std::size_t> first_;  // per camera, and the end
   int num_in_use_ = 0;
 };
 
-// Minimises over the items in use, from `equations` at T_rig_world; converged once a step is shorter than `tolerance`
-// standard deviations of the pose. Returns the pose reached.
+// Minimises the cost of the items in use, starting from `equations` at T_rig_world, until a step is shorter than
+// `tolerance` standard deviations of the pose. Returns the resulting pose.
 SE3 refine_pose(const PoseProblem& problem, const SE3& T_rig_world, const PoseEquations& equations, Kernel kernel,
                 int iterations, double tolerance);
 
-// Rounds of minimisation, each after a classification of all items. The first uses the bound `first_bound` (squared
-// error).
+// Rounds of minimisation, each after a classification of all items. `first_bound`: bound of the squared error in the
+// first round.
 PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double first_bound,
                           const PoseSolverOptions& options);
 

@@ -11,14 +11,14 @@ namespace {
 using geometry::Matrix6d;
 using geometry::Vector6d;
 
-// Largest standard deviation an acceptable pose may have in any direction: radians, and share of the distance to what
-// is seen. A sound pose of ten points has less than a tenth of it; points along one ray have far more.
+// Maximum standard deviation of a pose in any direction: radians, and relative to the distance of the points. A valid
+// pose from ten points has less than a tenth of it; for points along one ray it is much larger.
 constexpr double kMaxDeviation = 0.05;
 
-// Steps shorter than this many standard deviations of the pose decide nothing, between rounds and at the end.
+// Convergence tolerances in standard deviations of the pose, between rounds and for the last round.
 constexpr double kRoundTolerance = 0.1, kFinalTolerance = 1e-3;
 
-// Distance that makes rotation and translation comparable: harmonic mean, so that far points do not count.
+// Unit of translations relative to rotations: the harmonic mean distance, which far points hardly influence.
 double typical_distance(const PoseProblem& problem, const SE3& T_rig_world) {
   double inverse = 0.0;
   int count = 0;
@@ -67,8 +67,8 @@ PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double f
     const PoseEquations equations =
         problem.reselect_and_linearise(T, Kernel::kHuber, round == 0 ? first_bound : kChi2TwoDof95, changed);
     if (problem.num_in_use() < 3) break;
-    // After a re-classification all that is in use lies inside the kernel's knee: these equations are also those
-    // without it. A round that would change nothing is passed over.
+    // After a reclassification all items in use are within the quadratic part of the kernel, so that the equations are
+    // the same without kernel. Rounds without changes are skipped.
     const bool last = round > 0 && (round == options.rounds - 1 || changed == 0);
     T = refine_pose(problem, T, equations, last ? Kernel::kNone : Kernel::kHuber, options.iterations,
                     last || options.rounds == 1 ? kFinalTolerance : kRoundTolerance);
@@ -77,16 +77,16 @@ PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double f
   return report(problem, T, options);
 }
 
-PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
+PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_initial,
                         const PoseSolverOptions& options) {
   PoseProblem problem(rig, observations);
-  return solve_rounds(problem, T_rig_world_guess, options.first_chi2, options);
+  return solve_rounds(problem, T_rig_world_initial, options.first_chi2, options);
 }
 
-PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
+PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_initial,
                         const MotionModel& motion, const PoseSolverOptions& options) {
   PoseProblem problem(rig, observations, &motion);
-  return solve_rounds(problem, T_rig_world_guess, options.first_chi2, options);
+  return solve_rounds(problem, T_rig_world_initial, options.first_chi2, options);
 }
 
 }  // namespace bslam::solver

@@ -17,26 +17,27 @@ struct PoseObservation {
 };
 
 struct PoseSolverOptions {
-  int rounds = 4;        // solves with re-classification of outliers between them; the last one without robust kernel
-  int iterations = 10;   // Gauss-Newton steps a round at most
-  int min_inliers = 10;  // fewer say nothing about a pose
+  int rounds = 4;  // optimisation rounds with reclassification of outliers between them; the last one has no kernel
+  int iterations = 10;   // maximum number of Gauss-Newton steps per round
+  int min_inliers = 10;  // minimum number of inliers of a pose
   double first_chi2 =
-      kMaxChi2;  // squared normalised error at the guess beyond which an observation waits for the second round
+      kMaxChi2;  // maximum squared normalised error at the initial pose of observations of the first round
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("rounds", self.rounds, Range{1, 20}, "", "solve rounds with re-classification of outliers between them");
-    visitor("iterations", self.iterations, Range{1, 100}, "", "Gauss-Newton steps a round at most");
-    visitor("min_inliers", self.min_inliers, Range{3, 1000}, "", "fewer inliers say nothing about a pose");
+    visitor("rounds", self.rounds, Range{1, 20}, "",
+            "optimisation rounds with reclassification of outliers between them");
+    visitor("iterations", self.iterations, Range{1, 100}, "", "maximum number of Gauss-Newton steps per round");
+    visitor("min_inliers", self.min_inliers, Range{3, 1000}, "", "minimum number of inliers of a pose");
   }
 };
 
-// How a rig whose cameras fire one after the other goes on moving from its pose, given the one before it: the twist at
-// a pose is gain * log(T_rig_world T_before^-1) + offset. Its dependence on the pose is part of the problem: left out,
-// an error of the pose would make one of the twist, and that the next of the pose.
+// Motion of a rig during the capture of a frame whose cameras have different capture times: the twist at a pose is gain
+// * log(T_rig_world T_before^-1) + offset. The dependence of the twist on the pose is part of the problem; otherwise an
+// error of the pose would cause an error of the twist, and that an error of the next pose.
 struct MotionModel {
-  std::vector<double> delay_s;                             // per camera: time of its image after that of the pose
-  SE3 T_before;                                            // T_rig_world of the frame before
+  std::vector<double> delay_s;                             // per camera: capture time minus the time of the pose
+  SE3 T_before;                                            // T_rig_world of the previous frame
   double gain = 0.0;                                       // 1/s
   geometry::Vector6d offset = geometry::Vector6d::Zero();  // rad/s, m/s
 
@@ -51,17 +52,18 @@ struct PoseSolution {
   std::vector<std::uint8_t> inlier;  // per observation
   int num_inliers = 0;
   std::vector<int> inliers_per_camera;
-  geometry::Matrix6d information = geometry::Matrix6d::Zero();  // of the left perturbation, at the solution
-  double mean_chi2 = 0.0;                                       // over the inliers, per observation
+  geometry::Matrix6d information = geometry::Matrix6d::Zero();  // information of the left perturbation
+  double mean_chi2 = 0.0;                                       // mean squared normalised error of the inliers
 };
 
-// Huber rounds, each from a re-classification of all observations by chi-square (95 %, two degrees of freedom), also
-// back in; the last over the inliers without kernel. Observations in any order; their order within a camera fixes the
-// order of the sums. Deterministic. Not ok: the pose is the best found and nothing to rely on.
-PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
+// Rounds with Huber kernel, each after a reclassification of all observations by chi-square (95 %, two degrees of
+// freedom), which may readmit outliers; the last round uses the inliers without kernel. Observations may have any
+// order. Deterministic; the order of the observations within a camera determines the order of summation. If the result
+// is not ok, the pose must not be used.
+PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_initial,
                         const PoseSolverOptions& options);
-// The same with cameras that move as the model says; `rig` is the rig at rest.
-PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_guess,
+// The same for different capture times and the given motion model; `rig` is the rig at rest.
+PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_initial,
                         const MotionModel& motion, const PoseSolverOptions& options);
 
 }  // namespace bslam::solver

@@ -1,4 +1,4 @@
-// The linear system of bundle adjustment once the points are eliminated: sparse blocks of the frames, bordered by the
+// The linear system of bundle adjustment after elimination of the points: sparse blocks of the frames, bordered by the
 // dense block of the rig,
 //     [ S    B ] [x_frames]   [r_frames]
 //     [ B^T  C ] [x_rig   ] = [r_rig   ].
@@ -12,15 +12,15 @@
 
 namespace bslam::solver {
 
-// A diagonal entry of the normal equations as damping scales it: a direction without information is still damped a
+// A diagonal entry of the normal equations for damping, bounded so that directions without information are damped a
 // little.
 inline double bounded_diagonal(double entry) { return std::clamp(entry, 1e-6, 1e32); }
 
 class ReducedSystem {
  public:
-  enum class Storage { kDense, kSparse };  // of the frames
+  enum class Storage { kDense, kSparse };  // storage of the frames' blocks
 
-  // `pattern` is numbered and outlives this; `frame_sizes`: unknowns of each frame. The rig may have none.
+  // `pattern` must be numbered and outlive the system. `frame_sizes`: unknowns of each frame. `rig_size` may be 0.
   ReducedSystem(const BlockPattern& pattern, std::span<const int> frame_sizes, int rig_size, Storage storage);
 
   BlockMatrix& frames() { return frames_; }  // S
@@ -29,9 +29,9 @@ class ReducedSystem {
   Eigen::MatrixXd& rig() { return rig_; }        // C: lower triangle
   Eigen::VectorXd& rhs() { return rhs_; }        // frames, then rig
 
-  // Factorises and solves; false where the matrix is not positive definite to machine precision.
+  // Factorises and solves. Returns false if the matrix is not positive definite to machine precision.
   bool solve(Eigen::VectorXd& delta);
-  // C - B^T S^-1 B, the information about the rig with the frames marginalised out. Valid after solve().
+  // C - B^T S^-1 B, the information matrix of the rig with the frames marginalised out. Valid after solve().
   const Eigen::MatrixXd& rig_information() const { return rig_information_; }
 
  private:
@@ -44,7 +44,7 @@ class ReducedSystem {
   Eigen::VectorXd rhs_;
   Eigen::MatrixXd dense_;
   Eigen::SparseMatrix<double> sparse_;  // lower triangle
-  // Elimination order by approximate minimum degree; Eigen's own code, MPL-2.
+  // Elimination order by approximate minimum degree. Uses Eigen's MPL-2 code only.
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::AMDOrdering<int>> sparse_factor_;
 };
 

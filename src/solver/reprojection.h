@@ -25,14 +25,14 @@ struct Residual {
   Matrix23d J;     // dh / dp, px per metre
 };
 
-// The residual for a known camera model; empty where the model does not project the point.
+// The residual for a known camera model. Returns nullopt if the model does not project the point.
 template <class Model>
 std::optional<Residual> residual(const Model& model, const Vector3d& point_cam, const Vector2d& pixel) {
   const auto projection = model.project_with_jacobian(point_cam);
   if (!projection) return std::nullopt;
   return Residual{pixel - projection->pixel, projection->jacobian};
 }
-// Its value alone.
+// The value of the residual only.
 template <class Model>
 std::optional<Vector2d> residual_error(const Model& model, const Vector3d& point_cam, const Vector2d& pixel) {
   const auto projected = model.project(point_cam);
@@ -65,7 +65,7 @@ struct ReprojectionResidual {
   Matrix26d J_pose;   // de / d(left perturbation of T_rig_world, rotation first) = -J_h R_i0 [-[P']x  I]
   Matrix23d J_point;  // de / dP = -J_h R_i0 R_0w
 
-  // Empty where camera i does not project the point.
+  // Returns nullopt if camera i does not project the point.
   static std::optional<ReprojectionResidual> evaluate(const Rig& rig, CameraIndex i, const SE3& T_rig_world,
                                                       const Vector3d& point_world, const Vector2d& pixel);
   static std::optional<Vector2d> error_only(const Rig& rig, CameraIndex i, const SE3& T_rig_world,
@@ -80,15 +80,15 @@ constexpr double kFractionLeft = 0.95, kVarianceLeft = 0.80;
 // Bounds of chi-square at 95 %.
 constexpr double kChi2OneDof95 = 3.841, kChi2TwoDof95 = 5.991;
 
-// Squared normalised error at which the cost of an observation is truncated. One that misses by more, or does not
-// project, costs as much as at this bound and has no gradient, so a step cannot lower the cost by moving a point behind
-// a camera.
+// Squared normalised error at which the cost of an observation is truncated. Observations with a larger error, and
+// those that do not project, have the cost of this bound and no gradient, so that a step cannot decrease the cost by
+// moving a point behind a camera.
 constexpr double kMaxChi2 = 1e6;
 
 enum class Kernel { kNone, kHuber };
 
-// Huber weight and cost of a squared normalised error, with the knee at the 95 % bound of two degrees of freedom. The
-// cost is on the scale of chi2: half of it enters the sum to be minimised.
+// Huber weight and cost of a squared normalised error; the default threshold is the 95 % bound of two degrees of
+// freedom. The cost has the scale of chi2; the objective contains half of it.
 inline double huber_weight(double chi2, double knee_chi2 = kChi2TwoDof95) {
   return chi2 <= knee_chi2 ? 1.0 : std::sqrt(knee_chi2 / chi2);
 }
@@ -96,7 +96,7 @@ inline double huber_cost(double chi2, double knee_chi2 = kChi2TwoDof95) {
   return chi2 <= knee_chi2 ? chi2 : 2.0 * std::sqrt(knee_chi2 * chi2) - knee_chi2;
 }
 
-// The same under either kernel; the cost is truncated.
+// The same for a given kernel; the cost is truncated.
 inline double kernel_weight(Kernel kernel, double chi2) { return kernel == Kernel::kNone ? 1.0 : huber_weight(chi2); }
 inline double kernel_cost(Kernel kernel, double chi2) {
   const double truncated = chi2 < kMaxChi2 ? chi2 : kMaxChi2;

@@ -1,5 +1,5 @@
-// Parameters of the rig in bundle adjustment. A block type has some unknowns that all poses share; it says how each
-// pixel depends on them and what is known of them beforehand. The assembly of the normal equations knows no more of it.
+// Parameters of the rig in bundle adjustment. A block type defines unknowns that all poses share, the derivatives of
+// pixels with respect to them, and their prior. The assembly of the normal equations uses this interface only.
 #pragma once
 
 #include <memory>
@@ -9,16 +9,16 @@
 
 namespace bslam::solver {
 
-// The parameters themselves.
+// Values of the parameters.
 struct RigValues {
   std::vector<SE3> T_cam_rig;  // per camera; camera 0 is the identity
 };
 
-// One observation at the values of the linearisation.
+// An observation at the values of the linearisation.
 struct RigObservation {
   int camera = 0;
-  const SE3& T_cam_rig;       // extrinsics, without the motion between the times of pose and image
-  const Vector3d& point_cam;  // metres, at the time of the image
+  const SE3& T_cam_rig;       // extrinsics, without the motion from the time of the pose to that of the image
+  const Vector3d& point_cam;  // metres, at the capture time of the image
   const Matrix23d& J;         // d pixel / d point_cam, divided by sigma
 };
 
@@ -30,29 +30,30 @@ class RigBlock {
   };
 
   virtual ~RigBlock() = default;
-  virtual int size() const = 0;  // unknowns
-  // Which of its unknowns a pixel of a camera depends on.
+  virtual int size() const = 0;  // number of unknowns
+  // The range of its unknowns on which pixels of a camera depend.
   virtual Range columns(int camera) const = 0;
-  // d pixel / d those unknowns, divided by sigma: (2, columns(camera).size).
+  // Derivatives of the pixel with respect to those unknowns, divided by sigma: (2, columns(camera).size).
   virtual void evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const = 0;
   virtual void apply(const Eigen::VectorXd& delta, RigValues& values) const = 0;
-  // Half the squared normalised deviation from what is known beforehand, and its normal equations. The default is no
+  // Cost of the prior, half the squared normalised deviation from it, and its normal equations. The default is no
   // prior.
   virtual double prior_cost(const RigValues&) const { return 0.0; }
   virtual void add_prior(const RigValues&, Eigen::Ref<Eigen::MatrixXd>, Eigen::Ref<Eigen::VectorXd>) const {}
 };
 
-using RigBlocks = std::vector<std::unique_ptr<RigBlock>>;  // of one adjustment; no two change the same values
+using RigBlocks =
+    std::vector<std::unique_ptr<RigBlock>>;  // blocks of one adjustment; each must change different values
 
-// Calibrated extrinsics: those of each camera but the first are normally distributed about the calibrated ones.
+// Prior for the extrinsics of all cameras but the first: a normal distribution around the calibrated values.
 struct ExtrinsicPrior {
   std::vector<SE3> T_cam_rig;                        // calibrated, per camera
   double sigma_rotation = 0, sigma_translation = 0;  // radians, metres; per axis
 };
 
-// Difference of extrinsics from a reference: of D = T_cam_rig reference^-1, the logarithm of the rotation (radians),
-// then the translation (metres), both in the axes of the camera. The length of the latter is how far the camera's
-// centre moved.
+// Difference of extrinsics to a reference: for D = T_cam_rig reference^-1, the logarithm of the rotation (radians),
+// then the translation (metres), both in the axes of the camera. The length of the translation is the distance by which
+// the camera's centre moved.
 geometry::Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference);
 
 // The extrinsics of cameras 1 to N-1: left perturbations of T_cam_rig, rotation first.
@@ -71,7 +72,7 @@ class ExtrinsicsBlock : public RigBlock {
   ExtrinsicPrior prior_;
 };
 
-// One factor of all translations of the extrinsics, as its relative change: their length in units of the map.
+// A common scale factor of the translations of all extrinsics, as its relative change.
 class BaselineScaleBlock : public RigBlock {
  public:
   int size() const override { return 1; }

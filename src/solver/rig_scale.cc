@@ -10,11 +10,11 @@
 namespace bslam::solver {
 namespace {
 
-constexpr double kDamping = 1e-12;        // factor of the diagonal: points without parallax stay where they are
-constexpr double kMinInformation = 1e-9;  // share of the information that there would be with poses and points known
+constexpr double kDamping = 1e-12;        // factor of the diagonal; points without parallax do not move
+constexpr double kMinInformation = 1e-9;  // relative to the information if poses and points were known
 
-// The unit change of the free poses when the map grows about the first fixed pose. Images do not tell the size of the
-// map from the length of the extrinsics, so the size is held.
+// Derivative of the free poses with respect to a growth of the map around the first fixed pose. Images do not
+// distinguish the size of the map from the length of the extrinsics, so the size is held constant.
 Eigen::VectorXd growth(const ReprojectionProblem& problem, const BundleStructure& structure,
                        const BlockMatrix& frames) {
   const auto fixed = std::find(problem.pose_free.begin(), problem.pose_free.end(), std::uint8_t{0});
@@ -30,10 +30,10 @@ Eigen::VectorXd growth(const ReprojectionProblem& problem, const BundleStructure
 }
 
 struct ScaleStep {
-  double change = 0, information = 0;  // of the length of the extrinsics, poses and points marginalised out
+  double change = 0, information = 0;  // for the length of the extrinsics, with poses and points marginalised out
 };
 
-// One Gauss-Newton step with the size of the map held by a stiff term along `growth`.
+// One Gauss-Newton step; a stiff term along `growth` holds the size of the map constant.
 std::optional<ScaleStep> scale_step(ReducedSystem& system, const Eigen::VectorXd& growth) {
   const Eigen::Index frames = growth.size();
   Eigen::MatrixXd S = Eigen::MatrixXd::Zero(frames, frames);
@@ -47,8 +47,8 @@ std::optional<ScaleStep> scale_step(ReducedSystem& system, const Eigen::VectorXd
   return ScaleStep{rhs / information, information};
 }
 
-// Weighted mean squared error over what it should be with so many unknowns; empty where there are not more
-// observations.
+// Weighted mean squared error over its expectation for this number of unknowns. Returns nullopt if there are not more
+// observations than unknowns.
 std::optional<double> variance_factor(const std::vector<double>& chi2, std::size_t unknowns) {
   double sum = 0.0, count = 0.0;
   for (const double error : chi2) {
@@ -76,7 +76,8 @@ std::optional<RigScale> rig_scale(const ReprojectionProblem& problem, std::span<
   ReducedSystem& system = equations.reduce(kDamping);
   const Eigen::VectorXd size = growth(problem, structure, system.frames());
   const auto step = size.allFinite() ? scale_step(system, size) : std::nullopt;
-  const double conditional = bounded_diagonal(equations.rig_terms().H()(0, 0));  // information with all else known
+  const double conditional =
+      bounded_diagonal(equations.rig_terms().H()(0, 0));  // information if all other unknowns were known
   if (!step || !(step->information > kMinInformation * conditional)) return std::nullopt;
   const double length = 1.0 + step->change;
   const auto variance = variance_factor(equations.squared_errors(), 6 * slots + 3 * structure.num_points());

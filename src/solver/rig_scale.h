@@ -1,4 +1,4 @@
-// The scale of a map from the extrinsics of its rig, observable once the rig turns.
+// Estimates the scale of a map from the extrinsics of its rig; it is observable if the rig rotates.
 #pragma once
 
 #include <optional>
@@ -11,14 +11,14 @@ namespace bslam::solver {
 struct RigScale {
   double scale = 1.0;  // metres per unit of the map
   double deviation =
-      0.0;  // relative standard deviation of `scale`, enlarged where residuals exceed the keypoints' sigmas
+      0.0;  // relative standard deviation of `scale`, increased if residuals exceed the keypoints' sigmas
 };
 
 // One Gauss-Newton step over all free poses, all points and the length of the extrinsics in units of the map: T_cam_rig
-// = [R, t / scale]. In homogeneous coordinates that length enters linearly, so one step also serves a map whose scale
-// is far off. `problem` is in units of the map and stays unchanged. One pose should be fixed; more hold the shape of
-// the map, which makes the deviation too small. `skip` as for adjust. Empty where the scale is not observable: all
-// cameras in one place, no rotation, or an estimate that is not positive.
+// = [R, t / scale]. The projection is linear in that length in homogeneous coordinates, so that one step suffices even
+// if the scale is far off. `problem` is in units of the map and is not changed. Exactly one pose should be fixed; more
+// would constrain the shape of the map and make the deviation too small. `skip`: as for adjust. Returns nullopt if the
+// scale is not observable: all cameras at one position, no rotation, or an estimate that is not positive.
 std::optional<RigScale> rig_scale(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip = {});
 
 }  // namespace bslam::solver

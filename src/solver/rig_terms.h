@@ -16,38 +16,38 @@ class RigTerms {
   using Matrix3d = geometry::Matrix3d;
   using Matrix63d = Eigen::Matrix<double, 6, 3>;
 
-  // The arguments outlive this. `frame_unknowns`: of all frames together. Without blocks nothing of this costs
-  // anything.
+  // The arguments must outlive the terms. `frame_unknowns`: number of unknowns of all frames. Without blocks all
+  // functions return immediately.
   RigTerms(const BundleStructure& structure, std::size_t num_cameras, const RigBlocks& blocks, int frame_unknowns);
 
-  int size() const { return static_cast<int>(b_.size()); }  // unknowns of all blocks
+  int size() const { return static_cast<int>(b_.size()); }  // number of unknowns of all blocks
   double prior_cost(const RigValues& values) const;
-  // `delta`: of all blocks.
+  // `delta`: step of the unknowns of all blocks.
   void apply(const Eigen::VectorXd& delta, RigValues& values) const;
 
-  // Sets all sums to the priors; the observations of a point follow begin_point(point).
+  // Sets all sums to the priors. Call begin_point(point) before adding the observations of a point.
   void begin(const RigValues& values);
   void begin_point(std::size_t point);
-  // How the point of an observation depends on its pose and position.
+  // The point of an observation and its pose.
   struct Point {
     const Vector3d& point_rig;
     const Matrix3d& R_rig_world;
-    int pose_offset;  // first unknown of the pose; below zero where it is fixed
+    int pose_offset;  // first unknown of the pose; negative if it is fixed
   };
-  // `A`: d pixel / d point_rig and `e`: the error, both divided by sigma.
+  // `A`: d pixel / d point_rig. `e`: the error. Both divided by sigma.
   void add(const RigObservation& observation, const Matrix23d& A, const Vector2d& e, double weight, const Point& point);
 
   // Writes the damped block, its border and right-hand side.
   void copy_to(double damping, ReducedSystem& system) const;
-  // One point and a free pose: U = W L^-T and the first unknown of the pose.
+  // Coupling of a point and a free pose: U = W L^-T, and the first unknown of the pose.
   struct PoseCoupling {
     Matrix63d U;
     int pose_offset = 0;
   };
-  // Subtracts what a point says of the rig, with V = L L^T the point's block and y = L^-1 b its right-hand side.
+  // Eliminates a point from the rig's equations. V = L L^T is the point's block and y = L^-1 b its right-hand side.
   void eliminate(std::size_t point, const Matrix3d& L, const Vector3d& y, std::span<const PoseCoupling> poses,
                  ReducedSystem& system);
-  // Subtracts W^T delta of the rig's unknowns from the right-hand side of a point.
+  // Subtracts W^T delta for the rig's unknowns from the right-hand side of a point.
   void substitute(std::size_t point, const Eigen::VectorXd& delta, Vector3d& rhs) const;
 
   const Eigen::MatrixXd& H() const { return H_; }  // lower triangle
@@ -60,15 +60,15 @@ class RigTerms {
   };
 
   const RigBlocks& blocks_;
-  std::vector<int> first_of_block_;         // unknown, per block
-  std::vector<std::vector<int>> unknowns_;  // per camera: those its pixels depend on
+  std::vector<int> first_of_block_;         // per block: its first unknown
+  std::vector<std::vector<int>> unknowns_;  // per camera: unknowns on which its pixels depend
   Eigen::MatrixXd H_, border_;
   Eigen::VectorXd b_;
   std::vector<Coupling> couplings_;          // per point, unknowns ascending
-  std::vector<std::size_t> first_coupling_;  // per point and one more
+  std::vector<std::size_t> first_coupling_;  // per point, and the end
   std::vector<Coupling*> coupling_of_;       // per unknown, of the current point
   RigBlock::Jacobian J_;                     // scratch memory of one observation
-  std::vector<Vector3d> u_;                  // and of one elimination: L^-1 w
+  std::vector<Vector3d> u_;                  // scratch memory of one elimination: L^-1 w
 };
 
 }  // namespace bslam::solver

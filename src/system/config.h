@@ -1,4 +1,4 @@
-// Every setting of a run, gathered: one struct per stage, with defaults beside their meaning.
+// All options of a run: one struct per stage, with default values.
 #pragma once
 
 #include "base/options.h"
@@ -15,19 +15,19 @@
 namespace bslam::system {
 
 struct IoOptions {
-  double sync_tolerance = 0.002;  // s: images of different cameras within it make one frame
+  double sync_tolerance = 0.002;  // s, maximum time difference between the images of a frame
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("sync_tolerance", self.sync_tolerance, Range{0, 1}, "s",
-            "images of different cameras within it make one frame", kCommon);
+            "maximum time difference between the images of a frame", kCommon);
   }
 };
 
 struct Config {
   int seed = 1;
   bool final_adjustment = true;  // global bundle adjustment at the end
-  bool localize_only = false;    // poses in a loaded map, which stays as it is
+  bool localize_only = false;    // localise in a loaded map, which is not changed
   execution::Mode mode = execution::Mode::kParallel;
   IoOptions io;
   execution::ExecutionOptions execution;
@@ -43,9 +43,10 @@ struct Config {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("seed", self.seed, Range{0, 2147483647}, "", "of all randomness", kCommon);
+    visitor("seed", self.seed, Range{0, 2147483647}, "", "seed of all random numbers", kCommon);
     visitor("final_adjustment", self.final_adjustment, Range{}, "", "global bundle adjustment at the end", kCommon);
-    visitor("localize_only", self.localize_only, Range{}, "", "poses in a loaded map, which stays as it is", kCommon);
+    visitor("localize_only", self.localize_only, Range{}, "", "localise in a loaded map, which is not changed",
+            kCommon);
     visitor("mode", self.mode, Range{}, "", "when stages run", kCommon);
     visitor.section("io", self.io);
     visitor.section("execution", self.execution);
@@ -59,7 +60,7 @@ struct Config {
   }
 };
 
-// Settings that contradict each other, or the absence of a loaded map. The Error names the key, and no file.
+// Returns an Error with the key, without a file, if options contradict each other or a required loaded map is missing.
 Status check_config(const Config& config, bool with_map);
 
 }  // namespace bslam::system

@@ -9,15 +9,15 @@ using geometry::SE3;
 using geometry::Vector6d;
 using tracking::FrameRecord;
 
-// Mean twist from the middle frame's time to `delay` after it, of the parabola through three poses: the mean twists of
-// the two intervals are those at their middles, and it is the one at half the delay.
+// Mean twist from the middle frame's time to `delay` after it, for constant acceleration through three poses: the mean
+// twist of an interval is the twist at its middle, and the result is the twist at half the delay.
 std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, const map::BundledMap& map,
                                       double delay_s) {
   const double before_s = to_seconds(frames[1].result.time_ns - frames[0].result.time_ns);
   const double after_s = to_seconds(frames[2].result.time_ns - frames[1].result.time_ns);
   const auto near = [](double interval_s) { return interval_s > 0 && interval_s <= tracking::kMaxPrediction_s; };
   if (!near(before_s) || !near(after_s)) return std::nullopt;
-  if (frames[1].relocalisation || frames[2].relocalisation) return std::nullopt;  // found elsewhere: no motion
+  if (frames[1].relocalisation || frames[2].relocalisation) return std::nullopt;  // relocalised: the motion is unknown
   std::optional<SE3> T[3];
   KeyframeId root[3];
   for (std::size_t i = 0; i < 3; ++i) {

@@ -1,4 +1,4 @@
-// Poses and motions of all frames in the finished map.
+// Poses and motions of all frames in the final map.
 #pragma once
 
 #include <optional>
@@ -11,13 +11,13 @@
 
 namespace bslam::system {
 
-// Pose of a frame in `map`. Empty where the frame has none or `map` no longer holds the submap it was tracked in.
+// Pose of a frame in `map`. Returns nullopt if the frame has none or its submap was removed from `map`.
 std::optional<geometry::SE3> T_rig_world_of(const tracking::FrameRecord& record, const map::BundledMap& map);
 
-// How the rig moved while the cameras of a keyframe fired one after the other: by constant acceleration from the frame
-// before through the keyframe to the frame after it, which tracking could not know. Keyframes in slots from `first` on
-// that have late cameras and a frame with a pose on either side, no farther than tracking::kMaxPrediction_s and not by
-// relocalisation. `frames`: of the run, in order.
+// Motion of the rig during the capture of keyframes, by constant acceleration through the previous frame, the keyframe
+// and the next frame, which was not available during tracking. Contains the keyframes with ids from `first` on that
+// have late cameras, if both adjacent frames have a pose, are within tracking::kMaxPrediction_s and connected without
+// relocalisation. `frames`: all frames of the run, in order.
 std::vector<std::pair<KeyframeId, geometry::Vector6d>> twists_from_neighbours(
     const map::BundledMap& map, KeyframeId first, std::span<const tracking::FrameRecord> frames);
 

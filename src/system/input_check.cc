@@ -18,11 +18,11 @@ Status check_frame(const image::ImageBundle& images, const camera::Rig& rig, con
   if (!images.id.valid()) return Error{frame, "id", std::to_string(images.id.value()), "a number from 0 on"};
   if (before && images.id <= before->id) {
     return Error{frame, "id", std::to_string(images.id.value()),
-                 "a number after " + std::to_string(before->id.value()) + ", that of the last frame"};
+                 "a number larger than " + std::to_string(before->id.value()) + ", the id of the last frame"};
   }
   if (before && images.time_ns <= before->time_ns) {
     return Error{frame, "time", std::to_string(images.time_ns) + " ns",
-                 "a time after " + std::to_string(before->time_ns) + " ns, that of the last frame"};
+                 "a time after " + std::to_string(before->time_ns) + " ns, the time of the last frame"};
   }
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const image::CameraImage& image = images.images[c];

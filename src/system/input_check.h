@@ -1,4 +1,4 @@
-// Does what a caller hands in fit the rig?
+// Checks the input of a caller.
 #pragma once
 
 #include <optional>
@@ -10,18 +10,18 @@
 
 namespace bslam::system {
 
-// What identifies an input frame in time.
+// Id and time of an input frame.
 struct FrameStamp {
   FrameId id;
   TimeNs time_ns = 0;
 };
 
-// Errors: not one entry per camera; an image of another size than its camera's; an id or a time that is not after that
-// of the frame before, where there was one.
+// Errors: the number of images differs from the number of cameras; the size of an image differs from its camera's; the
+// id or time is not larger than that of the previous frame `before`, if there is one.
 Status check_frame(const image::ImageBundle& images, const camera::Rig& rig, const std::optional<FrameStamp>& before);
 
-// Errors: another number of masks than cameras, unless there are none at all; a mask of another size than its camera's
-// images, unless it is empty.
+// Errors: the number of masks differs from the number of cameras and is not 0; the size of a mask differs from the size
+// of its camera's images, and it is not empty.
 Status check_masks(std::span<const image::Image> masks, const camera::Rig& rig);
 
 }  // namespace bslam::system

@@ -27,8 +27,8 @@ execution::JournalStep journal_step(tracking::ProposedEdit::Kind kind) {
   return kind == tracking::ProposedEdit::Kind::kStart ? execution::JournalStep::kStart : execution::JournalStep::kTrack;
 }
 
-// What is known about each camera once the frame is tracked.
-std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images, const tracking::PictureFaults& faults,
+// Observations about each camera after the frame was tracked.
+std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images, const tracking::ImageFaults& faults,
                                                const tracking::FramePlan& plan, const tracking::TrackResult& result) {
   std::vector<tracking::CameraEvidence> out;
   for (std::size_t c = 0; c < images.images.size(); ++c) {
@@ -36,7 +36,7 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
     out.push_back({.image = images.images[c].state,
                    .outage = faults.outage[c],
                    .blurred = faults.blurred[c] != 0,
-                   .inconsistent = counts.doubted,
+                   .inconsistent = counts.excluded,
                    .postponed = plan.postponed[c] != 0,
                    .keypoints = counts.keypoints,
                    .inliers = counts.inliers});
@@ -59,7 +59,7 @@ Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<ima
 Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution::StageExecutor& executor) {
   const Stopwatch whole;
   Outcome outcome;
-  const tracking::PictureFaults faults = monitor_.examine(images);
+  const tracking::ImageFaults faults = monitor_.examine(images);
   const tracking::FramePlan plan = tracker_.plan(images, faults, state_);
 
   std::vector<StageTime> stages;
@@ -98,7 +98,7 @@ void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor&
   tracker_.committed(report, tracked);
   outcome.keyframes = report.keyframes;
   outcome.started_submap = edit.kind == tracking::ProposedEdit::Kind::kStart;
-  tracked.record.stages.back().ms += watch.ms();  // of the stage that proposed the edit
+  tracked.record.stages.back().ms += watch.ms();  // added to the time of the stage that proposed the edit
 }
 
 BundledFrame Pipeline::make_frame(const image::ImageBundle& images) {
@@ -107,7 +107,7 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images) {
 }
 
 BundledFrame Pipeline::extract(const image::ImageBundle& images, const tracking::FramePlan& plan) {
-  BundledFrame frame = builder_.extract(images, pool_, plan.left_out, plan.budgets);
+  BundledFrame frame = builder_.extract(images, pool_, plan.skipped, plan.budgets);
   frame.twist = plan.twist;
   if (config_.tracking.use_capture_times) return frame;
   for (frame::CameraFrame& c : frame.cameras) c.time_ns = frame.time_ns;

@@ -1,5 +1,5 @@
-// One frame through the caller's thread: monitor the cameras, extract, bundle, track, commit. Policy is that of the
-// tracker (tracking/tracker.h); background stages are those of the executor.
+// Processing of a frame in the caller's thread: camera monitoring, extraction, bundling, tracking, commit. Decisions
+// are made by the tracker (tracking/tracker.h); background stages are run by the executor.
 #pragma once
 
 #include <memory>
@@ -18,26 +18,28 @@ using tracking::StageTime;
 
 class Pipeline {
  public:
-  // `rig` and `config` outlive it. Without a relocaliser a lost rig is searched for only where it was lost.
+  // `rig` and `config` must outlive the pipeline. Without a relocaliser a lost rig is only searched for near its last
+  // pose.
   Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
            std::unique_ptr<tracking::Relocaliser> relocaliser = nullptr);
 
   struct Outcome {
     FrameRecord record;
-    map::MapSnapshot seen;              // version of the map the frame was tracked in
-    std::vector<KeyframeId> keyframes;  // added to the map, in order: the background stages are due for them
-    bool started_submap = false;        // the first of them is the root of a new submap
-    std::vector<tracking::BetweenKeyframes> early;  // frames a start up to scale was made from, the first among them
+    map::MapSnapshot seen;  // version of the map the frame was tracked in
+    std::vector<KeyframeId>
+        keyframes;                // added to the map, in order; the caller enqueues them for the background stages
+    bool started_submap = false;  // the first of `keyframes` is the root of a new submap
+    std::vector<tracking::BetweenKeyframes> early;  // frames of a monocular initialisation, including the first
   };
 
-  // Reads the version of the map that `executor` gives the frame, and commits keyframes through it. `images`: one per
-  // camera of the rig.
+  // Tracks a frame in the version of the map that `executor` returns for it, and commits keyframes through `executor`.
+  // `images`: one entry per camera of the rig.
   Outcome process(const image::ImageBundle& images, execution::StageExecutor& executor);
 
-  // Extraction and bundling of a frame by itself.
+  // Extracts and bundles a single frame.
   frame::BundledFrame make_frame(const image::ImageBundle& images);
 
-  // Forgets the map that was tracked; the next frames start another.
+  // Resets tracking; the next frames initialise another map.
   void restart() { state_ = state_.restarted(); }
 
   tracking::TrackStatus status() const { return state_.track.status; }

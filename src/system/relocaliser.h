@@ -24,7 +24,7 @@ class PlaceRelocaliser : public tracking::Relocaliser {
   const std::uint64_t seed_;
 };
 
-// Null without a vocabulary: then nothing is recognised.
+// Returns null without a vocabulary; then no place is recognised.
 std::unique_ptr<tracking::Relocaliser> make_relocaliser(const place::VocabularyPtr& vocabulary, const Config& config);
 
 }  // namespace bslam::system

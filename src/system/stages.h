@@ -1,4 +1,4 @@
-// The background stages of a run, as functions its executor calls.
+// The background stages of a run, as functions for its executor.
 #pragma once
 
 #include <functional>
@@ -13,13 +13,13 @@ namespace bslam::system {
 // A loop that was closed, or two submaps that were merged.
 struct LoopRecord {
   looping::LoopClosure closure;
-  TimeNs time_ns = 0, with_time_ns = 0;  // of the frames of the two keyframes
+  TimeNs time_ns = 0, with_time_ns = 0;  // times of the two keyframes
 };
 
 // Called for every loop closure that was committed, in the committing thread.
 using LoopObserver = std::function<void(const LoopRecord&)>;
 
-// `config` outlives them. Without a vocabulary no loops are closed.
+// `config` must outlive the functions. Without a vocabulary no loops are closed.
 execution::StageFunctions make_stages(const Config& config, const place::VocabularyPtr& vocabulary,
                                       LoopObserver observer);
 

@@ -10,9 +10,9 @@
 namespace bslam::system {
 namespace {
 
-constexpr std::size_t kYoungMap = 4;  // keyframes: a map lost before it has grown beyond them was no good start
+constexpr std::size_t kMaxFailedMap = 4;  // maximum number of keyframes of a map that is discarded if tracking is lost
 
-// Lost although there was something to see: the map, not the images, is in doubt.
+// Returns true if the frame is lost although it has features: the map may be wrong.
 bool disowns_map(const tracking::TrackResult& result) {
   using tracking::LostReason;
   return result.reason == LostReason::kFewMatches || result.reason == LostReason::kFewInliers ||
@@ -60,8 +60,8 @@ System::System(camera::Rig rig, Config config, Resources resources)
 
 System::~System() = default;
 
-// A start up to scale can be wrong and shows it at once: the next frames find nothing. What it told is withdrawn.
-void System::give_up_young_map() {
+// Discards a wrong monocular initialisation, including the poses it returned.
+void System::discard_map() {
   for (FrameRecord& record : frames_) {
     if (record.result.status != tracking::TrackStatus::kTracking) continue;
     record.result.status = tracking::TrackStatus::kLost;
@@ -86,7 +86,7 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
   Pipeline::Outcome outcome = pipeline_.process(images, *executor_);
   maps_started_ += outcome.started_submap;
   std::ranges::move(outcome.early, std::back_inserter(early_));
-  // A start up to scale makes two keyframes, both under the time of the frame that made it.
+  // A monocular initialisation adds two keyframes, both with the time of the second frame.
   for (const KeyframeId k : outcome.keyframes) set_keyframe_time(k, outcome.record.result.time_ns);
   const Stopwatch watch;
   for (const KeyframeId k : outcome.keyframes) executor_->enqueue(k);
@@ -94,22 +94,22 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
-  const bool refuted = refuted_young_map(outcome, had_pose);
+  const bool refuted = initialisation_failed(outcome, had_pose);
   frames_.push_back(std::move(outcome.record));
-  if (refuted) give_up_young_map();
+  if (refuted) discard_map();
   FrameRecord record = frames_.back();
   bound_history();
   return record;
 }
 
-// Was a start up to scale that was made a moment ago a wrong one?
-bool System::refuted_young_map(const Pipeline::Outcome& outcome, bool had_pose) const {
+// Returns true if a recent monocular initialisation was wrong, because the frames after it are lost.
+bool System::initialisation_failed(const Pipeline::Outcome& outcome, bool had_pose) const {
   const map::BundledMap& seen = *outcome.seen;
   return had_pose && !loaded_ && disowns_map(outcome.record.result) && seen.scale() != map::Scale::kMetric &&
-         seen.keyframe_slots() <= kYoungMap;
+         seen.keyframe_slots() <= kMaxFailedMap;
 }
 
-// Drops the oldest records once there are twice as many as asked for, so that a frame costs the same on average.
+// Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.
 void System::bound_history() {
   if (history_ == 0 || frames_.size() < 2 * history_) return;
   const auto drop_oldest = [this](auto& records) {
@@ -139,7 +139,7 @@ void System::finish() {
   executor_->end();
 }
 
-// A start up to scale needs some frames; where the rig was in them the finished map tells.
+// Determines the poses of the frames during monocular initialisations in the final map.
 void System::locate_early_frames() {
   const map::MapSnapshot map = store_.snapshot();
   for (const tracking::BetweenKeyframes& early : early_) {
@@ -152,7 +152,7 @@ void System::locate_early_frames() {
   }
 }
 
-// Where the images put the cameras, and where that is wanted, the map with them there.
+// Estimates the extrinsics and, if configured, applies them to the map.
 void System::check_extrinsics(map::MapDraft& draft, const std::stop_token& stop) {
   const auto& options = config_.extrinsics;
   if ((!options.check && !options.refine) || stop.stop_requested()) return;

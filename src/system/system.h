@@ -1,4 +1,4 @@
-// The whole system: images in, poses out. Owns the map and the threads.
+// The SLAM system: computes poses and a map from images. Owns the map and the threads.
 #pragma once
 
 #include <functional>
@@ -22,29 +22,29 @@
 
 namespace bslam::system {
 
-// One run of a background stage: its time and its figures.
+// One run of a background stage.
 struct StageRecord {
   execution::StageRun run;
-  TimeNs time_ns = 0;  // of its keyframe
+  TimeNs time_ns = 0;  // time of its keyframe
 };
 
-// Called after every run of a background stage, by any thread, also by several at once.
+// Called after every run of a background stage. Must be thread-safe: called from any thread, also concurrently.
 using StageRecordObserver = std::function<void(const StageRecord&)>;
 
-// What a run may be given besides rig and configuration.
+// Optional input of a run.
 struct Resources {
-  std::vector<image::Image> masks = {};  // one per camera of the rig, an empty image = none; or no masks at all
+  std::vector<image::Image> masks = {};  // one per camera of the rig, empty if it has no mask; or no masks at all
   place::VocabularyPtr vocabulary = {};  // null: no place is recognised
-  std::optional<map::BundledMap> map =
-      {};  // of an earlier run with this rig; the run goes on in it once it finds its place
-  std::optional<execution::Journal> replay = {};  // its run is repeated whatever the mode
+  // Map of an earlier run with this rig. The run continues in it after relocalisation.
+  std::optional<map::BundledMap> map = {};
+  std::optional<execution::Journal> replay = {};  // repeats the run of this journal, regardless of the mode
   StageRecordObserver observer = {};              // may be empty
-  // For runs without end: records of this many last frames and stage runs at least are kept, and no journal. 0: all
-  // are.
+  // Minimum number of last frames and stage runs whose records are kept, for runs of unlimited duration; no journal is
+  // kept then. 0: all records and the journal are kept.
   std::size_t history = 0;
 };
 
-// Poses of one part of the map. Parts that no common place joined have worlds of their own.
+// Poses in one submap. Each submap has its own world frame.
 struct SubmapTrajectory {
   KeyframeId root;
   evaluation::Trajectory poses;  // T_world_cam0
@@ -52,54 +52,53 @@ struct SubmapTrajectory {
 
 class System {
  public:
-  // `resources`: masks that pass check_masks. Where a journal is given, the frames must be those of the journal, and
-  // calls throw ReplayMismatch where it does not fit.
+  // The masks of `resources` must pass check_masks. If a journal is given, the frames must be those of the journal, and
+  // calls throw ReplayMismatch if the run differs from it.
   System(camera::Rig rig, Config config, Resources resources = {});
   ~System();
 
-  // Tracks the next frame. `images`: one entry per camera of the rig, which may be missing. Errors, after which the run
-  // goes on as if there had been no such call: those of check_frame (system/input_check.h). One thread calls. Throws
-  // what a worker threw.
+  // Tracks the next frame. `images`: one entry per camera of the rig; images may be missing. Errors: see check_frame in
+  // system/input_check.h; a call with an error has no effect on the run. All calls must come from one thread. Rethrows
+  // exceptions of workers.
   Result<FrameRecord> process(const image::ImageBundle& images);
 
-  // Waits for the stages and, where configured, adjusts the whole map. Call once, after the last frame.
+  // Waits for the stages and, if configured, adjusts the whole map. Must be called once, after the last frame.
   void finish();
 
-  // From any thread, at any time: background stages and the adjustment at the end are stopped or left out, so that
-  // whatever the caller's thread is in returns soon. What a stopped one had found does not come into the map.
+  // Thread-safe, at any time. Stops or skips background stages and the adjustment at the end, so that the current call
+  // of the caller's thread returns soon. Results of stopped stages are discarded.
   void interrupt();
 
   map::MapSnapshot snapshot() const { return store_.snapshot(); }
   // The last frames in order: all of the run, or at least Resources::history of them. Valid until the next
   // process().
   const std::vector<FrameRecord>& frames() const { return frames_; }
-  // The same given away, which leaves none: for what is wanted of a run after its trajectories.
+  // Moves the frames out; frames() is empty afterwards.
   std::vector<FrameRecord> take_frames() { return std::exchange(frames_, {}); }
   std::vector<StageRecord> stage_runs() const;
-  execution::Journal journal() const {
-    return gate_.journal();
-  }  // what a replay needs; empty where the history is bounded
+  // The journal for a replay; empty if the history is bounded.
+  execution::Journal journal() const { return gate_.journal(); }
   double final_adjustment_ms() const { return final_adjustment_ms_; }
   const adjustment::AdjustmentReport& final_adjustment() const { return final_adjustment_; }
-  // What finish() found about the extrinsics; not done where that was not asked for or not possible.
+  // The refinement of the extrinsics by finish(); not `done` if it was not configured or not possible.
   const calibration::RigRefinement& extrinsics() const { return extrinsics_; }
-  bool extrinsics_refined() const { return extrinsics_refined_; }  // and the map made with them
+  bool extrinsics_refined() const { return extrinsics_refined_; }  // true if the map uses the refined extrinsics
   double extrinsics_ms() const { return extrinsics_ms_; }
   int maps_started() const { return maps_started_; }
 
   std::vector<LoopRecord> loops() const;
   TimeNs keyframe_time(KeyframeId k) const;
 
-  // Every frame of frames() that has a pose, resolved against the present map: a trajectory for each part of the map
-  // that has some, the longest first.
+  // Poses of all frames() that have one, in the current map: one trajectory for each submap with poses, the longest
+  // first.
   std::vector<SubmapTrajectory> trajectories() const;
-  // The same as the caller was told at the time, never corrected, by parts as they were then; that of the longest final
-  // trajectory first.
+  // Uncorrected poses, as returned by process(), in the submaps of that time; the one of the longest final trajectory
+  // first.
   std::vector<SubmapTrajectory> live_trajectories() const;
 
  private:
-  bool refuted_young_map(const Pipeline::Outcome& outcome, bool had_pose) const;
-  void give_up_young_map();
+  bool initialisation_failed(const Pipeline::Outcome& outcome, bool had_pose) const;
+  void discard_map();
   void bound_history();
   void locate_early_frames();
   void check_extrinsics(map::MapDraft& draft, const std::stop_token& stop);
@@ -107,17 +106,17 @@ class System {
 
   const camera::Rig rig_;
   const Config config_;
-  const bool loaded_;                // a map of an earlier run
-  const KeyframeId first_keyframe_;  // of this run
+  const bool loaded_;                // whether the run began with a loaded map
+  const KeyframeId first_keyframe_;  // first keyframe of this run
   Pipeline pipeline_;
-  const std::size_t history_;  // as in Resources
+  const std::size_t history_;  // see Resources
   std::optional<FrameStamp> last_input_;
   std::vector<FrameRecord> frames_;
-  std::vector<tracking::BetweenKeyframes> early_;  // frames of before a start, by number
+  std::vector<tracking::BetweenKeyframes> early_;  // frames of monocular initialisations, in order of id
   mutable std::mutex records_mutex_;
-  std::vector<StageRecord> stage_runs_;  // guarded by records_mutex_, as the two below
+  std::vector<StageRecord> stage_runs_;  // this and the next two members are guarded by records_mutex_
   std::vector<LoopRecord> loops_;
-  std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId of the present map
+  std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId of the current map
   double final_adjustment_ms_ = 0, extrinsics_ms_ = 0;
   adjustment::AdjustmentReport final_adjustment_;
   calibration::RigRefinement extrinsics_;
@@ -126,7 +125,7 @@ class System {
   std::stop_source interruption_;
   map::MapStore store_;
   execution::MapGate gate_;
-  std::unique_ptr<execution::StageExecutor> executor_;  // last: its threads end before the rest goes
+  std::unique_ptr<execution::StageExecutor> executor_;  // last member, so that its threads are joined first
 };
 
 }  // namespace bslam::system

@@ -8,35 +8,36 @@ namespace bslam::tracking {
 
 using geometry::SE3;
 
-CameraTrust trusted(bool established) {
-  CameraTrust camera;
+CameraConsensusState readmitted(bool established) {
+  CameraConsensusState camera;
   camera.established = established;
   return camera;
 }
 
-std::vector<CameraTrust> doubts_of(std::vector<CameraTrust> cameras, const std::vector<int>& seen,
-                                   const ConsensusOptions& options) {
+std::vector<CameraConsensusState> readmit_observing_cameras(std::vector<CameraConsensusState> cameras,
+                                                            const std::vector<int>& seen,
+                                                            const ConsensusOptions& options) {
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     cameras[c].landmarks.clear();
-    if (seen[c] >= options.min_expected) cameras[c] = trusted(true);
+    if (seen[c] >= options.min_expected) cameras[c] = readmitted(true);
   }
   return cameras;
 }
 
-std::vector<Expectation> continuity(const map::BundledMap& map, const frame::BundledFrame& frame,
-                                    const SE3& T_rig_world, const std::vector<CameraTrust>& trust,
-                                    const FrameMatches& found) {
+std::vector<LandmarkCounts> count_reobserved(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                             const SE3& T_rig_world, const std::vector<CameraConsensusState>& states,
+                                             const FrameMatches& found) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  std::vector<Expectation> out(trust.size());
-  for (std::size_t c = 0; c < trust.size(); ++c) {
-    if (frame.cameras[c].state != image::ImageState::kPresent || trust[c].doubted) continue;
+  std::vector<LandmarkCounts> out(states.size());
+  for (std::size_t c = 0; c < states.size(); ++c) {
+    if (frame.cameras[c].state != image::ImageState::kPresent || states[c].excluded) continue;
     std::vector<LandmarkId> again;
     if (c < found.size()) {
       for (const Match& m : found[c]) again.push_back(m.landmark);
     }
     std::sort(again.begin(), again.end());
     const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
-    for (const LandmarkId before : trust[c].landmarks) {
+    for (const LandmarkId before : states[c].landmarks) {
       const LandmarkId l = map.resolve(before);
       if (!l.valid()) continue;
       const auto pixel = rig.camera(c).project(T_cam_world * map.landmark(l).position);
@@ -48,11 +49,12 @@ std::vector<Expectation> continuity(const map::BundledMap& map, const frame::Bun
   return out;
 }
 
-std::vector<std::uint8_t> contradicting(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
-                                        const std::vector<CameraTrust>& trust, const ConsensusOptions& options) {
+std::vector<std::uint8_t> conflicting_cameras(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
+                                              const std::vector<CameraConsensusState>& states,
+                                              const ConsensusOptions& options) {
   std::vector<std::uint8_t> out(matches.size(), 0);
-  for (std::size_t c = 0; c < trust.size(); ++c) {
-    if (!trust[c].established) continue;
+  for (std::size_t c = 0; c < states.size(); ++c) {
+    if (!states[c].established) continue;
     const auto found = static_cast<int>(matches[c].size());
     out[c] = found >= options.min_expected && inliers_per_camera[c] < options.conflict_inlier_ratio * found;
   }
@@ -63,74 +65,78 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
                                                     std::span<const solver::PoseObservation> observations,
                                                     const SE3& predicted, const ConsensusOptions& options,
                                                     const solver::PoseSolverOptions& pose) {
-  constexpr double kRadiansPerMetre = 1.0;  // turning as much as passing something a metre away
-  constexpr double kAgrees = 25.0;          // squared normalised error at a camera's own pose
+  constexpr double kRadiansPerMetre = 1.0;  // weight of a translation relative to a rotation
+  constexpr double kMaxChi2 = 25.0;  // squared normalised error of observations that agree with a camera's own pose
   solver::PoseSolution best;
-  double least = std::numeric_limits<double>::infinity();
+  double min_distance = std::numeric_limits<double>::infinity();
   std::size_t first = 0;
   for (const auto& camera : matches) {
     const auto own = observations.subspan(first, camera.size());
     first += camera.size();
     if (static_cast<int>(camera.size()) < options.min_expected) continue;
-    const solver::PoseSolution alone = solver::solve_pose(rig, own, predicted, pose);
-    if (!alone.ok || alone.num_inliers < options.healthy_reobservation_ratio * static_cast<double>(camera.size()))
+    const solver::PoseSolution single = solver::solve_pose(rig, own, predicted, pose);
+    if (!single.ok || single.num_inliers < options.healthy_reobservation_ratio * static_cast<double>(camera.size()))
       continue;
-    const geometry::Vector6d off = (alone.T_rig_world * predicted.inverse()).log();
-    const double distance = off.head<3>().norm() + kRadiansPerMetre * off.tail<3>().norm();
-    if (distance >= least) continue;
+    const geometry::Vector6d difference = (single.T_rig_world * predicted.inverse()).log();
+    const double distance = difference.head<3>().norm() + kRadiansPerMetre * difference.tail<3>().norm();
+    if (distance >= min_distance) continue;
     solver::PoseSolverOptions near = pose;
-    near.first_chi2 = kAgrees;
-    solver::PoseSolution joint = solver::solve_pose(rig, observations, alone.T_rig_world, near);
+    near.first_chi2 = kMaxChi2;
+    solver::PoseSolution joint = solver::solve_pose(rig, observations, single.T_rig_world, near);
     if (!joint.ok) continue;
-    least = distance;
+    min_distance = distance;
     best = std::move(joint);
   }
   return best;
 }
 
-std::vector<std::uint8_t> disagreeing(const std::vector<Expectation>& continuity, const std::vector<CameraTrust>& trust,
-                                      const ConsensusOptions& options) {
-  std::vector<std::uint8_t> out(continuity.size(), 0);
-  const auto counts = [&](const Expectation& e) { return e.expected >= options.min_expected; };
-  const bool sound = std::ranges::any_of(
-      continuity, [&](const Expectation& e) { return counts(e) && e.share() >= options.healthy_reobservation_ratio; });
-  for (std::size_t c = 0; sound && c < out.size(); ++c) {
-    out[c] = counts(continuity[c]) && continuity[c].share() < options.min_reobservation_ratio &&
-             trust[c].share >= options.previous_reobservation_ratio;
+std::vector<std::uint8_t> cameras_losing_view(const std::vector<LandmarkCounts>& reobserved,
+                                              const std::vector<CameraConsensusState>& states,
+                                              const ConsensusOptions& options) {
+  std::vector<std::uint8_t> out(reobserved.size(), 0);
+  const auto counts = [&](const LandmarkCounts& e) { return e.expected >= options.min_expected; };
+  const bool any_healthy = std::ranges::any_of(reobserved, [&](const LandmarkCounts& e) {
+    return counts(e) && e.ratio() >= options.healthy_reobservation_ratio;
+  });
+  for (std::size_t c = 0; any_healthy && c < out.size(); ++c) {
+    out[c] = counts(reobserved[c]) && reobserved[c].ratio() < options.min_reobservation_ratio &&
+             states[c].reobservation_ratio >= options.previous_reobservation_ratio;
   }
   return out;
 }
 
-void trust(CameraTrust& camera, const Expectation& continuity, const ConsensusOptions& options) {
-  if (continuity.expected >= options.min_expected) camera.share = continuity.share();
+void update_reobservation_ratio(CameraConsensusState& camera, const LandmarkCounts& reobserved,
+                                const ConsensusOptions& options) {
+  if (reobserved.expected >= options.min_expected) camera.reobservation_ratio = reobserved.ratio();
 }
 
-void doubt(CameraTrust& camera, const Expectation& view, TimeNs time_ns, const ConsensusOptions& options) {
+void update_exclusion(CameraConsensusState& camera, const LandmarkCounts& view, TimeNs time_ns,
+                      const ConsensusOptions& options) {
   camera.landmarks.clear();
-  if (!std::exchange(camera.doubted, true)) camera.judged_ns = camera.since_ns = time_ns;
+  if (!std::exchange(camera.excluded, true)) camera.last_judged_ns = camera.excluded_since_ns = time_ns;
   const bool judged = view.expected >= options.min_expected;
   if (judged) {
-    camera.seeing = view.share() >= options.readmission_ratio ? camera.seeing + 1 : 0;
-    camera.judged_ns = time_ns;
+    camera.consistent_frames = view.ratio() >= options.readmission_ratio ? camera.consistent_frames + 1 : 0;
+    camera.last_judged_ns = time_ns;
   }
-  const bool forgotten = to_seconds(time_ns - camera.judged_ns) >= options.forget_after_s;
-  if (camera.seeing >= options.readmit_after || forgotten) camera = trusted(camera.established);
+  const bool expired = to_seconds(time_ns - camera.last_judged_ns) >= options.forget_after_s;
+  if (camera.consistent_frames >= options.readmit_after || expired) camera = readmitted(camera.established);
 }
 
-bool due_for_retry(const CameraTrust& camera, TimeNs time_ns, const ConsensusOptions& options) {
-  return camera.doubted && to_seconds(time_ns - camera.since_ns) >= options.retry_after_s;
+bool due_for_retry(const CameraConsensusState& camera, TimeNs time_ns, const ConsensusOptions& options) {
+  return camera.excluded && to_seconds(time_ns - camera.excluded_since_ns) >= options.retry_after_s;
 }
 
-void retry(CameraTrust& camera, const Expectation& wide, TimeNs time_ns, const ConsensusOptions& options) {
-  if (wide.expected >= options.min_expected && wide.share() >= options.readmission_ratio) {
-    camera.since_ns = time_ns;
+void retry(CameraConsensusState& camera, const LandmarkCounts& wide, TimeNs time_ns, const ConsensusOptions& options) {
+  if (wide.expected >= options.min_expected && wide.ratio() >= options.readmission_ratio) {
+    camera.excluded_since_ns = time_ns;
   } else {
-    camera = trusted(camera.established);
+    camera = readmitted(camera.established);
   }
 }
 
-void leave_out(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2,
-               frame::BundledFrame& frame) {
+void remove_camera(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2,
+                   frame::BundledFrame& frame) {
   std::vector<std::vector<frame::KeypointRef>> matched;
   for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) {
     const auto all = frame.bundled.keypoints(FeatureId(f));

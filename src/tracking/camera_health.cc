@@ -11,8 +11,8 @@
 namespace bslam::tracking {
 namespace {
 
-constexpr int kSlow = 10;  // frames a sound camera may be without a picture, as it fires less often than the others
-constexpr int kSampleStep = 4;  // rows and columns: brightness does not hide between them
+constexpr int kMaxMissedFrames = 10;  // frames without an image of a working camera with a lower rate than the others
+constexpr int kSampleStep = 4;        // only every fourth row and column is used to measure brightness
 
 // A hash of every pixel, eight at a time.
 std::uint64_t content(const image::ImageView& image) {
@@ -65,9 +65,9 @@ void count_edges(const std::uint8_t* first, std::ptrdiff_t step, int pixels, dou
   }
 }
 
-// True, false, or nothing where there are too few edges to tell.
+// Returns nullopt if there are too few edges.
 std::optional<bool> is_blurred(const image::ImageView& image, const HealthOptions& options) {
-  constexpr int kLines = 30, kMinEdges = 40;  // rows looked at, and columns as far apart
+  constexpr int kLines = 30, kMinEdges = 40;  // number of rows searched; columns have the same spacing
   const int step = std::max(1, image.height / kLines);
   Edges edges;
   for (int y = 0; y < image.height; y += step) count_edges(image.row(y), 1, image.width, options.sharp_slope, edges);
@@ -82,19 +82,20 @@ std::optional<bool> is_blurred(const image::ImageView& image, const HealthOption
 CameraMonitor::CameraMonitor(std::size_t cameras, const HealthOptions& options)
     : options_(options), cameras_(cameras) {}
 
-PictureFaults CameraMonitor::examine(const image::ImageBundle& images) {
-  PictureFaults faults{judge(images), blurred(images), {}};
+ImageFaults CameraMonitor::examine(const image::ImageBundle& images) {
+  ImageFaults faults{find_outages(images), blurred(images), {}};
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const CameraReason outage = faults.outage[c];
     int& missed = cameras_[c].missed;
     missed = outage == CameraReason::kNoImages ? missed + 1 : 0;
-    faults.failing.push_back(outage == CameraReason::kNoImages ? missed > kSlow : outage != CameraReason::kNone);
+    faults.failing.push_back(outage == CameraReason::kNoImages ? missed > kMaxMissedFrames
+                                                               : outage != CameraReason::kNone);
   }
   return faults;
 }
 
-std::vector<CameraReason> CameraMonitor::judge(const image::ImageBundle& images) {
-  BSLAM_ASSERT(images.images.size() == cameras_.size(), "one image slot per camera");
+std::vector<CameraReason> CameraMonitor::find_outages(const image::ImageBundle& images) {
+  BSLAM_ASSERT(images.images.size() == cameras_.size(), "there must be one image entry per camera");
   std::vector<CameraReason> found(cameras_.size(), CameraReason::kNoImages);
   std::vector<std::uint8_t> same(cameras_.size(), 0);
   bool any_changed = false;
@@ -110,7 +111,7 @@ std::vector<CameraReason> CameraMonitor::judge(const image::ImageBundle& images)
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     Camera& camera = cameras_[c];
     if (found[c] == CameraReason::kNoImages) continue;
-    // Frozen it stays while its picture is the same, also where no other is there to change.
+    // A frozen camera stays frozen as long as its image is the same, even if no other camera has an image.
     const bool frozen = same[c] && (any_changed || camera.outage == CameraReason::kFrozen);
     if (found[c] == CameraReason::kNone && frozen) found[c] = CameraReason::kFrozen;
     if (found[c] != CameraReason::kNone) {
@@ -123,7 +124,7 @@ std::vector<CameraReason> CameraMonitor::judge(const image::ImageBundle& images)
     }
   }
   if (std::ranges::find(found, CameraReason::kNone) != found.end()) return found;
-  for (std::size_t c = 0; c < cameras_.size(); ++c) {  // better than nothing
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {  // no camera is used: admit those with a good image
     if (found[c] == CameraReason::kNoImages || cameras_[c].good == 0) continue;
     found[c] = cameras_[c].outage = CameraReason::kNone;
   }
@@ -131,7 +132,7 @@ std::vector<CameraReason> CameraMonitor::judge(const image::ImageBundle& images)
 }
 
 std::vector<std::uint8_t> CameraMonitor::blurred(const image::ImageBundle& images) {
-  BSLAM_ASSERT(images.images.size() == cameras_.size(), "one image slot per camera");
+  BSLAM_ASSERT(images.images.size() == cameras_.size(), "there must be one image entry per camera");
   std::vector<std::uint8_t> out(cameras_.size(), 0);
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const image::CameraImage& input = images.images[c];

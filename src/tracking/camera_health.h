@@ -1,4 +1,4 @@
-// Judges the pictures of each camera before anything is extracted from them: black, over-exposed, frozen, blurred.
+// Checks the images of each camera before features are extracted: black, over-exposed, frozen, blurred.
 #pragma once
 
 #include <cstdint>
@@ -12,66 +12,68 @@
 namespace bslam::tracking {
 
 struct HealthOptions {
-  int dark_level = 16;               // grey value; a picture with hardly anything above it is black
-  int bright_level = 250;            // grey value; a picture mostly above it is over-exposed
-  double black_pixel_ratio = 0.995;  // of the pixels
-  double over_exposed_pixel_ratio = 0.6;
-  double sharp_slope =
-      0.28;  // share of an edge's contrast that a sharp one has between two pixels; Gaussian blur of 3 px leaves 0.27
-  double min_sharp_edge_ratio = 0.1;  // of the edges; with fewer sharp ones a picture is blurred
-  int readmit_after = 3;  // good pictures in a row before a camera that was out counts again, while there are others
+  int dark_level = 16;                    // maximum grey value of a dark pixel
+  int bright_level = 250;                 // minimum grey value of a bright pixel
+  double black_pixel_ratio = 0.995;       // minimum fraction of dark pixels in a black image
+  double over_exposed_pixel_ratio = 0.6;  // minimum fraction of bright pixels in an over-exposed image
+  // Minimum fraction of the contrast of a sharp edge that lies between two adjacent pixels; Gaussian blur of 3 px
+  // leaves 0.27.
+  double sharp_slope = 0.28;
+  double min_sharp_edge_ratio = 0.1;  // minimum fraction of sharp edges; an image with fewer is blurred
+  int readmit_after = 3;  // consecutive good images until a camera is used again, if other cameras are available
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("dark_level", self.dark_level, Range{0, 255}, "",
-            "grey value: a picture with hardly anything above it is black", kCommon);
+            "maximum grey value of a dark pixel; an image of dark pixels is black", kCommon);
     visitor("bright_level", self.bright_level, Range{0, 255}, "",
-            "grey value: a picture mostly above it is over-exposed", kCommon);
-    visitor("black_pixel_ratio", self.black_pixel_ratio, Range{0, 1}, "", "of the pixels, that makes a picture black",
-            OptionNote{.formerly = "dark_share"});
+            "minimum grey value of a bright pixel; an image of mostly bright pixels is over-exposed", kCommon);
+    visitor("black_pixel_ratio", self.black_pixel_ratio, Range{0, 1}, "",
+            "minimum fraction of dark pixels in a black image", OptionNote{.formerly = "dark_share"});
     visitor("over_exposed_pixel_ratio", self.over_exposed_pixel_ratio, Range{0, 1}, "",
-            "of the pixels, that makes a picture over-exposed", OptionNote{.formerly = "bright_share"});
+            "minimum fraction of bright pixels in an over-exposed image", OptionNote{.formerly = "bright_share"});
     visitor("sharp_slope", self.sharp_slope, Range{0, 1}, "",
-            "share of an edge's contrast that a sharp one has between two pixels");
+            "minimum fraction of the contrast of a sharp edge between two adjacent pixels");
     visitor("min_sharp_edge_ratio", self.min_sharp_edge_ratio, Range{0, 1}, "",
-            "of the edges; with fewer sharp ones a picture is blurred", OptionNote{.formerly = "sharp_share"});
+            "minimum fraction of sharp edges; an image with fewer is blurred", OptionNote{.formerly = "sharp_share"});
     visitor("readmit_after", self.readmit_after, Range{1, 1000}, "",
-            "good pictures in a row before a camera that was out counts again");
+            "consecutive good images until a camera is used again");
   }
 };
 
-// What the pictures of a frame say about the cameras; one entry per camera.
-struct PictureFaults {
-  std::vector<CameraReason> outage;   // why it is left out of the frame; kNone: it is used
-  std::vector<std::uint8_t> blurred;  // out of focus or smeared; used all the same
-  std::vector<std::uint8_t> failing;  // out, and not only without an image as slow cameras are now and then
+// Faults found in the images of a frame; one entry per camera.
+struct ImageFaults {
+  std::vector<CameraReason> outage;   // why the camera is not used in this frame; kNone: it is used
+  std::vector<std::uint8_t> blurred;  // out of focus or smeared, but used
+  std::vector<std::uint8_t> failing;  // not used; false if only an image is missing, as between images of a slow camera
 };
 
 class CameraMonitor {
  public:
   CameraMonitor(std::size_t cameras, const HealthOptions& options);
 
-  // Looks at the pictures of the next frame: judge() and blurred(). `images`: one per camera.
-  PictureFaults examine(const image::ImageBundle& images);
+  // Checks the images of the next frame: find_outages() and blurred(). `images`: one per camera.
+  ImageFaults examine(const image::ImageBundle& images);
 
-  // Why each camera is left out of the next frame. A picture is frozen where it is to the byte the last one of its
-  // camera while another camera's has changed: a rig that stands still freezes nobody, and one camera alone cannot
-  // tell. A camera without a picture is out for that frame and counts again with its next. Where all others are out as
-  // well, one with a good picture counts at once.
-  std::vector<CameraReason> judge(const image::ImageBundle& images);
-  // Per camera: out of focus or behind something that smears, told from how steep the edges of its picture are, in
-  // rows and columns, so that motion to one side is not blur. Such a camera is used, with what it has. A picture with
-  // few edges says nothing; a camera was blurred until `readmit_after` pictures in a row are sharp.
+  // Per camera, why it is not used in the next frame. An image is frozen if it is identical to the previous image of
+  // its camera while the image of another camera has changed; frozen images are thus not detected with a single camera
+  // or if all images are identical. A camera without an image is not used in that frame, and used again with its next
+  // image. If all other cameras are out as well, a camera with a good image is used immediately.
+  std::vector<CameraReason> find_outages(const image::ImageBundle& images);
+  // Per camera: whether it is out of focus or smeared, determined from the slope of the edges in its image. Rows and
+  // columns are searched, so that motion blur in one direction is not detected as blur. A blurred camera is still
+  // used. Images with few edges do not change the result; a camera is blurred until `readmit_after` consecutive images
+  // are sharp.
   std::vector<std::uint8_t> blurred(const image::ImageBundle& images);
 
  private:
   struct Camera {
-    std::optional<std::uint64_t> last;          // content of its last picture
-    CameraReason outage = CameraReason::kNone;  // why it was out
-    int good = 0;                               // pictures since
+    std::optional<std::uint64_t> last;          // hash of its last image
+    CameraReason outage = CameraReason::kNone;  // reason of its last outage, until it is used again
+    int good = 0;                               // consecutive good images since
     bool blurred = false;
-    int sharp = 0;   // pictures since it was
-    int missed = 0;  // frames since its last picture
+    int sharp = 0;   // consecutive sharp images
+    int missed = 0;  // frames since its last image
   };
   const HealthOptions options_;
   std::vector<Camera> cameras_;

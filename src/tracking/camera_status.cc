@@ -8,13 +8,13 @@
 namespace bslam::tracking {
 namespace {
 
-constexpr int kFewKeypoints = 30;   // in an image: a camera that sees less hardly contributes
-constexpr int kUnknownPeriod = 11;  // frames without an image before a camera of unknown period counts as out
+constexpr int kFewKeypoints = 30;   // in an image; a camera with fewer hardly contributes
+constexpr int kUnknownPeriod = 11;  // frames without an image until a camera of unknown period is out
 
-// Agreement with the pose, as shares of a camera's keypoints, and what it takes to judge it.
-constexpr double kSoundShare = 0.1, kNoShare = 0.02;
-constexpr double kEnoughKeypoints = 1000;
-constexpr int kEnoughFrames = 10;
+// Ratios of inliers to keypoints of a camera, and the minimum number of keypoints and frames to evaluate them.
+constexpr double kHealthyInlierRatio = 0.1, kMaxInconsistentInlierRatio = 0.02;
+constexpr double kMinKeypoints = 1000;
+constexpr int kMinFrames = 10;
 
 }  // namespace
 
@@ -52,7 +52,7 @@ std::string_view describe(CameraReason reason) {
   return "";
 }
 
-void CameraStatusMonitor::note_image(bool present, Camera& camera) {
+void CameraStatusMonitor::record_image(bool present, Camera& camera) {
   ++camera.since_image;
   if (!present) return;
   if (camera.any_image) camera.steps[camera.num_steps++ % camera.steps.size()] = camera.since_image;
@@ -66,33 +66,34 @@ bool CameraStatusMonitor::between_images(const Camera& camera) {
   return camera.since_image < lower_median(std::vector<int>(camera.steps.begin(), camera.steps.begin() + known));
 }
 
-bool CameraStatusMonitor::agrees_with_nothing(std::size_t camera) const {
+bool CameraStatusMonitor::is_inconsistent(std::size_t camera) const {
   const Camera& c = cameras_[camera];
-  if (c.frames < kEnoughFrames || c.keypoints < kEnoughKeypoints || c.inliers > kNoShare * c.keypoints) return false;
+  if (c.frames < kMinFrames || c.keypoints < kMinKeypoints || c.inliers > kMaxInconsistentInlierRatio * c.keypoints)
+    return false;
   return std::ranges::any_of(cameras_, [](const Camera& other) {
-    return other.keypoints >= kEnoughKeypoints && other.inliers > kSoundShare * other.keypoints;
+    return other.keypoints >= kMinKeypoints && other.inliers > kHealthyInlierRatio * other.keypoints;
   });
 }
 
 CameraStatus CameraStatusMonitor::status(const CameraEvidence& evidence, std::size_t camera) const {
   const bool no_image = evidence.outage == CameraReason::kNoImages;
   if (no_image && evidence.image == image::ImageState::kMissing && between_images(cameras_[camera])) return {};
-  const bool picture_is_good = evidence.outage == CameraReason::kNone;
-  if (picture_is_good && evidence.blurred)  // blur also explains that it sees little of what it should
+  const bool image_is_good = evidence.outage == CameraReason::kNone;
+  if (image_is_good && evidence.blurred)  // blur also explains the inconsistency
     return {evidence.inconsistent ? CameraState::kOut : CameraState::kDegraded, CameraReason::kBlurred};
-  if (!picture_is_good) return {CameraState::kOut, evidence.outage};
+  if (!image_is_good) return {CameraState::kOut, evidence.outage};
   if (evidence.inconsistent) return {CameraState::kOut, CameraReason::kInconsistent};
   if (evidence.postponed) return {};
   if (evidence.keypoints < kFewKeypoints) return {CameraState::kDegraded, CameraReason::kFewFeatures};
-  if (agrees_with_nothing(camera)) return {CameraState::kDegraded, CameraReason::kInconsistent};
+  if (is_inconsistent(camera)) return {CameraState::kDegraded, CameraReason::kInconsistent};
   return {};
 }
 
 std::vector<CameraStatus> CameraStatusMonitor::update(std::span<const CameraEvidence> evidence) {
-  BSLAM_ASSERT(evidence.size() == cameras_.size(), "evidence about every camera");
+  BSLAM_ASSERT(evidence.size() == cameras_.size(), "there must be one entry per camera");
   const bool any_agrees = std::ranges::any_of(evidence, [](const CameraEvidence& e) { return e.inliers > 0; });
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    note_image(evidence[c].image == image::ImageState::kPresent, cameras_[c]);
+    record_image(evidence[c].image == image::ImageState::kPresent, cameras_[c]);
     if (!any_agrees || evidence[c].keypoints == 0) continue;
     cameras_[c].keypoints += evidence[c].keypoints;
     cameras_[c].inliers += evidence[c].inliers;

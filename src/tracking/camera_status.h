@@ -1,4 +1,4 @@
-// The status of every camera in every frame: the one place where it is decided from what is known about the camera.
+// The status of every camera in every frame, determined from its images and from tracking.
 #pragma once
 
 #include <array>
@@ -13,22 +13,22 @@ namespace bslam::tracking {
 
 enum class CameraState : std::uint8_t {
   kOk,
-  kDegraded,  // used, but it contributes less than it should
+  kDegraded,  // used, but contributes less than expected
   kOut,       // not used in this frame
 };
 
 enum class CameraReason : std::uint8_t {
   kNone,
   kNoImages,  // no image in this frame, although one is due
-  kBlack,     // told from the picture, as the next two
+  kBlack,     // this and the next two are determined from the image
   kOverExposed,
   kFrozen,
   kBlurred,       // out of focus or smeared
-  kInconsistent,  // what it sees contradicts the other cameras
+  kInconsistent,  // its images contradict the other cameras
   kFewFeatures,
 };
 
-// As in the summary: "ok", "degraded", "out"; "", "no-images", "black", ...
+// Names used in the summary: "ok", "degraded", "out"; "", "no-images", "black", ...
 std::string_view describe(CameraState state);
 std::string_view describe(CameraReason reason);
 
@@ -38,20 +38,20 @@ struct CameraStatus {
   friend bool operator==(const CameraStatus&, const CameraStatus&) = default;
 };
 
-// What is known about one camera after a frame.
+// Observations about one camera in one frame.
 struct CameraEvidence {
   image::ImageState image = image::ImageState::kMissing;
-  CameraReason outage = CameraReason::kNone;  // of its picture (tracking/camera_health.h); not kNone: it was not used
+  CameraReason outage = CameraReason::kNone;  // fault of its image (tracking/camera_health.h); kNone: it was used
   bool blurred = false;
-  bool inconsistent = false;  // left out by tracking (tracking/camera_consensus.h)
-  bool postponed = false;     // not used: it fires after camera 0, and the motion until then is not known
+  bool inconsistent = false;  // excluded by tracking (tracking/camera_consensus.h)
+  bool postponed = false;     // not used: it captures after camera 0, and the motion until then is not known
   int keypoints = 0, inliers = 0;
 };
 
-// Decides the status of each camera of a rig, frame by frame. A camera that delivers images at a lower rate than frames
-// come is not `no-images` between two of them: its period is the median of its last steps from image to image. A camera
-// that sees plenty while hardly any of it agrees with the pose, over the frames in which other cameras do agree, is
-// degraded, reason inconsistent: its extrinsics are probably wrong.
+// Determines the status of each camera of a rig, frame by frame. A camera whose image rate is lower than the frame rate
+// is not `no-images` between two images: its period is the median of the last intervals between its images. A camera is
+// degraded with the reason `inconsistent` if it has many keypoints of which hardly any agrees with the pose, counted
+// over the frames in which some camera agrees: its extrinsics are probably wrong.
 class CameraStatusMonitor {
  public:
   explicit CameraStatusMonitor(std::size_t cameras) : cameras_(cameras) {}
@@ -63,14 +63,14 @@ class CameraStatusMonitor {
   struct Camera {
     bool any_image = false;
     int since_image = 0;                // frames since its last image
-    std::array<int, 9> steps = {};      // frames from one image to the next: the last ones, in a ring
-    std::size_t num_steps = 0;          // ever
-    double keypoints = 0, inliers = 0;  // over the frames that count for agreement
-    int frames = 0;                     // of these
+    std::array<int, 9> steps = {};      // ring buffer of the last intervals between images, in frames
+    std::size_t num_steps = 0;          // total number of intervals so far
+    double keypoints = 0, inliers = 0;  // sums over the frames in which some camera has inliers
+    int frames = 0;                     // number of these frames
   };
-  static void note_image(bool present, Camera& camera);
+  static void record_image(bool present, Camera& camera);
   static bool between_images(const Camera& camera);
-  bool agrees_with_nothing(std::size_t camera) const;
+  bool is_inconsistent(std::size_t camera) const;
   CameraStatus status(const CameraEvidence& evidence, std::size_t camera) const;
 
   std::vector<Camera> cameras_;

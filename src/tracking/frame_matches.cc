@@ -17,8 +17,8 @@ std::size_t count(const FrameMatches& matches) {
 
 namespace {
 
-// What each camera is not searched for: the keypoints and landmarks of its matches. Landmarks are looked up quickly
-// where `landmarks` begins in order of id and they are in that part.
+// Keypoints and landmarks that each camera has already matched, which are excluded from the search. The lookup is fast
+// for landmarks in the leading part of `landmarks` that is sorted by id.
 std::vector<matching::SearchExclusions> matched_already(const frame::BundledFrame& frame,
                                                         std::span<const LandmarkId> landmarks,
                                                         const FrameMatches& known) {
@@ -76,21 +76,22 @@ namespace {
 // Aligns one matched keypoint to its landmark's reference patch.
 std::optional<matching::AlignedKeypoint> align_to_reference(const map::BundledMap& map, const camera::Camera& camera,
                                                             const SE3& T_cam_world, const image::Pyramid& pyramid,
-                                                            const map::Landmark& landmark, const Eigen::Vector2d& guess,
+                                                            const map::Landmark& landmark,
+                                                            const Eigen::Vector2d& initial,
                                                             const matching::AlignmentOptions& options) {
   const map::LandmarkReference& reference = landmark.reference;
   const camera::Rig& rig = map.rig();
   const feature::Keypoints& keypoints = map.keypoints(reference.keyframe, reference.keypoint.camera);
   const std::size_t k = reference.keypoint.keypoint.index();
   const SE3 T_ref_world = map.cam_from_world(reference.keyframe, reference.keypoint.camera);
-  // Smaller pictures have fewer levels than those of the reference may have had.
+  // A smaller image has fewer levels than the image of the reference may have had.
   const std::size_t level = keypoints.level[k];
   const double scale =
       level < pyramid.size() ? pyramid.scale_x[level] : map.pyramid().scale(static_cast<double>(level));
   const auto warp = matching::patch_warp(rig.camera(reference.keypoint.camera), camera,
                                          T_cam_world * T_ref_world.inverse(), T_ref_world * landmark.position, scale);
   if (!warp) return std::nullopt;
-  return matching::align_patch(keypoints.patch[k], *warp, pyramid, guess, options);
+  return matching::align_patch(keypoints.patch[k], *warp, pyramid, initial, options);
 }
 
 }  // namespace

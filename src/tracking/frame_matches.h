@@ -1,4 +1,4 @@
-// Which keypoints of a frame show which landmarks.
+// Matches between keypoints of a frame and landmarks.
 #pragma once
 
 #include <optional>
@@ -16,32 +16,32 @@
 
 namespace bslam::tracking {
 
-// One keypoint that shows a landmark.
+// A keypoint matched to a landmark.
 struct Match {
   KeypointIndex keypoint;
   LandmarkId landmark;
   bool aligned = false;  // to the landmark's reference patch
 };
 
-// Per camera, in order of keypoint; a keypoint at most once, a landmark at most once per camera.
+// Per camera, in order of keypoint. A keypoint has at most one match, a landmark at most one per camera.
 using FrameMatches = std::vector<std::vector<Match>>;
 
 std::size_t count(const FrameMatches& matches);
 
 struct MatchSearch {
   FrameMatches found;
-  std::vector<LandmarkId> visible;  // expected in some camera, each once, in order of the input
+  std::vector<LandmarkId> visible;  // predicted in some camera, each once, in order of the input
   std::vector<int> visible_by_camera;
 };
 
-// Looks for `landmarks` in every camera at `T_rig_world`, leaving out the keypoints and, per camera, the landmarks that
-// are in `known` already.
+// Searches for `landmarks` in every camera at `T_rig_world`. Skips the keypoints and, per camera, the landmarks of the
+// matches in `known`.
 MatchSearch find_landmarks(const map::BundledMap& map, const frame::BundledFrame& frame,
                            const geometry::SE3& T_rig_world, std::span<const LandmarkId> landmarks,
                            const FrameMatches& known, const matching::ProjectionSearchOptions& options,
                            ThreadPool& pool);
 
-// `a` and `b` together; they share no keypoint.
+// Union of `a` and `b`, which must have no keypoint in common.
 FrameMatches merge(const FrameMatches& a, const FrameMatches& b);
 
 // Aligned position of a matched keypoint.
@@ -54,25 +54,26 @@ struct AlignedMatch {
 // Per camera, in the order of the matches.
 using AlignedMatches = std::vector<std::vector<AlignedMatch>>;
 
-// Aligns each matched keypoint of `frame` to the reference patch of its landmark as seen from `T_rig_world`. A keypoint
-// whose patch does not align keeps its position, with the detector's standard deviation. `matches` are told which did
-// align. `pyramids` and `alignment`: one per camera.
+// Aligns each matched keypoint of `frame` to the reference patch of its landmark as seen from `T_rig_world`, and sets
+// Match::aligned. A keypoint whose patch cannot be aligned keeps its position, with the detector's standard deviation.
+// `pyramids` and `alignment`: one per camera.
 AlignedMatches align_matches(const map::BundledMap& map, const frame::BundledFrame& frame,
                              const geometry::SE3& T_rig_world, FrameMatches& matches,
                              std::span<const image::Pyramid> pyramids,
                              std::span<const matching::AlignmentOptions> alignment,
                              const feature::FeatureModel& features, ThreadPool& pool);
 
-// `frame` with the matched keypoints at their aligned positions where inlier[i] != 0, counted over all cameras.
+// `frame` with the matched keypoints for which inlier[i] != 0 at their aligned positions; i counts the matches of all
+// cameras.
 frame::BundledFrame refined(const frame::BundledFrame& frame, const FrameMatches& matches,
                             const AlignedMatches& aligned, std::span<const std::uint8_t> inlier,
                             const camera::Rig& rig);
 
-// Observations for the pose solver, camera by camera in the order of `matches`: as aligned to the landmarks.
+// Observations for the pose solver, camera by camera in the order of `matches`, at the aligned positions.
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const FrameMatches& matches,
                                                        const AlignedMatches& aligned);
-// Before alignment: a keypoint's own standard deviation holds between the cameras of its frame, against the map that of
-// the detector does.
+// Observations before alignment, with the detector's standard deviation. (The standard deviation stored with a keypoint
+// applies between the cameras of its frame, not to the map.)
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                        const FrameMatches& matches,
                                                        const feature::FeatureModel& features);

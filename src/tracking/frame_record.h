@@ -1,4 +1,4 @@
-// What became of one input frame. The one record of it: callers of the system, the summary and the plots read this.
+// The result of one input frame, used by the callers of the system, the summary and the plots.
 #pragma once
 
 #include <memory>
@@ -12,11 +12,11 @@
 namespace bslam::tracking {
 
 struct StageTime {
-  std::string_view stage;  // a literal
+  std::string_view stage;  // must be a string literal
   double ms = 0;
 };
 
-// A lost rig was located in the map again.
+// A lost rig was relocalised in the map.
 struct Relocalisation {
   KeyframeId matched_keyframe;
   int inliers = 0;  // keypoints
@@ -24,25 +24,26 @@ struct Relocalisation {
 
 struct FrameRecord {
   TrackResult result;  // as returned when the frame was processed
-  // The pose found at the end of the run, of a frame that had none when it was processed; else null.
+  // The result found at the end of the run for a frame that had no pose when it was processed; else null.
   std::shared_ptr<const TrackResult> found_later;
   std::vector<image::ImageState> images;  // per camera
   std::vector<CameraStatus> cameras;      // per camera
   std::optional<Relocalisation> relocalisation;
   // Velocity of the rig: T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); angular (rad/s) first, then linear (map
-  // units/s). Empty where it is not known: without a pose, and in the first frame with one.
+  // units/s). Empty in frames without a pose and in the first frame with one.
   std::optional<geometry::Vector6d> twist;
-  // The smooth pose: the accumulated motion of the rig. Corrections of the map change T_map_odom and never this pose,
-  // which stands still while the rig is lost. T_rig_odom = T_rig_world * T_map_odom, with T_rig_world of `result`.
+  // The odometry pose T_rig_odom (REP 105) is the accumulated motion of the rig. Corrections of the map change
+  // T_map_odom only. The odometry pose does not change while the rig is lost. T_rig_odom = T_rig_world * T_map_odom,
+  // with T_rig_world of `result`.
   geometry::SE3 T_rig_odom, T_map_odom;
   KeyframeId root;  // root keyframe of the submap in which `result` gives the pose
   bool keyframe = false;
   int unique = 0, monocular = 0, matched = 0;  // features; unique = monocular + matched
 
   std::vector<StageTime> stages;  // in the caller's thread
-  double frame_ms = 0;            // from handing over the images to having the pose
+  double frame_ms = 0;            // from receiving the images to the pose
 
-  // The result that counts at the end of the run.
+  // The final result at the end of the run.
   const TrackResult& final_result() const { return found_later ? *found_later : result; }
 };
 

@@ -14,9 +14,9 @@ using frame::BundledFrame;
 using frame::KeypointRef;
 using geometry::SE3;
 
-constexpr int kMaxHamming = 50;  // bits, of 256: without any prediction only clear matches count
+constexpr int kMaxHamming = 50;  // bits of 256; stricter than with a prediction
 constexpr double kRatio = 0.8;
-constexpr double kWindow = 0.25;  // radians a bearing may move between the two frames
+constexpr double kWindow = 0.25;  // rad, maximum angle between the bearings of a match in the two frames
 constexpr int kMinInliers = 50;
 
 // Matches of one camera between two frames.
@@ -34,7 +34,7 @@ struct TwoView {
   estimators::RelativePose pose;
 };
 
-// What every camera has matched.
+// Matches of every camera.
 struct FramePairs {
   std::vector<std::vector<feature::DescriptorMatch>> keypoints;
   std::vector<std::vector<estimators::BearingPair>> bearings;
@@ -52,7 +52,7 @@ FramePairs match_cameras(const BundledFrame& first, const BundledFrame& second) 
   return out;
 }
 
-// The camera with the widest parallax among those that see enough.
+// Returns the camera with the largest median parallax among those with enough inliers.
 std::optional<TwoView> best_two_view(const FramePairs& pairs, const InitialisationOptions& options,
                                      std::uint64_t seed) {
   std::optional<TwoView> best;
@@ -68,7 +68,7 @@ std::optional<TwoView> best_two_view(const FramePairs& pairs, const Initialisati
   return best;
 }
 
-// The unit of a start: what the distance between the two frames is multiplied by, and its relative standard deviation.
+// Length assigned to the distance between the two frames (before: 1), and its relative standard deviation.
 struct Unit {
   double length = 1;
   double deviation = std::numeric_limits<double>::infinity();
@@ -106,7 +106,7 @@ std::optional<StartedMap> initialise_metric(const BundledFrame& frame, std::span
                                             const InitialisationOptions& options, map::MapDraft& draft) {
   int metric = 0;
   for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f)
-    metric += has_sound_depth(frame.bundled.point(FeatureId(f)), options);
+    metric += has_accurate_depth(frame.bundled.point(FeatureId(f)), options);
   if (metric < options.min_matched) return std::nullopt;
   StartedMap out;
   out.keyframes.push_back(make_keyframe(frame, {}, SE3(), pyramids, KeyframeId(), options, draft));

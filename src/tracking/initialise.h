@@ -1,5 +1,4 @@
-// Initialisation of a map: from one frame whose cameras overlap, in metres, or from two frames of one camera, up to
-// scale.
+// Initialisation of a map: metric from one frame if cameras overlap, or up to scale from two frames of one camera.
 #pragma once
 
 #include <memory>
@@ -10,30 +9,32 @@
 
 namespace bslam::tracking {
 
-// The reference frame of a monocular initialisation, with what is needed to make it a keyframe.
+// The reference frame of a monocular initialisation, with the data needed to make it a keyframe.
 struct StartCandidate {
   std::shared_ptr<const frame::BundledFrame> frame;
   std::vector<image::Pyramid> pyramids;
 };
 
 struct StartedMap {
-  std::vector<NewKeyframe> keyframes;  // one (metric) or two (up to scale), in the draft
+  std::vector<NewKeyframe> keyframes;  // one (metric) or two (up to scale), with ids of the draft
   map::Scale scale = map::Scale::kMetric;
-  double scale_deviation = 0;  // relative; infinite where the length of the map's unit is not known, or a guess
+  double scale_deviation = 0;  // relative standard deviation; infinite if the scale is unknown or assumed
 };
 
-// Writes the first keyframe, at the origin. Empty where the frame has too few matched features of sound metric depth.
+// Writes the first keyframe, at the origin. Returns nullopt if the frame has too few matched features with accurate
+// metric depth.
 std::optional<StartedMap> initialise_metric(const frame::BundledFrame& frame, std::span<const image::Pyramid> pyramids,
                                             const InitialisationOptions& options, map::MapDraft& draft);
 
-// Do the two frames share enough matches in some camera for a start up to scale to be tried?
+// Returns true if some camera has enough matches between the two frames to attempt a monocular initialisation.
 bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& second,
                 const InitialisationOptions& options);
 
-// Writes two keyframes where some camera sees enough parallax between `first` and `frame`: the first at the origin.
-// With one camera the median depth of the points in the first is 1, and stays so. With several, none overlapping, the
-// scale is what their matches tell of it (estimators/generalised_scale.h), else the guessed depth: unobservable either
-// way, until mapping has measured it.
+// Writes two keyframes, the first at the origin, if the relative pose of some camera can be estimated between `first`
+// and `frame`; else returns nullopt. With one camera the unit is the median depth of the points in the first keyframe,
+// and the scale is not estimated later. With several cameras the scale is estimated from the matches of all cameras
+// (estimators/generalised_scale.h), or the median depth is assumed if that is too uncertain; in both cases the scale is
+// unobservable until mapping has measured it.
 std::optional<StartedMap> initialise_monocular(const StartCandidate& first, const frame::BundledFrame& frame,
                                                std::span<const image::Pyramid> pyramids,
                                                const InitialisationOptions& options, Random random,

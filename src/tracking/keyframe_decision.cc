@@ -9,23 +9,24 @@
 namespace bslam::tracking {
 namespace {
 
-constexpr int kFewMatchedTracked = 100,
-              kManyMatchedFree = 70;     // features; the rule of ORB-SLAM2's paper for near points
-constexpr double kStillParallax = 0.01;  // radians: less is a rig at rest
-constexpr double kStillOverlap = 0.95;
-constexpr int kStarvedInterval = 8;  // frames: a camera that sees nothing new may not ask all the time
+// Close-point rule of ORB-SLAM2 (Mur-Artal & Tardos, T-RO 2017): numbers of features with accurate depth.
+constexpr int kMinTrackedClose = 100, kMinUntrackedClose = 70;
+constexpr double kRestMaxParallax = 0.01;  // rad; a rig at rest has a smaller parallax
+constexpr double kRestMinOverlap = 0.95;
+constexpr int kFewInliersInterval = 8;  // minimum number of frames between keyframes due to a camera with few inliers
 
-bool fresh_depth(const frame::BundledFrame& frame, const FrameMatches& inliers, const InitialisationOptions& options) {
+bool untracked_depth(const frame::BundledFrame& frame, const FrameMatches& inliers,
+                     const InitialisationOptions& options) {
   std::vector<std::uint8_t> tracked(frame.bundled.size(), 0);
   for (std::size_t c = 0; c < inliers.size(); ++c) {
     for (const Match& m : inliers[c]) tracked[frame.bundled.feature(CameraIndex(c), m.keypoint).index()] = 1;
   }
-  int with = 0, without = 0;
+  int num_tracked = 0, num_untracked = 0;
   for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) {
-    if (!has_sound_depth(frame.bundled.point(FeatureId(f)), options)) continue;
-    ++(tracked[f] ? with : without);
+    if (!has_accurate_depth(frame.bundled.point(FeatureId(f)), options)) continue;
+    ++(tracked[f] ? num_tracked : num_untracked);
   }
-  return with < kFewMatchedTracked && without > kManyMatchedFree;
+  return num_tracked < kMinTrackedClose && num_untracked > kMinUntrackedClose;
 }
 
 }  // namespace
@@ -50,20 +51,20 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
   for (std::size_t c = 0; c < inliers.size(); ++c) {
     const auto keypoints = static_cast<double>(frame.cameras[c].keypoints.size());
     const auto found = static_cast<double>(inliers[c].size());
-    evidence.starved |=
+    evidence.camera_with_few_inliers |=
         found < options.keyframe.min_camera_inliers && found < options.keyframe.min_camera_inlier_ratio * keypoints;
   }
-  evidence.fresh_depth = fresh_depth(frame, inliers, options.initialisation);
+  evidence.untracked_depth = untracked_depth(frame, inliers, options.initialisation);
   return evidence;
 }
 
 bool keyframe_due(const KeyframeEvidence& e, const KeyframeOptions& options) {
   if (e.frames_since_keyframe < options.min_interval) return false;
   const double overlap = static_cast<double>(e.overlap) / std::max(1, e.best_overlap);
-  if (overlap < options.min_overlap || e.parallax > options.max_parallax || e.fresh_depth) return true;
-  const bool still = e.parallax < kStillParallax && overlap > kStillOverlap;
-  if (e.starved && e.frames_since_keyframe >= kStarvedInterval && !still) return true;
-  return e.frames_since_keyframe >= options.max_interval && !still;
+  if (overlap < options.min_overlap || e.parallax > options.max_parallax || e.untracked_depth) return true;
+  const bool at_rest = e.parallax < kRestMaxParallax && overlap > kRestMinOverlap;
+  if (e.camera_with_few_inliers && e.frames_since_keyframe >= kFewInliersInterval && !at_rest) return true;
+  return e.frames_since_keyframe >= options.max_interval && !at_rest;
 }
 
 }  // namespace bslam::tracking

@@ -1,4 +1,5 @@
-// When a frame becomes a keyframe. Looks at what was seen and at frame counts, never at a clock or at who is busy.
+// Decision whether a frame becomes a keyframe. It depends on observations and frame counts only, not on time or load,
+// so that results are deterministic.
 #pragma once
 
 #include "map/bundled_map.h"
@@ -8,13 +9,15 @@ namespace bslam::tracking {
 
 struct KeyframeEvidence {
   int frames_since_keyframe = 0;
-  int overlap = 0;           // landmarks of the reference keyframe among the inliers
-  int best_overlap = 0;      // the most of them in a frame since the keyframe
-  double parallax = 0;       // radians, median over them, at the landmark between then and now
-  bool starved = false;      // some camera with keypoints has too few inliers
-  bool fresh_depth = false;  // few features with landmarks, many matched ones without: new metric points to be had
+  int overlap = 0;       // landmarks of the reference keyframe among the inliers
+  int best_overlap = 0;  // maximum overlap of a frame since the keyframe
+  double parallax = 0;   // rad, median angle at these landmarks between the rays to the reference and to this frame
+  bool camera_with_few_inliers = false;  // some camera with keypoints has too few inliers
+  // Few features with accurate depth are tracked and many are not: a keyframe creates new metric landmarks.
+  bool untracked_depth = false;
 };
 
+// Everything but the frame counts and the best overlap. `inliers`: matches of `frame` at `T_rig_world`.
 KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::BundledFrame& frame,
                                    const FrameMatches& inliers, KeyframeId reference, const geometry::SE3& T_rig_world,
                                    const TrackingOptions& options);

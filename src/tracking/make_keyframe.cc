@@ -45,11 +45,11 @@ KeypointsByLandmark keypoints_by_landmark(const LandmarkTable& table) {
   return out;
 }
 
-// What a bundled feature shows.
+// Landmarks of the keypoints of a bundled feature.
 struct FeatureContent {
   std::vector<KeypointRef> free;  // its keypoints without a landmark
-  LandmarkId owner;               // the landmark of the others; invalid: they have none
-  bool disputed = false;          // they show more than one
+  LandmarkId owner;               // the landmark of the other keypoints; invalid if there are none
+  bool ambiguous = false;         // the other keypoints are matched to several landmarks
 };
 
 FeatureContent content_of(std::span<const KeypointRef> keypoints, const LandmarkTable& table) {
@@ -59,15 +59,15 @@ FeatureContent content_of(std::span<const KeypointRef> keypoints, const Landmark
     if (!l.valid()) {
       out.free.push_back(r);
     } else {
-      out.disputed |= out.owner.valid() && out.owner != l;
+      out.ambiguous |= out.owner.valid() && out.owner != l;
       out.owner = l;
     }
   }
   return out;
 }
 
-// Keypoints matched to the same landmark become one feature. A bundled keypoint without a landmark joins the feature it
-// was bundled with if that feature's landmark has no keypoint in its camera yet and projects to where the keypoint is.
+// Keypoints matched to the same landmark become one feature. A bundled keypoint without a landmark is added to the
+// feature of the landmark it was bundled with if that landmark has no keypoint in its camera yet and projects onto it.
 Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const camera::Rig& rig,
                const map::BundledMap& map, const geometry::SE3& T_rig_world) {
   const auto agrees = [&](KeypointRef r, LandmarkId l) {
@@ -84,7 +84,7 @@ Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const came
     if (!feature.owner.valid() && feature.free.size() >= 2) {
       groups.matched.push_back(feature.free);
       groups.landmark.push_back(LandmarkId());
-    } else if (feature.owner.valid() && !feature.disputed) {
+    } else if (feature.owner.valid() && !feature.ambiguous) {
       std::vector<KeypointRef>& known = by_landmark[feature.owner];
       for (const KeypointRef r : feature.free) {
         if (!has_camera(known, r.camera) && agrees(r, feature.owner)) known.push_back(r);
@@ -100,7 +100,7 @@ Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const came
   return groups;
 }
 
-// The patch of keypoint `k` at its refined pixel; as detected where that is too close to the border of its level.
+// The patch of keypoint `k` at its refined pixel, or its original patch if that pixel is too close to the border.
 feature::Patch patch_at_pixel(const image::Pyramid& pyramid, const feature::Keypoints& keypoints, std::size_t k) {
   constexpr double kMargin = feature::kPatchSize / 2 + 1;
   const std::size_t level = keypoints.level[k];
@@ -113,7 +113,7 @@ feature::Patch patch_at_pixel(const image::Pyramid& pyramid, const feature::Keyp
   return feature::sample_patch(image.view(), static_cast<float>(x), static_cast<float>(y));
 }
 
-// The frame as the map keeps it: patches follow the keypoints, the table holds what was learnt about them.
+// The frame that is stored in the map: patches are sampled at the refined keypoints, and the table contains `groups`.
 std::shared_ptr<const BundledFrame> keyframe_of(const BundledFrame& frame, const Groups& groups, const camera::Rig& rig,
                                                 std::span<const image::Pyramid> pyramids,
                                                 const InitialisationOptions& options) {
@@ -130,7 +130,7 @@ std::shared_ptr<const BundledFrame> keyframe_of(const BundledFrame& frame, const
 
 }  // namespace
 
-bool has_sound_depth(const std::optional<frame::BundledPoint>& point, const InitialisationOptions& options) {
+bool has_accurate_depth(const std::optional<frame::BundledPoint>& point, const InitialisationOptions& options) {
   if (!point) return false;
   const Eigen::Vector3d ray = point->point_rig.normalized();
   return std::sqrt(ray.dot(point->covariance * ray)) <= options.max_depth_error * point->point_rig.norm();
@@ -162,7 +162,7 @@ NewKeyframe make_keyframe(const BundledFrame& frame, const FrameMatches& matches
   for (std::size_t f = 0; f < stored->bundled.num_matched(); ++f) {
     const FeatureId feature(f);
     const auto& point = stored->bundled.point(feature);
-    if (has_landmark[f] || !has_sound_depth(point, options)) continue;
+    if (has_landmark[f] || !has_accurate_depth(point, options)) continue;
     const KeypointRef first = stored->bundled.keypoints(feature).front();
     out.landmarks.push_back(
         draft.add_landmark(T_world_rig * point->point_rig, {{out.keyframe, feature}}, {out.keyframe, first}));

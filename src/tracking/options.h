@@ -1,4 +1,4 @@
-// What steers tracking; gathered in system::Config.
+// Options of tracking; part of system::Config.
 #pragma once
 
 #include "base/options.h"
@@ -9,120 +9,138 @@
 namespace bslam::tracking {
 
 struct MatchingOptions {
-  double predicted_radius = 0.025;  // rad: where the motion model puts a landmark, it is looked for this far
-  double wide_radius = 0.12;        // rad: when that finds too little
-  double local_radius = 0.006;      // rad: landmarks of the local view, once the pose is nearly known
-  int max_hamming = 80;             // bits
-  double ratio = 0.9;               // best to second best descriptor distance on one level
+  double predicted_radius = 0.025;  // rad, search radius around the prediction of the motion model
+  double wide_radius = 0.12;        // rad, search radius if that finds too few landmarks
+  double local_radius = 0.006;      // rad, search radius for landmarks of the local view, at the estimated pose
+  int max_hamming = 80;             // bits, maximum descriptor distance of a match
+  double ratio = 0.9;               // maximum ratio of best to second best descriptor distance on one pyramid level
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("predicted_radius", self.predicted_radius, Range{1e-4, 1}, "rad",
-            "search radius about the motion model's prediction", kCommon);
-    visitor("wide_radius", self.wide_radius, Range{1e-4, 1.5}, "rad", "search radius when that finds too little",
+            "search radius around the prediction of the motion model", kCommon);
+    visitor("wide_radius", self.wide_radius, Range{1e-4, 1.5}, "rad", "search radius if that finds too few landmarks",
             kCommon);
-    visitor("local_radius", self.local_radius, Range{1e-4, 1}, "rad", "search radius once the pose is nearly known");
-    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "largest descriptor distance of a match");
-    visitor("ratio", self.ratio, Range{0.1, 1}, "", "best to second best descriptor distance on one level");
+    visitor("local_radius", self.local_radius, Range{1e-4, 1}, "rad",
+            "search radius for landmarks of the local view, at the estimated pose");
+    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "maximum descriptor distance of a match");
+    visitor("ratio", self.ratio, Range{0.1, 1}, "",
+            "maximum ratio of best to second best descriptor distance on one pyramid level");
   }
 };
 
 struct KeyframeOptions {
-  int min_interval = 2;         // frames between keyframes at least
-  int max_interval = 40;        // frames between keyframes at most
-  double min_overlap = 0.75;    // landmarks of the reference keyframe still tracked, below which a keyframe is due
-  double max_parallax = 0.06;   // rad: median parallax against the reference keyframe above which one is due
-  int min_camera_inliers = 40;  // inliers of a camera below which ...
-  double min_camera_inlier_ratio = 0.15;  // ... and below this share of its keypoints it asks for a keyframe
+  int min_interval = 2;   // minimum number of frames between keyframes
+  int max_interval = 40;  // maximum number of frames between keyframes, unless the rig is at rest
+  // A keyframe is inserted if the number of tracked landmarks of the reference keyframe, divided by the largest such
+  // number of any frame since that keyframe, is smaller.
+  double min_overlap = 0.75;
+  double max_parallax = 0.06;  // rad; a keyframe is inserted if the median parallax to the reference keyframe is larger
+  int min_camera_inliers = 40;            // a keyframe is inserted if some camera has fewer inliers than this ...
+  double min_camera_inlier_ratio = 0.15;  // ... and fewer than this fraction of its keypoints
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("min_interval", self.min_interval, Range{1, 1000}, "frames", "frames between keyframes at least", kCommon);
-    visitor("max_interval", self.max_interval, Range{1, 100000}, "frames", "frames between keyframes at most", kCommon);
+    visitor("min_interval", self.min_interval, Range{1, 1000}, "frames", "minimum number of frames between keyframes",
+            kCommon);
+    visitor("max_interval", self.max_interval, Range{1, 100000}, "frames",
+            "maximum number of frames between keyframes, unless the rig is at rest", kCommon);
     visitor("min_overlap", self.min_overlap, Range{0, 1}, "",
-            "share of the reference keyframe's landmarks still tracked", kCommon);
-    visitor("max_parallax", self.max_parallax, Range{0, 3}, "rad", "median parallax against the reference keyframe",
+            "minimum number of tracked landmarks of the reference keyframe, relative to the largest number in a frame "
+            "since that keyframe",
+            kCommon);
+    visitor("max_parallax", self.max_parallax, Range{0, 3}, "rad", "maximum median parallax to the reference keyframe",
             kCommon);
     visitor("min_camera_inliers", self.min_camera_inliers, Range{0, 10000}, "",
-            "inliers below which a camera may ask for a keyframe", OptionNote{.formerly = "starved_camera"});
+            "a keyframe is inserted if a camera has fewer inliers, and fewer than min_camera_inlier_ratio",
+            OptionNote{.formerly = "starved_camera"});
     visitor("min_camera_inlier_ratio", self.min_camera_inlier_ratio, Range{0, 1}, "",
-            "share of its keypoints below which it does", OptionNote{.formerly = "starved_share"});
+            "minimum ratio of inliers to keypoints of a camera with fewer than min_camera_inliers",
+            OptionNote{.formerly = "starved_share"});
   }
 };
 
 struct InitialisationOptions {
-  int min_matched = 60;               // features with a metric point that start a map at once
-  double max_depth_error = 0.15;      // relative standard deviation of the depth of a point that becomes a landmark
-  double min_parallax = 5e-4;         // rad: below it a matched feature has no point
-  double max_chi2 = 7.81;             // squared normalised error of a keypoint against its feature's point
-  int min_monocular = 80;             // matches between two frames that start a map up to scale
-  int min_monocular_points = 50;      // points it needs
-  double assumed_median_depth = 3.0;  // metres: median distance of its points, where the rig may tell the scale later
-  double max_scale_deviation = 0.3;   // relative, of the distance between the two frames: above it the guess is as good
+  int min_matched = 60;               // minimum number of features with an accurate metric point for a metric map
+  double max_depth_error = 0.15;      // maximum relative standard deviation of the depth of a new landmark
+  double min_parallax = 5e-4;         // rad, minimum parallax of a matched feature for which a point is triangulated
+  double max_chi2 = 7.81;             // maximum squared normalised error of a keypoint to its feature's point
+  int min_monocular = 80;             // minimum number of matches for a monocular initialisation
+  int min_monocular_points = 50;      // minimum number of points of a monocular initialisation
+  double assumed_median_depth = 3.0;  // m, assumed median distance of these points if the scale is too uncertain
+  double max_scale_deviation = 0.3;   // maximum relative standard deviation of the scale estimated from two frames
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("min_matched", self.min_matched, Range{10, 10000}, "",
-            "features with a metric point that start a map at once", kCommon);
+            "minimum number of features with an accurate metric point to initialise a metric map", kCommon);
     visitor("max_depth_error", self.max_depth_error, Range{0.001, 10}, "",
-            "relative depth error of a point that becomes a landmark");
-    visitor("min_parallax", self.min_parallax, Range{0, 1}, "rad", "least parallax of a feature that gets a point");
+            "maximum relative standard deviation of the depth of a new landmark");
+    visitor("min_parallax", self.min_parallax, Range{0, 1}, "rad", "minimum parallax of a feature with a point");
     visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "",
-            "squared normalised error of a keypoint against its feature's point");
+            "maximum squared normalised error of a keypoint to its feature's point");
     visitor("min_monocular", self.min_monocular, Range{10, 10000}, "",
-            "matches between two frames that start a map up to scale");
-    visitor("min_monocular_points", self.min_monocular_points, Range{10, 10000}, "", "points such a start needs");
+            "minimum number of matches between two frames for a monocular initialisation");
+    visitor("min_monocular_points", self.min_monocular_points, Range{10, 10000}, "",
+            "minimum number of points of a monocular initialisation");
     visitor("assumed_median_depth", self.assumed_median_depth, Range{1e-3, 1e4}, "m",
-            "median distance of its points where several cameras may tell later",
+            "assumed median distance of these points if the scale of a rig is too uncertain",
             OptionNote{.formerly = "guessed_depth"});
     visitor("max_scale_deviation", self.max_scale_deviation, Range{1e-3, 10}, "",
-            "relative error of a start's scale above which it is guessed");
+            "maximum relative standard deviation of the scale estimated at the initialisation");
   }
 };
 
-// Do the cameras of a frame agree?
+// Consistency between the cameras of a frame (tracking/camera_consensus.h).
 struct ConsensusOptions {
-  int min_expected = 20;  // landmarks a camera should see, below which nothing is said about it
-  double min_reobservation_ratio =
-      0.1;  // of what it saw in the last frame and should see now: found less, it is doubted ...
-  double healthy_reobservation_ratio = 0.4;  // ... while another camera finds this much ...
-  double previous_reobservation_ratio =
-      0.5;  // ... and it did itself find this much a frame ago: else its view went little by little
-  double conflict_inlier_ratio = 0.3;  // of a camera's matches that agree with the pose: fewer contradict it
-  double readmission_ratio =
-      0.15;                     // of the map's landmarks in its view, found by a doubted camera: it sees what it should
-  int readmit_after = 3;        // such frames in a row before it counts again
-  double forget_after_s = 2.0;  // without anything it should see, after which it counts again
-  double retry_after_s = 10.0;  // out for that long and not seen to show its view displaced, it is tried again
+  int min_expected = 20;  // minimum number of landmarks (or matches) of a camera to check its consistency
+  // A camera is excluded if the fraction of its expected landmarks of the last frame that it re-observes is smaller
+  // than this ...
+  double min_reobservation_ratio = 0.1;
+  // ... while another camera re-observes this fraction. It is also the minimum inlier ratio of a pose estimated from
+  // one camera if cameras contradict each other.
+  double healthy_reobservation_ratio = 0.4;
+  // ... and the camera itself re-observed this fraction in the previous frame; else it lost its landmarks gradually.
+  double previous_reobservation_ratio = 0.5;
+  double conflict_inlier_ratio = 0.3;  // minimum inlier ratio of a camera's matches; with fewer it contradicts the pose
+  double readmission_ratio = 0.15;     // minimum fraction of the landmarks in view that an excluded camera must match
+  int readmit_after = 3;               // consecutive such frames until it is used again
+  double forget_after_s = 2.0;         // an excluded camera with too few landmarks in view for this time is used again
+  double retry_after_s = 10.0;         // time after which an excluded camera is used again unless its view is displaced
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("min_expected", self.min_expected, Range{1, 10000}, "",
-            "landmarks a camera should see, below which nothing is said about it");
+            "minimum number of landmarks of a camera to check its consistency");
     visitor("min_reobservation_ratio", self.min_reobservation_ratio, Range{0, 1}, "",
-            "of what a camera saw last: finds it less again, it is doubted", OptionNote{.formerly = "lost_share"});
+            "minimum fraction of the landmarks of the last frame that a camera must re-observe",
+            OptionNote{.formerly = "lost_share"});
     visitor("healthy_reobservation_ratio", self.healthy_reobservation_ratio, Range{0, 1}, "",
-            "while another camera finds this much", OptionNote{.formerly = "sound_share"});
+            "fraction that another camera must re-observe to exclude it; minimum inlier ratio of a single-camera pose",
+            OptionNote{.formerly = "sound_share"});
     visitor("previous_reobservation_ratio", self.previous_reobservation_ratio, Range{0, 1}, "",
-            "and it found this much itself a frame ago", OptionNote{.formerly = "steady_share"});
+            "fraction that it must have re-observed in the previous frame to be excluded",
+            OptionNote{.formerly = "steady_share"});
     visitor("conflict_inlier_ratio", self.conflict_inlier_ratio, Range{0, 1}, "",
-            "of a camera's matches that agree with the pose: fewer contradict it",
+            "minimum inlier ratio of a camera's matches that does not contradict the pose",
             OptionNote{.formerly = "conflict_share"});
     visitor("readmission_ratio", self.readmission_ratio, Range{0, 1}, "",
-            "of the landmarks in its view that a doubted camera must find", OptionNote{.formerly = "seen_share"});
-    visitor("readmit_after", self.readmit_after, Range{1, 10000}, "frames", "in a row before it counts again");
+            "minimum fraction of the landmarks in view that an excluded camera must match",
+            OptionNote{.formerly = "seen_share"});
+    visitor("readmit_after", self.readmit_after, Range{1, 10000}, "frames",
+            "consecutive such frames until an excluded camera is used again");
     visitor("forget_after_s", self.forget_after_s, Range{0, 1e6}, "s",
-            "without anything it should see, after which it counts again");
+            "time without enough landmarks in view after which an excluded camera is used again");
     visitor("retry_after_s", self.retry_after_s, Range{0, 1e6}, "s",
-            "out and not seen to show its view displaced, after which it is tried again");
+            "time after which an excluded camera is used again unless its view is displaced");
   }
 };
 
 struct TrackingOptions {
-  bool use_capture_times = true;  // images count at their own times; false: at that of their frame
-  int min_inliers = 30;           // keypoints that must support a pose, all cameras together
-  int min_inliers_wide = 50;      // the same after a search without a usable prediction
-  double min_inlier_share = 0.3;  // of the matches: fewer agree by chance
+  bool use_capture_times = true;  // the cameras of a frame have their own capture times; false: the time of the frame
+  int min_inliers = 30;           // minimum number of inlier keypoints of a pose, all cameras together
+  int min_inliers_wide = 50;      // the same after a search in wide windows
+  double min_inlier_ratio = 0.3;  // minimum ratio of inliers to matches of a pose
   MatchingOptions matching;
   ConsensusOptions consensus;
   KeyframeOptions keyframe;
@@ -134,12 +152,14 @@ struct TrackingOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("use_capture_times", self.use_capture_times, Range{}, "",
-            "images count at their own times; false: at that of their frame",
+            "use the capture time of each camera; false: the time of the frame",
             OptionNote{.common = true, .formerly = "own_times"});
-    visitor("min_inliers", self.min_inliers, Range{6, 10000}, "", "keypoints that must support a pose", kCommon);
+    visitor("min_inliers", self.min_inliers, Range{6, 10000}, "",
+            "minimum number of inlier keypoints of a pose, all cameras together", kCommon);
     visitor("min_inliers_wide", self.min_inliers_wide, Range{6, 10000}, "",
-            "the same after a search without a prediction");
-    visitor("min_inlier_share", self.min_inlier_share, Range{0, 1}, "", "share of the matches that must agree");
+            "minimum number of inlier keypoints after a search in wide windows");
+    visitor("min_inlier_ratio", self.min_inlier_ratio, Range{0, 1}, "", "minimum ratio of inliers to matches of a pose",
+            OptionNote{.formerly = "min_inlier_share"});
     visitor.section("matching", self.matching);
     visitor.section("consensus", self.consensus);
     visitor.section("keyframe", self.keyframe);

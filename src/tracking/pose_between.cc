@@ -42,10 +42,10 @@ std::optional<TrackResult> pose_between(const map::BundledMap& map, const Betwee
   const frame::BundledFrame& frame = *early.frame;
   const SE3 T_before = map.resolved_pose(early.before), T_after = map.resolved_pose(early.after);
   if (frame.time_ns == early.before_ns) return result_at(map, frame, T_before, before);
-  const double share = to_seconds(frame.time_ns - early.before_ns) / to_seconds(early.after_ns - early.before_ns);
-  SE3 T = geometry::interpolate(T_before, T_after, share);
+  const double fraction = to_seconds(frame.time_ns - early.before_ns) / to_seconds(early.after_ns - early.before_ns);
+  SE3 T = geometry::interpolate(T_before, T_after, fraction);
   const std::vector<LandmarkId> landmarks = landmarks_of_both(map, before, after);
-  // What the interpolation predicts, then what the pose found does.
+  // The first search uses the interpolated pose, the second one the pose found by the first.
   solver::PoseSolution solution;
   FrameMatches found;
   for (const double radius : {options.matching.predicted_radius, options.matching.local_radius}) {
@@ -57,7 +57,7 @@ std::optional<TrackResult> pose_between(const map::BundledMap& map, const Betwee
                            pool)
                 .found;
     solution = solver::solve_pose(map.rig(), pose_observations(map, frame, found, features), T, options.pose);
-    const auto needed = options.min_inlier_share * static_cast<double>(count(found));
+    const auto needed = options.min_inlier_ratio * static_cast<double>(count(found));
     if (!solution.ok || solution.num_inliers < options.min_inliers || solution.num_inliers < needed)
       return std::nullopt;
     T = solution.T_rig_world;

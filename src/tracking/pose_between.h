@@ -9,11 +9,11 @@ namespace bslam::tracking {
 
 struct BetweenKeyframes {
   std::shared_ptr<const frame::BundledFrame> frame;
-  KeyframeId before, after;            // as committed: either may have been culled since
-  TimeNs before_ns = 0, after_ns = 0;  // of their frames
+  KeyframeId before, after;            // ids of the commit; either keyframe may have been culled since
+  TimeNs before_ns = 0, after_ns = 0;  // times of their frames
 };
 
-// Empty where the map does not support a pose of the frame, or a keyframe's part is gone.
+// Returns nullopt if no pose of the frame has enough inliers in the map, or the submap of a keyframe was removed.
 std::optional<TrackResult> pose_between(const map::BundledMap& map, const BetweenKeyframes& early,
                                         const feature::FeatureModel& features, const TrackingOptions& options,
                                         ThreadPool& pool);

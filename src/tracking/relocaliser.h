@@ -1,4 +1,4 @@
-// Where in the map is a lost rig? Place recognition lies above tracking; this is how a tracker is given it.
+// Interface through which tracking uses place recognition, which belongs to a higher layer, to relocalise a lost rig.
 #pragma once
 
 #include <optional>
@@ -10,20 +10,20 @@
 namespace bslam::tracking {
 
 struct FoundPlace {
-  KeyframeId matched_keyframe;                            // alive
-  geometry::SE3 T_rig_world;                              // of the frame
+  KeyframeId matched_keyframe;                            // alive in the map
+  geometry::SE3 T_rig_world;                              // pose of the frame
   std::vector<std::pair<FeatureId, LandmarkId>> matches;  // inliers
-  int inliers = 0;                                        // keypoints
+  int inliers = 0;                                        // number of inlier keypoints
 };
 
 class Relocaliser {
  public:
   virtual ~Relocaliser() = default;
 
-  // Prepares a frame to be located or to become a keyframe. Does nothing to a frame that is prepared already.
+  // Prepares a frame for relocalisation or for becoming a keyframe. Does nothing if the frame is already prepared.
   virtual void describe(frame::BundledFrame& frame) const = 0;
 
-  // The pose of a described frame, searched for in the whole map. Empty where no place is confirmed.
+  // Searches the whole map for the pose of a described frame. Returns nullopt if no place is confirmed.
   virtual std::optional<FoundPlace> verify_place(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
 };
 

@@ -13,7 +13,7 @@ namespace {
 
 using geometry::SE3;
 
-// Motion from the last pose to `time_ns`, where it is known.
+// Motion from the last pose to `time_ns`. Returns nullopt if it is not known.
 std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) {
   const double dt = to_seconds(time_ns - state.time_ns);
   if (dt == 0) return SE3();
@@ -21,17 +21,17 @@ std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) 
   return SE3::exp(dt * *state.twist);
 }
 
-// In the map as it is now.
+// The last pose in the current map.
 SE3 last_pose(const TrackInput& input) { return input.state.anchored.resolve(input.map).value(); }
 
-// The last pose moved on as far as the motion is known.
+// The last pose, advanced by the motion model if the motion is known.
 SE3 predict(const TrackInput& input, TimeNs time_ns) {
   return motion_since_last(input.state, time_ns).value_or(SE3()) * last_pose(input);
 }
 
-// What the last frame showed, and the last image of cameras that had none in it, as far as the present map still knows
-// it.
-std::vector<LandmarkId> seen_last(const map::BundledMap& map, const TrackerState& state) {
+// Landmarks of the last frame, and of the last image of cameras without an image in that frame, that still exist in the
+// map.
+std::vector<LandmarkId> last_landmarks(const map::BundledMap& map, const TrackerState& state) {
   std::vector<LandmarkId> out;
   const auto add = [&](const std::vector<LandmarkId>& landmarks) {
     for (const LandmarkId l : landmarks) {
@@ -40,8 +40,8 @@ std::vector<LandmarkId> seen_last(const map::BundledMap& map, const TrackerState
     }
   };
   add(state.landmarks);
-  for (const CameraTrust& camera : state.cameras) {
-    if (camera.seen_ns != state.time_ns) add(camera.landmarks);
+  for (const CameraConsensusState& camera : state.cameras) {
+    if (camera.last_image_ns != state.time_ns) add(camera.landmarks);
   }
   std::sort(out.begin(), out.end());
   out.erase(std::unique(out.begin(), out.end()), out.end());
@@ -51,17 +51,17 @@ std::vector<LandmarkId> seen_last(const map::BundledMap& map, const TrackerState
 bool supported(const solver::PoseSolution& solution, std::size_t num_matches, int min_inliers,
                const TrackingOptions& options) {
   return solution.ok && solution.num_inliers >= min_inliers &&
-         solution.num_inliers >= options.min_inlier_share * static_cast<double>(num_matches);
+         solution.num_inliers >= options.min_inlier_ratio * static_cast<double>(num_matches);
 }
 
 struct Coarse {
-  frame::BundledFrame frame;  // its twist is estimated along with the pose
+  frame::BundledFrame frame;  // its twist is estimated together with the pose
   SE3 T_rig_world;
   FrameMatches matches;  // inliers
   LostReason reason = LostReason::kNone;
-  std::vector<std::uint8_t> left_out = {};  // per camera: doubted before or now
-  // Per camera: what of the last frame was seen again; empty after a wide search alone.
-  std::vector<Expectation> again = {};
+  std::vector<std::uint8_t> excluded = {};  // per camera: excluded before or now
+  // Per camera: landmarks of the last frame that were re-observed; empty if only the wide search succeeded.
+  std::vector<LandmarkCounts> reobserved = {};
 };
 
 bool any(const std::vector<std::uint8_t>& flags) { return std::ranges::find(flags, std::uint8_t{1}) != flags.end(); }
@@ -80,9 +80,9 @@ matching::ProjectionSearchOptions search_options(const TrackInput& input, const 
           .scale_factor = input.features.pyramid.scale_factor};
 }
 
-// Motion while the cameras of a frame fire: that since the last frame, going on with the acceleration it had against
-// the interval before. The poses say it, never the late cameras alone: what these see again they saw first with the
-// same error.
+// Motion during the capture of a frame: the motion since the last frame, extrapolated with its acceleration with
+// respect to the interval before. It is a function of the poses. It must not be estimated from the late cameras: the
+// landmarks they re-observe were first observed with the same error.
 solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFrame& frame) {
   solver::MotionModel motion{.delay_s = frame::delays_of(frame), .T_before = last_pose(input)};
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
@@ -99,7 +99,7 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   return motion;
 }
 
-// Pose from what is found near where the pose so far puts it. False where that is too little.
+// Pose from landmarks found near their projections at the current estimate. Returns false if there are too few.
 bool track_in_narrow_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks,
                              const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
@@ -109,22 +109,23 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   FrameMatches found = find_landmarks(map, frame, predicted, landmarks, {},
                                       search_options(input, options.matching, options.matching.predicted_radius), pool)
                            .found;
-  std::vector<std::uint8_t> left_out = out.left_out;
-  drop(left_out, found);
+  std::vector<std::uint8_t> excluded = out.excluded;
+  drop(excluded, found);
   auto observations = pose_observations(map, frame, found, input.features);
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
   const solver::MotionModel motion = motion_model(input, frame);
   auto solution = solver::solve_pose(map.rig(), observations, predicted, motion, options.pose);
-  if (any(contradicting(found, solution.inliers_per_camera, input.state.cameras, options.consensus))) {
-    const SE3 led_to = predict(input, frame.time_ns);
-    const auto steadiest =
-        pose_of_most_consistent_camera(rig, found, observations, led_to, options.consensus, options.pose);
-    if (steadiest.ok) {
-      const auto wrong = contradicting(found, steadiest.inliers_per_camera, input.state.cameras, options.consensus);
-      for (std::size_t c = 0; c < wrong.size(); ++c) left_out[c] |= wrong[c];
-      drop(left_out, found);
+  if (any(conflicting_cameras(found, solution.inliers_per_camera, input.state.cameras, options.consensus))) {
+    const SE3 from_motion = predict(input, frame.time_ns);
+    const auto consistent =
+        pose_of_most_consistent_camera(rig, found, observations, from_motion, options.consensus, options.pose);
+    if (consistent.ok) {
+      const auto wrong =
+          conflicting_cameras(found, consistent.inliers_per_camera, input.state.cameras, options.consensus);
+      for (std::size_t c = 0; c < wrong.size(); ++c) excluded[c] |= wrong[c];
+      drop(excluded, found);
       observations = pose_observations(map, frame, found, input.features);
-      solution = solver::solve_pose(map.rig(), observations, steadiest.T_rig_world, motion, options.pose);
+      solution = solver::solve_pose(map.rig(), observations, consistent.T_rig_world, motion, options.pose);
     }
   }
   if (!supported(solution, observations.size(), options.min_inliers, options)) return false;
@@ -132,16 +133,16 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   out.T_rig_world = solution.T_rig_world;
   out.matches = keep_inliers(found, solution.inlier);
   out.reason = LostReason::kNone;
-  out.again = continuity(map, frame, out.T_rig_world, input.state.cameras, out.matches);
-  const auto lost = disagreeing(out.again, input.state.cameras, options.consensus);
-  for (std::size_t c = 0; c < lost.size(); ++c) left_out[c] |= lost[c];
-  out.left_out = std::move(left_out);
-  drop(out.left_out, out.matches);
+  out.reobserved = count_reobserved(map, frame, out.T_rig_world, input.state.cameras, out.matches);
+  const auto lost = cameras_losing_view(out.reobserved, input.state.cameras, options.consensus);
+  for (std::size_t c = 0; c < lost.size(); ++c) excluded[c] |= lost[c];
+  out.excluded = std::move(excluded);
+  drop(out.excluded, out.matches);
   return true;
 }
 
-// Pose from the landmarks about those of the last frame, looked for in wide windows, with a consensus. False where that
-// is too little.
+// Pose by RANSAC from landmarks around those of the last frame, found in wide windows. Returns false if there are too
+// few.
 bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks,
                            const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
@@ -151,7 +152,7 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   wide.level_slack = 2;
   wide.ratio = 0.8 * options.matching.ratio;
   MatchSearch search = find_landmarks(map, frame, out.T_rig_world, view.landmarks, {}, wide, pool);
-  drop(out.left_out, search.found);
+  drop(out.excluded, search.found);
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return false;
   const auto observations = pose_observations(map, frame, search.found, input.features);
   const auto solution =
@@ -165,14 +166,14 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   return true;
 }
 
-// Pose from the landmarks of the last frame: near where the motion model puts them, and where that finds too little or
-// no motion is known, about where a search in wide windows does. Narrow windows about a motion that was only guessed
-// would find what seems to confirm the guess.
+// Pose from the landmarks of the last frame, searched for near the prediction of the motion model. If that finds too
+// few or no motion is known, a search in wide windows precedes it. Narrow windows around an assumed motion would find
+// matches that seem to confirm the assumption.
 Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
                         ThreadPool& pool) {
-  const std::vector<LandmarkId> landmarks = seen_last(input.map, input.state);
+  const std::vector<LandmarkId> landmarks = last_landmarks(input.map, input.state);
   Coarse out{
-      frame, predict(input, frame.time_ns), {}, LostReason::kFewMatches, doubted(input.state, input.map.rig().size())};
+      frame, predict(input, frame.time_ns), {}, LostReason::kFewMatches, excluded(input.state, input.map.rig().size())};
   const bool tracking = input.state.status == TrackStatus::kTracking;
   const bool predicted = tracking && motion_since_last(input.state, frame.time_ns);
   if (predicted && track_in_narrow_windows(input, landmarks, options, pool, out)) return out;
@@ -182,7 +183,8 @@ Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& fram
 }
 
 bool any_due_for_retry(const TrackerState& state, TimeNs time_ns, const ConsensusOptions& options) {
-  return std::ranges::any_of(state.cameras, [&](const CameraTrust& c) { return due_for_retry(c, time_ns, options); });
+  return std::ranges::any_of(state.cameras,
+                             [&](const CameraConsensusState& c) { return due_for_retry(c, time_ns, options); });
 }
 
 struct Fine {
@@ -191,13 +193,13 @@ struct Fine {
   FrameMatches matches;      // all, inliers and outliers
   AlignedMatches aligned;    // of all matches
   std::vector<LandmarkId> visible;
-  std::vector<Expectation> views;  // per camera, of the local view
-  std::vector<Expectation> wide;   // the same in wide windows, where a doubted camera is due to be tried again
+  std::vector<LandmarkCounts> views;  // per camera, landmarks of the local view
+  std::vector<LandmarkCounts> wide;   // the same in wide windows, if an excluded camera is due for a retry
 };
 
 // Per camera.
-std::vector<Expectation> expectations(const MatchSearch& search) {
-  std::vector<Expectation> out;
+std::vector<LandmarkCounts> landmark_counts(const MatchSearch& search) {
+  std::vector<LandmarkCounts> out;
   for (std::size_t c = 0; c < search.found.size(); ++c)
     out.push_back({search.visible_by_camera[c], static_cast<int>(search.found[c].size())});
   return out;
@@ -212,13 +214,13 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, coarse.matches,
                                       search_options(input, options.matching, options.matching.local_radius), pool);
   Fine out;
-  out.views = expectations(search);
+  out.views = landmark_counts(search);
   if (any_due_for_retry(input.state, frame.time_ns, options.consensus)) {
     auto windows = search_options(input, options.matching, options.matching.wide_radius);
     windows.ratio = 0.8 * options.matching.ratio;
-    out.wide = expectations(find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, {}, windows, pool));
+    out.wide = landmark_counts(find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, {}, windows, pool));
   }
-  drop(coarse.left_out, search.found);
+  drop(coarse.excluded, search.found);
   out.matches = merge(coarse.matches, search.found);
   out.visible = std::move(search.visible);
   out.aligned =
@@ -230,13 +232,13 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   return out;
 }
 
-// The frame as tracking leaves it.
+// See TrackOutput::frame.
 frame::BundledFrame refined_frame(const camera::Rig& rig, const Coarse& coarse, const Fine& fine,
                                   const InitialisationOptions& options) {
   frame::BundledFrame frame = refined(coarse.frame, fine.matches, fine.aligned, fine.solution.inlier, rig);
   frame.twist = fine.twist;
-  for (std::size_t c = 0; c < coarse.left_out.size(); ++c) {
-    if (coarse.left_out[c]) leave_out(rig, c, options.min_parallax, options.max_chi2, frame);
+  for (std::size_t c = 0; c < coarse.excluded.size(); ++c) {
+    if (coarse.excluded[c]) remove_camera(rig, c, options.min_parallax, options.max_chi2, frame);
   }
   return frame;
 }
@@ -252,7 +254,7 @@ std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const 
   return counts;
 }
 
-// Each landmark that should have been seen counts once, also when several cameras should have.
+// Each landmark predicted visible counts once, even if it is visible in several cameras.
 void count_visibility(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found,
                       TrackerState& state) {
   for (const LandmarkId l : found) state.visibility_counts.push_back({l, 1, 1});
@@ -261,28 +263,28 @@ void count_visibility(const std::vector<LandmarkId>& visible, const std::vector<
   }
 }
 
-// What the next frame should know about the cameras of this one.
-void note_trust(const frame::BundledFrame& frame, const Coarse& coarse, const Fine& fine, const FrameMatches& inliers,
-                const TrackingOptions& options, TrackOutput& out) {
-  std::vector<CameraTrust>& cameras = out.state.cameras;
+// Updates the states of the cameras for the next frame.
+void update_cameras(const frame::BundledFrame& frame, const Coarse& coarse, const Fine& fine,
+                    const FrameMatches& inliers, const TrackingOptions& options, TrackOutput& out) {
+  std::vector<CameraConsensusState>& cameras = out.state.cameras;
   cameras.resize(inliers.size());
   for (std::size_t c = 0; c < cameras.size(); ++c) {
-    CameraTrust& camera = cameras[c];
-    out.result.cameras[c].doubted = coarse.left_out[c];
-    if (coarse.left_out[c]) {
-      doubt(camera, fine.views[c], frame.time_ns, options.consensus);
+    CameraConsensusState& camera = cameras[c];
+    out.result.cameras[c].excluded = coarse.excluded[c];
+    if (coarse.excluded[c]) {
+      update_exclusion(camera, fine.views[c], frame.time_ns, options.consensus);
       const bool tried = !fine.wide.empty() && fine.wide[c].expected > 0;
       if (tried && due_for_retry(camera, frame.time_ns, options.consensus))
         retry(camera, fine.wide[c], frame.time_ns, options.consensus);
       continue;
     }
     if (frame.cameras[c].state != image::ImageState::kPresent) {
-      if (to_seconds(frame.time_ns - camera.seen_ns) > kMaxPrediction_s)
-        camera.landmarks.clear();  // much may have come between
+      if (to_seconds(frame.time_ns - camera.last_image_ns) > kMaxPrediction_s)
+        camera.landmarks.clear();  // too old: the view may have changed since
       continue;
     }
-    if (!coarse.again.empty()) trust(camera, coarse.again[c], options.consensus);
-    camera.seen_ns = frame.time_ns;
+    if (!coarse.reobserved.empty()) update_reobservation_ratio(camera, coarse.reobserved[c], options.consensus);
+    camera.last_image_ns = frame.time_ns;
     camera.established |= static_cast<int>(inliers[c].size()) >= options.consensus.min_expected;
     camera.landmarks.clear();
     for (const Match& m : inliers[c]) camera.landmarks.push_back(m.landmark);
@@ -343,7 +345,7 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& f
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);
   count_visibility(fine.visible, state.landmarks, state);
-  note_trust(frame, coarse, fine, out.matches, options, out);
+  update_cameras(frame, coarse, fine, out.matches, options, out);
 
   ++state.frames_since_keyframe;
   KeyframeEvidence evidence =

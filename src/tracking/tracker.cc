@@ -4,7 +4,7 @@
 
 #include "base/stopwatch.h"
 #include "frame/capture_times.h"
-#include "tracking/error_floor.h"
+#include "tracking/calibration_error.h"
 #include "tracking/feature_budget.h"
 #include "tracking/make_keyframe.h"
 
@@ -15,12 +15,12 @@ using frame::BundledFrame;
 
 bool is_tracking(TrackStatus status) { return status == TrackStatus::kTracking; }
 
-// Was there enough to see for a pose?
-bool saw_something(const TrackResult& result) {
+// Returns true if there were enough features for a pose.
+bool had_features(const TrackResult& result) {
   return result.reason != LostReason::kNoImages && result.reason != LostReason::kFewFeatures;
 }
 
-// The counts of each landmark added up, in order of id.
+// Sums the counts of each landmark, in order of id.
 std::vector<map::VisibilityCount> folded(std::vector<map::VisibilityCount> counts) {
   std::stable_sort(counts.begin(), counts.end(), [](const map::VisibilityCount& a, const map::VisibilityCount& b) {
     return a.landmark < b.landmark;
@@ -37,24 +37,24 @@ std::vector<map::VisibilityCount> folded(std::vector<map::VisibilityCount> count
   return out;
 }
 
-// A camera that saw nothing because it was blurred is no longer suspect once it is sharp.
-void clear_blur_suspicion(const std::vector<std::uint8_t>& blurred, FrontEndState& state) {
+// Readmits cameras that were excluded while they were blurred and are sharp now.
+void readmit_sharp_cameras(const std::vector<std::uint8_t>& blurred, FrontEndState& state) {
   for (std::size_t c = 0; c < state.blurred.size() && c < state.track.cameras.size(); ++c) {
-    CameraTrust& camera = state.track.cameras[c];
-    if (state.blurred[c] && !blurred[c] && camera.doubted) camera = trusted(camera.established);
+    CameraConsensusState& camera = state.track.cameras[c];
+    if (state.blurred[c] && !blurred[c] && camera.excluded) camera = readmitted(camera.established);
   }
   state.blurred = blurred;
 }
 
-// Mapping may have rescaled the submap since the last frame: pose and velocity follow.
+// Mapping may have rescaled the submap since the last frame: rescales pose and velocity.
 void apply_scale_change(const map::BundledMap& map, TrackerState& state) {
   if (state.twist) state.twist->tail<3>() *= state.anchored.scale_change(map);
   state.anchored.rescale(map);
 }
 
-// Attributes what happened since the last frame either to the rig (T_rig_odom) or to a correction of the map
-// (T_map_odom).
-void note_motion(const map::BundledMap& map, const TrackerState& before, TrackOutcome& outcome) {
+// Attributes the change of the pose since the last frame to the motion of the rig (T_rig_odom) if tracking was
+// continuous, else to T_map_odom. Corrections of the map since the last frame change T_map_odom.
+void update_odometry(const map::BundledMap& map, const TrackerState& before, TrackOutcome& outcome) {
   FrontEndState& state = outcome.next;
   FrameRecord& record = outcome.record;
   const bool continued = is_tracking(before.status) && before.anchored.known_in(map);
@@ -68,7 +68,7 @@ void note_motion(const map::BundledMap& map, const TrackerState& before, TrackOu
   record.root = map.root_of(record.result.anchored.reference);
 }
 
-// The part of the record that repeats the state.
+// Copies the motion from the state to the record.
 void record_motion(TrackOutcome& outcome) {
   outcome.record.twist = outcome.next.track.twist;
   outcome.record.T_rig_odom = outcome.next.T_rig_odom;
@@ -90,20 +90,20 @@ Tracker::Tracker(const camera::Rig& rig, const TrackerOptions& options, ThreadPo
     : rig_(rig), options_(options), pool_(pool), relocaliser_(std::move(relocaliser)) {}
 
 std::vector<matching::AlignmentOptions> Tracker::alignment(const FrontEndState& state) const {
-  return alignment_by_camera(options_.tracking.alignment, state.error_floors, rig_.size());
+  return alignment_by_camera(options_.tracking.alignment, state.calibration_errors, rig_.size());
 }
 
-FramePlan Tracker::plan(const image::ImageBundle& images, const PictureFaults& faults, FrontEndState& state) const {
-  clear_blur_suspicion(faults.blurred, state);
+FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& faults, FrontEndState& state) const {
+  readmit_sharp_cameras(faults.blurred, state);
   FramePlan plan;
   std::vector<std::uint8_t> out(rig_.size());
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = faults.outage[c] != CameraReason::kNone;
   const bool motion_matters = options_.tracking.use_capture_times && !state.track.twist;
-  plan.left_out = motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
-  for (std::size_t c = 0; c < out.size(); ++c) plan.postponed.push_back(plan.left_out[c] && !out[c]);
-  std::vector<std::uint8_t> failing = doubted(state.track, rig_.size());
+  plan.skipped = motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
+  for (std::size_t c = 0; c < out.size(); ++c) plan.postponed.push_back(plan.skipped[c] && !out[c]);
+  std::vector<std::uint8_t> failing = excluded(state.track, rig_.size());
   for (std::size_t c = 0; c < failing.size(); ++c) failing[c] |= faults.failing[c];
-  plan.budgets = feature_budgets(rig_.size(), state.feature_shares, plan.left_out, failing, options_.features);
+  plan.budgets = feature_budgets(rig_.size(), state.budget_fractions, plan.skipped, failing, options_.features);
   plan.alignment = alignment(state);
   if (state.track.twist) plan.twist = *state.track.twist;
   return plan;
@@ -111,9 +111,9 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const PictureFaults& f
 
 FramePlan Tracker::plan() const {
   FramePlan plan;
-  plan.left_out.assign(rig_.size(), 0);
-  plan.postponed = plan.left_out;
-  plan.budgets = feature_budgets(rig_.size(), {}, {}, plan.left_out, options_.features);
+  plan.skipped.assign(rig_.size(), 0);
+  plan.postponed = plan.skipped;
+  plan.budgets = feature_budgets(rig_.size(), {}, {}, plan.skipped, options_.features);
   plan.alignment = alignment({});
   return plan;
 }
@@ -151,7 +151,7 @@ std::optional<TrackResult> Tracker::locate_early(const map::BundledMap& map, con
 }
 
 TrackOutput Tracker::follow(const Input& input, const FrontEndState& state) const {
-  if (!state.track.anchored.known_in(*input.map)) {  // no pose in this map so far
+  if (!state.track.anchored.known_in(*input.map)) {  // no pose in this map yet
     const bool blind = input.frame.num_keypoints() < static_cast<std::size_t>(options_.tracking.min_inliers);
     return lost(state.track, input.frame, blind ? LostReason::kFewFeatures : LostReason::kNotFound);
   }
@@ -172,20 +172,21 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   const TrackerState before = state.track;
   TrackOutput output = follow(input, state);
   record.stages.push_back({"track", watch.ms()});
-  if (!is_tracking(output.result.status) && saw_something(output.result) && relocalise(input, outcome)) {
+  if (!is_tracking(output.result.status) && had_features(output.result) && relocalise(input, outcome)) {
     output = follow(input, state);
     if (!is_tracking(output.result.status)) record.relocalisation.reset();
   }
-  if (is_tracking(output.result.status)) input.frame = output.frame;  // as tracking refined it
+  if (is_tracking(output.result.status)) input.frame = output.frame;  // refined by tracking
   record.result = output.result;
-  state.feature_shares = feature_shares(state.feature_shares, *input.map, input.frame, output);
-  state.error_floors = error_floors(state.error_floors, *input.map, input.frame, output, options_.tracking.alignment);
-  if (!is_tracking(output.result.status)) return note_lost(input, before, outcome);
+  state.budget_fractions = budget_fractions(state.budget_fractions, *input.map, input.frame, output);
+  state.calibration_errors =
+      calibration_errors(state.calibration_errors, *input.map, input.frame, output, options_.tracking.alignment);
+  if (!is_tracking(output.result.status)) return handle_lost(input, before, outcome);
   state.frames_lost = 0;
   state.start_reference.reset();
   state.waiting.clear();
   state.track = std::move(output.state);
-  note_motion(*input.map, before, outcome);
+  update_odometry(*input.map, before, outcome);
   if (options_.localize_only) {
     state.track.visibility_counts.clear();
   } else if (output.keyframe_due) {
@@ -193,22 +194,22 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   }
 }
 
-// The rig is searched for from where it was last seen; where that lasts too long, a new submap is started.
-void Tracker::note_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome) {
+// The next frames search for the rig near its last pose. After too many lost frames a new submap is started.
+void Tracker::handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome) {
   FrontEndState& state = outcome.next;
   const TrackResult result = outcome.record.result;
   state.track = before;
   state.track.status = TrackStatus::kLost;
   state.track.twist.reset();
-  state.frames_lost += saw_something(result);
-  note_motion(*input.map, before, outcome);
+  state.frames_lost += had_features(result);
+  update_odometry(*input.map, before, outcome);
   const bool give_up = state.frames_lost >= options_.new_submap_after && !options_.localize_only;
-  if (!give_up || !saw_something(result)) return;
+  if (!give_up || !had_features(result)) return;
   start(input, outcome);
   if (!outcome.edit) outcome.record.result = result;
 }
 
-// True where a place was found: the state is there now, for tracking to confirm.
+// Returns true if a place was found. The state is then set to its pose, which tracking has to confirm.
 bool Tracker::relocalise(const Input& input, TrackOutcome& outcome) {
   if (!relocaliser_) return false;
   const Stopwatch watch;
@@ -224,9 +225,9 @@ bool Tracker::relocalise(const Input& input, TrackOutcome& outcome) {
   }
   std::sort(landmarks.begin(), landmarks.end());
   TrackerState& state = outcome.next.track;
-  const auto trust = doubts_of(state.cameras, seen, options_.tracking.consensus);
+  auto cameras = readmit_observing_cameras(state.cameras, seen, options_.tracking.consensus);
   state = state_at_keyframe({}, input.frame.time_ns, place->matched_keyframe, std::move(landmarks));
-  state.cameras = trust;
+  state.cameras = std::move(cameras);
   state.anchored = map::AnchoredPose::at(*input.map, place->matched_keyframe, place->T_rig_world);
   outcome.record.relocalisation = Relocalisation{place->matched_keyframe, place->inliers};
   return true;
@@ -247,7 +248,7 @@ void Tracker::propose_keyframe(const Input& input, const TrackOutput& output, Tr
 void Tracker::complete_keyframe(const map::CommitReport& report, TrackOutcome& outcome) const {
   TrackerState& state = outcome.next.track;
   TrackResult& result = outcome.record.result;
-  // Mapping may have committed another scale while the frame was tracked.
+  // Mapping may have committed a new scale while the frame was tracked.
   if (state.twist) state.twist->tail<3>() *= result.anchored.scale_change(*report.published);
   state = state_at_keyframe(state, result.time_ns, report.keyframes.front(),
                             committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));

@@ -1,6 +1,6 @@
-// The front end: state and policy of tracking from frame to frame. It starts maps, follows the rig, locates it again
-// after a loss, and decides which frames become keyframes. Its state is a value, it reads the map from an immutable
-// version, and changes it only by proposing an edit.
+// The front end: initialises maps, tracks the rig from frame to frame, relocalises it after a loss, and decides which
+// frames become keyframes. Its state is passed as a value. It reads an immutable version of the map and proposes edits
+// of it.
 #pragma once
 
 #include <memory>
@@ -24,31 +24,31 @@ struct TrackerOptions {
   feature::FeatureOptions features;
   std::uint64_t seed = 1;
   bool localize_only = false;  // never propose an edit of the map
-  int new_submap_after = 50;   // frames with something to see but without a pose, after which a new submap is started
+  int new_submap_after = 50;   // number of frames with features but without a pose after which a new submap is started
 };
 
-// How the next frame is to be extracted and bundled. Per camera.
+// Parameters for the extraction and bundling of the next frame, per camera.
 struct FramePlan {
-  std::vector<std::uint8_t> left_out;   // its image is not used
-  std::vector<std::uint8_t> postponed;  // of these: sound cameras that fire late while the motion is not known
-  std::vector<int> budgets;             // keypoints wanted
+  std::vector<std::uint8_t> skipped;    // its image is not used
+  std::vector<std::uint8_t> postponed;  // subset: working cameras that capture late while the motion is not known
+  std::vector<int> budgets;             // target number of keypoints
   std::vector<matching::AlignmentOptions> alignment;
-  geometry::Vector6d twist = geometry::Vector6d::Zero();  // predicted motion of the rig, zero where unknown
+  geometry::Vector6d twist = geometry::Vector6d::Zero();  // predicted motion of the rig, zero if unknown
 };
 
-// What tracking carries from one frame to the next.
+// State of the front end that is carried from frame to frame.
 struct FrontEndState {
   TrackerState track;
-  std::vector<std::uint8_t> blurred;   // cameras that were blurred in the last frame
-  std::vector<double> feature_shares;  // of the cameras in the feature budget; empty: even
-  std::vector<double> error_floors;    // of the cameras, px; empty: nothing is known
-  // Before a map is started up to scale: the frame that later ones are compared with, and all since, itself first.
+  std::vector<std::uint8_t> blurred;       // cameras that were blurred in the last frame
+  std::vector<double> budget_fractions;    // per camera, fraction of the feature budget; empty: equal fractions
+  std::vector<double> calibration_errors;  // per camera, px; empty: not estimated
+  // During a monocular initialisation: the reference frame, and all frames since, beginning with the reference.
   std::shared_ptr<const StartCandidate> start_reference;
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
-  int frames_lost = 0;  // in a row, with something to see
+  int frames_lost = 0;  // consecutive lost frames with features
   geometry::SE3 T_rig_odom, T_map_odom;
 
-  // The state from which another map is started; the smooth pose goes on.
+  // The state for the initialisation of another map; the odometry pose is continued.
   FrontEndState restarted() const;
 };
 
@@ -57,37 +57,40 @@ struct ProposedEdit {
   enum class Kind { kStart, kKeyframe };
   Kind kind = Kind::kKeyframe;
   map::MapDraft draft;
-  std::vector<LandmarkId> landmarks;  // of the newest keyframe, with the ids of the draft
-  std::size_t base_landmarks = 0;     // landmark slots of the version it is based on: ids from there on are provisional
+  std::vector<LandmarkId> landmarks;  // landmarks of the newest keyframe, with ids of the draft
+  std::size_t base_landmarks = 0;     // landmark slots of the base version; ids from there on are provisional
 };
 
 struct TrackOutcome {
   FrameRecord record;
   FrontEndState next;
   std::optional<ProposedEdit> edit;
-  std::vector<BetweenKeyframes> early;  // known after a start up to scale: the frames it was made from
+  std::vector<BetweenKeyframes> early;  // frames of a monocular initialisation, once it succeeded
 };
 
 class Tracker {
  public:
-  // `rig` and `pool` outlive it. Without a relocaliser a lost rig is searched for only where it was lost.
+  // `rig` and `pool` must outlive the tracker. Without a relocaliser a lost rig is only searched for near its last
+  // pose.
   Tracker(const camera::Rig& rig, const TrackerOptions& options, ThreadPool& pool,
           std::unique_ptr<Relocaliser> relocaliser = nullptr);
 
-  // Before extraction. A camera that was out of focus or smeared, and is not any longer, is trusted again in `state`.
-  FramePlan plan(const image::ImageBundle& images, const PictureFaults& faults, FrontEndState& state) const;
-  // For a frame by itself: every camera is used and gets an even share of the budget.
+  // Called before extraction. Readmits excluded cameras in `state` that were blurred in the last frame and are not any
+  // more.
+  FramePlan plan(const image::ImageBundle& images, const ImageFaults& faults, FrontEndState& state) const;
+  // Plan for a single frame without a state: all cameras are used, with equal budgets.
   FramePlan plan() const;
 
-  // Tracks a frame in a version of the map, or tries to start a map with it. `pyramids`: per camera. Where there is an
-  // edit in the outcome, commit it and call `committed`; record and next state are complete only then.
+  // Tracks a frame in a version of the map, or attempts to initialise a map with it. `pyramids`: one per camera. If the
+  // outcome contains an edit, the caller must commit it and call `committed`, which completes the record and the next
+  // state.
   TrackOutcome process(FrontEndState state, frame::BundledFrame frame, std::span<const image::Pyramid> pyramids,
                        const map::MapSnapshot& map);
 
-  // Completes an outcome with the ids its edit was given. `report` is that of its commit.
+  // Completes an outcome with the ids assigned by the commit of its edit.
   void committed(const map::CommitReport& report, TrackOutcome& outcome) const;
 
-  // The pose of a frame from before the start of a map, in the map as it is now.
+  // The pose in the current map of a frame captured during a monocular initialisation (see pose_between).
   std::optional<TrackResult> locate_early(const map::BundledMap& map, const BetweenKeyframes& early) const;
 
  private:
@@ -101,7 +104,7 @@ class Tracker {
   void track(const Input& input, TrackOutcome& outcome);
   TrackOutput follow(const Input& input, const FrontEndState& state) const;
   bool relocalise(const Input& input, TrackOutcome& outcome);
-  void note_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome);
+  void handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome);
   void propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const;
   void complete_keyframe(const map::CommitReport& report, TrackOutcome& outcome) const;
 
@@ -117,7 +120,8 @@ class Tracker {
   const std::unique_ptr<Relocaliser> relocaliser_;
 };
 
-// Landmarks with the ids a commit gave them, alive, in order, each once. `base_landmarks` as in ProposedEdit.
+// The landmarks that are alive, with the ids assigned by a commit, in order, each once. `base_landmarks`: see
+// ProposedEdit.
 std::vector<LandmarkId> committed_landmarks(const std::vector<LandmarkId>& proposed, std::size_t base_landmarks,
                                             const map::CommitReport& report);
 

@@ -1,4 +1,4 @@
-// Starting a map: the part of the tracker that runs while there is no map, or none in which the rig can be located.
+// Initialisation of a map by the tracker, if there is no map or the rig cannot be located in it.
 #include "base/stopwatch.h"
 #include "tracking/tracker.h"
 
@@ -7,10 +7,10 @@ namespace {
 
 using frame::BundledFrame;
 
-constexpr int kMetricPatience = 5;  // frames a rig whose cameras overlap waits for depth before it starts up to scale
-constexpr int kMaxStartAge = 40;    // frames after which a start up to scale gets another reference frame
+constexpr int kMetricAttempts = 5;  // frames in which only metric initialisation is attempted if cameras overlap
+constexpr int kMaxStartAge = 40;    // maximum age in frames of the reference frame of a monocular initialisation
 
-// Landmarks of a keyframe seen by each camera.
+// Number of landmarks of a keyframe observed by each camera.
 std::vector<int> landmarks_by_camera(const map::BundledKeyframe& keyframe) {
   std::vector<int> seen(keyframe.frame->cameras.size(), 0);
   for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f) {
@@ -56,20 +56,20 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   if (overlap) {
     if (auto started = initialise_metric(input.frame, input.pyramids, options, draft)) return started;
   }
-  // All submaps share one scale: beside a metric one no other is started.
+  // All submaps have the same scale, so a metric map gets no submap of unknown scale.
   if (input.map->num_keyframes() > 0 && input.map->scale() == map::Scale::kMetric) return std::nullopt;
-  const int patience = overlap ? kMetricPatience : 0;
-  if (!state.start_reference || input.frame.id.value() - state.start_reference->frame->id.value() < patience)
+  const int metric_attempts = overlap ? kMetricAttempts : 0;
+  if (!state.start_reference || input.frame.id.value() - state.start_reference->frame->id.value() < metric_attempts)
     return std::nullopt;
   const Random random(options_.seed, "start", static_cast<std::uint64_t>(input.frame.id.value()));
   return initialise_monocular(*state.start_reference, input.frame, input.pyramids, options, random, draft);
 }
 
-// Takes over the frame. The reference is replaced when it is old or its view is gone.
+// Stores the frame. It replaces the reference frame if that is too old or has too few matches with it.
 void Tracker::keep_reference_frame(const Input& input, FrontEndState& state) const {
   const InitialisationOptions& options = options_.tracking.initialisation;
   if (state.start_reference && input.frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular))
-    return;  // too little to compare
+    return;  // too few keypoints to compare
   const bool good = state.start_reference &&
                     input.frame.id.value() - state.start_reference->frame->id.value() <= kMaxStartAge &&
                     comparable(*state.start_reference->frame, input.frame, options);
@@ -89,8 +89,8 @@ void Tracker::complete_start(const map::CommitReport& report, TrackOutcome& outc
   const map::BundledKeyframe& keyframe = report.published->keyframe(last);
   state.track = state_at_keyframe({}, result.time_ns, last,
                                   committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
-  state.track.cameras =
-      doubts_of(std::vector<CameraTrust>(rig_.size()), landmarks_by_camera(keyframe), options_.tracking.consensus);
+  state.track.cameras = readmit_observing_cameras(std::vector<CameraConsensusState>(rig_.size()),
+                                                  landmarks_by_camera(keyframe), options_.tracking.consensus);
   result.status = TrackStatus::kTracking;
   result.reason = LostReason::kNone;
   result.T_rig_world = keyframe.T_rig_world;

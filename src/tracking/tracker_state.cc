@@ -1,4 +1,4 @@
-// The parts of tracking/track.h that concern its state alone.
+// Functions of tracking/track.h that use the tracker state only.
 #include "tracking/track.h"
 
 namespace bslam::tracking {
@@ -25,9 +25,9 @@ std::string_view describe(LostReason reason) {
   return "";
 }
 
-std::vector<std::uint8_t> doubted(const TrackerState& state, std::size_t cameras) {
+std::vector<std::uint8_t> excluded(const TrackerState& state, std::size_t cameras) {
   std::vector<std::uint8_t> out(cameras, 0);
-  for (std::size_t c = 0; c < state.cameras.size(); ++c) out[c] = state.cameras[c].doubted;
+  for (std::size_t c = 0; c < state.cameras.size(); ++c) out[c] = state.cameras[c].excluded;
   return out;
 }
 

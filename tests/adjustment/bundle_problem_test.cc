@@ -35,20 +35,20 @@ std::vector<float> sigmas_of_one_landmark(map::BundledMap& map, const std::vecto
   return out;
 }
 
-TEST(BuildProblem, TakesTheReferenceForAsGoodAsWhatIsAlignedToIt) {
+TEST(BuildProblem, ReferenceGetsTheAccuracyOfAlignedKeypoints) {
   map::BundledMap map = keyframes_with({0.5f, 0.15f, 0.2f});
   const std::vector<map::Observation> seen = {
       {KeyframeId(0), FeatureId(2)}, {KeyframeId(1), FeatureId(2)}, {KeyframeId(2), FeatureId(2)}};
   EXPECT_EQ(sigmas_of_one_landmark(map, seen, 0), (std::vector<float>{0.15f, 0.15f, 0.2f}));
 }
 
-TEST(BuildProblem, LeavesTheReferenceWhereNothingIsAlignedToIt) {
+TEST(BuildProblem, ReferenceIsUnchangedIfNothingIsAlignedToIt) {
   map::BundledMap map = keyframes_with({0.35f, 0.15f});
   const std::vector<map::Observation> seen = {{KeyframeId(0), FeatureId(1)}, {KeyframeId(1), FeatureId(1), false}};
   EXPECT_EQ(sigmas_of_one_landmark(map, seen, 0), (std::vector<float>{0.35f, static_cast<float>(kDetected)}));
 }
 
-TEST(BuildProblem, LeavesAReferenceThatIsBetter) {
+TEST(BuildProblem, ReferenceIsUnchangedIfItIsMoreAccurate) {
   map::BundledMap map = keyframes_with({0.1f, 0.15f});
   const std::vector<map::Observation> seen = {{KeyframeId(0), FeatureId(1)}, {KeyframeId(1), FeatureId(1)}};
   EXPECT_EQ(sigmas_of_one_landmark(map, seen, 0), (std::vector<float>{0.1f, 0.15f}));

@@ -38,7 +38,7 @@ double pose_error(const scene::BundleScene& scene) {
   return sum;
 }
 
-TEST(LandmarkVariances, TellThoseThatAgreeFromThoseThatDoNot) {
+TEST(LandmarkVariances, AreLargerForInconsistentLandmarks) {
   const auto scene = uneven_scene(1);
   ASSERT_TRUE(solver::adjust(scene->problem, plain()).usable());
   const auto variances = variances_of(scene->problem, {});
@@ -51,7 +51,7 @@ TEST(LandmarkVariances, TellThoseThatAgreeFromThoseThatDoNot) {
   EXPECT_GT(uneven / m, 4 * steady / n);
 }
 
-TEST(LandmarkVariances, AreOneWhereNothingCanBeSaid) {
+TEST(LandmarkVariances, AreOneWithTooFewObservations) {
   const auto scene = uneven_scene(2);
   const std::vector<std::uint8_t> all(scene->problem.observations.size(), 1);
   for (const double v : variances_of(scene->problem, all)) EXPECT_EQ(v, 1.0);
@@ -60,7 +60,7 @@ TEST(LandmarkVariances, AreOneWhereNothingCanBeSaid) {
   for (const double v : variances_of(scene->problem, but_one)) EXPECT_EQ(v, 1.0);
 }
 
-TEST(AdjustWithVariances, BringsPosesNearerToTheTruth) {
+TEST(AdjustWithVariances, ImprovesPoses) {
   double without = 0, with = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const auto scene = uneven_scene(seed);

@@ -64,7 +64,7 @@ double median_point_error_m(const map::SimulatedMap& world, const map::BundledMa
   return *middle;
 }
 
-TEST(AdjustMap, BringsPerturbedPosesAndPointsNearTheTruth) {
+TEST(AdjustMap, RecoversPerturbedPosesAndPoints) {
   for (const int cameras : {1, 2, 4}) {
     map::SimulatedMap world = true_map(synthetic::ring_rig(cameras), 5);
     const Selection selection = everything(world.map, cameras == 1 ? 2 : 1);
@@ -96,13 +96,13 @@ double error_of_a_rig_with_late_cameras(bool knows_motion) {
   return mean_pose_error_m(world, draft.map());
 }
 
-TEST(AdjustMap, SeesLateCamerasFromWhereTheyWere) {
+TEST(AdjustMap, UsesThePosesOfLateCameras) {
   const double known = error_of_a_rig_with_late_cameras(true), unknown = error_of_a_rig_with_late_cameras(false);
   EXPECT_LT(known, 0.004);
   EXPECT_GT(unknown, 3 * known);
 }
 
-TEST(AdjustMap, LeavesAloneWhatIsFixedOrNotSelected) {
+TEST(AdjustMap, DoesNotChangeFixedOrUnselectedVariables) {
   map::SimulatedMap world = true_map(synthetic::ring_rig(2), 5);
   Selection selection;
   selection.free_keyframes = {KeyframeId(2), KeyframeId(3)};
@@ -181,7 +181,7 @@ TEST(AdjustMap, DoesNothingWithoutAFixedOrAFreeKeyframe) {
   EXPECT_FALSE(adjust_map(nothing, {}, kFeatures, draft).done);
 }
 
-TEST(AdjustMap, AskedToStopItKeepsTheMapSound) {
+TEST(AdjustMap, KeepsTheMapValidAfterAStopRequest) {
   map::SimulatedMap world = true_map(synthetic::ring_rig(2), 4);
   std::stop_source stop;
   stop.request_stop();

@@ -20,7 +20,7 @@ camera::Rig stereo() {
   return camera::Rig({{pinhole(300), T_body_cam0}, {pinhole(330), T_body_cam0 * step}});
 }
 
-// Keypoints of random points in front of the cameras; every point has a descriptor of its own.
+// Keypoints of random points in front of the cameras; every point has a unique descriptor.
 std::array<feature::Detections, 2> views_of(const camera::Rig& rig) {
   Random random(1);
   std::array<feature::Detections, 2> views;
@@ -44,7 +44,7 @@ PairEvidence judged(const camera::Rig& calibration, const std::array<feature::De
   return judge_pair(calibration, 0, 1, std::span(&views[0], 1), std::span(&views[1], 1));
 }
 
-TEST(ConventionCheck, FindsTheConventionThatWasMeant) {
+TEST(ConventionCheck, FindsTheIntendedConvention) {
   const camera::Rig rig = stereo();
   const auto views = views_of(rig);
   EXPECT_EQ(judged(rig, views).verdict, Convention::kAsGiven);
@@ -69,33 +69,33 @@ TEST(ConventionCheck, HasNoVerdictIfNoConventionFits) {
   EXPECT_FALSE(evidence.verdict);
 }
 
-TEST(ConventionCheck, SaysHowFarACameraIsTurned) {
+TEST(ConventionCheck, ReportsTheRotationOfACamera) {
   const camera::Rig rig = stereo();
-  const SE3 turned(geometry::so3_exp({0.02, 0.06, -0.03}), Eigen::Vector3d::Zero());  // 4 degrees
-  const camera::Rig wrong({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1) * turned}});
+  const SE3 rotated(geometry::so3_exp({0.02, 0.06, -0.03}), Eigen::Vector3d::Zero());  // 4 degrees
+  const camera::Rig wrong({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1) * rotated}});
   const PairEvidence evidence = judged(wrong, views_of(rig));
   EXPECT_FALSE(evidence.verdict);
   ASSERT_TRUE(evidence.other);
   EXPECT_GT(evidence.other->agreeing, 140);
-  EXPECT_NEAR(evidence.other->turned_deg, 4.0, 0.05);
+  EXPECT_NEAR(evidence.other->rotated_deg, 4.0, 0.05);
   EXPECT_LT(evidence.other->displaced_deg, 2.0);
   EXPECT_NE(describe_evidence(std::array{evidence}).find("warning: the images contradict the extrinsics"),
             std::string::npos);
 }
 
-TEST(ConventionCheck, SaysHowFarACameraIsDisplaced) {
+TEST(ConventionCheck, ReportsTheDisplacementOfACamera) {
   const camera::Rig rig = stereo();
   const SE3 step = rig.body_from_cam(0).inverse() * rig.body_from_cam(1);
   const SE3 above(step.rotation(), {step.translation().y(), step.translation().x(), step.translation().z()});
   const camera::Rig wrong({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(0) * above}});
   const PairEvidence evidence = judged(wrong, views_of(rig));
   ASSERT_TRUE(evidence.other);
-  EXPECT_LT(evidence.other->turned_deg, 0.1);
+  EXPECT_LT(evidence.other->rotated_deg, 0.1);
   EXPECT_NEAR(evidence.other->displaced_deg, 80.5, 2.0);  // between (12, 1, -1) and (1, 12, -1) cm
 }
 
 // Too few matches consistent with the calibration for a verdict are not yet evidence of another pose.
-TEST(ConventionCheck, IsNotAlarmedByAFewMoreMatchesElsewhere) {
+TEST(ConventionCheck, IgnoresOtherPosesWithSlightlyMoreMatches) {
   const camera::Rig rig = stereo();
   auto views = views_of(rig);
   for (feature::Detections& v : views) v.pixel.resize(40), v.descriptor.resize(40);
@@ -107,20 +107,20 @@ TEST(ConventionCheck, IsNotAlarmedByAFewMoreMatchesElsewhere) {
   EXPECT_EQ(describe_evidence(std::array{evidence}).find("warning"), std::string::npos);
 }
 
-TEST(ConventionCheck, SaysHowManyPairsItCouldJudge) {
+TEST(ConventionCheck, ReportsTheNumberOfTestedPairs) {
   const PairEvidence good{
       .first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
   const PairEvidence apart{.first = 0, .second = 2, .matches = 10};
-  const std::string said = describe_evidence(std::array{good, apart});
-  EXPECT_NE(said.find("1 of 2 pairs could not be judged, among them all pairs of camera 2\n"), std::string::npos)
-      << said;
+  const std::string text = describe_evidence(std::array{good, apart});
+  EXPECT_NE(text.find("1 of 2 pairs could not be tested, among them all pairs of camera 2\n"), std::string::npos)
+      << text;
   const PairEvidence also{
       .first = 1, .second = 2, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
-  EXPECT_NE(describe_evidence(std::array{good, apart, also}).find("1 of 3 pairs could not be judged\n"),
+  EXPECT_NE(describe_evidence(std::array{good, apart, also}).find("1 of 3 pairs could not be tested\n"),
             std::string::npos);
 }
 
-TEST(ConventionCheck, SpeaksOfTheMostFrequentFault) {
+TEST(ConventionCheck, ReportsTheMostFrequentFault) {
   PairEvidence good{
       .first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
   EXPECT_NE(describe_evidence(std::array{good}).find("the extrinsics are consistent with the images"),
@@ -137,7 +137,7 @@ TEST(ConventionCheck, SpeaksOfTheMostFrequentFault) {
       << mixed;
   EXPECT_NE(mixed.find("; 1 of 2 pairs are consistent as given"), std::string::npos) << mixed;
   bad.verdict.reset();
-  EXPECT_NE(describe_evidence(std::array{bad}).find("the extrinsics could not be judged"), std::string::npos);
+  EXPECT_NE(describe_evidence(std::array{bad}).find("the extrinsics could not be tested"), std::string::npos);
 }
 
 }  // namespace

@@ -36,27 +36,27 @@ std::vector<geometry::SE3> extrinsics(const camera::Rig& rig) {
   return out;
 }
 
-TEST(RecoverObservations, FindsWhatWasRefusedAndLittleElse) {
+TEST(RecoverObservations, RecoversRejectedKeypointsWithFewErrors) {
   map::SimulatedMap world = true_map();
   const KeyframeId last(5);
-  std::size_t refused = 0;  // keypoints of every second landmark of the last keyframe that two others see
+  std::size_t rejected = 0;  // keypoints of every second landmark of the last keyframe that two others see
   for (const LandmarkId l : world.map.landmark_ids()) {
     const auto observations = world.map.observations(l);
     if (l.value() % 2 != 0 || observations.size() < 3 || observations.back().keyframe != last) continue;
-    refused += world.map.keyframe(last).frame->bundled.keypoints(observations.back().feature).size();
+    rejected += world.map.keyframe(last).frame->bundled.keypoints(observations.back().feature).size();
     ASSERT_TRUE(world.map.remove_observation(l, last));
   }
-  ASSERT_GT(refused, 60u);
+  ASSERT_GT(rejected, 60u);
   adjustment::BundleProblem flat = everything(world.map);
   const auto before = flat.problem.observations;
   const int added = recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, flat);
-  EXPECT_GT(added, 0.8 * static_cast<double>(refused));
+  EXPECT_GT(added, 0.8 * static_cast<double>(rejected));
   ASSERT_EQ(flat.problem.observations.size(), before.size() + static_cast<std::size_t>(added));
   ASSERT_EQ(flat.sources.size(), flat.problem.observations.size());
   int right = 0, new_ones = 0;
   for (std::size_t i = 0, old = 0; i < flat.problem.observations.size(); ++i) {
     const auto& o = flat.problem.observations[i];
-    if (i > 0) {  // still sorted, no image shows a point twice
+    if (i > 0) {  // sorted, and no point is observed twice in an image
       const auto& p = flat.problem.observations[i - 1];
       EXPECT_LT(std::tuple(p.point, p.pose, p.camera), std::tuple(o.point, o.pose, o.camera));
     }
@@ -78,7 +78,7 @@ TEST(RecoverObservations, FindsWhatWasRefusedAndLittleElse) {
   EXPECT_GT(right, 0.97 * added);
 }
 
-TEST(RecoverObservations, LooksUnderTheExtrinsicsGiven) {
+TEST(RecoverObservations, UsesTheGivenExtrinsics) {
   map::SimulatedMap world = true_map();
   for (const LandmarkId l : world.map.landmark_ids()) {
     if (world.map.observations(l).size() >= 3 && world.map.observations(l).back().keyframe == KeyframeId(5)) {
@@ -96,7 +96,7 @@ TEST(RecoverObservations, LooksUnderTheExtrinsicsGiven) {
   EXPECT_LT(found_wrongly, found / 2);
 }
 
-TEST(RecoverObservations, TakesNoKeypointThatHasALandmark) {
+TEST(RecoverObservations, UsesNoKeypointWithALandmark) {
   const map::SimulatedMap world = true_map();
   adjustment::BundleProblem flat = everything(world.map);
   const std::size_t before = flat.problem.observations.size();
@@ -113,7 +113,7 @@ TEST(RecoverObservations, TakesNoKeypointThatHasALandmark) {
   EXPECT_LT(flat.problem.observations.size(), before + before / 20);
 }
 
-TEST(RecoverObservations, TakesNoKeypointThatTheProblemHasGivenToAnotherPoint) {
+TEST(RecoverObservations, UsesNoKeypointOfAnotherPointOfTheProblem) {
   map::SimulatedMap world = true_map();
   for (const LandmarkId l : world.map.landmark_ids()) {
     if (world.map.observations(l).size() >= 3 && world.map.observations(l).back().keyframe == KeyframeId(5)) {

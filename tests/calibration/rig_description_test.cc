@@ -5,7 +5,7 @@
 namespace bslam::calibration {
 namespace {
 
-TEST(RigDescription, SpeaksOfDisplacements) {
+TEST(RigDescription, DescribesDisplacements) {
   EXPECT_EQ(displacement_in_words({0.11, 0, 0}), "11.0 cm to the right");
   EXPECT_EQ(displacement_in_words({-1.2, 0.02, -0.3}), "1.20 m to the left, 30.0 cm behind, 2.0 cm below");
   EXPECT_EQ(displacement_in_words({0, -0.005, 0.001}), "5.0 mm above, 1.0 mm in front");

@@ -50,7 +50,7 @@ double rotation_error_deg(const CameraRefinement& camera, const SE3& T_cam_rig) 
   return map::angle_rad(camera.T_cam_rig_after, T_cam_rig) / kDegree;
 }
 
-TEST(RefineRig, RecoversTheCameraThatWasWrongFromTheStart) {
+TEST(RefineRig, RecoversACameraThatWasInitiallyWrong) {
   const camera::Rig truth = synthetic::default_rig();
   // Camera 1 overlaps with camera 0; camera 3 looks to the side and overlaps with none.
   ASSERT_TRUE(truth.overlap(0, 1));
@@ -74,7 +74,7 @@ TEST(RefineRig, RecoversTheCameraThatWasWrongFromTheStart) {
   }
 }
 
-TEST(RefineRig, SuspectsNoneWhereTheCalibrationIsRight) {
+TEST(RefineRig, SuspectsNoCameraIfTheCalibrationIsCorrect) {
   for (const int cameras : {2, 4}) {
     const camera::Rig truth = synthetic::ring_rig(cameras);
     const RigRefinement result = refine_rig(mapped(truth, truth, 16, 0.5).map, {}, kFeatures);
@@ -89,7 +89,7 @@ TEST(RefineRig, SuspectsNoneWhereTheCalibrationIsRight) {
   }
 }
 
-TEST(RefineRig, KeepsToItsLimitsAndStillFindsTheError) {
+TEST(RefineRig, RespectsItsLimitsAndFindsTheError) {
   const camera::Rig truth = synthetic::default_rig();
   const map::SimulatedMap world = mapped(truth, with_error(truth, 2), 50, 0.3);
   const RigRefinement result = refine_rig(world.map, {.keyframes = 30, .landmarks = 800}, kFeatures);
@@ -104,7 +104,7 @@ TEST(RefineRig, KeepsToItsLimitsAndStillFindsTheError) {
 
 // Groups of keyframes that share few landmarks are fixed separately; this must not constrain the length of the
 // baseline.
-TEST(RefineRig, HoldingSeveralKeyframesTellsNoLength) {
+TEST(RefineRig, FixingSeveralKeyframesDoesNotConstrainTheLength) {
   const camera::Rig stereo = synthetic::ring_rig(2);
   const map::SimulatedMap world = mapped(stereo, stereo, 36, 0.33);
   const RigRefinementOptions options{.keyframes = 20, .landmarks = 100};  // too few to connect all keyframes
@@ -117,7 +117,7 @@ TEST(RefineRig, HoldingSeveralKeyframesTellsNoLength) {
   EXPECT_FALSE(result.cameras[1].suspect);
 }
 
-TEST(RefineRig, AnswersNothingWhereTheMapCannotTell) {
+TEST(RefineRig, IsNotDoneIfNotObservable) {
   const camera::Rig one = synthetic::ring_rig(1), two = synthetic::ring_rig(2);
   EXPECT_FALSE(refine_rig(mapped(one, one, 4, 0.5).map, {}, kFeatures).done);
   EXPECT_FALSE(refine_rig(map::BundledMap(std::make_shared<const camera::Rig>(two)), {}, kFeatures).done);
@@ -138,7 +138,7 @@ TEST(RefineRig, IsDeterministic) {
   }
 }
 
-TEST(Refined, IsTheRigWithTheExtrinsicsFound) {
+TEST(Refined, IsTheRigWithTheEstimatedExtrinsics) {
   const camera::Rig rig = synthetic::default_rig();
   RigRefinement refinement;
   EXPECT_EQ(refined(rig, refinement).cam_from_rig(1).matrix(), rig.cam_from_rig(1).matrix());

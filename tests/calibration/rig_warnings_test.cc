@@ -37,7 +37,7 @@ bool warns(const camera::Rig& rig, const std::string& part) {
 
 camera::Rig one(const camera::Camera& camera) { return camera::Rig({{camera, SE3()}}); }
 
-TEST(RigWarnings, AreNoneForOrdinaryRigs) {
+TEST(RigWarnings, AreEmptyForOrdinaryRigs) {
   EXPECT_TRUE(rig_warnings(mounted({at({0, 0, 0}), at({0.11, 0, 0})})).empty());
   EXPECT_TRUE(rig_warnings(mounted({at({0, 0, 0}), at({-0.1, 0, 0}), at({0.1, 0, -0.1}, 1.57), at({0, 0, -0.2}, 3.14),
                                     at({-0.1, 0, -0.1}, -1.57)}))
@@ -47,7 +47,7 @@ TEST(RigWarnings, AreNoneForOrdinaryRigs) {
   }
 }
 
-TEST(RigWarnings, SpeakOfBaselinesHardlyMeant) {
+TEST(RigWarnings, ReportImplausibleBaselines) {
   EXPECT_TRUE(warns(camera::Rig({at({0, 0, 0}), at({0.0005, 0, 0})}), "0.5 mm apart"));
   EXPECT_TRUE(warns(camera::Rig({at({0, 0, 0}), at({110, 0, 0})}), "millimetres"));
   EXPECT_TRUE(warns(camera::Rig({at({0, 0, 0}), at({0, 0, 0})}), "the same extrinsics"));
@@ -57,7 +57,7 @@ TEST(RigWarnings, SpeakOfBaselinesHardlyMeant) {
             "cameras 0 and 1 are 100.00 m apart, and 5 other pairs are too far apart as well: are they millimetres?"));
 }
 
-TEST(RigWarnings, SpeakOfTimesHardlyMeant) {
+TEST(RigWarnings, ReportImplausibleTimeOffsets) {
   camera::Camera camera = pinhole();
   camera.time_offset_ns = 40'000'000;
   EXPECT_TRUE(rig_warnings(one(camera)).empty());
@@ -65,7 +65,7 @@ TEST(RigWarnings, SpeakOfTimesHardlyMeant) {
   EXPECT_TRUE(warns(one(camera), "a time offset of -20 s: is it given in milliseconds?"));
 }
 
-TEST(RigWarnings, SpeakOfIntrinsicsThatDoNotFitTheImage) {
+TEST(RigWarnings, ReportIntrinsicsThatDoNotFitTheImage) {
   camera::Camera camera = pinhole();
   camera.width = 300;
   EXPECT_TRUE(warns(one(camera), "is outside of the 300 x 480 image"));
@@ -82,13 +82,13 @@ TEST(RigWarnings, SpeakOfIntrinsicsThatDoNotFitTheImage) {
   EXPECT_TRUE(warns(one(camera), "the camera model is valid for only"));
 }
 
-TEST(RigWarnings, SpeakOfInvertedExtrinsics) {
+TEST(RigWarnings, ReportInvertedExtrinsics) {
   constexpr const char* kQuestion = "was T_cam_body given instead of T_body_cam";
   const camera::Rig stereo = mounted({at({0, 0, 0}), at({0.11, 0, 0})});
   EXPECT_LT(obstruction(stereo), 0.01);
   EXPECT_TRUE(warns(with_inverse_extrinsics(stereo), kQuestion));
-  EXPECT_TRUE(rig_warnings(camera::Rig({at({0, 0, 0}), at({0, 0.11, 0})})).empty());  // truly above each other
-  // A ring around the body: inverted, all of it falls into one place.
+  EXPECT_TRUE(rig_warnings(camera::Rig({at({0, 0, 0}), at({0, 0.11, 0})})).empty());  // actually above each other
+  // A ring around the body; inverted, all cameras are at one position.
   std::vector<camera::RigCamera> ring;
   for (int k = 0; k < 4; ++k) {
     const SE3 turn(geometry::so3_exp({0, k * std::numbers::pi / 2, 0}), Vector3d::Zero());
@@ -99,7 +99,7 @@ TEST(RigWarnings, SpeakOfInvertedExtrinsics) {
   EXPECT_TRUE(warns(with_inverse_extrinsics(around), kQuestion));
 }
 
-TEST(RigWarnings, SpeakOfCamerasInEachOthersView) {
+TEST(RigWarnings, ReportCamerasInEachOthersView) {
   EXPECT_TRUE(warns(camera::Rig({at({0, 0, 0}), at({0, 0, 0.3})}), "the cameras are in the view of each other"));
   const camera::Rig inwards({at({-0.2, 0, 0}, 1.57), at({0.2, 0, 0}, -1.57)});
   EXPECT_GT(obstruction(inwards), 0.9);

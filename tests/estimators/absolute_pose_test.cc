@@ -17,7 +17,7 @@ namespace {
 
 using scene::Models;
 
-// Exactly `inliers` of `count` observations are right, in random order.
+// Exactly `inliers` of `count` observations are correct, in random order.
 scene::PoseScene make_scene(const Rig& rig, int count, int inliers, double noise, Random& random) {
   scene::PoseScene out = scene::make_pose_scene(rig, count, noise, 0.0, random);
   for (std::uint32_t i = static_cast<std::uint32_t>(count) - 1; i > 0; --i) {
@@ -49,7 +49,7 @@ struct RigCase {
 };
 class AbsolutePoseOnRig : public testing::TestWithParam<RigCase> {};
 
-TEST_P(AbsolutePoseOnRig, FindsFortyInliersAmongAHundredAndThirtyWithoutAGuess) {
+TEST_P(AbsolutePoseOnRig, SolvesWithFortyInliersOfAHundredAndThirty) {
   const Rig rig = scene::make_rig(GetParam().cameras, GetParam().models);
   Random random(1, "absolute");
   constexpr int kTrials = 60;
@@ -59,7 +59,7 @@ TEST_P(AbsolutePoseOnRig, FindsFortyInliersAmongAHundredAndThirtyWithoutAGuess) 
     const solver::PoseSolution s =
         absolute_pose(rig, scene.observations, {}, {}, Random(2, "t", static_cast<std::uint64_t>(trial)));
     solved += s.ok && near_truth(s, scene);
-    EXPECT_TRUE(!s.ok || near_truth(s, scene)) << "a wrong pose must not look sound, trial " << trial;
+    EXPECT_TRUE(!s.ok || near_truth(s, scene)) << "a wrong pose must not be accepted, trial " << trial;
   }
   EXPECT_GE(solved, kTrials - 1);
 }
@@ -77,7 +77,7 @@ TEST_P(AbsolutePoseOnRig, IsExactWithoutNoiseAndOutliers) {
   }
 }
 
-TEST_P(AbsolutePoseOnRig, RefusesOutliersAlone) {
+TEST_P(AbsolutePoseOnRig, FailsWithOnlyOutliers) {
   const Rig rig = scene::make_rig(GetParam().cameras, GetParam().models);
   Random random(4);
   for (int trial = 0; trial < 40; ++trial) {
@@ -92,8 +92,8 @@ INSTANTIATE_TEST_SUITE_P(Rigs, AbsolutePoseOnRig,
                                          RigCase{4, Models::kRadTan}, RigCase{4, Models::kFisheye},
                                          RigCase{5, Models::kMixed}));
 
-// Two cameras back to back, 2 m apart, close to what they see: far from a central rig.
-TEST(AbsolutePose, SolvesRigsThatAreFarFromCentral) {
+// Two cameras in opposite directions, 2 m apart and close to the points: far from a central rig.
+TEST(AbsolutePose, SolvesRigsWithLongBaselines) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t i = 0; i < 2; ++i) {
     const geometry::Quaterniond R(Eigen::AngleAxisd(std::numbers::pi * static_cast<double>(i), Vector3d::UnitY()));
@@ -112,7 +112,7 @@ TEST(AbsolutePose, SolvesRigsThatAreFarFromCentral) {
   EXPECT_GE(solved, 39);
 }
 
-// The same landmarks in both cameras of a stereo rig: twice the observations do not make twice the points.
+// Two observations of a landmark in both cameras of a stereo rig count as one point.
 TEST(AbsolutePose, CountsDistinctPoints) {
   const Rig rig = scene::make_rig(2, Models::kPinhole);
   Random random(6);
@@ -134,13 +134,13 @@ TEST(AbsolutePose, CountsDistinctPoints) {
   EXPECT_TRUE(absolute_pose(rig, observations, {}, fourteen, Random(1)).ok);
 }
 
-TEST(AbsolutePose, RefusesTooFewOrDegenerateObservations) {
+TEST(AbsolutePose, FailsWithTooFewOrDegenerateObservations) {
   const Rig rig = scene::make_rig(1, Models::kPinhole);
   Random random(7);
   EXPECT_FALSE(absolute_pose(rig, {}, {}, {}, Random(1)).ok);
   const auto scene = make_scene(rig, 20, 20, 0.0, random);
   EXPECT_FALSE(absolute_pose(rig, std::span(scene.observations).first(2), {}, {}, Random(1)).ok);
-  std::vector<solver::PoseObservation> one(30, scene.observations[0]);  // one point over and over
+  std::vector<solver::PoseObservation> one(30, scene.observations[0]);  // the same observation repeated
   EXPECT_FALSE(absolute_pose(rig, one, {}, {}, Random(1)).ok);
   std::vector<solver::PoseObservation> line;
   for (int i = 0; i < 40; ++i) {
@@ -150,7 +150,7 @@ TEST(AbsolutePose, RefusesTooFewOrDegenerateObservations) {
   EXPECT_FALSE(absolute_pose(rig, line, {}, {}, Random(1)).ok);
 }
 
-TEST(AbsolutePose, RepeatsItselfToTheBitInAnyThread) {
+TEST(AbsolutePose, IsDeterministicInAnyThread) {
   const Rig rig = scene::make_rig(4, Models::kMixed);
   Random random(8);
   const auto scene = make_scene(rig, 130, 40, 1.0, random);

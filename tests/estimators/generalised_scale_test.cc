@@ -1,4 +1,4 @@
-// Distance between two frames of a rig, against the truth of random rooms.
+// Compares the estimated distance between two frames of a rig with the truth of random scenes.
 #include "estimators/generalised_scale.h"
 
 #include <gtest/gtest.h>
@@ -15,14 +15,14 @@ using geometry::SE3;
 
 namespace {
 
-constexpr double kSigma = 1e-3;  // radians of a bearing
+constexpr double kSigma = 1e-3;  // rad, standard deviation of a bearing
 
 Vector3d noisy(const Vector3d& bearing, Random& random) {
   return (bearing + kSigma * Vector3d(random.normal(), random.normal(), random.normal())).normalized();
 }
 
-// Matches of every camera, `outlier_share` of them anywhere in view.
-std::vector<CameraPairs> see_twice(const Rig& rig, const SE3& T_b_a, int count, double outlier_share, Random& random) {
+// Matches of every camera, `outlier_ratio` of them anywhere in view.
+std::vector<CameraPairs> see_twice(const Rig& rig, const SE3& T_b_a, int count, double outlier_ratio, Random& random) {
   std::vector<CameraPairs> out;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     CameraPairs camera{rig.cam_from_rig(i), {}};  // camera 0 is the reference
@@ -30,7 +30,7 @@ std::vector<CameraPairs> see_twice(const Rig& rig, const SE3& T_b_a, int count, 
       const Vector3d direction(random.uniform(-0.7, 0.7), random.uniform(-0.5, 0.5), 1.0);
       const Vector3d point = random.uniform(1.5, 6.0) * direction.normalized();
       const Vector3d moved = rig.cam_from_rig(i) * (T_b_a * (rig.rig_from_cam(i) * point));
-      const bool outlier = random.uniform() < outlier_share;
+      const bool outlier = random.uniform() < outlier_ratio;
       const Vector3d elsewhere = (moved.normalized() + 0.1 * scene::random_direction(random)).normalized();
       camera.pairs.push_back(
           {noisy(point.normalized(), random), outlier ? elsewhere : noisy(moved.normalized(), random)});
@@ -40,13 +40,13 @@ std::vector<CameraPairs> see_twice(const Rig& rig, const SE3& T_b_a, int count, 
   return out;
 }
 
-// The motion as one camera would have it: of unit length, and a little wrong.
+// The motion estimated from one camera: unit length, with small errors.
 SE3 up_to_scale(const SE3& T_b_a, Random& random) {
   const SE3 off = T_b_a.perturbed(scene::random_twist(random, 5e-4, 5e-3 * T_b_a.translation().norm()));
   return {off.rotation(), off.translation().normalized()};
 }
 
-TEST(GeneralisedScale, FindsTheDistanceOfATurningRig) {
+TEST(GeneralisedScale, EstimatesTheDistanceOfARotatingRig) {
   const Rig rig = scene::make_rig(3, scene::Models::kRadTan);
   double squared_z = 0.0;
   constexpr int kSeeds = 40;
@@ -64,11 +64,11 @@ TEST(GeneralisedScale, FindsTheDistanceOfATurningRig) {
     EXPECT_GT(found->num_inliers, 700);
     squared_z += z * z;
   }
-  EXPECT_GT(squared_z / kSeeds, 0.4);  // the deviation means what it says
+  EXPECT_GT(squared_z / kSeeds, 0.4);  // the deviation is realistic
   EXPECT_LT(squared_z / kSeeds, 2.5);
 }
 
-TEST(GeneralisedScale, IsNotDeterminedWithoutRotation) {
+TEST(GeneralisedScale, IsNotObservableWithoutRotation) {
   const Rig rig = scene::make_rig(3, scene::Models::kRadTan);
   for (int seed = 0; seed < 20; ++seed) {
     Random random(static_cast<std::uint64_t>(seed), "straight");
@@ -78,7 +78,7 @@ TEST(GeneralisedScale, IsNotDeterminedWithoutRotation) {
   }
 }
 
-TEST(GeneralisedScale, IsNotDeterminedByCamerasInOnePlace) {
+TEST(GeneralisedScale, IsNotObservableWithCamerasAtOnePosition) {
   Random random(1, "one place");
   const Rig rig = scene::make_rig(1, scene::Models::kRadTan);
   const SE3 T_b_a = SE3::exp(scene::random_twist(random, 0.2, 0.3));

@@ -30,10 +30,10 @@ struct Views {
 struct Spec {
   Shape shape = Shape::kGeneral;
   int count = 300;
-  double half_angle = 0.7;  // radians: widest angle off the axis of camera a
+  double half_angle = 0.7;  // rad, maximum angle to the axis of camera a
   double baseline = 0.4, angle = 0.1;
   double noise = 5e-4;  // radians
-  double outlier_share = 0.0;
+  double outlier_ratio = 0.0;
 };
 
 Views make_views(const Spec& spec, Random& random) {
@@ -50,7 +50,7 @@ Views make_views(const Spec& spec, Random& random) {
     const auto noisy = [&](const Vector3d& v) {
       return (v.normalized() + spec.noise * Vector3d(random.normal(), random.normal(), random.normal())).normalized();
     };
-    const bool outlier = random.uniform() < spec.outlier_share;
+    const bool outlier = random.uniform() < spec.outlier_ratio;
     out.pairs.push_back({noisy(point), outlier ? scene::random_direction(random) : noisy(out.T_b_a * point)});
     out.points_a.push_back(point);
     out.outlier.push_back(outlier);
@@ -64,17 +64,17 @@ void expect_right(const Views& views, const RelativePose& found) {
   EXPECT_LT(geometry::angle_between(found.T_b_a.translation(), views.T_b_a.translation()), 0.06);
 }
 
-TEST(RelativePose, FindsTheMotionInGeneralScenesWithOutliers) {
+TEST(RelativePose, EstimatesTheMotionInGeneralScenesWithOutliers) {
   Random random(1);
-  for (const double outlier_share : {0.0, 0.3}) {
+  for (const double outlier_ratio : {0.0, 0.3}) {
     for (int trial = 0; trial < 10; ++trial) {
       Spec spec;
-      spec.outlier_share = outlier_share;
+      spec.outlier_ratio = outlier_ratio;
       const Views views = make_views(spec, random);
       const auto found = relative_pose(views.pairs, {}, Random(3, "r", static_cast<std::uint64_t>(trial)));
       ASSERT_TRUE(found) << trial;
       expect_right(views, *found);
-      EXPECT_GT(found->num_inliers, 0.9 * (1 - outlier_share) * spec.count - 20);
+      EXPECT_GT(found->num_inliers, 0.9 * (1 - outlier_ratio) * spec.count - 20);
       EXPECT_EQ(found->num_inliers, std::count(found->inlier.begin(), found->inlier.end(), 1));
       int near = 0;
       for (std::size_t i = 0; i < views.pairs.size(); ++i) {
@@ -82,7 +82,7 @@ TEST(RelativePose, FindsTheMotionInGeneralScenesWithOutliers) {
         const Vector3d point = found->points_a[i] * views.T_b_a.translation().norm();
         near += (point - views.points_a[i]).norm() < 0.15 * views.points_a[i].norm();
       }
-      EXPECT_GT(near, 0.8 * (1 - outlier_share) * spec.count - 20);
+      EXPECT_GT(near, 0.8 * (1 - outlier_ratio) * spec.count - 20);
     }
   }
 }
@@ -92,7 +92,7 @@ TEST(RelativePose, WorksWithBearingsBehindTheImagePlane) {
   for (int trial = 0; trial < 10; ++trial) {
     Spec spec;
     spec.half_angle = 1.9;
-    spec.outlier_share = 0.2;
+    spec.outlier_ratio = 0.2;
     const Views views = make_views(spec, random);
     const auto found = relative_pose(views.pairs, {}, Random(4));
     ASSERT_TRUE(found) << trial;
@@ -100,7 +100,7 @@ TEST(RelativePose, WorksWithBearingsBehindTheImagePlane) {
   }
 }
 
-TEST(RelativePose, IsRightOrSilentInPlanarScenes) {
+TEST(RelativePose, IsCorrectOrFailsInPlanarScenes) {
   Random random(5);
   int right = 0;
   for (int trial = 0; trial < 20; ++trial) {
@@ -116,7 +116,7 @@ TEST(RelativePose, IsRightOrSilentInPlanarScenes) {
   EXPECT_GT(right, 0);
 }
 
-TEST(RelativePose, RefusesPureRotation) {
+TEST(RelativePose, FailsForPureRotation) {
   Random random(7);
   for (int trial = 0; trial < 10; ++trial) {
     Spec spec;
@@ -126,7 +126,7 @@ TEST(RelativePose, RefusesPureRotation) {
   }
 }
 
-TEST(RelativePose, RefusesLowParallaxAndTooFewPairs) {
+TEST(RelativePose, FailsWithLowParallaxOrTooFewPairs) {
   Random random(9);
   Spec spec;
   spec.baseline = 0.02;
@@ -137,17 +137,17 @@ TEST(RelativePose, RefusesLowParallaxAndTooFewPairs) {
   EXPECT_FALSE(relative_pose({}, {}, Random(1)));
 }
 
-TEST(RelativePose, RefusesOutliersAlone) {
+TEST(RelativePose, FailsWithOnlyOutliers) {
   Random random(10);
   Spec spec;
-  spec.outlier_share = 1.0;
+  spec.outlier_ratio = 1.0;
   EXPECT_FALSE(relative_pose(make_views(spec, random).pairs, {}, Random(1)));
 }
 
-TEST(RelativePose, RepeatsItselfToTheBit) {
+TEST(RelativePose, IsDeterministic) {
   Random random(11);
   Spec spec;
-  spec.outlier_share = 0.3;
+  spec.outlier_ratio = 0.3;
   const Views views = make_views(spec, random);
   const auto a = relative_pose(views.pairs, {}, Random(12)), b = relative_pose(views.pairs, {}, Random(12));
   ASSERT_TRUE(a && b);
@@ -155,7 +155,7 @@ TEST(RelativePose, RepeatsItselfToTheBit) {
   EXPECT_EQ(a->inlier, b->inlier);
 }
 
-TEST(Epipolar, RefinementReachesTruthWithoutNoise) {
+TEST(Epipolar, RefinementReachesTheTruthWithoutNoise) {
   Random random(13);
   Spec spec;
   spec.noise = 0.0;

@@ -17,7 +17,7 @@ constexpr std::string_view kText =
     "7 restart 1 11 12\n"
     "8 final - 12 13\n";
 
-TEST(Journal, SurvivesAsText) {
+TEST(Journal, IsReproducedFromItsText) {
   const auto journal = parse_journal(kText, "a.journal");
   ASSERT_TRUE(journal.ok()) << journal.error().message();
   EXPECT_EQ(journal->name, "a.journal");
@@ -29,7 +29,7 @@ TEST(Journal, SurvivesAsText) {
   EXPECT_TRUE(parse_journal("bslam-journal 1\n", "").ok());
 }
 
-TEST(Journal, NamesTheLineThatIsNoEntry) {
+TEST(Journal, ReportsTheLineOfAnInvalidEntry) {
   for (const std::string_view bad :
        {"1 start 0 7 8", "0 jump 0 7 -", "0 frame 0 7", "0 frame 0 7 - 1", "0 frame  7 -", "0 frame -1 7 -",
         "0 frame - 7 -", "0 frame 0 - -", "0 frame 99999999999 7 -", "0 frame 2147483647 7 -", "0 frame 0x1 7 -", "",
@@ -47,7 +47,7 @@ TEST(Journal, NamesTheLineThatIsNoEntry) {
   }
 }
 
-TEST(Journal, EveryCutOfItIsRefusedOrAJournal) {
+TEST(Journal, EveryTruncationIsRejectedOrValid) {
   for (std::size_t n = 0; n < kText.size(); ++n) {
     const std::string cut(kText.substr(0, n));
     const auto journal = parse_journal(cut, "");

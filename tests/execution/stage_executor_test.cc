@@ -15,7 +15,7 @@ namespace {
 constexpr execution::Mode kModes[] = {execution::Mode::kSequential, execution::Mode::kParallel,
                                       execution::Mode::kLagged};
 
-// Threads that keep the processor busy while one lives.
+// Keeps the processor busy with threads during its lifetime.
 class Load {
  public:
   explicit Load(int threads) {
@@ -48,7 +48,7 @@ struct WorldRun {
   MapGate gate{store};
   std::unique_ptr<StageExecutor> executor;
   int frames = 0;
-  std::vector<std::uint64_t> seen = {};  // of every frame
+  std::vector<std::uint64_t> seen = {};  // hash of the version used by every frame
 
   KeyframeId frame_with_keyframe() {
     const map::MapSnapshot map = executor->begin_frame(FrameId(frames));
@@ -59,7 +59,7 @@ struct WorldRun {
   }
   void frame_without() { seen.push_back(hash_of(*executor->begin_frame(FrameId(frames++)), 0)); }
 
-  // Keyframes at two of three frames; another map half way.
+  // A complete run with keyframes in two of three frames and a restart in the middle.
   void whole(int count = 60) {
     for (int half = 0; half < 2; ++half) {
       for (int i = 0; i < count / 2; ++i) i % 3 == 1 ? frame_without() : static_cast<void>(frame_with_keyframe());
@@ -78,7 +78,7 @@ std::size_t count(const Journal& journal, JournalStep step) {
                                                 [&](const JournalEntry& e) { return e.step == step; }));
 }
 
-// Background results that others had overtaken when they were committed.
+// Number of background results whose base was not the newest version when they were committed.
 std::size_t superseded(const Journal& journal) {
   MapVersion newest{0};
   std::size_t n = 0;
@@ -100,7 +100,7 @@ TEST(Stage, OnlyALoopThatWillBeCommittedSupersedesGlobalAdjustment) {
   EXPECT_FALSE(superseded_by(Stage::kMap, loop, *store.snapshot()));
 }
 
-TEST(MapGate, KeepsNoJournalWhereNoneIsWanted) {
+TEST(MapGate, KeepsNoJournalIfDisabled) {
   const StageWorld world;
   map::MapStore store{world.empty_map()};
   MapGate gate(store, false);
@@ -110,7 +110,7 @@ TEST(MapGate, KeepsNoJournalWhereNoneIsWanted) {
   EXPECT_TRUE(gate.journal().entries.empty());
 }
 
-TEST(StageExecutorSequential, RunsWhatFollowsBeforeItReturns) {
+TEST(StageExecutorSequential, RunsTheFollowingStagesBeforeItReturns) {
   WorldRun run(execution::Mode::kSequential, setup(hashing_stages(1, 2)));
   run.frame_with_keyframe();
   EXPECT_EQ(run.journal(),
@@ -119,7 +119,7 @@ TEST(StageExecutorSequential, RunsWhatFollowsBeforeItReturns) {
   EXPECT_EQ(run.gate.journal().entries.back(), (JournalEntry{JournalStep::kLoop, 1, MapVersion(6), std::nullopt}));
 }
 
-TEST(StageExecutorSequential, LeavesOutWhatIsNotConfigured) {
+TEST(StageExecutorSequential, SkipsStagesThatAreNotConfigured) {
   StageFunctions functions = hashing_stages(1, 1);
   functions[Stage::kLoop] = {};
   for (const execution::Mode mode : kModes) {
@@ -130,7 +130,7 @@ TEST(StageExecutorSequential, LeavesOutWhatIsNotConfigured) {
   }
 }
 
-TEST(StageExecutorLagged, GivesTheSameMapsHoweverLongStagesTake) {
+TEST(StageExecutorLagged, MapsDoNotDependOnTheDurationOfStages) {
   WorldRun quick(execution::Mode::kLagged, setup(hashing_stages(0, 3, 0)));
   quick.whole();
   EXPECT_GT(superseded(quick.gate.journal()), 10u);
@@ -145,7 +145,7 @@ TEST(StageExecutorLagged, GivesTheSameMapsHoweverLongStagesTake) {
   }
 }
 
-TEST(StageExecutorLagged, ShowsAResultThatManyFramesAfterItsBegin) {
+TEST(StageExecutorLagged, ResultsAreUsedAfterTheConfiguredNumberOfFrames) {
   for (const int lag : {1, 2, 7}) {
     ExecutionSetup s = setup(hashing_stages(1, 1));
     s.options.lag_map = lag;
@@ -166,7 +166,7 @@ TEST(StageExecutorLagged, ShowsAResultThatManyFramesAfterItsBegin) {
   }
 }
 
-TEST(StageExecutorLagged, CommitsEarlyWhereALaneIsFull) {
+TEST(StageExecutorLagged, CommitsEarlyIfAQueueIsFull) {
   ExecutionSetup s = setup(hashing_stages(1));
   s.options.lag_map = s.options.lag_loop = 1000;
   s.options.max_pending_keyframes = 2;
@@ -178,7 +178,7 @@ TEST(StageExecutorLagged, CommitsEarlyWhereALaneIsFull) {
   EXPECT_EQ(count(run.gate.journal(), JournalStep::kLoop), 4u);
 }
 
-TEST(StageExecutorReplay, RepeatsParallelRunsToTheBit) {
+TEST(StageExecutorReplay, RepeatsParallelRunsExactly) {
   std::size_t out_of_order = 0, globals = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     WorldRun recorded(execution::Mode::kParallel, setup(hashing_stages(seed)));
@@ -192,7 +192,7 @@ TEST(StageExecutorReplay, RepeatsParallelRunsToTheBit) {
     out_of_order += superseded(*journal);
     globals += count(*journal, JournalStep::kGlobal);
   }
-  EXPECT_GT(out_of_order, 40u);  // there was something to repeat
+  EXPECT_GT(out_of_order, 40u);  // the order is not trivial
   EXPECT_GT(globals, 40u);
 }
 
@@ -207,7 +207,7 @@ TEST(StageExecutorReplay, RepeatsTheOtherModes) {
   }
 }
 
-// What a replay of a changed journal says; empty where it went through.
+// Error of a replay of a changed journal; empty if it succeeds.
 std::string complaint(const Journal& journal, int loop_every = 3) {
   WorldRun run(journal, setup(hashing_stages(1, loop_every, 0)));
   try {
@@ -218,7 +218,7 @@ std::string complaint(const Journal& journal, int loop_every = 3) {
   return {};
 }
 
-TEST(StageExecutorReplay, NamesTheFirstEntryThatDiffers) {
+TEST(StageExecutorReplay, ReportsTheFirstEntryThatDiffers) {
   WorldRun recorded(execution::Mode::kLagged, setup(hashing_stages(1)));
   recorded.whole(24);
   const Journal good = recorded.gate.journal();
@@ -238,8 +238,7 @@ TEST(StageExecutorReplay, NamesTheFirstEntryThatDiffers) {
     bad.entries.resize(i);
     const bool only_stages = std::all_of(good.entries.begin() + static_cast<std::ptrdiff_t>(i), good.entries.end(),
                                          [](const JournalEntry& e) { return background_stage(e.step).has_value(); });
-    EXPECT_EQ(complaint(bad), only_stages ? "" : "entry " + std::to_string(i) + ": found the end")
-        << "interrupted then";
+    EXPECT_EQ(complaint(bad), only_stages ? "" : "entry " + std::to_string(i) + ": found the end") << "ends there";
   }
   Journal longer = good;
   longer.entries.push_back({JournalStep::kFrame, 24, MapVersion(3), std::nullopt});
@@ -247,7 +246,7 @@ TEST(StageExecutorReplay, NamesTheFirstEntryThatDiffers) {
   EXPECT_NE(complaint(good, 5), "");  // other stages
 }
 
-TEST(StageExecutorReplay, SaysWhereTasksAreLeftBeforeTheFinalStep) {
+TEST(StageExecutorReplay, ReportsTasksLeftBeforeTheFinalStep) {
   WorldRun recorded(execution::Mode::kSequential, setup(hashing_stages(1)));
   recorded.frame_with_keyframe();
   Journal journal = recorded.gate.journal();
@@ -259,13 +258,13 @@ TEST(StageExecutorReplay, SaysWhereTasksAreLeftBeforeTheFinalStep) {
   EXPECT_THROW(run.executor->commit(JournalStep::kFinal, map::MapDraft(run.gate.newest())), ReplayMismatch);
 }
 
-// A kGlobal that never ends by itself.
-StageFunctions endless_global(std::atomic<int>& begun, std::atomic<int>& stopped) {
+// A kGlobal stage that runs until it is stopped.
+StageFunctions endless_global(std::atomic<int>& started, std::atomic<int>& stopped) {
   StageFunctions functions = hashing_stages(1, 1, 0);
   functions[Stage::kGlobal] = [&, real = functions[Stage::kGlobal]](const StageTask& task, const map::MapSnapshot& base,
                                                                     const std::stop_token& stop) {
-    ++begun;
-    begun.notify_all();
+    ++started;
+    started.notify_all();
     while (!stop.stop_requested()) std::this_thread::yield();
     ++stopped;
     return real(task, base, {});
@@ -275,16 +274,16 @@ StageFunctions endless_global(std::atomic<int>& begun, std::atomic<int>& stopped
 
 TEST(StageExecutorParallel, ACorrectionSupersedesTheGlobalStage) {
   for (const execution::Mode mode : {execution::Mode::kParallel, execution::Mode::kLagged}) {
-    std::atomic<int> begun = 0, stopped = 0;
-    WorldRun run(mode, setup(endless_global(begun, stopped)));
+    std::atomic<int> started = 0, stopped = 0;
+    WorldRun run(mode, setup(endless_global(started, stopped)));
     run.frame_with_keyframe();
     for (int i = 0; i < 9; ++i) run.frame_without();
-    begun.wait(0);
+    started.wait(0);
     EXPECT_EQ(stopped, 0);
     run.frame_with_keyframe();
     for (int i = 0; i < 9; ++i) run.frame_without();
     while (stopped == 0) std::this_thread::yield();
-    begun.wait(1);  // the next one
+    started.wait(1);  // the next one
     EXPECT_EQ(count(run.gate.journal(), JournalStep::kGlobal), 0u);
     EXPECT_EQ(count(run.gate.journal(), JournalStep::kLoop), 2u);
     run.executor->interrupt();
@@ -293,7 +292,7 @@ TEST(StageExecutorParallel, ACorrectionSupersedesTheGlobalStage) {
   }
 }
 
-TEST(StageExecutorParallel, NeverRunsFurtherAheadThanItsQueuesAreLong) {
+TEST(StageExecutorParallel, QueuesAreBounded) {
   for (const int room : {1, 3}) {
     std::atomic<int> mapped = 0, closed = 0;
     StageFunctions functions = hashing_stages(3, 2);
@@ -311,7 +310,7 @@ TEST(StageExecutorParallel, NeverRunsFurtherAheadThanItsQueuesAreLong) {
       run.frame_with_keyframe();
       const int looped = closed, done = mapped;
       EXPECT_LE(enqueued - done, room + 1);            // waiting and under way
-      EXPECT_LE(enqueued - looped, 2 * room + 2 + 1);  // in both lanes, and one that waits for the next
+      EXPECT_LE(enqueued - looped, 2 * room + 2 + 1);  // in both queues, and one that waits for the next
     }
     run.executor->drain();
     EXPECT_EQ(mapped, 40);
@@ -319,7 +318,7 @@ TEST(StageExecutorParallel, NeverRunsFurtherAheadThanItsQueuesAreLong) {
   }
 }
 
-TEST(StageExecutorParallel, MayEndAtAnyMoment) {
+TEST(StageExecutorParallel, CanBeDestroyedAtAnyTime) {
   Random random(11);
   for (int i = 0; i < 50; ++i) {
     for (const execution::Mode mode : {execution::Mode::kParallel, execution::Mode::kLagged}) {
@@ -338,7 +337,7 @@ TEST(StageExecutorParallel, MayEndAtAnyMoment) {
   }
 }
 
-TEST(StageExecutorParallel, BringsAnExceptionOfAnyLaneToTheCaller) {
+TEST(StageExecutorParallel, RethrowsAnExceptionOfAnyStageInTheCaller) {
   Random random(12);
   for (int i = 0; i < 50; ++i) {
     for (const execution::Mode mode : kModes) {
@@ -366,26 +365,26 @@ TEST(StageExecutorParallel, BringsAnExceptionOfAnyLaneToTheCaller) {
   }
 }
 
-TEST(StageExecutorParallel, AnInterruptionFromAnotherThreadEndsEveryWait) {
+TEST(StageExecutorParallel, AnInterruptFromAnotherThreadEndsEveryWait) {
   for (const execution::Mode mode : {execution::Mode::kParallel, execution::Mode::kLagged}) {
-    std::atomic<int> begun = 0, stopped = 0;
-    StageFunctions functions = endless_global(begun, stopped);
+    std::atomic<int> started = 0, stopped = 0;
+    StageFunctions functions = endless_global(started, stopped);
     functions[Stage::kMap] = functions[Stage::kGlobal];
     WorldRun run(mode, setup(functions));
     run.frame_with_keyframe();
     std::jthread interrupter([&] {
-      begun.wait(0);
+      started.wait(0);
       run.executor->interrupt();
     });
     for (int i = 0; i < 30; ++i) run.frame_with_keyframe();  // more than the queue takes
     run.executor->drain();
     EXPECT_TRUE(run.executor->over());
-    EXPECT_EQ(run.gate.newest()->num_keyframes(), 31u);  // the caller's own edits hold
+    EXPECT_EQ(run.gate.newest()->num_keyframes(), 31u);  // edits of the caller are committed
     EXPECT_EQ(count(run.gate.journal(), JournalStep::kMap), 0u);
   }
 }
 
-TEST(StageExecutorReplay, RepeatsAnInterruptedRunAsFarAsItCame) {
+TEST(StageExecutorReplay, RepeatsAnInterruptedRunUntilTheInterrupt) {
   for (const execution::Mode mode : kModes) {
     WorldRun recorded(mode, setup(hashing_stages(1)));
     for (int i = 0; i < 12; ++i) recorded.frame_with_keyframe();
@@ -402,9 +401,9 @@ TEST(StageExecutorReplay, RepeatsAnInterruptedRunAsFarAsItCame) {
   }
 }
 
-TEST(StageExecutorParallel, TellsWhatWasCommittedInOrderAndAllThatRan) {
+TEST(StageExecutorParallel, ReportsCommitsInOrderAndAllRuns) {
   for (const execution::Mode mode : kModes) {
-    std::vector<MapVersion> versions;  // told one at a time
+    std::vector<MapVersion> versions;  // callbacks are not concurrent
     std::atomic<int> runs = 0, commits = 0;
     StageFunctions functions = hashing_stages(4);
     for (const Stage stage : kStages) {
@@ -424,8 +423,8 @@ TEST(StageExecutorParallel, TellsWhatWasCommittedInOrderAndAllThatRan) {
     run.whole(30);
     EXPECT_TRUE(std::is_sorted(versions.begin(), versions.end()));
     EXPECT_EQ(versions.size(), static_cast<std::size_t>(commits));
-    run.executor.reset();  // superseded ones may tell late
-    EXPECT_GE(runs, 40);   // 20 mapped, 20 looked at for loops
+    run.executor.reset();  // superseded runs may be reported late
+    EXPECT_GE(runs, 40);   // 20 of mapping, 20 of loop closing
     EXPECT_GT(runs, commits);
   }
 }

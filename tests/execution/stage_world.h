@@ -1,5 +1,5 @@
-// A run without images: keyframes made by a caller frame by frame, and stages that write a hash of all they were given
-// into the map. Whatever version, order or stage differs shows in every later position.
+// A run without images: the caller adds keyframes frame by frame, and stages write a hash of their input to the map.
+// Any difference of version, order or stage changes all later positions.
 #pragma once
 
 #include <bit>
@@ -11,7 +11,7 @@
 
 namespace bslam::execution {
 
-// Work that takes time without sleeping; its result has to go somewhere, or it would be left out.
+// Busy work; its result must be used, or the compiler would remove it.
 inline double busy(std::uint64_t rounds) {
   double x = 1;
   for (std::uint64_t i = 0; i < rounds; ++i) x = x * 1.0000001 + 1e-9;
@@ -44,7 +44,7 @@ class StageWorld {
 
   map::BundledMap empty_map() const { return map::BundledMap(rig_); }
 
-  // A keyframe with two landmarks of its own, placed by what the frame saw.
+  // Adds a keyframe with two landmarks, whose positions depend on the version that the frame uses.
   KeyframeId add_keyframe(FrameId frame, const map::MapSnapshot& seen, execution::StageExecutor& executor) const {
     map::MapDraft draft(seen);
     const auto hash = hash_of(*seen, static_cast<std::uint64_t>(frame.value()));
@@ -59,8 +59,9 @@ class StageWorld {
   std::shared_ptr<const frame::BundledFrame> frame_;
 };
 
-// Two landmarks by what the stage saw, one new, one moved; kLoop finds something for every `loop_every`th keyframe
-// alone. Every stage takes between none and some 100 microseconds, by `delay_seed`; kGlobal four times that.
+// Stages that change two landmarks depending on their input: one is new, one is moved. kLoop returns a result for every
+// `loop_every`th keyframe only. A stage takes up to about 100 microseconds, depending on `delay_seed`; kGlobal four
+// times as long.
 inline execution::StageFunctions hashing_stages(std::uint64_t delay_seed, int loop_every = 3,
                                                 std::uint64_t max_delay = 100'000) {
   const auto stage = [=](const execution::StageTask& task, const map::MapSnapshot& base,

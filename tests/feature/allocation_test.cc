@@ -1,4 +1,4 @@
-// Counts what extraction allocates: once warm, nothing.
+// Counts the allocations of extraction, which must be zero after the first image.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -12,13 +12,13 @@ namespace {
 std::atomic<long> allocations{0};
 }
 
-// Not inlined: the compiler would see free() meet what it takes for the library's operator new.
+// Not inlined, because the compiler would warn about free() of memory from operator new.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   ++allocations;
   if (void* p = std::malloc(size > 0 ? size : 1)) return p;
   throw std::bad_alloc();
 }
-// Of the library it would call the one above; of a sanitizer it would not.
+// The default version of the library calls the operator above; that of a sanitizer does not.
 [[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   try {
     return operator new(size);
@@ -32,7 +32,7 @@ std::atomic<long> allocations{0};
 namespace bslam::feature {
 namespace {
 
-TEST(Extractor, AllocatesNothingOnceWarm) {
+TEST(Extractor, AllocatesNoMemoryAfterTheFirstImage) {
   const cv::Mat scene = testing::make_scene(1500, 1000, 2);
   const cv::Size size(640, 480);
   Extractor extractor{FeatureOptions{}};
@@ -44,7 +44,7 @@ TEST(Extractor, AllocatesNothingOnceWarm) {
     extractor.extract(testing::view_of(view), {}, camera, pyramid, keypoints);
     return allocations - before;
   };
-  EXPECT_GT(run(cv::Mat(size, CV_8U, cv::Scalar(50))), 0);  // the first frame: even a blank one makes all room
+  EXPECT_GT(run(cv::Mat(size, CV_8U, cv::Scalar(50))), 0);  // the first image allocates all memory, even if it is blank
   EXPECT_EQ(run(testing::render(scene, {0, 1, 0, 0, size}, 0, 0.3, 0, 2)), 0);
   EXPECT_EQ(run(testing::render(scene, {0, 1, 0, 0, size}, 0, 1, 0, 2)), 0);
   EXPECT_EQ(run(testing::render(scene, {1, 1, 5, 5, size}, 0, 1, 0, 30)), 0);

@@ -72,7 +72,7 @@ TEST(Smoother, FiltersWithItsKernels) {
   check({1, 2, 3, 4, 3, 2, 1});
 }
 
-TEST(Smoother, KeepsTheBrightestImage) {
+TEST(Smoother, DoesNotOverflowForWhiteImages) {
   Smoother smoother;
   image::Image out;
   smoother.smooth(view_of(cv::Mat(5, 3, CV_8U, cv::Scalar(255))), out);
@@ -90,7 +90,7 @@ TEST(Orientation, VectorAndScalarMomentsAreEqual) {
   }
 }
 
-TEST(Orientation, PointsFromXTowardsY) {
+TEST(Orientation, IsMeasuredFromXTowardsY) {
   const auto angle_of = [](int dx, int dy) {
     Window window{};
     window[static_cast<std::size_t>((kWindowRadius + dy) * kWindowStride + kWindowRadius + dx)] = 255;
@@ -116,7 +116,7 @@ Described describe(const Describer& describer, const cv::Mat& view, const cv::Po
   return {angle, describer.describe(sample_window(smooth.view(), x, y), angle)};
 }
 
-TEST(Description, TurnsWithTheImage) {
+TEST(Description, RotatesWithTheImage) {
   const cv::Mat scene = testing::make_scene(700, 700, 12);
   const Describer describer;
   Similarity none;
@@ -126,11 +126,11 @@ TEST(Description, TurnsWithTheImage) {
   for (const double turn : {0.3, 1.0, 1.7, 2.6, -2.0, -0.8}) {
     Similarity warp = none;
     warp.angle = turn;
-    const cv::Mat turned = testing::render(scene, warp);
+    const cv::Mat rotated = testing::render(scene, warp);
     for (double y = 90; y < 210; y += 17.3) {
       for (double x = 90; x < 210; x += 17.3) {
-        const Described a = describe(describer, upright, {x, y}), b = describe(describer, turned, warp({x, y}));
-        const Described c = describe(describer, turned, warp({x + 25, y}));
+        const Described a = describe(describer, upright, {x, y}), b = describe(describer, rotated, warp({x, y}));
+        const Described c = describe(describer, rotated, warp({x + 25, y}));
         angle_error.push_back(std::abs(wrapped(b.angle - a.angle - turn)));
         same.push_back(hamming(a.descriptor, b.descriptor));
         different.push_back(hamming(a.descriptor, c.descriptor));
@@ -146,7 +146,7 @@ TEST(Description, TurnsWithTheImage) {
   EXPECT_GT(median(different), 90);
 }
 
-TEST(BriefPattern, AreSpreadAndSayDifferentThings) {
+TEST(BriefPattern, AreSpreadAndWeaklyCorrelated) {
   const auto tests = make_brief_pattern();
   double worst = 0, square = 0;
   for (std::size_t i = 0; i < tests.size(); ++i) {
@@ -164,7 +164,7 @@ TEST(BriefPattern, AreSpreadAndSayDifferentThings) {
   EXPECT_LT(worst, 0.75);
 }
 
-TEST(BriefPattern, CoverAllAnglesWithoutAGap) {
+TEST(BriefPattern, CoverAllAngles) {
   const cv::Mat scene = testing::make_scene(64, 64, 1);
   const Describer describer;
   const Window window = sample_window(view_of(scene), 32, 32);

@@ -24,7 +24,7 @@ std::vector<Descriptor> random_descriptors(std::size_t count, std::uint64_t seed
 constexpr auto kAll = [](std::size_t) { return true; };
 constexpr auto kAnyPair = [](std::size_t, std::size_t) { return true; };
 
-TEST(NearestDescriptor, KnowsTheNearestAndTheDistanceOfTheSecond) {
+TEST(NearestDescriptor, FindsTheNearestAndTheDistanceOfTheSecond) {
   const Descriptor d = random_descriptors(1, 1)[0];
   const std::vector<Descriptor> among = {flipped(d, 30), flipped(d, 10), flipped(d, 20), flipped(d, 10)};
   const NearestDescriptor found = nearest_descriptor(d, among, kAll);
@@ -37,7 +37,7 @@ TEST(NearestDescriptor, KnowsTheNearestAndTheDistanceOfTheSecond) {
   EXPECT_EQ(without.second, 30);
 }
 
-TEST(NearestDescriptor, IsClearWhereItIsCloseAndAlone) {
+TEST(NearestDescriptor, IsClearIfCloseAndUnambiguous) {
   EXPECT_TRUE((NearestDescriptor{0, 40, 51}.is_clear(40, 0.8)));
   EXPECT_FALSE((NearestDescriptor{0, 41, 60}.is_clear(40, 0.8)));
   EXPECT_FALSE((NearestDescriptor{0, 40, 50}.is_clear(40, 0.8)));
@@ -54,7 +54,7 @@ TEST(MutualMatches, FindsThePairsOfAShuffledCopy) {
   EXPECT_TRUE(std::ranges::is_sorted(matches, {}, &DescriptorMatch::a));
 }
 
-TEST(MutualMatches, LeavesOutWhatIsNotMutualOrNotAllowed) {
+TEST(MutualMatches, IgnoresMatchesThatAreNotMutualOrNotAllowed) {
   const std::vector<Descriptor> all = random_descriptors(3, 3);
   const std::vector<Descriptor> a = {all[0], flipped(all[0], 40), all[1]}, b = {flipped(all[0], 2), all[1], all[2]};
   const auto matches = mutual_matches(a, b, 50, 0.9, kAnyPair);

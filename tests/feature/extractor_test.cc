@@ -45,7 +45,7 @@ void expect_equal(const Detections& a, const Detections& b) {
   EXPECT_EQ(a.patch, b.patch);
 }
 
-TEST(Extractor, FillsWhatDetectionsPromise) {
+TEST(Extractor, FillsAllFieldsOfTheDetections) {
   const cv::Mat image = test_view();
   FeatureOptions options;
   Extractor extractor(options);
@@ -72,7 +72,7 @@ TEST(Extractor, FillsWhatDetectionsPromise) {
   EXPECT_TRUE(std::is_sorted(k.level.begin(), k.level.end()));
 }
 
-TEST(Extractor, GivesTheSameEveryTime) {
+TEST(Extractor, IsDeterministic) {
   const cv::Mat image = test_view(), other = test_view(0.4);
   const Detections first = extract(image);
   Extractor extractor{FeatureOptions{}};
@@ -84,7 +84,7 @@ TEST(Extractor, GivesTheSameEveryTime) {
   expect_equal(first, k);
 }
 
-TEST(Extractor, TakesStridedViewsOfAnyWidth) {
+TEST(Extractor, AcceptsStridedViewsOfAnyWidth) {
   const cv::Mat image = test_view();
   for (const int width : {331, 338, 345, 352}) {
     const cv::Mat part = image(cv::Rect(13, 9, width, 207));
@@ -92,7 +92,7 @@ TEST(Extractor, TakesStridedViewsOfAnyWidth) {
   }
 }
 
-TEST(Extractor, GivesAboutTheNumberWanted) {
+TEST(Extractor, ReturnsAboutTheWantedNumber) {
   const cv::Mat image = test_view();
   for (const int wanted : {50, 300, 1200, 2000}) {
     FeatureOptions options;
@@ -103,7 +103,7 @@ TEST(Extractor, GivesAboutTheNumberWanted) {
   }
 }
 
-// Cells of a 12 x 8 grid that hold keypoints, and the most that one of them holds.
+// Number of cells of a 12 x 8 grid with keypoints, and the maximum number of keypoints in one of them.
 std::pair<std::size_t, std::size_t> occupancy(const Detections& k) {
   std::vector<std::size_t> count(96, 0);
   for (const Eigen::Vector2f& p : k.pixel) {
@@ -113,7 +113,7 @@ std::pair<std::size_t, std::size_t> occupancy(const Detections& k) {
           *std::max_element(count.begin(), count.end())};
 }
 
-TEST(Extractor, ABudgetIsAsGoodAsTheOption) {
+TEST(Extractor, BudgetEqualsTheOption) {
   const cv::Mat image = test_view();
   const auto with = [](int per_image) {
     FeatureOptions options;
@@ -141,7 +141,7 @@ TEST(Extractor, SpreadsOverTheImage) {
   EXPECT_LE(most, 50u);  // 12.5 on average
 }
 
-TEST(Extractor, TexturedPartDoesNotTakeAll) {
+TEST(Extractor, TexturedRegionDoesNotTakeAll) {
   cv::Mat image = test_view(0.25);
   const cv::Mat strong = test_view();
   strong(cv::Rect(0, 0, 250, 160)).copyTo(image(cv::Rect(0, 0, 250, 160)));
@@ -164,12 +164,12 @@ TEST(Extractor, AdaptsToDarkImages) {
   EXPECT_LT(extract(dark, fixed).size(), k.size() / 4);
 }
 
-TEST(Extractor, LeavesOutMaskedAndUnseenPixels) {
+TEST(Extractor, IgnoresMaskedPixelsAndPixelsWithoutBearing) {
   const cv::Mat image = test_view();
   cv::Mat mask(image.size(), CV_8U, cv::Scalar(255));
   mask(cv::Rect(200, 100, 300, 250)) = 0;
   const Detections k = extract(image, {}, mask);
-  EXPECT_GT(k.size(), 1100u);  // what is masked is made up for elsewhere
+  EXPECT_GT(k.size(), 1100u);  // masked keypoints are replaced by others
   for (const Eigen::Vector2f& p : k.pixel) {
     EXPECT_NE(mask.at<std::uint8_t>(static_cast<int>(std::lround(p.y())), static_cast<int>(std::lround(p.x()))), 0);
   }
@@ -185,7 +185,7 @@ TEST(Extractor, LeavesOutMaskedAndUnseenPixels) {
   for (const Eigen::Vector2f& p : seen.pixel) EXPECT_TRUE(camera.unproject(p.cast<double>()).has_value());
 }
 
-TEST(Extractor, SurvivesAnyImage) {
+TEST(Extractor, AcceptsAnyImage) {
   for (const cv::Size size :
        {cv::Size(1, 1), cv::Size(5, 300), cv::Size(40, 30), cv::Size(37, 37), cv::Size(38, 45), cv::Size(64, 48)}) {
     EXPECT_TRUE(extract(cv::Mat(size, CV_8U, cv::Scalar(0))).empty());

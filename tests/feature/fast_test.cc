@@ -28,7 +28,7 @@ cv::Mat noise_image(int width, int height, std::uint64_t seed, int levels = 256)
 
 bool same(const Corner& a, const Corner& b) { return a.x == b.x && a.y == b.y && a.score == b.score; }
 
-TEST(Fast, VectorAndScalarKernelsGiveTheSameBits) {
+TEST(Fast, VectorAndScalarKernelsAreIdentical) {
   FastDetector fast, scalar(scalar_fast_kernels());
   std::vector<Corner> a, b;
   const cv::Mat scene = testing::make_scene(401, 203, 5);
@@ -45,7 +45,7 @@ TEST(Fast, VectorAndScalarKernelsGiveTheSameBits) {
   }
 }
 
-TEST(Fast, KindsAreTheSameBitsToo) {
+TEST(Fast, VectorAndScalarKernelsForKindsAreIdentical) {
   const cv::Mat image = noise_image(64, 16, 8);
   std::vector<std::uint8_t> dark(64), bright(64), dark_scalar(64), bright_scalar(64), score(64);
   fast_kernels().kinds_row(image.ptr(8), 64, 3, 60, dark.data(), bright.data());
@@ -77,7 +77,7 @@ TEST(Fast, AgreesWithOpenCv) {
   }
 }
 
-TEST(Fast, KeepsOneCornerOfAPlateauAndReadingOrder) {
+TEST(Fast, KeepsOneCornerOfAPlateauInRowMajorOrder) {
   cv::Mat image(40, 60, CV_8U, cv::Scalar(100));
   for (const cv::Point p : {cv::Point(20, 12), cv::Point(21, 12), cv::Point(40, 25)}) image.at<std::uint8_t>(p) = 200;
   std::vector<Corner> corners;

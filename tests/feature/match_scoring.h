@@ -1,4 +1,4 @@
-// How well the features of two views under a known warp agree: repeatability and matching, for any kind of ORB.
+// Repeatability and matching scores of the features of two views under a known warp.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,10 @@ struct Features {
 };
 
 struct MatchScore {
-  double repeatability = 0;  // share of the first view's keypoints in common view that have one near in the second
-  double precision = 0;      // share of mutual nearest matches that are right
-  double recall = 0;         // right matches per keypoint of the first view in common view
-  double error_px = 0;       // median distance of right matches
+  double repeatability = 0;  // fraction of the first view's common keypoints with a near one in the second view
+  double precision = 0;      // fraction of correct mutual nearest matches
+  double recall = 0;         // correct matches per common keypoint of the first view
+  double error_px = 0;       // median distance of correct matches
   std::size_t right = 0;
 };
 

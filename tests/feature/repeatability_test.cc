@@ -1,4 +1,4 @@
-// Beside cv::ORB with the same number of features, on views of one scene under known warps.
+// Comparison with cv::ORB with the same number of features, on views of one scene under known warps.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -91,7 +91,8 @@ TEST(Extractor, MatchesAtLeastAsWellAsOpenCvOrb) {
     const MatchScore b = score_matches(cv_first, open_cv(second), warp);
     print(v.name, a, b);
     EXPECT_GT(a.precision, b.precision - 0.05) << v.name;
-    EXPECT_GT(a.repeatability, b.repeatability - 0.15) << v.name;  // cv::ORB's crowd together, which raises its figure
+    EXPECT_GT(a.repeatability, b.repeatability - 0.15)
+        << v.name;  // keypoints of cv::ORB cluster, which increases its value
     EXPECT_LT(a.error_px, b.error_px) << v.name;
     add(our_mean, a);
     add(cv_mean, b);

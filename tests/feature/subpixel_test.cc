@@ -72,7 +72,7 @@ TEST(Subpixel, HalvesTheErrorOfPositions) {
   }
 }
 
-TEST(Subpixel, FollowsABlobAcrossAPixel) {
+TEST(Subpixel, TracksABlobAcrossAPixel) {
   for (double shift = -0.4; shift <= 0.41; shift += 0.1) {
     cv::Mat image(41, 41, CV_8U);
     for (int y = 0; y < 41; ++y) {
@@ -82,17 +82,17 @@ TEST(Subpixel, FollowsABlobAcrossAPixel) {
       }
     }
     const Eigen::Vector2f offset = refine(view_of(image), 20, 20);
-    // A broad blob is the hardest: the window draws the centroid in.
+    // A broad blob is the most difficult case: the window biases the centroid.
     EXPECT_NEAR(offset.x(), shift, 0.5 * std::abs(shift) + 0.02);
     EXPECT_NEAR(offset.y(), -0.5 * shift, 0.25 * std::abs(shift) + 0.02);
   }
 }
 
-TEST(Subpixel, StaysPutWithoutACorner) {
+TEST(Subpixel, IsZeroWithoutACorner) {
   EXPECT_EQ(refine(view_of(cv::Mat(40, 40, CV_8U, cv::Scalar(7))), 20, 20), Eigen::Vector2f::Zero());
 }
 
-TEST(Subpixel, IsTheSameWithScalarKernels) {
+TEST(Subpixel, VectorAndScalarKernelsGiveTheSameOffset) {
   const cv::Mat scene = testing::make_scene(200, 150, 3);
   for (int y = 15; y < 135; y += 3) {
     for (int x = 15; x < 185; x += 3) {

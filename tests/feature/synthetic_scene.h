@@ -62,7 +62,7 @@ inline cv::Mat make_scene(int width, int height, std::uint64_t seed) {
   return scene;
 }
 
-// Similarity about the middle of an image: rotation in radians (x towards y), scale, then a shift in pixels.
+// Similarity around the centre of an image: rotation in radians (x towards y), scale, then a shift in pixels.
 struct Similarity {
   double angle = 0, scale = 1, shift_x = 0, shift_y = 0;
   cv::Size size;  // of the image before and after
@@ -74,13 +74,13 @@ struct Similarity {
   }
 };
 
-// What a camera sees of `scene` under `warp`: the view without warp shows the middle of the scene at half its
-// resolution. Rendered at three times the resolution of the view and averaged, so that every view is sampled alike.
+// View of `scene` under `warp`. The view without warp shows the centre of the scene at half its resolution. Rendered at
+// three times the resolution of the view and averaged, so that all views have the same sampling.
 inline cv::Mat render(const cv::Mat& scene, const Similarity& warp, double blur = 0, double gain = 1, double offset = 0,
                       double noise = 0, std::uint64_t seed = 1) {
   constexpr int kOver = 3;
   const cv::Size fine(warp.size.width * kOver, warp.size.height * kOver);
-  // Scene pixel = 2 * inverse warp of the view's pixel, about the middle.
+  // Scene pixel = 2 * inverse warp of the view's pixel, relative to the centre.
   const double c = std::cos(warp.angle) * 2 / warp.scale, s = std::sin(warp.angle) * 2 / warp.scale;
   const double vx = (warp.size.width - 1) / 2.0 + warp.shift_x, vy = (warp.size.height - 1) / 2.0 + warp.shift_y;
   const double sx = (scene.cols - 1) / 2.0, sy = (scene.rows - 1) / 2.0;

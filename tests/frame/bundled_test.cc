@@ -42,7 +42,7 @@ Sample random_sample(Random& random) {
   return sample;
 }
 
-TEST(Bundled, PutsEveryKeypointIntoExactlyOneFeature) {
+TEST(Bundled, AssignsEveryKeypointToExactlyOneFeature) {
   Random random(1);
   for (int round = 0; round < 200; ++round) {
     const Sample sample = random_sample(random);
@@ -63,7 +63,7 @@ TEST(Bundled, PutsEveryKeypointIntoExactlyOneFeature) {
   }
 }
 
-TEST(Bundled, KeepsOneKeypointPerCameraInOrder) {
+TEST(Bundled, HasAtMostOneKeypointPerCameraInOrder) {
   Random random(2);
   for (int round = 0; round < 200; ++round) {
     const Bundled bundled = random_sample(random).bundled();
@@ -103,19 +103,19 @@ TEST(Bundled, KeepsThePointsOfMatchedFeatures) {
   }
 }
 
-TEST(Bundled, OfNothingIsEmpty) {
+TEST(Bundled, IsEmptyWithoutKeypoints) {
   EXPECT_EQ(Bundled().size(), 0u);
   const std::vector<std::size_t> counts = {0, 0};
   EXPECT_EQ(Bundled(counts, {}, {}).size(), 0u);
 }
 
-TEST(BundledDeathTest, RefusesAKeypointInTwoFeatures) {
+TEST(BundledDeathTest, RejectsAKeypointInTwoFeatures) {
   const std::vector<std::size_t> counts = {2, 2};
   const KeypointRef a{CameraIndex(0), KeypointIndex(0)}, b{CameraIndex(1), KeypointIndex(0)},
       c{CameraIndex(1), KeypointIndex(1)};
   const std::vector<std::vector<KeypointRef>> twice = {{a, b}, {a, c}}, same_camera = {{b, c}};
-  EXPECT_DEATH(Bundled(counts, twice, std::vector<std::optional<BundledPoint>>(2)), "exactly one");
-  EXPECT_DEATH(Bundled(counts, same_camera, std::vector<std::optional<BundledPoint>>(1)), "one keypoint per camera");
+  EXPECT_DEATH(Bundled(counts, twice, std::vector<std::optional<BundledPoint>>(2)), "two features");
+  EXPECT_DEATH(Bundled(counts, same_camera, std::vector<std::optional<BundledPoint>>(1)), "distinct cameras");
 }
 
 }  // namespace

@@ -30,24 +30,24 @@ camera::Rig looking(const std::vector<double>& yaws) {
   return camera::Rig(std::move(cameras));
 }
 
-TEST(CaptureTimes, LeaveOutCamerasThatFiredLater) {
+TEST(CaptureTimes, SkipsCamerasThatCapturedLater) {
   const camera::Rig rig = looking({0, 0, 90, -90});
   EXPECT_EQ(without_late_cameras(rig, taken_at({0, 0, 15 * kMs, 15 * kMs}), Flags(4, 0)), Flags({0, 0, 1, 1}));
   EXPECT_EQ(without_late_cameras(rig, taken_at({0, kMs, -kMs, 0}), Flags(4, 0)), Flags(4, 0))
-      << "a millisecond is together";
+      << "one millisecond counts as simultaneous";
 }
 
-TEST(CaptureTimes, KeepWhatWasLeftOut) {
+TEST(CaptureTimes, KeepsSkippedCameras) {
   const camera::Rig rig = looking({0, 0, 90, -90});
   EXPECT_EQ(without_late_cameras(rig, taken_at({0, 0, 0, 15 * kMs}), Flags({0, 0, 1, 0})), Flags({0, 0, 1, 1}));
 }
 
-TEST(CaptureTimes, LeaveOutNobodyWhereNothingWouldRemain) {
+TEST(CaptureTimes, SkipsNoCameraIfNoneWouldRemain) {
   const camera::Rig rig = looking({0, 0, 90, -90});
   EXPECT_EQ(without_late_cameras(rig, taken_at({0, 0, 15 * kMs, 15 * kMs}), Flags({1, 1, 0, 0})), Flags({1, 1, 0, 0}));
 }
 
-TEST(CaptureTimes, KeepTheOnlyOverlappingViews) {
+TEST(CaptureTimes, KeepsTheOnlyOverlappingViews) {
   const camera::Rig rig = looking({0, 0});
   ASSERT_TRUE(rig.any_overlap());
   EXPECT_EQ(without_late_cameras(rig, taken_at({0, 15 * kMs}), Flags(2, 0)), Flags(2, 0));

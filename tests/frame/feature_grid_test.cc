@@ -41,7 +41,7 @@ std::vector<std::uint32_t> brute_force(const feature::Keypoints& keypoints, cons
   return found;
 }
 
-TEST(FeatureGrid, FindsWhatBruteForceFinds) {
+TEST(FeatureGrid, AgreesWithBruteForce) {
   Random random(1);
   for (int round = 0; round < 5; ++round) {
     const feature::Keypoints keypoints = random_keypoints(random);
@@ -63,7 +63,7 @@ TEST(FeatureGrid, FindsWhatBruteForceFinds) {
   }
 }
 
-TEST(FeatureGrid, AppendsToWhatIsThere) {
+TEST(FeatureGrid, AppendsToTheOutput) {
   Random random(2);
   feature::Detections detections;
   add(detections, 100, 100, random);
@@ -74,7 +74,7 @@ TEST(FeatureGrid, AppendsToWhatIsThere) {
   EXPECT_EQ(found, (std::vector<std::uint32_t>{7, 0}));
 }
 
-TEST(FeatureGrid, OfNothingFindsNothing) {
+TEST(FeatureGrid, FindsNothingWithoutKeypoints) {
   std::vector<std::uint32_t> found;
   FeatureGrid().near({}, {10, 10}, 100, 0, 7, found);
   FeatureGrid({}, kWidth, kHeight).near({}, {10, 10}, 100, 0, 7, found);

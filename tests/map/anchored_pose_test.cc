@@ -29,7 +29,7 @@ struct Scene {
   AnchoredPose anchored;
 };
 
-TEST(AnchoredPose, IsThePoseItWasMadeFrom) {
+TEST(AnchoredPose, ResolvesToTheOriginalPose) {
   const Scene scene;
   ASSERT_TRUE(scene.anchored.known_in(scene.map));
   EXPECT_LT(difference(*scene.anchored.resolve(scene.map), scene.T_rig_world), 1e-12);
@@ -44,7 +44,7 @@ TEST(AnchoredPose, FollowsItsKeyframe) {
             1e-12);
 }
 
-TEST(AnchoredPose, OutlivesItsKeyframeAndEndsWithItsSubmap) {
+TEST(AnchoredPose, SurvivesRemovalOfItsKeyframeButNotOfItsSubmap) {
   Scene scene;
   ASSERT_TRUE(scene.map.remove_keyframe(scene.keyframes.back()));
   EXPECT_LT(difference(*scene.anchored.resolve(scene.map), scene.T_rig_world), 1e-12);
@@ -62,12 +62,12 @@ TEST(AnchoredPose, FollowsTheScaleOfItsSubmap) {
   scene.anchored.rescale(scene.map);
   EXPECT_EQ(scene.anchored.scale_change(scene.map), 1.0);
   EXPECT_LT(difference(*scene.anchored.resolve(scene.map), expected), 1e-12);
-  // Anchored to a map that was scaled before, it has that map's scale.
+  // A pose anchored after a change of scale has the new scale.
   const AnchoredPose later = AnchoredPose::at(scene.map, scene.keyframes.front(), expected);
   EXPECT_LT(difference(*later.resolve(scene.map), expected), 1e-12);
 }
 
-TEST(AnchoredPose, WithoutAReferenceThereIsNoPose) {
+TEST(AnchoredPose, HasNoPoseWithoutAReference) {
   const Scene scene;
   const AnchoredPose none;
   EXPECT_FALSE(none.known_in(scene.map));

@@ -30,7 +30,7 @@ TEST(AppendMap, KeepsPosesTreesAndObservations) {
   ASSERT_GT(other.keyframe_slots(), other.num_keyframes());
   BundledMap map = first;
   const AppendedIds ids = append_map(map, other);
-  EXPECT_EQ(map.check_invariants().value_or("sound"), "sound");
+  EXPECT_EQ(map.check_invariants().value_or("valid"), "valid");
   EXPECT_EQ(map.num_keyframes(), first.num_keyframes() + other.num_keyframes());
   EXPECT_EQ(map.num_landmarks(), first.num_landmarks() + other.num_landmarks());
   EXPECT_EQ(map.num_observations(), first.num_observations() + other.num_observations());
@@ -47,7 +47,7 @@ TEST(AppendMap, KeepsPosesTreesAndObservations) {
   }
 }
 
-TEST(AppendMap, KeepsWhatIsKnownOfLandmarks) {
+TEST(AppendMap, KeepsTheDataOfLandmarks) {
   const BundledMap first = worn_map(13), other = worn_map(14);
   BundledMap map = first;
   const AppendedIds ids = append_map(map, other);
@@ -75,7 +75,7 @@ TEST(AppendMap, KeepsWhatIsKnownOfLandmarks) {
   }
 }
 
-TEST(AppendMap, LeavesTheMapItExtendsAsItWas) {
+TEST(AppendMap, DoesNotChangeTheExistingSubmaps) {
   const BundledMap first = worn_map(15), other = worn_map(16);
   BundledMap map = first;
   const AppendedIds ids = append_map(map, other);
@@ -86,7 +86,7 @@ TEST(AppendMap, LeavesTheMapItExtendsAsItWas) {
   EXPECT_EQ(map.num_observations(), first.num_observations());
 }
 
-TEST(HangKeyframes, RefusesACircle) {
+TEST(AttachKeyframes, RejectsACycle) {
   Random random(1);
   BundledMap map{synthetic_rig(1)};
   for (int i = 0; i < 4; ++i) map.add_keyframe(synthetic_frame(random, 1, 5, 0), {}, {}, {});

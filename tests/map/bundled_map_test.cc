@@ -31,7 +31,7 @@ class BundledMapTest : public testing::Test {
   KeyframeId add(const Matches& list, KeyframeId fallback) {
     return map.add_keyframe(synthetic_frame(random, 2, 30, 10), random_pose(random, 0.5), list, fallback);
   }
-  void expect_sound() { EXPECT_EQ(map.check_invariants().value_or("sound"), "sound"); }
+  void expect_valid() { EXPECT_EQ(map.check_invariants().value_or("valid"), "valid"); }
 
   Random random{7, "bundled map test"};
   BundledMap map{synthetic_rig(2)};
@@ -43,10 +43,10 @@ TEST_F(BundledMapTest, CountsKeypointsAsObservations) {
   map.remove_observation(LandmarkId(0), KeyframeId(0));
   EXPECT_EQ(map.num_observations(), 48u);
   EXPECT_EQ(map.num_landmarks(), 39u);
-  expect_sound();
+  expect_valid();
 }
 
-TEST_F(BundledMapTest, HangsAKeyframeBelowTheOneItSharesMostWith) {
+TEST_F(BundledMapTest, AttachesAKeyframeToTheOneItSharesMostLandmarksWith) {
   EXPECT_FALSE(map.keyframe(KeyframeId(0)).parent.valid());
   const KeyframeId a = add(matches(0, 10), {});
   EXPECT_EQ(map.keyframe(a).parent, KeyframeId(0));
@@ -56,10 +56,10 @@ TEST_F(BundledMapTest, HangsAKeyframeBelowTheOneItSharesMostWith) {
   EXPECT_EQ(map.keyframe(c).parent, KeyframeId(0));
   const KeyframeId d = add({}, a);
   EXPECT_EQ(map.keyframe(d).parent, a);
-  expect_sound();
+  expect_valid();
 }
 
-TEST_F(BundledMapTest, BeginsASubmapWithAKeyframeWithoutParent) {
+TEST_F(BundledMapTest, StartsASubmapWithAKeyframeWithoutParent) {
   const KeyframeId a = add(matches(0, 10), {});
   const KeyframeId b = add({}, {}), c = add({}, b), d = add({}, KeyframeId(77));
   EXPECT_EQ(map.roots(), (std::vector{KeyframeId(0), b, d}));
@@ -68,7 +68,7 @@ TEST_F(BundledMapTest, BeginsASubmapWithAKeyframeWithoutParent) {
   EXPECT_EQ(map.root_of(d), d);
   map.remove_keyframe(c);
   EXPECT_FALSE(map.keyframe(add({}, c)).parent.valid());  // a removed keyframe cannot become a parent
-  expect_sound();
+  expect_valid();
 }
 
 TEST_F(BundledMapTest, ReversesTheLinksWhenSubmapsAreMerged) {
@@ -87,7 +87,7 @@ TEST_F(BundledMapTest, ReversesTheLinksWhenSubmapsAreMerged) {
     EXPECT_EQ(map.root_of(k), KeyframeId(0));
     EXPECT_EQ(map.keyframe(k).T_rig_world.translation(), poses[k.index()].translation());
   }
-  expect_sound();
+  expect_valid();
 }
 
 TEST_F(BundledMapTest, MergesOnlyAliveKeyframesOfTwoSubmaps) {
@@ -100,7 +100,7 @@ TEST_F(BundledMapTest, MergesOnlyAliveKeyframesOfTwoSubmaps) {
   EXPECT_FALSE(map.merge_submaps(KeyframeId(), a));
   EXPECT_TRUE(map.merge_submaps(a, r));  // the larger submap may be attached to the smaller one
   EXPECT_EQ(map.roots(), std::vector{r});
-  expect_sound();
+  expect_valid();
 }
 
 TEST_F(BundledMapTest, RemovesOneSubmapOnly) {
@@ -125,7 +125,7 @@ TEST_F(BundledMapTest, RemovesOneSubmapOnly) {
   EXPECT_EQ(map.num_observations(), observations - 3 * 2);  // three features with two keypoints each
   EXPECT_FALSE(map.remove_submap(r));
   EXPECT_FALSE(map.remove_submap(KeyframeId()));
-  expect_sound();
+  expect_valid();
 }
 
 TEST_F(BundledMapTest, ScalesASubmapWithItsRemovedKeyframesOnly) {
@@ -147,10 +147,10 @@ TEST_F(BundledMapTest, ScalesASubmapWithItsRemovedKeyframesOnly) {
   EXPECT_EQ(map.keyframe(s).T_rig_world.translation(), before.keyframe(s).T_rig_world.translation());
   EXPECT_EQ(map.landmark(theirs).position, before.landmark(theirs).position);
   EXPECT_EQ(map.gauge_epoch(), before.gauge_epoch() + 1);
-  expect_sound();
+  expect_valid();
 }
 
-TEST_F(BundledMapTest, SurvivesInTheNearestAliveAncestor) {
+TEST_F(BundledMapTest, ResolvesRemovedKeyframesToTheNearestAliveAncestor) {
   const KeyframeId a = add(matches(0, 20), {}), b = add(matches(0, 10), {}), c = add({}, b);
   EXPECT_EQ(map.nearest_alive_ancestor(c), c);
   map.remove_keyframe(c);
@@ -161,7 +161,7 @@ TEST_F(BundledMapTest, SurvivesInTheNearestAliveAncestor) {
   EXPECT_FALSE(map.nearest_alive_ancestor(KeyframeId()).valid());
 }
 
-TEST_F(BundledMapTest, KeepsTheAgeALandmarkIsGiven) {
+TEST_F(BundledMapTest, KeepsTheGivenBirthKeyframeOfALandmark) {
   const KeyframeId a = add({}, KeyframeId(0)), b = add({}, a);
   const std::vector<Observation> observations = {{b, FeatureId(3)}};
   EXPECT_EQ(map.landmark(map.add_landmark(random_point(random), observations, {}, a)).born, a);
@@ -179,7 +179,7 @@ TEST_F(BundledMapTest, OrdersCovisibleKeyframesByWeightThenAge) {
   EXPECT_EQ(map.best_covisible(a, 100, 4).size(), 2u);
 }
 
-TEST_F(BundledMapTest, RefusesAnObservationTwiceOrOfATakenFeature) {
+TEST_F(BundledMapTest, RejectsDuplicateObservationsAndUsedFeatures) {
   const KeyframeId a = add(matches(0, 5), {});
   EXPECT_FALSE(map.add_observation(LandmarkId(0), {a, FeatureId(20)}));
   EXPECT_FALSE(map.add_observation(LandmarkId(9), {a, FeatureId(4)}));
@@ -188,7 +188,7 @@ TEST_F(BundledMapTest, RefusesAnObservationTwiceOrOfATakenFeature) {
   map.remove_landmark(LandmarkId(9));
   EXPECT_FALSE(map.add_observation(LandmarkId(9), {a, FeatureId(21)}));
   EXPECT_FALSE(map.landmark_of(a, FeatureId(20)).valid());
-  expect_sound();
+  expect_valid();
 }
 
 TEST_F(BundledMapTest, PassesTheReferenceToTheOldestRemainingObservation) {
@@ -199,17 +199,17 @@ TEST_F(BundledMapTest, PassesTheReferenceToTheOldestRemainingObservation) {
   const LandmarkReference& reference = map.landmark(LandmarkId(0)).reference;
   EXPECT_EQ(reference.keyframe, a);
   EXPECT_EQ(reference.keypoint, map.keyframe(a).frame->bundled.keypoints(FeatureId(0)).front());
-  expect_sound();
+  expect_valid();
 }
 
-TEST_F(BundledMapTest, KeepsANamedReference) {
+TEST_F(BundledMapTest, KeepsAGivenReference) {
   const KeyframeId a = add({}, {});
   const std::vector<Observation> observations = {{KeyframeId(0), FeatureId(45)}, {a, FeatureId(0)}};
   const LandmarkReference second_camera{a, {CameraIndex(1), KeypointIndex(0)}};
   const LandmarkId l = map.add_landmark(random_point(random), observations, second_camera);
   EXPECT_EQ(map.landmark(l).reference.keypoint, second_camera.keypoint);
   EXPECT_EQ(map.landmark(l).born, a);
-  expect_sound();
+  expect_valid();
 }
 
 TEST_F(BundledMapTest, MovesObservationsAndCountersWhenMerging) {
@@ -223,7 +223,7 @@ TEST_F(BundledMapTest, MovesObservationsAndCountersWhenMerging) {
   EXPECT_EQ(map.landmark(LandmarkId(4)).found, 4u);
   EXPECT_EQ(map.landmark_of(a, FeatureId(3)), LandmarkId(4));
   for (const Observation& o : map.observations(LandmarkId(4))) {
-    EXPECT_EQ(o.aligned, o.feature == FeatureId(4)) << "placed by the patch of the other landmark";
+    EXPECT_EQ(o.aligned, o.feature == FeatureId(4)) << "aligned to the reference patch of the other landmark";
   }
   EXPECT_FALSE(map.landmark_of(b, FeatureId(3)).valid());  // b already observes landmark 4 with feature 4
   EXPECT_TRUE(map.merge_landmarks(LandmarkId(4), LandmarkId(5)));
@@ -231,10 +231,10 @@ TEST_F(BundledMapTest, MovesObservationsAndCountersWhenMerging) {
   EXPECT_FALSE(map.merge_landmarks(LandmarkId(5), LandmarkId(5)));
   map.remove_landmark(LandmarkId(5));
   EXPECT_FALSE(map.resolve(LandmarkId(3)).valid());
-  expect_sound();
+  expect_valid();
 }
 
-TEST_F(BundledMapTest, FreesRemovedLandmarksAndKnowsWhereTheyLead) {
+TEST_F(BundledMapTest, FreesRemovedLandmarksButKeepsTheirMerges) {
   const auto freed = [](const BundledMap& m) { return &m.landmark(LandmarkId(0)) == &m.landmark(LandmarkId(16)); };
   for (int l = 0; l < 31; ++l) map.remove_landmark(LandmarkId(l));
   map.free_removed(1000);
@@ -251,7 +251,7 @@ TEST_F(BundledMapTest, FreesRemovedLandmarksAndKnowsWhereTheyLead) {
     EXPECT_TRUE(map.observations(LandmarkId(l)).empty());
   }
   EXPECT_TRUE(map.alive(LandmarkId(33)));
-  expect_sound();
+  expect_valid();
 }
 
 TEST_F(BundledMapTest, KeepsATreeWhenAKeyframeIsRemoved) {
@@ -267,10 +267,10 @@ TEST_F(BundledMapTest, KeepsATreeWhenAKeyframeIsRemoved) {
   for (const KeyframeId k : {b, c, d}) EXPECT_EQ(map.keyframe(k).parent, KeyframeId(0));
   EXPECT_FALSE(map.remove_keyframe(a));
   EXPECT_FALSE(map.remove_keyframe(KeyframeId(0)));  // the root
-  expect_sound();
+  expect_valid();
 }
 
-TEST_F(BundledMapTest, HandsChildrenToASiblingWithTheStrongerLink) {
+TEST_F(BundledMapTest, ReassignsChildrenToASiblingWithTheStrongerLink) {
   const KeyframeId a = add(matches(0, 20), {});
   const KeyframeId b = add(matches(0, 15), {}), c = add(matches(0, 14), a);
   const std::vector<Observation> both = {{b, FeatureId(40)}, {c, FeatureId(40)}};
@@ -285,10 +285,10 @@ TEST_F(BundledMapTest, HandsChildrenToASiblingWithTheStrongerLink) {
   EXPECT_EQ(map.keyframe(b).parent, KeyframeId(0));
   EXPECT_EQ(map.keyframe(root_child).parent, KeyframeId(0));
   EXPECT_EQ(map.keyframe(sibling).parent, root_child);
-  expect_sound();
+  expect_valid();
 }
 
-TEST_F(BundledMapTest, CarriesRemovedKeyframesByTheirParents) {
+TEST_F(BundledMapTest, MovesRemovedKeyframesWithTheirParents) {
   const KeyframeId a = add(matches(0, 20), {}), b = add(matches(0, 10), {});
   const SE3 T_b_a = map.keyframe(b).T_rig_world * map.keyframe(a).T_rig_world.inverse();
   const SE3 T_a_0 = map.keyframe(a).T_rig_world * map.keyframe(KeyframeId(0)).T_rig_world.inverse();
@@ -302,7 +302,7 @@ TEST_F(BundledMapTest, CarriesRemovedKeyframesByTheirParents) {
   EXPECT_FALSE(map.keyframe(a).frame);
 }
 
-TEST_F(BundledMapTest, RefreshesWhatALandmarkLooksLike) {
+TEST_F(BundledMapTest, RefreshesTheAppearanceOfALandmark) {
   const LandmarkId l(2);
   std::vector<KeyframeId> keyframes = {KeyframeId(0)};
   for (int i = 0; i < 30; ++i) keyframes.push_back(add({{FeatureId(2), l}}, {}));
@@ -343,7 +343,7 @@ TEST_F(BundledMapTest, RefreshesWhatALandmarkLooksLike) {
 }
 
 // The pose of a camera with a late capture time follows the motion of the rig; scaling a submap scales that motion.
-TEST_F(BundledMapTest, KnowsWhereALateCameraWas) {
+TEST_F(BundledMapTest, ComputesThePoseOfALateCamera) {
   auto frame = std::make_shared<frame::BundledFrame>(*synthetic_frame(random, 2, 30, 10));
   frame->time_ns = 1'000'000'000;
   for (frame::CameraFrame& c : frame->cameras) c.state = image::ImageState::kPresent;

@@ -71,7 +71,7 @@ TEST(CowVector, CopiesBehaveAsIndependentValues) {
   for (std::size_t i = 0; i < values.size(); ++i) expect_equal(values[i], truth[i]);
 }
 
-TEST(CowVector, ChangesInPlaceWhatItHasDetachedOnce) {
+TEST(CowVector, ChangesDetachedChunksInPlace) {
   Value value;
   for (int i = 0; i < 100; ++i) value.push_back(i);
   const Value copy = value;

@@ -10,14 +10,14 @@
 namespace bslam::map {
 namespace {
 
-TEST(MapStore, CountsVersionsAndGivesProvisionalIdsWhereNothingCameBetween) {
+TEST(MapStore, CountsVersionsAndKeepsProvisionalIdsWithoutOtherCommits) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};
   EXPECT_EQ(store.snapshot()->version(), MapVersion(0));
   MapDraft draft(store.snapshot());
   const KeyframeId k = draft.add_keyframe(synthetic_frame(random, 1, 10, 0), {}, {}, {});
   const LandmarkId l = draft.add_landmark({0, 0, 5}, {{k, FeatureId(3)}});
-  EXPECT_EQ(store.snapshot()->keyframe_slots(), 0u);  // the draft is not visible to others
+  EXPECT_EQ(store.snapshot()->keyframe_slots(), 0u);  // the draft is not visible to other threads
   const CommitReport report = store.commit(std::move(draft));
   EXPECT_FALSE(report.rebased);
   EXPECT_EQ(report.applied, 2u);
@@ -28,7 +28,7 @@ TEST(MapStore, CountsVersionsAndGivesProvisionalIdsWhereNothingCameBetween) {
   EXPECT_EQ(report.published->landmark_of(k, FeatureId(3)), l);
 }
 
-TEST(MapStore, GivesTheNextIdsWhereOthersWereFaster) {
+TEST(MapStore, AssignsTheNextIdsAfterOtherCommits) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};
   MapDraft first(store.snapshot()), second(store.snapshot());
@@ -45,10 +45,10 @@ TEST(MapStore, GivesTheNextIdsWhereOthersWereFaster) {
   EXPECT_EQ(report.published->version(), MapVersion(2));
   EXPECT_EQ(report.published->landmark_of(KeyframeId(1), FeatureId(3)), LandmarkId(1));
   EXPECT_EQ(report.published->roots(), (std::vector{KeyframeId(0), KeyframeId(1)}));  // each is the root of a submap
-  EXPECT_EQ(report.published->check_invariants().value_or("sound"), "sound");
+  EXPECT_EQ(report.published->check_invariants().value_or("valid"), "valid");
 }
 
-TEST(MapStore, FreesWhatWasRemovedAlsoWhereOthersWereFasterAndNeverForReaders) {
+TEST(MapStore, FreesRemovedLandmarksAlsoWhenRebasedButNotInOldSnapshots) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};
   MapDraft made(store.snapshot());
@@ -67,19 +67,19 @@ TEST(MapStore, FreesWhatWasRemovedAlsoWhereOthersWereFasterAndNeverForReaders) {
   EXPECT_TRUE(freed(*report.published));
   EXPECT_FALSE(freed(*reader));
   EXPECT_EQ(reader->landmark(LandmarkId(3)).position, Eigen::Vector3d(0, 0, 5));
-  EXPECT_EQ(report.published->check_invariants().value_or("sound"), "sound");
+  EXPECT_EQ(report.published->check_invariants().value_or("valid"), "valid");
 }
 
 TEST(MapStore, ServesReadersWhileTwoThreadsCommit) {
   constexpr int kCommits = 60;
   MapStore store{BundledMap(synthetic_rig(2))};
-  std::atomic<int> writers = 2, refused = 0;  // corrections rejected because of another correction
+  std::atomic<int> writers = 2, rejected = 0;  // corrections rejected because of another correction
   const auto write = [&](std::uint64_t seed) {
     RandomEditor editor(seed);
     for (int i = 0; i < kCommits; ++i) {
       MapDraft draft(store.snapshot());
       for (int n = 0; n < 20; ++n) editor.change(draft);
-      refused += store.commit(std::move(draft)).refused;
+      rejected += store.commit(std::move(draft)).rejected;
     }
     --writers;
   };
@@ -97,8 +97,8 @@ TEST(MapStore, ServesReadersWhileTwoThreadsCommit) {
     }
   }
   EXPECT_TRUE(broken.empty()) << broken.front();
-  EXPECT_EQ(store.snapshot()->version(), MapVersion(2 * kCommits - refused));
-  EXPECT_EQ(store.snapshot()->check_invariants().value_or("sound"), "sound");
+  EXPECT_EQ(store.snapshot()->version(), MapVersion(2 * kCommits - rejected));
+  EXPECT_EQ(store.snapshot()->check_invariants().value_or("valid"), "valid");
 }
 
 }  // namespace

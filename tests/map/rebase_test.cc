@@ -48,8 +48,8 @@ class RebaseTest : public testing::Test {
   CommitReport commit() {
     store.commit(*std::move(early));
     CommitReport report = store.commit(*std::move(late));
-    EXPECT_TRUE(report.rebased || report.refused);
-    EXPECT_EQ(report.published->check_invariants().value_or("sound"), "sound");
+    EXPECT_TRUE(report.rebased || report.rejected);
+    EXPECT_EQ(report.published->check_invariants().value_or("valid"), "valid");
     return report;
   }
 
@@ -91,7 +91,7 @@ TEST_F(RebaseTest, NewKeyframeFallsBackToAnAliveAncestor) {
   EXPECT_EQ(report.published->keyframe(report.keyframes.at(0)).parent, kSecond);
 }
 
-TEST_F(RebaseTest, NewRootKeyframeBeginsASubmap) {
+TEST_F(RebaseTest, NewRootKeyframeStartsASubmap) {
   MapDraft setup(store.snapshot());
   setup.remove_keyframe(kThird);
   store.commit(std::move(setup));
@@ -104,7 +104,7 @@ TEST_F(RebaseTest, NewRootKeyframeBeginsASubmap) {
   EXPECT_FALSE(report.published->keyframe(report.keyframes.at(0)).parent.valid());
 }
 
-TEST_F(RebaseTest, NewKeyframeOfARemovedSubmapBeginsOne) {
+TEST_F(RebaseTest, NewKeyframeOfARemovedSubmapStartsANewOne) {
   const KeyframeId root = begin_submap();
   early->remove_submap(root);
   add_keyframe(*late, {}, root);
@@ -112,7 +112,7 @@ TEST_F(RebaseTest, NewKeyframeOfARemovedSubmapBeginsOne) {
   EXPECT_EQ(report.published->roots(), (std::vector{kRoot, report.keyframes.at(0)}));
 }
 
-TEST_F(RebaseTest, NewKeyframeSeesNewLandmarksOfItsOwnEdit) {
+TEST_F(RebaseTest, NewKeyframeObservesNewLandmarksOfItsOwnEdit) {
   early->add_landmark(random_point(random), {{kRoot, FeatureId(40)}});
   const LandmarkId draft_id = late->add_landmark(random_point(random), {{kRoot, FeatureId(41)}});
   add_keyframe(*late, {{FeatureId(7), draft_id}});
@@ -137,7 +137,7 @@ TEST_F(RebaseTest, NewLandmarkLosesObservationsThatAreNoLongerPossible) {
   EXPECT_EQ(report.landmarks.at(1), LandmarkId(32));
 }
 
-TEST_F(RebaseTest, NewLandmarkWithoutObservationsLeftIsDroppedWithAllThatNamesIt) {
+TEST_F(RebaseTest, NewLandmarkWithoutRemainingObservationsIsDroppedWithAllOperationsOnIt) {
   early->add_landmark(random_point(random), {{kRoot, FeatureId(40)}});
   const LandmarkId lost = late->add_landmark(random_point(random), {{kRoot, FeatureId(40)}});
   late->add_observation(lost, {kSecond, FeatureId(40)});
@@ -199,7 +199,7 @@ TEST_F(RebaseTest, NewObservationInARemovedKeyframeIsDropped) {
   EXPECT_EQ(report.dropped, 2u);
 }
 
-TEST_F(RebaseTest, RemovalOfAnObservationIsDroppedWhereItIsGone) {
+TEST_F(RebaseTest, RemovalOfAnObservationIsDroppedIfItNoLongerExists) {
   early->remove_observation(LandmarkId(0), kThird);
   early->merge_landmarks(LandmarkId(1), LandmarkId(2));
   late->remove_observation(LandmarkId(0), kThird);
@@ -213,7 +213,7 @@ TEST_F(RebaseTest, RemovalOfAnObservationIsDroppedWhereItIsGone) {
   EXPECT_EQ(report.published->observations(LandmarkId(4)).size(), 2u);
 }
 
-TEST_F(RebaseTest, RemovalOfALandmarkIsDroppedWhereANewerKeyframeObservesIt) {
+TEST_F(RebaseTest, RemovalOfALandmarkIsDroppedIfANewerKeyframeObservesIt) {
   add_keyframe(*early, same_numbers(0, 2));
   early->remove_landmark(LandmarkId(3));
   for (const std::size_t i : {0u, 2u, 3u}) late->remove_landmark(LandmarkId(i));
@@ -240,7 +240,7 @@ TEST_F(RebaseTest, MergesForwardBothEnds) {
   EXPECT_EQ(report.dropped, 2u);
 }
 
-TEST_F(RebaseTest, RemovalOfAKeyframeIsDroppedWhereItIsGoneAndHandsOverNewerChildren) {
+TEST_F(RebaseTest, RemovalOfAKeyframeIsDroppedIfRemovedAndReassignsNewerChildren) {
   early->remove_keyframe(kSecond);
   const KeyframeId child = add_keyframe(*early, {}, kThird);
   late->remove_keyframe(kSecond);
@@ -251,7 +251,7 @@ TEST_F(RebaseTest, RemovalOfAKeyframeIsDroppedWhereItIsGoneAndHandsOverNewerChil
   EXPECT_EQ(report.published->keyframe(child).parent, kRoot);
 }
 
-TEST_F(RebaseTest, PosesSkipWhatIsGone) {
+TEST_F(RebaseTest, PosesOfRemovedKeyframesAndLandmarksAreIgnored) {
   const Eigen::Vector3d position = store.snapshot()->landmark(LandmarkId(1)).position;
   early->remove_keyframe(kThird);
   early->remove_landmark(LandmarkId(0));
@@ -264,7 +264,7 @@ TEST_F(RebaseTest, PosesSkipWhatIsGone) {
   EXPECT_EQ(report.applied, 1u);
 }
 
-TEST_F(RebaseTest, PosesCarryNewerKeyframesAndLandmarksAlong) {
+TEST_F(RebaseTest, NewerKeyframesAndLandmarksMoveWithPoses) {
   const KeyframeId child = add_keyframe(*early, {}, kThird);
   const KeyframeId grandchild = add_keyframe(*early, {}, child);
   const KeyframeId elsewhere = add_keyframe(*early, {}, kRoot);
@@ -308,20 +308,20 @@ TEST_F(RebaseTest, PosesAreDroppedAfterACorrection) {
   EXPECT_EQ(report.published->gauge_epoch(), before->gauge_epoch() + 1);
 }
 
-TEST_F(RebaseTest, OfTwoCorrectionsTheFirstHoldsAndNothingOfTheOther) {
+TEST_F(RebaseTest, TheSecondOfTwoConcurrentCorrectionsIsRejected) {
   const SE3 corrected = random_pose(random, 1);
   early->set_poses({{{kThird, corrected}}, {}, true});
   late->set_poses({{{kThird, random_pose(random, 1)}}, {}, true});
   ASSERT_TRUE(late->merge_landmarks(LandmarkId(0), LandmarkId(1)));
   const CommitReport report = commit();
-  EXPECT_TRUE(report.refused);
+  EXPECT_TRUE(report.rejected);
   EXPECT_EQ(report.published, store.snapshot());
   EXPECT_TRUE(report.published->alive(LandmarkId(0)));
   expect_near(report.published->keyframe(kThird).T_rig_world, corrected);
   EXPECT_EQ(report.published->gauge_epoch(), 1);
 }
 
-TEST_F(RebaseTest, ACorrectionBeginsAnEpochAlsoWhereItComesLater) {
+TEST_F(RebaseTest, ACorrectionBeginsAnEpochWhenRebased) {
   early->set_poses({{{kSecond, random_pose(random, 1)}}, {}});
   const KeyframeId child = add_keyframe(*early, {}, kThird);
   const SE3 T_child_third =
@@ -338,7 +338,7 @@ TEST_F(RebaseTest, ACorrectionBeginsAnEpochAlsoWhereItComesLater) {
   expect_near(report.published->keyframe(child).T_rig_world, T_child_third * corrected);
 }
 
-TEST_F(RebaseTest, ACorrectionOfNothingThatIsLeftBeginsNoEpoch) {
+TEST_F(RebaseTest, ACorrectionOfRemovedKeyframesBeginsNoEpoch) {
   early->remove_keyframe(kThird);
   late->set_poses({{{kThird, random_pose(random, 1)}}, {}, true});
   const CommitReport report = commit();
@@ -365,7 +365,7 @@ TEST_F(RebaseTest, SubmapsAreMergedIfBothStillExistSeparately) {
   EXPECT_EQ(report.published->root_of(newer), kRoot);
 }
 
-TEST_F(RebaseTest, JoiningIsDroppedWhereItHasBeenDone) {
+TEST_F(RebaseTest, MergingIsDroppedIfAlreadyDone) {
   const KeyframeId root = begin_submap();
   early->merge_submaps(root, kSecond);
   late->merge_submaps(root, kThird);
@@ -374,7 +374,7 @@ TEST_F(RebaseTest, JoiningIsDroppedWhereItHasBeenDone) {
   EXPECT_EQ(report.published->keyframe(root).parent, kSecond);
 }
 
-TEST_F(RebaseTest, JoiningStandsByTheAncestorOfWhatIsGone) {
+TEST_F(RebaseTest, MergingUsesTheAncestorOfARemovedKeyframe) {
   const KeyframeId root = begin_submap();
   early->remove_keyframe(kThird);
   late->merge_submaps(root, kThird);
@@ -390,7 +390,7 @@ TEST_F(RebaseTest, MergingIsDroppedIfASubmapWasRemoved) {
   EXPECT_EQ(commit().dropped, 1u);
 }
 
-TEST_F(RebaseTest, JoiningFollowsTheIdsOfTheEditsOwnKeyframes) {
+TEST_F(RebaseTest, MergingFollowsTheIdsOfTheEditsOwnKeyframes) {
   add_keyframe(*early, same_numbers(0, 3));
   const KeyframeId own = add_keyframe(*late, {});
   late->merge_submaps(own, kSecond);
@@ -423,7 +423,7 @@ TEST_F(RebaseTest, RemovalOfASubmapIsDroppedIfItWasRemovedOrMerged) {
   EXPECT_EQ(commit().dropped, 1u);
 }
 
-TEST_F(RebaseTest, NewKeyframesEndUpTheSameWhicheverOfTwoEditsComesFirst) {
+TEST_F(RebaseTest, NewKeyframesDoNotDependOnTheOrderOfTwoEdits) {
   const auto frame = synthetic_frame(random, 2, 30, 10);
   const SE3 T_new_world = random_pose(random, 1), T_third_new = random_pose(random, 1);
   std::vector<SE3> ends;
@@ -515,16 +515,16 @@ TEST_F(RebaseTest, PosesInAnOldUnitAreDropped) {
   EXPECT_EQ(report.published->keyframe(kSecond).T_rig_world.translation(), 2.0 * before.translation());
 }
 
-TEST_F(RebaseTest, OneOfTwoScalingsAtATimeIsRefused) {
+TEST_F(RebaseTest, TheSecondOfTwoConcurrentScalingsIsRejected) {
   const SE3 before = early->map().keyframe(kSecond).T_rig_world;
   early->scale_submap(kRoot, 2.0);
   late->scale_submap(kRoot, 3.0);
   const CommitReport report = commit();
-  EXPECT_TRUE(report.refused);
+  EXPECT_TRUE(report.rejected);
   EXPECT_EQ(report.published->keyframe(kSecond).T_rig_world.translation(), 2.0 * before.translation());
 }
 
-TEST_F(RebaseTest, ScaleIsWhatTheLaterEditSays) {
+TEST_F(RebaseTest, TheLaterEditDeterminesTheScale) {
   early->set_scale(Scale::kUpToScale);
   late->set_scale(Scale::kUnobservable);
   const CommitReport report = commit();

@@ -7,7 +7,7 @@
 namespace bslam::map {
 namespace {
 
-TEST(MedianDepth, IsTheDistanceInTheMiddle) {
+TEST(MedianDepth, IsTheMedianDistance) {
   BundledMap map(synthetic_rig(1));
   Random random(1);
   const geometry::SE3 T_rig_world(Eigen::Quaterniond::Identity(), {0, 0, 1});

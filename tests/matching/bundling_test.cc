@@ -14,14 +14,14 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using geometry::SE3;
 
-// A wall of grey tiles of five centimetres with soft edges, three metres ahead and slanted.
+// A slanted wall of grey tiles of five centimetres with soft edges, three metres ahead.
 class Wall {
  public:
   Wall() {
     Random random(1, "wall");
     for (double& t : tile_) t = random.uniform(20, 235);
   }
-  // Where the ray meets the wall, rig frame.
+  // Intersection of a ray with the wall, rig frame.
   static Vector3d hit(const Vector3d& origin, const Vector3d& direction) {
     const Vector3d normal = Vector3d(0.3, 0.1, -1).normalized(), on(0, 0, 3);
     return origin + direction * (normal.dot(on - origin) / normal.dot(direction));
@@ -43,7 +43,7 @@ class Wall {
   std::array<double, 4093> tile_;
 };
 
-image::Image picture(const Wall& wall, const camera::Camera& camera, const SE3& T_rig_cam) {
+image::Image render(const Wall& wall, const camera::Camera& camera, const SE3& T_rig_cam) {
   image::Image image(camera.width, camera.height);
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -60,7 +60,7 @@ image::Image picture(const Wall& wall, const camera::Camera& camera, const SE3& 
   return image;
 }
 
-// Three cameras of two models with overlapping views, and one that looks away.
+// Three cameras of two models with overlapping views, and one without overlap.
 camera::Rig wall_rig() {
   const camera::Camera pinhole{"pinhole", camera::Pinhole({260, 260, 159.5, 119.5}), 320, 240, 0, ""};
   const camera::Camera radtan{
@@ -80,7 +80,7 @@ class Bundle : public ::testing::Test {
     const Wall wall;
     images.images.resize(4);
     for (std::size_t c = 0; c < 3; ++c)
-      images.images[c] = {image::ImageState::kPresent, 0, picture(wall, rig.camera(c), rig.rig_from_cam(c))};
+      images.images[c] = {image::ImageState::kPresent, 0, render(wall, rig.camera(c), rig.rig_from_cam(c))};
   }
   static feature::FeatureOptions options() {
     feature::FeatureOptions o;
@@ -98,7 +98,7 @@ class Bundle : public ::testing::Test {
   image::ImageBundle images;
 };
 
-TEST_F(Bundle, MatchedFeaturesShowOnePlaceOfTheWorld) {
+TEST_F(Bundle, KeypointsOfMatchedFeaturesShowTheSamePoint) {
   const frame::BundledFrame frame = make();
   EXPECT_GT(frame.bundled.num_matched(), 100u);
   std::vector<double> pixel_errors, normalised;
@@ -130,7 +130,7 @@ TEST_F(Bundle, MatchedFeaturesShowOnePlaceOfTheWorld) {
   EXPECT_LT(normalised[normalised.size() * 95 / 100], 2.5);  // depth errors in standard deviations
 }
 
-TEST_F(Bundle, KeepsTheRulesOfTheTable) {
+TEST_F(Bundle, SatisfiesTheInvariantsOfTheTable) {
   const frame::BundledFrame frame = make();
   EXPECT_EQ(frame.bundled.size(), frame.bundled.num_matched() + frame.bundled.num_monocular());
   std::size_t keypoints = 0;
@@ -146,7 +146,7 @@ TEST_F(Bundle, KeepsTheRulesOfTheTable) {
   EXPECT_TRUE(frame.cameras[3].keypoints.empty());
 }
 
-TEST_F(Bundle, IsTheSameWithAnyNumberOfThreads) {
+TEST_F(Bundle, DoesNotDependOnTheNumberOfThreads) {
   const frame::BundledFrame once = make();
   ThreadPool alone(1);
   const frame::BundledFrame extracted = builder.extract(images, alone);
@@ -159,8 +159,8 @@ TEST_F(Bundle, IsTheSameWithAnyNumberOfThreads) {
   }
 }
 
-// A keypoint is where it was detected unless it belongs to a matched feature, and what was detected stays as it is.
-TEST_F(Bundle, MovesTheKeypointsOfMatchedFeaturesAlone) {
+// Only keypoints of matched features are moved, and the detected keypoints are unchanged.
+TEST_F(Bundle, MovesOnlyKeypointsOfMatchedFeatures) {
   const frame::BundledFrame extracted = builder.extract(images, pool);
   std::vector<feature::Refinement> detected;
   for (const frame::CameraFrame& c : extracted.cameras) detected.push_back(c.keypoints.positions());
@@ -187,7 +187,7 @@ TEST_F(Bundle, AMissingOrDamagedImageLeavesItsCameraEmpty) {
   const frame::BundledFrame frame = make();
   EXPECT_TRUE(frame.cameras[1].keypoints.empty());
   EXPECT_EQ(frame.cameras[1].state, image::ImageState::kDamaged);
-  EXPECT_GT(frame.bundled.num_matched(), 50u);  // of cameras 0 and 2
+  EXPECT_GT(frame.bundled.num_matched(), 50u);  // matched between cameras 0 and 2
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ Camera fisheye() {  // 190 degrees
 }
 
 struct Pair {
-  feature::Detections a, b;  // keypoint k of a shows what keypoint partner[k] of b shows, -1 = nothing
+  feature::Detections a, b;  // keypoint k of a and partner[k] of b show the same point; -1: none
   std::vector<int> partner;
 };
 
@@ -50,7 +50,7 @@ feature::Descriptor flipped(feature::Descriptor d, int bits, Random& random) {
   return d;
 }
 
-// Points all around between half a metre and twenty, as far as a sees them; b sees them where it does, with noise.
+// Points in all directions at distances of 0.5 to 20 m that a observes; b observes a subset, with noise.
 Pair seen_by(const Camera& a, const Camera& b, const SE3& T_common_a, const SE3& T_common_b, std::size_t count) {
   Random random(11, "epipolar");
   Pair out;
@@ -69,7 +69,7 @@ Pair seen_by(const Camera& a, const Camera& b, const SE3& T_common_a, const SE3&
     out.partner.back() = static_cast<int>(out.b.size());
     add(b, noisy, flipped(descriptor, 12, random), out.b);
   }
-  for (std::size_t i = 0; i < count / 5; ++i) {  // what only b sees
+  for (std::size_t i = 0; i < count / 5; ++i) {  // points observed by b only
     const Vector2d pixel(random.uniform(0, b.width - 1), random.uniform(0, b.height - 1));
     if (b.unproject(pixel)) add(b, pixel, random_descriptor(random), out.b);
   }
@@ -102,7 +102,7 @@ Score score(const Pair& pair, const std::vector<EpipolarMatch>& matches) {
   return s;
 }
 
-SE3 turned(double yaw, double pitch, const Vector3d& position) {
+SE3 rotated_pose(double yaw, double pitch, const Vector3d& position) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Vector3d::UnitY()) * Eigen::AngleAxisd(pitch, Vector3d::UnitX())),
           position};
 }
@@ -115,14 +115,15 @@ TEST(MatchEpipolar, RecoversTrueMatchesOfAnyCamerasInAnyDirection) {
     SE3 T_common_a, T_common_b;
   };
   const Case cases[] = {
-      {"pinholes side by side", pinhole(), pinhole(), SE3(), turned(0, 0, {0.11, 0, 0})},
-      {"one above the other", pinhole(), radtan(), SE3(), turned(0.05, 0.02, {0, 0.2, 0})},
-      {"radtan, converging", radtan(), radtan(), turned(0.2, 0, {0, 0, 0}), turned(-0.2, 0, {0.4, 0, 0.1})},
-      {"forward motion", radtan(), radtan(), SE3(), turned(0, 0, {0.05, 0, 0.3})},
-      {"fisheyes at right angles", fisheye(), fisheye(), SE3(), turned(0.5 * pi, 0, {0.1, 0, 0.1})},
-      {"fisheyes back to back", fisheye(), fisheye(), SE3(), turned(0.9 * pi, 0, {0.1, 0, -0.05})},
-      {"both looking back", fisheye(), radtan(), turned(pi, 0, {0, 0, 0}), turned(pi - 0.1, 0, {0.3, 0.1, 0})},
-      {"fisheye and pinhole sideways", fisheye(), pinhole(), SE3(), turned(-1.2, 0.3, {0, 0, 0.2})},
+      {"pinholes side by side", pinhole(), pinhole(), SE3(), rotated_pose(0, 0, {0.11, 0, 0})},
+      {"one above the other", pinhole(), radtan(), SE3(), rotated_pose(0.05, 0.02, {0, 0.2, 0})},
+      {"radtan, converging", radtan(), radtan(), rotated_pose(0.2, 0, {0, 0, 0}), rotated_pose(-0.2, 0, {0.4, 0, 0.1})},
+      {"forward motion", radtan(), radtan(), SE3(), rotated_pose(0, 0, {0.05, 0, 0.3})},
+      {"fisheyes at right angles", fisheye(), fisheye(), SE3(), rotated_pose(0.5 * pi, 0, {0.1, 0, 0.1})},
+      {"fisheyes back to back", fisheye(), fisheye(), SE3(), rotated_pose(0.9 * pi, 0, {0.1, 0, -0.05})},
+      {"both looking back", fisheye(), radtan(), rotated_pose(pi, 0, {0, 0, 0}),
+       rotated_pose(pi - 0.1, 0, {0.3, 0.1, 0})},
+      {"fisheye and pinhole sideways", fisheye(), pinhole(), SE3(), rotated_pose(-1.2, 0.3, {0, 0, 0.2})},
   };
   for (const Case& c : cases) {
     const Pair pair = seen_by(c.a, c.b, c.T_common_a, c.T_common_b, 800);
@@ -134,8 +135,8 @@ TEST(MatchEpipolar, RecoversTrueMatchesOfAnyCamerasInAnyDirection) {
   }
 }
 
-// Whatever the direction of the baseline, some epipolar planes lie at the seam of the angle about it.
-TEST(MatchEpipolar, HasNoSeamAboutTheBaseline) {
+// For every direction of the baseline some epipolar planes lie at the wrap-around of the angle.
+TEST(MatchEpipolar, HandlesTheWrapAroundOfTheAngle) {
   const Camera camera = fisheye();
   for (int i = 0; i < 12; ++i) {
     const double turn = 2 * std::numbers::pi * i / 12;
@@ -152,11 +153,11 @@ class MatchEpipolarSideBySide : public ::testing::Test {
     return matching::match({camera, pair.a, SE3()}, {camera, pair.b, T_common_b}, options, usable_a);
   }
   Camera camera = pinhole();
-  SE3 T_common_b = turned(0, 0, {0.2, 0, 0});
+  SE3 T_common_b = rotated_pose(0, 0, {0.2, 0, 0});
   Pair pair = seen_by(camera, camera, SE3(), T_common_b, 600);
 };
 
-TEST_F(MatchEpipolarSideBySide, UsesEveryKeypointOnceAndInOrder) {
+TEST_F(MatchEpipolarSideBySide, MatchesEveryKeypointAtMostOnceInOrder) {
   std::set<KeypointIndex> a, b;
   KeypointIndex last;
   for (const EpipolarMatch& m : match({})) {
@@ -167,7 +168,7 @@ TEST_F(MatchEpipolarSideBySide, UsesEveryKeypointOnceAndInOrder) {
   EXPECT_GT(a.size(), 200u);
 }
 
-TEST_F(MatchEpipolarSideBySide, FindsTheSameFromEitherSide) {
+TEST_F(MatchEpipolarSideBySide, IsSymmetric) {
   std::set<std::pair<int, int>> forth, back;
   for (const EpipolarMatch& m : match({})) forth.insert({m.a.value(), m.b.value()});
   for (const EpipolarMatch& m : matching::match({camera, pair.b, T_common_b}, {camera, pair.a, SE3()})) {
@@ -178,20 +179,20 @@ TEST_F(MatchEpipolarSideBySide, FindsTheSameFromEitherSide) {
   EXPECT_GT(static_cast<double>(both), 0.98 * static_cast<double>(forth.size()));
 }
 
-TEST_F(MatchEpipolarSideBySide, KeepsToTheDistancesAskedFor) {
+TEST_F(MatchEpipolarSideBySide, RespectsTheDistanceRange) {
   // Depth is 400 px * 0.2 m / disparity.
-  for (const EpipolarMatch& m : match({.min_depth_m = 2.0, .far_m = 5.0})) {
+  for (const EpipolarMatch& m : match({.min_depth_m = 2.0, .max_depth_m = 5.0})) {
     const double disparity = pair.a.pixel[m.a.index()].x() - pair.b.pixel[m.b.index()].x();
     const double cosine = pair.a.bearing[m.a.index()].z();  // depth is distance times this
     EXPECT_GT(disparity * cosine, 80 / 5.0 - 4);
     EXPECT_LT(disparity * cosine, 80 / 2.0 + 4);
   }
-  const std::size_t all = match({}).size(), some = match({.min_depth_m = 2.0, .far_m = 5.0}).size();
+  const std::size_t all = match({}).size(), some = match({.min_depth_m = 2.0, .max_depth_m = 5.0}).size();
   EXPECT_GT(some, all / 10);
   EXPECT_LT(some, all / 2);
 }
 
-TEST_F(MatchEpipolarSideBySide, LeavesOutWhatIsAmbiguousOrNotUsable) {
+TEST_F(MatchEpipolarSideBySide, IgnoresAmbiguousAndUnusableKeypoints) {
   const std::size_t all = match({}).size();
   Pair doubled = pair;
   for (std::size_t k = 0; k < pair.a.size(); ++k) {  // a twin of every partner elsewhere on its epipolar line
@@ -212,12 +213,12 @@ TEST_F(MatchEpipolarSideBySide, LeavesOutWhatIsAmbiguousOrNotUsable) {
 TEST_F(MatchEpipolarSideBySide, FindsNothingWithoutABaselineOrKeypoints) {
   T_common_b = SE3();
   EXPECT_TRUE(match({}).empty());
-  T_common_b = turned(0, 0, {0.2, 0, 0});
+  T_common_b = rotated_pose(0, 0, {0.2, 0, 0});
   pair.b.clear();
   EXPECT_TRUE(match({}).empty());
 }
 
-TEST_F(MatchEpipolarSideBySide, RefusesOtherDescriptorsAndLevels) {
+TEST_F(MatchEpipolarSideBySide, RejectsDifferentDescriptorsAndLevels) {
   for (const EpipolarMatch& m : match({.max_hamming = 10})) EXPECT_LE(m.hamming, 10);
   for (std::uint8_t& l : pair.b.level) l = 5;
   EXPECT_TRUE(match({.max_level_difference = 2}).empty());

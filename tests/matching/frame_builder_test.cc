@@ -7,20 +7,20 @@
 namespace bslam::matching {
 namespace {
 
-// Two cameras and pictures of squares with far more corners than are wanted.
+// Two cameras and images of squares with far more corners than the budget.
 class FrameBuilderTest : public ::testing::Test {
  protected:
   FrameBuilderTest() : pool(2), builder(rig, options(), {}) {
     Random random(1, "squares");
     for (int c = 0; c < 2; ++c) {
-      image::Image picture(320, 240);
-      for (int y = 0; y < 240; ++y) std::fill_n(picture.row(y), 320, std::uint8_t{128});
+      image::Image image(320, 240);
+      for (int y = 0; y < 240; ++y) std::fill_n(image.row(y), 320, std::uint8_t{128});
       for (int i = 0; i < 600; ++i) {
         const auto x = static_cast<int>(random.below(308)), y = static_cast<int>(random.below(228));
         const auto grey = static_cast<std::uint8_t>(random.below(256));
-        for (int r = y; r < y + 12; ++r) std::fill_n(picture.row(r) + x, 12, grey);
+        for (int r = y; r < y + 12; ++r) std::fill_n(image.row(r) + x, 12, grey);
       }
-      images.images.push_back({image::ImageState::kPresent, 0, std::move(picture)});
+      images.images.push_back({image::ImageState::kPresent, 0, std::move(image)});
     }
   }
   static feature::FeatureOptions options() {
@@ -42,23 +42,23 @@ class FrameBuilderTest : public ::testing::Test {
   image::ImageBundle images;
 };
 
-TEST_F(FrameBuilderTest, TakesAsManyKeypointsAsTheOptionsSay) {
+TEST_F(FrameBuilderTest, ExtractsTheConfiguredNumberOfKeypoints) {
   const frame::BundledFrame frame = builder.extract(images, pool);
   EXPECT_EQ(keypoints(frame, 0), 400u);
   EXPECT_EQ(keypoints(frame, 1), 400u);
 }
 
-TEST_F(FrameBuilderTest, KeepsToTheBudgetOfEachCamera) {
+TEST_F(FrameBuilderTest, RespectsTheBudgetOfEachCamera) {
   const frame::BundledFrame frame = builder.extract(images, pool, {}, std::vector<int>{100, 300});
   EXPECT_EQ(keypoints(frame, 0), 100u);
   EXPECT_EQ(keypoints(frame, 1), 300u);
   const frame::BundledFrame other = builder.extract(images, pool, {}, std::vector<int>{350, 9000});
   EXPECT_EQ(keypoints(other, 0), 350u);
-  EXPECT_EQ(keypoints(other, 1), 800u);  // twice per_image at most
+  EXPECT_EQ(keypoints(other, 1), 800u);  // maximum: twice per_image
   EXPECT_EQ(keypoints(builder.extract(images, pool), 1), 400u);
 }
 
-TEST_F(FrameBuilderTest, LeavesOutWhatItIsTold) {
+TEST_F(FrameBuilderTest, SkipsCameras) {
   const frame::BundledFrame frame =
       builder.extract(images, pool, std::vector<std::uint8_t>{1, 0}, std::vector<int>{0, 250});
   EXPECT_EQ(frame.cameras[0].state, image::ImageState::kMissing);

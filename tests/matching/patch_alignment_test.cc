@@ -13,7 +13,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using geometry::SE3;
 
-// A smooth texture known everywhere: waves of six to thirty pixels.
+// A smooth texture defined at every position: waves of six to thirty pixels.
 struct Texture {
   explicit Texture(std::uint64_t seed) {
     Random random(seed, "texture");
@@ -31,7 +31,7 @@ struct Texture {
   std::array<std::array<double, 4>, 8> waves;
 };
 
-// An image that shows the texture's point d at `centre + warp(d)`, times gain plus offset.
+// An image of the texture: point d is at `centre + warp(d)`, with gain and offset.
 image::Pyramid image_of(const Texture& texture, const PatchWarp& warp, const Vector2d& centre, double gain = 1,
                         double offset = 0) {
   image::Image image(160, 120);
@@ -50,7 +50,7 @@ image::Pyramid image_of(const Texture& texture, const PatchWarp& warp, const Vec
   return pyramid;
 }
 
-// The patch about the texture's origin.
+// The patch around the texture's origin.
 feature::Patch patch_of(const Texture& texture) {
   const Vector2d centre(80, 60);
   return feature::sample_patch(image_of(texture, {}, centre).levels[0].view(), 80, 60);
@@ -67,14 +67,14 @@ TEST(AlignPatch, RecoversSubPixelShiftsUnderAffineWarpsAndLight) {
         random.uniform(0.85, 1.2);
     const Vector2d truth(80 + random.uniform(-0.5, 0.5), 60 + random.uniform(-0.5, 0.5));
     const auto target = image_of(texture, warp, truth, random.uniform(0.7, 1.1), random.uniform(-10, 20));
-    const Vector2d guess = truth + Vector2d(random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8));
-    const auto found = align_patch(patch_of(texture), warp, target, guess, {});
+    const Vector2d initial = truth + Vector2d(random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8));
+    const auto found = align_patch(patch_of(texture), warp, target, initial, {});
     if (!found) continue;
     ++aligned;
     errors.push_back((found->pixel - truth).norm());
     EXPECT_LT(errors.back(), 0.2);
     EXPECT_GT(found->ncc, 0.8);
-    EXPECT_GE(found->sigma, 0.3);  // the floor
+    EXPECT_GE(found->sigma, 0.3);  // the calibration error
   }
   EXPECT_GT(aligned, 50);
   std::sort(errors.begin(), errors.end());
@@ -82,7 +82,7 @@ TEST(AlignPatch, RecoversSubPixelShiftsUnderAffineWarpsAndLight) {
   EXPECT_LT(errors[errors.size() * 9 / 10], 0.1);
 }
 
-// What bends the patch is no shift of it.
+// Quadratic terms of the warp do not shift the result.
 TEST(AlignPatch, IsNotDisplacedByWarpsOfSecondOrder) {
   const Vector2d truth(80.3, 59.8);
   std::vector<Vector2d> with, without;
@@ -104,12 +104,12 @@ TEST(AlignPatch, IsNotDisplacedByWarpsOfSecondOrder) {
     return (sum / static_cast<double>(errors.size())).eval();
   };
   EXPECT_LT(mean(with).norm(), 0.02);
-  // On average over the patch x^2 and y^2 are 5.25.
+  // The mean of x^2 and y^2 over the patch is 5.25.
   EXPECT_NEAR(mean(without).x(), 5.25 * 0.03, 0.05);
   EXPECT_NEAR(mean(without).y(), 5.25 * -0.015, 0.05);
 }
 
-TEST(AlignPatch, RefusesFlatPatchesAndOtherTextures) {
+TEST(AlignPatch, RejectsFlatPatchesAndOtherTextures) {
   const Texture texture(1);
   const Vector2d centre(80, 60);
   const auto target = image_of(texture, {}, centre);
@@ -122,7 +122,7 @@ TEST(AlignPatch, RefusesFlatPatchesAndOtherTextures) {
   EXPECT_LE(wrong, 3);
 }
 
-TEST(AlignPatch, RefusesToLeaveTheImageOrToMoveTooFar) {
+TEST(AlignPatch, RejectsPositionsOutsideTheImageAndLargeShifts) {
   const Texture texture(1);
   const Vector2d centre(80, 60);
   const feature::Patch patch = patch_of(texture);
@@ -136,16 +136,16 @@ TEST(AlignPatch, RefusesToLeaveTheImageOrToMoveTooFar) {
   EXPECT_FALSE(align_patch(patch, {}, image::Pyramid(), centre, {}).has_value());
 }
 
-TEST(AlignPatch, BendsThatLeaveTheImageAreRefused) {
+TEST(AlignPatch, RejectsQuadraticWarpsThatLeaveTheImage) {
   const Texture texture(1);
   const feature::Patch patch = patch_of(texture);
   for (const Vector2d& at : {Vector2d(6, 60), Vector2d(153, 60), Vector2d(80, 6), Vector2d(80, 113)}) {
     const auto target = image_of(texture, {}, at);
     ASSERT_TRUE(align_patch(patch, {}, target, at, {})) << at.transpose();
-    for (const double bend : {0.6, -0.6, 1e6, std::numeric_limits<double>::infinity(), std::nan("")}) {
+    for (const double quadratic : {0.6, -0.6, 1e6, std::numeric_limits<double>::infinity(), std::nan("")}) {
       PatchWarp warp;
-      warp.quadratic.setConstant(bend);
-      EXPECT_FALSE(align_patch(patch, warp, target, at, {})) << at.transpose() << " " << bend;
+      warp.quadratic.setConstant(quadratic);
+      EXPECT_FALSE(align_patch(patch, warp, target, at, {})) << at.transpose() << " " << quadratic;
     }
   }
 }
@@ -162,7 +162,7 @@ TEST(AlignPatch, WorksOnTheLevelThatFitsTheWarp) {
 }
 
 // Projects points of the plane that faces the reference camera into both images and compares.
-TEST(PatchWarp, IsTheProjectionOfTheFacingPlane) {
+TEST(PatchWarp, MatchesTheProjectionOfThePlane) {
   const camera::Camera cameras[] = {
       {"pinhole", camera::Pinhole({400, 410, 319.5, 239.5}), 640, 480, 0, ""},
       {"radtan", camera::PinholeRadTan({458, 457, 367, 248}, {-0.283, 0.074, 2e-4, 2e-5}), 752, 480, 0, ""},

@@ -28,7 +28,7 @@ SE3 at(double x, double y, double z, double yaw = 0) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Vector3d::UnitY())), Vector3d(x, y, z)};
 }
 
-TEST(EstimatePoint, LiesWithinItsCovariance) {
+TEST(EstimatePoint, ErrorsMatchTheCovariance) {
   Random random(1, "points");
   double sum = 0;
   constexpr int kPoints = 400;
@@ -61,7 +61,7 @@ TEST(EstimatePoint, IsExactWithoutNoise) {
   EXPECT_LT(estimated->worst_chi2, 1e-12);
 }
 
-TEST(EstimatePoint, NamesTheObservationThatDoesNotFit) {
+TEST(EstimatePoint, ReportsTheObservationWithTheLargestError) {
   Random random(3, "points");
   const Vector3d truth(0.3, -0.2, 3);
   std::vector<PointObservation> observations;
@@ -74,7 +74,7 @@ TEST(EstimatePoint, NamesTheObservationThatDoesNotFit) {
   EXPECT_GT(estimated->worst_chi2, 100);
 }
 
-TEST(EstimatePoint, RefusesParallelRaysPointsBehindAndSingleViews) {
+TEST(EstimatePoint, FailsForParallelRaysPointsBehindAndSingleViews) {
   Random random(4, "points");
   const Vector3d far(0, 0, 1000), near(0, 0, 2);
   const PointObservation parallel[] = {observe(kPinhole, at(0, 0, 0), far, 0, random),

@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector3d;
 using geometry::SE3;
 
-// 300 points before a camera, each with a keypoint on the level its distance asks for, a little off.
+// 300 points in front of a camera, each with a keypoint close to its projection on the predicted level.
 class SearchByProjection : public ::testing::Test {
  protected:
   static constexpr std::size_t kPoints = 300;
@@ -56,7 +56,7 @@ class SearchByProjection : public ::testing::Test {
   SearchExclusions exclusions;
 };
 
-TEST_F(SearchByProjection, FindsTheRightKeypointsEachOnce) {
+TEST_F(SearchByProjection, FindsTheCorrectKeypointsOnce) {
   const ProjectionSearchResult result = search();
   EXPECT_EQ(result.visible.size(), kPoints);
   EXPECT_GT(result.matches.size(), kPoints * 95 / 100);
@@ -71,8 +71,8 @@ TEST_F(SearchByProjection, FindsTheRightKeypointsEachOnce) {
   }
 }
 
-TEST_F(SearchByProjection, GivesAKeypointToThePointThatFitsBest) {
-  points[1] = points[0];  // looks exactly like keypoint 0 now
+TEST_F(SearchByProjection, MatchesAKeypointToTheMostSimilarPoint) {
+  points[1] = points[0];  // has the descriptor of keypoint 0
   descriptors[1] = frame.keypoints.descriptor[0];
   points[1].descriptor = &descriptors[1];
   for (const ProjectionMatch& m : search().matches) {
@@ -83,18 +83,18 @@ TEST_F(SearchByProjection, GivesAKeypointToThePointThatFitsBest) {
   }
 }
 
-TEST_F(SearchByProjection, LeavesOutWhatIsSkippedOrTaken) {
+TEST_F(SearchByProjection, IgnoresExcludedPointsAndKeypoints) {
   exclusions.points.assign(kPoints, 0);
   for (std::size_t i = 0; i < 100; ++i) exclusions.points[i] = 1;
   exclusions.keypoints.assign(kPoints, 0);
   for (std::size_t i = 100; i < 200; ++i) exclusions.keypoints[i] = 1;
   const ProjectionSearchResult result = search();
-  EXPECT_EQ(result.visible.size(), kPoints - 100);  // a taken keypoint does not make its point invisible
+  EXPECT_EQ(result.visible.size(), kPoints - 100);  // an excluded keypoint does not make its point invisible
   for (const ProjectionMatch& m : result.matches) EXPECT_GE(m.keypoint.index(), 200u);
   EXPECT_GT(result.matches.size(), 90u);
 }
 
-TEST_F(SearchByProjection, LooksOnlyAroundTheLevelExpected) {
+TEST_F(SearchByProjection, SearchesOnlyAroundThePredictedLevel) {
   std::vector<std::uint8_t> levels = frame.keypoints.level.copy();
   for (std::uint8_t& l : levels) l = static_cast<std::uint8_t>(l + 2);
   frame.keypoints.level = std::move(levels);
@@ -102,7 +102,7 @@ TEST_F(SearchByProjection, LooksOnlyAroundTheLevelExpected) {
   EXPECT_GT(search({.level_slack = 2}).matches.size(), kPoints * 9 / 10);
 }
 
-TEST_F(SearchByProjection, LooksOnlyFromDirectionsThePointWasSeenFrom) {
+TEST_F(SearchByProjection, SearchesOnlyWithinTheViewingAngle) {
   for (std::size_t i = 0; i < kPoints; ++i) {
     Vector3d& direction = points[i].view_direction;
     if (i < 100) direction = -direction;
@@ -114,8 +114,8 @@ TEST_F(SearchByProjection, LooksOnlyFromDirectionsThePointWasSeenFrom) {
   EXPECT_EQ(search().visible.size(), 100u);
 }
 
-TEST_F(SearchByProjection, LooksOnlyWithinTheDistancesOfThePyramid) {
-  for (std::size_t i = 0; i < 50; ++i) points[i].max_distance *= 0.3f;     // too far away now
+TEST_F(SearchByProjection, SearchesOnlyWithinTheDistanceRange) {
+  for (std::size_t i = 0; i < 50; ++i) points[i].max_distance *= 0.3f;     // too far
   for (std::size_t i = 50; i < 100; ++i) points[i].min_distance *= 10.0f;  // too near
   for (const std::uint32_t i : search().visible) EXPECT_GE(i, 50u);
   std::size_t near = 0;
@@ -123,7 +123,7 @@ TEST_F(SearchByProjection, LooksOnlyWithinTheDistancesOfThePyramid) {
   EXPECT_EQ(near, 0u);
 }
 
-TEST_F(SearchByProjection, IgnoresWhatIsBehindOrOutside) {
+TEST_F(SearchByProjection, IgnoresPointsBehindOrOutsideTheImage) {
   for (SearchPoint& p : points) p.position = T_cam_common.inverse() * -(T_cam_common * p.position);
   const ProjectionSearchResult result = search();
   EXPECT_TRUE(result.visible.empty() && result.matches.empty());
@@ -134,8 +134,8 @@ TEST_F(SearchByProjection, FindsNothingInACameraWithoutImage) {
   EXPECT_TRUE(search().matches.empty());
 }
 
-// Two cameras at one place see the same; the third has no image.
-TEST_F(SearchByProjection, OfAllCamerasIsThatOfEach) {
+// Two cameras with the same pose have the same matches; the third has no image.
+TEST_F(SearchByProjection, SearchOfAllCamerasEqualsSearchOfEach) {
   const camera::Rig rig({{camera, SE3()}, {camera, SE3()}, {camera, SE3()}});
   frame::BundledFrame bundled;
   bundled.cameras = {frame, frame, frame::CameraFrame()};

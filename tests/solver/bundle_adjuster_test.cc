@@ -31,7 +31,7 @@ struct CeresCase {
   std::size_t cameras;
   Models models;
   bool robust;
-  double outlier_share;
+  double outlier_ratio;
 };
 class AgainstCeres : public testing::TestWithParam<CeresCase> {};
 
@@ -42,8 +42,8 @@ TEST_P(AgainstCeres, ReachesTheSameMinimum) {
     BundleSpec spec;
     spec.cameras = c.cameras;
     spec.models = c.models;
-    spec.outlier_share = c.outlier_share;
-    spec.farthest = 10;  // farther ones may have their minimum at infinity, which no solver reaches
+    spec.outlier_ratio = c.outlier_ratio;
+    spec.farthest = 10;  // farther points may have their minimum at infinity
     const auto scene = scene::make_bundle_scene(spec, random);
     ReprojectionProblem ours = scene->problem, theirs = scene->problem;
     const LmSummary summary = adjust(ours, to_the_end(c.robust));
@@ -85,7 +85,7 @@ TEST(BundleAdjuster, NearlyConvergesInFiveIterations) {
   EXPECT_LT(adjust(scene->problem, five).final_cost, 1.01 * minimum);
 }
 
-TEST(BundleAdjuster, DoesNotTouchFixedPoses) {
+TEST(BundleAdjuster, DoesNotChangeFixedPoses) {
   Random random(3);
   BundleSpec spec;
   spec.fixed_poses = 3;
@@ -98,7 +98,7 @@ TEST(BundleAdjuster, DoesNotTouchFixedPoses) {
   }
 }
 
-TEST(BundleAdjuster, MovesPointsAloneWhereEveryPoseIsFixed) {
+TEST(BundleAdjuster, MovesOnlyPointsIfAllPosesAreFixed) {
   Random random(4);
   BundleSpec spec;
   spec.free_poses = 0;
@@ -108,7 +108,7 @@ TEST(BundleAdjuster, MovesPointsAloneWhereEveryPoseIsFixed) {
   EXPECT_LT(adjust(scene->problem, to_the_end(false)).final_cost, 1e-4);
 }
 
-TEST(BundleAdjuster, StopsWhenAsked) {
+TEST(BundleAdjuster, StopsOnRequest) {
   Random random(5);
   const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
   const ReprojectionProblem before = scene->problem;
@@ -120,7 +120,7 @@ TEST(BundleAdjuster, StopsWhenAsked) {
   EXPECT_EQ(largest_difference(before, scene->problem), 0.0);
 }
 
-TEST(BundleAdjuster, RepeatsItselfToTheBit) {
+TEST(BundleAdjuster, IsDeterministic) {
   for (const int dense_poses : {150, 0}) {
     Random random(6);
     const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
@@ -149,7 +149,7 @@ TEST(BundleAdjuster, SparseAndDenseSolutionsAgree) {
   EXPECT_LT(largest_difference(dense, sparse), 1e-8);
 }
 
-TEST(BundleAdjuster, LeavesOutWhatIsSkipped) {
+TEST(BundleAdjuster, IgnoresSkippedObservations) {
   Random random(8);
   BundleSpec spec;
   spec.noise = 0.0;
@@ -162,10 +162,10 @@ TEST(BundleAdjuster, LeavesOutWhatIsSkipped) {
   EXPECT_LT(adjust(scene->problem, to_the_end(false), skip).final_cost, 1e-4);
 }
 
-TEST(BundleAdjuster, CostNeverRises) {
+TEST(BundleAdjuster, CostNeverIncreases) {
   Random random(9);
   BundleSpec spec;
-  spec.outlier_share = 0.2;
+  spec.outlier_ratio = 0.2;
   spec.pose_angle = 0.1;
   spec.pose_distance = 0.5;
   spec.point_distance = 1.0;
@@ -181,7 +181,7 @@ TEST(BundleAdjuster, CostNeverRises) {
   }
 }
 
-TEST(BundleAdjuster, FinalCostIsThatOfTheSquaredErrors) {
+TEST(BundleAdjuster, FinalCostMatchesTheSquaredErrors) {
   Random random(10);
   const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
   const LmSummary summary = adjust(scene->problem, {});
@@ -195,7 +195,7 @@ TEST(BundleAdjuster, FinalCostIsThatOfTheSquaredErrors) {
   EXPECT_NEAR(sum, summary.final_cost, 1e-9 * sum);
 }
 
-TEST(BundleAdjuster, LivesWithPointsOfOneRayAndPointsBehindACamera) {
+TEST(BundleAdjuster, ToleratesPointsOfOneRayAndPointsBehindACamera) {
   Random random(11);
   BundleSpec spec;
   spec.cameras = 1;
@@ -203,7 +203,7 @@ TEST(BundleAdjuster, LivesWithPointsOfOneRayAndPointsBehindACamera) {
   const auto scene = scene::make_bundle_scene(spec, random);
   ReprojectionProblem problem = scene->problem;
   auto& observations = problem.observations;
-  // Points 0 to 9 keep one observation; 10 to 19 start behind the cameras; 20 to 29 are a touch in front of a camera.
+  // Points 0 to 9 keep one observation; 10 to 19 are initially behind the cameras; 20 to 29 are very close to a camera.
   std::vector<std::uint8_t> seen(problem.points.size(), 0);
   std::erase_if(observations,
                 [&](const auto& o) { return o.point < 10 && seen[static_cast<std::size_t>(o.point)]++ > 0; });
@@ -220,7 +220,7 @@ TEST(BundleAdjuster, LivesWithPointsOfOneRayAndPointsBehindACamera) {
   }
 }
 
-TEST(BundleAdjuster, SaysSoWhereThereIsNothingToLearnFrom) {
+TEST(BundleAdjuster, FailsWithoutObservations) {
   const Rig rig = scene::make_rig(1, Models::kPinhole);
   ReprojectionProblem problem;
   problem.rig = &rig;
@@ -229,7 +229,7 @@ TEST(BundleAdjuster, SaysSoWhereThereIsNothingToLearnFrom) {
   EXPECT_EQ(adjust(problem, {}).stop, LmStop::kFailed);
 }
 
-TEST(BundleAdjusterDeathTest, RefusesAProblemWithoutAFixedPose) {
+TEST(BundleAdjusterDeathTest, RejectsAProblemWithoutAFixedPose) {
   Random random(12);
   const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
   scene->problem.pose_free.assign(scene->problem.pose_free.size(), 1);

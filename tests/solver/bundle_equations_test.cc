@@ -1,5 +1,5 @@
-// The normal equations of bundle adjustment against differences of their cost, for poses, points and every block of the
-// rig.
+// Compares the normal equations of bundle adjustment with differences of their cost, for poses, points and all blocks
+// of the rig.
 #include "solver/bundle_equations.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ RigBlocks make_blocks(BlockType type, const Rig& rig) {
   return blocks;
 }
 
-// A scene at a wrong start, with cameras that move between the times of pose and image.
+// A scene with inaccurate initial values and motion between the times of pose and image.
 std::unique_ptr<scene::BundleScene> moving_scene(Models models, double noise, Random& random) {
   BundleSpec spec;
   spec.models = models;
@@ -106,8 +106,8 @@ INSTANTIATE_TEST_SUITE_P(EveryModelAndBlock, BundleGradient,
                                                           Models::kMixed, Models::kSpheres),
                                           testing::Values(BlockType::kExtrinsics, BlockType::kBaselineScale)));
 
-// Without noise the residuals at the minimum are zero and a Gauss-Newton step converges quadratically, which it does
-// only if all blocks, borders and couplings are right.
+// Without noise the residuals at the minimum are zero and Gauss-Newton converges quadratically, which it does
+// only if all blocks, borders and couplings are correct.
 TEST(BundleEquations, StepWithRigBlocksConvergesQuadratically) {
   for (const int dense_poses : {150, 0}) {
     Random random(2, "newton");
@@ -139,8 +139,8 @@ TEST(BundleEquations, StepWithRigBlocksConvergesQuadratically) {
   }
 }
 
-// Minimum with free extrinsics and their prior, against Ceres with numeric derivatives.
-TEST(BundleEquations, ReachTheSameMinimumAsCeresWithFreeExtrinsics) {
+// Compares the minimum with free extrinsics and their prior with Ceres (numeric derivatives).
+TEST(BundleEquations, ReachTheMinimumOfCeresWithFreeExtrinsics) {
   for (const std::size_t cameras : {2u, 4u}) {
     Random random(3, "extrinsics");
     BundleSpec spec;

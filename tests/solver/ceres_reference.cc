@@ -7,7 +7,7 @@
 namespace bslam::solver::ceres_reference {
 namespace {
 
-// Poses as increments [omega, v] on the left of the start pose: no manifold needed, and another path to the minimum.
+// Poses are left increments [omega, v] of the initial pose: no manifold is needed, and the path to the minimum differs.
 class Cost : public ceres::SizedCostFunction<2, 6, 3> {
  public:
   Cost(const ReprojectionProblem& problem, const ReprojectionProblem::Observation& o, const SE3& start)
@@ -134,7 +134,7 @@ double adjust_with_extrinsics(ReprojectionProblem& problem, const ExtrinsicPrior
 }
 
 double adjust(ReprojectionProblem& problem, bool robust) {
-  // Left out as by our own: what does not project at the start, and points with less than two observations then.
+  // Ignores the same observations: those that do not project initially, and points with fewer than two remaining ones.
   std::vector<int> rays(problem.points.size(), 0);
   const std::vector<double> chi2 = squared_errors(problem);
   for (std::size_t i = 0; i < chi2.size(); ++i) {

@@ -14,7 +14,7 @@ using scene::Models;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// The rig with the extrinsics of one camera off by a left perturbation of T_cam_rig.
+// The rig with a left perturbation of T_cam_rig of one camera.
 Rig with_error(const Rig& rig, std::size_t camera, const Vector6d& error) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t i = 0; i < rig.size(); ++i) {
@@ -24,14 +24,14 @@ Rig with_error(const Rig& rig, std::size_t camera, const Vector6d& error) {
   return Rig(std::move(cameras));
 }
 
-// How far an estimate is from the truth, in the units of its covariance.
+// Error of an estimate, as a left perturbation.
 Vector6d error_of(const ExtrinsicEstimate& estimate, const SE3& T_cam_rig) {
   return extrinsic_change(estimate.T_cam_rig, T_cam_rig);
 }
 
-// Points that the rig sees from the poses, each from all of them; 0.5 px of noise. Problem and truth start alike.
+// Points that are visible from all poses, with 0.5 px of noise. The problem is initialised with the truth.
 std::unique_ptr<scene::BundleScene> seen_from(const std::vector<SE3>& T_rig_world, std::size_t cameras, int points,
-                                              double outlier_share, Random& random) {
+                                              double outlier_ratio, Random& random) {
   auto out = std::make_unique<scene::BundleScene>(
       scene::BundleScene{scene::make_rig(cameras, Models::kPinhole), {}, T_rig_world, {}});
   out->problem.rig = &out->rig;
@@ -44,7 +44,7 @@ std::unique_ptr<scene::BundleScene> seen_from(const std::vector<SE3>& T_rig_worl
       for (std::size_t i = 0; i < cameras; ++i) {
         auto pixel = scene::see(out->rig, i, T_rig_world[k], out->points.back());
         if (!pixel) continue;
-        *pixel += (random.uniform() < outlier_share ? 10.0 : 0.5) * Vector2d(random.normal(), random.normal());
+        *pixel += (random.uniform() < outlier_ratio ? 10.0 : 0.5) * Vector2d(random.normal(), random.normal());
         out->problem.observations.push_back({static_cast<int>(k), p, CameraIndex(i), pixel->cast<float>(), 0.5f});
       }
     }
@@ -53,9 +53,9 @@ std::unique_ptr<scene::BundleScene> seen_from(const std::vector<SE3>& T_rig_worl
   return out;
 }
 
-// A walk in a curve of 1.5 m radius, 2.7 m long with 100 degrees of turning; cameras overlap (two) or look all around
-// without (four).
-std::unique_ptr<scene::BundleScene> walk(std::size_t cameras, std::uint64_t seed, double outlier_share = 0,
+// A curve with a radius of 1.5 m, 2.7 m long with a rotation of 100 degrees; cameras overlap (two) or look in all
+// directions without overlap (four).
+std::unique_ptr<scene::BundleScene> walk(std::size_t cameras, std::uint64_t seed, double outlier_ratio = 0,
                                          int points = 300) {
   Random random(seed, "rig walk");
   std::vector<SE3> T_rig_world;
@@ -67,7 +67,7 @@ std::unique_ptr<scene::BundleScene> walk(std::size_t cameras, std::uint64_t seed
     T_rig_world.push_back(
         SE3(R, Vector3d(1.5 * (1 - std::cos(yaw)), 0.05 * std::cos(k), 1.5 * std::sin(yaw))).inverse());
   }
-  return seen_from(T_rig_world, cameras, points, outlier_share, random);
+  return seen_from(T_rig_world, cameras, points, outlier_ratio, random);
 }
 
 // Poses on a line without any rotation, one metre from first to last.
@@ -79,10 +79,10 @@ std::unique_ptr<scene::BundleScene> straight_line(std::size_t cameras, std::uint
   return seen_from(T_rig_world, cameras, 300, 0, random);
 }
 
-TEST(AdjustExtrinsics, FindsOneCameraThatIsOffByADegreeAndACentimetre) {
+TEST(AdjustExtrinsics, EstimatesTheErrorOfOneCamera) {
   for (const std::size_t cameras : {2u, 4u}) {  // overlapping, without overlap
-    for (const double outlier_share : {0.0, 0.08}) {
-      const auto scene = walk(cameras, 7, outlier_share);
+    for (const double outlier_ratio : {0.0, 0.08}) {
+      const auto scene = walk(cameras, 7, outlier_ratio);
       Random random(11, "error");
       const std::size_t wrong = cameras - 1;
       const Rig calibrated = with_error(scene->rig, wrong, scene::random_twist(random, kDegree, 0.01));
@@ -101,7 +101,7 @@ TEST(AdjustExtrinsics, FindsOneCameraThatIsOffByADegreeAndACentimetre) {
   }
 }
 
-TEST(AdjustExtrinsics, ErrorsAreAsLargeAsTheirStandardDeviationsSay) {
+TEST(AdjustExtrinsics, ErrorsMatchTheirStandardDeviations) {
   const ExtrinsicAdjustmentOptions options{.sigma_rotation = 0.5 * kDegree, .sigma_translation = 0.02};
   for (const std::size_t cameras : {2u, 4u}) {
     Vector6d squared = Vector6d::Zero();  // normalised, by degree of freedom
@@ -112,7 +112,7 @@ TEST(AdjustExtrinsics, ErrorsAreAsLargeAsTheirStandardDeviationsSay) {
       Random random(seed, "calibration");
       Rig calibrated = scene->rig;
       for (std::size_t c = 1; c < cameras; ++c) {
-        Vector6d error;  // as improbable as the prior says
+        Vector6d error;  // distributed as the prior
         for (int k = 0; k < 6; ++k)
           error(k) = (k < 3 ? options.sigma_rotation : options.sigma_translation) * random.normal();
         calibrated = with_error(calibrated, c, error);
@@ -139,7 +139,7 @@ TEST(AdjustExtrinsics, ErrorsAreAsLargeAsTheirStandardDeviationsSay) {
 
 TEST(AdjustExtrinsics, WithoutRotationTheTranslationOfACameraWithoutOverlapIsNotObserved) {
   const auto scene = straight_line(4, 5);
-  // Neither at one time nor later does a point pass from one camera to another.
+  // No point is observed by two cameras.
   std::vector<CameraIndex> owner(scene->points.size());
   std::erase_if(scene->problem.observations, [&](const ReprojectionProblem::Observation& o) {
     CameraIndex& first = owner[static_cast<std::size_t>(o.point)];
@@ -156,7 +156,7 @@ TEST(AdjustExtrinsics, WithoutRotationTheTranslationOfACameraWithoutOverlapIsNot
       EXPECT_NEAR(std::sqrt(result.cameras[c].covariance(at, at)), options.sigma_translation,
                   0.05 * options.sigma_translation);
     }
-    // What all cameras share is the direction of travel: it tells the two rotations that turn it, not that about it.
+    // The common direction of motion determines the two rotations perpendicular to it, but not the rotation around it.
     const Vector3d travel =
         (scene->rig.cam_from_rig(c).rotation() * scene->T_rig_world.back().translation()).normalized();
     const Vector3d across = travel.unitOrthogonal();
@@ -178,7 +178,7 @@ TEST(AdjustExtrinsics, LengthOfTheOnlyBaselineIsNotObserved) {
   for (const std::size_t k : {0u, 1u, 2u, 4u}) EXPECT_TRUE(result.cameras[1].observed[k]) << k;
 }
 
-TEST(AdjustExtrinsics, CameraWithoutObservationsKeepsWhatWasCalibrated) {
+TEST(AdjustExtrinsics, CameraWithoutObservationsKeepsItsCalibration) {
   const auto scene = walk(4, 8);
   std::erase_if(scene->problem.observations,
                 [](const ReprojectionProblem::Observation& o) { return o.camera == CameraIndex(2); });
@@ -194,8 +194,8 @@ TEST(AdjustExtrinsics, CameraWithoutObservationsKeepsWhatWasCalibrated) {
   EXPECT_GT(result.cameras[1].observations, 100);
 }
 
-// Cameras that fire one after the other look like wrong extrinsics unless the motion between them is told.
-TEST(AdjustExtrinsics, TellsMotionBetweenCamerasFromExtrinsics) {
+// Different capture times have the same effect as wrong extrinsics unless the motion between them is known.
+TEST(AdjustExtrinsics, DistinguishesMotionBetweenCamerasFromExtrinsics) {
   const auto scene = walk(4, 9);
   const std::size_t cameras = 4, late = 3;
   const SE3 moved = SE3::exp((Vector6d() << 0, 0.02, 0, 0.01, 0, 0.03).finished());
@@ -209,15 +209,16 @@ TEST(AdjustExtrinsics, TellsMotionBetweenCamerasFromExtrinsics) {
                            *scene->rig.camera(late).project(scene->rig.cam_from_rig(late) * before);
     o.pixel += shift.cast<float>();
   }
-  ReprojectionProblem untold = scene->problem;
-  untold.motion.clear();
-  const ExtrinsicAdjustment told = adjust_extrinsics(scene->problem), not_told = adjust_extrinsics(untold);
-  ASSERT_TRUE(told.done && not_told.done);
-  EXPECT_LT(told.cameras[late].change.head<3>().norm(), 0.1 * kDegree);
-  EXPECT_NEAR(not_told.cameras[late].change.head<3>().norm(), 0.02, 0.1 * kDegree);
+  ReprojectionProblem unaware = scene->problem;
+  unaware.motion.clear();
+  const ExtrinsicAdjustment with_motion = adjust_extrinsics(scene->problem),
+                            without_motion = adjust_extrinsics(unaware);
+  ASSERT_TRUE(with_motion.done && without_motion.done);
+  EXPECT_LT(with_motion.cameras[late].change.head<3>().norm(), 0.1 * kDegree);
+  EXPECT_NEAR(without_motion.cameras[late].change.head<3>().norm(), 0.02, 0.1 * kDegree);
 }
 
-TEST(AdjustExtrinsics, LeavesTheProblemAloneWhereItCannotAnswer) {
+TEST(AdjustExtrinsics, DoesNotChangeTheProblemOnFailure) {
   const auto scene = walk(2, 10);
   const ReprojectionProblem before = scene->problem;
   std::stop_source stop;
@@ -238,7 +239,7 @@ TEST(AdjustExtrinsics, LeavesTheProblemAloneWhereItCannotAnswer) {
   EXPECT_EQ(single.points, before.points);
 }
 
-TEST(AdjustExtrinsics, RepeatsItselfToTheBitAndKeepsFixedPoses) {
+TEST(AdjustExtrinsics, IsDeterministicAndKeepsFixedPoses) {
   const auto scene = walk(3, 12, 0.05);
   const SE3 fixed = scene->problem.T_rig_world.front();
   ReprojectionProblem a = scene->problem, b = scene->problem;

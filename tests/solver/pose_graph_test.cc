@@ -26,8 +26,9 @@ Vector7d noise(Random& random, const PoseGraphOptions& sigma, bool scale_free) {
   return out;
 }
 
-// Once around a circle of 10 m, looking ahead; every vertex is linked to the `neighbours` before it with noise and, if
-// `closed`, the last to the first. The start is the odometry: the links to the vertex before, chained.
+// Once around a circle of 10 m, looking ahead. Every vertex is connected to the `neighbours` before it with noise and,
+// if `closed`, the last to the first. The initial values are the odometry: the concatenated edges to the previous
+// vertices.
 struct Circle {
   PoseGraphProblem problem;
   std::vector<Sim3> truth;
@@ -108,14 +109,14 @@ TEST(PoseGraph, ClosesALoopOfARigidRig) {
     after += rms_centre_error(circle.problem.S_world, circle.truth);
     for (const Sim3& S : circle.problem.S_world) ASSERT_EQ(S.scale(), 1.0);
   }
-  EXPECT_GT(before / 10, 0.3);  // metres: there was something to correct
+  EXPECT_GT(before / 10, 0.3);  // metres, the initial error
   EXPECT_LT(after, 0.5 * before);
 }
 
 TEST(PoseGraph, ClosesALoopWithScaleDrift) {
   Random random(3);
   for (int trial = 0; trial < 10; ++trial) {
-    // 0.4 % a step: the last of 120 keyframes is off by more than a third in scale.
+    // 0.4 % per step: the scale of the last of 120 keyframes is wrong by more than a third.
     Circle circle = make_circle(120, 2, true, kScaleFree, 0.1, random, -0.004);
     const double before = rms_centre_error(circle.problem.S_world, circle.truth);
     EXPECT_GT(std::abs(std::log(circle.problem.S_world.back().scale())), 0.3);
@@ -127,7 +128,7 @@ TEST(PoseGraph, ClosesALoopWithScaleDrift) {
 }
 
 // At the minimum twice the cost follows a chi-square with residuals less unknowns degrees of freedom.
-TEST(PoseGraph, LeavesAsMuchErrorAsTheNoiseHas) {
+TEST(PoseGraph, FinalCostMatchesTheNoise) {
   for (const bool scale_free : {kRigid, kScaleFree}) {
     Random random(4);
     double sum = 0.0, dof = 0.0;
@@ -151,7 +152,7 @@ TEST(PoseGraph, FollowsTheHeavierEdge) {
   EXPECT_NEAR(problem.S_world[1].translation().x(), 1.75, 1e-9);
 }
 
-TEST(PoseGraph, HoldsTheFirstOfAPartWithoutFixedVertexAndWhatHasNoEdge) {
+TEST(PoseGraph, FixesTheFirstVertexOfAComponentWithoutFixedVertex) {
   Random random(5);
   Circle one = make_circle(20, 2, true, kRigid, 1.0, random);
   PoseGraphProblem problem = one.problem;  // 0 to 19, of which 0 is fixed
@@ -169,13 +170,13 @@ TEST(PoseGraph, HoldsTheFirstOfAPartWithoutFixedVertexAndWhatHasNoEdge) {
   ASSERT_EQ(optimise(problem, {}).stop, LmStop::kConverged);
   for (const std::size_t i : {0u, 20u, 40u}) expect_equal(problem.S_world[i], before[i]);
   ASSERT_TRUE(optimise(one.problem, {}).usable());
-  for (std::size_t i = 0; i < 20; ++i) {  // the parts do not disturb one another
+  for (std::size_t i = 0; i < 20; ++i) {  // the components are independent
     EXPECT_LT((problem.S_world[i] * one.problem.S_world[i].inverse()).log().norm(), 1e-6);
     EXPECT_GT((problem.S_world[20 + i] * before[20 + i].inverse()).log().norm(), i == 0 ? -1.0 : 1e-4);
   }
 }
 
-TEST(PoseGraph, DoesNotTouchFixedVertices) {
+TEST(PoseGraph, DoesNotChangeFixedVertices) {
   Random random(6);
   Circle circle = make_circle(40, 2, true, kScaleFree, 1.0, random);
   for (std::size_t i = 0; i < 40; i += 7) circle.problem.fixed[i] = 1;
@@ -184,7 +185,7 @@ TEST(PoseGraph, DoesNotTouchFixedVertices) {
   for (std::size_t i = 0; i < 40; i += 7) expect_equal(circle.problem.S_world[i], before[i]);
 }
 
-TEST(PoseGraph, HasNothingToDoWithoutEdgesOrFreeVertices) {
+TEST(PoseGraph, DoesNothingWithoutEdgesOrFreeVertices) {
   PoseGraphProblem empty;
   EXPECT_TRUE(optimise(empty, {}).usable());
   Random random(7);
@@ -196,7 +197,7 @@ TEST(PoseGraph, HasNothingToDoWithoutEdgesOrFreeVertices) {
   EXPECT_EQ(summary.final_cost, summary.initial_cost);
 }
 
-TEST(PoseGraph, LeavesTheProblemAsItWasWhereItFails) {
+TEST(PoseGraph, FailureDoesNotChangeTheProblem) {
   Random random(8);
   Circle circle = make_circle(10, 2, true, kRigid, 1.0, random);
   circle.problem.edges[3].S_a_b = Sim3(1.0, Quaterniond::Identity(), Vector3d(0, std::nan(""), 0));
@@ -205,7 +206,7 @@ TEST(PoseGraph, LeavesTheProblemAsItWasWhereItFails) {
   for (std::size_t i = 0; i < before.size(); ++i) expect_equal(circle.problem.S_world[i], before[i]);
 }
 
-TEST(PoseGraph, EndsOnAStopRequest) {
+TEST(PoseGraph, StopsOnAStopRequest) {
   Random random(9);
   Circle circle = make_circle(30, 2, true, kRigid, 1.0, random);
   std::stop_source source;
@@ -215,7 +216,7 @@ TEST(PoseGraph, EndsOnAStopRequest) {
   EXPECT_EQ(summary.final_cost, summary.initial_cost);
 }
 
-TEST(PoseGraph, RepeatsItselfToTheBit) {
+TEST(PoseGraph, IsDeterministic) {
   for (const bool scale_free : {kRigid, kScaleFree}) {
     Random random(10);
     Circle circle = make_circle(80, 3, true, scale_free, 1.0, random);
@@ -225,7 +226,7 @@ TEST(PoseGraph, RepeatsItselfToTheBit) {
   }
 }
 
-// The same cost by Ceres with automatic derivatives and other parameters: angle-axis, translation, log scale.
+// The same cost in Ceres with automatic derivatives and different parameters: angle-axis, translation, log scale.
 struct CeresEdge {
   Sim3 S_b_a;
   Vector7d weights;
@@ -333,8 +334,8 @@ TEST(PoseGraph, ReachesTheSameMinimumAsCeres) {
   }
 }
 
-// Gauss-Newton with exact Jacobians converges quadratically; with a wrong one the last steps would go on for long.
-TEST(PoseGraph, NeedsFewStepsFromFarAway) {
+// Gauss-Newton with exact Jacobians converges quadratically; with a wrong Jacobian it would need many steps.
+TEST(PoseGraph, NeedsFewStepsFromAPoorInitialGraph) {
   for (const bool scale_free : {kRigid, kScaleFree}) {
     Random random(12);
     Circle circle = make_circle(100, 3, true, scale_free, 1.0, random);

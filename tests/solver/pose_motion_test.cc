@@ -1,4 +1,4 @@
-// Poses of a rig whose cameras fire one after the other.
+// Poses of a rig whose cameras have different capture times.
 #include <gtest/gtest.h>
 
 #include "solver/pose_problem.h"
@@ -17,7 +17,7 @@ struct MotionScene {
   MotionModel motion;
 };
 
-// Four cameras, the last two fire late, while the rig goes on as it did since the pose before.
+// Four cameras, of which the last two capture late, while the rig moves with the twist since the previous pose.
 MotionScene make_motion_scene(const Rig& rig, double delay_s, double noise, Random& random) {
   const Vector6d twist = scene::random_twist(random, kTurn, kWalk);
   MotionScene out;
@@ -28,20 +28,20 @@ MotionScene make_motion_scene(const Rig& rig, double delay_s, double noise, Rand
   return out;
 }
 
-TEST(PoseWithMotion, IsTheTruthWithoutNoise) {
+TEST(PoseWithMotion, EqualsTheTruthWithoutNoise) {
   const Rig rig = scene::make_rig(4, scene::Models::kMixed);
   Random random(2, "motion");
   for (int trial = 0; trial < 10; ++trial) {
     const MotionScene s = make_motion_scene(rig, 0.03, 0.0, random);
-    const SE3 guess = s.seen.T_rig_world.perturbed(scene::random_twist(random, 0.01, 0.03));
-    const PoseSolution solution = solve_pose(rig, s.seen.observations, guess, s.motion, {});
+    const SE3 initial = s.seen.T_rig_world.perturbed(scene::random_twist(random, 0.01, 0.03));
+    const PoseSolution solution = solve_pose(rig, s.seen.observations, initial, s.motion, {});
     ASSERT_TRUE(solution.ok) << trial;
     EXPECT_LT(scene::centre_error(solution.T_rig_world, s.seen.T_rig_world), 1e-4) << trial;
     EXPECT_LT(scene::rotation_error(solution.T_rig_world, s.seen.T_rig_world), 1e-5) << trial;
   }
 }
 
-TEST(PoseWithMotion, IsFarNearerToTheTruthThanWithoutTheTimesOfTheImages) {
+TEST(PoseWithMotion, IsMuchMoreAccurateThanWithoutCaptureTimes) {
   const Rig rig = scene::make_rig(4, scene::Models::kRadTan);
   Random random(3, "motion");
   double own = 0, ignored = 0;
@@ -55,7 +55,7 @@ TEST(PoseWithMotion, IsFarNearerToTheTruthThanWithoutTheTimesOfTheImages) {
   EXPECT_LT(own, 0.3 * ignored);
 }
 
-TEST(PoseWithMotion, IsTheOrdinaryPoseWhereAllFireTogether) {
+TEST(PoseWithMotion, EqualsTheOrdinaryPoseForSimultaneousImages) {
   const Rig rig = scene::make_rig(4, scene::Models::kMixed);
   Random random(9);
   const auto scene = scene::make_pose_scene(rig, 200, 1.0, 0.1, random);
@@ -67,7 +67,7 @@ TEST(PoseWithMotion, IsTheOrdinaryPoseWhereAllFireTogether) {
 }
 
 // b is minus the gradient of the cost; to second order in delay times twist.
-TEST(PoseWithMotion, HasTheGradientOfItsCost) {
+TEST(PoseWithMotion, AgreesWithTheGradientOfItsCost) {
   const Rig rig = scene::make_rig(4, scene::Models::kMixed);
   Random random(11);
   const MotionScene s = make_motion_scene(rig, 0.04, 1.0, random);

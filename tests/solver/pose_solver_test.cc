@@ -29,8 +29,8 @@ TEST_P(PoseSolverOnRig, RecoversTruthFromNoiseAndThirtyPercentOutliers) {
   Random random(7, "pose");
   for (int trial = 0; trial < 20; ++trial) {
     const auto scene = scene::make_pose_scene(rig, 400, 1.0, 0.3, random);
-    const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.03, 0.1));
-    const PoseSolution s = solve_pose(rig, scene.observations, guess, {});
+    const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 0.03, 0.1));
+    const PoseSolution s = solve_pose(rig, scene.observations, initial, {});
     ASSERT_TRUE(s.ok) << trial;
     EXPECT_LT(scene::rotation_error(s.T_rig_world, scene.T_rig_world), 3e-3) << trial;
     EXPECT_LT(scene::centre_error(s.T_rig_world, scene.T_rig_world), 0.03) << trial;
@@ -61,10 +61,10 @@ TEST(PoseSolver, IsExactWithoutNoise) {
   EXPECT_LT(scene::centre_error(s.T_rig_world, scene.T_rig_world), 1e-5);
 }
 
-// The error of the pose, measured with the information returned, would follow a chi-square of six degrees of freedom,
-// were the 5 % of inliers beyond the bound not cut off: that makes the covariance larger by 0.95 / 0.80 (docs/math.md,
-// 4).
-TEST(PoseSolver, InformationAgreesWithTheSpreadOfTheError) {
+// The pose error normalised by the returned information would have a chi-square distribution with six degrees of
+// freedom if the 5 % of inliers beyond the bound were not cut off. This increases the covariance by 0.95 / 0.80
+// (docs/math.md, section 4).
+TEST(PoseSolver, InformationMatchesTheError) {
   const Rig rig = scene::make_rig(4, Models::kRadTan);
   Random random(11);
   double sum = 0.0;
@@ -75,26 +75,26 @@ TEST(PoseSolver, InformationAgreesWithTheSpreadOfTheError) {
     ASSERT_TRUE(s.ok);
     const geometry::Vector6d error = (s.T_rig_world * scene.T_rig_world.inverse()).log();
     sum += error.dot(s.information * error);
-    EXPECT_NEAR(s.mean_chi2, 1.7, 0.5);  // 2 less what the bound cuts off
+    EXPECT_NEAR(s.mean_chi2, 1.7, 0.5);  // 2 without the bound
   }
   EXPECT_NEAR(sum / kTrials, 6.0 * 0.95 / 0.80, 1.0);
 }
 
-TEST(PoseSolver, TakesBackWhatABadGuessMadeLookWrong) {
+TEST(PoseSolver, ReadmitsInliersRejectedAtAPoorInitialPose) {
   const Rig rig = scene::make_rig(4, Models::kRadTan);
   Random random(5);
   const auto scene = scene::make_pose_scene(rig, 300, 0.5, 0.0, random);
-  const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.1, 0.3));
-  const PoseSolution s = solve_pose(rig, scene.observations, guess, {});
+  const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 0.1, 0.3));
+  const PoseSolution s = solve_pose(rig, scene.observations, initial, {});
   ASSERT_TRUE(s.ok);
   EXPECT_GT(s.num_inliers, 290);
 }
 
-TEST(PoseSolver, PassesOverPointsBehindTheCamera) {
+TEST(PoseSolver, IgnoresPointsBehindTheCamera) {
   const Rig rig = scene::make_rig(1, Models::kPinhole);
   Random random(9);
   auto scene = scene::make_pose_scene(rig, 200, 0.5, 0.0, random);
-  for (std::size_t i = 0; i < 40; ++i) {  // through the centre to the other side
+  for (std::size_t i = 0; i < 40; ++i) {  // mirrored at the camera centre
     auto& point = scene.observations[i].point_world;
     point = scene.T_rig_world.inverse() * -(scene.T_rig_world * point);
   }
@@ -109,16 +109,16 @@ TEST(PoseSolver, DoesNotDependOnTheOrderOfCameras) {
   const Rig rig = scene::make_rig(4, Models::kMixed);
   Random random(13);
   auto scene = scene::make_pose_scene(rig, 300, 1.0, 0.2, random);
-  const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.02, 0.1));
-  const PoseSolution a = solve_pose(rig, scene.observations, guess, {});
+  const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 0.02, 0.1));
+  const PoseSolution a = solve_pose(rig, scene.observations, initial, {});
   std::stable_sort(scene.observations.begin(), scene.observations.end(),
                    [](const auto& x, const auto& y) { return x.camera > y.camera; });
-  const PoseSolution b = solve_pose(rig, scene.observations, guess, {});
+  const PoseSolution b = solve_pose(rig, scene.observations, initial, {});
   EXPECT_EQ(a.num_inliers, b.num_inliers);
   EXPECT_EQ(a.T_rig_world.matrix(), b.T_rig_world.matrix());
 }
 
-TEST(PoseSolver, RefusesTooFewObservations) {
+TEST(PoseSolver, FailsWithTooFewObservations) {
   const Rig rig = scene::make_rig(2, Models::kPinhole);
   Random random(2);
   const auto scene = scene::make_pose_scene(rig, 9, 0.0, 0.0, random);
@@ -128,7 +128,7 @@ TEST(PoseSolver, RefusesTooFewObservations) {
   EXPECT_EQ(none.T_rig_world.matrix(), scene.T_rig_world.matrix());
 }
 
-TEST(PoseSolver, RefusesPointsAlongOneRay) {
+TEST(PoseSolver, FailsWithPointsAlongOneRay) {
   const Rig rig = scene::make_rig(1, Models::kPinhole);
   Random random(4);
   for (const double noise : {0.0, 1.0}) {
@@ -143,45 +143,45 @@ TEST(PoseSolver, RefusesPointsAlongOneRay) {
   }
 }
 
-TEST(PoseSolver, RefusesOutliersAlone) {
+TEST(PoseSolver, FailsWithOnlyOutliers) {
   const Rig rig = scene::make_rig(2, Models::kRadTan);
   Random random(6);
   const auto scene = scene::make_pose_scene(rig, 100, 1.0, 1.0, random);
   EXPECT_FALSE(solve_pose(rig, scene.observations, scene.T_rig_world, {}).ok);
 }
 
-TEST(PoseRansac, SurvivesSixtyPercentOutliersAndAFarGuess) {
+TEST(PoseRansac, SolvesWithSixtyPercentOutliersAndAPoorInitialPose) {
   Random random(17, "ransac");
   int solved = 0, trials = 0;
   for (const auto& [cameras, models] : {std::pair{1, Models::kPinhole}, {2, Models::kRadTan}, {4, Models::kMixed}}) {
     const Rig rig = scene::make_rig(static_cast<std::size_t>(cameras), models);
     for (int trial = 0; trial < 20; ++trial, ++trials) {
       const auto scene = scene::make_pose_scene(rig, 400, 1.0, 0.6, random);
-      const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 10 * std::numbers::pi / 180, 0.5));
-      const PoseSolution s = estimators::ransac_pose(rig, scene.observations, guess, {}, {},
+      const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 10 * std::numbers::pi / 180, 0.5));
+      const PoseSolution s = estimators::ransac_pose(rig, scene.observations, initial, {}, {},
                                                      Random(1, "t", static_cast<std::uint64_t>(trial)));
       const bool good = s.ok && scene::rotation_error(s.T_rig_world, scene.T_rig_world) < 5e-3 &&
                         scene::centre_error(s.T_rig_world, scene.T_rig_world) < 0.05;
       solved += good;
-      EXPECT_TRUE(good || !s.ok || s.num_inliers < 100) << "a wrong pose must not look sound, trial " << trial;
+      EXPECT_TRUE(good || !s.ok || s.num_inliers < 100) << "a wrong pose must not be accepted, trial " << trial;
     }
   }
   EXPECT_EQ(solved, trials);
 }
 
-TEST(PoseRansac, RepeatsItselfToTheBit) {
+TEST(PoseRansac, IsDeterministic) {
   const Rig rig = scene::make_rig(3, Models::kMixed);
   Random random(19);
   const auto scene = scene::make_pose_scene(rig, 300, 1.0, 0.5, random);
-  const SE3 guess = scene.T_rig_world.perturbed(scene::random_twist(random, 0.1, 0.4));
-  const PoseSolution a = estimators::ransac_pose(rig, scene.observations, guess, {}, {}, Random(5));
-  const PoseSolution b = estimators::ransac_pose(rig, scene.observations, guess, {}, {}, Random(5));
+  const SE3 initial = scene.T_rig_world.perturbed(scene::random_twist(random, 0.1, 0.4));
+  const PoseSolution a = estimators::ransac_pose(rig, scene.observations, initial, {}, {}, Random(5));
+  const PoseSolution b = estimators::ransac_pose(rig, scene.observations, initial, {}, {}, Random(5));
   EXPECT_EQ(a.T_rig_world.matrix(), b.T_rig_world.matrix());
   EXPECT_EQ(a.inlier, b.inlier);
   EXPECT_EQ(a.information, b.information);
 }
 
-TEST(PoseRansac, RefusesOutliersAlone) {
+TEST(PoseRansac, FailsWithOnlyOutliers) {
   const Rig rig = scene::make_rig(2, Models::kRadTan);
   Random random(23);
   const auto scene = scene::make_pose_scene(rig, 200, 1.0, 1.0, random);

@@ -19,7 +19,7 @@ std::vector<camera::CameraModel> every_model() {
           camera::DoubleSphere(k, -0.2, 0.58)};
 }
 
-// Central differences of a residual's error, as the Jacobian of the prediction: the error is the observation minus it.
+// Jacobian of the prediction by central differences of the error, which is the observation minus the prediction.
 template <int N, class Error>
 Eigen::Matrix<double, 2, N> numeric_jacobian(const Error& error) {
   constexpr double kStep = 1e-6;
@@ -33,7 +33,7 @@ Eigen::Matrix<double, 2, N> numeric_jacobian(const Error& error) {
 
 class ResidualOfModel : public testing::TestWithParam<std::size_t> {};
 
-// The kernel of every optimisation: its error is pixel minus projection, its Jacobians are those of differences.
+// The error is pixel minus projection, and the Jacobians agree with differences.
 TEST_P(ResidualOfModel, AgreesWithFiniteDifferences) {
   const camera::CameraModel model = every_model()[GetParam()];
   Random random(5, "residual");
@@ -85,13 +85,13 @@ TEST_P(ReprojectionJacobian, AgreesWithFiniteDifferences) {
 INSTANTIATE_TEST_SUITE_P(EveryModel, ReprojectionJacobian,
                          testing::Values(Models::kPinhole, Models::kRadTan, Models::kFisheye, Models::kMixed));
 
-TEST(ReprojectionResidual, IsEmptyWhereThePointIsBehindAPinhole) {
+TEST(ReprojectionResidual, IsEmptyForAPointBehindAPinhole) {
   const Rig rig = scene::make_rig(1, Models::kPinhole);
   EXPECT_FALSE(ReprojectionResidual::evaluate(rig, CameraIndex(0), SE3(), Vector3d(0, 0, -2), Vector2d(1, 1)));
   EXPECT_FALSE(ReprojectionResidual::error_only(rig, CameraIndex(0), SE3(), Vector3d(0, 0, -2), Vector2d(1, 1)));
 }
 
-TEST(ReprojectionResidual, SeesBehindThePlaneOfAFisheye) {
+TEST(ReprojectionResidual, ProjectsPointsBehindTheImagePlaneOfAFisheye) {
   const Rig rig = scene::make_rig(1, Models::kFisheye);
   EXPECT_TRUE(ReprojectionResidual::evaluate(rig, CameraIndex(0), SE3(), Vector3d(2, 0, -0.2), Vector2d(1, 1)));
 }

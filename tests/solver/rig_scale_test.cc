@@ -1,4 +1,4 @@
-// The length of a map's unit, against the truth of simulated rides.
+// Compares the estimated scale of a map with the truth of simulated trajectories.
 #include "solver/rig_scale.h"
 
 #include <gtest/gtest.h>
@@ -8,15 +8,16 @@
 namespace bslam::solver {
 namespace {
 
-struct Ride {
+struct SimulatedMotion {
   Rig rig;
   ReprojectionProblem problem;  // its rig points to `rig`
 };
 
-// Ten poses, 0.15 m apart, turning by `turn_rad` from one to the next; at the truth, pixels with noise of 1 px. A point
-// that one camera hands to another would tell the scale without any rotation: each is seen by one camera alone.
-std::unique_ptr<Ride> make_ride(double turn_rad, Random& random, std::size_t cameras = 3) {
-  auto out = std::make_unique<Ride>(Ride{scene::make_rig(cameras, scene::Models::kRadTan), {}});
+// Ten poses, 0.15 m apart, rotated by `turn_rad` from one to the next; true values, and pixels with noise of 1 px.
+// Points observed by several cameras would determine the scale without rotation, so each one is observed by one camera
+// only.
+std::unique_ptr<SimulatedMotion> make_motion(double turn_rad, Random& random, std::size_t cameras = 3) {
+  auto out = std::make_unique<SimulatedMotion>(SimulatedMotion{scene::make_rig(cameras, scene::Models::kRadTan), {}});
   ReprojectionProblem& problem = out->problem;
   problem.rig = &out->rig;
   SE3 T_world_rig;
@@ -32,7 +33,8 @@ std::unique_ptr<Ride> make_ride(double turn_rad, Random& random, std::size_t cam
     for (int k = 0; k < 10; ++k) {
       for (std::size_t i = 0; i < out->rig.size(); ++i) {
         auto pixel = scene::see(out->rig, i, problem.T_rig_world[static_cast<std::size_t>(k)], point);
-        if (!pixel || i != static_cast<std::size_t>(p) % cameras) continue;  // no point goes from camera to camera
+        if (!pixel || i != static_cast<std::size_t>(p) % cameras)
+          continue;  // each point is observed by one camera only
         *pixel += Vector2d(random.normal(), random.normal());
         problem.observations.push_back({k, p, CameraIndex(i), pixel->cast<float>(), 1.0f});
       }
@@ -41,27 +43,26 @@ std::unique_ptr<Ride> make_ride(double turn_rad, Random& random, std::size_t cam
   return out;
 }
 
-// As a map would have it whose unit is 1 / `factor` metres.
+// Converts the problem to a map whose unit is 1 / `factor` metres.
 void grow(ReprojectionProblem& problem, double factor) {
   for (SE3& T : problem.T_rig_world) T = SE3(T.rotation(), factor * T.translation());
   for (Vector3d& p : problem.points) p *= factor;
 }
 
-// What adjustment leaves of the truth where two poses are held: errors of rotations and places by the noise of the
-// pixels.
-void settle(ReprojectionProblem& problem) {
+// Adjusts the problem with two fixed poses, so that rotations and positions have the errors due to pixel noise.
+void adjust_with_fixed_poses(ReprojectionProblem& problem) {
   problem.pose_free[1] = 0;
   adjust(problem, {.iterations = 20});
   problem.pose_free[1] = 1;
 }
 
-TEST(RigScale, IsOneOfATrueMapWithinItsDeviation) {
+TEST(RigScale, IsOneForATrueMapWithinItsDeviation) {
   double squared_z = 0.0;
   constexpr int kSeeds = 25;
   for (int seed = 0; seed < kSeeds; ++seed) {
     Random random(static_cast<std::uint64_t>(seed), "ride");
-    const auto ride = make_ride(0.05, random);
-    const auto found = rig_scale(ride->problem);
+    const auto motion = make_motion(0.05, random);
+    const auto found = rig_scale(motion->problem);
     ASSERT_TRUE(found.has_value());
     EXPECT_LT(found->deviation, 0.03);
     const double z = (found->scale - 1.0) / found->deviation;
@@ -72,17 +73,17 @@ TEST(RigScale, IsOneOfATrueMapWithinItsDeviation) {
   EXPECT_LT(squared_z / kSeeds, 2.0);
 }
 
-TEST(RigScale, FindsAUnitThatIsWrongByAnyFactor) {
+TEST(RigScale, EstimatesAScaleThatIsWrongByAnyFactor) {
   for (const double factor : {1.0 / 3.0, 0.7, 1.5, 3.0, 10.0}) {
     Random random(3, "grown");
-    const auto ride = make_ride(0.05, random);
-    grow(ride->problem, factor);
+    const auto motion = make_motion(0.05, random);
+    grow(motion->problem, factor);
     double unit = factor;
     std::optional<RigScale> found;
     for (int i = 0; i < 8; ++i) {
-      found = rig_scale(ride->problem);
+      found = rig_scale(motion->problem);
       ASSERT_TRUE(found.has_value()) << factor;
-      grow(ride->problem, found->scale);
+      grow(motion->problem, found->scale);
       unit *= found->scale;
     }
     EXPECT_NEAR(unit, 1.0, 4.0 * found->deviation) << factor;
@@ -90,43 +91,43 @@ TEST(RigScale, FindsAUnitThatIsWrongByAnyFactor) {
   }
 }
 
-TEST(RigScale, FindsTheUnitAgainAfterTheMapWasBentToAWrongOne) {
+TEST(RigScale, EstimatesTheScaleOfAMapAdjustedWithAWrongOne) {
   for (const double factor : {0.4, 2.5}) {
     Random random(5, "bent");
-    const auto ride = make_ride(0.05, random);
-    grow(ride->problem, factor);
-    adjust(ride->problem, {.iterations = 10});
+    const auto motion = make_motion(0.05, random);
+    grow(motion->problem, factor);
+    adjust(motion->problem, {.iterations = 10});
     double scale = 1.0;
     std::optional<RigScale> found;
     for (int i = 0; i < 4; ++i) {
-      found = rig_scale(ride->problem);
+      found = rig_scale(motion->problem);
       ASSERT_TRUE(found.has_value());
-      grow(ride->problem, found->scale);
+      grow(motion->problem, found->scale);
       scale *= found->scale;
-      adjust(ride->problem, {.iterations = 10});
+      adjust(motion->problem, {.iterations = 10});
     }
-    const double length = ride->problem.T_rig_world.back().inverse().translation().norm();
+    const double length = motion->problem.T_rig_world.back().inverse().translation().norm();
     Random same(5, "bent");
-    const double truth = make_ride(0.05, same)->problem.T_rig_world.back().inverse().translation().norm();
+    const double truth = make_motion(0.05, same)->problem.T_rig_world.back().inverse().translation().norm();
     EXPECT_NEAR(length / truth, 1.0, 4.0 * found->deviation) << factor;
   }
 }
 
-TEST(RigScale, IsUnknownOnAStraightLine) {
+TEST(RigScale, IsNotObservableOnAStraightLine) {
   for (int seed = 0; seed < 10; ++seed) {
     Random random(static_cast<std::uint64_t>(seed), "straight");
-    const auto ride = make_ride(0.0, random);
-    settle(ride->problem);
-    const auto found = rig_scale(ride->problem);
+    const auto motion = make_motion(0.0, random);
+    adjust_with_fixed_poses(motion->problem);
+    const auto found = rig_scale(motion->problem);
     EXPECT_TRUE(!found || found->deviation > 0.3)
         << "seed " << seed << ": " << found->scale << " +- " << found->deviation;
   }
 }
 
-TEST(RigScale, IsUnknownToOneCamera) {
+TEST(RigScale, IsNotObservableWithOneCamera) {
   Random random(1, "one camera");
-  const auto ride = make_ride(0.05, random, 1);
-  EXPECT_FALSE(rig_scale(ride->problem).has_value());
+  const auto motion = make_motion(0.05, random, 1);
+  EXPECT_FALSE(rig_scale(motion->problem).has_value());
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Seeded scenes for the solver tests and benchmarks: rigs of any cameras, a path of poses, points all around.
+// Seeded scenes for the solver tests and benchmarks: rigs of any cameras, a path of poses, points in all directions.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ enum class Models { kPinhole, kRadTan, kFisheye, kSpheres, kMixed };
 
 inline camera::CameraModel make_model(Models models, std::size_t i) {
   if (models == Models::kMixed) models = std::array{Models::kRadTan, Models::kFisheye, Models::kPinhole}[i % 3];
-  const double step = static_cast<double>(i);  // no two cameras alike
+  const double step = static_cast<double>(i);  // all cameras differ
   if (models == Models::kPinhole) return camera::Pinhole({420 + step, 422, 376, 240 + step});
   if (models == Models::kRadTan) return camera::PinholeRadTan({458 + step, 457, 367, 248}, {-0.28, 0.074, 2e-4, 2e-5});
   const camera::Intrinsics wide{220 + step, 221, 374, 238};
@@ -30,7 +30,7 @@ inline camera::CameraModel make_model(Models models, std::size_t i) {
   return camera::DoubleSphere(wide, -0.2, 0.58);
 }
 
-// Up to two cameras look ahead with a baseline of 0.2 m; more look outwards all around, 0.2 m from the middle.
+// Up to two cameras look ahead with a baseline of 0.2 m; more cameras look outwards, 0.2 m from the centre.
 inline Rig make_rig(std::size_t cameras, Models models) {
   std::vector<camera::RigCamera> out;
   for (std::size_t i = 0; i < cameras; ++i) {
@@ -60,14 +60,14 @@ inline Vector6d random_twist(Random& random, double angle, double distance) {
   return xi;
 }
 
-// Pixel of the point where the camera has it in its image.
+// Pixel of the point, or nullopt if it is outside the image.
 inline std::optional<Vector2d> see(const Rig& rig, std::size_t i, const SE3& T_rig_world, const Vector3d& point_world) {
   const auto pixel = rig.camera(i).project(rig.cam_from_rig(i) * (T_rig_world * point_world));
   if (!pixel || !rig.camera(i).contains(*pixel)) return std::nullopt;
   return pixel;
 }
 
-// A point that some camera of the rig sees, from 2 m away, evenly in inverse distance.
+// A point visible in some camera of the rig, at least 2 m away, uniform in inverse distance.
 inline Vector3d random_visible_point(const Rig& rig, const SE3& T_rig_world, Random& random, double farthest = 30) {
   const std::size_t i = random.below(static_cast<std::uint32_t>(rig.size()));
   for (;;) {
@@ -84,8 +84,8 @@ struct PoseScene {
   std::vector<std::uint8_t> outlier;
 };
 
-// `count` observations in random order of cameras; of them `outlier_share` anywhere in the image; sigma 1 or 1.2 px.
-inline PoseScene make_pose_scene(const Rig& rig, int count, double noise, double outlier_share, Random& random) {
+// `count` observations in random order of cameras; of them `outlier_ratio` anywhere in the image; sigma 1 or 1.2 px.
+inline PoseScene make_pose_scene(const Rig& rig, int count, double noise, double outlier_ratio, Random& random) {
   PoseScene out;
   out.T_rig_world = SE3::exp(random_twist(random, 0.8, 5.0));
   while (static_cast<int>(out.observations.size()) < count) {
@@ -93,7 +93,7 @@ inline PoseScene make_pose_scene(const Rig& rig, int count, double noise, double
     for (std::size_t i = 0; i < rig.size() && static_cast<int>(out.observations.size()) < count; ++i) {
       const auto pixel = see(rig, i, out.T_rig_world, point);
       if (!pixel) continue;
-      const bool outlier = random.uniform() < outlier_share;
+      const bool outlier = random.uniform() < outlier_ratio;
       const double sigma = random.below(2) == 0 ? 1.0 : 1.2;
       Vector2d seen = *pixel + noise * sigma * Vector2d(random.normal(), random.normal());
       while (outlier && (seen - *pixel).norm() < 20) {
@@ -111,11 +111,12 @@ struct BundleSpec {
   Models models = Models::kMixed;
   int fixed_poses = 2, free_poses = 6;  // the fixed ones come first
   int points = 200;
-  int poses_per_point = 6;                                               // consecutive ones, at most
-  int max_observations = 1 << 30;                                        // of one point
-  double farthest = 30;                                                  // metres
-  double noise = 1.0, outlier_share = 0.0;                               // outliers miss by some 15 px
-  double pose_angle = 0.01, pose_distance = 0.05, point_distance = 0.1;  // how far off the start is: radians, metres
+  int poses_per_point = 6;                  // maximum number of consecutive poses
+  int max_observations = 1 << 30;           // of one point
+  double farthest = 30;                     // metres
+  double noise = 1.0, outlier_ratio = 0.0;  // outliers have errors of about 15 px
+  double pose_angle = 0.01, pose_distance = 0.05,
+         point_distance = 0.1;  // errors of the initial values: radians, metres
 };
 
 struct BundleScene {
@@ -155,7 +156,7 @@ inline std::unique_ptr<BundleScene> make_bundle_scene(const BundleSpec& spec, Ra
         auto pixel = see(out->rig, i, out->T_rig_world[static_cast<std::size_t>(k)], point);
         if (!pixel) continue;
         *pixel += spec.noise * Vector2d(random.normal(), random.normal());
-        if (random.uniform() < spec.outlier_share) *pixel += 12 * Vector2d(random.normal(), random.normal());
+        if (random.uniform() < spec.outlier_ratio) *pixel += 12 * Vector2d(random.normal(), random.normal());
         out->problem.observations.push_back({k, p, CameraIndex(i), pixel->cast<float>(), 1.0f});
         --left;
       }

@@ -1,5 +1,5 @@
-// A walk that comes back to where it began: some steps out and home again, while the rig turns once round. What it sees
-// at the end it has not seen since the beginning.
+// A closed trajectory: some steps out and back, while the rig rotates by 360 degrees. The view at the end was not
+// observed since the beginning.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@
 
 namespace bslam::system {
 
-constexpr std::size_t kRound = 60, kWalk = 76;  // frames until the rig is back, and in all
+constexpr std::size_t kRound = 60, kWalk = 76;  // frames until the rig is back, and total number
 
-// `beside` metres to the left of the walk and as much above it.
+// `beside` metres to the left of the trajectory and the same distance above it.
 inline synthetic::Trajectory round_and_home(const simulator::Building& building, double duration_s, double beside = 0) {
   constexpr double kKnot_s = 0.1, kReach_m = 1.2;
   const double round_s = static_cast<double>(kRound) / RenderedTour::kRateHz;
@@ -37,15 +37,15 @@ inline const RenderedTour& closed_walk() {
   return walk;
 }
 
-// Stretches of the walk one after the other, as if the rig were carried from one to the next.
+// Segments of the trajectory one after the other, as if the rig was carried from one to the next.
 struct Playback {
   std::vector<image::ImageBundle> frames;
   evaluation::Trajectory truth;
 };
 
-inline Playback play(const RenderedTour& tour, std::initializer_list<std::pair<std::size_t, std::size_t>> stretches) {
+inline Playback play(const RenderedTour& tour, std::initializer_list<std::pair<std::size_t, std::size_t>> segments) {
   Playback out;
-  for (const auto& [first, end] : stretches) {
+  for (const auto& [first, end] : segments) {
     for (std::size_t k = first; k < end; ++k) {
       image::ImageBundle images = tour.frames()[k];
       const TimeNs later_ns = tour.frames()[out.frames.size()].time_ns - images.time_ns;
@@ -67,7 +67,7 @@ inline Resources with_vocabulary() { return {.vocabulary = place::shipped_vocabu
 
 inline bool is_tracked(const FrameRecord& record) { return record.result.status == tracking::TrackStatus::kTracking; }
 
-// How far a pose is off.
+// Error of a pose.
 struct PoseError {
   double m = 0, rad = 0;
 };
@@ -76,8 +76,8 @@ inline PoseError pose_error(const geometry::SE3& estimate, const geometry::SE3& 
   return {off.translation().norm(), off.rotation().angularDistance(Eigen::Quaterniond::Identity())};
 }
 
-// Every tracked frame was told where it is, in the world whose frame camera 0 was at `T_world_origin`. Bounds are some
-// five times what these small images give.
+// Checks the live poses of all tracked frames in the world frame of camera 0 at `T_world_origin`. The bounds are about
+// five times the errors for these small images.
 inline void expect_told_where_it_is(const System& system, const evaluation::Trajectory& truth,
                                     const geometry::SE3& T_world_origin) {
   for (const FrameRecord& record : system.frames()) {
@@ -89,7 +89,7 @@ inline void expect_told_where_it_is(const System& system, const evaluation::Traj
   }
 }
 
-// The smooth pose goes on from frame to frame as the rig did, whatever became of the map.
+// Checks that the odometry pose follows the motion of the rig, independent of corrections of the map.
 inline void expect_smooth(const System& system, const evaluation::Trajectory& truth) {
   const std::vector<FrameRecord>& frames = system.frames();
   for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -105,7 +105,7 @@ inline void expect_smooth(const System& system, const evaluation::Trajectory& tr
   }
 }
 
-// The same maps, to the bit.
+// Returns true if the maps are bitwise identical.
 inline bool identical(const map::BundledMap& a, const map::BundledMap& b) {
   const auto same = [](const geometry::SE3& x, const geometry::SE3& y) {
     return x.translation() == y.translation() && x.rotation().coeffs() == y.rotation().coeffs();

@@ -17,7 +17,7 @@
 namespace bslam::system {
 namespace {
 
-// Another value the option takes; empty where the range leaves none.
+// Another valid value of the option; empty if there is none.
 std::string other_value(const Option& option) {
   if (const auto* flag = std::get_if<bool*>(&option.field)) return **flag ? "false" : "true";
   if (const auto* number = std::get_if<int*>(&option.field))
@@ -31,7 +31,7 @@ std::string other_value(const Option& option) {
   return std::string(names.names[static_cast<std::size_t>(names.get(names.field) + 1) % names.names.size()]);
 }
 
-TEST(Config, EveryOptionSurvivesAsText) {
+TEST(Config, EveryOptionIsReproducedFromItsText) {
   Config changed, copy;
   OptionTable from(changed), to(copy);
   EXPECT_GT(from.options().size(), 60u);
@@ -56,7 +56,7 @@ TEST(Config, DefaultsLieWithinTheirRangesAndKeysAreUnique) {
   }
 }
 
-// The settings and defaults in the tables of docs/settings.md; units follow the defaults after a space.
+// Options and defaults in the tables of docs/settings.md; units follow the defaults after a space.
 std::map<std::string, std::string> documented_settings() {
   std::map<std::string, std::string> settings;
   std::ifstream page(std::filesystem::path(BSLAM_SOURCE_DIR) / "docs/settings.md");

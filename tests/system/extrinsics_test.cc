@@ -11,8 +11,8 @@ using geometry::SE3;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// The rig with one camera turned by a degree about its vertical axis.
-camera::Rig turned(const camera::Rig& rig, std::size_t camera) {
+// The rig with one camera rotated by a degree around its vertical axis.
+camera::Rig rotated(const camera::Rig& rig, std::size_t camera) {
   geometry::Vector6d turn = geometry::Vector6d::Zero();
   turn[1] = kDegree;
   std::vector<camera::RigCamera> cameras;
@@ -25,7 +25,7 @@ camera::Rig turned(const camera::Rig& rig, std::size_t camera) {
 
 double angle_deg(const SE3& a, const SE3& b) { return a.rotation().angularDistance(b.rotation()) / kDegree; }
 
-// Runs with camera 2 off by a degree.
+// Runs with camera 2 rotated by a degree.
 void run(const RenderedTour& tour, System& system) {
   for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
@@ -37,24 +37,24 @@ void run(const RenderedTour& tour, System& system) {
     EXPECT_EQ(found[c].suspect, c == 2) << "camera " << c << ": " << found[c].change_deg << " degrees";
 }
 
-TEST(SystemExtrinsics, ACameraThatWasTurnedIsNamedAndTheMapIsMadeAsAsked) {
+TEST(SystemExtrinsics, ReportsTheRotatedCameraAndKeepsTheGivenExtrinsics) {
   const RenderedTour tour(4, 40);
-  const camera::Rig wrong = turned(tour.rig(), 2);
+  const camera::Rig wrong = rotated(tour.rig(), 2);
   System system(wrong, small_config(execution::Mode::kSequential));
   run(tour, system);
   EXPECT_FALSE(system.extrinsics_refined());
   EXPECT_EQ(angle_deg(system.snapshot()->rig().cam_from_rig(2), wrong.cam_from_rig(2)), 0.0);
 }
 
-TEST(SystemExtrinsics, RefinedTheMapIsMadeWithWhatWasFound) {
+TEST(SystemExtrinsics, UsesTheRefinedExtrinsicsForTheMap) {
   const RenderedTour tour(4, 40);
   Config config = small_config(execution::Mode::kSequential);
   config.extrinsics.refine = true;
-  System system(turned(tour.rig(), 2), config);
+  System system(rotated(tour.rig(), 2), config);
   run(tour, system);
   EXPECT_TRUE(system.extrinsics_refined());
   for (std::size_t c = 0; c < 4; ++c) {
-    // A pixel of these pictures is a third of a degree; of camera 3, which looks aside, less is known after two
+    // A pixel of these images is a third of a degree; camera 3, which looks sideways, is less accurate after two
     // seconds.
     EXPECT_LT(angle_deg(system.snapshot()->rig().cam_from_rig(c), tour.rig().cam_from_rig(c)), c == 3 ? 0.2 : 0.1)
         << "camera " << c;
@@ -62,7 +62,7 @@ TEST(SystemExtrinsics, RefinedTheMapIsMadeWithWhatWasFound) {
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 }
 
-TEST(SystemExtrinsics, NotAskedForNothingIsSaid) {
+TEST(SystemExtrinsics, ReportsNothingIfDisabled) {
   const RenderedTour tour(2, 16);
   Config config = small_config(execution::Mode::kSequential);
   config.extrinsics.check = false;

@@ -15,14 +15,14 @@ using tracking::Relocalisation;
 
 constexpr TimeNs kInterval = 50'000'000, kDelay = 40'000'000;
 
-// A rig that turns and goes ever faster, by constant acceleration.
+// A rig that rotates and translates with constant acceleration.
 Vector3d place(double t) { return {1.0 * t + 0.9 * t * t, 0.4 * t - 0.6 * t * t, 0.2 * t}; }
 SE3 pose(double t, double turn_rate) {
   const geometry::Quaterniond R_rig_world = geometry::so3_exp({0, turn_rate * t, 0});
   return SE3(R_rig_world, -(R_rig_world * place(t)));
 }
 
-// Frames around a keyframe of two cameras, the second of which fires late; all hang on the keyframe.
+// Frames around a keyframe of two cameras, of which the second captures late; all are anchored to the keyframe.
 struct Scene {
   explicit Scene(double turn_rate, std::size_t count = 5) {
     const double from = -to_seconds(kInterval) * static_cast<double>(count / 2);
@@ -44,7 +44,7 @@ struct Scene {
     frame->cameras[1].time_ns = frame->time_ns + kDelay;
     map.add_keyframe(frame, pose(0, turn_rate), {}, KeyframeId());
   }
-  // Of the rig's pose at the late camera's time, rad and m together.
+  // Error of the rig's pose at the late camera's time, sum of rad and m.
   double error(const Vector6d& twist, double turn_rate) const {
     const double delay_s = to_seconds(kDelay);
     return (SE3::exp(delay_s * twist) * pose(0, turn_rate) * pose(delay_s, turn_rate).inverse()).log().norm();
@@ -55,13 +55,13 @@ struct Scene {
   std::vector<FrameRecord> frames;
 };
 
-TEST(FinalPoses, MotionGoesThroughTheFramesBeforeAndAfter) {
+TEST(FinalPoses, MotionInterpolatesTheAdjacentFrames) {
   const Scene straight(0.0);
   auto found = twists_from_neighbours(straight.map, KeyframeId(0), straight.frames);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].first, KeyframeId(0));
   EXPECT_LT(straight.error(found[0].second, 0.0), 1e-12);
-  const Scene turning(0.8);  // to third order in the interval
+  const Scene turning(0.8);  // the error is of third order in the interval
   found = twists_from_neighbours(turning.map, KeyframeId(0), turning.frames);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_LT(turning.error(found[0].second, 0.8), 2e-5);
@@ -76,7 +76,7 @@ TEST(FinalPoses, MotionIsInTheUnitOfTheMap) {
   EXPECT_TRUE(found[0].second.tail<3>().isApprox(3.0 * before.at(0).second.tail<3>(), 1e-12));
 }
 
-TEST(FinalPoses, MotionIsLeftWhereANeighbourIsMissing) {
+TEST(FinalPoses, NoMotionIfAnAdjacentFrameIsMissing) {
   Scene lost(0.3);
   lost.frames[3].result.status = tracking::TrackStatus::kLost;
   EXPECT_TRUE(twists_from_neighbours(lost.map, KeyframeId(0), lost.frames).empty());
@@ -87,14 +87,14 @@ TEST(FinalPoses, MotionIsLeftWhereANeighbourIsMissing) {
   EXPECT_TRUE(twists_from_neighbours(alone.map, KeyframeId(0), alone.frames).empty());
 }
 
-TEST(FinalPoses, ARigFoundElsewhereHasNotMovedThere) {
+TEST(FinalPoses, NoMotionAcrossARelocalisation) {
   for (const std::size_t found : {2u, 3u}) {
     Scene scene(0.3);
     scene.frames[found].relocalisation = Relocalisation{KeyframeId(0), 50};
     EXPECT_TRUE(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).empty()) << found;
   }
   Scene scene(0.3);
-  scene.frames[1].relocalisation = Relocalisation{KeyframeId(0), 50};  // before that pose, not after it
+  scene.frames[1].relocalisation = Relocalisation{KeyframeId(0), 50};  // the relocalisation precedes that pose
   EXPECT_EQ(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).size(), 1u);
 }
 
@@ -106,12 +106,12 @@ TEST(FinalPoses, NoMotionBetweenSubmaps) {
   EXPECT_TRUE(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).empty());
 }
 
-TEST(FinalPoses, MotionOfAnEarlierRunStays) {
+TEST(FinalPoses, MotionOfAnEarlierRunIsKept) {
   const Scene scene(0.3);
   EXPECT_TRUE(twists_from_neighbours(scene.map, KeyframeId(1), scene.frames).empty());
 }
 
-TEST(FinalPoses, MotionMattersToLateCamerasAlone) {
+TEST(FinalPoses, NoMotionWithoutLateCameras) {
   Scene scene(0.3);
   auto together = std::make_shared<frame::BundledFrame>(*scene.map.keyframe(KeyframeId(0)).frame);
   together->cameras[1].time_ns = together->time_ns;

@@ -25,14 +25,14 @@ class FrameCheck : public ::testing::Test {
   image::ImageBundle images_;
 };
 
-TEST_F(FrameCheck, PassesAFrameOfTheRig) {
+TEST_F(FrameCheck, AcceptsAFrameOfTheRig) {
   EXPECT_EQ(key(), "");
-  EXPECT_EQ(key(FrameStamp{FrameId(1), 999}), "");  // numbers may leave gaps
+  EXPECT_EQ(key(FrameStamp{FrameId(1), 999}), "");  // ids may have gaps
   images_.images[1] = {};
   EXPECT_EQ(key(), "");  // any image may be missing
 }
 
-TEST_F(FrameCheck, NamesWhatDoesNotFit) {
+TEST_F(FrameCheck, ReportsTheInvalidPart) {
   EXPECT_EQ(key(FrameStamp{FrameId(2), 1000}), "time");
   EXPECT_EQ(key(FrameStamp{FrameId(3), 999}), "id");
   images_.images[1].image = image::Image(10, 10);
@@ -43,7 +43,7 @@ TEST_F(FrameCheck, NamesWhatDoesNotFit) {
   EXPECT_EQ(key(), "images");
 }
 
-TEST(MaskCheck, WantsOneOfTheRightSizePerCameraOrNone) {
+TEST(MaskCheck, RequiresOneOfTheRightSizePerCameraOrNone) {
   const camera::Rig rig = synthetic::ring_rig(2);
   const image::Image mask(rig.camera(0).width, rig.camera(0).height), small(10, 10);
   EXPECT_TRUE(check_masks({}, rig).ok());
@@ -52,7 +52,7 @@ TEST(MaskCheck, WantsOneOfTheRightSizePerCameraOrNone) {
   EXPECT_FALSE(check_masks(std::vector{mask, small}, rig).ok());
 }
 
-TEST_F(FrameCheck, RefusesAFrameWithoutANumber) {
+TEST_F(FrameCheck, RejectsAFrameWithoutAnId) {
   images_.id = FrameId();
   EXPECT_EQ(key(), "id");
 }

@@ -5,7 +5,7 @@
 namespace bslam::system {
 namespace {
 
-TEST(SystemLagged, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
+TEST(SystemLagged, IsDeterministicWithAnyNumberOfThreads) {
   const RenderedTour tour(4, 16);
   evaluation::Trajectory final, live;
   std::string journal;
@@ -27,7 +27,7 @@ TEST(SystemLagged, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
   }
 }
 
-TEST(SystemLagged, MayEndAtAnyFrameWithoutBeingFinishedParallel) {
+TEST(SystemLagged, CanBeDestroyedAtAnyFrameParallel) {
   const RenderedTour tour(2, 12);
   for (std::size_t end = 0; end <= tour.frames().size(); ++end) {
     System system(tour.rig(), small_config(execution::Mode::kLagged));

@@ -21,20 +21,19 @@ void play(System& system) {
   system.finish();
 }
 
-// How far the map has a late camera from where it truly was, from camera 0 at the time of the keyframe; m and rad
-// together.
+// Error of the poses of late cameras in the map relative to camera 0 at the time of the keyframe; sum of m and rad.
 double motion_error(const map::BundledMap& map) {
   std::vector<double> errors;
   for (const KeyframeId k : map.keyframe_ids()) {
     const auto frame = static_cast<std::size_t>(map.keyframe(k).frame->id.value());
-    if (frame == 0) continue;  // begins without a motion
+    if (frame == 0) continue;  // has no motion yet
     const SE3 true_motion = tour().rig_truth(2)[frame].T_world_frame.inverse() * tour().truth()[frame].T_world_frame;
     errors.push_back((map.motion_until(k, CameraIndex(2)) * true_motion.inverse()).log().norm());
   }
   return median(std::move(errors));
 }
 
-TEST(LateCameras, AreWhereTheFramesOnBothSidesHaveThem) {
+TEST(LateCameras, PosesFollowTheAdjacentFrames) {
   Config live = small_config(execution::Mode::kSequential);
   live.final_adjustment = false;
   System before(tour().rig(), live);
@@ -48,14 +47,14 @@ TEST(LateCameras, AreWhereTheFramesOnBothSidesHaveThem) {
   EXPECT_EQ(after.snapshot()->check_invariants(), std::nullopt);
 }
 
-TEST(LateCameras, OfAnEarlierRunAreLeftWhereTheyWere) {
+TEST(LateCameras, PosesOfAnEarlierRunAreKept) {
   System first(tour().rig(), small_config(execution::Mode::kSequential));
   play(first);
   const map::MapSnapshot saved = first.snapshot();
   Resources resources;
   resources.map = *saved;
   System second(tour().rig(), small_config(execution::Mode::kSequential), std::move(resources));
-  play(second);  // frames of the same numbers and times
+  play(second);  // frames with the same ids and times
   for (const KeyframeId k : saved->keyframe_ids()) {
     if (!second.snapshot()->alive(k)) continue;
     EXPECT_EQ(second.snapshot()->keyframe(k).twist, saved->keyframe(k).twist);

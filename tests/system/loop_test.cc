@@ -1,4 +1,4 @@
-// Loops, and the parts of a map that a place seen by both of them joins.
+// Loop closures, and merging of submaps at a place observed in both.
 #include <gtest/gtest.h>
 
 #include <thread>
@@ -8,7 +8,7 @@
 namespace bslam::system {
 namespace {
 
-// A loop between the last frames of the walk and its first.
+// A loop between the last and the first frames of the trajectory.
 void expect_loop(const System& system) {
   const auto& frames = closed_walk().frames();
   ASSERT_FALSE(system.loops().empty());
@@ -20,7 +20,7 @@ void expect_loop(const System& system) {
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 }
 
-TEST(SystemLoopSequential, WhereTheWalkIsBackTheMapIsClosedAndTheErrorGone) {
+TEST(SystemLoopSequential, ClosesTheLoopAndRemovesTheError) {
   Config config = small_config(execution::Mode::kSequential);
   config.final_adjustment = false;
   Config off = config;
@@ -41,13 +41,13 @@ TEST(SystemLoopSequential, WhereTheWalkIsBackTheMapIsClosedAndTheErrorGone) {
   EXPECT_TRUE(identical(open.trajectories(), blind.trajectories()));
   EXPECT_LT(2 * ate_m(final_poses(system), closed_walk().truth()), ate_m(final_poses(open), closed_walk().truth()));
   const map::BundledMap &closed_map = *system.snapshot(), &open_map = *open.snapshot();
-  EXPECT_LT(closed_map.num_landmarks(), open_map.num_landmarks());  // what was there twice is there once
+  EXPECT_LT(closed_map.num_landmarks(), open_map.num_landmarks());  // duplicate landmarks are fused
 }
 
-// Carried away with its eyes shut the rig begins anew, comes back to where it began first, and has one map then.
+// After dark frames the rig initialises a second submap, which is merged when it returns to the first place.
 class SystemLoopSubmaps : public ::testing::Test {
  protected:
-  static constexpr std::size_t kFirst = 16, kAfter = 3;  // frames of the first part; frames lost before the second
+  static constexpr std::size_t kFirst = 16, kAfter = 3;  // frames of the first submap; lost frames before the second
   static Playback carried() { return play(closed_walk(), {{0, kFirst}, {36, kWalk}}); }
   static Config config() {
     Config out = small_config(execution::Mode::kSequential);
@@ -56,7 +56,7 @@ class SystemLoopSubmaps : public ::testing::Test {
   }
 };
 
-TEST_F(SystemLoopSubmaps, ASubmapBegunElsewhereIsMergedAtAKnownPlace) {
+TEST_F(SystemLoopSubmaps, ASubmapIsMergedAtAKnownPlace) {
   const Playback walk = carried();
   System system(closed_walk().rig(), config(), with_vocabulary());
   std::size_t two = 0;
@@ -77,27 +77,27 @@ TEST_F(SystemLoopSubmaps, ASubmapBegunElsewhereIsMergedAtAKnownPlace) {
   ASSERT_EQ(system.trajectories().size(), 1u);
   EXPECT_EQ(final_poses(system).size(), walk.frames.size() - (kAfter - 1));
   EXPECT_LT(ate_m(final_poses(system), walk.truth), 0.01);
-  EXPECT_EQ(system.live_trajectories().size(), 2u);  // as it was told then
+  EXPECT_EQ(system.live_trajectories().size(), 2u);  // uncorrected
 }
 
-TEST_F(SystemLoopSubmaps, TheLivePoseNeverJumpsWhereTheMapDoes) {
+TEST_F(SystemLoopSubmaps, TheOdometryPoseIsContinuousWhenTheMapIsCorrected) {
   const Playback walk = carried();
   System system(closed_walk().rig(), config(), with_vocabulary());
   process_all(system, walk.frames);
   system.finish();
   expect_smooth(system, walk.truth);
   const std::vector<FrameRecord>& frames = system.frames();
-  for (std::size_t k = kFirst; k < kFirst + kAfter; ++k) {  // nobody knows how the rig moved meanwhile
+  for (std::size_t k = kFirst; k < kFirst + kAfter; ++k) {  // the motion is unknown
     EXPECT_EQ(frames[k].T_rig_odom.translation(), frames[kFirst - 1].T_rig_odom.translation()) << "frame " << k;
   }
   double jump = 0;
   for (std::size_t k = kFirst + kAfter; k < frames.size(); ++k) {
     jump = std::max(jump, (frames[k].T_map_odom * frames[k - 1].T_map_odom.inverse()).translation().norm());
   }
-  EXPECT_GT(jump, 0.2);  // metres: from the world of one part to that of the other
+  EXPECT_GT(jump, 0.2);  // metres, from the world frame of one submap to that of the other
 }
 
-TEST(SystemLoopParallel, ClosesTheLoopWithinTheRun) {
+TEST(SystemLoopParallel, ClosesTheLoopDuringTheRun) {
   System system(closed_walk().rig(), small_config(execution::Mode::kParallel), with_vocabulary());
   process_all(system, closed_walk().frames());
   system.finish();
@@ -108,7 +108,7 @@ TEST(SystemLoopParallel, ClosesTheLoopWithinTheRun) {
   EXPECT_LT(ate_m(final_poses(system), closed_walk().truth()), 0.005);
 }
 
-TEST(SystemLoopLagged, GivesTheSameMapWithAnyNumberOfThreads) {
+TEST(SystemLoopLagged, MapDoesNotDependOnTheNumberOfThreads) {
   std::vector<SubmapTrajectory> final, live;
   map::MapSnapshot map;
   for (const int threads : {1, 2, 4}) {
@@ -128,8 +128,8 @@ TEST(SystemLoopLagged, GivesTheSameMapWithAnyNumberOfThreads) {
   }
 }
 
-TEST(SystemLoopReplay, RepeatsAParallelRunWithLoopsToTheBit) {
-  const Playback walk = play(closed_walk(), {{0, 16}, {36, kWalk}});  // joined, then closed
+TEST(SystemLoopReplay, RepeatsAParallelRunWithLoopsExactly) {
+  const Playback walk = play(closed_walk(), {{0, 16}, {36, kWalk}});  // merged, then closed
   Config config = small_config(execution::Mode::kParallel);
   config.looping.recovery.new_submap_after = 3;
   for (int i = 0; i < 2; ++i) {
@@ -151,10 +151,10 @@ TEST(SystemLoopReplay, RepeatsAParallelRunWithLoopsToTheBit) {
   }
 }
 
-// The runs go on in the map of the walk until shortly before its end, so that each of them comes to the loop soon.
+// The runs continue in the map of the trajectory until shortly before its end, so that the loop follows soon.
 class SystemLoopEnd : public ::testing::TestWithParam<execution::Mode> {};
 
-TEST_P(SystemLoopEnd, MayComeAtAnyFrameByInterruptionOrWithoutParallel) {
+TEST_P(SystemLoopEnd, RunsCanEndAtAnyFrameParallel) {
   const Playback end = play(closed_walk(), {{48, 66}});
   Config before = small_config(execution::Mode::kSequential);
   before.final_adjustment = false;
@@ -178,14 +178,14 @@ TEST_P(SystemLoopEnd, MayComeAtAnyFrameByInterruptionOrWithoutParallel) {
       must_process(system, end.frames[k]);
     }
     closed += !system.loops().empty();
-    if (i % 3 != 2) continue;  // it goes as it is
+    if (i % 3 != 2) continue;  // destroyed without finish()
     system.interrupt();
     system.finish();
     EXPECT_EQ(system.frames().size(), frames);
     EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
   }
   EXPECT_LT(closed, kRuns);
-  if (GetParam() == execution::Mode::kLagged) {  // ends before the loop and after it, whatever the machine does
+  if (GetParam() == execution::Mode::kLagged) {  // ends before and after the loop, independent of timing
     EXPECT_GT(closed, 3u);
   }
 }

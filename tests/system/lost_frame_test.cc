@@ -1,4 +1,4 @@
-// A frame that could not be tracked is looked for all over the map: what tracking tried with it must not matter then.
+// A frame that could not be tracked is relocalised; the attempt to track it must not change the result.
 #include <gtest/gtest.h>
 
 #include "looping/verify_place.h"
@@ -7,7 +7,7 @@
 namespace bslam::system {
 namespace {
 
-// Pictures with smooth random texture, which have nothing to do with the landmarks' patches.
+// Images with smooth random texture, unrelated to the landmarks' patches.
 std::vector<image::Pyramid> textured_pyramids(const camera::Rig& rig) {
   Random random(3, "texture");
   std::vector<image::Pyramid> out(rig.size());
@@ -26,12 +26,12 @@ std::vector<image::Pyramid> textured_pyramids(const camera::Rig& rig) {
 
 class LostFrame : public ::testing::Test {
  protected:
-  tracking::TrackOutput track(const frame::BundledFrame& frame, double min_inlier_share) {
-    // Aligns to any picture, so that most keypoints move to where their landmarks are not.
+  tracking::TrackOutput track(const frame::BundledFrame& frame, double min_inlier_ratio) {
+    // Accepts any alignment, so that most keypoints move to wrong positions.
     const std::vector<matching::AlignmentOptions> alignment(
         pyramids.size(), {.iterations = 50, .max_shift_px = 10, .min_ncc = -1, .calibration_error_px = 0.01});
     tracking::TrackingOptions options;
-    options.min_inlier_share = min_inlier_share;
+    options.min_inlier_ratio = min_inlier_ratio;
     const tracking::TrackerState state = tracking::state_at_first(world);
     const tracking::TrackInput input{.map = world.map,
                                      .pyramids = pyramids,
@@ -50,7 +50,7 @@ class LostFrame : public ::testing::Test {
   const std::vector<image::Pyramid> pyramids = textured_pyramids(world.map.rig());
 };
 
-TEST_F(LostFrame, IsFoundLikeOneThatWasNeverTracked) {
+TEST_F(LostFrame, IsRelocalisedLikeAFrameThatWasNotTracked) {
   const frame::BundledFrame tried = world.sim.frame(FrameId(1), 0.05).frame;
   const frame::BundledFrame fresh = world.sim.frame(FrameId(1), 0.05).frame;
   const tracking::TrackOutput lost = track(tried, 0.8);
@@ -72,8 +72,8 @@ TEST_F(LostFrame, IsFoundLikeOneThatWasNeverTracked) {
   EXPECT_EQ(found->T_rig_world.rotation().coeffs(), expected->T_rig_world.rotation().coeffs());
 }
 
-// What makes the test above one: had the same alignment been accepted, keypoints would have moved.
-TEST_F(LostFrame, WouldHaveHadOtherKeypointsHadItBeenTracked) {
+// Shows that the test above is effective: with a tracked frame the keypoints move.
+TEST_F(LostFrame, WouldHaveDifferentKeypointsIfTracked) {
   const frame::BundledFrame frame = world.sim.frame(FrameId(1), 0.05).frame;
   const tracking::TrackOutput out = track(frame, 0.0);
   ASSERT_EQ(out.result.status, tracking::TrackStatus::kTracking) << describe(out.result.reason);

@@ -23,7 +23,7 @@ TEST(SystemParallel, TracksAllFramesAsWellAsSequential) {
   EXPECT_GT(system.stage_runs().size(), 0u);
 }
 
-TEST(SystemParallel, MayEndAtAnyFrameWithoutBeingFinished) {
+TEST(SystemParallel, CanBeDestroyedAtAnyFrame) {
   const RenderedTour tour(2, 12);
   for (std::size_t end = 0; end <= tour.frames().size(); ++end) {
     System system(tour.rig(), small_config(execution::Mode::kParallel));
@@ -32,12 +32,12 @@ TEST(SystemParallel, MayEndAtAnyFrameWithoutBeingFinished) {
   }
 }
 
-TEST(SystemParallel, WaitsForAPendingKeyframeAtMost) {
+TEST(SystemParallel, WaitsAtMostForAPendingKeyframe) {
   const RenderedTour tour(2, 12);
   Config config = small_config(execution::Mode::kParallel);
   config.execution.max_pending_keyframes = 1;
   config.tracking.keyframe.min_interval = 1;
-  config.tracking.keyframe.min_overlap = 1.0;  // a keyframe with every frame that lost one landmark
+  config.tracking.keyframe.min_overlap = 1.0;  // a keyframe if a single landmark is lost
   System system(tour.rig(), config);
   for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
@@ -45,7 +45,7 @@ TEST(SystemParallel, WaitsForAPendingKeyframeAtMost) {
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 }
 
-TEST(SystemParallel, VersionsOfTheMapStayWholeForReadersInOtherThreads) {
+TEST(SystemParallel, VersionsOfTheMapAreConsistentForReadersInOtherThreads) {
   const RenderedTour tour(2, 12);
   System system(tour.rig(), small_config(execution::Mode::kParallel));
   must_process(system, tour.frames()[0]);
@@ -66,7 +66,7 @@ TEST(SystemParallel, VersionsOfTheMapStayWholeForReadersInOtherThreads) {
   EXPECT_EQ(broken, 0);
 }
 
-TEST(SystemParallel, LeavesAYoungMapUpToScaleThatIsLost) {
+TEST(SystemParallel, DiscardsANewMapUpToScaleThatIsLost) {
   const RenderedTour tour(1, 12);
   System system(tour.rig(), small_config(execution::Mode::kParallel));
   std::size_t k = 0;

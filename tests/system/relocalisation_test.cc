@@ -1,4 +1,4 @@
-// A lost rig is found again anywhere in the map, also in one of an earlier run, and nowhere else.
+// A lost rig is relocalised anywhere in the map, also in the map of an earlier run, and not at unknown places.
 #include <gtest/gtest.h>
 
 #include "system/closed_walk.h"
@@ -6,7 +6,7 @@
 namespace bslam::system {
 namespace {
 
-TEST(SystemRelocalisation, CarriedInTheDarkTheRigIsFoundWhereItHasBeen) {
+TEST(SystemRelocalisation, RelocalisesAtAKnownPlaceAfterDarkFrames) {
   constexpr std::size_t kDark = 30, kLight = 33;
   Playback walk = play(closed_walk(), {{0, kLight}, {8, 24}});
   for (std::size_t k = kDark; k < kLight; ++k) {
@@ -20,7 +20,7 @@ TEST(SystemRelocalisation, CarriedInTheDarkTheRigIsFoundWhereItHasBeen) {
     const std::size_t k = record.result.frame.index();
     EXPECT_EQ(is_tracked(record), k < kDark || k >= kLight) << "frame " << k;
     EXPECT_EQ(record.relocalisation.has_value(), k == kLight) << "frame " << k;
-    EXPECT_EQ(is_tracked(blind.frames()[k]), k < kDark) << "frame " << k;  // nothing but the vocabulary finds it
+    EXPECT_EQ(is_tracked(blind.frames()[k]), k < kDark) << "frame " << k;  // without a vocabulary it is not relocalised
   }
   ASSERT_TRUE(system.frames()[kLight].relocalisation);
   EXPECT_LE(system.keyframe_time(system.frames()[kLight].relocalisation->matched_keyframe), walk.frames[24].time_ns);
@@ -33,7 +33,7 @@ TEST(SystemRelocalisation, CarriedInTheDarkTheRigIsFoundWhereItHasBeen) {
   EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
 }
 
-TEST(SystemRelocalisation, WhereItHasNeverBeenThereIsNoPose) {
+TEST(SystemRelocalisation, HasNoPoseAtAnUnknownPlace) {
   const Playback walk = play(closed_walk(), {{0, 16}, {36, 46}});
   System system(closed_walk().rig(), small_config(execution::Mode::kSequential), with_vocabulary());
   process_all(system, walk.frames);
@@ -45,7 +45,7 @@ TEST(SystemRelocalisation, WhereItHasNeverBeenThereIsNoPose) {
   EXPECT_EQ(system.maps_started(), 1);
 }
 
-// Another walk beside the first, in the map of that.
+// Another trajectory next to the first, in the map of the first.
 class SystemSavedMap : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -66,13 +66,13 @@ class SystemSavedMap : public ::testing::Test {
         2, 20, [](const auto& building, double duration_s) { return round_and_home(building, duration_s, 0.08); });
     return walk;
   }
-  // Where the world of the map stands.
+  // Pose of the map's world frame.
   static geometry::SE3 origin() { return closed_walk().truth().front().T_world_frame; }
 
   static inline map::MapSnapshot saved_;
 };
 
-TEST_F(SystemSavedMap, LocalisingLeavesItAsItIs) {
+TEST_F(SystemSavedMap, LocaliseOnlyDoesNotChangeIt) {
   for (const execution::Mode mode :
        {execution::Mode::kSequential, execution::Mode::kParallel, execution::Mode::kLagged}) {
     Config config = small_config(mode);
@@ -93,7 +93,7 @@ TEST_F(SystemSavedMap, LocalisingLeavesItAsItIs) {
   }
 }
 
-TEST_F(SystemSavedMap, WhereThePlaceIsNotInItLocalisingHasNoPose) {
+TEST_F(SystemSavedMap, LocaliseOnlyHasNoPoseAtAnUnknownPlace) {
   System part(closed_walk().rig(), small_config(execution::Mode::kSequential), with_vocabulary());
   process_all(part, play(closed_walk(), {{0, 16}}).frames);
   Config config = small_config(execution::Mode::kSequential);
@@ -108,7 +108,7 @@ TEST_F(SystemSavedMap, WhereThePlaceIsNotInItLocalisingHasNoPose) {
   EXPECT_EQ(system.snapshot()->version(), part.snapshot()->version());
 }
 
-TEST_F(SystemSavedMap, ARunGoesOnInItAndCanBeRepeated) {
+TEST_F(SystemSavedMap, ARunContinuesInItAndCanBeRepeated) {
   System system(beside().rig(), small_config(execution::Mode::kParallel), resources());
   process_all(system, beside().frames());
   system.finish();

@@ -1,5 +1,5 @@
-// A short tour through the built-in world, rendered small: what the tests of the system see. One ring of eight cameras;
-// rigs of fewer are its first ones, of which the first two look ahead side by side.
+// A short tour through the built-in world, rendered with a low resolution for the system tests. A ring of eight
+// cameras; rigs with fewer cameras contain the first ones, of which the first two look ahead side by side.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ class RenderedTour {
             },
             late_ns) {}
 
-  // `late_ns`: by how much cameras 2 and on fire after the others.
+  // `late_ns`: delay of the images of camera 2 and the following ones.
   RenderedTour(int cameras, std::size_t frames, const Motion& motion, TimeNs late_ns = 0)
       : pool_(2), rig_(late(first_cameras(cameras), late_ns)), rig_truth_(rig_.size()) {
     const simulator::World world(simulator::make_building(3), {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2},
@@ -59,7 +59,7 @@ class RenderedTour {
   const camera::Rig& rig() const { return rig_; }
   const std::vector<image::ImageBundle>& frames() const { return frames_; }
   const evaluation::Trajectory& truth() const { return rig_truth_[0]; }  // of camera 0
-  // Where the rig was when camera c took its picture, under the time of the frame.
+  // Pose of the rig at the capture time of camera c, stored with the time of the frame.
   const evaluation::Trajectory& rig_truth(std::size_t c) const { return rig_truth_[c]; }
 
   // The same recording with fewer cameras.
@@ -70,7 +70,7 @@ class RenderedTour {
     return out;
   }
 
-  // The recording played once more as frames number `first_id` and on: frame k, and the truth of all.
+  // The recording repeated with ids from `first_id`: frame k, and the truth of all frames.
   image::ImageBundle replayed(std::size_t k, std::size_t first_id) const {
     image::ImageBundle out = frames_[k];
     out.id = FrameId(first_id + k);
@@ -110,7 +110,7 @@ class RenderedTour {
   std::vector<evaluation::Trajectory> rig_truth_;  // by camera
 };
 
-// Another place with as much to see: left and right exchanged.
+// Another place with similar texture: images mirrored horizontally.
 inline void mirror(image::CameraImage& image) {
   for (int y = 0; y < image.image.height(); ++y)
     std::reverse(image.image.row(y), image.image.row(y) + image.image.width());
@@ -127,7 +127,7 @@ inline void make_absent(image::CameraImage& input, image::ImageState state) {
   input.image = {};
 }
 
-// Settings for pictures of 320 x 204.
+// Options for images of 320 x 204.
 inline Config small_config(execution::Mode mode, int threads = 2) {
   Config config;
   config.mode = mode;
@@ -136,7 +136,7 @@ inline Config small_config(execution::Mode mode, int threads = 2) {
   return config;
 }
 
-// Processes a frame the system has no reason to refuse.
+// Processes a valid frame.
 inline FrameRecord must_process(System& system, const image::ImageBundle& images) {
   const auto record = system.process(images);
   EXPECT_TRUE(record.ok());
@@ -156,7 +156,7 @@ inline double ate_m(const evaluation::Trajectory& estimate, const evaluation::Tr
   return result ? result->ate.rmse : std::numeric_limits<double>::infinity();
 }
 
-// Poses of the longest part of the map, final and as told at the time.
+// Poses in the longest submap, final and live.
 inline evaluation::Trajectory final_poses(const System& system) {
   const std::vector<SubmapTrajectory> submaps = system.trajectories();
   return submaps.empty() ? evaluation::Trajectory() : submaps.front().poses;

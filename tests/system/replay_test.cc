@@ -13,19 +13,19 @@ void expect_same(const System& a, const System& b) {
   EXPECT_EQ(execution::journal_text(a.journal()), execution::journal_text(b.journal()));
 }
 
-// The recorded journal as it would come back from a file.
+// The recorded journal after conversion to text and back.
 execution::Journal reread(const System& system) {
   auto journal = execution::parse_journal(execution::journal_text(system.journal()), "recorded");
   EXPECT_TRUE(journal.ok());
   return std::move(*journal);
 }
 
-TEST(SystemReplay, RepeatsAParallelRunToTheBit) {
+TEST(SystemReplay, RepeatsAParallelRunExactly) {
   const RenderedTour tour(2, 14);
   for (int i = 0; i < 3; ++i) {
     Config config = small_config(execution::Mode::kParallel);
     config.tracking.keyframe.min_interval = 1;
-    config.tracking.keyframe.min_overlap = 1.0;  // many keyframes, so that much overlaps
+    config.tracking.keyframe.min_overlap = 1.0;  // many keyframes, so that stages overlap
     System recorded(tour.rig(), config);
     for (const image::ImageBundle& images : tour.frames()) must_process(recorded, images);
     recorded.finish();
@@ -37,7 +37,7 @@ TEST(SystemReplay, RepeatsAParallelRunToTheBit) {
   }
 }
 
-TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
+TEST(SystemReplay, RepeatsARunThatDiscardedAMapParallel) {
   const RenderedTour tour(1, 12);
   std::vector<image::ImageBundle> frames(tour.frames().begin(), tour.frames().begin() + 6);
   frames.push_back(tour.frames()[6]);
@@ -53,14 +53,14 @@ TEST(SystemReplay, RepeatsARunThatLeftAMapParallel) {
   replayed.finish();
   expect_same(recorded, replayed);
   MapVersion newest{0};
-  for (const execution::JournalEntry& e : recorded.journal().entries) {  // versions go on counting over the maps
+  for (const execution::JournalEntry& e : recorded.journal().entries) {  // version numbers continue across maps
     if (!e.committed) continue;
     EXPECT_EQ(*e.committed, newest.next());
     newest = *e.committed;
   }
 }
 
-TEST(SystemReplay, RefusesAJournalOfOtherSettings) {
+TEST(SystemReplay, RejectsAJournalOfOtherOptions) {
   const RenderedTour tour(2, 10);
   System recorded(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : tour.frames()) must_process(recorded, images);

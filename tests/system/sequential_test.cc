@@ -22,7 +22,7 @@ Outcome run(const RenderedTour& tour, const Config& config) {
           system.snapshot()->num_observations()};
 }
 
-TEST(SystemSequential, GivesTheSameBytesTwiceAndWithAnyNumberOfThreads) {
+TEST(SystemSequential, IsDeterministicWithAnyNumberOfThreads) {
   const RenderedTour tour(4, 16);
   const Outcome first = run(tour, small_config(execution::Mode::kSequential, 1));
   EXPECT_EQ(first.final.size(), tour.frames().size());
@@ -44,21 +44,21 @@ TEST(SystemSequential, TracksWithOneToEightCameras) {
     system.finish();
     const auto align = n == 1 ? evaluation::AlignMode::kSim3 : evaluation::AlignMode::kSe3;
     EXPECT_EQ(system.snapshot()->scale(), n == 1 ? map::Scale::kUpToScale : map::Scale::kMetric) << n << " cameras";
-    EXPECT_GE(tracked_frames(system), n == 1 ? count - 5 : count) << n << " cameras";  // two views must first differ
+    EXPECT_GE(tracked_frames(system), n == 1 ? count - 5 : count) << n << " cameras";  // two views must have parallax
     EXPECT_LT(ate_m(final_poses(system), tour.truth(), align), 0.01) << n << " cameras";
     EXPECT_LT(ate_m(live_poses(system), tour.truth(), align), 0.015) << n << " cameras";
     EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt) << n << " cameras";
   }
 }
 
-TEST(SystemSequential, KnowsTheTruePathLengthWithTwoCameras) {
+TEST(SystemSequential, EstimatesTheTruePathLengthWithTwoCameras) {
   const RenderedTour tour(2, 24);
   const Outcome outcome = run(tour, small_config(execution::Mode::kSequential));
   const double truth_m = evaluation::path_length_m(tour.truth());
   EXPECT_NEAR(evaluation::path_length_m(outcome.final), truth_m, 0.03 * truth_m);
 }
 
-TEST(SystemSequential, ADamagedOrMissingImageCostsOnlyItsCamera) {
+TEST(SystemSequential, ADamagedOrMissingImageAffectsOnlyItsCamera) {
   const RenderedTour tour(4, 16);
   std::vector<image::ImageBundle> frames = tour.frames();
   make_absent(frames[6].images[1], ImageState::kDamaged);
@@ -142,7 +142,7 @@ TEST(SystemSequential, RecordsEveryInputFrame) {
                                                    [](const FrameRecord& r) { return r.keyframe; })));
 }
 
-TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {
+TEST(SystemSequential, UsesOnlyUnmaskedPixels) {
   const RenderedTour tour(2, 4);
   image::Image nothing(tour.rig().camera(1).width, tour.rig().camera(1).height);
   image::CameraImage black{ImageState::kPresent, 0, nothing};
@@ -152,12 +152,12 @@ TEST(SystemSequential, LooksOnlyWhereTheMaskAllowsIt) {
     const FrameRecord record = must_process(system, images);
     EXPECT_GT(record.result.cameras[0].keypoints, 100);
     EXPECT_EQ(record.result.cameras[1].keypoints, 0);
-    EXPECT_EQ(record.result.reason, LostReason::kNotStarted);  // no matched features, no metric start
+    EXPECT_EQ(record.result.reason, LostReason::kNotStarted);  // no matched features, so no metric initialisation
   }
   EXPECT_TRUE(final_poses(system).empty());
 }
 
-TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
+TEST(SystemSequential, DiscardsANewMapUpToScaleAndItsPosesIfLost) {
   const RenderedTour tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
@@ -177,7 +177,7 @@ TEST(SystemSequential, WithdrawsAYoungMapUpToScaleThatIsLost) {
   EXPECT_LT(ate_m(final_poses(system), tour.replayed_truth(k), evaluation::AlignMode::kSim3), 0.01);
 }
 
-TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {
+TEST(SystemSequential, KeepsANewMapDuringADarkFrame) {
   const RenderedTour tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
@@ -193,7 +193,7 @@ TEST(SystemSequential, KeepsAYoungMapThroughADarkFrame) {
   EXPECT_GT(tracked_frames(system), before + 4);
 }
 
-TEST(SystemSequential, StartsUpToScaleSoonAfterADarkFirstFrame) {
+TEST(SystemSequential, InitialisesUpToScaleSoonAfterADarkFirstFrame) {
   const RenderedTour tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   image::ImageBundle dark = tour.frames()[0];
@@ -203,7 +203,7 @@ TEST(SystemSequential, StartsUpToScaleSoonAfterADarkFirstFrame) {
   EXPECT_GT(tracked_frames(system), 8u);
 }
 
-TEST(SystemSequential, RefusesAFrameThatIsNoneOfItsRigAndGoesOn) {
+TEST(SystemSequential, RejectsAnInvalidFrameAndContinues) {
   const RenderedTour tour(2, 6);
   System system(tour.rig(), small_config(execution::Mode::kSequential)),
       undisturbed(tour.rig(), small_config(execution::Mode::kSequential));
@@ -213,13 +213,13 @@ TEST(SystemSequential, RefusesAFrameThatIsNoneOfItsRigAndGoesOn) {
     EXPECT_FALSE(system.process(wrong).ok());
     must_process(system, images);
     must_process(undisturbed, images);
-    EXPECT_FALSE(system.process(images).ok());  // its time has passed
+    EXPECT_FALSE(system.process(images).ok());  // not after the last frame
   }
   EXPECT_EQ(system.frames().size(), tour.frames().size());
   EXPECT_TRUE(identical(live_poses(system), live_poses(undisturbed)));
 }
 
-TEST(SystemSequential, KeepsAsMuchHistoryAsAskedFor) {
+TEST(SystemSequential, KeepsTheConfiguredHistory) {
   constexpr std::size_t kHistory = 4;
   const RenderedTour tour(2, 16);
   System all(tour.rig(), small_config(execution::Mode::kSequential)),
@@ -239,17 +239,17 @@ TEST(SystemSequential, KeepsAsMuchHistoryAsAskedFor) {
   EXPECT_TRUE(identical({whole.end() - static_cast<std::ptrdiff_t>(last.size()), whole.end()}, last));
 }
 
-TEST(SystemSequential, TellsAnObserverWhatItsStagesDid) {
+TEST(SystemSequential, ReportsStagesToTheObserver) {
   const RenderedTour tour(2, 8);
-  std::vector<StageRecord> told;
+  std::vector<StageRecord> reported;
   System system(tour.rig(), small_config(execution::Mode::kSequential),
-                {.observer = [&](const StageRecord& record) { told.push_back(record); }});
+                {.observer = [&](const StageRecord& record) { reported.push_back(record); }});
   for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
-  ASSERT_FALSE(told.empty());
-  ASSERT_EQ(told.size(), system.stage_runs().size());
+  ASSERT_FALSE(reported.empty());
+  ASSERT_EQ(reported.size(), system.stage_runs().size());
   double created = 0;
-  for (const StageRecord& record : told) {
+  for (const StageRecord& record : reported) {
     for (const execution::StageStatistic& s : record.run.statistics)
       created += s.name == "created landmarks" ? s.value : 0;
   }
@@ -258,7 +258,7 @@ TEST(SystemSequential, TellsAnObserverWhatItsStagesDid) {
   EXPECT_LT(system.final_adjustment().final_cost, system.final_adjustment().initial_cost);
 }
 
-TEST(SystemSequential, AdjustsTheWholeMapAtTheEndOnlyWhereConfigured) {
+TEST(SystemSequential, AdjustsTheWholeMapAtTheEndOnlyIfConfigured) {
   const RenderedTour tour(2, 8);
   for (const bool wanted : {false, true}) {
     Config config = small_config(execution::Mode::kSequential);

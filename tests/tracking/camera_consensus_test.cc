@@ -9,107 +9,108 @@ namespace {
 
 using Flags = std::vector<std::uint8_t>;
 
-TEST(CameraConsensus, FlagsWhoLostWhatItSawWhileAnotherDidNot) {
+TEST(CameraConsensus, FlagsCamerasThatLoseTheirLandmarksWhileAnotherDoesNot) {
   const ConsensusOptions options;
-  EXPECT_EQ(disagreeing({{100, 80}, {100, 2}}, std::vector<CameraTrust>(3), options), Flags({0, 1}));
-  EXPECT_EQ(disagreeing({{100, 3}, {100, 2}, {60, 50}}, std::vector<CameraTrust>(3), options), Flags({1, 1, 0}));
-  EXPECT_EQ(disagreeing({{100, 80}, {100, 30}}, std::vector<CameraTrust>(3), options), Flags({0, 0}))
-      << "a hard frame is no wrong one";
-  EXPECT_EQ(disagreeing({{100, 80}, {10, 0}}, std::vector<CameraTrust>(3), options), Flags({0, 0}))
-      << "too little to judge by";
-  EXPECT_EQ(disagreeing({{100, 5}, {100, 2}}, std::vector<CameraTrust>(3), options), Flags({0, 0}))
-      << "nobody to judge by";
+  EXPECT_EQ(cameras_losing_view({{100, 80}, {100, 2}}, std::vector<CameraConsensusState>(3), options), Flags({0, 1}));
+  EXPECT_EQ(cameras_losing_view({{100, 3}, {100, 2}, {60, 50}}, std::vector<CameraConsensusState>(3), options),
+            Flags({1, 1, 0}));
+  EXPECT_EQ(cameras_losing_view({{100, 80}, {100, 30}}, std::vector<CameraConsensusState>(3), options), Flags({0, 0}))
+      << "re-observed fraction above the minimum";
+  EXPECT_EQ(cameras_losing_view({{100, 80}, {10, 0}}, std::vector<CameraConsensusState>(3), options), Flags({0, 0}))
+      << "too few expected landmarks";
+  EXPECT_EQ(cameras_losing_view({{100, 5}, {100, 2}}, std::vector<CameraConsensusState>(3), options), Flags({0, 0}))
+      << "no healthy camera";
 }
 
-TEST(CameraConsensus, ReadmitsAfterSomeFramesThatFit) {
+TEST(CameraConsensus, ReadmitsAfterConsecutiveConsistentFrames) {
   const ConsensusOptions options;
-  CameraTrust camera;
-  doubt(camera, {100, 0}, 0, options);
+  CameraConsensusState camera;
+  update_exclusion(camera, {100, 0}, 0, options);
   for (int i = 1; i < options.readmit_after; ++i) {
-    doubt(camera, {100, 50}, 0, options);
-    EXPECT_TRUE(camera.doubted);
+    update_exclusion(camera, {100, 50}, 0, options);
+    EXPECT_TRUE(camera.excluded);
   }
-  doubt(camera, {100, 1}, 0, options);  // from the beginning
+  update_exclusion(camera, {100, 1}, 0, options);  // restarts the count
   for (int i = 0; i < options.readmit_after; ++i) {
-    EXPECT_TRUE(camera.doubted);
-    doubt(camera, {100, 50}, 0, options);
+    EXPECT_TRUE(camera.excluded);
+    update_exclusion(camera, {100, 50}, 0, options);
   }
-  EXPECT_FALSE(camera.doubted);
+  EXPECT_FALSE(camera.excluded);
 }
 
-TEST(CameraConsensus, ForgetsWhereThereIsLongNothingToJudgeBy) {
+TEST(CameraConsensus, ReadmitsACameraThatCannotBeChecked) {
   const ConsensusOptions options;
-  CameraTrust camera;
-  doubt(camera, {3, 0}, 0, options);
-  doubt(camera, {3, 0}, from_seconds(options.forget_after_s - 0.1), options);
-  EXPECT_TRUE(camera.doubted);
-  doubt(camera, {3, 0}, from_seconds(options.forget_after_s), options);
-  EXPECT_FALSE(camera.doubted);
+  CameraConsensusState camera;
+  update_exclusion(camera, {3, 0}, 0, options);
+  update_exclusion(camera, {3, 0}, from_seconds(options.forget_after_s - 0.1), options);
+  EXPECT_TRUE(camera.excluded);
+  update_exclusion(camera, {3, 0}, from_seconds(options.forget_after_s), options);
+  EXPECT_FALSE(camera.excluded);
 }
 
-TEST(CameraConsensus, ACameraThatLostItsViewLittleByLittleIsNotDoubted) {
+TEST(CameraConsensus, KeepsACameraThatLosesItsLandmarksGradually) {
   const ConsensusOptions options;
-  const std::vector<Expectation> now = {{100, 80}, {100, 2}, {100, 2}};
-  std::vector<CameraTrust> before(3);
-  trust(before[1], {100, 70}, options);
-  trust(before[2], {100, 45}, options);
-  EXPECT_EQ(disagreeing(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
-  trust(before[1], {10, 0}, options);  // too little to tell
-  EXPECT_EQ(disagreeing(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
+  const std::vector<LandmarkCounts> now = {{100, 80}, {100, 2}, {100, 2}};
+  std::vector<CameraConsensusState> before(3);
+  update_reobservation_ratio(before[1], {100, 70}, options);
+  update_reobservation_ratio(before[2], {100, 45}, options);
+  EXPECT_EQ(cameras_losing_view(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
+  update_reobservation_ratio(before[1], {10, 0}, options);  // too few landmarks, no update
+  EXPECT_EQ(cameras_losing_view(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
 }
 
-TEST(CameraConsensus, ACameraLongOutIsTriedAgainUnlessItsViewIsDisplaced) {
+TEST(CameraConsensus, RetriesACameraAfterALongTimeUnlessItsViewIsDisplaced) {
   const ConsensusOptions options;
   const TimeNs later = from_seconds(options.retry_after_s);
   for (const bool displaced : {false, true}) {
-    CameraTrust camera;
-    doubt(camera, {100, 2}, 0, options);
+    CameraConsensusState camera;
+    update_exclusion(camera, {100, 2}, 0, options);
     EXPECT_FALSE(due_for_retry(camera, later - 1, options));
-    doubt(camera, {100, 2}, later, options);
+    update_exclusion(camera, {100, 2}, later, options);
     ASSERT_TRUE(due_for_retry(camera, later, options));
     retry(camera, {100, displaced ? 60 : 3}, later, options);
-    EXPECT_EQ(camera.doubted, displaced);
+    EXPECT_EQ(camera.excluded, displaced);
     EXPECT_FALSE(due_for_retry(camera, later + 1, options));
     EXPECT_EQ(due_for_retry(camera, 2 * later, options), displaced);
   }
 }
 
-TEST(CameraConsensus, KeepsDoubtsThroughALossButOfCamerasThatSawThePlace) {
-  std::vector<CameraTrust> cameras(3);
-  cameras[0].doubted = cameras[1].doubted = true;
+TEST(CameraConsensus, ReadmitsOnlyCamerasThatObserveThePlaceAfterALoss) {
+  std::vector<CameraConsensusState> cameras(3);
+  cameras[0].excluded = cameras[1].excluded = true;
   cameras[2].landmarks = {LandmarkId(4)};
-  const auto after = doubts_of(cameras, {5, 60, 0}, {});
-  EXPECT_TRUE(after[0].doubted);
-  EXPECT_FALSE(after[1].doubted);
+  const auto after = readmit_observing_cameras(cameras, {5, 60, 0}, {});
+  EXPECT_TRUE(after[0].excluded);
+  EXPECT_FALSE(after[1].excluded);
   EXPECT_TRUE(after[2].landmarks.empty());
   EXPECT_FALSE(after[0].established || after[2].established);
   EXPECT_TRUE(after[1].established);
 }
 
-// A camera that is late is left out until the motion is known. What it then finds of what the others mapped, it may
-// mistake.
-TEST(CameraConsensus, DoesNotJudgeACameraByWhatOnlyOthersHaveSeen) {
+// A camera that captures late is skipped until the motion is known. Its first matches are to landmarks observed by
+// other cameras only, and may be wrong.
+TEST(CameraConsensus, DoesNotFlagACameraThatIsNotEstablished) {
   const FrameMatches matches{FrameMatches::value_type(100), FrameMatches::value_type(33)};
-  std::vector<CameraTrust> cameras(2);
+  std::vector<CameraConsensusState> cameras(2);
   cameras[0].established = true;
-  EXPECT_EQ(contradicting(matches, {95, 7}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
-  EXPECT_EQ(contradicting(matches, {20, 7}, cameras, {}), (std::vector<std::uint8_t>{1, 0}));
+  EXPECT_EQ(conflicting_cameras(matches, {95, 7}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(conflicting_cameras(matches, {20, 7}, cameras, {}), (std::vector<std::uint8_t>{1, 0}));
   cameras[1].established = true;
-  EXPECT_EQ(contradicting(matches, {95, 7}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
-  doubt(cameras[1], {100, 2}, 0, {});
-  for (int k = 1; k <= ConsensusOptions{}.readmit_after; ++k) doubt(cameras[1], {100, 60}, k, {});
-  EXPECT_FALSE(cameras[1].doubted);
+  EXPECT_EQ(conflicting_cameras(matches, {95, 7}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
+  update_exclusion(cameras[1], {100, 2}, 0, {});
+  for (int k = 1; k <= ConsensusOptions{}.readmit_after; ++k) update_exclusion(cameras[1], {100, 60}, k, {});
+  EXPECT_FALSE(cameras[1].excluded);
   EXPECT_TRUE(cameras[1].established);
 }
 
-class WrongPictures : public ::testing::Test {
+class WrongImages : public ::testing::Test {
  protected:
   static const map::SimulatedMap& world() {
     static const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 2.0, 0.25);
     return world;
   }
-  // The frame, with the pictures of camera `from` in camera `to`: its keypoints as the rig would take them to be.
-  static synthetic::SimulatedFrame with_pictures_of(int i, std::size_t to, std::size_t from) {
+  // Frame i with the image of camera `from` in camera `to`: bearings are computed with the model of `to`.
+  static synthetic::SimulatedFrame with_images_of(int i, std::size_t to, std::size_t from) {
     synthetic::SimulatedFrame seen = world().sim.frame(FrameId(i), 0.05 * i);
     frame::CameraFrame& camera = seen.frame.cameras[to];
     const camera::Rig& rig = world().map.rig();
@@ -125,60 +126,59 @@ class WrongPictures : public ::testing::Test {
   }
 };
 
-TEST_F(WrongPictures, AreLeftOutAtOnceAndTheirCameraComesBackWithItsOwn) {
+TEST_F(WrongImages, AreExcludedImmediatelyAndTheCameraIsReadmittedLater) {
   SimulatedTracker tracker(world());
   const int readmitted = 20 + ConsensusOptions{}.readmit_after;
   for (int i = 1; i < 30; ++i) {
     const bool wrong = i >= 10 && i < 20;
-    const auto seen = wrong ? with_pictures_of(i, 2, 3) : world().sim.frame(FrameId(i), 0.05 * i);
+    const auto seen = wrong ? with_images_of(i, 2, 3) : world().sim.frame(FrameId(i), 0.05 * i);
     const TrackOutput out = tracker.track(seen.frame);
     ASSERT_EQ(out.result.status, TrackStatus::kTracking) << i;
     EXPECT_LT(map::distance_m(out.result.T_rig_world, seen.T_world_rig.inverse()), 0.012) << i;
-    EXPECT_EQ(out.result.cameras[2].doubted, i >= 10 && i < readmitted) << i;
-    EXPECT_EQ(out.result.cameras[2].inliers > 0, !out.result.cameras[2].doubted) << i;
+    EXPECT_EQ(out.result.cameras[2].excluded, i >= 10 && i < readmitted) << i;
+    EXPECT_EQ(out.result.cameras[2].inliers > 0, !out.result.cameras[2].excluded) << i;
     for (const std::size_t c : {0, 1, 3})
-      EXPECT_FALSE(out.result.cameras[c].doubted) << "camera " << c << ", frame " << i;
+      EXPECT_FALSE(out.result.cameras[c].excluded) << "camera " << c << ", frame " << i;
   }
 }
 
-TEST_F(WrongPictures, AreLeftOutOfACameraOfHalfTheRateAsWell) {
+TEST_F(WrongImages, AreExcludedForACameraOfHalfTheRate) {
   SimulatedTracker tracker(world());
   const int readmitted = 20 + 2 * ConsensusOptions{}.readmit_after;
   const std::vector<int> missing = {2};
   for (int i = 1; i < 36; ++i) {
     const bool wrong = i >= 10 && i < 20;
     const auto seen = i % 2 == 1 ? world().sim.frame(FrameId(i), 0.05 * i, missing)
-                      : wrong    ? with_pictures_of(i, 2, 3)
+                      : wrong    ? with_images_of(i, 2, 3)
                                  : world().sim.frame(FrameId(i), 0.05 * i);
     const TrackOutput out = tracker.track(seen.frame);
     ASSERT_EQ(out.result.status, TrackStatus::kTracking) << i;
     if (i % 2 == 1) continue;
-    EXPECT_EQ(out.result.cameras[2].doubted, i >= 10 && i < readmitted) << i;
+    EXPECT_EQ(out.result.cameras[2].excluded, i >= 10 && i < readmitted) << i;
   }
 }
 
-TEST_F(WrongPictures, InAllCamerasButOneLeaveThatOneToGoOn) {
+TEST_F(WrongImages, TrackingContinuesWithOneCorrectCamera) {
   SimulatedTracker tracker(world());
   for (int i = 1; i < 20; ++i) {
     auto seen = world().sim.frame(FrameId(i), 0.05 * i);
     if (i >= 8) {
-      for (const std::size_t c : {0, 1, 2})
-        seen.frame.cameras[c] = with_pictures_of(i, c, (c + 2) % 4).frame.cameras[c];
+      for (const std::size_t c : {0, 1, 2}) seen.frame.cameras[c] = with_images_of(i, c, (c + 2) % 4).frame.cameras[c];
       seen.frame.bundled = matching::make_bundled(world().map.rig(), seen.frame.cameras, {}, 5e-4, 7.81);
     }
     const TrackOutput out = tracker.track(seen.frame);
     ASSERT_EQ(out.result.status, TrackStatus::kTracking) << i;
     EXPECT_LT(map::distance_m(out.result.T_rig_world, seen.T_world_rig.inverse()), 0.03) << i;
-    EXPECT_FALSE(out.result.cameras[3].doubted) << i;
-    EXPECT_EQ(out.result.cameras[2].doubted, i >= 8) << i;
+    EXPECT_FALSE(out.result.cameras[3].excluded) << i;
+    EXPECT_EQ(out.result.cameras[2].excluded, i >= 8) << i;
   }
 }
 
-TEST(LeavingOutACamera, KeepsTheFeaturesOfTheOthers) {
+TEST(RemoveCamera, KeepsTheFeaturesOfTheOtherCameras) {
   const auto sim = simulator(synthetic::ring_rig(3));
   frame::BundledFrame frame = sim.frame(FrameId(1), 0.5).frame;
   const std::size_t others = frame.cameras[0].keypoints.size() + frame.cameras[1].keypoints.size();
-  leave_out(sim.rig(), 2, 5e-4, 7.81, frame);
+  remove_camera(sim.rig(), 2, 5e-4, 7.81, frame);
   EXPECT_EQ(frame.num_keypoints(), others);
   EXPECT_EQ(frame.cameras[2].state, image::ImageState::kMissing);
   std::size_t keypoints = 0;

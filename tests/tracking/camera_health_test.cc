@@ -9,10 +9,10 @@
 namespace bslam::tracking {
 namespace {
 
-constexpr int kWidth = 101, kHeight = 40;  // rows do not end on a word
+constexpr int kWidth = 101, kHeight = 40;  // the width is not a multiple of 8, the word size of the hash
 
 // Grey values within [low, high], different for every seed.
-image::Image picture(std::uint64_t seed, int low, int high) {
+image::Image textured_image(std::uint64_t seed, int low, int high) {
   Random random(seed);
   image::Image image(kWidth, kHeight);
   for (int y = 0; y < kHeight; ++y) {
@@ -24,7 +24,7 @@ image::Image picture(std::uint64_t seed, int low, int high) {
   return image;
 }
 
-image::Image good(std::uint64_t seed) { return picture(seed, 20, 200); }
+image::Image good(std::uint64_t seed) { return textured_image(seed, 20, 200); }
 
 image::ImageBundle frame(std::vector<image::Image> images) {
   image::ImageBundle bundle;
@@ -37,82 +37,85 @@ image::ImageBundle frame(std::vector<image::Image> images) {
 
 using Outages = std::vector<CameraReason>;
 
-TEST(CameraMonitor, PassesOrdinaryPictures) {
+TEST(CameraMonitor, AcceptsOrdinaryImages) {
   CameraMonitor monitor(2, {});
   for (std::uint64_t k = 0; k < 5; ++k) {
-    EXPECT_EQ(monitor.judge(frame({good(2 * k), good(2 * k + 1)})),
+    EXPECT_EQ(monitor.find_outages(frame({good(2 * k), good(2 * k + 1)})),
               (Outages{CameraReason::kNone, CameraReason::kNone}));
   }
 }
 
-TEST(CameraMonitor, TellsBlackOverExposedAndMissingApart) {
+TEST(CameraMonitor, DistinguishesBlackOverExposedAndMissingImages) {
   CameraMonitor monitor(3, {});
-  EXPECT_EQ(monitor.judge(frame({picture(1, 0, 12), picture(2, 251, 255), {}})),
+  EXPECT_EQ(monitor.find_outages(frame({textured_image(1, 0, 12), textured_image(2, 251, 255), {}})),
             (Outages{CameraReason::kBlack, CameraReason::kOverExposed, CameraReason::kNoImages}));
 }
 
 TEST(CameraMonitor, ANightSceneWithLampsIsNotBlack) {
-  image::Image night = picture(1, 0, 10);
+  image::Image night = textured_image(1, 0, 10);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < 8; ++x) night.row(y)[x] = 180;
   }
   CameraMonitor monitor(1, {});
-  EXPECT_EQ(monitor.judge(frame({night})), Outages{CameraReason::kNone});
+  EXPECT_EQ(monitor.find_outages(frame({night})), Outages{CameraReason::kNone});
 }
 
-TEST(CameraMonitor, FindsTheFrozenCameraAndNotARigThatStandsStill) {
+TEST(CameraMonitor, DetectsAFrozenCameraButNotARigAtRest) {
   CameraMonitor monitor(2, {});
-  monitor.judge(frame({good(1), good(2)}));
-  EXPECT_EQ(monitor.judge(frame({good(1), good(2)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
+  monitor.find_outages(frame({good(1), good(2)}));
+  EXPECT_EQ(monitor.find_outages(frame({good(1), good(2)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  EXPECT_EQ(monitor.find_outages(frame({good(3), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
 }
 
-TEST(CameraMonitor, AFrozenCameraStaysOutWhereTheOthersMissAFrame) {
+TEST(CameraMonitor, AFrozenCameraStaysFrozenIfTheOthersMissAFrame) {
   CameraMonitor monitor(2, {});
-  monitor.judge(frame({good(1), good(2)}));
-  EXPECT_EQ(monitor.judge(frame({good(3), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
+  monitor.find_outages(frame({good(1), good(2)}));
+  EXPECT_EQ(monitor.find_outages(frame({good(3), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
   for (int k = 0; k < 4; ++k)
-    EXPECT_EQ(monitor.judge(frame({{}, good(2)})), (Outages{CameraReason::kNoImages, CameraReason::kFrozen}));
-  EXPECT_EQ(monitor.judge(frame({good(4), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
+    EXPECT_EQ(monitor.find_outages(frame({{}, good(2)})), (Outages{CameraReason::kNoImages, CameraReason::kFrozen}));
+  EXPECT_EQ(monitor.find_outages(frame({good(4), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
 }
 
-TEST(CameraMonitor, OnePixelIsChangeEnough) {
+TEST(CameraMonitor, AnImageWithOneChangedPixelIsNotFrozen) {
   CameraMonitor monitor(2, {});
   image::Image almost = good(2);
-  monitor.judge(frame({good(1), good(2)}));
+  monitor.find_outages(frame({good(1), good(2)}));
   almost.row(kHeight - 1)[kWidth - 1] ^= 1;
-  EXPECT_EQ(monitor.judge(frame({good(3), almost})), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  EXPECT_EQ(monitor.find_outages(frame({good(3), almost})), (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
-TEST(CameraMonitor, ReadmitsAfterGoodPicturesInARow) {
+TEST(CameraMonitor, ReadmitsAfterConsecutiveGoodImages) {
   CameraMonitor monitor(2, {.readmit_after = 3});
-  monitor.judge(frame({picture(1, 0, 5), good(11)}));
-  EXPECT_EQ(monitor.judge(frame({good(1), good(12)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(2), good(13)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.judge(frame({picture(2, 0, 5), good(14)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(3), good(15)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(4), good(16)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.judge(frame({good(5), good(17)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  monitor.find_outages(frame({textured_image(1, 0, 5), good(11)}));
+  EXPECT_EQ(monitor.find_outages(frame({good(1), good(12)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.find_outages(frame({good(2), good(13)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.find_outages(frame({textured_image(2, 0, 5), good(14)})),
+            (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.find_outages(frame({good(3), good(15)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.find_outages(frame({good(4), good(16)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(monitor.find_outages(frame({good(5), good(17)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
-TEST(CameraMonitor, ReadmitsAtOnceWhereNoOtherIsLeft) {
+TEST(CameraMonitor, ReadmitsImmediatelyIfNoOtherCameraIsLeft) {
   CameraMonitor monitor(3, {.readmit_after = 3});
   const Outages dark(3, CameraReason::kBlack);
-  EXPECT_EQ(monitor.judge(frame({picture(1, 0, 5), picture(2, 0, 5), picture(3, 0, 5)})), dark);
-  EXPECT_EQ(monitor.judge(frame({picture(4, 0, 5), good(1), {}})),
+  EXPECT_EQ(monitor.find_outages(frame({textured_image(1, 0, 5), textured_image(2, 0, 5), textured_image(3, 0, 5)})),
+            dark);
+  EXPECT_EQ(monitor.find_outages(frame({textured_image(4, 0, 5), good(1), {}})),
             (Outages{CameraReason::kBlack, CameraReason::kNone, CameraReason::kNoImages}));
-  EXPECT_EQ(monitor.judge(frame({good(2), good(3), good(4)})),
+  EXPECT_EQ(monitor.find_outages(frame({good(2), good(3), good(4)})),
             (Outages{CameraReason::kBlack, CameraReason::kNone, CameraReason::kBlack}));
 }
 
-TEST(CameraMonitor, ACameraThatComesNowAndThenIsTakenAsItComes) {
+TEST(CameraMonitor, ACameraIsUsedWithItsFirstImageAfterMissingOnes) {
   CameraMonitor monitor(2, {});
-  monitor.judge(frame({good(1), good(2)}));
-  EXPECT_EQ(monitor.judge(frame({good(3), {}})), (Outages{CameraReason::kNone, CameraReason::kNoImages}));
-  EXPECT_EQ(monitor.judge(frame({good(4), good(5)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  monitor.find_outages(frame({good(1), good(2)}));
+  EXPECT_EQ(monitor.find_outages(frame({good(3), {}})), (Outages{CameraReason::kNone, CameraReason::kNoImages}));
+  EXPECT_EQ(monitor.find_outages(frame({good(4), good(5)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
-// Tiles of 40 pixels whose edges are blurred by `across` and `along` pixels (standard deviations) in rows and columns.
+// Tiles of 40 pixels whose edges are blurred with standard deviations of `across` pixels along rows and `along` pixels
+// along columns.
 image::Image tiles(double across, double along, int contrast = 60) {
   const auto edge = [](int at, double sigma) {
     const int in_tile = at % 40;
@@ -130,21 +133,21 @@ image::Image tiles(double across, double along, int contrast = 60) {
 
 using Flags = std::vector<std::uint8_t>;
 
-TEST(CameraMonitor, TellsABlurredPictureFromASharpOneAndFromMotion) {
+TEST(CameraMonitor, DistinguishesBlurredImagesFromSharpAndMotionBlurredOnes) {
   CameraMonitor monitor(3, {});
   EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6), tiles(4, 4), tiles(6, 0.6)})), (Flags{0, 1, 0}));
 }
 
-TEST(CameraMonitor, SaysNothingOfBlurWhereThereAreNoEdges) {
+TEST(CameraMonitor, DetectsNoBlurInImagesWithoutEdges) {
   CameraMonitor monitor(2, {});
   EXPECT_EQ(monitor.blurred(frame({tiles(4, 4, 15), {}})), (Flags{0, 0}));
 }
 
-TEST(CameraMonitor, ACameraIsBlurredUntilSomePicturesAreSharp) {
+TEST(CameraMonitor, ACameraIsBlurredUntilSeveralImagesAreSharp) {
   CameraMonitor monitor(1, {});
   EXPECT_EQ(monitor.blurred(frame({tiles(4, 4)})), Flags{1});
   EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{1});
-  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4, 15)})), Flags{1});  // says nothing
+  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4, 15)})), Flags{1});  // too few edges
   EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{1});
   EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{0});
 }

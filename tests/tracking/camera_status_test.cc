@@ -17,20 +17,20 @@ CameraEvidence no_image(ImageState why = ImageState::kMissing) {
   return {.image = why, .outage = CameraReason::kNoImages};
 }
 
-// Status of the first of one camera, or of the first beside a good one.
+// Status of the only camera of a rig.
 CameraStatus alone(const CameraEvidence& evidence) { return CameraStatusMonitor(1).update(std::vector{evidence})[0]; }
 
-TEST(CameraStatus, NamesWhatThePictureSays) {
+TEST(CameraStatus, ReportsTheFaultOfTheImage) {
   EXPECT_EQ(alone(good()), kGood);
   for (const CameraReason reason : {CameraReason::kBlack, CameraReason::kOverExposed, CameraReason::kFrozen}) {
     CameraEvidence evidence = good();
     evidence.outage = reason;
-    evidence.inconsistent = true;  // the picture explains more
+    evidence.inconsistent = true;  // the fault of the image has priority
     EXPECT_EQ(alone(evidence), out(reason)) << describe(reason);
   }
 }
 
-TEST(CameraStatus, ABlurredCameraIsDegradedAsLongAsWhatItSeesFits) {
+TEST(CameraStatus, ABlurredCameraIsDegradedWhileItIsConsistent) {
   CameraEvidence evidence = good();
   evidence.blurred = true;
   EXPECT_EQ(alone(evidence), degraded(CameraReason::kBlurred));
@@ -45,23 +45,23 @@ TEST(CameraStatus, FewFeaturesDegradeACameraThatIsUsed) {
   evidence.keypoints = evidence.inliers = 29;
   EXPECT_EQ(alone(evidence), degraded(CameraReason::kFewFeatures));
   evidence.keypoints = 0;
-  evidence.postponed = true;  // not looked at
+  evidence.postponed = true;  // its image was not used
   EXPECT_EQ(alone(evidence), kGood);
 }
 
-// Statuses of a camera that has an image in the frames whose letter is x.
+// Statuses of a camera that has an image in the frames marked x; O: out.
 std::string statuses(const std::string& images) {
   CameraStatusMonitor monitor(1);
-  std::string told;
+  std::string text;
   for (const char c : images) {
     const CameraStatus status = monitor.update(std::vector{c == 'x' ? good() : no_image()})[0];
     EXPECT_TRUE(status == kGood || status == out(CameraReason::kNoImages));
-    told += status == kGood ? '.' : 'O';
+    text += status == kGood ? '.' : 'O';
   }
-  return told;
+  return text;
 }
 
-TEST(CameraStatus, ACameraOfEveryFrameIsOutWithoutAnImage) { EXPECT_EQ(statuses("xxx-xx--x"), "...O..OO."); }
+TEST(CameraStatus, ACameraOfFullRateIsOutWithoutAnImage) { EXPECT_EQ(statuses("xxx-xx--x"), "...O..OO."); }
 
 TEST(CameraStatus, ASlowCameraIsNotOutBetweenItsImages) {
   EXPECT_EQ(statuses("x--x--x--x--x"), ".............");
@@ -75,13 +75,13 @@ TEST(CameraStatus, ACameraOfUnknownPeriodIsOutAfterSomeFrames) {
   EXPECT_EQ(statuses("x------------"), "...........OO");
 }
 
-TEST(CameraStatus, ADamagedImageIsDue) {
+TEST(CameraStatus, ADamagedImageMeansTheCameraIsOut) {
   CameraStatusMonitor monitor(1);
   for (const bool image : {true, false, true, false}) monitor.update(std::vector{image ? good() : no_image()});
   EXPECT_EQ(monitor.update(std::vector{no_image(ImageState::kDamaged)})[0], out(CameraReason::kNoImages));
 }
 
-// Status of the second camera of two after `frames` frames in which it and the first had these shares of inliers.
+// Status of the second of two cameras after `frames` frames with these numbers of inliers.
 CameraStatus after(int frames, int inliers, int inliers_of_other) {
   CameraStatusMonitor monitor(2);
   CameraEvidence first = good(), second = good();
@@ -92,15 +92,15 @@ CameraStatus after(int frames, int inliers, int inliers_of_other) {
   return status;
 }
 
-TEST(CameraStatus, ACameraThatAgreesWithNothingIsInconsistent) {
+TEST(CameraStatus, ACameraWithHardlyAnyInliersIsInconsistent) {
   EXPECT_EQ(after(12, 5, 200), degraded(CameraReason::kInconsistent));
-  EXPECT_EQ(after(12, 15, 200), kGood);  // with little
-  EXPECT_EQ(after(12, 5, 40), kGood);    // but no other does better
-  EXPECT_EQ(after(5, 5, 200), kGood);    // a new map does not show what all cameras see at once
+  EXPECT_EQ(after(12, 15, 200), kGood);  // low inlier ratio, but not inconsistent
+  EXPECT_EQ(after(12, 5, 40), kGood);    // no other camera has a high inlier ratio
+  EXPECT_EQ(after(5, 5, 200), kGood);    // too few frames
   EXPECT_EQ(after(12, 0, 0), kGood);     // lost
 }
 
-TEST(CameraStatus, NamesAreThoseOfTheSummary) {
+TEST(CameraStatus, NamesMatchTheSummary) {
   EXPECT_EQ(describe(CameraState::kOk), "ok");
   EXPECT_EQ(describe(CameraState::kDegraded), "degraded");
   EXPECT_EQ(describe(CameraState::kOut), "out");

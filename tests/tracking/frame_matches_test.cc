@@ -17,7 +17,7 @@ class FindLandmarks : public ::testing::Test {
   MatchSearch find(const FrameMatches& known) {
     return find_landmarks(world.map, seen.frame, seen.T_world_rig.inverse(), all, known, {.radius = kRadius}, pool);
   }
-  // Of keypoints that show a landmark of the map: how many matches are right, and how many could have been.
+  // For keypoints that show a landmark of the map: number of correct matches and of possible matches.
   std::pair<std::size_t, std::size_t> right(const FrameMatches& found) const {
     std::size_t right = 0, possible = 0;
     for (std::size_t c = 0; c < found.size(); ++c) {
@@ -29,7 +29,7 @@ class FindLandmarks : public ::testing::Test {
   }
 };
 
-TEST_F(FindLandmarks, FindsNearlyAllAndHardlyAnyWrong) {
+TEST_F(FindLandmarks, FindsNearlyAllLandmarksWithFewErrors) {
   const MatchSearch search = find({});
   ASSERT_EQ(search.found.size(), 4u);
   const auto [good, possible] = right(search.found);
@@ -45,7 +45,7 @@ TEST_F(FindLandmarks, ListsEachExpectedLandmarkOnceAndInOrder) {
     EXPECT_TRUE(std::binary_search(search.visible.begin(), search.visible.end(), l));
 }
 
-TEST_F(FindLandmarks, LeavesOutWhatIsKnownCameraByCamera) {
+TEST_F(FindLandmarks, SkipsKnownMatchesPerCamera) {
   const MatchSearch first = find({});
   FrameMatches known = first.found;
   known[1].clear();
@@ -72,7 +72,7 @@ TEST_F(FindLandmarks, ACameraWithoutImageFindsNothing) {
   EXPECT_FALSE(search.found[0].empty());
 }
 
-TEST_F(FindLandmarks, WhatDoesNotAlignKeepsItsPlaceWithTheDetectorsNoise) {
+TEST_F(FindLandmarks, KeypointsThatCannotBeAlignedKeepTheirPositionAndDetectorNoise) {
   MatchSearch search = find({});
   const feature::Keypoints& keypoints = seen.frame.cameras[0].keypoints;
   const AlignedMatches aligned =
@@ -87,8 +87,8 @@ TEST_F(FindLandmarks, WhatDoesNotAlignKeepsItsPlaceWithTheDetectorsNoise) {
   }
 }
 
-// Outliers stay where they were, the frame that was aligned stays as it is, and what does not move is shared.
-TEST_F(FindLandmarks, TheRefinedFrameHasTheInliersAtTheirAlignedPositions) {
+// Outliers keep their position, the input frame is unchanged, and unchanged data is shared.
+TEST_F(FindLandmarks, RefinedFrameHasInliersAtAlignedPositions) {
   const FrameMatches found = find({}).found;
   AlignedMatches aligned(found.size());
   std::vector<std::uint8_t> inlier;

@@ -14,7 +14,7 @@ map::MapDraft empty_draft(const synthetic::FeatureSimulator& sim) {
   return map::MapDraft(std::make_shared<const map::BundledMap>(std::make_shared<const camera::Rig>(sim.rig())));
 }
 
-TEST(StartMetric, MakesLandmarksAtTheirTruePlaces) {
+TEST(InitialiseMetric, CreatesLandmarksAtTheirTruePositions) {
   const auto sim = simulator(synthetic::ring_rig(2));
   const auto seen = sim.frame(FrameId(0), 0.0);
   map::MapDraft draft = empty_draft(sim);
@@ -37,7 +37,7 @@ TEST(StartMetric, MakesLandmarksAtTheirTruePlaces) {
   }
 }
 
-TEST(StartMetric, WaitsForEnoughMatchedFeatures) {
+TEST(InitialiseMetric, FailsWithTooFewMatchedFeatures) {
   const auto sim = simulator(synthetic::ring_rig(2));
   const std::vector<int> missing = {1};
   map::MapDraft draft = empty_draft(sim);
@@ -46,7 +46,7 @@ TEST(StartMetric, WaitsForEnoughMatchedFeatures) {
   EXPECT_EQ(draft.map().num_keyframes(), 0u);
 }
 
-TEST(StartMetric, WaitsWhereNothingIsNearEnoughForDepth) {
+TEST(InitialiseMetric, FailsIfAllPointsAreTooFarForAccurateDepth) {
   synthetic::FeatureSimulatorOptions options = room();
   options.room_low = {-60, -60, -60};
   options.room_high = {60, 60, 60};
@@ -58,7 +58,7 @@ TEST(StartMetric, WaitsWhereNothingIsNearEnoughForDepth) {
   EXPECT_TRUE(!started || draft.map().num_landmarks() >= 60u) << draft.map().num_landmarks() << " landmarks";
 }
 
-class StartUpToScale : public ::testing::Test {
+class InitialiseMonocular : public ::testing::Test {
  protected:
   std::optional<StartedMap> start(const synthetic::SimulatedFrame& first, const synthetic::SimulatedFrame& second,
                                   map::MapDraft& draft, const InitialisationOptions& options = {}) {
@@ -74,7 +74,7 @@ class StartUpToScale : public ::testing::Test {
   }
 };
 
-TEST_F(StartUpToScale, FindsTheMotionAndTheRoomUpToScale) {
+TEST_F(InitialiseMonocular, EstimatesMotionAndStructureUpToScale) {
   const auto sim = simulator(synthetic::ring_rig(1), room(1, 0.25), {.radius = 2.2, .period_s = 20});
   const auto first = sim.frame(FrameId(0), 0.0);
   auto second = first;
@@ -115,7 +115,7 @@ TEST_F(StartUpToScale, FindsTheMotionAndTheRoomUpToScale) {
   EXPECT_LT(relative[relative.size() / 2], 0.1);
 }
 
-TEST_F(StartUpToScale, WaitsForParallax) {
+TEST_F(InitialiseMonocular, FailsWithoutParallax) {
   const auto sim = simulator(synthetic::ring_rig(1));
   map::MapDraft draft = empty_draft(sim);
   EXPECT_FALSE(start(sim.frame(FrameId(0), 0.0), sim.frame(FrameId(1), 0.0), draft).has_value());
@@ -123,7 +123,7 @@ TEST_F(StartUpToScale, WaitsForParallax) {
   EXPECT_EQ(draft.map().num_keyframes(), 0u);
 }
 
-TEST_F(StartUpToScale, DoesNotStartBetweenTwoPlaces) {
+TEST_F(InitialiseMonocular, FailsForFramesOfTwoPlaces) {
   const auto sim = simulator(synthetic::ring_rig(1));
   map::MapDraft draft = empty_draft(sim);
   EXPECT_FALSE(start(sim.frame(FrameId(0), 0.0), sim.frame(FrameId(1), 6.0), draft).has_value());
@@ -131,8 +131,8 @@ TEST_F(StartUpToScale, DoesNotStartBetweenTwoPlaces) {
   EXPECT_FALSE(start(sim.frame(FrameId(0), 0.0), elsewhere.frame(FrameId(1), 0.3), draft).has_value());
 }
 
-TEST_F(StartUpToScale, ATurningRigWithoutOverlapStartsAboutAsLargeAsItIs) {
-  int told = 0;
+TEST_F(InitialiseMonocular, ARotatingRigWithoutOverlapIsInitialisedAtApproximateScale) {
+  int num_estimated = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const auto sim = simulator(three_sides(), room(seed, 0.25), {.seed = seed});
     ASSERT_FALSE(sim.rig().any_overlap());
@@ -140,21 +140,21 @@ TEST_F(StartUpToScale, ATurningRigWithoutOverlapStartsAboutAsLargeAsItIs) {
     map::MapDraft draft = empty_draft(sim);
     const auto started = start(first, second, draft);
     ASSERT_TRUE(started.has_value());
-    EXPECT_EQ(started->scale, map::Scale::kUnobservable);  // two frames do not decide it
+    EXPECT_EQ(started->scale, map::Scale::kUnobservable);  // two frames do not suffice
     EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
     const SE3 found = draft.map().keyframe(KeyframeId(1)).T_rig_world,
               truth = second.T_world_rig.inverse() * first.T_world_rig;
     EXPECT_LT(map::angle_rad(found, truth), 0.5 * kDegree);
     if (!std::isfinite(started->scale_deviation)) continue;
-    ++told;
+    ++num_estimated;
     EXPECT_LE(started->scale_deviation, 0.3);
     const double ratio = found.translation().norm() / truth.translation().norm();
     EXPECT_NEAR(ratio, 1.0, 4 * started->scale_deviation) << "seed " << seed;
   }
-  EXPECT_GE(told, 3);
+  EXPECT_GE(num_estimated, 3);
 }
 
-TEST_F(StartUpToScale, GuessesTheDepthWhereTwoFramesDoNotTellTheScale) {
+TEST_F(InitialiseMonocular, AssumesTheDepthIfTwoFramesDoNotDetermineTheScale) {
   const auto sim = simulator(three_sides(), room(1, 0.25));
   map::MapDraft draft = empty_draft(sim);
   InitialisationOptions options;

@@ -7,7 +7,7 @@
 namespace bslam::tracking {
 namespace {
 
-// A rig in motion with plenty in common with its reference: nothing asks for a keyframe.
+// A slowly moving rig with a large overlap with its reference: no keyframe is due.
 KeyframeEvidence calm() {
   KeyframeEvidence e;
   e.frames_since_keyframe = 10;
@@ -18,9 +18,9 @@ KeyframeEvidence calm() {
 }
 const KeyframeOptions kOptions;
 
-TEST(KeyframeDecision, NothingAsksForOneInCalmMotion) { EXPECT_FALSE(keyframe_due(calm(), kOptions)); }
+TEST(KeyframeDecision, NoKeyframeInSlowMotion) { EXPECT_FALSE(keyframe_due(calm(), kOptions)); }
 
-TEST(KeyframeDecision, OverlapBelowItsShareOfTheBestAsksForOne) {
+TEST(KeyframeDecision, DueIfOverlapFallsBelowAFractionOfItsMaximum) {
   KeyframeEvidence e = calm();
   e.overlap = 76;
   EXPECT_FALSE(keyframe_due(e, kOptions));
@@ -30,22 +30,22 @@ TEST(KeyframeDecision, OverlapBelowItsShareOfTheBestAsksForOne) {
   EXPECT_FALSE(keyframe_due(e, kOptions));
 }
 
-TEST(KeyframeDecision, ParallaxAsksForOne) {
+TEST(KeyframeDecision, DueIfParallaxIsLarge) {
   KeyframeEvidence e = calm();
   e.parallax = 0.061;
   EXPECT_TRUE(keyframe_due(e, kOptions));
 }
 
-TEST(KeyframeDecision, FreshDepthAsksForOne) {
+TEST(KeyframeDecision, DueIfManyFeaturesWithDepthAreUntracked) {
   KeyframeEvidence e = calm();
-  e.fresh_depth = true;
+  e.untracked_depth = true;
   EXPECT_TRUE(keyframe_due(e, kOptions));
 }
 
-TEST(KeyframeDecision, NothingHurriesTheLeastInterval) {
+TEST(KeyframeDecision, NeverDueWithinTheMinimumInterval) {
   KeyframeEvidence e;
   e.parallax = 1;
-  e.fresh_depth = e.starved = true;
+  e.untracked_depth = e.camera_with_few_inliers = true;
   e.best_overlap = 100;
   e.frames_since_keyframe = kOptions.min_interval - 1;
   EXPECT_FALSE(keyframe_due(e, kOptions));
@@ -53,7 +53,7 @@ TEST(KeyframeDecision, NothingHurriesTheLeastInterval) {
   EXPECT_TRUE(keyframe_due(e, kOptions));
 }
 
-TEST(KeyframeDecision, TheLongestIntervalEndsUnlessTheRigRests) {
+TEST(KeyframeDecision, DueAfterTheMaximumIntervalUnlessTheRigIsAtRest) {
   KeyframeEvidence e = calm();
   e.frames_since_keyframe = kOptions.max_interval - 1;
   EXPECT_FALSE(keyframe_due(e, kOptions));
@@ -64,9 +64,9 @@ TEST(KeyframeDecision, TheLongestIntervalEndsUnlessTheRigRests) {
   EXPECT_FALSE(keyframe_due(e, kOptions));
 }
 
-TEST(KeyframeDecision, AStarvedCameraAsksForOneNowAndThenUnlessTheRigRests) {
+TEST(KeyframeDecision, DuePeriodicallyIfACameraHasFewInliersUnlessTheRigIsAtRest) {
   KeyframeEvidence e = calm();
-  e.starved = true;
+  e.camera_with_few_inliers = true;
   e.frames_since_keyframe = 4;
   EXPECT_FALSE(keyframe_due(e, kOptions));
   e.frames_since_keyframe = 8;
@@ -82,7 +82,7 @@ class KeyframeEvidenceTest : public ::testing::Test {
     static const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 0.0, 1.0);
     return world;
   }
-  // Every keypoint that shows a landmark of the map, in the cameras asked for.
+  // The true matches of the given cameras.
   static FrameMatches true_matches(const synthetic::SimulatedFrame& frame, const std::vector<int>& cameras) {
     FrameMatches matches(frame.frame.cameras.size());
     for (const int c : cameras) {
@@ -97,14 +97,14 @@ class KeyframeEvidenceTest : public ::testing::Test {
   }
 };
 
-TEST_F(KeyframeEvidenceTest, CountsTheLandmarksOfTheReferenceOnce) {
+TEST_F(KeyframeEvidenceTest, CountsEachLandmarkOfTheReferenceOnce) {
   const auto frame = world().sim.frame(FrameId(1), 0.1);
   const FrameMatches matches = true_matches(frame, {0, 1, 2, 3});
   const KeyframeEvidence e = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0),
                                                frame.T_world_rig.inverse(), TrackingOptions());
   EXPECT_EQ(e.overlap, static_cast<int>(landmarks_of(matches).size()));  // the map is one keyframe
-  EXPECT_FALSE(e.starved);
-  EXPECT_FALSE(e.fresh_depth);
+  EXPECT_FALSE(e.camera_with_few_inliers);
+  EXPECT_FALSE(e.untracked_depth);
 }
 
 TEST_F(KeyframeEvidenceTest, MeasuresParallaxAtTheLandmarks) {
@@ -113,8 +113,8 @@ TEST_F(KeyframeEvidenceTest, MeasuresParallaxAtTheLandmarks) {
   const geometry::SE3 here = world().true_pose(KeyframeId(0));
   EXPECT_NEAR(keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), here, TrackingOptions()).parallax,
               0.0, 1e-9);
-  const geometry::SE3 turned = geometry::SE3::exp((geometry::Vector6d() << 0.1, 0.2, 0, 0, 0, 0).finished()) * here;
-  EXPECT_NEAR(keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), turned, TrackingOptions()).parallax,
+  const geometry::SE3 rotated = geometry::SE3::exp((geometry::Vector6d() << 0.1, 0.2, 0, 0, 0, 0).finished()) * here;
+  EXPECT_NEAR(keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0), rotated, TrackingOptions()).parallax,
               0.0, 1e-9);
   const geometry::SE3 moved(here.rotation(), here.translation() + Eigen::Vector3d(0, 0.2, 0));
   const double parallax =
@@ -123,25 +123,25 @@ TEST_F(KeyframeEvidenceTest, MeasuresParallaxAtTheLandmarks) {
   EXPECT_LT(parallax, 0.2 / 1.5);
 }
 
-TEST_F(KeyframeEvidenceTest, NoticesACameraThatFindsNothing) {
+TEST_F(KeyframeEvidenceTest, DetectsACameraWithoutInliers) {
   const auto frame = world().sim.frame(FrameId(1), 0.1);
   const geometry::SE3 pose = frame.T_world_rig.inverse();
   EXPECT_TRUE(keyframe_evidence(world().map, frame.frame, true_matches(frame, {0, 1, 2}), KeyframeId(0), pose,
                                 TrackingOptions())
-                  .starved);
-  const std::vector<int> missing = {3};  // a camera without keypoints does not starve
+                  .camera_with_few_inliers);
+  const std::vector<int> missing = {3};  // a camera without keypoints is ignored
   const auto three = world().sim.frame(FrameId(1), 0.1, missing);
   EXPECT_FALSE(keyframe_evidence(world().map, three.frame, true_matches(three, {0, 1, 2}), KeyframeId(0), pose,
                                  TrackingOptions())
-                   .starved);
+                   .camera_with_few_inliers);
 }
 
-TEST_F(KeyframeEvidenceTest, NoticesMatchedFeaturesThatNobodyTracks) {
+TEST_F(KeyframeEvidenceTest, DetectsUntrackedFeaturesWithDepth) {
   const auto frame = world().sim.frame(FrameId(1), 0.1);
-  FrameMatches matches = true_matches(frame, {2, 3});  // the two in front, which overlap, have nothing
+  FrameMatches matches = true_matches(frame, {2, 3});  // the two front cameras, which overlap, have no matches
   const KeyframeEvidence e = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0),
                                                frame.T_world_rig.inverse(), TrackingOptions());
-  EXPECT_TRUE(e.fresh_depth);
+  EXPECT_TRUE(e.untracked_depth);
 }
 
 }  // namespace

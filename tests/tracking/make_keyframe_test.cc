@@ -12,7 +12,7 @@ namespace {
 using frame::KeypointRef;
 
 // unique = monocular + matched; every keypoint in one feature; one keypoint per camera.
-void expect_sound_table(const frame::BundledFrame& frame) {
+void expect_consistent_table(const frame::BundledFrame& frame) {
   std::size_t keypoints = 0;
   EXPECT_EQ(frame.bundled.size(), frame.bundled.num_matched() + frame.bundled.num_monocular());
   for (std::size_t f = 0; f < frame.bundled.size(); ++f) {
@@ -49,12 +49,12 @@ class MakeKeyframe : public ::testing::Test {
   std::vector<image::Pyramid> pyramids = map::flat_pyramids(4);
 };
 
-TEST_F(MakeKeyframe, KeypointsThatShowOneLandmarkBecomeOneFeature) {
+TEST_F(MakeKeyframe, KeypointsOfOneLandmarkBecomeOneFeature) {
   map::MapDraft draft = world.draft();
   const NewKeyframe made = make(draft);
   const map::BundledMap& map = draft.map();
   const frame::BundledFrame& stored = *map.keyframe(made.keyframe).frame;
-  expect_sound_table(stored);
+  expect_consistent_table(stored);
   std::size_t joined = 0;
   for (std::size_t c = 0; c < matches.size(); ++c) {
     for (const Match& m : matches[c]) {
@@ -64,11 +64,11 @@ TEST_F(MakeKeyframe, KeypointsThatShowOneLandmarkBecomeOneFeature) {
                 !seen.frame.bundled.is_matched(seen.frame.bundled.feature(CameraIndex(c), m.keypoint));
     }
   }
-  EXPECT_GT(joined, 20u);  // a fifth of what two cameras see was not known as matched before
+  EXPECT_GT(joined, 20u);  // a fifth of the landmarks seen by two cameras was not matched between them before
   EXPECT_EQ(map.check_invariants(), std::nullopt);
 }
 
-TEST_F(MakeKeyframe, MatchedFeaturesOfSoundDepthGetLandmarksAtTheirPlace) {
+TEST_F(MakeKeyframe, MatchedFeaturesWithAccurateDepthBecomeLandmarksAtTheirPoint) {
   map::MapDraft draft = world.draft();
   const std::size_t before = draft.map().landmark_slots();
   const NewKeyframe made = make(draft);
@@ -93,7 +93,7 @@ TEST_F(MakeKeyframe, MatchedFeaturesOfSoundDepthGetLandmarksAtTheirPlace) {
   EXPECT_GE(static_cast<double>(near), 0.97 * static_cast<double>(fresh));
 }
 
-TEST_F(MakeKeyframe, NamesEveryLandmarkItObservesInOrder) {
+TEST_F(MakeKeyframe, ListsEveryObservedLandmarkInOrder) {
   map::MapDraft draft = world.draft();
   const NewKeyframe made = make(draft);
   std::vector<LandmarkId> table;
@@ -107,7 +107,7 @@ TEST_F(MakeKeyframe, NamesEveryLandmarkItObservesInOrder) {
 }
 
 TEST_F(MakeKeyframe, TwoLandmarksNeverShareAFeature) {
-  // A feature whose two keypoints were matched to different landmarks falls apart.
+  // A feature whose two keypoints were matched to different landmarks is split.
   FeatureId torn;
   for (std::size_t f = 0; f < seen.frame.bundled.num_matched() && !torn.valid(); ++f) {
     if (world.landmark_of.contains(map::shown_by(seen, FeatureId(f)))) torn = FeatureId(f);
@@ -129,14 +129,14 @@ TEST_F(MakeKeyframe, TwoLandmarksNeverShareAFeature) {
   map::MapDraft draft = world.draft();
   const NewKeyframe made = make(draft);
   const frame::BundledFrame& stored = *draft.map().keyframe(made.keyframe).frame;
-  expect_sound_table(stored);
+  expect_consistent_table(stored);
   const KeypointRef first = seen.frame.bundled.keypoints(torn)[0];
   EXPECT_NE(stored.bundled.feature(first), stored.bundled.feature(second));
   EXPECT_EQ(draft.map().landmark_of(made.keyframe, stored.bundled.feature(second)), other);
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
-TEST_F(MakeKeyframe, ACommitGivesTheSameMap) {
+TEST_F(MakeKeyframe, CommitGivesTheSameMap) {
   map::MapStore store(world.map);
   map::MapDraft draft(store.snapshot());
   const NewKeyframe made = make(draft);
@@ -147,14 +147,14 @@ TEST_F(MakeKeyframe, ACommitGivesTheSameMap) {
   EXPECT_EQ(store.snapshot()->num_keyframes(), 2u);
 }
 
-TEST_F(MakeKeyframe, WorksWithACameraMissing) {
+TEST_F(MakeKeyframe, WorksWithAMissingCamera) {
   const std::vector<int> missing = {0};
   seen = world.sim.frame(FrameId(1), 0.3, missing);
   matches.clear();
   SetUp();
   map::MapDraft draft = world.draft();
   const NewKeyframe made = make(draft);
-  expect_sound_table(*draft.map().keyframe(made.keyframe).frame);
+  expect_consistent_table(*draft.map().keyframe(made.keyframe).frame);
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 

@@ -21,7 +21,7 @@ class PoseBetween : public ::testing::Test {
   ThreadPool pool_;
 };
 
-TEST_F(PoseBetween, IsThatOfTheFrame) {
+TEST_F(PoseBetween, EqualsThePoseOfTheFrame) {
   for (const double time_s : {0.1, 0.3, 0.5}) {
     const auto seen = world_.sim.frame(FrameId(7), time_s);
     const auto result = verify_place(seen.frame);
@@ -35,13 +35,13 @@ TEST_F(PoseBetween, IsThatOfTheFrame) {
   }
 }
 
-TEST_F(PoseBetween, OfTheFirstKeyframeIsItsOwn) {
+TEST_F(PoseBetween, OfTheFirstKeyframeIsItsOwnPose) {
   const auto result = verify_place(world_.frames[0].frame);
   ASSERT_TRUE(result);
   EXPECT_EQ(result->T_rig_world.matrix(), world_.map.keyframe(KeyframeId(0)).T_rig_world.matrix());
 }
 
-TEST_F(PoseBetween, AlsoWhereTheSecondKeyframeWasCulled) {
+TEST_F(PoseBetween, WorksAfterTheSecondKeyframeWasCulled) {
   ASSERT_TRUE(world_.map.remove_keyframe(KeyframeId(1)));
   const auto seen = world_.sim.frame(FrameId(7), 0.3);
   const auto result = verify_place(seen.frame);
@@ -50,7 +50,7 @@ TEST_F(PoseBetween, AlsoWhereTheSecondKeyframeWasCulled) {
   EXPECT_LT(map::distance_m(result->T_rig_world, seen.T_world_rig.inverse()), 0.02);
 }
 
-TEST_F(PoseBetween, IsNoneForAFrameOfAnotherPlace) {
+TEST_F(PoseBetween, FailsForAFrameOfAnotherPlace) {
   EXPECT_FALSE(verify_place(simulator(synthetic::ring_rig(1), room(99)).frame(FrameId(7), 0.3).frame));
 }
 

@@ -1,4 +1,4 @@
-// Tracking against a map made from the truth.
+// Tracking in a map created from the ground truth.
 #pragma once
 
 #include "mapping/simulated_map.h"
@@ -25,14 +25,14 @@ inline synthetic::FeatureSimulator simulator(camera::Rig rig,
   return synthetic::FeatureSimulator(std::move(rig), synthetic::make_orbit(orbit), options);
 }
 
-// Keyframes every `step_s` until `to_s`, numbered from 1000 so that tracked frames have noise of their own.
+// Keyframes every `step_s` until `to_s`, numbered from 1000 so that tracked frames have different noise.
 inline map::SimulatedMap true_map(synthetic::FeatureSimulator sim, double to_s, double step_s) {
   map::SimulatedMap out(std::move(sim));
   for (int i = 0; step_s * i <= to_s; ++i) out.add_keyframe(FrameId(1000 + i), step_s * i);
   return out;
 }
 
-// The state of a tracker that made keyframe 0 a moment ago.
+// The state of a tracker that has just created keyframe 0.
 inline TrackerState state_at_first(const map::SimulatedMap& world) {
   const KeyframeId first(0);
   std::vector<LandmarkId> seen;
@@ -74,7 +74,7 @@ class SimulatedTracker {
   ThreadPool pool_;
 };
 
-// Observations of the matched keypoints as the frame has them, each with its own standard deviation.
+// Observations of the matched keypoints at their positions in the frame, each with its own standard deviation.
 inline std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map,
                                                             const frame::BundledFrame& frame,
                                                             const FrameMatches& matches) {
@@ -89,12 +89,12 @@ inline std::vector<solver::PoseObservation> observations_of(const map::BundledMa
   return out;
 }
 
-// Moves a share of the keypoints by up to 25 pixels: they still look like their landmarks and are where those are not.
-inline void displace_keypoints(const camera::Rig& rig, double share, Random random, frame::BundledFrame& frame) {
+// Moves a fraction of the keypoints by up to 25 pixels without changing their descriptors.
+inline void displace_keypoints(const camera::Rig& rig, double fraction, Random random, frame::BundledFrame& frame) {
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     feature::Refinement k = frame.cameras[c].keypoints.positions();
     for (std::size_t i = 0; i < k.pixel.size(); ++i) {
-      if (random.uniform() >= share) continue;
+      if (random.uniform() >= fraction) continue;
       const Eigen::Vector2d moved =
           k.pixel[i].cast<double>() + Eigen::Vector2d(random.uniform(-25, 25), random.uniform(-25, 25));
       const auto bearing = rig.camera(c).unproject(moved);

@@ -17,8 +17,8 @@ struct RigCase {
   double mean_error_m, mean_angle_deg;  // over all frames, per pixel of noise
 };
 
-// Squared Mahalanobis distance of the pose from the truth under the noise of the keypoints it was made of: six on
-// average where nothing but that noise is at work.
+// Squared Mahalanobis distance of the pose from the truth given the noise of its keypoints; six on average if there are
+// no other errors.
 double squared_normalised_error(const map::BundledMap& map, const frame::BundledFrame& frame,
                                 const FrameMatches& matches, const SE3& T_rig_world, const SE3& true_T_rig_world) {
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
@@ -54,7 +54,7 @@ class TrackRigs : public ::testing::TestWithParam<int> {
   }
 };
 
-TEST_P(TrackRigs, FollowsTheRigThroughTheRoomWithinTheNoiseOfItsKeypoints) {
+TEST_P(TrackRigs, ErrorsMatchTheNoiseOfTheKeypoints) {
   const RigCase rig = rig_case(GetParam());
   constexpr int kFrames = 20;
   for (const double sigma_px : {0.5, 1.0}) {
@@ -95,7 +95,7 @@ class Track : public ::testing::Test {
   }
 };
 
-TEST_F(Track, HoldsWhereAFifthOfTheKeypointsIsWrong) {
+TEST_F(Track, ToleratesTwentyPercentOutliers) {
   SimulatedTracker tracker(world());
   for (int i = 1; i <= 12; ++i) {
     auto frame = seen(i);
@@ -104,7 +104,7 @@ TEST_F(Track, HoldsWhereAFifthOfTheKeypointsIsWrong) {
   }
 }
 
-TEST_F(Track, CountsWhatEachCameraContributes) {
+TEST_F(Track, CountsKeypointsMatchesAndInliersPerCamera) {
   SimulatedTracker tracker(world());
   const auto frame = seen(1);
   const TrackOutput out = tracker.track(frame.frame);
@@ -121,7 +121,7 @@ TEST_F(Track, CountsWhatEachCameraContributes) {
   EXPECT_EQ(out.result.time_ns, frame.frame.time_ns);
 }
 
-TEST_F(Track, MatchesOnlyWhatIsTrueButForAFew) {
+TEST_F(Track, NearlyAllMatchesAreCorrect) {
   SimulatedTracker tracker(world());
   const auto frame = seen(2);
   const TrackOutput out = tracker.track(frame.frame);
@@ -138,7 +138,7 @@ TEST_F(Track, MatchesOnlyWhatIsTrueButForAFew) {
   EXPECT_LT(wrong, count(out.matches) / 100);
 }
 
-TEST_F(Track, KeepsThePoseRelativeToItsReference) {
+TEST_F(Track, StoresThePoseRelativeToItsReference) {
   SimulatedTracker tracker(world());
   const TrackOutput out = tracker.track(seen(3).frame);
   ASSERT_EQ(out.result.status, TrackStatus::kTracking);
@@ -148,7 +148,7 @@ TEST_F(Track, KeepsThePoseRelativeToItsReference) {
   EXPECT_EQ(out.state.landmarks, landmarks_of(out.matches));
 }
 
-TEST_F(Track, CorrectionsOfTheMapCarryTheTrackerAlong) {
+TEST_F(Track, FollowsCorrectionsOfTheMap) {
   SimulatedTracker tracker(world());
   for (int i = 1; i <= 4; ++i) ASSERT_EQ(tracker.track(seen(i).frame).result.status, TrackStatus::kTracking);
   const SE3 T_new_old = SE3::exp((geometry::Vector6d() << 0.2, -0.1, 0.4, 3, -2, 1).finished());
@@ -165,7 +165,7 @@ TEST_F(Track, CorrectionsOfTheMapCarryTheTrackerAlong) {
   }
 }
 
-TEST_F(Track, NotesWhichLandmarksItShouldHaveSeenAndWhichItSaw) {
+TEST_F(Track, CountsPredictedAndFoundLandmarks) {
   SimulatedTracker tracker(world());
   const TrackOutput out = tracker.track(seen(1).frame);
   std::size_t found = 0, expected = 0;
@@ -182,7 +182,7 @@ TEST_F(Track, NotesWhichLandmarksItShouldHaveSeenAndWhichItSaw) {
   EXPECT_GT(static_cast<double>(found), 0.6 * static_cast<double>(expected));  // 85 % are detected in each camera
 }
 
-TEST_F(Track, IsLostInTheDarkAndResumes) {
+TEST_F(Track, IsLostWithoutFeaturesAndResumes) {
   SimulatedTracker tracker(world());
   for (int i = 1; i <= 10; ++i) {
     const auto frame = seen(i);
@@ -203,7 +203,7 @@ TEST_F(Track, IsLostInTheDarkAndResumes) {
   }
 }
 
-TEST_F(Track, SaysThereAreNoImages) {
+TEST_F(Track, ReportsMissingImages) {
   SimulatedTracker tracker(world());
   const std::vector<int> missing = {0, 1};
   const TrackOutput out = tracker.track(world().sim.frame(FrameId(1), 0.05, missing).frame);
@@ -211,7 +211,7 @@ TEST_F(Track, SaysThereAreNoImages) {
   EXPECT_EQ(out.result.reason, LostReason::kNoImages);
 }
 
-TEST_F(Track, GoesOnWithTheCamerasThatAreLeft) {
+TEST_F(Track, ContinuesWithTheRemainingCameras) {
   SimulatedTracker tracker(world());
   for (int i = 1; i <= 9; ++i) {
     const std::vector<int> missing = i < 4 ? std::vector<int>{0} : i < 7 ? std::vector<int>{1} : std::vector<int>{};
@@ -222,7 +222,7 @@ TEST_F(Track, GoesOnWithTheCamerasThatAreLeft) {
   }
 }
 
-TEST_F(Track, IsLostAtAPlaceItDoesNotKnow) {
+TEST_F(Track, IsLostAtAnUnknownPlace) {
   const synthetic::FeatureSimulator elsewhere = simulator(synthetic::ring_rig(2), room(99));
   SimulatedTracker tracker(world());
   for (int i = 1; i <= 5; ++i) {
@@ -233,7 +233,7 @@ TEST_F(Track, IsLostAtAPlaceItDoesNotKnow) {
   }
 }
 
-// From half a metre and many degrees away tracking may fail, but it never answers a wrong pose.
+// From half a metre and many degrees away tracking may fail, but it never returns a wrong pose.
 TEST_F(Track, IsLostRatherThanWrong) {
   int tracked = 0;
   for (int i = 2; i <= 120; i += 2) {
@@ -250,7 +250,7 @@ TEST_F(Track, IsLostRatherThanWrong) {
   EXPECT_GT(tracked, 0);
 }
 
-TEST_F(Track, SearchesWidelyWhereThePredictionIsWrong) {
+TEST_F(Track, SearchesInWideWindowsIfThePredictionIsWrong) {
   SimulatedTracker tracker(world());
   tracker.state.twist =
       (geometry::Vector6d() << 0.0, 1.2, 0.4, 0.5, 0, 0).finished();  // 3.6 degrees, 2.5 cm in a frame
@@ -258,10 +258,10 @@ TEST_F(Track, SearchesWidelyWhereThePredictionIsWrong) {
   expect_true(tracker.track(frame.frame).result, frame.T_world_rig, "wrong prediction");
 }
 
-// On the first frame after the start nothing is known of the motion, and after a long pause nothing any more. Two
-// keypoints of five are where they were before, as with a pattern that repeats itself: narrow windows about the old
-// pose would hold these alone.
-TEST_F(Track, DoesNotTakeWhatStayedForProofThatNothingMoved) {
+// The motion is unknown in the first frame after the initialisation and after a long pause. Two of five keypoints are
+// at their previous position, as with a repetitive pattern: narrow windows around the old pose would contain only
+// these.
+TEST_F(Track, DoesNotLockOntoStationaryMatchesIfTheMotionIsUnknown) {
   SimulatedTracker tracker(world()), paused(world());
   paused.state.twist.emplace(geometry::Vector6d::Zero());
   paused.state.time_ns -= from_seconds(1.0);
@@ -285,7 +285,7 @@ TEST_F(Track, DoesNotTakeWhatStayedForProofThatNothingMoved) {
   expect_true(paused.track(shown).result, frame.T_world_rig, "motion after a pause");
 }
 
-TEST_F(Track, LearnsTheMotion) {
+TEST_F(Track, EstimatesTheMotion) {
   SimulatedTracker tracker(world());
   for (int i = 1; i <= 6; ++i) tracker.track(seen(i).frame);
   ASSERT_TRUE(tracker.state.twist.has_value());
@@ -295,7 +295,7 @@ TEST_F(Track, LearnsTheMotion) {
   EXPECT_LT(map::angle_rad(predicted, next), 0.4 * kDegree);
 }
 
-TEST_F(Track, IsTheSameWithAnyNumberOfThreads) {
+TEST_F(Track, DoesNotDependOnTheNumberOfThreads) {
   const auto pyramids = map::flat_pyramids(2);
   const std::vector<matching::AlignmentOptions> alignment(pyramids.size());
   std::vector<SE3> poses;
@@ -313,7 +313,7 @@ TEST_F(Track, IsTheSameWithAnyNumberOfThreads) {
   }
 }
 
-TEST(TrackerState, StartsAfreshAtAKeyframe) {
+TEST(TrackerState, IsResetAtAKeyframe) {
   TrackerState before;
   before.status = TrackStatus::kTracking;
   before.twist = geometry::Vector6d::Ones().eval();
@@ -331,7 +331,7 @@ TEST(TrackerState, StartsAfreshAtAKeyframe) {
   EXPECT_EQ(state.landmarks.size(), 2u);
 }
 
-TEST(LostReason, EachHasWordsOfItsOwn) {
+TEST(LostReason, EachHasADistinctDescription) {
   std::vector<std::string_view> words;
   for (int i = 1; i <= static_cast<int>(LostReason::kNotFound); ++i)
     words.push_back(describe(static_cast<LostReason>(i)));
@@ -342,8 +342,8 @@ TEST(LostReason, EachHasWordsOfItsOwn) {
   EXPECT_TRUE(describe(LostReason::kNone).empty());
 }
 
-// Errors of the positions, over frames in which the rig turns and the side cameras fire late.
-double mean_error_with_late_sides(bool use_capture_times) {
+// Mean position error over frames in which the rig rotates and the side cameras capture late.
+double mean_error_with_late_side_cameras(bool use_capture_times) {
   const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 2.0, 0.25);
   synthetic::FeatureSimulatorOptions late = room();
   late.capture_offset_s = {0, 0, 0.03, 0.03};
@@ -361,10 +361,10 @@ double mean_error_with_late_sides(bool use_capture_times) {
   return error;
 }
 
-TEST(TrackOneByOne, CamerasThatFireLateHelpWhereTheirTimesAreUsed) {
-  const double own = mean_error_with_late_sides(true);
+TEST(TrackOneByOne, CamerasThatCaptureLateImproveThePoseIfTheirTimesAreUsed) {
+  const double own = mean_error_with_late_side_cameras(true);
   EXPECT_LT(own, 0.006);
-  EXPECT_GT(mean_error_with_late_sides(false), 2 * own);
+  EXPECT_GT(mean_error_with_late_side_cameras(false), 2 * own);
 }
 
 }  // namespace

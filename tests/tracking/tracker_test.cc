@@ -9,10 +9,10 @@ namespace {
 
 using geometry::SE3;
 
-// A relocaliser that answers with a place it was told.
-class ToldPlace : public Relocaliser {
+// A relocaliser that returns a given place.
+class FixedPlaceRelocaliser : public Relocaliser {
  public:
-  explicit ToldPlace(const std::optional<FoundPlace>& place) : place_(place) {}
+  explicit FixedPlaceRelocaliser(const std::optional<FoundPlace>& place) : place_(place) {}
   void describe(frame::BundledFrame&) const override {}
   std::optional<FoundPlace> verify_place(const map::BundledMap&, const frame::BundledFrame&) override { return place_; }
 
@@ -20,7 +20,7 @@ class ToldPlace : public Relocaliser {
   const std::optional<FoundPlace>& place_;
 };
 
-// A tracker and the map it makes, fed with simulated frames of the orbit.
+// A tracker and its map, fed with simulated frames of the orbit.
 class TrackerRun {
  public:
   explicit TrackerRun(camera::Rig rig, const TrackerOptions& options = {})
@@ -28,7 +28,7 @@ class TrackerRun {
   explicit TrackerRun(synthetic::FeatureSimulator simulator, const TrackerOptions& options = {})
       : sim(std::move(simulator)),
         store(map::BundledMap(std::make_shared<const camera::Rig>(sim.rig()))),
-        tracker(sim.rig(), options, pool_, std::make_unique<ToldPlace>(place)),
+        tracker(sim.rig(), options, pool_, std::make_unique<FixedPlaceRelocaliser>(place)),
         pyramids_(map::flat_pyramids(sim.rig().size())) {}
 
   frame::BundledFrame frame(int i) const { return sim.frame(FrameId(i), time_s(i)).frame; }
@@ -76,7 +76,7 @@ frame::BundledFrame elsewhere(frame::BundledFrame frame) {
   return frame;
 }
 
-TEST(Tracker, StartsAMetricMapAndFollowsTheRigInIt) {
+TEST(Tracker, InitialisesAMetricMapAndTracksTheRig) {
   TrackerRun run(synthetic::ring_rig(2));
   int keyframes = 0;
   for (int i = 0; i < 12; ++i) {
@@ -93,7 +93,7 @@ TEST(Tracker, StartsAMetricMapAndFollowsTheRigInIt) {
   EXPECT_EQ(run.store.snapshot()->check_invariants(), std::nullopt);
 }
 
-TEST(Tracker, OneCameraStartsUpToScaleAndLocatesTheFramesBeforeThat) {
+TEST(Tracker, OneCameraInitialisesUpToScaleAndLocatesTheEarlierFrames) {
   TrackerRun run(simulator(synthetic::ring_rig(1), room(1, 0.25), {.radius = 2.2, .period_s = 20}));
   TrackOutcome outcome;
   int i = 0;
@@ -117,7 +117,7 @@ TEST(Tracker, OneCameraStartsUpToScaleAndLocatesTheFramesBeforeThat) {
   }
 }
 
-TEST(Tracker, ItsOutcomeDependsOnItsArgumentsAlone) {
+TEST(Tracker, OutcomeDependsOnlyOnTheArguments) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 4; ++i) run.process(run.frame(i));
   const TrackOutcome once = run.propose(run.frame(4)), other = run.propose(elsewhere(run.frame(5))),
@@ -126,10 +126,10 @@ TEST(Tracker, ItsOutcomeDependsOnItsArgumentsAlone) {
   EXPECT_EQ(once.record.result.T_rig_world.translation(), again.record.result.T_rig_world.translation());
   EXPECT_EQ(once.record.result.covariance, again.record.result.covariance);
   EXPECT_EQ(once.next.track.landmarks, again.next.track.landmarks);
-  EXPECT_EQ(once.next.feature_shares, again.next.feature_shares);
+  EXPECT_EQ(once.next.budget_fractions, again.next.budget_fractions);
 }
 
-TEST(Tracker, TheCovarianceIsThatOfItsErrors) {
+TEST(Tracker, CovarianceMatchesTheErrors) {
   const map::SimulatedMap world = true_map(simulator(synthetic::default_rig(), room(1, 0.7, 0.1)), 1.0, 0.25);
   SimulatedTracker tracker(world);
   constexpr int kFrames = 60;
@@ -146,7 +146,7 @@ TEST(Tracker, TheCovarianceIsThatOfItsErrors) {
   EXPECT_LT(normalised, 7.2);
 }
 
-TEST(Tracker, ALostRigIsFollowedAgainFromThePlaceItWasLocatedAt) {
+TEST(Tracker, TracksFromTheRelocalisedPlaceAfterALoss) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 5; ++i) run.process(run.frame(i));
   const SE3 T_rig_odom = run.state.T_rig_odom;
@@ -156,7 +156,7 @@ TEST(Tracker, ALostRigIsFollowedAgainFromThePlaceItWasLocatedAt) {
   EXPECT_FALSE(lost.result.anchored.reference.valid());
   EXPECT_EQ(lost.T_rig_odom.translation(), T_rig_odom.translation());
 
-  run.state.track.anchored = {};  // far from where it was: only the relocaliser can tell
+  run.state.track.anchored = {};  // no last pose: only the relocaliser can locate it
   const FrameRecord blind = run.process(run.frame(6));
   EXPECT_EQ(blind.result.reason, LostReason::kNotFound);
 
@@ -173,11 +173,11 @@ TEST(Tracker, ALostRigIsFollowedAgainFromThePlaceItWasLocatedAt) {
   EXPECT_LT(map::distance_m(found.result.T_rig_world, relative(run.sim, 0, 7)), 0.03);
   ASSERT_TRUE(found.relocalisation);
   EXPECT_EQ(found.relocalisation->matched_keyframe, KeyframeId(0));
-  EXPECT_LT(map::distance_m(found.T_rig_odom, T_rig_odom), 1e-9);  // the smooth pose does not jump
+  EXPECT_LT(map::distance_m(found.T_rig_odom, T_rig_odom), 1e-9);  // the odometry pose is continuous
   EXPECT_LT(map::distance_m(found.T_rig_odom, found.result.T_rig_world * found.T_map_odom), 1e-9);
 }
 
-TEST(Tracker, StartsANewSubmapWhereItStaysLost) {
+TEST(Tracker, StartsANewSubmapIfItStaysLost) {
   TrackerOptions options;
   options.new_submap_after = 3;
   TrackerRun run(synthetic::ring_rig(2), options);
@@ -192,7 +192,7 @@ TEST(Tracker, StartsANewSubmapWhereItStaysLost) {
   EXPECT_EQ(started.root, run.store.snapshot()->roots().back());
 }
 
-TEST(Tracker, LocalisingProposesNothing) {
+TEST(Tracker, LocaliseOnlyProposesNoEdits) {
   TrackerRun made(synthetic::ring_rig(2));
   for (int i = 0; i < 3; ++i) made.process(made.frame(i));
   TrackerOptions options;
@@ -223,33 +223,33 @@ TEST(Tracker, FollowsTheScaleOfItsSubmap) {
   EXPECT_NEAR(record.twist->tail<3>().norm() / before.tail<3>().norm(), 2.0, 0.4);
 }
 
-TEST(Tracker, PlansWithoutTheCamerasThatAreOut) {
+TEST(Tracker, PlanSkipsFaultyCameras) {
   TrackerRun run(synthetic::ring_rig(2));
   image::ImageBundle images;
   images.images.resize(2);
   for (image::CameraImage& i : images.images) i.state = image::ImageState::kPresent;
-  const PictureFaults faults{{CameraReason::kNone, CameraReason::kBlack}, {0, 0}, {0, 1}};
+  const ImageFaults faults{{CameraReason::kNone, CameraReason::kBlack}, {0, 0}, {0, 1}};
   const FramePlan plan = run.tracker.plan(images, faults, run.state);
-  EXPECT_EQ(plan.left_out, (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(plan.skipped, (std::vector<std::uint8_t>{0, 1}));
   EXPECT_EQ(plan.postponed, (std::vector<std::uint8_t>{0, 0}));
   EXPECT_GT(plan.budgets[0], 0);
   EXPECT_EQ(plan.budgets[1], 0);
-  EXPECT_EQ(run.tracker.plan().left_out, (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(run.tracker.plan().skipped, (std::vector<std::uint8_t>{0, 0}));
 }
 
-TEST(Tracker, ABlurredCameraIsTrustedAgainOnceItIsSharp) {
+TEST(Tracker, ABlurredCameraIsReadmittedOnceItIsSharp) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 3; ++i) run.process(run.frame(i));
   image::ImageBundle images;
   images.images.resize(2);
-  run.state.track.cameras[1].doubted = true;
+  run.state.track.cameras[1].excluded = true;
   const auto plan = [&](std::uint8_t blurred) {
     run.tracker.plan(images, {{CameraReason::kNone, CameraReason::kNone}, {0, blurred}, {0, 0}}, run.state);
   };
   plan(1);
-  EXPECT_TRUE(run.state.track.cameras[1].doubted);
+  EXPECT_TRUE(run.state.track.cameras[1].excluded);
   plan(0);
-  EXPECT_FALSE(run.state.track.cameras[1].doubted);
+  EXPECT_FALSE(run.state.track.cameras[1].excluded);
 }
 
 }  // namespace

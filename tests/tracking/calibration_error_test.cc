@@ -1,4 +1,4 @@
-#include "tracking/error_floor.h"
+#include "tracking/calibration_error.h"
 
 #include <gtest/gtest.h>
 
@@ -10,43 +10,43 @@ namespace {
 const matching::AlignmentOptions kOptions{.calibration_error_px = 0.3, .min_calibration_error_px = 0.05};
 constexpr double kAlignment = 0.1;  // px
 
-// What frames of `count` keypoints say one after the other, whose calibration is off by `floor` pixels and alignment by
-// kAlignment.
-double after(int frames, double floor, int count, double before = kOptions.calibration_error_px) {
+// Estimated calibration error after `frames` frames of `count` keypoints with a calibration error of `error` pixels and
+// an alignment error of kAlignment.
+double after(int frames, double error, int count, double before = kOptions.calibration_error_px) {
   Random random(1, "floor");
-  const double sigma = std::hypot(floor, kAlignment);
+  const double sigma = std::hypot(error, kAlignment);
   for (int f = 0; f < frames; ++f) {
     std::vector<double> errors, variances(static_cast<std::size_t>(count), kAlignment * kAlignment);
     for (int i = 0; i < count; ++i) {
       const double x = sigma * random.normal(), y = sigma * random.normal();
       errors.push_back(x * x + y * y);
     }
-    before = error_floor(before, errors, variances, kOptions);
+    before = update_calibration_error(before, errors, variances, kOptions);
   }
   return before;
 }
 
-TEST(ErrorFloor, IsFoundFromEitherSide) {
+TEST(CalibrationError, ConvergesFromLargerAndSmallerValues) {
   EXPECT_NEAR(after(40, 0.15, 300), 0.15, 0.02);
   EXPECT_NEAR(after(40, 0.15, 300, 0.06), 0.15, 0.02);
 }
 
-TEST(ErrorFloor, FollowsWithinSomeTenFrames) {
+TEST(CalibrationError, FollowsAChangeWithinAboutTenFrames) {
   EXPECT_GT(after(3, 0.05, 300), 0.2);
   EXPECT_LT(after(20, 0.05, 300), 0.1);
 }
 
-TEST(ErrorFloor, StaysWithinItsBounds) {
+TEST(CalibrationError, StaysWithinItsBounds) {
   EXPECT_NEAR(after(100, 0.0, 300), kOptions.min_calibration_error_px, 0.01);
   EXPECT_GE(after(100, 0.0, 300), kOptions.min_calibration_error_px);
   EXPECT_DOUBLE_EQ(after(100, 3.0, 300), kOptions.calibration_error_px);
 }
 
-TEST(ErrorFloor, NeedsEnoughKeypoints) { EXPECT_EQ(after(10, 0.0, 10), kOptions.calibration_error_px); }
+TEST(CalibrationError, NeedsEnoughKeypoints) { EXPECT_EQ(after(10, 0.0, 10), kOptions.calibration_error_px); }
 
-class FloorsOfAFrame : public ::testing::Test {
+class CalibrationErrorsOfAFrame : public ::testing::Test {
  protected:
-  FloorsOfAFrame() : tracker(world) {
+  CalibrationErrorsOfAFrame() : tracker(world) {
     frame = world.sim.frame(FrameId(1), 0.1).frame;
     for (frame::CameraFrame& c : frame.cameras) c.keypoints.sigma = std::vector<float>(c.keypoints.size(), 0.35f);
     output = tracker.track(frame);
@@ -65,37 +65,37 @@ class FloorsOfAFrame : public ::testing::Test {
   TrackOutput output;
 };
 
-TEST_F(FloorsOfAFrame, FallWhereErrorsAreSmallerThanClaimed) {
+TEST_F(CalibrationErrorsOfAFrame, DecreaseIfErrorsAreSmallerThanAssumed) {
   ASSERT_EQ(output.result.status, TrackStatus::kTracking);
-  const auto floors = error_floors({}, world.map, frame, output, kOptions);
-  ASSERT_EQ(floors.size(), 4u);
+  const auto errors = calibration_errors({}, world.map, frame, output, kOptions);
+  ASSERT_EQ(errors.size(), 4u);
   for (std::size_t c = 0; c < 4; ++c) {
-    EXPECT_LT(floors[c], kOptions.calibration_error_px) << "camera " << c;
-    EXPECT_GT(floors[c], kOptions.min_calibration_error_px) << "camera " << c;
+    EXPECT_LT(errors[c], kOptions.calibration_error_px) << "camera " << c;
+    EXPECT_GT(errors[c], kOptions.min_calibration_error_px) << "camera " << c;
   }
 }
 
-TEST_F(FloorsOfAFrame, AreEachCamerasOwn) {
+TEST_F(CalibrationErrorsOfAFrame, AreEstimatedPerCamera) {
   Random random(1, "worse camera");
   std::vector<Eigen::Vector2f> pixels = frame.cameras[2].keypoints.pixel.copy();
   for (Eigen::Vector2f& pixel : pixels) pixel += 0.6f * Eigen::Vector2d(random.normal(), random.normal()).cast<float>();
   frame.cameras[2].keypoints.pixel = std::move(pixels);
-  const auto floors = error_floors({}, world.map, frame, output, kOptions);
-  for (const std::size_t c : {0u, 1u, 3u}) EXPECT_LT(floors[c] + 0.01, floors[2]) << "camera " << c;
+  const auto errors = calibration_errors({}, world.map, frame, output, kOptions);
+  for (const std::size_t c : {0u, 1u, 3u}) EXPECT_LT(errors[c] + 0.01, errors[2]) << "camera " << c;
 }
 
-TEST_F(FloorsOfAFrame, StayForCamerasWithoutMatches) {
+TEST_F(CalibrationErrorsOfAFrame, AreKeptForCamerasWithoutMatches) {
   output.matches[2].clear();
   const std::vector<double> before = {0.2, 0.2, 0.17, 0.2};
-  EXPECT_EQ(error_floors(before, world.map, frame, output, kOptions)[2], 0.17);
+  EXPECT_EQ(calibration_errors(before, world.map, frame, output, kOptions)[2], 0.17);
 }
 
-TEST_F(FloorsOfAFrame, AreForgottenWithALostFrame) {
+TEST_F(CalibrationErrorsOfAFrame, AreResetByALostFrame) {
   output.result.status = TrackStatus::kLost;
-  EXPECT_TRUE(error_floors(std::vector<double>(4, 0.1), world.map, frame, output, kOptions).empty());
+  EXPECT_TRUE(calibration_errors(std::vector<double>(4, 0.1), world.map, frame, output, kOptions).empty());
 }
 
-TEST(AlignmentByCamera, PutsTheFloorsInTheirPlaces) {
+TEST(AlignmentByCamera, SetsTheCalibrationErrorOfEachCamera) {
   const auto some = alignment_by_camera(kOptions, std::vector<double>{0.1, 0.2}, 2);
   EXPECT_EQ(some[0].calibration_error_px, 0.1);
   EXPECT_EQ(some[1].calibration_error_px, 0.2);
