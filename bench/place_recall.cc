@@ -188,7 +188,7 @@ class Recall {
                                 config_.looping.verification, config_.feature_model(), random, &report);
       note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} found {} of {}; ",
                            candidate.keyframe.value(), candidate.score, static_cast<int>(report.rejection),
-                           report.matches, report.inliers, report.found, report.sought);
+                           report.matches, report.inliers, report.found, report.expected);
       if (place_match) return is_right(now, *old, *place_match) ? Outcome::kRight : Outcome::kWrong;
     }
     return outcome;
