@@ -45,7 +45,7 @@ class VocabularyBytes : public testing::Test {
   std::string bytes_ = serialise(*vocabulary_);
 };
 
-TEST_F(VocabularyBytes, ComeBackAsTheyWere) {
+TEST_F(VocabularyBytes, RoundTrip) {
   const auto read = deserialise(bytes_);
   ASSERT_TRUE(read.ok()) << read.error().message();
   const VocabularyContent &a = vocabulary_->content(), &b = (*read)->content();
@@ -60,7 +60,7 @@ TEST_F(VocabularyBytes, ComeBackAsTheyWere) {
   EXPECT_TRUE(is_vocabulary(bytes_));
 }
 
-TEST_F(VocabularyBytes, AreRefusedWhenDamaged) {
+TEST_F(VocabularyBytes, AreRejectedWhenDamaged) {
   for (int round = 0; round < 2000; ++round) {
     std::string damaged = bytes_;
     switch (round % 4) {
@@ -86,7 +86,7 @@ TEST_F(VocabularyBytes, AreRefusedWhenDamaged) {
 
 // With a repaired checksum, damaged bytes give either an error or a vocabulary of those numbers, whose words are in
 // range.
-TEST_F(VocabularyBytes, AreSafeWhenTheChecksumFitsTheDamage) {
+TEST_F(VocabularyBytes, AreSafeWhenDamagedWithAMatchingChecksum) {
   int accepted = 0, refused = 0;
   for (int round = 0; round < 2000; ++round) {
     std::string damaged = bytes_;
@@ -106,8 +106,8 @@ TEST_F(VocabularyBytes, AreSafeWhenTheChecksumFitsTheDamage) {
   EXPECT_GT(refused, 200);
 }
 
-TEST_F(VocabularyBytes, NameWhatIsWrong) {
-  EXPECT_EQ(deserialise("").error().found, "no bslam vocabulary");
+TEST_F(VocabularyBytes, ErrorsNameTheField) {
+  EXPECT_EQ(deserialise("").error().found, "not a bslam vocabulary");
   EXPECT_EQ(deserialise("BSLAMVOC").error().key, "size");
   std::string newer = bytes_;
   put(newer, 8, std::uint32_t{2});
