@@ -1,4 +1,4 @@
-// Swaying motion of a walker about a smooth path: sums of sine waves with random phases.
+// Swaying motion of a person walking along a smooth path: sums of sine waves with random phases.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ class Waves {
   std::array<double, 3> phase_{};
 };
 
-// The sway of one lap about the path.
+// The sway of one lap relative to the path.
 struct Sway {
   explicit Sway(Random& random)
       : aside(random, {2, 3, 7}),
@@ -44,7 +44,7 @@ struct Sway {
   Waves aside, up, step, yaw, pitch, roll;
 };
 
-// Offsets from the path. `own` belongs to one lap and fades out at its ends, so that laps connect and start alike.
+// Offsets from the path. `own` belongs to one lap and fades out at its ends, so that consecutive laps connect.
 struct Offsets {
   double aside, up, yaw, pitch, roll;
 };
