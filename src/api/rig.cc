@@ -23,7 +23,7 @@ Result<image::Image> read_mask(const camera::Camera& camera) {
   if (camera.mask_file.empty()) return image::Image();
   const auto bytes = read_file(camera.mask_file, kMaxMaskBytes);
   if (!bytes) return bytes.error();
-  auto mask = image_files::is_whole_png(*bytes) ? image_files::decode_grey_png(*bytes) : std::nullopt;
+  auto mask = image_files::is_complete_png(*bytes) ? image_files::decode_grey_png(*bytes) : std::nullopt;
   if (!mask) return Error{camera.mask_file, "", "no 8-bit grey PNG without interlacing", "one"};
   return image_files::checked_mask(*std::move(mask), camera);
 }

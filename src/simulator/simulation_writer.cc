@@ -105,7 +105,7 @@ fs::path picture_file(const fs::path& folder, const Shot& shot) {
   return camera_folder(folder, shot.camera) / "data" / picture_name(shot);
 }
 
-Status write_picture(const fs::path& file, const image::Image& picture) {
+Status write_image(const fs::path& file, const image::Image& picture) {
   // OpenCV has no matrix of constant pixels. These are only read.
   const cv::Mat pixels(picture.height(), picture.width(), CV_8UC1, const_cast<std::uint8_t*>(picture.row(0)));
   std::vector<unsigned char> png;
@@ -130,7 +130,7 @@ Result<bool> write_pictures(const SimulationRequest& request, const std::vector<
     const fs::path file = picture_file(request.folder, shots[i]);
     Status status;
     std::error_code code;
-    if (shots[i].written && !fs::exists(file, code)) status = write_picture(file, recorder.picture(shots[i]));
+    if (shots[i].written && !fs::exists(file, code)) status = write_image(file, recorder.picture(shots[i]));
     const std::lock_guard lock(mutex);
     ++done;
     if (!status && !failure) failure = status.error();
