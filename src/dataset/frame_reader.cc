@@ -29,7 +29,7 @@ std::string why_damaged(const Dataset& dataset, std::size_t index, std::size_t c
 }
 
 image::ImageBundle read_frame(const Dataset& dataset, std::size_t index) {
-  BSLAM_ASSERT(index < dataset.frames.size(), "a frame of the data set");
+  BSLAM_ASSERT(index < dataset.frames.size(), "the frame index must be within the data set");
   const FrameEntry& frame = dataset.frames[index];
   image::ImageBundle bundle{FrameId(index), frame.time_ns, {}};
   bundle.images.resize(frame.images.size());
