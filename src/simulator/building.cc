@@ -72,7 +72,8 @@ void add_room(Building& b, const RoomPlan& p, Random& random) {
 
 Building make_building(std::uint64_t seed) {
   Building b;
-  constexpr double kCornerRadius = 1.6;  // metres; turns at walking pace stay below 60 degrees per second
+  constexpr double kCornerRadius =
+      1.6;  // metres; at walking pace the yaw rate in corners stays below 60 degrees per second
   b.tour = rounded_loop({{5.5, 4.6}, {14.0, 4.6}, {14.0, 9.1}, {5.5, 9.1}}, kCornerRadius, Building::kTourStep);
   for (std::size_t i = 0; i < kRooms.size(); ++i) {
     Random random(seed, "room", i);

@@ -66,7 +66,7 @@ class Furnisher {
     add_box(building_.surfaces, {{p.centre.x(), p.centre.y(), p.bottom}, p.size, p.yaw}, p.sides, p.top);
   }
 
-  // Whether the floor is free: inside the room, and away from doors, the tour and other furniture.
+  // Returns true if the floor is inside the room and away from doors, the tour and other furniture.
   bool is_free(const Footprint& f, double gap) const {
     if ((f.low.array() < room_.low.array()).any() || (f.high.array() > room_.high.array()).any()) return false;
     for (const Vector2d& door : doors_) {
@@ -294,7 +294,7 @@ class Furnisher {
     building_.surfaces.push_back({{corner.x(), corner.y(), bottom}, {edge.x(), edge.y(), 0}, {0, 0, size.z()}, face});
   }
 
-  // Metres between the tour and furniture: clearance, sway and a margin for the step of the tour.
+  // Distance in metres between the tour and furniture: clearance, sway and a margin for the step of the tour.
   static constexpr double kTourGap = Building::kTourClearance + Building::kTourSway + 0.1;
 
   Building& building_;
@@ -309,7 +309,7 @@ class Furnisher {
 
 void furnish(Building& building, const Room& room, const std::vector<WallStretch>& walls,
              const std::vector<Vector2d>& door_centres, Random& random) {
-  // A copy, since adding to the building may reallocate its rooms.
+  // Copied, since adding to the building may reallocate its rooms.
   const Room here = room;
   Furnisher(building, here, walls, door_centres, random).furnish();
 }

@@ -8,8 +8,8 @@
 
 namespace bslam::simulator {
 
-// A section of wall between doors, seen from inside a room: from `start` along the unit vector `direction`, `length`
-// metres long, with the room on its left (normal = z x direction).
+// A section of wall between doors, seen from inside a room: `length` metres long, from `start` along the unit vector
+// `direction`, with the room on its left (normal = z x direction).
 struct WallStretch {
   Vector2d start, direction;
   double length;

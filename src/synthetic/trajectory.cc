@@ -61,7 +61,7 @@ Trajectory make_orbit(const OrbitOptions& options) {
   for (std::size_t i = 0; i < pieces + 3; ++i) {
     const double rounds = (static_cast<double>(i) - 1) * spacing / options.period_s, angle = 2 * pi * rounds;
     const Offsets o = offsets_at(base, own, rounds - std::floor(rounds));
-    const double radius = options.radius + o.aside;
+    const double radius = options.radius + o.lateral;
     control.push_back({options.centre + Vector3d(radius * std::cos(angle), radius * std::sin(angle), o.up),
                        angle + 0.5 * pi + o.yaw, o.pitch, o.roll});
   }

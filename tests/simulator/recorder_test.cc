@@ -23,7 +23,7 @@ double mean_of(const image::Image& image) {
   return sum / (image.width() * image.height());
 }
 
-// Mean difference of neighbours in a row.
+// Returns the mean difference of neighbouring pixels in a row.
 double roughness_of(const image::Image& image) {
   double sum = 0;
   for (int y = 0; y < image.height(); ++y) {
@@ -45,14 +45,14 @@ std::vector<std::vector<std::uint8_t>> record(std::uint64_t seed, int threads) {
   return pictures;
 }
 
-TEST(Recorder, GivesTheSameBytesWithAnyNumberOfThreads) {
+TEST(Recorder, IsIdenticalWithAnyNumberOfThreads) {
   const auto once = record(1, 1), again = record(1, 2), other = record(2, 2);
   EXPECT_EQ(once, again);
   ASSERT_EQ(once.size(), 9u);
   for (std::size_t i = 0; i < once.size(); ++i) EXPECT_NE(once[i], other[i]);
 }
 
-// Points seen in one picture look alike in the other camera's, where the truth says they are.
+// Points visible in one image have the same appearance at their true position in the image of the other camera.
 TEST(Recorder, AgreesWithGroundTruthAcrossCamerasAndTime) {
   ThreadPool pool(2);
   const World world = small_world(1, pool);
@@ -81,7 +81,7 @@ TEST(Recorder, AgreesWithGroundTruthAcrossCamerasAndTime) {
         if (!pixel || !rig.camera(to.camera).contains(*pixel, 2)) continue;
         const Vector3d back = point - T_world_to.translation();
         const auto seen = world.cast(T_world_to.translation(), back.normalized());
-        if (!seen || std::abs(seen->distance - back.norm()) > 0.005) continue;  // hidden from there
+        if (!seen || std::abs(seen->distance - back.norm()) > 0.005) continue;  // occluded in the other camera
         const int u = static_cast<int>(pixel->x()), v = static_cast<int>(pixel->y());
         const double fx = pixel->x() - u, fy = pixel->y() - v;
         const double b = (1 - fy) * ((1 - fx) * other.row(v)[u] + fx * other.row(v)[u + 1]) +
@@ -97,7 +97,7 @@ TEST(Recorder, AgreesWithGroundTruthAcrossCamerasAndTime) {
   }
 }
 
-TEST(Recorder, ExposesSensibly) {
+TEST(Recorder, HasReasonableExposure) {
   ThreadPool pool(2);
   const World world = small_world(1, pool);
   const camera::Rig rig = synthetic::ring_rig(4, 188);
@@ -127,7 +127,7 @@ TEST(PlanShots, StampsFramesAtTheRate) {
   EXPECT_NEAR(shots[3].scene_time_s, 0.1, 1e-12);
 }
 
-TEST(PlanShots, MovesTheSceneByTheCamerasTimeOffset) {
+TEST(PlanShots, ShiftsTheSceneByTheTimeOffset) {
   const camera::Rig plain = synthetic::ring_rig(1, 96);
   camera::RigCamera camera{plain.camera(std::size_t{0}), plain.body_from_cam(0)};
   camera.camera.time_offset_ns = 4'000'000;
@@ -178,7 +178,7 @@ TEST(Recorder, ShowsFaults) {
   const auto bright = picture(4);
   EXPECT_GT(std::count_if(bright.begin(), bright.end(), [](std::uint8_t v) { return v >= 250; }),
             static_cast<std::ptrdiff_t>(0.6 * static_cast<double>(bright.size())));
-  // A smeared lens keeps the light and loses what differs between neighbours.
+  // A smeared lens preserves the mean intensity and reduces the differences between neighbouring pixels.
   Shot sharp = shots[5];
   EXPECT_GT(sharp.blur_px, 0);
   sharp.blur_px = 0;
