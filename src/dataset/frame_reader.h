@@ -15,6 +15,6 @@ namespace bslam::dataset {
 image::ImageBundle read_frame(const Dataset& dataset, std::size_t index);
 
 // Returns file and cause of damage of an image in state kDamaged, determined by reading it again.
-std::string why_damaged(const Dataset& dataset, std::size_t index, std::size_t camera);
+std::string describe_damage(const Dataset& dataset, std::size_t index, std::size_t camera);
 
 }  // namespace bslam::dataset
