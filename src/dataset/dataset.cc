@@ -66,8 +66,8 @@ std::string name_of(const fs::path& path) {
 }
 
 // Returns the requested cameras, or all `count` cameras if none were requested.
-Result<std::vector<int>> chosen_cameras(const std::vector<int>& asked, std::size_t count) {
-  std::vector<int> cameras = asked;
+Result<std::vector<int>> chosen_cameras(const std::vector<int>& requested, std::size_t count) {
+  std::vector<int> cameras = requested;
   if (cameras.empty()) {
     cameras.resize(count);
     std::iota(cameras.begin(), cameras.end(), 0);
@@ -239,8 +239,8 @@ Status keep_range(const DatasetRequest& request, Dataset& dataset) {
                fmt::format("a range that contains frames, which are between 0 and {:.3f} s", last_s)};
 }
 
-// Returns the rig file in the folder of a recording, or an empty path.
-std::optional<fs::path> rig_beside(const DatasetRequest& request) {
+// Returns the rig file in the folder of a recording, or nullopt if there is none.
+std::optional<fs::path> rig_file_in_folder(const DatasetRequest& request) {
   fs::path folder = request.path.filename().empty() ? request.path.parent_path() : request.path;
   if (folder.filename() == "mav0") folder = folder.parent_path();
   fs::path file = folder / "rig.yaml";
@@ -266,17 +266,17 @@ void warn_of_times(const fs::path& file, std::vector<std::string>& warnings) {
 
 }  // namespace
 
-Result<Dataset> open_dataset(const DatasetRequest& asked) {
-  DatasetRequest request = asked;
+Result<Dataset> open_dataset(const DatasetRequest& original) {
+  DatasetRequest request = original;
   if (const Status status = check_request(request); !status) return status.error();
   const auto opened = open_recording(request);
   if (!opened) return opened.error();
   const Recording& recording = *opened->recording;
-  const auto beside = request.rig_file ? std::nullopt : rig_beside(request);
-  if (beside && !recording.calibrated()) request.rig_file = *beside;
+  const auto own_rig_file = request.rig_file ? std::nullopt : rig_file_in_folder(request);
+  if (own_rig_file && !recording.calibrated()) request.rig_file = *own_rig_file;
   auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
-  if (beside && !request.rig_file) warn_of_times(*beside, chosen->warnings);
+  if (own_rig_file && !request.rig_file) warn_of_times(*own_rig_file, chosen->warnings);
   const auto images = collect_images(recording, *chosen);
   if (!images) return images.error();
   Dataset dataset{name_of(request.path),

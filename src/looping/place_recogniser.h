@@ -60,7 +60,7 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   const place::VocabularyPtr vocabulary_;
   const RecognitionOptions options_;
   place::InvertedIndex index_;
-  // frame of each keyframe in the index, by slot; null if not in the index
+  // frame of each keyframe in the index, by keyframe id; null if not in the index
   std::vector<std::shared_ptr<const frame::BundledFrame>> known_;
 };
 

@@ -36,14 +36,14 @@ float box_distance(float x, float y, float half_width, float half_height) {
 float motif(float x, float y, float radius, Seed seed) {
   const float turn = 6.2832f * unit(hash(1, 0, seed)), c = std::cos(turn), s = std::sin(turn);
   const float u = c * x + s * y, v = c * y - s * x, r = std::sqrt(x * x + y * y);
-  const float stretch = mix(0.35f, 0.8f, unit(hash(2, 0, seed)));
+  const float aspect = mix(0.35f, 0.8f, unit(hash(2, 0, seed)));
   switch (hash(3, 0, seed) % 7) {
     case 0:
       return inside(r - radius);
     case 1:
       return inside(std::abs(r - 0.75f * radius) - 0.22f * radius);
     case 2:
-      return inside(box_distance(u, v, 0.7f * radius, 0.7f * stretch * radius));
+      return inside(box_distance(u, v, 0.7f * radius, 0.7f * aspect * radius));
     case 3:
       return std::max(inside(box_distance(u, v, 0.9f * radius, 0.2f * radius)),
                       inside(box_distance(u, v, 0.2f * radius, 0.9f * radius)));

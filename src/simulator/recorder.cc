@@ -88,7 +88,7 @@ Recorder::Recorder(const World& world, camera::Rig rig, synthetic::Trajectory tr
   pool.for_each(rig_.size(), [&](std::size_t c) { renderers_[c].emplace(world, rig_.camera(c), imaging); });
 }
 
-image::Image Recorder::picture(const Shot& shot) const {
+image::Image Recorder::render(const Shot& shot) const {
   ExposurePoses poses;
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const double fraction = (static_cast<double>(k) + 0.5) / static_cast<double>(poses.size()) - 0.5;

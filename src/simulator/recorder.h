@@ -52,7 +52,7 @@ class Recorder {
            double exposure_s, ThreadPool& pool);
 
   // Renders an image. The result depends on the shot only. May be called from several threads.
-  image::Image picture(const Shot& shot) const;
+  image::Image render(const Shot& shot) const;
 
   // Returns T_world_cam of a camera at a time of the trajectory.
   geometry::SE3 T_world_cam(std::size_t camera, double time_s) const {

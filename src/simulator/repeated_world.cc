@@ -100,14 +100,14 @@ void add_room(Building& b, const Room& room, const Vector2d& low, const Vector2d
               Random& random) {
   const Vector2d overlap = Vector2d::Constant(kOverlap);
   add_floor_and_ceiling(b, room.low - overlap, room.high - room.low + 2 * overlap, Material::kPlanks, random);
-  std::vector<WallStretch> stretches;
+  std::vector<WallSegment> segments;
   for (const Face& f : faces_of(room, low, high)) {
     const auto more = add_face(b, f, doors, room.height, texture(Material::kWallpaper, 0.54f, random));
-    stretches.insert(stretches.end(), more.begin(), more.end());
+    segments.insert(segments.end(), more.begin(), more.end());
   }
   std::vector<Vector2d> centres;
   for (const Door& d : doors) centres.push_back(centre_of(d));
-  furnish(b, room, stretches, centres, random);
+  furnish(b, room, segments, centres, random);
 }
 
 }  // namespace

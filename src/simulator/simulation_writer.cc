@@ -131,7 +131,7 @@ Result<bool> write_images(const SimulationRequest& request, const std::vector<Sh
     const fs::path file = image_file(request.folder, shots[i]);
     Status status;
     std::error_code code;
-    if (shots[i].written && !fs::exists(file, code)) status = write_image(file, recorder.image(shots[i]));
+    if (shots[i].written && !fs::exists(file, code)) status = write_image(file, recorder.render(shots[i]));
     const std::lock_guard lock(mutex);
     ++done;
     if (!status && !failure) failure = status.error();

@@ -40,7 +40,7 @@ inline Vector3d at_height(const Vector2d& p, double z) { return {p.x(), p.y(), z
 std::array<Face, 4> faces_of(const Room& room, const Vector2d& low, const Vector2d& high);
 
 // Adds a face with openings for the elements of `doors` that are in it. Returns the sections of wall between them.
-std::vector<WallStretch> add_face(Building& building, const Face& face, std::span<const Door> doors, double height,
+std::vector<WallSegment> add_face(Building& building, const Face& face, std::span<const Door> doors, double height,
                                   const Texture& texture);
 
 // Adds jambs, lintel, threshold and the casing on both sides.

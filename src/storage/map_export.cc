@@ -38,7 +38,7 @@ std::string colmap_camera(const Camera& camera) {
 
 // Image ids of the COLMAP model.
 struct Images {
-  // Ids from 1 for every keyframe slot and camera; 0 if there is no image.
+  // Ids from 1 for every keyframe id and camera; 0 if there is no image.
   explicit Images(const BundledMap& map) : cameras(map.rig().size()), id(map.keyframe_slots() * cameras, 0) {
     std::size_t next = 1;
     for (const KeyframeId k : map.keyframe_ids()) {

@@ -23,7 +23,7 @@ struct FileIds {
   // keyframe if there is none.
   KeyframeId nearest_older(KeyframeId k) const;
 
-  std::vector<KeyframeId> keyframe;  // per keyframe slot of the map
+  std::vector<KeyframeId> keyframe;  // indexed by the keyframe ids of the map
 };
 
 // Functions that write sections.

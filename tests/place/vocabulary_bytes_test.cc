@@ -87,7 +87,7 @@ TEST_F(VocabularyBytes, AreRejectedWhenDamaged) {
 // With a repaired checksum, damaged bytes give either an error or a vocabulary of those numbers, whose words are in
 // range.
 TEST_F(VocabularyBytes, AreSafeWhenDamagedWithAMatchingChecksum) {
-  int accepted = 0, refused = 0;
+  int accepted = 0, rejected = 0;
   for (int round = 0; round < 2000; ++round) {
     std::string damaged = bytes_;
     const std::size_t header_and_counts = 32 + vocabulary_->kind().size() + vocabulary_->num_nodes();
@@ -98,12 +98,12 @@ TEST_F(VocabularyBytes, AreSafeWhenDamagedWithAMatchingChecksum) {
     }
     repair_checksum(damaged);
     const auto read = deserialise(damaged);
-    read.ok() ? ++accepted : ++refused;
+    read.ok() ? ++accepted : ++rejected;
     if (!read) continue;
     for (int i = 0; i < 20; ++i) ASSERT_LT((*read)->word(random_descriptor(random_)).index(), (*read)->size());
   }
   EXPECT_GT(accepted, 200);  // the repair works
-  EXPECT_GT(refused, 200);
+  EXPECT_GT(rejected, 200);
 }
 
 TEST_F(VocabularyBytes, ErrorsNameTheField) {

@@ -338,16 +338,13 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
   const camera::Rig upside_down = [&] {
     std::vector<camera::RigCamera> rotated;
     for (std::size_t c = 0; c < rig.size(); ++c) rotated.push_back({rig.camera(c), rig.body_from_cam(c)});
-    rotated[3].T_body_cam =
-        rotated[3].T_body_cam * geometry::SE3(Eigen::Quaterniond(0, 0, 0, 1), {0, 0, 0});
+    rotated[3].T_body_cam = rotated[3].T_body_cam * geometry::SE3(Eigen::Quaterniond(0, 0, 0, 1), {0, 0, 0});
     return camera::Rig(rotated);
   }();
   ASSERT_TRUE(rig_formats::write_rig(upside_down, out("upside_down.yaml")));
   const Ran ran = run("run " + data() + options + out("upside_down.yaml") + " --out " + out("upside_down"));
-  EXPECT_NE(ran.err.find("keypoints are inliers: check this camera's extrinsics"), std::string::npos)
-      << ran.err;
-  EXPECT_NE(ran.err.find("bslam rig info " + out("upside_down.yaml") + " --images " + data()),
-            std::string::npos)
+  EXPECT_NE(ran.err.find("keypoints are inliers: check this camera's extrinsics"), std::string::npos) << ran.err;
+  EXPECT_NE(ran.err.find("bslam rig info " + out("upside_down.yaml") + " --images " + data()), std::string::npos)
       << ran.err;
   const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
   EXPECT_EQ(right.err, "");
