@@ -1,5 +1,5 @@
-// Measures whether a map stops growing once the place is known. Plays a recording of laps that ends at its start
-// several times, and prints the size of the map and the time of the frames for each lap.
+// Measures whether a map stops growing once the place is mapped. Plays a recording of closed laps several times, and
+// prints the size of the map and the time of the frames for each lap.
 //   bslam_lap_growth DATA --laps 5 --times 4 [--cameras 0,1] [--set key=value ...]
 #include <fmt/format.h>
 #include <unistd.h>
@@ -95,10 +95,15 @@ Status play(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app("growth of the map over laps");
   bslam::Arguments arguments;
-  app.add_option("data", arguments.data, "recording of whole laps")->required();
-  app.add_option("--laps", arguments.laps, "laps it holds")->capture_default_str()->check(CLI::PositiveNumber);
-  app.add_option("--times", arguments.times, "it is played")->capture_default_str()->check(CLI::PositiveNumber);
-  app.add_option("--cameras", arguments.cameras, "of the rig, as for `bslam run` (default: all)")->delimiter(',');
+  app.add_option("data", arguments.data, "recording of complete laps")->required();
+  app.add_option("--laps", arguments.laps, "number of laps in the recording")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  app.add_option("--times", arguments.times, "number of times the recording is played")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  app.add_option("--cameras", arguments.cameras, "cameras of the rig to use, as for `bslam run` (default: all)")
+      ->delimiter(',');
   bslam::cli::add_config_options(app, arguments.config);
   CLI11_PARSE(app, argc, argv);
   const bslam::Status status = bslam::play(arguments);

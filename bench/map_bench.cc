@@ -71,7 +71,7 @@ void EmptyDraft(benchmark::State& state) {
 }
 BENCHMARK(EmptyDraft)->Unit(benchmark::kMicrosecond);
 
-// `spread`: the 600 matches are distributed evenly over the landmarks of that many keyframes; 1000 is the whole map.
+// The 600 matches are distributed evenly over the landmarks of `spread` keyframes; 1000 is the whole map.
 void CommitKeyframe(benchmark::State& state) {
   const auto spread = static_cast<std::size_t>(state.range(0));
   std::vector<std::pair<FeatureId, LandmarkId>> matches;
@@ -122,7 +122,7 @@ void CommitVisibilityCounts(benchmark::State& state) {
 }
 BENCHMARK(CommitVisibilityCounts)->Unit(benchmark::kMicrosecond);
 
-// A run of mapping behind keyframe 500: 1,000 new landmarks with 3 observations each, 2,000 observations added, 1,000
+// The edit of mapping at keyframe 500: 1,000 new landmarks with 3 observations each, 2,000 observations added, 1,000
 // removed, 100 merges, and an update of all modified landmarks.
 void CommitMappingRun(benchmark::State& state) {
   for (auto _ : state) {

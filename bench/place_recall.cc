@@ -1,12 +1,13 @@
-// Precision and recall of place recognition without the rest of the system: a map that was made without loop closing is
-// traversed in the order in which it grew, and for every keyframe an older place is searched.
-//   bslam_place_recall MAP.bmap TRUTH.tum [--older S] [--overlap SHARE] [--set key=value ...]
+// Precision and recall of place recognition without the rest of the system: a map that was built without loop closing
+// is traversed in order of its creation, and for every keyframe an older place is searched.
+//   bslam_place_recall MAP.bmap TRUTH.tum [--older S] [--overlap FRACTION] [--set key=value ...]
 // TRUTH: T_world_cam0 at the times of the keyframes. Prints a line of a table.
 //
-// A place to be recognised exists if, according to the true poses, the keyframe sees the same as another keyframe that
-// is more than S seconds older and not a neighbour: at least SHARE of its landmarks project to an image of this
-// keyframe, are not occluded, and are seen from a similar distance (within kZoom) and direction (within kTurn) as
-// before, beyond which descriptors cannot be compared. An answer is correct if the verified pose is the true one.
+// A place to be recognised exists if, according to the true poses, the keyframe observes the place of another keyframe
+// that is more than S seconds older and not a neighbour: at least FRACTION of its landmarks project to an image of this
+// keyframe, are not occluded, and are observed from a similar distance (within kZoom) and direction (within
+// kMaxViewingAngle) as before, beyond which descriptors cannot be compared. A match is correct if the verified pose
+// agrees with the true pose.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -31,8 +32,9 @@ using Eigen::Vector3d;
 using geometry::SE3;
 
 constexpr double kZoom = 1.5;
-constexpr double kTurn = std::numbers::pi / 6;       // rad
-constexpr double kMaxOff = 0.1, kMaxTurnOff = 0.05;  // tolerances of a correct pose: relative to the median depth; rad
+constexpr double kMaxViewingAngle = std::numbers::pi / 6;  // rad
+constexpr double kMaxPositionError = 0.1,
+                 kMaxRotationError = 0.05;  // tolerances of a correct pose: relative to the median depth; rad
 
 struct Arguments {
   std::string map, truth;
@@ -41,7 +43,8 @@ struct Arguments {
   cli::ConfigArguments config;
 };
 
-// The landmarks that a keyframe sees, in the frame of its camera 0. They are correct up to the error of the local map.
+// The landmarks observed by a keyframe, in the frame of its camera 0. They are correct up to the error of the local
+// map.
 struct View {
   KeyframeId keyframe;
   TimeNs time_ns = 0;
@@ -73,12 +76,12 @@ View view_of(const map::BundledMap& map, KeyframeId k, const SE3& T_world_rig) {
   return view;
 }
 
-// Whether the view shows a point that was observed from `seen_from` (both in its frame). The known point closest to it
-// in the image must have a similar depth, so that the point is not occluded.
+// Returns true if the view contains a point that was observed from `seen_from` (both in its frame). The known point
+// closest to it in the image must have a similar depth, so that the point is not occluded.
 bool shows(const camera::Rig& rig, const View& view, const Vector3d& point, const Vector3d& seen_from) {
   const double depth = point.norm(), depth_then = (point - seen_from).norm();
   if (depth > kZoom * depth_then || depth_then > kZoom * depth) return false;
-  if (point.dot(point - seen_from) < std::cos(kTurn) * depth * depth_then) return false;
+  if (point.dot(point - seen_from) < std::cos(kMaxViewingAngle) * depth * depth_then) return false;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const auto pixel = rig.camera(c).project(rig.cam_from_rig(c) * point);
     if (!pixel || !rig.camera(c).contains(*pixel)) continue;
@@ -95,7 +98,7 @@ bool shows(const camera::Rig& rig, const View& view, const Vector3d& point, cons
   return false;
 }
 
-// The fraction of the landmarks of `old` that `now` shows.
+// Returns the fraction of the landmarks of `old` that are visible in `now`.
 double shared_share(const camera::Rig& rig, const View& now, const View& old) {
   const SE3 T_now_old = now.T_world_rig.inverse() * old.T_world_rig;
   if (T_now_old.translation().norm() > 2 * std::max(now.median_depth, old.median_depth)) return 0;
@@ -105,7 +108,7 @@ double shared_share(const camera::Rig& rig, const View& now, const View& old) {
 }
 
 enum class Outcome { kRight, kWrong, kNoCandidate, kOtherCandidates, kRejected };
-constexpr std::array kOutcomes = {"right", "wrong", "no candidate", "other candidates", "rejected"};
+constexpr std::array kOutcomes = {"correct", "wrong", "no candidate", "other candidates", "rejected"};
 
 class Recall {
  public:
@@ -123,7 +126,7 @@ class Recall {
     }
   }
 
-  // From the newest keyframe to the oldest, each in the map that ends with it.
+  // From the newest keyframe to the oldest, each in the map up to this keyframe.
   void run() {
     for (std::size_t i = views_.size(); i-- > 0;) {
       ask(i);
@@ -149,7 +152,7 @@ class Recall {
     double best = 0;
     for (std::size_t j = 0; j < i && old_enough(now, views_[j].time_ns); ++j) {
       if (std::ranges::binary_search(neighbours, views_[j].keyframe, {}, &map::Covisible::keyframe))
-        continue;  // the place was in view all the time
+        continue;  // the place has always been in view
       const double share = shared_share(map_.rig(), now, views_[j]);
       if (share >= arguments_.overlap) places.push_back(views_[j].keyframe);
       best = std::max(best, share);
@@ -162,7 +165,7 @@ class Recall {
       ++missed_[static_cast<std::size_t>(outcome)];
     }
     if (arguments_.detail) {
-      fmt::print("{} at {:.2f} s: {} right places, overlap {:.2f}: {} ({})\n", now.keyframe.value(),
+      fmt::print("{} at {:.2f} s: {} correct places, overlap {:.2f}: {} ({})\n", now.keyframe.value(),
                  1e-9 * static_cast<double>(now.time_ns), places.size(), best,
                  kOutcomes[static_cast<std::size_t>(outcome)], note_);
     }
@@ -188,7 +191,7 @@ class Recall {
                                 config_.looping.verification, config_.feature_model(), random, &report);
       note_ += fmt::format("{} score {:.3f} rejection {} matches {} inliers {} found {} of {}; ",
                            candidate.keyframe.value(), candidate.score, static_cast<int>(report.rejection),
-                           report.matches, report.inliers, report.found, report.sought);
+                           report.matches, report.inliers, report.found, report.expected);
       if (place_match) return is_right(now, *old, *place_match) ? Outcome::kRight : Outcome::kWrong;
     }
     return outcome;
@@ -197,8 +200,8 @@ class Recall {
   bool is_right(const View& now, const View& old, const looping::PlaceMatch& place_match) const {
     const SE3 T_old_now = map_.keyframe(old.keyframe).T_rig_world * place_match.T_rig_world.inverse();
     const SE3 error = (old.T_world_rig.inverse() * now.T_world_rig).inverse() * T_old_now;
-    return error.translation().norm() < kMaxOff * now.median_depth &&
-           error.rotation().angularDistance(Eigen::Quaterniond::Identity()) < kMaxTurnOff;
+    return error.translation().norm() < kMaxPositionError * now.median_depth &&
+           error.rotation().angularDistance(Eigen::Quaterniond::Identity()) < kMaxRotationError;
   }
 
   map::BundledMap map_;
@@ -232,12 +235,13 @@ Status measure(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app("precision and recall of place recognition over a map made without loop closing");
   bslam::Arguments arguments;
-  app.add_option("map", arguments.map, "as `bslam run --no-loop --save-map` writes it")->required();
+  app.add_option("map", arguments.map, "map written by `bslam run --no-loop --save-map`")->required();
   app.add_option("truth", arguments.truth, "true poses of camera 0, TUM")->required();
-  app.add_option("--older", arguments.older_s, "seconds that a place was seen before")->capture_default_str();
-  app.add_option("--overlap", arguments.overlap, "share of its landmarks that is seen again where a place is")
+  app.add_option("--older", arguments.older_s, "minimum age of a place in seconds")->capture_default_str();
+  app.add_option("--overlap", arguments.overlap,
+                 "minimum fraction of the landmarks of a place that must be visible again")
       ->capture_default_str();
-  app.add_flag("--detail", arguments.detail, "a line for each keyframe");
+  app.add_flag("--detail", arguments.detail, "print a line for each keyframe");
   bslam::cli::add_config_options(app, arguments.config);
   CLI11_PARSE(app, argc, argv);
   const bslam::Status status = bslam::measure(arguments);

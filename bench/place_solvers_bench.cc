@@ -10,8 +10,8 @@ namespace {
 
 using geometry::Sim3;
 
-// range(0) vertices on two rounds of a circle, with edges from every vertex to the four before it and, in the second
-// round, to the vertex at the same place in the first round. The initial values are the concatenated odometry.
+// range(0) vertices on two laps of a circle, with edges from every vertex to the four previous ones and, in the second
+// lap, to the vertex at the same position of the first lap. The initial values are the concatenated odometry.
 PoseGraphProblem loop(int count, bool scale_free) {
   Random random(1);
   PoseGraphProblem problem;
@@ -56,7 +56,7 @@ void pose_graph(benchmark::State& state, bool scale_free) {
 BENCHMARK_CAPTURE(pose_graph, rigid, false)->Arg(1000)->Arg(4000)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(pose_graph, scale_free, true)->Arg(1000)->Arg(4000)->Unit(benchmark::kMillisecond);
 
-// 130 observations; range(0): cameras, range(1): percentage of outliers.
+// 130 observations; range(0): number of cameras, range(1): percentage of outliers.
 void absolute(benchmark::State& state, scene::Models models) {
   const Rig rig = scene::make_rig(static_cast<std::size_t>(state.range(0)), models);
   Random random(2);

@@ -1,4 +1,4 @@
-// The images of one camera of a data set in EuRoC's layout, by time.
+// Reads the images of one camera of a data set in EuRoC layout.
 #pragma once
 
 #include <bslam/image_bundle.h>
@@ -9,7 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
-// Time in nanoseconds -> file, from DATA/mav0/camN/data.csv ("time,name" a line below a comment).
+// Returns the image files by time in nanoseconds, from DATA/mav0/camN/data.csv (lines "time,name" after a comment).
 inline std::map<std::int64_t, std::string> list_images(const std::string& data, std::size_t camera) {
   const std::string folder = data + "/mav0/cam" + std::to_string(camera);
   std::map<std::int64_t, std::string> images;
@@ -23,7 +23,7 @@ inline std::map<std::int64_t, std::string> list_images(const std::string& data, 
   return images;
 }
 
-// The image as bslam takes it; cv::Mat counts its references, so a copy of it keeps the pixels. No data if unreadable.
+// Reads an image. A shared cv::Mat owns the pixels. `data` is null if the file cannot be read.
 inline bslam::CameraImage read_image(const std::string& file, std::int64_t time_ns) {
   const auto mat = std::make_shared<cv::Mat>(cv::imread(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION));
   return {mat->data, mat->cols, mat->rows, static_cast<std::ptrdiff_t>(mat->step), time_ns, mat};

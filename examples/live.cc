@@ -1,5 +1,5 @@
-// Live cameras: one thread per camera delivers images, one runs SLAM. Here the cameras replay a data set in EuRoC's
-// layout at its own pace: live DATA [SPEED]
+// SLAM with live cameras: one thread per camera delivers images, and one thread runs SLAM. In this example the cameras
+// replay a data set in EuRoC layout at SPEED times its recorded rate. Usage: live DATA [SPEED]
 #include <bslam/bslam.h>
 
 #include <chrono>
@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   if (!rig) return std::cerr << rig.error().message() << '\n', 1;
 
   bslam::Startup startup;
-  startup.history_frames = 10000;  // memory is bounded by the map
+  startup.history_frames = 10000;  // poses of older frames are discarded
   startup.callbacks.log = [](bslam::LogLevel, std::string_view line) { std::cerr << line << '\n'; };
   auto slam = bslam::System::create(*rig, bslam::Config(), startup);
   if (!slam) return std::cerr << slam.error().message() << '\n', 1;
@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
   auto synchronizer = bslam::Synchronizer::create(*rig, options);
   if (!synchronizer) return std::cerr << synchronizer.error().message() << '\n', 1;
 
-  const auto replay = [&](std::size_t camera) {  // what the driver's callback does on a robot
+  const auto replay = [&](std::size_t camera) {  // on a robot, the callback of the camera driver calls push()
     const auto files = list_images(data, camera);
     const auto start = std::chrono::steady_clock::now();
     for (const auto& [time_ns, file] : files) {

@@ -1,4 +1,4 @@
-// What a saved map holds: read_map MAP [POINTS.xyz]
+// Prints the content of a saved map. Usage: read_map MAP [POINTS.xyz]
 #include <bslam/bslam.h>
 
 #include <fstream>

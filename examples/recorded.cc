@@ -1,4 +1,4 @@
-// A recorded data set in EuRoC's layout, frame after frame: recorded DATA TRAJECTORY.tum [MAP]
+// Runs SLAM on a recorded data set in EuRoC layout. Usage: recorded DATA TRAJECTORY.tum [MAP]
 #include <bslam/bslam.h>
 
 #include <iostream>
@@ -22,19 +22,19 @@ int main(int argc, char** argv) {
   if (!rig) return fail(rig.error());
 
   bslam::Config config;
-  config.set_mode(bslam::Mode::kSequential);  // the same result on every run
+  config.set_mode(bslam::Mode::kSequential);  // identical results on every run
   auto slam = bslam::System::create(*rig, config);
   if (!slam) return fail(slam.error());
 
   std::vector<std::map<std::int64_t, std::string>> files;
-  std::set<std::int64_t> instants;
+  std::set<std::int64_t> times;
   for (std::size_t c = 0; c < rig->size(); ++c) {
     files.push_back(list_images(data, c));
-    for (const auto& [time_ns, file] : files[c]) instants.insert(time_ns);
+    for (const auto& [time_ns, file] : files[c]) times.insert(time_ns);
   }
 
   int tracked = 0;
-  for (const std::int64_t time_ns : instants) {  // cameras of this layout are triggered together
+  for (const std::int64_t time_ns : times) {  // the cameras of the data set are synchronised
     bslam::ImageBundle bundle;
     for (const auto& camera : files) {
       const auto image = camera.find(time_ns);
@@ -45,7 +45,7 @@ int main(int argc, char** argv) {
     tracked += frame->tracking();
   }
   if (const auto done = slam->finish(); !done) return fail(done.error());
-  std::cout << tracked << " of " << instants.size() << " frames have a pose\n";
+  std::cout << tracked << " of " << times.size() << " frames have a pose\n";
 
   const auto trajectory = slam->trajectory();
   if (!trajectory) return fail(trajectory.error());

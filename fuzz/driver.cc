@@ -23,7 +23,7 @@
 // Options of the sanitizers, if the program is built with them. This file is not instrumented, since the sanitizers ask
 // for their options before they are initialised.
 extern "C" void __sanitizer_set_death_callback(void (*)()) __attribute__((weak));
-// Inputs have at most 64 KB, so a reader that allocates a gigabyte trusts a number that it should check.
+// Inputs have at most 64 KB, so a reader that allocates a gigabyte uses a number that it should check.
 extern "C" const char* __asan_default_options();
 extern "C" const char* __ubsan_default_options();
 const char* __asan_default_options() { return "max_allocation_size_mb=1024:allocator_may_return_null=0"; }
@@ -54,7 +54,7 @@ void keep_current() {
 }
 
 void on_signal(int number) {
-  if (number == SIGPROF) std::fprintf(stderr, "fuzz: an input took over %d s\n", kSlowSeconds);
+  if (number == SIGPROF) std::fprintf(stderr, "fuzz: an input took more than %d s\n", kSlowSeconds);
   keep_current();
   ::_exit(1);
 }

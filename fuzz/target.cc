@@ -20,7 +20,7 @@ class Folder {
     const fs::path memory = "/dev/shm";
     std::string name =
         ((fs::is_directory(memory, error) ? memory : fs::temp_directory_path()) / "bslam_fuzz_XXXXXX").string();
-    require(::mkdtemp(name.data()) != nullptr, "a folder to work in");
+    require(::mkdtemp(name.data()) != nullptr, "cannot create a temporary folder");
     path_ = name;
   }
   ~Folder() {

@@ -24,12 +24,12 @@ def summary_of(out):
 
 
 def evaluate(bslam, out, data, align='se3'):
-    """Result of `bslam eval` for a run: {"ate": ..., "scale": ...}."""
+    """Returns the result of `bslam eval` for a run: {"ate": ..., "scale": ...}."""
     return json.loads(call(bslam, 'eval', out / 'trajectory.tum', data / 'groundtruth_cam0.tum', '--align', align, '--json'))
 
 
 def black_like(file):
-    """A black PNG with the size of another one."""
+    """Writes a black PNG with the size of another one."""
     width, height = struct.unpack('>II', file.read_bytes()[16:24])
 
     def chunk(kind, body):
@@ -40,8 +40,8 @@ def black_like(file):
 
 
 def with_fault(data, folder, cameras, kind, from_s, to_s):
-    """A copy of a recording in which `cameras` are temporarily black or frozen, or have the images of the next camera in
-    `kind[1]`. Images are links to those of the original."""
+    """Creates a copy of a recording in which `cameras` are temporarily black or frozen, or have the images of the next camera in
+    `kind[1]`. Images are links to the original images."""
     if folder.exists():
         shutil.rmtree(folder)
     (folder / 'mav0').mkdir(parents=True)

@@ -26,6 +26,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   OptionTable again_table(again);
   fuzz::require(yaml::apply_config_file(again_table, fuzz::scratch_file("again.yaml", yaml)).ok() &&
                     yaml::config_to_yaml(again_table) == yaml,
-                "settings that were written read the same");
+                "written settings must be read back equal");
   return 0;
 }

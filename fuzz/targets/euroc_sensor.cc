@@ -30,9 +30,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::require(camera->camera.unproject({0.5 * camera->camera.width, 0.5 * camera->camera.height})
                     .value_or(Eigen::Vector3d::UnitZ())
                     .allFinite(),
-                "a bearing");
+                "the bearing must be finite");
   const std::string yaml = rig_formats::euroc_sensor_yaml(*camera, 20);
   fuzz::require(rig_formats::read_euroc_sensor(fuzz::scratch_file("again.yaml", yaml), "cam0").ok(),
-                "a camera that was written can be read");
+                "a written camera must be readable");
   return 0;
 }

@@ -20,8 +20,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!faults) return 0;
   for (const simulator::Fault& f : *faults) {
     fuzz::require(!f.cameras.empty() && f.from_s >= 0 && f.to_s > f.from_s && f.delay_s >= 0,
-                  "a fault with an interval");
-    for (const int c : f.cameras) fuzz::require(c >= 0 && c < 4, "a camera of the rig");
+                  "the interval of a fault must not be empty");
+    for (const int c : f.cameras) fuzz::require(c >= 0 && c < 4, "the camera must be in the rig");
   }
   return 0;
 }

@@ -20,9 +20,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto projections = rig_formats::read_kitti_calib(file);
   if (!projections) return 0;
   for (const rig_formats::KittiProjection& p : *projections) {
-    fuzz::require(p.camera >= 0 && p.camera <= 3, "a camera of the four");
+    fuzz::require(p.camera >= 0 && p.camera <= 3, "the camera number must be 0 to 3");
     const auto camera = rig_formats::kitti_camera(p, 1241, 376, file);
-    fuzz::require(!camera || camera->T_body_cam.translation().allFinite(), "a camera at a place");
+    fuzz::require(!camera || camera->T_body_cam.translation().allFinite(), "the camera position must be finite");
   }
   return 0;
 }

@@ -39,12 +39,12 @@ void repair(std::string& bytes) {
 
 void check(std::string_view bytes) {
   const auto saved = storage::map_from_bytes(bytes, "fuzz");
-  if (!saved) return require(!saved.error().message().empty(), "an error says something");
+  if (!saved) return require(!saved.error().message().empty(), "an error must have a message");
   const std::string again = storage::map_to_bytes(saved->map, saved->info);
-  require(again.size() <= bytes.size(), "a map that was read is written as large at most");
+  require(again.size() <= bytes.size(), "a map must not become larger when written again");
   const auto twice = storage::map_from_bytes(again, "fuzz");
   require(twice.ok() && storage::map_to_bytes(twice->map, twice->info) == again,
-          "a map that was written reads the same");
+          "a written map must be read back equal");
 }
 
 std::shared_ptr<const frame::BundledFrame> small_frame(Random& random, std::size_t cameras, std::size_t keypoints) {

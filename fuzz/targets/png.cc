@@ -1,5 +1,5 @@
-// Images: our PNG decoder, and the general one behind it; as they come, and with the checksums of PNG chunks made
-// right.
+// Images, read by our PNG decoder and the general decoder: unchanged inputs, and inputs with corrected checksums of PNG
+// chunks.
 #include <libdeflate.h>
 
 #include "image_decoding/image_file.h"
@@ -62,12 +62,13 @@ std::string small_png(int width, int height, int channels) {
 void check(std::string_view bytes) {
   const auto image = image_decoding::decode_grey(bytes);
   if (!image) return;
-  require(image->width() > 0 && image->height() > 0, "an image has pixels");
-  unsigned sum = 0;  // reads them all
+  require(image->width() > 0 && image->height() > 0, "an image must have pixels");
+  unsigned sum = 0;  // reads all pixels
   for (int y = 0; y < image->height(); ++y) {
     for (int x = 0; x < image->width(); ++x) sum += image->row(y)[x];
   }
-  require(sum <= 255u * static_cast<unsigned>(image->width()) * static_cast<unsigned>(image->height()), "grey values");
+  require(sum <= 255u * static_cast<unsigned>(image->width()) * static_cast<unsigned>(image->height()),
+          "grey values must be at most 255");
 }
 
 }  // namespace

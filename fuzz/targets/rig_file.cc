@@ -26,6 +26,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!rig) return 0;
   const std::string yaml = rig_formats::rig_to_yaml(*rig);
   const auto again = rig_formats::read_rig(fuzz::scratch_file("again.yaml", yaml));
-  fuzz::require(again.ok() && again->size() == rig->size(), "a rig that was written can be read");
+  fuzz::require(again.ok() && again->size() == rig->size(), "a written rig must be readable");
   return 0;
 }

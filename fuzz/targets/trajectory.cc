@@ -25,18 +25,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto times = fuzz::scratch_file("times.txt", split == std::string_view::npos ? "" : text.substr(split + 5));
   const auto trajectory = evaluation::read_trajectory(poses, times);
   if (!trajectory) return 0;
-  fuzz::require(!trajectory->empty(), "poses");
+  fuzz::require(!trajectory->empty(), "a trajectory must have poses");
   for (std::size_t i = 0; i < trajectory->size(); ++i) {
     const auto& p = (*trajectory)[i];
-    fuzz::require(i == 0 || (*trajectory)[i - 1].time_ns < p.time_ns, "times that increase");
+    fuzz::require(i == 0 || (*trajectory)[i - 1].time_ns < p.time_ns, "times must increase");
     fuzz::require(p.T_world_frame.translation().allFinite() && p.T_world_frame.rotation().coeffs().allFinite(),
-                  "finite poses");
+                  "poses must be finite");
   }
   const auto csv =
       evaluation::read_trajectory(fuzz::scratch_file("again.csv", evaluation::euroc_csv_text(*trajectory)));
-  fuzz::require(csv.ok() && csv->size() == trajectory->size(), "a trajectory that was written can be read");
+  fuzz::require(csv.ok() && csv->size() == trajectory->size(), "a written trajectory must be readable");
   const auto tum =
       evaluation::read_trajectory(fuzz::scratch_file("again.tum", evaluation::tum_text(*trajectory, "fuzz")));
-  fuzz::require(tum.ok() && tum->size() == trajectory->size(), "a trajectory that was written can be read");
+  fuzz::require(tum.ok() && tum->size() == trajectory->size(), "a written trajectory must be readable");
   return 0;
 }

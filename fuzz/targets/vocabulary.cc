@@ -16,7 +16,7 @@ std::vector<std::string> seeds() {
     content.descriptor.push_back({random.next(), random.next(), random.next(), random.next()});
   content.weight = {1, 0.5f, 2, 1, 1, 3};
   const auto vocabulary = place::Vocabulary::make(content);
-  require(vocabulary.ok(), "the seed is a vocabulary");
+  require(vocabulary.ok(), "the seed must be a vocabulary");
   std::string bytes32;
   for (int i = 0; i < 32; ++i) bytes32 += std::to_string(7 * i % 256) + " ";
   const std::string text =
@@ -33,10 +33,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const place::Vocabulary& v = **vocabulary;
   for (const feature::Descriptor& d : {feature::Descriptor{}, feature::Descriptor{~0ull, 1, 2, 3}}) {
     const WordId word = v.word(d);
-    fuzz::require(word.valid() && word.index() < v.size(), "a word of the vocabulary");
-    fuzz::require(v.weight(word) >= 0, "a weight");
+    fuzz::require(word.valid() && word.index() < v.size(), "the word must be in the vocabulary");
+    fuzz::require(v.weight(word) >= 0, "the weight must not be negative");
   }
   const auto again = place::deserialise(place::serialise(v));
-  fuzz::require(again.ok() && (*again)->id() == v.id(), "a vocabulary that was written reads the same");
+  fuzz::require(again.ok() && (*again)->id() == v.id(), "a written vocabulary must be read back equal");
   return 0;
 }

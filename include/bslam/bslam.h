@@ -1,4 +1,4 @@
-// bslam: visual SLAM for a rig of any number of cameras. This header brings the whole library; docs/cpp.md explains it.
+// bslam: visual SLAM for a rig of any number of cameras. This header includes the whole library; see docs/cpp.md.
 //
 //   auto rig = bslam::Rig::load("rig.yaml");
 //   auto slam = bslam::System::create(*rig, bslam::Config());
@@ -8,7 +8,7 @@
 //   }
 //   slam->finish();
 //
-// The headers need C++17 and the standard library alone.
+// The headers require only C++17 and the standard library.
 #pragma once
 
 #include "bslam/config.h"

@@ -15,20 +15,21 @@ namespace bslam {
 // When mapping and loop closing run.
 enum class Mode {
   kSequential,  // in the caller's thread before the next frame: identical results on every run
-  kLagged,      // in threads of their own, each result used a fixed number of frames later: identical results as well
-  kParallel     // in threads of their own, each result used as soon as it is there: for live use, the default
+  kLagged,      // in separate threads; each result is used a fixed number of frames later: identical results as well
+  kParallel     // in separate threads; each result is used as soon as it is available: for live use, the default
 };
 
-// One setting, described.
+// Description of one setting.
 struct Setting {
   std::string name;      // "features.per_image"
-  std::string value;     // in force, as text that Config::set takes
+  std::string value;     // current value, as text that Config::set accepts
   std::string expected;  // "an integer in [50, 20000]", "one of: sequential, lagged, parallel"
   std::string unit;      // may be empty
   std::string help;
 };
 
-// A value: copies are independent. Every setting has a default; all values it can hold are valid.
+// The settings of a run, a value type whose copies are independent. Every setting has a default, and its value is
+// always valid.
 class BSLAM_EXPORT Config {
  public:
   Config();
@@ -36,22 +37,22 @@ class BSLAM_EXPORT Config {
   Config& operator=(const Config& other);
   ~Config();
 
-  // Errors, which leave the setting as it was: an unknown name (the nearest one is told), a value of another type or
-  // out of range.
+  // Sets one setting from text. On error the setting keeps its value. Errors: an unknown name (the message suggests the
+  // nearest one), a value of another type or out of range.
   Status set(std::string_view name, std::string_view value);
   void set_mode(Mode mode);
-  Status set_seed(int seed);  // of all randomness; not below 0
+  Status set_seed(int seed);  // seed of all random numbers; must not be negative
 
-  // Settings of a YAML file, as `bslam run` writes it to config.yaml; what it does not name stays as it is. Errors name
-  // file and key; nothing is changed then.
+  // Reads settings from a YAML file such as the config.yaml written by `bslam run`. Settings that are not in the file
+  // keep their values. Errors name file and key; on error no setting is changed.
   Status load(const std::filesystem::path& file);
 
-  // Errors: an unknown name.
+  // Returns the value of a setting as text. Error: an unknown name.
   Result<std::string> get(std::string_view name) const;
   std::vector<Setting> settings() const;
-  std::string to_yaml() const;  // what `load` reads back exactly
+  std::string to_yaml() const;  // `load` restores exactly the same values
 
-  struct Impl;  // hidden
+  struct Impl;  // implementation
   const Impl& impl() const { return *impl_; }
 
  private:

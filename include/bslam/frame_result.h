@@ -1,4 +1,4 @@
-// What became of one frame.
+// The result of one frame.
 #pragma once
 
 #include <cstdint>
@@ -12,78 +12,80 @@
 namespace bslam {
 
 enum class TrackingStatus {
-  kNotStarted,  // no map yet: the rig has to see texture and, without overlapping cameras, to move
-  kTracking,    // the pose below holds
-  kLost         // no pose; every further frame is tried again, by place recognition as well
+  kNotStarted,  // no map yet: the images need texture and, without overlapping cameras, the rig must move
+  kTracking,    // the poses below are valid
+  kLost         // no pose; tracking and relocalisation are attempted with every further frame
 };
 
-// Why a frame has no pose.
+// The reason for which a frame has no pose.
 enum class LostReason {
-  kNone,          // it has one
+  kNone,          // the frame has a pose
   kNotStarted,    // there is no map yet
-  kNoImages,      // no camera delivered an image that can be used
-  kFewFeatures,   // hardly any texture in the images
-  kFewMatches,    // too few landmarks of the map found again
-  kFewInliers,    // too few of those agree on a pose
+  kNoImages,      // no camera delivered a usable image
+  kFewFeatures,   // too little texture in the images
+  kFewMatches,    // too few landmarks of the map were matched
+  kFewInliers,    // too few matches are consistent with a pose
   kUnstablePose,  // the images do not determine the pose
-  kNotFound       // not recognised in a loaded map so far
+  kNotFound       // the place was not yet recognised in the loaded map
 };
 BSLAM_EXPORT std::string_view to_string(TrackingStatus status);  // "not-started", "tracking", "lost"
 BSLAM_EXPORT std::string_view to_string(LostReason reason);      // "" for kNone
 
 enum class CameraState {
   kOk,
-  kDegraded,  // used, but it sees little: see `reason`
+  kDegraded,  // used, but with few features or reduced quality: see `reason`
   kOut        // not used for this frame: see `reason`
 };
 BSLAM_EXPORT std::string_view to_string(CameraState state);  // "ok", "degraded", "out"
 
 struct CameraResult {
   CameraState state = CameraState::kOk;
-  // "" while ok; no-images, black, over-exposed, frozen, inconsistent, blurred, few-features. A literal of the library.
+  // "" if ok, otherwise no-images, black, over-exposed, frozen, inconsistent, blurred or few-features. Points to static
+  // storage.
   std::string_view reason;
-  int keypoints = 0;  // found in the image
-  int matched = 0;    // of these, matched to landmarks of the map
-  int inliers = 0;    // of these, in agreement with the pose
+  int keypoints = 0;  // number of keypoints in the image
+  int matched = 0;    // keypoints matched to landmarks of the map
+  int inliers = 0;    // matched keypoints that are consistent with the pose
 };
 
 struct StageTime {
-  std::string_view stage;  // a literal of the library: "extract", "bundle", "track", ...
+  std::string_view stage;  // "extract", "bundle", "track", ...; points to static storage
   double ms = 0;           // wall time in the caller's thread
 };
 
 struct FrameResult {
-  int frame = 0;             // counts the calls of System::process that gave a result, from 0
-  std::int64_t time_ns = 0;  // of camera 0's image, or the earliest where that is missing; with its time offset
+  int frame = 0;             // number of earlier calls of System::process that returned a result
+  std::int64_t time_ns = 0;  // time of camera 0's image, or of the earliest image if it is missing; with time offset
 
   TrackingStatus status = TrackingStatus::kNotStarted;
   LostReason reason = LostReason::kNotStarted;
   bool tracking() const { return status == TrackingStatus::kTracking; }
 
-  // The pose in the map, identity unless tracking. The world is camera 0 where the submap began: x right, y down, z
-  // forward there. It jumps where a loop is closed. Poses of different submaps have nothing in common; later frames may
-  // tell another number for the same place after submaps were merged.
+  // The pose in the map; identity unless tracking. The world frame is the frame of camera 0 at the start of the submap:
+  // x right, y down, z forward. The pose jumps when a loop is closed. Poses of different submaps are unrelated; after
+  // submaps were merged, `submap` of later frames may differ for the same place.
   Pose T_world_cam0, T_world_body;
-  int submap = -1;  // of these poses: id of the submap's first keyframe
-  // The same pose's uncertainty, where it is known: of the small motion d with T_world_cam0(true) = T_world_cam0
-  // exp(d), rotation first, in camera 0's axes. From image noise alone: drift of the map is not in it.
+  int submap = -1;  // id of the first keyframe of the submap of these poses
+  // Covariance of T_world_cam0, if known: of the small motion d, rotation first, in the axes of camera 0, with
+  // T_world_cam0(true) = T_world_cam0 exp(d). Includes only image noise, not the drift of the map.
   std::optional<Covariance6> covariance;
-  std::optional<Velocity> velocity;  // of the body frame, in its own axes; empty where the motion is not known
+  std::optional<Velocity> velocity;  // of the body frame, in its own axes; nullopt if unknown
 
-  // The smooth pose: no correction of the map touches it, and it stands still while the rig is lost. For control and
-  // local planning. T_world_cam0 = T_map_odom * T_odom_cam0, with `map` another word for world.
+  // The odometry pose (the `odom` frame of ROS REP 105): continuous, since corrections of the map do not change it, and
+  // constant while the rig is lost. For control and local planning. T_world_cam0 = T_map_odom * T_odom_cam0, where
+  // `map` denotes the same frame as `world`.
   Pose T_odom_cam0, T_odom_body, T_map_odom;
 
   std::vector<CameraResult> cameras;  // one per camera of the rig
-  int unique_features = 0;            // of all cameras together, those seen by several counted once
-  int matched_features = 0;           // of these, seen by more than one camera
+  int unique_features = 0;            // number of features of all cameras; features matched between cameras count once
+  int matched_features = 0;           // unique features observed by several cameras
 
   bool keyframe = false;     // the frame became a keyframe
-  int keyframe_id = -1;      // its id in the map then; else the keyframe the frame was tracked against; -1: none
-  bool relocalised = false;  // found again after a loss, somewhere in the map
+  int keyframe_id = -1;      // its id if it became a keyframe, otherwise the reference keyframe; -1 if none
+  bool relocalised = false;  // tracking was recovered by place recognition
 
   std::vector<StageTime> stages;
-  double total_ms = 0;  // from handing over the images to having the pose
+  double total_ms = 0;  // wall time from the call of System::process to the pose
 };
 
 }  // namespace bslam

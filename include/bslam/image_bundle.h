@@ -1,4 +1,4 @@
-// Images of the cameras of a rig, taken together.
+// Images of the cameras of a rig taken at the same time.
 #pragma once
 
 #include <cstddef>
@@ -8,18 +8,19 @@
 
 namespace bslam {
 
-// One 8-bit grey image, row-major, raw as the camera delivers it: neither rectified nor undistorted.
+// An 8-bit grey image, row-major, as delivered by the camera: neither rectified nor undistorted.
 struct CameraImage {
-  const std::uint8_t* data = nullptr;  // first row; null = this camera has no image here
-  int width = 0, height = 0;           // pixels, as the rig's camera says
-  std::ptrdiff_t stride = 0;           // bytes from one row to the next, at least `width`
-  std::int64_t time_ns = 0;  // middle of the exposure by the camera's own clock; the rig's time offset is added inside
-  // Keeps `data` alive for as long as a copy of this struct exists. Empty: the memory is the caller's and has to stay
-  // as it is until the call that was given the image returns.
+  const std::uint8_t* data = nullptr;  // first row; null if the camera has no image
+  int width = 0, height = 0;           // pixels; must equal the resolution of the calibration
+  std::ptrdiff_t stride = 0;           // bytes between rows; must be at least `width`
+  // Middle of the exposure by the clock of the camera; the library adds the time offset of the calibration.
+  std::int64_t time_ns = 0;
+  // Owner of `data`, which keeps it alive as long as a copy of this struct exists. If empty, the memory belongs to the
+  // caller and must remain valid and unchanged until the call that receives the image returns.
   std::shared_ptr<const void> owner = nullptr;
 };
 
-// One image per camera of the rig, in the rig's order; any may be missing, not all.
+// One image per camera of the rig, in the order of the rig. Any image may be missing, but not all.
 struct ImageBundle {
   std::vector<CameraImage> images;
 };

@@ -15,23 +15,23 @@ using Matrix4 = std::array<double, 16>;
 using Covariance6 = std::array<double, 36>;
 
 struct BSLAM_EXPORT Pose {
-  std::array<double, 4> rotation = {0, 0, 0, 1};  // unit quaternion x, y, z, w (Hamilton), of b's axes in a
-  std::array<double, 3> translation = {0, 0, 0};  // metres, of b's origin in a
+  std::array<double, 4> rotation = {0, 0, 0, 1};  // unit quaternion x, y, z, w (Hamilton): orientation of b in a
+  std::array<double, 3> translation = {0, 0, 0};  // metres: origin of b in a
 
   Matrix4 matrix() const;
   Pose inverse() const;  // T_b_a
-  // Errors: a rotation off by more than 1e-3 or mirrored, a last row that is not 0 0 0 1, a translation beyond 1000 km,
-  // numbers that are not finite.
+  // Errors: a rotation that is mirrored or deviates from orthonormal by more than 1e-3, a last row that is not 0 0 0 1,
+  // a translation beyond 1000 km, numbers that are not finite.
   static Result<Pose> from_matrix(const Matrix4& rows);
 };
 
 BSLAM_EXPORT Pose operator*(const Pose& T_a_b, const Pose& T_b_c);
 BSLAM_EXPORT std::array<double, 3> operator*(const Pose& T_a_b, const std::array<double, 3>& point_b);
 
-// Motion of a frame against the world, in that frame's own axes (as geometry's "twist in the child frame" in ROS).
+// Velocity of a frame relative to the world, in the axes of that frame (like the twist in the child frame of ROS).
 struct Velocity {
   std::array<double, 3> angular = {0, 0, 0};  // rad/s
-  std::array<double, 3> linear = {0, 0, 0};   // m/s, of the frame's origin
+  std::array<double, 3> linear = {0, 0, 0};   // m/s, velocity of the frame's origin
 };
 
 }  // namespace bslam

@@ -1,4 +1,4 @@
-// Errors as values. No function of bslam throws, prints or exits because of what it was given: it returns a Result.
+// Errors as values. No function of bslam throws, prints or exits because of invalid input; it returns a Result.
 #pragma once
 
 #include <optional>
@@ -10,24 +10,24 @@
 
 namespace bslam {
 
-// One thing that is wrong with the input: where it is, what was found there, and what was expected.
+// An error in the input: its location, what was found there, and what was expected.
 struct BSLAM_EXPORT Error {
   std::string file;      // file, folder, function or command-line option; may be empty
-  std::string key;       // key, line or part within it; may be empty
-  std::string found;     // what is there
-  std::string expected;  // what would be right
-  // Message in place of "found X, expected Y" where a sentence reads better; may be empty.
+  std::string key;       // key, line or section in it; may be empty
+  std::string found;     // actual content
+  std::string expected;  // accepted content
+  // Message that replaces "found X, expected Y"; may be empty.
   std::string sentence = {};
 
-  // One line: "FILE: KEY: found X, expected Y", or "FILE: KEY: SENTENCE". Empty parts are left out, and so are file and
-  // key where the sentence names them itself. Control characters are replaced by spaces.
+  // One line: "FILE: KEY: found X, expected Y", or "FILE: KEY: SENTENCE". Empty fields are omitted, and so are file
+  // and key if the sentence contains them. Control characters are replaced by spaces.
   std::string message() const;
 };
 
-// Prints `message` to stderr and aborts. Called only where a caller asks a Result for what it does not hold.
+// Prints `message` to stderr and aborts. Called only if the absent alternative of a Result is accessed.
 [[noreturn]] BSLAM_EXPORT void bad_result_access(const char* message);
 
-// A value or an Error. Check ok() first: asking for the one that is not there is a bug of the caller and aborts.
+// A value or an Error. Check ok() first: accessing the absent alternative is a bug of the caller and aborts.
 template <class T>
 class [[nodiscard]] Result {
  public:

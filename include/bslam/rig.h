@@ -1,4 +1,4 @@
-// The rig: cameras, their calibration and where they are mounted.
+// The rig: cameras with their intrinsics and extrinsics.
 #pragma once
 
 #include <array>
@@ -15,18 +15,19 @@
 
 namespace bslam {
 
-// Calibration of one camera. A camera looks along +z, x to the right and y down; the centre of the upper left pixel is
-// pixel (0, 0).
+// Calibration of one camera. The camera frame has z forward, x to the right and y down; the centre of the upper left
+// pixel is pixel (0, 0).
 struct CameraCalibration {
-  std::string name;                                 // for messages
+  std::string name;                                 // used in messages
   std::string model = "pinhole-radtan";             // pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere
   int width = 0, height = 0;                        // pixels, 1 to 20000
   std::array<double, 4> intrinsics = {0, 0, 0, 0};  // fx, fy, cx, cy in pixels
-  // What the model has beside these: none; k1 k2 p1 p2 [k3 [k4 k5 k6]]; k1 k2 k3 k4; alpha; alpha beta; xi alpha.
+  // Further parameters, by model in the above order: none; k1 k2 p1 p2 [k3 [k4 k5 k6]]; k1 k2 k3 k4; alpha; alpha beta;
+  // xi alpha.
   std::vector<double> distortion = {};
-  Pose T_body_cam = {};      // metres; the body frame is any frame of your choice that all cameras share
+  Pose T_body_cam = {};      // metres; the body frame can be chosen freely and is common to all cameras
   double time_offset_s = 0;  // true time = stamp + offset
-  // (height, width) row-major; 0 = ignore these pixels, as they show the robot. Empty: none.
+  // Mask of size (height, width), row-major; 0 marks pixels to ignore, such as views of the robot. Empty if not used.
   std::vector<std::uint8_t> mask = {};
 };
 
@@ -34,28 +35,32 @@ struct CameraCalibration {
 class BSLAM_EXPORT Rig {
  public:
   // Reads a calibration of any known format, recognised by its content: bslam, EuRoC, Kalibr, OpenVINS, ORB-SLAM3,
-  // Basalt, COLMAP, KITTI; or the one that the folder of a data set holds. Errors name file and key: not readable, no
-  // known format, values out of range, a mask that is no 8-bit grey PNG of the camera's size.
+  // Basalt, COLMAP, KITTI; or the calibration in the folder of a data set. Errors name file and key: a file that
+  // cannot be read or has an unknown format, values out of range, a mask that is not an 8-bit grey PNG of the camera's
+  // resolution.
   static Result<Rig> load(const std::filesystem::path& file);
 
-  // A rig made in code; the first is camera 0. Errors name the camera and what of it is wrong, as `load`; no camera.
+  // Creates a rig from calibrations; the first one is camera 0. Errors: no camera; as for `load`, values out of range,
+  // with the name of the camera and the parameter.
   static Result<Rig> make(const std::vector<CameraCalibration>& cameras);
 
-  // Some of the cameras, in this order; the first becomes camera 0. Errors: none, an index twice or out of range.
+  // Returns the rig of the given cameras, in this order; the first one becomes camera 0. Errors: no index, a repeated
+  // index, an index out of range.
   Result<Rig> subset(const std::vector<int>& cameras) const;
 
-  // Writes bslam's own format; masks made in code are left out. Error: the file cannot be written.
+  // Writes the rig file format of bslam; masks that were not loaded from files are omitted. Error: the file cannot be
+  // written.
   Status save(const std::filesystem::path& file) const;
 
-  std::size_t size() const;  // cameras
-  // Copies the calibration of camera i; i below size(), anything else gives an empty one.
+  std::size_t size() const;  // number of cameras
+  // Returns a copy of the calibration of camera i; an empty calibration if i >= size().
   CameraCalibration camera(std::size_t i) const;
 
-  // How the file was understood where it leaves a choice, and likely mistakes of units, frames or axes; a line each.
+  // How ambiguous content of the file was interpreted, and likely mistakes in units, frames or axes; one line each.
   std::vector<std::string> notes() const;
   std::vector<std::string> warnings() const;
 
-  struct Impl;  // hidden
+  struct Impl;  // implementation
   explicit Rig(std::shared_ptr<const Impl> impl);
   const Impl& impl() const { return *impl_; }
 

@@ -1,4 +1,4 @@
-// Puts single images of live cameras together to bundles.
+// Groups single images of live cameras into bundles.
 #pragma once
 
 #include <array>
@@ -17,12 +17,12 @@
 
 namespace bslam {
 
-// Why an image is in no bundle.
+// The reason for which an image is in no bundle.
 enum class DropReason {
-  kDuplicate,  // the camera has delivered an image with this time before
-  kTooLate,    // the bundle it belongs to, or a later one, was handed out already
-  kNoFrame,    // not within the tolerance of an image of camera 0, or another one of its camera is nearer to that
-  kFarAhead,   // stamped far ahead of all images before it, as a broken clock does
+  kDuplicate,  // the camera has already delivered an image with this time
+  kTooLate,    // its bundle or a later one is already complete
+  kNoFrame,    // not within the tolerance of an image of camera 0, or another image of its camera is nearer to it
+  kFarAhead,   // its time stamp is far ahead of all earlier images, as with a broken clock
   kOverflow    // its bundle was not fetched in time
 };
 inline constexpr std::size_t kDropReasons = 5;
@@ -30,56 +30,59 @@ BSLAM_EXPORT std::string_view to_string(DropReason reason);  // "duplicate", "to
 
 struct DroppedImage {
   std::size_t camera = 0;
-  std::int64_t time_ns = 0;  // as it was pushed
+  std::int64_t time_ns = 0;  // time stamp as passed to push()
   DropReason reason = DropReason::kTooLate;
 };
 
 struct SyncOptions {
-  double tolerance_s = 0.002;   // images of different cameras this near make one bundle; below half a camera's interval
-  double max_wait_s = 0.1;      // how much later, by the stamps of other images, a missing image may still come
-  double reorder_s = 0;         // by how much the images of one camera may overtake each other
-  double silent_after_s = 1;    // a camera without an image for so long is not waited for until it delivers again
-  double max_ahead_s = 10;      // an image farther ahead of all others is dropped, unless its camera stays there
-  std::size_t max_images = 32;  // that wait, per camera: with more the oldest bundle is handed out as it is
-  std::size_t max_bundles = 4;  // that wait to be fetched: with more the oldest is dropped
-  std::function<void(const DroppedImage&)> on_drop = {};  // called by the thread that pushes; may be empty
+  double tolerance_s = 0.002;  // maximum time difference within a bundle; must be less than half an image interval
+  double max_wait_s = 0.1;     // maximum delay of a missing image relative to the time stamps of other images
+  double reorder_s = 0;        // maximum time difference between images of one camera that arrive out of order
+  double silent_after_s = 1;   // a camera without an image for this long is ignored until it delivers again
+  double max_ahead_s = 10;     // an image farther ahead of all others is dropped, unless further ones confirm its clock
+  // Maximum number of waiting images per camera; if it is exceeded, the oldest bundle is completed without its missing
+  // images.
+  std::size_t max_images = 32;
+  std::size_t max_bundles = 4;  // maximum number of bundles to be fetched; if exceeded, the oldest one is dropped
+  std::function<void(const DroppedImage&)> on_drop = {};  // called by the thread that calls push() or close(); optional
 };
 
-// What became of the images so far.
+// Numbers of images and bundles so far.
 struct SyncCounts {
-  std::size_t bundles = 0;                                     // handed out or ready
-  std::vector<std::size_t> pushed;                             // per camera
-  std::vector<std::array<std::size_t, kDropReasons>> dropped;  // per camera, by DropReason
+  std::size_t bundles = 0;                                     // fetched, or ready to be fetched
+  std::vector<std::size_t> pushed;                             // images per camera
+  std::vector<std::array<std::size_t, kDropReasons>> dropped;  // images per camera, by DropReason
   std::size_t waiting = 0;                                     // images of all cameras that are in no bundle yet
 };
 
-// The rule is that of recorded data sets: bundles are the instants of camera 0, the nearest image of every other camera
-// within the tolerance belongs to it, and where camera 0 is silent the others make bundles of their own. A bundle is
-// handed out once no missing image can be expected for it: each camera has delivered a later image, is not due yet by
-// its own rate, is silent, or max_wait_s has passed. Time is that of the stamps, never of a clock, so the same sequence
-// of pushes gives the same bundles, as long as they are fetched in time.
+// Images are grouped by the same rule as recorded data sets: each image of camera 0 defines a bundle, to which the
+// nearest image of every other camera within the tolerance belongs; while camera 0 is silent, the other cameras define
+// bundles. A bundle is ready when no missing image can be expected for it: each camera has delivered a later image, is
+// not due yet according to its rate, is silent, or max_wait_s has passed. All times are time stamps of images, never of
+// the system clock, so the same sequence of pushes gives the same bundles, as long as they are fetched in time.
 //
 // All functions may be called from any thread. Bundles come in order of time.
 class BSLAM_EXPORT Synchronizer {
  public:
-  // Stamps are compared after the rig's time offsets were added. Errors: options that are negative or not finite, or
-  // bounds of 0.
+  // Time stamps are compared after adding the time offsets of the rig. Errors: options that are negative or not finite;
+  // maximum numbers of 0.
   static Result<Synchronizer> create(const Rig& rig, SyncOptions options = {});
   Synchronizer(Synchronizer&& other) noexcept;
   Synchronizer& operator=(Synchronizer&& other) noexcept;
   ~Synchronizer();
 
-  // An image of one camera. With an `owner` it is shared, else its pixels are copied. Errors: no such camera, no data,
-  // another size than the calibration's, a stride below the width, a time beyond +-4e18 ns, a call after close().
+  // Adds an image of one camera. Its pixels are shared if it has an `owner`, otherwise copied. Errors: a camera index
+  // out of range, no data, a size that differs from the calibration, a stride smaller than the width, a time beyond
+  // +-4e18 ns, a call after close().
   Status push(std::size_t camera, const CameraImage& image);
 
-  // The next bundle that is ready, if any.
+  // Returns the next bundle if one is ready.
   std::optional<ImageBundle> pop();
 
-  // Waits for it. Empty once the synchroniser was closed and all bundles were fetched.
+  // Waits for the next bundle. Returns nullopt when the synchroniser is closed and all bundles were fetched.
   std::optional<ImageBundle> wait();
 
-  // No images follow: what waits becomes bundles, without limit of their number.
+  // Declares that no images follow: all waiting images become bundles, whose number is not limited.
   void close();
 
   SyncCounts counts() const;

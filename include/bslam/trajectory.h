@@ -1,4 +1,4 @@
-// Poses over time.
+// Trajectories: poses over time.
 #pragma once
 
 #include <cstdint>
@@ -13,17 +13,17 @@ namespace bslam {
 
 struct TimedPose {
   std::int64_t time_ns = 0;
-  Pose T_world_frame;  // of camera 0 or of the body frame, as asked for
+  Pose T_world_frame;  // pose of camera 0 or of the body frame, as requested
 };
 
-// Strictly increasing in time.
+// Poses with strictly increasing times.
 using Trajectory = std::vector<TimedPose>;
 
-// Which of the rig's frames a pose is of: camera 0, or the frame its calibration gives the cameras in (often the IMU).
+// The frame of the rig to which a pose refers: camera 0, or the body frame of the calibration (often the IMU).
 enum class RigFrame { kCamera0, kBody };
 
-// Writes TUM's format: `t x y z qx qy qz qw` a line, seconds and metres with nine decimals, below a comment that names
-// the frame. The file appears whole or not at all. Error: it cannot be written.
+// Writes the TUM format: a comment with the frame, then one line `t x y z qx qy qz qw` per pose, in seconds and metres
+// with nine decimals. The file is written completely or not at all. Error: it cannot be written.
 BSLAM_EXPORT Status write_tum(const std::filesystem::path& file, const Trajectory& trajectory, RigFrame frame);
 
 }  // namespace bslam

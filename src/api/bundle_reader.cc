@@ -49,8 +49,8 @@ Result<image::ImageBundle> BundleReader::convert(const ImageBundle& bundle) cons
     image.state = image::ImageState::kPresent;
     image.time_ns = in.time_ns + rig_.camera(c).time_offset_ns;
     image.borrowed = {in.data, in.width, in.height, in.stride};
-    const bool leads = !any || (image.time_ns < out.time_ns && out.images[0].state != image::ImageState::kPresent);
-    if (leads) out.time_ns = image.time_ns;
+    const bool sets_time = !any || (image.time_ns < out.time_ns && out.images[0].state != image::ImageState::kPresent);
+    if (sets_time) out.time_ns = image.time_ns;
     any = true;
   }
   if (!any) return Error{kProcess, "images", "none", "the image of at least one camera"};
@@ -60,7 +60,7 @@ Result<image::ImageBundle> BundleReader::convert(const ImageBundle& bundle) cons
 Status BundleReader::check_times(const image::ImageBundle& images) const {
   if (last_ns_ && images.time_ns <= *last_ns_) {
     return Error{kProcess, "time", fmt::format("{} ns", images.time_ns),
-                 fmt::format("one after {} ns, that of the bundle before", *last_ns_)};
+                 fmt::format("a time after {} ns (previous bundle)", *last_ns_)};
   }
   for (std::size_t c = 0; c < images.images.size(); ++c) {
     const image::CameraImage& image = images.images[c];
@@ -73,7 +73,7 @@ Status BundleReader::check_times(const image::ImageBundle& images) const {
     }
     if (last_camera_ns_[c] && image.time_ns <= *last_camera_ns_[c]) {
       return Error{kProcess, key, fmt::format("time {} ns", image.time_ns),
-                   fmt::format("one after {} ns, that of the camera's image before", *last_camera_ns_[c])};
+                   fmt::format("a time after {} ns (previous image of the camera)", *last_camera_ns_[c])};
     }
   }
   return {};

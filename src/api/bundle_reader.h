@@ -1,4 +1,4 @@
-// Bundles as callers hand them over, checked, as bundles of the estimator.
+// Checks bundles passed by the caller and converts them to bundles of the estimator.
 #pragma once
 
 #include <bslam/image_bundle.h>
@@ -12,15 +12,15 @@
 
 namespace bslam::api {
 
-// Why an image cannot be of this camera; `name`: of the public function, for the Error.
+// Returns an Error if the image cannot be from this camera. `name` is the public function, used in the Error.
 Status check_image(const CameraImage& image, const camera::Camera& camera, const char* name);
 
 class BundleReader {
  public:
   explicit BundleReader(const camera::Rig& rig) : rig_(rig), last_camera_ns_(rig.size()) {}
 
-  // The same images, their memory borrowed, with the time offsets of the rig applied and the number of the next frame.
-  // Errors as those of bslam::System::process about a bundle; then it does not count.
+  // Returns the same images without copying their pixels, with the time offsets of the rig applied and the number of
+  // the next frame. Errors: those of bslam::System::process about a bundle; such a bundle does not change the reader.
   Result<image::ImageBundle> read(const ImageBundle& bundle);
 
  private:
@@ -29,8 +29,8 @@ class BundleReader {
 
   const camera::Rig rig_;
   FrameId next_{0};
-  std::optional<TimeNs> last_ns_;                      // of the frame before
-  std::vector<std::optional<TimeNs>> last_camera_ns_;  // per camera, of its last image
+  std::optional<TimeNs> last_ns_;                      // time of the previous frame
+  std::vector<std::optional<TimeNs>> last_camera_ns_;  // per camera: time of its last image
 };
 
 }  // namespace bslam::api

@@ -1,4 +1,4 @@
-// What a public Config hides.
+// Implementation of the public class Config.
 #pragma once
 
 #include <bslam/config.h>

@@ -25,7 +25,7 @@ Covariance6 to_covariance(const geometry::Matrix6d& covariance) {
   return out;
 }
 
-// T_world_rig(t + dt) = T_world_rig(t) exp(-dt twist): seen in the rig's own axes it moves by -twist.
+// T_world_rig(t + dt) = T_world_rig(t) exp(-dt twist): in the axes of the rig, the velocity is -twist.
 Velocity to_velocity(const geometry::Vector6d& twist, const SE3& T_frame_rig) {
   const geometry::Vector6d v = -(T_frame_rig.adjoint() * twist);
   return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};

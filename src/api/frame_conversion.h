@@ -1,4 +1,4 @@
-// One frame as the caller is told of it. The only place that knows both records.
+// Converts the internal record of a frame to the public FrameResult.
 #pragma once
 
 #include <bslam/frame_result.h>

@@ -12,7 +12,7 @@
 namespace bslam {
 namespace {
 
-// Root of the submap of every keyframe slot; -1 where it was removed.
+// Returns the root of the submap of every keyframe index; -1 if the keyframe was removed.
 std::vector<int> submap_by_keyframe(const map::BundledMap& map) {
   std::vector<int> out(map.keyframe_slots(), -1);
   for (const KeyframeId root : map.roots()) {

@@ -1,4 +1,4 @@
-// What a public MapView hides.
+// Implementation of the public class MapView.
 #pragma once
 
 #include <bslam/map_view.h>
@@ -14,7 +14,7 @@ struct MapView::Impl {
 namespace api {
 
 MapView make_map_view(map::MapSnapshot map);
-MapView empty_map_view();  // of a rig of one camera that stands for none
+MapView empty_map_view();  // has a rig with one placeholder camera, since a rig cannot be empty
 
 }  // namespace api
 }  // namespace bslam

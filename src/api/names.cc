@@ -1,4 +1,4 @@
-// Words for the enumerations of the public headers.
+// Names of the enumerators of the public headers.
 #include <bslam/bslam.h>
 
 namespace bslam {

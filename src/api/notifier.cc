@@ -16,7 +16,7 @@ void Notifier::started(const Rig& rig) {
   for (const std::string& warning : rig.warnings()) log(LogLevel::kWarning, "rig: " + warning);
 }
 
-void Notifier::tell_status(const FrameResult& frame) {
+void Notifier::report_status(const FrameResult& frame) {
   if (frame.status == status_) return;
   const double time_s = to_seconds(frame.time_ns);
   if (frame.tracking()) {
@@ -27,7 +27,7 @@ void Notifier::tell_status(const FrameResult& frame) {
   status_ = frame.status;
 }
 
-void Notifier::tell_cameras(const FrameResult& frame) {
+void Notifier::report_cameras(const FrameResult& frame) {
   if (cameras_.empty()) cameras_.resize(frame.cameras.size());
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     const CameraResult& now = frame.cameras[c];
@@ -41,7 +41,7 @@ void Notifier::tell_cameras(const FrameResult& frame) {
   }
 }
 
-void Notifier::tell_loops(const system::System& system) {
+void Notifier::report_loops(const system::System& system) {
   const std::vector<system::LoopRecord> loops = system.loops();
   for (; loops_ < loops.size(); ++loops_) {
     const system::LoopRecord& loop = loops[loops_];
@@ -55,25 +55,25 @@ void Notifier::tell_loops(const system::System& system) {
   }
 }
 
-void Notifier::tell_map(const system::System& system) {
+void Notifier::report_map(const system::System& system) {
   map::MapSnapshot map = system.snapshot();
   const int version = map->version().value();
   if (version == map_version_) return;
   map_version_ = version;
-  tell_loops(system);
+  report_loops(system);
   if (callbacks_.map) callbacks_.map(make_map_view(std::move(map)));
 }
 
 void Notifier::processed(const FrameResult& frame, const system::System& system) {
-  tell_status(frame);
-  tell_cameras(frame);
+  report_status(frame);
+  report_cameras(frame);
   if (frame.keyframe && callbacks_.keyframe) callbacks_.keyframe({frame.keyframe_id, frame});
-  tell_map(system);
+  report_map(system);
 }
 
 void Notifier::finished(const system::System& system) {
-  tell_map(system);
-  tell_loops(system);
+  report_map(system);
+  report_loops(system);
 }
 
 }  // namespace bslam::api

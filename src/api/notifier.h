@@ -1,4 +1,4 @@
-// Tells the callbacks of a System what changed since they were last told.
+// Reports changes of the state of a System through its callbacks.
 #pragma once
 
 #include <bslam/system.h>
@@ -10,27 +10,27 @@
 
 namespace bslam::api {
 
-// For one thread at a time, the one that calls process() and finish().
+// Must be used by one thread at a time, the one that calls process() and finish().
 class Notifier {
  public:
   Notifier(Callbacks callbacks, const camera::Rig& rig) : callbacks_(std::move(callbacks)), rig_(rig) {}
 
-  // What is to be said of the rig before the first frame.
+  // Logs notes and warnings about the rig, before the first frame.
   void started(const Rig& rig);
   void processed(const FrameResult& frame, const system::System& system);
   void finished(const system::System& system);
 
  private:
-  void tell_status(const FrameResult& frame);
-  void tell_cameras(const FrameResult& frame);
-  void tell_map(const system::System& system);
-  void tell_loops(const system::System& system);
+  void report_status(const FrameResult& frame);
+  void report_cameras(const FrameResult& frame);
+  void report_map(const system::System& system);
+  void report_loops(const system::System& system);
   void log(LogLevel level, const std::string& line) const;
 
   const Callbacks callbacks_;
   const camera::Rig rig_;
   TrackingStatus status_ = TrackingStatus::kNotStarted;
-  std::vector<CameraResult> cameras_;  // as last told; empty before the first frame
+  std::vector<CameraResult> cameras_;  // last reported states; empty before the first frame
   int map_version_ = 0;
   std::size_t loops_ = 0;
 };

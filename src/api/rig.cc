@@ -23,12 +23,12 @@ Result<image::Image> read_mask(const camera::Camera& camera) {
   if (camera.mask_file.empty()) return image::Image();
   const auto bytes = read_file(camera.mask_file, kMaxMaskBytes);
   if (!bytes) return bytes.error();
-  auto mask = image_files::is_whole_png(*bytes) ? image_files::decode_grey_png(*bytes) : std::nullopt;
-  if (!mask) return Error{camera.mask_file, "", "no 8-bit grey PNG without interlacing", "one"};
+  auto mask = image_files::is_complete_png(*bytes) ? image_files::decode_grey_png(*bytes) : std::nullopt;
+  if (!mask) return Error{camera.mask_file, "", "another kind of file", "an 8-bit grey PNG without interlacing"};
   return image_files::checked_mask(*std::move(mask), camera);
 }
 
-// The camera and its mask, which may be empty. `key`: of the camera, for errors.
+// Returns the camera and its mask, which may be empty. `key` is the key of the camera in errors.
 Result<std::pair<camera::RigCamera, image::Image>> make_camera(const CameraCalibration& c, const std::string& key) {
   const auto& q = c.T_body_cam.rotation;
   const auto& t = c.T_body_cam.translation;
@@ -85,7 +85,7 @@ Result<Rig> Rig::load(const std::filesystem::path& file) {
 
 Result<Rig> Rig::make(const std::vector<CameraCalibration>& cameras) {
   return api::guarded("Rig::make", [&]() -> Result<Rig> {
-    if (cameras.empty()) return Error{"Rig::make", "", "no camera", "at least one"};
+    if (cameras.empty()) return Error{"Rig::make", "", "no camera", "at least one camera"};
     std::vector<camera::RigCamera> made;
     std::vector<image::Image> masks;
     for (std::size_t c = 0; c < cameras.size(); ++c) {
@@ -100,7 +100,7 @@ Result<Rig> Rig::make(const std::vector<CameraCalibration>& cameras) {
 
 Result<Rig> Rig::subset(const std::vector<int>& cameras) const {
   return api::guarded("Rig::subset", [&]() -> Result<Rig> {
-    if (cameras.empty()) return Error{"Rig::subset", "", "no camera", "at least one"};
+    if (cameras.empty()) return Error{"Rig::subset", "", "no camera", "at least one camera"};
     std::vector<image::Image> masks;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
       const int c = cameras[i];
@@ -108,7 +108,7 @@ Result<Rig> Rig::subset(const std::vector<int>& cameras) const {
         return Error{"Rig::subset", "", std::to_string(c), fmt::format("cameras in [0, {}]", size() - 1)};
       }
       if (std::count(cameras.begin(), cameras.end(), c) > 1) {
-        return Error{"Rig::subset", "", fmt::format("camera {} twice", c), "every camera once"};
+        return Error{"Rig::subset", "", fmt::format("camera {} twice", c), "each camera at most once"};
       }
       masks.push_back(impl_->masks[static_cast<std::size_t>(c)]);
     }

@@ -1,4 +1,4 @@
-// What a public Rig hides.
+// Implementation of the public class Rig.
 #pragma once
 
 #include <bslam/rig.h>
@@ -13,7 +13,7 @@ namespace bslam {
 
 struct Rig::Impl {
   camera::Rig rig;
-  std::vector<image::Image> masks;  // one per camera, an empty image = none
+  std::vector<image::Image> masks;  // one per camera; empty if the camera has no mask
   std::vector<std::string> notes;
 };
 

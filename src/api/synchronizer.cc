@@ -27,15 +27,15 @@ Status check_options(const SyncOptions& options) {
                           Number{"reorder_s", options.reorder_s}, Number{"silent_after_s", options.silent_after_s},
                           Number{"max_ahead_s", options.max_ahead_s}}) {
     if (n.value >= 0 && n.value <= kMaxSeconds) continue;
-    return Error{"SyncOptions", n.name, fmt::format("{}", n.value), "seconds, not below 0"};
+    return Error{"SyncOptions", n.name, fmt::format("{}", n.value), "a number of seconds in [0, 1e6]"};
   }
-  if (options.max_images < 1) return Error{"SyncOptions", "max_images", "0", "at least 1"};
-  if (options.max_bundles < 1) return Error{"SyncOptions", "max_bundles", "0", "at least 1"};
+  if (options.max_images < 1) return Error{"SyncOptions", "max_images", "0", "1 or more"};
+  if (options.max_bundles < 1) return Error{"SyncOptions", "max_bundles", "0", "1 or more"};
   return {};
 }
 
-// The image with memory of its own.
-CameraImage kept(const CameraImage& image) {
+// Returns the image with shared ownership of its pixels, which are copied if it has no owner.
+CameraImage with_owner(const CameraImage& image) {
   if (image.owner) return image;
   const auto width = static_cast<std::size_t>(image.width), height = static_cast<std::size_t>(image.height);
   const std::shared_ptr<std::uint8_t[]> pixels(new std::uint8_t[width * height]);
@@ -45,9 +45,7 @@ CameraImage kept(const CameraImage& image) {
   return {pixels.get(), image.width, image.height, image.width, image.time_ns, pixels};
 }
 
-Error moved_from() {
-  return {"Synchronizer::push", "", "a Synchronizer that was moved from", "one that create() made"};
-}
+Error moved_from() { return {"Synchronizer::push", "", "a Synchronizer that was moved from", "a valid Synchronizer"}; }
 
 }  // namespace
 
@@ -59,21 +57,22 @@ struct Synchronizer::Impl {
 
   Status push(std::size_t camera, const CameraImage& image);
   void close();
-  void settle(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped, std::size_t limit);
+  void commit(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped, std::size_t limit);
   std::optional<ImageBundle> take();
 
   const camera::Rig rig;
   const SyncOptions options;
   std::mutex mutex;
   std::condition_variable changed;
-  api::ImageSorter sorter;  // guarded by mutex, as the three below
+  api::ImageSorter sorter;  // guarded by mutex, like the next three members
   std::deque<ImageBundle> ready;
   SyncCounts counts;
   bool closed = false;
 };
 
-// Makes bundles ready and counts; `dropped` also gets the images of bundles that nobody fetched. The mutex is held.
-void Synchronizer::Impl::settle(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped,
+// Adds complete bundles to `ready` and updates the counts. If `limit` is exceeded, the oldest bundles are discarded and
+// their images appended to `dropped`. The mutex must be held.
+void Synchronizer::Impl::commit(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped,
                                 std::size_t limit) {
   counts.bundles += bundles.size();
   for (ImageBundle& bundle : bundles) ready.push_back(std::move(bundle));
@@ -89,18 +88,19 @@ void Synchronizer::Impl::settle(std::vector<ImageBundle> bundles, std::vector<Dr
 
 Status Synchronizer::Impl::push(std::size_t camera, const CameraImage& image) {
   if (camera >= rig.size()) {
-    return Error{"Synchronizer::push", "camera", std::to_string(camera), fmt::format("one in [0, {}]", rig.size() - 1)};
+    return Error{"Synchronizer::push", "camera", std::to_string(camera),
+                 fmt::format("an index in [0, {}]", rig.size() - 1)};
   }
   if (const Status s = api::check_image(image, rig.camera(camera), "Synchronizer::push"); !s) return s;
-  CameraImage own = kept(image);
+  const CameraImage owned = with_owner(image);
   std::vector<DroppedImage> dropped;
   {
     const std::lock_guard lock(mutex);
-    if (closed) return Error{"Synchronizer::push", "", "a call after close()", "calls before it"};
+    if (closed) return Error{"Synchronizer::push", "", "a call after close()", "no call after close()"};
     ++counts.pushed[camera];
     std::vector<ImageBundle> bundles;
-    sorter.push(camera, image.time_ns + rig.camera(camera).time_offset_ns, own, bundles, dropped);
-    settle(std::move(bundles), dropped, options.max_bundles);
+    sorter.push(camera, image.time_ns + rig.camera(camera).time_offset_ns, owned, bundles, dropped);
+    commit(std::move(bundles), dropped, options.max_bundles);
   }
   changed.notify_all();
   for (const DroppedImage& d : dropped) {
@@ -117,7 +117,7 @@ void Synchronizer::Impl::close() {
     closed = true;
     std::vector<ImageBundle> bundles;
     sorter.flush(bundles, dropped);
-    settle(std::move(bundles), dropped, ready.max_size());
+    commit(std::move(bundles), dropped, ready.max_size());
   }
   changed.notify_all();
   for (const DroppedImage& d : dropped) {
@@ -125,7 +125,7 @@ void Synchronizer::Impl::close() {
   }
 }
 
-// The mutex is held.
+// The mutex must be held.
 std::optional<ImageBundle> Synchronizer::Impl::take() {
   if (ready.empty()) return std::nullopt;
   ImageBundle bundle = std::move(ready.front());
@@ -169,7 +169,7 @@ void Synchronizer::close() {
     impl_->close();
     return {};
   });
-  static_cast<void>(status);  // a callback's exception ends here: all that waited is ready
+  static_cast<void>(status);  // exceptions of a callback are ignored: all bundles are ready
 }
 
 SyncCounts Synchronizer::counts() const {

@@ -11,7 +11,7 @@
 namespace bslam {
 namespace {
 
-// Owns a file descriptor; -1 means none.
+// Owns a file descriptor; -1 if there is none.
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -28,7 +28,7 @@ class Descriptor {
   int fd_;
 };
 
-// "cannot open FILE: No such file or directory", from errno.
+// Returns an error such as "cannot open FILE: No such file or directory", from errno.
 Error system_error(std::string_view attempt, const std::filesystem::path& path, std::string expected) {
   const std::string reason = std::system_category().message(errno);
   std::string sentence = "cannot " + std::string(attempt) + " " + path.string() + ": " + reason;
@@ -77,7 +77,7 @@ Status write_atomically(const std::filesystem::path& path, std::string_view byte
 }
 
 Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes) {
-  // Non-blocking, so that a named pipe is refused instead of blocking until someone writes to it.
+  // Non-blocking, so that a named pipe is rejected instead of blocking until another process writes to it.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return system_error("open", path, "a file that can be read");
@@ -86,7 +86,7 @@ Result<std::string> read_file(const std::filesystem::path& path, std::size_t max
   const Error too_large{path.string(), "", "more than " + std::to_string(max_bytes) + " bytes", "a smaller file"};
   if (static_cast<std::size_t>(status.st_size) > max_bytes) return too_large;
   std::string bytes(static_cast<std::size_t>(status.st_size) + 1,
-                    '\0');  // one byte more, so that the end of the file shows without growing the buffer
+                    '\0');  // one byte more, so that the end of the file is detected without growing the buffer
   std::size_t size = 0;
   for (;;) {
     if (size == bytes.size()) bytes.resize(2 * size);  // the file has grown since fstat

@@ -14,8 +14,8 @@ namespace bslam {
 // exist. An existing file is replaced. On error the temporary file is removed and an existing file is unchanged.
 Status write_atomically(const std::filesystem::path& path, std::string_view bytes);
 
-// The contents of a regular file. Errors: it cannot be opened or read, is not a regular file, or is larger than
-// `max_bytes`.
+// Returns the contents of a regular file. Errors: the file cannot be opened or read, is not a regular file, or is
+// larger than `max_bytes`.
 Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes);
 
 }  // namespace bslam

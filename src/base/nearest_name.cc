@@ -26,7 +26,7 @@ namespace {
 
 constexpr std::size_t kTooFar = std::numeric_limits<std::size_t>::max();
 
-// The edit distance of two names that may be misspellings of each other, else kTooFar.
+// Returns the edit distance of two names if one may be a misspelling of the other, otherwise kTooFar.
 std::size_t misspelling_distance(std::string_view a, std::string_view b) {
   const std::size_t distance = edit_distance(a, b);
   const std::size_t limit = std::max<std::size_t>(1, std::max(a.size(), b.size()) / 3);

@@ -17,7 +17,7 @@ template <class... Cases>
 struct Overloaded : Cases... {
   using Cases::operator()...;
 };
-template <class... Cases>  // clang before 17 does not deduce the arguments of an aggregate by itself
+template <class... Cases>  // clang before 17 does not deduce the template arguments of an aggregate
 Overloaded(Cases...)->Overloaded<Cases...>;
 
 std::string bound_text(double bound, bool integer) {
@@ -69,7 +69,7 @@ bool store(const EnumField& field, const Range&, std::string_view text) {
 }
 
 std::string suggestion_text(const std::string& nearest) {
-  if (nearest.empty()) return "; 'bslam settings --common' lists those that are commonly changed";
+  if (nearest.empty()) return "; 'bslam settings --common' lists the commonly changed settings";
   return "; did you mean '" + nearest + "'?";
 }
 
@@ -78,9 +78,10 @@ std::string suggestion_text(const std::string& nearest) {
 void OptionTable::check_keys() const {
   std::set<std::string> seen;
   for (const Option& option : options_) {
-    BSLAM_ASSERT(seen.insert(option.key).second, "an option is declared once");
+    BSLAM_ASSERT(seen.insert(option.key).second, "option keys must be declared once");
     if (!option.former_key.empty()) {
-      BSLAM_ASSERT(seen.insert(option.former_key).second, "a former key is declared once and no longer in use");
+      BSLAM_ASSERT(seen.insert(option.former_key).second,
+                   "former keys must be declared once and must not be current keys");
     }
   }
 }
@@ -125,7 +126,7 @@ std::string value_text(const Option& option) {
                                [](const std::string* field) { return *field; },
                                [](const EnumField& field) {
                                  const int position = field.get(field.field);
-                                 BSLAM_ASSERT(position >= 0, "every value of an option's enumeration has a name");
+                                 BSLAM_ASSERT(position >= 0, "every value of an option's enumeration must have a name");
                                  return std::string(field.names[static_cast<std::size_t>(position)]);
                                }},
                     option.field);

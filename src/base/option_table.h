@@ -29,7 +29,7 @@ struct Option {
   std::string unit;
   std::string help;
   bool common = false;     // in the supported set of docs/settings.md; all others are advanced
-  std::string former_key;  // the key before it was renamed, still accepted; empty if it never was
+  std::string former_key;  // the previous key, still accepted; empty if the option was never renamed
 };
 
 class OptionTable {
@@ -42,10 +42,10 @@ class OptionTable {
     check_keys();
   }
 
-  // The options in the order of `visit`.
+  // Returns the options in the order of `visit`.
   const std::vector<Option>& options() const { return options_; }
   std::vector<std::string> keys() const;
-  // By current or former key; null if there is no such option.
+  // Finds an option by its current or former key. Returns null if there is no such option.
   const Option* find(std::string_view key) const;
 
   // Sets one option from text. Errors: unknown key (with a suggestion if one is close), text of another type, NaN or
@@ -53,7 +53,7 @@ class OptionTable {
   // left empty. Setting an option by its former key works and adds a warning.
   Status set(std::string_view key, std::string_view text);
 
-  // One sentence for every former key that was set, in order of first use.
+  // Returns one sentence for every former key that was set, in order of first use.
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
@@ -107,10 +107,10 @@ class OptionTable {
   std::vector<std::string> warnings_;
 };
 
-// The value as text, from which `OptionTable::set` restores exactly the same value.
+// Returns the value as text, from which `OptionTable::set` restores exactly the same value.
 std::string value_text(const Option& option);
 
-// The accepted values in words: "an integer in [1, 20]", "one of: fast, realtime".
+// Describes the accepted values: "an integer in [1, 20]", "one of: fast, realtime".
 std::string expected_text(const Option& option);
 
 }  // namespace bslam

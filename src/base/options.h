@@ -10,7 +10,7 @@
 //   struct FooOptions {
 //     int rounds = 4;  // optimisation rounds, with reclassification of outliers between them
 //     Pace pace = Pace::kFast;
-//     BarOptions bar;  // nested options, with a visit of their own
+//     BarOptions bar;  // nested options with their own visit function
 //     template <class Self, class Visitor>
 //     static void visit(Self& self, Visitor& visitor) {
 //       visitor("rounds", self.rounds, Range{1, 20}, "", "optimisation rounds", OptionNote{.formerly = "repeats"});
@@ -30,13 +30,13 @@
 
 namespace bslam {
 
-// Closed interval of accepted values of a number. Values outside are refused with an error that names the option.
+// Closed interval of accepted values of a number. Values outside are rejected with an error that names the option.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
 };
 
-// What is known of an option beyond its value.
+// Properties of an option beyond its value.
 struct OptionNote {
   bool common = false;             // in the supported set of docs/settings.md; all other options are advanced
   std::string_view formerly = {};  // its previous name in the same section, still accepted for one release

@@ -40,7 +40,7 @@ std::uint64_t Random::next() {
 }
 
 std::uint32_t Random::below(std::uint32_t n) {
-  BSLAM_ASSERT(n > 0, "an empty range has no random element");
+  BSLAM_ASSERT(n > 0, "n must be positive");
   const std::uint64_t limit = (std::uint64_t{1} << 32) / n * n;
   std::uint64_t draw = next() >> 32;
   while (draw >= limit) draw = next() >> 32;

@@ -1,5 +1,5 @@
 // Errors as values: everything a user or a file can cause is returned as an Error, which the command line prints as one
-// line. The types are those of the public header.
+// line. The types are defined in the public header.
 #pragma once
 
 #include <bslam/result.h>

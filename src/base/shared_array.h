@@ -16,10 +16,10 @@ class SharedArray {
   using value_type = T;
 
   SharedArray() = default;
-  // Takes over the elements. Implicit: a vector that is moved here is the array.
+  // Takes ownership of the elements. The conversion is implicit, so that a vector can be moved into an array.
   SharedArray(std::vector<T>&& values) {  // NOLINT(google-explicit-constructor)
     if (values.empty()) return;
-    values.shrink_to_fit();  // some live as long as the map
+    values.shrink_to_fit();  // some arrays live as long as the map
     values_ = std::make_shared<const std::vector<T>>(std::move(values));
     data_ = values_->data();
     size_ = values_->size();
@@ -40,7 +40,7 @@ class SharedArray {
 
  private:
   std::shared_ptr<const std::vector<T>> values_;
-  const T* data_ = nullptr;  // of *values_
+  const T* data_ = nullptr;  // data of *values_
   std::size_t size_ = 0;
 };
 

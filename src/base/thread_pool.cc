@@ -7,7 +7,7 @@
 namespace bslam {
 
 ThreadPool::ThreadPool(int threads) {
-  BSLAM_ASSERT(threads >= 1, "a pool has at least the caller's thread");
+  BSLAM_ASSERT(threads >= 1, "the number of threads must be 1 or more");
   for (int i = 1; i < threads; ++i) workers_.emplace_back([this](std::stop_token stop) { work(std::move(stop)); });
 }
 
@@ -31,7 +31,7 @@ void ThreadPool::for_each(std::size_t count, const std::function<void(std::size_
   }
   {
     const std::lock_guard lock(mutex_);
-    BSLAM_ASSERT(body_ == nullptr, "one loop at a time");
+    BSLAM_ASSERT(body_ == nullptr, "only one loop may run at a time");
     body_ = &body;
     next_ = 0;
     count_ = count;

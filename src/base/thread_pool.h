@@ -1,4 +1,5 @@
-// Data-parallel loops. Each item writes to its own slot, so the result does not depend on which thread runs which item.
+// Data-parallel loops. Each item writes only its own output, so the result does not depend on which thread runs which
+// item.
 #pragma once
 
 #include <condition_variable>
@@ -13,7 +14,7 @@ namespace bslam {
 
 class ThreadPool {
  public:
-  // `threads` is the number of threads that run a loop, including the caller; 1 means that the caller runs it alone.
+  // `threads` is the number of threads that run a loop, including the caller; if it is 1, only the caller runs it.
   explicit ThreadPool(int threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;

@@ -20,7 +20,7 @@ double Camera::radians_per_pixel() const {
   // Computed from the Jacobian rather than from fx and fy, because some models have another focal length on the optical
   // axis.
   const auto axis = project_with_jacobian(Vector3d::UnitZ());
-  BSLAM_ASSERT(axis, "a camera sees along its optical axis");
+  BSLAM_ASSERT(axis, "the optical axis must be in the domain of the model");
   return 2.0 / (axis->jacobian(0, 0) + axis->jacobian(1, 1));
 }
 

@@ -14,7 +14,7 @@ struct Camera {
   CameraModel model;
   int width = 0, height = 0;  // pixels
   TimeNs time_offset_ns = 0;  // true time = timestamp + offset
-  std::string mask_file;      // image in which 0 marks pixels to ignore; empty if none
+  std::string mask_file;      // image in which 0 marks pixels to ignore; empty if there is none
 
   std::optional<Vector2d> project(const Vector3d& point_cam) const;
   std::optional<Projection> project_with_jacobian(const Vector3d& point_cam) const;

@@ -26,7 +26,7 @@ constexpr double kRotationTolerance = 1e-3;  // calibration files round to four 
 
 // Returns the rotation nearest to R, with quaternion coefficients rounded to a grid. The grid is fine enough not to
 // matter (4e-15) and coarse enough that a conversion to a matrix and back gives the same quaternion. The largest
-// coefficient is computed from the other three; among nearly equal ones the first is taken.
+// coefficient is computed from the other three; among nearly equal ones the first is used.
 geometry::Quaterniond rounded_rotation(const Matrix3d& R) {
   constexpr double kGrid = 0x1p-48, kTie = 1e-9;
   const Eigen::JacobiSVD<Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -40,7 +40,7 @@ geometry::Quaterniond rounded_rotation(const Matrix3d& R) {
   return geometry::Quaterniond(q);
 }
 
-// "4, 5 or 8 coefficients for pinhole-radtan", "2, xi and alpha, for double-sphere".
+// Returns "4, 5 or 8 coefficients for pinhole-radtan" or "2, xi and alpha, for double-sphere".
 std::string parameters_expected(const ModelRow& row) {
   if (row.parameters.empty()) return fmt::format("none for {}", row.name);
   if (row.parameters.size() <= 2) {
@@ -80,13 +80,14 @@ Status check_numbers(const CameraDescription& d, const DescriptionKeys& keys) {
     if (!std::isfinite(value)) return Error{keys.file, keys.intrinsics, fmt::format("{}", value), "finite numbers"};
   }
   for (const double focal : {d.intrinsics[0], d.intrinsics[1]}) {
-    if (!(focal > 0)) return Error{keys.file, keys.intrinsics, fmt::format("focal length {}", focal), "one above 0"};
+    if (!(focal > 0))
+      return Error{keys.file, keys.intrinsics, fmt::format("focal length {}", focal), "a positive number"};
   }
   for (const double value : d.distortion) {
     if (!std::isfinite(value)) return Error{keys.file, keys.distortion, fmt::format("{}", value), "finite numbers"};
   }
   if (!(std::abs(d.time_offset_s) <= kMaxTimeOffset)) {
-    return Error{keys.file, keys.time_offset, fmt::format("{}", d.time_offset_s), "seconds, at most a million"};
+    return Error{keys.file, keys.time_offset, fmt::format("{}", d.time_offset_s), "at most 1e6 seconds"};
   }
   return {};
 }
@@ -97,7 +98,7 @@ Result<SE3> rigid_transform(const std::vector<double>& m, const std::string& fil
   const auto error = [&](std::string found, std::string expected) {
     return Error{file, key, std::move(found), std::move(expected)};
   };
-  if (m.size() != 16) return error(fmt::format("{} numbers", m.size()), "16, the rows of a 4x4 transform");
+  if (m.size() != 16) return error(fmt::format("{} numbers", m.size()), "16 (rows of a 4x4 transform)");
   if (!std::all_of(m.begin(), m.end(), [](double v) { return std::isfinite(v); })) {
     return error("a number that is not finite", "a rigid transform");
   }
@@ -108,7 +109,7 @@ Result<SE3> rigid_transform(const std::vector<double>& m, const std::string& fil
   R << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
   const double deviation = (R.transpose() * R - Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(deviation <= kRotationTolerance)) {
-    return error(fmt::format("a 3x3 part that is no rotation (R'R differs from I by {:.3g})", deviation),
+    return error(fmt::format("a 3x3 part that is not a rotation (R'R differs from I by {:.3g})", deviation),
                  "a rigid transform, with orthonormal axes");
   }
   if (R.determinant() < 0) {
@@ -170,7 +171,8 @@ Result<RigCamera> make_camera(const CameraDescription& d, const DescriptionKeys&
                       from_seconds(d.time_offset_s),
                       d.mask_file};
   if (!camera.unproject({d.intrinsics[2], d.intrinsics[3]})) {
-    return Error{keys.file, keys.distortion, "coefficients that bend every ray back", "those of a lens"};
+    return Error{keys.file, keys.distortion, "coefficients for which the model projects no point",
+                 "coefficients of a lens"};
   }
   return RigCamera{camera, *T_body_cam};
 }

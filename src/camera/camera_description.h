@@ -13,7 +13,7 @@ namespace bslam::camera {
 
 struct CameraDescription {
   std::string name;
-  std::string model;                     // a name of model_table()
+  std::string model;                     // a model name of model_table()
   std::vector<std::int64_t> resolution;  // width, height in pixels
   std::vector<double> intrinsics;        // fx fy cx cy
   std::vector<double> distortion;        // distortion coefficients or shape parameters, in the order of distortion()
@@ -22,7 +22,7 @@ struct CameraDescription {
   std::string mask_file;
 };
 
-// The file a description was read from and the names of its fields there, for error messages.
+// The file a description was read from, and the names of its keys in that file, for error messages.
 struct DescriptionKeys {
   std::string file;
   std::string model, resolution, intrinsics, distortion, T_body_cam, time_offset;

@@ -1,5 +1,5 @@
 // Camera models: a closed set behind one interface. Points are in the camera frame (x right, y down, z forward) in
-// metres. Pixels refer to the raw image, with (0, 0) at the centre of the top-left pixel. Each model knows its valid
+// metres. Pixels refer to the raw image, with (0, 0) at the centre of the top-left pixel. Each model has a
 // domain and returns nullopt outside of it.
 #pragma once
 
@@ -53,7 +53,7 @@ class PinholeRadTan {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {d_.begin(), d_.begin() + count_}; }
-  double max_radius() const { return max_radius_; }  // tangent of the largest valid angle, or infinity
+  double max_radius() const { return max_radius_; }  // tangent of the maximum valid angle, or infinity
   static constexpr std::string_view kName = "pinhole-radtan";
 
  private:

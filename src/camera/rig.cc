@@ -11,7 +11,7 @@ namespace bslam::camera {
 using geometry::SE3;
 
 Rig::Rig(std::vector<RigCamera> cameras) {
-  BSLAM_ASSERT(!cameras.empty(), "a rig has at least one camera");
+  BSLAM_ASSERT(!cameras.empty(), "a rig must have at least one camera");
   for (const RigCamera& c : cameras) {
     T_cam_rig_.push_back(c.T_body_cam.inverse() * cameras.front().T_body_cam);
     T_rig_cam_.push_back(T_cam_rig_.back().inverse());
@@ -50,8 +50,8 @@ std::vector<double> Rig::measured_overlap(const std::vector<RigCamera>& cameras)
   return overlap;
 }
 
-bool Rig::any_overlap(std::span<const std::uint8_t> left_out) const {
-  const auto counts = [&](std::size_t i) { return left_out.empty() || !left_out[i]; };
+bool Rig::any_overlap(std::span<const std::uint8_t> ignored) const {
+  const auto counts = [&](std::size_t i) { return ignored.empty() || !ignored[i]; };
   for (std::size_t i = 0; i < size(); ++i) {
     for (std::size_t j = 0; j < size(); ++j) {
       if (counts(i) && counts(j) && overlap(i, j)) return true;
@@ -66,14 +66,14 @@ Rig Rig::subset(std::span<const int> indices) const {
   if (in_order && indices.size() == size()) return *this;
   std::vector<RigCamera> chosen;
   for (const int i : indices) {
-    BSLAM_ASSERT(i >= 0 && static_cast<std::size_t>(i) < size(), "camera index within the rig");
+    BSLAM_ASSERT(i >= 0 && static_cast<std::size_t>(i) < size(), "the camera index must be within the rig");
     chosen.push_back(calibration_->cameras[static_cast<std::size_t>(i)]);
   }
   return Rig(std::move(chosen));
 }
 
 Rig Rig::with_extrinsics_of(const Rig& part, std::span<const int> indices) const {
-  BSLAM_ASSERT(part.size() == indices.size(), "one index per camera of the part");
+  BSLAM_ASSERT(part.size() == indices.size(), "there must be one index per camera of `part`");
   std::vector<RigCamera> cameras = calibration_->cameras;
   for (std::size_t i = 0; i < part.size(); ++i)
     cameras[static_cast<std::size_t>(indices[i])].T_body_cam = part.body_from_cam(i);
@@ -81,7 +81,7 @@ Rig Rig::with_extrinsics_of(const Rig& part, std::span<const int> indices) const
 }
 
 Rig Rig::moving(std::span<const double> delay_s, const geometry::Vector6d& twist) const {
-  BSLAM_ASSERT(delay_s.size() == size(), "one delay per camera");
+  BSLAM_ASSERT(delay_s.size() == size(), "there must be one delay per camera");
   Rig out = *this;
   for (std::size_t i = 0; i < size(); ++i) {
     if (delay_s[i] == 0.0) continue;

@@ -22,7 +22,7 @@ struct RigCamera {
 // Immutable; copies share the calibration.
 class Rig {
  public:
-  // Needs at least one camera; the first becomes camera 0.
+  // There must be at least one camera; the first one becomes camera 0.
   explicit Rig(std::vector<RigCamera> cameras);
 
   std::size_t size() const { return T_cam_rig_.size(); }
@@ -39,11 +39,11 @@ class Rig {
 
   // Returns true if the fields of view of cameras i and j overlap at some depth. Sampled from the calibration.
   bool overlap(std::size_t i, std::size_t j) const { return overlap_share(i, j) > kMinOverlap; }
-  // Fraction of camera i's image that camera j sees, in [0, 1]; the maximum over the sampled depths.
+  // Fraction of camera i's image that is in view of camera j, in [0, 1]; the maximum over the sampled depths.
   double overlap_share(std::size_t i, std::size_t j) const { return calibration_->overlap[i * size() + j]; }
-  // Returns true if some pair of cameras overlaps, so that the rig observes metric depth without moving. `left_out` has
-  // one entry per camera, non-zero for cameras to ignore; it may be empty.
-  bool any_overlap(std::span<const std::uint8_t> left_out = {}) const;
+  // Returns true if any two cameras overlap, so that metric depth is observable without motion. `ignored` has one entry
+  // per camera, non-zero for cameras to ignore; it may be empty.
+  bool any_overlap(std::span<const std::uint8_t> ignored = {}) const;
 
   // Returns the rig that consists of the given cameras, in the given order; the first becomes camera 0. The indices
   // must be valid and distinct.
@@ -53,13 +53,13 @@ class Rig {
   Rig with_extrinsics_of(const Rig& part, std::span<const int> indices) const;
 
   // Returns the rig for cameras with different capture times, under a constant-velocity model. Camera i takes its image
-  // `delay_s[i]` seconds after the time of the rig; until then the rig moves by exp(delay twist), so T_cam_rig of
+  // `delay_s[i]` seconds after the time of the rig; in that time the rig moves by exp(delay twist), so T_cam_rig of
   // camera i becomes T_i0 exp(delay twist), and the rig's pose refers to the time of the rig. `twist` (rad/s and m/s)
   // is defined by T_rig_world(t + dt) = exp(dt twist) T_rig_world(t). Cheap.
   Rig moving(std::span<const double> delay_s, const geometry::Vector6d& twist) const;
 
  private:
-  static constexpr double kMinOverlap = 0.05;  // fraction of the image; less overlap is not worth searching
+  static constexpr double kMinOverlap = 0.05;  // fraction of the image; a smaller overlap is ignored
   struct Calibration {
     std::vector<RigCamera> cameras;
     std::vector<double> overlap;  // (N, N) row-major

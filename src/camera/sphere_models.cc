@@ -1,4 +1,4 @@
-// The camera models that project by way of a sphere. All share a last stage: a point at height `k` above the centre of
+// The camera models that project through a sphere. All share a last stage: a point at height `k` above the centre of
 // a sphere and at distance `d` from it is mapped to m = (x, y) / (alpha d + (1 - alpha) k). Equations: docs/math.md,
 // section 8.
 #include <cmath>
@@ -11,8 +11,9 @@ namespace {
 
 Vector2d from_pixel(const Intrinsics& k, const Vector2d& u) { return {(u.x() - k.cx) / k.fx, (u.y() - k.cy) / k.fy}; }
 
-// Returns alpha d + (1 - alpha) k in the domain k > -w d, where the last stage is one-to-one: for alpha <= 1/2 where
-// the divisor is positive, for larger alpha up to the angle at which the image radius starts to decrease.
+// Returns alpha d + (1 - alpha) k in the domain k > -w d, in which the last stage is one-to-one: for alpha <= 1/2 the
+// directions with a positive divisor, for larger alpha those up to the angle at which the image radius starts to
+// decrease.
 std::optional<double> divisor(double alpha, double k, double d) {
   const double w = alpha > 0.5 ? (1 - alpha) / alpha : alpha / (1 - alpha);
   if (!(k > -w * d)) return std::nullopt;
@@ -70,7 +71,7 @@ std::optional<Vector3d> unproject_ellipsoid(const Intrinsics& k, double alpha, d
 }  // namespace
 
 Unified::Unified(const Intrinsics& k, double alpha) : k_(k), alpha_(alpha) {
-  BSLAM_ASSERT(alpha >= 0 && alpha <= 1, "alpha lies in [0, 1]");
+  BSLAM_ASSERT(alpha >= 0 && alpha <= 1, "alpha must be in [0, 1]");
 }
 
 std::optional<Vector2d> Unified::project(const Vector3d& point) const {
@@ -84,7 +85,7 @@ std::optional<Vector3d> Unified::unproject(const Vector2d& pixel) const {
 }
 
 ExtendedUnified::ExtendedUnified(const Intrinsics& k, double alpha, double beta) : k_(k), alpha_(alpha), beta_(beta) {
-  BSLAM_ASSERT(alpha >= 0 && alpha <= 1 && beta > 0, "alpha lies in [0, 1], beta above 0");
+  BSLAM_ASSERT(alpha >= 0 && alpha <= 1 && beta > 0, "alpha must be in [0, 1] and beta positive");
 }
 
 std::optional<Vector2d> ExtendedUnified::project(const Vector3d& point) const {
@@ -98,7 +99,7 @@ std::optional<Vector3d> ExtendedUnified::unproject(const Vector2d& pixel) const 
 }
 
 DoubleSphere::DoubleSphere(const Intrinsics& k, double xi, double alpha) : k_(k), xi_(xi), alpha_(alpha) {
-  BSLAM_ASSERT(xi > -1 && xi <= 1 && alpha >= 0 && alpha <= 1, "xi lies in (-1, 1], alpha in [0, 1]");
+  BSLAM_ASSERT(xi > -1 && xi <= 1 && alpha >= 0 && alpha <= 1, "xi must be in (-1, 1] and alpha in [0, 1]");
 }
 
 std::optional<Vector2d> DoubleSphere::project(const Vector3d& point) const {

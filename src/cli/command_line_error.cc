@@ -10,7 +10,7 @@
 namespace bslam::cli {
 namespace {
 
-// The innermost command that was recognised: for `bslam map info`, this is `info`.
+// Returns the innermost command that was recognised: for `bslam map info`, this is `info`.
 const CLI::App& chosen(const CLI::App& app) {
   const auto verbs = app.get_subcommands();
   return verbs.empty() ? app : chosen(*verbs.back());
@@ -30,7 +30,7 @@ std::vector<std::string> verbs_of(const CLI::App& verb) {
   return names;
 }
 
-// "bslam map info".
+// Returns the full name of a command, such as "bslam map info".
 std::string path_of(const CLI::App& verb) {
   return verb.get_parent() == nullptr ? "bslam" : path_of(*verb.get_parent()) + " " + verb.get_name();
 }

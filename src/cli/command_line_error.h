@@ -1,4 +1,4 @@
-// Turns errors of the command line parser into the error type of the program.
+// Converts errors of the command line parser to the error type of the program.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,7 +8,7 @@
 namespace bslam::cli {
 
 // Names the first unknown command or option, and suggests an existing one if its name is close. Other errors are
-// reported in the words of the parser.
+// reported with the message of the parser.
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace bslam::cli

@@ -30,8 +30,8 @@ void add_dataset_options(CLI::App& verb, DatasetArguments& a) {
   verb.add_option("--rig", a.rig, "calibration file; default: the calibration in DATA");
   verb.add_option("--cameras", a.cameras,
                   "cameras of the rig to use, in this order, such as 0,1; the first becomes camera 0 of the run");
-  verb.add_option("--begin", a.begin_s, "start of the part to use, in seconds after the first image");
-  verb.add_option("--end", a.end_s, "end of the part to use, in seconds after the first image");
+  verb.add_option("--begin", a.begin_s, "start of the interval to process, in seconds after the first image");
+  verb.add_option("--end", a.end_s, "end of the interval to process, in seconds after the first image");
 }
 
 Result<dataset::DatasetRequest> dataset_request(const DatasetArguments& a, double sync_tolerance_s) {

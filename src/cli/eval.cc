@@ -40,7 +40,8 @@ AlignMode align_mode(const std::string& name) {
   return name == "none" ? AlignMode::kNone : AlignMode::kSe3;
 }
 
-// The estimate in the frame of the ground truth. If that is the body: T_world_body = T_world_cam * T_cam_body.
+// Returns the estimate in the frame of the ground truth. If that is the body frame: T_world_body = T_world_cam *
+// T_cam_body.
 Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& arguments) {
   if (arguments.gt_frame != "body") return estimate;
   if (!arguments.rig) {
@@ -89,7 +90,7 @@ std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& argum
     return fmt::format("{:<24}{}\n", name, value);
   };
   const auto errors = [](const evaluation::ErrorStatistics& s, std::string_view unit) {
-    if (s.count == 0) return std::string("no two poses are this far apart in time");
+    if (s.count == 0) return std::string("no pairs of poses with this time difference");
     return fmt::format("rmse {:.6f}  mean {:.6f}  median {:.6f}  max {:.6f}  {}  ({})", s.rmse, s.mean, s.median, s.max,
                        unit, s.count);
   };
@@ -112,9 +113,10 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
   const auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
   if (!ground_truth) return ground_truth.error();
   if (arguments.gt_frame == "cam0" && std::filesystem::path(arguments.ground_truth).extension() == ".csv") {
-    std::fprintf(stderr,
-                 "note: EuRoC ground truth holds poses of the body; use --gt-frame body --rig FILE to compare it with "
-                 "a camera\n");
+    std::fprintf(
+        stderr,
+        "note: EuRoC ground truth contains poses of the body; use --gt-frame body --rig FILE to compare it with "
+        "a camera\n");
   }
   const auto estimate = in_frame_of_truth(std::move(read).value(), arguments);
   if (!estimate) return estimate.error();
@@ -154,12 +156,11 @@ void add_eval(CLI::App& app, int& exit_status) {
   verb->add_option("--align", arguments->align, "alignment of the estimate to ground truth")
       ->check(CLI::IsMember({"se3", "sim3", "none"}))
       ->capture_default_str();
-  verb->add_option(
-          "--max-dt", arguments->max_dt_s,
-          "largest time difference in seconds between an estimated pose and the ground truth pose it is compared with")
+  verb->add_option("--max-dt", arguments->max_dt_s,
+                   "maximum time difference in seconds between an estimated pose and its ground truth pose")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  verb->add_option("--gt-frame", arguments->gt_frame, "frame of the ground truth poses; body needs --rig")
+  verb->add_option("--gt-frame", arguments->gt_frame, "frame of the ground truth poses; body requires --rig")
       ->check(CLI::IsMember({"cam0", "body"}))
       ->capture_default_str();
   verb->add_option("--rig", arguments->rig, "calibration with the pose of the camera on the body");

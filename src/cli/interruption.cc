@@ -7,8 +7,8 @@
 namespace bslam::cli {
 namespace {
 
-// Posting a semaphore is one of the few things a signal handler may do. Requesting a stop takes locks, so a thread
-// waits for the semaphore and does that.
+// A signal handler may only call async-signal-safe functions such as sem_post. Requesting a stop takes locks, so a
+// separate thread waits for the semaphore and requests the stop.
 sem_t g_signalled;
 
 void on_signal(int) { ::sem_post(&g_signalled); }

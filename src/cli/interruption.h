@@ -1,4 +1,4 @@
-// Turns SIGINT and SIGTERM into a stop token.
+// Converts SIGINT and SIGTERM to a stop request.
 #pragma once
 
 #include <atomic>
@@ -16,7 +16,7 @@ class Interruption {
   Interruption(const Interruption&) = delete;
   Interruption& operator=(const Interruption&) = delete;
 
-  // Stop is requested by the first signal.
+  // The first signal requests a stop.
   std::stop_token token() const { return source_.get_token(); }
 
  private:

@@ -1,4 +1,4 @@
-// The command line of bslam. Every command has a file of its own; this file only combines them.
+// The command line of bslam. Every command has its own file; this file only combines them.
 #include <cstdio>
 #include <exception>
 
@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // help and version
     return report_error(command_line_error(app, e));
-  } catch (const std::exception& e) {  // such as out of memory: not an error in the request
+  } catch (const std::exception& e) {  // for example out of memory; not an error in the request
     std::fprintf(stderr, "bslam: %s\n", e.what());
     return kExitFailed;
   }

@@ -34,7 +34,7 @@ struct MapArguments {
   bool json = false, overwrite = false;
 };
 
-// "1 submap", "2 submaps".
+// Returns text such as "1 submap" or "2 submaps".
 std::string counted(std::size_t count, std::string_view name) {
   return fmt::format("{} {}{}", count, name, count == 1 ? "" : "s");
 }
@@ -185,7 +185,7 @@ int map_merge(const MapArguments& arguments) {
   if (!vocabulary) return report_error(vocabulary.error());
   std::error_code error;
   if (fs::exists(arguments.out, error) && !arguments.overwrite) {
-    return report_error({arguments.out, "--out", "a file that exists", "a new file, or --overwrite"});
+    return report_error({arguments.out, "--out", "an existing file", "a new file, or --overwrite"});
   }
   const auto a = storage::read_map(arguments.file);
   if (!a) return report_error(a.error());
@@ -196,7 +196,7 @@ int map_merge(const MapArguments& arguments) {
   const storage::MapFileInfo info{(*vocabulary)->id(), version_number(),
                                   fmt::format("{} + {}", a->info.data, b->info.data)};
   if (const Status s = storage::write_map(merged->map, info, arguments.out); !s) return report_error(s.error());
-  fmt::print("{} keyframes, {} landmarks; merged {}, {}, {} left\n{}\n", merged->map.num_keyframes(),
+  fmt::print("{} keyframes, {} landmarks; merged {}, {}, {} remaining\n{}\n", merged->map.num_keyframes(),
              merged->map.num_landmarks(), counted(static_cast<std::size_t>(merged->joined), "submap"),
              counted(static_cast<std::size_t>(merged->loops), "further loop closure"),
              counted(merged->submaps, "submap"), arguments.out);
@@ -219,17 +219,17 @@ void add_map(CLI::App& app, int& exit_status) {
   out->add_option("FILE", arguments->file, "a saved map")->required();
   out->add_option("--out", arguments->out, "folder to write to")->required();
   out->add_option("--images", arguments->images,
-                  "the data set of the map: the COLMAP model then names images by their files in it");
+                  "data set of the map, so that the COLMAP model names images by their files in the data set");
   out->add_option("--rig", arguments->rig, "calibration of the data set, as for bslam run");
   out->add_flag("--overwrite", arguments->overwrite, "write into a folder that is not empty");
   out->callback([arguments, &exit_status] { exit_status = map_export(*arguments); });
 
-  CLI::App* merge = map->add_subcommand("merge", "merge maps of separate runs that show common places");
+  CLI::App* merge = map->add_subcommand("merge", "merge maps of separate runs that contain common places");
   merge->add_option("A", arguments->file, "a saved map, whose world frame is kept")->required();
   merge->add_option("B", arguments->other, "a saved map of the same rig")->required();
   merge->add_option("--out", arguments->out, "file for the merged map")->required();
   merge->add_option("--vocabulary", arguments->vocabulary,
-                    "vocabulary with which the maps were made; default: the one shipped with this program");
+                    "vocabulary of the maps; default: the vocabulary shipped with this program");
   merge->add_flag("--overwrite", arguments->overwrite, "replace an existing file");
   add_config_options(*merge, arguments->config);
   merge->callback([arguments, &exit_status] { exit_status = map_merge(*arguments); });

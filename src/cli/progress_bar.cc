@@ -7,8 +7,8 @@
 
 namespace bslam::cli {
 
-ProgressBar::ProgressBar(bool wanted, std::string unit)
-    : active_(wanted && isatty(STDERR_FILENO) == 1), unit_(std::move(unit)) {}
+ProgressBar::ProgressBar(bool enabled, std::string unit)
+    : active_(enabled && isatty(STDERR_FILENO) == 1), unit_(std::move(unit)) {}
 
 void ProgressBar::show(std::size_t done, std::size_t all) {
   const auto now = Clock::now();

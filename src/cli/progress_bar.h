@@ -9,7 +9,7 @@ namespace bslam::cli {
 
 class ProgressBar {
  public:
-  ProgressBar(bool wanted, std::string unit);
+  ProgressBar(bool enabled, std::string unit);
   void show(std::size_t done, std::size_t all);  // redrawn at most ten times per second
   void finish();                                 // ends the line
 

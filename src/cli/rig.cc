@@ -90,7 +90,7 @@ void add_convert(CLI::App& rig, int& exit_status) {
                    "a file (.json: basalt, else bslam), or a folder (euroc); the name of a new folder must end in /")
       ->required();
   convert->add_option("--to", arguments->to, "format of OUT: " + joined_formats());
-  convert->add_option("--drop", arguments->drop, "leave out what the format cannot store: body, mask, time-offset");
+  convert->add_option("--drop", arguments->drop, "omit content that the format cannot store: body, mask, time-offset");
   convert->add_flag("--overwrite", arguments->overwrite, "replace an existing calibration");
   convert->callback([arguments, &exit_status] { exit_status = rig_convert(*arguments); });
 }

@@ -38,7 +38,7 @@ struct RunArguments {
   bool no_loop = false, localize_only = false, no_final_ba = false, overwrite = false;
 };
 
-// Options of their own override --config and --set.
+// Applies the command-line options that override --config and --set.
 Result<system::Config> resolve_run_config(const RunArguments& arguments) {
   auto resolved = resolve_config(arguments.config);
   if (!resolved) return resolved;
@@ -127,7 +127,7 @@ Status write_files(const session::SessionResult& result, const system::Config& c
                             arguments.save_map);
 }
 
-// The command that tests the calibration of the run against its images.
+// Returns the command that tests the calibration of the run against its images.
 std::string check_command(const DatasetArguments& data) {
   return shell_command({"bslam", "rig", "info", data.rig.empty() ? data.path : data.rig, "--images", data.path});
 }
@@ -147,7 +147,7 @@ void print_after(const session::RunRecord& record, const dataset::Dataset& datas
 }
 
 int run(const RunArguments& arguments) {
-  // Created first: as soon as the output folder exists, an interruption ends the run in an orderly way.
+  // Created first: once the output folder exists, an interruption ends the run with complete output files.
   const Interruption interruption;
   const auto config = resolve_run_config(arguments);
   if (!config) return report_error(config.error());
@@ -201,8 +201,8 @@ void add_run(CLI::App& app, int& exit_status) {
                    "do repeated lagged "
                    "runs; the two differ from each other");
   verb->add_option("--journal", a->journal,
-                   "write a journal to this file: which stage read and which produced each version of the map");
-  verb->add_option("--replay", a->replay, "repeat the run that wrote this journal exactly, in whichever mode it was");
+                   "write a journal to this file: the map version read and written by each stage");
+  verb->add_option("--replay", a->replay, "repeat the run of this journal exactly, regardless of its mode");
   verb->add_option("--pace", a->pace, "fast: as fast as possible; realtime: feed images at their recorded rate")
       ->check(CLI::IsMember({"fast", "realtime"}))
       ->capture_default_str();
@@ -213,11 +213,11 @@ void add_run(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb->add_flag("--no-loop", a->no_loop, "disable loop closing; relocalisation stays enabled");
   verb->add_option("--save-map", a->save_map, "save the final map to this file");
-  verb->add_option("--load-map", a->load_map, "a saved map, which the run continues after relocalising in it");
+  verb->add_option("--load-map", a->load_map, "saved map to continue after relocalising in it");
   verb->add_flag("--localize-only", a->localize_only, "localise in the loaded map without changing it");
-  verb->add_option(
-      "--vocabulary", a->vocabulary,
-      "vocabulary for place recognition, in bslam or DBoW2 text format; default: the one shipped with this program");
+  verb->add_option("--vocabulary", a->vocabulary,
+                   "vocabulary for place recognition, in bslam or DBoW2 text format; default: the vocabulary shipped "
+                   "with this program");
   verb->add_flag("--no-final-ba", a->no_final_ba, "skip the global bundle adjustment at the end");
   verb->add_option("--seed", a->seed, "seed of all random numbers; default 1")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));

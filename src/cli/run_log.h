@@ -7,7 +7,7 @@
 
 namespace bslam::cli {
 
-// Each level includes those before it.
+// Each level includes the previous levels.
 enum class LogVerbosity {
   kError,    // only errors, which end the run
   kWarning,  // warnings about input and results
@@ -15,13 +15,13 @@ enum class LogVerbosity {
   kDebug,    // outcome of every frame
 };
 
-// Of "error", "warning", "info" or "debug".
+// Converts "error", "warning", "info" or "debug".
 LogVerbosity log_verbosity(const std::string& name);
 
-// On stderr: one line per stage with the number of calls and the median, 95 % and largest time per call.
+// Prints to stderr one line per stage with the number of calls and the median, 95 % and maximum time per call.
 void print_stage_statistics(const session::RunRecord& record);
 
-// On stderr: one line per frame with its outcome, its inliers and its processing time.
+// Prints to stderr one line per frame with its outcome, its inliers and its processing time.
 void print_frames(const session::RunRecord& record);
 
 }  // namespace bslam::cli

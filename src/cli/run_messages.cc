@@ -31,12 +31,12 @@ void warn_of_extrinsics(const session::CameraRecord& camera) {
   if (!e || !e->suspect) return;
   fmt::print(stderr,
              "warning: {}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm, provided that "
-             "its time offset is right{}\n",
+             "its time offset is correct{}\n",
              camera.name, e->change_deg, e->change_mm,
-             e->refined ? "" : "; --set extrinsics.refine=true uses the estimated ones");
+             e->refined ? "" : "; use the estimate with --set extrinsics.refine=true");
 }
 
-// Warns of a camera that is still inconsistent with the others at the end of the run: its extrinsics are probably
+// Warns about a camera that is still inconsistent with the others at the end of the run: its extrinsics are probably
 // wrong.
 void warn_of_disagreement(const session::RunRecord& record, std::size_t camera, const std::string& check_command) {
   constexpr tracking::CameraStatus kDisagrees{tracking::CameraState::kDegraded, tracking::CameraReason::kInconsistent};
@@ -56,7 +56,7 @@ std::ptrdiff_t count(const session::RunRecord& record, session::FrameOutcome out
   return std::ranges::count(record.frames, outcome, &session::RunFrame::outcome);
 }
 
-// The largest fraction of one camera's field of view that another camera sees as well.
+// Returns the maximum fraction of a camera's field of view that is in view of another camera.
 double largest_overlap(const camera::Rig& rig) {
   double share = 0;
   for (std::size_t i = 0; i < rig.size(); ++i) {
@@ -65,7 +65,7 @@ double largest_overlap(const camera::Rig& rig) {
   return share;
 }
 
-// Warns if the fields of view of two cameras overlap, yet hardly any feature is matched between cameras.
+// Warns if the fields of view of two cameras overlap, but hardly any feature is matched between cameras.
 void warn_if_nothing_matches(const session::RunRecord& record, const camera::Rig& rig,
                              const std::string& check_command) {
   constexpr double kMuchOverlap = 0.4, kLeastShare = 0.01;
@@ -77,7 +77,7 @@ void warn_if_nothing_matches(const session::RunRecord& record, const camera::Rig
   }
   if (unique == 0 || matched >= kLeastShare * unique || largest_overlap(rig) < kMuchOverlap) return;
   fmt::print(stderr,
-             "warning: the calibrated fields of view overlap, but only {:.1f} % of the features match between any two "
+             "warning: the calibrated fields of view overlap, but only {:.1f} % of the features are matched between "
              "cameras: check the calibration ({})\n",
              100 * matched / unique, check_command);
 }

@@ -6,7 +6,7 @@
 
 namespace bslam::cli {
 
-// The words separated by spaces, quoted where a POSIX shell requires it.
+// Returns the words separated by spaces, quoted if a POSIX shell requires it.
 std::string shell_command(const std::vector<std::string>& words);
 
 }  // namespace bslam::cli

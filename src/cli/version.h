@@ -5,10 +5,10 @@
 
 namespace bslam::cli {
 
-// Several lines: version, git revision, compiler, and the versions of the linked libraries.
+// Returns several lines: version, git revision, compiler, and the versions of the linked libraries.
 std::string version_text();
 
-// Only the version, such as "0.1.0".
+// Returns only the version, such as "0.1.0".
 std::string version_number();
 
 }  // namespace bslam::cli

@@ -34,7 +34,8 @@ struct VocabTrainArguments {
   bool overwrite = false;
 };
 
-// The descriptors of an image. The extractor needs a camera model, so one that covers the whole image is made up.
+// Returns the descriptors of an image. The extractor requires a camera model, so a pinhole camera of the image size is
+// used.
 std::vector<feature::Descriptor> describe(const image::Image& image, feature::Extractor& extractor) {
   const double focal = std::max(image.width(), image.height());
   camera::Camera camera{.name = "any",
@@ -54,7 +55,7 @@ struct TrainingSet {
   std::size_t skipped = 0, descriptors = 0;
 };
 
-// Every thread has an extractor of its own. The results are in the order of the files.
+// Every thread has its own extractor. The results are in the order of the files.
 TrainingSet extract_all(const std::vector<std::filesystem::path>& files, const VocabTrainArguments& a,
                         ThreadPool& pool) {
   std::vector<std::optional<std::vector<feature::Descriptor>>> found(files.size());
@@ -90,7 +91,7 @@ TrainingSet extract_all(const std::vector<std::filesystem::path>& files, const V
   return set;
 }
 
-// Checks before the training what would otherwise only be noticed when it is done.
+// Checks the output file before the training, which takes long.
 Status check_output(const VocabTrainArguments& a) {
   std::error_code error;
   const std::filesystem::path out(a.out), folder = out.has_parent_path() ? out.parent_path() : ".";
@@ -110,7 +111,7 @@ int run_train(const VocabTrainArguments& a) {
   ThreadPool pool(a.threads > 0 ? a.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
   const TrainingSet set = extract_all(*files, a, pool);
   if (set.images.empty())
-    return report_error({a.images.front(), "", "no image that can be read", "PNG, JPEG, PGM or WebP images"});
+    return report_error({a.images.front(), "", "no readable image", "PNG, JPEG, PGM or WebP images"});
   Random random(a.seed, "vocabulary");
   ProgressBar bar(a.progress == "auto", "descriptors");
   const auto vocabulary = place::train_vocabulary(set.images, a.training, random, pool,
@@ -134,19 +135,18 @@ int run_info(const std::string& file) {
   if (!read) return report_error(read.error());
   const place::Vocabulary& v = **read;
   const std::vector<float>& weights = v.content().weight;
-  const auto [least, most] = std::minmax_element(weights.begin(), weights.end());
+  const auto [min_weight, max_weight] = std::minmax_element(weights.begin(), weights.end());
   fmt::print("vocabulary   {}\n", file.empty() ? "shipped with this program" : file);
   fmt::print("descriptors  {}\n", v.kind());
   fmt::print("branching    {}\nlevels       {}\nwords        {}\nnodes        {}\n", v.branching(), v.levels(),
              v.size(), v.num_nodes());
-  fmt::print("weights      {:.4f} to {:.4f}\n", *least, *most);
+  fmt::print("weights      {:.4f} to {:.4f}\n", *min_weight, *max_weight);
   fmt::print("size         {} bytes\n", place::serialise(v).size());
   fmt::print("id           {:016x}\n", v.id());
   fmt::print("load time    {:.1f} ms\n", load.count());
   if (v.kind() != place::kDescriptorKind) {
-    fmt::print(
-        "note         made for other descriptors than those of this program ({}): place recognition is less reliable\n",
-        place::kDescriptorKind);
+    fmt::print("note         trained for other descriptors than {}: place recognition is less reliable\n",
+               place::kDescriptorKind);
   }
   return kExitOk;
 }
@@ -170,7 +170,7 @@ void add_train(CLI::App& vocab, int& exit_status) {
       ->check(CLI::Range(50, 20000))
       ->capture_default_str();
   verb->add_option("--max-side", a.max_side,
-                   "larger images are scaled down to this many pixels on their longer side; 0: never")
+                   "maximum length of the longer side in pixels; larger images are scaled down; 0: no limit")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str();
   verb->add_option("--threads", a.threads, "number of threads; 0: one per core")
@@ -191,7 +191,8 @@ void add_vocab(CLI::App& app, int& exit_status) {
   add_train(*vocab, exit_status);
   const auto file = std::make_shared<std::string>();
   CLI::App* info = vocab->add_subcommand("info", "print kind, size, id and weights of a vocabulary");
-  info->add_option("FILE", *file, "bslam vocabulary or DBoW2 text file (default: the one shipped with this program)");
+  info->add_option("FILE", *file,
+                   "bslam vocabulary or DBoW2 text file (default: the vocabulary shipped with this program)");
   info->callback([file, &exit_status] { exit_status = run_info(*file); });
 }
 

@@ -56,7 +56,7 @@ Result<OpenRecording> open_recording(const DatasetRequest& request) {
   return OpenRecording{format, *std::move(recording)};
 }
 
-// The name of the data set folder. Handles "DATA/mav0", "DATA/" and "." as well.
+// Returns the name of the data set folder. Handles "DATA/mav0", "DATA/" and "." as well.
 std::string name_of(const fs::path& path) {
   std::error_code error;
   fs::path whole = fs::weakly_canonical(path, error);
@@ -65,9 +65,9 @@ std::string name_of(const fs::path& path) {
   return whole.filename().string();
 }
 
-// The requested cameras, or all `count` cameras if none were requested.
-Result<std::vector<int>> chosen_cameras(const std::vector<int>& asked, std::size_t count) {
-  std::vector<int> cameras = asked;
+// Returns the requested cameras, or all `count` cameras if none were requested.
+Result<std::vector<int>> chosen_cameras(const std::vector<int>& requested, std::size_t count) {
+  std::vector<int> cameras = requested;
   if (cameras.empty()) {
     cameras.resize(count);
     std::iota(cameras.begin(), cameras.end(), 0);
@@ -112,7 +112,7 @@ Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recordin
   return chosen;
 }
 
-// Empty if the calibration of any camera cannot be read.
+// Returns nullopt if the calibration of any camera cannot be read.
 std::optional<camera::Rig> whole_rig(const Recording& recording) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < recording.camera_count(); ++c) {
@@ -162,7 +162,7 @@ Status check_images(const std::vector<image_files::ImageFile>& images, const cam
                fmt::format("{}x{}, the resolution of the calibration", camera.width, camera.height)};
 }
 
-// The images of every camera in use, with time offsets applied to the time stamps.
+// Returns the images of every camera in use, with time offsets applied to the time stamps.
 Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Recording& recording, ChosenRig& chosen) {
   std::vector<std::vector<image_files::ImageFile>> images;
   for (std::size_t i = 0; i < chosen.cameras.size(); ++i) {
@@ -212,14 +212,15 @@ Status group(const DatasetRequest& request, const std::vector<std::vector<image_
 Status check_request(const DatasetRequest& request) {
   for (const auto& [name, value] : {std::pair("--begin", request.begin_s), std::pair("--end", request.end_s)}) {
     if (value && !(*value >= 0 && *value < 1e9))
-      return Error{name, "", fmt::format("{}", *value), "seconds, at least 0"};
+      return Error{name, "", fmt::format("{}", *value), "a non-negative number of seconds"};
   }
   if (request.begin_s && request.end_s && !(*request.begin_s < *request.end_s)) {
     return Error{"--begin", "", fmt::format("{} s with --end {} s", *request.begin_s, *request.end_s),
                  "a begin before the end"};
   }
   if (!(request.sync_tolerance_s >= 0 && request.sync_tolerance_s < 1e3)) {
-    return Error{"io.sync_tolerance", "", fmt::format("{}", request.sync_tolerance_s), "seconds, at least 0"};
+    return Error{"io.sync_tolerance", "", fmt::format("{}", request.sync_tolerance_s),
+                 "a non-negative number of seconds"};
   }
   return {};
 }
@@ -238,8 +239,8 @@ Status keep_range(const DatasetRequest& request, Dataset& dataset) {
                fmt::format("a range that contains frames, which are between 0 and {:.3f} s", last_s)};
 }
 
-// The rig file in the folder of a recording, if there is one.
-std::optional<fs::path> rig_beside(const DatasetRequest& request) {
+// Returns the rig file in the folder of a recording, or nullopt if there is none.
+std::optional<fs::path> rig_file_in_folder(const DatasetRequest& request) {
   fs::path folder = request.path.filename().empty() ? request.path.parent_path() : request.path;
   if (folder.filename() == "mav0") folder = folder.parent_path();
   fs::path file = folder / "rig.yaml";
@@ -265,17 +266,17 @@ void warn_of_times(const fs::path& file, std::vector<std::string>& warnings) {
 
 }  // namespace
 
-Result<Dataset> open_dataset(const DatasetRequest& asked) {
-  DatasetRequest request = asked;
+Result<Dataset> open_dataset(const DatasetRequest& original) {
+  DatasetRequest request = original;
   if (const Status status = check_request(request); !status) return status.error();
   const auto opened = open_recording(request);
   if (!opened) return opened.error();
   const Recording& recording = *opened->recording;
-  const auto beside = request.rig_file ? std::nullopt : rig_beside(request);
-  if (beside && !recording.calibrated()) request.rig_file = *beside;
+  const auto own_rig_file = request.rig_file ? std::nullopt : rig_file_in_folder(request);
+  if (own_rig_file && !recording.calibrated()) request.rig_file = *own_rig_file;
   auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
-  if (beside && !request.rig_file) warn_of_times(*beside, chosen->warnings);
+  if (own_rig_file && !request.rig_file) warn_of_times(*own_rig_file, chosen->warnings);
   const auto images = collect_images(recording, *chosen);
   if (!images) return images.error();
   Dataset dataset{name_of(request.path),

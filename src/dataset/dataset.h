@@ -27,7 +27,7 @@ struct DatasetRequest {
 
 // Images taken at the same time, at most one of every camera.
 struct FrameEntry {
-  TimeNs time_ns = 0;  // time of the image of camera 0, or of the earliest image if that is missing
+  TimeNs time_ns = 0;  // time of the image of camera 0, or of the earliest image if camera 0 has none
   std::vector<std::optional<image_files::ImageFile>> images;  // one per camera in use
 };
 
@@ -36,7 +36,7 @@ struct Dataset {
   DatasetFormat format;           // never kAuto
   camera::Rig rig;                // the cameras in use, in the requested order
   std::vector<int> cameras_used;  // their indices in the whole rig
-  // All cameras of the calibration in its order. Empty if the calibration of a camera that is not in use cannot be
+  // All cameras of the calibration, in its order; nullopt if the calibration of a camera that is not in use cannot be
   // read.
   std::optional<camera::Rig> whole_rig;
   TimeNs first_time_ns = 0;  // time of the first frame of the recording, from which the seconds of a run are counted
@@ -48,7 +48,7 @@ struct Dataset {
 
 // Detects the format, reads the calibration and the lists of images, and groups the images into frames
 // (dataset/frame_grouping.h). An image that is listed but cannot be read is not an error here; read_frame reports it as
-// damaged. Errors: the folder does not exist or has no known format; the calibration is missing or invalid; a list is
+// damaged. Errors: the folder does not exist or has an unknown format; the calibration is missing or invalid; a list is
 // missing, empty or malformed; a camera has no image file, or its images differ from the calibrated resolution; two
 // cameras have no common frame; a camera is requested twice or does not exist; the time range is empty or reversed.
 Result<Dataset> open_dataset(const DatasetRequest& request);

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxListBytes = std::size_t{1} << 28;
-// Nanoseconds. Time offsets can be added to it without overflow.
+// Maximum time in nanoseconds, to which time offsets can be added without overflow.
 constexpr TimeNs kMaxTime = 9'200'000'000'000'000'000;
 
 std::string_view trimmed(std::string_view text) {

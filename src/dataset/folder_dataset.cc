@@ -22,7 +22,7 @@ class FolderRecording : public Recording {
   Result<camera::RigCamera> calibration(std::size_t camera) const override {
     const std::string data = folders_[camera].parent_path().string();
     return Error{data, "", "no calibration", "a rig file (--rig FILE)",
-                 "no calibration in " + data + ": give --rig FILE"};
+                 "no calibration in " + data + "; specify it with --rig FILE"};
   }
 
   Result<image_files::ImageList> images(std::size_t camera) const override {

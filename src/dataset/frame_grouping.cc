@@ -8,7 +8,7 @@
 namespace bslam::dataset {
 
 FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> images, TimeNs tolerance_ns) {
-  BSLAM_ASSERT(!images.empty() && !images[0].empty(), "camera 0 has images");
+  BSLAM_ASSERT(!images.empty() && !images[0].empty(), "camera 0 must have images");
   std::vector<std::vector<TimeNs>> times(images.size());
   for (std::size_t c = 0; c < images.size(); ++c) {
     for (const image_files::ImageFile& image : images[c]) times[c].push_back(image.time_ns);

@@ -15,8 +15,9 @@ struct FrameGrouping {
   std::vector<int> unassigned;           // per camera: number of images in no frame
 };
 
-// By the rule of image/frame_grouping.h. Camera 0 has a gap where two of its images are more than 3/4 of its median
-// interval apart. `images[i]` are the images of camera i, strictly increasing in time. Camera 0 must have at least one.
+// Groups images by the rule of image/frame_grouping.h. Camera 0 has a gap where two of its images are more than 3/4 of
+// its median interval apart. `images[i]` are the images of camera i, strictly increasing in time. Camera 0 must have at
+// least one.
 FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> images, TimeNs tolerance_ns);
 
 }  // namespace bslam::dataset

@@ -20,7 +20,7 @@ Result<image::Image> read_of_camera(const std::filesystem::path& file, const cam
 
 }  // namespace
 
-std::string why_damaged(const Dataset& dataset, std::size_t index, std::size_t camera) {
+std::string describe_damage(const Dataset& dataset, std::size_t index, std::size_t camera) {
   const auto& file = dataset.frames.at(index).images.at(camera);
   if (!file) return "";
   const auto image = read_of_camera(file->path, dataset.rig.camera(camera));
@@ -29,7 +29,7 @@ std::string why_damaged(const Dataset& dataset, std::size_t index, std::size_t c
 }
 
 image::ImageBundle read_frame(const Dataset& dataset, std::size_t index) {
-  BSLAM_ASSERT(index < dataset.frames.size(), "a frame of the data set");
+  BSLAM_ASSERT(index < dataset.frames.size(), "the frame index must be within the data set");
   const FrameEntry& frame = dataset.frames[index];
   image::ImageBundle bundle{FrameId(index), frame.time_ns, {}};
   bundle.images.resize(frame.images.size());

@@ -14,7 +14,7 @@ namespace bslam::dataset {
 // image in this frame. May be called from several threads at the same time.
 image::ImageBundle read_frame(const Dataset& dataset, std::size_t index);
 
-// File and cause of damage of an image in state kDamaged, found by reading it again.
-std::string why_damaged(const Dataset& dataset, std::size_t index, std::size_t camera);
+// Returns file and cause of damage of an image in state kDamaged, determined by reading it again.
+std::string describe_damage(const Dataset& dataset, std::size_t index, std::size_t camera);
 
 }  // namespace bslam::dataset

@@ -19,23 +19,23 @@ class Recording {
   virtual ~Recording() = default;
 
   virtual std::size_t camera_count() const = 0;
-  // Whether the data set contains the calibration of at least one camera.
+  // Returns true if the data set contains the calibration of at least one camera.
   virtual bool calibrated() const { return true; }
-  // The calibration in the data set.
+  // Returns the calibration in the data set.
   virtual Result<camera::RigCamera> calibration(std::size_t camera) const = 0;
-  // All listed images with their recorded time stamps; at least one.
+  // Returns all listed images with their recorded time stamps; at least one.
   virtual Result<image_files::ImageList> images(std::size_t camera) const = 0;
   virtual std::optional<std::filesystem::path> ground_truth() const { return std::nullopt; }
 };
 
 using RecordingResult = Result<std::unique_ptr<Recording>>;
 
-// Each returns an Error that says what is expected if `folder` does not have its format.
+// Each function returns an Error that names the expected files if `folder` does not have its format.
 RecordingResult open_euroc(const std::filesystem::path& folder);   // mav0/camN/data.csv
 RecordingResult open_kitti(const std::filesystem::path& folder);   // image_N/NNNNNN.png and times.txt
 RecordingResult open_folder(const std::filesystem::path& folder);  // camN/<ns>.png
 
-// Whether the folder seems to have the format.
+// Each function returns true if the folder seems to have the format.
 bool looks_like_euroc(const std::filesystem::path& folder);
 bool looks_like_kitti(const std::filesystem::path& folder);
 bool looks_like_folder(const std::filesystem::path& folder);

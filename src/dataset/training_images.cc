@@ -43,7 +43,7 @@ Result<std::vector<fs::path>> images_below(const fs::path& folder) {
   return found;
 }
 
-// A number of a PGM header, after white space and comments.
+// Reads a number of a PGM header, after white space and comments.
 std::optional<int> header_number(std::string_view& bytes) {
   constexpr std::string_view kBlanks = " \t\r\n\v\f";
   for (;;) {
@@ -85,7 +85,7 @@ std::optional<image::Image> decode_webp(std::string_view bytes) {
   return image;
 }
 
-// Supports more formats than recordings do.
+// Supports more formats than the images of recordings.
 std::optional<image::Image> decode_any(std::string_view bytes) {
   if (bytes.starts_with("P5")) return decode_pgm(bytes);
   if (bytes.starts_with("RIFF") && bytes.size() > 12 && bytes.substr(8, 4) == "WEBP") return decode_webp(bytes);
@@ -132,7 +132,8 @@ Result<image::Image> read_training_image(const fs::path& file, int max_side) {
   const auto bytes = read_file(file, kMaxImageBytes);
   if (!bytes) return bytes.error();
   auto image = decode_any(*bytes);
-  if (!image) return Error{file.string(), "", "no complete image", "a PNG, JPEG, PGM or WebP image"};
+  if (!image)
+    return Error{file.string(), "", "an incomplete image or another format", "a PNG, JPEG, PGM or WebP image"};
   const bool large = max_side > 0 && std::max(image->width(), image->height()) > max_side;
   return large ? shrink(*image, max_side) : *std::move(image);
 }

@@ -10,7 +10,7 @@
 
 namespace bslam::dataset {
 
-// The PNG, JPEG, PGM and WebP files in `paths`, and, recognised by their names, those in folders in `paths` and their
+// Returns the PNG, JPEG, PGM and WebP files in `paths`, and the files with such names in folders in `paths` and their
 // subfolders. The files of a folder are ordered by path; duplicates are removed. Errors: a path that does not exist or
 // cannot be searched; a file of another type.
 Result<std::vector<std::filesystem::path>> find_images(const std::vector<std::string>& paths);

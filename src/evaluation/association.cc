@@ -15,7 +15,7 @@ TimeNs distance_ns(const TimedPose& a, const TimedPose& b) { return std::abs(a.t
 }  // namespace
 
 std::size_t nearest_in_time(const Trajectory& trajectory, TimeNs time_ns) {
-  BSLAM_ASSERT(!trajectory.empty(), "a pose to find");
+  BSLAM_ASSERT(!trajectory.empty(), "the trajectory must not be empty");
   const auto after = std::ranges::lower_bound(trajectory, time_ns, {}, &TimedPose::time_ns);
   if (after == trajectory.begin()) return 0;
   const auto before = std::prev(after);

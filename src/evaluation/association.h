@@ -1,4 +1,4 @@
-// Association of the poses of an estimate with those of a ground truth by their timestamps.
+// Association of the poses of an estimate with the poses of a ground truth by their timestamps.
 #pragma once
 
 #include <cstddef>
@@ -16,18 +16,18 @@ struct Association {
 
 // Returns pairs of poses at most `max_dt_ns` apart, in order of time. Nothing is interpolated: if the ground truth has
 // a higher rate, the nearest sample is used, as in common evaluation tools. Each pose of the shorter trajectory (the
-// estimate, if they are equally long) is paired with the pose of the longer one nearest in time; the earlier one on
-// ties. Each estimated pose is used at most once: if several ground-truth poses select it, the nearest is kept.
+// estimate, if they are equally long) is paired with the nearest pose in time of the longer trajectory; the earlier one
+// on ties. Each estimated pose is used at most once: if several ground-truth poses select it, the nearest is kept.
 std::vector<Association> associate(const Trajectory& estimate, const Trajectory& ground_truth, TimeNs max_dt_ns);
 
 // Returns the index of the pose nearest in time to `time_ns`; the earlier one on ties. The trajectory must not be
 // empty.
 std::size_t nearest_in_time(const Trajectory& trajectory, TimeNs time_ns);
 
-// Median time between consecutive poses; 0 if there are fewer than two poses.
+// Returns the median time between consecutive poses; 0 if there are fewer than two poses.
 TimeNs median_interval_ns(const Trajectory& trajectory);
 
-// Length of the path through all positions, in metres.
+// Returns the length of the path through all positions, in metres.
 double path_length_m(const Trajectory& trajectory);
 
 // Converts the trajectory to another frame fixed to the moving one: T_world_other = T_world_frame * T_frame_other.

@@ -13,7 +13,7 @@ using geometry::Matrix3d;
 using geometry::Quaterniond;
 using geometry::Vector3d;
 
-// relative to the largest possible covariance of the two paths; anything below is rounding error
+// relative to the largest possible covariance of the two paths; smaller values are rounding errors
 constexpr double kNoExtent = 1e-12;
 
 Vector3d mean_of(std::span<const Vector3d> points) {
@@ -26,7 +26,7 @@ Vector3d mean_of(std::span<const Vector3d> points) {
 
 std::optional<geometry::Sim3> align_positions(std::span<const Vector3d> src, std::span<const Vector3d> dst,
                                               geometry::ScaleMode scale) {
-  BSLAM_ASSERT(src.size() == dst.size() && !src.empty(), "as many positions of one trajectory as of the other");
+  BSLAM_ASSERT(src.size() == dst.size() && !src.empty(), "the spans must have equal size and must not be empty");
   if (auto determined = geometry::align_points(src, dst, scale)) return determined;
   const Vector3d mean_src = mean_of(src), mean_dst = mean_of(dst);
   Matrix3d covariance = Matrix3d::Zero();
@@ -36,8 +36,8 @@ std::optional<geometry::Sim3> align_positions(std::span<const Vector3d> src, std
     spread_src += (src[i] - mean_src).squaredNorm();
     spread_dst += (dst[i] - mean_dst).squaredNorm();
   }
-  // The covariance has at most rank one: every rotation that maps its only direction in src to that in dst is a
-  // minimum.
+  // The covariance has at most rank one: every rotation that maps its only direction in src to its direction in dst
+  // is a minimum.
   const Eigen::JacobiSVD<Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double strength = svd.singularValues().x();
   const bool has_direction = strength > kNoExtent * std::sqrt(spread_src * spread_dst);

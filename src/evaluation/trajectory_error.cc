@@ -58,7 +58,7 @@ RelativeErrors relative_errors(const Trajectory& aligned, const Trajectory& grou
           .rotation_deg = statistics_of(std::move(rotation))};
 }
 
-// Counts the times start + k * step, k = 1 .. count, that have a ground-truth pose within `tolerance_ns`. Stretches
+// Counts the times start + k * step, k = 1 .. count, that have a ground-truth pose within `tolerance_ns`. Intervals
 // without ground truth are skipped at once, so a single stray timestamp far away costs nothing.
 std::size_t count_covered(const Trajectory& ground_truth, TimeNs start, double step, TimeNs count,
                           TimeNs tolerance_ns) {
@@ -67,7 +67,7 @@ std::size_t count_covered(const Trajectory& ground_truth, TimeNs start, double s
     const TimeNs t = start + std::llround(static_cast<double>(k) * step);
     const auto next = std::ranges::lower_bound(ground_truth, t - tolerance_ns, {}, &TimedPose::time_ns);
     if (next == ground_truth.end()) break;
-    // time until the next pose is within tolerance; it is already if <= 0
+    // time until the next pose is within the tolerance; <= 0 if it already is
     const TimeNs wait = next->time_ns - tolerance_ns - t;
     if (wait <= 0) {
       ++covered;
@@ -163,8 +163,8 @@ Result<TrajectoryEvaluation> evaluate(const Trajectory& estimate, const Trajecto
     if (!alignment) {
       return Error{.file = {},
                    .key = {},
-                   .found = "positions that all agree, which leave the scale open",
-                   .expected = "a trajectory that moves, or no scale to be fitted"};
+                   .found = "a motionless trajectory, which does not determine the scale",
+                   .expected = "a trajectory with motion, or an alignment without scale"};
     }
     result.T_gt_estimate = *alignment;
   }

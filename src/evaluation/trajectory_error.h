@@ -36,10 +36,10 @@ ErrorStatistics statistics_of(std::vector<double> errors);
 
 // Relative errors over the time `delta_s`. Each associated pose i is paired with the later pose j whose time
 // difference, by the estimate's timestamps, is nearest to delta_s (the earlier one on ties). The pair is used only if
-// that difference deviates from delta_s by at most half the median interval between associated poses and at most a
-// tenth of delta_s; otherwise the nearest frame is missing (a gap or the end of the trajectory). The error of a pair is
-// E = (Q_i^-1 Q_j)^-1 (P_i^-1 P_j), with ground truth Q and estimate P, both as compared (with Sim(3) alignment, after
-// scaling). For frames at equal time intervals these are all pairs (i, i + n).
+// that difference deviates from delta_s by no more than half the median interval between associated poses and no more
+// than a tenth of delta_s; otherwise the nearest frame is missing (a gap or the end of the trajectory). The error of a
+// pair is E = (Q_i^-1 Q_j)^-1 (P_i^-1 P_j), with ground truth Q and estimate P, both as compared (with Sim(3)
+// alignment, after scaling). For frames at equal time intervals these are all pairs (i, i + n).
 struct RelativeErrors {
   double delta_s = 1.0;
   ErrorStatistics translation_m;
@@ -73,7 +73,7 @@ Result<TrajectoryEvaluation> evaluate(const Trajectory& estimate, const Trajecto
 
 // Fraction of the input frames with ground truth that have an estimated pose, in [0, 1]. The input frames are not
 // stored in the files, so they are inferred. If the ground truth is no denser than the estimate (median interval at
-// least 3/4 of the estimate's), its poses stand for the frames, and the result is the fraction of them with an
+// least 3/4 of the estimate's), its poses represent the frames, and the result is the fraction of them with an
 // estimated pose. If it is denser, the frames are times at the estimate's median interval, laid through the gaps of the
 // estimate and beyond both its ends, that have ground truth within max_dt. Frames lost at such regular intervals that
 // the estimate's median interval grows cannot be distinguished from a slower camera.

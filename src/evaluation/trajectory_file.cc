@@ -53,7 +53,7 @@ Result<std::string> read_bytes(const std::filesystem::path& file) {
     return Error{.file = file.string(), .key = {}, .found = "a folder", .expected = "a file"};
   }
   std::ifstream in(file, std::ios::binary);
-  if (!in) return Error{.file = file.string(), .key = {}, .found = "no readable file", .expected = "a file"};
+  if (!in) return Error{.file = file.string(), .key = {}, .found = "an unreadable file", .expected = "a file"};
   std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   if (in.bad()) return Error{.file = file.string(), .key = {}, .found = "a read error", .expected = "a readable file"};
   return bytes;
@@ -172,7 +172,8 @@ Result<SE3> kitti_pose(const std::filesystem::path& file, const Line& line) {
   const Matrix3d R = T.leftCols<3>();
   const double off = (R * R.transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(off <= kRotationTolerance) || R.determinant() < 0) {
-    return line_error(file, line.number, "a matrix that is no rotation", "the upper three rows of a rigid transform");
+    return line_error(file, line.number, "a matrix that is not a rotation",
+                      "the upper three rows of a rigid transform");
   }
   return SE3(R, T.col(3));
 }
@@ -198,13 +199,13 @@ Status check_field_count(const std::filesystem::path& file, const Line& line, Tr
   };
   switch (format) {
     case TrajectoryFormat::kTum:
-      if (line.commas || found != kTumFields) return error("8 (t x y z qx qy qz qw), as TUM has");
+      if (line.commas || found != kTumFields) return error("8 (t x y z qx qy qz qw), in TUM files");
       break;
     case TrajectoryFormat::kEurocCsv:
-      if (!line.commas || found < kEurocFields) return error("at least 8 (ns,x,y,z,qw,qx,qy,qz), as EuRoC csv has");
+      if (!line.commas || found < kEurocFields) return error("at least 8 (ns,x,y,z,qw,qx,qy,qz), in EuRoC csv files");
       break;
     case TrajectoryFormat::kKitti:
-      if (line.commas || found != kKittiFields) return error("12 (rows of a 3x4 matrix), as KITTI poses have");
+      if (line.commas || found != kKittiFields) return error("12 (rows of a 3x4 matrix), in KITTI pose files");
       break;
   }
   return {};
@@ -231,7 +232,7 @@ Result<Trajectory> kitti_trajectory(const std::filesystem::path& file, const std
     return Error{.file = file.string(),
                  .key = {},
                  .found = "KITTI poses without times",
-                 .expected = "times.txt beside them, or --times FILE"};
+                 .expected = "times.txt in the same folder, or --times FILE"};
   }
   const auto times = read_times(times_file);
   if (!times) return times.error();
@@ -239,7 +240,7 @@ Result<Trajectory> kitti_trajectory(const std::filesystem::path& file, const std
     return Error{.file = times_file.string(),
                  .key = {},
                  .found = fmt::format("{} times", times->size()),
-                 .expected = fmt::format("{}, one for each pose of {}", lines.size(), file.string())};
+                 .expected = fmt::format("{} (one per pose of {})", lines.size(), file.string())};
   }
   Trajectory trajectory;
   for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -251,7 +252,7 @@ Result<Trajectory> kitti_trajectory(const std::filesystem::path& file, const std
       return Error{.file = times_file.string(),
                    .key = fmt::format("time {}", i + 1),
                    .found = fmt::format("{} s after {} s", to_seconds((*times)[i]), to_seconds((*times)[i - 1])),
-                   .expected = "times that increase"};
+                   .expected = "increasing times"};
     }
     trajectory.push_back({(*times)[i], *pose});
   }
@@ -287,7 +288,8 @@ std::optional<TimeNs> parse_seconds(std::string_view text) {
   if (point != std::string_view::npos) digits += text.substr(point + 1);
   if (digits.empty() || digits.find_first_not_of("0123456789") != std::string::npos) return std::nullopt;
 
-  // The value is 0.DIGITS * 10^exponent: the first `exponent` digits are whole nanoseconds, and the next one rounds.
+  // The value is 0.DIGITS * 10^exponent: the first `exponent` digits are whole nanoseconds, and the next one determines
+  // the rounding.
   TimeNs value = 0;
   for (int k = 0; k < exponent; ++k) {
     const std::size_t at = static_cast<std::size_t>(k);
@@ -318,7 +320,7 @@ Result<Trajectory> read_trajectory(const std::filesystem::path& file,
     if (!trajectory.empty() && pose->time_ns <= trajectory.back().time_ns) {
       return line_error(file, line.number,
                         seconds_text(pose->time_ns) + " s after " + seconds_text(trajectory.back().time_ns) + " s",
-                        "times that increase");
+                        "increasing times");
     }
     trajectory.push_back(*pose);
   }

@@ -35,7 +35,7 @@ enum class PoseState { kFinal, kLive };
 // The comment line at the top of trajectories written by a run: "bslam trajectory frame=cam0 parent=world final=true".
 std::string trajectory_header(std::string_view frame, PoseState state);
 
-// The content of a trajectory file. TUM begins with "# HEADER" if `header` is not empty. Seconds, metres and
+// Returns the content of a trajectory file. TUM begins with "# HEADER" if `header` is not empty. Seconds, metres and
 // quaternions have nine decimals. KITTI contains poses only; `times_text` gives the matching times file.
 std::string tum_text(const evaluation::Trajectory& trajectory, std::string_view header);
 std::string euroc_csv_text(const evaluation::Trajectory& trajectory);

@@ -7,7 +7,7 @@
 namespace bslam::geometry {
 
 std::optional<Sim3> align_points(std::span<const Vector3d> src, std::span<const Vector3d> dst, ScaleMode scale) {
-  BSLAM_ASSERT(src.size() == dst.size(), "point sets of equal size");
+  BSLAM_ASSERT(src.size() == dst.size(), "the point sets must have equal size");
   if (src.size() < 3) return std::nullopt;
   Vector3d mean_src = Vector3d::Zero(), mean_dst = Vector3d::Zero();
   for (std::size_t i = 0; i < src.size(); ++i) {

@@ -39,6 +39,8 @@ Matrix6d SE3::adjoint() const {
   return ad;
 }
 
-SE3 interpolate(const SE3& a, const SE3& b, double share) { return SE3::exp(share * (b * a.inverse()).log()) * a; }
+SE3 interpolate(const SE3& a, const SE3& b, double fraction) {
+  return SE3::exp(fraction * (b * a.inverse()).log()) * a;
+}
 
 }  // namespace bslam::geometry

@@ -37,7 +37,7 @@ class SE3 {
 // Returns T with its translation multiplied by `factor`.
 inline SE3 scaled(const SE3& T, double factor) { return {T.rotation(), factor * T.translation()}; }
 
-// Returns the pose on the geodesic from `a` (share 0) to `b` (share 1). Shares outside [0, 1] extrapolate.
-SE3 interpolate(const SE3& a, const SE3& b, double share);
+// Returns the pose on the geodesic from `a` (fraction 0) to `b` (fraction 1). Fractions outside [0, 1] extrapolate.
+SE3 interpolate(const SE3& a, const SE3& b, double fraction);
 
 }  // namespace bslam::geometry

@@ -1,5 +1,5 @@
-// Which images of different cameras make one frame, told from their times alone. Recorded data sets are grouped whole;
-// live images by the same rule over what has arrived.
+// Groups images of different cameras into frames by their capture times. Recorded data sets are grouped as a whole;
+// live images are grouped by the same rule among the images received so far.
 #pragma once
 
 #include <span>
@@ -10,28 +10,30 @@
 namespace bslam::image {
 
 struct GroupedFrame {
-  TimeNs time_ns = 0;       // of camera 0's image, or of the earliest where that is missing
-  std::vector<int> images;  // per camera: position in its list of times; -1 = none
+  TimeNs time_ns = 0;       // time of camera 0's image, or of the earliest image if camera 0 has none
+  std::vector<int> images;  // per camera: index into its list of times; -1 if it has no image
 };
 
 struct FrameGroups {
   std::vector<GroupedFrame> frames;      // in order of time
-  std::vector<int> shared_with_camera0;  // per camera: images in a frame that has an image of camera 0
-  std::vector<int> unassigned;           // per camera: images in no frame
+  std::vector<int> shared_with_camera0;  // per camera: number of images in frames that have an image of camera 0
+  std::vector<int> unassigned;           // per camera: number of images in no frame
 };
 
-// Frames are the instants of camera 0. An image of another camera joins the nearest of them within `tolerance_ns`; of
-// two images of one camera the nearer stays. Where camera 0 has a gap, the others make frames of their own: an image
-// more than `gap_ns` away from any image of camera 0, with those of other cameras within the tolerance after it. Images
-// that lie near an instant of camera 0 but not within the tolerance belong to no frame, so that cameras which do not
-// fire together never double the frame rate. `times[i]`: of camera i's images, strictly increasing; any may be empty.
+// Each image of camera 0 defines a frame. An image of another camera is assigned to the nearest frame within
+// `tolerance_ns`; of two images of the same camera the nearer one is kept. In a gap of camera 0 the other cameras
+// define frames: an image more than `gap_ns` away from any image of camera 0, together with the images of other cameras
+// within the tolerance after it. Images near an image of camera 0 but outside the tolerance belong to no frame, so that
+// cameras which do not capture simultaneously never double the frame rate. `times[i]` are the times of camera i's
+// images, strictly increasing; any list may be empty.
 FrameGroups group_frames(std::span<const std::vector<TimeNs>> times, TimeNs tolerance_ns, TimeNs gap_ns);
 
-// Distance from camera 0's images beyond which it has a gap: 3/4 of the interval between them, no less than the
-// tolerance.
+// Returns the distance in time from camera 0's images beyond which camera 0 has a gap: 3/4 of the interval between its
+// images, but at least the tolerance.
 TimeNs gap_after(TimeNs interval_ns, TimeNs tolerance_ns);
 
-// Median of the intervals between neighbouring times, the lower of two in the middle; 0 for fewer than two times.
+// Returns the median interval between consecutive times, the smaller of the two middle ones for an even number, and 0
+// for fewer than two times.
 TimeNs median_interval(std::span<const TimeNs> times);
 
 }  // namespace bslam::image

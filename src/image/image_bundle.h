@@ -19,7 +19,8 @@ struct CameraImage {
   ImageState state = ImageState::kMissing;
   TimeNs time_ns = 0;  // capture time of this image, with the camera's time offset applied; valid only if kPresent
   Image image;         // pixels owned by this struct; empty unless kPresent, and if they are borrowed
-  // Pixels owned by the caller, who keeps them while the frame is processed. Empty: the pixels are in `image`.
+  // Pixels owned by the caller, which must remain valid while the frame is processed. If empty, the pixels are in
+  // `image`.
   ImageView borrowed = {};
 
   ImageView view() const { return borrowed.empty() ? image.view() : borrowed; }
@@ -27,7 +28,7 @@ struct CameraImage {
 
 struct ImageBundle {
   FrameId id;  // input frames are numbered consecutively from 0
-  // Time of the frame: the time of camera 0's image, or the earliest of the others if that one is missing.
+  // Time of the frame: the time of camera 0's image, or of the earliest other image if camera 0 has none.
   TimeNs time_ns = 0;
   std::vector<CameraImage> images;  // one per camera of the rig
 };

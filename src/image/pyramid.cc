@@ -21,7 +21,7 @@ constexpr int kTaps = 4;  // enough for a triangle filter of half-width 2, that 
 constexpr int kStrip = 512;
 constexpr int kRowWeightSum = 1 << 8;      // sum of the vertical weights; a weighted sum of bytes fits into 16 bits
 constexpr int kColumnWeightSum = 1 << 14;  // sum of the horizontal weights
-constexpr int kShift = 21;  // fixed-point bits of both passes together: 8 + 14, less the one dropped between them
+constexpr int kShift = 21;  // fixed-point bits of both passes: 8 + 14, minus 1 that is dropped between them
 
 // Weights of the input samples `first` ... `first` + 3 that contribute to output sample `i`.
 struct Taps {
@@ -29,7 +29,7 @@ struct Taps {
   std::array<int, kTaps> weight;  // the weights add up to `weight_sum`
 };
 
-// Anti-aliasing with a triangle filter as wide as the output pixel (half-width = ratio); it is bilinear interpolation
+// Anti-aliasing with a triangle filter of half-width `ratio`, the size of an output pixel; it is bilinear interpolation
 // if the ratio is 1. Samples beyond the border repeat the last one.
 Taps make_taps(int i, int inputs, int outputs, int weight_sum) {
   const double ratio = static_cast<double>(inputs) / outputs;
@@ -117,7 +117,7 @@ void shrink(const Image& in, Image& out) {
   Strip strip;
   for (int begin = 0; begin < out.width(); begin += kStrip) {
     make_strip(begin, std::min(begin + kStrip, out.width()), in.width(), out.width(), strip);
-    BSLAM_ASSERT(strip.input_count <= static_cast<int>(row.size()), "ratio of pyramid levels beyond 2");
+    BSLAM_ASSERT(strip.input_count <= static_cast<int>(row.size()), "the ratio of pyramid levels must be at most 2");
     for (int y = 0; y < out.height(); ++y) {
       const Taps taps = make_taps(y, in.height(), out.height(), kRowWeightSum);
       std::array<const std::uint8_t*, kTaps> rows;
@@ -131,7 +131,7 @@ void shrink(const Image& in, Image& out) {
 }  // namespace
 
 void build_pyramid(const ImageView& base, int levels, double factor, Pyramid& pyramid) {
-  BSLAM_ASSERT(factor > 1.0 && factor <= 2.0, "ratio of pyramid levels outside of (1, 2]");
+  BSLAM_ASSERT(factor > 1.0 && factor <= 2.0, "the ratio of pyramid levels must be in (1, 2]");
   pyramid.scale_x.clear();
   pyramid.scale_y.clear();
   double scale = 1.0;

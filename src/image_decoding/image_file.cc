@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::size_t kMaxImageBytes = std::size_t{1} << 30;
 
-// Whether the bytes start as a JPEG and end with the end-of-image marker. Zeros after it, which some recorders add, are
-// allowed.
+// Returns true if the bytes start as a JPEG and end with the end-of-image marker. Zeros after it, which some recorders
+// add, are allowed.
 bool is_whole_jpeg(std::string_view bytes) {
   if (!bytes.starts_with("\xff\xd8\xff")) return false;
   const std::size_t last = bytes.find_last_not_of('\0');
@@ -41,7 +41,7 @@ std::optional<image::Image> decode_with_opencv(std::string_view bytes) {
 
 std::optional<image::Image> decode_grey(std::string_view bytes) {
   if (bytes.size() > kMaxImageBytes) return std::nullopt;
-  if (image_files::is_whole_png(bytes)) {
+  if (image_files::is_complete_png(bytes)) {
     auto image = image_files::decode_grey_png(bytes);
     return image ? std::move(image) : decode_with_opencv(bytes);
   }
@@ -52,7 +52,7 @@ Result<image::Image> read_image(const std::filesystem::path& file) {
   const auto bytes = read_file(file, kMaxImageBytes);
   if (!bytes) return bytes.error();
   auto image = decode_grey(*bytes);
-  if (!image) return Error{file.string(), "", "no complete PNG or JPEG image", "a complete PNG or JPEG image"};
+  if (!image) return Error{file.string(), "", "an incomplete image or another format", "a complete PNG or JPEG image"};
   return *std::move(image);
 }
 

@@ -32,10 +32,11 @@ struct NumberedImage {
   std::filesystem::path path;
 };
 
-// The PNG and JPEG files of a folder whose names are numbers, ordered by number. None if the folder does not exist.
+// Returns the PNG and JPEG files of a folder whose names are numbers, ordered by number. The list is empty if the
+// folder does not exist.
 std::vector<NumberedImage> images_in(const std::filesystem::path& folder);
 
-// Size of the first image whose header can be read, among the first few.
+// Returns the size of the first image with a readable header among the first few images, or nullopt.
 std::optional<ImageSize> first_image_size(const std::vector<NumberedImage>& images);
 
 }  // namespace bslam::image_files

@@ -7,7 +7,7 @@ namespace {
 
 constexpr int kMaxSidePx = 1 << 20;
 
-// Big-endian number of `count` bytes.
+// Reads a big-endian number of `count` bytes.
 int number_at(std::string_view bytes, std::size_t at, std::size_t count) {
   unsigned value = 0;
   for (std::size_t i = 0; i < count; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
@@ -24,7 +24,7 @@ std::optional<ImageSize> png_size(std::string_view bytes) {
   return sensible(number_at(bytes, 16, 4), number_at(bytes, 20, 4));
 }
 
-// Start-of-frame markers: 0xC0 to 0xCF but for Huffman tables (C4), JPG (C8) and arithmetic conditioning (CC).
+// Start-of-frame markers: 0xC0 to 0xCF except Huffman tables (C4), JPG (C8) and arithmetic conditioning (CC).
 bool starts_frame(unsigned char marker) {
   return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
 }

@@ -1,4 +1,4 @@
-// The size of an image, from its header alone.
+// The size of an image, read from its header only.
 #pragma once
 
 #include <optional>
@@ -10,8 +10,8 @@ struct ImageSize {
   int width = 0, height = 0;  // pixels
 };
 
-// Of a PNG (ISO/IEC 15948, section 11.2.2) or JPEG (ITU-T T.81, section B.2.2). Empty for anything else and for a
-// header that is cut off or says 0. The pixels are not looked at.
+// Returns the size of a PNG (ISO/IEC 15948, section 11.2.2) or JPEG (ITU-T T.81, section B.2.2) image. Returns nullopt
+// for other formats, for a truncated header, and for a size of 0. The pixels are not read.
 std::optional<ImageSize> image_size(std::string_view bytes);
 
 }  // namespace bslam::image_files

@@ -15,8 +15,8 @@ Result<image::Image> checked_mask(image::Image mask, const camera::Camera& camer
   }
   const std::span pixels(mask.row(0), static_cast<std::size_t>(mask.width()) * static_cast<std::size_t>(mask.height()));
   if (std::ranges::all_of(pixels, [](std::uint8_t p) { return p == 0; })) {
-    return Error{camera.mask_file, "", "only zeros, which mask all of " + camera.name,
-                 "values above 0 where the image is to be used"};
+    return Error{camera.mask_file, "", "only zeros, which mask the whole image of " + camera.name,
+                 "positive values for the pixels to use"};
   }
   return mask;
 }

@@ -1,4 +1,4 @@
-// Masks of cameras: images with 0 where a camera sees itself, its robot or nothing of use.
+// Masks of cameras: images in which 0 marks pixels to ignore, such as views of the rig or robot itself.
 #pragma once
 
 #include "base/result.h"
@@ -7,7 +7,8 @@
 
 namespace bslam::image_files {
 
-// The mask itself. Errors, which name the camera's mask file: another size than the camera's images, 0 everywhere.
+// Returns the mask if it is valid. Errors, which name the camera's mask file: the size of the mask differs from the
+// camera's resolution; all pixels are 0.
 Result<image::Image> checked_mask(image::Image mask, const camera::Camera& camera);
 
 }  // namespace bslam::image_files

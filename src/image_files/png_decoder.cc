@@ -27,7 +27,7 @@ struct Chunk {
   std::uint32_t checksum = 0;  // CRC-32 over type and data, as stored
 };
 
-// Removes the next chunk from `rest`. Empty if it is truncated.
+// Removes the next chunk from `rest` and returns it, or nullopt if it is truncated.
 std::optional<Chunk> next_chunk(std::string_view& rest) {
   if (rest.size() < kChunkFrame) return std::nullopt;
   const std::size_t length = big_endian(rest.data());
@@ -47,7 +47,7 @@ struct Header {
   int width = 0, height = 0;
 };
 
-// Empty unless the image is 8-bit grey without interlacing.
+// Returns nullopt unless the image is 8-bit grey without interlacing.
 std::optional<Header> read_header(const Chunk& chunk) {
   if (chunk.type != "IHDR" || chunk.data.size() != 13) return std::nullopt;
   const std::uint32_t width = big_endian(chunk.data.data()), height = big_endian(chunk.data.data() + 4);
@@ -57,7 +57,7 @@ std::optional<Header> read_header(const Chunk& chunk) {
   return Header{static_cast<int>(width), static_cast<int>(height)};
 }
 
-// The compressed stream: the concatenated data of all IDAT chunks.
+// Returns the compressed stream, which is the concatenated data of all IDAT chunks.
 std::string join_data(std::string_view chunks) {
   std::string joined;
   joined.reserve(chunks.size());
@@ -109,7 +109,7 @@ bool unfilter(int filter, const std::uint8_t* in, const std::uint8_t* above, std
 
 }  // namespace
 
-bool is_whole_png(std::string_view bytes) {
+bool is_complete_png(std::string_view bytes) {
   if (!bytes.starts_with(kSignature)) return false;
   bytes.remove_prefix(kSignature.size());
   while (const auto chunk = next_chunk(bytes)) {

@@ -8,13 +8,13 @@
 
 namespace bslam::image_files {
 
-// Whether the bytes are a PNG whose chunks are complete up to IEND and, if built with libdeflate, have correct
+// Returns true if the bytes are a PNG whose chunks are complete up to IEND and, if built with libdeflate, have correct
 // checksums.
-bool is_whole_png(std::string_view bytes);
+bool is_complete_png(std::string_view bytes);
 
 // Decodes an 8-bit grey PNG without interlacing at about twice the speed of libpng. `bytes` must have passed
-// is_whole_png. Empty for other kinds of PNG, for damaged data, and if built without libdeflate; the caller then uses
-// the general decoder.
+// is_complete_png. Returns nullopt for other kinds of PNG, for damaged data, and if built without libdeflate; the
+// caller then uses the general decoder.
 std::optional<image::Image> decode_grey_png(std::string_view bytes);
 
 }  // namespace bslam::image_files

@@ -1,5 +1,5 @@
-// Temporal consistency of place recognition: one keyframe may resemble another place by chance, several in a row hardly
-// do.
+// Temporal consistency of place recognition: a single keyframe may resemble another place by chance, several
+// consecutive ones rarely do.
 #pragma once
 
 #include <vector>

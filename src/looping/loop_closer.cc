@@ -8,8 +8,8 @@
 namespace bslam::looping {
 namespace {
 
-// On a continuous path the candidate is linked to the keyframe by those in between, and the landmarks matched are
-// mostly ones that the keyframe observes already. A real revisit matches landmarks that it does not observe yet.
+// On a continuous path the candidate is linked to the keyframe by the keyframes in between, and most of the matched
+// landmarks are already observed by the keyframe. A revisit matches landmarks that the keyframe does not observe yet.
 bool is_revisit(const map::BundledMap& map, KeyframeId keyframe, const PlaceMatch& place_match,
                 const LoopOptions& options) {
   const auto known = std::ranges::count_if(place_match.matches, [&](const auto& match) {
@@ -54,7 +54,8 @@ std::optional<PlaceMatch> LoopCloser::verify(KeyframeId keyframe, const map::Bun
 
 // Submaps can have any relative pose, so no pose prior can reject a wrong match, only appearance. Therefore no other
 // place in the rest of the map may match equally well. The candidates are searched as for relocalisation, with lower
-// thresholds, because a look-alike place observed by fewer keyframes would not be a candidate beside the right one.
+// thresholds, because a look-alike place observed by fewer keyframes would not be a candidate in addition to the right
+// one.
 bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const PlaceMatch& place_match) const {
   const std::shared_ptr<const frame::BundledFrame> frame = map.keyframe(keyframe).frame;
   const camera::Rig rig = map.rig_of(keyframe);

@@ -40,8 +40,8 @@ double reprojection_error_px(const map::BundledMap& map, KeyframeId keyframe, co
   return errors.empty() ? 0.0 : median(std::move(errors));
 }
 
-// Distance between the verified pose and the matched keyframe, divided by the median distance to the landmarks both
-// observe.
+// Distance between the verified pose and the matched keyframe, divided by the median distance to the landmarks
+// observed by both.
 double relative_distance(const map::BundledMap& map, const PlaceMatch& place_match) {
   const Vector3d here = centre(place_match.T_rig_world);
   std::vector<double> distances;
@@ -157,8 +157,7 @@ map::SetPoses corrected(const map::BundledMap& map, const EssentialGraph& graph,
   return poses;
 }
 
-// Moved landmarks are seen from other directions and, if the scale changed, from other distances, so they are
-// refreshed.
+// The viewing directions of moved landmarks change and, if the scale changed, their distances, so they are refreshed.
 void move_map(map::SetPoses poses, map::MapDraft& draft) {
   std::vector<LandmarkId> moved;
   moved.reserve(poses.landmarks.size());
@@ -241,8 +240,8 @@ bool close_loop(const LoopClosure& closure, const PlaceMatch& place_match, const
   for (const KeyframeId k : window)
     T_window.push_back(pose_of(graph.problem.S_world[static_cast<std::size_t>(graph.vertex(k))]));
   if (closure.reprojection_error_px <= options.max_bundle_error_px && !graph.problem.scale_free) {
-    // The error is small, so bundle adjustment can remove it starting from the present map. The pose verified for a
-    // single keyframe is no more accurate than the map.
+    // The error is small enough for bundle adjustment to remove it, starting from the present map. The pose verified
+    // for a single keyframe is no more accurate than the map.
     fuse(window, T_window, closure, place_match, options, features, draft);
     return true;
   }

@@ -8,7 +8,7 @@
 
 namespace bslam::looping {
 
-// Measures the pose error of the map at `keyframe`, assuming that the verification is right.
+// Measures the pose error of the map at `keyframe`, assuming that the verified pose is correct.
 LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const PlaceMatch& place_match);
 
 // Returns true if the keyframe returned to the place and drift on the path between them can explain the error. False

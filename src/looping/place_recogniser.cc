@@ -126,8 +126,8 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
     groups.push_back(group_of(map, s, scored, options_.group, options_.min_neighbour_landmarks));
   std::sort(groups.begin(), groups.end(), better);
   std::vector<Candidate> out;
-  // A group covers its representative and the neighbours of it. Keyframes that share only a few landmarks, for example
-  // through a door, count as different places.
+  // A group covers its representative and the neighbours of the representative. Keyframes that share only a few
+  // landmarks, for example through a door, count as different places.
   std::vector<std::uint8_t> taken(map.keyframe_slots(), 0);
   for (const Candidate& g : groups) {
     if (out.size() == static_cast<std::size_t>(options_.max_candidates) ||

@@ -15,7 +15,7 @@ namespace bslam::looping {
 
 struct Candidate {
   KeyframeId keyframe;
-  double score = 0;  // of its group; candidates are sorted by decreasing score
+  double score = 0;  // score of its group; candidates are sorted by decreasing score
 };
 
 // Returns the neighbours of a keyframe, that is the keyframes that share enough landmarks with it, in order of id.
@@ -52,7 +52,7 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   Words words_of(const frame::BundledFrame& frame) const;
   struct Bounds {
     double min_common_word_ratio, min_group_score_ratio;  // as in RecognitionOptions
-    double min_score = 0;                                 // of a single keyframe
+    double min_score = 0;                                 // minimum score of a single keyframe
   };
   std::vector<Candidate> rank(const map::BundledMap& map, const place::WordVector& words,
                               const std::vector<std::uint8_t>& excluded, const Bounds& bounds) const;
@@ -60,7 +60,7 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   const place::VocabularyPtr vocabulary_;
   const RecognitionOptions options_;
   place::InvertedIndex index_;
-  // frame of each keyframe in the index, by slot; null if not in the index
+  // frame of each keyframe in the index, by keyframe id; null if not in the index
   std::vector<std::shared_ptr<const frame::BundledFrame>> known_;
 };
 

@@ -13,7 +13,7 @@ std::optional<PlaceMatch> relocalise(PlaceRecogniser& recogniser, const map::Bun
       found.push_back(std::move(*place_match));
   }
   if (found.empty()) return std::nullopt;
-  // Ties go to the first one, which scores higher in appearance.
+  // On ties the first one is used, which has the higher appearance score.
   auto best = std::max_element(found.begin(), found.end(),
                                [](const PlaceMatch& a, const PlaceMatch& b) { return a.inliers < b.inliers; });
   const bool ambiguous =

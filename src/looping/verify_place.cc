@@ -18,7 +18,7 @@ struct KeypointMatch {
   LandmarkId landmark;
 };
 
-// Descriptors of a frame's unique features: of the first keypoint of each.
+// Returns the descriptor of each unique feature of a frame, which is the descriptor of its first keypoint.
 std::vector<feature::Descriptor> feature_descriptors(const frame::BundledFrame& frame) {
   std::vector<feature::Descriptor> out(frame.bundled.size());
   for (std::size_t f = 0; f < out.size(); ++f) {
@@ -28,7 +28,8 @@ std::vector<feature::Descriptor> feature_descriptors(const frame::BundledFrame& 
   return out;
 }
 
-// Matches by appearance alone: clear ones, and of several landmarks that choose one feature the nearest.
+// Matches by appearance only. Ambiguous matches are discarded, and if several landmarks match one feature, the nearest
+// one is kept.
 std::vector<KeypointMatch> match_descriptors(const map::BundledMap& map, const frame::BundledFrame& frame,
                                              const std::vector<LandmarkId>& landmarks,
                                              const VerificationOptions& options) {
@@ -66,16 +67,17 @@ std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map,
   return out;
 }
 
-// What a place is looked for by: landmarks, and as points.
-struct Sought {
+// The landmarks of a place and their positions as search points.
+struct PlaceLandmarks {
   std::vector<LandmarkId> landmarks;
-  std::vector<matching::SearchPoint> points;  // of each
+  std::vector<matching::SearchPoint> points;  // one per landmark
 };
 
-// All landmarks looked for where the pose puts them. `rig`: as it was while the cameras of the frame fired.
-std::vector<KeypointMatch> search_at(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place,
-                                     const SE3& T_rig_world, double radius, const VerificationOptions& options,
-                                     const feature::FeatureModel& features) {
+// Searches for all landmarks at their projections with the given pose. `rig` has the camera poses at the capture times
+// of the frame.
+std::vector<KeypointMatch> search_at(const camera::Rig& rig, const frame::BundledFrame& frame,
+                                     const PlaceLandmarks& place, const SE3& T_rig_world, double radius,
+                                     const VerificationOptions& options, const feature::FeatureModel& features) {
   const matching::ProjectionSearchOptions search{.radius = radius,
                                                  .max_hamming = options.max_hamming,
                                                  .ratio = 1.0,
@@ -91,10 +93,12 @@ std::vector<KeypointMatch> search_at(const camera::Rig& rig, const frame::Bundle
   return out;
 }
 
-// The landmarks that some camera sees from about where they are known from, in order of id: what is the same place
-// looks the same from there. From far aside it does not, and missing it says nothing.
-std::vector<LandmarkId> to_be_found(const camera::Rig& rig, const frame::BundledFrame& frame, const Sought& place,
-                                    const SE3& T_rig_world, double max_viewing_angle) {
+// Returns the landmarks predicted visible in any camera within `max_viewing_angle` of a known viewing direction, in
+// order of id. From such a direction a landmark looks the same; from others it may not, and a missing match is no
+// evidence against the place.
+std::vector<LandmarkId> expected_landmarks(const camera::Rig& rig, const frame::BundledFrame& frame,
+                                           const PlaceLandmarks& place, const SE3& T_rig_world,
+                                           double max_viewing_angle) {
   std::vector<LandmarkId> out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (frame.cameras[c].keypoints.empty()) continue;
@@ -108,7 +112,7 @@ std::vector<LandmarkId> to_be_found(const camera::Rig& rig, const frame::Bundled
   return out;
 }
 
-// Inliers by feature; where cameras disagree about the landmark of a feature, the first in order of camera holds.
+// Returns the inliers by feature. If cameras disagree about the landmark of a feature, the first camera is used.
 std::vector<std::pair<FeatureId, LandmarkId>> by_feature(const frame::BundledFrame& frame,
                                                          const std::vector<KeypointMatch>& matches,
                                                          const std::vector<std::uint8_t>& inlier) {
@@ -159,7 +163,7 @@ std::optional<PlaceMatch> verify_place(const map::BundledMap& map, const camera:
     out.rejection = why;
     return std::nullopt;
   };
-  Sought place{landmarks_around(map, candidate, options.neighbours, options.max_landmarks), {}};
+  PlaceLandmarks place{landmarks_around(map, candidate, options.neighbours, options.max_landmarks), {}};
   const std::vector<KeypointMatch> matches = match_descriptors(map, frame, place.landmarks, options);
   out.matches = static_cast<int>(matches.size());
   if (out.matches < options.consensus.min_inliers) return rejected(Rejection::kFewMatches);
@@ -170,7 +174,8 @@ std::optional<PlaceMatch> verify_place(const map::BundledMap& map, const camera:
   if (!solution.ok) return rejected(Rejection::kNoConsensus);
 
   place.points = map::search_points(map, place.landmarks);
-  // Twice: what the consensus alone gives is good to a few pixels, what the guided search gives to less than one.
+  // Two searches: the consensus pose is accurate to a few pixels, the pose after a guided search to less than one
+  // pixel.
   std::vector<KeypointMatch> guided;
   for (const double radius : {options.radius, 0.5 * options.radius}) {
     guided = search_at(rig, frame, place, solution.T_rig_world, radius, options, features);
@@ -182,32 +187,32 @@ std::optional<PlaceMatch> verify_place(const map::BundledMap& map, const camera:
   if (solution.num_inliers < options.min_inliers) return rejected(Rejection::kFewInliers);
   PlaceMatch place_match{candidate, solution.T_rig_world, by_feature(frame, guided, solution.inlier),
                          solution.num_inliers};
-  for (const double turn : {options.max_viewing_angle, matching::ProjectionSearchOptions{}.max_view_angle}) {
-    const std::vector<LandmarkId> sought = to_be_found(rig, frame, place, solution.T_rig_world, turn);
-    const auto is_sought = [&](const auto& match) { return std::ranges::binary_search(sought, match.second); };
-    out.sought = static_cast<int>(sought.size());
-    out.found = static_cast<int>(std::ranges::count_if(place_match.matches, is_sought));
-    if (out.sought >= options.min_inliers)
-      break;  // fewer: the place is seen from aside, and what is known from there has to do
+  for (const double max_angle : {options.max_viewing_angle, matching::ProjectionSearchOptions{}.max_view_angle}) {
+    const std::vector<LandmarkId> expected = expected_landmarks(rig, frame, place, solution.T_rig_world, max_angle);
+    const auto is_expected = [&](const auto& match) { return std::ranges::binary_search(expected, match.second); };
+    out.expected = static_cast<int>(expected.size());
+    out.found = static_cast<int>(std::ranges::count_if(place_match.matches, is_expected));
+    // With fewer, the viewing directions are mostly new, and all landmarks predicted visible are compared.
+    if (out.expected >= options.min_inliers) break;
   }
-  if (out.found < options.min_found_ratio * out.sought) return rejected(Rejection::kFewFound);
+  if (out.found < options.min_found_ratio * out.expected) return rejected(Rejection::kFewFound);
   return place_match;
 }
 
 bool contradicts(const map::BundledMap& map, const PlaceMatch& best, const PlaceMatch& other) {
-  constexpr double kRival = 0.6;        // of the best one's inliers: as good an answer
-  constexpr double kSameCentre = 0.05;  // of the distance to what is seen
-  constexpr double kSameTurn = 0.05;    // rad
-  if (other.inliers <= kRival * best.inliers ||
+  constexpr double kMinInlierRatio = 0.6;      // inliers relative to the best match
+  constexpr double kMaxCentreDistance = 0.05;  // relative to the mean distance to the matched landmarks
+  constexpr double kMaxRotation = 0.05;        // rad
+  if (other.inliers <= kMinInlierRatio * best.inliers ||
       map.root_of(best.matched_keyframe) != map.root_of(other.matched_keyframe))
     return false;
   const Eigen::Vector3d centre = best.T_rig_world.inverse().translation(),
-                        rival = other.T_rig_world.inverse().translation();
+                        other_centre = other.T_rig_world.inverse().translation();
   double distance = 0;
   for (const auto& [feature, l] : best.matches) distance += (map.landmark(l).position - centre).norm();
   distance /= static_cast<double>(best.matches.size());
-  const double turn = best.T_rig_world.rotation().angularDistance(other.T_rig_world.rotation());
-  return (centre - rival).norm() > kSameCentre * distance || turn > kSameTurn;
+  const double rotation = best.T_rig_world.rotation().angularDistance(other.T_rig_world.rotation());
+  return (centre - other_centre).norm() > kMaxCentreDistance * distance || rotation > kMaxRotation;
 }
 
 }  // namespace bslam::looping

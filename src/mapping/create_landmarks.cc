@@ -14,13 +14,14 @@ using Eigen::Vector3d;
 using frame::KeypointRef;
 using geometry::SE3;
 
-// Largest ratio between the size change predicted from the distances of two views and the one of the pyramid levels.
+// Maximum ratio of the size change predicted from the distances of two views to the size change between their pyramid
+// levels.
 constexpr double kMaxScaleRatio = 2.0;
-// Every how many keypoints one is projected to test whether two cameras share a view.
+// Whether two cameras have a common view is tested with every kProbeStep-th keypoint.
 constexpr std::size_t kProbeStep = 16;
 constexpr double kMinShared = 0.1;
 
-// Flags, per keypoint of one camera, those whose feature has no landmark.
+// Returns one flag per keypoint of a camera: 1 if its feature has no landmark.
 std::vector<std::uint8_t> free_keypoints(const map::BundledKeyframe& keyframe, CameraIndex c) {
   const std::size_t n = keyframe.frame->keypoints(c).size();
   std::vector<std::uint8_t> free(n);
@@ -37,7 +38,7 @@ struct View {
 
 SE3 cam_from_world(const map::BundledMap& map, View v) { return map.cam_from_world(v.keyframe, v.camera); }
 
-// Returns true if camera b sees part of what camera a sees at a depth of about `depth` metres.
+// Returns true if camera b observes enough of the points that camera a observes at a depth of about `depth` metres.
 bool shares_view(const map::BundledMap& map, View a, View b, double depth) {
   const feature::Keypoints& keypoints = map.keypoints(a.keyframe, a.camera);
   const camera::Camera& camera_b = map.rig().camera(b.camera);

@@ -45,7 +45,7 @@ bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& o
 
 int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
-  // Landmark ids are in order of creation, so the recent ones are at the end.
+  // Landmark ids are in order of creation, so the recent landmarks are at the end.
   std::vector<LandmarkId> bad;
   for (std::size_t i = map.landmark_slots(); i-- > 0;) {
     const LandmarkId id(i);

@@ -1,5 +1,5 @@
-// Culling: removes new landmarks that tracking does not match again, and redundant keyframes whose landmarks are
-// observed by enough others.
+// Culling: removes new landmarks that tracking does not match again, and redundant keyframes, whose landmarks are
+// observed by enough other keyframes.
 #pragma once
 
 #include "map/map_edit.h"

@@ -10,7 +10,7 @@ namespace {
 
 using geometry::SE3;
 
-// The keypoint agrees with the landmark's projection.
+// Returns true if the keypoint is close enough to the projection of the landmark.
 bool agrees(const map::BundledMap& map, LandmarkId l, const camera::Camera& camera, const SE3& T_cam_world,
             const feature::Keypoints& keypoints, std::size_t k, const LandmarkFusionOptions& options,
             const feature::FeatureModel& features) {
@@ -20,20 +20,20 @@ bool agrees(const map::BundledMap& map, LandmarkId l, const camera::Camera& came
   return (keypoints.pixel[k].cast<double>() - *pixel).squaredNorm() < options.max_chi2 * sigma * sigma;
 }
 
-// One landmark found at a feature of a keyframe: a new observation, or two landmarks that are one.
+// Adds the feature as an observation of landmark l or, if the feature already has another landmark, merges the two.
 void join(LandmarkId l, KeyframeId target, FeatureId feature, Keep keep, map::MapDraft& draft, FusionReport& report) {
-  const LandmarkId there = draft.map().landmark_of(target, feature);
-  if (!there.valid()) {
+  const LandmarkId existing = draft.map().landmark_of(target, feature);
+  if (!existing.valid()) {
     report.added += draft.add_observation(l, {target, feature, false});
-  } else if (there != l) {
-    const bool keep_there =
-        keep == Keep::kMoreObserved && draft.map().observations(there).size() > draft.map().observations(l).size();
-    draft.merge_landmarks(keep_there ? l : there, keep_there ? there : l);
+  } else if (existing != l) {
+    const bool keep_existing =
+        keep == Keep::kMoreObserved && draft.map().observations(existing).size() > draft.map().observations(l).size();
+    draft.merge_landmarks(keep_existing ? l : existing, keep_existing ? existing : l);
     ++report.merged;
   }
 }
 
-// Those of `landmarks` that are alive and not observed by `target`.
+// Returns the elements of `landmarks` that are alive and not observed by `target`.
 std::vector<LandmarkId> absent_from(const map::BundledMap& map, KeyframeId target,
                                     const std::vector<LandmarkId>& landmarks) {
   const std::vector<LandmarkId> present = landmarks_of(map, target);
@@ -66,7 +66,7 @@ FusionReport fuse_into(KeyframeId target, const SE3& T_rig_world, const std::vec
                        const LandmarkFusionOptions& options, const feature::FeatureModel& features,
                        map::MapDraft& draft) {
   FusionReport report;
-  const auto frame = draft.map().keyframe(target).frame;  // kept: edits may copy the keyframe
+  const auto frame = draft.map().keyframe(target).frame;  // shared ownership, because edits may copy the keyframe
   const camera::Rig rig = draft.map().rig_of(target);
   const std::vector<LandmarkId> absent = absent_from(draft.map(), target, landmarks);
   const matching::ProjectionSearchOptions search{.radius = options.radius,

@@ -1,5 +1,5 @@
-// Searches for landmarks in one keyframe. A match becomes an observation or, where the keypoint shows another landmark,
-// the two landmarks are merged.
+// Searches for landmarks in one keyframe. A match becomes an observation or, if the feature already has another
+// landmark, the two landmarks are merged.
 #pragma once
 
 #include <vector>
@@ -11,21 +11,21 @@
 namespace bslam::mapping {
 
 struct LandmarkFusionOptions {
-  double radius = 0.006;    // rad about the projection
-  int max_hamming = 50;     // bits
-  double max_chi2 = 5.991;  // squared normalised error of the keypoint against the landmark
+  double radius = 0.006;    // rad, search radius about the projection
+  int max_hamming = 50;     // bits, maximum descriptor distance
+  double max_chi2 = 5.991;  // maximum squared normalised reprojection error of the keypoint
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("radius", self.radius, Range{1e-4, 1}, "rad", "search radius about the projection");
-    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "largest descriptor distance");
-    visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "", "squared normalised error against the landmark");
+    visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "maximum descriptor distance");
+    visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "", "maximum squared normalised reprojection error");
   }
 };
 
 struct FusionReport {
-  int added = 0;   // observations
-  int merged = 0;  // landmarks
+  int added = 0;   // number of new observations
+  int merged = 0;  // number of landmarks merged into others
 
   FusionReport& operator+=(const FusionReport& other) {
     added += other.added;
@@ -34,20 +34,20 @@ struct FusionReport {
   }
 };
 
-// Which of two merged landmarks keeps its position.
+// Determines which of two merged landmarks is kept: the one with more observations, or the one searched for.
 enum class Keep { kMoreObserved, kSearched };
 
-// Looks for `landmarks` in every camera of `target` as if that were at `T_rig_world`. Those it observes already are
-// left out.
+// Searches for `landmarks` in every camera of `target`, projected with the rig pose `T_rig_world`. Landmarks that
+// `target` already observes are skipped.
 FusionReport fuse_into(KeyframeId target, const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& landmarks,
                        Keep keep, const LandmarkFusionOptions& options, const feature::FeatureModel& features,
                        map::MapDraft& draft);
-// The same at its pose in the draft.
+// The same with the pose of `target` in the draft.
 FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
                        const LandmarkFusionOptions& options, const feature::FeatureModel& features,
                        map::MapDraft& draft);
 
-// The landmarks a keyframe observes, in order of id.
+// Returns the landmarks observed by a keyframe, in order of id.
 std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId k);
 
 }  // namespace bslam::mapping

@@ -8,7 +8,7 @@ namespace {
 
 bool is_root(const map::BundledMap& map, KeyframeId k) { return !map.keyframe(k).parent.valid(); }
 
-// Returns the landmarks observed by the most of these keyframes, at most `limit`, in order of id.
+// Returns up to `limit` landmarks, those observed by the largest number of these keyframes, in order of id.
 std::vector<LandmarkId> most_observed(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes, int limit) {
   std::vector<int> count(map.landmark_slots(), 0);
   std::vector<LandmarkId> out;
@@ -26,14 +26,14 @@ std::vector<LandmarkId> most_observed(const map::BundledMap& map, const std::vec
   return out;
 }
 
-// Returns the other keyframes that observe the most of these landmarks, at most `limit`, in order of id.
+// Returns up to `limit` other keyframes, those that observe the largest number of these landmarks, in order of id.
 std::vector<KeyframeId> other_observers(const map::BundledMap& map, const std::vector<LandmarkId>& landmarks,
-                                        const std::vector<KeyframeId>& inside, int limit) {
+                                        const std::vector<KeyframeId>& window, int limit) {
   std::vector<int> count(map.keyframe_slots(), 0);
   for (const LandmarkId l : landmarks) {
     for (const map::Observation& o : map.observations(l)) ++count[o.keyframe.index()];
   }
-  for (const KeyframeId k : inside) count[k.index()] = 0;
+  for (const KeyframeId k : window) count[k.index()] = 0;
   std::vector<KeyframeId> out;
   for (std::size_t k = 0; k < count.size(); ++k) {
     if (count[k] > 0) out.emplace_back(k);

@@ -1,4 +1,4 @@
-// Local mapping: what a new keyframe adds to the map and which old data is removed.
+// Local mapping: the landmarks that a new keyframe adds to the map, and the removal of old data.
 #pragma once
 
 #include <stop_token>

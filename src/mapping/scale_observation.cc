@@ -10,14 +10,14 @@
 namespace bslam::mapping {
 namespace {
 
-// Largest scale factor applied at once: the equations are linearised, and far from the solution only their direction is
-// right.
+// Largest scale factor applied at once: the equations are linearised, and far from the solution only the sign of the
+// correction is reliable.
 constexpr double kMaxScaleStep = 3.0;
 constexpr double kMaxMetricCorrectionSigmas =
     3.0;                                      // in standard deviations: a smaller correction leaves the map metric
 constexpr double kMinCorrectionSigmas = 0.5;  // in standard deviations: a smaller correction is not applied
 
-// Only the oldest keyframe is fixed: fixing more would constrain the very shape from which the scale is estimated.
+// Only the oldest keyframe is fixed: fixing more would constrain the shape from which the scale is estimated.
 adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId keyframe, int limit) {
   adjustment::Selection out;
   out.free_keyframes.push_back(keyframe);

@@ -10,7 +10,7 @@
 namespace bslam::mapping {
 
 struct ScaleReport {
-  bool observed = false;                                       // the images constrain the scale
+  bool observed = false;                                       // true if the images constrain the scale
   double correction = 1;                                       // factor by which the submap was scaled in the draft
   double deviation = std::numeric_limits<double>::infinity();  // relative standard deviation of the map scale
   int keyframes = 0;                                           // number of keyframes used
@@ -21,8 +21,8 @@ struct ScaleReport {
 ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features,
                           map::MapDraft& draft);
 
-// Returns true if the map can be declared metric: this estimate and that of the previous keyframe, whose deviation is
-// `deviation_before`, are both accurate enough, and this one did not change the scale significantly.
+// Returns true if the map can be declared metric: this estimate and the estimate of the previous keyframe, whose
+// deviation is `deviation_before`, are both accurate enough, and this estimate did not change the scale significantly.
 bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options);
 
 }  // namespace bslam::mapping

@@ -8,8 +8,8 @@
 namespace bslam::place {
 
 void InvertedIndex::add(KeyframeId keyframe, std::shared_ptr<const WordVector> words) {
-  BSLAM_ASSERT(keyframe.valid() && words != nullptr, "a keyframe and its words");
-  BSLAM_ASSERT(!contains(keyframe), "a keyframe is added once");
+  BSLAM_ASSERT(keyframe.valid() && words != nullptr, "the keyframe must be valid and the words not null");
+  BSLAM_ASSERT(!contains(keyframe), "the keyframe must not be in the index yet");
   if (!words->empty()) by_word_.resize(std::max(by_word_.size(), words->words().back().word.index() + 1));
   for (const WeightedWord& w : words->words()) {
     std::vector<KeyframeId>& list = by_word_[w.word.index()];

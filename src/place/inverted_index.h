@@ -13,11 +13,11 @@ namespace bslam::place {
 
 struct CommonWords {
   KeyframeId keyframe;
-  int count = 0;  // number of words shared with the query, at least 1
+  int count = 0;  // number of words shared with the query, 1 or more
   friend bool operator==(const CommonWords&, const CommonWords&) = default;
 };
 
-// The content, and therefore every answer, depends on which keyframes were added, not on the order of adding.
+// The content, and therefore every result, depends on which keyframes were added, not on the order of adding.
 class InvertedIndex {
  public:
   // The keyframe must not be in the index yet; `words` must not be null.

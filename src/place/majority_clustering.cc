@@ -149,7 +149,7 @@ Descriptor majority(std::span<const Descriptor> descriptors, const Descriptor& t
 }
 
 Clusters cluster_by_majority(std::span<const Descriptor> descriptors, int k, int iterations, Random& random) {
-  BSLAM_ASSERT(!descriptors.empty() && k >= 2 && k <= 64, "something to divide into 2 to 64 clusters");
+  BSLAM_ASSERT(!descriptors.empty() && k >= 2 && k <= 64, "there must be descriptors, and k must be 2 to 64");
   Clusters clusters{seed_centres(descriptors, k, random), std::vector<std::uint8_t>(descriptors.size(), 0xff)};
   assign(descriptors, clusters);
   for (int i = 0; i < iterations; ++i) {

@@ -12,7 +12,8 @@ namespace bslam::place {
 
 struct Clusters {
   std::vector<feature::Descriptor> centre;  // every cluster has members
-  std::vector<std::uint8_t> of;  // per descriptor: its cluster, that is the nearest centre (the first one on ties)
+  std::vector<std::uint8_t>
+      of;  // per descriptor: index of its cluster, which has the nearest centre (the first one on ties)
 };
 
 // Divides the descriptors into at most `k` (2 to 64) clusters; fewer if there are fewer distinct descriptors, one if

@@ -127,17 +127,18 @@ VocabularyContent grow(Training& t, std::size_t images, const TrainingOptions& o
 
 Result<VocabularyPtr> train_vocabulary(std::span<const std::vector<Descriptor>> images, const TrainingOptions& options,
                                        Random& random, ThreadPool& pool, const TrainingProgress& progress) {
-  BSLAM_ASSERT(options.branching >= 2 && options.branching <= kMaxBranching, "a tree that branches");
-  BSLAM_ASSERT(options.levels >= 1 && options.levels <= kMaxLevels, "a tree with levels");
+  BSLAM_ASSERT(options.branching >= 2 && options.branching <= kMaxBranching, "branching must be 2 to kMaxBranching");
+  BSLAM_ASSERT(options.levels >= 1 && options.levels <= kMaxLevels, "levels must be 1 to kMaxLevels");
   std::size_t count = 0;
   for (const auto& image : images) count += image.size();
   if (count > std::numeric_limits<std::int32_t>::max()) {
-    return Error{"", "descriptors", std::to_string(count), "2^31 - 1 at most: fewer images or fewer features of each"};
+    return Error{"", "descriptors", std::to_string(count),
+                 "at most 2^31 - 1 (fewer images or fewer features per image)"};
   }
   Training training = gather(images);
   const auto& all = training.descriptor;
   if (std::all_of(all.begin(), all.end(), [&](const Descriptor& d) { return d == all.front(); })) {
-    return Error{"", "descriptors", all.empty() ? "none" : "all alike", "different ones"};
+    return Error{"", "descriptors", all.empty() ? "none" : "all identical", "at least two distinct descriptors"};
   }
   return Vocabulary::make(grow(training, images.size(), options, random, pool, progress));
 }

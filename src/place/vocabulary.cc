@@ -17,7 +17,7 @@ namespace {
 Status check_numbers(const VocabularyContent& c) {
   const bool printable = std::all_of(c.kind.begin(), c.kind.end(), [](char k) { return k > ' ' && k <= '~'; });
   if (c.kind.empty() || c.kind.size() > 64 || !printable) {
-    return Error{"", "kind", "no name of a descriptor kind", "1 to 64 printable characters"};
+    return Error{"", "kind", "invalid name of a descriptor kind", "1 to 64 printable characters"};
   }
   if (c.branching < 2 || c.branching > kMaxBranching) {
     return Error{"", "branching", std::to_string(c.branching), "2 to " + std::to_string(kMaxBranching)};
@@ -60,7 +60,7 @@ Status Vocabulary::link() {
   std::size_t level_end = 1;  // first node of the next level
   std::size_t words = 0;
   for (std::size_t i = 0; i < nodes; ++i) {
-    if (i == next) return Error{"", "node " + std::to_string(i), "no parent", "a child of a node before it"};
+    if (i == next) return Error{"", "node " + std::to_string(i), "no parent", "a child of an earlier node"};
     if (i == level_end) {
       ++depth_;
       level_end = next;
@@ -70,14 +70,15 @@ Status Vocabulary::link() {
       return Error{"", "node " + std::to_string(i), std::to_string(count) + " children",
                    "at most " + std::to_string(content_.branching)};
     }
-    if (count > nodes - next) return Error{"", "node " + std::to_string(i), "children beyond the last node", "fewer"};
+    if (count > nodes - next)
+      return Error{"", "node " + std::to_string(i), "children beyond the last node", "fewer children"};
     nodes_[i] = {static_cast<std::int32_t>(count > 0 ? next : words++), static_cast<std::int32_t>(count)};
     next += count;
   }
   if (depth_ > content_.levels) {
     return Error{"", "levels", std::to_string(depth_), "at most " + std::to_string(content_.levels)};
   }
-  if (words != size()) return Error{"", "weights", std::to_string(size()), std::to_string(words) + ", one a word"};
+  if (words != size()) return Error{"", "weights", std::to_string(size()), std::to_string(words) + ", one per word"};
   return {};
 }
 
@@ -94,7 +95,7 @@ std::uint64_t Vocabulary::hash() const {
   return hash.value();
 }
 
-// Packs distance and child index into one number, so that the minimum is the nearest child, and the first one on ties.
+// Packs distance and child index into one number, so that the minimum is the nearest child, the first one on ties.
 inline std::int32_t Vocabulary::nearest_child(const Node& node, const feature::Descriptor& descriptor) const {
   const feature::Descriptor* child = content_.descriptor.data() + (node.first - 1);
   std::int32_t best = (feature::hamming(descriptor, child[0]) << 8);
@@ -113,7 +114,7 @@ WordId Vocabulary::word(const feature::Descriptor& descriptor) const {
 // Descends with a group of descriptors at the same time, so that the memory of one is prefetched while the others are
 // compared.
 void Vocabulary::words(std::span<const feature::Descriptor> descriptors, std::span<WordId> words) const {
-  BSLAM_ASSERT(descriptors.size() == words.size(), "one word a descriptor");
+  BSLAM_ASSERT(descriptors.size() == words.size(), "the numbers of words and descriptors must be equal");
   constexpr std::size_t kBatch = 32;
   constexpr std::size_t kCacheLine = 64;
   std::array<Node, kBatch> at;

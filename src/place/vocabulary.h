@@ -20,8 +20,8 @@ namespace bslam::place {
 constexpr std::string_view kDescriptorKind = "orb256-bslam";
 
 // The data of a vocabulary. Nodes are in breadth-first order, and node 0 is the root. The children of a node follow
-// those of the previous node, so the numbers of children define the tree. A node without children is a word; words are
-// numbered in the order of their nodes.
+// the children of the previous node, so the numbers of children define the tree. A node without children is a word;
+// words are numbered in the order of their nodes.
 struct VocabularyContent {
   std::string kind{kDescriptorKind};            // name of the descriptors: 1 to 64 printable ASCII characters
   int branching = 0;                            // maximum number of children, 2 to kMaxBranching
@@ -55,7 +55,7 @@ class Vocabulary {
   int levels() const { return content_.levels; }
   const std::string& kind() const { return content_.kind; }
 
-  // Hash of the content: equal if two vocabularies give the same words and weights. Saved maps store it.
+  // Hash of the content: two vocabularies with equal hashes give the same words and weights. Saved maps store it.
   std::uint64_t id() const { return id_; }
 
   const VocabularyContent& content() const { return content_; }

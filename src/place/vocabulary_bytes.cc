@@ -55,8 +55,9 @@ bool is_vocabulary(std::string_view bytes) { return bytes.starts_with(kMagic); }
 
 Result<VocabularyPtr> deserialise(std::string_view bytes) {
   if (!is_vocabulary(bytes))
-    return Error{"", "", "no bslam vocabulary", "bytes that begin with " + std::string(kMagic)};
-  if (bytes.size() < kHeaderBytes) return Error{"", "size", std::to_string(bytes.size()) + " bytes", "a whole header"};
+    return Error{"", "", "not a bslam vocabulary", "bytes that begin with " + std::string(kMagic)};
+  if (bytes.size() < kHeaderBytes)
+    return Error{"", "size", std::to_string(bytes.size()) + " bytes", "a complete header"};
   const auto field = [&](std::size_t offset) { return number_at<std::uint32_t>(bytes.data() + offset); };
   if (field(8) != kVersion) return Error{"", "version", std::to_string(field(8)), std::to_string(kVersion)};
   const Lengths lengths{field(12), field(24), field(28)};
@@ -90,7 +91,7 @@ Result<VocabularyPtr> deserialise(std::string_view bytes) {
   const std::uint64_t checksum = number_at<std::uint64_t>(at);
   auto vocabulary = Vocabulary::make(std::move(c));
   if (vocabulary && (*vocabulary)->id() != checksum)
-    return Error{"", "checksum", "another one", "that of the content: the bytes are damaged"};
+    return Error{"", "checksum", "mismatch", "the checksum of the content (the bytes are damaged)"};
   return vocabulary;
 }
 

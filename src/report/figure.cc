@@ -14,11 +14,12 @@ namespace bslam::report {
 namespace {
 
 constexpr double kTitleFont = 20.0, kSubtitleFont = 13.0, kPanelFont = 14.0, kFont = 12.0;
-constexpr double kGlyphWidth = 0.57;  // of the font size: an upper estimate of the mean for sans-serif fonts
+constexpr double kGlyphWidth =
+    0.57;  // relative to the font size: an upper estimate of the mean width for sans-serif fonts
 constexpr double kMarginLeft = 76.0, kMarginRight = 16.0, kMarginTop = 46.0, kMarginBottom = 44.0;
 constexpr double kPagePadding = 14.0, kTickEveryX = 70.0, kTickEveryY = 32.0;  // pixels
 constexpr double kSmallestStep =
-    0.4;  // pixels: shorter line segments are left out, since they are invisible and enlarge the file
+    0.4;  // pixels: shorter line segments are omitted, since they are invisible and enlarge the file
 constexpr std::array<std::string_view, 8> kPalette = {kBlue,   kVermilion, kGreen,    kPurple,
                                                       kOrange, kSky,       "#8C510A", kBlack};
 
@@ -57,7 +58,8 @@ bool is_utf8(std::string_view text) {
   return true;
 }
 
-// Text for XML, which allows neither control characters nor bytes that are not UTF-8. File names may contain both.
+// Returns text for XML, which allows neither control characters nor bytes that are not UTF-8. File names may contain
+// both.
 std::string escaped(std::string_view text) {
   const bool utf8 = is_utf8(text);
   std::string out;
@@ -158,10 +160,10 @@ std::string tick_text(double value, double step) {
   return text.find_first_not_of("-0.") == std::string::npos ? "0" : text;
 }
 
-// The text, shortened at its end if it is wider than `width` pixels.
+// Returns the text, shortened at its end if it is wider than `width` pixels.
 std::string fitting(const std::string& text, double width) {
-  const auto most = static_cast<std::size_t>(std::max(3.0, width / (kGlyphWidth * kFont)));
-  return text.size() <= most ? text : text.substr(0, most - 2) + "..";
+  const auto max_size = static_cast<std::size_t>(std::max(3.0, width / (kGlyphWidth * kFont)));
+  return text.size() <= max_size ? text : text.substr(0, max_size - 2) + "..";
 }
 
 double step_of(const std::vector<double>& ticks) { return ticks.size() > 1 ? ticks[1] - ticks[0] : 1.0; }
@@ -211,7 +213,7 @@ void add_series(std::string& out, const Axes& axes, const Series& series) {
     if (pen_down && std::hypot(now[0] - last[0], now[1] - last[1]) < kSmallestStep) continue;
     last = now;
     fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}{}", pen_down ? "L" : "M", now[0], now[1],
-                   pen_down ? "" : "h0");  // a segment of zero length, so that an isolated point shows as a dot
+                   pen_down ? "" : "h0");  // a segment of zero length, so that an isolated point is drawn as a dot
     pen_down = true;
   }
   if (path.empty()) return;
@@ -222,7 +224,7 @@ void add_series(std::string& out, const Axes& axes, const Series& series) {
                  series.style == SeriesStyle::kDashed ? " stroke-dasharray=\"6 4\"" : "");
 }
 
-// Entries from left to right between the title and the plot area; those that do not fit are left out.
+// Entries from left to right between the title and the plot area; entries that do not fit are omitted.
 void add_legend(std::string& out, const Panel& panel, const Box& box) {
   double x = box.x;
   const double y = box.y - 10;
@@ -354,11 +356,11 @@ std::string figure_svg(const Figure& figure) {
   double y = head;
   int clip_id = 0;
   for (const PanelRow& row : figure.rows) {
-    double shares = 0.0;
-    for (const Panel& panel : row.panels) shares += panel.share;
+    double total_width = 0.0;
+    for (const Panel& panel : row.panels) total_width += panel.width_fraction;
     double x = 0.0;
     for (const Panel& panel : row.panels) {
-      const double width = figure.width_px * panel.share / shares;
+      const double width = figure.width_px * panel.width_fraction / total_width;
       add_panel(out, panel, {x, y, width, row.height_px}, clip_id++);
       x += width;
     }

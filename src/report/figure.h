@@ -1,5 +1,5 @@
 // Plots as SVG text, without dependencies: rows of panels with axes, ticks, lines and legends on a white background.
-// The colours are those of Okabe and Ito, which colour-blind readers can tell apart as well.
+// The colours are from Okabe and Ito and can be distinguished by colour-blind readers as well.
 #pragma once
 
 #include <array>
@@ -38,7 +38,7 @@ struct Mark {
   std::string colour{kGrey};
 };
 
-// A legend entry for bands or marks, which have no label of their own.
+// A legend entry for bands or marks, which have no label.
 struct LegendEntry {
   std::string label;
   std::string colour;
@@ -47,7 +47,7 @@ struct LegendEntry {
 enum class AxisScale { kFree, kEqual };     // equal: x and y have the same scale, as in maps
 enum class AxisFloor { kFromData, kZero };  // lower end of the y axis
 
-// A tick of the y axis with a text in place of its value.
+// A tick of the y axis with a text instead of its value.
 struct NamedTick {
   double y = 0.0;
   std::string name;
@@ -62,7 +62,7 @@ struct Panel {
   std::vector<NamedTick> y_ticks{};  // replace the numbers of the y axis unless empty
   AxisScale scale = AxisScale::kFree;
   AxisFloor floor = AxisFloor::kFromData;
-  double share = 1.0;  // width relative to the other panels of the row
+  double width_fraction = 1.0;  // width relative to the other panels of the row
 };
 
 struct PanelRow {
@@ -76,15 +76,15 @@ struct Figure {
   std::vector<PanelRow> rows{};
 };
 
-// The figure as an SVG document. The same input gives the same bytes.
+// Returns the figure as an SVG document. The output is deterministic.
 std::string figure_svg(const Figure& figure);
 
-// About `count` round numbers within [low, high], spaced by 1, 2 or 5 times a power of ten. Empty if the range is empty
-// or not finite.
+// Returns about `count` round numbers within [low, high], spaced by 1, 2 or 5 times a power of ten. The list is empty
+// if the range is empty or not finite.
 std::vector<double> axis_ticks(double low, double high, int count);
 
 // Reduces a long series to one point for each of `bins` equal intervals of x: the median or the maximum of the points
-// in the interval. A series of at most `bins` points is returned unchanged. Intervals without points interrupt the
+// in the interval. A series of no more than `bins` points is returned unchanged. Intervals without points interrupt the
 // line.
 enum class Reduction { kMedian, kMaximum };
 std::vector<std::array<double, 2>> reduced(const std::vector<std::array<double, 2>>& points, std::size_t bins,

@@ -17,8 +17,8 @@ using geometry::Vector2d;
 using geometry::Vector3d;
 
 constexpr double kWidth = 1000, kMargin = 28, kHeader = 64, kFooter = 44;
-constexpr double kPanelWidth = (kWidth - 3 * kMargin) / 2, kLeastPanelHeight = 180, kMostPanelHeight = 460;
-constexpr double kRoomForNames = 150, kRoomAbove = 60;  // pixels
+constexpr double kPanelWidth = (kWidth - 3 * kMargin) / 2, kMinPanelHeight = 180, kMaxPanelHeight = 460;
+constexpr double kNameMargin = 150, kTopMargin = 60;  // pixels
 
 std::string escaped(const std::string& text) {
   std::string out;
@@ -242,9 +242,8 @@ std::string rig_plot_svg(const camera::Rig& rig) {
                                     box_of(cameras, T_rig_body.translation(), views[1])};
   Vector2d size = Vector2d::Constant(1e-6);
   for (const Box& box : boxes) size = size.cwiseMax(box.high - box.low);
-  const double px_per_m =
-      std::min((kPanelWidth - kRoomForNames) / size.x(), (kMostPanelHeight - kRoomAbove) / size.y());
-  const double panel_height = std::max(kLeastPanelHeight, px_per_m * size.y() + kRoomAbove);
+  const double px_per_m = std::min((kPanelWidth - kNameMargin) / size.x(), (kMaxPanelHeight - kTopMargin) / size.y());
+  const double panel_height = std::max(kMinPanelHeight, px_per_m * size.y() + kTopMargin);
   const double height = kHeader + panel_height + kFooter;
   std::string out = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} {1:.0f}\" "

@@ -22,13 +22,13 @@ struct TrajectoryPlotInput {
   WorldAxes axes = WorldAxes::kUnknown;
 };
 
-// The input of the plot of `bslam eval --plot`: aligned estimate, ground truth and position error.
+// Returns the input of the plot of `bslam eval --plot`: aligned estimate, ground truth and position error.
 TrajectoryPlotInput evaluation_plot_input(const evaluation::TrajectoryEvaluation& evaluation,
                                           const evaluation::Trajectory& ground_truth, std::string title);
 
-// An SVG document with the path seen from above and from the side, with equal scales on both axes and the upward
-// direction up the page, and with the position error over time if there is ground truth. Lines are interrupted where
-// poses are missing.
+// Returns an SVG document with the path seen from above and from the side, with equal scales on both axes and the
+// upward direction up the page, and with the position error over time if there is ground truth. Lines are interrupted
+// if poses are missing.
 std::string trajectory_plot_svg(const TrajectoryPlotInput& input);
 
 }  // namespace bslam::report

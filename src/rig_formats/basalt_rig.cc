@@ -130,7 +130,8 @@ Result<camera::RigReading> read_basalt_rig(const fs::path& file, const std::stri
   for (const auto& [key, size] :
        {std::pair("intrinsics", models->size()), std::pair("resolution", yaml->node()["resolution"].size())}) {
     if (size != places->size()) {
-      return yaml->error(key, fmt::format("{} entries", size), fmt::format("{}, as of T_imu_cam", places->size()));
+      return yaml->error(key, fmt::format("{} entries", size),
+                         fmt::format("{}, the number of entries of T_imu_cam", places->size()));
     }
   }
   double offset_s = 0.0;
@@ -162,7 +163,7 @@ Result<camera::RigReading> read_basalt_rig(const fs::path& file, const std::stri
 }
 
 Result<std::string> basalt_rig_text(const camera::Rig& rig, const std::string& out) {
-  RigLimits limits{.format = "Basalt's calibration", .models = {}, .time_offsets = Holds::kOneForAll};
+  RigLimits limits{.format = "Basalt's calibration", .models = {}, .time_offsets = Supports::kOneForAll};
   for (const BasaltModel& model : basalt_models()) limits.models.push_back(model.model);
   if (const Status status = check_limits(rig, out, limits); !status) return status.error();
   std::vector<std::string> places, models, sides;

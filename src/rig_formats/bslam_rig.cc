@@ -105,7 +105,7 @@ Result<camera::RigReading> read_bslam_rig(const fs::path& file, const std::strin
     auto camera = read_camera(map, reading.cameras.size());
     if (!camera) return camera.error();
     if (!names.insert(camera->camera.name).second) {
-      return map.error("name", camera->camera.name + " for a second camera", "different names for all cameras");
+      return map.error("name", camera->camera.name + " for a second camera", "a different name for each camera");
     }
     reading.cameras.push_back(*std::move(camera));
   }

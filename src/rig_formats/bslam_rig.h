@@ -12,8 +12,8 @@ namespace bslam::rig_formats {
 // keys are errors.
 Result<camera::RigReading> read_bslam_rig(const std::filesystem::path& file, const std::string& text);
 
-// The rig as YAML. The format stores everything a rig contains, and reading it back gives exactly the same rig. Paths
-// of masks are written unchanged.
+// Returns the rig as YAML. The format stores everything a rig contains, and reading it back gives exactly the same rig.
+// Paths of masks are written unchanged.
 std::string rig_to_yaml(const camera::Rig& rig);
 
 }  // namespace bslam::rig_formats

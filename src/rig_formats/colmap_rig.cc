@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 using geometry::SE3;
 
 constexpr std::size_t kMaxBytes = std::size_t{1} << 24;
-constexpr const char* kInOrder = "the cameras of rig_config.json are those of cameras.txt in order of their ids";
+constexpr const char* kInOrder =
+    "the cameras of rig_config.json correspond to the cameras of cameras.txt in order of their ids";
 constexpr double kPixelShift =
     0.5;  // the origin is the corner of the top-left pixel in COLMAP, and its centre in bslam
 
@@ -67,7 +68,7 @@ Status read_parameters(const std::string& name, const std::vector<double>& p, co
   return {};
 }
 
-// The words of every line that is neither empty nor a comment, by line number.
+// Returns the words of every line that is neither empty nor a comment, by line number.
 std::map<std::size_t, std::vector<std::string>> lines_of(const std::string& text) {
   std::map<std::size_t, std::vector<std::string>> lines;
   std::istringstream stream(text);
@@ -85,7 +86,8 @@ std::map<std::size_t, std::vector<std::string>> lines_of(const std::string& text
 
 Result<std::vector<double>> numbers_of(const std::vector<std::string>& words, std::size_t from, std::size_t count,
                                        const Place& at) {
-  if (words.size() < from + count) return at.error(fmt::format("{} words", words.size()), "more of them");
+  if (words.size() < from + count)
+    return at.error(fmt::format("{} words", words.size()), fmt::format("at least {} words", from + count));
   std::vector<double> numbers;
   for (std::size_t i = from; i < from + count; ++i) {
     const auto value = parse_double(words[i]);
@@ -113,7 +115,7 @@ Result<Cameras> read_cameras(const fs::path& file) {
     d.name = fmt::format("camera_{}", *id);
     d.resolution = {*width, *height};
     if (const Status status = read_parameters(words[1], *parameters, at, d); !status) return status.error();
-    if (!cameras.emplace(*id, d).second) return at.error(fmt::format("camera {} twice", *id), "it once");
+    if (!cameras.emplace(*id, d).second) return at.error(fmt::format("camera {} twice", *id), "each camera once");
   }
   if (cameras.empty()) return Error{file.string(), "", "no camera", "a line for every camera"};
   return cameras;
@@ -135,13 +137,15 @@ Status add(camera::CameraDescription d, const SE3& T_rig_cam, const Place& at, c
   return {};
 }
 
-Error unknown_camera(const Place& at, const std::string& id) { return at.error("camera " + id, "one of cameras.txt"); }
+Error unknown_camera(const Place& at, const std::string& id) {
+  return at.error("camera " + id, "a camera of cameras.txt");
+}
 
 Result<camera::RigReading> read_rigs_txt(const fs::path& file, const Cameras& cameras) {
   const auto text = read_file(file, kMaxBytes);
   if (!text) return text.error();
   const auto lines = lines_of(*text);
-  if (lines.size() != 1) return Error{file.string(), "", fmt::format("{} rigs", lines.size()), "one"};
+  if (lines.size() != 1) return Error{file.string(), "", fmt::format("{} rigs", lines.size()), "one rig"};
   const auto& [number, words] = *lines.begin();
   const Place at{file.string(), fmt::format("line {}", number)};
   constexpr const char* kExpected = "RIG_ID NUM_SENSORS CAMERA REF_ID (CAMERA ID 1 QW QX QY QZ TX TY TZ)...";
@@ -169,7 +173,8 @@ Result<camera::RigReading> read_rigs_txt(const fs::path& file, const Cameras& ca
   return reading;
 }
 
-// The cameras of rig_config.json in the order of the file. Their number must be that of cameras.txt.
+// Returns the cameras of rig_config.json in the order of the file. Their number must equal the number of cameras in
+// cameras.txt.
 Result<std::vector<yaml::YamlMap>> configured_cameras(const fs::path& file, std::size_t count) {
   const auto text = read_file(file, kMaxBytes);
   if (!text) return text.error();
@@ -179,7 +184,7 @@ Result<std::vector<yaml::YamlMap>> configured_cameras(const fs::path& file, std:
   if (!yaml) return yaml.error();
   const auto rigs = yaml->maps("rigs");
   if (!rigs) return rigs.error();
-  if (rigs->size() != 1) return Error{file.string(), "", fmt::format("{} rigs", rigs->size()), "one"};
+  if (rigs->size() != 1) return Error{file.string(), "", fmt::format("{} rigs", rigs->size()), "one rig"};
   auto configured = rigs->front().maps("cameras");
   if (configured && configured->size() != count) {
     return rigs->front().error("cameras", fmt::format("{} cameras", configured->size()),
@@ -202,7 +207,7 @@ Status take_names(const std::vector<yaml::YamlMap>& configured, Cameras& cameras
   return {};
 }
 
-// One camera of rig_config.json, whose values take precedence over those of cameras.txt.
+// Adds one camera of rig_config.json, whose values take precedence over the values in cameras.txt.
 Status read_configured(const yaml::YamlMap& yaml, camera::CameraDescription d, camera::RigReading& reading) {
   const Place at{yaml.file(), yaml.key_path("camera_params")};
   if (yaml.has("camera_params")) {
@@ -216,7 +221,8 @@ Status read_configured(const yaml::YamlMap& yaml, camera::CameraDescription d, c
   const auto q = yaml.numbers("cam_from_rig_rotation"), t = yaml.numbers("cam_from_rig_translation");
   if (!q) return q.error();
   if (!t) return t.error();
-  if (q->size() != 4) return yaml.error("cam_from_rig_rotation", fmt::format("{} numbers", q->size()), "four: w x y z");
+  if (q->size() != 4)
+    return yaml.error("cam_from_rig_rotation", fmt::format("{} numbers", q->size()), "four (w x y z)");
   if (t->size() != 3) return yaml.error("cam_from_rig_translation", fmt::format("{} numbers", t->size()), "three");
   const auto T = rig_from_camera(*q, *t, {yaml.file(), yaml.key_path("cam_from_rig_rotation")});
   if (!T) return T.error();
@@ -233,7 +239,7 @@ Result<camera::RigReading> read_rig_config(const std::vector<yaml::YamlMap>& con
   return reading;
 }
 
-// Poses from rigs.txt, and names from rig_config.json if that can be read.
+// Reads poses from rigs.txt, and names from rig_config.json if that file can be read.
 Result<camera::RigReading> read_solved(const fs::path& rigs, const fs::path& config, Cameras& cameras) {
   std::string note;
   std::error_code error;
@@ -259,7 +265,7 @@ std::string camera_parameters(const camera::CameraModel& model, std::string_view
   return fmt::format("{}", fmt::join(texts, separator));
 }
 
-// Text as a JSON string.
+// Returns the text as a JSON string.
 std::string json_quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
@@ -286,7 +292,7 @@ Result<camera::RigReading> read_colmap_rig(const fs::path& folder) {
   }
   if (cameras->size() > 1) {
     return Error{folder.string(), "", fmt::format("{} cameras without extrinsics", cameras->size()),
-                 "rigs.txt or rig_config.json beside cameras.txt"};
+                 "rigs.txt or rig_config.json in the folder of cameras.txt"};
   }
   camera::RigReading reading;
   const Status status = add(cameras->begin()->second, SE3(), {(folder / "cameras.txt").string(), ""}, reading);

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxSensorBytes = std::size_t{1} << 20;
 constexpr std::array kModels = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName};
 
-// Names of distortion models in EuRoC and in bslam.
+// Converts names of distortion models between EuRoC and bslam.
 std::optional<std::string> model_name(const std::string& distortion_model) {
   if (distortion_model == "none") return std::string(camera::Pinhole::kName);
   if (distortion_model == "radial-tangential" || distortion_model == "radtan") {
@@ -158,7 +158,7 @@ Status write_euroc_sensors(const camera::Rig& rig, const fs::path& folder, doubl
     const fs::path camera_folder = folder / "mav0" / fmt::format("cam{}", i);
     std::error_code error;
     fs::create_directories(camera_folder, error);
-    if (error) return Error{camera_folder.string(), "", error.message(), "a folder that can be made"};
+    if (error) return Error{camera_folder.string(), "", error.message(), "a folder that can be created"};
     const Status status = write_atomically(camera_folder / "sensor.yaml",
                                            euroc_sensor_yaml({rig.camera(i), rig.body_from_cam(i)}, rate_hz));
     if (!status) return status;

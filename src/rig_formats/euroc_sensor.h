@@ -12,20 +12,20 @@
 namespace bslam::rig_formats {
 
 // Reads `camera_model: pinhole` with `distortion_model` radial-tangential (radtan), equidistant or none. Unknown keys
-// are ignored, since the format has many. The camera is called `name`.
+// are ignored, since the format has many. `name` becomes the name of the camera.
 Result<camera::RigCamera> read_euroc_sensor(const std::filesystem::path& file, const std::string& name);
 
-// The folders cam0, cam1, ... in `folder` that contain `entry`, ordered by number.
+// Returns the folders cam0, cam1, ... in `folder` that contain `entry`, ordered by number.
 std::vector<std::filesystem::path> camera_folders(const std::filesystem::path& folder, const std::string& entry);
 
-// The folder with the cameras of an EuRoC data set: DATA/mav0 if it exists, else DATA itself.
+// Returns the folder with the cameras of an EuRoC data set: DATA/mav0 if it exists, else DATA itself.
 std::filesystem::path euroc_root(const std::filesystem::path& data);
 
-// Whether the format supports the models of all cameras.
+// Returns true if the format supports the models of all cameras.
 bool euroc_holds_models(const camera::Rig& rig);
 
-// The content of sensor.yaml for one camera, whose model must be supported. `rate_hz` is written for information only.
-// The format stores no name, time offset or mask.
+// Returns the content of sensor.yaml for one camera, whose model must be supported. `rate_hz` is written for
+// information only. The format stores no name, time offset or mask.
 std::string euroc_sensor_yaml(const camera::RigCamera& camera, double rate_hz);
 
 // Writes FOLDER/mav0/camN/sensor.yaml for every camera and creates the folders. Errors: a camera with a time offset, a

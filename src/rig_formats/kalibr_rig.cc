@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using geometry::SE3;
 
-// The number of values in `intrinsics` and their names.
+// A camera model of Kalibr: the number of values in `intrinsics` and their names.
 struct KalibrModel {
   std::string_view name;
   std::size_t count;
@@ -56,12 +56,13 @@ Status read_pinhole(const yaml::YamlMap& yaml, const std::string& distortion_mod
 Status read_sphere(const yaml::YamlMap& yaml, const KalibrModel& model, const std::vector<double>& numbers,
                    camera::CameraDescription& d) {
   if (std::any_of(d.distortion.begin(), d.distortion.end(), [](double v) { return v != 0; })) {
-    return yaml.error("distortion_coeffs", fmt::format("{} with distortion", model.name),
-                      fmt::format("{} without; calibrate again as ds-none, eucm-none or pinhole-equi", model.name));
+    return yaml.error(
+        "distortion_coeffs", fmt::format("{} with distortion", model.name),
+        fmt::format("{} without distortion (calibrate again as ds-none, eucm-none or pinhole-equi)", model.name));
   }
   if (model.name == "omni") {  // the model of Mei with parameter xi: m = (x, y) / (z + xi |p|)
     const double xi = numbers[0];
-    if (!(xi >= 0)) return yaml.error("intrinsics", fmt::format("xi {}", xi), "xi of at least 0");
+    if (!(xi >= 0)) return yaml.error("intrinsics", fmt::format("xi {}", xi), "xi >= 0");
     d.model = camera::Unified::kName;
     d.distortion = {xi / (1 + xi)};
     d.intrinsics[0] /= 1 + xi;
@@ -123,7 +124,7 @@ bool agree(const SE3& a, const SE3& b) {
   return difference.translation().norm() < kMetres && geometry::so3_log(difference.rotation()).norm() < kRadians;
 }
 
-// T_body_cam of camera n. `before` is T_body_cam of camera n - 1.
+// Returns T_body_cam of camera n. `before` is T_body_cam of camera n - 1.
 Result<SE3> place_of(const yaml::YamlMap& yaml, const std::optional<SE3>& before) {
   const auto of_body = body_from_camera(yaml);
   if (!of_body) return of_body.error();
@@ -134,8 +135,8 @@ Result<SE3> place_of(const yaml::YamlMap& yaml, const std::optional<SE3>& before
   const SE3 by_chain = *before * T_cn_cnm1->inverse();
   if (!*of_body) return by_chain;
   if (!agree(**of_body, by_chain)) {
-    return yaml.error("T_cn_cnm1", "another place of the camera than by the IMU",
-                      "both the same: camera n-1 to camera n, and IMU to camera (T_cam_imu)");
+    return yaml.error("T_cn_cnm1", "a camera pose that differs from T_cam_imu",
+                      "consistent transforms T_cn_cnm1 (camera n-1 to camera n) and T_cam_imu (IMU to camera)");
   }
   return **of_body;
 }
@@ -160,7 +161,7 @@ Result<camera::RigCamera> read_camera(const yaml::YamlMap& yaml, const std::stri
           yaml.key_path("distortion_coeffs"), yaml.key_path("T_cam_imu"), yaml.key_path("timeshift_cam_imu")});
 }
 
-// Writing.
+// Functions for writing.
 
 struct KalibrNumbers {
   std::string_view model, distortion_model;
@@ -216,9 +217,10 @@ Result<camera::RigReading> read_kalibr_rig(const fs::path& file, const std::stri
   for (std::string name = "cam0"; yaml->has(name); name = fmt::format("cam{}", reading.cameras.size())) {
     const auto map = yaml->map(name);
     if (!map) return map.error();
-    const bool knows_imu = map->has("T_imu_cam") || map->has("T_cam_imu");
-    if (before && knows_imu && !imu) return yaml->error("cam0.T_cam_imu", "nothing", "it, as " + name + " has it");
-    imu = knows_imu || imu;
+    const bool has_imu = map->has("T_imu_cam") || map->has("T_cam_imu");
+    if (before && has_imu && !imu)
+      return yaml->error("cam0.T_cam_imu", "nothing", "T_cam_imu for every camera, since " + name + " has it");
+    imu = has_imu || imu;
     const auto T_body_cam = place_of(*map, before);
     if (!T_body_cam) return T_body_cam.error();
     auto camera = read_camera(*map, name, *T_body_cam);
@@ -236,14 +238,14 @@ Result<std::string> kalibr_rig_text(const camera::Rig& rig, const std::string& o
       .format = "Kalibr's camchain",
       .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName,
                  camera::Unified::kName, camera::ExtendedUnified::kName, camera::DoubleSphere::kName},
-      .time_offsets = Holds::kEach,
-      .most_coefficients = 4};
+      .time_offsets = Supports::kEach,
+      .max_coefficients = 4};
   if (const Status status = check_limits(rig, out, limits); !status) return status.error();
   std::string text;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const camera::CameraModel& model = rig.camera(i).model;
     if (std::holds_alternative<camera::Unified>(model) && camera::distortion(model)[0] == 1) {
-      return Error{out, rig.camera(i).name, "alpha 1, whose xi is infinite", "alpha below 1"};
+      return Error{out, rig.camera(i).name, "alpha 1, for which xi is infinite", "alpha < 1"};
     }
     text += fmt::format("cam{}:\n", i) + transform_text("T_cam_imu", rig.body_from_cam(i).inverse());
     if (i > 0) text += transform_text("T_cn_cnm1", rig.body_from_cam(i).inverse() * rig.body_from_cam(i - 1));
@@ -255,13 +257,13 @@ Result<std::string> kalibr_rig_text(const camera::Rig& rig, const std::string& o
 Result<std::string> openvins_rig_text(const camera::Rig& rig, const std::string& out) {
   const RigLimits limits{.format = "OpenVINS's camera chain",
                          .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName},
-                         .time_offsets = Holds::kEach,
-                         .most_coefficients = 4};
+                         .time_offsets = Supports::kEach,
+                         .max_coefficients = 4};
   if (const Status status = check_limits(rig, out, limits); !status) return status.error();
   std::string text = "%YAML:1.0\n\n";
   for (std::size_t i = 0; i < rig.size(); ++i) {
     KalibrNumbers numbers = numbers_of(rig.camera(i).model);
-    if (numbers.distortion_model == "none") {  // OpenVINS does not know "none", so zero coefficients are written
+    if (numbers.distortion_model == "none") {  // OpenVINS does not support "none", so zero coefficients are written
       numbers.distortion_model = "radtan";
       numbers.coefficients.assign(4, 0.0);
     }

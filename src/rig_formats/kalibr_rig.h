@@ -16,7 +16,7 @@ Result<camera::RigReading> read_kalibr_rig(const std::filesystem::path& file, co
 
 // When read back, extrinsics may differ in the last bits, since T_cam_imu and T_cn_cnm1 are inverses and products.
 Result<std::string> kalibr_rig_text(const camera::Rig& rig, const std::string& out);
-// With T_imu_cam, which is read back exactly.
+// Writes T_imu_cam, which is read back exactly.
 Result<std::string> openvins_rig_text(const camera::Rig& rig, const std::string& out);
 
 }  // namespace bslam::rig_formats

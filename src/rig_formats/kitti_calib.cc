@@ -30,9 +30,9 @@ Result<KittiProjection> projection_of(const std::string& key, std::istringstream
     if (!value) return error(word, "a finite number");
     P.push_back(*value);
   }
-  if (P.size() != 12) return error(fmt::format("{} numbers", P.size()), "12, the rows of a 3x4 projection");
+  if (P.size() != 12) return error(fmt::format("{} numbers", P.size()), "12 (rows of a 3x4 projection)");
   const double fx = P[0], fy = P[5], cx = P[2], cy = P[6];
-  if (!(fx > 0 && fy > 0)) return error(fmt::format("focal lengths {} and {}", fx, fy), "both above 0");
+  if (!(fx > 0 && fy > 0)) return error(fmt::format("focal lengths {} and {}", fx, fy), "positive focal lengths");
   if (P[1] != 0 || P[4] != 0 || P[8] != 0 || P[9] != 0 || P[10] != 1) {
     return error("a 3x3 part that is not rectified", "fx 0 cx, 0 fy cy, 0 0 1");
   }
@@ -58,7 +58,7 @@ Result<std::vector<KittiProjection>> read_kitti_calib(const fs::path& file) {
     if (!projection) return projection.error();
     const bool again = std::any_of(projections.begin(), projections.end(),
                                    [&](const KittiProjection& p) { return p.camera == projection->camera; });
-    if (again) return Error{file.string(), key, "the line twice", "it once"};
+    if (again) return Error{file.string(), key, "a repeated line", "each line once"};
     projections.push_back(*projection);
   }
   if (projections.empty()) return Error{file.string(), "", "no projection", "lines P0: to P3:"};

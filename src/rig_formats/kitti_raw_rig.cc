@@ -19,7 +19,7 @@ using geometry::SE3;
 
 constexpr int kCameras = 4;
 
-// Lines "KEY: numbers", except for the line with the date.
+// The lines "KEY: numbers" of the file, except for the line with the date.
 struct Table {
   std::string file;
   std::map<std::string, std::vector<double>> rows;
@@ -48,7 +48,7 @@ Result<Table> table_of(const fs::path& file, const std::string& text) {
       if (!value) return Error{file.string(), key, word, "a finite number"};
       numbers.push_back(*value);
     }
-    if (!table.rows.emplace(key, numbers).second) return Error{file.string(), key, "the line twice", "it once"};
+    if (!table.rows.emplace(key, numbers).second) return Error{file.string(), key, "a repeated line", "each line once"};
   }
   return table;
 }
@@ -59,7 +59,7 @@ struct Choice {
   std::string because;
 };
 
-// Chosen by the size of images in the folder of the calibration, in one of the usual folder layouts.
+// Chooses the rig by the size of the images in the folder of the calibration, in one of the usual folder layouts.
 std::optional<Choice> by_images(const fs::path& folder, const Table& table) {
   for (int c = 0; c < kCameras; ++c) {
     const auto raw = table.numbers(fmt::format("S_0{}", c), 2);
@@ -70,8 +70,8 @@ std::optional<Choice> by_images(const fs::path& folder, const Table& table) {
       const auto size = image_files::first_image_size(image_files::images_in(images));
       if (!size) continue;
       const std::vector<double> sides = {static_cast<double>(size->width), static_cast<double>(size->height)};
-      if (sides == *raw) return Choice{KittiRig::kRaw, "the images in its folder have their size"};
-      if (sides == *rectified) return Choice{KittiRig::kRectified, "the images in its folder have their size"};
+      if (sides == *raw) return Choice{KittiRig::kRaw, "the images in its folder have that size"};
+      if (sides == *rectified) return Choice{KittiRig::kRectified, "the images in its folder have that size"};
     }
   }
   return std::nullopt;
@@ -97,8 +97,8 @@ Choice choose(const fs::path& file, const Table& table) {
     raw = raw || rig == KittiRig::kRaw;
     rectified = rectified || rig == KittiRig::kRectified;
   }
-  if (raw && !rectified) return {KittiRig::kRaw, "there are only folders _extract next to it"};
-  return {KittiRig::kRectified, rectified ? "there are folders _sync next to it" : "by default"};
+  if (raw && !rectified) return {KittiRig::kRaw, "only folders ending in _extract are next to it"};
+  return {KittiRig::kRectified, rectified ? "folders ending in _sync are next to it" : "by default"};
 }
 
 Result<SE3> describe_raw(const Table& table, const std::string& n, camera::CameraDescription& d) {

@@ -26,7 +26,7 @@ std::string with_spaces(std::string text) {
   return text;
 }
 
-// A !!opencv-matrix of `count` numbers, row-major.
+// Reads a !!opencv-matrix of `count` numbers, row-major.
 Result<std::vector<double>> matrix(const yaml::YamlMap& yaml, const char* key, std::size_t count) {
   const auto map = yaml.map(key);
   if (!map) return map.error();
@@ -38,7 +38,7 @@ Result<std::vector<double>> matrix(const yaml::YamlMap& yaml, const char* key, s
   return data;
 }
 
-// A rigid transform of three rows or four.
+// Reads a rigid transform of three or four rows.
 Result<SE3> transform(const yaml::YamlMap& yaml, const char* key) {
   const auto map = yaml.map(key);
   if (!map) return map.error();
@@ -59,7 +59,7 @@ Result<std::vector<double>> prefixed(const yaml::YamlMap& yaml, const std::strin
   return numbers;
 }
 
-// Model, intrinsics and coefficients under a prefix such as "Camera1.".
+// Reads model, intrinsics and coefficients under a prefix such as "Camera1.".
 Status read_model(const yaml::YamlMap& yaml, const std::string& type, const std::string& prefix,
                   camera::CameraDescription& d) {
   auto intrinsics = prefixed(yaml, prefix, {"fx", "fy", "cx", "cy"});
@@ -88,8 +88,8 @@ Status read_model(const yaml::YamlMap& yaml, const std::string& type, const std:
 struct OrbslamFile {
   const yaml::YamlMap& yaml;
   std::string type = "PinHole";
-  std::string prefix;                    // of the keys of camera 1
-  std::vector<std::int64_t> resolution;  // of both cameras
+  std::string prefix;                    // prefix of the keys of camera 1
+  std::vector<std::int64_t> resolution;  // resolution of both cameras
   SE3 T_body_cam1;
   camera::RigReading reading = {};
 
@@ -105,7 +105,8 @@ struct OrbslamFile {
   }
 };
 
-// Raw cameras with rectifying rotations, p_rectified = R p. In the rectified frame, RIGHT is a baseline to the right.
+// Raw cameras with rectifying rotations, p_rectified = R p. In the rectified frame, camera RIGHT is shifted to the
+// right by the baseline.
 Status read_rectification(OrbslamFile& file, double baseline) {
   std::optional<SE3> T_rectified_left;
   for (const std::string side : {"LEFT", "RIGHT"}) {
@@ -138,13 +139,13 @@ Status read_rectification(OrbslamFile& file, double baseline) {
   return {};
 }
 
-// The baseline of rectified cameras in metres, if the file contains it.
+// Returns the baseline of rectified cameras in metres, if the file contains it.
 Result<std::optional<double>> baseline_of(const yaml::YamlMap& yaml, const std::string& prefix) {
   for (const char* key : {"Stereo.b", "Camera.bf"}) {
     if (!yaml.has(key)) continue;
     const auto value = yaml.number(key);
     if (!value) return value.error();
-    if (!(*value > 0)) return yaml.error(key, fmt::format("{}", *value), "a number above 0");
+    if (!(*value > 0)) return yaml.error(key, fmt::format("{}", *value), "a positive number");
     if (std::string_view(key) == "Stereo.b") return std::optional(*value);
     const auto fx = yaml.number(prefix + "fx");
     if (!fx) return fx.error();
@@ -173,7 +174,7 @@ Status read_cameras(OrbslamFile& file) {
     if (const Status status = read_model(yaml, file.type, "Camera2.", d); !status) return status;
     if (file.type == "KannalaBrandt8") {
       file.reading.notes.push_back(
-          "camera 2 has its own k1 to k4; ORB-SLAM3 V1.0 uses those of camera 1 for it, so its results may differ");
+          "camera 2 has its own k1 to k4; ORB-SLAM3 V1.0 uses k1 to k4 of camera 1 instead, so its results may differ");
     }
     return file.add(d, *T_c1_c2, "Camera2.");
   }
@@ -237,13 +238,13 @@ Result<camera::RigReading> read_orbslam_rig(const fs::path& file, const std::str
 Result<std::string> orbslam_rig_text(const camera::Rig& rig, const std::string& out) {
   const RigLimits limits{.format = "an ORB-SLAM3 settings file",
                          .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName},
-                         .most_coefficients = 5,
-                         .most_cameras = 2};
+                         .max_coefficients = 5,
+                         .max_cameras = 2};
   if (const Status status = check_limits(rig, out, limits); !status) return status.error();
   const camera::Camera &first = rig.camera(std::size_t{0}), &last = rig.camera(rig.size() - 1);
   const auto fisheye = [](const camera::Camera& c) { return std::holds_alternative<camera::KannalaBrandt>(c.model); };
   if (fisheye(first) != fisheye(last)) {
-    return Error{out, last.name, std::string(camera::model_name(last.model)), "both cameras with one Camera.type"};
+    return Error{out, last.name, std::string(camera::model_name(last.model)), "the same Camera.type for both cameras"};
   }
   if (first.width != last.width || first.height != last.height) {
     return Error{out, last.name, fmt::format("{}x{} pixels", last.width, last.height),

@@ -42,7 +42,7 @@ Result<camera::RigReading> read_colmap_file(const fs::path& file, const std::str
   return read_colmap_rig(fs::absolute(file).parent_path());
 }
 
-// Whether any line begins with `key` and a colon.
+// Returns true if any line begins with `key` and a colon.
 bool has_line(std::string_view text, std::string_view key) {
   const std::string start = std::string(key) + ":";
   return text.starts_with(start) || text.find("\n" + start) != std::string_view::npos;
@@ -130,7 +130,7 @@ Result<RigFile> read_folder(const fs::path& folder) {
   if (fs::exists(folder / "calib_cam_to_cam.txt", error)) return read_rig_file(folder / "calib_cam_to_cam.txt");
   if (fs::exists(folder / "rig.yaml", error)) return read_rig_file(folder / "rig.yaml");
   return Error{folder.string(), "", "a folder without a calibration",
-               "mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt, cameras.txt or rig.yaml in it"};
+               "a folder with mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt, cameras.txt or rig.yaml"};
 }
 
 Status make_folder(const fs::path& folder) {
@@ -211,7 +211,7 @@ Result<RigFile> read_rig_file(const fs::path& path) {
   }
   // A syntax error is more helpful than an unknown format.
   if (const auto yaml = yaml::YamlMap::parse(path, *text); !yaml && !yaml.error().key.empty()) return yaml.error();
-  return Error{path.string(), "", "no calibration in a known format", "one of: " + names};
+  return Error{path.string(), "", "a file of unknown format", "one of: " + names};
 }
 
 Result<camera::Rig> read_rig(const fs::path& path) {

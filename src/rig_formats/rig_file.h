@@ -16,12 +16,13 @@ namespace bslam::rig_formats {
 
 enum class RigFormat { kBslam, kEuroc, kKalibr, kOpenvins, kOrbslam3, kBasalt, kColmap, kKitti, kKittiRaw };
 
-// The name on the command line: bslam, euroc, kalibr, openvins, orbslam3, basalt, colmap, kitti, kitti-raw.
+// Returns the name on the command line: bslam, euroc, kalibr, openvins, orbslam3, basalt, colmap, kitti, kitti-raw.
 std::string_view format_name(RigFormat format);
-// The formats that can be written: all except those of KITTI.
+// Returns a format that can be written, by its name: all except those of KITTI.
 std::span<const RigFormat> writable_formats();
 std::optional<RigFormat> writable_format(std::string_view name);
-// The format implied by an output name: EuRoC for a folder (which exists or ends in /), Basalt for .json, else bslam.
+// Returns the format implied by an output name: EuRoC for a folder (one that exists, or a name ending in /), Basalt for
+// .json, otherwise bslam.
 RigFormat format_of_output(const std::filesystem::path& out);
 
 struct RigFile {
@@ -37,19 +38,19 @@ Result<RigFile> read_rig_file(const std::filesystem::path& path);
 // The same, without format and notes.
 Result<camera::Rig> read_rig(const std::filesystem::path& path);
 
-Status write_rig(const camera::Rig& rig, const std::filesystem::path& file);  // in the format of bslam
+Status write_rig(const camera::Rig& rig, const std::filesystem::path& file);  // writes the format of bslam
 
-// Writes `out`, which is a file, or, for EuRoC and COLMAP, a folder that is created. Returns notes on what was not
-// stored although it does not affect a run: camera names. Errors: content that the format cannot store
+// Writes `out`, which is a file, or, for EuRoC and COLMAP, a folder that is created. Returns notes on content that was
+// not stored but does not affect a run (camera names). Errors: content that the format cannot store
 // (rig_formats/rig_limits.h); a file that cannot be written.
 Result<std::vector<std::string>> write_rig_as(const camera::Rig& rig, RigFormat format,
                                               const std::filesystem::path& out);
-// The existing files that would be replaced.
+// Returns the existing files that would be replaced.
 std::vector<std::filesystem::path> files_in_the_way(RigFormat format, const std::filesystem::path& out);
 
-// Parts of a rig that can be left out if a format cannot store them.
+// Parts of a rig that can be omitted if a format cannot store them.
 enum class Droppable { kBodyFrame, kMasks, kTimeOffsets };
-// The rig without this part. Without its body frame, the body is camera 0.
+// Returns the rig without this part. Without a body frame, the body is camera 0.
 camera::Rig without(const camera::Rig& rig, Droppable what);
 
 }  // namespace bslam::rig_formats

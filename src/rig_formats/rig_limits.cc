@@ -18,7 +18,7 @@ Status check_camera(const camera::Camera& camera, const std::string& out, const 
   if (!camera.mask_file.empty()) {
     return error("a mask, which " + format + " cannot store", "cameras without masks, or --drop mask");
   }
-  if (limits.time_offsets == Holds::kNothing && camera.time_offset_ns != 0) {
+  if (limits.time_offsets == Supports::kNothing && camera.time_offset_ns != 0) {
     return error("a time offset, which " + format + " cannot store",
                  "cameras without time offsets, or --drop time-offset");
   }
@@ -28,9 +28,9 @@ Status check_camera(const camera::Camera& camera, const std::string& out, const 
                  fmt::format("one of: {}", fmt::join(limits.models, ", ")));
   }
   const std::size_t count = needed_coefficients(camera.model).size();
-  if (model == camera::PinholeRadTan::kName && count > limits.most_coefficients) {
+  if (model == camera::PinholeRadTan::kName && count > limits.max_coefficients) {
     return error(fmt::format("{} coefficients", count),
-                 fmt::format("at most {}, since {} cannot store more", limits.most_coefficients, format));
+                 fmt::format("at most {}, since {} cannot store more", limits.max_coefficients, format));
   }
   return {};
 }
@@ -38,16 +38,16 @@ Status check_camera(const camera::Camera& camera, const std::string& out, const 
 }  // namespace
 
 Status check_limits(const camera::Rig& rig, const std::string& out, const RigLimits& limits) {
-  if (rig.size() > limits.most_cameras) {
+  if (rig.size() > limits.max_cameras) {
     return Error{out, "", fmt::format("{} cameras", rig.size()),
-                 fmt::format("at most {}, since {} cannot store more", limits.most_cameras, limits.format)};
+                 fmt::format("at most {}, since {} cannot store more", limits.max_cameras, limits.format)};
   }
   const TimeNs offset = rig.camera(std::size_t{0}).time_offset_ns;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const camera::Camera& camera = rig.camera(i);
     if (const Status status = check_camera(camera, out, limits); !status) return status;
-    if (limits.time_offsets == Holds::kOneForAll && camera.time_offset_ns != offset) {
-      return Error{out, camera.name, "a time offset of its own",
+    if (limits.time_offsets == Supports::kOneForAll && camera.time_offset_ns != offset) {
+      return Error{out, camera.name, "a time offset that differs from camera 0",
                    fmt::format("one time offset for all cameras, since {} cannot store more, or --drop time-offset",
                                limits.format)};
     }

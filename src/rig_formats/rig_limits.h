@@ -11,26 +11,26 @@
 
 namespace bslam::rig_formats {
 
-enum class Holds { kNothing, kOneForAll, kEach };
+enum class Supports { kNothing, kOneForAll, kEach };
 
 struct RigLimits {
-  std::string_view format;               // name in errors
+  std::string_view format;               // name of the format in errors
   std::vector<std::string_view> models;  // names as in the rig file of bslam
-  Holds time_offsets = Holds::kNothing;
-  bool body_frame = true;             // whether the body frame may differ from camera 0
-  std::size_t most_coefficients = 8;  // number of coefficients of pinhole-radtan
-  std::size_t most_cameras = std::numeric_limits<std::size_t>::max();
+  Supports time_offsets = Supports::kNothing;
+  bool body_frame = true;            // the body frame may differ from camera 0
+  std::size_t max_coefficients = 8;  // maximum number of coefficients of pinhole-radtan
+  std::size_t max_cameras = std::numeric_limits<std::size_t>::max();
 };
 
-// Error for the first part of the rig that the format cannot store: a mask, a time offset, a model, too many
+// Returns an Error for the first part of the rig that the format cannot store: a mask, a time offset, a model, too many
 // radial-tangential coefficients, a body frame other than camera 0, too many cameras. `out` is the file named in the
 // error.
 Status check_limits(const camera::Rig& rig, const std::string& out, const RigLimits& limits);
 
-// The distortion coefficients without trailing zeros: radial-tangential ones are shortened to 5 or 4.
+// Returns the distortion coefficients without trailing zeros: eight radial-tangential coefficients may become 5 or 4.
 std::vector<double> needed_coefficients(const camera::CameraModel& model);
 
-// "[1.0, 2.5]", with the shortest text for each number that is read back as the same double.
+// Returns a list such as "[1.0, 2.5]", with the shortest text for each number that is read back as the same double.
 std::string number_list(const std::vector<double>& values);
 
 }  // namespace bslam::rig_formats

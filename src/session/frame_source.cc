@@ -11,7 +11,7 @@
 namespace bslam::session {
 namespace {
 
-// On Linux the nice value belongs to the calling thread. Failure only costs time and is ignored.
+// On Linux the nice value applies to the calling thread only. A failure only affects the speed and is ignored.
 void lower_priority() {
 #if defined(__linux__)
   constexpr int kNice = 10;
@@ -21,9 +21,9 @@ void lower_priority() {
 
 }  // namespace
 
-FrameSource::FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReadAhead priority)
+FrameSource::FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority)
     : dataset_(dataset), ahead_(ahead), reader_([this, priority](std::stop_token stop) {
-        if (priority == ReadAhead::kGivesWay) lower_priority();
+        if (priority == ReaderPriority::kLow) lower_priority();
         read(std::move(stop));
       }) {}
 

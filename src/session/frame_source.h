@@ -1,4 +1,4 @@
-// Reads the frames of a data set ahead of time, in order, in a thread of its own.
+// Reads the frames of a data set ahead of time, in order, in a separate thread.
 #pragma once
 
 #include <condition_variable>
@@ -12,9 +12,9 @@
 
 namespace bslam::session {
 
-// Priority of the reading thread: equal to that of the other threads, or lower. A lower priority is meant for
-// sequential runs; threads of background stages would starve the reader.
-enum class ReadAhead { kAsAll, kGivesWay };
+// Priority of the reading thread: the same as the other threads, or lower. The lower priority is for sequential runs
+// only; with background stages, a reader with lower priority would get too little processor time.
+enum class ReaderPriority { kNormal, kLow };
 
 class FrameSource {
  public:
@@ -23,11 +23,11 @@ class FrameSource {
     double read_ms = 0;  // time for reading and decoding
   };
 
-  // Keeps a reference to `dataset`. At most `ahead` frames wait to be taken.
-  FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReadAhead priority = ReadAhead::kAsAll);
+  // Keeps a reference to `dataset`, which must outlive this object. Up to `ahead` frames are read in advance.
+  FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority = ReaderPriority::kNormal);
   ~FrameSource() = default;
 
-  // The next frame, or nothing after the last one. Rethrows exceptions of the reading thread.
+  // Returns the next frame, or nullopt after the last one. Rethrows exceptions of the reading thread.
   std::optional<Item> next();
 
  private:

@@ -15,7 +15,8 @@ Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedM
   features.pyramid = a.map.pyramid();
   for (const storage::SavedMap* saved : {&a, &b}) {
     if (saved->map.scale() != map::Scale::kMetric)
-      return Error{saved->file, "scale", "a map without metric scale", "metric maps, since only these can be merged"};
+      return Error{saved->file, "scale", "a map without metric scale",
+                   "a metric map, since only metric maps can be merged"};
     if (const Status s = storage::fits(*saved, a.map.rig(), a.map.pyramid(), vocabulary.get()); !s) return s.error();
   }
   map::BundledMap both = a.map;

@@ -1,4 +1,4 @@
-// Merges maps of separate runs that show common places.
+// Merges maps of separate runs that contain common places.
 #pragma once
 
 #include "map/bundled_map.h"
@@ -12,7 +12,7 @@ struct MergeResult {
   map::BundledMap map;
   int joined = 0;           // submaps that were merged into others
   int loops = 0;            // further loop closures
-  std::size_t submaps = 0;  // submaps left; 1 if everything lies in one world frame
+  std::size_t submaps = 0;  // remaining submaps; 1 if everything is in one world frame
 };
 
 // Adds the keyframes and landmarks of `b` to `a`, searches a loop closure for every keyframe of `b`, and finally runs a

@@ -21,7 +21,7 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
       const image::ImageState image = frame.record->images[c];
       camera.images += image == image::ImageState::kPresent;
       if (image != image::ImageState::kDamaged || camera.skipped++ > 0) continue;
-      camera.first_skipped = dataset::why_damaged(input.dataset, frame.record->result.frame.index(), c);
+      camera.first_skipped = dataset::describe_damage(input.dataset, frame.record->result.frame.index(), c);
     }
     camera.states = camera_intervals(record.frames, c);
     const auto& found = input.system.extrinsics().cameras;
@@ -43,21 +43,21 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
 void add_stages(const RecordInput& input, RunRecord& record) {
   for (std::size_t i = 0; i < input.inputs.size(); ++i) {
     const RunFrame& frame = record.frames[i];
-    add_stage_sample(record, "read", StagePlace::kBackground, {frame.time_s, input.inputs[i].read_ms});
+    add_stage_sample(record, "read", StageThread::kBackground, {frame.time_s, input.inputs[i].read_ms});
     if (!frame.record) continue;
     for (const tracking::StageTime& s : frame.record->stages)
-      add_stage_sample(record, s.stage, StagePlace::kFrame, {frame.time_s, s.ms});
+      add_stage_sample(record, s.stage, StageThread::kCaller, {frame.time_s, s.ms});
   }
   for (const system::StageRecord& s : input.system.stage_runs()) {
-    add_stage_sample(record, execution::stage_name(s.run.task.stage), StagePlace::kBackground,
+    add_stage_sample(record, execution::stage_name(s.run.task.stage), StageThread::kBackground,
                      {seconds(input, s.time_ns), s.run.ms});
   }
   if (input.system.final_adjustment_ms() > 0 && !input.inputs.empty()) {
-    add_stage_sample(record, "global adjustment", StagePlace::kBackground,
+    add_stage_sample(record, "global adjustment", StageThread::kBackground,
                      {seconds(input, input.inputs.back().time_ns), input.system.final_adjustment_ms()});
   }
   if (input.system.extrinsics_ms() > 0 && !input.inputs.empty()) {
-    add_stage_sample(record, "extrinsics", StagePlace::kBackground,
+    add_stage_sample(record, "extrinsics", StageThread::kBackground,
                      {seconds(input, input.inputs.back().time_ns), input.system.extrinsics_ms()});
   }
 }
@@ -81,7 +81,7 @@ void add_places(const RecordInput& input, RunRecord& record) {
   }
 }
 
-// When stages ran.
+// Returns the name of the mode, which determines when stages run.
 std::string mode_name(const RecordInput& input) {
   if (input.replayed) return "replay";
   for (const auto& [mode, name] : EnumNames<execution::Mode>::kNames) {
@@ -90,7 +90,7 @@ std::string mode_name(const RecordInput& input) {
   return "";
 }
 
-// Largest resident size of this process, as Linux tells it.
+// Returns the maximum resident size of this process, as reported by Linux, or nullopt.
 std::optional<double> peak_memory_mb() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {

@@ -1,4 +1,4 @@
-// What the system knows of a run, as the plain record of summary and plots.
+// Builds the record of a run, from which summary and plots are written, from the state of the system.
 #pragma once
 
 #include <vector>
@@ -9,32 +9,32 @@
 
 namespace bslam::session {
 
-// One input frame of the session, also those the system never saw.
+// One input frame of the session, including frames that were not passed to the system.
 struct InputFrame {
   TimeNs time_ns = 0;
-  bool dropped = false;  // no time for it
+  bool dropped = false;  // not processed, because processing was too slow
   double read_ms = 0;
 };
 
 struct RecordInput {
   const dataset::Dataset& dataset;
   const system::Config& config;
-  const std::vector<InputFrame>& inputs;  // in order; those not dropped match `frames` one by one
+  const std::vector<InputFrame>& inputs;  // in order; the inputs that were not dropped correspond to `frames`
   const system::System& system;
-  const std::vector<system::SubmapTrajectory>& trajectories;  // final
+  const std::vector<system::SubmapTrajectory>& trajectories;  // final poses
   bool replayed = false;
-  bool loaded = false;  // the run went on in a saved map
+  bool loaded = false;  // the run continued a saved map
   bool complete = true;
   double start_up_s = 0, wall_s = 0;
 };
 
-// A scale as files name it: metric, up-to-scale, unobservable.
+// Returns the name of a scale in files: metric, up-to-scale, unobservable.
 std::string scale_name(map::Scale scale);
 
-// Name of the file of the i-th part's poses: "trajectory.tum", "trajectory_part2.tum".
+// Returns the name of the file with the poses of submap `submap`: "trajectory.tum", "trajectory_part2.tum".
 std::string trajectory_file(const std::string& stem, std::size_t submap);
 
-// `frames`: all of the run, moved into the record.
+// `frames` contains all frames passed to the system, which are moved into the record.
 RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameRecord> frames);
 
 }  // namespace bslam::session

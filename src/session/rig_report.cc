@@ -65,7 +65,7 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
   return pairs;
 }
 
-// Likely mistakes in the calibration, and masks that cannot be used.
+// Returns likely mistakes in the calibration, and masks that cannot be used.
 std::vector<std::string> warnings_of(const camera::Rig& rig) {
   std::vector<std::string> warnings = calibration::rig_warnings(rig);
   for (std::size_t i = 0; i < rig.size(); ++i) {
@@ -105,7 +105,7 @@ std::string as_text(const rig_formats::RigFile& file, const std::optional<std::v
 
 // Tests the calibration against a few frames spread over a recording.
 Result<std::vector<PairEvidence>> check_against_images(const RigReportRequest& request) {
-  constexpr double kTolerance_s = 0.1;  // wide enough to group the images of cameras that fire late
+  constexpr double kTolerance_s = 0.1;  // wide enough to group the images of cameras that capture late
   constexpr std::size_t kFrames = 6;
   const auto dataset =
       dataset::open_dataset({.path = request.images, .rig_file = request.file, .sync_tolerance_s = kTolerance_s});

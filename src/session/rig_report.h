@@ -14,8 +14,8 @@ struct RigReportRequest {
   std::string images = {};  // test the extrinsics against this data set unless empty
 };
 
-// Text or JSON for stdout: format, cameras, poses, overlaps, notes, warnings. Errors: a file that cannot be read or
-// written.
+// Returns text or JSON for stdout: format, cameras, poses, overlaps, notes, warnings. Errors: a file that cannot be
+// read or written.
 Result<std::string> report_rig(const RigReportRequest& request);
 
 }  // namespace bslam::session

@@ -30,7 +30,7 @@ Series time_series(std::string label, Points points, std::string_view colour, do
   return series;
 }
 
-// One of the counts of a camera over all frames, with gaps at frames without an image of it.
+// Returns one of the counts of a camera over all frames, with gaps at frames without an image of the camera.
 Points camera_points(const RunRecord& record, std::size_t camera, int tracking::CameraCounts::*count) {
   Points points;
   for (const RunFrame& frame : record.frames) {
@@ -42,7 +42,7 @@ Points camera_points(const RunRecord& record, std::size_t camera, int tracking::
   return reduced(points, kBins, Reduction::kMedian);
 }
 
-// A panel with the time range of the run and the intervals in which tracking was lost.
+// Returns a panel with the time range of the run and the intervals in which tracking was lost.
 Panel time_panel(const RunRecord& record, std::string title, std::string y_label) {
   Panel panel{.title = std::move(title), .x_label = "time [s]", .y_label = std::move(y_label)};
   panel.floor = AxisFloor::kZero;
@@ -108,8 +108,9 @@ std::string_view reason_colour(std::size_t k) {
   return kColours[k % kColours.size()];
 }
 
-// A bar for every interval in which a camera was degraded or out, in the row of the camera and the colour of the
-// reason. Bars that are too close to be distinguished are merged. Empty if there were no faults.
+// Returns a panel with a bar for every interval in which a camera was degraded or out, in the row of the camera and the
+// colour of the reason. Bars that are too close to be distinguished are merged. Returns nullopt if there were no
+// faults.
 std::optional<Panel> camera_fault_panel(const RunRecord& record) {
   if (record.frames.empty()) return std::nullopt;
   const double begin_s = record.frames.front().time_s, end_s = record.frames.back().time_s,
@@ -165,7 +166,7 @@ Panel frame_time_panel(const RunRecord& record) {
   panel.series.push_back(time_series("frame", reduced(total, kBins, Reduction::kMedian), kBlack, 1.8));
   std::size_t k = 0;
   for (const StageSeries& stage : record.stages) {
-    if (stage.place != StagePlace::kFrame) continue;
+    if (stage.thread != StageThread::kCaller) continue;
     panel.series.push_back(
         time_series(stage.name, reduced(stage_points(stage), kBins, Reduction::kMedian), series_colour(k++), 1.3));
   }
@@ -205,7 +206,7 @@ std::string run_plot_svg(const RunRecord& record) {
   figure.rows.push_back({.height_px = 270.0, .panels = {frame_time_panel(record)}});
   std::vector<const StageSeries*> background;
   for (const StageSeries& stage : record.stages) {
-    if (stage.place == StagePlace::kBackground && !stage.samples.empty()) background.push_back(&stage);
+    if (stage.thread == StageThread::kBackground && !stage.samples.empty()) background.push_back(&stage);
   }
   if (!background.empty())
     figure.rows.push_back({.height_px = 250.0, .panels = {background_panel(record, background)}});

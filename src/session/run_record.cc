@@ -23,10 +23,10 @@ std::vector<CameraInterval> camera_intervals(std::span<const RunFrame> frames, s
   return intervals;
 }
 
-void add_stage_sample(RunRecord& record, std::string_view stage, StagePlace place, StageSample sample) {
+void add_stage_sample(RunRecord& record, std::string_view stage, StageThread thread, StageSample sample) {
   auto series = std::ranges::find(record.stages, stage, &StageSeries::name);
   if (series == record.stages.end()) {
-    record.stages.push_back({.name = std::string(stage), .place = place});
+    record.stages.push_back({.name = std::string(stage), .thread = thread});
     series = std::prev(record.stages.end());
   }
   series->samples.push_back(sample);

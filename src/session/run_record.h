@@ -1,5 +1,5 @@
-// What happened in a run, as plain numbers: the one source of summary.json and of the run's plots. Whoever drives the
-// system fills it. Times are seconds since the first image of the data set unless a name says otherwise.
+// Results of a run as plain numbers, from which summary.json and the plots are written. Times are in seconds since the
+// first image of the data set unless the name contains another unit.
 #pragma once
 
 #include <cstddef>
@@ -16,73 +16,75 @@ namespace bslam::session {
 
 enum class FrameOutcome {
   kTracked,
-  kLost,     // handed to the tracker and left without a pose
-  kDropped,  // never handed to the tracker: no time for it
+  kLost,     // processed, but without a pose
+  kDropped,  // not processed, because processing was too slow
 };
 
 // One input frame of the run.
 struct RunFrame {
   double time_s = 0.0;
-  std::optional<tracking::FrameRecord> record;  // empty: dropped
+  std::optional<tracking::FrameRecord> record;  // nullopt if the frame was dropped
 
   FrameOutcome outcome() const;
 };
 
-// Where a stage runs, for the plots: those of every frame apart from those beside it.
-enum class StagePlace { kFrame, kBackground };
+// The thread of a stage, by which the plots are grouped: the thread that processes each frame, or a background thread.
+// Mapping, loop closing and global adjustment are background stages in all modes.
+enum class StageThread { kCaller, kBackground };
 
 struct StageSample {
-  double time_s = 0.0;  // of the frame it worked on
+  double time_s = 0.0;  // time of the processed frame
   double ms = 0.0;
 };
 
-// Every call of one stage (read, extract, bundle, ...), in order.
+// All calls of one stage (read, extract, bundle, ...), in order.
 struct StageSeries {
   std::string name;
-  StagePlace place = StagePlace::kFrame;
+  StageThread thread = StageThread::kCaller;
   std::vector<StageSample> samples{};
 };
 
-// A stretch of frames in which the status of a camera was the same.
+// An interval of consecutive frames in which the status of a camera was the same.
 struct CameraInterval {
   tracking::CameraStatus status;
   double from_s = 0.0, to_s = 0.0;
 };
 
-// What the images of the run say about the extrinsics of a camera.
+// Extrinsics of a camera estimated from the images of the run.
 struct ExtrinsicsRecord {
-  double change_deg = 0.0, change_mm = 0.0, std_deg = 0.0, std_mm = 0.0;  // from the calibrated ones
+  double change_deg = 0.0, change_mm = 0.0;  // difference from the calibration
+  double std_deg = 0.0, std_mm = 0.0;        // standard deviations of the estimate
   bool rotation_observed = false, translation_observed = false, suspect = false, refined = false;
 };
 
 struct CameraRecord {
   std::string name;
   std::int64_t images = 0;
-  std::int64_t skipped = 0;  // listed in the data set, but not readable
+  std::int64_t skipped = 0;  // images that are listed in the data set but cannot be read
   std::vector<CameraInterval> states;
-  std::optional<ExtrinsicsRecord> extrinsics = {};  // none of camera 0, which is the rig
-  std::string first_skipped = {};                   // file and cause of the first image that was not readable
+  std::optional<ExtrinsicsRecord> extrinsics = {};  // nullopt for camera 0, whose frame is the rig frame
+  std::string first_skipped = {};                   // file and cause of damage of the first skipped image
 };
 
 struct MapRecord {
   std::int64_t keyframes = 0, landmarks = 0, observations = 0;
   std::string scale = "metric";  // metric, up-to-scale, unobservable
   bool loaded = false;
-  std::optional<double> scale_deviation;  // relative standard deviation; empty where nothing is known of the scale
+  std::optional<double> scale_deviation;  // relative standard deviation; nullopt if unknown
 };
 
-// A loop closed, or tracking found again: at one time, with the place seen at another.
+// A loop closure or relocalisation: the time of the frame, and the time of the matched keyframe.
 struct PlaceEvent {
   double at_s = 0.0;
   double with_s = 0.0;
   int inliers = 0;
 };
 
-// A part of the map that no common place joined to the others, with a world of its own.
+// A submap at the end of the run; each has its own world frame.
 struct SubmapRecord {
-  std::int64_t frames = 0;  // with a pose in it
+  std::int64_t frames = 0;  // number of frames with a pose in it
   double from_s = 0.0, to_s = 0.0;
-  std::string trajectory;  // file of its final poses
+  std::string trajectory;  // name of the file with its final poses
 };
 
 struct RunRecord {
@@ -90,25 +92,25 @@ struct RunRecord {
   bool complete = true;
   std::uint64_t seed = 1;
   std::vector<int> cameras_used;
-  std::vector<RunFrame> frames;       // every input frame, in order of time
+  std::vector<RunFrame> frames;       // all input frames, in order of time
   std::vector<CameraRecord> cameras;  // in the order of cameras_used
   std::vector<StageSeries> stages;
   MapRecord map;
   std::vector<PlaceEvent> loops, relocalisations;
   int maps_started = 0;
-  std::vector<SubmapRecord> submaps;  // most frames first
+  std::vector<SubmapRecord> submaps;  // in decreasing order of frames
   double start_up_s = 0.0, wall_s = 0.0;
-  std::optional<double> peak_memory_mb;  // largest resident size of the process; empty where the system does not tell
+  std::optional<double> peak_memory_mb;  // maximum resident size; nullopt if unavailable
 };
 
-// The statuses of camera `camera` over the frames that were not dropped, equal consecutive ones merged.
+// Returns the statuses of a camera over the frames that were not dropped; consecutive equal statuses are merged.
 std::vector<CameraInterval> camera_intervals(std::span<const RunFrame> frames, std::size_t camera);
 
-// Adds a call of a stage, making its series at the first.
-void add_stage_sample(RunRecord& record, std::string_view stage, StagePlace place, StageSample sample);
+// Adds a call of a stage. The first call of a stage creates its series with the given thread.
+void add_stage_sample(RunRecord& record, std::string_view stage, StageThread thread, StageSample sample);
 
-// Frames lost one after another, as one stretch: from the first to the last of them. Dropped frames among them do not
-// part it. The reason is that of the first: why tracking was lost, not why it was not found again.
+// An interval of consecutive lost frames, from the first to the last one; dropped frames in between do not end it.
+// `reason` is the reason of the first frame, for which tracking was lost.
 struct LostInterval {
   double from_s = 0.0, to_s = 0.0;
   std::string reason;

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t kReadAhead = 4;  // frames
 
-// Replays the recorded pace: when each frame is due, relative to the first.
+// Replays the recorded pace: determines when each frame is due relative to the first frame.
 class Metronome {
  public:
   using Clock = std::chrono::steady_clock;
@@ -36,8 +36,8 @@ class Metronome {
   Clock::time_point start_;
 };
 
-// Frames of the recorded run, in order. There are fewer than in the data set if the run was interrupted or dropped
-// frames.
+// Returns the frames of the recorded run, in order. There are fewer than in the data set if the run was interrupted or
+// dropped frames.
 std::vector<FrameId> recorded_frames(const execution::Journal& journal) {
   std::vector<FrameId> frames;
   for (const execution::JournalEntry& e : journal.entries) {
@@ -51,7 +51,7 @@ Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const Sess
                                      system::System& system) {
   std::vector<InputFrame> inputs;
   const bool sequential = options.config.mode == execution::Mode::kSequential;
-  FrameSource source(dataset, kReadAhead, sequential ? ReadAhead::kGivesWay : ReadAhead::kAsAll);
+  FrameSource source(dataset, kReadAhead, sequential ? ReaderPriority::kLow : ReaderPriority::kNormal);
   const Metronome metronome(dataset.frames.front().time_ns);
   const std::vector<FrameId> recorded = options.replay ? recorded_frames(*options.replay) : std::vector<FrameId>();
   for (std::size_t i = 0; i < dataset.frames.size() && !options.interrupted.stop_requested(); ++i) {
@@ -75,7 +75,7 @@ Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const Sess
 
 namespace {
 
-// The calibration of all cameras, with the extrinsics of `found` for the cameras in use.
+// Returns the calibration of all cameras, with the extrinsics of `found` for the cameras in use.
 camera::Rig with_refined_extrinsics(const camera::Rig& found, const dataset::Dataset& dataset) {
   return dataset.whole_rig ? dataset.whole_rig->with_extrinsics_of(found, dataset.cameras_used) : found;
 }
@@ -125,9 +125,9 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
 
 namespace {
 
-using Files = std::vector<std::pair<std::string, std::string>>;  // name, bytes
+using Files = std::vector<std::pair<std::string, std::string>>;  // name and content
 
-// One file per submap; the file of the first is written even if there is none.
+// Adds one file per submap. The file of the first submap is written even if there is no submap.
 void add_trajectories(const std::vector<system::SubmapTrajectory>& submaps, const std::string& stem,
                       evaluation::PoseState state, Files& files) {
   const std::string header = evaluation::trajectory_header("cam0", state);
@@ -137,7 +137,7 @@ void add_trajectories(const std::vector<system::SubmapTrajectory>& submaps, cons
   }
 }
 
-// The results first and the plots, which are large, last: if the disk is full, the results matter more.
+// The plots, which are large, are written last: if the disk is full, the results are more important.
 Files output_files(const SessionResult& result, const system::Config& config) {
   system::Config copy = config;
   const OptionTable table(copy);

@@ -16,7 +16,7 @@
 namespace bslam::session {
 
 enum class Pace { kFast, kRealtime };  // as fast as possible, or at the recorded pace
-enum class Late { kBlock, kDrop };     // at the recorded pace: process every frame, or drop frames that are late
+enum class Late { kBlock, kDrop };     // at the recorded pace: process every frame, or drop late frames
 
 struct SessionOptions {
   system::Config config;
@@ -24,9 +24,9 @@ struct SessionOptions {
   Late late = Late::kBlock;
   double start_up_s = 0;                     // time spent before the session, for the record
   std::stop_token interrupted;               // a stop request ends the run early and keeps the results so far
-  std::optional<execution::Journal> replay;  // of a run to repeat: exactly its frames are processed
+  std::optional<execution::Journal> replay;  // journal of a run to repeat: exactly its frames are processed
   place::VocabularyPtr vocabulary;           // null: no place recognition
-  std::optional<map::BundledMap> map;        // of an earlier run with this rig, to be continued
+  std::optional<map::BundledMap> map;        // map of an earlier run with this rig, which is continued
   std::function<void(std::size_t done, std::size_t all)> progress;  // called after every frame; may be empty
 };
 
@@ -45,7 +45,8 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
 
 // Writes summary.json, trajectory.tum, trajectory_live.tum (further submaps: ..._part2.tum), config.yaml,
 // rig_refined.yaml if extrinsics were refined, trajectory.svg and run.svg, in this order. Each file is written
-// completely or not at all. If one cannot be written, the others are still tried, and the first error is returned.
+// completely or not at all. If one cannot be written, the others are written nevertheless, and the first error is
+// returned.
 Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder);
 
 }  // namespace bslam::session

@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Rounded to the given number of decimals, since further digits are noise. NaN becomes null.
+// Rounds to the given number of decimals, since further digits are noise. NaN becomes null.
 ordered_json rounded(double value, int decimals) {
   if (!std::isfinite(value)) return nullptr;
   const double unit = std::pow(10.0, decimals);
@@ -172,7 +172,7 @@ ordered_json summary_json(const RunRecord& record) {
       {"loops", events_json(record.loops)},
       {"relocalisations", events_json(record.relocalisations)},
       {"maps_started", record.maps_started},
-      {"parts", submaps_json(record.submaps)},
+      {"parts", submaps_json(record.submaps)},  // the submaps; the key is kept for compatibility
       {"time", time_json(record)},
       {"memory", {{"peak_mb", record.peak_memory_mb ? rounded(*record.peak_memory_mb, 1) : ordered_json(nullptr)}}}};
 }

@@ -10,7 +10,7 @@
 namespace bslam::session {
 
 // Order statistics of durations in ms, all NaN if there are no samples. Percentiles between two samples are
-// interpolated linearly, as numpy.percentile does.
+// interpolated linearly, as in numpy.percentile.
 struct DurationStatistics {
   double median = 0.0, p95 = 0.0, max = 0.0;
   std::size_t count = 0;
@@ -18,12 +18,12 @@ struct DurationStatistics {
 
 DurationStatistics duration_statistics(std::vector<double> durations_ms);
 
-// The summary, with keys in the order documented in docs/cli.md. Frame counts, lost intervals, mean feature counts and
-// time statistics are computed here from the record. Features are averaged over the frames given to the tracker,
-// keypoints over the images of these frames. A value that was not measured is null.
+// Returns the summary, with keys in the order documented in docs/cli.md. The key `parts` lists the submaps. Frame
+// counts, lost intervals, mean feature counts and time statistics are computed here from the record. Features are
+// averaged over the processed frames, keypoints over the images of these frames. A value that was not measured is null.
 nlohmann::ordered_json summary_json(const RunRecord& record);
 
-// The content of the file: indented, with a final newline. Bytes that are not UTF-8 are replaced.
+// Returns the content of the file: indented, with a final newline. Bytes that are not UTF-8 are replaced.
 std::string summary_text(const RunRecord& record);
 
 }  // namespace bslam::session

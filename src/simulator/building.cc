@@ -54,25 +54,26 @@ void add_room(Building& b, const RoomPlan& p, Random& random) {
   b.surfaces.push_back({at_height(low, 0), {size.x(), 0, 0}, {0, size.y(), 0}, {p.floor, seed(), p.floor_shade}});
   b.surfaces.push_back(
       {at_height(low, p.height), {0, size.y(), 0}, {size.x(), 0, 0}, {Material::kCeiling, seed(), 0.68f}});
-  std::vector<WallStretch> stretches;
+  std::vector<WallSegment> segments;
   const std::uint32_t accent = random.below(4);
   std::uint32_t index = 0;
   for (const Face& f : faces_of(room, {p.x0, p.y0}, {p.x1, p.y1})) {
     const Texture texture{index == accent ? p.accent : p.walls, seed(), p.wall_shade};
-    const std::vector<WallStretch> more = add_face(b, f, kDoors, p.height, texture);
-    stretches.insert(stretches.end(), more.begin(), more.end());
+    const std::vector<WallSegment> more = add_face(b, f, kDoors, p.height, texture);
+    segments.insert(segments.end(), more.begin(), more.end());
     ++index;
   }
   std::vector<Vector2d> doors;
   for (const Door& d : kDoors) doors.push_back(centre_of(d));
-  furnish(b, room, stretches, doors, random);
+  furnish(b, room, segments, doors, random);
 }
 
 }  // namespace
 
 Building make_building(std::uint64_t seed) {
   Building b;
-  constexpr double kCornerRadius = 1.6;  // metres; turns at walking pace stay below 60 degrees per second
+  constexpr double kCornerRadius =
+      1.6;  // metres; at walking pace the yaw rate in corners stays below 60 degrees per second
   b.tour = rounded_loop({{5.5, 4.6}, {14.0, 4.6}, {14.0, 9.1}, {5.5, 9.1}}, kCornerRadius, Building::kTourStep);
   for (std::size_t i = 0; i < kRooms.size(); ++i) {
     Random random(seed, "room", i);

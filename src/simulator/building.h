@@ -12,7 +12,7 @@ namespace bslam::simulator {
 
 struct Lamp {
   Vector3d position;
-  double intensity;  // irradiance of a surface facing the lamp at 1 m; 1 is about that of a well lit white wall
+  double intensity;  // irradiance of a surface facing the lamp at 1 m; a well lit white wall has about 1
 };
 
 // Interior of a room, in metres.
@@ -26,16 +26,17 @@ struct Building {
   std::vector<Room> rooms;
   std::vector<Surface> surfaces;
   std::vector<Lamp> lamps;
-  // The closed tour in the plane: points at a distance of kTourStep, the last one a step before the first. Walls and
-  // furniture keep a distance of kTourClearance from all points that are within kTourSway of the tour at a height in
-  // [kTourLow, kTourHigh].
+  // The closed tour in the plane: points with a spacing of kTourStep; the last point is one step before the first.
+  // Walls and furniture keep a distance of kTourClearance from all points that are within kTourSway of the tour at a
+  // height in [kTourLow, kTourHigh].
   std::vector<Vector2d> tour;
 
   static constexpr double kTourStep = 0.05, kTourClearance = 0.35, kTourSway = synthetic::kMaxSway, kTourLow = 1.1,
                           kTourHigh = 1.85;  // m
 };
 
-// Rooms, doors and tour are the same for every seed, which determines materials, furniture and pictures.
+// Creates the building. The seed determines materials, furniture and pictures on the walls; rooms, doors and tour are
+// the same for every seed.
 Building make_building(std::uint64_t seed);
 
 // The available worlds: this building, and those of simulator/repeated_world.h.

@@ -53,16 +53,16 @@ Result<Fault> read_fault(const yaml::YamlMap& map, std::size_t num_cameras) {
   const auto from = map.number("from"), to = map.number("to");
   if (!from) return from.error();
   if (!to) return to.error();
-  if (!(*from >= 0)) return map.error("from", fmt::format("{}", *from), "0 s or later");
-  if (!(*to > *from)) return map.error("to", fmt::format("{}", *to), fmt::format("later than {} s", *from));
+  if (!(*from >= 0)) return map.error("from", fmt::format("{}", *from), "a non-negative number of seconds");
+  if (!(*to > *from)) return map.error("to", fmt::format("{}", *to), fmt::format("more than {} s", *from));
   fault.from_s = *from;
   fault.to_s = *to;
   if (map.has("delay_s")) {
     const auto delay = map.number("delay_s");
     if (!delay) return delay.error();
     if (*type != FaultType::kDelayed)
-      return map.error("delay_s", fmt::format("a delay for type {}", *name), "a delay for type delayed only");
-    if (!(*delay >= 0)) return map.error("delay_s", fmt::format("{}", *delay), "0 s or more");
+      return map.error("delay_s", fmt::format("a delay for type {}", *name), "a delay only for type delayed");
+    if (!(*delay >= 0)) return map.error("delay_s", fmt::format("{}", *delay), "a non-negative number of seconds");
     fault.delay_s = *delay;
   }
   return fault;

@@ -29,7 +29,7 @@ Footprint footprint_of(const Vector2d& centre, const Vector2d& size, double yaw)
 // Places furniture in a room and keeps track of occupied floor.
 class Furnisher {
  public:
-  Furnisher(Building& building, const Room& room, const std::vector<WallStretch>& walls,
+  Furnisher(Building& building, const Room& room, const std::vector<WallSegment>& walls,
             const std::vector<Vector2d>& doors, Random& random)
       : building_(building), room_(room), walls_(walls), doors_(doors), random_(random) {}
 
@@ -44,7 +44,7 @@ class Furnisher {
     add_pillar();
     for (int i = 0; i < boxes; ++i) add_box_stack();
     add_floor_lamp();
-    for (const WallStretch& wall : walls_) add_pictures(wall);
+    for (const WallSegment& wall : walls_) add_pictures(wall);
   }
 
  private:
@@ -66,7 +66,7 @@ class Furnisher {
     add_box(building_.surfaces, {{p.centre.x(), p.centre.y(), p.bottom}, p.size, p.yaw}, p.sides, p.top);
   }
 
-  // Whether the floor is free: inside the room, and away from doors, the tour and other furniture.
+  // Returns true if the floor is inside the room and away from doors, the tour and other furniture.
   bool is_free(const Footprint& f, double gap) const {
     if ((f.low.array() < room_.low.array()).any() || (f.high.array() > room_.high.array()).any()) return false;
     for (const Vector2d& door : doors_) {
@@ -81,7 +81,7 @@ class Furnisher {
   // Finds free floor for an object of this size with its back to a wall. Returns false if there is none.
   bool find_at_wall(const Vector2d& size, Vector2d& centre, double& yaw) {
     for (int trial = 0; trial < 60; ++trial) {
-      const WallStretch& w = walls_[random_.below(static_cast<std::uint32_t>(walls_.size()))];
+      const WallSegment& w = walls_[random_.below(static_cast<std::uint32_t>(walls_.size()))];
       if (w.length < size.x() + 0.1) continue;
       const Vector2d normal(-w.direction.y(), w.direction.x());
       centre = w.start + random_.uniform(0.5 * size.x() + 0.02, w.length - 0.5 * size.x() - 0.02) * w.direction +
@@ -264,7 +264,7 @@ class Furnisher {
   }
 
   // Pictures, posters and windows side by side along a section of wall.
-  void add_pictures(const WallStretch& wall) {
+  void add_pictures(const WallSegment& wall) {
     const Vector2d normal(-wall.direction.y(), wall.direction.x());
     const double yaw = std::atan2(wall.direction.y(), wall.direction.x());
     for (double at = 0.15 + random_.uniform(0, 0.4); at < wall.length - 0.4;) {
@@ -294,12 +294,12 @@ class Furnisher {
     building_.surfaces.push_back({{corner.x(), corner.y(), bottom}, {edge.x(), edge.y(), 0}, {0, 0, size.z()}, face});
   }
 
-  // Metres between the tour and furniture: clearance, sway and a margin for the step of the tour.
+  // Distance in metres between the tour and furniture: clearance, sway and a margin for the step of the tour.
   static constexpr double kTourGap = Building::kTourClearance + Building::kTourSway + 0.1;
 
   Building& building_;
   const Room& room_;
-  const std::vector<WallStretch>& walls_;
+  const std::vector<WallSegment>& walls_;
   const std::vector<Vector2d>& doors_;
   Random& random_;
   std::vector<Footprint> taken_;
@@ -307,9 +307,9 @@ class Furnisher {
 
 }  // namespace
 
-void furnish(Building& building, const Room& room, const std::vector<WallStretch>& walls,
+void furnish(Building& building, const Room& room, const std::vector<WallSegment>& walls,
              const std::vector<Vector2d>& door_centres, Random& random) {
-  // A copy, since adding to the building may reallocate its rooms.
+  // Copied, since adding to the building may reallocate its rooms.
   const Room here = room;
   Furnisher(building, here, walls, door_centres, random).furnish();
 }

@@ -8,16 +8,16 @@
 
 namespace bslam::simulator {
 
-// A section of wall between doors, seen from inside a room: from `start` along the unit vector `direction`, `length`
-// metres long, with the room on its left (normal = z x direction).
-struct WallStretch {
+// A section of wall between doors, seen from inside a room: `length` metres long, from `start` along the unit vector
+// `direction`, with the room on its left (normal = z x direction).
+struct WallSegment {
   Vector2d start, direction;
   double length;
   bool outer;  // an outer wall, which may have windows
 };
 
 // Furnishes one room: adds surfaces and lamps to `building`, away from its tour and from `door_centres` (in the plane).
-void furnish(Building& building, const Room& room, const std::vector<WallStretch>& walls,
+void furnish(Building& building, const Room& room, const std::vector<WallSegment>& walls,
              const std::vector<Vector2d>& door_centres, Random& random);
 
 }  // namespace bslam::simulator

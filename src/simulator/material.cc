@@ -36,14 +36,14 @@ float box_distance(float x, float y, float half_width, float half_height) {
 float motif(float x, float y, float radius, Seed seed) {
   const float turn = 6.2832f * unit(hash(1, 0, seed)), c = std::cos(turn), s = std::sin(turn);
   const float u = c * x + s * y, v = c * y - s * x, r = std::sqrt(x * x + y * y);
-  const float stretch = mix(0.35f, 0.8f, unit(hash(2, 0, seed)));
+  const float aspect = mix(0.35f, 0.8f, unit(hash(2, 0, seed)));
   switch (hash(3, 0, seed) % 7) {
     case 0:
       return inside(r - radius);
     case 1:
       return inside(std::abs(r - 0.75f * radius) - 0.22f * radius);
     case 2:
-      return inside(box_distance(u, v, 0.7f * radius, 0.7f * stretch * radius));
+      return inside(box_distance(u, v, 0.7f * radius, 0.7f * aspect * radius));
     case 3:
       return std::max(inside(box_distance(u, v, 0.9f * radius, 0.2f * radius)),
                       inside(box_distance(u, v, 0.2f * radius, 0.9f * radius)));
@@ -58,21 +58,21 @@ float motif(float x, float y, float radius, Seed seed) {
   }
 }
 
-// Motifs scattered over cells of `size` metres: positive or negative coverage, 0 between them.
+// Motifs scattered over cells of `size` metres: returns positive or negative coverage, and 0 between motifs.
 float scattered_motifs(float x, float y, float size, float density, Seed seed) {
   const Cell c = cell_at(x, y, size, size);
-  const Seed own = hash(c.column, c.row, seed);
-  if (unit(hash(10, 0, own)) > density) return 0;
-  const float radius = size * mix(0.12f, 0.36f, unit(hash(11, 0, own)));
+  const Seed cell_seed = hash(c.column, c.row, seed);
+  if (unit(hash(10, 0, cell_seed)) > density) return 0;
+  const float radius = size * mix(0.12f, 0.36f, unit(hash(11, 0, cell_seed)));
   const float slack = 0.5f * size - radius;
-  const float cx = 0.5f * size + slack * mix(-1, 1, unit(hash(12, 0, own)));
-  const float cy = 0.5f * size + slack * mix(-1, 1, unit(hash(13, 0, own)));
-  const float strength = mix(-1, 1, unit(hash(14, 0, own)));
-  return motif(c.x - cx, c.y - cy, radius, own) * (strength < 0 ? strength - 0.4f : strength + 0.4f) / 1.4f;
+  const float cx = 0.5f * size + slack * mix(-1, 1, unit(hash(12, 0, cell_seed)));
+  const float cy = 0.5f * size + slack * mix(-1, 1, unit(hash(13, 0, cell_seed)));
+  const float strength = mix(-1, 1, unit(hash(14, 0, cell_seed)));
+  return motif(c.x - cx, c.y - cy, radius, cell_seed) * (strength < 0 ? strength - 0.4f : strength + 0.4f) / 1.4f;
 }
 
-// Imitates writing: cells of `height` metres with 5 x 7 random dots, grouped to words of random length. 1 where there
-// is ink.
+// Imitates writing: cells of `height` metres with 5 x 7 random dots, grouped to words of random length. Returns 1 on a
+// dot and 0 elsewhere.
 float glyphs(float x, float y, float height, Seed seed) {
   const float width = 0.75f * height;
   const Cell c = cell_at(x, y, width, 1.6f * height);
@@ -108,12 +108,12 @@ float brick(const Texture& t, float x, float y) {
   const std::int32_t course = floor_int(y / kHeight);
   const Cell c =
       cell_at(x + 0.5f * kWidth * static_cast<float>(course & 1) + 0.02f * unit(course, 3, t.seed), y, kWidth, kHeight);
-  const Seed own = hash(c.column, c.row, t.seed);
+  const Seed cell_seed = hash(c.column, c.row, t.seed);
   const float wear = 0.006f * value_noise(30 * x, 30 * y, t.seed + 1);
   const float edge = std::min(std::min(c.x, kWidth - c.x), std::min(c.y, kHeight - c.y)) + wear;
   const float body = smooth_step(kJoint, kJoint + 0.005f, edge);
   const float grain = fractal_noise(18 * x, 18 * y, t.seed + 2, 4, 0.7f);
-  const float tint = mix(0.55f, 1.4f, unit(hash(1, 1, own)));
+  const float tint = mix(0.55f, 1.4f, unit(hash(1, 1, cell_seed)));
   const float chips = scattered_motifs(x, y, 0.055f, 0.25f, t.seed + 3);
   const float face = t.shade * tint * (1 + 0.3f * grain + 0.45f * chips);
   return mix(t.shade * 1.25f * (1 + 0.2f * grain), face, body);
@@ -122,32 +122,33 @@ float brick(const Texture& t, float x, float y) {
 float tile(const Texture& t, float x, float y) {
   constexpr float kSize = 0.21f, kJoint = 0.004f;
   const Cell c = cell_at(x, y, kSize, kSize);
-  const Seed own = hash(c.column, c.row, t.seed);
+  const Seed cell_seed = hash(c.column, c.row, t.seed);
   const float edge = std::min(std::min(c.x, kSize - c.x), std::min(c.y, kSize - c.y));
-  const float veins = fractal_noise(7 * x + 3 * unit(own), 7 * y, own & 0xffffu, 4, 0.65f);
-  float a = t.shade * mix(0.7f, 1.3f, unit(hash(1, 2, own))) * (1 + 0.22f * veins);
-  if (hash(2, 2, own) % 5 < 2) {
-    const float figure = motif(c.x - 0.5f * kSize, c.y - 0.5f * kSize, mix(0.04f, 0.09f, unit(hash(3, 2, own))), own);
-    a *= 1 + figure * (hash(4, 2, own) & 1u ? 0.6f : -0.6f);
+  const float veins = fractal_noise(7 * x + 3 * unit(cell_seed), 7 * y, cell_seed & 0xffffu, 4, 0.65f);
+  float a = t.shade * mix(0.7f, 1.3f, unit(hash(1, 2, cell_seed))) * (1 + 0.22f * veins);
+  if (hash(2, 2, cell_seed) % 5 < 2) {
+    const float figure =
+        motif(c.x - 0.5f * kSize, c.y - 0.5f * kSize, mix(0.04f, 0.09f, unit(hash(3, 2, cell_seed))), cell_seed);
+    a *= 1 + figure * (hash(4, 2, cell_seed) & 1u ? 0.6f : -0.6f);
   }
   a *= 1 + 0.5f * scattered_motifs(x, y, 0.06f, 0.22f, t.seed + 5);
   return mix(0.45f * t.shade, a, smooth_step(0.0f, 0.004f, edge - kJoint)) + 0.02f * speckle(x, y, t.seed + 4);
 }
 
-// Wood grain along x for a board with seed `own`.
-float grain(float x, float y, Seed own) {
-  const float bend = 0.02f * value_noise(2.0f * x, 9 * y, own);
-  const float lines = fractal_noise(3.5f * x, 75 * (y + bend), own + 1, 3, 0.7f);
+// Wood grain along x for a board with seed `cell_seed`.
+float grain(float x, float y, Seed cell_seed) {
+  const float waviness = 0.02f * value_noise(2.0f * x, 9 * y, cell_seed);
+  const float lines = fractal_noise(3.5f * x, 75 * (y + waviness), cell_seed + 1, 3, 0.7f);
   return lines;
 }
 
 float knots(float x, float y, Seed seed) {
   const Cell c = cell_at(x, y, 0.24f, 0.13f);
-  const Seed own = hash(c.column, c.row, seed);
-  if (own % 3 != 0) return 0;
-  const float dx = (c.x - mix(0.05f, 0.19f, unit(hash(1, 3, own)))) * 0.6f;
-  const float dy = c.y - mix(0.03f, 0.10f, unit(hash(2, 3, own)));
-  const float r = std::sqrt(dx * dx + dy * dy), size = mix(0.006f, 0.018f, unit(hash(3, 3, own)));
+  const Seed cell_seed = hash(c.column, c.row, seed);
+  if (cell_seed % 3 != 0) return 0;
+  const float dx = (c.x - mix(0.05f, 0.19f, unit(hash(1, 3, cell_seed)))) * 0.6f;
+  const float dy = c.y - mix(0.03f, 0.10f, unit(hash(2, 3, cell_seed)));
+  const float r = std::sqrt(dx * dx + dy * dy), size = mix(0.006f, 0.018f, unit(hash(3, 3, cell_seed)));
   return smooth_step(size, 0.6f * size, r) * 0.8f + 0.3f * smooth_step(2.2f * size, size, r);
 }
 
@@ -156,12 +157,13 @@ float planks(const Texture& t, float x, float y) {
   const std::int32_t row = floor_int(y / kWidth);
   const float length = mix(0.5f, 1.3f, unit(row, 1, t.seed));
   const Cell c = cell_at(x + 3 * unit(row, 2, t.seed), y, length, kWidth);
-  const Seed own = hash(c.column, c.row, t.seed + 9);
+  const Seed cell_seed = hash(c.column, c.row, t.seed + 9);
   const float edge = std::min(std::min(c.x, length - c.x), std::min(c.y, kWidth - c.y));
   const float body = smooth_step(0.001f, 0.004f, edge);
-  const float tint = mix(0.6f, 1.35f, unit(hash(1, 4, own)));
+  const float tint = mix(0.6f, 1.35f, unit(hash(1, 4, cell_seed)));
   const float scuffs = scattered_motifs(x, y, 0.11f, 0.25f, t.seed + 3);
-  float a = t.shade * tint * (1 + 0.28f * grain(x, y, own)) * (1 - 0.7f * knots(x + 7 * unit(own), y, own));
+  float a =
+      t.shade * tint * (1 + 0.28f * grain(x, y, cell_seed)) * (1 - 0.7f * knots(x + 7 * unit(cell_seed), y, cell_seed));
   a *= 1 + 0.30f * scuffs + 0.12f * fractal_noise(2 * x, 2 * y, t.seed + 2, 3);
   return mix(0.25f * t.shade, a, body);
 }
@@ -184,10 +186,11 @@ float ceiling(const Texture& t, float x, float y) {
   constexpr float kSize = 0.6f;
   const Cell c = cell_at(x, y, kSize, kSize);
   const float edge = std::min(std::min(c.x, kSize - c.x), std::min(c.y, kSize - c.y));
-  const Seed own = hash(c.column, c.row, t.seed);
-  const float holes = scattered_motifs(x, y, 0.055f, 0.3f, own);
+  const Seed cell_seed = hash(c.column, c.row, t.seed);
+  const float holes = scattered_motifs(x, y, 0.055f, 0.3f, cell_seed);
   const float stains = fractal_noise(1.1f * x, 1.1f * y, t.seed + 1, 5);
-  const float a = t.shade * mix(0.85f, 1.1f, unit(own)) * (1 + 0.2f * stains) * (1 + 0.55f * std::min(holes, 0.15f));
+  const float a =
+      t.shade * mix(0.85f, 1.1f, unit(cell_seed)) * (1 + 0.2f * stains) * (1 + 0.55f * std::min(holes, 0.15f));
   return mix(0.55f * t.shade, a, smooth_step(0.006f, 0.010f, edge)) + 0.03f * speckle(x, y, t.seed + 2);
 }
 
@@ -196,10 +199,10 @@ float artwork(const Texture& t, float x, float y, float width, float height) {
   const float size = std::min(width, height);
   float a = mix(0.25f, 0.85f, unit(hash(1, 5, t.seed))) * (1 + 0.3f * fractal_noise(4 * x, 4 * y, t.seed, 3));
   for (std::int32_t i = 0; i < 9; ++i) {
-    const Seed own = hash(i, 6, t.seed);
-    const float cx = width * unit(hash(1, i, own)), cy = height * unit(hash(2, i, own));
-    const float covered = motif(x - cx, y - cy, size * mix(0.06f, 0.30f, unit(hash(3, i, own))), own);
-    a = mix(a, mix(0.04f, 0.95f, unit(hash(4, i, own))), covered);
+    const Seed cell_seed = hash(i, 6, t.seed);
+    const float cx = width * unit(hash(1, i, cell_seed)), cy = height * unit(hash(2, i, cell_seed));
+    const float covered = motif(x - cx, y - cy, size * mix(0.06f, 0.30f, unit(hash(3, i, cell_seed))), cell_seed);
+    a = mix(a, mix(0.04f, 0.95f, unit(hash(4, i, cell_seed))), covered);
   }
   const bool written = y < mix(0.1f, 0.5f, unit(hash(2, 5, t.seed))) * height;
   if (written)
@@ -222,8 +225,8 @@ float window(const Texture& t, float x, float y, float width, float height) {
   const float clouds = 0.80f + 0.18f * fractal_noise(2 * x, 4 * y, t.seed + 2, 4);
   if (y > ridge) return clouds;
   const Cell house = cell_at(x, y, 0.19f, 0.14f);
-  const Seed own = hash(house.column, house.row, t.seed + 3);
-  const float wall = mix(0.12f, 0.6f, unit(own)) * (1 + 0.3f * fractal_noise(25 * x, 25 * y, t.seed + 4, 3));
+  const Seed cell_seed = hash(house.column, house.row, t.seed + 3);
+  const float wall = mix(0.12f, 0.6f, unit(cell_seed)) * (1 + 0.3f * fractal_noise(25 * x, 25 * y, t.seed + 4, 3));
   return wall * (1 + 0.8f * scattered_motifs(x, y, 0.05f, 0.6f, t.seed + 5));
 }
 

@@ -1,4 +1,4 @@
-// Procedural materials of the surfaces of the built-in world. No two places look the same.
+// Procedural materials of the surfaces of the built-in world. The patterns never repeat.
 #pragma once
 
 #include <cstdint>

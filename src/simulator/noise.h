@@ -30,7 +30,7 @@ inline float smooth_step(float low, float high, float x) {
   return t * t * (3 - 2 * t);
 }
 
-inline float mix(float a, float b, float share) { return a + (b - a) * share; }
+inline float mix(float a, float b, float fraction) { return a + (b - a) * fraction; }
 
 // Value noise in [-1, 1] with features of size 1.
 inline float value_noise(float x, float y, std::uint32_t seed) {

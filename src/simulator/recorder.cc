@@ -9,7 +9,7 @@
 namespace bslam::simulator {
 namespace {
 
-constexpr double kBlurPixels = 5.0;     // standard deviation of a smeared lens's pictures
+constexpr double kBlurPixels = 5.0;     // standard deviation of the blur of a smeared lens
 constexpr double kOverExposure = 14.0;  // factor on the light, which saturates most pixels
 
 // The last fault in the list that affects a camera at a time, or null.
@@ -58,12 +58,12 @@ TimeNs frame_stamp(const RecordingOptions& options, std::size_t frame) {
 }
 
 std::size_t frame_count(const RecordingOptions& options) {
-  constexpr double kRounding = 1e-9;  // 0.3 s at 10 Hz are three frames in spite of rounding
+  constexpr double kRounding = 1e-9;  // so that 0.3 s at 10 Hz are three frames despite rounding
   return std::max<std::size_t>(1, static_cast<std::size_t>(options.duration_s * options.rate_hz + kRounding));
 }
 
 std::vector<Shot> plan_shots(const camera::Rig& rig, const RecordingOptions& options) {
-  BSLAM_ASSERT(options.duration_s > 0 && options.rate_hz > 0, "a recording has a length and a rate");
+  BSLAM_ASSERT(options.duration_s > 0 && options.rate_hz > 0, "duration and rate must be positive");
   std::vector<Shot> shots;
   for (std::size_t frame = 0; frame < frame_count(options); ++frame) {
     for (std::size_t c = 0; c < rig.size(); ++c) {
@@ -88,11 +88,11 @@ Recorder::Recorder(const World& world, camera::Rig rig, synthetic::Trajectory tr
   pool.for_each(rig_.size(), [&](std::size_t c) { renderers_[c].emplace(world, rig_.camera(c), imaging); });
 }
 
-image::Image Recorder::picture(const Shot& shot) const {
+image::Image Recorder::render(const Shot& shot) const {
   ExposurePoses poses;
   for (std::size_t k = 0; k < poses.size(); ++k) {
-    const double share = (static_cast<double>(k) + 0.5) / static_cast<double>(poses.size()) - 0.5;
-    poses[k] = T_world_cam(shot.camera, shot.scene_time_s + share * exposure_s_);
+    const double fraction = (static_cast<double>(k) + 0.5) / static_cast<double>(poses.size()) - 0.5;
+    poses[k] = T_world_cam(shot.camera, shot.scene_time_s + fraction * exposure_s_);
   }
   return renderers_[shot.camera]->render(poses, shot.noise_key, shot.exposure, shot.blur_px);
 }

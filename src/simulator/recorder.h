@@ -35,13 +35,13 @@ struct Shot {
   std::optional<FaultType> fault;
 };
 
-// Time stamp of frame k: start + k / rate, rounded to nanoseconds. The number of frames is floor(duration * rate), but
-// at least one.
+// Returns the time stamp of frame k: start + k / rate, rounded to nanoseconds. The number of frames is floor(duration *
+// rate), but at least one.
 TimeNs frame_stamp(const RecordingOptions& options, std::size_t frame);
 std::size_t frame_count(const RecordingOptions& options);
 
-// All shots of the recording including missing ones, ordered by frame, then by camera. The time offset of a camera
-// shifts the content of its images: true time = stamp + offset. Faults must refer to cameras of the rig.
+// Returns all shots of the recording including missing ones, ordered by frame, then by camera. The time offset of a
+// camera shifts the content of its images: true time = stamp + offset. Faults must refer to cameras of the rig.
 std::vector<Shot> plan_shots(const camera::Rig& rig, const RecordingOptions& options);
 
 // Renders the images.
@@ -51,10 +51,10 @@ class Recorder {
   Recorder(const World& world, camera::Rig rig, synthetic::Trajectory trajectory, const ImagingOptions& imaging,
            double exposure_s, ThreadPool& pool);
 
-  // Depends on the shot only. May be called from several threads.
-  image::Image picture(const Shot& shot) const;
+  // Renders an image. The result depends on the shot only. May be called from several threads.
+  image::Image render(const Shot& shot) const;
 
-  // T_world_cam of a camera at a time of the trajectory.
+  // Returns T_world_cam of a camera at a time of the trajectory.
   geometry::SE3 T_world_cam(std::size_t camera, double time_s) const {
     return trajectory_.T_world_body(time_s) * rig_.body_from_cam(camera);
   }

@@ -14,15 +14,15 @@ enum class Turn { kNone, kHalf };  // rotation about the z axis through the orig
 // Adds the surfaces and lamps of `part`, rotated and then translated by `shift`.
 void add_copy(const Building& part, Turn turn, const Vector2d& shift, Building& to) {
   const double sign = turn == Turn::kHalf ? -1.0 : 1.0;
-  const auto turned = [&](const Vector3d& v) { return Vector3d(sign * v.x(), sign * v.y(), v.z()); };
+  const auto rotated = [&](const Vector3d& v) { return Vector3d(sign * v.x(), sign * v.y(), v.z()); };
   const Vector3d by = at_height(shift, 0);
   for (Surface s : part.surfaces) {
-    s.origin = turned(s.origin) + by;
-    s.u = turned(s.u);
-    s.v = turned(s.v);
+    s.origin = rotated(s.origin) + by;
+    s.u = rotated(s.u);
+    s.v = rotated(s.v);
     to.surfaces.push_back(s);
   }
-  for (const Lamp& lamp : part.lamps) to.lamps.push_back({turned(lamp.position) + by, lamp.intensity});
+  for (const Lamp& lamp : part.lamps) to.lamps.push_back({rotated(lamp.position) + by, lamp.intensity});
 }
 
 Texture texture(Material material, float shade, Random& random) {
@@ -42,7 +42,8 @@ void add_wall(Building& b, const Vector2d& start, const Vector2d& direction, dou
 }
 
 constexpr double kWidth = 5.0, kLane = 1.1,
-                 kTurnAt = 1.5;  // metres: of the corridor; of the tour, from middle and ends
+                 kTurnDistance =
+                     1.5;  // metres: size of the corridor; distances of the tour from the middle and the ends
 constexpr int kPieces = 6;
 
 // A closed door in the wall y = `wall`, seen from the north.
@@ -65,14 +66,16 @@ Building corridor_side(Random& random) {
   add_floor_and_ceiling(b, room.low, room.high - room.low, Material::kTile, random);
   add_wall(b, room.low, {1, 0}, kPeriod, texture(Material::kPlaster, 0.58f, random));
   add_closed_door(b, kDoor, kWall, random);
-  for (double x = 0; x <= kPeriod; x += Building::kTourStep) {  // the lane, and the middle, which must stay free
+  for (double x = 0; x <= kPeriod;
+       x += Building::kTourStep) {  // the path in either direction and the middle must stay free
     b.tour.emplace_back(x, -kLane);
     b.tour.emplace_back(x, 0);
   }
-  constexpr double kBeside = 0.54;  // metres from the middle of the door to the end of its casing
-  furnish(b, room,
-          {{room.low, {1, 0}, kDoor - kBeside, false}, {{kDoor + kBeside, kWall}, {1, 0}, kDoor - kBeside, false}},
-          {{kDoor, kWall}}, random);
+  constexpr double kCasingEnd = 0.54;  // metres from the middle of the door to the end of its casing
+  furnish(
+      b, room,
+      {{room.low, {1, 0}, kDoor - kCasingEnd, false}, {{kDoor + kCasingEnd, kWall}, {1, 0}, kDoor - kCasingEnd, false}},
+      {{kDoor, kWall}}, random);
   return b;
 }
 
@@ -97,14 +100,14 @@ void add_room(Building& b, const Room& room, const Vector2d& low, const Vector2d
               Random& random) {
   const Vector2d overlap = Vector2d::Constant(kOverlap);
   add_floor_and_ceiling(b, room.low - overlap, room.high - room.low + 2 * overlap, Material::kPlanks, random);
-  std::vector<WallStretch> stretches;
+  std::vector<WallSegment> segments;
   for (const Face& f : faces_of(room, low, high)) {
     const auto more = add_face(b, f, doors, room.height, texture(Material::kWallpaper, 0.54f, random));
-    stretches.insert(stretches.end(), more.begin(), more.end());
+    segments.insert(segments.end(), more.begin(), more.end());
   }
   std::vector<Vector2d> centres;
   for (const Door& d : doors) centres.push_back(centre_of(d));
-  furnish(b, room, stretches, centres, random);
+  furnish(b, room, segments, centres, random);
 }
 
 }  // namespace
@@ -112,7 +115,10 @@ void add_room(Building& b, const Room& room, const Vector2d& low, const Vector2d
 Building make_corridor(std::uint64_t seed) {
   constexpr double kLength = kPieces * kCorridorPeriod;
   Building b;
-  b.tour = rounded_loop({{kTurnAt, -kLane}, {kLength - kTurnAt, -kLane}, {kLength - kTurnAt, kLane}, {kTurnAt, kLane}},
+  b.tour = rounded_loop({{kTurnDistance, -kLane},
+                         {kLength - kTurnDistance, -kLane},
+                         {kLength - kTurnDistance, kLane},
+                         {kTurnDistance, kLane}},
                         kLane, Building::kTourStep);
   b.rooms.push_back({"corridor", {0, -0.5 * kWidth}, {kLength, 0.5 * kWidth}, kHeight});
   Random random(seed, "corridor");
@@ -127,10 +133,10 @@ Building make_corridor(std::uint64_t seed) {
 }
 
 Building make_twin_rooms(std::uint64_t seed) {
-  constexpr double kBesideMiddle = 0.1;  // metres between the middle of the passage and the path in either direction
+  constexpr double kLaneOffset = 0.1;  // metres between the middle of the passage and the path in either direction
   const std::vector<Vector2d> corners = {
-      {-3.6, -kBesideMiddle}, {3.6, -kBesideMiddle}, {5.2, -1.7}, {6.9, 0},  {5.2, 1.7},
-      {3.6, kBesideMiddle},   {-3.6, kBesideMiddle}, {-5.2, 1.7}, {-6.9, 0}, {-5.2, -1.7}};
+      {-3.6, -kLaneOffset}, {3.6, -kLaneOffset}, {5.2, -1.7}, {6.9, 0},  {5.2, 1.7},
+      {3.6, kLaneOffset},   {-3.6, kLaneOffset}, {-5.2, 1.7}, {-6.9, 0}, {-5.2, -1.7}};
   Building b;
   b.tour = rounded_loop(corners, 1.15, Building::kTourStep);
   constexpr Door kWest{Axis::kY, -kHalfPassage, 0}, kEast{Axis::kY, kHalfPassage, 0};

@@ -21,33 +21,33 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kWorldVersion = 1;  // version of the images; to be incremented whenever the images of a request change
-constexpr int kListsVersion = 2;  // the same for the other files
+constexpr int kListsVersion = 2;  // version of the other files; to be incremented whenever they change
 constexpr double kGroundTruthRate = 200.0;  // Hz
 constexpr const char* kPartial = ".partial";
 constexpr const char* kComplete = ".complete";
 
 Status check(const SimulationRequest& r) {
-  const auto refuse = [](const char* key, double found, const char* expected) {
+  const auto out_of_range = [](const char* key, double found, const char* expected) {
     return Error{"", key, fmt::format("{}", found), expected};
   };
   const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
   if (!(within(r.recording.duration_s, 1e-3, 86400)))
-    return refuse("duration", r.recording.duration_s, "seconds above 0, at most 86400");
+    return out_of_range("duration", r.recording.duration_s, "seconds in (0, 86400]");
   if (!(within(r.recording.rate_hz, 1e-3, 1000)))
-    return refuse("rate", r.recording.rate_hz, "images a second above 0, at most 1000");
+    return out_of_range("rate", r.recording.rate_hz, "images per second in (0, 1000]");
   if (!within(r.recording.exposure_s, 0, 1))
-    return refuse("exposure-ms", 1e3 * r.recording.exposure_s, "milliseconds from 0 to 1000");
+    return out_of_range("exposure-ms", 1e3 * r.recording.exposure_s, "milliseconds in [0, 1000]");
   for (const Fault& f : r.recording.faults) {
     if (f.from_s >= r.recording.duration_s) {
-      return Error{"", "faults", fmt::format("{} from {} s on", fault_name(f.type), f.from_s),
-                   fmt::format("a begin within the {} s of the recording", r.recording.duration_s)};
+      return Error{"", "faults", fmt::format("{} from {} s", fault_name(f.type), f.from_s),
+                   fmt::format("a start time within the {} s of the recording", r.recording.duration_s)};
     }
   }
-  if (!within(r.imaging.noise, 0, 1000)) return refuse("noise", r.imaging.noise, "a factor from 0 to 1000");
+  if (!within(r.imaging.noise, 0, 1000)) return out_of_range("noise", r.imaging.noise, "a factor in [0, 1000]");
   if (!within(r.tour.speed_mps, 0, 5))
-    return refuse("speed", r.tour.speed_mps, "metres a second from 0 to 5, 0 for a walking pace");
+    return out_of_range("speed", r.tour.speed_mps, "metres per second in [0, 5] (0: walking pace)");
   if (!within(r.tour.laps, 0, 1000))
-    return refuse("laps", r.tour.laps, "a number from 0 to 1000, 0 for as many as suit");
+    return out_of_range("laps", r.tour.laps, "a number in [0, 1000] (0: determined by the walking pace)");
   if (r.tour.laps > 0 && r.tour.speed_mps > 0) {
     return Error{"", "speed", fmt::format("{} with {} laps", r.tour.speed_mps, r.tour.laps),
                  "either a speed or a number of laps"};
@@ -62,7 +62,7 @@ Status make_folder(const fs::path& folder) {
   return {};
 }
 
-// The content of the marker file `name` in `folder`; empty if it does not exist.
+// Returns the content of the marker file `name` in `folder`, or an empty string if it does not exist.
 std::string marker(const fs::path& folder, const char* name) {
   const auto text = read_file(folder / name, 1024);
   return text ? text->substr(0, text->find('\n')) : std::string();
@@ -70,7 +70,7 @@ std::string marker(const fs::path& folder, const char* name) {
 
 std::string complete_mark(const std::string& digest) { return fmt::format("{} lists {}", digest, kListsVersion); }
 
-enum class FolderState { kFresh, kSamePartly, kSameComplete };
+enum class FolderState { kFresh, kSameIncomplete, kSameComplete };
 
 // Examines and prepares the folder. With `overwrite`, an earlier simulated recording is removed.
 Result<FolderState> prepare_folder(const SimulationRequest& request, const std::string& digest) {
@@ -82,14 +82,15 @@ Result<FolderState> prepare_folder(const SimulationRequest& request, const std::
   if (const Status s = make_folder(folder); !s) return s.error();
   const std::string complete = marker(folder, kComplete), partial = marker(folder, kPartial);
   if (complete == complete_mark(digest)) return FolderState::kSameComplete;
-  if (complete.starts_with(digest)) return FolderState::kSamePartly;  // the lists have another version
-  const bool ours = !complete.empty() || !partial.empty();
-  if (partial == digest && complete.empty()) return FolderState::kSamePartly;
+  if (complete.starts_with(digest)) return FolderState::kSameIncomplete;  // the lists have another version
+  const bool is_simulation = !complete.empty() || !partial.empty();
+  if (partial == digest && complete.empty()) return FolderState::kSameIncomplete;
   if (!fs::is_empty(folder, code) && !request.overwrite) {
-    return Error{folder.string(), "", ours ? "the recording of another simulation" : "a folder that is not empty",
+    return Error{folder.string(), "",
+                 is_simulation ? "the recording of another simulation" : "a folder that is not empty",
                  "a new or empty folder, or --overwrite"};
   }
-  if (ours) fs::remove_all(folder / "mav0", code);
+  if (is_simulation) fs::remove_all(folder / "mav0", code);
   fs::remove(folder / kComplete, code);
   if (const Status s = write_atomically(folder / kPartial, digest + "\n"); !s) return s.error();
   return FolderState::kFresh;
@@ -99,15 +100,15 @@ fs::path camera_folder(const fs::path& folder, std::size_t camera) {
   return folder / "mav0" / fmt::format("cam{}", camera);
 }
 
-std::string picture_name(const Shot& shot) { return fmt::format("{}.png", shot.stamp_ns); }
+std::string image_name(const Shot& shot) { return fmt::format("{}.png", shot.stamp_ns); }
 
-fs::path picture_file(const fs::path& folder, const Shot& shot) {
-  return camera_folder(folder, shot.camera) / "data" / picture_name(shot);
+fs::path image_file(const fs::path& folder, const Shot& shot) {
+  return camera_folder(folder, shot.camera) / "data" / image_name(shot);
 }
 
-Status write_picture(const fs::path& file, const image::Image& picture) {
-  // OpenCV has no matrix of constant pixels. These are only read.
-  const cv::Mat pixels(picture.height(), picture.width(), CV_8UC1, const_cast<std::uint8_t*>(picture.row(0)));
+Status write_image(const fs::path& file, const image::Image& image) {
+  // OpenCV has no matrix of constant pixels; the pixels are only read.
+  const cv::Mat pixels(image.height(), image.width(), CV_8UC1, const_cast<std::uint8_t*>(image.row(0)));
   std::vector<unsigned char> png;
   constexpr int kFast = 1;
   if (!cv::imencode(".png", pixels, png, {cv::IMWRITE_PNG_COMPRESSION, kFast})) {
@@ -117,8 +118,8 @@ Status write_picture(const fs::path& file, const image::Image& picture) {
 }
 
 // Writes all images that do not exist yet. Returns false if a stop was requested before all were written.
-Result<bool> write_pictures(const SimulationRequest& request, const std::vector<Shot>& shots, const Recorder& recorder,
-                            ThreadPool& pool, const SimulationProgress& progress, const std::stop_token& stop) {
+Result<bool> write_images(const SimulationRequest& request, const std::vector<Shot>& shots, const Recorder& recorder,
+                          ThreadPool& pool, const SimulationProgress& progress, const std::stop_token& stop) {
   std::mutex mutex;
   std::size_t done = 0;
   std::optional<Error> failure;
@@ -127,10 +128,10 @@ Result<bool> write_pictures(const SimulationRequest& request, const std::vector<
       const std::lock_guard lock(mutex);
       if (failure || stop.stop_requested()) return;
     }
-    const fs::path file = picture_file(request.folder, shots[i]);
+    const fs::path file = image_file(request.folder, shots[i]);
     Status status;
     std::error_code code;
-    if (shots[i].written && !fs::exists(file, code)) status = write_picture(file, recorder.picture(shots[i]));
+    if (shots[i].written && !fs::exists(file, code)) status = write_image(file, recorder.render(shots[i]));
     const std::lock_guard lock(mutex);
     ++done;
     if (!status && !failure) failure = status.error();
@@ -143,7 +144,7 @@ Result<bool> write_pictures(const SimulationRequest& request, const std::vector<
 std::string image_list(const std::vector<Shot>& shots, std::size_t camera) {
   std::string text = "#timestamp [ns],filename\n";
   for (const Shot& shot : shots) {
-    if (shot.camera == camera && shot.written) text += fmt::format("{},{}\n", shot.stamp_ns, picture_name(shot));
+    if (shot.camera == camera && shot.written) text += fmt::format("{},{}\n", shot.stamp_ns, image_name(shot));
   }
   return text;
 }
@@ -152,7 +153,7 @@ std::string fault_list(const std::vector<Shot>& shots) {
   std::string text = "#timestamp [ns],camera,filename,fault\n";
   for (const Shot& shot : shots) {
     if (shot.fault)
-      text += fmt::format("{},{},{},{}\n", shot.stamp_ns, shot.camera, picture_name(shot), fault_name(*shot.fault));
+      text += fmt::format("{},{},{},{}\n", shot.stamp_ns, shot.camera, image_name(shot), fault_name(*shot.fault));
   }
   return text;
 }
@@ -244,9 +245,9 @@ Result<SimulationOutcome> write_simulation(const SimulationRequest& request, Thr
     if (const Status s = make_folder(camera_folder(request.folder, c) / "data"); !s) return s.error();
   }
   const std::vector<Shot> shots = plan_shots(request.rig, request.recording);
-  if (*state == FolderState::kFresh) {  // existing images may be of another recording
+  if (*state == FolderState::kFresh) {  // existing images may belong to another recording
     std::error_code code;
-    for (const Shot& shot : shots) fs::remove(picture_file(request.folder, shot), code);
+    for (const Shot& shot : shots) fs::remove(image_file(request.folder, shot), code);
   }
   const Building building = make_building(request.kind, request.seed);
   TourOptions tour = request.tour;
@@ -255,7 +256,7 @@ Result<SimulationOutcome> write_simulation(const SimulationRequest& request, Thr
   if (stop.stop_requested()) return SimulationOutcome::kInterrupted;
   const Recorder recorder(world, request.rig, make_tour(building, tour), request.imaging, request.recording.exposure_s,
                           pool);
-  const auto all = write_pictures(request, shots, recorder, pool, progress, stop);
+  const auto all = write_images(request, shots, recorder, pool, progress, stop);
   if (!all) return all.error();
   if (!*all) return SimulationOutcome::kInterrupted;
   if (const Status s = write_lists(request, shots, recorder); !s) return s.error();

@@ -16,7 +16,7 @@ struct SimulationRequest {
   std::filesystem::path folder;
   camera::Rig rig;
   RecordingOptions recording;
-  TourOptions tour;  // its duration is that of the recording
+  TourOptions tour;  // its duration is replaced by the duration of the recording
   ImagingOptions imaging;
   WorldOptions world;
   WorldKind kind = WorldKind::kBuilding;
@@ -27,7 +27,7 @@ struct SimulationRequest {
 enum class SimulationOutcome {
   kWritten,
   kWasComplete,  // the same recording was already complete
-  kInterrupted,  // a stop was requested; the next call continues from here
+  kInterrupted,  // a stop was requested; the next call continues the recording
 };
 
 // Called after each image with the number of existing images. Calls come from any thread, but one at a time.
@@ -45,7 +45,7 @@ using SimulationProgress = std::function<void(std::size_t done, std::size_t tota
 Result<SimulationOutcome> write_simulation(const SimulationRequest& request, ThreadPool& pool,
                                            const SimulationProgress& progress = {}, std::stop_token stop = {});
 
-// A digest of everything that determines the content of the recording: 16 hexadecimal digits.
+// Returns a digest of everything that determines the content of the recording: 16 hexadecimal digits.
 std::string simulation_digest(const SimulationRequest& request);
 
 }  // namespace bslam::simulator

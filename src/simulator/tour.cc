@@ -20,7 +20,8 @@ using synthetic::Trajectory;
 
 constexpr double kWalkingPace = 1.2;  // metres per second
 constexpr double kFastestPace = 1.5;
-constexpr double kTurnRound_s = 4.0, kHalt_s = 1.0;  // seconds for turning on the spot, and for stopping before
+constexpr double kTurnRound_s = 4.0,
+                 kHalt_s = 1.0;        // seconds for turning on the spot, and for stopping before the turn
 constexpr double kTangentReach = 0.4;  // metres of path on either side that determine the viewing direction
 
 // A closed polyline, parametrised by arc length.
@@ -37,8 +38,8 @@ class Loop {
     arc -= length() * std::floor(arc / length());
     const auto next = std::upper_bound(at_.begin() + 1, at_.end() - 1, arc);
     const std::size_t i = static_cast<std::size_t>(next - at_.begin()) - 1;
-    const double share = (arc - at_[i]) / (at_[i + 1] - at_[i]);
-    return points_[i] + share * (points_[(i + 1) % points_.size()] - points_[i]);
+    const double fraction = (arc - at_[i]) / (at_[i + 1] - at_[i]);
+    return points_[i] + fraction * (points_[(i + 1) % points_.size()] - points_[i]);
   }
   Vector2d tangent(double arc) const {
     return ((*this)(arc + kTangentReach) - (*this)(arc - kTangentReach)).normalized();
@@ -49,7 +50,7 @@ class Loop {
   std::vector<double> at_;  // arc length at each point, and total length
 };
 
-// Duration of walking in one direction, seconds.
+// Returns the duration of walking in one direction, in seconds.
 double walking_s(const TourOptions& o) {
   return o.back ? std::max(0.1, 0.5 * (o.duration_s - kTurnRound_s)) : o.duration_s;
 }
@@ -58,16 +59,16 @@ double laps_of(const TourOptions& o, double length) {
   if (o.laps > 0) return o.laps;
   if (o.speed_mps > 0) return o.speed_mps * walking_s(o) / length;
   const double wanted = kWalkingPace * walking_s(o) / length;
-  const double most = std::floor(kFastestPace * walking_s(o) / length);
-  return most < 1 ? wanted : std::clamp(std::round(wanted), 1.0, most);
+  const double max_laps = std::floor(kFastestPace * walking_s(o) / length);
+  return max_laps < 1 ? wanted : std::clamp(std::round(wanted), 1.0, max_laps);
 }
 
-// Progress of a tour: laps walked, and rotation while turning around.
+// Progress of a tour, including the rotation while turning around.
 struct Progress {
-  double laps = 0, turned = 0;  // turned is in radians
+  double laps = 0, yaw = 0;  // laps walked; rotation in radians
 };
 
-Progress there_and_back(const TourOptions& o, double laps, double time_s) {
+Progress out_and_back(const TourOptions& o, double laps, double time_s) {
   const double walk = walking_s(o);
   const double turning = std::clamp((time_s - walk) / kTurnRound_s, 0.0, 1.0);
   // The speed falls to zero within kHalt_s and rises in the same way.
@@ -80,15 +81,15 @@ Progress there_and_back(const TourOptions& o, double laps, double time_s) {
 }  // namespace
 
 Trajectory make_tour(const simulator::Building& building, const TourOptions& options) {
-  BSLAM_ASSERT(options.duration_s > 0, "a tour takes time");
+  BSLAM_ASSERT(options.duration_s > 0, "duration must be positive");
   const Loop loop(building.tour);
   const double laps = laps_of(options, loop.length());
   Random base_random(options.seed, "sway");
   const Sway base(base_random);
-  std::vector<Sway> own;
+  std::vector<Sway> lap_sway;
   for (int lap = -1; lap <= static_cast<int>(laps) + 1; ++lap) {
     Random random(options.seed, "sway of lap", static_cast<std::uint64_t>(lap + 1));
-    own.emplace_back(random);
+    lap_sway.emplace_back(random);
   }
   const auto pieces = static_cast<std::size_t>(std::max(1.0, std::round(options.duration_s / kKnotSpacing)));
   const double spacing = options.duration_s / static_cast<double>(pieces);
@@ -96,17 +97,17 @@ Trajectory make_tour(const simulator::Building& building, const TourOptions& opt
   double last_yaw = 0;
   for (std::size_t i = 0; i < pieces + 3; ++i) {
     const double step = static_cast<double>(i) - 1;
-    const Progress progress = options.back ? there_and_back(options, laps, spacing * step)
+    const Progress progress = options.back ? out_and_back(options, laps, spacing * step)
                                            : Progress{laps * step / static_cast<double>(pieces), 0};
     const double lap = std::floor(progress.laps), phase = progress.laps - lap;
-    const Offsets o = offsets_at(base, own[static_cast<std::size_t>(lap + 1)], phase);
-    // The speed varies by a tenth, equally in every lap.
+    const Offsets o = offsets_at(base, lap_sway[static_cast<std::size_t>(lap + 1)], phase);
+    // The speed varies by 10 %, equally in every lap.
     const double arc = loop.length() * (phase + 0.1 / (6 * pi) * std::sin(6 * pi * phase));
-    const Vector2d tangent = loop.tangent(arc), place = loop(arc) + o.aside * Vector2d(-tangent.y(), tangent.x());
+    const Vector2d tangent = loop.tangent(arc), place = loop(arc) + o.lateral * Vector2d(-tangent.y(), tangent.x());
     double yaw = std::atan2(tangent.y(), tangent.x());
     yaw += 2 * pi * std::round((last_yaw - yaw) / (2 * pi));
     last_yaw = yaw;
-    control.push_back({{place.x(), place.y(), 1.5 + o.up}, yaw + progress.turned + o.yaw, o.pitch, o.roll});
+    control.push_back({{place.x(), place.y(), 1.5 + o.up}, yaw + progress.yaw + o.yaw, o.pitch, o.roll});
   }
   return Trajectory(std::move(control), spacing);
 }

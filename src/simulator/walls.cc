@@ -31,7 +31,7 @@ std::array<Face, 4> faces_of(const Room& r, const Vector2d& low, const Vector2d&
           face({r.low.x(), r.high.y()}, {0, -1}, Axis::kY, low.x(), r.low.x())};
 }
 
-std::vector<WallStretch> add_face(Building& b, const Face& f, std::span<const Door> doors, double height,
+std::vector<WallSegment> add_face(Building& b, const Face& f, std::span<const Door> doors, double height,
                                   const Texture& texture) {
   std::vector<double> openings;  // distances along the face
   for (const Door& d : doors) {
@@ -39,11 +39,11 @@ std::vector<WallStretch> add_face(Building& b, const Face& f, std::span<const Do
     if (d.along == f.along && d.wall == f.wall && at > 0 && at < f.length) openings.push_back(at);
   }
   std::sort(openings.begin(), openings.end());
-  std::vector<WallStretch> stretches;
+  std::vector<WallSegment> segments;
   double from = 0;
   const auto close = [&](double to, double left_overlap, double right_overlap) {
     add_wall_piece(b, f, from - left_overlap, to + right_overlap, -kOverlap, height + kOverlap, texture);
-    stretches.push_back({f.start + from * f.direction, f.direction, to - from, f.outer});
+    segments.push_back({f.start + from * f.direction, f.direction, to - from, f.outer});
   };
   for (const double at : openings) {
     close(at - 0.5 * kDoorWidth, from == 0 ? kOverlap : 0, 0);
@@ -51,7 +51,7 @@ std::vector<WallStretch> add_face(Building& b, const Face& f, std::span<const Do
     add_wall_piece(b, f, at - 0.5 * kDoorWidth, from, kDoorHeight, height + kOverlap, texture);
   }
   close(f.length, from == 0 ? kOverlap : 0, kOverlap);
-  return stretches;
+  return segments;
 }
 
 void add_door(Building& b, const Door& d, Random& random) {
@@ -68,10 +68,10 @@ void add_door(Building& b, const Door& d, Random& random) {
     const Vector2d post = c + side * (half + 0.5 * kCasing) * along;
     const double yaw = std::atan2(along.y(), along.x());
     for (const double face : {-1.0, 1.0}) {
-      const Vector2d beside = face * (kHalfWall + 0.01) * across;
-      add_box(b.surfaces, {at_height(post + beside, 0), {kCasing, 0.02, kDoorHeight + kCasing}, yaw}, jamb, jamb);
+      const Vector2d offset = face * (kHalfWall + 0.01) * across;
+      add_box(b.surfaces, {at_height(post + offset, 0), {kCasing, 0.02, kDoorHeight + kCasing}, yaw}, jamb, jamb);
       if (side > 0)
-        add_box(b.surfaces, {at_height(c + beside, kDoorHeight), {kDoorWidth, 0.02, kCasing}, yaw}, wood, wood);
+        add_box(b.surfaces, {at_height(c + offset, kDoorHeight), {kDoorWidth, 0.02, kCasing}, yaw}, wood, wood);
     }
   }
   const Vector3d corner = at_height(c - half * along - depth * across, kDoorHeight);

@@ -1,4 +1,4 @@
-// Walls with openings for doors, door frames, and tours with rounded corners, which all built-in worlds use.
+// Walls with openings for doors, door frames, and tours with rounded corners; used by all built-in worlds.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ constexpr double kDoorHeight = 2.30, kDoorWidth = 1.30;
 constexpr double kCasing = 0.09;   // width of the frame around a door
 constexpr double kOverlap = 0.02;  // metres by which adjacent rectangles overlap, so that no ray passes between them
 
-enum class Axis { kX, kY };  // the axis parallel to the wall of an opening
+enum class Axis { kX, kY };  // the axis parallel to the wall that contains an opening
 
 struct Door {
   Axis along;
@@ -36,18 +36,18 @@ struct Face {
 Vector2d centre_of(const Door& door);
 inline Vector3d at_height(const Vector2d& p, double z) { return {p.x(), p.y(), z}; }
 
-// South, east, north and west face of a room. The centre lines of its walls are at `low` and `high`.
+// Returns the south, east, north and west face of a room. The centre lines of its walls are at `low` and `high`.
 std::array<Face, 4> faces_of(const Room& room, const Vector2d& low, const Vector2d& high);
 
-// Adds a face with openings for those of `doors` that are in it. Returns the sections of wall between them.
-std::vector<WallStretch> add_face(Building& building, const Face& face, std::span<const Door> doors, double height,
+// Adds a face with openings for the elements of `doors` that are in it. Returns the sections of wall between them.
+std::vector<WallSegment> add_face(Building& building, const Face& face, std::span<const Door> doors, double height,
                                   const Texture& texture);
 
-// Jambs, lintel, threshold and the casing on both sides.
+// Adds jambs, lintel, threshold and the casing on both sides.
 void add_door(Building& building, const Door& door, Random& random);
 
-// A closed polygon with corners rounded by arcs of `radius`, as points with a distance of about `step`. It starts in
-// the middle of the first edge.
+// Returns a closed polygon with corners rounded by arcs of `radius`, as points with a spacing of about `step`. It
+// starts in the middle of the first edge.
 std::vector<Vector2d> rounded_loop(const std::vector<Vector2d>& corners, double radius, double step);
 
 }  // namespace bslam::simulator

@@ -17,13 +17,13 @@ constexpr float kAmbient = 0.42f;      // ambient light before occlusion by near
 constexpr double kAmbientReach = 1.2;  // metres within which surfaces occlude ambient light
 constexpr double kLampRadius = 0.14;   // metres; determines the softness of shadows
 constexpr double kOffSurface = 0.006;  // metres between a surface and the origin of rays that start on it
-constexpr double kLeastLight = 0.012;  // irradiance by a lamp below which its shadow is not computed
+constexpr double kMinLight = 0.012;    // minimum irradiance by a lamp for which its shadow is computed
 const Vector3d kLampPoints[] = {{1, 0.2, 0}, {-0.3, 0.9, 0.1}, {-0.9, -0.4, -0.1}, {0.2, -0.9, 0}, {0, 0, -0.2}};
 constexpr float kLampLight = 2.2f, kDaylight = 0.75f;
 
 Vector3d unit_normal(const Surface& s) { return s.u.cross(s.v).normalized(); }
 
-// Level of the texture pyramid for a footprint of `texels` finest texels: floor(log2).
+// Returns the level of the texture pyramid for a footprint of `texels` finest texels: floor(log2).
 int level_of(float texels, int levels) {
   const int exponent = static_cast<int>(std::bit_cast<std::uint32_t>(texels) >> 23) - 127;
   return std::clamp(exponent, 0, levels - 1);
@@ -47,8 +47,8 @@ struct TexelGrid {
   std::int32_t width, height;
 };
 
-// The next level of a texture pyramid. Texels hold square roots of albedo: each of `out` is the root of the mean square
-// of the four of `in` it covers, where the last row and column of `in` repeat.
+// The next level of a texture pyramid. Texels hold square roots of albedo: each texel of `out` is the root of the mean
+// square of the four texels of `in` that it covers; the last row and column of `in` are repeated.
 void halve(const std::uint8_t* in, const TexelGrid& fine, std::uint8_t* out, const TexelGrid& coarse) {
   const auto square = [&](std::int32_t x, std::int32_t y) {
     const std::int32_t v = in[std::min(y, fine.height - 1) * fine.width + std::min(x, fine.width - 1)];
@@ -69,7 +69,7 @@ void halve(const std::uint8_t* in, const TexelGrid& fine, std::uint8_t* out, con
 // surface.
 struct World::Scene {
   explicit Scene(const std::vector<Surface>& surfaces) : device(rtcNewDevice("threads=1,set_affinity=0")) {
-    BSLAM_ASSERT(device != nullptr, "Embree gives a device");
+    BSLAM_ASSERT(device != nullptr, "Embree must provide a device");
     scene = rtcNewScene(device);
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
@@ -239,7 +239,7 @@ float World::light_at(const Vector3d& point, const Vector3d& n, int ambient_rays
     const Vector3d to = lamp.position - start;
     const double distance2 = to.squaredNorm(), facing = to.dot(n) / std::sqrt(distance2);
     const double unshadowed = lamp.intensity * facing / (distance2 + 0.35);
-    if (unshadowed < kLeastLight) continue;
+    if (unshadowed < kMinLight) continue;
     int open = 0;
     for (const Vector3d& offset : kLampPoints) open += blocked(start, lamp.position + kLampRadius * offset) ? 0 : 1;
     light += unshadowed * open / static_cast<double>(std::size(kLampPoints));

@@ -43,14 +43,15 @@ class World {
 
   const Building& building() const { return building_; }
 
-  // The first intersection of a ray, or nothing if it leaves the world. `direction` is a unit vector.
+  // Returns the first intersection of a ray, or nullopt if it leaves the world. `direction` is a unit vector.
   std::optional<Hit> cast(const Vector3d& origin, const Vector3d& direction) const;
 
-  // Radiance of a surface at a point, averaged over `footprint` metres. 0.15 is about medium grey.
+  // Returns the radiance of a surface at a point, averaged over `footprint` metres. 0.15 is about medium grey.
   float radiance(const Hit& hit, double footprint) const;
 
-  // The radiance at the end of eight rays, averaged over `spread` radians around each. `detail` in [0, 1) selects one
-  // of two texture levels; averaging over uniformly distributed values blends them. May be called from several threads.
+  // Computes the radiance at the end of eight rays, averaged over `spread` radians around each. `detail` in [0, 1)
+  // selects one of two texture levels; averaging over uniformly distributed values blends them. May be called from
+  // several threads.
   void radiance(const Eigen::Vector3f& origin, const RayPacket& rays, float spread, float detail, float* out) const;
 
  private:
@@ -62,14 +63,14 @@ class World {
     Eigen::Vector3f normal;
     std::int32_t width, height;  // texels of the finest level
     float texels_per_m;
-    bool hidden;  // not visible from the tour: has neither details nor shadows
+    bool hidden;  // not visible from the tour, therefore without details and shadows
     std::int32_t levels;
     std::uint32_t texel[kLevels];            // first texel of each level
     std::int32_t light_width, light_height;  // numbers of samples, including those on the edges
     std::uint32_t light;                     // first sample
   };
 
-  // Texel size of a surface in metres, or nothing if its visible side faces away from the whole tour.
+  // Returns the texel size of a surface in metres, or nullopt if its visible side faces away from the whole tour.
   std::optional<double> texel_of(const Surface& surface, double finest) const;
   void lay_out(const WorldOptions& options);
   void bake_albedo(ThreadPool& pool, const std::stop_token& stop);

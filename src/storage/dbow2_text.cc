@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kBytes = sizeof(feature::Descriptor);
 
-// A node as given by its line. Node 0 is the root, which has no line.
+// A node as described by its line. Node 0 is the root, which has no line.
 struct TextNode {
   std::int32_t parent = -1;
   std::int32_t level = 0;
@@ -53,7 +53,7 @@ class Words {  // the words of a line, separated by blanks
   std::string_view rest_;
 };
 
-// The complete word as a number within limits.
+// Parses the complete word as a number within limits.
 template <class T>
 std::optional<T> number(std::string_view word, T low, T high) {
   T value{};
@@ -82,7 +82,7 @@ Result<Shape> parse_shape(std::string_view line) {
   const auto levels = number<std::int32_t>(words.next(), 1, place::kMaxLevels);
   const auto scoring = number<std::int32_t>(words.next(), 0, 5), weighting = number<std::int32_t>(words.next(), 0, 3);
   if (!branching || !levels || !scoring || !weighting || words.count() > 0) {
-    return at_line(1, "another first line",
+    return at_line(1, "an invalid first line",
                    "branching (2 to " + std::to_string(place::kMaxBranching) + "), levels (1 to " +
                        std::to_string(place::kMaxLevels) + "), scoring (0 to 5), weighting (0 to 3)");
   }
@@ -98,23 +98,22 @@ Result<TextNode> parse_node(std::string_view text, std::size_t line, const Shape
   }
   TextNode node;
   const auto parent = number<std::int32_t>(words.next(), 0, static_cast<std::int32_t>(nodes.size()) - 1);
-  if (!parent)
-    return at_line(line, "another parent", "a node that stands before: 0 to " + std::to_string(nodes.size() - 1));
+  if (!parent) return at_line(line, "an invalid parent", "an earlier node: 0 to " + std::to_string(nodes.size() - 1));
   const TextNode& above = nodes[static_cast<std::size_t>(*parent)];
   if (above.is_leaf) return at_line(line, "a parent that is a leaf", "an inner node");
   if (above.children == shape.branching)
-    return at_line(line, "a parent with more children", "at most " + std::to_string(shape.branching));
+    return at_line(line, "too many children of one parent", "at most " + std::to_string(shape.branching));
   if (above.level == shape.levels)
-    return at_line(line, "a node on a deeper level", "at most " + std::to_string(shape.levels));
+    return at_line(line, "a node on a too deep level", "at most " + std::to_string(shape.levels));
   const auto is_leaf = number<int>(words.next(), 0, 1);
-  if (!is_leaf) return at_line(line, "another is_leaf", "0 or 1");
+  if (!is_leaf) return at_line(line, "an invalid is_leaf", "0 or 1");
   for (std::size_t i = 0; i < kBytes; ++i) {
     const auto byte = number<int>(words.next(), 0, 255);
-    if (!byte) return at_line(line, "another descriptor", "32 numbers from 0 to 255");
+    if (!byte) return at_line(line, "an invalid descriptor", "32 numbers from 0 to 255");
     node.descriptor[i / 8] |= static_cast<std::uint64_t>(*byte) << (8 * (i % 8));
   }
   const auto weight = number<double>(words.next(), 0.0, std::numeric_limits<float>::max());
-  if (!weight) return at_line(line, "another weight", "a number, 0 or more");
+  if (!weight) return at_line(line, "an invalid weight", "a non-negative number");
   node.parent = *parent;
   node.level = above.level + 1;
   node.is_leaf = *is_leaf == 1;
@@ -122,7 +121,7 @@ Result<TextNode> parse_node(std::string_view text, std::size_t line, const Shape
   return node;
 }
 
-// Breadth-first order, with the children of a node in the order of their lines.
+// Returns the nodes in breadth-first order, with the children of a node in the order of their lines.
 place::VocabularyContent arrange(const std::vector<TextNode>& nodes, const Shape& shape) {
   std::vector<std::size_t> first(nodes.size() + 1, 0);  // index in `children` of the first child of a node
   for (std::size_t i = 0; i < nodes.size(); ++i) first[i + 1] = first[i] + static_cast<std::size_t>(nodes[i].children);
@@ -162,7 +161,7 @@ Result<place::VocabularyPtr> parse_dbow2_text(std::string_view text) {
   while (!text.empty()) {
     ++line;
     if (nodes.size() == place::kMaxNodes)
-      return at_line(line, "another node", "at most " + std::to_string(place::kMaxNodes));
+      return at_line(line, "too many nodes", "at most " + std::to_string(place::kMaxNodes));
     const auto node = parse_node(take_line(text), line, *shape, nodes);
     if (!node) return node.error();
     ++nodes[static_cast<std::size_t>(node->parent)].children;

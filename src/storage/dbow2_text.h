@@ -8,7 +8,7 @@
 
 namespace bslam::storage {
 
-// Whether the first line consists of four integers.
+// Returns true if the first line consists of four integers.
 bool is_dbow2_text(std::string_view text);
 
 // Errors name the line; Error.file is left empty.

@@ -7,7 +7,7 @@
 namespace bslam::storage {
 
 void ByteWriter::count(std::size_t n) {
-  BSLAM_ASSERT(n <= std::numeric_limits<std::uint32_t>::max(), "counts in a map file have 32 bits");
+  BSLAM_ASSERT(n <= std::numeric_limits<std::uint32_t>::max(), "counts in a map file must fit into 32 bits");
   number(static_cast<std::uint32_t>(n));
 }
 
@@ -19,8 +19,8 @@ void ByteWriter::text(std::string_view text) {
 std::size_t ByteReader::count(std::size_t bytes_each) {
   const std::size_t n = number<std::uint32_t>();
   if (ok() && n > rest_.size() / bytes_each) {
-    fail(std::to_string(n) + " things in " + std::to_string(rest_.size()) + " bytes",
-         "as many as the section can hold");
+    fail(std::to_string(n) + " elements in " + std::to_string(rest_.size()) + " bytes",
+         "a count that fits into the section");
   }
   return ok() ? n : 0;
 }
@@ -33,7 +33,7 @@ std::string ByteReader::text() {
 }
 
 bool ByteReader::finish() {
-  return require(rest_.empty(), std::to_string(rest_.size()) + " bytes too many", "the end of the section");
+  return require(rest_.empty(), std::to_string(rest_.size()) + " excess bytes", "the end of the section");
 }
 
 void ByteReader::fail(std::string_view found, std::string_view expected) {

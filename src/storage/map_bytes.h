@@ -42,7 +42,7 @@ class ByteWriter {
   void number(T value) {
     numbers(&value, 1);
   }
-  // The 32-bit number of elements or bytes that follow.
+  // Writes the 32-bit number of elements or bytes that follow.
   void count(std::size_t n);
   void text(std::string_view text);
 
@@ -53,7 +53,7 @@ class ByteWriter {
   std::string bytes_;
 };
 
-// Reads one section of a file. The first error is kept and ends the reading: all further values are 0 or empty. The
+// Reads one section of a file. After the first error, which is kept, all further values are 0 or empty. The
 // Error names the element that was being read, as declared by enter and leave.
 class ByteReader {
  public:
@@ -86,17 +86,17 @@ class ByteReader {
     numbers(&value, 1);
     return value;
   }
-  // The number of elements that follow, each of at least `bytes_each` bytes. It is an error if the remaining bytes
-  // cannot contain that many, so that memory can be reserved for the returned number.
+  // Reads the number of elements that follow, each of at least `bytes_each` bytes. It is an error if the remaining
+  // bytes cannot contain that many, so that memory can be reserved for the returned number.
   std::size_t count(std::size_t bytes_each);
   std::string text();
 
-  // It is an error if `holds` is false. Returns ok().
+  // Sets an error if `holds` is false. Returns ok().
   bool require(bool holds, std::string_view found, std::string_view expected) {
     if (!holds) fail(found, expected);
     return ok();
   }
-  // It is an error if there are remaining bytes. Returns ok().
+  // Sets an error if there are remaining bytes. Returns ok().
   bool finish();
 
  private:

@@ -15,7 +15,7 @@ using camera::Camera;
 using map::BundledKeyframe;
 using map::BundledMap;
 
-// The name of a camera model in COLMAP; empty if COLMAP does not have it.
+// Returns the name of a camera model in COLMAP, or an empty string if COLMAP does not support it.
 std::string_view colmap_name(const camera::CameraModel& model) {
   if (std::holds_alternative<camera::Pinhole>(model)) return "PINHOLE";
   if (std::holds_alternative<camera::KannalaBrandt>(model)) return "OPENCV_FISHEYE";
@@ -23,7 +23,7 @@ std::string_view colmap_name(const camera::CameraModel& model) {
   return camera::distortion(model).size() == 4 ? "OPENCV" : "FULL_OPENCV";
 }
 
-// Model, size and parameters in the format of cameras.txt.
+// Returns model, size and parameters in the format of cameras.txt.
 std::string colmap_camera(const Camera& camera) {
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   const std::vector<double> d = camera::distortion(camera.model);
@@ -38,7 +38,7 @@ std::string colmap_camera(const Camera& camera) {
 
 // Image ids of the COLMAP model.
 struct Images {
-  // Ids from 1 for every keyframe slot and camera; 0 if there is no image.
+  // Ids from 1 for every keyframe id and camera; 0 if there is no image.
   explicit Images(const BundledMap& map) : cameras(map.rig().size()), id(map.keyframe_slots() * cameras, 0) {
     std::size_t next = 1;
     for (const KeyframeId k : map.keyframe_ids()) {

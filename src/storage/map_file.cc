@@ -47,16 +47,17 @@ std::string header_of(const std::array<std::string, kTags.size()>& sections) {
   return header + std::move(seal).take();
 }
 
-Error damaged(std::string_view part, std::string found, std::string expected) {
-  return {"", std::string(part), std::move(found), std::move(expected)};
+Error damaged(std::string_view section, std::string found, std::string expected) {
+  return {"", std::string(section), std::move(found), std::move(expected)};
 }
 
-// The sections of a complete file, after their checksums have been verified. Error.file is left empty.
+// Returns the sections of a complete file after verifying their checksums. Error.file is left empty.
 Result<Sections> take_apart(std::string_view bytes) {
-  if (!bytes.starts_with(kMagic)) return damaged("", "no saved map", fmt::format("a file that begins with {}", kMagic));
-  if (bytes.size() < kHeaderBytes) return damaged("header", fmt::format("{} bytes", bytes.size()), "a whole header");
+  if (!bytes.starts_with(kMagic))
+    return damaged("", "a file of another format", fmt::format("a saved map, which begins with {}", kMagic));
+  if (bytes.size() < kHeaderBytes) return damaged("header", fmt::format("{} bytes", bytes.size()), "a complete header");
   ByteReader in(bytes.substr(kMagic.size(), kHeaderBytes - kMagic.size()), "header");
-  if (in.number<std::uint32_t>() != kOrderMark) return damaged("header", "another order of bytes", "little endian");
+  if (in.number<std::uint32_t>() != kOrderMark) return damaged("header", "another byte order", "little endian");
   const auto version = in.number<std::uint32_t>();
   if (version != kVersion) return damaged("format version", std::to_string(version), std::to_string(kVersion));
   const auto count = in.number<std::uint32_t>();
@@ -81,13 +82,14 @@ Result<Sections> take_apart(std::string_view bytes) {
   for (std::size_t i = 0; i < kTags.size(); ++i) {
     const Entry& e = table[i];
     if (std::string_view(e.tag.data(), e.tag.size()) != kTags[i])
-      return damaged("header", "unknown sections", "those of this version");
-    if (e.size > rest.size()) return damaged(kNames[i], "a section beyond the end", "one within the file");
+      return damaged("header", "unknown sections", "the sections of this format version");
+    if (e.size > rest.size())
+      return damaged(kNames[i], "a section beyond the end of the file", "a section within the file");
     sections[i] = rest.substr(0, e.size);
     rest.remove_prefix(e.size);
     if (checksum(sections[i]) != e.checksum) return damaged(kNames[i], "a wrong checksum", "an undamaged file");
   }
-  if (!rest.empty()) return damaged("size", "bytes after the last section", "none");
+  if (!rest.empty()) return damaged("size", "bytes after the last section", "the end of the file");
   return sections;
 }
 
@@ -105,12 +107,11 @@ Result<SavedMap> build(const Sections& sections, std::string file) {
   if (!keyframes_in.ok()) return keyframes_in.error();
   take_landmarks(landmarks_in, saved.map);
   if (!landmarks_in.ok()) return landmarks_in.error();
-  if (auto broken = saved.map.check_invariants())
-    return damaged("", *std::move(broken), "a map without contradictions");
+  if (auto broken = saved.map.check_invariants()) return damaged("", *std::move(broken), "a consistent map");
   return saved;
 }
 
-// Comparison of rigs.
+// Functions for comparing rigs.
 
 bool near(double a, double b) { return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a)); }
 
@@ -124,27 +125,30 @@ std::vector<double> transform_numbers(const geometry::SE3& T) {
 }
 
 Status compare_camera(const SavedMap& saved, const camera::Rig& rig, std::size_t i) {
-  const camera::Camera &ours = saved.map.rig().camera(i), &other = rig.camera(i);
+  const camera::Camera &saved_camera = saved.map.rig().camera(i), &camera = rig.camera(i);
   const auto error = [&](std::string_view field, std::string found, std::string expected) {
-    return Error{saved.file, fmt::format("camera {} ({}): {}", i, ours.name, field), std::move(found),
-                 std::move(expected) + " as the rig of the run has"};
+    return Error{saved.file, fmt::format("camera {} ({}): {}", i, saved_camera.name, field), std::move(found),
+                 std::move(expected) + " (this rig)"};
   };
   const auto compare = [&](std::string_view field, const std::vector<double>& a,
                            const std::vector<double>& b) -> Status {
     if (a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), near)) return {};
     return error(field, numbers_text(a), numbers_text(b));
   };
-  const auto model = camera::model_name(ours.model), other_model = camera::model_name(other.model);
-  if (model != other_model) return error("model", std::string(model), std::string(other_model));
-  if (ours.width != other.width || ours.height != other.height) {
-    return error("resolution", fmt::format("{}x{}", ours.width, ours.height),
-                 fmt::format("{}x{}", other.width, other.height));
+  const auto model = camera::model_name(saved_camera.model), camera_model = camera::model_name(camera.model);
+  if (model != camera_model) return error("model", std::string(model), std::string(camera_model));
+  if (saved_camera.width != camera.width || saved_camera.height != camera.height) {
+    return error("resolution", fmt::format("{}x{}", saved_camera.width, saved_camera.height),
+                 fmt::format("{}x{}", camera.width, camera.height));
   }
   const auto list = [](const camera::Intrinsics& k) { return std::vector<double>{k.fx, k.fy, k.cx, k.cy}; };
-  if (Status s = compare("intrinsics", list(camera::intrinsics(ours.model)), list(camera::intrinsics(other.model))); !s)
+  if (Status s =
+          compare("intrinsics", list(camera::intrinsics(saved_camera.model)), list(camera::intrinsics(camera.model)));
+      !s)
     return s;
-  if (Status s = compare("distortion", camera::distortion(ours.model), camera::distortion(other.model)); !s) return s;
-  return compare("place in the rig", transform_numbers(saved.map.rig().cam_from_rig(i)),
+  if (Status s = compare("distortion", camera::distortion(saved_camera.model), camera::distortion(camera.model)); !s)
+    return s;
+  return compare("extrinsics", transform_numbers(saved.map.rig().cam_from_rig(i)),
                  transform_numbers(rig.cam_from_rig(i)));
 }
 
@@ -209,21 +213,22 @@ Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::Pyrami
             const place::Vocabulary* vocabulary) {
   if (saved.map.rig().size() != rig.size()) {
     return Error{saved.file, "rig", fmt::format("{} cameras", saved.map.rig().size()),
-                 fmt::format("{} as the rig of the run has", rig.size())};
+                 fmt::format("{} (cameras of this rig)", rig.size())};
   }
   for (std::size_t i = 0; i < rig.size(); ++i) {
     if (Status status = compare_camera(saved, rig, i); !status) return status;
   }
-  const feature::PyramidShape& own = saved.map.pyramid();
-  if (own.levels != pyramid.levels || own.scale_factor != pyramid.scale_factor) {
-    return Error{saved.file, "pyramid", fmt::format("{} levels, factor {}", own.levels, own.scale_factor),
-                 fmt::format("{} levels, factor {} as features.levels and features.scale_factor say", pyramid.levels,
+  const feature::PyramidShape& saved_pyramid = saved.map.pyramid();
+  if (saved_pyramid.levels != pyramid.levels || saved_pyramid.scale_factor != pyramid.scale_factor) {
+    return Error{saved.file, "pyramid",
+                 fmt::format("{} levels, factor {}", saved_pyramid.levels, saved_pyramid.scale_factor),
+                 fmt::format("{} levels, factor {} (features.levels, features.scale_factor)", pyramid.levels,
                              pyramid.scale_factor)};
   }
   if (vocabulary == nullptr || saved.info.vocabulary == 0) return {};
   if (saved.info.vocabulary != vocabulary->id() || saved.words_end > vocabulary->size()) {
     return Error{saved.file, "vocabulary", fmt::format("{:016x}", saved.info.vocabulary),
-                 fmt::format("{:016x} as the run uses", vocabulary->id())};
+                 fmt::format("{:016x} (vocabulary of this run)", vocabulary->id())};
   }
   return {};
 }

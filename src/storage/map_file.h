@@ -27,7 +27,7 @@ struct SavedMap {
   std::size_t words_end = 0;  // one more than the highest word id of its keyframes
 };
 
-// Writes the keyframes and landmarks that are not removed, with consecutive ids in the same order. Words are left out
+// Writes the keyframes and landmarks that are not removed, with consecutive ids in the same order. Words are omitted
 // if there is no vocabulary. The file is written completely or not at all.
 Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std::filesystem::path& file);
 
@@ -43,12 +43,12 @@ Result<SavedMap> read_map(const std::filesystem::path& file);
 Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary);
 
-// The map of a file, for a run that continues it: checked by fits(), and with at least one keyframe.
+// Reads the map that a run continues. Errors: as for read_map and fits; the map has no keyframes.
 Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
                                  const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
 
-// Conversion to and from the content of a file. `file` is the name used in errors. The content is not trusted: counts
-// are checked against the number of remaining bytes before memory is reserved.
+// Convert a map to and from the content of a file. `file` is the name used in errors. The content may be damaged or
+// malicious: counts are checked against the number of remaining bytes before memory is reserved.
 std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info);
 Result<SavedMap> map_from_bytes(std::string_view bytes, std::string file);
 

@@ -79,16 +79,17 @@ bool check_keypoints(ByteReader& in, const Keypoints& k, const camera::Camera& c
   }
   return in.require(pixels, "a keypoint far outside of the image", "pixels of the camera") &&
          in.require(on_levels, "a keypoint on a level that does not exist", "levels of the pyramid") &&
-         in.require(numbers, "an angle or standard deviation that cannot be", "finite numbers, deviations above 0") &&
-         in.require(unit, "a bearing that is no unit vector", "unit vectors");
+         in.require(numbers, "an invalid angle or standard deviation",
+                    "finite numbers and positive standard deviations") &&
+         in.require(unit, "a bearing that is not a unit vector", "unit vectors");
 }
 
 void take_words(ByteReader& in, frame::CameraFrame& camera, bool with_words, std::size_t& words_end) {
   const auto has_words = in.number<std::uint8_t>();
-  if (!in.require(has_words <= 1, "neither 0 nor 1", "whether words follow")) return;
-  if (has_words == 0 || !in.require(with_words, "words", "none, as the map names no vocabulary")) return;
+  if (!in.require(has_words <= 1, "an invalid flag", "0 or 1 (words follow)")) return;
+  if (has_words == 0 || !in.require(with_words, "words", "none, since the map has no vocabulary")) return;
   const std::size_t n = camera.keypoints.size();
-  if (!in.require(n <= in.remaining() / sizeof(std::int32_t), "the end of the section", "a word for each keypoint"))
+  if (!in.require(n <= in.remaining() / sizeof(std::int32_t), "the end of the section", "one word per keypoint"))
     return;
   camera.words.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -102,11 +103,12 @@ void take_words(ByteReader& in, frame::CameraFrame& camera, bool with_words, std
 void take_camera(ByteReader& in, const camera::Camera& calibration, int levels, bool with_words, std::size_t& words_end,
                  frame::CameraFrame& camera) {
   const auto state = in.number<std::uint8_t>();
-  if (!in.require(state <= static_cast<int>(image::ImageState::kDamaged), "an unknown state", "that of an image"))
+  if (!in.require(state <= static_cast<int>(image::ImageState::kDamaged), "an unknown image state",
+                  "present, missing or damaged"))
     return;
   camera.state = static_cast<image::ImageState>(state);
   camera.time_ns = in.number<TimeNs>();
-  if (!in.require(std::abs(camera.time_ns / 2) < kMaxTime / 2, "a time beyond all times", "nanoseconds")) return;
+  if (!in.require(std::abs(camera.time_ns / 2) < kMaxTime / 2, "a time out of range", "nanoseconds")) return;
   camera.keypoints = take_keypoints(in);
   if (!in.ok() || !check_keypoints(in, camera.keypoints, calibration, levels)) return;
   take_words(in, camera, with_words, words_end);
@@ -137,17 +139,18 @@ std::vector<KeypointRef> take_group(ByteReader& in, const frame::BundledFrame& f
                                     std::vector<std::vector<std::uint8_t>>& taken) {
   const std::size_t size = in.number<std::uint8_t>();
   std::vector<KeypointRef> group;
-  if (!in.require(size >= 2 && size <= frame.cameras.size(), "a matched feature of too few or too many keypoints",
-                  "two or more, at most one for each camera")) {
+  if (!in.require(size >= 2 && size <= frame.cameras.size(), "a matched feature with too few or too many keypoints",
+                  "two or more keypoints, at most one per camera")) {
     return group;
   }
   for (std::size_t i = 0; i < size; ++i) {
     const std::size_t c = in.number<std::uint16_t>(), k = in.number<std::uint32_t>();
     if (!in.require(c < frame.cameras.size() && k < frame.cameras[c].keypoints.size(), "a keypoint that does not exist",
-                    "one of the frame") ||
-        !in.require(group.empty() || group.back().camera.index() < c, "cameras out of order or twice",
-                    "one keypoint a camera") ||
-        !in.require(!std::exchange(taken[c][k], std::uint8_t{1}), "a keypoint of two features", "one feature each")) {
+                    "a keypoint of the frame") ||
+        !in.require(group.empty() || group.back().camera.index() < c, "cameras out of order or repeated",
+                    "one keypoint per camera") ||
+        !in.require(!std::exchange(taken[c][k], std::uint8_t{1}), "a keypoint of two features",
+                    "one feature per keypoint")) {
       break;
     }
     group.push_back({CameraIndex(c), KeypointIndex(k)});
@@ -157,11 +160,11 @@ std::vector<KeypointRef> take_group(ByteReader& in, const frame::BundledFrame& f
 
 std::optional<frame::BundledPoint> take_point(ByteReader& in) {
   const auto has_point = in.number<std::uint8_t>();
-  if (!in.require(has_point <= 1, "neither 0 nor 1", "whether a point follows") || has_point == 0) return {};
+  if (!in.require(has_point <= 1, "an invalid flag", "0 or 1 (a point follows)") || has_point == 0) return {};
   frame::BundledPoint point;
   in.numbers(point.point_rig.data(), 3);
   in.numbers(point.covariance.data(), 9);
-  in.require(is_plausible(point.point_rig) && point.covariance.allFinite(), "a point that cannot be", "finite numbers");
+  in.require(is_plausible(point.point_rig) && point.covariance.allFinite(), "an invalid point", "finite numbers");
   return point;
 }
 
@@ -201,10 +204,10 @@ frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const fea
   frame::BundledFrame frame;
   frame.id = FrameId(in.number<std::int32_t>());
   frame.time_ns = in.number<TimeNs>();
-  if (!in.require(std::abs(frame.time_ns / 2) < kMaxTime / 2, "a time beyond all times", "nanoseconds")) return frame;
+  if (!in.require(std::abs(frame.time_ns / 2) < kMaxTime / 2, "a time out of range", "nanoseconds")) return frame;
   in.numbers(frame.twist.data(), 6);
-  if (!in.require(frame.twist.allFinite() && frame.twist.cwiseAbs().maxCoeff() < kMaxTwist, "a motion that cannot be",
-                  "rad/s and m/s"))
+  if (!in.require(frame.twist.allFinite() && frame.twist.cwiseAbs().maxCoeff() < kMaxTwist, "an invalid twist",
+                  "finite numbers in rad/s and m/s"))
     return frame;
   frame.cameras.resize(rig.size());
   for (std::size_t c = 0; c < rig.size() && in.ok(); ++c) {

@@ -73,20 +73,20 @@ bool in_range(std::int32_t id, std::size_t end) { return id >= 0 && static_cast<
 std::vector<map::Observation> take_observations(ByteReader& in, const map::BundledMap& map) {
   const std::size_t n = in.count(kObservationBytes);
   std::vector<map::Observation> observations;
-  if (!in.require(n > 0, "no observation", "one or more")) return observations;
+  if (!in.require(n > 0, "no observation", "one or more observations")) return observations;
   observations.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
     const auto k = in.number<std::int32_t>(), f = in.number<std::int32_t>();
     const auto aligned = in.number<std::uint8_t>();
     if (!in.require(in_range(k, map.keyframe_slots()), "observation by a keyframe that does not exist",
-                    "one of the map") ||
+                    "a keyframe of the map") ||
         !in.require(i == 0 || observations.back().keyframe.value() < k, "observations out of order",
-                    "keyframes in order, each once") ||
+                    "increasing keyframe ids") ||
         !in.require(in_range(f, map.keyframe(KeyframeId(k)).landmarks.size()),
-                    "observation by a feature that does not exist", "one of the keyframe") ||
+                    "observation by a feature that does not exist", "a feature of the keyframe") ||
         !in.require(!map.landmark_of(KeyframeId(k), FeatureId(f)).valid(), "a feature of two landmarks",
-                    "one landmark each") ||
-        !in.require(aligned <= 1, "neither 0 nor 1", "whether the observation is aligned")) {
+                    "one landmark per feature") ||
+        !in.require(aligned <= 1, "an invalid flag", "0 or 1 (the observation is aligned)")) {
       break;
     }
     observations.push_back({KeyframeId(k), FeatureId(f), aligned == 1});
@@ -114,10 +114,11 @@ void take_landmark(ByteReader& in, map::BundledMap& map) {
   const auto born = in.number<std::int32_t>();
   const auto expected = in.number<std::uint32_t>(), found = in.number<std::uint32_t>();
   const std::vector<map::Observation> observations = take_observations(in, map);
-  if (!in.ok() || !in.require(is_plausible(position), "a position that cannot be", "finite coordinates") ||
-      !in.require(in_range(born, map.keyframe_slots()), "born with a keyframe that does not exist", "one of the map") ||
-      !in.require(is_among(reference, observations, map), "a reference that is none of its observations",
-                  "one of them")) {
+  if (!in.ok() || !in.require(is_plausible(position), "an invalid position", "finite coordinates") ||
+      !in.require(in_range(born, map.keyframe_slots()), "a creating keyframe that does not exist",
+                  "a keyframe of the map") ||
+      !in.require(is_among(reference, observations, map), "a reference that is not an observation",
+                  "an observation of the landmark")) {
     return;
   }
   const LandmarkId l = map.add_landmark(position, observations, reference, KeyframeId(born));
@@ -151,8 +152,9 @@ SE3 take_transform(ByteReader& in) {
   in.numbers(xyzw.data(), 4);
   in.numbers(translation.data(), 3);
   if (!in.ok() ||
-      !in.require(std::abs(xyzw.squaredNorm() - 1) <= kUnitTolerance, "a rotation that is no unit quaternion", "one") ||
-      !in.require(is_plausible(translation), "a translation that cannot be", "finite coordinates")) {
+      !in.require(std::abs(xyzw.squaredNorm() - 1) <= kUnitTolerance, "a rotation that is not a unit quaternion",
+                  "a unit quaternion") ||
+      !in.require(is_plausible(translation), "an invalid translation", "finite coordinates")) {
     return {};
   }
   return with_exact_rotation(Quaterniond(xyzw), translation);
@@ -210,7 +212,7 @@ InfoSection take_info(ByteReader& in) {
   section.scale = static_cast<map::Scale>(scale);
   const bool pyramid = section.pyramid.scale_factor > 1 && section.pyramid.scale_factor <= 4 &&
                        section.pyramid.levels >= 1 && section.pyramid.levels <= kMaxLevels;
-  in.require(pyramid, "a pyramid that cannot be", "levels in [1, 32] of a scale in (1, 4]");
+  in.require(pyramid, "an invalid pyramid", "1 to 32 levels and a scale factor in (1, 4]");
   in.require(scale <= static_cast<int>(map::Scale::kUnobservable), "an unknown scale",
              "metric, up to scale or unobservable");
   in.require(kind == place::kDescriptorKind, "features of kind " + kind, std::string(place::kDescriptorKind));
@@ -246,7 +248,7 @@ std::size_t take_keyframes(ByteReader& in, bool with_words, map::BundledMap& map
     parents.emplace_back(parent);
   }
   if (!in.finish()) return 0;
-  in.require(map::attach_keyframes(map, KeyframeId(0), parents), "parents in a circle", "trees");
+  in.require(map::attach_keyframes(map, KeyframeId(0), parents), "cyclic parents", "trees");
   return words_end;
 }
 

@@ -19,19 +19,20 @@ constexpr std::size_t kMaxCameras = 100;  // the cost of constructing a rig grow
 // Ids in the file: consecutive for keyframes that are not removed, invalid for the others.
 struct FileIds {
   explicit FileIds(const map::BundledMap& map);
-  // The id of the keyframe or, if it was removed, of the newest one before it; of the first if there is none.
+  // Returns the id of the keyframe or, if it was removed, of the newest remaining keyframe before it, or of the first
+  // keyframe if there is none.
   KeyframeId nearest_older(KeyframeId k) const;
 
-  std::vector<KeyframeId> keyframe;  // per keyframe slot of the map
+  std::vector<KeyframeId> keyframe;  // indexed by the keyframe ids of the map
 };
 
-// Writing.
+// Functions that write sections.
 void put_rig(const camera::Rig& rig, ByteWriter& out);
 void put_info(const map::BundledMap& map, const MapFileInfo& info, ByteWriter& out);
 void put_keyframes(const map::BundledMap& map, const FileIds& ids, bool with_words, ByteWriter& out);
 void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& out);
 
-// Reading. Results are only valid if the reader is ok afterwards.
+// Functions that read sections. Results are only valid if the reader is ok afterwards.
 std::optional<camera::Rig> take_rig(ByteReader& in);
 
 struct InfoSection {
@@ -46,17 +47,17 @@ std::size_t take_keyframes(ByteReader& in, bool with_words, map::BundledMap& map
 
 void take_landmarks(ByteReader& in, map::BundledMap& map);
 
-// The BundledFrame of a keyframe; implemented in map_frame_bytes.cc.
+// Write and read the BundledFrame of a keyframe; implemented in map_frame_bytes.cc.
 void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out);
 frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                                bool with_words, std::size_t& words_end);
 
-// A transform as seven numbers, quaternion x y z w and translation. It is read back exactly.
+// Write and read a transform as seven numbers, quaternion x y z w and translation. It is read back exactly.
 void put_transform(const geometry::SE3& transform, ByteWriter& out);
 geometry::SE3 take_transform(ByteReader& in);
 constexpr std::size_t kTransformBytes = 7 * sizeof(double);
 
-// Whether the point is finite and small enough that computations with it do not overflow.
+// Returns true if the point is finite and small enough that computations with it do not overflow.
 bool is_plausible(const Eigen::Vector3d& point);
 
 }  // namespace bslam::storage

@@ -15,7 +15,7 @@ constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
 Result<place::VocabularyPtr> parse(std::string_view bytes) {
   if (place::is_vocabulary(bytes)) return place::deserialise(bytes);
   if (is_dbow2_text(bytes)) return parse_dbow2_text(bytes);
-  return Error{"", "", "no vocabulary", "a file written by bslam vocab train, or the text format of DBoW2"};
+  return Error{"", "", "a file of another format", "a file written by bslam vocab train, or the text format of DBoW2"};
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ constexpr std::string_view kDbow2Kind = "orb256-dbow2";
 // children than k or levels than L, an inner node without children, values out of range.
 Result<place::VocabularyPtr> read_vocabulary(const std::filesystem::path& file);
 
-// The vocabulary in `file`, or the one shipped with the program if `file` is empty.
+// Returns the vocabulary in `file`, or the vocabulary shipped with the program if `file` is empty.
 Result<place::VocabularyPtr> vocabulary_or_shipped(const std::string& file);
 
 // Writes the binary format of bslam. The file is written completely or not at all.

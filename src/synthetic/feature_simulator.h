@@ -32,16 +32,16 @@ struct FeatureSimulatorOptions {
   int levels = 8;
   double scale_factor = 1.2;
   double detection_share = 0.85;  // fraction of visible landmarks that are detected
-  // mean Hamming distance between the descriptor of an observation and that of the landmark
+  // mean Hamming distance between the descriptor of an observation and the descriptor of the landmark
   double flipped_bits = 12.0;
   // outliers at random positions with random descriptors, relative to the number of inliers
   double outlier_share = 0.05;
   // fraction of landmarks detected by several cameras that the Bundled table contains as matched
   double matched_share = 0.8;
-  // Capture time of each camera's image relative to the frame's time, in seconds; empty: all 0.
+  // Capture time of each camera's image relative to the frame's time, in seconds; 0 for all cameras if empty.
   std::vector<double> capture_offset_s;
 
-  static constexpr double kMinAngle = 1e-4;  // radians: smallest angle between rays for which a point is triangulated
+  static constexpr double kMinAngle = 1e-4;  // radians: minimum angle between rays for which a point is triangulated
 };
 
 struct SimulatedLandmark {
@@ -62,7 +62,7 @@ class FeatureSimulator {
  public:
   FeatureSimulator(camera::Rig rig, Trajectory trajectory, const FeatureSimulatorOptions& options);
 
-  // Returns the features observed at a time of the trajectory, deterministically. Cameras listed in `missing` give no
+  // Returns the features observed at a time of the trajectory, deterministically. Cameras listed in `missing` have no
   // image.
   SimulatedFrame frame(FrameId id, double time_s, std::span<const int> missing = {}) const;
 

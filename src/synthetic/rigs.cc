@@ -73,7 +73,7 @@ camera::Rig default_rig() {
 }
 
 camera::Rig ring_rig(int n, int width) {
-  BSLAM_ASSERT(n >= 1 && n <= 8, "1 to 8 cameras");
+  BSLAM_ASSERT(n >= 1 && n <= 8, "the number of cameras must be 1 to 8");
   Random random(static_cast<std::uint64_t>(n), "ring rig");
   std::vector<RigCamera> cameras;
   for (int i = 0; i < n; ++i) {
@@ -88,7 +88,7 @@ camera::Rig ring_rig(int n, int width) {
 }
 
 camera::Rig fisheye_rig(int n, int width) {
-  BSLAM_ASSERT(n >= 1 && n <= 8, "1 to 8 cameras");
+  BSLAM_ASSERT(n >= 1 && n <= 8, "the number of cameras must be 1 to 8");
   Random random(static_cast<std::uint64_t>(n), "fisheye rig");
   std::vector<RigCamera> cameras;
   for (int i = 0; i < n; ++i) {

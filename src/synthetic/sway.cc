@@ -2,12 +2,12 @@
 
 namespace bslam::synthetic {
 
-Offsets offsets_at(const Sway& base, const Sway& own, double lap_phase) {
+Offsets offsets_at(const Sway& base, const Sway& lap_sway, double lap_phase) {
   const double window = std::pow(std::sin(std::numbers::pi * lap_phase), 2);
   const auto both = [&](Waves Sway::*part) {
-    return 0.4 * (base.*part)(lap_phase) + 0.6 * window * (own.*part)(lap_phase);
+    return 0.4 * (base.*part)(lap_phase) + 0.6 * window * (lap_sway.*part)(lap_phase);
   };
-  return {.aside = 0.9 * kMaxSway * both(&Sway::aside),
+  return {.lateral = 0.9 * kMaxSway * both(&Sway::lateral),
           .up = 0.26 * both(&Sway::up) + 0.012 * both(&Sway::step),
           .yaw = 0.16 * both(&Sway::yaw),
           .pitch = 0.09 * both(&Sway::pitch) + 0.006 * both(&Sway::step),

@@ -1,4 +1,4 @@
-// Swaying motion of a walker about a smooth path: sums of sine waves with random phases.
+// Swaying motion of a person walking along a smooth path: sums of sine waves with random phases.
 #pragma once
 
 #include <array>
@@ -32,24 +32,24 @@ class Waves {
   std::array<double, 3> phase_{};
 };
 
-// The sway of one lap about the path.
+// The sway of one lap relative to the path.
 struct Sway {
   explicit Sway(Random& random)
-      : aside(random, {2, 3, 7}),
+      : lateral(random, {2, 3, 7}),
         up(random, {1, 4, 6}),
         step(random, {31, 33, 34}),
         yaw(random, {2, 3, 5}),
         pitch(random, {2, 5, 9}),
         roll(random, {3, 6, 11}) {}
-  Waves aside, up, step, yaw, pitch, roll;
+  Waves lateral, up, step, yaw, pitch, roll;
 };
 
-// Offsets from the path. `own` belongs to one lap and fades out at its ends, so that laps connect and start alike.
+// Offsets from the path. `lap_sway` belongs to one lap and fades out at its ends, so that consecutive laps connect.
 struct Offsets {
-  double aside, up, yaw, pitch, roll;
+  double lateral, up, yaw, pitch, roll;
 };
 
 // `base` is the same for all laps; `lap_phase` runs from 0 to 1 over a lap.
-Offsets offsets_at(const Sway& base, const Sway& own, double lap_phase);
+Offsets offsets_at(const Sway& base, const Sway& lap_sway, double lap_phase);
 
 }  // namespace bslam::synthetic

@@ -15,7 +15,8 @@ using std::numbers::pi;
 
 Trajectory::Trajectory(std::vector<ControlPose> control, double knot_spacing_s)
     : control_(std::move(control)), knot_spacing_s_(knot_spacing_s) {
-  BSLAM_ASSERT(control_.size() >= 4 && knot_spacing_s > 0, "a cubic spline has four control poses and a knot spacing");
+  BSLAM_ASSERT(control_.size() >= 4 && knot_spacing_s > 0,
+               "there must be four control poses, and the knot spacing must be positive");
 }
 
 Trajectory::Vector Trajectory::blend(double time_s, bool derivative) const {
@@ -51,7 +52,7 @@ Vector3d Trajectory::velocity(double time_s) const { return blend(time_s, true).
 double Trajectory::yaw_rate(double time_s) const { return blend(time_s, true)[3]; }
 
 Trajectory make_orbit(const OrbitOptions& options) {
-  BSLAM_ASSERT(options.duration_s > 0 && options.period_s > 0, "an orbit takes time");
+  BSLAM_ASSERT(options.duration_s > 0 && options.period_s > 0, "duration and period must be positive");
   Random random(options.seed, "orbit");
   const Sway base(random), own(random);
   const auto pieces = static_cast<std::size_t>(std::max(1.0, std::round(options.duration_s / kKnotSpacing)));
@@ -60,7 +61,7 @@ Trajectory make_orbit(const OrbitOptions& options) {
   for (std::size_t i = 0; i < pieces + 3; ++i) {
     const double rounds = (static_cast<double>(i) - 1) * spacing / options.period_s, angle = 2 * pi * rounds;
     const Offsets o = offsets_at(base, own, rounds - std::floor(rounds));
-    const double radius = options.radius + o.aside;
+    const double radius = options.radius + o.lateral;
     control.push_back({options.centre + Vector3d(radius * std::cos(angle), radius * std::sin(angle), o.up),
                        angle + 0.5 * pi + o.yaw, o.pitch, o.roll});
   }

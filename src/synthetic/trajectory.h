@@ -19,7 +19,7 @@ struct ControlPose {
 // Uniform cubic B-spline over the position and the three angles; twice continuously differentiable.
 class Trajectory {
  public:
-  // Control pose i has its influence around the time (i - 1) * knot_spacing_s. Needs at least four.
+  // Control pose i determines the pose around the time (i - 1) * knot_spacing_s. There must be at least four.
   Trajectory(std::vector<ControlPose> control, double knot_spacing_s);
 
   double duration_s() const { return (static_cast<double>(control_.size()) - 3.0) * knot_spacing_s_; }
@@ -43,7 +43,7 @@ class Trajectory {
 struct OrbitOptions {
   Vector3d centre = {0, 0, 1.5};  // metres
   double radius = 1.5;            // metres
-  double period_s = 12.0;         // of one circle
+  double period_s = 12.0;         // duration of one circle
   double duration_s = 12.0;
   std::uint64_t seed = 1;
 };

@@ -14,7 +14,7 @@ namespace bslam::yaml {
 namespace {
 
 constexpr std::size_t kMaxConfigBytes = std::size_t{1} << 22;
-constexpr int kMaxDepth = 16;  // also ends the recursion of a file with cyclic aliases
+constexpr int kMaxDepth = 16;  // also bounds the recursion for a file with cyclic aliases
 
 Error with_file(Error error, std::string file) {
   error.file = std::move(file);
@@ -46,7 +46,7 @@ class ConfigReader {
   Status apply_value(const YAML::Node& value, const std::string& key) {
     const Option* option = table_.find(key);
     if (!seen_.insert(option != nullptr ? option->key : key).second)
-      return Error{file_, key, "the key twice", "it once"};
+      return Error{file_, key, "a repeated key", "a unique key"};
     if (option == nullptr && is_section(key)) {
       if (value.IsNull()) return {};  // a section whose entries are all commented out
       return Error{file_, key, describe(value), "a map of settings"};
@@ -105,7 +105,7 @@ Status apply_setting(OptionTable& table, std::string_view assignment) {
 
 std::string config_to_yaml(const OptionTable& table, Selection selection) {
   std::string yaml;
-  std::vector<std::string_view> open;  // sections that contain the last line
+  std::vector<std::string_view> open;  // the enclosing sections of the last line
   for (const Option& option : table.options()) {
     if (selection == Selection::kCommon && !option.common) continue;
     std::vector<std::string_view> parts = split_key(option.key);

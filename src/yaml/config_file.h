@@ -11,7 +11,7 @@
 
 namespace bslam::yaml {
 
-// Applies a YAML file of nested maps, dotted keys, or both. Settings that the file does not name keep their values.
+// Applies a YAML file of nested maps, dotted keys, or both. Settings that are not in the file keep their values.
 // Former names of settings are accepted, with a warning in the table. Errors name the file and the key: a file that is
 // not YAML, an unknown key (with a suggestion if one is close), a repeated key, a bad value. On error, the settings
 // before the faulty one may have been applied.
@@ -22,8 +22,8 @@ Status apply_setting(OptionTable& table, std::string_view assignment);
 
 enum class Selection { kAll, kCommon };
 
-// The settings as YAML, each with its value and a comment that gives its meaning, unit and accepted values. The comment
-// of an advanced setting begins with "[advanced]". Reading the text back gives exactly the same values.
+// Returns the settings as YAML, each with its value and a comment that gives its meaning, unit and accepted values. The
+// comment of an advanced setting begins with "[advanced]". Reading the text back gives exactly the same values.
 std::string config_to_yaml(const OptionTable& table, Selection selection = Selection::kAll);
 
 }  // namespace bslam::yaml

@@ -13,7 +13,7 @@ namespace bslam::yaml {
 
 Result<YamlMap> YamlMap::parse(const std::filesystem::path& file, std::string text) {
   if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);  // byte order mark
-  if (text.starts_with("%YAML:")) text[0] = '#';           // turned into a comment, which keeps the line numbers
+  if (text.starts_with("%YAML:")) text[0] = '#';           // becomes a comment, so that line numbers stay the same
   try {
     YAML::Node root = YAML::Load(text);
     if (!root.IsDefined() || root.IsNull()) root = YAML::Node(YAML::NodeType::Map);
@@ -45,7 +45,7 @@ Status YamlMap::allow_only(const std::vector<std::string>& known) const {
       unknown.sentence = nearest.empty() ? "unknown key" : "unknown key; did you mean '" + nearest + "'?";
       return unknown;
     }
-    if (!seen.insert(key).second) return error(key, "the key twice", "it once");
+    if (!seen.insert(key).second) return error(key, "a repeated key", "a unique key");
   }
   return {};
 }

@@ -21,7 +21,7 @@ class YamlMap {
   // although it is not valid YAML, is ignored. Syntax errors name the line.
   static Result<YamlMap> parse(const std::filesystem::path& file, std::string text);
 
-  // Whether the key is present and its value is not null.
+  // Returns true if the key is present and its value is not null.
   bool has(std::string_view key) const;
   // Errors: a key that is not in `known`, with a suggestion if one is close; a repeated key.
   Status allow_only(const std::vector<std::string>& known) const;
@@ -35,7 +35,7 @@ class YamlMap {
   Result<YamlMap> map(std::string_view key) const;
   Result<std::vector<YamlMap>> maps(std::string_view key) const;  // a list of maps, at least one
 
-  // An Error at a key of this map. An empty key refers to the map itself.
+  // Returns an Error at a key of this map. An empty key refers to the map itself.
   Error error(std::string_view key, std::string found, std::string expected) const;
   std::string key_path(std::string_view key) const;
 
@@ -52,10 +52,10 @@ class YamlMap {
   YAML::Node node_;
 };
 
-// A short description of a node, for the `found` of an Error.
+// Returns a short description of a node, for the `found` of an Error.
 std::string describe(const YAML::Node& node);
 
-// Text as a double-quoted YAML scalar.
+// Returns the text as a double-quoted YAML scalar.
 std::string yaml_quoted(std::string_view text);
 
 }  // namespace bslam::yaml

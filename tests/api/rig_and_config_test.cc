@@ -12,7 +12,7 @@ namespace {
 using support::TemporaryFolder;
 using testing::TexturedWall;
 
-TEST(PublicPose, ComposesInvertsAndComesFromItsMatrix) {
+TEST(PublicPose, ComposesInvertsAndConvertsFromItsMatrix) {
   Pose T_a_b;
   T_a_b.rotation = {0, 0, std::sqrt(0.5), std::sqrt(0.5)};  // 90 degrees about z
   T_a_b.translation = {1, 2, 3};
@@ -30,7 +30,7 @@ TEST(PublicPose, ComposesInvertsAndComesFromItsMatrix) {
   EXPECT_FALSE(Pose::from_matrix(mirrored));
 }
 
-TEST(PublicRig, MadeInCodeTellsItsCalibration) {
+TEST(PublicRig, ReturnsTheCalibrationItWasMadeFrom) {
   CameraCalibration fisheye = TexturedWall::calibration(1);
   fisheye.model = "kannala-brandt";
   fisheye.distortion = {0.01, 0.002, 0, 0};
@@ -47,20 +47,20 @@ TEST(PublicRig, MadeInCodeTellsItsCalibration) {
   EXPECT_TRUE(rig.camera(7).name.empty());
 }
 
-TEST(PublicRig, RefusesWhatIsNoCamera) {
-  const auto refused = [](auto change) {
+TEST(PublicRig, RejectsInvalidCameras) {
+  const auto rejected = [](auto change) {
     CameraCalibration c = TexturedWall::calibration(0);
     change(c);
     return !Rig::make({c}).ok();
   };
-  EXPECT_FALSE(refused([](CameraCalibration&) {}));
-  EXPECT_TRUE(refused([](CameraCalibration& c) { c.model = "spherical"; }));
-  EXPECT_TRUE(refused([](CameraCalibration& c) { c.width = 0; }));
-  EXPECT_TRUE(refused([](CameraCalibration& c) { c.intrinsics[0] = -1; }));
-  EXPECT_TRUE(refused([](CameraCalibration& c) { c.distortion = {1}; }));
-  EXPECT_TRUE(refused([](CameraCalibration& c) { c.mask = {1, 2}; }));
-  EXPECT_TRUE(refused([](CameraCalibration& c) { c.T_body_cam.translation[0] = 1e9; }));
-  EXPECT_TRUE(refused([](CameraCalibration& c) { c.T_body_cam.rotation = {0, 0, 0, 0}; }));
+  EXPECT_FALSE(rejected([](CameraCalibration&) {}));
+  EXPECT_TRUE(rejected([](CameraCalibration& c) { c.model = "spherical"; }));
+  EXPECT_TRUE(rejected([](CameraCalibration& c) { c.width = 0; }));
+  EXPECT_TRUE(rejected([](CameraCalibration& c) { c.intrinsics[0] = -1; }));
+  EXPECT_TRUE(rejected([](CameraCalibration& c) { c.distortion = {1}; }));
+  EXPECT_TRUE(rejected([](CameraCalibration& c) { c.mask = {1, 2}; }));
+  EXPECT_TRUE(rejected([](CameraCalibration& c) { c.T_body_cam.translation[0] = 1e9; }));
+  EXPECT_TRUE(rejected([](CameraCalibration& c) { c.T_body_cam.rotation = {0, 0, 0, 0}; }));
   EXPECT_FALSE(Rig::make({}));
   EXPECT_FALSE(TexturedWall::rig().subset({0, 0}));
   EXPECT_FALSE(TexturedWall::rig().subset({2}));
@@ -80,7 +80,7 @@ TEST(PublicRig, LoadsFilesFoldersAndMasks) {
   EXPECT_FALSE(Rig::load("/no/such/file"));
 }
 
-TEST(PublicConfig, SetsByNameAndRefusesWhatIsWrong) {
+TEST(PublicConfig, SetsByNameAndRejectsInvalidValues) {
   Config config;
   EXPECT_TRUE(config.set("features.per_image", "777"));
   EXPECT_EQ(*config.get("features.per_image"), "777");
@@ -97,7 +97,7 @@ TEST(PublicConfig, SetsByNameAndRefusesWhatIsWrong) {
   EXPECT_EQ(*config.get("mode"), "lagged");
 }
 
-TEST(PublicConfig, IsAValueAndGoesThroughYaml) {
+TEST(PublicConfig, IsAValueTypeAndRoundTripsThroughYaml) {
   const TemporaryFolder folder;
   Config a;
   ASSERT_TRUE(a.set("seed", "9"));

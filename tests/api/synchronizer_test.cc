@@ -35,7 +35,7 @@ const std::vector<std::uint8_t> g_pixels(kSide* kSide, 7);
 
 CameraImage image_at(std::int64_t time_ns) { return {g_pixels.data(), kSide, kSide, kSide, time_ns, nullptr}; }
 
-// Cameras that fire every `interval` ms together, in order of time.
+// Cameras that capture simultaneously every `interval_ms`, in order of time.
 std::vector<Shot> regular(std::size_t cameras, int count, std::int64_t interval_ms = 50) {
   std::vector<Shot> shots;
   for (int k = 0; k < count; ++k) {
@@ -44,7 +44,7 @@ std::vector<Shot> regular(std::size_t cameras, int count, std::int64_t interval_
   return shots;
 }
 
-using Times = std::vector<std::vector<std::int64_t>>;  // per bundle and camera, ms; -1 = none
+using Times = std::vector<std::vector<std::int64_t>>;  // per bundle and camera, ms; -1 if there is no image
 
 std::vector<std::int64_t> times_of(const ImageBundle& bundle) {
   std::vector<std::int64_t> out;
@@ -86,7 +86,7 @@ class Feed {
   }
 };
 
-// The bundles of the same images as a recording.
+// Returns the bundles of the same images grouped as a recording.
 Times as_recorded(const std::vector<Shot>& shots, std::size_t cameras) {
   std::vector<std::vector<TimeNs>> times(cameras);
   for (const Shot& shot : shots) times[shot.camera].push_back(shot.time_ns);
@@ -102,7 +102,7 @@ Times as_recorded(const std::vector<Shot>& shots, std::size_t cameras) {
   return out;
 }
 
-TEST(Synchronizer, HandsOutACompleteBundleAtOnce) {
+TEST(Synchronizer, ReturnsACompleteBundleImmediately) {
   Feed feed(3);
   feed.push(regular(3, 5));
   EXPECT_EQ(feed.bundles.size(), 5u);
@@ -111,10 +111,10 @@ TEST(Synchronizer, HandsOutACompleteBundleAtOnce) {
   EXPECT_EQ(feed.synchronizer.counts().waiting, 0u);
 }
 
-TEST(Synchronizer, GroupsShuffledImagesAsARecordingIsGrouped) {
+TEST(Synchronizer, GroupsShuffledImagesLikeARecording) {
   std::vector<Shot> shots = regular(4, 60);
   const Times expected = as_recorded(shots, 4);
-  constexpr std::size_t kBlock = 10;  // images: within 150 ms
+  constexpr std::size_t kBlock = 10;  // number of images, which are within 150 ms
   Random random(5);
   for (std::size_t block = 0; block < shots.size(); block += kBlock) {
     for (std::uint32_t i = kBlock - 1; i > 0; --i) std::swap(shots[block + i], shots[block + random.below(i + 1)]);
@@ -125,7 +125,7 @@ TEST(Synchronizer, GroupsShuffledImagesAsARecordingIsGrouped) {
   EXPECT_TRUE(feed.dropped.empty());
 }
 
-TEST(Synchronizer, LostImagesLeaveTheirPlacesEmpty) {
+TEST(Synchronizer, LeavesLostImagesEmpty) {
   std::vector<Shot> shots = regular(3, 80), kept;
   Random random(6);
   for (const Shot& shot : shots) {
@@ -138,7 +138,7 @@ TEST(Synchronizer, LostImagesLeaveTheirPlacesEmpty) {
   EXPECT_TRUE(feed.dropped.empty());
 }
 
-TEST(Synchronizer, DoesNotWaitForACameraThatDied) {
+TEST(Synchronizer, DoesNotWaitForASilentCamera) {
   for (const std::size_t dead : {0u, 2u}) {
     std::vector<Shot> shots;
     for (const Shot& shot : regular(3, 100)) {
@@ -152,14 +152,14 @@ TEST(Synchronizer, DoesNotWaitForACameraThatDied) {
   }
 }
 
-TEST(Synchronizer, WaitsForACameraThatIsSilentNoLongerThanTold) {
+TEST(Synchronizer, WaitsForASilentCameraUpToTheMaximum) {
   Feed feed(2, {.max_wait_s = 0.12, .silent_after_s = 10});
   std::vector<Shot> shots;
   for (const Shot& shot : regular(2, 20)) {
     if (shot.camera == 0 || shot.time_ns < 500 * kMs) shots.push_back(shot);
   }
   feed.push(shots);
-  EXPECT_EQ(feed.bundles.size(), 17u);  // up to 800 ms: 950 ms came, and 120 ms are waited
+  EXPECT_EQ(feed.bundles.size(), 17u);  // up to 800 ms: the last image is at 950 ms, and the maximum delay is 120 ms
   EXPECT_EQ(feed.synchronizer.counts().waiting, 3u);
 }
 
@@ -175,11 +175,11 @@ TEST(Synchronizer, AcceptsCamerasOfDifferentRates) {
   EXPECT_TRUE(feed.dropped.empty());
 }
 
-TEST(Synchronizer, TellsWhatItDropsAndWhy) {
+TEST(Synchronizer, ReportsDroppedImagesAndReasons) {
   Feed feed(2);
   feed.push(regular(2, 10));
-  feed.push({{1, 450 * kMs}});  // once more
-  feed.push({{0, 430 * kMs}});  // its time is over
+  feed.push({{1, 450 * kMs}});  // duplicate
+  feed.push({{0, 430 * kMs}});  // too late
   feed.push({{0, 500 * kMs}, {1, 460 * kMs}, {1, 500 * kMs}});
   feed.push({{1, 9'000'000 * kMs}});  // a broken clock
   feed.push({{0, 550 * kMs}, {1, 550 * kMs}});
@@ -192,7 +192,7 @@ TEST(Synchronizer, TellsWhatItDropsAndWhy) {
   EXPECT_EQ(feed.synchronizer.counts().dropped[1][static_cast<std::size_t>(DropReason::kFarAhead)], 1u);
 }
 
-TEST(Synchronizer, BelievesAClockThatStaysAhead) {
+TEST(Synchronizer, AcceptsAClockThatStaysAhead) {
   Feed feed(1);
   feed.push(regular(1, 5));
   for (int k = 0; k < 6; ++k) feed.push({{0, (100'000 + 50 * k) * kMs}});
@@ -212,7 +212,7 @@ TEST(Synchronizer, HoldsABoundedNumberOfImagesAndBundles) {
   EXPECT_EQ(times_of(*synchronizer.pop()), (std::vector<std::int64_t>{600, -1}));
 }
 
-TEST(Synchronizer, KeepsThePixels) {
+TEST(Synchronizer, CopiesPixelsWithoutOwner) {
   auto synchronizer = Synchronizer::create(rig_of(1)).value();
   std::vector<std::uint8_t> pixels(2 * kSide * kSide, 1);
   for (int y = 0; y < kSide; ++y) pixels[static_cast<std::size_t>(2 * kSide * y + 3)] = static_cast<std::uint8_t>(y);
@@ -235,7 +235,7 @@ TEST(Synchronizer, AddsTheTimeOffsetsOfTheRig) {
   EXPECT_EQ(times_of(synchronizer.pop().value()), (std::vector<std::int64_t>{100, 70}));
 }
 
-TEST(Synchronizer, RefusesWhatCannotBeAnImage) {
+TEST(Synchronizer, RejectsInvalidImagesAndOptions) {
   auto synchronizer = Synchronizer::create(rig_of(1)).value();
   EXPECT_FALSE(synchronizer.push(1, image_at(0)));
   EXPECT_FALSE(synchronizer.push(0, {}));
@@ -250,7 +250,7 @@ TEST(Synchronizer, RefusesWhatCannotBeAnImage) {
   EXPECT_FALSE(Synchronizer::create(rig_of(1), {.max_bundles = 0}));
 }
 
-TEST(Synchronizer, TakesImagesFromAThreadPerCamera) {
+TEST(Synchronizer, AcceptsImagesFromOneThreadPerCamera) {
   constexpr int kCount = 200;
   auto synchronizer = Synchronizer::create(rig_of(3), {.max_wait_s = 1000,
                                                        .silent_after_s = 1000,

@@ -39,7 +39,7 @@ class PublicSystem : public ::testing::Test {
   }
 };
 
-TEST_F(PublicSystem, TellsPoseAndVelocityInTheDocumentedFrames) {
+TEST_F(PublicSystem, ReportsPoseAndVelocityInTheDocumentedFrames) {
   std::vector<CameraCalibration> cameras = {TexturedWall::calibration(0), TexturedWall::calibration(1)};
   for (CameraCalibration& c : cameras) {  // body axes: x forward, y left, z up
     Pose T_body_cam0;
@@ -75,7 +75,7 @@ TEST_F(PublicSystem, TellsPoseAndVelocityInTheDocumentedFrames) {
   EXPECT_FALSE(last.stages.empty());
 }
 
-TEST_F(PublicSystem, TheMapCanBeReadSavedAndGoneOnIn) {
+TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   const TemporaryFolder folder;
   const auto file = folder.path() / "map.bslam";
   auto system = make_system();
@@ -113,25 +113,25 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndGoneOnIn) {
   EXPECT_FALSE(System::create(TexturedWall::rig(), pyramid, {.map = file}));
 }
 
-TEST_F(PublicSystem, ReturnsErrorsForWhatACallerCanGetWrong) {
+TEST_F(PublicSystem, ReturnsErrorsForInvalidCalls) {
   auto system = make_system();
   process(system, 0, 3);
-  const auto refused = [&](auto change) {
+  const auto rejected = [&](auto change) {
     ImageBundle bundle = wall_.bundle(3);
     change(bundle);
     return !system.process(bundle).ok();
   };
-  EXPECT_TRUE(refused([](ImageBundle& b) { b.images.pop_back(); }));
-  EXPECT_TRUE(refused([](ImageBundle& b) { b.images.push_back(b.images[0]); }));
-  EXPECT_TRUE(refused([](ImageBundle& b) { b.images = {{}, {}}; }));
-  EXPECT_TRUE(refused([](ImageBundle& b) { b.images[1].width = 10; }));
-  EXPECT_TRUE(refused([](ImageBundle& b) { b.images[1].stride = 10; }));
-  EXPECT_TRUE(refused([](ImageBundle& b) { b.images[1].time_ns += 2'000'000'000; }));
-  EXPECT_TRUE(refused([&](ImageBundle& b) { b = wall_.bundle(2); }));
-  EXPECT_TRUE(refused([&](ImageBundle& b) { b = wall_.bundle(1); }));
-  EXPECT_TRUE(refused([&](ImageBundle& b) { b.images[1] = wall_.image(2, 1); }));
-  EXPECT_FALSE(refused([](ImageBundle& b) { b.images[1].data = nullptr; }));
-  EXPECT_EQ(system.process(wall_.bundle(4)).value().frame, 4);  // what was refused does not count
+  EXPECT_TRUE(rejected([](ImageBundle& b) { b.images.pop_back(); }));
+  EXPECT_TRUE(rejected([](ImageBundle& b) { b.images.push_back(b.images[0]); }));
+  EXPECT_TRUE(rejected([](ImageBundle& b) { b.images = {{}, {}}; }));
+  EXPECT_TRUE(rejected([](ImageBundle& b) { b.images[1].width = 10; }));
+  EXPECT_TRUE(rejected([](ImageBundle& b) { b.images[1].stride = 10; }));
+  EXPECT_TRUE(rejected([](ImageBundle& b) { b.images[1].time_ns += 2'000'000'000; }));
+  EXPECT_TRUE(rejected([&](ImageBundle& b) { b = wall_.bundle(2); }));
+  EXPECT_TRUE(rejected([&](ImageBundle& b) { b = wall_.bundle(1); }));
+  EXPECT_TRUE(rejected([&](ImageBundle& b) { b.images[1] = wall_.image(2, 1); }));
+  EXPECT_FALSE(rejected([](ImageBundle& b) { b.images[1].data = nullptr; }));
+  EXPECT_EQ(system.process(wall_.bundle(4)).value().frame, 4);  // what was rejected does not count
   ASSERT_TRUE(system.finish());
   EXPECT_FALSE(system.process(wall_.bundle(5)));
   EXPECT_FALSE(system.finish());
@@ -141,7 +141,7 @@ TEST_F(PublicSystem, ReturnsErrorsForWhatACallerCanGetWrong) {
   EXPECT_GT(moved.map().num_keyframes(), 0u);
 }
 
-TEST_F(PublicSystem, RefusesSettingsAndFilesThatDoNotFit) {
+TEST_F(PublicSystem, RejectsInconsistentSettingsAndFiles) {
   Config localise = sequential();
   ASSERT_TRUE(localise.set("localize_only", "true"));
   EXPECT_FALSE(System::create(TexturedWall::rig(), localise));
@@ -153,7 +153,7 @@ TEST_F(PublicSystem, RefusesSettingsAndFilesThatDoNotFit) {
   EXPECT_FALSE(System::create(TexturedWall::rig(), sequential(), {.vocabulary = "/no/such/file"}));
 }
 
-TEST_F(PublicSystem, CallsBackFromTheCallersThread) {
+TEST_F(PublicSystem, CallsCallbacksInTheCallersThread) {
   int keyframes = 0, maps = 0, lines = 0, cameras = 0, last_version = 0;
   System* running = nullptr;
   bool reentered = false;
@@ -189,7 +189,7 @@ TEST_F(PublicSystem, CallsBackFromTheCallersThread) {
   EXPECT_FALSE(reentered);
 }
 
-TEST_F(PublicSystem, ReturnsWhatACallbackThrowsAndGoesOn) {
+TEST_F(PublicSystem, ReturnsExceptionsOfCallbacksAndRemainsUsable) {
   Startup startup;
   startup.callbacks.keyframe = [](const KeyframeEvent&) { throw std::runtime_error("full disk"); };
   auto system = make_system(startup);
@@ -199,7 +199,7 @@ TEST_F(PublicSystem, ReturnsWhatACallbackThrowsAndGoesOn) {
   EXPECT_TRUE(system.process(wall_.bundle(1)).value().tracking());
 }
 
-TEST_F(PublicSystem, ForgetsFramesBeyondItsHistory) {
+TEST_F(PublicSystem, DiscardsFramesBeyondItsHistory) {
   auto all = make_system(), few = make_system({.history_frames = 5});
   process(all, 0, kFrames);
   process(few, 0, kFrames);
@@ -216,8 +216,8 @@ TEST_F(PublicSystem, ForgetsFramesBeyondItsHistory) {
   }
 }
 
-// Borrowed rows with a wide stride are the same images as packed ones.
-TEST_F(PublicSystem, ReadsImagesWhereTheyLie) {
+// Images with padded rows give the same results as packed images.
+TEST_F(PublicSystem, ReadsImagesWithAnyStride) {
   auto borrowed = make_system(), packed = make_system();
   for (int k = 0; k < 10; ++k) {
     ImageBundle bundle = wall_.bundle(k);

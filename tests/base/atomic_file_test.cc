@@ -33,17 +33,17 @@ TEST(AtomicFile, ReplacesAFile) {
   EXPECT_EQ(read_file(folder.path() / "file", 100).value(), "short");
 }
 
-TEST(AtomicFile, LeavesNothingBehindOnError) {
+TEST(AtomicFile, RemovesTheTemporaryFileOnError) {
   const support::TemporaryFolder folder;
-  fs::create_directories(folder.path() / "taken" / "inside");
-  const Status onto_folder = write_atomically(folder.path() / "taken", "text");
+  fs::create_directories(folder.path() / "existing" / "inside");
+  const Status onto_folder = write_atomically(folder.path() / "existing", "text");
   ASSERT_FALSE(onto_folder);
-  EXPECT_EQ(onto_folder.error().file, (folder.path() / "taken").string());
+  EXPECT_EQ(onto_folder.error().file, (folder.path() / "existing").string());
   EXPECT_FALSE(write_atomically(folder.path() / "no" / "such" / "folder", "text"));
   EXPECT_EQ(entries(folder.path()), 1);
 }
 
-TEST(AtomicFile, MayBeReadByOthersAsUsual) {
+TEST(AtomicFile, HasTheUsualPermissions) {
   const support::TemporaryFolder folder;
   const mode_t old = ::umask(022);
   ASSERT_TRUE(write_atomically(folder.path() / "file", "text"));
@@ -51,7 +51,7 @@ TEST(AtomicFile, MayBeReadByOthersAsUsual) {
   EXPECT_EQ(fs::status(folder.path() / "file").permissions() & fs::perms::mask, fs::perms(0644));
 }
 
-TEST(ReadFile, RefusesWhatIsNoReadableFile) {
+TEST(ReadFile, RejectsUnreadableFiles) {
   const support::TemporaryFolder folder;
   EXPECT_EQ(read_file(folder.path() / "none", 10).error().message(),
             "cannot open " + (folder.path() / "none").string() + ": No such file or directory");
@@ -60,7 +60,7 @@ TEST(ReadFile, RefusesWhatIsNoReadableFile) {
   EXPECT_FALSE(read_file(folder.path() / "pipe", 10));
 }
 
-TEST(ReadFile, RefusesWhatIsTooLarge) {
+TEST(ReadFile, RejectsTooLargeFiles) {
   const support::TemporaryFolder folder;
   support::write_text(folder.path() / "file", "12345");
   EXPECT_TRUE(read_file(folder.path() / "file", 5));

@@ -23,7 +23,7 @@ static_assert(!std::is_convertible_v<KeyframeId, int>);
 static_assert(!Comparable<KeyframeId, LandmarkId>);
 static_assert(Comparable<KeyframeId, KeyframeId>);
 
-TEST(Id, IsInvalidUntilGiven) {
+TEST(Id, IsInvalidByDefault) {
   EXPECT_FALSE(KeyframeId().valid());
   EXPECT_TRUE(KeyframeId(0).valid());
   EXPECT_EQ(KeyframeId().next(), KeyframeId(0));

@@ -14,7 +14,7 @@ TEST(EditDistance, CountsInsertionsDeletionsAndReplacements) {
   EXPECT_EQ(edit_distance("same", "same"), 0u);
 }
 
-TEST(NearestName, FindsTheNameThatWasMeant) {
+TEST(NearestName, FindsTheIntendedName) {
   const std::vector<std::string> known = {"features.per_image", "features.levels", "pose.rounds"};
   EXPECT_EQ(nearest_name("features.per_imge", known), "features.per_image");
   EXPECT_EQ(nearest_name("level", known), "features.levels");
@@ -22,7 +22,7 @@ TEST(NearestName, FindsTheNameThatWasMeant) {
   EXPECT_EQ(nearest_name("anything", {}), "");
 }
 
-TEST(NearestName, SuggestsNoFarName) {
+TEST(NearestName, ReturnsNothingIfNoNameIsClose) {
   const std::vector<std::string> known = {"bundling.near_m", "features.per_image", "seed"};
   EXPECT_EQ(nearest_name("nfeatures", known), "");
   EXPECT_EQ(nearest_name("frobnicate", known), "");

@@ -28,7 +28,7 @@ TEST(NumberText, ReadsIntegersThatFit) {
     EXPECT_FALSE(parse_integer(text));
 }
 
-TEST(NumberText, DoublesComeBackExactly) {
+TEST(NumberText, DoublesRoundTripExactly) {
   Random random(1);
   for (int i = 0; i < 20000; ++i) {
     const double value = std::bit_cast<double>(random.next());

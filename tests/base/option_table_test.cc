@@ -65,7 +65,7 @@ TEST(OptionTable, SetsEveryType) {
   EXPECT_EQ(options.pace, Pace::kRealtime);
 }
 
-TEST(OptionTable, RefusesBadValuesAndKeepsTheOld) {
+TEST(OptionTable, RejectsBadValuesAndKeepsTheOldOnes) {
   OuterOptions options;
   OptionTable table(options);
   for (const auto& [key, text] : {std::pair("loop", "maybe"),
@@ -88,7 +88,7 @@ TEST(OptionTable, RefusesBadValuesAndKeepsTheOld) {
   EXPECT_EQ(options.inner.sigma_px, 0.7);
 }
 
-TEST(OptionTable, SaysWhatItExpects) {
+TEST(OptionTable, ErrorsNameTheAcceptedValues) {
   OuterOptions options;
   OptionTable table(options);
   EXPECT_EQ(table.set("rounds", "0").error().message(), "rounds: found 0, expected an integer in [1, 20]");
@@ -97,10 +97,10 @@ TEST(OptionTable, SaysWhatItExpects) {
   EXPECT_EQ(table.set("inner.sigma", "1").error().message(),
             "unknown setting 'inner.sigma'; did you mean 'inner.sigma_px'?");
   EXPECT_EQ(table.set("frobnication", "1").error().message(),
-            "unknown setting 'frobnication'; 'bslam settings --common' lists those that are commonly changed");
+            "unknown setting 'frobnication'; 'bslam settings --common' lists the commonly changed settings");
 }
 
-TEST(OptionTable, ValuesReadBackExactly) {
+TEST(OptionTable, ValuesRoundTripExactly) {
   OuterOptions options;
   options.inner.sigma_px = 0.1 + 0.2;
   OptionTable table(options);
@@ -140,7 +140,7 @@ TEST(OptionTable, AcceptsAFormerNameWithAWarning) {
   EXPECT_EQ(table.set("section.old_name", "10").error().key, "section.new_name");
 }
 
-TEST(OptionTable, KnowsWhichOptionsAreCommon) {
+TEST(OptionTable, MarksTheCommonOptions) {
   RenamedInSection options;
   const OptionTable table(options);
   EXPECT_TRUE(table.find("section.new_name")->common);
@@ -156,7 +156,7 @@ struct TwiceOptions {
   }
 };
 
-TEST(OptionTableDeathTest, RefusesAKeyDeclaredTwice) {
+TEST(OptionTableDeathTest, RejectsAKeyDeclaredTwice) {
   TwiceOptions options;
   EXPECT_DEATH(OptionTable{options}, "declared once");
 }

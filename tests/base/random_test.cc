@@ -16,11 +16,11 @@ std::vector<std::uint64_t> draws(Random random, int count) {
   return out;
 }
 
-TEST(Random, RepeatsForEqualSeedStageAndFrame) {
+TEST(Random, IsDeterministicForSeedStageAndFrame) {
   EXPECT_EQ(draws(Random(1, "track", 7), 100), draws(Random(1, "track", 7), 100));
 }
 
-TEST(Random, DiffersWhereSeedStageOrFrameDiffers) {
+TEST(Random, DependsOnSeedStageAndFrame) {
   std::set<std::uint64_t> first;
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
     for (const char* stage : {"", "a", "b", "ab", "ba"}) {
@@ -39,7 +39,7 @@ TEST(Random, MatchesTheReferenceGenerator) {
   EXPECT_EQ(random.next(), 0xd7b8d41f4bd16d68ull);
 }
 
-TEST(Random, UniformFillsTheUnitIntervalEvenly) {
+TEST(Random, UniformIsUniformOnTheUnitInterval) {
   Random random(5);
   constexpr int kDraws = 100000, kBins = 20;
   std::array<int, kBins> bins{};
@@ -57,7 +57,7 @@ TEST(Random, UniformFillsTheUnitIntervalEvenly) {
   EXPECT_NEAR(sum / kDraws, 0.5, 0.005);
 }
 
-TEST(Random, BelowGivesEveryElementEvenly) {
+TEST(Random, BelowIsUniform) {
   Random random(6);
   constexpr int kDraws = 70000;
   std::array<int, 7> counts{};

@@ -17,7 +17,7 @@ TEST(SharedArray, CopiesShareTheElements) {
   EXPECT_EQ(b.back(), "three");
 }
 
-TEST(SharedArray, OutlivesWhatItWasCopiedFrom) {
+TEST(SharedArray, CopyOutlivesTheOriginal) {
   SharedArray<std::string> a = std::vector<std::string>{"one"};
   const SharedArray<std::string> b = a;
   a = std::vector<std::string>{"two"};
@@ -32,7 +32,7 @@ TEST(SharedArray, ComparesElements) {
   EXPECT_TRUE(SharedArray<int>() == SharedArray<int>(std::vector<int>()));
 }
 
-TEST(SharedArray, GivesACopyToChange) {
+TEST(SharedArray, CopyCanBeChanged) {
   const SharedArray<int> a = std::vector<int>{1, 2};
   std::vector<int> copy = a.copy();
   copy[0] = 7;

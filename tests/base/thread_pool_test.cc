@@ -11,7 +11,7 @@ namespace {
 
 class ThreadPoolOf : public testing::TestWithParam<int> {};
 
-TEST_P(ThreadPoolOf, DoesEachItemOnce) {
+TEST_P(ThreadPoolOf, RunsEachItemOnce) {
   ThreadPool pool(GetParam());
   EXPECT_EQ(pool.size(), GetParam());
   for (const std::size_t count : {0u, 1u, 2u, 3u, 100u, 5000u}) {
@@ -21,7 +21,7 @@ TEST_P(ThreadPoolOf, DoesEachItemOnce) {
   }
 }
 
-TEST_P(ThreadPoolOf, StartsManyShortLoops) {
+TEST_P(ThreadPoolOf, RunsManyShortLoops) {
   ThreadPool pool(GetParam());
   std::vector<int> sums(8, 0);
   for (int loop = 0; loop < 2000; ++loop)
@@ -29,7 +29,7 @@ TEST_P(ThreadPoolOf, StartsManyShortLoops) {
   for (std::size_t i = 0; i < sums.size(); ++i) EXPECT_EQ(sums[i], 2000 * static_cast<int>(i));
 }
 
-TEST_P(ThreadPoolOf, RethrowsAndWorksOn) {
+TEST_P(ThreadPoolOf, RethrowsAndRemainsUsable) {
   ThreadPool pool(GetParam());
   for (int round = 0; round < 20; ++round) {
     EXPECT_THROW(pool.for_each(50,
@@ -43,7 +43,7 @@ TEST_P(ThreadPoolOf, RethrowsAndWorksOn) {
   }
 }
 
-TEST_P(ThreadPoolOf, DoesAllOtherItemsWhenOneThrows) {
+TEST_P(ThreadPoolOf, RunsAllOtherItemsIfOneThrows) {
   ThreadPool pool(GetParam());
   std::vector<std::atomic<int>> done(40);
   EXPECT_THROW(pool.for_each(done.size(),

@@ -13,7 +13,7 @@ TEST(Timestamp, RoundsSecondsToTheNearestNanosecond) {
   EXPECT_DOUBLE_EQ(to_seconds(1'500'000'000), 1.5);
 }
 
-TEST(Timestamp, ComesBackFromSeconds) {
+TEST(Timestamp, RoundTripsThroughSeconds) {
   for (const TimeNs t : {TimeNs{0}, TimeNs{1}, TimeNs{-1}, TimeNs{123456789}, TimeNs{3'600'000'000'001}}) {
     EXPECT_EQ(from_seconds(to_seconds(t)), t);
   }

@@ -37,21 +37,21 @@ std::vector<Vector3d> points_of(const Camera& camera, Random random) {
   return points;
 }
 
-TEST_P(CameraModelOf, PixelsComeBackFromTheirBearing) {
-  int answered = 0;
+TEST_P(CameraModelOf, PixelsRoundTripThroughTheirBearing) {
+  int valid = 0;
   for (const Vector2d& pixel : pixels_of(GetParam())) {
     const auto bearing = GetParam().unproject(pixel);
     if (!bearing) continue;
-    ++answered;
+    ++valid;
     EXPECT_NEAR(bearing->norm(), 1.0, 1e-12);
     const auto again = GetParam().project(3.7 * *bearing);
     ASSERT_TRUE(again) << pixel.transpose();
     EXPECT_LT((*again - pixel).norm(), 1e-6) << pixel.transpose();
   }
-  EXPECT_GT(answered, 400);  // of 441: at most the corners of a fisheye image are outside the domain
+  EXPECT_GT(valid, 400);  // of 441: at most the corners of a fisheye image are outside the domain
 }
 
-TEST_P(CameraModelOf, PointsComeBackUpToTheirDistance) {
+TEST_P(CameraModelOf, PointsRoundTripUpToTheirDistance) {
   for (const Vector3d& point : points_of(GetParam(), Random(1))) {
     const auto bearing = GetParam().unproject(GetParam().project(point).value());
     ASSERT_TRUE(bearing) << point.transpose();
@@ -59,7 +59,7 @@ TEST_P(CameraModelOf, PointsComeBackUpToTheirDistance) {
   }
 }
 
-TEST_P(CameraModelOf, JacobianIsThatOfTheProjection) {
+TEST_P(CameraModelOf, JacobianAgreesWithFiniteDifferences) {
   for (const Vector3d& point : points_of(GetParam(), Random(2))) {
     const auto projection = GetParam().project_with_jacobian(point);
     ASSERT_TRUE(projection);
@@ -78,7 +78,7 @@ TEST_P(CameraModelOf, JacobianIsThatOfTheProjection) {
   }
 }
 
-TEST_P(CameraModelOf, JacobianHoldsOnTheOpticalAxis) {
+TEST_P(CameraModelOf, JacobianIsCorrectOnTheOpticalAxis) {
   const auto projection = GetParam().project_with_jacobian({0, 0, 2.0});
   ASSERT_TRUE(projection);
   const Intrinsics& k = intrinsics(GetParam().model);
@@ -98,7 +98,7 @@ TEST_P(CameraModelOf, ProjectionDependsOnDirectionOnly) {
   }
 }
 
-TEST_P(CameraModelOf, AnswersNothingForNonsense) {
+TEST_P(CameraModelOf, ReturnsNulloptForInvalidInput) {
   const double nan = std::nan("");
   EXPECT_FALSE(GetParam().project({nan, 0, 1}));
   EXPECT_FALSE(GetParam().project({0, 0, nan}));
@@ -123,7 +123,7 @@ TEST_P(CameraModelOf, NoTwoDirectionsShareAPixel) {
   }
 }
 
-TEST(Pinhole, SeesNothingOnOrBehindItsPlane) {
+TEST(Pinhole, ProjectsNothingOnOrBehindItsPlane) {
   const Pinhole camera({400, 400, 320, 240});
   EXPECT_FALSE(camera.project({1, 0, 0}));
   EXPECT_FALSE(camera.project({0.1, 0, -1}));
@@ -131,7 +131,7 @@ TEST(Pinhole, SeesNothingOnOrBehindItsPlane) {
   EXPECT_TRUE(camera.project({5, 0, 0.01}));
 }
 
-TEST(PinholeRadTan, EndsWhereTheDistortedRadiusTurnsBack) {
+TEST(PinholeRadTan, DomainEndsAtTheMaximumDistortedRadius) {
   const PinholeRadTan camera({458.654, 457.296, 367.215, 248.375}, {-0.28340811, 0.07395907, 0, 0});
   // r (1 + k1 r^2 + k2 r^4): 1 + 3 k1 r^2 + 5 k2 r^4 has no root here, so the radius increases without limit.
   EXPECT_TRUE(std::isinf(camera.max_radius()));
@@ -150,7 +150,7 @@ TEST(PinholeRadTan, KeepsItsCoefficients) {
   }
 }
 
-TEST(KannalaBrandt, SeesBehindItsPlane) {
+TEST(KannalaBrandt, ProjectsPointsBehindItsPlane) {
   const KannalaBrandt camera({130, 130, 320, 240}, {0, 0, 0, 0});
   EXPECT_EQ(camera.max_theta(), kPi);
   for (const double theta : {0.5 * kPi, 0.6 * kPi, 0.9 * kPi}) {
@@ -160,7 +160,7 @@ TEST(KannalaBrandt, SeesBehindItsPlane) {
   }
 }
 
-TEST(KannalaBrandt, EndsWhereTheRadiusTurnsBack) {
+TEST(KannalaBrandt, DomainEndsAtTheMaximumRadius) {
   const KannalaBrandt camera({130, 130, 320, 240}, {-0.1, 0, 0, 0});  // 1 - 0.3 theta^2 = 0
   const double end = std::sqrt(1 / 0.3);
   EXPECT_NEAR(camera.max_theta(), end, 0.0011);
@@ -196,7 +196,7 @@ double widest_angle(const Model& model) {
   return inside;
 }
 
-TEST(Unified, IsMeisModelWithoutDistortion) {
+TEST(Unified, EqualsMeisModelWithoutDistortion) {
   const double xi = 1.3, gamma = 540;
   const Unified camera({gamma / (1 + xi), gamma / (1 + xi), 320, 240}, xi / (1 + xi));
   Random random(5);
@@ -235,7 +235,7 @@ TEST(ExtendedUnified, WithBetaOneIsTheUnifiedModel) {
 }
 
 // Equations 40 to 42 of the paper.
-TEST(DoubleSphere, IsThatOfThePaper) {
+TEST(DoubleSphere, AgreesWithThePaper) {
   const double xi = -0.24, alpha = 0.567;
   const DoubleSphere camera({350, 349, 366, 249}, xi, alpha);
   Random random(6);
@@ -248,7 +248,7 @@ TEST(DoubleSphere, IsThatOfThePaper) {
   }
 }
 
-TEST(SphereModels, EndWhereTheirRadiusTurnsBack) {
+TEST(SphereModels, DomainEndsAtTheMaximumRadius) {
   const Intrinsics k{200, 200, 320, 240};
   const Unified wide(k, 0.7);
   EXPECT_NEAR(widest_angle(wide), std::acos(-0.3 / 0.7), 1e-9);  // d r / d theta = 0
@@ -275,7 +275,7 @@ TEST(SphereModels, EndWhereTheirRadiusTurnsBack) {
   EXPECT_TRUE(wide.unproject({320 + 200 / std::sqrt(0.4) - 1, 240}));
 }
 
-TEST(CameraModel, KnowsItsNameAndNumbers) {
+TEST(CameraModel, ReturnsItsNameAndParameters) {
   const auto cameras = test_cameras();
   EXPECT_EQ(model_name(cameras[0].model), "pinhole");
   EXPECT_EQ(model_name(cameras[1].model), "pinhole-radtan");

@@ -7,7 +7,7 @@
 namespace bslam::camera {
 namespace {
 
-// Values within the bounds of `row`, that make a lens of moderate distortion.
+// Values within the bounds of `row` that describe a lens of moderate distortion.
 std::vector<double> moderate(const ModelRow& row, std::size_t count) {
   std::vector<double> values;
   for (std::size_t i = 0; i < count; ++i) {
@@ -28,7 +28,7 @@ TEST(ModelTable, HasARowForEachAlternativeInItsOrder) {
   }
 }
 
-TEST(ModelTable, ModelsKeepTheParametersTheyWereMadeOf) {
+TEST(ModelTable, ModelsReturnTheirParameters) {
   for (const ModelRow& row : model_table()) {
     for (const std::size_t count : row.counts) {
       ASSERT_LE(count, row.parameters.size()) << row.name;

@@ -12,7 +12,7 @@ namespace {
 
 cv::Mat matrix_of(const Intrinsics& k) { return (cv::Mat_<double>(3, 3) << k.fx, 0, k.cx, 0, k.fy, k.cy, 0, 0, 1); }
 
-TEST(CameraModel, ProjectsAsOpenCVDoes) {
+TEST(CameraModel, ProjectsLikeOpenCV) {
   const cv::Mat zero = cv::Mat::zeros(3, 1, CV_64F);
   for (const Camera& camera : test_cameras()) {
     if (is_sphere_model(camera.model)) continue;  // calib3d has no such models

@@ -17,7 +17,7 @@ constexpr double kPi = std::numbers::pi;
 
 Camera pinhole(const std::string& name) { return {name, Pinhole({300, 300, 319.5, 239.5}), 640, 480, 0, ""}; }
 
-SE3 turned(double yaw, const Vector3d& position) { return SE3(geometry::so3_exp({0, yaw, 0}), position); }
+SE3 rotated(double yaw, const Vector3d& position) { return SE3(geometry::so3_exp({0, yaw, 0}), position); }
 
 double difference(const SE3& a, const SE3& b) { return (a.inverse() * b).log().norm(); }
 
@@ -25,8 +25,8 @@ double difference(const SE3& a, const SE3& b) { return (a.inverse() * b).log().n
 Rig three_cameras() {
   const SE3 T_body_rig(geometry::so3_exp({0.3, -1.2, 0.5}), {0.1, 0.2, 0.3});
   return Rig({{pinhole("left"), T_body_rig},
-              {pinhole("right"), T_body_rig * turned(0, {0.11, 0, 0})},
-              {pinhole("back"), T_body_rig * turned(kPi, {0, 0, -0.2})}});
+              {pinhole("right"), T_body_rig * rotated(0, {0.11, 0, 0})},
+              {pinhole("back"), T_body_rig * rotated(kPi, {0, 0, -0.2})}});
 }
 
 TEST(Rig, ComposesCameraPoses) {
@@ -69,7 +69,7 @@ TEST(Rig, OppositeCamerasDoNotOverlap) {
 TEST(Rig, OverlapShrinksWithTheAngleBetweenCameras) {
   double last = 1.1;
   for (const double degrees : {0.0, 30.0, 60.0, 85.0, 120.0}) {
-    const Rig rig({{pinhole("a"), SE3()}, {pinhole("b"), turned(degrees * kPi / 180, {0, 0, 0})}});
+    const Rig rig({{pinhole("a"), SE3()}, {pinhole("b"), rotated(degrees * kPi / 180, {0, 0, 0})}});
     EXPECT_LT(rig.overlap_share(0, 1), last);
     last = rig.overlap_share(0, 1);
     EXPECT_EQ(rig.overlap(0, 1), degrees < 90) << degrees;
@@ -79,7 +79,7 @@ TEST(Rig, OverlapShrinksWithTheAngleBetweenCameras) {
 
 TEST(Rig, WideFisheyesOverlapSideways) {
   const Camera fisheye = test_cameras().back();
-  const Rig rig({{fisheye, SE3()}, {fisheye, turned(kPi / 2, {0.05, 0, 0})}, {fisheye, turned(kPi, {0, 0, -0.1})}});
+  const Rig rig({{fisheye, SE3()}, {fisheye, rotated(kPi / 2, {0.05, 0, 0})}, {fisheye, rotated(kPi, {0, 0, -0.1})}});
   EXPECT_TRUE(rig.overlap(0, 1));
   EXPECT_TRUE(rig.overlap(0, 2));  // 220 degrees, back to back: the fields of view overlap in a ring
 }
@@ -96,10 +96,10 @@ TEST(Rig, SubsetKeepsTheOrderAndMovesTheRigFrame) {
   EXPECT_LT(difference(chosen.body_from_cam(0), rig.body_from_cam(2)), 1e-15);
 }
 
-TEST(Rig, TakesTheExtrinsicsOfAPartOfIt) {
+TEST(Rig, ReplacesTheExtrinsicsOfSomeCameras) {
   const Rig rig = three_cameras();
   const std::array order = {2, 0};
-  const SE3 moved = rig.body_from_cam(0) * turned(0.1, {0.01, 0.02, 0.03});
+  const SE3 moved = rig.body_from_cam(0) * rotated(0.1, {0.01, 0.02, 0.03});
   const Rig part({{rig.camera(std::size_t{2}), rig.body_from_cam(2)}, {rig.camera(std::size_t{0}), moved}});
   const Rig found = rig.with_extrinsics_of(part, order);
   EXPECT_EQ(found.camera(std::size_t{0}).name, rig.camera(std::size_t{0}).name);
@@ -114,7 +114,7 @@ TEST(Rig, OneCameraOverlapsNothing) {
   EXPECT_FALSE(rig.any_overlap());
 }
 
-TEST(RigDeathTest, HasAtLeastOneCamera) { EXPECT_DEATH(Rig({}), "at least one camera"); }
+TEST(RigDeathTest, RequiresACamera) { EXPECT_DEATH(Rig({}), "at least one camera"); }
 
 TEST(Camera, ContainsPixelsUpToItsMargin) {
   const Camera camera = pinhole("c");

@@ -1,4 +1,4 @@
-// The layouts beside EuRoC, and real recordings where they are present.
+// Layouts other than EuRoC, and real recordings if they are present.
 #include <gtest/gtest.h>
 
 #include "dataset/dataset.h"
@@ -18,7 +18,7 @@ class SmallKitti : public testing::Test {
     std::string times;
     for (int k = 0; k < 10; ++k) {
       times += std::to_string(k) + ".044989e-01\n";
-      for (const int c : {0, 1}) support::write_picture(image(k, c), 60, 20, k);
+      for (const int c : {0, 1}) support::write_image(image(k, c), 60, 20, k);
     }
     support::write_text(data() / "times.txt", times);
     support::write_text(data() / "calib.txt",
@@ -46,7 +46,7 @@ TEST_F(SmallKitti, Opens) {
   EXPECT_EQ(read_frame(*dataset, 9).images[1].image.width(), 60);
 }
 
-TEST_F(SmallKitti, AMissingImageIsDamagedAndKeepsItsPlace) {
+TEST_F(SmallKitti, AMissingImageIsDamagedAndKeepsItsIndex) {
   fs::remove(image(4, 1));
   const auto dataset = open();
   ASSERT_TRUE(dataset) << dataset.error().message();
@@ -54,15 +54,15 @@ TEST_F(SmallKitti, AMissingImageIsDamagedAndKeepsItsPlace) {
   EXPECT_EQ(read_frame(*dataset, 5).images[1].state, ImageState::kPresent);
 }
 
-TEST_F(SmallKitti, ImagesWithoutATimeAreWarnedOf) {
-  support::write_picture(data() / "image_0" / "000010.png", 60, 20);
+TEST_F(SmallKitti, WarnsOfImagesWithoutATime) {
+  support::write_image(data() / "image_0" / "000010.png", 60, 20);
   const auto dataset = open();
   ASSERT_TRUE(dataset);
   EXPECT_EQ(dataset->frames.size(), 10u);
   EXPECT_EQ(dataset->warnings.size(), 1u);
 }
 
-TEST_F(SmallKitti, IsChecked) {
+TEST_F(SmallKitti, RejectsInvalidTimes) {
   support::write_text(data() / "times.txt", "0.0\nsoon\n");
   EXPECT_EQ(open().error().key, "line 2");
   support::write_text(data() / "times.txt", "");
@@ -72,7 +72,7 @@ TEST_F(SmallKitti, IsChecked) {
   EXPECT_FALSE(open_dataset({.path = data(), .format = DatasetFormat::kKitti}));
 }
 
-TEST_F(SmallKitti, NeedsALineForEveryCamera) {
+TEST_F(SmallKitti, RequiresAProjectionForEveryCamera) {
   support::write_text(data() / "calib.txt", "P0: 50 0 30 0 0 50 10 0 0 0 1 0\n");
   EXPECT_FALSE(open());
   EXPECT_TRUE(open_dataset({.path = data(), .cameras = {0}}));
@@ -101,7 +101,7 @@ TEST(FolderDataset, OpensWithARigFile) {
   EXPECT_FALSE(open_dataset({.path = data, .format = DatasetFormat::kKitti}));
 }
 
-TEST(Dataset, SaysWhatLayoutsItLookedFor) {
+TEST(Dataset, ErrorsNameTheKnownLayouts) {
   const support::TemporaryFolder folder;
   const auto dataset = open_dataset({.path = folder.path()});
   ASSERT_FALSE(dataset);
@@ -121,7 +121,7 @@ class RecordedDataset : public testing::TestWithParam<Recorded> {};
 
 TEST_P(RecordedDataset, OpensWithItsFramesAndSizes) {
   const auto path = support::shared_data(GetParam().name);
-  if (!path) GTEST_SKIP() << "../shared/data/" << GetParam().name << " is not there";
+  if (!path) GTEST_SKIP() << "../shared/data/" << GetParam().name << " is not present";
   const auto dataset = open_dataset({.path = *path});
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(dataset->rig.size(), GetParam().cameras);
@@ -157,7 +157,7 @@ INSTANTIATE_TEST_SUITE_P(Sets, RecordedDataset,
 // Cameras 2 and 3 of this recording have 25 images each among the 160 of cameras 0 and 1.
 TEST(RealDataset, CamerasWithFewImagesJoinTheFramesOfTheOthers) {
   const auto path = support::shared_data("kitti_0039");
-  if (!path) GTEST_SKIP() << "../shared/data/kitti_0039 is not there";
+  if (!path) GTEST_SKIP() << "../shared/data/kitti_0039 is not present";
   const auto dataset = open_dataset({.path = *path});
   ASSERT_TRUE(dataset);
   std::vector<int> counts(4, 0);
@@ -170,7 +170,7 @@ TEST(RealDataset, CamerasWithFewImagesJoinTheFramesOfTheOthers) {
 // The stamps of these cameras differ by some microseconds, and every image keeps its own.
 TEST(RealDataset, ImagesKeepTheirOwnTimes) {
   const auto path = support::shared_data("aria_gen2_4cam");
-  if (!path) GTEST_SKIP() << "../shared/data/aria_gen2_4cam is not there";
+  if (!path) GTEST_SKIP() << "../shared/data/aria_gen2_4cam is not present";
   const auto dataset = open_dataset({.path = *path});
   ASSERT_TRUE(dataset);
   EXPECT_EQ(dataset->frames[0].images[0]->time_ns, 7385791599780);

@@ -32,7 +32,7 @@ class SmallEuroc : public testing::Test {
   }
   std::string line(int k) const { return support::small_list({k}).substr(support::small_list({}).size()); }
 
-  // Opening is refused; the message names the file.
+  // Expects that opening fails with a message that names the file.
   void expect_error(const fs::path& file, std::string_view found) const {
     const auto dataset = open();
     ASSERT_FALSE(dataset);
@@ -40,7 +40,7 @@ class SmallEuroc : public testing::Test {
     EXPECT_NE(dataset.error().found.find(found), std::string::npos) << dataset.error().message();
   }
 
-  // It opens, and of all images only image 20 of camera 0 is damaged.
+  // Expects that the data set opens and only image 20 of camera 0 is damaged.
   void expect_one_damaged() const {
     const auto dataset = open();
     ASSERT_TRUE(dataset) << dataset.error().message();
@@ -93,12 +93,12 @@ TEST_F(SmallEuroc, OpensByItsMav0FolderToo) {
   EXPECT_EQ(open_dataset({.path = data() / ""}).value().name, "small");
 }
 
-TEST_F(SmallEuroc, NamesItsGroundTruth) {
+TEST_F(SmallEuroc, ReportsItsGroundTruth) {
   support::write_text(data() / "mav0" / "state_groundtruth_estimate0" / "data.csv", "#\n");
   EXPECT_EQ(open().value().ground_truth, data() / "mav0" / "state_groundtruth_estimate0" / "data.csv");
 }
 
-TEST_F(SmallEuroc, TakesCamerasInTheOrderAsked) {
+TEST_F(SmallEuroc, UsesCamerasInTheRequestedOrder) {
   const auto dataset = open_dataset({.path = data(), .cameras = {1, 0}});
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(dataset->rig.camera(std::size_t{0}).name, "cam1");
@@ -109,7 +109,7 @@ TEST_F(SmallEuroc, TakesCamerasInTheOrderAsked) {
   EXPECT_EQ(open_dataset({.path = data(), .cameras = {1}}).value().whole_rig->size(), 2u);
 }
 
-TEST_F(SmallEuroc, DoesNotLookAtCamerasNotAskedFor) {
+TEST_F(SmallEuroc, IgnoresOtherCameras) {
   support::write_text(camera(1) / "sensor.yaml", "broken: [");
   EXPECT_FALSE(open());
   const auto one = open_dataset({.path = data(), .cameras = {0}});
@@ -117,7 +117,7 @@ TEST_F(SmallEuroc, DoesNotLookAtCamerasNotAskedFor) {
   EXPECT_FALSE(one->whole_rig);
 }
 
-TEST_F(SmallEuroc, RefusesCamerasTwiceOrNotThere) {
+TEST_F(SmallEuroc, RejectsRepeatedAndMissingCameras) {
   for (const std::vector<int>& cameras : {std::vector<int>{0, 9}, {0, 0}, {-1}, {2}}) {
     const auto dataset = open_dataset({.path = data(), .cameras = cameras});
     ASSERT_FALSE(dataset);
@@ -125,7 +125,7 @@ TEST_F(SmallEuroc, RefusesCamerasTwiceOrNotThere) {
   }
 }
 
-TEST_F(SmallEuroc, KeepsTheRangeAskedFor) {
+TEST_F(SmallEuroc, RestrictsFramesToTheTimeRange) {
   const auto dataset = open_dataset({.path = data(), .begin_s = 0.1, .end_s = 0.25});
   ASSERT_TRUE(dataset) << dataset.error().message();
   ASSERT_EQ(dataset->frames.size(), 3u);
@@ -133,7 +133,7 @@ TEST_F(SmallEuroc, KeepsTheRangeAskedFor) {
   EXPECT_EQ(dataset->first_time_ns, support::kSmallStart);
 }
 
-TEST_F(SmallEuroc, RefusesEmptyAndReversedRanges) {
+TEST_F(SmallEuroc, RejectsEmptyAndReversedRanges) {
   EXPECT_EQ(open_dataset({.path = data(), .begin_s = 5, .end_s = 1}).error().file, "--begin");
   EXPECT_EQ(open_dataset({.path = data(), .begin_s = 1, .end_s = 1}).error().file, "--begin");
   EXPECT_EQ(open_dataset({.path = data(), .begin_s = 100}).error().file, "--begin");
@@ -142,13 +142,13 @@ TEST_F(SmallEuroc, RefusesEmptyAndReversedRanges) {
   EXPECT_FALSE(open_dataset({.path = data(), .begin_s = std::nan("")}));
 }
 
-TEST_F(SmallEuroc, IgnoresARigBesideItUnlessAskedFor) {
+TEST_F(SmallEuroc, IgnoresARigFileInItsFolderUnlessRequested) {
   support::write_text(data() / "rig.yaml", "bslam_rig: 1\ncameras: nonsense\n");
   EXPECT_TRUE(open());
   EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
 }
 
-TEST_F(SmallEuroc, TakesAnotherRig) {
+TEST_F(SmallEuroc, UsesAnotherRig) {
   std::string yaml = rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value());
   for (std::size_t at = 0; (at = yaml.find("time_offset_s: 0.0", at)) != std::string::npos; ++at) {
     yaml.replace(at, 18, "time_offset_s: 0.5");
@@ -170,18 +170,18 @@ TEST_F(SmallEuroc, TakesAnotherRig) {
   EXPECT_TRUE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml", .cameras = {0}}));
 }
 
-TEST_F(SmallEuroc, AMaskThatDoesNotFitIsAnError) {
+TEST_F(SmallEuroc, RejectsAMaskOfAnotherSize) {
   std::string yaml = rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value());
   yaml.replace(yaml.find("mask: null"), 10, "mask: mask.png");
   support::write_text(data() / "rig.yaml", yaml);
   EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
-  support::write_picture(data() / "mask.png", 5, 5);
+  support::write_image(data() / "mask.png", 5, 5);
   EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
-  support::write_picture(data() / "mask.png", support::kSmallWidth, support::kSmallHeight);
+  support::write_image(data() / "mask.png", support::kSmallWidth, support::kSmallHeight);
   EXPECT_TRUE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
 }
 
-TEST_F(SmallEuroc, TellsWhereAnImageIsMissingFromAnInstant) {
+TEST_F(SmallEuroc, ReportsMissingImages) {
   std::vector<int> some;
   for (int k = 0; k < support::kSmallFrames; k += 2) some.push_back(k);
   support::write_text(camera(1) / "data.csv", support::small_list(some));
@@ -192,7 +192,7 @@ TEST_F(SmallEuroc, TellsWhereAnImageIsMissingFromAnInstant) {
   EXPECT_EQ(read_frame(*dataset, 3).images[1].state, ImageState::kMissing);
 }
 
-// ---- what folders look like when they are wrong
+// ---- invalid folders and files
 
 TEST_F(SmallEuroc, NoSuchFolder) {
   fs::remove_all(data());
@@ -217,11 +217,11 @@ TEST_F(SmallEuroc, SensorYamlIsMissing) {
   expect_error(camera(0) / "sensor.yaml", "No such file");
 }
 
-TEST_F(SmallEuroc, WithoutASensorYamlTheRigBesideItCounts) {
+TEST_F(SmallEuroc, UsesTheRigFileInItsFolderWithoutSensorYaml) {
   support::write_text(data() / "rig.yaml", rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value()));
   edit(data() / "rig.yaml", "cam1", "right");
   fs::remove(camera(0) / "sensor.yaml");
-  expect_error(camera(0) / "sensor.yaml", "No such file");  // half of them is a damaged recording
+  expect_error(camera(0) / "sensor.yaml", "No such file");  // a recording with some of the files is damaged
   fs::remove(camera(1) / "sensor.yaml");
   const auto dataset = open();
   ASSERT_TRUE(dataset) << dataset.error().message();
@@ -254,9 +254,9 @@ TEST_F(SmallEuroc, UnknownCameraModel) {
   expect_error(camera(0) / "sensor.yaml", "telepathic");
 }
 
-TEST_F(SmallEuroc, TransformIsNoRotation) {
+TEST_F(SmallEuroc, TransformIsNotARotation) {
   edit(camera(1) / "sensor.yaml", "[1, 0, 0,", "[2.0, 0, 0,");
-  expect_error(camera(1) / "sensor.yaml", "no rotation");
+  expect_error(camera(1) / "sensor.yaml", "not a rotation");
 }
 
 TEST_F(SmallEuroc, TransformIsMirrored) {
@@ -275,7 +275,7 @@ TEST_F(SmallEuroc, ResolutionOfAnotherCamera) {
 }
 
 TEST_F(SmallEuroc, EveryImageOfACameraHasAnotherSize) {
-  for (int k = 0; k < support::kSmallFrames; ++k) support::write_picture(image(k, 1), 64, 48);
+  for (int k = 0; k < support::kSmallFrames; ++k) support::write_image(image(k, 1), 64, 48);
   expect_error(camera(1) / "data", "64x48");
 }
 
@@ -291,7 +291,7 @@ TEST_F(SmallEuroc, ListIsMissing) {
   expect_error(camera(0) / "data.csv", "No such file");
 }
 
-TEST_F(SmallEuroc, ListHoldsWords) {
+TEST_F(SmallEuroc, ListContainsWords) {
   edit(camera(0) / "data.csv", line(0), "then,image.png\n");
   expect_error(camera(0) / "data.csv", "then");
   EXPECT_EQ(open().error().key, "line 2");
@@ -302,14 +302,14 @@ TEST_F(SmallEuroc, ListWithoutFileNames) {
   expect_error(camera(0) / "data.csv", "123");
 }
 
-TEST_F(SmallEuroc, TimestampsBeyondReason) {
+TEST_F(SmallEuroc, TimestampsOutOfRange) {
   for (const char* time : {"-5", "99999999999999999999", "9223372036854775807", "1.5"}) {
     support::write_text(camera(0) / "data.csv", std::string(time) + ",a.png\n");
     expect_error(camera(0) / "data.csv", time);
   }
 }
 
-TEST_F(SmallEuroc, ATimestampTwiceIsDroppedWithAWarning) {
+TEST_F(SmallEuroc, RepeatedTimestampsAreDroppedWithAWarning) {
   edit(camera(0) / "data.csv", line(4), line(4) + line(4));
   const auto dataset = open();
   ASSERT_TRUE(dataset) << dataset.error().message();
@@ -333,7 +333,7 @@ TEST_F(SmallEuroc, CamerasWithNoCommonTime) {
   expect_error(data(), "no image within 2 ms of an image of cam0");
 }
 
-TEST_F(SmallEuroc, CamerasThatAlternateNeedALargerTolerance) {
+TEST_F(SmallEuroc, AlternatingCamerasRequireALargerTolerance) {
   std::string list;
   for (int k = 0; k < support::kSmallFrames; ++k) {
     list += std::to_string(support::kSmallStart + k * support::kSmallInterval + support::kSmallInterval / 2) + "," +
@@ -372,7 +372,7 @@ TEST_F(SmallEuroc, AnImageIsATextFile) {
 }
 
 TEST_F(SmallEuroc, OneImageHasAnotherSize) {
-  support::write_picture(image(20), 31, 24);
+  support::write_image(image(20), 31, 24);
   expect_one_damaged();
 }
 
@@ -380,7 +380,7 @@ TEST_F(SmallEuroc, TheFirstImagesMayBeDamaged) {
   for (int k = 0; k < 10; ++k) support::write_text(image(k), "not an image");
   EXPECT_TRUE(open());
   fs::remove(image(0));
-  support::write_picture(image(1), 10, 10);
+  support::write_image(image(1), 10, 10);
   EXPECT_TRUE(open_dataset({.path = data(), .cameras = {1}}));
 }
 

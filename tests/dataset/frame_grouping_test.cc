@@ -34,7 +34,7 @@ TEST(FrameGrouping, JoinsImagesWithinTheToleranceAndKeepsTheirTimes) {
   EXPECT_EQ(g.unassigned, (std::vector<int>{0, 0, 0}));
 }
 
-TEST(FrameGrouping, CamerasThatFireElsewhereMakeNoFrames) {
+TEST(FrameGrouping, CamerasWithOtherCaptureTimesDefineNoFrames) {
   const auto g = group({at_ms({0, 100, 200}), at_ms({10, 101, 150, 190})});
   EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, -1}, {100, 101}, {200, -1}}));
   EXPECT_EQ(g.unassigned, (std::vector<int>{0, 3}));
@@ -47,7 +47,7 @@ TEST(FrameGrouping, AFasterCameraDoesNotRaiseTheFrameRate) {
   EXPECT_EQ(g.unassigned[1], 3);
 }
 
-TEST(FrameGrouping, OthersGoOnWhereCamera0HasAGap) {
+TEST(FrameGrouping, OtherCamerasDefineFramesInAGapOfCamera0) {
   const auto g = group({at_ms({0, 100, 500}), at_ms({0, 100, 200, 300, 400, 500, 600}), at_ms({301, 600.5})});
   EXPECT_EQ(
       times(g),
@@ -68,7 +68,7 @@ TEST(FrameGrouping, OthersGoOnWhereCamera0HasAGap) {
   EXPECT_EQ(h.frames[5].time_ns, 499 * kMs);
 }
 
-TEST(FrameGrouping, TheNearerOfTwoImagesStays) {
+TEST(FrameGrouping, KeepsTheNearerOfTwoImages) {
   const auto g = group({at_ms({0, 100}), at_ms({-1.5, 0.5, 99, 100.5})});
   EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, 0.5}, {100, 100.5}}));
   EXPECT_EQ(g.unassigned[1], 2);

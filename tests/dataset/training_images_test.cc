@@ -9,19 +9,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST(TrainingImages, AreFoundInFoldersAndBelow) {
+TEST(TrainingImages, AreFoundInFoldersAndSubfolders) {
   const support::TemporaryFolder folder;
   const fs::path root = folder.path();
   for (const char* name : {"b/z.png", "b/a.JPG", "a.pgm", "b/c/d.webp", "notes.txt", "b/e.png.bak", "f.jpeg"})
     support::write_text(root / name, "x");
-  fs::create_directories(root / "not_a_picture.png");
+  fs::create_directories(root / "folder.png");
   const auto found = find_images({(root / "f.jpeg").string(), root.string()});
   ASSERT_TRUE(found.ok());
   EXPECT_EQ(*found, (std::vector<fs::path>{root / "f.jpeg", root / "a.pgm", root / "b/a.JPG", root / "b/c/d.webp",
                                            root / "b/z.png"}));
 }
 
-TEST(TrainingImages, RefuseWhatIsNone) {
+TEST(TrainingImages, RejectOtherFiles) {
   const support::TemporaryFolder folder;
   support::write_text(folder.path() / "notes.txt", "x");
   EXPECT_EQ(find_images({(folder.path() / "none").string()}).error().file, (folder.path() / "none").string());
@@ -32,7 +32,7 @@ TEST(TrainingImages, RefuseWhatIsNone) {
 TEST(TrainingImages, AreReadInAllFormats) {
   const support::TemporaryFolder folder;
   for (const char* name : {"a.png", "b.jpg", "c.pgm", "d.webp"}) {
-    support::write_picture(folder.path() / name, 60, 40);
+    support::write_image(folder.path() / name, 60, 40);
     const auto image = read_training_image(folder.path() / name, 0);
     ASSERT_TRUE(image.ok()) << name << ": " << image.error().message();
     EXPECT_EQ(image->width(), 60);
@@ -40,15 +40,15 @@ TEST(TrainingImages, AreReadInAllFormats) {
   }
 }
 
-TEST(TrainingImages, AreRefusedWhenCut) {
+TEST(TrainingImages, AreRejectedWhenTruncated) {
   const support::TemporaryFolder folder;
   for (const char* name : {"a.png", "b.jpg", "c.pgm", "d.webp"}) {
-    support::write_picture(folder.path() / name, 60, 40);
+    support::write_image(folder.path() / name, 60, 40);
     const std::string bytes = support::read_text(folder.path() / name);
     support::write_text(folder.path() / name, bytes.substr(0, bytes.size() / 2));
     EXPECT_FALSE(read_training_image(folder.path() / name, 0).ok()) << name;
   }
-  support::write_text(folder.path() / "e.png", "no picture");
+  support::write_text(folder.path() / "e.png", "not an image");
   EXPECT_EQ(read_training_image(folder.path() / "e.png", 0).error().file, (folder.path() / "e.png").string());
 }
 
@@ -68,7 +68,7 @@ TEST(TrainingImages, OfPgmMayHaveComments) {
 
 TEST(TrainingImages, AreShrunkByAveraging) {
   const support::TemporaryFolder folder;
-  support::write_picture(folder.path() / "a.png", 80, 40, 3);
+  support::write_image(folder.path() / "a.png", 80, 40, 3);
   const auto full = read_training_image(folder.path() / "a.png", 80).value();
   ASSERT_EQ(full.width(), 80);
   const auto half = read_training_image(folder.path() / "a.png", 40).value();

@@ -29,25 +29,25 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Trajectory& esti
 
 using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
-TEST(Association, TakesTheNearestOfADenserGroundTruth) {
+TEST(Association, SelectsTheNearestPoseOfADenserGroundTruth) {
   EXPECT_EQ(pairs_of(at_ms({0, 50, 100}), at_ms({2, 48, 49, 53, 90, 99, 104}), 10), (Pairs{{0, 0}, {1, 2}, {2, 5}}));
 }
 
-TEST(Association, TakesTheNearestOfADenserEstimate) {
+TEST(Association, SelectsTheNearestPoseOfADenserEstimate) {
   EXPECT_EQ(pairs_of(at_ms({0, 10, 20, 30, 40}), at_ms({11, 39}), 10), (Pairs{{1, 0}, {4, 1}}));
 }
 
-TEST(Association, LeavesOutWhatIsFurtherApartThanAllowed) {
+TEST(Association, IgnoresPosesTooFarApart) {
   EXPECT_EQ(pairs_of(at_ms({0, 50, 100}), at_ms({10, 61, 100}), 10), (Pairs{{0, 0}, {2, 2}}));
   EXPECT_TRUE(pairs_of(at_ms({0}), at_ms({11}), 10).empty());
   EXPECT_TRUE(pairs_of({}, at_ms({11}), 10).empty());
 }
 
-TEST(Association, UsesAnEstimateOnceAndForTheNearestTruth) {
+TEST(Association, UsesEachEstimateOnceForTheNearestTruth) {
   EXPECT_EQ(pairs_of(at_ms({0, 100, 200, 300}), at_ms({92, 99, 104}), 10), (Pairs{{1, 1}}));
 }
 
-TEST(Association, PrefersTheEarlierOfTwoEquallyNear) {
+TEST(Association, SelectsTheEarlierPoseOnTies) {
   EXPECT_EQ(nearest_in_time(at_ms({0, 10}), 5 * kMs), 0u);
   EXPECT_EQ(nearest_in_time(at_ms({0, 10}), 6 * kMs), 1u);
   EXPECT_EQ(nearest_in_time(at_ms({0, 10}), -99 * kMs), 0u);
@@ -60,7 +60,7 @@ TEST(Trajectory, HasLengthAndMedianInterval) {
   EXPECT_EQ(median_interval_ns(at_ms({5})), 0);
 }
 
-TEST(Trajectory, MovesToAnotherFrameOnTheSameBody) {
+TEST(Trajectory, ConvertsToAnotherFrameOnTheSameBody) {
   const SE3 T_world_cam(geometry::so3_exp(Vector3d(0.1, -0.4, 0.9)), Vector3d(1, 2, 3));
   const SE3 T_body_cam(geometry::so3_exp(Vector3d(1.2, 0.3, -0.2)), Vector3d(0.1, -0.2, 0.05));
   const Trajectory body = moved_to_frame({{7, T_world_cam}}, T_body_cam.inverse());

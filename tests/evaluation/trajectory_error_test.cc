@@ -55,7 +55,7 @@ TEST(TrajectoryError, IsZeroAfterAlignmentOfAMovedCopy) {
   EXPECT_NEAR(result->gt_length_m, path_length_m(truth), 1e-12);
 }
 
-TEST(TrajectoryError, ReportsTheFittedScaleWhateverTheAlignment) {
+TEST(TrajectoryError, ReportsTheFittedScaleForAnyAlignment) {
   const Trajectory truth = winding(200);
   const Trajectory estimate =
       moved_by(truth, Sim3(0.25, geometry::so3_exp(Vector3d(0.5, -1.0, 2.0)), Vector3d(1, 2, 3)));
@@ -72,7 +72,7 @@ TEST(TrajectoryError, ReportsTheFittedScaleWhateverTheAlignment) {
   }
 }
 
-TEST(TrajectoryError, HasTheStatisticsComputedByHand) {
+TEST(TrajectoryError, AgreesWithStatisticsComputedByHand) {
   const Trajectory truth = {still(0, 0, 0, 0), still(kFrame, 1, 0, 0), still(2 * kFrame, 1, 1, 0),
                             still(3 * kFrame, 1, 1, 1)};
   Trajectory estimate = truth;
@@ -114,7 +114,7 @@ TEST(RelativeError, MeasuresDriftOverDeltaByHand) {
   EXPECT_NEAR(*result->scale, 0.1 / 0.12, 1e-12);
 }
 
-TEST(RelativeError, MakesNoPairWhereTheFrameIsMissing) {
+TEST(RelativeError, MakesNoPairWithAMissingFrame) {
   const Trajectory truth = winding(100);
   Trajectory estimate = truth;
   estimate.erase(estimate.begin() + 40, estimate.begin() + 50);
@@ -123,7 +123,7 @@ TEST(RelativeError, MakesNoPairWhereTheFrameIsMissing) {
   EXPECT_EQ(result->rpe.translation_m.count, 80u - 20u);  // ten pairs lack their first pose, ten their second
 }
 
-TEST(RelativeError, FollowsFramesWithUneasyTimes) {
+TEST(RelativeError, ToleratesJitterOfTheFrameTimes) {
   Trajectory truth = winding(100), estimate = truth;
   Random random(3, "times");
   for (TimedPose& pose : estimate) pose.time_ns += static_cast<TimeNs>(random.uniform(-5e6, 5e6));
@@ -133,7 +133,7 @@ TEST(RelativeError, FollowsFramesWithUneasyTimes) {
   EXPECT_LT(result->rpe.translation_m.max, 1e-9);
 }
 
-TEST(Coverage, IsTheShareOfGroundTruthFramesWithAPose) {
+TEST(Coverage, IsTheFractionOfGroundTruthFramesWithAPose) {
   const Trajectory truth = winding(200);
   Trajectory estimate = truth;
   estimate.erase(estimate.begin() + 60, estimate.begin() + 80);
@@ -143,7 +143,7 @@ TEST(Coverage, IsTheShareOfGroundTruthFramesWithAPose) {
   EXPECT_DOUBLE_EQ(result->coverage, 170.0 / 200.0);
 }
 
-TEST(Coverage, CountsFramesWhereADenserGroundTruthIs) {
+TEST(Coverage, CountsFramesWithDenserGroundTruth) {
   // Ground truth at 200 Hz for frames 20 .. 179 except 100 .. 109; poses for frames 30 .. 199 except 60 .. 69 and 104
   // .. 111.
   const Trajectory dense = winding(2000, kFrame / 10);
@@ -164,7 +164,7 @@ TEST(Coverage, CountsFramesWhereADenserGroundTruthIs) {
   EXPECT_DOUBLE_EQ(result->coverage, 128.0 / 150.0);
 }
 
-TEST(Coverage, StaysQuickWithAStrayTimeFarAway) {
+TEST(Coverage, IsFastWithAStrayTimestampFarAway) {
   Trajectory truth = winding(2000, kFrame / 10);
   truth.insert(truth.begin(), still(0, 0, 0, 0));  // half a century before the rest
   const auto result = evaluate(winding(200), truth, {});
@@ -172,7 +172,7 @@ TEST(Coverage, StaysQuickWithAStrayTimeFarAway) {
   EXPECT_NEAR(result->coverage, 200.0 / 201.0, 1e-12);
 }
 
-TEST(TrajectoryError, RefusesFewerThanThreePairs) {
+TEST(TrajectoryError, RejectsFewerThanThreePairs) {
   Trajectory truth = winding(10), estimate(truth.begin(), truth.begin() + 2);
   const auto result = evaluate(estimate, truth, {});
   ASSERT_FALSE(result.ok());
@@ -206,7 +206,7 @@ TEST(TrajectoryError, AlignsToAStraightLine) {
   EXPECT_NEAR(*exact->scale, 1.0, 1e-12);
 }
 
-TEST(TrajectoryError, ComparesStandingStillButFitsNoScaleToIt) {
+TEST(TrajectoryError, AlignsMotionlessTrajectoriesOnlyWithoutScale) {
   Trajectory truth, estimate;
   for (int i = 0; i < 4; ++i) {
     truth.push_back(still(i * kFrame, 1, 2, 3));

@@ -63,7 +63,7 @@ void expect_equal(const Trajectory& a, const Trajectory& b) {
   }
 }
 
-TEST(ParseSeconds, KeepsEveryNanosecond) {
+TEST(ParseSeconds, IsExactToTheNanosecond) {
   EXPECT_EQ(parse_seconds("1403636579.763555584"), 1'403'636'579'763'555'584);
   EXPECT_EQ(parse_seconds("1317045937"), 1'317'045'937'000'000'000);
   EXPECT_EQ(parse_seconds("0.000000001"), 1);
@@ -81,21 +81,21 @@ TEST(ParseSeconds, ReadsExponents) {
   EXPECT_EQ(parse_seconds("1e-99"), 0);
 }
 
-TEST(ParseSeconds, RoundsBeyondNanoseconds) {
+TEST(ParseSeconds, RoundsToNanoseconds) {
   EXPECT_EQ(parse_seconds("1.0000000004"), 1'000'000'000);
   EXPECT_EQ(parse_seconds("1.0000000005"), 1'000'000'001);
   EXPECT_EQ(parse_seconds("5e-10"), 1);
   EXPECT_EQ(parse_seconds("4.9e-10"), 0);
 }
 
-TEST(ParseSeconds, RefusesWhatIsNoTime) {
+TEST(ParseSeconds, RejectsInvalidTimes) {
   for (const char* text : {"", "-", ".", "e5", "1.2.3", "1,5", "nan", "inf", "0x10", "1e", "1e1e1", "--1", "1 ",
                            "4000000001", "99999999999999999999999", "1e99", "1e999999999999"}) {
     EXPECT_EQ(parse_seconds(text), std::nullopt) << text;
   }
 }
 
-TEST_F(TrajectoryFile, ReadsBackWhatItWrote) {
+TEST_F(TrajectoryFile, RoundTrips) {
   const Trajectory trajectory = random_trajectory();
   for (const TrajectoryFormat format :
        {TrajectoryFormat::kTum, TrajectoryFormat::kEurocCsv, TrajectoryFormat::kKitti}) {
@@ -106,7 +106,7 @@ TEST_F(TrajectoryFile, ReadsBackWhatItWrote) {
   }
 }
 
-TEST_F(TrajectoryFile, WritesTumAsTheContractSays) {
+TEST_F(TrajectoryFile, WritesTumWithHeaderAndNineDecimals) {
   const Trajectory trajectory = {{1'250'000'001, SE3(Quaterniond(1, 0, 0, 0), Vector3d(1, -2, 0.5))}};
   EXPECT_EQ(tum_text(trajectory, trajectory_header("cam0", PoseState::kFinal)),
             "# bslam trajectory frame=cam0 parent=world final=true\n"
@@ -138,8 +138,9 @@ TEST_F(TrajectoryFile, ReadsEurocCsvWithFurtherColumns) {
 
 TEST_F(TrajectoryFile, ReadsKittiPosesWithTheirTimes) {
   const auto poses = write("06.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 5 1 0 0 6 0 0 1 7\n");
-  EXPECT_EQ(read_trajectory(poses).error().message(),
-            poses.string() + ": found KITTI poses without times, expected times.txt beside them, or --times FILE");
+  EXPECT_EQ(
+      read_trajectory(poses).error().message(),
+      poses.string() + ": found KITTI poses without times, expected times.txt in the same folder, or --times FILE");
   const auto times = write("other.txt", "0.000000e+00\n1.044989e-01\n");
   const auto read = read_trajectory(poses, times);
   ASSERT_TRUE(read.ok()) << read.error().message();
@@ -154,10 +155,10 @@ TEST_F(TrajectoryFile, ReadsKittiPosesWithTheirTimes) {
   EXPECT_EQ(read_trajectory(poses).error().key, "line 2");
 }
 
-TEST_F(TrajectoryFile, NamesTheLineThatIsDamaged) {
+TEST_F(TrajectoryFile, ErrorsNameTheLine) {
   const std::string good = "1 0 0 0 0 0 0 1\n";
   EXPECT_EQ(error_of(good + "2 0 0 0 0 0\n"),
-            "t.txt: line 2: found 6 fields, expected 8 (t x y z qx qy qz qw), as TUM has");
+            "t.txt: line 2: found 6 fields, expected 8 (t x y z qx qy qz qw), in TUM files");
   EXPECT_EQ(error_of(good + "# c\n2 0 nan 0 0 0 0 1\n"), "t.txt: line 3: found 'nan', expected a finite number");
   EXPECT_EQ(error_of(good + "2 0 inf 0 0 0 0 1\n"), "t.txt: line 2: found 'inf', expected a finite number");
   EXPECT_EQ(error_of(good + "2 0 1e999 0 0 0 0 1\n"), "t.txt: line 2: found '1e999', expected a finite number");
@@ -166,7 +167,7 @@ TEST_F(TrajectoryFile, NamesTheLineThatIsDamaged) {
   EXPECT_EQ(error_of(good + "2 0 0 0 0 0 0 0\n"), "t.txt: line 2: found a quaternion of norm 0, expected norm 1");
   EXPECT_EQ(error_of(good + "2 0 0 0 1 1 0 1\n"), "t.txt: line 2: found a quaternion of norm 1.73205, expected norm 1");
   EXPECT_EQ(error_of("1 0 0 0 0 1 0 0 0 0 2 0\n"),
-            "t.txt: found KITTI poses without times, expected times.txt beside them, or --times FILE");
+            "t.txt: found KITTI poses without times, expected times.txt in the same folder, or --times FILE");
   EXPECT_NE(error_of("1,2,3,4,1,0,0,0\n2.5,2,3,4,1,0,0,0\n")
                 .find("line 2: found '2.5', expected a time in integer nanoseconds"),
             std::string::npos);
@@ -174,13 +175,13 @@ TEST_F(TrajectoryFile, NamesTheLineThatIsDamaged) {
             std::string::npos);
 }
 
-TEST_F(TrajectoryFile, RefusesTimesThatDoNotIncrease) {
+TEST_F(TrajectoryFile, RejectsTimesThatDoNotIncrease) {
   EXPECT_EQ(error_of("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n"),
-            "t.txt: line 2: found 1.000000000 s after 2.000000000 s, expected times that increase");
+            "t.txt: line 2: found 1.000000000 s after 2.000000000 s, expected increasing times");
   EXPECT_NE(error_of("2 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n"), "");
 }
 
-TEST_F(TrajectoryFile, RefusesWhatIsNoTrajectory) {
+TEST_F(TrajectoryFile, RejectsFilesOfOtherFormats) {
   EXPECT_EQ(error_of(""), "t.txt: found no poses, expected a TUM, EuRoC csv or KITTI trajectory");
   EXPECT_EQ(error_of("# only a comment\n"), "t.txt: found no poses, expected a TUM, EuRoC csv or KITTI trajectory");
   EXPECT_NE(error_of("1 2 3\n").find("line 1: found 3 fields"), std::string::npos);
@@ -189,14 +190,14 @@ TEST_F(TrajectoryFile, RefusesWhatIsNoTrajectory) {
   EXPECT_FALSE(read_trajectory(folder_ / "absent").ok());
 }
 
-TEST_F(TrajectoryFile, RefusesAMatrixThatIsNoRotation) {
+TEST_F(TrajectoryFile, RejectsAMatrixThatIsNotARotation) {
   write("times.txt", "1\n2\n");
   EXPECT_NE(error_of("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 -1 0\n")
-                .find("line 2: found a matrix that is no rotation"),
+                .find("line 2: found a matrix that is not a rotation"),
             std::string::npos);
 }
 
-TEST_F(TrajectoryFile, SurvivesEveryTruncation) {
+TEST_F(TrajectoryFile, HandlesEveryTruncation) {
   const std::string whole = tum_text(random_trajectory(), "header").substr(0, 250);
   for (std::size_t length = 0; length <= whole.size(); ++length) {
     const auto result = read_trajectory(write("t.txt", whole.substr(0, length)));

@@ -51,7 +51,7 @@ TEST(Alignment, FindsTheScale) {
   EXPECT_LT(found->rotation().angularDistance(S.rotation()), 1e-7);
 }
 
-TEST(Alignment, NeverMirrors) {
+TEST(Alignment, ReturnsARotationWithoutReflection) {
   Random random(3);
   const auto src = cloud(random, 20, {2, 2, 2});
   std::vector<Vector3d> dst;
@@ -76,7 +76,7 @@ TEST(Alignment, IsAMinimum) {
   }
 }
 
-TEST(Alignment, AnswersNothingWhereTheRotationIsFree) {
+TEST(Alignment, ReturnsNulloptIfTheRotationIsUndetermined) {
   std::vector<Vector3d> line, point(5, Vector3d(1, 2, 3));
   for (int i = 0; i < 10; ++i) line.push_back(Vector3d(1, 1, 2) * i + Vector3d(5, 5, 5));
   EXPECT_FALSE(align_points(line, line, ScaleMode::kFixed));

@@ -16,9 +16,9 @@ inline Vector3d random_direction(Random& random) {
   return Vector3d(random.normal(), random.normal(), random.normal()).normalized();
 }
 
-// Returns a rotation vector whose angle is uniform in [0, `most`).
-inline Vector3d random_rotation_vector(Random& random, double most = 0.999 * std::numbers::pi) {
-  return random.uniform(0.0, most) * random_direction(random);
+// Returns a rotation vector whose angle is uniform in [0, `max_angle`).
+inline Vector3d random_rotation_vector(Random& random, double max_angle = 0.999 * std::numbers::pi) {
+  return random.uniform(0.0, max_angle) * random_direction(random);
 }
 
 inline SE3 random_se3(Random& random, double size = 5.0) {

@@ -24,7 +24,7 @@ Vector6d random_twist(Random& random, double translation = 5.0) {
   return xi;
 }
 
-TEST(SE3, MapsPointsAsItsMatrixDoes) {
+TEST(SE3, MapsPointsLikeItsMatrix) {
   Random random(1);
   for (int i = 0; i < 50; ++i) {
     const SE3 T = random_se3(random);
@@ -68,7 +68,7 @@ TEST(SE3, LogInvertsExp) {
   }
 }
 
-TEST(SE3, AdjointCarriesATwistThrough) {
+TEST(SE3, AdjointTransformsATwist) {
   Random random(6);
   for (int i = 0; i < 50; ++i) {
     const SE3 T = random_se3(random);
@@ -99,7 +99,7 @@ TEST(SE3, PerturbedPointHasTheExpectedJacobian) {
   }
 }
 
-TEST(SE3, InterpolatesFromEndToEnd) {
+TEST(SE3, InterpolatesBetweenItsEnds) {
   Random random(9);
   for (int i = 0; i < 30; ++i) {
     const SE3 a = random_se3(random), b = SE3::exp(0.5 * random_twist(random)) * a;

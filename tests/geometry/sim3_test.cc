@@ -34,7 +34,7 @@ Vector7d random_tangent(Random& random) {
   return xi;
 }
 
-TEST(Sim3, ComposesLikeTheMapsItStandsFor) {
+TEST(Sim3, ComposesLikeItsMatrix) {
   Random random(1);
   for (int i = 0; i < 50; ++i) {
     const Sim3 A = random_sim3(random), B = random_sim3(random);
@@ -44,14 +44,14 @@ TEST(Sim3, ComposesLikeTheMapsItStandsFor) {
   }
 }
 
-TEST(Sim3, OfARigidTransformIsTheSameMap) {
+TEST(Sim3, FromARigidTransformIsTheSameMap) {
   Random random(2);
   const SE3 T = random_se3(random);
   const Vector3d p = random_vector(random, 3);
   EXPECT_LT((Sim3(T) * p - T * p).norm(), 1e-13);
 }
 
-TEST(Sim3, MovesAPoseWithTheWorldAroundIt) {
+TEST(Sim3, TransformsAPoseWithItsWorld) {
   Random random(3);
   const Sim3 S = random_sim3(random);
   const SE3 T_b_frame = random_se3(random);
@@ -86,7 +86,7 @@ TEST(Sim3, LogInvertsExp) {
   }
 }
 
-TEST(Sim3, WithoutScaleIsSE3ToTheBit) {
+TEST(Sim3, WithoutScaleEqualsSE3Bitwise) {
   Random random(6);
   Vector7d xi = random_tangent(random);
   xi(6) = 0.0;
@@ -98,7 +98,7 @@ TEST(Sim3, WithoutScaleIsSE3ToTheBit) {
   EXPECT_EQ(S.log().head<6>(), T.log());
 }
 
-TEST(Sim3, AdjointCarriesATangentThrough) {
+TEST(Sim3, AdjointTransformsATangent) {
   Random random(7);
   for (int i = 0; i < 50; ++i) {
     const Sim3 S = random_sim3(random);

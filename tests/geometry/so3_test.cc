@@ -55,7 +55,7 @@ TEST(So3, LogInvertsExp) {
   }
 }
 
-TEST(So3, LogTakesTheShorterWayForBothSignsOfAQuaternion) {
+TEST(So3, LogReturnsTheSmallerAngleForBothSignsOfAQuaternion) {
   Random random(4);
   for (int i = 0; i < 100; ++i) {
     const Vector3d omega = random_rotation_vector(random);
@@ -65,7 +65,7 @@ TEST(So3, LogTakesTheShorterWayForBothSignsOfAQuaternion) {
   }
 }
 
-TEST(So3, LogOfHalfATurnHasNormPi) {
+TEST(So3, LogOfARotationByPiHasNormPi) {
   Random random(5);
   for (int i = 0; i < 50; ++i) {
     const Vector3d axis = random_direction(random);
@@ -75,7 +75,7 @@ TEST(So3, LogOfHalfATurnHasNormPi) {
   }
 }
 
-TEST(So3, LeftJacobianIsItsSeries) {
+TEST(So3, LeftJacobianEqualsItsSeries) {
   Random random(6);
   for (const double angle : kAngles) {
     const Vector3d omega = angle * random_direction(random);

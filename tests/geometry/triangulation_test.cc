@@ -25,19 +25,19 @@ TEST(Triangulation, FindsThePointOfExactRays) {
   }
 }
 
-TEST(Triangulation, TakesTheMidpointOfSkewRays) {
+TEST(Triangulation, ReturnsTheMidpointOfSkewRays) {
   const std::vector<Ray> rays = {{{0, 0, 0}, {0, 0, 1}}, {{1, 0.2, 2}, {-1, 0, 0}}};
   EXPECT_LT((triangulate_midpoint(rays, 1e-3).value() - Vector3d(0, 0.1, 2)).norm(), 1e-12);
 }
 
-TEST(Triangulation, AnswersNothingForParallelRays) {
+TEST(Triangulation, ReturnsNulloptForParallelRays) {
   const std::vector<Ray> rays = {{{0, 0, 0}, {0, 0, 1}}, {{1, 0, 0}, {0, 0, 1}}};
   EXPECT_FALSE(triangulate_midpoint(rays, 1e-4));
   EXPECT_FALSE(triangulate_midpoint(rays, 0.0));
   EXPECT_FALSE(triangulate_midpoint(std::vector<Ray>{rays[0]}, 1e-4));
 }
 
-TEST(Triangulation, AnswersNothingBehindAnOrigin) {
+TEST(Triangulation, ReturnsNulloptBehindAnOrigin) {
   const Vector3d point(0, 0, 5);
   const std::vector<Ray> rays = {{{-1, 0, 0}, (point - Vector3d(-1, 0, 0)).normalized()},
                                  {{1, 0, 0}, -(point - Vector3d(1, 0, 0)).normalized()}};

@@ -32,7 +32,7 @@ TEST(Pyramid, HasExactRatios) {
   }
 }
 
-TEST(Pyramid, KeepsTheBaseAsItIs) {
+TEST(Pyramid, CopiesTheBaseImageUnchanged) {
   const Image base = make_image(101, 67, [](int x, int y) { return (x * 7 + y * 13) % 256; });
   const ImageView part{base.row(3) + 5, 80, 50, 101};  // a strided view
   Pyramid pyramid;
@@ -45,7 +45,7 @@ TEST(Pyramid, KeepsTheBaseAsItIs) {
 
 // A linear ramp is the same ramp in level-0 coordinates on every level, which tests the positions of the pixel centres:
 // an error of half a pixel on level 1 would be 0.2 grey levels or more.
-TEST(Pyramid, LevelsLieWhereTheirCoordinatesSay) {
+TEST(Pyramid, LevelsAreAlignedToTheirCoordinates) {
   for (const double factor : {1.2, 1.5, 2.0}) {
     const Image base = make_image(740, 430, [](int x, int y) { return 10 + 0.2137 * x + 0.1519 * y; });
     Pyramid pyramid;
@@ -92,7 +92,7 @@ TEST(Pyramid, DoesNotAlias) {
   EXPECT_LT(std::sqrt(square / count), 10.0);  // 71 at level 0
 }
 
-TEST(Pyramid, LeavesOutLevelsThatAreTooSmall) {
+TEST(Pyramid, OmitsLevelsThatAreTooSmall) {
   Pyramid pyramid;
   build_pyramid(Image(60, 40).view(), 8, 1.2, pyramid);
   EXPECT_EQ(pyramid.size(), 2u);  // 40, 33, 28
@@ -112,7 +112,7 @@ TEST(Pyramid, ReusesItsMemory) {
   for (std::size_t l = 0; l < pyramid.size(); ++l) EXPECT_EQ(pyramid.levels[l].row(0), before[l]);
 }
 
-TEST(Pyramid, TakesAnySize) {
+TEST(Pyramid, AcceptsAnySize) {
   Pyramid pyramid;
   for (int width = 33; width < 120; width += 7) {
     for (const double factor : {1.05, 1.2, 2.0})

@@ -13,24 +13,24 @@
 namespace bslam::image_decoding {
 namespace {
 
-std::string encoded(const cv::Mat& picture, const std::string& extension, const std::vector<int>& parameters = {}) {
+std::string encoded(const cv::Mat& original, const std::string& extension, const std::vector<int>& parameters = {}) {
   std::vector<std::uint8_t> bytes;
-  cv::imencode(extension, picture, bytes, parameters);
+  cv::imencode(extension, original, bytes, parameters);
   return std::string(bytes.begin(), bytes.end());
 }
 
-// Smooth with noise, so that an encoder that chooses filters takes every kind of them.
+// A smooth image with noise, so that an encoder uses every kind of filter.
 cv::Mat picture_of(int width, int height, int type = CV_8UC1) {
   Random random(9);
-  cv::Mat picture(height, width, type);
+  cv::Mat original(height, width, type);
   for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width * picture.channels(); ++x) {
+    for (int x = 0; x < width * original.channels(); ++x) {
       const double value = 0.5 + 0.3 * std::sin(0.05 * x) * std::cos(0.08 * y) + 0.05 * random.uniform();
-      if (picture.depth() == CV_16U) picture.ptr<std::uint16_t>(y)[x] = static_cast<std::uint16_t>(65535 * value);
-      if (picture.depth() == CV_8U) picture.ptr<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(255 * value);
+      if (original.depth() == CV_16U) original.ptr<std::uint16_t>(y)[x] = static_cast<std::uint16_t>(65535 * value);
+      if (original.depth() == CV_8U) original.ptr<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(255 * value);
     }
   }
-  return picture;
+  return original;
 }
 
 bool equal(const image::Image& ours, const cv::Mat& theirs) {
@@ -43,45 +43,45 @@ bool equal(const image::Image& ours, const cv::Mat& theirs) {
 
 TEST(ImageFile, DecodesGreyPngExactly) {
   for (const auto& [width, height] : {std::pair(1, 1), {3, 5}, {640, 480}, {751, 33}}) {
-    const cv::Mat picture = picture_of(width, height);
+    const cv::Mat original = picture_of(width, height);
     for (const int strategy :
          {cv::IMWRITE_PNG_STRATEGY_DEFAULT, cv::IMWRITE_PNG_STRATEGY_FILTERED, cv::IMWRITE_PNG_STRATEGY_RLE}) {
       for (const int level : {1, 9}) {
         const auto image = decode_grey(
-            encoded(picture, ".png", {cv::IMWRITE_PNG_STRATEGY, strategy, cv::IMWRITE_PNG_COMPRESSION, level}));
+            encoded(original, ".png", {cv::IMWRITE_PNG_STRATEGY, strategy, cv::IMWRITE_PNG_COMPRESSION, level}));
         ASSERT_TRUE(image);
-        EXPECT_TRUE(equal(*image, picture)) << width << "x" << height;
+        EXPECT_TRUE(equal(*image, original)) << width << "x" << height;
       }
     }
   }
 }
 
-TEST(ImageFile, TakesTheUpperBitsOfSixteen) {
-  const cv::Mat picture = picture_of(40, 30, CV_16UC1);
-  const auto image = decode_grey(encoded(picture, ".png"));
+TEST(ImageFile, KeepsTheUpperEightOfSixteenBits) {
+  const cv::Mat original = picture_of(40, 30, CV_16UC1);
+  const auto image = decode_grey(encoded(original, ".png"));
   ASSERT_TRUE(image);
   for (int y = 0; y < 30; ++y) {
-    for (int x = 0; x < 40; ++x) EXPECT_EQ(image->row(y)[x], picture.at<std::uint16_t>(y, x) >> 8);
+    for (int x = 0; x < 40; ++x) EXPECT_EQ(image->row(y)[x], original.at<std::uint16_t>(y, x) >> 8);
   }
 }
 
-TEST(ImageFile, MakesColoursGrey) {
-  const cv::Mat picture(20, 30, CV_8UC3, cv::Scalar(200, 100, 50));  // blue, green, red
-  const auto image = decode_grey(encoded(picture, ".png"));
+TEST(ImageFile, ConvertsColoursToGrey) {
+  const cv::Mat original(20, 30, CV_8UC3, cv::Scalar(200, 100, 50));  // blue, green, red
+  const auto image = decode_grey(encoded(original, ".png"));
   ASSERT_TRUE(image);
   EXPECT_NEAR(image->row(3)[4], 0.114 * 200 + 0.587 * 100 + 0.299 * 50, 1.01);
 }
 
 TEST(ImageFile, DecodesJpeg) {
-  const cv::Mat picture = picture_of(64, 48);
-  const std::string bytes = encoded(picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 100});
+  const cv::Mat original = picture_of(64, 48);
+  const std::string bytes = encoded(original, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 100});
   const auto image = decode_grey(bytes);
   ASSERT_TRUE(image);
   EXPECT_TRUE(equal(*image, cv::imdecode(std::vector<std::uint8_t>(bytes.begin(), bytes.end()), cv::IMREAD_GRAYSCALE)));
   EXPECT_TRUE(decode_grey(bytes + std::string(100, '\0')));  // as some recorders pad
 }
 
-TEST(ImageFile, RefusesEveryTruncation) {
+TEST(ImageFile, RejectsEveryTruncation) {
   for (const char* extension : {".png", ".jpg"}) {
     const std::string bytes = encoded(picture_of(64, 48), extension);
     for (std::size_t size = 0; size < bytes.size(); size += size < 100 ? 1 : 37) {
@@ -91,16 +91,17 @@ TEST(ImageFile, RefusesEveryTruncation) {
   }
 }
 
-TEST(ImageFile, RefusesWhatIsNoImage) {
+TEST(ImageFile, RejectsOtherData) {
   EXPECT_FALSE(decode_grey(""));
   EXPECT_FALSE(decode_grey("not an image"));
   EXPECT_FALSE(decode_grey(std::string(5000, 'x')));
 }
 
-// Damage anywhere in a PNG: its checksums tell, or the picture is whole all the same; it never crashes or reads beyond.
-TEST(ImageFile, SurvivesDamagedBytes) {
-  const cv::Mat picture = picture_of(48, 36);
-  const std::string bytes = encoded(picture, ".png");
+// Damage anywhere in a PNG is detected by the checksums or does not change the image; the decoder never crashes or
+// reads beyond the data.
+TEST(ImageFile, HandlesDamagedBytes) {
+  const cv::Mat original = picture_of(48, 36);
+  const std::string bytes = encoded(original, ".png");
   Random random(3);
   for (int i = 0; i < 2000; ++i) {
     std::string damaged = bytes;
@@ -108,13 +109,13 @@ TEST(ImageFile, SurvivesDamagedBytes) {
       damaged[random.below(static_cast<std::uint32_t>(bytes.size()))] ^= static_cast<char>(1 + random.below(255));
     if (damaged == bytes) continue;
     const auto image = decode_grey(damaged);
-    EXPECT_TRUE(!image || equal(*image, picture));
+    EXPECT_TRUE(!image || equal(*image, original));
   }
 }
 
 TEST(ImageFile, ReadsFiles) {
   const support::TemporaryFolder folder;
-  support::write_picture(folder.path() / "a.png", 20, 10);
+  support::write_image(folder.path() / "a.png", 20, 10);
   EXPECT_EQ(read_image(folder.path() / "a.png").value().width(), 20);
   EXPECT_FALSE(read_image(folder.path() / "b.png"));
   EXPECT_FALSE(read_image(folder.path()));
@@ -122,7 +123,7 @@ TEST(ImageFile, ReadsFiles) {
 
 TEST(ImageFile, ReadsMasksOfTheCamerasSize) {
   const support::TemporaryFolder folder;
-  support::write_picture(folder.path() / "mask.png", 20, 10);
+  support::write_image(folder.path() / "mask.png", 20, 10);
   camera::Camera camera{"c", camera::Pinhole({10, 10, 10, 5}), 20, 10, 0, ""};
   EXPECT_TRUE(read_mask(camera).value().empty());
   camera.mask_file = (folder.path() / "mask.png").string();
@@ -134,7 +135,7 @@ TEST(ImageFile, ReadsMasksOfTheCamerasSize) {
   ASSERT_TRUE(cv::imwrite((folder.path() / "black.png").string(), cv::Mat::zeros(10, 30, CV_8U)));
   camera.mask_file = (folder.path() / "black.png").string();
   ASSERT_FALSE(read_mask(camera));
-  EXPECT_EQ(read_mask(camera).error().found, "only zeros, which mask all of c");
+  EXPECT_EQ(read_mask(camera).error().found, "only zeros, which mask the whole image of c");
 }
 
 }  // namespace

@@ -8,10 +8,10 @@
 namespace bslam::image_files {
 namespace {
 
-TEST(ImageSize, IsThatOfTheHeader) {
+TEST(ImageSize, IsReadFromTheHeader) {
   const support::TemporaryFolder folder;
   for (const char* name : {"a.png", "a.jpg"}) {
-    support::write_picture(folder.path() / name, 67, 35);
+    support::write_image(folder.path() / name, 67, 35);
     const std::string bytes = support::read_text(folder.path() / name);
     const auto size = image_size(bytes);
     ASSERT_TRUE(size) << name;
@@ -32,17 +32,17 @@ TEST(ImageSize, SkipsSegmentsBeforeTheFrameHeader) {
   for (std::size_t n = 0; n < jpeg.size(); ++n) EXPECT_FALSE(image_size(jpeg.substr(0, n))) << n;
 }
 
-TEST(ImageSize, RefusesWhatIsNoImage) {
+TEST(ImageSize, ReturnsNulloptForOtherFiles) {
   EXPECT_FALSE(image_size(""));
   EXPECT_FALSE(image_size("P5 67 35 255\n"));
   EXPECT_FALSE(image_size(std::string("\xff\xd8\xff\xd9\x00\x02", 6)));
   EXPECT_FALSE(image_size("\x89PNG\r\n\x1a\n0000IHDR"));
 }
 
-TEST(ImageFolder, TellsTheSizeOfTheFirstImageThatIsOne) {
+TEST(ImageFolder, ReturnsTheSizeOfTheFirstReadableImage) {
   const support::TemporaryFolder folder;
   support::write_text(folder.path() / "1.png", "no image");
-  support::write_picture(folder.path() / "2.png", 40, 30);
+  support::write_image(folder.path() / "2.png", 40, 30);
   const auto size = first_image_size(images_in(folder.path()));
   ASSERT_TRUE(size);
   EXPECT_EQ(size->width, 40);

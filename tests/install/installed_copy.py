@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Installs a build into a folder of its own and uses it as a stranger would: builds the examples against it with
-find_package and as C++17 with warnings as errors, runs them on a rendered recording, and compares the recorded example
-with `bslam run --mode sequential` byte by byte.
+"""Installs a build into a separate folder and uses it like an external project: builds the examples against it with
+find_package, as C++17 with warnings as errors, runs them on a rendered recording, and compares the result of the example
+`recorded` with `bslam run --mode sequential` byte by byte.
 
     installed_copy.py --build BUILD --source SOURCE [--cmake CMAKE] [--data DATA]
 """
@@ -26,14 +26,14 @@ def run(*command):
 
 def check(condition, claim):
     if not condition:
-        sys.exit('not so: ' + claim)
+        sys.exit('check failed: ' + claim)
 
 
 def check_package(prefix):
-    """What is installed asks nothing of who links it but the standard library."""
+    """Checks that the installed package requires only the standard library from its users."""
     targets = next(prefix.rglob('bslamTargets.cmake')).read_text()
     for word in ('-msse', '-Werror', '-Wconversion', 'igen', 'opencv', 'yaml'):
-        check(word not in targets, f'bslamTargets.cmake says nothing of {word}')
+        check(word not in targets, f'bslamTargets.cmake does not contain {word}')
     for header in prefix.rglob('include/bslam/*.h'):
         for include in re.findall(r'#include "([^"]+)"', header.read_text()):
             check(include.startswith('bslam/'), f'{header.name} includes public headers only, not {include}')
@@ -71,9 +71,9 @@ def check_examples(prefix, cmake, source, data, work):
     run(bslam, 'run', data, '--mode', 'sequential', '--out', work / 'run', '--progress', 'never')
     poses = (work / 'trajectory.tum').read_bytes()
     check(poses.count(b'\n') > 2, 'the example has poses')
-    check(poses == (work / 'run/trajectory.tum').read_bytes(), 'the example and bslam run agree to the byte')
-    check('keyframes in 1 submaps' in run(build / 'read_map', work / 'map.bmap', work / 'points.xyz'), 'a map is read')
-    check((work / 'points.xyz').stat().st_size > 0, 'it has landmarks')
+    check(poses == (work / 'run/trajectory.tum').read_bytes(), 'the trajectories of the example and of bslam run are identical')
+    check('keyframes in 1 submaps' in run(build / 'read_map', work / 'map.bmap', work / 'points.xyz'), 'the saved map can be read')
+    check((work / 'points.xyz').stat().st_size > 0, 'the map has landmarks')
     run(build / 'live', data, 4)
 
 

@@ -15,7 +15,7 @@ class Consistency : public ::testing::Test {
     options.max_keyframe_gap = 3;
   }
   // Returns the consistent candidates of a keyframe.
-  std::vector<KeyframeId> told(int keyframe, const std::vector<int>& candidates) {
+  std::vector<KeyframeId> consistent(int keyframe, const std::vector<int>& candidates) {
     std::vector<Candidate> list;
     for (const int c : candidates) list.push_back({KeyframeId(c), 1.0});
     std::vector<KeyframeId> out;
@@ -26,56 +26,56 @@ class Consistency : public ::testing::Test {
   static std::vector<KeyframeId> ids(const std::vector<int>& values) { return {values.begin(), values.end()}; }
 
   LoopOptions options;
-  const map::BundledMap& map_ = exact_walk(1).map;
+  const map::BundledMap& map_ = map_without_drift(1).map;
   RecognitionHistory history_;
 };
 
-TEST_F(Consistency, APlaceCountsOnceSeveralKeyframesHaveRecognisedIt) {
-  EXPECT_EQ(told(28, {3}), ids({}));
-  EXPECT_EQ(told(29, {4}), ids({}));
-  EXPECT_EQ(told(30, {5}), ids({5}));
-  EXPECT_EQ(told(31, {6}), ids({6}));
+TEST_F(Consistency, RequiresConsecutiveRecognitions) {
+  EXPECT_EQ(consistent(28, {3}), ids({}));
+  EXPECT_EQ(consistent(29, {4}), ids({}));
+  EXPECT_EQ(consistent(30, {5}), ids({5}));
+  EXPECT_EQ(consistent(31, {6}), ids({6}));
 }
 
-TEST_F(Consistency, OneKeyframeSufficesWhereNoMoreAreAskedFor) {
+TEST_F(Consistency, AcceptsTheFirstKeyframeIfOnlyOneIsRequired) {
   options.consistent_keyframes = 1;
-  EXPECT_EQ(told(28, {3, 20}), ids({3, 20}));
+  EXPECT_EQ(consistent(28, {3, 20}), ids({3, 20}));
 }
 
-TEST_F(Consistency, SeveralCandidatesOfAPlaceInOneKeyframeCountOnce) {
-  EXPECT_EQ(told(28, {3, 4, 5}), ids({}));
-  EXPECT_EQ(told(29, {3, 4, 5}), ids({}));
-  EXPECT_EQ(told(30, {3, 4, 5}), ids({3, 4, 5}));
+TEST_F(Consistency, CountsSeveralCandidatesOfOneKeyframeOnce) {
+  EXPECT_EQ(consistent(28, {3, 4, 5}), ids({}));
+  EXPECT_EQ(consistent(29, {3, 4, 5}), ids({}));
+  EXPECT_EQ(consistent(30, {3, 4, 5}), ids({3, 4, 5}));
 }
 
-TEST_F(Consistency, PlacesAreCountedApart) {
-  EXPECT_EQ(told(28, {3}), ids({}));
-  EXPECT_EQ(told(29, {20}), ids({}));
-  EXPECT_EQ(told(30, {21, 4}), ids({}));
-  EXPECT_EQ(told(31, {5, 22}), ids({5, 22}));
+TEST_F(Consistency, CountsEachPlaceSeparately) {
+  EXPECT_EQ(consistent(28, {3}), ids({}));
+  EXPECT_EQ(consistent(29, {20}), ids({}));
+  EXPECT_EQ(consistent(30, {21, 4}), ids({}));
+  EXPECT_EQ(consistent(31, {5, 22}), ids({5, 22}));
 }
 
-TEST_F(Consistency, ItOutlivesKeyframesThatDoNotSeeThePlace) {
-  told(20, {3});
-  told(22, {});
-  EXPECT_EQ(told(23, {4}), ids({}));  // the second one
-  EXPECT_EQ(told(26, {5}), ids({5}));
+TEST_F(Consistency, ToleratesShortGaps) {
+  consistent(20, {3});
+  consistent(22, {});
+  EXPECT_EQ(consistent(23, {4}), ids({}));  // the second recognition
+  EXPECT_EQ(consistent(26, {5}), ids({5}));
 }
 
-TEST_F(Consistency, ItIsForgottenAfterTooManyOfThem) {
-  told(20, {3});
-  told(21, {4});
-  EXPECT_EQ(told(25, {5}), ids({}));
-  EXPECT_EQ(told(26, {5}), ids({}));
-  EXPECT_EQ(told(27, {5}), ids({5}));
+TEST_F(Consistency, DropsAPlaceAfterALongGap) {
+  consistent(20, {3});
+  consistent(21, {4});
+  EXPECT_EQ(consistent(25, {5}), ids({}));
+  EXPECT_EQ(consistent(26, {5}), ids({}));
+  EXPECT_EQ(consistent(27, {5}), ids({5}));
 }
 
-TEST_F(Consistency, NothingIsKeptOfPlacesNotSeenAgain) {
-  told(20, {3, 20});
+TEST_F(Consistency, DropsTheHistoryOfPlacesNotRecognisedAgain) {
+  consistent(20, {3, 20});
   EXPECT_EQ(history_.places.size(), 2u);
-  told(21, {});
+  consistent(21, {});
   EXPECT_EQ(history_.places.size(), 2u);
-  told(24, {});
+  consistent(24, {});
   EXPECT_TRUE(history_.places.empty());
 }
 

@@ -12,16 +12,16 @@ namespace {
 using map::Fingerprint;
 
 // Options that accept any correction as drift.
-LoopingOptions credulous() {
+LoopingOptions options_without_drift_bound() {
   LoopingOptions options;
   options.loop.max_drift = 10;
   return options;
 }
 
 // Runs the stage on a growing map, keyframe by keyframe, until it closes a loop.
-class Watch {
+class LoopCloserRun {
  public:
-  explicit Watch(const LoopingOptions& options = {}, std::uint64_t seed = 1)
+  explicit LoopCloserRun(const LoopingOptions& options = {}, std::uint64_t seed = 1)
       : closer_(recogniser(), options, kFeatures, seed) {}
 
   // Returns true as long as no loop was closed; the draft is then unchanged.
@@ -45,29 +45,29 @@ class Watch {
 
 class LoopCloserRig : public ::testing::TestWithParam<int> {};
 
-TEST_P(LoopCloserRig, ClosesTheLoopWhereTheEndSeesTheStartAndNotBefore) {
-  Watch watch;
-  const HallMap world =
-      walk(hall(rig_of(GetParam())), 5, rigid_drift(), [&](const HallMap& w, KeyframeId k) { return watch(w, k); });
-  ASSERT_TRUE(watch.closure);
-  const KeyframeId k = watch.closure->keyframe;
+TEST_P(LoopCloserRig, ClosesTheLoopAtTheRevisitAndNotBefore) {
+  LoopCloserRun run;
+  const HallMap world = simulate_lap(hall(rig_of(GetParam())), 5, rigid_drift(),
+                                     [&](const HallMap& w, KeyframeId k) { return run(w, k); });
+  ASSERT_TRUE(run.closure);
+  const KeyframeId k = run.closure->keyframe;
   EXPECT_EQ(k, world.map.newest_keyframe());
-  EXPECT_GT(k.value(), kRound - 12);
+  EXPECT_GT(k.value(), kLapKeyframes - 12);
   // They are close enough to observe the same landmarks.
-  EXPECT_LT(distance_m(world.truth(k), world.truth(watch.closure->matched_keyframe)), 9.0);
-  EXPECT_FALSE(watch.closure->merged);
+  EXPECT_LT(distance_m(world.truth(k), world.truth(run.closure->matched_keyframe)), 9.0);
+  EXPECT_FALSE(run.closure->merged);
   const double before = distance_m(world.map.keyframe(k).T_rig_world, world.truth(k));
-  EXPECT_LT(5 * distance_m(watch.corrected->keyframe(k).T_rig_world, world.truth(k)), before);
-  EXPECT_EQ(watch.corrected->check_invariants(), std::nullopt);
+  EXPECT_LT(5 * distance_m(run.corrected->keyframe(k).T_rig_world, world.truth(k)), before);
+  EXPECT_EQ(run.corrected->check_invariants(), std::nullopt);
 }
 
-TEST_P(LoopCloserRig, SaysTheSameForTheSameSeed) {
+TEST_P(LoopCloserRig, IsDeterministicForASeed) {
   const auto corrected = [&] {
-    Watch watch;
-    const HallMap& world = drifted_walk(GetParam());
-    watch(world, KeyframeId(kRound));
-    watch(world, KeyframeId(kRound + 1));
-    return watch.corrected;
+    LoopCloserRun run;
+    const HallMap& world = map_with_drift(GetParam());
+    run(world, KeyframeId(kLapKeyframes));
+    run(world, KeyframeId(kLapKeyframes + 1));
+    return run.corrected;
   };
   const auto a = corrected(), b = corrected();
   ASSERT_TRUE(a && b);
@@ -76,54 +76,53 @@ TEST_P(LoopCloserRig, SaysTheSameForTheSameSeed) {
 
 INSTANTIATE_TEST_SUITE_P(Cameras, LoopCloserRig, ::testing::Values(1, 2, 4));
 
-TEST(LoopCloser, AsksForAsManyKeyframesInARowAsToldTo) {
-  const HallMap& world = drifted_walk(2);
-  Watch watch;
-  EXPECT_TRUE(watch(world, KeyframeId(kRound)));
-  EXPECT_FALSE(watch(world, KeyframeId(kRound + 1)));
-  LoopingOptions hasty;
-  hasty.loop.consistent_keyframes = 1;
-  EXPECT_FALSE(Watch(hasty)(world, KeyframeId(kRound)));
+TEST(LoopCloser, RequiresTheConfiguredNumberOfConsecutiveKeyframes) {
+  const HallMap& world = map_with_drift(2);
+  LoopCloserRun run;
+  EXPECT_TRUE(run(world, KeyframeId(kLapKeyframes)));
+  EXPECT_FALSE(run(world, KeyframeId(kLapKeyframes + 1)));
+  LoopingOptions single;
+  single.loop.consistent_keyframes = 1;
+  EXPECT_FALSE(LoopCloserRun(single)(world, KeyframeId(kLapKeyframes)));
 }
 
-TEST(LoopCloser, RemembersNothingOfAMapThatWasLeftForAnother) {
-  const HallMap& world = drifted_walk(2);
-  Watch watch;
-  EXPECT_TRUE(watch(world, KeyframeId(kRound)));
+TEST(LoopCloser, ResetsTheHistoryForANewMap) {
+  const HallMap& world = map_with_drift(2);
+  LoopCloserRun run;
+  EXPECT_TRUE(run(world, KeyframeId(kLapKeyframes)));
   // The ids do not increase, so this is a new map, and the first recognition of the place.
-  EXPECT_TRUE(watch(world, KeyframeId(kRound)));
-  EXPECT_FALSE(watch(world, KeyframeId(kRound + 1)));
+  EXPECT_TRUE(run(world, KeyframeId(kLapKeyframes)));
+  EXPECT_FALSE(run(world, KeyframeId(kLapKeyframes + 1)));
 }
 
-TEST(LoopCloser, NothingIsClosedOnAWalkThatComesNowhereBack) {
-  Watch watch;
+TEST(LoopCloser, ClosesNothingWithoutARevisit) {
+  LoopCloserRun run;
   const FeatureSimulator simulator = hall(rig_of(4));
   HallMap world(simulator.rig());
-  for (int i = 0; i < 2 * kRound / 3; ++i)
-    EXPECT_TRUE(watch(world, world.add(simulator.frame(FrameId(i), kStepS * i))));
+  for (int i = 0; i < 2 * kLapKeyframes / 3; ++i)
+    EXPECT_TRUE(run(world, world.add(simulator.frame(FrameId(i), kStepS * i))));
 }
 
 // Two identical-looking rooms, 8 m apart: after moving from one to the other, the required correction exceeds drift.
-void two_rooms(int cameras, Watch& watch) {
+void two_rooms(int cameras, LoopCloserRun& run) {
   const FeatureSimulator simulator = hall(rig_of(cameras));
   HallMap world(simulator.rig());
   const SE3 next_door(Eigen::Quaterniond::Identity(), {0, 8, 0});
   for (int i = 0; i < 12; ++i) {
     const int room = i / 6;
-    if (!watch(world,
-               world.add(simulator.frame(FrameId(i), kStepS * (i % 6)), {}, room, room == 1 ? next_door : SE3())))
+    if (!run(world, world.add(simulator.frame(FrameId(i), kStepS * (i % 6)), {}, room, room == 1 ? next_door : SE3())))
       return;
   }
 }
 
-TEST(LoopCloser, RefusesACorrectionThatNoDriftExplains) {
+TEST(LoopCloser, RejectsACorrectionBeyondDrift) {
   for (const int cameras : {1, 2, 4}) {
-    Watch watch, believer(credulous());
-    two_rooms(cameras, watch);
-    EXPECT_FALSE(watch.closure);
-    two_rooms(cameras, believer);
-    ASSERT_TRUE(believer.closure);  // rejected by the drift bound only
-    EXPECT_NEAR(believer.closure->translation_correction, 8.0, 0.05);
+    LoopCloserRun run, unbounded(options_without_drift_bound());
+    two_rooms(cameras, run);
+    EXPECT_FALSE(run.closure);
+    two_rooms(cameras, unbounded);
+    ASSERT_TRUE(unbounded.closure);  // rejected by the drift bound only
+    EXPECT_NEAR(unbounded.closure->translation_correction, 8.0, 0.05);
   }
 }
 
@@ -133,18 +132,18 @@ TEST(LoopCloser, MergesSubmapsAtACommonPlace) {
     const FeatureSimulator simulator = hall(rig_of(cameras));
     const Sim3 elsewhere(Sim3::exp((geometry::Vector7d() << 0.1, 0.3, -1.2, 15, -7, 2, 0).finished()));
     HallMap world(simulator.rig());
-    Watch watch;
-    for (int i = 0; i < 10; ++i) ASSERT_TRUE(watch(world, world.add(simulator.frame(FrameId(i), kStepS * i))));
+    LoopCloserRun run;
+    for (int i = 0; i < 10; ++i) ASSERT_TRUE(run(world, world.add(simulator.frame(FrameId(i), kStepS * i))));
     for (int i = 10; i < 13; ++i) {
       const KeyframeId k = world.add(simulator.frame(FrameId(i), kStepS * (i - 6) + 0.5), elsewhere, 0, {}, i == 10);
-      if (!watch(world, k)) break;
+      if (!run(world, k)) break;
     }
-    ASSERT_TRUE(watch.closure);
-    EXPECT_TRUE(watch.closure->merged);
-    EXPECT_EQ(watch.corrected->roots(), std::vector{KeyframeId(0)});
-    EXPECT_EQ(watch.corrected->check_invariants(), std::nullopt);
-    for (const KeyframeId k : watch.corrected->keyframe_ids()) {
-      EXPECT_LT(distance_m(watch.corrected->keyframe(k).T_rig_world, world.truth(k)), 0.02);
+    ASSERT_TRUE(run.closure);
+    EXPECT_TRUE(run.closure->merged);
+    EXPECT_EQ(run.corrected->roots(), std::vector{KeyframeId(0)});
+    EXPECT_EQ(run.corrected->check_invariants(), std::nullopt);
+    for (const KeyframeId k : run.corrected->keyframe_ids()) {
+      EXPECT_LT(distance_m(run.corrected->keyframe(k).T_rig_world, world.truth(k)), 0.02);
     }
   }
 }

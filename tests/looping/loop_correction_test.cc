@@ -16,15 +16,14 @@ namespace {
 using Eigen::Vector3d;
 using map::Fingerprint;
 
-constexpr KeyframeId kLast(kRound + 1);
+constexpr KeyframeId kLast(kLapKeyframes + 1);
 
 std::optional<PlaceMatch> locate_last(const HallMap& world) {
   return verify_place(world.map, world.map.rig_of(kLast), *world.map.keyframe(kLast).frame, KeyframeId(1), {},
                       kFeatures, seeded(1));
 }
 
-// Distance in metres between the estimated and the true position of a keyframe, and the mean of the same over its
-// landmarks.
+// Position error of a keyframe in metres, and the mean position error of its landmarks.
 double error_of(const HallMap& world, const map::BundledMap& map, KeyframeId k) {
   return distance_m(map.keyframe(k).T_rig_world, world.truth(k));
 }
@@ -56,16 +55,16 @@ void expect_refreshed(const map::BundledMap& map) {
   int stale = 0;
   for (const LandmarkId l : map.landmark_ids()) {
     again.refresh_landmark(l);
-    const map::Landmark &ours = map.landmark(l), &anew = again.landmark(l);
-    stale += (ours.view_direction - anew.view_direction).norm() > 1e-6 ||
-             std::abs(ours.max_distance / anew.max_distance - 1) > 1e-5;
+    const map::Landmark &ours = map.landmark(l), &refreshed = again.landmark(l);
+    stale += (ours.view_direction - refreshed.view_direction).norm() > 1e-6 ||
+             std::abs(ours.max_distance / refreshed.max_distance - 1) > 1e-5;
   }
   EXPECT_EQ(stale, 0) << "of " << map.num_landmarks();
 }
 
 class CloseLoopRig : public ::testing::TestWithParam<int> {
  protected:
-  CloseLoopRig() : world(drifted_walk(GetParam())), place_match(locate_last(world)), draft(world.draft()) {}
+  CloseLoopRig() : world(map_with_drift(GetParam())), place_match(locate_last(world)), draft(world.draft()) {}
   void SetUp() override {
     ASSERT_TRUE(place_match);
     closure = measure(world.map, kLast, *place_match);
@@ -93,7 +92,7 @@ TEST_P(CloseLoopRig, MeasuresTheDrift) {
   EXPECT_FALSE(plausible(world.map, closure, strict));
 }
 
-TEST_P(CloseLoopRig, BringsTheKeyframesBack) {
+TEST_P(CloseLoopRig, ReducesThePoseErrors) {
   for (const KeyframeId k : {kLast, KeyframeId(kLast.value() - 1), KeyframeId(kLast.value() - 4)}) {
     EXPECT_LT(5 * error_of(world, draft.map(), k), error_of(world, world.map, k));
     EXPECT_LT(5 * angle_rad(draft.map().keyframe(k).T_rig_world, world.truth(k)),
@@ -119,7 +118,7 @@ TEST_P(CloseLoopRig, LandmarksMoveWithTheirKeyframes) {
   expect_refreshed(draft.map());
 }
 
-TEST_P(CloseLoopRig, FusesWhatIsSeenOnBothEnds) {
+TEST_P(CloseLoopRig, FusesLandmarksObservedAtBothEnds) {
   const map::BundledMap& after = draft.map();
   EXPECT_EQ(weight_between(world.map, kLast, KeyframeId(1)), 0);
   EXPECT_GT(weight_between(after, kLast, KeyframeId(1)), 60);
@@ -141,18 +140,18 @@ TEST_P(CloseLoopRig, FusesWhatIsSeenOnBothEnds) {
   for (const LandmarkId l : after.keyframe(kLast).landmarks) {
     if (!l.valid() || !then.contains(world.shown_by_landmark[l.index()])) continue;
     ++known;
-    twice += world.map.landmark(l).born > KeyframeId(kRound / 2);
+    twice += world.map.landmark(l).born > KeyframeId(kLapKeyframes / 2);
   }
   EXPECT_LT(twice, known / 10) << "of " << known;
 }
 
-TEST_P(CloseLoopRig, LeavesAMapInOrder) {
+TEST_P(CloseLoopRig, LeavesAValidMap) {
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
   EXPECT_EQ(draft.map().gauge_epoch(), world.map.gauge_epoch() + 1);
   EXPECT_EQ(draft.map().num_keyframes(), world.map.num_keyframes());
 }
 
-TEST_P(CloseLoopRig, GivesTheSameBytesAgain) {
+TEST_P(CloseLoopRig, IsDeterministic) {
   map::MapDraft again = world.draft();
   close_loop(closure, *place_match, {}, kFeatures, again);
   EXPECT_TRUE(Fingerprint(draft.map()) == Fingerprint(again.map()));
@@ -161,9 +160,9 @@ TEST_P(CloseLoopRig, GivesTheSameBytesAgain) {
 INSTANTIATE_TEST_SUITE_P(Cameras, CloseLoopRig, ::testing::Values(1, 2, 4));
 
 // A keyframe committed while the loop is closed moves with the correction, and so do its landmarks.
-TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
+TEST(CloseLoop, IsRebasedOntoAKeyframeCommittedMeanwhile) {
   const FeatureSimulator simulator = hall(rig_of(2));
-  HallMap world = drifted_walk(2);
+  HallMap world = map_with_drift(2);
   const auto place_match = locate_last(world);
   ASSERT_TRUE(place_match);
   map::MapStore store(world.map);
@@ -171,8 +170,9 @@ TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
   close_loop(measure(loop.map(), kLast, *place_match), *place_match, {}, kFeatures, loop);
 
   map::MapDraft tracking(store.snapshot());
+  // added at its predicted pose
   const KeyframeId newer =
-      world.add(simulator.frame(FrameId(kRound + 2), kStepS * (kRound + 2)), rigid_drift());  // its expected pose
+      world.add(simulator.frame(FrameId(kLapKeyframes + 2), kStepS * (kLapKeyframes + 2)), rigid_drift());
   std::vector<std::pair<FeatureId, LandmarkId>> matches;
   std::vector<std::pair<FeatureId, LandmarkId>> own;
   for (std::size_t f = 0; f < world.map.keyframe(newer).landmarks.size(); ++f) {
@@ -200,12 +200,12 @@ TEST(CloseLoop, IsRebasedOverAKeyframeCommittedMeanwhile) {
   EXPECT_GT(weight_between(after, newer, KeyframeId(1)), 30);  // its matches were forwarded along the merges
 }
 
-// A single camera does not observe the scale: at the end the map is a tenth too small.
+// The scale is not observable with a single camera: at the end the map is too small by 10 %.
 class ScaleDrift : public ::testing::Test {
  protected:
   static const HallMap& world() {
-    static const HallMap walked = walk(hall(rig_of(1)), 2, scale_drift());
-    return walked;
+    static const HallMap map = simulate_lap(hall(rig_of(1)), 2, scale_drift());
+    return map;
   }
   // Ratio of the lengths of the last steps in the map to their true lengths.
   static double step_ratio(const map::BundledMap& map) {
@@ -293,10 +293,10 @@ class MergeSubmaps : public ::testing::TestWithParam<int> {
   HallMap world;
 };
 
-TEST_P(MergeSubmaps, TheNewerSubmapMovesToTheOlder) { expect_joined(10, 6); }
-TEST_P(MergeSubmaps, AlsoWhereTheOlderOneRecognisesIt) { expect_joined(6, 10); }
+TEST_P(MergeSubmaps, MovesTheYoungerSubmapToTheOlder) { expect_joined(10, 6); }
+TEST_P(MergeSubmaps, MovesTheYoungerSubmapIfTheOlderOneRecognisesIt) { expect_joined(6, 10); }
 
-TEST_P(MergeSubmaps, SubmapsOfUnknownScaleAreNotMerged) {
+TEST_P(MergeSubmaps, DoesNotMergeSubmapsOfUnknownScale) {
   world.map.set_scale(map::Scale::kUpToScale);
   const auto place_match = located(10, 6);
   ASSERT_TRUE(place_match);

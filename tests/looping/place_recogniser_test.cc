@@ -21,17 +21,17 @@ void expect_equal(const std::vector<Candidate>& a, const std::vector<Candidate>&
 class RecogniserRig : public ::testing::TestWithParam<int> {};
 
 TEST_P(RecogniserRig, RanksTheRevisitedPlaceFirst) {
-  const HallMap& world = drifted_walk(GetParam());
-  for (const int again : {kRound, kRound + 1}) {
+  const HallMap& world = map_with_drift(GetParam());
+  for (const int again : {kLapKeyframes, kLapKeyframes + 1}) {
     const std::vector<Candidate> candidates = recogniser()->query_keyframe(world.map, KeyframeId(again));
     ASSERT_FALSE(candidates.empty());
-    EXPECT_LE(std::abs(candidates.front().keyframe.value() - (again - kRound)), 2);
+    EXPECT_LE(std::abs(candidates.front().keyframe.value() - (again - kLapKeyframes)), 2);
     for (std::size_t i = 1; i < candidates.size(); ++i) EXPECT_LE(candidates[i].score, candidates[i - 1].score);
   }
 }
 
 TEST_P(RecogniserRig, RanksTheTrueNeighbourhoodOfAFrameFirst) {
-  const HallMap& world = exact_walk(GetParam());
+  const HallMap& world = map_without_drift(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (const int at : {2, 9, 17, 28}) {
     const auto frame = described(simulator.frame(FrameId(1000 + at), kStepS * at + 0.5));
@@ -42,7 +42,7 @@ TEST_P(RecogniserRig, RanksTheTrueNeighbourhoodOfAFrameFirst) {
 }
 
 TEST_P(RecogniserRig, NeighboursAreNeverCandidates) {
-  const HallMap& world = drifted_walk(GetParam());
+  const HallMap& world = map_with_drift(GetParam());
   const auto loose = recogniser(kLoose);
   std::size_t candidates = 0;
   for (const KeyframeId k : world.map.keyframe_ids()) {
@@ -63,14 +63,13 @@ TEST_P(RecogniserRig, NeighboursAreNeverCandidates) {
 
 INSTANTIATE_TEST_SUITE_P(Cameras, RecogniserRig, ::testing::Values(1, 2, 4));
 
-// The place has changed so much that it is less similar than the neighbours of the keyframe are.
-TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
+// The place has changed so much that it is less similar to the keyframe than the neighbours of the keyframe.
+TEST(BagOfWordsRecogniser, DiscardsPlacesLessSimilarThanTheNeighbours) {
   const FeatureSimulator simulator = hall(rig_of(1));
   HallMap world(simulator.rig());
   for (int i = 0; i < 3; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
   for (int i = 3; i < 6; ++i) world.add(simulator.frame(FrameId(i), 20 + kStepS * i), {}, 1);
-  for (int i = 6; i < 9; ++i)
-    world.add(redecorated(simulator.frame(FrameId(i), kRoundS + 0.3 * (i - 6)), 0.8, 1), {}, 2);
+  for (int i = 6; i < 9; ++i) world.add(redecorated(simulator.frame(FrameId(i), kLapS + 0.3 * (i - 6)), 0.8, 1), {}, 2);
   const KeyframeId newest(8);
   ASSERT_GE(world.map.best_covisible(newest, 1).front().weight, RecognitionOptions().min_neighbour_landmarks);
   EXPECT_TRUE(recogniser()->query_keyframe(world.map, newest).empty());
@@ -82,7 +81,7 @@ TEST(BagOfWordsRecogniser, DiscardsWhatLooksLessAlikeThanTheNeighbours) {
 }
 
 // For example two rooms, one of which is partly visible from the other through a door.
-TEST(BagOfWordsRecogniser, OneLandmarkInCommonMakesNoOnePlace) {
+TEST(BagOfWordsRecogniser, OneCommonLandmarkDoesNotJoinTwoPlaces) {
   const FeatureSimulator simulator = hall(rig_of(1));
   HallMap world(simulator.rig());
   world.add(simulator.frame(FrameId(0), 0.0));
@@ -97,55 +96,55 @@ TEST(BagOfWordsRecogniser, OneLandmarkInCommonMakesNoOnePlace) {
   EXPECT_EQ(recogniser(kLoose)->query_frame(world.map, frame).size(), 2u);
 }
 
-TEST(BagOfWordsRecogniser, AnswersDoNotDependOnTheMapsAskedAboutBefore) {
-  const HallMap& world = drifted_walk(1);
-  const HallMap& other = exact_walk(1);
-  const KeyframeId last(kRound + 1);
+TEST(BagOfWordsRecogniser, ResultsDoNotDependOnEarlierQueries) {
+  const HallMap& world = map_with_drift(1);
+  const HallMap& other = map_without_drift(1);
+  const KeyframeId last(kLapKeyframes + 1);
   map::MapDraft thinned = world.draft();
   for (const int k : {3, 7, 30}) thinned.remove_keyframe(KeyframeId(k));
   const auto frame = described(hall(rig_of(1)).frame(FrameId(1000), 9.5));
 
-  const auto wandering = recogniser();
+  const auto reused = recogniser();
   for (int turn = 0; turn < 2; ++turn) {
-    expect_equal(wandering->query_keyframe(world.map, last), recogniser()->query_keyframe(world.map, last));
-    expect_equal(wandering->query_frame(other.map, frame), recogniser()->query_frame(other.map, frame));
-    expect_equal(wandering->query_keyframe(thinned.map(), last), recogniser()->query_keyframe(thinned.map(), last));
-    expect_equal(wandering->query_frame(world.map, frame), recogniser()->query_frame(world.map, frame));
+    expect_equal(reused->query_keyframe(world.map, last), recogniser()->query_keyframe(world.map, last));
+    expect_equal(reused->query_frame(other.map, frame), recogniser()->query_frame(other.map, frame));
+    expect_equal(reused->query_keyframe(thinned.map(), last), recogniser()->query_keyframe(thinned.map(), last));
+    expect_equal(reused->query_frame(world.map, frame), recogniser()->query_frame(world.map, frame));
   }
 }
 
-TEST(BagOfWordsRecogniser, RemovedKeyframesVanish) {
-  const HallMap& world = drifted_walk(1);
-  const KeyframeId last(kRound + 1);
-  const auto ours = recogniser(kLoose);
+TEST(BagOfWordsRecogniser, DoesNotReturnRemovedKeyframes) {
+  const HallMap& world = map_with_drift(1);
+  const KeyframeId last(kLapKeyframes + 1);
+  const auto places = recogniser(kLoose);
   const auto found = [&](const std::vector<Candidate>& candidates, KeyframeId k) {
     return std::ranges::find(candidates, k, &Candidate::keyframe) != candidates.end();
   };
-  const KeyframeId best = ours->query_keyframe(world.map, last).front().keyframe;
+  const KeyframeId best = places->query_keyframe(world.map, last).front().keyframe;
   map::MapDraft draft = world.draft();
   if (!draft.remove_keyframe(best)) GTEST_FAIL() << "the best one is the root";
-  const std::vector<Candidate> after = ours->query_keyframe(draft.map(), last);
+  const std::vector<Candidate> after = places->query_keyframe(draft.map(), last);
   EXPECT_FALSE(after.empty());
   EXPECT_FALSE(found(after, best));
 }
 
-TEST(BagOfWordsRecogniser, NoticesAMapBegunAnew) {
+TEST(BagOfWordsRecogniser, HandlesANewMapWithTheSameIds) {
   const FeatureSimulator simulator = hall(rig_of(1));
   HallMap fresh(simulator.rig());  // the same ids belong to another region of the hall
   for (int i = 0; i < 8; ++i) fresh.add(simulator.frame(FrameId(i), 24 + kStepS * i));
-  const auto ours = recogniser();
+  const auto places = recogniser();
   const auto frame = described(simulator.frame(FrameId(1000), 26.4));
-  ours->query_frame(exact_walk(1).map, frame);
-  const std::vector<Candidate> candidates = ours->query_frame(fresh.map, frame);
+  places->query_frame(map_without_drift(1).map, frame);
+  const std::vector<Candidate> candidates = places->query_frame(fresh.map, frame);
   ASSERT_FALSE(candidates.empty());
   EXPECT_LE(std::abs(candidates.front().keyframe.value() - 2), 1);
   expect_equal(candidates, recogniser()->query_frame(fresh.map, frame));
 }
 
-TEST(BagOfWordsRecogniser, AFrameWithoutImagesIsLikeNothing) {
+TEST(BagOfWordsRecogniser, ReturnsNothingForAFrameWithoutImages) {
   const std::vector<int> all = {0, 1};
   const auto frame = described(hall(rig_of(2)).frame(FrameId(1000), 3.0, all));
-  EXPECT_TRUE(recogniser()->query_frame(exact_walk(2).map, frame).empty());
+  EXPECT_TRUE(recogniser()->query_frame(map_without_drift(2).map, frame).empty());
 }
 
 }  // namespace

@@ -20,8 +20,8 @@ bool is_true(const PlaceMatch& place_match, const SE3& T_rig_world) {
          angle_rad(place_match.T_rig_world, T_rig_world) < 0.5 * kDegree;
 }
 
-TEST(Relocalise, FindsTheFrameFromAnyOfItsCameras) {
-  const HallMap& world = exact_walk(4);
+TEST(Relocalise, FindsThePoseFromAnySubsetOfTheCameras) {
+  const HallMap& world = map_without_drift(4);
   const FeatureSimulator simulator = hall(rig_of(4));
   for (int present = 1; present < 16; ++present) {
     std::vector<int> missing;
@@ -35,8 +35,8 @@ TEST(Relocalise, FindsTheFrameFromAnyOfItsCameras) {
   }
 }
 
-TEST(Relocalise, FindsThePlaceTurnedRound) {
-  const HallMap& world = exact_walk(4);
+TEST(Relocalise, FindsThePoseInTheOppositeViewingDirection) {
+  const HallMap& world = map_without_drift(4);
   const SimulatedFrame seen = hall(rig_of(4), std::numbers::pi).frame(FrameId(1000), kStepS * 12 + 0.4);
   const auto place_match = relocalised(world, seen);
   ASSERT_TRUE(place_match);
@@ -46,15 +46,15 @@ TEST(Relocalise, FindsThePlaceTurnedRound) {
 // Frames of the hall, and of halls in which most or all landmarks look different; various rigs.
 class RelocaliseRig : public ::testing::TestWithParam<int> {};
 
-TEST_P(RelocaliseRig, IsNeverWrong) {
+TEST_P(RelocaliseRig, NeverReturnsAWrongPose) {
   const int cameras = GetParam();
-  const HallMap& world = exact_walk(cameras);
+  const HallMap& world = map_without_drift(cameras);
   const FeatureSimulator simulator = hall(rig_of(cameras));
   const auto places = recogniser();
   int found = 0;
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     Random random(seed, "frames");
-    const double time_s = random.uniform(0, kStepS * (2 * kRound / 3 - 1));
+    const double time_s = random.uniform(0, kStepS * (2 * kLapKeyframes / 3 - 1));
     std::vector<int> missing;
     for (int c = 1; c < cameras; ++c) {
       if (random.uniform() < 0.4) missing.push_back(c);
@@ -72,17 +72,17 @@ TEST_P(RelocaliseRig, IsNeverWrong) {
 
 INSTANTIATE_TEST_SUITE_P(Cameras, RelocaliseRig, ::testing::Values(1, 2, 4));
 
-// A map of two rooms 30 m apart; in the second one the fraction `share` of the landmarks looks different.
-HallMap two_rooms(const FeatureSimulator& simulator, double share) {
+// A map of two rooms 30 m apart; in the second one, `fraction` of the landmarks look different.
+HallMap two_rooms(const FeatureSimulator& simulator, double fraction) {
   HallMap world(simulator.rig());
   const SE3 next_door(Eigen::Quaterniond::Identity(), {30, 0, 0});
   for (int i = 0; i < 8; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
   for (int i = 8; i < 16; ++i)
-    world.add(redecorated(simulator.frame(FrameId(i), kStepS * (i - 8)), share, 1), {}, 1, next_door);
+    world.add(redecorated(simulator.frame(FrameId(i), kStepS * (i - 8)), fraction, 1), {}, 1, next_door);
   return world;
 }
 
-TEST(Relocalise, CannotTellRoomsApartThatLookTheSame) {
+TEST(Relocalise, RejectsAmbiguousRooms) {
   for (const int cameras : {1, 2, 4}) {
     const FeatureSimulator simulator = hall(rig_of(cameras));
     const HallMap world = two_rooms(simulator, 0.0);
@@ -94,7 +94,7 @@ TEST(Relocalise, CannotTellRoomsApartThatLookTheSame) {
   }
 }
 
-TEST(Relocalise, TellsRoomsApartThatDifferInHalfOfWhatIsSeen) {
+TEST(Relocalise, DistinguishesRoomsThatDifferInHalfOfTheirLandmarks) {
   for (const int cameras : {1, 2, 4}) {
     const FeatureSimulator simulator = hall(rig_of(cameras));
     const HallMap world = two_rooms(simulator, 0.5);
@@ -125,8 +125,8 @@ TEST(Relocalise, FindsFramesInEverySubmap) {
   }
 }
 
-TEST(Relocalise, SaysTheSameForTheSameSeed) {
-  const HallMap& world = exact_walk(2);
+TEST(Relocalise, IsDeterministicForASeed) {
+  const HallMap& world = map_without_drift(2);
   const SimulatedFrame seen = hall(rig_of(2)).frame(FrameId(1000), 7.3);
   const auto a = relocalised(world, seen), b = relocalised(world, seen);
   ASSERT_TRUE(a && b);

@@ -43,26 +43,26 @@ inline synthetic::FeatureSimulatorOptions hall_options() {
 
 const inline feature::FeatureModel kFeatures{.sigma_px = hall_options().sigma_px};
 
-constexpr double kRoundS = 48;  // duration of a lap of 44 m
-constexpr double kStepS = 1.0;  // between two keyframes
-constexpr int kRound = 48;      // keyframes
+constexpr double kLapS = 48;       // duration of a lap of 44 m
+constexpr double kStepS = 1.0;     // between two keyframes
+constexpr int kLapKeyframes = 48;  // keyframes
 
-// Laps with a radius of 7 m and slight sway; `turned` is the angle between viewing and motion direction, radians.
-inline synthetic::Trajectory rounds(double turned = 0.0) {
+// Laps with a radius of 7 m and slight sway; `view_yaw` is the angle between viewing and motion direction, radians.
+inline synthetic::Trajectory laps(double view_yaw = 0.0) {
   std::vector<synthetic::ControlPose> control;
   for (int i = -1; i < 66; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kRoundS;
+    const double angle = 2 * std::numbers::pi * i / kLapS;
     const double radius = 7.0 + 0.2 * std::sin(5 * angle);
     control.push_back({{radius * std::cos(angle), radius * std::sin(angle), 1.5 + 0.1 * std::sin(9 * angle)},
-                       angle + 0.5 * std::numbers::pi + turned,
+                       angle + 0.5 * std::numbers::pi + view_yaw,
                        0.05 * std::sin(7 * angle),
                        0.04 * std::sin(4 * angle)});
   }
   return synthetic::Trajectory(std::move(control), 1.0);
 }
 
-inline FeatureSimulator hall(camera::Rig rig, double turned = 0.0) {
-  return FeatureSimulator(std::move(rig), rounds(turned), hall_options());
+inline FeatureSimulator hall(camera::Rig rig, double view_yaw = 0.0) {
+  return FeatureSimulator(std::move(rig), laps(view_yaw), hall_options());
 }
 
 // Rigs of 1, 2 and 4 cameras; the last one looks in all directions.
@@ -92,15 +92,15 @@ inline std::unique_ptr<BagOfWordsRecogniser> recogniser(const RecognitionOptions
   return std::make_unique<BagOfWordsRecogniser>(small_vocabulary(), options);
 }
 
-// The hall with the fraction `share` of its landmarks replaced by different ones; the replacement depends on the seed
+// The hall with `fraction` of its landmarks replaced by different ones; the replacement depends on the seed
 // only.
-inline SimulatedFrame redecorated(SimulatedFrame seen, double share, std::uint64_t seed) {
+inline SimulatedFrame redecorated(SimulatedFrame seen, double fraction, std::uint64_t seed) {
   for (std::size_t c = 0; c < seen.landmark.size(); ++c) {
     std::vector<feature::Descriptor> descriptors = seen.frame.cameras[c].keypoints.descriptor.copy();
     for (std::size_t k = 0; k < seen.landmark[c].size(); ++k) {
       if (seen.landmark[c][k] < 0) continue;
       Random random(seed, "decoration", static_cast<std::uint64_t>(seen.landmark[c][k]));
-      if (random.uniform() >= share) continue;
+      if (random.uniform() >= fraction) continue;
       for (std::uint64_t& word : descriptors[k]) word ^= random.next();
     }
     seen.frame.cameras[c].keypoints.descriptor = std::move(descriptors);
@@ -112,17 +112,17 @@ class HallMap {
  public:
   using Shown = std::pair<int, int>;  // room, landmark of the simulator
   using Vector3d = Eigen::Vector3d;
-  static constexpr int kMemory = 8;
+  static constexpr int kMaxLandmarkAge = 8;
 
   explicit HallMap(const camera::Rig& rig) : map(std::make_shared<const camera::Rig>(rig)) {}
 
-  // Adds a keyframe of the features seen in hall number `room`, whose pose is `T_world_room`; its parent is the newest
+  // Adds a keyframe of the features of hall number `room`, whose pose is `T_world_room`; its parent is the newest
   // keyframe, or it becomes the root of a submap. `error` is the drift of the estimate, from the true world to the
-  // world of the map. Landmarks last seen more than `kMemory` keyframes ago, or in another submap, are not matched
-  // again and are therefore duplicated.
+  // world of the map. Landmarks last seen more than `kMaxLandmarkAge` keyframes ago, or in another submap, are not
+  // matched again and are therefore duplicated.
   KeyframeId add(const SimulatedFrame& seen, const Sim3& error = {}, int room = 0, const SE3& T_world_room = {},
-                 bool new_part = false) {
-    if (new_part) known_.clear();
+                 bool new_submap = false) {
+    if (new_submap) known_.clear();
     auto stored = std::make_shared<frame::BundledFrame>(seen.frame);
     describe.describe(*stored);
     const KeyframeId k(map.keyframe_slots());
@@ -133,7 +133,7 @@ class HallMap {
       const Shown shown{room, map::shown_by(seen, FeatureId(f))};
       if (shown.second < 0 || std::exchange(taken[shown], true)) continue;
       const auto at = known_.find(shown);
-      if (at != known_.end() && k.value() - at->second.last.value() <= kMemory) {
+      if (at != known_.end() && k.value() - at->second.last.value() <= kMaxLandmarkAge) {
         matches.emplace_back(f, at->second.landmark);
         at->second.last = k;
       } else {
@@ -142,7 +142,7 @@ class HallMap {
     }
     const SE3 T_world_rig = T_world_room * seen.T_world_rig;
     map.add_keyframe(stored, error.apply_to_pose(T_world_rig).inverse(), matches,
-                     new_part ? KeyframeId() : map.newest_keyframe());
+                     new_submap ? KeyframeId() : map.newest_keyframe());
     for (const auto& [feature, shown] : unknown) {
       const Vector3d place = T_world_room * hall_landmarks()[static_cast<std::size_t>(shown.second)].position;
       const map::Observation observation{k, feature};
@@ -175,8 +175,8 @@ class HallMap {
   std::map<Shown, Known> known_;
 };
 
-// Returns the fraction `share` of the similarity `whole`.
-inline Sim3 fraction_of(const Sim3& whole, double share) { return Sim3::exp(share * whole.log()); }
+// Returns the similarity whose logarithm is `fraction` times the logarithm of `whole`.
+inline Sim3 fraction_of(const Sim3& whole, double fraction) { return Sim3::exp(fraction * whole.log()); }
 
 // Drift at the end of a lap.
 inline Sim3 rigid_drift() {
@@ -187,12 +187,12 @@ inline Sim3 scale_drift() {
 }
 
 // One lap and `more` keyframes, whose drift grows to `drift` at the end. `after_each` is called with the growing map
-// and stops the walk by returning false.
-inline HallMap walk(const FeatureSimulator& simulator, int more, const Sim3& drift,
-                    const std::function<bool(const HallMap&, KeyframeId)>& after_each = {}) {
+// and stops the simulation by returning false.
+inline HallMap simulate_lap(const FeatureSimulator& simulator, int more, const Sim3& drift,
+                            const std::function<bool(const HallMap&, KeyframeId)>& after_each = {}) {
   HallMap out(simulator.rig());
   if (std::abs(drift.scale() - 1) > 1e-9) out.map.set_scale(map::Scale::kUpToScale);
-  const int count = kRound + more;
+  const int count = kLapKeyframes + more;
   for (int i = 0; i < count; ++i) {
     const KeyframeId k =
         out.add(simulator.frame(FrameId(i), kStepS * i), fraction_of(drift, static_cast<double>(i) / (count - 1)));
@@ -202,22 +202,23 @@ inline HallMap walk(const FeatureSimulator& simulator, int more, const Sim3& dri
 }
 
 // Two thirds of a lap without drift; created once per rig.
-inline const HallMap& exact_walk(int cameras) {
+inline const HallMap& map_without_drift(int cameras) {
   static std::map<int, HallMap> made;
   const auto at = made.find(cameras);
   if (at != made.end()) return at->second;
   const FeatureSimulator simulator = hall(rig_of(cameras));
   HallMap& out = made.emplace(cameras, HallMap(simulator.rig())).first->second;
-  for (int i = 0; i < 2 * kRound / 3; ++i) out.add(simulator.frame(FrameId(i), kStepS * i));
+  for (int i = 0; i < 2 * kLapKeyframes / 3; ++i) out.add(simulator.frame(FrameId(i), kStepS * i));
   return out;
 }
 
-// A little more than one lap, so that the last keyframe sees what the first one saw; created once per rig and drift.
-inline const HallMap& drifted_walk(int cameras) {
+// A little more than one lap, so that the last keyframe observes the place of the first one; created once per rig and
+// drift.
+inline const HallMap& map_with_drift(int cameras) {
   static std::map<int, HallMap> made;
   const auto at = made.find(cameras);
   return at != made.end() ? at->second
-                          : made.emplace(cameras, walk(hall(rig_of(cameras)), 2, rigid_drift())).first->second;
+                          : made.emplace(cameras, simulate_lap(hall(rig_of(cameras)), 2, rigid_drift())).first->second;
 }
 
 // The frame as prepared by the tracker for relocalisation.

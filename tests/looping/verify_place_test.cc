@@ -1,4 +1,4 @@
-// Geometric verification: the right place gives the pose, any other a reason.
+// Geometric verification: the true place gives the pose, any other place a reason for its rejection.
 #include "looping/verify_place.h"
 
 #include <gtest/gtest.h>
@@ -11,18 +11,18 @@
 namespace bslam::looping {
 namespace {
 
-constexpr double kFar = 0.006,
-                 kTurned = 0.1 * kDegree;  // metres, radians: what noise of 0.7 px on 100 keypoints allows
+// maximum errors in metres and radians, for noise of 0.7 px on 100 keypoints
+constexpr double kMaxDistance = 0.006, kMaxAngle = 0.1 * kDegree;
 
-void expect_true_pose(const PlaceMatch& place_match, const SE3& T_rig_world, double metres = kFar) {
+void expect_true_pose(const PlaceMatch& place_match, const SE3& T_rig_world, double metres = kMaxDistance) {
   EXPECT_LT(distance_m(place_match.T_rig_world, T_rig_world), metres);
-  EXPECT_LT(angle_rad(place_match.T_rig_world, T_rig_world), kTurned);
+  EXPECT_LT(angle_rad(place_match.T_rig_world, T_rig_world), kMaxAngle);
 }
 
 class VerifyPlaceRig : public ::testing::TestWithParam<int> {};
 
-TEST_P(VerifyPlaceRig, FindsThePoseOfAFrameTakenWhereTheCandidateWas) {
-  const HallMap& world = exact_walk(GetParam());
+TEST_P(VerifyPlaceRig, FindsThePoseOfAFrameTakenNearTheCandidate) {
+  const HallMap& world = map_without_drift(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (const int at : {3, 11, 25}) {
     const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at + 0.4);
@@ -38,8 +38,8 @@ TEST_P(VerifyPlaceRig, FindsThePoseOfAFrameTakenWhereTheCandidateWas) {
   }
 }
 
-TEST_P(VerifyPlaceRig, ItsMatchesAreDistinctAndTrue) {
-  const HallMap& world = exact_walk(GetParam());
+TEST_P(VerifyPlaceRig, MatchesAreDistinctAndCorrect) {
+  const HallMap& world = map_without_drift(GetParam());
   const SimulatedFrame seen = hall(rig_of(GetParam())).frame(FrameId(1000), kStepS * 8 + 0.5);
   const auto place_match =
       verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(1));
@@ -55,8 +55,8 @@ TEST_P(VerifyPlaceRig, ItsMatchesAreDistinctAndTrue) {
   EXPECT_LE(wrong, static_cast<int>(place_match->matches.size() / 100));
 }
 
-TEST_P(VerifyPlaceRig, SaysTheSameForTheSameSeed) {
-  const HallMap& world = exact_walk(GetParam());
+TEST_P(VerifyPlaceRig, IsDeterministicForASeed) {
+  const HallMap& world = map_without_drift(GetParam());
   const SimulatedFrame seen = hall(rig_of(GetParam())).frame(FrameId(1000), kStepS * 8 + 0.5);
   const auto a = verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
   const auto b = verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(8), {}, kFeatures, seeded(3));
@@ -67,8 +67,8 @@ TEST_P(VerifyPlaceRig, SaysTheSameForTheSameSeed) {
 }
 
 // The same geometry with other descriptors.
-TEST_P(VerifyPlaceRig, AHallThatLooksDifferentIsNeverAccepted) {
-  const HallMap& world = exact_walk(GetParam());
+TEST_P(VerifyPlaceRig, RejectsAHallThatLooksDifferent) {
+  const HallMap& world = map_without_drift(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (int at = 0; at < 30; ++at) {
     const SimulatedFrame other =
@@ -80,10 +80,10 @@ TEST_P(VerifyPlaceRig, AHallThatLooksDifferentIsNeverAccepted) {
   }
 }
 
-// One landmark in eight is of the kind that stands in every room: the geometry agrees, but too little of what should be
-// there is.
-TEST_P(VerifyPlaceRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
-  const HallMap& world = exact_walk(GetParam());
+// One landmark in eight is the same in both halls: the geometry agrees, but too few of the expected landmarks are
+// found.
+TEST_P(VerifyPlaceRig, RejectsAHallThatLooksPartlyAlike) {
+  const HallMap& world = map_without_drift(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   std::set<Rejection> reasons;
   for (int at = 0; at < 30; ++at) {
@@ -94,7 +94,7 @@ TEST_P(VerifyPlaceRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
                               seeded(static_cast<std::uint64_t>(at)), &report));
     reasons.insert(report.rejection);
   }
-  // With fewer inliers asked for, it is the share that decides.
+  // If fewer inliers are required, the fraction of found landmarks is decisive.
   VerificationOptions options;
   options.min_inliers = 15;
   const SimulatedFrame other = redecorated(simulator.frame(FrameId(2000), kStepS * 8), 0.875, 1);
@@ -102,12 +102,12 @@ TEST_P(VerifyPlaceRig, AHallThatLooksAlikeInPartIsNeverAccepted) {
   EXPECT_FALSE(
       verify_place(world.map, world.map.rig(), other.frame, KeyframeId(8), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
-  EXPECT_LT(report.found, report.sought / 4);
+  EXPECT_LT(report.found, report.expected / 4);
   EXPECT_FALSE(reasons.contains(Rejection::kNone));
 }
 
-TEST_P(VerifyPlaceRig, AnotherPlaceOfTheHallIsNeverAccepted) {
-  const HallMap& world = exact_walk(GetParam());
+TEST_P(VerifyPlaceRig, RejectsAnotherPlaceOfTheHall) {
+  const HallMap& world = map_without_drift(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (int at = 0; at < 12; ++at) {
     const SimulatedFrame seen = simulator.frame(FrameId(1000 + at), kStepS * at);
@@ -120,20 +120,21 @@ TEST_P(VerifyPlaceRig, AnotherPlaceOfTheHallIsNeverAccepted) {
 
 INSTANTIATE_TEST_SUITE_P(Cameras, VerifyPlaceRig, ::testing::Values(1, 2, 4));
 
-// Everything that is seen from more than `turn` aside of where the map knows it from looks different from there.
-SimulatedFrame changed_aside(SimulatedFrame seen, const HallMap& world, double turn) {
-  std::map<int, Eigen::Vector3d> known_from;
+// Landmarks seen from a direction that differs by more than `max_angle` from the viewing direction in the map look
+// different.
+SimulatedFrame changed_in_new_directions(SimulatedFrame seen, const HallMap& world, double max_angle) {
+  std::map<int, Eigen::Vector3d> known_direction;
   for (const LandmarkId l : world.map.landmark_ids())
-    known_from[world.shown_by_landmark[l.index()].second] = world.map.landmark(l).view_direction;
-  const Eigen::Vector3d here = seen.T_world_rig.translation();
+    known_direction[world.shown_by_landmark[l.index()].second] = world.map.landmark(l).view_direction;
+  const Eigen::Vector3d centre = seen.T_world_rig.translation();
   for (std::size_t c = 0; c < seen.landmark.size(); ++c) {
     std::vector<feature::Descriptor> descriptors = seen.frame.cameras[c].keypoints.descriptor.copy();
     for (std::size_t k = 0; k < seen.landmark[c].size(); ++k) {
-      const auto at = known_from.find(seen.landmark[c][k]);
-      if (at == known_from.end()) continue;
+      const auto at = known_direction.find(seen.landmark[c][k]);
+      if (at == known_direction.end()) continue;
       const Eigen::Vector3d direction =
-          (hall_landmarks()[static_cast<std::size_t>(at->first)].position - here).normalized();
-      if (direction.dot(at->second) > std::cos(turn)) continue;
+          (hall_landmarks()[static_cast<std::size_t>(at->first)].position - centre).normalized();
+      if (direction.dot(at->second) > std::cos(max_angle)) continue;
       Random random(1, "aside", static_cast<std::uint64_t>(at->first));
       for (std::uint64_t& word : descriptors[k]) word ^= random.next();
     }
@@ -142,15 +143,16 @@ SimulatedFrame changed_aside(SimulatedFrame seen, const HallMap& world, double t
   return seen;
 }
 
-TEST(VerifyPlace, WhatLooksDifferentFromAsideIsNotMissed) {
-  const HallMap& world = exact_walk(4);
+TEST(VerifyPlace, IgnoresLandmarksExpectedOnlyFromNewDirections) {
+  const HallMap& world = map_without_drift(4);
   const SimulatedFrame seen = hall(rig_of(4)).frame(FrameId(1000), kStepS * 11 + 0.5);
   VerificationOptions options;
-  const SimulatedFrame changed = redecorated(changed_aside(seen, world, options.max_viewing_angle), 0.66, 1);
+  const SimulatedFrame changed =
+      redecorated(changed_in_new_directions(seen, world, options.max_viewing_angle), 0.66, 1);
   VerificationReport report;
   const auto place_match =
       verify_place(world.map, world.map.rig(), changed.frame, KeyframeId(11), options, kFeatures, seeded(1), &report);
-  ASSERT_TRUE(place_match) << report.found << " of " << report.sought;
+  ASSERT_TRUE(place_match) << report.found << " of " << report.expected;
   expect_true_pose(*place_match, seen.T_world_rig.inverse());
   options.max_viewing_angle = 1.05;
   EXPECT_FALSE(
@@ -158,9 +160,9 @@ TEST(VerifyPlace, WhatLooksDifferentFromAsideIsNotMissed) {
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
 }
 
-// Where hardly anything can be compared from about the same direction, all that is in view counts.
-TEST(VerifyPlace, AViewFromFarAsideIsHeldAgainstAllThatIsInView) {
-  const HallMap& world = exact_walk(4);
+// If hardly any landmark is seen from about the same direction, all landmarks in view are compared.
+TEST(VerifyPlace, ComparesAllLandmarksIfAllViewingDirectionsAreNew) {
+  const HallMap& world = map_without_drift(4);
   const SimulatedFrame seen = redecorated(hall(rig_of(4)).frame(FrameId(1000), kStepS * 11 + 0.5), 0.85, 1);
   VerificationOptions options;
   options.max_viewing_angle = 1e-4;
@@ -168,12 +170,12 @@ TEST(VerifyPlace, AViewFromFarAsideIsHeldAgainstAllThatIsInView) {
   EXPECT_FALSE(
       verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(11), options, kFeatures, seeded(1), &report));
   EXPECT_EQ(report.rejection, Rejection::kFewFound);
-  EXPECT_GT(report.sought, 100);
+  EXPECT_GT(report.expected, 100);
 }
 
-// The rig comes the other way: what the left camera saw is before the right one now.
-TEST(VerifyPlace, AnotherCameraThanThenFindsThePlace) {
-  const HallMap& world = exact_walk(4);
+// The rig moves in the opposite direction: landmarks of the left camera are now in view of the right one.
+TEST(VerifyPlace, MatchesLandmarksOfOtherCameras) {
+  const HallMap& world = map_without_drift(4);
   const FeatureSimulator back = hall(rig_of(4), std::numbers::pi);
   for (const int at : {5, 14, 22}) {
     const SimulatedFrame seen = back.frame(FrameId(1000 + at), kStepS * at + 0.3);
@@ -182,20 +184,20 @@ TEST(VerifyPlace, AnotherCameraThanThenFindsThePlace) {
         verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(at), {}, kFeatures, seeded(1), &report);
     ASSERT_TRUE(place_match) << "rejected for " << static_cast<int>(report.rejection);
     expect_true_pose(*place_match, seen.T_world_rig.inverse());
-    int by_another = 0;  // matches with landmarks that this camera has never seen
+    int by_other_camera = 0;  // matches with landmarks that this camera has not observed
     for (const auto& [feature, l] : place_match->matches) {
-      std::set<CameraIndex> then;
+      std::set<CameraIndex> observers;
       for (const map::Observation& o : world.map.observations(l)) {
         for (const frame::KeypointRef r : world.map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature))
-          then.insert(r.camera);
+          observers.insert(r.camera);
       }
-      by_another += !then.contains(seen.frame.bundled.keypoints(feature).front().camera);
+      by_other_camera += !observers.contains(seen.frame.bundled.keypoints(feature).front().camera);
     }
-    EXPECT_GT(by_another, 50);
+    EXPECT_GT(by_other_camera, 50);
   }
 }
 
-TEST(VerifyPlace, FisheyesFindThePlaceTurnedRound) {
+TEST(VerifyPlace, FisheyesFindThePoseInTheOppositeViewingDirection) {
   const camera::Rig rig = synthetic::fisheye_rig(2);
   HallMap world(rig);
   const FeatureSimulator simulator = hall(rig), back = hall(rig, std::numbers::pi);
@@ -204,11 +206,11 @@ TEST(VerifyPlace, FisheyesFindThePlaceTurnedRound) {
   const auto place_match =
       verify_place(world.map, world.map.rig(), seen.frame, KeyframeId(2), {}, kFeatures, seeded(1));
   ASSERT_TRUE(place_match);
-  expect_true_pose(*place_match, seen.T_world_rig.inverse(), 0.015);  // 3 times fewer pixels a radian
+  expect_true_pose(*place_match, seen.T_world_rig.inverse(), 0.015);  // 3 times fewer pixels per radian
 }
 
-TEST(VerifyPlace, LandmarksAboutAKeyframeAreThoseSeenMostOften) {
-  const HallMap& world = exact_walk(1);
+TEST(VerifyPlace, LandmarksAroundAKeyframeAreOrderedByObservations) {
+  const HallMap& world = map_without_drift(1);
   const std::vector<LandmarkId> all = landmarks_around(world.map, KeyframeId(9), 4, 100000),
                                 few = landmarks_around(world.map, KeyframeId(9), 4, 50);
   const std::set<LandmarkId> distinct(all.begin(), all.end());

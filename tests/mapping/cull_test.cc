@@ -27,20 +27,20 @@ class Cull : public ::testing::Test {
   const CullingOptions options;
 };
 
-TEST_F(Cull, LandmarksThatTrackingDoesNotFindAgainGo) {
+TEST_F(Cull, RemovesLandmarksThatTrackingRarelyMatches) {
   const KeyframeId k = add_keyframe();
   const LandmarkId found = add_landmark({{k, FeatureId(0)}}), missed = add_landmark({{k, FeatureId(1)}}),
-                   hardly_tried = add_landmark({{k, FeatureId(2)}});
+                   rarely_expected = add_landmark({{k, FeatureId(2)}});
   map.add_visibility_counts(found, 8, 2);
   map.add_visibility_counts(missed, 8, 1);
-  map.add_visibility_counts(hardly_tried, 3, 0);
+  map.add_visibility_counts(rarely_expected, 3, 0);
   map::MapDraft d = draft();
   EXPECT_EQ(cull_landmarks(k, options, d), 1);
-  EXPECT_TRUE(d.map().alive(found) && d.map().alive(hardly_tried));
+  EXPECT_TRUE(d.map().alive(found) && d.map().alive(rarely_expected));
   EXPECT_FALSE(d.map().alive(missed));
 }
 
-TEST_F(Cull, AfterItsProbationALandmarkNeedsThreeKeypoints) {
+TEST_F(Cull, RequiresThreeKeypointsAfterTheProbation) {
   const KeyframeId k0 = add_keyframe();
   const LandmarkId two = add_landmark({{k0, FeatureId(0)}}), one = add_landmark({{k0, monocular(0)}});
   const KeyframeId k1 = add_keyframe();
@@ -56,7 +56,7 @@ TEST_F(Cull, AfterItsProbationALandmarkNeedsThreeKeypoints) {
   }
 }
 
-TEST_F(Cull, OldLandmarksStay) {
+TEST_F(Cull, KeepsLandmarksOlderThanTheProbation) {
   const KeyframeId k = add_keyframe();
   const LandmarkId old = add_landmark({{k, monocular(0)}});
   map.add_visibility_counts(old, 100, 0);
@@ -84,40 +84,40 @@ class CullKeyframes : public Cull {
   std::vector<int> culled(const CullingOptions& o) const {
     map::MapDraft d = draft();
     const int n = cull_keyframes(KeyframeId(5), o, d);
-    std::vector<int> gone;
+    std::vector<int> removed;
     for (int k = 0; k < 6; ++k) {
-      if (!d.map().alive(KeyframeId(k))) gone.push_back(k);
+      if (!d.map().alive(KeyframeId(k))) removed.push_back(k);
     }
-    EXPECT_EQ(n, static_cast<int>(gone.size()));
+    EXPECT_EQ(n, static_cast<int>(removed.size()));
     EXPECT_EQ(d.map().check_invariants(), std::nullopt);
-    return gone;
+    return removed;
   }
 };
 
-TEST_F(CullKeyframes, RedundantOnesGoButNotTheRootNorTheNewest) {
+TEST_F(CullKeyframes, RemovesRedundantOnesExceptTheRootAndTheNewest) {
   EXPECT_EQ(culled(options), (std::vector<int>{1, 2}));
 }
 
-TEST_F(CullKeyframes, StopsWhereOthersAreNeeded) {
+TEST_F(CullKeyframes, StopsWhenTheOthersAreNoLongerRedundant) {
   CullingOptions five;
   five.redundant_views = 5;  // after one is removed, no landmark is observed by five others
   EXPECT_EQ(culled(five), (std::vector<int>{1}));
 }
 
-TEST_F(CullKeyframes, OneWithLandmarksOfItsOwnStays) {
+TEST_F(CullKeyframes, KeepsAKeyframeWithOwnLandmarks) {
   // 40 of 46 are observed elsewhere: 87 %
   for (int l = 0; l < 6; ++l) add_landmark({{KeyframeId(1), FeatureId(50 + l)}});
   EXPECT_EQ(culled(options), (std::vector<int>{2}));
 }
 
-TEST_F(CullKeyframes, ViewsFromFarAwayDoNotReplaceANearOne) {
+TEST_F(CullKeyframes, CoarseObservationsDoNotMakeAFineOneRedundant) {
   const auto coarse = [&](int k) {
     for (frame::CameraFrame& c : const_cast<frame::BundledFrame&>(*map.keyframe(KeyframeId(k)).frame).cameras) {
       c.keypoints.level = std::vector<std::uint8_t>(c.keypoints.size(), 6);
     }
   };
   for (const int k : {2, 3, 4, 5}) coarse(k);
-  EXPECT_EQ(culled(options), (std::vector<int>{2}));  // keyframe 1 observes all on level 2, as only the root does
+  EXPECT_EQ(culled(options), (std::vector<int>{2}));  // only keyframe 1 and the root observe the landmarks on level 2
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Landmarks looked for in a keyframe of a simulated map, with the truth about who shows what.
+// Searches for landmarks in a keyframe of a simulated map with known correspondences.
 #include "mapping/landmark_fusion.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,8 @@ synthetic::FeatureSimulator simulator(camera::Rig rig) {
   return synthetic::FeatureSimulator(std::move(rig), synthetic::make_orbit({}), options);
 }
 
-// Keyframes 0 and 1 share their landmarks; keyframe 2 has its own, so that what all see is in the map twice.
+// Keyframes 0 and 1 share their landmarks; keyframe 2 has its own, so that landmarks visible in all three are in the
+// map twice.
 SimulatedMap doubled_map(camera::Rig rig) {
   SimulatedMap world(simulator(std::move(rig)));
   world.add_keyframe(FrameId(0), 0.0);
@@ -31,7 +32,7 @@ SimulatedMap doubled_map(camera::Rig rig) {
 
 int truth_of(const SimulatedMap& world, LandmarkId l) { return world.truth_of_landmark.at(l.value()); }
 
-// Of the searched landmarks and the target's, pairs that are one in truth.
+// Returns the pairs of landmarks of `a` and of `b` that are the same landmark of the simulator.
 std::vector<std::pair<LandmarkId, LandmarkId>> pairs(const SimulatedMap& world, KeyframeId a, KeyframeId b) {
   std::vector<std::pair<LandmarkId, LandmarkId>> out;
   for (const LandmarkId l : landmarks_of(world.map, a)) {
@@ -47,14 +48,14 @@ class LandmarkFusion : public ::testing::TestWithParam<int> {
   camera::Rig rig() const { return synthetic::ring_rig(GetParam()); }
 };
 
-TEST_P(LandmarkFusion, LandmarksOfAKeyframeAreInOrderAndDistinct) {
+TEST_P(LandmarkFusion, LandmarksOfAKeyframeAreSortedAndDistinct) {
   const SimulatedMap world = doubled_map(rig());
   const std::vector<LandmarkId> list = landmarks_of(world.map, kSecond);
   EXPECT_GT(list.size(), 100u);
   EXPECT_EQ(std::adjacent_find(list.begin(), list.end(), std::greater_equal<>()), list.end());
 }
 
-TEST_P(LandmarkFusion, WhatIsFoundAtAFreeFeatureBecomesAnObservation) {
+TEST_P(LandmarkFusion, AddsAnObservationAtAFreeFeature) {
   const SimulatedMap world = doubled_map(rig());
   map::MapDraft draft = world.draft();
   const std::vector<LandmarkId> searched = landmarks_of(world.map, kFirst);
@@ -81,7 +82,7 @@ TEST_P(LandmarkFusion, WhatIsFoundAtAFreeFeatureBecomesAnObservation) {
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
-TEST_P(LandmarkFusion, LandmarksFoundAtOneFeatureBecomeOne) {
+TEST_P(LandmarkFusion, MergesLandmarksMatchedToTheSameFeature) {
   const SimulatedMap world = doubled_map(rig());
   const auto doubles = pairs(world, kSecond, kThird);
   ASSERT_GT(doubles.size(), 100u);
@@ -99,9 +100,9 @@ TEST_P(LandmarkFusion, LandmarksFoundAtOneFeatureBecomeOne) {
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
-// Landmarks of keyframe 1 have two observations where keyframe 0 sees them as well, those of keyframe 2 one; and the
-// other way round.
-TEST_P(LandmarkFusion, KeepsTheOneItIsToldTo) {
+// Landmarks of keyframe 1 that keyframe 0 also observes have two observations, landmarks of keyframe 2 have one. Both
+// directions of the search are tested.
+TEST_P(LandmarkFusion, KeepsTheLandmarkSelectedByTheArgument) {
   const SimulatedMap world = doubled_map(rig());
   const auto merged = [&](KeyframeId target, KeyframeId from, Keep keep) {
     map::MapDraft draft = world.draft();
@@ -126,7 +127,7 @@ TEST_P(LandmarkFusion, KeepsTheOneItIsToldTo) {
   EXPECT_GT(merged(kSecond, kThird, Keep::kMoreObserved)[0], 50);
 }
 
-TEST_P(LandmarkFusion, WhatTheKeyframeObservesAlreadyIsLeftAlone) {
+TEST_P(LandmarkFusion, SkipsLandmarksThatTheKeyframeAlreadyObserves) {
   const SimulatedMap world = doubled_map(rig());
   map::MapDraft draft = world.draft();
   const FusionReport report = fuse_into(kThird, landmarks_of(world.map, kThird), Keep::kSearched, {}, kFeatures, draft);
@@ -134,7 +135,7 @@ TEST_P(LandmarkFusion, WhatTheKeyframeObservesAlreadyIsLeftAlone) {
   EXPECT_TRUE(std::move(draft).finish().edit.operations.empty());
 }
 
-TEST_P(LandmarkFusion, RemovedAndMergedLandmarksAreNotLookedFor) {
+TEST_P(LandmarkFusion, SkipsRemovedLandmarks) {
   const SimulatedMap world = doubled_map(rig());
   map::MapDraft draft = world.draft();
   const std::vector<LandmarkId> searched = landmarks_of(world.map, kSecond);
@@ -143,27 +144,27 @@ TEST_P(LandmarkFusion, RemovedAndMergedLandmarksAreNotLookedFor) {
   EXPECT_EQ(report.added + report.merged, 0);
 }
 
-// Half a degree beside its place a landmark is within the search radius, but agrees with keypoints of coarse levels
-// only.
-TEST_P(LandmarkFusion, WhatDisagreesWithTheKeypointIsRefused) {
+// Landmarks are displaced by half a degree: they are within the search radius, but only keypoints of coarse levels are
+// accepted.
+TEST_P(LandmarkFusion, RejectsKeypointsFarFromTheProjection) {
   SimulatedMap world = doubled_map(rig());
   const std::vector<LandmarkId> searched = landmarks_of(world.map, kSecond);
   const Eigen::Vector3d centre = world.frames[2].T_world_rig.translation();
   for (const LandmarkId l : searched) {
-    const Eigen::Vector3d away = world.map.landmark(l).position - centre;
-    const Eigen::Vector3d aside = away.cross(Eigen::Vector3d::UnitZ()).normalized();
-    world.map.set_position(l, world.map.landmark(l).position + 0.009 * away.norm() * aside);
+    const Eigen::Vector3d ray = world.map.landmark(l).position - centre;
+    const Eigen::Vector3d sideways = ray.cross(Eigen::Vector3d::UnitZ()).normalized();
+    world.map.set_position(l, world.map.landmark(l).position + 0.009 * ray.norm() * sideways);
   }
   LandmarkFusionOptions options;
   options.radius = 0.012;
   map::MapDraft strict = world.draft(), lenient = world.draft();
-  const FusionReport refused = fuse_into(kThird, searched, Keep::kSearched, options, kFeatures, strict);
+  const FusionReport rejected = fuse_into(kThird, searched, Keep::kSearched, options, kFeatures, strict);
   const double chi2 = std::exchange(options.max_chi2, 1000);
   const FusionReport accepted = fuse_into(kThird, searched, Keep::kSearched, options, kFeatures, lenient);
-  EXPECT_GT(accepted.merged, refused.merged + 100);
+  EXPECT_GT(accepted.merged, rejected.merged + 100);
   for (const LandmarkId l : landmarks_of(strict.map(), kThird)) {
     if (!std::ranges::binary_search(searched, l)) continue;
-    double least = 1e9;  // of the feature's keypoints: one of them was agreed with
+    double min_chi2 = 1e9;  // minimum over the feature's keypoints, one of which was accepted
     const auto o = std::ranges::find(strict.map().observations(l), kThird, &map::Observation::keyframe);
     const map::BundledKeyframe& target = strict.map().keyframe(kThird);
     for (const frame::KeypointRef r : target.frame->bundled.keypoints(o->feature)) {
@@ -174,16 +175,16 @@ TEST_P(LandmarkFusion, WhatDisagreesWithTheKeypointIsRefused) {
       const double sigma = kFeatures.sigma(keypoints.level[r.keypoint.index()]);
       const Eigen::Vector2d error =
           keypoints.pixel[r.keypoint.index()].cast<double>() - *cameras.camera(r.camera).project(in_camera);
-      least = std::min(least, error.squaredNorm() / (sigma * sigma));
+      min_chi2 = std::min(min_chi2, error.squaredNorm() / (sigma * sigma));
     }
-    EXPECT_LT(least, chi2);
+    EXPECT_LT(min_chi2, chi2);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, LandmarkFusion, ::testing::Values(1, 2, 4));
 
-// The rig has turned by a right angle: the left camera sees what the front ones saw.
-TEST(LandmarkFusionAcrossCameras, AnyCameraFindsWhatAnotherSaw) {
+// The rig has rotated by a right angle, so the left camera observes landmarks that the front cameras observed.
+TEST(LandmarkFusionAcrossCameras, MatchesLandmarksOfOtherCameras) {
   SimulatedMap world(simulator(synthetic::default_rig()));
   world.add_keyframe(FrameId(0), 0.0);
   world.landmark_of.clear();

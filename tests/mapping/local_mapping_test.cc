@@ -21,7 +21,7 @@ synthetic::FeatureSimulator simulator(camera::Rig rig, double period_s = 12.0) {
   return synthetic::FeatureSimulator(std::move(rig), synthetic::make_orbit({.period_s = period_s}), options);
 }
 
-// A map with landmarks for matched features only; the monocular ones are left to mapping.
+// A map with landmarks for matched features only; mapping creates the monocular ones.
 SimulatedMap stereo_map(camera::Rig rig, int keyframes, double period_s = 12.0) {
   SimulatedMap out(simulator(std::move(rig), period_s));
   for (int i = 0; i < keyframes; ++i) out.add_keyframe(FrameId(i), 0.3 * i, false);
@@ -36,7 +36,7 @@ std::set<int> shown(const SimulatedMap& world, const map::BundledMap& map, Landm
   return out;
 }
 
-TEST(CreateLandmarks, MakesLandmarksNearTheirTruePlaces) {
+TEST(CreateLandmarks, CreatesLandmarksNearTheirTruePositions) {
   const camera::Rig rigs[] = {synthetic::ring_rig(2), synthetic::default_rig(), synthetic::mixed_rig()};
   for (const camera::Rig& rig : rigs) {
     const SimulatedMap world = stereo_map(rig, 4);
@@ -63,9 +63,9 @@ TEST(CreateLandmarks, MakesLandmarksNearTheirTruePlaces) {
   }
 }
 
-TEST(CreateLandmarks, JoinsAnyCameraThenToAnyCameraNow) {
+TEST(CreateLandmarks, MatchesBetweenDifferentCameras) {
   const SimulatedMap world =
-      // 72 degrees per second: the side cameras soon see what the front cameras saw
+      // 72 degrees per second: the side cameras soon observe landmarks that the front cameras observed
       stereo_map(synthetic::default_rig(), 5, 5.0);
   map::MapDraft draft = world.draft();
   const std::size_t before = draft.map().landmark_slots();
@@ -85,7 +85,7 @@ TEST(CreateLandmarks, JoinsAnyCameraThenToAnyCameraNow) {
   EXPECT_GT(across, 10);
 }
 
-TEST(CreateLandmarks, MakesNoneWithoutABaseline) {
+TEST(CreateLandmarks, CreatesNoneWithoutABaseline) {
   SimulatedMap world(simulator(synthetic::ring_rig(2)));
   world.add_keyframe(FrameId(0), 0.5, false);
   world.add_keyframe(FrameId(1), 0.5, false);
@@ -93,7 +93,7 @@ TEST(CreateLandmarks, MakesNoneWithoutABaseline) {
   EXPECT_EQ(create_landmarks(KeyframeId(1), {}, kFeatures, draft), 0);
 }
 
-TEST(CreateLandmarks, NeverGivesAFeatureTwoLandmarks) {
+TEST(CreateLandmarks, CreatesAtMostOneLandmarkPerFeature) {
   const SimulatedMap world = stereo_map(synthetic::ring_rig(3), 4);
   map::MapDraft draft = world.draft();
   create_landmarks(KeyframeId(3), {}, kFeatures, draft);
@@ -102,12 +102,12 @@ TEST(CreateLandmarks, NeverGivesAFeatureTwoLandmarks) {
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
-TEST(CreateLandmarks, ComparesWithNobodyWhereToldSo) {
+TEST(CreateLandmarks, CreatesNoneWithZeroNeighbours) {
   const SimulatedMap world = stereo_map(synthetic::ring_rig(2), 4);
   map::MapDraft draft = world.draft();
   EXPECT_EQ(create_landmarks(KeyframeId(3), {.neighbours = 0}, kFeatures, draft), 0);
-  const adjustment::Selection alone = select_local(world.map, KeyframeId(3), {.free_keyframes = 1});
-  EXPECT_EQ(alone.free_keyframes.size(), 1u);
+  const adjustment::Selection single = select_local(world.map, KeyframeId(3), {.free_keyframes = 1});
+  EXPECT_EQ(single.free_keyframes.size(), 1u);
 }
 
 class FuseLandmarks : public ::testing::Test {
@@ -145,7 +145,7 @@ TEST_F(FuseLandmarks, MergesPlantedDuplicates) {
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
-TEST_F(FuseLandmarks, FindsObservationsThatWereMissed) {
+TEST_F(FuseLandmarks, AddsMissingObservations) {
   SimulatedMap world = doubled_map();
   const KeyframeId last(2);
   std::size_t removed = 0;
@@ -160,7 +160,7 @@ TEST_F(FuseLandmarks, FindsObservationsThatWereMissed) {
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
-TEST_F(FuseLandmarks, JoinsHardlyAnythingThatIsNotTheSame) {
+TEST_F(FuseLandmarks, RarelyMergesDifferentLandmarks) {
   const SimulatedMap world = doubled_map();
   map::MapDraft draft = world.draft();
   fuse_landmarks(KeyframeId(2), {}, kFeatures, draft);
@@ -169,7 +169,7 @@ TEST_F(FuseLandmarks, JoinsHardlyAnythingThatIsNotTheSame) {
   EXPECT_LT(mixed, draft.map().num_landmarks() / 50);
 }
 
-TEST_F(FuseLandmarks, WorksWhereACameraHadNoImage) {
+TEST_F(FuseLandmarks, WorksIfACameraHasNoImage) {
   SimulatedMap world = doubled_map();
   auto gap = std::make_shared<frame::BundledFrame>(world.sim.frame(FrameId(3), 0.5, std::vector<int>{1}).frame);
   std::vector<std::pair<FeatureId, LandmarkId>> matches;
@@ -184,7 +184,7 @@ TEST_F(FuseLandmarks, WorksWhereACameraHadNoImage) {
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
-TEST(SelectLocal, HoldsTheRootAndTheKeyframesBeyondTheWindow) {
+TEST(SelectLocal, FixesTheRootAndTheKeyframesOutsideTheWindow) {
   const SimulatedMap world = stereo_map(synthetic::ring_rig(2), 8);
   const adjustment::Selection s = select_local(world.map, KeyframeId(7), {.free_keyframes = 3, .fixed_keyframes = 4});
   EXPECT_EQ(s.free_keyframes.size(), 3u);
@@ -198,16 +198,17 @@ TEST(SelectLocal, HoldsTheRootAndTheKeyframesBeyondTheWindow) {
   EXPECT_TRUE(std::is_sorted(s.landmarks.begin(), s.landmarks.end()));
 }
 
-TEST(SelectLocal, TakesTheLandmarksSeenMost) {
+TEST(SelectLocal, SelectsTheLandmarksObservedMostOften) {
   const SimulatedMap world = stereo_map(synthetic::ring_rig(2), 6);
   const adjustment::Selection s = select_local(world.map, KeyframeId(5), {.max_landmarks = 50});
   ASSERT_EQ(s.landmarks.size(), 50u);
-  std::size_t least = 100;
-  for (const LandmarkId l : s.landmarks) least = std::min(least, world.map.observations(l).size());
-  EXPECT_GE(least, 3u);
+  std::size_t min_observations = 100;
+  for (const LandmarkId l : s.landmarks)
+    min_observations = std::min(min_observations, world.map.observations(l).size());
+  EXPECT_GE(min_observations, 3u);
 }
 
-TEST(SelectLocal, HoldsTwoPosesWhereTheScaleIsFree) {
+TEST(SelectLocal, FixesTwoPosesIfTheScaleIsArbitrary) {
   SimulatedMap world = stereo_map(synthetic::ring_rig(2), 5);
   world.map.set_scale(map::Scale::kUpToScale);
   EXPECT_GE(select_local(world.map, KeyframeId(4), {}).fixed_keyframes.size(), 2u);
@@ -216,7 +217,7 @@ TEST(SelectLocal, HoldsTwoPosesWhereTheScaleIsFree) {
   EXPECT_EQ(select_all(world.map).fixed_keyframes, std::vector<KeyframeId>{KeyframeId(0)});
 }
 
-TEST(MapKeyframe, GrowsAnAccurateMapKeyframeByKeyframe) {
+TEST(MapKeyframe, BuildsAnAccurateMap) {
   const camera::Rig rigs[] = {synthetic::ring_rig(2), synthetic::mixed_rig()};
   for (const camera::Rig& rig : rigs) {
     SimulatedMap world(simulator(rig));
@@ -253,7 +254,7 @@ TEST(MapKeyframe, GrowsAnAccurateMapKeyframeByKeyframe) {
   }
 }
 
-TEST(MapKeyframe, StopsEarlyWithASoundMap) {
+TEST(MapKeyframe, LeavesAValidMapWhenStopped) {
   const SimulatedMap world = stereo_map(synthetic::ring_rig(2), 4);
   std::stop_source stop;
   stop.request_stop();

@@ -30,8 +30,8 @@ synthetic::FeatureSimulatorOptions room(std::uint64_t seed) {
 
 // Keyframes at their true poses, 0.25 s apart, in a map with unobservable scale whose length unit is 1 / `factor`
 // metres.
-SimulatedMap ride(const synthetic::Trajectory& trajectory, const camera::Rig& rig, int keyframes, double factor,
-                  std::uint64_t seed) {
+SimulatedMap simulated_map(const synthetic::Trajectory& trajectory, const camera::Rig& rig, int keyframes,
+                           double factor, std::uint64_t seed) {
   SimulatedMap world(synthetic::FeatureSimulator(rig, trajectory, room(seed)));
   for (int i = 0; i < keyframes; ++i) world.add_keyframe(FrameId(i), 0.25 * i);
   world.map.set_scale(map::Scale::kUnobservable);
@@ -59,11 +59,11 @@ double length_ratio(const SimulatedMap& world, const map::BundledMap& map) {
   return found / truth;
 }
 
-TEST(ObserveScale, DeviationIsThatOfTheErrors) {
+TEST(ObserveScale, DeviationAgreesWithTheErrors) {
   double squared_z = 0;
   constexpr int kSeeds = 12;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const SimulatedMap world = ride(orbit(seed), three_sides(), 7, 1.0, seed);
+    const SimulatedMap world = simulated_map(orbit(seed), three_sides(), 7, 1.0, seed);
     map::MapDraft draft = world.draft();
     map_keyframe(KeyframeId(6), {}, kFeatures,
                  draft);  // the adjustment moves the map from the truth to the optimum for the noisy pixels
@@ -78,9 +78,9 @@ TEST(ObserveScale, DeviationIsThatOfTheErrors) {
   EXPECT_LT(squared_z / kSeeds, 2.5);
 }
 
-TEST(ObserveScale, FindsTheUnitFromAFactorOfThreeEitherWay) {
+TEST(ObserveScale, ConvergesFromThreeTimesTooLargeOrTooSmall) {
   for (const double factor : {1.0 / 3.0, 3.0}) {
-    const SimulatedMap world = ride(orbit(1), three_sides(), 8, factor, 1);
+    const SimulatedMap world = simulated_map(orbit(1), three_sides(), 8, factor, 1);
     map::MapDraft draft = world.draft();
     const MappingReport report = map_keyframe(KeyframeId(7), {}, kFeatures, draft);
     EXPECT_TRUE(report.scale.observed);
@@ -95,9 +95,9 @@ TEST(ObserveScale, FindsTheUnitFromAFactorOfThreeEitherWay) {
   }
 }
 
-TEST(ObserveScale, StaysUnknownOnAStraightLine) {
+TEST(ObserveScale, IsUnobservableOnAStraightLine) {
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
-    const SimulatedMap world = ride(straight_line(), three_sides(), 12, 1.5, seed);
+    const SimulatedMap world = simulated_map(straight_line(), three_sides(), 12, 1.5, seed);
     map::MapDraft draft = world.draft();
     for (int i = 0; i < 2; ++i) {
       const MappingReport report = map_keyframe(KeyframeId(11), {}, kFeatures, draft);
@@ -108,8 +108,8 @@ TEST(ObserveScale, StaysUnknownOnAStraightLine) {
   }
 }
 
-TEST(ObserveScale, LeavesOtherMapsAlone) {
-  SimulatedMap world = ride(orbit(1), three_sides(), 4, 1.5, 1);
+TEST(ObserveScale, DoesNotChangeMapsOfKnownOrArbitraryScale) {
+  SimulatedMap world = simulated_map(orbit(1), three_sides(), 4, 1.5, 1);
   for (const map::Scale scale : {map::Scale::kMetric, map::Scale::kUpToScale}) {
     world.map.set_scale(scale);
     map::MapDraft draft = world.draft();
@@ -120,17 +120,17 @@ TEST(ObserveScale, LeavesOtherMapsAlone) {
   }
 }
 
-TEST(ObserveScale, IsSilentAboutOneCameraAndOneKeyframe) {
-  const SimulatedMap one = ride(orbit(1), synthetic::ring_rig(1), 5, 1.5, 1);
+TEST(ObserveScale, IsUnobservableWithOneCameraOrOneKeyframe) {
+  const SimulatedMap one = simulated_map(orbit(1), synthetic::ring_rig(1), 5, 1.5, 1);
   map::MapDraft draft = one.draft();
   EXPECT_FALSE(observe_scale(KeyframeId(4), {}, kFeatures, draft).observed);
-  const SimulatedMap first = ride(orbit(1), three_sides(), 1, 1.5, 1);
+  const SimulatedMap first = simulated_map(orbit(1), three_sides(), 1, 1.5, 1);
   map::MapDraft start = first.draft();
   EXPECT_FALSE(observe_scale(KeyframeId(0), {}, kFeatures, start).observed);
 }
 
-TEST(SelectSubmap, FreesAllButTheRootWhileTheScaleIsUnknown) {
-  SimulatedMap world = ride(orbit(1), three_sides(), 5, 1.0, 1);
+TEST(SelectSubmap, FreesAllExceptTheRootWhileTheScaleIsUnknown) {
+  SimulatedMap world = simulated_map(orbit(1), three_sides(), 5, 1.0, 1);
   EXPECT_TRUE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 5}));
   EXPECT_FALSE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 4}));
   const adjustment::Selection s = select_submap(world.map, KeyframeId(4));
@@ -141,7 +141,7 @@ TEST(SelectSubmap, FreesAllButTheRootWhileTheScaleIsUnknown) {
   EXPECT_FALSE(needs_whole_submap(world.map, KeyframeId(4), {.keyframes = 5}));
 }
 
-TEST(IsMetric, AsksForTwoMeasurementsAndASettledMap) {
+TEST(IsMetric, RequiresTwoMeasurementsAndASmallCorrection) {
   const ScaleReport sure{.observed = true, .correction = 1.01, .deviation = 0.01, .keyframes = 8};
   EXPECT_TRUE(is_metric(sure, 0.015, {}));
   EXPECT_FALSE(is_metric(sure, 0.03, {}));

@@ -39,7 +39,7 @@ class InvertedIndexTest : public testing::Test {
   std::map<KeyframeId, std::shared_ptr<const WordVector>> held_;
 };
 
-TEST_F(InvertedIndexTest, FindsWhatAComparisonWithAllFinds) {
+TEST_F(InvertedIndexTest, AgreesWithAnExhaustiveComparison) {
   InvertedIndex index;
   for (int step = 0; step < 300; ++step) {
     const KeyframeId keyframe(static_cast<int>(random_.below(120)));
@@ -68,7 +68,7 @@ TEST_F(InvertedIndexTest, DoesNotDependOnTheOrderOfAdding) {
   EXPECT_EQ(forward.query(*query), backward.query(*query));
 }
 
-TEST_F(InvertedIndexTest, ForgetsWhatWasRemoved) {
+TEST_F(InvertedIndexTest, DoesNotReturnRemovedKeyframes) {
   InvertedIndex index;
   index.add(KeyframeId(3), vector_of({WordId(1), WordId(2)}));
   index.add(KeyframeId(5), vector_of({WordId(2), WordId(7)}));
@@ -85,7 +85,7 @@ TEST_F(InvertedIndexTest, ForgetsWhatWasRemoved) {
   EXPECT_EQ(index.query(*vector_of({WordId(7)})).size(), 1u);
 }
 
-TEST_F(InvertedIndexTest, TakesWordsNoKeyframeHas) {
+TEST_F(InvertedIndexTest, AcceptsWordsThatNoKeyframeContains) {
   InvertedIndex index;
   EXPECT_TRUE(index.query(*vector_of({WordId(0)})).empty());
   index.add(KeyframeId(0), vector_of({WordId(0)}));

@@ -12,7 +12,7 @@ namespace {
 
 using feature::Descriptor;
 
-TEST(Majority, IsTheBitMostHave) {
+TEST(Majority, SetsTheBitsOfTheMajority) {
   Random random(5);
   for (const std::size_t count : {1u, 2u, 7u, 254u, 255u, 256u, 257u, 1000u}) {
     std::vector<Descriptor> descriptors(count);
@@ -29,7 +29,7 @@ TEST(Majority, IsTheBitMostHave) {
   }
 }
 
-TEST(MajorityClustering, SeparatesWhatLiesApart) {
+TEST(MajorityClustering, SeparatesDistantClusters) {
   Random random(6);
   std::vector<Descriptor> truth, descriptors;
   for (int c = 0; c < 10; ++c) truth.push_back(random_descriptor(random));
@@ -43,7 +43,7 @@ TEST(MajorityClustering, SeparatesWhatLiesApart) {
   }
 }
 
-TEST(MajorityClustering, PutsEveryMemberToItsNearestCentre) {
+TEST(MajorityClustering, AssignsEveryMemberToItsNearestCentre) {
   Random random(8);
   std::vector<Descriptor> descriptors(700);
   for (Descriptor& d : descriptors) d = random_descriptor(random);
@@ -64,7 +64,7 @@ TEST(MajorityClustering, PutsEveryMemberToItsNearestCentre) {
   }
 }
 
-TEST(MajorityClustering, MakesFewerClustersOfFewDescriptors) {
+TEST(MajorityClustering, CreatesFewerClustersFromFewDescriptors) {
   Random random(9);
   const Descriptor a = random_descriptor(random), b = random_descriptor(random);
   EXPECT_EQ(cluster_by_majority(std::vector{a}, 10, 5, random).centre, std::vector{a});

@@ -11,7 +11,7 @@
 namespace bslam::place {
 namespace {
 
-TEST(ShippedVocabulary, IsOneForOurDescriptors) {
+TEST(ShippedVocabulary, MatchesTheDescriptorKind) {
   const auto v = shipped_vocabulary();
   ASSERT_TRUE(v.ok()) << v.error().message();
   EXPECT_EQ((*v)->kind(), kDescriptorKind);
@@ -23,7 +23,7 @@ TEST(ShippedVocabulary, IsOneForOurDescriptors) {
 
 // A word carries log2(number of words) bits if all words are equally likely. Descriptors scattered around the tree's
 // own centres must come close to that and use most of the words.
-TEST(ShippedVocabulary, SpreadsDescriptorsOverItsWords) {
+TEST(ShippedVocabulary, DistributesDescriptorsOverItsWords) {
   const VocabularyPtr v = shipped_vocabulary().value();
   Random random(41);
   const auto& centres = v->content().descriptor;

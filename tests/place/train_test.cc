@@ -67,7 +67,7 @@ TEST(Train, FindsExactlyTheClustersOnOneLevel) {
   for (const WordId w : words) EXPECT_NEAR(v->weight(w), std::log(41.0 / 32.0), 1e-6);
 }
 
-TEST(Train, WeighsWordsByTheImagesThatShowThem) {
+TEST(Train, WeightsAreInverseDocumentFrequencies) {
   Random random(23);
   const TwoGroups world(random);
   const VocabularyPtr v = train(world.images, {.branching = 4, .levels = 5}, 3);
@@ -81,7 +81,7 @@ TEST(Train, WeighsWordsByTheImagesThatShowThem) {
   }
 }
 
-TEST(Train, DependsOnSeedAndNotOnThreads) {
+TEST(Train, DependsOnTheSeedAndNotOnThreads) {
   Random random(24);
   const TwoGroups world(random);
   const TrainingOptions options{.branching = 5, .levels = 4};
@@ -91,7 +91,7 @@ TEST(Train, DependsOnSeedAndNotOnThreads) {
   EXPECT_NE(serialise(*train(world.images, options, 2)), once);
 }
 
-TEST(Train, StaysWithinItsShape) {
+TEST(Train, RespectsBranchingAndLevels) {
   Random random(25);
   const TwoGroups world(random);
   const VocabularyPtr v = train(world.images, {.branching = 3, .levels = 4}, 1);
@@ -101,7 +101,7 @@ TEST(Train, StaysWithinItsShape) {
   EXPECT_GT(v->size(), 27u);
 }
 
-TEST(Train, TakesFewOrEqualDescriptors) {
+TEST(Train, AcceptsFewOrEqualDescriptors) {
   Random random(26);
   const Descriptor a = random_descriptor(random), b = random_descriptor(random);
   const VocabularyPtr v = train({{a, a}, {}, {a, b}}, {.branching = 10, .levels = 5}, 1);
@@ -110,7 +110,7 @@ TEST(Train, TakesFewOrEqualDescriptors) {
   EXPECT_NEAR(v->weight(v->word(b)), std::log(4.0 / 1.0), 1e-6);
 }
 
-TEST(Train, RefusesWhatCannotBeDivided) {
+TEST(Train, RejectsIndistinctDescriptors) {
   Random random(27);
   ThreadPool pool(1);
   const Descriptor a = random_descriptor(random);
@@ -119,7 +119,7 @@ TEST(Train, RefusesWhatCannotBeDivided) {
   EXPECT_FALSE(train_vocabulary(Images{{a, a}, {a}}, {}, random, pool).ok());
 }
 
-TEST(Train, TellsItsProgress) {
+TEST(Train, ReportsItsProgress) {
   Random random(28);
   const TwoGroups world(random);
   ThreadPool pool(2);

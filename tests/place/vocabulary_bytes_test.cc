@@ -45,7 +45,7 @@ class VocabularyBytes : public testing::Test {
   std::string bytes_ = serialise(*vocabulary_);
 };
 
-TEST_F(VocabularyBytes, ComeBackAsTheyWere) {
+TEST_F(VocabularyBytes, RoundTrip) {
   const auto read = deserialise(bytes_);
   ASSERT_TRUE(read.ok()) << read.error().message();
   const VocabularyContent &a = vocabulary_->content(), &b = (*read)->content();
@@ -60,7 +60,7 @@ TEST_F(VocabularyBytes, ComeBackAsTheyWere) {
   EXPECT_TRUE(is_vocabulary(bytes_));
 }
 
-TEST_F(VocabularyBytes, AreRefusedWhenDamaged) {
+TEST_F(VocabularyBytes, AreRejectedWhenDamaged) {
   for (int round = 0; round < 2000; ++round) {
     std::string damaged = bytes_;
     switch (round % 4) {
@@ -86,8 +86,8 @@ TEST_F(VocabularyBytes, AreRefusedWhenDamaged) {
 
 // With a repaired checksum, damaged bytes give either an error or a vocabulary of those numbers, whose words are in
 // range.
-TEST_F(VocabularyBytes, AreSafeWhenTheChecksumFitsTheDamage) {
-  int accepted = 0, refused = 0;
+TEST_F(VocabularyBytes, AreSafeWhenDamagedWithAMatchingChecksum) {
+  int accepted = 0, rejected = 0;
   for (int round = 0; round < 2000; ++round) {
     std::string damaged = bytes_;
     const std::size_t header_and_counts = 32 + vocabulary_->kind().size() + vocabulary_->num_nodes();
@@ -98,16 +98,16 @@ TEST_F(VocabularyBytes, AreSafeWhenTheChecksumFitsTheDamage) {
     }
     repair_checksum(damaged);
     const auto read = deserialise(damaged);
-    read.ok() ? ++accepted : ++refused;
+    read.ok() ? ++accepted : ++rejected;
     if (!read) continue;
     for (int i = 0; i < 20; ++i) ASSERT_LT((*read)->word(random_descriptor(random_)).index(), (*read)->size());
   }
   EXPECT_GT(accepted, 200);  // the repair works
-  EXPECT_GT(refused, 200);
+  EXPECT_GT(rejected, 200);
 }
 
-TEST_F(VocabularyBytes, NameWhatIsWrong) {
-  EXPECT_EQ(deserialise("").error().found, "no bslam vocabulary");
+TEST_F(VocabularyBytes, ErrorsNameTheField) {
+  EXPECT_EQ(deserialise("").error().found, "not a bslam vocabulary");
   EXPECT_EQ(deserialise("BSLAMVOC").error().key, "size");
   std::string newer = bytes_;
   put(newer, 8, std::uint32_t{2});

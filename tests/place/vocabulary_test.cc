@@ -32,7 +32,7 @@ WordId word_by_definition(const VocabularyContent& c, const Descriptor& d) {
       std::count(c.child_count.begin(), c.child_count.begin() + static_cast<std::ptrdiff_t>(node), std::uint8_t{0})));
 }
 
-TEST(Vocabulary, FindsTheWordOfTheDescent) {
+TEST(Vocabulary, FindsTheWordByGreedyDescent) {
   Random random(1);
   for (int tree = 0; tree < 6; ++tree) {
     const VocabularyPtr v = random_vocabulary(2 + tree * 2, 4 - tree / 3, random);
@@ -61,7 +61,7 @@ TEST(Vocabulary, FindsWordsOfAnyNumberOfDescriptors) {
   }
 }
 
-TEST(Vocabulary, GivesTiesToTheFirstChild) {
+TEST(Vocabulary, SelectsTheFirstChildOnTies) {
   VocabularyContent c;
   c.branching = 3;
   c.levels = 1;
@@ -74,7 +74,7 @@ TEST(Vocabulary, GivesTiesToTheFirstChild) {
   EXPECT_EQ(v->word(Descriptor{3, 0, 0, 0}), WordId(0));
 }
 
-TEST(Vocabulary, TellsEqualContentByItsId) {
+TEST(Vocabulary, IdIdentifiesTheContent) {
   Random random(3);
   const VocabularyContent content = random_content(5, 3, random);
   const std::uint64_t id = Vocabulary::make(content).value()->id();
@@ -92,7 +92,7 @@ TEST(Vocabulary, TellsEqualContentByItsId) {
   EXPECT_NE(changed([](VocabularyContent& c) { c.weight.back() += 0.5f; }), id);
 }
 
-TEST(Vocabulary, RefusesContentThatContradictsItself) {
+TEST(Vocabulary, RejectsInconsistentContent) {
   VocabularyContent good;
   good.branching = 2;
   good.levels = 2;
@@ -100,31 +100,31 @@ TEST(Vocabulary, RefusesContentThatContradictsItself) {
   good.descriptor.resize(4);
   good.weight = {1, 1, 1};
   ASSERT_TRUE(Vocabulary::make(good).ok());
-  const auto refused = [&](auto change) {
+  const auto rejected = [&](auto change) {
     VocabularyContent c = good;
     change(c);
     return !Vocabulary::make(c).ok();
   };
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.kind = ""; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.kind = "a b"; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.kind = std::string(65, 'k'); }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.branching = 1; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.branching = kMaxBranching + 1; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.levels = 1; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.levels = kMaxLevels + 1; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {}; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {0, 2, 2, 0, 0}; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.kind = ""; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.kind = "a b"; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.kind = std::string(65, 'k'); }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.branching = 1; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.branching = kMaxBranching + 1; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.levels = 1; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.levels = kMaxLevels + 1; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.child_count = {}; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.child_count = {0, 2, 2, 0, 0}; }));
   // node 3 is not the child of any node
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {2, 0, 0, 2, 0}; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {2, 3, 0, 0, 0}; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {2, 2, 2, 0, 0}; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.child_count = {1, 2, 0, 0, 0}; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.descriptor.pop_back(); }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.weight.pop_back(); }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.weight.push_back(1); }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.weight[1] = -1; }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.weight[1] = std::numeric_limits<float>::infinity(); }));
-  EXPECT_TRUE(refused([](VocabularyContent& c) { c.weight[1] = std::numeric_limits<float>::quiet_NaN(); }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.child_count = {2, 0, 0, 2, 0}; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.child_count = {2, 3, 0, 0, 0}; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.child_count = {2, 2, 2, 0, 0}; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.child_count = {1, 2, 0, 0, 0}; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.descriptor.pop_back(); }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.weight.pop_back(); }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.weight.push_back(1); }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.weight[1] = -1; }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.weight[1] = std::numeric_limits<float>::infinity(); }));
+  EXPECT_TRUE(rejected([](VocabularyContent& c) { c.weight[1] = std::numeric_limits<float>::quiet_NaN(); }));
 }
 
 // The kind identifies the meaning of the descriptor bits. A change of the BRIEF pattern requires a new kDescriptorKind,

@@ -33,7 +33,7 @@ class WordVectorTest : public testing::Test {
   VocabularyPtr vocabulary_ = random_vocabulary(6, 3, random_);
 };
 
-TEST_F(WordVectorTest, WeighsByFrequencyAndRarity) {
+TEST_F(WordVectorTest, ComputesTfIdfWeights) {
   const std::vector<WordId> words{WordId(4), WordId(2), WordId(4), WordId(), WordId(9)};
   const WordVector v(*vocabulary_, words);
   ASSERT_EQ(v.size(), 3u);
@@ -46,7 +46,7 @@ TEST_F(WordVectorTest, WeighsByFrequencyAndRarity) {
   EXPECT_NEAR(v.words()[1].weight, 2 * vocabulary_->weight(WordId(4)) / sum, 1e-6);
 }
 
-TEST_F(WordVectorTest, SumsToOneWhateverTheOrder) {
+TEST_F(WordVectorTest, SumsToOneInAnyOrder) {
   std::vector<WordId> words = random_words(*vocabulary_, 500, random_);
   const WordVector v(*vocabulary_, words);
   double sum = 0;
@@ -63,7 +63,7 @@ TEST_F(WordVectorTest, IsEmptyWithoutWords) {
   EXPECT_TRUE(WordVector(*vocabulary_, std::vector<WordId>(3)).empty());
 }
 
-TEST_F(WordVectorTest, LeavesOutWordsOfNoWeight) {
+TEST_F(WordVectorTest, IgnoresWordsOfZeroWeight) {
   VocabularyContent c = vocabulary_->content();
   c.weight[1] = 0;
   const VocabularyPtr stopped = Vocabulary::make(c).value();

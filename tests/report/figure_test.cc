@@ -31,7 +31,7 @@ Series line(std::vector<std::array<double, 2>> points) {
   return series;
 }
 
-TEST(XmlFault, FindsWhatIsWrong) {
+TEST(XmlFault, ReportsErrors) {
   EXPECT_EQ(xml_fault("<a><b x=\"1\"/>t &amp; u</a>"), "");
   for (const char* text : {"", "<a>", "<a></b>", "<a/><b/>", "<a>&x</a>", "<a x=\"></a>", "<a", "<a>></a>"}) {
     EXPECT_NE(xml_fault(text), "") << text;
@@ -52,7 +52,7 @@ TEST(AxisTicks, AreRoundAndInside) {
   }
 }
 
-TEST(AxisTicks, AreNoneForARangeWithoutSize) {
+TEST(AxisTicks, AreEmptyForAnEmptyRange) {
   EXPECT_TRUE(axis_ticks(1.0, 1.0, 5).empty());
   EXPECT_TRUE(axis_ticks(2.0, 1.0, 5).empty());
   EXPECT_TRUE(axis_ticks(0.0, kNan, 5).empty());
@@ -60,7 +60,7 @@ TEST(AxisTicks, AreNoneForARangeWithoutSize) {
   EXPECT_TRUE(axis_ticks(1e18, 1e18 + 256, 5).empty());  // steps lost in the digits
 }
 
-TEST(Figure, IsWellFormedWhateverTheText) {
+TEST(Figure, IsWellFormedForAnyText) {
   Panel panel{.title = "a < b & \"c\" > d", .x_label = "x\x01", .y_label = "\xFFy"};
   panel.series.push_back(line({{0, 0}, {1, 2}}));
   panel.series[0].label = "<&>";
@@ -83,7 +83,7 @@ TEST(Figure, BreaksLinesAtPointsThatAreNotFinite) {
   EXPECT_EQ(occurrences(data, "L"), 2u);
 }
 
-TEST(Figure, HasOneLengthForAUnitOnEqualAxes) {
+TEST(Figure, HasEqualScalesOnEqualAxes) {
   // Corners of a 10 x 1 m path, drawn as points: their distances in pixels keep the ratio.
   Panel panel{.title = "map", .scale = AxisScale::kEqual};
   Series corners = line({{0, 0}, {10, 0}, {10, 1}});
@@ -101,7 +101,7 @@ TEST(Figure, HasOneLengthForAUnitOnEqualAxes) {
   EXPECT_NEAR(pixels[1][0] - pixels[0][0], 10.0 * (pixels[1][1] - pixels[2][1]), 1.1);  // written to 0.1 px
 }
 
-TEST(Figure, SurvivesEmptyConstantAndEndlessData) {
+TEST(Figure, HandlesEmptyConstantAndInfiniteData) {
   for (const auto& points :
        std::vector<std::vector<std::array<double, 2>>>{{},
                                                        {{1, 1}},
@@ -134,7 +134,7 @@ TEST(Reduced, KeepsMediansMaximaAndGaps) {
   EXPECT_EQ(reduced(points, 81, Reduction::kMedian), points);
 }
 
-TEST(SeriesColours, DifferForEightThings) {
+TEST(SeriesColours, DifferForEightSeries) {
   for (std::size_t i = 0; i < 8; ++i) {
     for (std::size_t j = 0; j < i; ++j) EXPECT_NE(series_colour(i), series_colour(j));
   }

@@ -35,7 +35,7 @@ TEST(TrajectoryPlot, ShowsViewsAndError) {
   }
 }
 
-TEST(TrajectoryPlot, LooksAlongYInAWorldOfCameraAxes) {
+TEST(TrajectoryPlot, UsesYAsVerticalWithCameraAxes) {
   TrajectoryPlotInput input;
   input.estimate = circle(true);
   const std::string svg = trajectory_plot_svg(input);
@@ -68,7 +68,7 @@ TEST(TrajectoryPlot, DrawsAClimbUpwards) {
   EXPECT_TRUE(contains(trajectory_plot_svg(camera), ">-y [m]<"));
 }
 
-TEST(TrajectoryPlot, GivesSmallErrorsInMillimetres) {
+TEST(TrajectoryPlot, ShowsSmallErrorsInMillimetres) {
   const evaluation::Trajectory truth = circle(false);
   evaluation::Trajectory estimate = truth;
   for (std::size_t i = 0; i < estimate.size(); i += 2) {
@@ -83,7 +83,7 @@ TEST(TrajectoryPlot, GivesSmallErrorsInMillimetres) {
   EXPECT_FALSE(contains(svg, "error [m]"));
 }
 
-TEST(TrajectoryPlot, DrawsATrajectoryThatIsEmpty) { EXPECT_EQ(xml_fault(trajectory_plot_svg({})), ""); }
+TEST(TrajectoryPlot, DrawsAnEmptyTrajectory) { EXPECT_EQ(xml_fault(trajectory_plot_svg({})), ""); }
 
 }  // namespace
 }  // namespace bslam::report

@@ -1,4 +1,4 @@
-// A small check of XML as figure_svg writes it: one root, tags that close in order, attributes in quotes, no stray < or
+// Checks XML as written by figure_svg: one root, tags that close in order, attributes in quotes, no stray < or
 // &.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 namespace bslam::report {
 
-// What is wrong first; empty where nothing is.
+// Returns a description of the first error, or an empty string.
 inline std::string xml_fault(std::string_view text) {
   std::vector<std::string> open;
   bool rooted = false;

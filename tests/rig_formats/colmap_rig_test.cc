@@ -1,4 +1,4 @@
-// COLMAP's rigs, read, and written and read again.
+// Reading and writing of COLMAP rigs.
 #include "camera/test_cameras.h"
 #include "rig_formats/rig_formats.h"
 
@@ -30,9 +30,9 @@ TEST_F(ColmapRig, IsReadFromItsTextModel) {
   EXPECT_EQ(camera::model_name(file->rig.camera(index(0)).model), "kannala-brandt");
   const camera::Camera& radial = file->rig.camera(index(1));
   EXPECT_EQ(camera::distortion(radial.model), (std::vector{-0.02, 0.0, 0.0, 0.0}));
-  // sensor_from_rig: the rig's origin lies at (-0.2, 0, 0.1) of the sensor.
+  // sensor_from_rig: the rig's origin is at (-0.2, 0, 0.1) in the sensor frame.
   EXPECT_LT((file->rig.rig_from_cam(1).translation() - Vector3d(0.2, 0, -0.1)).norm(), 1e-12);
-  // The middle of COLMAP's image, 320 of 640, lies between two of our pixels.
+  // The centre of the image, 320 of 640 in COLMAP, is between two pixels in bslam.
   EXPECT_LT((radial.project({0, 0, 1}).value() - Vector2d(319.5, 239.5)).norm(), 1e-12);
   for (const char* name : {"cameras.txt", "rigs.txt"}) {
     EXPECT_EQ(read_rig_file(folder_.path() / "rig" / name)->rig.size(), 2u) << name;
@@ -48,7 +48,7 @@ TEST_F(ColmapRig, IsReadFromItsRigConfiguration) {
   EXPECT_EQ(file->rig.camera(index(0)).name, "rig1/left");
   EXPECT_EQ(camera::model_name(file->rig.camera(index(1)).model), "pinhole");
   EXPECT_EQ(camera::intrinsics(file->rig.camera(index(1)).model).fy, 401);
-  // A quarter turn about y: what the rig has ahead, the camera has on its right.
+  // A rotation by 90 degrees about y: the forward direction of the rig is the right direction of the camera.
   EXPECT_LT((file->rig.cam_from_rig(index(1)).rotation() * Vector3d::UnitZ() - Vector3d::UnitX()).norm(), 1e-12);
   std::string broken = config;
   broken.replace(broken.find("0.7071067811865475"), 18, "0.8");
@@ -58,7 +58,7 @@ TEST_F(ColmapRig, IsReadFromItsRigConfiguration) {
   EXPECT_EQ(read_folder(kCameras, "", broken).error().key, "rigs[0].cameras[1].cam_from_rig_translation");
 }
 
-TEST_F(ColmapRig, IsChecked) {
+TEST_F(ColmapRig, RejectsInvalidFiles) {
   EXPECT_EQ(read_folder("1 THIN_PRISM_FISHEYE 640 480 1 1 1 1\n", "", "").error().found, "THIN_PRISM_FISHEYE");
   EXPECT_EQ(read_folder("1 PINHOLE 640 480 500 320 240\n", "", "").error().found, "3 parameters");
   EXPECT_EQ(read_folder("1 PINHOLE 640 480 500 500 320 x\n", "", "").error().key, "line 1");
@@ -69,7 +69,7 @@ TEST_F(ColmapRig, IsChecked) {
   EXPECT_EQ(read_folder("1 PINHOLE 640 480 500 500 320 240\n", "", "")->rig.size(), 1u);
 }
 
-TEST_F(ColmapRig, HoldsNoBodyFrame) {
+TEST_F(ColmapRig, CannotStoreABodyFrame) {
   const camera::Rig rig({{camera::test_cameras()[1], SE3(geometry::Quaterniond::Identity(), {0, 0, 1})}});
   const auto status = write_rig_as(rig, RigFormat::kColmap, folder_.path() / "out");
   ASSERT_FALSE(status);
@@ -77,7 +77,7 @@ TEST_F(ColmapRig, HoldsNoBodyFrame) {
   EXPECT_TRUE(write_rig_as(without(rig, Droppable::kBodyFrame), RigFormat::kColmap, folder_.path() / "out"));
 }
 
-TEST_F(ColmapRig, KeepsNamesInTheRigConfiguration) {
+TEST_F(ColmapRig, StoresNamesInTheRigConfiguration) {
   camera::Camera camera = camera::test_cameras()[1];
   camera.name = "front \"left\"";
   ASSERT_TRUE(write_rig_as(camera::Rig({{camera, SE3()}}), RigFormat::kColmap, folder_.path() / "out"));
@@ -86,7 +86,7 @@ TEST_F(ColmapRig, KeepsNamesInTheRigConfiguration) {
   EXPECT_EQ(read_rig_file(folder_.path() / "out")->rig.camera(index(0)).name, "front \"left\"");
 }
 
-TEST_F(ColmapRig, TakesNamesByIdAndPlacesFromRigsTxt) {
+TEST_F(ColmapRig, ReadsNamesByIdAndPosesFromRigsTxt) {
   const std::string config =
       R"([{"cameras": [{"image_prefix": "left/", "ref_sensor": true}, {"image_prefix": "right/"}]}])";
   const auto named = read_folder(kCameras, kRigs, config);

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Cameras of every model at random places.
+// Cameras of every model at random poses.
 camera::Rig mixed_rig() {
   Random random(1);
   std::vector<camera::RigCamera> cameras;
@@ -21,7 +21,7 @@ camera::Rig mixed_rig() {
   return camera::Rig(std::move(cameras));
 }
 
-// Those of them that EuRoC's format can hold.
+// The cameras of all_models that EuRoC's format can store.
 camera::Rig euroc_rig() {
   const camera::Rig rig = mixed_rig();
   std::vector<int> chosen;
@@ -47,7 +47,7 @@ void expect_equal(const camera::Rig& a, const camera::Rig& b) {
   }
 }
 
-// The file of one camera, with lines of it replaced.
+// The rig file of one camera, with lines replaced.
 class OwnRigFile : public testing::Test {
  protected:
   Result<camera::Rig> read(const std::string& text) {
@@ -87,7 +87,7 @@ TEST_F(OwnRigFile, IsRead) {
   EXPECT_LT((rig->body_from_cam(0) * geometry::Vector3d(1, 0, 0) - geometry::Vector3d(0.5, 0.75, 0.125)).norm(), 1e-12);
 }
 
-TEST_F(OwnRigFile, MayLeaveOutWhatHasADefault) {
+TEST_F(OwnRigFile, MayOmitKeysWithDefaults) {
   const auto rig = read(
       "bslam_rig: 1\ncameras:\n  - {model: pinhole, resolution: [4, 3], intrinsics: [1, 1, 2, 2],\n"
       "     T_body_cam: [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]], mask: null}\n");
@@ -103,7 +103,7 @@ TEST_F(OwnRigFile, RenormalisesARoundedRotation) {
   EXPECT_LT((R.transpose() * R - geometry::Matrix3d::Identity()).norm(), 1e-14);
 }
 
-TEST_F(OwnRigFile, NamesTheKeyAndWhatIsWrong) {
+TEST_F(OwnRigFile, ErrorsNameTheKeyAndValue) {
   struct Case {
     const char *from, *to, *key, *found;
   };
@@ -118,13 +118,13 @@ TEST_F(OwnRigFile, NamesTheKeyAndWhatIsWrong) {
            Case{", 1.76187114e-05]", "]", "cameras[0].distortion", "3 numbers"},
            Case{"pinhole-radtan", "pinhole", "cameras[0].distortion", "4 numbers"},
            Case{"-0.28340811", "wide", "cameras[0].distortion[0]", "wide"},
-           Case{"-0.28340811", "-1e9", "cameras[0].distortion", "coefficients that bend every ray back"},
+           Case{"-0.28340811", "-1e9", "cameras[0].distortion", "coefficients for which the model projects no point"},
            Case{"[752, 480]", "[752, 0]", "cameras[0].resolution", "0"},
            Case{"[752, 480]", "[30000, 480]", "cameras[0].resolution", "30000"},
            Case{"[752, 480]", "[752.5, 480]", "cameras[0].resolution", "752.5"},
            Case{"[752, 480]", "[752]", "cameras[0].resolution", "1 numbers"},
            Case{"[0, -1, 0, 0.5]", "[0, -2, 0, 0.5]", "cameras[0].T_body_cam",
-                "a 3x3 part that is no rotation (R'R differs from I by 3)"},
+                "a 3x3 part that is not a rotation (R'R differs from I by 3)"},
            Case{"[0, -1, 0, 0.5]", "[0, 1, 0, 0.5]", "cameras[0].T_body_cam", "a mirrored frame (determinant -1)"},
            Case{"[0, 0, 0, 1]]", "[0, 0, 0.1, 1]]", "cameras[0].T_body_cam", "last row 0 0 0.1 1"},
            Case{", [0, 0, 0, 1]]", "]", "cameras[0].T_body_cam", "a list of 3"},
@@ -135,7 +135,7 @@ TEST_F(OwnRigFile, NamesTheKeyAndWhatIsWrong) {
            Case{"time_offset_s: -0.0015", "time_offset_s: 1e9", "cameras[0].time_offset_s", "1000000000"},
            Case{"time_offset_s", "time_ofset_s", "cameras[0].time_ofset_s", "an unknown key"},
            Case{"T_body_cam", "T_cam_body", "cameras[0].T_cam_body", "the transform from body to camera"},
-           Case{"    mask:", "    name: again\n    mask:", "cameras[0].name", "the key twice"},
+           Case{"    mask:", "    name: again\n    mask:", "cameras[0].name", "a repeated key"},
            Case{"bslam_rig: 1", "bslam_rig: 2", "bslam_rig", "2"},
            Case{"bslam_rig: 1", "bslam_rig: one", "bslam_rig", "one"},
            Case{"bslam_rig: 1", "bslam_rig: 1\nrate: 5", "rate", "an unknown key"},
@@ -150,33 +150,33 @@ TEST_F(OwnRigFile, NamesTheKeyAndWhatIsWrong) {
   }
 }
 
-TEST_F(OwnRigFile, NamesTheNearestKeyAndTheKnownModels) {
+TEST_F(OwnRigFile, ErrorsSuggestKeysAndModels) {
   EXPECT_EQ(read_with("time_offset_s", "time_ofset_s").error().sentence, "unknown key; did you mean 'time_offset_s'?");
   EXPECT_EQ(read_with("pinhole-radtan", "telepathic").error().expected,
             "one of: pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere");
 }
 
-TEST_F(OwnRigFile, RefusesNoCamerasAndNamesTwice) {
+TEST_F(OwnRigFile, RejectsMissingCamerasAndRepeatedNames) {
   EXPECT_EQ(read("bslam_rig: 1\n").error().key, "cameras");
   EXPECT_EQ(read("bslam_rig: 1\ncameras: []\n").error().key, "cameras");
   const std::string two = std::string(kGood) + std::string(kGood).substr(std::string(kGood).find("  - name"));
   EXPECT_EQ(read(two).error().key, "cameras[1].name");
 }
 
-TEST_F(OwnRigFile, SyntaxErrorsCarryTheLine) {
+TEST_F(OwnRigFile, SyntaxErrorsNameTheLine) {
   EXPECT_EQ(read("bslam_rig: 1\ncameras:\n  - [1, 2\n b}").error().key, "line 4");
   EXPECT_EQ(read("a: [1, 2\n b}").error().key, "line 2");
 }
 
-TEST_F(OwnRigFile, OfNoKnownFormatIsSaidSo) {
-  EXPECT_EQ(read("something: else\n").error().found, "no calibration in a known format");
+TEST_F(OwnRigFile, RejectsUnknownFormats) {
+  EXPECT_EQ(read("something: else\n").error().found, "a file of unknown format");
   EXPECT_FALSE(read(""));
   EXPECT_FALSE(read_rig(folder_.path() / "none.yaml"));
   fs::create_directories(folder_.path() / "empty");
   EXPECT_EQ(read_rig(folder_.path() / "empty").error().found, "a folder without a calibration");
 }
 
-TEST_F(OwnRigFile, ComesBackExactly) {
+TEST_F(OwnRigFile, RoundTripsExactly) {
   const camera::Rig rig = mixed_rig();
   ASSERT_TRUE(write_rig(rig, folder_.path() / "rig.yaml"));
   const auto again = read_rig(folder_.path() / "rig.yaml");
@@ -185,7 +185,7 @@ TEST_F(OwnRigFile, ComesBackExactly) {
   for (std::size_t i = 0; i < rig.size(); ++i) EXPECT_EQ(again->camera(i).name, rig.camera(i).name);
 }
 
-TEST_F(OwnRigFile, KeepsOffsetsAndMasks) {
+TEST_F(OwnRigFile, StoresOffsetsAndMasks) {
   std::vector<camera::RigCamera> cameras;
   for (const TimeNs offset : {TimeNs{0}, TimeNs{1}, TimeNs{-1}, TimeNs{1234567891}, TimeNs{-999999999999}}) {
     camera::Camera camera = camera::test_cameras()[0];
@@ -214,7 +214,7 @@ class EurocSensor : public OwnRigFile {
   }
 };
 
-TEST_F(EurocSensor, IsReadInAllItsModels) {
+TEST_F(EurocSensor, SupportsAllDistortionModels) {
   EXPECT_EQ(camera::model_name(sensor_with("intr", "intr").value().camera(std::size_t{0}).model), "pinhole-radtan");
   const auto kb = sensor_with("radial-tangential", "equidistant");
   EXPECT_EQ(camera::model_name(kb.value().camera(std::size_t{0}).model), "kannala-brandt");
@@ -227,7 +227,7 @@ TEST_F(EurocSensor, IsReadInAllItsModels) {
   }
 }
 
-TEST_F(EurocSensor, NamesTheKeyAndWhatIsWrong) {
+TEST_F(EurocSensor, ErrorsNameTheKeyAndValue) {
   struct Case {
     const char *from, *to, *key;
   };
@@ -248,7 +248,7 @@ TEST_F(EurocSensor, NamesTheKeyAndWhatIsWrong) {
             "one of: none, radial-tangential, equidistant");
 }
 
-TEST_F(EurocSensor, ComesBackExactly) {
+TEST_F(EurocSensor, RoundTripsExactly) {
   const camera::Rig rig = euroc_rig();
   ASSERT_TRUE(write_euroc_sensors(rig, folder_.path() / "out", 20.0));
   const auto again = read_rig(folder_.path() / "out");
@@ -256,13 +256,13 @@ TEST_F(EurocSensor, ComesBackExactly) {
   expect_equal(rig, *again);
 }
 
-TEST_F(EurocSensor, CannotHoldAnOffset) {
+TEST_F(EurocSensor, CannotStoreATimeOffset) {
   camera::Camera camera = camera::test_cameras()[0];
   camera.time_offset_ns = 1;
   EXPECT_FALSE(write_euroc_sensors(camera::Rig({{camera, geometry::SE3()}}), folder_.path(), 20.0));
 }
 
-TEST_F(EurocSensor, CannotHoldASphereModel) {
+TEST_F(EurocSensor, CannotStoreASphereModel) {
   const Status status = write_euroc_sensors(mixed_rig(), folder_.path(), 20.0);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().found, "model double-sphere, which EuRoC sensor files cannot store");
@@ -276,10 +276,10 @@ constexpr const char* kCalib =
     "P2: 700 0 600 45.38 0 710 180 -0.1130887 0 0 1 0.003779761\n"
     "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n";
 
-TEST_F(OwnRigFile, KittiCalibrationPlacesCamerasByTheirProjections) {
+TEST_F(OwnRigFile, KittiCalibrationGivesPosesFromProjections) {
   support::write_text(folder_.path() / "calib.txt", kCalib);
   for (const int c : {0, 1, 2})
-    support::write_picture(folder_.path() / ("image_" + std::to_string(c)) / "000000.png", 124, 37);
+    support::write_image(folder_.path() / ("image_" + std::to_string(c)) / "000000.png", 124, 37);
   for (const fs::path& path : {folder_.path(), folder_.path() / "calib.txt"}) {
     const auto rig = read_rig(path);
     ASSERT_TRUE(rig) << rig.error().message();
@@ -287,7 +287,7 @@ TEST_F(OwnRigFile, KittiCalibrationPlacesCamerasByTheirProjections) {
     EXPECT_EQ(rig->camera(std::size_t{1}).name, "image_1");
     EXPECT_EQ(rig->camera(std::size_t{1}).width, 124);
     EXPECT_LT((rig->body_from_cam(1).translation() - geometry::Vector3d(0.5, 0, 0)).norm(), 1e-12);
-    // P = K [I | t]: a point of camera 0 projects through P2 as through the camera at its place.
+    // P = K [I | t]: a point of camera 0 projects to the same pixel through P2 and through the camera at its pose.
     const geometry::Vector3d p(0.3, -0.2, 4.0);
     const geometry::Vector3d h(700 * p.x() + 600 * p.z() + 45.38, 710 * p.y() + 180 * p.z() - 0.1130887,
                                p.z() + 0.003779761);
@@ -296,18 +296,18 @@ TEST_F(OwnRigFile, KittiCalibrationPlacesCamerasByTheirProjections) {
   }
 }
 
-TEST_F(OwnRigFile, KittiCalibrationIsChecked) {
-  support::write_picture(folder_.path() / "image_0" / "000000.png", 124, 37);
+TEST_F(OwnRigFile, KittiCalibrationIsValidated) {
+  support::write_image(folder_.path() / "image_0" / "000000.png", 124, 37);
   const auto broken = [&](const std::string& text) {
     support::write_text(folder_.path() / "calib.txt", text);
     return read_rig(folder_.path()).error();
   };
   EXPECT_EQ(broken("P0: 700 0 600 0 0 710 180 0 0 0 1\n").found, "11 numbers");
   EXPECT_EQ(broken("P0: 700 0 600 0 0 ten 180 0 0 0 1 0\n").found, "ten");
-  EXPECT_EQ(broken("P0: -700 0 600 0 0 710 180 0 0 0 1 0\n").expected, "both above 0");
+  EXPECT_EQ(broken("P0: -700 0 600 0 0 710 180 0 0 0 1 0\n").expected, "positive focal lengths");
   EXPECT_EQ(broken("P0: 700 1 600 0 0 710 180 0 0 0 1 0\n").key, "P0");
   EXPECT_EQ(broken("P0: 700 0 600 0 0 710 180 0 0 0 1 0\nP0: 700 0 600 0 0 710 180 0 0 0 1 0\n").found,
-            "the line twice");
+            "a repeated line");
   EXPECT_EQ(broken("nothing\n").found, "no projection");
   EXPECT_EQ(broken("P3: 700 0 600 0 0 710 180 0 0 0 1 0\n").found, "no images in its folder");
 }

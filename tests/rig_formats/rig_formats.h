@@ -1,4 +1,4 @@
-// What the tests of calibration formats share: a folder with a calibration in it, read.
+// Test fixture for calibration formats: a temporary folder with a calibration, and functions that read it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ using geometry::SE3;
 using geometry::Vector2d;
 using geometry::Vector3d;
 
-// `camera(index(0))`: a plain 0 would be taken for a name.
+// `camera(index(0))`: a literal 0 would also convert to a name.
 inline std::size_t index(std::size_t i) { return i; }
 
 class RigFormats : public testing::Test {

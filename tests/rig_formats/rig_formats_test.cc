@@ -1,4 +1,4 @@
-// Calibrations as other programs write them: read, and written and read again.
+// Reading and writing of calibrations in the formats of other programs.
 #include "rig_formats/rig_formats.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ bool holds(RigFormat format, const camera::CameraModel& model) {
   }
 }
 
-// Rigs that the format can hold, of all its models at random places.
+// Rigs that the format can store, with all its models at random poses.
 std::vector<camera::Rig> rigs_for(RigFormat format) {
   Random random(7);
   std::vector<camera::RigCamera> cameras;
@@ -44,7 +44,7 @@ std::vector<camera::Rig> rigs_for(RigFormat format) {
     cameras.push_back({camera, stays ? SE3() : geometry::random_se3(random, 0.5)});
   }
   if (format != RigFormat::kOrbslam3) return {camera::Rig(cameras)};
-  std::vector<camera::Rig> pairs;  // two of one size and kind at a time
+  std::vector<camera::Rig> pairs;  // pairs of equal resolution and kind
   for (const camera::RigCamera& c : cameras) {
     camera::RigCamera other{c.camera, geometry::random_se3(random, 0.5)};
     camera::RigCamera first = c;
@@ -64,7 +64,7 @@ void expect_near(const camera::Rig& a, const camera::Rig& b, double tolerance) {
     EXPECT_LE(std::abs(ka.fx - kb.fx) + std::abs(ka.fy - kb.fy), tolerance) << i;
     EXPECT_LE(std::abs(ka.cx - kb.cx) + std::abs(ka.cy - kb.cy), tolerance) << i;
     std::vector<double> da = camera::distortion(ca.model), db = camera::distortion(cb.model);
-    const std::size_t count = std::max(da.size(), db.size());  // zeros may be written out
+    const std::size_t count = std::max(da.size(), db.size());  // trailing zeros may be written
     da.resize(count), db.resize(count);
     for (std::size_t k = 0; k < count; ++k) EXPECT_LE(std::abs(da[k] - db[k]), tolerance) << i;
     EXPECT_EQ((std::array{ca.width, ca.height}), (std::array{cb.width, cb.height}));
@@ -83,7 +83,7 @@ class RigFormatOf : public RigFormats, public testing::WithParamInterface<RigFor
 INSTANTIATE_TEST_SUITE_P(Writable, RigFormatOf, testing::ValuesIn(writable_formats().begin(), writable_formats().end()),
                          [](const auto& instance) { return std::string(format_name(instance.param)); });
 
-TEST_P(RigFormatOf, ComesBack) {
+TEST_P(RigFormatOf, RoundTrips) {
   for (const camera::Rig& rig : rigs_for(GetParam())) {
     ASSERT_GE(rig.size(), 2u);
     const auto notes = write_rig_as(rig, GetParam(), out());
@@ -96,7 +96,7 @@ TEST_P(RigFormatOf, ComesBack) {
   }
 }
 
-TEST_P(RigFormatOf, RefusesWhatItCannotHold) {
+TEST_P(RigFormatOf, RejectsContentItCannotStore) {
   const bool all = GetParam() == RigFormat::kBslam;
   camera::Camera camera = camera::test_cameras()[1];
   camera.mask_file = "/mask.png";
@@ -116,8 +116,8 @@ TEST_P(RigFormatOf, RefusesWhatItCannotHold) {
   EXPECT_EQ(write_rig_as(camera::Rig({{camera, SE3()}, {plain, SE3()}}), GetParam(), out()).ok(), each);
 }
 
-// What has been read once is read again from another format with the same bits, where that holds the same numbers.
-TEST_F(RigFormats, KeepTheBitsOfWhatWasRead) {
+// A rig that was read is bitwise identical after conversion to another format that stores the same numbers.
+TEST_F(RigFormats, ConversionsAreBitwiseExact) {
   for (const RigFormat format : {RigFormat::kBslam, RigFormat::kEuroc, RigFormat::kOpenvins, RigFormat::kBasalt}) {
     const camera::Rig first = read(rig_to_yaml(rigs_for(format).front())).value().rig;
     const fs::path out = folder_.path() / (format == RigFormat::kEuroc ? "out" : "out.txt");
@@ -131,7 +131,7 @@ TEST_F(RigFormats, KeepTheBitsOfWhatWasRead) {
   }
 }
 
-TEST(RigTransform, KeepsRightAnglesExact) {
+TEST(RigTransform, KeepsRightAnglesExactly) {
   const auto T = camera::rigid_transform({0, 0, 1, 0.5, -1, 0, 0, 0.25, 0, -1, 0, 0.125, 0, 0, 0, 1}, "", "");
   Eigen::Matrix3d R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -139,7 +139,7 @@ TEST(RigTransform, KeepsRightAnglesExact) {
   EXPECT_EQ(camera::rigid_transform(camera::rows_of(SE3()), "", "")->matrix(), Eigen::Matrix4d::Identity());
 }
 
-TEST(RigTransform, IsReadFromItsOwnMatrixWithTheSameBits) {
+TEST(RigTransform, RoundTripsThroughItsMatrixBitwise) {
   Random random(3);
   for (int i = 0; i < 50000; ++i) {
     const auto first = camera::rigid_transform(camera::rows_of(geometry::random_se3(random, 1.0)), "", "");
@@ -151,7 +151,7 @@ TEST(RigTransform, IsReadFromItsOwnMatrixWithTheSameBits) {
   }
 }
 
-TEST(RigFormat, FollowsFromTheName) {
+TEST(RigFormat, IsDeterminedByTheFileName) {
   EXPECT_EQ(format_of_output("rig.yaml"), RigFormat::kBslam);
   EXPECT_EQ(format_of_output("rig.json"), RigFormat::kBasalt);
   EXPECT_EQ(format_of_output("folder/"), RigFormat::kEuroc);
@@ -159,7 +159,7 @@ TEST(RigFormat, FollowsFromTheName) {
   EXPECT_FALSE(writable_format("kitti"));
 }
 
-TEST_F(RigFormats, DropsWhatIsAskedFor) {
+TEST_F(RigFormats, WithoutRemovesTheGivenPart) {
   camera::Camera camera = camera::test_cameras()[1];
   camera.mask_file = "/mask.png";
   camera.time_offset_ns = 5;
@@ -202,7 +202,7 @@ cam1:
   resolution: [752, 480]
 )";
 
-TEST_F(RigFormats, KalibrChainsCamerasAndShiftsTime) {
+TEST_F(RigFormats, KalibrChainsPosesAndTimeShifts) {
   const auto file = read(kKalibr);
   ASSERT_TRUE(file) << file.error().message();
   const camera::Rig& rig = file->rig;
@@ -213,14 +213,14 @@ TEST_F(RigFormats, KalibrChainsCamerasAndShiftsTime) {
   EXPECT_EQ(camera::model_name(rig.camera(index(1)).model), "double-sphere");
   EXPECT_EQ(camera::distortion(rig.camera(index(1)).model), (std::vector{-0.2, 0.6}));
   EXPECT_EQ(camera::intrinsics(rig.camera(index(1)).model).fy, 351);
-  // A point of camera 0 moves by -0.11 in camera 1: camera 1 stands 0.11 to the right.
+  // A point of camera 0 is shifted by -0.11 in camera 1, so camera 1 is 0.11 to the right.
   EXPECT_LT((rig.rig_from_cam(1).translation() - Vector3d(0.11, 0, 0)).norm(), 1e-12);
   // T_cam_imu maps the IMU's x axis to the camera's z.
   EXPECT_LT((rig.body_from_cam(0).rotation() * Vector3d::UnitZ() - Vector3d::UnitX()).norm(), 1e-12);
   EXPECT_LT((rig.body_from_cam(0).inverse() * Vector3d::Zero() - Vector3d(0.1, 0.2, 0.3)).norm(), 1e-12);
 }
 
-TEST_F(RigFormats, KalibrWithoutImuHasItsBodyAtCamera0) {
+TEST_F(RigFormats, KalibrWithoutImuUsesCamera0AsBody) {
   const std::string text(kKalibr);
   const auto file = read(text.substr(0, 6) + text.substr(text.find("  cam_overlaps")));
   ASSERT_TRUE(file) << file.error().message();
@@ -250,7 +250,7 @@ TEST_F(RigFormats, KalibrOmniBecomesTheUnifiedModel) {
   EXPECT_EQ(distorted.error().found, "omni with distortion");
 }
 
-TEST_F(RigFormats, KalibrIsChecked) {
+TEST_F(RigFormats, KalibrRejectsInvalidValues) {
   struct Case {
     const char *from, *to, *key;
   };
@@ -271,7 +271,7 @@ TEST_F(RigFormats, KalibrIsChecked) {
   }
 }
 
-TEST_F(RigFormats, KalibrMustAgreeWithItself) {
+TEST_F(RigFormats, KalibrRejectsInconsistentTransforms) {
   const std::string wrong =
       "  T_cam_imu:\n  - [0.0, -1.0, 0.0, 0.21]\n  - [0.0, 0.0, -1.0, 0.2]\n"
       "  - [1.0, 0.0, 0.0, 0.3]\n  - [0.0, 0.0, 0.0, 1.0]\n  T_cn_cnm1:\n";
@@ -281,7 +281,7 @@ TEST_F(RigFormats, KalibrMustAgreeWithItself) {
   EXPECT_TRUE(read_with(kKalibr, "  T_cn_cnm1:\n", right));
 }
 
-TEST_F(RigFormats, OpenvinsSaysCameraToImu) {
+TEST_F(RigFormats, OpenvinsStoresCameraToImu) {
   const std::string head = "%YAML:1.0\n\ncam0:\n", rest = R"(
     - [0.0148655429818, -0.999880929698, 0.00414029679422, -0.0216401454975]
     - [0.999557249008, 0.0149672133247, 0.025715529948, -0.064676986768]
@@ -302,7 +302,7 @@ TEST_F(RigFormats, OpenvinsSaysCameraToImu) {
   EXPECT_LT((inverse->rig.body_from_cam(0).inverse().matrix() - file->rig.body_from_cam(0).matrix()).norm(), 1e-12);
 }
 
-TEST_F(RigFormats, OpenvinsHasNoDistortionAsOneOfZeros) {
+TEST_F(RigFormats, OpenvinsWritesNoDistortionAsZeros) {
   const camera::Rig rig({{camera::Camera{"front", camera::Pinhole({400, 401, 320, 240}), 640, 480, 0, {}}, SE3()}});
   ASSERT_TRUE(write_rig_as(rig, RigFormat::kOpenvins, folder_.path() / "out.yaml"));
   const auto again = read_rig_file(folder_.path() / "out.yaml");
@@ -358,7 +358,7 @@ TEST_F(RigFormats, OrbslamFisheyesHaveTheirOwnCoefficients) {
   EXPECT_EQ(file->notes.size(), 2u);  // on the body frame, and on the coefficients
 }
 
-TEST_F(RigFormats, OrbslamRectifiedPairIsABaselineApart) {
+TEST_F(RigFormats, OrbslamRectifiedPairIsSeparatedByTheBaseline) {
   const std::string common = "%YAML:1.0\nCamera.width: 752\nCamera.height: 480\n";
   const auto stereo = read(common +
                            "Camera.type: \"Rectified\"\nCamera1.fx: 435.2\nCamera1.fy: 435.2\nCamera1.cx: 367.4\n"
@@ -374,8 +374,8 @@ TEST_F(RigFormats, OrbslamRectifiedPairIsABaselineApart) {
   EXPECT_EQ(read(old + "Camera.bf: -40.0\n").error().key, "Camera.bf");
 }
 
-// ORB-SLAM2's EuRoC.yaml: the extrinsics of the raw cameras, found back from their rectification, are those of EuRoC.
-TEST_F(RigFormats, OrbslamRectificationLeadsToTheRawCameras) {
+// ORB-SLAM2's EuRoC.yaml: the extrinsics of the raw cameras, recovered from their rectification, equal EuRoC's.
+TEST_F(RigFormats, OrbslamRectificationGivesTheRawCameras) {
   const auto matrix = [](const std::string& key, int rows, int cols, const std::string& data) {
     return key + ": !!opencv-matrix\n   rows: " + std::to_string(rows) + "\n   cols: " + std::to_string(cols) +
            "\n   dt: d\n   data:[" + data + "]\n";
@@ -416,7 +416,7 @@ TEST_F(RigFormats, OrbslamRectificationLeadsToTheRawCameras) {
   EXPECT_LT((file->rig.rig_from_cam(1).matrix() - T_left_right.matrix()).cwiseAbs().maxCoeff(), 2e-5);
 }
 
-TEST_F(RigFormats, OrbslamIsChecked) {
+TEST_F(RigFormats, OrbslamRejectsInvalidValues) {
   struct Case {
     const char *from, *to, *key;
   };
@@ -432,7 +432,7 @@ TEST_F(RigFormats, OrbslamIsChecked) {
   }
 }
 
-TEST_F(RigFormats, OrbslamHoldsTwoCamerasOfOneKind) {
+TEST_F(RigFormats, OrbslamStoresUpToTwoCamerasOfOneKind) {
   const auto cameras = camera::test_cameras();
   const auto write = [&](const std::vector<camera::RigCamera>& rig) {
     return write_rig_as(camera::Rig(rig), RigFormat::kOrbslam3, folder_.path() / "out.yaml");
@@ -476,7 +476,7 @@ TEST_F(RigFormats, BasaltIsRead) {
   EXPECT_LT((rig.body_from_cam(0).matrix3() - q.toRotationMatrix()).norm(), 1e-15);
 }
 
-TEST_F(RigFormats, BasaltIsChecked) {
+TEST_F(RigFormats, BasaltRejectsInvalidValues) {
   struct Case {
     const char *from, *to, *key;
   };
@@ -520,7 +520,7 @@ constexpr const char* kKittiRaw =
     "P_rect_01: 7.215377e+02 0.000000e+00 6.095593e+02 -3.875744e+02 0.000000e+00 7.215377e+02 1.728540e+02 "
     "0.000000e+00 0.000000e+00 0.000000e+00 1.000000e+00 0.000000e+00\n";
 
-TEST_F(RigFormats, KittiRawFollowsWhereItLies) {
+TEST_F(RigFormats, KittiRawChoosesTheRigByItsFolder) {
   const auto at = [&](const std::string& name) { return read(kKittiRaw, name + "/calib_cam_to_cam.txt"); };
   const auto rectified = at("plain");
   ASSERT_TRUE(rectified) << rectified.error().message();
@@ -531,16 +531,16 @@ TEST_F(RigFormats, KittiRawFollowsWhereItLies) {
   EXPECT_EQ(raw->rig.camera(index(0)).width, 1392);
   EXPECT_EQ(camera::distortion(raw->rig.camera(index(1)).model)[4], -5.314062e-02);
   EXPECT_NEAR(raw->rig.rig_from_cam(1).translation().norm(), 0.537, 1e-3);
-  EXPECT_GT(raw->rig.rig_from_cam(1).translation().x(), 0.53);  // camera 01 stands on the right
+  EXPECT_GT(raw->rig.rig_from_cam(1).translation().x(), 0.53);  // camera 01 is to the right
   EXPECT_EQ(at("2011_09_26_drive_0039_sync")->rig.camera(index(0)).width, 1242);
   fs::create_directories(folder_.path() / "date" / "2011_09_26_drive_0039_extract");
   EXPECT_EQ(at("date")->rig.camera(index(0)).width, 1392);
-  support::write_picture(folder_.path() / "images" / "image_00" / "data" / "0000000000.png", 1392, 512);
+  support::write_image(folder_.path() / "images" / "image_00" / "data" / "0000000000.png", 1392, 512);
   EXPECT_EQ(at("images")->rig.camera(index(0)).width, 1392);
   EXPECT_EQ(read_rig_file(folder_.path() / "images")->rig.size(), 2u);
 }
 
-TEST_F(RigFormats, KittiRawIsChecked) {
+TEST_F(RigFormats, KittiRawRejectsInvalidValues) {
   EXPECT_EQ(read_with(kKittiRaw, "S_rect_00: 1.242000e+03", "S_rect_00:").error().key, "S_rect_00");
   EXPECT_EQ(read_with(kKittiRaw, "P_rect_01: 7.2", "P_rect_01: x7.2").error().found, "x7.215377e+02");
   EXPECT_EQ(read_with(kKittiRaw, "P_rect_01: 7.215377e+02 0.0", "P_rect_01: 7.215377e+02 0.1").error().key,

@@ -7,7 +7,7 @@ check_sizes = load('check_sizes')
 
 
 def function_of(lines, name='f'):
-    """A function that has that many lines of code."""
+    """Returns a function with the given number of lines of code."""
     return f'int {name}() {{\n' + '  work();\n' * (lines - 2) + '}\n'
 
 
@@ -20,11 +20,11 @@ def findings(files, exceptions=None):
 
 
 class Functions(unittest.TestCase):
-    def test_counts_signature_and_braces_but_neither_comments_nor_blank_lines(self):
+    def test_counts_signature_and_braces_but_no_comments_or_blank_lines(self):
         self.assertEqual(lengths('// what f does\nint f(int a,\n      int b) {\n\n  // why\n  return a;  // so\n  /* or\n not */\n}\n'),
                          {'f': 4})
 
-    def test_counts_lambdas_and_local_classes_to_the_function_around_them(self):
+    def test_counts_lambdas_and_local_classes_as_part_of_the_enclosing_function(self):
         text = 'void f() {\n  struct S {\n    int g() { return 1; }\n  };\n  const auto h = [&] {\n    return 2;\n  };\n}\n'
         self.assertEqual(lengths(text), {'f': 8})
 
@@ -34,7 +34,7 @@ class Functions(unittest.TestCase):
         found = lengths(text)
         self.assertEqual((found['get'], found['C::far'], found['C']), (3, 3, 1))
 
-    def test_braces_of_values_and_in_literals_are_no_functions(self):
+    def test_ignores_braces_of_values_and_in_literals(self):
         text = ('const int table[] = {1, 2, 3};\nconst char* const t = "}{ int g() {";\nconst char c = \'{\';\n'
                 'const char* const r = R"(int h() {)";\nenum class E { kA, kB };\n#define X() {\nint f() {\n  return 1;\n}\n')
         self.assertEqual(lengths(text), {'f': 3})
@@ -46,31 +46,31 @@ class Functions(unittest.TestCase):
 
 
 class Limits(unittest.TestCase):
-    def test_a_function_at_the_limit_passes_and_one_more_line_does_not(self):
+    def test_rejects_functions_beyond_the_limit(self):
         short = ''.join(function_of(3, f's{i}') for i in range(40))
         self.assertEqual(findings({'src/a/a.cc': short + function_of(45)}), [])
         self.assertEqual(findings({'src/a/a.cc': short + function_of(46)}),
-                         ['src/a/a.cc:121: f has 46 lines of code, at most 45'])
+                         ['src/a/a.cc:121: f has 46 lines of code; the limit is 45'])
 
-    def test_a_file_at_the_limit_passes_and_one_more_line_does_not(self):
+    def test_rejects_files_beyond_the_limit(self):
         self.assertEqual(findings({'src/a/a.h': function_of(3) + '\n' * 397}), [])
-        self.assertEqual(findings({'src/a/a.h': function_of(3) + '\n' * 398}), ['src/a/a.h:401: 401 lines, at most 400'])
+        self.assertEqual(findings({'src/a/a.h': function_of(3) + '\n' * 398}), ['src/a/a.h:401: 401 lines; the limit is 400'])
 
-    def test_at_most_five_percent_of_the_functions_are_longer_than_27_lines(self):
+    def test_rejects_more_than_five_percent_of_functions_beyond_27_lines(self):
         def tree(short, long):
             files = {f'src/a/short{i}.cc': function_of(27) for i in range(short)}
             return files | {f'src/a/long{i}.cc': function_of(40) for i in range(long)}
         self.assertEqual(findings(tree(96, 4)), [])
-        self.assertEqual(findings(tree(90, 10)), ['src: 95 % of the functions have up to 40 lines of code, at most 27'])
+        self.assertEqual(findings(tree(90, 10)), ['src: the 95th percentile of the functions is 40 lines of code; the limit is 27'])
 
-    def test_exceptions_hold_for_what_they_name_and_are_reported_when_not_needed(self):
+    def test_applies_exceptions_and_reports_unused_ones(self):
         short = ''.join(function_of(3, f's{i}') for i in range(40))
         files = {'src/a/a.cc': short + function_of(46)}
         self.assertEqual(findings(files, {'src/a/a.cc: f': 'why'}), [])
         self.assertEqual(findings(files, {'src/a/a.cc: f': 'why', 'src/a/b.cc': 'why'}),
-                         ['src/a/b.cc: an exception of check_sizes that is not needed'])
+                         ['src/a/b.cc: unused exception of check_sizes'])
 
-    def test_does_not_take_an_empty_folder_for_a_clean_one(self):
+    def test_rejects_an_empty_folder(self):
         self.assertEqual(Tree({}).run('check_sizes')[0], 1)
 
 

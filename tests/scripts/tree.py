@@ -1,4 +1,4 @@
-"""What the tests of the checking scripts share: small source trees, and the scripts as modules."""
+"""Common functions of the tests of the checking scripts: small source trees, and the scripts as modules."""
 import atexit
 import importlib.machinery
 import importlib.util
@@ -13,7 +13,7 @@ sys.dont_write_bytecode = True
 
 
 def load(name):
-    """The script as a module; its main() does not run."""
+    """Returns the script as a module without running its main()."""
     loader = importlib.machinery.SourceFileLoader(name, str(SCRIPTS / name))
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
     loader.exec_module(module)
@@ -21,7 +21,7 @@ def load(name):
 
 
 class Tree:
-    """A temporary project: Tree({'src/a/b.h': 'text'}); removed when the program ends."""
+    """A temporary project: Tree({'src/a/b.h': 'text'}); removed at the end of the program."""
 
     def __init__(self, files):
         self.root = pathlib.Path(tempfile.mkdtemp(prefix='bslam_scripts_'))
@@ -32,7 +32,7 @@ class Tree:
             path.write_text(text)
 
     def run(self, script, *arguments):
-        """(exit status, lines printed) of a script called on this tree."""
+        """Runs a script on this tree and returns (exit status, printed lines)."""
         command = [sys.executable, str(SCRIPTS / script), '--root', str(self.root), *arguments]
         done = subprocess.run(command, capture_output=True, text=True)
         return done.returncode, (done.stdout + done.stderr).splitlines()

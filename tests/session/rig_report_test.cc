@@ -55,7 +55,7 @@ TEST_F(RigReport, IsTextOrJson) {
   EXPECT_FALSE(report_rig({.file = (folder_ / "none.yaml").string()}));
 }
 
-TEST_F(RigReport, NamesAMaskThatCannotBeUsed) {
+TEST_F(RigReport, WarnsOfAnUnusableMask) {
   camera::RigCamera camera{stereo().camera(0u), stereo().body_from_cam(0)};
   camera.camera.mask_file = (folder_ / "none.png").string();
   ASSERT_TRUE(rig_formats::write_rig(camera::Rig({camera}), folder_ / "rig.yaml"));
@@ -65,7 +65,7 @@ TEST_F(RigReport, NamesAMaskThatCannotBeUsed) {
   EXPECT_NE(text->find("none.png"), std::string::npos) << *text;
 }
 
-// The whole way: images, features, verdict.
+// The complete test: images, features, verdict.
 TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   ThreadPool pool(2);
   const simulator::SimulationRequest request{.folder = folder_ / "data",

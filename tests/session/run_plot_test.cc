@@ -28,8 +28,8 @@ RunRecord short_run(int frames) {
     frame.result.cameras = {{1000 + i, 300, 250}, {900, 200, 100}};
     const bool lost = i >= 10 && i < 15;
     frame.result.status = lost ? tracking::TrackStatus::kLost : tracking::TrackStatus::kTracking;
-    add_stage_sample(record, "extract", StagePlace::kFrame, {time_s, 9.0});
-    if (frame.keyframe) add_stage_sample(record, "local adjustment", StagePlace::kBackground, {time_s, 50.0});
+    add_stage_sample(record, "extract", StageThread::kCaller, {time_s, 9.0});
+    if (frame.keyframe) add_stage_sample(record, "local adjustment", StageThread::kBackground, {time_s, 50.0});
     record.frames.push_back({time_s, std::move(frame)});
   }
   record.loops = {{0.9, 0.1, 50}};
@@ -55,30 +55,31 @@ std::size_t count(const std::string& text, std::string_view part) {
   return n;
 }
 
-TEST(RunPlot, ShowsCameraFaultsWithTheNamesOfTheCameras) {
+TEST(RunPlot, ShowsCameraFaultsByCamera) {
   constexpr std::string_view kBar = "stroke-width=\"6";
-  const std::string sound = run_plot_svg(short_run(40));
+  const std::string without_faults = run_plot_svg(short_run(40));
   RunRecord record = short_run(40);
   record.cameras[1].states = {{kOk, 0.0, 0.5}, {kFrozen, 0.55, 1.0}, {kOk, 1.05, 1.95}};
   const std::string svg = run_plot_svg(record);
   EXPECT_EQ(xml_fault(svg), "");
   EXPECT_TRUE(contains(svg, "Camera faults"));
   EXPECT_TRUE(contains(svg, "out: frozen"));
-  EXPECT_GT(count(svg, kBar), count(sound, kBar));
-  EXPECT_GT(count(svg, ">rear<"), count(sound, ">rear<"));  // the tick of the camera, besides the legends
-  EXPECT_FALSE(contains(sound, "Camera faults"));
+  EXPECT_GT(count(svg, kBar), count(without_faults, kBar));
+  EXPECT_GT(count(svg, ">rear<"),
+            count(without_faults, ">rear<"));  // the tick of the camera, in addition to the legends
+  EXPECT_FALSE(contains(without_faults, "Camera faults"));
   record.cameras[1].states = {{kOk, 0.0, 1.95}};
-  EXPECT_EQ(run_plot_svg(record), sound);
+  EXPECT_EQ(run_plot_svg(record), without_faults);
   record.frames.clear();
   record.cameras[1].states = {{kFrozen, 0.55, 1.0}};
   EXPECT_EQ(xml_fault(run_plot_svg(record)), "");
 }
 
-TEST(RunPlot, IsTheSameForTheSameRecord) { EXPECT_EQ(run_plot_svg(short_run(40)), run_plot_svg(short_run(40))); }
+TEST(RunPlot, IsDeterministic) { EXPECT_EQ(run_plot_svg(short_run(40)), run_plot_svg(short_run(40))); }
 
-TEST(RunPlot, StaysSmallForALongRun) {
+TEST(RunPlot, IsSmallForALongRun) {
   RunRecord record = short_run(20000);
-  for (int i = 0; i < 10000; ++i) {  // a camera that flickers
+  for (int i = 0; i < 10000; ++i) {  // a camera whose status changes often
     record.cameras[1].states.push_back({i % 2 == 0 ? kOk : kNoImages, 0.1 * i, 0.1 * i + 0.05});
   }
   const std::string svg = run_plot_svg(record);
@@ -87,7 +88,7 @@ TEST(RunPlot, StaysSmallForALongRun) {
   EXPECT_TRUE(contains(svg, "frame, maximum"));
 }
 
-TEST(RunPlot, DrawsARunThatHasNothing) {
+TEST(RunPlot, DrawsAnEmptyRun) {
   EXPECT_EQ(xml_fault(run_plot_svg({})), "");
   EXPECT_EQ(xml_fault(run_plot_svg(short_run(1))), "");
 }

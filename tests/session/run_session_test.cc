@@ -63,10 +63,10 @@ TEST_F(Session, ReadsFramesInOrder) {
   EXPECT_FALSE(source.next().has_value());
 }
 
-TEST_F(Session, StopsReadingCleanlyWhereNobodyWantsMoreParallel) {
+TEST_F(Session, ReaderStopsBeforeTheLastFrameParallel) {
   const dataset::Dataset data = dataset();
   for (std::size_t taken = 0; taken <= data.frames.size(); ++taken) {
-    FrameSource source(data, 1 + taken % 3, taken % 2 == 0 ? ReadAhead::kGivesWay : ReadAhead::kAsAll);
+    FrameSource source(data, 1 + taken % 3, taken % 2 == 0 ? ReaderPriority::kLow : ReaderPriority::kNormal);
     for (std::size_t i = 0; i < taken; ++i) EXPECT_TRUE(source.next().has_value());
   }
 }
@@ -92,17 +92,17 @@ TEST_F(Session, WritesAllItsFiles) {
   for (const CameraRecord& c : result->record.cameras) EXPECT_EQ(c.images, 8);
 
   const fs::path out = folder() / "out";
-  EXPECT_FALSE(write_outputs(*result, o.config, out).ok());  // the folder is the caller's
+  EXPECT_FALSE(write_outputs(*result, o.config, out).ok());  // the caller must create the folder
   fs::create_directory(out);
   ASSERT_TRUE(write_outputs(*result, o.config, out).ok());
   for (const char* name :
        {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg", "run.svg"}) {
     EXPECT_GT(fs::file_size(out / name), 50u) << name;
   }
-  EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 6);  // and nothing half-written
+  EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 6);  // and no partially written file
 }
 
-TEST_F(Session, EverySubmapHasFilesOfItsOwn) {
+TEST_F(Session, WritesFilesForEverySubmap) {
   SessionOptions o = options();
   auto result = run_session(dataset(), o);
   ASSERT_TRUE(result.ok());
@@ -115,13 +115,13 @@ TEST_F(Session, EverySubmapHasFilesOfItsOwn) {
     std::ifstream file(out / name);
     return std::count(std::istreambuf_iterator<char>(file), {}, '\n');
   };
-  EXPECT_EQ(lines("trajectory.tum"), 1 + 8);  // after the header
+  EXPECT_EQ(lines("trajectory.tum"), 1 + 8);  // header and poses
   EXPECT_EQ(lines("trajectory_part2.tum"), 1 + 3);
   EXPECT_EQ(lines("trajectory_live.tum"), 1 + 8);
   EXPECT_FALSE(fs::exists(out / "trajectory_live_part2.tum"));
 }
 
-TEST_F(Session, GoesOnInAMapOfAnEarlierRun) {
+TEST_F(Session, ContinuesTheMapOfAnEarlierRun) {
   SessionOptions o = options();
   o.vocabulary = place::shipped_vocabulary().value();
   const auto first = run_session(dataset(), o);
@@ -146,7 +146,7 @@ TEST_F(Session, GoesOnInAMapOfAnEarlierRun) {
   EXPECT_GE(second->record.relocalisations.front().inliers, 50);
 }
 
-TEST_F(Session, TracksTheSameInParallel) {
+TEST_F(Session, TracksAllFramesInParallelMode) {
   SessionOptions o = options();
   o.config.mode = execution::Mode::kParallel;
   const auto result = run_session(dataset(), o);
@@ -155,7 +155,7 @@ TEST_F(Session, TracksTheSameInParallel) {
   EXPECT_EQ(result->record.mode, "parallel");
 }
 
-TEST_F(Session, EndsWhereInterrupted) {
+TEST_F(Session, EndsWhenInterrupted) {
   std::stop_source interruption;
   SessionOptions o = options();
   o.interrupted = interruption.get_token();
@@ -175,7 +175,7 @@ TEST_F(Session, EndsWhereInterrupted) {
   EXPECT_TRUE(write_outputs(*nothing, o.config, folder() / "nothing").ok());
 }
 
-TEST_F(Session, RepeatsARunByItsJournalAlsoAnInterruptedOne) {
+TEST_F(Session, ReplaysCompleteAndInterruptedRuns) {
   for (const std::size_t end : {3u, 8u}) {
     std::stop_source interruption;
     SessionOptions o = options();
@@ -203,7 +203,7 @@ TEST_F(Session, RepeatsARunByItsJournalAlsoAnInterruptedOne) {
   }
 }
 
-TEST_F(Session, RefusesAJournalOfAnotherRun) {
+TEST_F(Session, RejectsAJournalOfAnotherRun) {
   SessionOptions o = options();
   const auto recorded = run_session(dataset(), o);
   ASSERT_TRUE(recorded.ok());
@@ -216,11 +216,11 @@ TEST_F(Session, RefusesAJournalOfAnotherRun) {
   EXPECT_EQ(replayed.error().key, "entry 1");
 }
 
-TEST_F(Session, CountsADamagedImageAsSkippedAndGoesOn) {
+TEST_F(Session, CountsADamagedImageAsSkippedAndContinues) {
   const dataset::Dataset data = dataset();
   const fs::path victim = data.frames[4].images[1]->path, kept = folder() / "kept.png";
   fs::rename(victim, kept);
-  std::ofstream(victim) << "no image";
+  std::ofstream(victim) << "not an image";
   const auto result = run_session(data, options());
   fs::rename(kept, victim);
   ASSERT_TRUE(result.ok());
@@ -234,7 +234,7 @@ TEST_F(Session, CountsADamagedImageAsSkippedAndGoesOn) {
   for (const RunFrame& f : result->record.frames) EXPECT_EQ(f.outcome(), FrameOutcome::kTracked);
 }
 
-TEST_F(Session, ReportsAMaskThatCannotBeRead) {
+TEST_F(Session, ReportsAnUnreadableMask) {
   dataset::Dataset data = dataset();
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < data.rig.size(); ++c) cameras.push_back({data.rig.camera(c), data.rig.body_from_cam(c)});

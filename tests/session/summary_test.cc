@@ -28,14 +28,14 @@ RunFrame frame(double time_s, LostReason reason = LostReason::kNone) {
 
 RunFrame dropped(double time_s) { return {time_s, std::nullopt}; }
 
-TEST(Summary, HasTheKeysOfTheContractInTheirOrder) {
+TEST(Summary, HasTheDocumentedKeysInOrder) {
   RunRecord record;
   record.cameras = {
       {"cam0", 400, 1, {{{tracking::CameraState::kDegraded, tracking::CameraReason::kBlurred}, 0.0, 1.5}}}};
   record.loops = {{43.1, 1.2, 83}};
   record.relocalisations = {{12.4, 3.15, 60}};
   record.frames = {frame(1.25, LostReason::kFewMatches)};
-  add_stage_sample(record, "extract", StagePlace::kFrame, {0.0, 9.1});
+  add_stage_sample(record, "extract", StageThread::kCaller, {0.0, 9.1});
   const ordered_json json = summary_json(record);
   EXPECT_EQ(keys(json), (std::vector<std::string>{"schema", "version", "complete", "data", "mode", "seed",
                                                   "cameras_used", "frames", "cameras", "features", "map", "loops",
@@ -121,7 +121,7 @@ TEST(CameraIntervals, MergeEqualConsecutiveStatuses) {
   EXPECT_EQ(camera_intervals(frames, 0).size(), 1u);
 }
 
-TEST(Summary, MeansFeaturesOverFramesAndImages) {
+TEST(Summary, AveragesFeaturesOverFramesAndImages) {
   RunRecord record;
   RunFrame first = frame(0), second = frame(1, LostReason::kFewInliers);
   using enum image::ImageState;
@@ -138,7 +138,7 @@ TEST(Summary, MeansFeaturesOverFramesAndImages) {
             R"({"keypoints_per_image":700.0,"unique":1000.0,"monocular":950.0,"matched":50.0})");
 }
 
-TEST(DurationStatistics, AreThoseOfNumpyPercentile) {
+TEST(DurationStatistics, AgreeWithNumpyPercentile) {
   std::vector<double> values;
   for (int i = 20; i >= 1; --i) values.push_back(i);
   const DurationStatistics s = duration_statistics(values);
@@ -149,7 +149,7 @@ TEST(DurationStatistics, AreThoseOfNumpyPercentile) {
   EXPECT_TRUE(std::isnan(duration_statistics({}).median));
 }
 
-TEST(Summary, IsNullWhereNothingWasMeasured) {
+TEST(Summary, IsNullIfNothingWasMeasured) {
   const ordered_json json = summary_json({});
   EXPECT_TRUE(json["time"]["frame_ms"]["median"].is_null());
   EXPECT_TRUE(json["features"]["unique"].is_null());
@@ -157,7 +157,7 @@ TEST(Summary, IsNullWhereNothingWasMeasured) {
   EXPECT_EQ(json["time"]["stages_ms"], ordered_json::object());
 }
 
-TEST(Summary, WritesTextThatParsesWhateverTheName) {
+TEST(Summary, WritesValidJsonForAnyName) {
   RunRecord record;
   record.data = "bad \xFF name \"quoted\"";
   record.peak_memory_mb = 210.44;

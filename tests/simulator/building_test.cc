@@ -5,7 +5,7 @@
 namespace bslam::simulator {
 namespace {
 
-TEST(Building, FollowsFromItsSeed) {
+TEST(Building, IsDeterminedByItsSeed) {
   const Building a = make_building(3), b = make_building(3), c = make_building(4);
   ASSERT_EQ(a.surfaces.size(), b.surfaces.size());
   for (std::size_t i = 0; i < a.surfaces.size(); ++i) {
@@ -15,7 +15,7 @@ TEST(Building, FollowsFromItsSeed) {
   EXPECT_NE(a.surfaces.size(), c.surfaces.size());
 }
 
-TEST(Building, IsMadeOfRectangles) {
+TEST(Building, ConsistsOfRectangles) {
   const Building b = make_building(1);
   EXPECT_EQ(b.rooms.size(), 7u);
   for (const Surface& s : b.surfaces) {
@@ -41,7 +41,7 @@ TEST(Building, HasATourThroughSixRooms) {
   }
 }
 
-TEST(Surface, KnowsItsDistance) {
+TEST(Surface, ComputesTheDistanceOfAPoint) {
   std::vector<Surface> one(1);
   one[0].origin = Vector3d(0, 0, 1);
   one[0].u = Vector3d(2, 0, 0);

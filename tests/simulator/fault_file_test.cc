@@ -41,7 +41,7 @@ TEST_F(FaultFile, ReadsJson) {
   EXPECT_TRUE(read("[]").value().empty());
 }
 
-TEST_F(FaultFile, RefusesWhatMakesNoSense) {
+TEST_F(FaultFile, RejectsInvalidFaults) {
   const char* const wrong[] = {
       "{type: black}",
       "- {type: blakc, cameras: [1], from: 0, to: 1}",

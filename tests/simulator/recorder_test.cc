@@ -23,7 +23,7 @@ double mean_of(const image::Image& image) {
   return sum / (image.width() * image.height());
 }
 
-// Mean difference of neighbours in a row.
+// Returns the mean difference of neighbouring pixels in a row.
 double roughness_of(const image::Image& image) {
   double sum = 0;
   for (int y = 0; y < image.height(); ++y) {
@@ -40,19 +40,19 @@ std::vector<std::vector<std::uint8_t>> record(std::uint64_t seed, int threads) {
   const Recorder recorder(world, rig, make_tour(world.building(), {.duration_s = 1, .seed = seed}), {.seed = seed},
                           0.005, pool);
   const std::vector<Shot> shots = plan_shots(rig, options);
-  std::vector<std::vector<std::uint8_t>> pictures(shots.size());
-  pool.for_each(shots.size(), [&](std::size_t i) { pictures[i] = bytes_of(recorder.picture(shots[i])); });
-  return pictures;
+  std::vector<std::vector<std::uint8_t>> images(shots.size());
+  pool.for_each(shots.size(), [&](std::size_t i) { images[i] = bytes_of(recorder.render(shots[i])); });
+  return images;
 }
 
-TEST(Recorder, GivesTheSameBytesWithAnyNumberOfThreads) {
+TEST(Recorder, IsIdenticalWithAnyNumberOfThreads) {
   const auto once = record(1, 1), again = record(1, 2), other = record(2, 2);
   EXPECT_EQ(once, again);
   ASSERT_EQ(once.size(), 9u);
   for (std::size_t i = 0; i < once.size(); ++i) EXPECT_NE(once[i], other[i]);
 }
 
-// Points seen in one picture look alike in the other camera's, where the truth says they are.
+// Points visible in one image have the same appearance at their true position in the image of the other camera.
 TEST(Recorder, AgreesWithGroundTruthAcrossCamerasAndTime) {
   ThreadPool pool(2);
   const World world = small_world(1, pool);
@@ -65,14 +65,14 @@ TEST(Recorder, AgreesWithGroundTruthAcrossCamerasAndTime) {
     return s;
   };
   const Shot from = shot(0, 3.0);
-  const image::Image picture = recorder.picture(from);
+  const image::Image rendered = recorder.render(from);
   for (const Shot& to : {shot(1, 3.0), shot(0, 3.3), shot(1, 3.3)}) {
-    const image::Image other = recorder.picture(to);
+    const image::Image other = recorder.render(to);
     const geometry::SE3 T_world_from = recorder.T_world_cam(0, from.scene_time_s);
     const geometry::SE3 T_world_to = recorder.T_world_cam(to.camera, to.scene_time_s);
     double n = 0, sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
-    for (int y = 5; y < picture.height() - 5; y += 3) {
-      for (int x = 5; x < picture.width() - 5; x += 3) {
+    for (int y = 5; y < rendered.height() - 5; y += 3) {
+      for (int x = 5; x < rendered.width() - 5; x += 3) {
         const Vector3d ray = T_world_from.rotation() * *rig.camera(std::size_t{0}).unproject({x, y});
         const auto hit = world.cast(T_world_from.translation(), ray);
         ASSERT_TRUE(hit.has_value());
@@ -81,12 +81,12 @@ TEST(Recorder, AgreesWithGroundTruthAcrossCamerasAndTime) {
         if (!pixel || !rig.camera(to.camera).contains(*pixel, 2)) continue;
         const Vector3d back = point - T_world_to.translation();
         const auto seen = world.cast(T_world_to.translation(), back.normalized());
-        if (!seen || std::abs(seen->distance - back.norm()) > 0.005) continue;  // hidden from there
+        if (!seen || std::abs(seen->distance - back.norm()) > 0.005) continue;  // occluded in the other camera
         const int u = static_cast<int>(pixel->x()), v = static_cast<int>(pixel->y());
         const double fx = pixel->x() - u, fy = pixel->y() - v;
         const double b = (1 - fy) * ((1 - fx) * other.row(v)[u] + fx * other.row(v)[u + 1]) +
                          fy * ((1 - fx) * other.row(v + 1)[u] + fx * other.row(v + 1)[u + 1]);
-        const double a = picture.row(y)[x];
+        const double a = rendered.row(y)[x];
         n += 1, sa += a, sb += b, saa += a * a, sbb += b * b, sab += a * b;
       }
     }
@@ -97,7 +97,7 @@ TEST(Recorder, AgreesWithGroundTruthAcrossCamerasAndTime) {
   }
 }
 
-TEST(Recorder, ExposesSensibly) {
+TEST(Recorder, HasReasonableExposure) {
   ThreadPool pool(2);
   const World world = small_world(1, pool);
   const camera::Rig rig = synthetic::ring_rig(4, 188);
@@ -107,10 +107,10 @@ TEST(Recorder, ExposesSensibly) {
       Shot shot;
       shot.camera = c;
       shot.scene_time_s = time;
-      const image::Image picture = recorder.picture(shot);
-      EXPECT_GT(mean_of(picture), 65);
-      EXPECT_LT(mean_of(picture), 150);
-      const auto bytes = bytes_of(picture);
+      const image::Image rendered = recorder.render(shot);
+      EXPECT_GT(mean_of(rendered), 65);
+      EXPECT_LT(mean_of(rendered), 150);
+      const auto bytes = bytes_of(rendered);
       EXPECT_LT(std::count(bytes.begin(), bytes.end(), 255), static_cast<std::ptrdiff_t>(bytes.size() / 20));
     }
   }
@@ -127,7 +127,7 @@ TEST(PlanShots, StampsFramesAtTheRate) {
   EXPECT_NEAR(shots[3].scene_time_s, 0.1, 1e-12);
 }
 
-TEST(PlanShots, MovesTheSceneByTheCamerasTimeOffset) {
+TEST(PlanShots, ShiftsTheSceneByTheTimeOffset) {
   const camera::Rig plain = synthetic::ring_rig(1, 96);
   camera::RigCamera camera{plain.camera(std::size_t{0}), plain.body_from_cam(0)};
   camera.camera.time_offset_ns = 4'000'000;
@@ -171,21 +171,21 @@ TEST(Recorder, ShowsFaults) {
                     {FaultType::kBlurred, {0}, 0.75, 0.9, 0}};
   const Recorder recorder(world, rig, make_tour(world.building(), {.duration_s = 1}), {}, 0.005, pool);
   const std::vector<Shot> shots = plan_shots(rig, options);
-  const auto picture = [&](std::size_t i) { return bytes_of(recorder.picture(shots[i])); };
-  EXPECT_EQ(picture(0), picture(1));
-  EXPECT_EQ(picture(0), picture(2));
-  EXPECT_EQ(mean_of(recorder.picture(shots[3])), 0.0);
-  const auto bright = picture(4);
+  const auto rendered = [&](std::size_t i) { return bytes_of(recorder.render(shots[i])); };
+  EXPECT_EQ(rendered(0), rendered(1));
+  EXPECT_EQ(rendered(0), rendered(2));
+  EXPECT_EQ(mean_of(recorder.render(shots[3])), 0.0);
+  const auto bright = rendered(4);
   EXPECT_GT(std::count_if(bright.begin(), bright.end(), [](std::uint8_t v) { return v >= 250; }),
             static_cast<std::ptrdiff_t>(0.6 * static_cast<double>(bright.size())));
-  // A smeared lens keeps the light and loses what differs between neighbours.
+  // A smeared lens preserves the mean intensity and reduces the differences between neighbouring pixels.
   Shot sharp = shots[5];
   EXPECT_GT(sharp.blur_px, 0);
   sharp.blur_px = 0;
-  const image::Image blurred = recorder.picture(shots[5]), as_usual = recorder.picture(sharp);
+  const image::Image blurred = recorder.render(shots[5]), as_usual = recorder.render(sharp);
   EXPECT_NEAR(mean_of(blurred), mean_of(as_usual), 0.05 * mean_of(as_usual));
   EXPECT_LT(roughness_of(blurred), 0.5 * roughness_of(as_usual));
-  EXPECT_NE(bytes_of(as_usual), picture(0));
+  EXPECT_NE(bytes_of(as_usual), rendered(0));
 }
 
 TEST(Fault, NamesRoundTrip) {

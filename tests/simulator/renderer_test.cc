@@ -52,7 +52,7 @@ std::vector<camera::Camera> cameras() {
           {"fisheye", camera::KannalaBrandt({110, 111, 187.3, 119.1}, {-0.02, 0.004, -8e-4, 5e-5}), 376, 240, 0, ""}};
 }
 
-TEST(Renderer, PutsAPointAtItsProjection) {
+TEST(Renderer, RendersAPointAtItsProjection) {
   ThreadPool pool(1);
   for (const camera::Camera& camera : cameras()) {
     for (const Vector2d& pixel : {Vector2d(187.0, 120.0), Vector2d(60.5, 40.25), Vector2d(330.75, 200.6)}) {
@@ -74,19 +74,19 @@ TEST(Renderer, BlursAroundTheMiddleOfTheExposure) {
   const Vector2d pixel(200.0, 130.0);
   const World world = world_with_square(3.0 * *camera.unproject(pixel), 0.05, pool);
   const Renderer renderer(world, camera, kIdeal);
-  ExposurePoses still, turning;
+  ExposurePoses still, rotating;
   still.fill(SE3());
-  for (std::size_t k = 0; k < turning.size(); ++k) {  // turning about y: the spot moves along x, 4 pixels in all
+  for (std::size_t k = 0; k < rotating.size(); ++k) {  // rotation about y: the spot moves 4 pixels along x
     const double yaw = ((static_cast<double>(k) + 0.5) / 4 - 0.5) * 4 / 230;
-    turning[k] = SE3(geometry::so3_exp({0, yaw, 0}), Vector3d::Zero());
+    rotating[k] = SE3(geometry::so3_exp({0, yaw, 0}), Vector3d::Zero());
   }
-  const Spot sharp = find_spot(renderer.render(still, 0)), blurred = find_spot(renderer.render(turning, 0));
+  const Spot sharp = find_spot(renderer.render(still, 0)), blurred = find_spot(renderer.render(rotating, 0));
   EXPECT_NEAR((blurred.centre - sharp.centre).norm(), 0.0, 0.06);
   EXPECT_GT(blurred.spread.x(), sharp.spread.x() + 0.2);
   EXPECT_NEAR(blurred.spread.y(), sharp.spread.y(), 0.1);
 }
 
-TEST(Renderer, LeavesPixelsWithoutBearingBlack) {
+TEST(Renderer, RendersPixelsWithoutBearingBlack) {
   ThreadPool pool(1);
   const camera::Rig rig = synthetic::fisheye_rig(1, 128);
   const camera::Camera& camera = rig.camera(std::size_t{0});
@@ -108,7 +108,7 @@ TEST(Renderer, LeavesPixelsWithoutBearingBlack) {
   RecordProperty("pixels_outside", outside);
 }
 
-TEST(Renderer, DrawsNoiseOfTheStatedSize) {
+TEST(Renderer, NoiseHasTheSpecifiedDeviation) {
   ThreadPool pool(1);
   const camera::Camera camera = cameras()[0];
   const World world = world_with_square({0, 0, 1}, 20.0, pool);  // fills the image
@@ -133,7 +133,7 @@ TEST(Renderer, DrawsNoiseOfTheStatedSize) {
                                                std::sqrt(options.shot_noise * options.shot_noise * signal +
                                                          options.read_noise * options.read_noise);
   EXPECT_NEAR(std::sqrt(variance), expected, 0.08 * expected + 0.1);
-  EXPECT_NEAR(products / count - mean * sum_b / count, 0.0, 0.02 * variance + 0.05);  // pictures are independent
+  EXPECT_NEAR(products / count - mean * sum_b / count, 0.0, 0.02 * variance + 0.05);  // the images are independent
 }
 
 }  // namespace

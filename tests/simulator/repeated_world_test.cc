@@ -10,7 +10,7 @@ namespace {
 
 constexpr WorldOptions kCoarse{.texel = 0.05, .light_texel = 0.5, .ambient_rays = 2};
 
-// Directions all around, evenly on a spiral.
+// Returns directions uniformly distributed on the sphere, on a spiral.
 std::vector<Vector3d> directions() {
   constexpr int kCount = 400;
   std::vector<Vector3d> out;
@@ -23,15 +23,16 @@ std::vector<Vector3d> directions() {
 
 struct Place {
   Vector3d at;
-  bool turned;  // by half a turn about z
+  bool rotated;  // by 180 degrees about z
 };
 
-// Of rays that end within `reach` in both, the share that meets the same texture at the same place and distance.
-double alike(const World& world, const Place& a, const Place& b, double reach, int& rays) {
+// Returns the fraction of rays, among those that end within `reach` at one of the places, that hit the same texture at
+// the same position and distance.
+double similarity(const World& world, const Place& a, const Place& b, double reach, int& rays) {
   int same = 0;
   rays = 0;
   const auto look = [&](const Place& p, const Vector3d& d) {
-    return world.cast(p.at, p.turned ? Vector3d(-d.x(), -d.y(), d.z()) : d);
+    return world.cast(p.at, p.rotated ? Vector3d(-d.x(), -d.y(), d.z()) : d);
   };
   for (const Vector3d& d : directions()) {
     const auto hit_a = look(a, d), hit_b = look(b, d);
@@ -44,28 +45,28 @@ double alike(const World& world, const Place& a, const Place& b, double reach, i
   return static_cast<double>(same) / rays;
 }
 
-TEST(Corridor, RepeatsItself) {
+TEST(Corridor, IsPeriodicAndSymmetric) {
   ThreadPool pool(2);
   const World world(make_corridor(3), kCoarse, pool);
   int rays = 0;
   const Place place{{7.2, -1.1, 1.5}, false};
-  EXPECT_GT(alike(world, place, {place.at + Vector3d(kCorridorPeriod, 0, 0), false}, 4, rays), 0.99);
+  EXPECT_GT(similarity(world, place, {place.at + Vector3d(kCorridorPeriod, 0, 0), false}, 4, rays), 0.99);
   EXPECT_GT(rays, 300);
-  EXPECT_GT(alike(world, place, {{18 - place.at.x(), -place.at.y(), place.at.z()}, true}, 100, rays), 0.99);
-  EXPECT_LT(alike(world, place, {place.at + Vector3d(1.0, 0, 0), false}, 4, rays), 0.5);
+  EXPECT_GT(similarity(world, place, {{18 - place.at.x(), -place.at.y(), place.at.z()}, true}, 100, rays), 0.99);
+  EXPECT_LT(similarity(world, place, {place.at + Vector3d(1.0, 0, 0), false}, 4, rays), 0.5);
 }
 
-TEST(TwinRooms, AreAlikeAndThePassageIsNot) {
+TEST(TwinRooms, LookAlikeAndThePassageIsUnique) {
   ThreadPool pool(2);
   const World world(make_twin_rooms(3), kCoarse, pool);
   int rays = 0;
   const Place first{{-5.2, 1.5, 1.5}, false}, second{{5.2, -1.5, 1.5}, true};
-  EXPECT_GT(alike(world, first, second, 3.5, rays), 0.99);
+  EXPECT_GT(similarity(world, first, second, 3.5, rays), 0.99);
   EXPECT_GT(rays, 150);
-  EXPECT_LT(alike(world, {{-0.8, 0, 1.5}, false}, {{0.8, 0, 1.5}, true}, 2.0, rays), 0.9);
+  EXPECT_LT(similarity(world, {{-0.8, 0, 1.5}, false}, {{0.8, 0, 1.5}, true}, 2.0, rays), 0.9);
 }
 
-TEST(RepeatedWorld, LeavesTheTourClear) {
+TEST(RepeatedWorld, HasAClearTour) {
   for (const WorldKind kind : {WorldKind::kCorridor, WorldKind::kTwinRooms}) {
     for (const std::uint64_t seed : {1u, 2u, 3u}) {
       const Building building = make_building(kind, seed);

@@ -24,7 +24,7 @@ class SimulationWriter : public testing::Test {
  protected:
   ~SimulationWriter() override { fs::remove_all(folder_); }
 
-  // Three frames of two small cameras in a world of little detail.
+  // Three frames of two small cameras in a world with few details.
   SimulationRequest request() const {
     SimulationRequest r{.folder = folder_ / "sim",
                         .rig = synthetic::ring_rig(2, 64),
@@ -37,7 +37,7 @@ class SimulationWriter : public testing::Test {
     return r;
   }
 
-  // Bytes of all files but the markers, by name within the folder.
+  // Returns the bytes of all files except the markers, by name within the folder.
   std::map<std::string, std::string> contents(const fs::path& folder) const {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -73,7 +73,7 @@ TEST_F(SimulationWriter, WritesEurocLayoutWithGroundTruth) {
   }
 }
 
-TEST_F(SimulationWriter, WritesNoSensorYamlOfAModelItCannotHold) {
+TEST_F(SimulationWriter, WritesNoSensorYamlForUnsupportedModels) {
   SimulationRequest r = request();
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < 2; ++c) cameras.push_back({r.rig.camera(c), r.rig.body_from_cam(c)});
@@ -89,22 +89,22 @@ TEST_F(SimulationWriter, WritesNoSensorYamlOfAModelItCannotHold) {
   EXPECT_TRUE(rig_formats::read_rig(r.folder).ok());
 }
 
-// A recording of a version that wrote other lists beside the same pictures.
-TEST_F(SimulationWriter, RenewsListsOfAnotherVersion) {
+// A recording of an older version, with other lists and the same images.
+TEST_F(SimulationWriter, RewritesListsOfAnotherVersion) {
   const SimulationRequest r = request();
   ASSERT_TRUE(write_simulation(r, pool_).ok());
   const auto files = contents(r.folder);
-  const fs::path picture = r.folder / "mav0/cam0/data/1100000000.png";
-  const auto rendered = fs::last_write_time(picture);
+  const fs::path image_path = r.folder / "mav0/cam0/data/1100000000.png";
+  const auto rendered = fs::last_write_time(image_path);
   std::ofstream(r.folder / ".complete") << simulation_digest(r) << "\n";
   std::ofstream(r.folder / "faults.csv") << "old";
   EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWritten);
   EXPECT_EQ(contents(r.folder), files);
-  EXPECT_EQ(fs::last_write_time(picture), rendered);
+  EXPECT_EQ(fs::last_write_time(image_path), rendered);
   EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWasComplete);
 }
 
-TEST_F(SimulationWriter, WritesTwoGroundTruthsThatAgree) {
+TEST_F(SimulationWriter, WritesConsistentGroundTruths) {
   const SimulationRequest r = request();
   ASSERT_TRUE(write_simulation(r, pool_).ok());
   const auto body = evaluation::read_trajectory(r.folder / "mav0/state_groundtruth_estimate0/data.csv");
@@ -121,7 +121,7 @@ TEST_F(SimulationWriter, WritesTwoGroundTruthsThatAgree) {
   }
 }
 
-TEST_F(SimulationWriter, DoesACompleteRequestOnlyOnce) {
+TEST_F(SimulationWriter, RendersACompleteRequestOnlyOnce) {
   const SimulationRequest r = request();
   ASSERT_TRUE(write_simulation(r, pool_).ok());
   const auto again = write_simulation(r, pool_);
@@ -129,7 +129,7 @@ TEST_F(SimulationWriter, DoesACompleteRequestOnlyOnce) {
   EXPECT_EQ(*again, SimulationOutcome::kWasComplete);
 }
 
-TEST_F(SimulationWriter, StopsWhileItBuildsTheWorld) {
+TEST_F(SimulationWriter, StopsWhileBuildingTheWorld) {
   const SimulationRequest r = request();
   std::stop_source source;
   source.request_stop();
@@ -140,7 +140,7 @@ TEST_F(SimulationWriter, StopsWhileItBuildsTheWorld) {
   EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWritten);
 }
 
-TEST_F(SimulationWriter, GoesOnWhereItWasInterrupted) {
+TEST_F(SimulationWriter, ContinuesAfterAnInterruption) {
   SimulationRequest whole = request(), r = request();
   whole.folder = folder_ / "whole";
   ASSERT_TRUE(write_simulation(whole, pool_).ok());
@@ -165,12 +165,12 @@ TEST_F(SimulationWriter, GoesOnWhereItWasInterrupted) {
   EXPECT_EQ(contents(r.folder), contents(whole.folder));
 }
 
-TEST_F(SimulationWriter, LeavesForeignFoldersAlone) {
+TEST_F(SimulationWriter, DoesNotChangeOtherFolders) {
   const SimulationRequest r = request();
   fs::create_directories(r.folder);
   std::ofstream(r.folder / "letter.txt") << "mine";
-  const auto refused = write_simulation(r, pool_);
-  ASSERT_FALSE(refused.ok());
+  const auto rejected = write_simulation(r, pool_);
+  ASSERT_FALSE(rejected.ok());
   EXPECT_EQ(contents(r.folder).size(), 1u);
   SimulationRequest allowed = r;
   allowed.overwrite = true;
@@ -178,17 +178,17 @@ TEST_F(SimulationWriter, LeavesForeignFoldersAlone) {
   EXPECT_EQ(contents(r.folder).at("letter.txt"), "mine");
 }
 
-TEST_F(SimulationWriter, KeepsNoForeignPictures) {
+TEST_F(SimulationWriter, ReplacesImagesOfOtherRecordings) {
   SimulationRequest r = request();
-  const fs::path picture = r.folder / "mav0/cam0/data/1000000000.png";
-  fs::create_directories(picture.parent_path());
-  std::ofstream(picture) << "foreign";
+  const fs::path image_path = r.folder / "mav0/cam0/data/1000000000.png";
+  fs::create_directories(image_path.parent_path());
+  std::ofstream(image_path) << "foreign";
   r.overwrite = true;
   ASSERT_TRUE(write_simulation(r, pool_).ok());
-  EXPECT_GT(fs::file_size(picture), 100u);
+  EXPECT_GT(fs::file_size(image_path), 100u);
 }
 
-TEST_F(SimulationWriter, ReplacesAnotherRecordingOnlyWhenAllowed) {
+TEST_F(SimulationWriter, ReplacesAnotherRecordingOnlyWithOverwrite) {
   SimulationRequest r = request();
   ASSERT_TRUE(write_simulation(r, pool_).ok());
   r.recording.duration_s = 0.2;
@@ -198,7 +198,7 @@ TEST_F(SimulationWriter, ReplacesAnotherRecordingOnlyWhenAllowed) {
   EXPECT_FALSE(fs::exists(r.folder / "mav0/cam0/data/1200000000.png"));
 }
 
-TEST_F(SimulationWriter, ListsPicturesHitByFaults) {
+TEST_F(SimulationWriter, ListsImagesAffectedByFaults) {
   SimulationRequest r = request();
   r.recording.faults = {{FaultType::kDropped, {0}, 0.1, 0.15, 0}, {FaultType::kFrozen, {1}, 0.2, 9, 0}};
   ASSERT_TRUE(write_simulation(r, pool_).ok());
@@ -211,24 +211,24 @@ TEST_F(SimulationWriter, ListsPicturesHitByFaults) {
             "#timestamp [ns],filename\n1000000000,1000000000.png\n1200000000,1200000000.png\n");
   EXPECT_EQ(files.at("mav0/cam1/data/1200000000.png"), files.at("mav0/cam1/data/1100000000.png"));
   EXPECT_EQ(evaluation::read_trajectory(r.folder / "groundtruth_cam0.tum")->size(),
-            3u);  // the rig was there all the same
+            3u);  // poses exist for dropped images as well
 }
 
-TEST_F(SimulationWriter, RefusesRequestsOutOfRange) {
-  const auto refused = [&](auto change) {
+TEST_F(SimulationWriter, RejectsRequestsOutOfRange) {
+  const auto rejected = [&](auto change) {
     SimulationRequest r = request();
     change(r);
     const bool wrong = !write_simulation(r, pool_).ok();
     return wrong && !fs::exists(r.folder);
   };
-  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.duration_s = -1; }));
-  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.duration_s = std::nan(""); }));
-  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.rate_hz = 0; }));
-  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.exposure_s = -0.1; }));
-  EXPECT_TRUE(refused([](SimulationRequest& r) { r.imaging.noise = -1; }));
-  EXPECT_TRUE(refused([](SimulationRequest& r) { r.tour.laps = -1; }));
-  EXPECT_TRUE(refused([](SimulationRequest& r) { r.recording.faults = {{FaultType::kBlack, {0}, 0.3, 0.4}}; }));
-  EXPECT_TRUE(refused([](SimulationRequest& r) { r.tour.laps = 1, r.tour.speed_mps = 1; }));
+  EXPECT_TRUE(rejected([](SimulationRequest& r) { r.recording.duration_s = -1; }));
+  EXPECT_TRUE(rejected([](SimulationRequest& r) { r.recording.duration_s = std::nan(""); }));
+  EXPECT_TRUE(rejected([](SimulationRequest& r) { r.recording.rate_hz = 0; }));
+  EXPECT_TRUE(rejected([](SimulationRequest& r) { r.recording.exposure_s = -0.1; }));
+  EXPECT_TRUE(rejected([](SimulationRequest& r) { r.imaging.noise = -1; }));
+  EXPECT_TRUE(rejected([](SimulationRequest& r) { r.tour.laps = -1; }));
+  EXPECT_TRUE(rejected([](SimulationRequest& r) { r.recording.faults = {{FaultType::kBlack, {0}, 0.3, 0.4}}; }));
+  EXPECT_TRUE(rejected([](SimulationRequest& r) { r.tour.laps = 1, r.tour.speed_mps = 1; }));
 }
 
 }  // namespace

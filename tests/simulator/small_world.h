@@ -1,4 +1,4 @@
-// The built-in world with little detail, which bakes in a fraction of a second.
+// The built-in world with few details, which is built in a fraction of a second.
 #pragma once
 
 #include "simulator/world.h"

@@ -30,7 +30,7 @@ TEST(Trajectory, IsSmoothAcrossKnots) {
   }
 }
 
-TEST(Tour, EndsWhereItBegan) {
+TEST(Tour, EndsAtItsInitialPose) {
   for (const double duration : {18.0, 20.0, 45.0, 60.0}) {
     const Trajectory t = make_tour(make_building(1), {.duration_s = duration, .seed = 5});
     EXPECT_NEAR(t.duration_s(), duration, 1e-9);
@@ -40,7 +40,7 @@ TEST(Tour, EndsWhereItBegan) {
   }
 }
 
-TEST(Tour, KeepsToAWalkersMotion) {
+TEST(Tour, HasTheMotionOfAPersonWalking) {
   const Trajectory t = make_tour(make_building(1), {});
   double length = 0;
   for (double time = 0; time < 20; time += 0.01) {
@@ -57,7 +57,7 @@ TEST(Tour, KeepsToAWalkersMotion) {
   EXPECT_LT(length, 30.0);
 }
 
-TEST(Tour, KeepsClearOfWallsAndFurniture) {
+TEST(Tour, KeepsADistanceToWallsAndFurniture) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     const Building building = make_building(seed);
     const Trajectory t = make_tour(building, {.duration_s = 40, .seed = seed});
@@ -69,14 +69,14 @@ TEST(Tour, KeepsClearOfWallsAndFurniture) {
   }
 }
 
-TEST(Tour, ComesBackTheWayItWent) {
+TEST(Tour, ReturnsAlongTheSamePath) {
   constexpr double kDuration = 30;
   const Trajectory t = make_tour(make_building(1), {.duration_s = kDuration, .laps = 1, .back = true});
   for (double time = 0; time < 0.5 * kDuration - 2; time += 0.2) {
     const geometry::SE3 there = t.T_world_body(time), back = t.T_world_body(kDuration - time);
     EXPECT_LT((there.translation() - back.translation()).norm(), 0.01) << time;
     const double turn = angle_between(there, back);
-    EXPECT_GT(turn, 160 * std::numbers::pi / 180) << time;  // it leans and nods the other way
+    EXPECT_GT(turn, 160 * std::numbers::pi / 180) << time;  // roll and pitch are in the opposite direction
   }
   for (double time = 0; time < kDuration; time += 0.02) {
     EXPECT_LT(t.velocity(time).norm(), 2.5);
@@ -93,13 +93,13 @@ TEST(Tour, SwaysDifferentlyInEachLap) {
   EXPECT_GT(apart, 0.04);
 }
 
-TEST(Tour, DrivesPartOfALapInAShortTime) {
+TEST(Tour, CoversPartOfALapInAShortTime) {
   const Trajectory t = make_tour(make_building(1), {.duration_s = 3});
   for (double time = 0; time < 3; time += 0.1) EXPECT_LT(t.velocity(time).norm(), 1.5);
   EXPECT_GT((t.T_world_body(0).translation() - t.T_world_body(3).translation()).norm(), 2.5);
 }
 
-TEST(Tour, TakesPaceAndLapsFromTheOptions) {
+TEST(Tour, UsesSpeedAndLapsOfTheOptions) {
   const Building building = make_building(1);
   const auto length = [&](const TourOptions& options) {
     const Trajectory t = make_tour(building, options);

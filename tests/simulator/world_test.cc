@@ -43,7 +43,7 @@ TEST(World, ShowsOnlyFrontsOfSurfaces) {
   EXPECT_EQ(backs, 0);
 }
 
-TEST(World, AnswersPacketsAsSingleRays) {
+TEST(World, PacketsAgreeWithSingleRays) {
   ThreadPool pool(2);
   const World world = small_world(1, pool);
   const Vector3d origin(5.0, 4.0, 1.5);

@@ -97,13 +97,11 @@ TEST(RigScale, EstimatesTheScaleOfAMapAdjustedWithAWrongOne) {
     const auto motion = make_motion(0.05, random);
     grow(motion->problem, factor);
     adjust(motion->problem, {.iterations = 10});
-    double scale = 1.0;
     std::optional<RigScale> found;
     for (int i = 0; i < 4; ++i) {
       found = rig_scale(motion->problem);
       ASSERT_TRUE(found.has_value());
       grow(motion->problem, found->scale);
-      scale *= found->scale;
       adjust(motion->problem, {.iterations = 10});
     }
     const double length = motion->problem.T_rig_world.back().inverse().translation().norm();

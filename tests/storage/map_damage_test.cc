@@ -1,5 +1,5 @@
-// A thousand damaged map files: every one is refused or gives a sound map, and none makes the reader ask for much
-// memory.
+// A thousand damaged map files: each one is rejected or gives a valid map, and the memory used by the reader is
+// bounded.
 #include <gtest/gtest.h>
 #include <libdeflate.h>
 #include <malloc.h>
@@ -16,7 +16,8 @@ namespace {
 std::atomic<std::size_t> live_bytes{0}, peak_bytes{0};
 }
 
-// Not inlined: the compiler would see free() meet what it takes for the library's operator new.
+// Not inlined, since the compiler would warn about free() of memory from what it assumes to be the library's operator
+// new.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   void* p = std::malloc(size > 0 ? size : 1);
   if (p == nullptr) throw std::bad_alloc();
@@ -26,7 +27,7 @@ std::atomic<std::size_t> live_bytes{0}, peak_bytes{0};
   }
   return p;
 }
-// Of the library it would call the one above; of a sanitizer it would not.
+// The library's version would call the operator above, but the version of a sanitizer would not.
 [[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   try {
     return operator new(size);
@@ -60,8 +61,8 @@ std::size_t section_size(const std::string& bytes, std::size_t i) {
   return number_at<std::uint64_t>(bytes, kTable + i * kEntry + 8);
 }
 
-// Makes sizes and checksums those of a file that was written like this; the last section takes what is missing or too
-// much.
+// Sets the sizes and checksums to the values for the damaged content; the size of the last section is adjusted to the
+// size of the file.
 void repair(std::string& bytes) {
   if (bytes.size() < kHeader) bytes.resize(kHeader, '\0');
   set_number(bytes, kTotal, std::uint64_t{bytes.size()});
@@ -76,7 +77,8 @@ void repair(std::string& bytes) {
   set_number(bytes, kHeader - 4, libdeflate_crc32(0, bytes.data(), kHeader - 4));
 }
 
-// A place in the file, with its small sections and the beginnings of sections as likely as the bulk.
+// Returns a random position in the file. The header, small sections and the beginnings of sections are as likely as the
+// rest.
 std::size_t place_in(const std::string& bytes, Random& random) {
   const auto below = [&](std::size_t n) { return std::size_t{random.below(static_cast<std::uint32_t>(n))}; };
   const std::size_t section = below(kSections);
@@ -120,12 +122,12 @@ std::string damage(const std::string& whole, Random& random) {
   return bytes;
 }
 
-TEST(DamagedMaps, AreRefusedOrSoundAndCostLittleMemory) {
+TEST(DamagedMaps, AreRejectedOrValidWithBoundedMemory) {
   const std::string whole = map_to_bytes(
       small_map(synthetic::mixed_rig(), {.keyframes = 6, .max_keypoints = 30, .landmarks = 800}), small_info());
   ASSERT_TRUE(map_from_bytes(whole, "whole"));
   Random random(2, "damage");
-  int repaired_and_sound = 0, repaired_and_refused = 0;
+  int repaired_and_valid = 0, repaired_and_rejected = 0;
   std::size_t worst = 0;
   for (int n = 0; n < 1000; ++n) {
     std::string bytes = damage(whole, random);
@@ -139,26 +141,25 @@ TEST(DamagedMaps, AreRefusedOrSoundAndCostLittleMemory) {
     worst = std::max(worst, needed);
     EXPECT_LE(needed + bytes.size(), 2 * bytes.size() + (std::size_t{64} << 20)) << n;
     if (!repaired) {
-      EXPECT_FALSE(saved) << "damaged file " << n << " was taken";
+      EXPECT_FALSE(saved) << "damaged file " << n << " was accepted";
     } else if (saved) {
       EXPECT_EQ(saved->map.check_invariants(), std::nullopt);
       EXPECT_EQ(map_to_bytes(saved->map, saved->info).size(), bytes.size());
-      ++repaired_and_sound;
+      ++repaired_and_valid;
     } else {
       EXPECT_EQ(saved.error().file, "damaged");
       EXPECT_FALSE(saved.error().found.empty());
-      ++repaired_and_refused;
+      ++repaired_and_rejected;
     }
   }
-  EXPECT_GT(repaired_and_refused, 150);  // the parser was exercised
-  EXPECT_GT(repaired_and_sound, 20);     // a changed grey value of a patch breaks nothing
+  EXPECT_GT(repaired_and_rejected, 150);  // the parser was exercised
+  EXPECT_GT(repaired_and_valid, 20);      // for example a changed grey value of a patch is valid
   RecordProperty("file_bytes", static_cast<int>(whole.size()));
   RecordProperty("worst_bytes", static_cast<int>(worst));
 }
 
-// Counts that promise more than the file holds, wherever a count may stand: all places near the beginning of sections,
-// and others.
-TEST(DamagedMaps, PromiseMoreThanTheyHold) {
+// Counts larger than the file, at all positions near the beginning of sections and at some others.
+TEST(DamagedMaps, WithTooLargeCountsUseBoundedMemory) {
   const std::string whole = map_to_bytes(
       small_map(synthetic::ring_rig(2), {.keyframes = 3, .max_keypoints = 8, .landmarks = 300}), small_info());
   std::vector<std::size_t> places;

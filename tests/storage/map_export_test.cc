@@ -11,7 +11,7 @@
 namespace bslam::storage {
 namespace {
 
-TEST(Submaps, AreTheTreesInOrderOfTime) {
+TEST(Submaps, AreSpanningTreesInOrderOfTime) {
   const map::BundledMap map = small_map(synthetic::default_rig());
   const std::vector<Submap> submaps = submaps_of(map);
   ASSERT_EQ(submaps.size(), 2u);
@@ -35,7 +35,7 @@ TEST(Submaps, AreTheTreesInOrderOfTime) {
   }
 }
 
-TEST(MapPly, HasEveryLandmark) {
+TEST(MapPly, ContainsEveryLandmark) {
   const map::BundledMap map = small_map(synthetic::default_rig());
   const std::string ply = landmarks_ply(map);
   const std::size_t end = ply.find("end_header\n");
@@ -47,8 +47,8 @@ TEST(MapPly, HasEveryLandmark) {
   EXPECT_EQ(first, map.landmark(map.landmark_ids().front()).position);
 }
 
-// What a reader of the model makes of it: every observation of a point lies where its camera projects the point.
-TEST(ColmapModel, ProjectsItsPointsOntoItsImages) {
+// Parses the model: every observation of a point is where its camera projects the point.
+TEST(ColmapModel, PointsProjectToTheirObservations) {
   const map::BundledMap map = small_map(synthetic::ring_rig(3));
   const ColmapModel model = colmap_model(map).value();
   std::map<int, std::array<double, 8>> cameras;  // fx fy cx cy k1 k2 p1 p2
@@ -106,10 +106,10 @@ TEST(ColmapModel, ProjectsItsPointsOntoItsImages) {
     }
   }
   EXPECT_EQ(checked, map.num_observations());
-  EXPECT_GT(close, checked / 2);  // the part without true places is off
+  EXPECT_GT(close, checked / 2);  // the submap without true positions does not agree
 }
 
-TEST(ColmapModel, HasNoneForModelsUnknownToColmap) {
+TEST(ColmapModel, RejectsModelsUnknownToColmap) {
   const camera::Rig ring = synthetic::ring_rig(2);
   std::vector<camera::RigCamera> cameras = {{ring.camera(0), ring.body_from_cam(0)},
                                             {ring.camera(1), ring.body_from_cam(1)}};
@@ -119,7 +119,7 @@ TEST(ColmapModel, HasNoneForModelsUnknownToColmap) {
   EXPECT_EQ(model.error().key, ring.camera(1).name);
 }
 
-TEST(ColmapModel, HasNoImageOfACameraThatGaveNone) {
+TEST(ColmapModel, OmitsMissingImages) {
   const map::BundledMap map = small_map(synthetic::ring_rig(3));
   const ColmapModel model = colmap_model(map).value();
   const auto lines = static_cast<std::size_t>(std::ranges::count(model.images, '\n'));

@@ -56,7 +56,7 @@ void expect_same_frame(const frame::BundledFrame& a, const frame::BundledFrame& 
   }
 }
 
-// The n-th alive keyframe and landmark of one map are those of number n of the other.
+// The n-th alive keyframe and landmark of one map correspond to number n of the other.
 void expect_same_map(const map::BundledMap& a, const map::BundledMap& b, bool with_words = true) {
   const std::vector<KeyframeId> keyframes = a.keyframe_ids();
   const std::vector<LandmarkId> landmarks = a.landmark_ids();
@@ -108,7 +108,7 @@ std::size_t words_end(const map::BundledMap& map) {
   return end;
 }
 
-TEST(MapFile, GivesBackTheMapToTheBit) {
+TEST(MapFile, RoundTripsTheMapBitwise) {
   for (const camera::Rig& rig :
        {synthetic::default_rig(), synthetic::mixed_rig(), synthetic::ring_rig(1), synthetic::fisheye_rig(3)}) {
     const map::BundledMap map = small_map(rig);
@@ -131,7 +131,7 @@ camera::Rig changed(const camera::Rig& rig, std::size_t i, const std::function<v
   return camera::Rig(std::move(cameras));
 }
 
-TEST(MapFile, GivesBackTheRigToTheBit) {
+TEST(MapFile, RoundTripsTheRigBitwise) {
   camera::Rig rig = changed(synthetic::mixed_rig(), 1, [](camera::RigCamera& c) {
     c.camera.model = camera::DoubleSphere(camera::intrinsics(c.camera.model), -0.2, 0.6);
     c.camera.time_offset_ns = -1'234'567;
@@ -153,7 +153,7 @@ TEST(MapFile, GivesBackTheRigToTheBit) {
   }
 }
 
-TEST(MapFile, KeepsPosesToTheBitThatNormalisingAgainWouldChange) {
+TEST(MapFile, RoundTripsPosesThatNormalisationWouldChange) {
   Random random(5);
   map::BundledMap map(std::make_shared<const camera::Rig>(synthetic::ring_rig(1)));
   std::size_t changeable = 0;
@@ -172,7 +172,7 @@ TEST(MapFile, KeepsPosesToTheBitThatNormalisingAgainWouldChange) {
     expect_same_bits(saved.map.keyframe(k).T_rig_world, map.keyframe(k).T_rig_world);
 }
 
-TEST(MapFile, IsTheSameBytesWhenWrittenAgain) {
+TEST(MapFile, IsIdenticalWhenWrittenAgain) {
   const support::TemporaryFolder folder;
   const fs::path a = folder.path() / "a.map", b = folder.path() / "b.map";
   ASSERT_TRUE(write_map(small_map(synthetic::default_rig()), small_info(), a));
@@ -183,42 +183,42 @@ TEST(MapFile, IsTheSameBytesWhenWrittenAgain) {
   EXPECT_TRUE(support::read_text(a) == support::read_text(b));
 }
 
-TEST(MapFile, HoldsAnEmptyMap) {
+TEST(MapFile, RoundTripsAnEmptyMap) {
   const map::BundledMap map(std::make_shared<const camera::Rig>(synthetic::ring_rig(2)));
   const SavedMap saved = read_back(map);
   EXPECT_EQ(saved.map.keyframe_slots(), 0u);
   EXPECT_EQ(saved.words_end, 0u);
 }
 
-TEST(MapFile, LeavesWordsOutWithoutTheirVocabulary) {
+TEST(MapFile, OmitsWordsWithoutAVocabulary) {
   const map::BundledMap map = small_map(synthetic::default_rig());
   const SavedMap saved = read_back(map, {0, "0.1.0", ""});
   expect_same_map(map, saved.map, false);
   EXPECT_EQ(saved.words_end, 0u);
 }
 
-TEST(MapFile, RefusesWhatIsNoMap) {
+TEST(MapFile, RejectsOtherFiles) {
   const support::TemporaryFolder folder;
-  const auto refused = [&](std::string_view content) {
+  const auto rejected = [&](std::string_view content) {
     support::write_text(folder.path() / "file", content);
     const auto saved = read_map(folder.path() / "file");
     EXPECT_FALSE(saved);
     EXPECT_EQ(saved.error().file, (folder.path() / "file").string());
     return saved.error();
   };
-  EXPECT_EQ(refused("").found, "no saved map");
-  EXPECT_EQ(refused("PNG and so on").found, "no saved map");
-  EXPECT_EQ(refused("BSLAMMAP").key, "header");
+  EXPECT_EQ(rejected("").found, "a file of another format");
+  EXPECT_EQ(rejected("PNG and so on").found, "a file of another format");
+  EXPECT_EQ(rejected("BSLAMMAP").key, "header");
   std::string bytes = map_to_bytes(small_map(synthetic::ring_rig(1)), small_info());
-  EXPECT_EQ(refused(bytes + "x").key, "size");
+  EXPECT_EQ(rejected(bytes + "x").key, "size");
   bytes[12] = 99;
-  EXPECT_EQ(refused(bytes).key, "format version");
-  EXPECT_EQ(refused(bytes).found, "99");
+  EXPECT_EQ(rejected(bytes).key, "format version");
+  EXPECT_EQ(rejected(bytes).found, "99");
   EXPECT_FALSE(read_map(folder.path() / "none"));
   EXPECT_FALSE(read_map(folder.path()));
 }
 
-TEST(MapFile, IsWholeOrNotThere) {
+TEST(MapFile, IsWrittenCompletelyOrNotAtAll) {
   const support::TemporaryFolder folder;
   const map::BundledMap map = small_map(synthetic::ring_rig(1));
   EXPECT_FALSE(write_map(map, small_info(), folder.path() / "no" / "folder.map"));
@@ -228,7 +228,7 @@ TEST(MapFile, IsWholeOrNotThere) {
 
 // ---- fits
 
-TEST(MapFits, TheSameRigWhereverItsBodyFrameIs) {
+TEST(MapFits, TheSameRigWithAnotherBodyFrame) {
   const camera::Rig rig = synthetic::default_rig();
   const SavedMap saved = read_back(small_map(rig));
   EXPECT_TRUE(fits(saved, rig, saved.map.pyramid(), nullptr));
@@ -238,7 +238,7 @@ TEST(MapFits, TheSameRigWhereverItsBodyFrameIs) {
   EXPECT_TRUE(fits(saved, camera::Rig(std::move(cameras)), saved.map.pyramid(), nullptr));
 }
 
-TEST(MapFits, NamesTheCameraAndWhatDiffersOfIt) {
+TEST(MapFits, ErrorsNameTheCameraAndTheDifference) {
   const camera::Rig rig = synthetic::default_rig();
   const SavedMap saved = read_back(small_map(rig));
   const auto key = [&](std::size_t i, const std::function<void(camera::RigCamera&)>& change) {
@@ -266,12 +266,12 @@ TEST(MapFits, NamesTheCameraAndWhatDiffersOfIt) {
                 [](camera::RigCamera& c) {
                   c.T_body_cam = geometry::SE3(c.T_body_cam.rotation(), c.T_body_cam.translation() * 1.001);
                 }),
-            second + "place in the rig");
+            second + "extrinsics");
   const std::vector<int> fewer = {0, 1};
   EXPECT_EQ(fits(saved, rig.subset(fewer), saved.map.pyramid(), nullptr).error().key, "rig");
 }
 
-TEST(MapFits, OnlyTheVocabularyOfItsWords) {
+TEST(MapFits, OnlyTheVocabularyOfItsKeyframes) {
   const camera::Rig rig = synthetic::ring_rig(1);
   place::VocabularyContent content;
   content.branching = 2;
@@ -284,7 +284,7 @@ TEST(MapFits, OnlyTheVocabularyOfItsWords) {
   const map::BundledMap map = small_map(rig);
   EXPECT_EQ(fits(read_back(map), rig, map.pyramid(), vocabulary->get()).error().key, "vocabulary");
   EXPECT_TRUE(fits(read_back(map, {0, "", ""}), rig, map.pyramid(), vocabulary->get()));
-  // The right name does not make up for words it does not have.
+  // The id of the vocabulary is correct, but the keyframes contain words that it does not have.
   EXPECT_EQ(fits(read_back(map, {(*vocabulary)->id(), "", ""}), rig, map.pyramid(), vocabulary->get()).error().key,
             "vocabulary");
 }

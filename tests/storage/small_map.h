@@ -1,4 +1,4 @@
-// Maps for tests of saved maps, made of simulated frames: several parts, gaps where things were removed, words.
+// Maps for tests of saved maps, built from simulated frames: two submaps, removed keyframes and landmarks, words.
 #pragma once
 
 #include <algorithm>
@@ -13,12 +13,12 @@ namespace bslam::storage {
 
 struct SmallMapOptions {
   int keyframes = 8;
-  int max_keypoints = 60;  // of one camera
+  int max_keypoints = 60;  // per camera
   int landmarks = 1500;
   std::uint64_t seed = 1;
 };
 
-// Words for all keypoints, of no vocabulary.
+// Adds words to all keypoints; they belong to no vocabulary.
 inline std::shared_ptr<const frame::BundledFrame> with_words(frame::BundledFrame frame) {
   for (frame::CameraFrame& c : frame.cameras) {
     for (std::size_t k = 0; k < c.keypoints.size(); ++k) {
@@ -28,7 +28,7 @@ inline std::shared_ptr<const frame::BundledFrame> with_words(frame::BundledFrame
   return std::make_shared<const frame::BundledFrame>(std::move(frame));
 }
 
-// The last two keyframes are a part of their own, in which camera 1 gave no picture.
+// The last two keyframes are a separate submap, in which camera 1 has no image.
 inline map::BundledMap small_map(camera::Rig rig, const SmallMapOptions& options = {}) {
   synthetic::FeatureSimulatorOptions simulation;
   simulation.landmarks = options.landmarks;

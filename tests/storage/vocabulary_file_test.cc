@@ -44,7 +44,7 @@ class VocabularyFile : public testing::Test {
   std::filesystem::path file_ = folder_.path() / "words.bvoc";
 };
 
-TEST_F(VocabularyFile, ComesBackAsItWas) {
+TEST_F(VocabularyFile, RoundTrips) {
   Random random(1);
   std::vector<std::vector<feature::Descriptor>> images(5);
   for (auto& image : images) {
@@ -59,7 +59,7 @@ TEST_F(VocabularyFile, ComesBackAsItWas) {
   EXPECT_FALSE(write_vocabulary(*made, folder_.path() / "none" / "words.bvoc"));
 }
 
-TEST_F(VocabularyFile, NamesTheFileThatIsNone) {
+TEST_F(VocabularyFile, ErrorsNameTheFile) {
   EXPECT_EQ(read_vocabulary(folder_.path() / "none").error().file, (folder_.path() / "none").string());
   for (const char* text : {"", "\n", "some text\n", "1 2 3\n", "1 2 3 4 5\n", "BSLAMVOC", "a b c d\n"}) {
     const auto none = read(text);
@@ -68,7 +68,7 @@ TEST_F(VocabularyFile, NamesTheFileThatIsNone) {
   }
 }
 
-TEST_F(VocabularyFile, ReadsTheTextOfDbow2) {
+TEST_F(VocabularyFile, ReadsDbow2Text) {
   const auto vocabulary = read(good_text());
   ASSERT_TRUE(vocabulary.ok()) << vocabulary.error().message();
   const place::Vocabulary& v = **vocabulary;
@@ -78,11 +78,11 @@ TEST_F(VocabularyFile, ReadsTheTextOfDbow2) {
   EXPECT_EQ(v.levels(), 2);
   EXPECT_EQ(v.content().weight, (std::vector<float>{1.5f, 2.25f, 0.0f, 0.3f}));
   EXPECT_EQ(v.word(feature::Descriptor{2, 0, 0, 0}), WordId(1));
-  EXPECT_EQ(v.word(feature::Descriptor{0, 0, 0, 0}), WordId(0));  // as near to word 1
+  EXPECT_EQ(v.word(feature::Descriptor{0, 0, 0, 0}), WordId(0));  // at the same distance from word 1
   EXPECT_EQ(v.word(feature::Descriptor{~2ull, ~0ull, ~0ull, ~0ull}), WordId(3));
 }
 
-// DBoW2 numbers nodes as it makes them, which is not breadth-first: children of the second node may stand first.
+// DBoW2 numbers nodes in order of creation, which is not breadth-first: children of the second node may come first.
 TEST_F(VocabularyFile, ReadsNodesInAnyOrderOfParentsBeforeChildren) {
   const auto vocabulary = read(std::string("2 2 0 0\n0 0 ") + bytes_text(0) + " 0\n0 0 " + bytes_text(255, 255) +
                                " 0\n2 1 " + bytes_text(254, 255) + " 7\n1 1 " + bytes_text(1) + " 5\n2 1 " +
@@ -92,13 +92,13 @@ TEST_F(VocabularyFile, ReadsNodesInAnyOrderOfParentsBeforeChildren) {
   EXPECT_EQ((*vocabulary)->content().descriptor[2][0], 1u);
 }
 
-TEST_F(VocabularyFile, RefusesTextThatMakesNoTree) {
+TEST_F(VocabularyFile, RejectsTextThatIsNotATree) {
   const auto line_of = [](const Result<place::VocabularyPtr>& r) { return r.ok() ? "accepted" : r.error().key; };
   EXPECT_EQ(line_of(read_changed("2 2 0 0", "1 2 0 0")), "line 1");
   EXPECT_EQ(line_of(read_changed("2 2 0 0", "100000 2 0 0")), "line 1");
   EXPECT_EQ(line_of(read_changed("2 2 0 0", "2 99999999999 0 0")), "line 1");
   EXPECT_EQ(line_of(read_changed("2 2 0 0", "2 2 6 0")), "line 1");
-  EXPECT_EQ(line_of(read_changed("2 2 0 0", "2 1 0 0")), "line 4");  // deeper than it says
+  EXPECT_EQ(line_of(read_changed("2 2 0 0", "2 1 0 0")), "line 4");  // deeper than the given number of levels
   EXPECT_EQ(line_of(read_changed("\n1 1 ", "\n0 1 ")), "line 4");    // a third child of the root
   EXPECT_EQ(line_of(read_changed("\n1 1 ", "\n3 1 ")), "line 4");    // its own parent
   EXPECT_EQ(line_of(read_changed("\n1 1 ", "\n5 1 ")), "line 4");    // a parent that comes later: a cycle
@@ -118,7 +118,7 @@ TEST_F(VocabularyFile, RefusesTextThatMakesNoTree) {
   EXPECT_FALSE(read("2 2 0 0\n").ok());
 }
 
-TEST_F(VocabularyFile, RefusesOtherDescriptorLengths) {
+TEST_F(VocabularyFile, RejectsOtherDescriptorLengths) {
   std::string line = "0 1";
   for (int i = 0; i < 64; ++i) line += " 7";
   const auto longer = read(std::string("10 6 0 0\n") + line + " 1.0\n");
@@ -127,7 +127,7 @@ TEST_F(VocabularyFile, RefusesOtherDescriptorLengths) {
   EXPECT_NE(longer.error().expected.find("32 bytes"), std::string::npos);
 }
 
-TEST(Dbow2Text, SurvivesDamage) {
+TEST(Dbow2Text, HandlesDamage) {
   Random random(5);
   const std::string good = good_text();
   int accepted = 0;

@@ -35,15 +35,15 @@ std::string read_text(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-void write_picture(const fs::path& file, int width, int height, int seed) {
+void write_image(const fs::path& file, int width, int height, int seed) {
   fs::create_directories(file.parent_path());
   Random random(static_cast<std::uint64_t>(seed));
-  cv::Mat picture(height, width, CV_8UC1);
+  cv::Mat image(height, width, CV_8UC1);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x)
-      picture.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(4 * x + 2 * y + random.below(20));
+      image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(4 * x + 2 * y + random.below(20));
   }
-  ASSERT_TRUE(cv::imwrite(file.string(), picture));
+  ASSERT_TRUE(cv::imwrite(file.string(), image));
 }
 
 std::string small_image_name(int frame) { return std::to_string(kSmallStart + frame * kSmallInterval) + ".png"; }
@@ -71,7 +71,7 @@ void write_small_euroc(const fs::path& folder, int cameras) {
     write_text(camera / "sensor.yaml", small_sensor_yaml(0.1 * c));
     write_text(camera / "data.csv", small_list(frames));
     for (const int k : frames)
-      write_picture(camera / "data" / small_image_name(k), kSmallWidth, kSmallHeight, 100 * c + k);
+      write_image(camera / "data" / small_image_name(k), kSmallWidth, kSmallHeight, 100 * c + k);
   }
 }
 

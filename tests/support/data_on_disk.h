@@ -1,4 +1,4 @@
-// Folders and small data sets made for a test and removed after it.
+// Temporary folders and small data sets for tests.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 namespace bslam::support {
 
-// A folder of its own under the system's temporary folder, removed with all its content.
+// A new folder in the system's temporary folder; the destructor removes it with its content.
 class TemporaryFolder {
  public:
   TemporaryFolder();
@@ -25,29 +25,29 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-void write_text(const std::filesystem::path& file, std::string_view text);  // makes the folders
+void write_text(const std::filesystem::path& file, std::string_view text);  // creates missing folders
 std::string read_text(const std::filesystem::path& file);
 
-// An 8-bit grey picture that depends on `seed`; the format follows from the extension.
-void write_picture(const std::filesystem::path& file, int width, int height, int seed = 0);
+// Writes an 8-bit grey image that depends on `seed`; the extension determines the format.
+void write_image(const std::filesystem::path& file, int width, int height, int seed = 0);
 
 constexpr int kSmallWidth = 32, kSmallHeight = 24;
 constexpr int kSmallFrames = 24;
 constexpr TimeNs kSmallStart = 1'000'000'000'000, kSmallInterval = 50'000'000;
 
-// "TIME.png" of frame k in a small data set.
+// Returns the file name "TIME.png" of a frame of the small data set.
 std::string small_image_name(int frame);
 
-// A sensor.yaml of the small data set: pinhole without distortion at x metres to the right of the body.
+// Returns a sensor.yaml of the small data set: a pinhole camera without distortion, x metres to the right of the body.
 std::string small_sensor_yaml(double x);
 
-// An EuRoC data set of `cameras` cameras with kSmallFrames pictures each, at FOLDER/mav0.
+// Writes an EuRoC data set of `cameras` cameras with kSmallFrames images each to FOLDER/mav0.
 void write_small_euroc(const std::filesystem::path& folder, int cameras = 2);
 
-// Its data.csv of these frames.
+// Returns the data.csv of the small data set with the given frames.
 std::string small_list(const std::vector<int>& frames);
 
-// A data set of ../shared/data beside the project, where it is present.
+// Path of a data set in ../shared/data, relative to the project; nullopt if it is not present.
 std::optional<std::filesystem::path> shared_data(std::string_view name);
 
 }  // namespace bslam::support

@@ -32,7 +32,7 @@ void check_invariants(const frame::BundledFrame& frame) {
   EXPECT_EQ(seen, frame.num_keypoints());
 }
 
-TEST(FeatureSimulator, KeepsTheRulesOfTheBundledTable) {
+TEST(FeatureSimulator, SatisfiesTheInvariantsOfTheBundledTable) {
   std::vector<camera::Rig> rigs = {default_rig(), fisheye_rig(2), mixed_rig()};
   for (int n = 1; n <= 8; ++n) rigs.push_back(ring_rig(n));
   for (const camera::Rig& rig : rigs) {
@@ -102,7 +102,7 @@ TEST(FeatureSimulator, MatchesOneLandmarkAndTriangulatesItWithinItsCovariance) {
   EXPECT_LT(sum / count, 1.5);
 }
 
-TEST(FeatureSimulator, FindsLevelsByDistance) {
+TEST(FeatureSimulator, ChoosesLevelsByDistance) {
   const FeatureSimulator s = simulator(default_rig());
   const SimulatedFrame out = s.frame(FrameId(0), 2.0);
   const Vector3d camera = out.T_world_rig.translation();
@@ -131,7 +131,7 @@ TEST(FeatureSimulator, HasSeparateSeeds) {
   EXPECT_NE(noise.frame(FrameId(1), 1.0).frame.cameras[0].keypoints.pixel, a.frame.cameras[0].keypoints.pixel);
 }
 
-TEST(FeatureSimulator, LeavesOutMissingCameras) {
+TEST(FeatureSimulator, ObservesNothingInMissingCameras) {
   const FeatureSimulator s = simulator(default_rig());
   const int missing[] = {1};
   const SimulatedFrame out = s.frame(FrameId(0), 1.0, missing);
@@ -141,7 +141,7 @@ TEST(FeatureSimulator, LeavesOutMissingCameras) {
   check_invariants(out.frame);
 }
 
-TEST(FeatureSimulator, TakesEachCameraAtItsOwnTime) {
+TEST(FeatureSimulator, SimulatesEachCameraAtItsCaptureTime) {
   FeatureSimulatorOptions options;
   options.capture_offset_s = {0, 0.02};
   options.sigma_px = 1e-3;

@@ -7,7 +7,7 @@
 namespace bslam::synthetic {
 namespace {
 
-TEST(DefaultRig, HasFourCamerasOfWhichTheFrontPairOverlaps) {
+TEST(DefaultRig, HasFourCamerasWithAnOverlappingFrontPair) {
   const camera::Rig rig = default_rig();
   ASSERT_EQ(rig.size(), 4u);
   for (std::size_t c = 0; c < 4; ++c) {
@@ -22,7 +22,7 @@ TEST(DefaultRig, HasFourCamerasOfWhichTheFrontPairOverlaps) {
   EXPECT_NEAR(rig.cam_from_rig(1).translation().norm(), 0.11, 0.01);
 }
 
-TEST(DefaultRig, LooksWhereItsNamesSay) {
+TEST(DefaultRig, CamerasLookInTheDirectionsOfTheirNames) {
   const camera::Rig rig = default_rig();
   const Eigen::Vector3d expected[] = {{1, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -1, 0}};
   for (std::size_t c = 0; c < 4; ++c) {
@@ -32,7 +32,7 @@ TEST(DefaultRig, LooksWhereItsNamesSay) {
   }
 }
 
-TEST(RingRig, OverlapsInItsFirstTwoCameras) {
+TEST(RingRig, FirstTwoCamerasOverlap) {
   for (int n = 1; n <= 8; ++n) {
     const camera::Rig rig = ring_rig(n, 188);
     EXPECT_EQ(rig.size(), static_cast<std::size_t>(n));
@@ -42,7 +42,7 @@ TEST(RingRig, OverlapsInItsFirstTwoCameras) {
   }
 }
 
-TEST(FisheyeRig, SeesBehindItsPlane) {
+TEST(FisheyeRig, ProjectsPointsBehindItsPlane) {
   for (int n = 1; n <= 8; ++n) {
     const camera::Rig rig = fisheye_rig(n);
     EXPECT_EQ(rig.size(), static_cast<std::size_t>(n));

@@ -1,4 +1,4 @@
-// The program as a user meets it: exit status, one line on what is wrong, files that are whole or not there.
+// The command-line program: exit status, one-line errors, and files that are written completely or not at all.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -61,15 +61,15 @@ class CommandLine : public testing::Test {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(out("stdout")), slurp(out("stderr"))};
   }
 
-  static void expect_refused(const std::string& arguments) {
+  static void expect_rejected(const std::string& arguments) {
     const Ran ran = run(arguments);
     EXPECT_EQ(ran.status, 2) << arguments;
     EXPECT_EQ(ran.err.rfind("bslam: ", 0), 0u) << arguments << ": " << ran.err;
     EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1) << arguments << ": " << ran.err;
-    EXPECT_FALSE(fs::exists(folder_ / "refused/trajectory.tum")) << arguments;
+    EXPECT_FALSE(fs::exists(folder_ / "rejected/trajectory.tum")) << arguments;
   }
 
-  // A run over the recording, with fewer features for small images; its files are in out(name).
+  // Runs SLAM on the recording, with fewer features for its small images; the output is in out(name).
   static nlohmann::json summary_of(const std::string& name, const std::string& more) {
     const Ran ran =
         run("run " + data() + " --out " + out(name) + " --set features.per_image=500 --progress never " + more);
@@ -87,7 +87,7 @@ class CommandLine : public testing::Test {
   static inline fs::path folder_;
 };
 
-TEST_F(CommandLine, TellsItsVersionAndHelpOnEveryVerb) {
+TEST_F(CommandLine, PrintsVersionAndHelpForEveryCommand) {
   EXPECT_EQ(run("--version").status, 0);
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
   for (const char* verb : {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "map",
@@ -96,8 +96,8 @@ TEST_F(CommandLine, TellsItsVersionAndHelpOnEveryVerb) {
   }
 }
 
-TEST_F(CommandLine, NamesWhatIsMisspeltAndWhatWasMeant) {
-  const std::string base = "run " + data() + " --out " + out("refused");
+TEST_F(CommandLine, SuggestsCorrectionsOfMisspelledWords) {
+  const std::string base = "run " + data() + " --out " + out("rejected");
   const std::pair<std::string, std::string> cases[] = {
       {"rum " + data(), "bslam: unknown command 'rum'; did you mean 'run'?\n"},
       {"rum " + data() + " --out x", "unknown command 'rum'; did you mean 'run'?"},
@@ -113,14 +113,14 @@ TEST_F(CommandLine, NamesWhatIsMisspeltAndWhatWasMeant) {
       {base + " --config /no/such", "bslam: cannot open /no/such: No such file or directory\n"},
       {base + " --seed -1", "--seed: Value -1 not in range 0 to 2147483647"},
       {"run", "DATA is required (see bslam run --help)\n"}};
-  for (const auto& [arguments, said] : cases) {
+  for (const auto& [arguments, message] : cases) {
     const Ran ran = run(arguments);
     EXPECT_EQ(ran.status, 2) << arguments;
-    EXPECT_NE(ran.err.find(said), std::string::npos) << arguments << ": " << ran.err;
+    EXPECT_NE(ran.err.find(message), std::string::npos) << arguments << ": " << ran.err;
   }
 }
 
-TEST_F(CommandLine, PrintsSettingsThatItReads) {
+TEST_F(CommandLine, PrintedSettingsCanBeRead) {
   const Ran all = run("settings --set features.levels=5");
   EXPECT_EQ(all.status, 0);
   EXPECT_NE(all.out.find("levels: 5"), std::string::npos);
@@ -128,14 +128,14 @@ TEST_F(CommandLine, PrintsSettingsThatItReads) {
   EXPECT_EQ(run("settings --config " + out("settings.yaml")).out, all.out);
 }
 
-TEST_F(CommandLine, PrintsTheCommonSettingsAlone) {
+TEST_F(CommandLine, PrintsOnlyTheCommonSettings) {
   const std::string common = run("settings --common").out;
   EXPECT_NE(common.find("per_image: "), std::string::npos);
   EXPECT_EQ(common.find("[advanced]"), std::string::npos);
   EXPECT_LT(common.size(), run("settings").out.size() / 3);
 }
 
-TEST_F(CommandLine, TheLogLevelSelectsWhatIsPrinted) {
+TEST_F(CommandLine, TheLogLevelSelectsTheMessages) {
   const std::string command = "run " + data() + " --end 0.3 --overwrite --progress never --out " + out("logged");
   EXPECT_EQ(run(command).err.find("info: "), std::string::npos);
   const Ran info = run(command + " --log-level info");
@@ -145,8 +145,8 @@ TEST_F(CommandLine, TheLogLevelSelectsWhatIsPrinted) {
   EXPECT_EQ(run(command + " --log-level error").err, "");
 }
 
-TEST_F(CommandLine, RefusesWhatMakesNoSense) {
-  const std::string base = "run " + data() + " --out " + out("refused") + " --progress never ";
+TEST_F(CommandLine, RejectsInvalidArguments) {
+  const std::string base = "run " + data() + " --out " + out("rejected") + " --progress never ";
   for (const char* more : {"--set no.such.key=1",
                            "--set features.per_image=-5",
                            "--set features.per_image=many",
@@ -170,24 +170,24 @@ TEST_F(CommandLine, RefusesWhatMakesNoSense) {
                            "--vocabulary /no/such/file",
                            "--replay /no/such/file",
                            "--no-final-ba --set extrinsics.refine=true"}) {
-    expect_refused(base + more);
+    expect_rejected(base + more);
   }
-  expect_refused("run /no/such/folder --out " + out("refused"));
-  expect_refused("run " + data());
-  expect_refused("frobnicate");
-  expect_refused("");
-  expect_refused("eval /no/such/file " + data() + "/groundtruth_cam0.tum");
-  expect_refused("inspect " + data() + " --frame 999 --out " + out("frame.json"));
-  expect_refused("rig info /no/such/file");
-  expect_refused("map info /no/such/file");
-  expect_refused("map info " + data() + "/groundtruth_cam0.tum");
-  expect_refused("map export /no/such/file --out " + out("refused"));
-  expect_refused("vocab info " + data() + "/groundtruth_cam0.tum");
-  expect_refused("vocab train /no/such/folder --out " + out("never.bvoc"));
-  expect_refused("simulate --out " + out("never") + " --duration -1");
+  expect_rejected("run /no/such/folder --out " + out("rejected"));
+  expect_rejected("run " + data());
+  expect_rejected("frobnicate");
+  expect_rejected("");
+  expect_rejected("eval /no/such/file " + data() + "/groundtruth_cam0.tum");
+  expect_rejected("inspect " + data() + " --frame 999 --out " + out("frame.json"));
+  expect_rejected("rig info /no/such/file");
+  expect_rejected("map info /no/such/file");
+  expect_rejected("map info " + data() + "/groundtruth_cam0.tum");
+  expect_rejected("map export /no/such/file --out " + out("rejected"));
+  expect_rejected("vocab info " + data() + "/groundtruth_cam0.tum");
+  expect_rejected("vocab train /no/such/folder --out " + out("never.bvoc"));
+  expect_rejected("simulate --out " + out("never") + " --duration -1");
 }
 
-TEST_F(CommandLine, RunWritesItsFilesAndRepeatsFromItsConfiguration) {
+TEST_F(CommandLine, RunWritesItsFilesAndIsRepeatableFromItsConfiguration) {
   const Ran first = run("run " + data() + " --out " + out("first") +
                         " --mode sequential --progress never --set features.per_image=700");
   ASSERT_EQ(first.status, 0) << first.err;
@@ -208,9 +208,9 @@ TEST_F(CommandLine, RunWritesItsFilesAndRepeatsFromItsConfiguration) {
       run("run " + data() + " --out " + out("again") + " --progress never --config " + out("first/config.yaml"));
   ASSERT_EQ(again.status, 0) << again.err;
   EXPECT_EQ(slurp(folder_ / "first/trajectory.tum"), slurp(folder_ / "again/trajectory.tum"));
-  expect_refused("run " + data() + " --out " + out("again"));  // it is there, and --overwrite was not given
+  expect_rejected("run " + data() + " --out " + out("again"));  // exists already, and --overwrite is not given
 
-  // What an earlier run refined goes, unless it is what this one is told to read.
+  // A refined rig of an earlier run is removed, unless it is an input of this run.
   const std::filesystem::path refined = folder_ / "again/rig_refined.yaml";
   std::filesystem::copy_file(folder_ / "data/rig.yaml", refined);
   const std::string overwrite = "run " + data() + " --end 0.2 --overwrite --progress never --out " + out("again");
@@ -220,7 +220,7 @@ TEST_F(CommandLine, RunWritesItsFilesAndRepeatsFromItsConfiguration) {
   EXPECT_FALSE(std::filesystem::exists(refined));
 }
 
-TEST_F(CommandLine, ASavedMapIsDescribedExportedAndGoneOnIn) {
+TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
   const auto saved = summary_of("saved", "--mode sequential --cameras 0,1 --save-map " + out("saved.map"));
   EXPECT_EQ(saved["map"]["loaded"], false);
   EXPECT_EQ(saved["maps_started"], 1);
@@ -229,11 +229,11 @@ TEST_F(CommandLine, ASavedMapIsDescribedExportedAndGoneOnIn) {
 
   const Ran info = run("map info --json " + out("saved.map"));
   ASSERT_EQ(info.status, 0) << info.err;
-  const auto told = nlohmann::json::parse(info.out);
-  EXPECT_EQ(told["keyframes"], saved["map"]["keyframes"]);
-  EXPECT_EQ(told["landmarks"], saved["map"]["landmarks"]);
-  EXPECT_EQ(told["cameras"].size(), 2u);
-  EXPECT_EQ(told["parts"].size(), 1u);
+  const auto described = nlohmann::json::parse(info.out);
+  EXPECT_EQ(described["keyframes"], saved["map"]["keyframes"]);
+  EXPECT_EQ(described["landmarks"], saved["map"]["landmarks"]);
+  EXPECT_EQ(described["cameras"].size(), 2u);
+  EXPECT_EQ(described["parts"].size(), 1u);
   EXPECT_NE(run("map info " + out("saved.map")).out.find("scale metric"), std::string::npos);
 
   ASSERT_EQ(run("map export " + out("saved.map") + " --out " + out("exported")).status, 0);
@@ -247,8 +247,8 @@ TEST_F(CommandLine, ASavedMapIsDescribedExportedAndGoneOnIn) {
   for (std::string word; images >> word;) existing += word.ends_with(".png") && fs::exists(data() + "/" + word);
   EXPECT_GE(existing, 2u);
   const std::string poses = slurp(folder_ / "exported/keyframes.tum");
-  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 1 + told["keyframes"].get<int>());
-  expect_refused("map export " + out("saved.map") + " --out " + out("exported"));
+  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 1 + described["keyframes"].get<int>());
+  expect_rejected("map export " + out("saved.map") + " --out " + out("exported"));
   EXPECT_EQ(run("map export " + out("saved.map") + " --overwrite --out " + out("exported")).status, 0);
 
   const auto localised = summary_of("localised", "--cameras 0,1 --localize-only --load-map " + out("saved.map"));
@@ -262,44 +262,44 @@ TEST_F(CommandLine, ASavedMapIsDescribedExportedAndGoneOnIn) {
       summary_of("grown", "--cameras 0,1 --load-map " + out("saved.map") + " --save-map " + out("grown.map"));
   EXPECT_EQ(grown["frames"]["tracked"], 15);
   EXPECT_EQ(run("map info " + out("grown.map")).status, 0);
-  expect_refused("run " + data() + " --out " + out("refused") + " --cameras 2,3 --load-map " + out("saved.map"));
+  expect_rejected("run " + data() + " --out " + out("rejected") + " --cameras 2,3 --load-map " + out("saved.map"));
 }
 
-TEST_F(CommandLine, AVocabularyIsTrainedDescribedAndUsed) {
+TEST_F(CommandLine, VocabulariesCanBeTrainedDescribedAndUsed) {
   EXPECT_NE(run("vocab info").out.find("orb256-bslam"), std::string::npos);
   const std::string train = "vocab train " + data() + "/mav0/cam0/data " + data() +
                             "/mav0/cam2/data --branching 6 --levels 3 --features 300 --progress never ";
   ASSERT_EQ(run(train + "--threads 1 --out " + out("one.bvoc")).status, 0);
   ASSERT_EQ(run(train + "--threads 2 --out " + out("two.bvoc")).status, 0);
   EXPECT_EQ(slurp(out("one.bvoc")), slurp(out("two.bvoc")));
-  expect_refused(train + "--out " + out("one.bvoc"));  // it is there, and --overwrite was not given
+  expect_rejected(train + "--out " + out("one.bvoc"));  // exists already, and --overwrite is not given
   const Ran info = run("vocab info " + out("one.bvoc"));
   EXPECT_NE(info.out.find("branching    6\nlevels       3\nwords        216\n"), std::string::npos) << info.out;
 
   summary_of("worded", "--cameras 0,1 --vocabulary " + out("one.bvoc") + " --save-map " + out("worded.map"));
-  expect_refused("run " + data() + " --out " + out("refused") + " --cameras 0,1 --load-map " +
-                 out("worded.map"));  // other words
+  expect_rejected("run " + data() + " --out " + out("rejected") + " --cameras 0,1 --load-map " +
+                  out("worded.map"));  // another vocabulary
   const std::string same =
       "--cameras 0,1 --vocabulary " + out("one.bvoc") + " --localize-only --load-map " + out("worded.map");
   EXPECT_EQ(summary_of("worded_again", same)["frames"]["tracked"], 15);
 }
 
-TEST_F(CommandLine, AJournalRepeatsItsRun) {
+TEST_F(CommandLine, AJournalReplaysItsRun) {
   EXPECT_EQ(summary_of("recorded", "--cameras 0,1 --mode parallel --journal " + out("run.journal"))["mode"],
             "parallel");
   EXPECT_EQ(summary_of("replayed", "--cameras 0,1 --mode parallel --replay " + out("run.journal"))["mode"], "replay");
   expect_same_trajectories("recorded", "replayed");
-  expect_refused("run " + data() + " --out " + out("other") +
-                 " --cameras 0,1 --set features.per_image=300 --progress never" + " --replay " + out("run.journal"));
+  expect_rejected("run " + data() + " --out " + out("other") +
+                  " --cameras 0,1 --set features.per_image=300 --progress never" + " --replay " + out("run.journal"));
 }
 
-TEST_F(CommandLine, LaggedRunsGiveTheSameBytes) {
+TEST_F(CommandLine, LaggedRunsAreDeterministic) {
   EXPECT_EQ(summary_of("lagged", "--mode lagged --set execution.threads=1")["mode"], "lagged");
   EXPECT_EQ(summary_of("lagged_again", "--mode lagged --set execution.threads=3")["mode"], "lagged");
   expect_same_trajectories("lagged", "lagged_again");
 }
 
-TEST_F(CommandLine, SimulateWritesARecordingThatRuns) {
+TEST_F(CommandLine, SimulateWritesAUsableRecording) {
   const Ran made = run("simulate --out " + out("simulated") + " --duration 0.5 --rate 10 --progress never");
   ASSERT_EQ(made.status, 0) << made.err;
   const Ran ran = run("run " + out("simulated") + " --out " + out("of_simulated") + " --progress never");
@@ -307,7 +307,7 @@ TEST_F(CommandLine, SimulateWritesARecordingThatRuns) {
   EXPECT_EQ(nlohmann::json::parse(slurp(out("of_simulated") + "/summary.json"))["frames"]["tracked"], 5);
 }
 
-TEST_F(CommandLine, InspectShowsABundledTableThatHoldsTogether) {
+TEST_F(CommandLine, InspectWritesAConsistentBundledTable) {
   const Ran ran = run("inspect " + data() + " --frame 3 --out " + out("frame.json"));
   ASSERT_EQ(ran.status, 0) << ran.err;
   const auto frame = nlohmann::json::parse(slurp(out("frame.json")));
@@ -321,12 +321,12 @@ TEST_F(CommandLine, InspectShowsABundledTableThatHoldsTogether) {
   EXPECT_GT(matched, 100u);
 }
 
-TEST_F(CommandLine, ARunSaysThatItsCalibrationIsProbablyWrong) {
+TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
   const camera::Rig rig = rig_formats::read_rig(data() + "/rig.yaml").value();
   ASSERT_TRUE(rig_formats::write_rig(calibration::with_inverse_extrinsics(rig), out("inverse.yaml")));
   const std::string options = " --set features.per_image=500 --progress never --rig ";
   const Ran inverse = run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse"));
-  EXPECT_NE(inverse.err.find("of the features match between any two"), std::string::npos) << inverse.err;
+  EXPECT_NE(inverse.err.find("of the features are matched between"), std::string::npos) << inverse.err;
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const geometry::SE3& T = rig.body_from_cam(c);
@@ -336,21 +336,21 @@ TEST_F(CommandLine, ARunSaysThatItsCalibrationIsProbablyWrong) {
   const Ran large = run("run " + data() + options + out("millimetres.yaml") + " --out " + out("millimetres"));
   EXPECT_NE(large.err.find("are they millimetres?"), std::string::npos) << large.err;
   const camera::Rig upside_down = [&] {
-    std::vector<camera::RigCamera> turned;
-    for (std::size_t c = 0; c < rig.size(); ++c) turned.push_back({rig.camera(c), rig.body_from_cam(c)});
-    turned[3].T_body_cam = turned[3].T_body_cam * geometry::SE3(Eigen::Quaterniond(0, 0, 0, 1), {0, 0, 0});
-    return camera::Rig(turned);
+    std::vector<camera::RigCamera> rotated;
+    for (std::size_t c = 0; c < rig.size(); ++c) rotated.push_back({rig.camera(c), rig.body_from_cam(c)});
+    rotated[3].T_body_cam = rotated[3].T_body_cam * geometry::SE3(Eigen::Quaterniond(0, 0, 0, 1), {0, 0, 0});
+    return camera::Rig(rotated);
   }();
   ASSERT_TRUE(rig_formats::write_rig(upside_down, out("upside_down.yaml")));
-  const Ran turned = run("run " + data() + options + out("upside_down.yaml") + " --out " + out("upside_down"));
-  EXPECT_NE(turned.err.find("keypoints are inliers: check this camera's extrinsics"), std::string::npos) << turned.err;
-  EXPECT_NE(turned.err.find("bslam rig info " + out("upside_down.yaml") + " --images " + data()), std::string::npos)
-      << turned.err;
+  const Ran ran = run("run " + data() + options + out("upside_down.yaml") + " --out " + out("upside_down"));
+  EXPECT_NE(ran.err.find("keypoints are inliers: check this camera's extrinsics"), std::string::npos) << ran.err;
+  EXPECT_NE(ran.err.find("bslam rig info " + out("upside_down.yaml") + " --images " + data()), std::string::npos)
+      << ran.err;
   const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
   EXPECT_EQ(right.err, "");
 }
 
-TEST_F(CommandLine, InterruptedRunKeepsWhatItHasAndSaysSo) {
+TEST_F(CommandLine, AnInterruptedRunWritesItsResultsAndReportsIt) {
   const std::string folder = out("interrupted");
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
@@ -361,7 +361,7 @@ TEST_F(CommandLine, InterruptedRunKeepsWhatItHasAndSaysSo) {
             "--progress", "never", static_cast<char*>(nullptr));
     std::_Exit(127);
   }
-  // Its folder appears before the first frame; at the recorded pace the run then lasts a second and a half.
+  // The output folder is created before the first frame; at the recorded pace the run then takes 1.5 s.
   while (!fs::exists(folder) && ::waitpid(child, nullptr, WNOHANG) == 0) std::this_thread::yield();
   ::kill(child, SIGINT);
   int status = 0;

@@ -1,4 +1,4 @@
-// Real images, where they are: ../shared/data beside the project. A checkout alone does not have them.
+// Runs on real images in ../shared/data, if they are present; they are not part of the repository.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -12,8 +12,8 @@ namespace {
 
 struct RealCase {
   const char* folder;
-  std::vector<int> cameras;  // empty = all
-  double max_ate_m;          // generous: far below what a wrong scale or a lost stretch gives
+  std::vector<int> cameras;  // all cameras if empty
+  double max_ate_m;          // loose bound, but far below the error with a wrong scale or lost intervals
 };
 
 void PrintTo(const RealCase& c, std::ostream* out) {
@@ -22,9 +22,9 @@ void PrintTo(const RealCase& c, std::ostream* out) {
 
 class RealData : public testing::TestWithParam<RealCase> {};
 
-TEST_P(RealData, PosesEveryFrame) {
+TEST_P(RealData, TracksEveryFrame) {
   const std::filesystem::path data = std::filesystem::path(BSLAM_SHARED_DIR) / "data" / GetParam().folder;
-  if (!std::filesystem::is_directory(data)) GTEST_SKIP() << data << " is not here";
+  if (!std::filesystem::is_directory(data)) GTEST_SKIP() << data << " is not present";
   const auto dataset = dataset::open_dataset({.path = data, .cameras = GetParam().cameras});
   ASSERT_TRUE(dataset) << dataset.error().message();
   session::SessionOptions options;
@@ -43,9 +43,9 @@ INSTANTIATE_TEST_SUITE_P(Sets, RealData,
                          testing::Values(RealCase{"kitti_06_start", {}, 0.1}, RealCase{"aria_gen2_4cam", {}, 0.01},
                                          RealCase{"aria_gen2_4cam", {0, 1}, 0.01}, RealCase{"kitti_0039", {}, 0.25}));
 
-TEST(RealData, StandsStillWhereTheRigDoes) {
+TEST(RealData, HasNoMotionWhileTheRigIsAtRest) {
   const std::filesystem::path data = std::filesystem::path(BSLAM_SHARED_DIR) / "data/euroc_v101_rest";
-  if (!std::filesystem::is_directory(data)) GTEST_SKIP() << data << " is not here";
+  if (!std::filesystem::is_directory(data)) GTEST_SKIP() << data << " is not present";
   const auto dataset = dataset::open_dataset({.path = data});
   ASSERT_TRUE(dataset) << dataset.error().message();
   session::SessionOptions options;

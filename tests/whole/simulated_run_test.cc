@@ -1,4 +1,4 @@
-// From rendered pictures on disk to a trajectory, for every number of cameras.
+// Runs from rendered images on disk to a trajectory, for every number of cameras.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr int kCameras = 8, kWidth = 376;
 constexpr double kDuration_s = 3.0, kRate_hz = 12.0;
 
-// A short recording through eight small cameras, rendered once for all tests of this program.
+// A short recording of eight small cameras, rendered once for all tests of this program.
 class SimulatedRun : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -77,7 +77,7 @@ TEST_F(SimulatedRun, TracksWithEveryNumberOfCamerasFromTwoUp) {
   }
 }
 
-TEST_F(SimulatedRun, OneCameraTracksUpToScaleAndSaysSo) {
+TEST_F(SimulatedRun, OneCameraTracksUpToScale) {
   const dataset::Dataset dataset = open(1);
   const session::SessionResult result = run(dataset);
   EXPECT_EQ(result.record.map.scale, "up-to-scale");
@@ -86,7 +86,7 @@ TEST_F(SimulatedRun, OneCameraTracksUpToScaleAndSaysSo) {
   EXPECT_LT(evaluate(result.trajectories.front().poses, evaluation::AlignMode::kSim3).ate.rmse, 0.03);
 }
 
-TEST_F(SimulatedRun, SequentialRunsGiveTheSameBytes) {
+TEST_F(SimulatedRun, SequentialRunsAreDeterministic) {
   const dataset::Dataset dataset = open(4);
   const session::SessionResult first = run(dataset), second = run(dataset);
   EXPECT_EQ(evaluation::tum_text(first.trajectories.front().poses, ""),
@@ -94,7 +94,7 @@ TEST_F(SimulatedRun, SequentialRunsGiveTheSameBytes) {
   EXPECT_EQ(evaluation::tum_text(first.live.front().poses, ""), evaluation::tum_text(second.live.front().poses, ""));
 }
 
-TEST_F(SimulatedRun, ParallelRunIsAboutAsAccurate) {
+TEST_F(SimulatedRun, ParallelRunsAreSimilarlyAccurate) {
   const dataset::Dataset dataset = open(4);
   const session::SessionResult result = run(dataset, execution::Mode::kParallel);
   EXPECT_EQ(result.trajectories.front().poses.size(), dataset.frames.size());

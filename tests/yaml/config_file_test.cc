@@ -31,8 +31,8 @@ struct Features {
   bool mask = false;
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("per_image", self.per_image, Range{50, 20000}, "", "keypoints wanted in one image",
-            OptionNote{.common = true, .formerly = "per_picture"});
+    visitor("per_image", self.per_image, Range{50, 20000}, "", "number of keypoints per image",
+            OptionNote{.common = true, .formerly = "per_image_old"});
     visitor.section("deep", self.deep);
     visitor("mask", self.mask, Range{}, "", "use masks");
   }
@@ -61,7 +61,7 @@ class ConfigFile : public testing::Test {
   OptionTable table_{settings_};
 };
 
-TEST_F(ConfigFile, TakesNestedMapsAndDottedKeys) {
+TEST_F(ConfigFile, AcceptsNestedMapsAndDottedKeys) {
   ASSERT_TRUE(apply("features:\n  per_image: 800\n  deep.gain: 2.5\nfeatures.mask: true\nlate: drop\n"));
   EXPECT_EQ(settings_.features.per_image, 800);
   EXPECT_EQ(settings_.features.deep.gain, 2.5);
@@ -69,14 +69,14 @@ TEST_F(ConfigFile, TakesNestedMapsAndDottedKeys) {
   EXPECT_EQ(settings_.late, Late::kDrop);
 }
 
-TEST_F(ConfigFile, LeavesTheRestAlone) {
+TEST_F(ConfigFile, KeepsSettingsThatAreNotInTheFile) {
   ASSERT_TRUE(apply(""));
   ASSERT_TRUE(apply("# only words\n"));
   ASSERT_TRUE(apply("features:\n  # per_image: 7\nlate: drop\n"));
   EXPECT_EQ(settings_.features.per_image, 1200);
 }
 
-TEST_F(ConfigFile, NamesFileKeyAndWhatIsWrong) {
+TEST_F(ConfigFile, ErrorsNameFileKeyAndValue) {
   struct Case {
     const char *yaml, *key, *found;
   };
@@ -87,8 +87,8 @@ TEST_F(ConfigFile, NamesFileKeyAndWhatIsWrong) {
                         Case{"features:\n  per_image: {a: 1}\n", "features.per_image", "a map"},
                         Case{"features:\n  deep:\n    gain: .nan\n", "features.deep.gain", ".nan"},
                         Case{"features: 3\n", "features", "3"}, Case{"late: 5\n", "late", "5"},
-                        Case{"late: block\nlate: drop\n", "late", "the key twice"},
-                        Case{"features:\n  mask: true\nfeatures.mask: false\n", "features.mask", "the key twice"}}) {
+                        Case{"late: block\nlate: drop\n", "late", "a repeated key"},
+                        Case{"features:\n  mask: true\nfeatures.mask: false\n", "features.mask", "a repeated key"}}) {
     const Status status = apply(c.yaml);
     ASSERT_FALSE(status) << c.yaml;
     EXPECT_EQ(status.error().file, (folder_.path() / "config.yaml").string());
@@ -100,15 +100,15 @@ TEST_F(ConfigFile, NamesFileKeyAndWhatIsWrong) {
                 ": unknown setting 'features.per_imge'; did you mean 'features.per_image'?");
 }
 
-TEST_F(ConfigFile, RefusesWhatIsNoYamlMap) {
+TEST_F(ConfigFile, RejectsDocumentsThatAreNotMaps) {
   EXPECT_EQ(apply("a: 1\nb: [1, 2\n c}").error().key, "line 3");
   EXPECT_FALSE(apply("- a\n- b\n"));
   EXPECT_FALSE(apply("words"));
-  EXPECT_FALSE(apply("&a {features: *a}"));  // a circle
+  EXPECT_FALSE(apply("&a {features: *a}"));  // a cycle
   EXPECT_FALSE(apply_config_file(table_, folder_.path() / "none.yaml"));
 }
 
-TEST_F(ConfigFile, ComesBackExactly) {
+TEST_F(ConfigFile, RoundTripsExactly) {
   settings_.features.deep.gain = 0.1 + 0.2;
   settings_.features.per_image = 777;
   settings_.late = Late::kDrop;
@@ -126,10 +126,10 @@ TEST_F(ConfigFile, ComesBackExactly) {
   EXPECT_EQ(config_to_yaml(other_table), text);
 }
 
-TEST_F(ConfigFile, SaysWhatEverySettingMeans) {
+TEST_F(ConfigFile, DescribesEverySetting) {
   EXPECT_EQ(config_to_yaml(table_),
             "features:\n"
-            "  per_image: 1200  # keypoints wanted in one image; an integer in [50, 20000]\n"
+            "  per_image: 1200  # number of keypoints per image; an integer in [50, 20000]\n"
             "  deep:\n"
             "    gain: 1.5  # [advanced] gain of the deep part; 1/s; a number in [-100.0, 100.0]\n"
             "  mask: false  # [advanced] use masks; true or false\n"
@@ -137,20 +137,21 @@ TEST_F(ConfigFile, SaysWhatEverySettingMeans) {
             "vocabulary: \"\"  # [advanced] file; text\n");
 }
 
-TEST_F(ConfigFile, PrintsTheCommonSettingsAlone) {
+TEST_F(ConfigFile, PrintsOnlyTheCommonSettings) {
   EXPECT_EQ(config_to_yaml(table_, Selection::kCommon),
             "features:\n"
-            "  per_image: 1200  # keypoints wanted in one image; an integer in [50, 20000]\n");
+            "  per_image: 1200  # number of keypoints per image; an integer in [50, 20000]\n");
 }
 
 TEST_F(ConfigFile, AcceptsFormerNamesWithAWarning) {
-  ASSERT_TRUE(apply("features:\n  per_picture: 800\n"));
+  ASSERT_TRUE(apply("features:\n  per_image_old: 800\n"));
   EXPECT_EQ(settings_.features.per_image, 800);
   ASSERT_EQ(table_.warnings().size(), 1u);
-  EXPECT_NE(table_.warnings()[0].find("'features.per_picture' is now called 'features.per_image'"), std::string::npos);
-  EXPECT_TRUE(apply_setting(table_, "features.per_picture=900"));
+  EXPECT_NE(table_.warnings()[0].find("'features.per_image_old' is now called 'features.per_image'"),
+            std::string::npos);
+  EXPECT_TRUE(apply_setting(table_, "features.per_image_old=900"));
   EXPECT_EQ(settings_.features.per_image, 900);
-  EXPECT_EQ(apply("features:\n  per_picture: 800\n  per_image: 700\n").error().found, "the key twice");
+  EXPECT_EQ(apply("features:\n  per_image_old: 800\n  per_image: 700\n").error().found, "a repeated key");
 }
 
 TEST_F(ConfigFile, SettingsOfTheCommandLine) {
