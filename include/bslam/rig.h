@@ -18,11 +18,12 @@ namespace bslam {
 // Calibration of one camera. A camera looks along +z, x to the right and y down; the centre of the upper left pixel is
 // pixel (0, 0).
 struct CameraCalibration {
-  std::string name;                                 // for messages
-  std::string model = "pinhole-radtan";             // pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere
+  std::string name;  // for messages
+  // pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere, fov
+  std::string model = "pinhole-radtan";
   int width = 0, height = 0;                        // pixels, 1 to 20000
   std::array<double, 4> intrinsics = {0, 0, 0, 0};  // fx, fy, cx, cy in pixels
-  // What the model has beside these: none; k1 k2 p1 p2 [k3 [k4 k5 k6]]; k1 k2 k3 k4; alpha; alpha beta; xi alpha.
+  // What the model has beside these: none; k1 k2 p1 p2 [k3 [k4 k5 k6]]; k1 k2 k3 k4; alpha; alpha beta; xi alpha; w.
   std::vector<double> distortion = {};
   Pose T_body_cam = {};      // metres; the body frame is any frame of your choice that all cameras share
   double time_offset_s = 0;  // true time = stamp + offset
