@@ -35,8 +35,8 @@ struct CameraCalibration {
 class BSLAM_EXPORT Rig {
  public:
   // Reads a calibration of any known format, recognised by its content: bslam, EuRoC, Kalibr, OpenVINS, ORB-SLAM3,
-  // Basalt, COLMAP, KITTI; or the one that the folder of a data set holds. Errors name file and key: not readable, no
-  // known format, values out of range, a mask that is no 8-bit grey PNG of the camera's size.
+  // OKVIS2, Basalt, COLMAP, KITTI; or the one that the folder of a data set holds. Errors name file and key: not
+  // readable, no known format, values out of range, a mask that is no 8-bit grey PNG of the camera's size.
   static Result<Rig> load(const std::filesystem::path& file);
 
   // A rig made in code; the first is camera 0. Errors name the camera and what of it is wrong, as `load`; no camera.

@@ -26,6 +26,8 @@ bool holds(RigFormat format, const camera::CameraModel& model) {
       return camera::is_opencv_model(model) && !pinhole && (!radtan || coefficients == 4);
     case RigFormat::kOrbslam3:
       return camera::is_opencv_model(model) && (!radtan || coefficients <= 5);
+    case RigFormat::kOkvis2:
+      return camera::is_opencv_model(model) && !pinhole;
     case RigFormat::kEuroc:
       return camera::is_opencv_model(model);
     case RigFormat::kColmap:
@@ -122,7 +124,8 @@ TEST_P(RigFormatOf, RefusesWhatItCannotHold) {
 
 // What has been read once is read again from another format with the same bits, where that holds the same numbers.
 TEST_F(RigFormats, KeepTheBitsOfWhatWasRead) {
-  for (const RigFormat format : {RigFormat::kBslam, RigFormat::kEuroc, RigFormat::kOpenvins, RigFormat::kBasalt}) {
+  for (const RigFormat format :
+       {RigFormat::kBslam, RigFormat::kEuroc, RigFormat::kOpenvins, RigFormat::kOkvis2, RigFormat::kBasalt}) {
     const camera::Rig first = read(rig_to_yaml(rigs_for(format).front())).value().rig;
     const fs::path out = folder_.path() / (format == RigFormat::kEuroc ? "out" : "out.txt");
     ASSERT_TRUE(write_rig_as(first, format, out));
