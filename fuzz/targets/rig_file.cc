@@ -15,7 +15,12 @@ std::vector<std::string> seeds() {
           "  intrinsics: [400, 400, 320, 240]\n  resolution: [640, 480]\n  rostopic: /a\n"
           "cam1:\n  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n  camera_model: pinhole\n"
           "  distortion_coeffs: [0.1, 0.01, 0, 0]\n  distortion_model: radtan\n  intrinsics: [400, 400, 320, 240]\n  "
-          "resolution: [640, 480]\n"};
+          "resolution: [640, 480]\n",
+          "%YAML:1.0\ncameras:\n  - {T_SC: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],\n"
+          "    image_dimension: [640, 480],\n"
+          "    distortion_coefficients: [0.1, 0.01, 0, 0],\n    distortion_type: radialtangential,\n"
+          "    focal_length: [400, 400],\n    principal_point: [320, 240],\n    slam_use: okvis}\n"
+          "camera_parameters:\n  image_delay: 0.01\n"};
 }
 
 }  // namespace bslam::fuzz

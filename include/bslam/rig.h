@@ -18,12 +18,13 @@ namespace bslam {
 // Calibration of one camera. The camera frame has z forward, x to the right and y down; the centre of the upper left
 // pixel is pixel (0, 0).
 struct CameraCalibration {
-  std::string name;                                 // used in messages
-  std::string model = "pinhole-radtan";             // pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere
+  std::string name;  // used in messages
+  // pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere, fov
+  std::string model = "pinhole-radtan";
   int width = 0, height = 0;                        // pixels, 1 to 20000
   std::array<double, 4> intrinsics = {0, 0, 0, 0};  // fx, fy, cx, cy in pixels
   // Further parameters, by model in the above order: none; k1 k2 p1 p2 [k3 [k4 k5 k6]]; k1 k2 k3 k4; alpha; alpha beta;
-  // xi alpha.
+  // xi alpha; w.
   std::vector<double> distortion = {};
   Pose T_body_cam = {};      // metres; the body frame can be chosen freely and is common to all cameras
   double time_offset_s = 0;  // true time = stamp + offset
@@ -35,7 +36,7 @@ struct CameraCalibration {
 class BSLAM_EXPORT Rig {
  public:
   // Reads a calibration of any known format, recognised by its content: bslam, EuRoC, Kalibr, OpenVINS, ORB-SLAM3,
-  // Basalt, COLMAP, KITTI; or the calibration in the folder of a data set. Errors name file and key: a file that
+  // OKVIS2, Basalt, COLMAP, KITTI; or the calibration in the folder of a data set. Errors name file and key: a file that
   // cannot be read or has an unknown format, values out of range, a mask that is not an 8-bit grey PNG of the camera's
   // resolution.
   static Result<Rig> load(const std::filesystem::path& file);

@@ -144,7 +144,27 @@ class DoubleSphere {
   double xi_ = 0, alpha_ = 0;
 };
 
-using CameraModel = std::variant<Pinhole, PinholeRadTan, KannalaBrandt, Unified, ExtendedUnified, DoubleSphere>;
+// Field-of-view model (Devernay, Faugeras, MVA 2001): a pinhole whose normalised radius r becomes atan(2 r tan(w / 2))
+// / w with w in (0, pi) radians. The radius 1/2 stays the same for every w, and the focal length on the optical axis is
+// f 2 tan(w / 2) / w. Domain: z > 0, and pixels with a distorted radius below pi / (2 w).
+class Fov {
+ public:
+  Fov(const Intrinsics& k, double w);
+  std::optional<Vector2d> project(const Vector3d& point) const;
+  std::optional<Projection> project_with_jacobian(const Vector3d& point) const;
+  std::optional<Vector3d> unproject(const Vector2d& pixel) const;
+  const Intrinsics& intrinsics() const { return k_; }
+  std::vector<double> distortion() const { return {w_}; }
+  static constexpr std::string_view kName = "fov";
+
+ private:
+  double scale(double radius) const;  // distorted radius / radius
+
+  Intrinsics k_;
+  double w_ = 0, slope_ = 0;  // slope: 2 tan(w / 2)
+};
+
+using CameraModel = std::variant<Pinhole, PinholeRadTan, KannalaBrandt, Unified, ExtendedUnified, DoubleSphere, Fov>;
 
 // Name of the model in rig files.
 std::string_view model_name(const CameraModel& model);

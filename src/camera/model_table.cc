@@ -52,13 +52,20 @@ ModelRow double_sphere() {
           [](const Intrinsics& k, const auto& p) -> CameraModel { return DoubleSphere(k, p[0], p[1]); }};
 }
 
+// A smaller w is a pinhole to all digits; tan(w / 2) is infinite at pi.
+ModelRow fov() {
+  return {Fov::kName, {{"w", 1e-6, 3.14}}, {1}, [](const Intrinsics& k, const auto& p) -> CameraModel {
+            return Fov(k, p[0]);
+          }};
+}
+
 }  // namespace
 
 bool ModelRow::takes(std::size_t count) const { return std::ranges::find(counts, count) != counts.end(); }
 
 const std::vector<ModelRow>& model_table() {
-  static const std::vector<ModelRow> table = {pinhole(), pinhole_radtan(),   kannala_brandt(),
-                                              unified(), extended_unified(), double_sphere()};
+  static const std::vector<ModelRow> table = {
+      pinhole(), pinhole_radtan(), kannala_brandt(), unified(), extended_unified(), double_sphere(), fov()};
   return table;
 }
 

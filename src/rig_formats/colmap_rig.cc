@@ -31,13 +31,14 @@ struct ColmapModel {
   std::string_view name, model;
   std::size_t focal_lengths, coefficients, ours;
 };
-constexpr std::array<ColmapModel, 7> kModels = {{{"SIMPLE_PINHOLE", camera::Pinhole::kName, 1, 0, 0},
+constexpr std::array<ColmapModel, 8> kModels = {{{"SIMPLE_PINHOLE", camera::Pinhole::kName, 1, 0, 0},
                                                  {"PINHOLE", camera::Pinhole::kName, 2, 0, 0},
                                                  {"SIMPLE_RADIAL", camera::PinholeRadTan::kName, 1, 1, 4},
                                                  {"RADIAL", camera::PinholeRadTan::kName, 1, 2, 4},
                                                  {"OPENCV", camera::PinholeRadTan::kName, 2, 4, 4},
                                                  {"FULL_OPENCV", camera::PinholeRadTan::kName, 2, 8, 8},
-                                                 {"OPENCV_FISHEYE", camera::KannalaBrandt::kName, 2, 4, 4}}};
+                                                 {"OPENCV_FISHEYE", camera::KannalaBrandt::kName, 2, 4, 4},
+                                                 {"FOV", camera::Fov::kName, 2, 1, 1}}};
 
 // File and line of a text, for errors.
 struct Place {
@@ -253,12 +254,15 @@ Result<camera::RigReading> read_solved(const fs::path& rigs, const fs::path& con
   return reading;
 }
 
+// The parameters in the first model of the table that holds all of them.
 std::string camera_parameters(const camera::CameraModel& model, std::string_view separator, std::string& name) {
   const camera::Intrinsics& k = camera::intrinsics(model);
   std::vector<double> d = needed_coefficients(model);
-  if (d.size() == 5) d.resize(8, 0.0);
-  const bool fisheye = std::holds_alternative<camera::KannalaBrandt>(model);
-  name = d.empty() ? "PINHOLE" : fisheye ? "OPENCV_FISHEYE" : d.size() == 4 ? "OPENCV" : "FULL_OPENCV";
+  const auto* written = std::ranges::find_if(kModels, [&](const ColmapModel& m) {
+    return m.model == camera::model_name(model) && m.focal_lengths == 2 && m.coefficients >= d.size();
+  });
+  d.resize(written->coefficients, 0.0);
+  name = written->name;
   d.insert(d.begin(), {k.fx, k.fy, k.cx + kPixelShift, k.cy + kPixelShift});
   std::vector<std::string> texts;
   for (const double value : d) texts.push_back(format_double(value));
@@ -302,7 +306,8 @@ Result<camera::RigReading> read_colmap_rig(const fs::path& folder) {
 
 Result<std::vector<NamedText>> colmap_rig_texts(const camera::Rig& rig, const std::string& out) {
   const RigLimits limits{.format = "a COLMAP rig",
-                         .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName},
+                         .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName,
+                                    camera::Fov::kName},
                          .body_frame = false};
   if (const Status status = check_limits(rig, out, limits); !status) return status.error();
   std::string cameras = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n";

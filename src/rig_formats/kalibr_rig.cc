@@ -30,6 +30,15 @@ constexpr std::array<KalibrModel, 4> kModels = {{{"pinhole", 4, "fu fv pu pv"},
                                                  {"eucm", 6, "alpha beta fu fv pu pv"},
                                                  {"ds", 6, "xi alpha fu fv pu pv"}}};
 
+// The distortion models of a pinhole camera, and the models of bslam.
+struct KalibrDistortion {
+  std::string_view name, model;
+};
+constexpr std::array<KalibrDistortion, 4> kDistortions = {{{"none", camera::Pinhole::kName},
+                                                           {"radtan", camera::PinholeRadTan::kName},
+                                                           {"equidistant", camera::KannalaBrandt::kName},
+                                                           {"fov", camera::Fov::kName}}};
+
 Result<std::vector<double>> read_coefficients(const yaml::YamlMap& yaml, const std::string& distortion_model) {
   if (distortion_model == "none" && !yaml.has("distortion_coeffs")) return std::vector<double>();
   auto coefficients = yaml.numbers("distortion_coeffs");
@@ -40,15 +49,13 @@ Result<std::vector<double>> read_coefficients(const yaml::YamlMap& yaml, const s
 }
 
 Status read_pinhole(const yaml::YamlMap& yaml, const std::string& distortion_model, camera::CameraDescription& d) {
-  if (distortion_model == "none") {
-    d.model = camera::Pinhole::kName;
-  } else if (distortion_model == "radtan") {
-    d.model = camera::PinholeRadTan::kName;
-  } else if (distortion_model == "equidistant") {
-    d.model = camera::KannalaBrandt::kName;
-  } else {
-    return yaml.error("distortion_model", distortion_model, "one of: none, radtan, equidistant");
+  const auto* distortion = std::ranges::find(kDistortions, distortion_model, &KalibrDistortion::name);
+  if (distortion == kDistortions.end()) {
+    std::vector<std::string_view> names;
+    for (const KalibrDistortion& known : kDistortions) names.push_back(known.name);
+    return yaml.error("distortion_model", distortion_model, fmt::format("one of: {}", fmt::join(names, ", ")));
   }
+  d.model = distortion->model;
   return {};
 }
 
@@ -181,8 +188,8 @@ KalibrNumbers numbers_of(const camera::CameraModel& model) {
   if (std::holds_alternative<camera::DoubleSphere>(model)) {
     return {"ds", "none", {d[0], d[1], k.fx, k.fy, k.cx, k.cy}, {}};
   }
-  const bool fisheye = std::holds_alternative<camera::KannalaBrandt>(model);
-  return {"pinhole", d.empty() ? "none" : fisheye ? "equidistant" : "radtan", {k.fx, k.fy, k.cx, k.cy}, d};
+  const auto* distortion = std::ranges::find(kDistortions, camera::model_name(model), &KalibrDistortion::model);
+  return {"pinhole", distortion->name, {k.fx, k.fy, k.cx, k.cy}, d};
 }
 
 std::string transform_text(const char* key, const SE3& T) {
@@ -237,7 +244,7 @@ Result<std::string> kalibr_rig_text(const camera::Rig& rig, const std::string& o
   const RigLimits limits{
       .format = "Kalibr's camchain",
       .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName,
-                 camera::Unified::kName, camera::ExtendedUnified::kName, camera::DoubleSphere::kName},
+                 camera::Unified::kName, camera::ExtendedUnified::kName, camera::DoubleSphere::kName, camera::Fov::kName},
       .time_offsets = Supports::kEach,
       .max_coefficients = 4};
   if (const Status status = check_limits(rig, out, limits); !status) return status.error();

@@ -15,6 +15,7 @@
 #include "rig_formats/kalibr_rig.h"
 #include "rig_formats/kitti_calib.h"
 #include "rig_formats/kitti_raw_rig.h"
+#include "rig_formats/okvis_rig.h"
 #include "rig_formats/orbslam_rig.h"
 #include "yaml/yaml_map.h"
 
@@ -81,7 +82,7 @@ struct FormatEntry {
 
 // The first format that recognises a file reads it, so that errors refer to the right format. The variant of OpenVINS
 // is read by the reader of Kalibr.
-constexpr std::array<FormatEntry, 9> kFormats = {{
+constexpr std::array<FormatEntry, 10> kFormats = {{
     {RigFormat::kBslam, "bslam", "a bslam rig (bslam_rig: 1)",
      [](std::string_view t) { return has_line(t, "bslam_rig"); }, read_bslam_rig},
     {RigFormat::kBasalt, "basalt", "a Basalt calibration (value0: T_imu_cam)",
@@ -98,6 +99,9 @@ constexpr std::array<FormatEntry, 9> kFormats = {{
        return has_line(t, "Camera.type") || has_line(t, "Camera.fx") || has_line(t, "Camera1.fx");
      },
      read_orbslam_rig},
+    {RigFormat::kOkvis2, "okvis2", "an OKVIS2 configuration (cameras: T_SC)",
+     [](std::string_view t) { return has_line(t, "cameras") && (has(t, "T_SC") || has(t, "image_dimension")); },
+     read_okvis_rig},
     {RigFormat::kEuroc, "euroc", "an EuRoC sensor.yaml",
      [](std::string_view t) { return has_line(t, "T_BS") || has_line(t, "camera_model"); }, read_euroc_file},
     {RigFormat::kKittiRaw, "kitti-raw", "a KITTI calib_cam_to_cam.txt",
@@ -107,7 +111,7 @@ constexpr std::array<FormatEntry, 9> kFormats = {{
 }};
 
 constexpr std::array kWritable = {RigFormat::kBslam,    RigFormat::kEuroc,  RigFormat::kKalibr, RigFormat::kOpenvins,
-                                  RigFormat::kOrbslam3, RigFormat::kBasalt, RigFormat::kColmap};
+                                  RigFormat::kOrbslam3, RigFormat::kOkvis2, RigFormat::kBasalt, RigFormat::kColmap};
 
 Result<RigFile> as_file(Result<camera::RigReading> reading, RigFormat format) {
   if (!reading) return reading.error();
@@ -166,6 +170,8 @@ Status write_as(const camera::Rig& rig, RigFormat format, const fs::path& out) {
       return write_text(openvins_rig_text(rig, out.string()), out);
     case RigFormat::kOrbslam3:
       return write_text(orbslam_rig_text(rig, out.string()), out);
+    case RigFormat::kOkvis2:
+      return write_text(okvis_rig_text(rig, out.string()), out);
     case RigFormat::kBasalt:
       return write_text(basalt_rig_text(rig, out.string()), out);
     case RigFormat::kColmap:

@@ -19,6 +19,7 @@ using map::BundledMap;
 std::string_view colmap_name(const camera::CameraModel& model) {
   if (std::holds_alternative<camera::Pinhole>(model)) return "PINHOLE";
   if (std::holds_alternative<camera::KannalaBrandt>(model)) return "OPENCV_FISHEYE";
+  if (std::holds_alternative<camera::Fov>(model)) return "FOV";
   if (!std::holds_alternative<camera::PinholeRadTan>(model)) return "";
   return camera::distortion(model).size() == 4 ? "OPENCV" : "FULL_OPENCV";
 }

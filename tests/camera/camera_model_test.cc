@@ -78,15 +78,21 @@ TEST_P(CameraModelOf, JacobianAgreesWithFiniteDifferences) {
   }
 }
 
+// The focal length on the optical axis divided by fx of the model. That of the double sphere refers to the second sphere centre,
+// and that of the field-of-view model to the radius 1/2.
+double magnification_on_axis(const CameraModel& model) {
+  if (const auto* sphere = std::get_if<DoubleSphere>(&model)) return 1 / (1 + sphere->distortion()[0]);
+  if (const auto* fov = std::get_if<Fov>(&model)) return 2 * std::tan(fov->distortion()[0] / 2) / fov->distortion()[0];
+  return 1;
+}
+
 TEST_P(CameraModelOf, JacobianIsCorrectOnTheOpticalAxis) {
   const auto projection = GetParam().project_with_jacobian({0, 0, 2.0});
   ASSERT_TRUE(projection);
   const Intrinsics& k = intrinsics(GetParam().model);
   EXPECT_LT((projection->pixel - Vector2d(k.cx, k.cy)).norm(), 1e-9);
   Matrix23d expected;
-  // The focal length of the double sphere model refers to the second sphere centre.
-  const auto* sphere = std::get_if<DoubleSphere>(&GetParam().model);
-  const double depth = sphere ? 2 * (1 + sphere->distortion()[0]) : 2;
+  const double depth = 2 / magnification_on_axis(GetParam().model);
   expected << k.fx / depth, 0, 0, 0, k.fy / depth, 0;
   EXPECT_NEAR(GetParam().radians_per_pixel(), depth / (k.fx + k.fy), 1e-12);
   EXPECT_LT((projection->jacobian - expected).norm(), 1e-9);

@@ -41,14 +41,20 @@ inline std::vector<Camera> test_cameras() {
       camera("ucm_below_half", Unified({260, 259, 322, 238}, 0.4), 640, 480),
       camera("eucm", ExtendedUnified({235, 234, 318, 240}, 0.6, 1.1), 640, 480),
       camera("eucm_below_half", ExtendedUnified({235, 234, 318, 240}, 0.45, 0.9), 640, 480),
+      // The published calibration of TUM monoVO's wide lens, its fractions of the image in pixels; a lens whose image
+      // reaches beyond the model's domain in the corners; and hardly any distortion.
+      camera("fov_monovo", Fov({685.720714, 685.636463, 630.858138, 511.918473}, 0.897966326944875), 1280, 1024),
+      camera("fov_wide", Fov({280, 281, 319.5, 239.5}, 1.2), 640, 480),
+      camera("fov_faint", Fov({500, 501, 322, 238}, 0.01), 640, 480),
       // A field of view of 220 degrees, which includes points behind the image plane.
       camera("fisheye_wide", KannalaBrandt({130.0, 131.0, 319.5, 239.5}, {-0.01, 0.002, -0.0003, 0.00001}), 640, 480),
   };
 }
 
-inline bool is_sphere_model(const CameraModel& model) {
-  return std::holds_alternative<Unified>(model) || std::holds_alternative<ExtendedUnified>(model) ||
-         std::holds_alternative<DoubleSphere>(model);
+// Whether OpenCV has the model.
+inline bool is_opencv_model(const CameraModel& model) {
+  return std::holds_alternative<Pinhole>(model) || std::holds_alternative<PinholeRadTan>(model) ||
+         std::holds_alternative<KannalaBrandt>(model);
 }
 
 }  // namespace bslam::camera

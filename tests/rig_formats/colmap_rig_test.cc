@@ -1,4 +1,5 @@
 // Reading and writing of COLMAP rigs.
+#include "base/atomic_file.h"
 #include "camera/test_cameras.h"
 #include "rig_formats/rig_formats.h"
 
@@ -37,6 +38,20 @@ TEST_F(ColmapRig, IsReadFromItsTextModel) {
   for (const char* name : {"cameras.txt", "rigs.txt"}) {
     EXPECT_EQ(read_rig_file(folder_.path() / "rig" / name)->rig.size(), 2u) << name;
   }
+}
+
+TEST_F(ColmapRig, HoldsTheFieldOfViewModel) {
+  const auto file = read_folder("1 FOV 640 480 300 301 320 240 0.9\n", "", "");
+  ASSERT_TRUE(file) << file.error().message();
+  const camera::Camera& camera = file->rig.camera(index(0));
+  EXPECT_EQ(camera::model_name(camera.model), "fov");
+  EXPECT_EQ(camera::distortion(camera.model), std::vector{0.9});
+  EXPECT_EQ(camera::intrinsics(camera.model).cx, 319.5);
+  ASSERT_TRUE(write_rig_as(file->rig, RigFormat::kColmap, folder_.path() / "out"));
+  const std::string written = read_file(folder_.path() / "out" / "cameras.txt", 4096).value();
+  EXPECT_NE(written.find("1 FOV 640 480 300.0 301.0 320.0 240.0 0.9\n"), std::string::npos) << written;
+  EXPECT_EQ(read_folder("1 FOV 640 480 300 301 320 240\n", "", "").error().expected, "5 for FOV");
+  EXPECT_EQ(read_folder("1 FOV 640 480 300 301 320 240 4\n", "", "").error().expected, "w in [1e-06, 3.14]");
 }
 
 TEST_F(ColmapRig, IsReadFromItsRigConfiguration) {

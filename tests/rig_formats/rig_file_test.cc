@@ -26,7 +26,7 @@ camera::Rig euroc_rig() {
   const camera::Rig rig = mixed_rig();
   std::vector<int> chosen;
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    if (!camera::is_sphere_model(rig.camera(i).model)) chosen.push_back(static_cast<int>(i));
+    if (camera::is_opencv_model(rig.camera(i).model)) chosen.push_back(static_cast<int>(i));
   }
   return rig.subset(chosen);
 }
@@ -153,7 +153,7 @@ TEST_F(OwnRigFile, ErrorsNameTheKeyAndValue) {
 TEST_F(OwnRigFile, ErrorsSuggestKeysAndModels) {
   EXPECT_EQ(read_with("time_offset_s", "time_ofset_s").error().sentence, "unknown key; did you mean 'time_offset_s'?");
   EXPECT_EQ(read_with("pinhole-radtan", "telepathic").error().expected,
-            "one of: pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere");
+            "one of: pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere, fov");
 }
 
 TEST_F(OwnRigFile, RejectsMissingCamerasAndRepeatedNames) {

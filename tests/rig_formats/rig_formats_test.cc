@@ -18,16 +18,22 @@ bool holds(RigFormat format, const camera::CameraModel& model) {
   const std::size_t coefficients = camera::distortion(model).size();
   const bool radtan = std::holds_alternative<camera::PinholeRadTan>(model);
   const bool pinhole = std::holds_alternative<camera::Pinhole>(model);
+  const bool fov = std::holds_alternative<camera::Fov>(model);
   switch (format) {
     case RigFormat::kKalibr:
       return !radtan || coefficients == 4;
     case RigFormat::kOpenvins:
-      return !camera::is_sphere_model(model) && !pinhole && (!radtan || coefficients == 4);
+      return camera::is_opencv_model(model) && !pinhole && (!radtan || coefficients == 4);
     case RigFormat::kOrbslam3:
-      return !camera::is_sphere_model(model) && (!radtan || coefficients <= 5);
+      return camera::is_opencv_model(model) && (!radtan || coefficients <= 5);
+    case RigFormat::kOkvis2:
+      return camera::is_opencv_model(model) && !pinhole;
     case RigFormat::kEuroc:
+      return camera::is_opencv_model(model);
     case RigFormat::kColmap:
-      return !camera::is_sphere_model(model);
+      return camera::is_opencv_model(model) || fov;
+    case RigFormat::kBasalt:
+      return !fov;
     default:
       return true;
   }
@@ -118,7 +124,8 @@ TEST_P(RigFormatOf, RejectsContentItCannotStore) {
 
 // A rig that was read is bitwise identical after conversion to another format that stores the same numbers.
 TEST_F(RigFormats, ConversionsAreBitwiseExact) {
-  for (const RigFormat format : {RigFormat::kBslam, RigFormat::kEuroc, RigFormat::kOpenvins, RigFormat::kBasalt}) {
+  for (const RigFormat format :
+       {RigFormat::kBslam, RigFormat::kEuroc, RigFormat::kOpenvins, RigFormat::kOkvis2, RigFormat::kBasalt}) {
     const camera::Rig first = read(rig_to_yaml(rigs_for(format).front())).value().rig;
     const fs::path out = folder_.path() / (format == RigFormat::kEuroc ? "out" : "out.txt");
     ASSERT_TRUE(write_rig_as(first, format, out));
@@ -250,13 +257,33 @@ TEST_F(RigFormats, KalibrOmniBecomesTheUnifiedModel) {
   EXPECT_EQ(distorted.error().found, "omni with distortion");
 }
 
+TEST_F(RigFormats, KalibrStoresFovAsADistortionOfThePinhole) {
+  const std::string text = R"(cam0:
+  camera_model: pinhole
+  distortion_coeffs: [0.9271]
+  distortion_model: fov
+  intrinsics: [256.9, 257.1, 319.5, 239.5]
+  resolution: [640, 480]
+)";
+  const auto file = read(text);
+  ASSERT_TRUE(file) << file.error().message();
+  const camera::Camera& camera = file->rig.camera(index(0));
+  EXPECT_EQ(camera::model_name(camera.model), "fov");
+  EXPECT_EQ(camera::distortion(camera.model), std::vector{0.9271});
+  EXPECT_EQ(camera::intrinsics(camera.model).fy, 257.1);
+  const Error two = read_with(text, "[0.9271]", "[0.9271, 0.0]").error();
+  EXPECT_EQ(two.key, "cam0.distortion_coeffs");
+  EXPECT_EQ(two.expected, "1, w, for fov");
+  EXPECT_EQ(read_with(text, "[0.9271]", "[0.0]").error().expected, "w in [1e-06, 3.14]");
+}
+
 TEST_F(RigFormats, KalibrRejectsInvalidValues) {
   struct Case {
     const char *from, *to, *key;
   };
   for (const Case& c :
        {Case{"camera_model: pinhole", "camera_model: telepathic", "cam0.camera_model"},
-        Case{"distortion_model: radtan", "distortion_model: fov", "cam0.distortion_model"},
+        Case{"distortion_model: radtan", "distortion_model: fog", "cam0.distortion_model"},
         Case{"[458.0, 457.0,", "[458.0,", "cam0.intrinsics"}, Case{"[-0.2, 0.6, 350.0,", "[350.0,", "cam1.intrinsics"},
         Case{"[-0.2, 0.6, 350.0,", "[-2.0, 0.6, 350.0,", "cam1.distortion_coeffs"},
         Case{"[0.0, -1.0, 0.0, 0.1]", "[0.0, 1.0, 0.0, 0.1]", "cam0.T_cam_imu"},

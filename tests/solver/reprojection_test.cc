@@ -16,7 +16,8 @@ std::vector<camera::CameraModel> every_model() {
           camera::KannalaBrandt(k, {0.01, -0.004, 0.002, -0.0005}),
           camera::Unified(k, 0.6),
           camera::ExtendedUnified(k, 0.57, 1.1),
-          camera::DoubleSphere(k, -0.2, 0.58)};
+          camera::DoubleSphere(k, -0.2, 0.58),
+          camera::Fov(k, 0.9)};
 }
 
 // Jacobian of the prediction by central differences of the error, which is the observation minus the prediction.

@@ -1,5 +1,6 @@
 #include "storage/map_export.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <sstream>
@@ -107,6 +108,18 @@ TEST(ColmapModel, PointsProjectToTheirObservations) {
   }
   EXPECT_EQ(checked, map.num_observations());
   EXPECT_GT(close, checked / 2);  // the submap without true positions does not agree
+}
+
+TEST(ColmapModel, SupportsTheFieldOfViewModel) {
+  const camera::Rig ring = synthetic::ring_rig(1);
+  camera::Camera camera = ring.camera(0);
+  camera.model = camera::Fov({300, 301, 375.5, 239.5}, 0.9);
+  const auto model = colmap_model(
+      map::BundledMap(std::make_shared<const camera::Rig>(camera::Rig({{camera, ring.body_from_cam(0)}}))));
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_NE(model->cameras.find(fmt::format("1 FOV {} {} 300 301 376 240 0.9\n", camera.width, camera.height)),
+            std::string::npos)
+      << model->cameras;
 }
 
 TEST(ColmapModel, RejectsModelsUnknownToColmap) {
