@@ -36,9 +36,9 @@ struct CameraCalibration {
 class BSLAM_EXPORT Rig {
  public:
   // Reads a calibration of any known format, recognised by its content: bslam, EuRoC, Kalibr, OpenVINS, ORB-SLAM3,
-  // OKVIS2, Basalt, COLMAP, KITTI; or the calibration in the folder of a data set. Errors name file and key: a file that
-  // cannot be read or has an unknown format, values out of range, a mask that is not an 8-bit grey PNG of the camera's
-  // resolution.
+  // OKVIS2, Basalt, COLMAP, KITTI; or the calibration in the folder of a data set. Errors name file and key: a file
+  // that cannot be read or has an unknown format, values out of range, a mask that is not an 8-bit grey PNG of the
+  // camera's resolution.
   static Result<Rig> load(const std::filesystem::path& file);
 
   // Creates a rig from calibrations; the first one is camera 0. Errors: no camera; as for `load`, values out of range,

@@ -11,6 +11,8 @@
 namespace bslam {
 namespace {
 
+constexpr const char* kWritable = "a file that can be written";
+
 // Owns a file descriptor; -1 if there is none.
 class Descriptor {
  public:
@@ -55,17 +57,34 @@ int open_beside(const std::filesystem::path& path, std::filesystem::path& name) 
   }
 }
 
+// An existing file can be replaced by another one; a folder or a device cannot.
+Status check_replaceable(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) return {};
+  return Error{path.string(), "", "something other than a regular file", "a regular file or a new name"};
+}
+
 }  // namespace
 
+Status check_writable(const std::filesystem::path& path) {
+  if (Status replaceable = check_replaceable(path); !replaceable) return replaceable;
+  std::filesystem::path part;
+  const Descriptor file(open_beside(path, part));
+  if (file.get() < 0) return system_error("write", path, kWritable);
+  ::unlink(part.c_str());
+  return {};
+}
+
 Status write_atomically(const std::filesystem::path& path, std::string_view bytes) {
-  const std::string expected = "a file that can be written";
+  if (Status replaceable = check_replaceable(path); !replaceable) return replaceable;
   std::filesystem::path part;
   Descriptor file(open_beside(path, part));
-  if (file.get() < 0) return system_error("write", path, expected);
+  if (file.get() < 0) return system_error("write", path, kWritable);
   const bool written = write_all(file.get(), bytes) && ::fsync(file.get()) == 0 && file.close() &&
                        ::rename(part.c_str(), path.c_str()) == 0;
   if (!written) {
-    const Error error = system_error("write", path, expected);
+    const Error error = system_error("write", path, kWritable);
     ::unlink(part.c_str());
     return error;
   }

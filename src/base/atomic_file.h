@@ -11,8 +11,14 @@
 namespace bslam {
 
 // Writes `bytes` to a temporary file in the same folder, flushes it to disk and renames it to `path`. The folder must
-// exist. An existing file is replaced. On error the temporary file is removed and an existing file is unchanged.
+// exist. An existing regular file is replaced; a device, for example, is an error. On error the temporary file is
+// removed and an existing file is unchanged.
 Status write_atomically(const std::filesystem::path& path, std::string_view bytes);
+
+// Checks whether write_atomically could write a file of this name, by creating and removing a temporary file in its
+// folder. Errors: the folder does not exist or is not writable; the name belongs to something other than a regular
+// file.
+Status check_writable(const std::filesystem::path& path);
 
 // Returns the contents of a regular file. Errors: the file cannot be opened or read, is not a regular file, or is
 // larger than `max_bytes`.

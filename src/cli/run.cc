@@ -72,6 +72,7 @@ Status prepare_folder(const RunArguments& arguments) {
   }
   std::filesystem::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
+  if (const Status status = check_writable(folder / "summary.json"); !status) return status;
   for (const char* name : {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "rig_refined.yaml"}) {
     const auto is = [&](const std::string& input) {
       return !input.empty() && std::filesystem::equivalent(folder / name, input, error);
@@ -86,15 +87,17 @@ Status prepare_folder(const RunArguments& arguments) {
   return {};
 }
 
-// Checks before the run whether the file can be created later. An existing file will be replaced.
-Status check_output_file(const std::string& file, const char* option) {
+// Checks before the run whether the file can be written after it. An existing file is replaced only with --overwrite.
+Status check_output_file(const std::string& file, const char* option, bool overwrite) {
   if (file.empty()) return {};
   std::error_code error;
   const std::filesystem::path path(file), folder = path.has_parent_path() ? path.parent_path() : ".";
   if (std::filesystem::is_directory(path, error)) return Error{file, option, "a folder", "the name of a file"};
   if (!std::filesystem::is_directory(folder, error))
     return Error{folder.string(), option, "no such folder", "an existing folder"};
-  return {};
+  if (std::filesystem::is_regular_file(path, error) && !overwrite)
+    return Error{file, option, "an existing file", "a new name, or --overwrite"};
+  return check_writable(path);
 }
 
 Result<std::optional<execution::Journal>> read_journal(const std::string& file) {
@@ -163,7 +166,7 @@ int run(const RunArguments& arguments) {
   if (!map) return report_error(map.error());
   for (const auto& [option, file] :
        {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
-    if (const Status s = check_output_file(file, option); !s) return report_error(s.error());
+    if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return report_error(s.error());
   }
   if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
   print_before(*dataset, log_verbosity(arguments.log_level));
@@ -230,7 +233,7 @@ void add_run(CLI::App& app, int& exit_status) {
       ->check(CLI::IsMember({"error", "warning", "info", "debug"}))
       ->capture_default_str();
   verb->add_flag("--overwrite", a->overwrite,
-                 "write into a folder that is not empty; files of an earlier run are replaced");
+                 "write into a folder that is not empty; files of an earlier run, a map and a journal are replaced");
   verb->callback([a, &exit_status] { exit_status = run(*a); });
 }
 

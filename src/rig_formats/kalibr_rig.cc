@@ -241,12 +241,12 @@ Result<camera::RigReading> read_kalibr_rig(const fs::path& file, const std::stri
 }
 
 Result<std::string> kalibr_rig_text(const camera::Rig& rig, const std::string& out) {
-  const RigLimits limits{
-      .format = "Kalibr's camchain",
-      .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName,
-                 camera::Unified::kName, camera::ExtendedUnified::kName, camera::DoubleSphere::kName, camera::Fov::kName},
-      .time_offsets = Supports::kEach,
-      .max_coefficients = 4};
+  const RigLimits limits{.format = "Kalibr's camchain",
+                         .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName,
+                                    camera::Unified::kName, camera::ExtendedUnified::kName, camera::DoubleSphere::kName,
+                                    camera::Fov::kName},
+                         .time_offsets = Supports::kEach,
+                         .max_coefficients = 4};
   if (const Status status = check_limits(rig, out, limits); !status) return status.error();
   std::string text;
   for (std::size_t i = 0; i < rig.size(); ++i) {

@@ -16,7 +16,8 @@ namespace bslam::rig_formats {
 
 enum class RigFormat { kBslam, kEuroc, kKalibr, kOpenvins, kOrbslam3, kOkvis2, kBasalt, kColmap, kKitti, kKittiRaw };
 
-// Returns the name on the command line: bslam, euroc, kalibr, openvins, orbslam3, okvis2, basalt, colmap, kitti, kitti-raw.
+// Returns the name on the command line: bslam, euroc, kalibr, openvins, orbslam3, okvis2, basalt, colmap, kitti,
+// kitti-raw.
 std::string_view format_name(RigFormat format);
 // Returns a format that can be written, by its name: all except those of KITTI.
 std::span<const RigFormat> writable_formats();

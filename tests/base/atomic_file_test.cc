@@ -43,6 +43,26 @@ TEST(AtomicFile, RemovesTheTemporaryFileOnError) {
   EXPECT_EQ(entries(folder.path()), 1);
 }
 
+TEST(AtomicFile, NeverReplacesWhatIsNoRegularFile) {
+  const support::TemporaryFolder folder;
+  const fs::path pipe = folder.path() / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(write_atomically(pipe, "text").error().found, "something other than a regular file");
+  EXPECT_FALSE(check_writable(pipe));
+  EXPECT_TRUE(fs::is_fifo(pipe));
+  EXPECT_EQ(entries(folder.path()), 1);
+}
+
+TEST(AtomicFile, CanBeCheckedBeforehand) {
+  const support::TemporaryFolder folder;
+  EXPECT_TRUE(check_writable(folder.path() / "new"));
+  EXPECT_EQ(entries(folder.path()), 0);
+  EXPECT_FALSE(check_writable(folder.path() / "none" / "new"));
+  support::write_text(folder.path() / "old", "text");
+  EXPECT_TRUE(check_writable(folder.path() / "old"));
+  EXPECT_EQ(read_file(folder.path() / "old", 10).value(), "text");
+}
+
 TEST(AtomicFile, HasTheUsualPermissions) {
   const support::TemporaryFolder folder;
   const mode_t old = ::umask(022);

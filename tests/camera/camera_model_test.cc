@@ -78,8 +78,8 @@ TEST_P(CameraModelOf, JacobianAgreesWithFiniteDifferences) {
   }
 }
 
-// The focal length on the optical axis divided by fx of the model. That of the double sphere refers to the second sphere centre,
-// and that of the field-of-view model to the radius 1/2.
+// The focal length on the optical axis divided by fx of the model. That of the double sphere refers to the second
+// sphere centre, and that of the field-of-view model to the radius 1/2.
 double magnification_on_axis(const CameraModel& model) {
   if (const auto* sphere = std::get_if<DoubleSphere>(&model)) return 1 / (1 + sphere->distortion()[0]);
   if (const auto* fov = std::get_if<Fov>(&model)) return 2 * std::tan(fov->distortion()[0] / 2) / fov->distortion()[0];

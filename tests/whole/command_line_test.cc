@@ -224,6 +224,9 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
   const auto saved = summary_of("saved", "--mode sequential --cameras 0,1 --save-map " + out("saved.map"));
   EXPECT_EQ(saved["map"]["loaded"], false);
   EXPECT_EQ(saved["maps_started"], 1);
+  const Ran again = run("run " + data() + " --out " + out("unsaved") + " --save-map " + out("saved.map"));
+  EXPECT_EQ(again.status, 2);
+  EXPECT_NE(again.err.find("--overwrite"), std::string::npos) << again.err;
   ASSERT_EQ(saved["parts"].size(), 1u);
   EXPECT_EQ(saved["parts"][0]["trajectory"], "trajectory.tum");
 
