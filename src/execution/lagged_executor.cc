@@ -20,13 +20,13 @@ struct Job {
   StageResult result;
   std::exception_ptr failure;
   double ms = 0;
-  bool done = false;  // guarded by the executor's mutex
+  bool done = false;      // guarded by the executor's mutex, as the one below
+  bool observed = false;  // by the worker, because the job was stopped before it was done
 };
 
 // What runs a lane's jobs, one after the other: it decides nothing.
 struct Worker {
   std::deque<std::shared_ptr<Job>> handed;  // more than one only while a superseded one comes to its end
-  std::shared_ptr<Job> running;
   std::jthread thread;
 };
 
@@ -74,9 +74,9 @@ class LaggedExecutor : public StageExecutor {
   void interrupt() override {
     const std::lock_guard lock(mutex_);
     interrupted_ = true;
-    for (Worker& w : workers_) {
-      w.handed.clear();
-      if (w.running) w.running->stop.request_stop();
+    for (Worker& w : workers_) w.handed.clear();
+    for (Lane& l : lanes_) {
+      if (l.running) l.running->stop.request_stop();
     }
     changed_.notify_all();
   }
@@ -87,10 +87,12 @@ class LaggedExecutor : public StageExecutor {
   }
 
  private:
-  // The caller's view of a lane; its thread alone looks at it.
+  // The caller's view of a lane. Only the caller's thread changes it.
   struct Lane {
     std::deque<StageTask> waiting;
-    std::shared_ptr<Job> running;  // begun and not committed yet, whether its worker is there or not
+    // Begun and not settled yet, whether or not its worker is done with it. Changed with mutex_ held, because
+    // interrupt() reads it.
+    std::shared_ptr<Job> running;
   };
 
   Lane& lane(Stage stage) { return lanes_[static_cast<std::size_t>(stage)]; }
@@ -109,7 +111,13 @@ class LaggedExecutor : public StageExecutor {
   }
 
   void rethrow() const {
+    const std::lock_guard lock(mutex_);
     if (failure_) std::rethrow_exception(failure_);
+  }
+
+  void fail(const std::exception_ptr& failure) {
+    const std::lock_guard lock(mutex_);
+    failure_ = failure;
   }
 
   // Whether a lane is full is a matter of counts: then its task under way is committed early.
@@ -123,55 +131,69 @@ class LaggedExecutor : public StageExecutor {
   void start_next(Stage stage) {
     Lane& l = lane(stage);
     if (l.waiting.empty()) return;
-    l.running = std::make_shared<Job>();
-    l.running->task = l.waiting.front();
-    l.running->base = gate_.newest();
-    l.running->started = now_;
+    auto job = std::make_shared<Job>();
+    job->task = l.waiting.front();
+    job->base = gate_.newest();
+    job->started = now_;
     l.waiting.pop_front();
     const std::lock_guard lock(mutex_);
-    if (interrupted_) return;  // nobody will do it, and nobody will wait for it
-    worker(stage).handed.push_back(l.running);
+    if (interrupted_) return l.waiting.clear();
+    l.running = job;
+    worker(stage).handed.push_back(std::move(job));
     changed_.notify_all();
   }
 
-  // Waits for the lane's task under way and commits it, then what follows and the lane's next one start.
+  // Waits for the lane's task under way and commits it, then what follows and the lane's next one start. A task that
+  // was stopped is only removed. It stays in the lane until then, so that interrupt() can still stop it.
   void settle(Stage stage) {
-    Lane& l = lane(stage);
-    const std::shared_ptr<Job> job = std::exchange(l.running, nullptr);
-    if (!wait_for(*job)) {
-      l.waiting.clear();
-      return;
-    }
-    if (job->failure) {
-      failure_ = job->failure;
-      rethrow();
-    }
-    if (const auto superseded = superseded_by(stage, job->result, *gate_.newest())) supersede(*superseded);
-    std::vector<StageStatistic> statistics = std::move(job->result.statistics);
-    const bool committed = gate_.settle(job->task, job->base->version(), std::move(job->result), job->stop.get_token());
-    observe(setup_, {job->task, job->ms, committed, std::move(statistics)});
+    const std::shared_ptr<Job> job = lane(stage).running;
+    const bool committed = wait_for(*job) && commit_result(*job);
+    leave(stage);
     if (const auto next = following(job->task, setup_.functions); committed && next) push(*next);
     start_next(stage);
   }
 
-  // False where interrupted before it was done.
+  // Returns false if interrupted before the job was done.
   bool wait_for(const Job& job) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return job.done || interrupted_; });
     return job.done;
   }
 
+  // Commits the result of a job that is done, and tells the observer.
+  bool commit_result(Job& job) {
+    const std::stop_token stop = job.stop.get_token();
+    if (job.failure && !stop.stop_requested()) {  // what a stopped task ended with does not count
+      fail(job.failure);
+      rethrow();
+    }
+    if (const auto superseded = superseded_by(job.task.stage, job.result, *gate_.newest())) supersede(*superseded);
+    const bool committed = gate_.settle(job.task, job.base->version(), std::move(job.result), stop);
+    if (!job.observed) observe(setup_, {job.task, job.ms, committed});
+    return committed;
+  }
+
+  // Removes the task under way from its lane and returns it.
+  std::shared_ptr<Job> leave(Stage stage) {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(lane(stage).running, nullptr);
+  }
+
   // Drops what waits and stops what runs in a lane.
   void supersede(Stage stage) {
-    Lane& l = lane(stage);
-    l.waiting.clear();
-    const std::shared_ptr<Job> job = std::exchange(l.running, nullptr);
+    lane(stage).waiting.clear();
+    const std::shared_ptr<Job> job = leave(stage);
     if (!job) return;
-    const std::lock_guard lock(mutex_);
-    std::erase(worker(stage).handed, job);
-    job->stop.request_stop();
-    if (job->done) observe(setup_, {job->task, job->ms, false});  // else its worker tells
+    {
+      const std::lock_guard lock(mutex_);
+      std::erase(worker(stage).handed, job);
+      job->stop.request_stop();
+      if (!job->done || job->observed) return;  // its worker tells the observer
+    }
+    observe(setup_, {job->task, job->ms, false});
   }
+
+  // The functions below: in a worker's thread.
 
   void work(Worker& w) {
     while (const std::shared_ptr<Job> job = take(w)) {
@@ -182,12 +204,22 @@ class LaggedExecutor : public StageExecutor {
         job->failure = std::current_exception();
       }
       job->ms = watch.ms();
-      const std::lock_guard lock(mutex_);
-      w.running.reset();
-      job->done = true;
-      if (job->stop.stop_requested()) observe(setup_, {job->task, job->ms, false});
-      changed_.notify_all();
+      if (!finish(*job)) continue;
+      try {
+        observe(setup_, {job->task, job->ms, false});
+      } catch (...) {
+        fail(std::current_exception());
+      }
     }
+  }
+
+  // Returns whether the job was stopped, so that nobody else tells the observer of it.
+  bool finish(Job& job) {
+    const std::lock_guard lock(mutex_);
+    job.done = true;
+    job.observed = job.stop.stop_requested();
+    changed_.notify_all();
+    return job.observed;
   }
 
   // The next job; none where interrupted.
@@ -195,19 +227,19 @@ class LaggedExecutor : public StageExecutor {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return interrupted_ || !w.handed.empty(); });
     if (interrupted_) return nullptr;
-    w.running = std::move(w.handed.front());
+    std::shared_ptr<Job> job = std::move(w.handed.front());
     w.handed.pop_front();
-    return w.running;
+    return job;
   }
 
   MapGate& gate_;
   const ExecutionSetup setup_;
-  int now_ = 0;  // frames begun; of the caller's thread, as the two below
+  int now_ = 0;  // frames begun; of the caller's thread, as the one below
   std::array<Lane, kStages.size()> lanes_;
-  std::exception_ptr failure_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  bool interrupted_ = false;                    // guarded by mutex_, as what the workers are handed and run
+  std::exception_ptr failure_;  // guarded by mutex_, as the one below and what the workers are handed
+  bool interrupted_ = false;
   std::array<Worker, kStages.size()> workers_;  // last: they end before the rest goes
 };
 
