@@ -153,9 +153,8 @@ class ParallelExecutor : public StageExecutor {
       const std::lock_guard lock(mutex_);
       drop(lane(*superseded));
     }
-    std::vector<StageStatistic> statistics = std::move(result.statistics);
     const bool committed = gate_.settle(task, base->version(), std::move(result), stop);
-    observe(setup_, {task, watch.ms(), committed, std::move(statistics)});
+    observe(setup_, {task, watch.ms(), committed});
     return committed;
   }
 

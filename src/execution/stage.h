@@ -8,7 +8,6 @@
 #include <optional>
 #include <stop_token>
 #include <string_view>
-#include <vector>
 
 #include "base/id.h"
 #include "map/map_store.h"
@@ -28,19 +27,12 @@ struct StageTask {
   friend bool operator==(const StageTask&, const StageTask&) = default;
 };
 
-// A figure a stage reports about its run: landmarks created, observations adjusted, ...
-struct StageStatistic {
-  std::string_view name;  // a literal
-  double value = 0;
-};
-
 struct StageResult {
   std::optional<map::MapDraft>
       draft;  // of the version the stage was given; none: nothing to change, and nothing follows
   // Called when the draft is in the map and never otherwise, in order of the commits and before the next one, by
   // whatever thread commits. For what is to be told of the result; may be empty.
   std::function<void(const map::CommitReport&)> committed;
-  std::vector<StageStatistic> statistics = {};
 };
 
 // Once a stop is requested its result no longer counts: it may return anything as soon as it can. The keyframe may have
@@ -68,7 +60,6 @@ struct StageRun {
   StageTask task;
   double ms = 0;
   bool committed = false;  // false: it had nothing to change, or was superseded
-  std::vector<StageStatistic> statistics = {};
 };
 
 // Called from any thread, also from several at once.

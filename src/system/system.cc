@@ -47,9 +47,8 @@ System::System(camera::Rig rig, Config config, Resources resources)
     const std::lock_guard lock(records_mutex_);
     loops_.push_back(loop);
   };
-  const auto note_run = [this, observer = std::move(resources.observer)](const execution::StageRun& run) {
+  const auto note_run = [this](const execution::StageRun& run) {
     const StageRecord record{run, keyframe_time(run.task.keyframe)};
-    if (observer) observer(record);
     const std::lock_guard lock(records_mutex_);
     stage_runs_.push_back(record);
   };

@@ -1,7 +1,6 @@
 // The whole system: images in, poses out. Owns the map and the threads.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -22,14 +21,11 @@
 
 namespace bslam::system {
 
-// One run of a background stage: its time and its figures.
+// One run of a background stage.
 struct StageRecord {
   execution::StageRun run;
   TimeNs time_ns = 0;  // of its keyframe
 };
-
-// Called after every run of a background stage, by any thread, also by several at once.
-using StageRecordObserver = std::function<void(const StageRecord&)>;
 
 // What a run may be given besides rig and configuration.
 struct Resources {
@@ -38,7 +34,6 @@ struct Resources {
   std::optional<map::BundledMap> map =
       {};  // of an earlier run with this rig; the run goes on in it once it finds its place
   std::optional<execution::Journal> replay = {};  // its run is repeated whatever the mode
-  StageRecordObserver observer = {};              // may be empty
   // For runs without end: records of this many last frames and stage runs at least are kept, and no journal. 0: all
   // are.
   std::size_t history = 0;
