@@ -82,6 +82,9 @@ struct FrameResult {
   int keyframe_id = -1;      // its id in the map then; else the keyframe the frame was tracked against; -1: none
   bool relocalised = false;  // found again after a loss, somewhere in the map
 
+  // The map was a wrong start: it was up to scale, and the rig was lost in it soon after. All poses and keyframes told
+  // so far are withdrawn, and the map is empty. Another one is started; ids of keyframes are not used again.
+  bool map_withdrawn = false;
   std::vector<StageTime> stages;
   double total_ms = 0;  // from handing over the images to having the pose
 };

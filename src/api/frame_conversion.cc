@@ -97,6 +97,7 @@ FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::R
   out.keyframe_id = result.anchored.reference.value();
   out.relocalised = record.relocalisation.has_value();
   for (const tracking::StageTime& s : record.stages) out.stages.push_back({s.stage, s.ms});
+  out.map_withdrawn = record.map_withdrawn;
   out.total_ms = record.frame_ms;
   return out;
 }

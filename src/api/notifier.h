@@ -22,6 +22,7 @@ class Notifier {
 
  private:
   void tell_status(const FrameResult& frame);
+  void tell_withdrawal(const FrameResult& frame);
   void tell_cameras(const FrameResult& frame);
   void tell_map(const system::System& system);
   void tell_loops(const system::System& system);

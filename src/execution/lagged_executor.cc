@@ -66,9 +66,9 @@ class LaggedExecutor : public StageExecutor {
     }
   }
 
-  void restart(map::BundledMap initial) override {
+  void restart() override {
     drain();
-    gate_.restart(std::move(initial));
+    gate_.restart();
   }
 
   void interrupt() override {

@@ -28,8 +28,8 @@ class MapGate {
   // if the stage had never run. Returns whether it was committed. From any thread.
   bool settle(const StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop);
 
-  // Replaces the map by another one; version numbers continue.
-  void restart(map::BundledMap initial);
+  // Empties the map; version numbers and ids continue.
+  void restart();
 
   // What was done so far; from any thread.
   Journal journal() const;

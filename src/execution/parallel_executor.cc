@@ -46,9 +46,9 @@ class ParallelExecutor : public StageExecutor {
     rethrow();
   }
 
-  void restart(map::BundledMap initial) override {
+  void restart() override {
     drain();
-    gate_.restart(std::move(initial));
+    gate_.restart();
   }
 
   void interrupt() override {

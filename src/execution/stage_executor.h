@@ -30,8 +30,8 @@ class StageExecutor {
   // Returns when all tasks enqueued, and those that followed them, are done and committed.
   virtual void drain() = 0;
 
-  // Drains, then replaces the map by another one.
-  virtual void restart(map::BundledMap initial) = 0;
+  // Drains, then empties the map.
+  virtual void restart() = 0;
 
   // The run is over; call after drain. Throws where a replayed run should have gone on.
   virtual void end() {}

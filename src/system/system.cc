@@ -37,6 +37,7 @@ System::System(camera::Rig rig, Config config, Resources resources)
       config_(std::move(config)),
       loaded_(resources.map.has_value()),
       first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0),
+      first_of_map_(first_keyframe_),
       pipeline_(rig_, config_, std::move(resources.masks), make_relocaliser(resources.vocabulary, config_)),
       history_(resources.history),
       store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)),
@@ -69,7 +70,9 @@ void System::give_up_young_map() {
   }
   early_.clear();
   pipeline_.restart();
-  executor_->restart(empty_map(rig_, config_));
+  executor_->restart();
+  first_of_map_ = KeyframeId(store_.snapshot()->keyframe_slots());
+  frames_.back().map_withdrawn = true;
 }
 
 void System::set_keyframe_time(KeyframeId k, TimeNs time_ns) {
@@ -105,7 +108,7 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
 bool System::refuted_young_map(const Pipeline::Outcome& outcome, bool had_pose) const {
   const map::BundledMap& seen = *outcome.seen;
   return had_pose && !loaded_ && disowns_map(outcome.record.result) && seen.scale() != map::Scale::kMetric &&
-         seen.keyframe_slots() <= kYoungMap;
+         seen.keyframe_slots() - first_of_map_.index() <= kYoungMap;
 }
 
 // Drops the oldest records once there are twice as many as asked for, so that a frame costs the same on average.

@@ -104,6 +104,7 @@ class System {
   const Config config_;
   const bool loaded_;                // a map of an earlier run
   const KeyframeId first_keyframe_;  // of this run
+  KeyframeId first_of_map_;          // after the last map that was withdrawn
   Pipeline pipeline_;
   const std::size_t history_;  // as in Resources
   std::optional<FrameStamp> last_input_;
@@ -112,7 +113,7 @@ class System {
   mutable std::mutex records_mutex_;
   std::vector<StageRecord> stage_runs_;  // guarded by records_mutex_, as the two below
   std::vector<LoopRecord> loops_;
-  std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId of the present map
+  std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId
   double final_adjustment_ms_ = 0, extrinsics_ms_ = 0;
   adjustment::AdjustmentReport final_adjustment_;
   calibration::RigRefinement extrinsics_;

@@ -38,6 +38,7 @@ struct FrameRecord {
   KeyframeId root;  // root keyframe of the submap in which `result` gives the pose
   bool keyframe = false;
   int unique = 0, monocular = 0, matched = 0;  // features; unique = monocular + matched
+  bool map_withdrawn = false;                  // after this frame the map was emptied, because it was not a good start
 
   std::vector<StageTime> stages;  // in the caller's thread
   double frame_ms = 0;            // from handing over the images to having the pose

@@ -59,11 +59,11 @@ struct WorldRun {
   }
   void frame_without() { seen.push_back(hash_of(*executor->begin_frame(FrameId(frames++)), 0)); }
 
-  // Keyframes at two of three frames; another map half way.
+  // Keyframes at two of three frames; the map is emptied half way.
   void whole(int count = 60) {
     for (int half = 0; half < 2; ++half) {
       for (int i = 0; i < count / 2; ++i) i % 3 == 1 ? frame_without() : static_cast<void>(frame_with_keyframe());
-      if (half == 0) executor->restart(world.empty_map());
+      if (half == 0) executor->restart();
     }
     executor->drain();
     executor->end();

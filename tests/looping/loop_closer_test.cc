@@ -86,15 +86,6 @@ TEST(LoopCloser, AsksForAsManyKeyframesInARowAsToldTo) {
   EXPECT_FALSE(Watch(hasty)(world, KeyframeId(kRound)));
 }
 
-TEST(LoopCloser, RemembersNothingOfAMapThatWasLeftForAnother) {
-  const HallMap& world = drifted_walk(2);
-  Watch watch;
-  EXPECT_TRUE(watch(world, KeyframeId(kRound)));
-  // The ids do not increase, so this is a new map, and the first recognition of the place.
-  EXPECT_TRUE(watch(world, KeyframeId(kRound)));
-  EXPECT_FALSE(watch(world, KeyframeId(kRound + 1)));
-}
-
 TEST(LoopCloser, NothingIsClosedOnAWalkThatComesNowhereBack) {
   Watch watch;
   const FeatureSimulator simulator = hall(rig_of(4));
