@@ -20,14 +20,9 @@ struct LocalViewOptions {
   }
 };
 
-struct LocalView {
-  std::vector<KeyframeId> keyframes;  // most shared landmarks first
-  std::vector<LandmarkId> landmarks;  // all they observe, each once, those of `seeds` first
-};
-
-// Keyframes that observe the `seeds` (alive landmarks, distinct), the best of them with their covisible neighbours, and
-// `reference` in any case; then all their landmarks.
-LocalView make_local_view(const BundledMap& map, std::span<const LandmarkId> seeds, KeyframeId reference,
-                          const LocalViewOptions& options);
+// All landmarks that these keyframes observe, each once, `seeds` (alive landmarks, distinct) first: the keyframes that
+// observe the seeds, the best of them with their covisible neighbours, and `reference` in any case.
+std::vector<LandmarkId> local_landmarks(const BundledMap& map, std::span<const LandmarkId> seeds, KeyframeId reference,
+                                        const LocalViewOptions& options);
 
 }  // namespace bslam::map

@@ -67,7 +67,6 @@ std::optional<PatchWarp> patch_warp(const camera::Camera& reference_camera, cons
 struct AlignedKeypoint {
   Eigen::Vector2d pixel;  // level-0 pixels of the target image
   double sigma = 0;       // px, level 0, per axis (of the weaker direction)
-  double ncc = 0;
 };
 
 // Aligns `patch` in `target` by an inverse-compositional Lucas-Kanade step for translation with gain and offset (Baker

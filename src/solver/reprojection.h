@@ -72,8 +72,8 @@ struct ReprojectionResidual {
                                             const Vector3d& point_world, const Vector2d& pixel);
 };
 
-// Bounds of chi-square at 95 %.
-constexpr double kChi2OneDof95 = 3.841, kChi2TwoDof95 = 5.991;
+// Bound of chi-square with two degrees of freedom at 95 %.
+constexpr double kChi2TwoDof95 = 5.991;
 
 // Squared normalised error at which the cost of an observation is truncated. One that misses by more, or does not
 // project, costs as much as at this bound and has no gradient, so a step cannot lower the cost by moving a point behind
