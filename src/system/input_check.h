@@ -2,7 +2,7 @@
 #pragma once
 
 #include <optional>
-#include <span>
+#include <string>
 
 #include "base/result.h"
 #include "camera/rig.h"
@@ -20,8 +20,9 @@ struct FrameStamp {
 // of the frame before, where there was one.
 Status check_frame(const image::ImageBundle& images, const camera::Rig& rig, const std::optional<FrameStamp>& before);
 
-// Errors: another number of masks than cameras, unless there are none at all; a mask of another size than its camera's
-// images, unless it is empty.
-Status check_masks(std::span<const image::Image> masks, const camera::Rig& rig);
+// Parts of it. `where`: what was given them, for the error.
+Status check_count(std::size_t images, const camera::Rig& rig, const std::string& where);
+Status check_size(int width, int height, const camera::Camera& camera, const std::string& where);
+Status check_later(TimeNs time_ns, TimeNs before_ns, const std::string& where);
 
 }  // namespace bslam::system

@@ -47,8 +47,8 @@ struct SubmapTrajectory {
 
 class System {
  public:
-  // `resources`: masks that pass check_masks. Where a journal is given, the frames must be those of the journal, and
-  // calls throw ReplayMismatch where it does not fit.
+  // `resources`: masks of the size of their cameras' images. Where a journal is given, the frames must be those of the
+  // journal, and calls throw ReplayMismatch where it does not fit.
   System(camera::Rig rig, Config config, Resources resources = {});
   ~System();
 
