@@ -1,5 +1,7 @@
 #include "api/frame_conversion.h"
 
+#include <utility>
+
 #include "api/conversions.h"
 
 namespace bslam::api {
@@ -41,14 +43,14 @@ LostReason to_reason(tracking::LostReason reason) {
   return LostReason::kNone;
 }
 
+constexpr std::pair<CameraState, tracking::CameraState> kCameraStates[] = {
+    {CameraState::kOk, tracking::CameraState::kOk},
+    {CameraState::kDegraded, tracking::CameraState::kDegraded},
+    {CameraState::kOut, tracking::CameraState::kOut}};
+
 CameraState to_state(tracking::CameraState state) {
-  switch (state) {
-    case tracking::CameraState::kOk:
-      return CameraState::kOk;
-    case tracking::CameraState::kDegraded:
-      return CameraState::kDegraded;
-    case tracking::CameraState::kOut:
-      return CameraState::kOut;
+  for (const auto& [outer, inner] : kCameraStates) {
+    if (inner == state) return outer;
   }
   return CameraState::kOut;
 }
@@ -103,3 +105,10 @@ FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::R
 }
 
 }  // namespace bslam::api
+
+std::string_view bslam::to_string(CameraState state) {
+  for (const auto& [outer, inner] : api::kCameraStates) {
+    if (outer == state) return tracking::describe(inner);
+  }
+  return "";
+}

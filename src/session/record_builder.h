@@ -28,9 +28,6 @@ struct RecordInput {
   double start_up_s = 0, wall_s = 0;
 };
 
-// A scale as files name it: metric, up-to-scale, unobservable.
-std::string scale_name(map::Scale scale);
-
 // Name of the file of the i-th part's poses: "trajectory.tum", "trajectory_part2.tum".
 std::string trajectory_file(const std::string& stem, std::size_t submap);
 
