@@ -64,7 +64,8 @@ struct FrameResult {
   // forward there. It jumps where a loop is closed. Poses of different submaps have nothing in common; later frames may
   // tell another number for the same place after submaps were merged.
   Pose T_world_cam0, T_world_body;
-  int submap = -1;  // of these poses: id of the submap's first keyframe
+  Scale scale = Scale::kMetric;  // of the map then, and so the unit of length of all poses and velocities here
+  int submap = -1;               // of these poses: id of the submap's first keyframe
   // The same pose's uncertainty, where it is known: of the small motion d with T_world_cam0(true) = T_world_cam0
   // exp(d), rotation first, in camera 0's axes. From image noise alone: drift of the map is not in it.
   std::optional<Covariance6> covariance;
@@ -81,10 +82,10 @@ struct FrameResult {
   bool keyframe = false;     // the frame became a keyframe
   int keyframe_id = -1;      // its id in the map then; else the keyframe the frame was tracked against; -1: none
   bool relocalised = false;  // found again after a loss, somewhere in the map
-
   // The map was a wrong start: it was up to scale, and the rig was lost in it soon after. All poses and keyframes told
   // so far are withdrawn, and the map is empty. Another one is started; ids of keyframes are not used again.
   bool map_withdrawn = false;
+
   std::vector<StageTime> stages;
   double total_ms = 0;  // from handing over the images to having the pose
 };

@@ -16,12 +16,9 @@
 
 namespace bslam {
 
-enum class Scale {
-  kMetric,       // lengths are metres
-  kUpToScale,    // one camera, or cameras that cannot tell: the unit of length is arbitrary
-  kUnobservable  // the rig could tell the unit of length, but its motion has not allowed it so far
-};
-BSLAM_EXPORT std::string_view to_string(Scale scale);  // "metric", "up-to-scale", "unobservable"
+namespace api {
+struct Access;  // how the library itself reads what these classes hide
+}
 
 // An immutable version of a map. Taking and copying one costs next to nothing and never waits for the mapping; all its
 // functions may be called from any thread. It keeps its version alive and does not change while the System goes on.

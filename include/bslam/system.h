@@ -43,17 +43,17 @@ struct CameraEvent {
   CameraResult before, now;
 };
 
-// What a System tells while it works. Each may be empty. All are called by the thread that calls process() or finish(),
-// before that call returns; what a background thread found is told by the next of these calls. A callback may read the
-// map, but a call of process(), finish() or trajectory() from within one is an error. What a callback throws is caught
-// and returned as the error of the call, after which the System goes on.
+// What a System tells while it works. Each may be empty. All are called by the thread that calls process() or finish()
+// (or create(), see `log`), before that call returns; what a background thread found is told by the next of these
+// calls. A callback may read the map, but a call of process(), finish() or trajectory() from within one is an error.
+// What a callback throws is caught and returned as the error of the call, after which the System goes on.
 struct Callbacks {
   std::function<void(const KeyframeEvent&)> keyframe;
   std::function<void(const LoopEvent&)> loop;
   std::function<void(const MapView&)> map;  // the map has another version than when this was last called
   std::function<void(const CameraEvent&)> camera;
-  std::function<void(LogLevel, std::string_view line)>
-      log;  // without the line's end; never printed by the library itself
+  // `line` has no end of line; the library itself prints nothing. Called by System::create() as well.
+  std::function<void(LogLevel, std::string_view line)> log;
 };
 
 // What a System may be given besides rig and configuration.
@@ -92,7 +92,9 @@ class BSLAM_EXPORT System {
   // after the last frame. Errors: called before; one of a background thread.
   Status finish();
 
-  // Makes the call under way, and finish(), return soon: background work is stopped and left out.
+  // Makes the call under way, and finish(), return soon. Background work is stopped and left out from then on:
+  // process() goes on to track and to add keyframes, but no landmarks are made between them, no loops closed, nothing
+  // adjusted.
   void interrupt();
 
   // The present version of the map.

@@ -80,6 +80,7 @@ FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::R
   out.status =
       result.reason == tracking::LostReason::kNotStarted ? TrackingStatus::kNotStarted : to_status(result.status);
   out.reason = to_reason(result.reason);
+  out.scale = to_scale(record.scale);
   if (out.tracking()) {
     const SE3 T_world_rig = result.T_rig_world.inverse();
     out.T_world_cam0 = to_pose(T_world_rig);
@@ -96,10 +97,10 @@ FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::R
   out.unique_features = record.unique;
   out.matched_features = record.matched;
   out.keyframe = record.keyframe;
+  out.map_withdrawn = record.map_withdrawn;
   out.keyframe_id = result.anchored.reference.value();
   out.relocalised = record.relocalisation.has_value();
   for (const tracking::StageTime& s : record.stages) out.stages.push_back({s.stage, s.ms});
-  out.map_withdrawn = record.map_withdrawn;
   out.total_ms = record.frame_ms;
   return out;
 }

@@ -51,6 +51,7 @@ TEST_F(PublicSystem, TellsPoseAndVelocityInTheDocumentedFrames) {
   for (int k = 0; k < kFrames; ++k) last = system.process(wall_.bundle(k)).value();
   ASSERT_TRUE(last.tracking());
   EXPECT_EQ(last.frame, kFrames - 1);
+  EXPECT_EQ(last.scale, Scale::kMetric);
   EXPECT_EQ(last.time_ns, TexturedWall::kStart + (kFrames - 1) * TexturedWall::kInterval);
   const double travelled = TexturedWall::kSpeed * 0.05 * (kFrames - 1);
   EXPECT_NEAR(last.T_world_cam0.translation[0], travelled, 0.05);
