@@ -12,6 +12,10 @@
 
 namespace bslam {
 
+namespace api {
+struct Access;  // how the library itself reads what these classes hide
+}
+
 // When mapping and loop closing run.
 enum class Mode {
   kSequential,  // in the caller's thread before the next frame: identical results on every run
@@ -51,10 +55,9 @@ class BSLAM_EXPORT Config {
   std::vector<Setting> settings() const;
   std::string to_yaml() const;  // what `load` reads back exactly
 
-  struct Impl;  // hidden
-  const Impl& impl() const { return *impl_; }
-
  private:
+  friend struct api::Access;
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <string_view>
 #include <vector>
 
 #include "bslam/export.h"
@@ -48,6 +47,9 @@ class BSLAM_EXPORT MapView {
     std::size_t keyframes = 0;
   };
 
+  MapView(const MapView& other) = default;  // a move copies as well, so that a MapView always has a map
+  MapView& operator=(const MapView& other) = default;
+
   // A map of System::save_map or `bslam run --save-map`. Errors name file and section: not readable, no map, damaged,
   // of another format version.
   static Result<MapView> load(const std::filesystem::path& file);
@@ -65,12 +67,11 @@ class BSLAM_EXPORT MapView {
   std::vector<CovisibilityEdge> covisibility(int min_landmarks = 15) const;
   std::vector<Submap> submaps() const;  // in order of their roots
 
-  struct Impl;  // hidden
-  explicit MapView(std::shared_ptr<const Impl> impl);
-  const Impl& impl() const { return *impl_; }
-
  private:
-  std::shared_ptr<const Impl> impl_;
+  friend struct api::Access;
+  struct Impl;
+  explicit MapView(std::shared_ptr<const Impl> impl);
+  std::shared_ptr<const Impl> impl_;  // never null
 };
 
 }  // namespace bslam

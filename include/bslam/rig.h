@@ -15,10 +15,14 @@
 
 namespace bslam {
 
+namespace api {
+struct Access;  // how the library itself reads what these classes hide
+}
+
 // Calibration of one camera. A camera looks along +z, x to the right and y down; the centre of the upper left pixel is
 // pixel (0, 0).
 struct CameraCalibration {
-  std::string name;                                 // for messages
+  std::string name;                                 // of its own in the rig; empty: "cam0", "cam1", ... by its place
   std::string model = "pinhole-radtan";             // pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere
   int width = 0, height = 0;                        // pixels, 1 to 20000
   std::array<double, 4> intrinsics = {0, 0, 0, 0};  // fx, fy, cx, cy in pixels
@@ -33,12 +37,16 @@ struct CameraCalibration {
 // Immutable; copies are cheap and may be used from any thread.
 class BSLAM_EXPORT Rig {
  public:
+  Rig(const Rig& other) = default;  // a move copies as well, so that a Rig always has cameras
+  Rig& operator=(const Rig& other) = default;
+
   // Reads a calibration of any known format, recognised by its content: bslam, EuRoC, Kalibr, OpenVINS, ORB-SLAM3,
   // Basalt, COLMAP, KITTI; or the one that the folder of a data set holds. Errors name file and key: not readable, no
   // known format, values out of range, a mask that is no 8-bit grey PNG of the camera's size.
   static Result<Rig> load(const std::filesystem::path& file);
 
-  // A rig made in code; the first is camera 0. Errors name the camera and what of it is wrong, as `load`; no camera.
+  // A rig made in code; the first is camera 0. Errors name the camera and what of it is wrong, as `load`; no
+  // camera; a name twice.
   static Result<Rig> make(const std::vector<CameraCalibration>& cameras);
 
   // Some of the cameras, in this order; the first becomes camera 0. Errors: none, an index twice or out of range.
@@ -55,12 +63,11 @@ class BSLAM_EXPORT Rig {
   std::vector<std::string> notes() const;
   std::vector<std::string> warnings() const;
 
-  struct Impl;  // hidden
-  explicit Rig(std::shared_ptr<const Impl> impl);
-  const Impl& impl() const { return *impl_; }
-
  private:
-  std::shared_ptr<const Impl> impl_;
+  friend struct api::Access;
+  struct Impl;
+  explicit Rig(std::shared_ptr<const Impl> impl);
+  std::shared_ptr<const Impl> impl_;  // never null
 };
 
 }  // namespace bslam

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <utility>
 
+#include "api/access.h"
 #include "api/bundle_reader.h"
 #include "api/guard.h"
 #include "api/image_sorter.h"
@@ -52,7 +53,8 @@ Error moved_from() {
 }  // namespace
 
 struct Synchronizer::Impl {
-  Impl(const Rig& r, SyncOptions o) : rig(r.impl().rig), options(std::move(o)), sorter(rig.size(), options) {
+  Impl(const Rig& r, SyncOptions o)
+      : rig(api::Access::impl(r).rig), options(std::move(o)), sorter(rig.size(), options) {
     counts.pushed.resize(rig.size());
     counts.dropped.resize(rig.size());
   }

@@ -227,7 +227,7 @@ TEST(Synchronizer, KeepsThePixels) {
 }
 
 TEST(Synchronizer, AddsTheTimeOffsetsOfTheRig) {
-  CameraCalibration late = rig_of(1).camera(0);
+  CameraCalibration late = rig_of(2).camera(1);
   late.time_offset_s = 0.03;
   auto synchronizer = Synchronizer::create(Rig::make({rig_of(1).camera(0), late}).value()).value();
   ASSERT_TRUE(synchronizer.push(0, image_at(100 * kMs)));

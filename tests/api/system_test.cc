@@ -85,7 +85,7 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndGoneOnIn) {
   ASSERT_TRUE(system.save_map(file));
   EXPECT_FALSE(system.save_map("/no/such/folder/map"));
 
-  const auto map = MapView::load(file);
+  auto map = MapView::load(file);
   ASSERT_TRUE(map) << map.error().message();
   EXPECT_EQ(map->scale(), Scale::kMetric);
   EXPECT_EQ(map->rig().size(), 2u);
@@ -101,6 +101,9 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndGoneOnIn) {
   ASSERT_GE(keyframes.size(), 2u);
   EXPECT_EQ(keyframes[0].parent, -1);
   EXPECT_FALSE(map->covisibility(1).empty());
+
+  const MapView moved = *std::move(map);
+  EXPECT_EQ(map->num_landmarks(), moved.num_landmarks());  // NOLINT: the state after a move is defined
 
   const auto resumed = System::create(TexturedWall::rig(), sequential(), {.map = file});
   ASSERT_TRUE(resumed) << resumed.error().message();
