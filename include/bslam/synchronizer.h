@@ -42,7 +42,9 @@ struct SyncOptions {
   double max_ahead_s = 10;      // an image farther ahead of all others is dropped, unless its camera stays there
   std::size_t max_images = 32;  // that wait, per camera: with more the oldest bundle is handed out as it is
   std::size_t max_bundles = 4;  // that wait to be fetched: with more the oldest is dropped
-  std::function<void(const DroppedImage&)> on_drop = {};  // called by the thread that pushes; may be empty
+  // Called by the thread that pushes or closes; may be empty. What it throws is returned by the call as an error, after
+  // all other images were told.
+  std::function<void(const DroppedImage&)> on_drop = {};
 };
 
 // What became of the images so far.
@@ -70,7 +72,8 @@ class BSLAM_EXPORT Synchronizer {
   ~Synchronizer();
 
   // An image of one camera. With an `owner` it is shared, else its pixels are copied. Errors: no such camera, no data,
-  // another size than the calibration's, a stride below the width, a time beyond +-4e18 ns, a call after close().
+  // another size than the calibration's, a stride below the width, a time beyond +-4e18 ns, a call after close(); those
+  // of on_drop, after which the image is taken all the same.
   Status push(std::size_t camera, const CameraImage& image);
 
   // The next bundle that is ready, if any.
@@ -79,8 +82,9 @@ class BSLAM_EXPORT Synchronizer {
   // Waits for it. Empty once the synchroniser was closed and all bundles were fetched.
   std::optional<ImageBundle> wait();
 
-  // No images follow: what waits becomes bundles, without limit of their number.
-  void close();
+  // No images follow: what waits becomes bundles, without limit of their number. Errors: those of on_drop alone, after
+  // which it is closed all the same.
+  Status close();
 
   SyncCounts counts() const;
 

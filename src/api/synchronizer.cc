@@ -60,7 +60,8 @@ struct Synchronizer::Impl {
   }
 
   Status push(std::size_t camera, const CameraImage& image);
-  void close();
+  Status close();
+  Status tell(const std::vector<DroppedImage>& dropped, const char* name) const;
   void settle(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped, std::size_t limit);
   std::optional<ImageBundle> take();
 
@@ -105,26 +106,35 @@ Status Synchronizer::Impl::push(std::size_t camera, const CameraImage& image) {
     settle(std::move(bundles), dropped, options.max_bundles);
   }
   changed.notify_all();
-  for (const DroppedImage& d : dropped) {
-    if (options.on_drop) options.on_drop(d);
-  }
-  return {};
+  return tell(dropped, "Synchronizer::push: on_drop");
 }
 
-void Synchronizer::Impl::close() {
+Status Synchronizer::Impl::close() {
   std::vector<DroppedImage> dropped;
   {
     const std::lock_guard lock(mutex);
-    if (closed) return;
+    if (closed) return {};
     closed = true;
     std::vector<ImageBundle> bundles;
     sorter.flush(bundles, dropped);
     settle(std::move(bundles), dropped, ready.max_size());
   }
   changed.notify_all();
+  return tell(dropped, "Synchronizer::close: on_drop");
+}
+
+// Tells all of them, and returns the first error. `name`: of the call, for the error.
+Status Synchronizer::Impl::tell(const std::vector<DroppedImage>& dropped, const char* name) const {
+  Status first;
+  if (!options.on_drop) return first;
   for (const DroppedImage& d : dropped) {
-    if (options.on_drop) options.on_drop(d);
+    const Status told = api::guarded(name, [&]() -> Status {
+      options.on_drop(d);
+      return {};
+    });
+    if (first) first = told;
   }
+  return first;
 }
 
 // The mutex is held.
@@ -165,13 +175,9 @@ std::optional<ImageBundle> Synchronizer::wait() {
   return impl_->take();
 }
 
-void Synchronizer::close() {
-  if (!impl_) return;
-  const Status status = api::guarded("Synchronizer::close", [&]() -> Status {
-    impl_->close();
-    return {};
-  });
-  static_cast<void>(status);  // a callback's exception ends here: all that waited is ready
+Status Synchronizer::close() {
+  if (!impl_) return {};
+  return api::guarded("Synchronizer::close", [&] { return impl_->close(); });
 }
 
 SyncCounts Synchronizer::counts() const {
