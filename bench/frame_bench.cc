@@ -78,18 +78,18 @@ void AlignPatch(benchmark::State& state) {
 }
 BENCHMARK(AlignPatch)->Unit(benchmark::kNanosecond);
 
-void MakeLocalView(benchmark::State& state) {
+void LocalLandmarks(benchmark::State& state) {
   const map::BundledMap& map = world().map;
   std::vector<LandmarkId> seeds;
   for (const LandmarkId l : map.keyframe(KeyframeId(12)).landmarks) {
     if (l.valid()) seeds.push_back(l);
   }
   std::size_t landmarks = 0;
-  for (auto _ : state) landmarks = map::make_local_view(map, seeds, KeyframeId(12), {}).landmarks.size();
+  for (auto _ : state) landmarks = map::local_landmarks(map, seeds, KeyframeId(12), {}).size();
   state.counters["seeds"] = static_cast<double>(seeds.size());
   state.counters["landmarks"] = static_cast<double>(landmarks);
 }
-BENCHMARK(MakeLocalView)->Unit(benchmark::kMicrosecond);
+BENCHMARK(LocalLandmarks)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace bslam::frame

@@ -41,7 +41,7 @@ int main(int argc, char** argv) {
   for (std::size_t c = 0; c < rig->size(); ++c) cameras.emplace_back(replay, c);
   std::thread end([&] {
     for (auto& camera : cameras) camera.join();
-    synchronizer->close();
+    if (const auto closed = synchronizer->close(); !closed) std::cerr << closed.error().message() << '\n';
   });
 
   int frames = 0, tracked = 0;

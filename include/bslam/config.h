@@ -12,6 +12,10 @@
 
 namespace bslam {
 
+namespace api {
+struct Access;  // access of the library to the implementations
+}
+
 // When mapping and loop closing run.
 enum class Mode {
   kSequential,  // in the caller's thread before the next frame: identical results on every run
@@ -52,10 +56,9 @@ class BSLAM_EXPORT Config {
   std::vector<Setting> settings() const;
   std::string to_yaml() const;  // `load` restores exactly the same values
 
-  struct Impl;  // implementation
-  const Impl& impl() const { return *impl_; }
-
  private:
+  friend struct api::Access;
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -65,7 +65,8 @@ struct FrameResult {
   // x right, y down, z forward. The pose jumps when a loop is closed. Poses of different submaps are unrelated; after
   // submaps were merged, `submap` of later frames may differ for the same place.
   Pose T_world_cam0, T_world_body;
-  int submap = -1;  // id of the first keyframe of the submap of these poses
+  Scale scale = Scale::kMetric;  // of the map then, and so the unit of length of all poses and velocities here
+  int submap = -1;               // id of the first keyframe of the submap of these poses
   // Covariance of T_world_cam0, if known: of the small motion d, rotation first, in the axes of camera 0, with
   // T_world_cam0(true) = T_world_cam0 exp(d). Includes only image noise, not the drift of the map.
   std::optional<Covariance6> covariance;
@@ -83,6 +84,9 @@ struct FrameResult {
   bool keyframe = false;     // the frame became a keyframe
   int keyframe_id = -1;      // its id if it became a keyframe, otherwise the reference keyframe; -1 if none
   bool relocalised = false;  // tracking was recovered by place recognition
+  // The initial map was up to scale and wrong: the rig was lost in it soon after. All poses and keyframes reported so
+  // far are withdrawn, and the map is empty. A new one will be initialised; ids of keyframes are not used again.
+  bool map_withdrawn = false;
 
   std::vector<StageTime> stages;
   double total_ms = 0;  // wall time from the call of System::process to the pose

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <string_view>
 #include <vector>
 
 #include "bslam/export.h"
@@ -16,12 +15,9 @@
 
 namespace bslam {
 
-enum class Scale {
-  kMetric,       // lengths are metres
-  kUpToScale,    // the cameras do not determine the scale, for example one camera: the unit of length is arbitrary
-  kUnobservable  // the rig can determine the scale, but its motion has not allowed it so far
-};
-BSLAM_EXPORT std::string_view to_string(Scale scale);  // "metric", "up-to-scale", "unobservable"
+namespace api {
+struct Access;  // access of the library to the implementations
+}
 
 // An immutable version of a map. Obtaining and copying a view is cheap and never waits for mapping; all functions may
 // be called from any thread. A view keeps its version alive and does not change while the System continues. Functions
@@ -51,6 +47,9 @@ class BSLAM_EXPORT MapView {
     std::size_t keyframes = 0;
   };
 
+  MapView(const MapView& other) = default;  // a move copies as well, so that a MapView always has a map
+  MapView& operator=(const MapView& other) = default;
+
   // Loads a map saved by System::save_map or `bslam run --save-map`. Errors name file and section: a file that cannot
   // be read, is not a map, is damaged, or has another format version.
   static Result<MapView> load(const std::filesystem::path& file);
@@ -69,12 +68,11 @@ class BSLAM_EXPORT MapView {
   std::vector<CovisibilityEdge> covisibility(int min_landmarks = 15) const;
   std::vector<Submap> submaps() const;  // in order of root id
 
-  struct Impl;  // implementation
-  explicit MapView(std::shared_ptr<const Impl> impl);
-  const Impl& impl() const { return *impl_; }
-
  private:
-  std::shared_ptr<const Impl> impl_;
+  friend struct api::Access;
+  struct Impl;
+  explicit MapView(std::shared_ptr<const Impl> impl);
+  std::shared_ptr<const Impl> impl_;  // never null
 };
 
 }  // namespace bslam

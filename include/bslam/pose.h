@@ -1,13 +1,22 @@
 // Rigid transforms, velocities and covariances as plain numbers. T_a_b maps coordinates in b to coordinates in a:
-// p_a = T_a_b * p_b, and T_a_c = T_a_b * T_b_c. Lengths are metres, angles radians.
+// p_a = T_a_b * p_b, and T_a_c = T_a_b * T_b_c. Angles are radians. Lengths are metres, but those of a map are in its
+// own unit if its Scale is not metric.
 #pragma once
 
 #include <array>
+#include <string_view>
 
 #include "bslam/export.h"
 #include "bslam/result.h"
 
 namespace bslam {
+
+enum class Scale {
+  kMetric,       // lengths are metres
+  kUpToScale,    // one camera, or cameras that cannot tell: the unit of length is arbitrary
+  kUnobservable  // the rig could tell the unit of length, but its motion has not allowed it so far
+};
+BSLAM_EXPORT std::string_view to_string(Scale scale);  // "metric", "up-to-scale", "unobservable"
 
 // Row-major 4x4, the last row 0 0 0 1.
 using Matrix4 = std::array<double, 16>;

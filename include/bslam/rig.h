@@ -15,10 +15,14 @@
 
 namespace bslam {
 
+namespace api {
+struct Access;  // access of the library to the implementations
+}
+
 // Calibration of one camera. The camera frame has z forward, x to the right and y down; the centre of the upper left
 // pixel is pixel (0, 0).
 struct CameraCalibration {
-  std::string name;  // used in messages
+  std::string name;  // unique in the rig; empty: "cam0", "cam1", ... by index
   // pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere, fov
   std::string model = "pinhole-radtan";
   int width = 0, height = 0;                        // pixels, 1 to 20000
@@ -35,14 +39,17 @@ struct CameraCalibration {
 // Immutable; copies are cheap and may be used from any thread.
 class BSLAM_EXPORT Rig {
  public:
+  Rig(const Rig& other) = default;  // a move copies as well, so that a Rig always has cameras
+  Rig& operator=(const Rig& other) = default;
+
   // Reads a calibration of any known format, recognised by its content: bslam, EuRoC, Kalibr, OpenVINS, ORB-SLAM3,
   // OKVIS2, Basalt, COLMAP, KITTI; or the calibration in the folder of a data set. Errors name file and key: a file
   // that cannot be read or has an unknown format, values out of range, a mask that is not an 8-bit grey PNG of the
   // camera's resolution.
   static Result<Rig> load(const std::filesystem::path& file);
 
-  // Creates a rig from calibrations; the first one is camera 0. Errors: no camera; as for `load`, values out of range,
-  // with the name of the camera and the parameter.
+  // Creates a rig from calibrations; the first one is camera 0. Errors: no camera; two cameras of one name; as for
+  // `load`, values out of range, with the name of the camera and the parameter.
   static Result<Rig> make(const std::vector<CameraCalibration>& cameras);
 
   // Returns the rig of the given cameras, in this order; the first one becomes camera 0. Errors: no index, a repeated
@@ -61,12 +68,11 @@ class BSLAM_EXPORT Rig {
   std::vector<std::string> notes() const;
   std::vector<std::string> warnings() const;
 
-  struct Impl;  // implementation
-  explicit Rig(std::shared_ptr<const Impl> impl);
-  const Impl& impl() const { return *impl_; }
-
  private:
-  std::shared_ptr<const Impl> impl_;
+  friend struct api::Access;
+  struct Impl;
+  explicit Rig(std::shared_ptr<const Impl> impl);
+  std::shared_ptr<const Impl> impl_;  // never null
 };
 
 }  // namespace bslam

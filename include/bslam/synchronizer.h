@@ -44,7 +44,9 @@ struct SyncOptions {
   // images.
   std::size_t max_images = 32;
   std::size_t max_bundles = 4;  // maximum number of bundles to be fetched; if exceeded, the oldest one is dropped
-  std::function<void(const DroppedImage&)> on_drop = {};  // called by the thread that calls push() or close(); optional
+  // Called by the thread that calls push() or close(); optional. An exception that it throws is returned by the call as
+  // an error, after all other images were reported.
+  std::function<void(const DroppedImage&)> on_drop = {};
 };
 
 // Numbers of images and bundles so far.
@@ -73,7 +75,8 @@ class BSLAM_EXPORT Synchronizer {
 
   // Adds an image of one camera. Its pixels are shared if it has an `owner`, otherwise copied. Errors: a camera index
   // out of range, no data, a size that differs from the calibration, a stride smaller than the width, a time beyond
-  // +-4e18 ns, a call after close().
+  // +-4e18 ns, a call after close(); those
+  // of on_drop, after which the image is taken all the same.
   Status push(std::size_t camera, const CameraImage& image);
 
   // Returns the next bundle if one is ready.
@@ -82,8 +85,9 @@ class BSLAM_EXPORT Synchronizer {
   // Waits for the next bundle. Returns nullopt when the synchroniser is closed and all bundles were fetched.
   std::optional<ImageBundle> wait();
 
-  // Declares that no images follow: all waiting images become bundles, whose number is not limited.
-  void close();
+  // Declares that no images follow: all waiting images become bundles, whose number is not limited. Errors: those of
+  // on_drop alone, after which it is closed all the same.
+  Status close();
 
   SyncCounts counts() const;
 

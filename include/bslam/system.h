@@ -44,15 +44,16 @@ struct CameraEvent {
 };
 
 // Functions that a System calls to report events. Each may be empty. They are called by the thread that calls process()
-// or finish(), before that call returns; events of background threads are reported during the next of these calls. A
-// callback may read the map, but must not call process(), finish() or trajectory(), which return an error then. An
-// exception thrown by a callback is caught and returned as the error of the call; the System remains usable.
+// or finish() (or create(), see `log`), before that call returns; events of background threads are reported during the
+// next of these calls. A callback may read the map, but must not call process(), finish() or trajectory(), which return
+// an error then. An exception thrown by a callback is caught and returned as the error of the call; the System remains
+// usable.
 struct Callbacks {
   std::function<void(const KeyframeEvent&)> keyframe;
   std::function<void(const LoopEvent&)> loop;
   std::function<void(const MapView&)> map;  // the version of the map has changed since the last call
   std::function<void(const CameraEvent&)> camera;
-  // Receives log lines without line breaks; the library itself prints nothing.
+  // Receives log lines without line breaks; the library itself prints nothing. Also called by System::create().
   std::function<void(LogLevel, std::string_view line)> log;
 };
 
@@ -91,7 +92,9 @@ class BSLAM_EXPORT System {
   // the last frame. Errors: a second call; an error of a background thread.
   Status finish();
 
-  // Makes the current call and finish() return soon: background work is stopped and its results are discarded.
+  // Makes the current call and finish() return soon. Background work is stopped and its results are discarded from then
+  // on: process() continues to track and to add keyframes, but no landmarks are created between them, no loops are
+  // closed and nothing is adjusted.
   void interrupt();
 
   // Returns the current version of the map.

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "system/input_check.h"
+
 namespace bslam::api {
 namespace {
 
@@ -20,10 +22,7 @@ std::string camera_key(std::size_t c, const camera::Camera& camera) {
 
 Status check_image(const CameraImage& image, const camera::Camera& camera, const char* name) {
   if (image.data == nullptr) return Error{name, camera.name, "no pixels (data is null)", "an image"};
-  if (image.width != camera.width || image.height != camera.height) {
-    return Error{name, camera.name, fmt::format("{}x{} pixels", image.width, image.height),
-                 fmt::format("{}x{}, the resolution of the calibration", camera.width, camera.height)};
-  }
+  if (const Status size = system::check_size(image.width, image.height, camera, name); !size) return size;
   if (image.stride < image.width) {
     return Error{name, camera.name, fmt::format("a stride of {} bytes", image.stride),
                  fmt::format("at least {}, the width", image.width)};
@@ -35,10 +34,7 @@ Status check_image(const CameraImage& image, const camera::Camera& camera, const
 }
 
 Result<image::ImageBundle> BundleReader::convert(const ImageBundle& bundle) const {
-  if (bundle.images.size() != rig_.size()) {
-    return Error{kProcess, "images", std::to_string(bundle.images.size()),
-                 fmt::format("{}, one per camera of the rig", rig_.size())};
-  }
+  if (const Status count = system::check_count(bundle.images.size(), rig_, kProcess); !count) return count.error();
   image::ImageBundle out{next_, 0, std::vector<image::CameraImage>(rig_.size())};
   bool any = false;
   for (std::size_t c = 0; c < rig_.size(); ++c) {
@@ -58,9 +54,8 @@ Result<image::ImageBundle> BundleReader::convert(const ImageBundle& bundle) cons
 }
 
 Status BundleReader::check_times(const image::ImageBundle& images) const {
-  if (last_ns_ && images.time_ns <= *last_ns_) {
-    return Error{kProcess, "time", fmt::format("{} ns", images.time_ns),
-                 fmt::format("a time after {} ns (previous bundle)", *last_ns_)};
+  if (last_ns_) {
+    if (const Status later = system::check_later(images.time_ns, *last_ns_, kProcess); !later) return later;
   }
   for (std::size_t c = 0; c < images.images.size(); ++c) {
     const image::CameraImage& image = images.images[c];

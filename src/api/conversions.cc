@@ -1,8 +1,18 @@
 #include "api/conversions.h"
 
+#include <utility>
+
 namespace bslam::api {
 
 using geometry::SE3;
+
+namespace {
+
+constexpr std::pair<Scale, map::Scale> kScales[] = {{Scale::kMetric, map::Scale::kMetric},
+                                                    {Scale::kUpToScale, map::Scale::kUpToScale},
+                                                    {Scale::kUnobservable, map::Scale::kUnobservable}};
+
+}  // namespace
 
 Pose to_pose(const SE3& T) {
   const auto& q = T.rotation();
@@ -32,13 +42,8 @@ Velocity to_velocity(const geometry::Vector6d& twist, const SE3& T_frame_rig) {
 }
 
 Scale to_scale(map::Scale scale) {
-  switch (scale) {
-    case map::Scale::kMetric:
-      return Scale::kMetric;
-    case map::Scale::kUpToScale:
-      return Scale::kUpToScale;
-    case map::Scale::kUnobservable:
-      return Scale::kUnobservable;
+  for (const auto& [outer, inner] : kScales) {
+    if (inner == scale) return outer;
   }
   return Scale::kMetric;
 }
@@ -53,3 +58,10 @@ Trajectory to_trajectory(const evaluation::Trajectory& cam0, const std::optional
 }
 
 }  // namespace bslam::api
+
+std::string_view bslam::to_string(Scale scale) {
+  for (const auto& [outer, inner] : api::kScales) {
+    if (outer == scale) return map::scale_name(inner);
+  }
+  return "";
+}

@@ -1,5 +1,7 @@
 #include "api/frame_conversion.h"
 
+#include <utility>
+
 #include "api/conversions.h"
 
 namespace bslam::api {
@@ -41,14 +43,14 @@ LostReason to_reason(tracking::LostReason reason) {
   return LostReason::kNone;
 }
 
+constexpr std::pair<CameraState, tracking::CameraState> kCameraStates[] = {
+    {CameraState::kOk, tracking::CameraState::kOk},
+    {CameraState::kDegraded, tracking::CameraState::kDegraded},
+    {CameraState::kOut, tracking::CameraState::kOut}};
+
 CameraState to_state(tracking::CameraState state) {
-  switch (state) {
-    case tracking::CameraState::kOk:
-      return CameraState::kOk;
-    case tracking::CameraState::kDegraded:
-      return CameraState::kDegraded;
-    case tracking::CameraState::kOut:
-      return CameraState::kOut;
+  for (const auto& [outer, inner] : kCameraStates) {
+    if (inner == state) return outer;
   }
   return CameraState::kOut;
 }
@@ -78,6 +80,7 @@ FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::R
   out.status =
       result.reason == tracking::LostReason::kNotStarted ? TrackingStatus::kNotStarted : to_status(result.status);
   out.reason = to_reason(result.reason);
+  out.scale = to_scale(record.scale);
   if (out.tracking()) {
     const SE3 T_world_rig = result.T_rig_world.inverse();
     out.T_world_cam0 = to_pose(T_world_rig);
@@ -94,6 +97,7 @@ FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::R
   out.unique_features = record.unique;
   out.matched_features = record.matched;
   out.keyframe = record.keyframe;
+  out.map_withdrawn = record.map_withdrawn;
   out.keyframe_id = result.anchored.reference.value();
   out.relocalised = record.relocalisation.has_value();
   for (const tracking::StageTime& s : record.stages) out.stages.push_back({s.stage, s.ms});
@@ -102,3 +106,10 @@ FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::R
 }
 
 }  // namespace bslam::api
+
+std::string_view bslam::to_string(CameraState state) {
+  for (const auto& [outer, inner] : api::kCameraStates) {
+    if (outer == state) return tracking::describe(inner);
+  }
+  return "";
+}

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "api/access.h"
 #include "api/conversions.h"
 #include "api/guard.h"
 #include "api/map_view_impl.h"
@@ -23,12 +24,10 @@ std::vector<int> submap_by_keyframe(const map::BundledMap& map) {
 
 }  // namespace
 
-MapView api::make_map_view(map::MapSnapshot map) {
-  return MapView(std::make_shared<const MapView::Impl>(MapView::Impl{std::move(map)}));
-}
+MapView api::make_map_view(map::MapSnapshot map) { return Access::make<MapView>(std::move(map)); }
 
 MapView api::empty_map_view() {
-  const camera::Camera camera{"", camera::Pinhole({1, 1, 0, 0}), 1, 1, 0, ""};
+  const camera::Camera camera{"cam0", camera::Pinhole({1, 1, 0, 0}), 1, 1, 0, ""};
   const auto rig = std::make_shared<const camera::Rig>(std::vector<camera::RigCamera>{{camera, geometry::SE3()}});
   return make_map_view(std::make_shared<const map::BundledMap>(rig));
 }

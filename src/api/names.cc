@@ -37,30 +37,6 @@ std::string_view to_string(LostReason reason) {
   return "";
 }
 
-std::string_view to_string(CameraState state) {
-  switch (state) {
-    case CameraState::kOk:
-      return "ok";
-    case CameraState::kDegraded:
-      return "degraded";
-    case CameraState::kOut:
-      return "out";
-  }
-  return "";
-}
-
-std::string_view to_string(Scale scale) {
-  switch (scale) {
-    case Scale::kMetric:
-      return "metric";
-    case Scale::kUpToScale:
-      return "up-to-scale";
-    case Scale::kUnobservable:
-      return "unobservable";
-  }
-  return "";
-}
-
 std::string_view to_string(DropReason reason) {
   switch (reason) {
     case DropReason::kDuplicate:

@@ -27,6 +27,12 @@ void Notifier::report_status(const FrameResult& frame) {
   status_ = frame.status;
 }
 
+void Notifier::report_withdrawal(const FrameResult& frame) {
+  if (!frame.map_withdrawn) return;
+  log(LogLevel::kWarning, fmt::format("{:.3f} s: the initial map was wrong and is withdrawn, with all poses so far",
+                                      to_seconds(frame.time_ns)));
+}
+
 void Notifier::report_cameras(const FrameResult& frame) {
   if (cameras_.empty()) cameras_.resize(frame.cameras.size());
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
@@ -66,6 +72,7 @@ void Notifier::report_map(const system::System& system) {
 
 void Notifier::processed(const FrameResult& frame, const system::System& system) {
   report_status(frame);
+  report_withdrawal(frame);
   report_cameras(frame);
   if (frame.keyframe && callbacks_.keyframe) callbacks_.keyframe({frame.keyframe_id, frame});
   report_map(system);

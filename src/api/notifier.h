@@ -22,6 +22,7 @@ class Notifier {
 
  private:
   void report_status(const FrameResult& frame);
+  void report_withdrawal(const FrameResult& frame);
   void report_cameras(const FrameResult& frame);
   void report_map(const system::System& system);
   void report_loops(const system::System& system);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "api/access.h"
 #include "api/conversions.h"
 #include "api/guard.h"
 #include "api/rig_impl.h"
@@ -64,7 +65,7 @@ Result<std::pair<camera::RigCamera, image::Image>> make_camera(const CameraCalib
 
 Rig api::make_rig(camera::Rig rig, std::vector<image::Image> masks, std::vector<std::string> notes) {
   masks.resize(rig.size());
-  return Rig(std::make_shared<const Rig::Impl>(Rig::Impl{std::move(rig), std::move(masks), std::move(notes)}));
+  return Access::make<Rig>(std::move(rig), std::move(masks), std::move(notes));
 }
 
 Rig::Rig(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
@@ -89,7 +90,12 @@ Result<Rig> Rig::make(const std::vector<CameraCalibration>& cameras) {
     std::vector<camera::RigCamera> made;
     std::vector<image::Image> masks;
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      auto camera = make_camera(cameras[c], fmt::format("camera {} ({})", c, cameras[c].name));
+      CameraCalibration calibration = cameras[c];
+      if (calibration.name.empty()) calibration.name = fmt::format("cam{}", c);
+      const std::string key = fmt::format("camera {} ({})", c, calibration.name);
+      const bool taken = std::ranges::any_of(made, [&](const auto& m) { return m.camera.name == calibration.name; });
+      if (taken) return Error{"Rig::make", key, "the name of a camera before", "another name for each"};
+      auto camera = make_camera(calibration, key);
       if (!camera) return camera.error();
       made.push_back(std::move(camera->first));
       masks.push_back(std::move(camera->second));

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <utility>
 
+#include "api/access.h"
 #include "api/bundle_reader.h"
 #include "api/guard.h"
 #include "api/image_sorter.h"
@@ -50,13 +51,15 @@ Error moved_from() { return {"Synchronizer::push", "", "a Synchronizer that was 
 }  // namespace
 
 struct Synchronizer::Impl {
-  Impl(const Rig& r, SyncOptions o) : rig(r.impl().rig), options(std::move(o)), sorter(rig.size(), options) {
+  Impl(const Rig& r, SyncOptions o)
+      : rig(api::Access::impl(r).rig), options(std::move(o)), sorter(rig.size(), options) {
     counts.pushed.resize(rig.size());
     counts.dropped.resize(rig.size());
   }
 
   Status push(std::size_t camera, const CameraImage& image);
-  void close();
+  Status close();
+  Status tell(const std::vector<DroppedImage>& dropped, const char* name) const;
   void commit(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped, std::size_t limit);
   std::optional<ImageBundle> take();
 
@@ -103,26 +106,35 @@ Status Synchronizer::Impl::push(std::size_t camera, const CameraImage& image) {
     commit(std::move(bundles), dropped, options.max_bundles);
   }
   changed.notify_all();
-  for (const DroppedImage& d : dropped) {
-    if (options.on_drop) options.on_drop(d);
-  }
-  return {};
+  return tell(dropped, "Synchronizer::push: on_drop");
 }
 
-void Synchronizer::Impl::close() {
+Status Synchronizer::Impl::close() {
   std::vector<DroppedImage> dropped;
   {
     const std::lock_guard lock(mutex);
-    if (closed) return;
+    if (closed) return {};
     closed = true;
     std::vector<ImageBundle> bundles;
     sorter.flush(bundles, dropped);
     commit(std::move(bundles), dropped, ready.max_size());
   }
   changed.notify_all();
+  return tell(dropped, "Synchronizer::close: on_drop");
+}
+
+// Tells all of them, and returns the first error. `name`: of the call, for the error.
+Status Synchronizer::Impl::tell(const std::vector<DroppedImage>& dropped, const char* name) const {
+  Status first;
+  if (!options.on_drop) return first;
   for (const DroppedImage& d : dropped) {
-    if (options.on_drop) options.on_drop(d);
+    const Status told = api::guarded(name, [&]() -> Status {
+      options.on_drop(d);
+      return {};
+    });
+    if (first) first = told;
   }
+  return first;
 }
 
 // The mutex must be held.
@@ -163,13 +175,9 @@ std::optional<ImageBundle> Synchronizer::wait() {
   return impl_->take();
 }
 
-void Synchronizer::close() {
-  if (!impl_) return;
-  const Status status = api::guarded("Synchronizer::close", [&]() -> Status {
-    impl_->close();
-    return {};
-  });
-  static_cast<void>(status);  // exceptions of a callback are ignored: all bundles are ready
+Status Synchronizer::close() {
+  if (!impl_) return {};
+  return api::guarded("Synchronizer::close", [&] { return impl_->close(); });
 }
 
 SyncCounts Synchronizer::counts() const {

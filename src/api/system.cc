@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "api/access.h"
 #include "api/bundle_reader.h"
 #include "api/config_impl.h"
 #include "api/conversions.h"
@@ -56,12 +57,12 @@ Result<Resources> load_resources(const Rig& rig, const system::Config& config, c
     out.vocabulary = out.for_system.vocabulary->id();
   }
   if (!startup.map.empty()) {
-    auto map =
-        storage::open_map(startup.map, rig.impl().rig, config.feature_model().pyramid, out.for_system.vocabulary.get());
+    auto map = storage::open_map(startup.map, api::Access::impl(rig).rig, config.feature_model().pyramid,
+                                 out.for_system.vocabulary.get());
     if (!map) return map.error();
     out.for_system.map = *std::move(map);
   }
-  out.for_system.masks = rig.impl().masks;
+  out.for_system.masks = api::Access::impl(rig).masks;
   out.for_system.history = startup.history_frames;
   return out;
 }
@@ -70,7 +71,7 @@ Result<Resources> load_resources(const Rig& rig, const system::Config& config, c
 
 struct System::Impl {
   Impl(const Rig& of, const system::Config& config, Resources resources, Callbacks callbacks)
-      : rig(of.impl().rig),
+      : rig(api::Access::impl(of).rig),
         vocabulary(resources.vocabulary),
         system(rig, config, std::move(resources.for_system)),
         reader(rig),
@@ -154,7 +155,7 @@ System::~System() = default;
 
 Result<System> System::create(const Rig& rig, const Config& config, Startup startup) {
   return api::guarded("System::create", [&]() -> Result<System> {
-    const system::Config& settings = config.impl().config;
+    const system::Config& settings = api::Access::impl(config).config;
     if (const Status status = system::check_config(settings, !startup.map.empty()); !status) return status.error();
     auto resources = load_resources(rig, settings, startup);
     if (!resources) return resources.error();

@@ -65,7 +65,7 @@ nlohmann::ordered_json to_json(const storage::SavedMap& saved, std::uintmax_t fi
           {"keyframes", map.num_keyframes()},
           {"landmarks", map.num_landmarks()},
           {"observations", map.num_observations()},
-          {"scale", session::scale_name(map.scale())},
+          {"scale", map::scale_name(map.scale())},
           {"vocabulary", vocabulary_name(saved.info.vocabulary)},
           {"parts", std::move(submaps)}};
 }
@@ -81,7 +81,7 @@ void print_info(const storage::SavedMap& saved, std::uintmax_t file_bytes) {
                         camera.height);
   }
   text += fmt::format("{} keyframes, {} landmarks, {} observations; scale {}; vocabulary {}\n", map.num_keyframes(),
-                      map.num_landmarks(), map.num_observations(), session::scale_name(map.scale()),
+                      map.num_landmarks(), map.num_observations(), map::scale_name(map.scale()),
                       vocabulary_name(saved.info.vocabulary));
   const std::string unit = map.scale() == map::Scale::kMetric ? "m" : "units";
   const std::vector<storage::Submap> submaps = storage::submaps_of(map);

@@ -20,13 +20,13 @@ struct Job {
   StageResult result;
   std::exception_ptr failure;
   double ms = 0;
-  bool done = false;  // guarded by the executor's mutex
+  bool done = false;      // guarded by the executor's mutex, as the one below
+  bool observed = false;  // reported by the worker, because the job was stopped before it was done
 };
 
 // Runs the jobs of a stage one after the other.
 struct Worker {
   std::deque<std::shared_ptr<Job>> queue;  // at most one job, which waits if a superseded one is still running
-  std::shared_ptr<Job> running;
   std::jthread thread;
 };
 
@@ -66,17 +66,17 @@ class LaggedExecutor : public StageExecutor {
     }
   }
 
-  void restart(map::BundledMap initial) override {
+  void restart() override {
     drain();
-    gate_.restart(std::move(initial));
+    gate_.restart();
   }
 
   void interrupt() override {
     const std::lock_guard lock(mutex_);
     interrupted_ = true;
-    for (Worker& w : workers_) {
-      w.queue.clear();
-      if (w.running) w.running->stop.request_stop();
+    for (Worker& w : workers_) w.queue.clear();
+    for (StageQueue& q : queues_) {
+      if (q.running) q.running->stop.request_stop();
     }
     changed_.notify_all();
   }
@@ -87,11 +87,12 @@ class LaggedExecutor : public StageExecutor {
   }
 
  private:
-  // Tasks of a stage; used by the caller's thread only.
+  // Tasks of a stage; changed by the caller's thread only.
   struct StageQueue {
     std::deque<StageTask> waiting;
-    std::shared_ptr<Job>
-        running;  // started and not committed yet; its worker may not have begun it or have finished it
+    // Started and not committed yet; its worker may not have begun it or have finished it. Changed with mutex_ held,
+    // because interrupt() reads it.
+    std::shared_ptr<Job> running;
   };
 
   StageQueue& queue(Stage stage) { return queues_[static_cast<std::size_t>(stage)]; }
@@ -110,7 +111,13 @@ class LaggedExecutor : public StageExecutor {
   }
 
   void rethrow() const {
+    const std::lock_guard lock(mutex_);
     if (failure_) std::rethrow_exception(failure_);
+  }
+
+  void fail(const std::exception_ptr& failure) {
+    const std::lock_guard lock(mutex_);
+    failure_ = failure;
   }
 
   // If the queue is full, its running task is committed early. This depends on counts only, so it is deterministic.
@@ -124,35 +131,24 @@ class LaggedExecutor : public StageExecutor {
   void start_next(Stage stage) {
     StageQueue& q = queue(stage);
     if (q.waiting.empty()) return;
-    q.running = std::make_shared<Job>();
-    q.running->task = q.waiting.front();
-    q.running->base = gate_.newest();
-    q.running->started = now_;
+    auto job = std::make_shared<Job>();
+    job->task = q.waiting.front();
+    job->base = gate_.newest();
+    job->started = now_;
     q.waiting.pop_front();
     const std::lock_guard lock(mutex_);
-    if (interrupted_) return;  // no worker will run it, and wait_for() does not wait
-    worker(stage).queue.push_back(q.running);
+    if (interrupted_) return q.waiting.clear();
+    q.running = job;
+    worker(stage).queue.push_back(std::move(job));
     changed_.notify_all();
   }
 
   // Waits for the running task of a stage and commits it. Then starts the task that follows and the next one of the
-  // stage.
+  // stage. A stopped task is only removed. It stays in the queue until then, so that interrupt() can still stop it.
   void finish_running(Stage stage) {
-    StageQueue& q = queue(stage);
-    const std::shared_ptr<Job> job = std::exchange(q.running, nullptr);
-    if (!wait_for(*job)) {
-      q.waiting.clear();
-      return;
-    }
-    if (job->failure) {
-      failure_ = job->failure;
-      rethrow();
-    }
-    if (const auto superseded = superseded_by(stage, job->result, *gate_.newest())) supersede(*superseded);
-    std::vector<StageStatistic> statistics = std::move(job->result.statistics);
-    const bool committed =
-        gate_.commit_stage(job->task, job->base->version(), std::move(job->result), job->stop.get_token());
-    observe(setup_, {job->task, job->ms, committed, std::move(statistics)});
+    const std::shared_ptr<Job> job = queue(stage).running;
+    const bool committed = wait_for(*job) && commit_result(*job);
+    leave(stage);
     if (const auto next = following(job->task, setup_.functions); committed && next) push(*next);
     start_next(stage);
   }
@@ -164,17 +160,40 @@ class LaggedExecutor : public StageExecutor {
     return job.done;
   }
 
+  // Commits the result of a job that is done, and reports it to the observer.
+  bool commit_result(Job& job) {
+    const std::stop_token stop = job.stop.get_token();
+    if (job.failure && !stop.stop_requested()) {  // failures of a stopped task are ignored
+      fail(job.failure);
+      rethrow();
+    }
+    if (const auto superseded = superseded_by(job.task.stage, job.result, *gate_.newest())) supersede(*superseded);
+    const bool committed = gate_.commit_stage(job.task, job.base->version(), std::move(job.result), stop);
+    if (!job.observed) observe(setup_, {job.task, job.ms, committed});
+    return committed;
+  }
+
+  // Removes the running task from its queue and returns it.
+  std::shared_ptr<Job> leave(Stage stage) {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(queue(stage).running, nullptr);
+  }
+
   // Drops the waiting tasks of a stage and stops its running one.
   void supersede(Stage stage) {
-    StageQueue& q = queue(stage);
-    q.waiting.clear();
-    const std::shared_ptr<Job> job = std::exchange(q.running, nullptr);
+    queue(stage).waiting.clear();
+    const std::shared_ptr<Job> job = leave(stage);
     if (!job) return;
-    const std::lock_guard lock(mutex_);
-    std::erase(worker(stage).queue, job);
-    job->stop.request_stop();
-    if (job->done) observe(setup_, {job->task, job->ms, false});  // else its worker reports it
+    {
+      const std::lock_guard lock(mutex_);
+      std::erase(worker(stage).queue, job);
+      job->stop.request_stop();
+      if (!job->done || job->observed) return;  // its worker reports it
+    }
+    observe(setup_, {job->task, job->ms, false});
   }
+
+  // The functions below are called by a worker's thread.
 
   void work(Worker& w) {
     while (const std::shared_ptr<Job> job = take(w)) {
@@ -185,12 +204,22 @@ class LaggedExecutor : public StageExecutor {
         job->failure = std::current_exception();
       }
       job->ms = watch.ms();
-      const std::lock_guard lock(mutex_);
-      w.running.reset();
-      job->done = true;
-      if (job->stop.stop_requested()) observe(setup_, {job->task, job->ms, false});
-      changed_.notify_all();
+      if (!finish(*job)) continue;
+      try {
+        observe(setup_, {job->task, job->ms, false});
+      } catch (...) {
+        fail(std::current_exception());
+      }
     }
+  }
+
+  // Returns whether the job was stopped; its worker then reports it to the observer.
+  bool finish(Job& job) {
+    const std::lock_guard lock(mutex_);
+    job.done = true;
+    job.observed = job.stop.stop_requested();
+    changed_.notify_all();
+    return job.observed;
   }
 
   // Returns the next job, or null if interrupted.
@@ -198,19 +227,19 @@ class LaggedExecutor : public StageExecutor {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return interrupted_ || !w.queue.empty(); });
     if (interrupted_) return nullptr;
-    w.running = std::move(w.queue.front());
+    std::shared_ptr<Job> job = std::move(w.queue.front());
     w.queue.pop_front();
-    return w.running;
+    return job;
   }
 
   MapGate& gate_;
   const ExecutionSetup setup_;
-  int now_ = 0;  // number of frames begun; this and the next two members belong to the caller's thread
+  int now_ = 0;  // number of frames begun; this and the next member belong to the caller's thread
   std::array<StageQueue, kStages.size()> queues_;
-  std::exception_ptr failure_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  bool interrupted_ = false;                    // guarded by mutex_, as the jobs of the workers
+  std::exception_ptr failure_;  // guarded by mutex_, as the next member and the jobs of the workers
+  bool interrupted_ = false;
   std::array<Worker, kStages.size()> workers_;  // last member, so that the threads are joined first
 };
 

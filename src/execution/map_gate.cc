@@ -41,10 +41,10 @@ bool MapGate::commit_stage(const StageTask& task, MapVersion base, StageResult r
   return true;
 }
 
-void MapGate::restart(map::BundledMap initial) {
+void MapGate::restart() {
   const std::lock_guard order(order_);
   const MapVersion base = newest()->version();
-  store_.restart(std::move(initial));
+  store_.restart();
   map::MapSnapshot fresh = store_.snapshot();
   const MapVersion version = fresh->version();
   append({JournalStep::kRestart, frame_.value(), base, version}, std::move(fresh));

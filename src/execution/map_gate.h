@@ -29,8 +29,8 @@ class MapGate {
   // result is discarded as if the stage had never run. Thread-safe.
   bool commit_stage(const StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop);
 
-  // Replaces the map by another one; version numbers continue.
-  void restart(map::BundledMap initial);
+  // Empties the map; version numbers and ids continue.
+  void restart();
 
   // The journal so far. Thread-safe.
   Journal journal() const;

@@ -46,9 +46,9 @@ class ParallelExecutor : public StageExecutor {
     rethrow();
   }
 
-  void restart(map::BundledMap initial) override {
+  void restart() override {
     drain();
-    gate_.restart(std::move(initial));
+    gate_.restart();
   }
 
   void interrupt() override {
@@ -153,9 +153,8 @@ class ParallelExecutor : public StageExecutor {
       const std::lock_guard lock(mutex_);
       drop(queue(*superseded));
     }
-    std::vector<StageStatistic> statistics = std::move(result.statistics);
     const bool committed = gate_.commit_stage(task, base->version(), std::move(result), stop);
-    observe(setup_, {task, watch.ms(), committed, std::move(statistics)});
+    observe(setup_, {task, watch.ms(), committed});
     return committed;
   }
 

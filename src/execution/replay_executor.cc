@@ -40,12 +40,12 @@ class ReplayExecutor : public StageExecutor {
 
   void drain() override { run_background(); }
 
-  void restart(map::BundledMap initial) override {
+  void restart() override {
     run_background();
-    if (interrupted()) return gate_.restart(std::move(initial));
+    if (interrupted()) return gate_.restart();
     expect(JournalStep::kRestart, gate_.frame().value(), gate_.newest()->version());
     for (auto& tasks : waiting_) tasks.clear();
-    gate_.restart(std::move(initial));
+    gate_.restart();
     keep(gate_.newest());
     advance();
   }

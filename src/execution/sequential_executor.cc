@@ -21,7 +21,7 @@ class SequentialExecutor : public StageExecutor {
   }
 
   void drain() override {}
-  void restart(map::BundledMap initial) override { gate_.restart(std::move(initial)); }
+  void restart() override { gate_.restart(); }
   void interrupt() override { stop_.request_stop(); }
   bool over() const override { return stop_.stop_requested(); }
 

@@ -8,7 +8,6 @@
 #include <optional>
 #include <stop_token>
 #include <string_view>
-#include <vector>
 
 #include "base/id.h"
 #include "map/map_store.h"
@@ -28,19 +27,12 @@ struct StageTask {
   friend bool operator==(const StageTask&, const StageTask&) = default;
 };
 
-// A statistic of one run of a stage: landmarks created, observations adjusted, ...
-struct StageStatistic {
-  std::string_view name;  // must be a string literal
-  double value = 0;
-};
-
 struct StageResult {
   // Draft of the version passed to the stage; nullopt: nothing is changed, and no stage follows.
   std::optional<map::MapDraft> draft;
   // Called after the draft was committed, in the committing thread and before the next commit; never called if it was
   // not committed. May be empty.
   std::function<void(const map::CommitReport&)> committed;
-  std::vector<StageStatistic> statistics = {};
 };
 
 // After a stop request the result is discarded, so that the function should return early with any result. The keyframe
@@ -68,7 +60,6 @@ struct StageRun {
   StageTask task;
   double ms = 0;
   bool committed = false;  // false: there was nothing to change, or it was superseded
-  std::vector<StageStatistic> statistics = {};
 };
 
 // Must be thread-safe: called from any thread, also concurrently.

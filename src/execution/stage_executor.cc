@@ -22,9 +22,8 @@ bool run_to_commit(const StageTask& task, const map::MapSnapshot& base, MapGate&
                    const std::stop_token& stop) {
   const Stopwatch watch;
   StageResult result = setup.functions[task.stage](task, base, stop);
-  std::vector<StageStatistic> statistics = std::move(result.statistics);
   const bool committed = gate.commit_stage(task, base->version(), std::move(result), stop);
-  observe(setup, {task, watch.ms(), committed, std::move(statistics)});
+  observe(setup, {task, watch.ms(), committed});
   return committed;
 }
 

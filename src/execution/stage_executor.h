@@ -30,8 +30,8 @@ class StageExecutor {
   // Returns when all enqueued tasks, and the tasks that follow them, are done and committed.
   virtual void drain() = 0;
 
-  // Drains, then replaces the map by another one.
-  virtual void restart(map::BundledMap initial) = 0;
+  // Drains, then empties the map.
+  virtual void restart() = 0;
 
   // Ends the run; must be called after drain. Throws if the journal of a replayed run has further entries.
   virtual void end() {}

@@ -68,7 +68,7 @@ bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map,
   });
 }
 
-std::optional<PlaceMatch> LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map) {
+std::optional<std::pair<PlaceMatch, LoopClosure>> LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map) {
   const std::vector<Candidate> candidates = recogniser_->query_keyframe(map, keyframe);
   for (const Candidate& candidate : consistent_candidates(map, keyframe, candidates, options_.loop, history_)) {
     auto place_match = verify(keyframe, map, candidate);
@@ -79,20 +79,19 @@ std::optional<PlaceMatch> LoopCloser::find(KeyframeId keyframe, const map::Bundl
     place_match->matched_keyframe = closest_keyframe_of_place(map, keyframe, *place_match, options_);
     const LoopClosure closure = measure(map, keyframe, *place_match);
     if (!plausible(map, closure, options_.loop)) continue;
-    if (!closure.merged || is_unambiguous(keyframe, map, *place_match)) return place_match;
+    if (!closure.merged || is_unambiguous(keyframe, map, *place_match))
+      return std::pair(*std::move(place_match), closure);
   }
   return std::nullopt;
 }
 
 std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft& draft) {
-  if (last_.valid() && keyframe <= last_) history_ = {};
-  last_ = keyframe;
-  const auto place_match = find(keyframe, draft.map());
-  if (!place_match) return std::nullopt;
-  const LoopClosure closure = measure(draft.map(), keyframe, *place_match);
+  const auto found = find(keyframe, draft.map());
+  if (!found) return std::nullopt;
+  const auto& [place_match, closure] = *found;
   map::MapDraft attempt = draft;
-  const bool done = closure.merged ? merge_submaps(closure, *place_match, options_.loop, features_, attempt)
-                                   : close_loop(closure, *place_match, options_.loop, features_, attempt);
+  const bool done = closure.merged ? merge_submaps(closure, place_match, options_.loop, features_, attempt)
+                                   : close_loop(closure, place_match, options_.loop, features_, attempt);
   if (!done) return std::nullopt;
   draft = std::move(attempt);
   history_ = {};

@@ -29,20 +29,19 @@ class LoopCloser {
              const feature::FeatureModel& features, std::uint64_t seed);
 
   // If `keyframe` (alive) closes a loop, writes the correction to the draft; otherwise leaves the draft unchanged.
-  // Keyframes must come in order: an id that does not increase means a new map, and resets the history.
+  // Keyframes must come in order of their ids.
   std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft);
 
  private:
   std::optional<PlaceMatch> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const;
   bool is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const PlaceMatch& place_match) const;
-  std::optional<PlaceMatch> find(KeyframeId keyframe, const map::BundledMap& map);
+  std::optional<std::pair<PlaceMatch, LoopClosure>> find(KeyframeId keyframe, const map::BundledMap& map);
 
   const std::unique_ptr<PlaceRecogniser> recogniser_;
   const LoopingOptions options_;
   const feature::FeatureModel features_;
   const std::uint64_t seed_;
   RecognitionHistory history_;
-  KeyframeId last_;  // the last keyframe passed to close()
 };
 
 }  // namespace bslam::looping

@@ -76,8 +76,8 @@ void BagOfWordsRecogniser::sync(const map::BundledMap& map) {
   for (std::size_t i = 0; i < known_.size(); ++i) {
     const KeyframeId k(i);
     const auto frame = map.alive(k) ? map.keyframe(k).frame : nullptr;
-    if (frame == known_[i]) continue;
-    if (known_[i]) index_.remove(k);
+    if (frame && frame == known_[i].lock()) continue;
+    index_.remove(k);
     if (frame) index_.add(k, words_of(*frame));
     known_[i] = frame;
   }

@@ -60,8 +60,8 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   const place::VocabularyPtr vocabulary_;
   const RecognitionOptions options_;
   place::InvertedIndex index_;
-  // frame of each keyframe in the index, by keyframe id; null if not in the index
-  std::vector<std::shared_ptr<const frame::BundledFrame>> known_;
+  // frame of each keyframe in the index, by keyframe id; not owned, so that frames of removed keyframes are released
+  std::vector<std::weak_ptr<const frame::BundledFrame>> known_;
 };
 
 }  // namespace bslam::looping

@@ -15,6 +15,18 @@ geometry::SE3 motion_of(const BundledKeyframe& k, CameraIndex c) {
 
 }  // namespace
 
+std::string_view scale_name(Scale scale) {
+  switch (scale) {
+    case Scale::kMetric:
+      return "metric";
+    case Scale::kUpToScale:
+      return "up-to-scale";
+    case Scale::kUnobservable:
+      return "unobservable";
+  }
+  return "";
+}
+
 std::vector<KeyframeId> BundledMap::keyframe_ids() const {
   std::vector<KeyframeId> ids;
   ids.reserve(alive_keyframes_);

@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/id.h"
@@ -25,6 +26,7 @@ namespace bslam::map {
 // kMetric: lengths are in metres. kUpToScale: the rig cannot observe the scale. kUnobservable: the rig can observe the
 // metric scale, but its motion has not made it observable so far.
 enum class Scale { kMetric, kUpToScale, kUnobservable };
+std::string_view scale_name(Scale scale);  // "metric", "up-to-scale", "unobservable"
 
 class BundledMap {
  public:

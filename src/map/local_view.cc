@@ -39,31 +39,30 @@ std::vector<LandmarkId> each_once(std::span<const LandmarkId> ids) {
 
 }  // namespace
 
-LocalView make_local_view(const BundledMap& map, std::span<const LandmarkId> seeds, KeyframeId reference,
-                          const LocalViewOptions& options) {
-  LocalView view;
+std::vector<LandmarkId> local_landmarks(const BundledMap& map, std::span<const LandmarkId> seeds, KeyframeId reference,
+                                        const LocalViewOptions& options) {
+  std::vector<KeyframeId> keyframes;  // most shared landmarks first
   const auto limit = static_cast<std::size_t>(options.max_keyframes);
   std::vector<std::uint8_t> taken(map.keyframe_slots(), 0);
   const auto take = [&](KeyframeId k) {
-    if (view.keyframes.size() >= limit || !map.alive(k) || taken[k.index()]) return;
+    if (keyframes.size() >= limit || !map.alive(k) || taken[k.index()]) return;
     taken[k.index()] = 1;
-    view.keyframes.push_back(k);
+    keyframes.push_back(k);
   };
   take(reference);
   const std::vector<Covisible> ranked = vote(map, seeds);
-  for (std::size_t i = 0; i < ranked.size() && view.keyframes.size() < (2 * limit) / 3; ++i) take(ranked[i].keyframe);
-  const std::vector<KeyframeId> direct = view.keyframes;
+  for (std::size_t i = 0; i < ranked.size() && keyframes.size() < (2 * limit) / 3; ++i) take(ranked[i].keyframe);
+  const std::vector<KeyframeId> direct = keyframes;
   for (const KeyframeId k : direct) {
     for (const Covisible& c : map.best_covisible(k, static_cast<std::size_t>(options.neighbours))) take(c.keyframe);
   }
 
   std::vector<LandmarkId> observed(seeds.begin(), seeds.end());
-  for (const KeyframeId k : view.keyframes) {
+  for (const KeyframeId k : keyframes) {
     std::ranges::copy_if(map.keyframe(k).landmarks, std::back_inserter(observed),
                          [](LandmarkId l) { return l.valid(); });
   }
-  view.landmarks = each_once(observed);
-  return view;
+  return each_once(observed);
 }
 
 }  // namespace bslam::map

@@ -21,14 +21,10 @@ struct LocalViewOptions {
   }
 };
 
-struct LocalView {
-  std::vector<KeyframeId> keyframes;  // most shared landmarks first
-  std::vector<LandmarkId> landmarks;  // all landmarks they observe, each once, beginning with the seeds
-};
-
-// Keyframes that observe the `seeds` (distinct, alive landmarks), covisible neighbours of the best of them, and always
-// `reference`; and all their landmarks.
-LocalView make_local_view(const BundledMap& map, std::span<const LandmarkId> seeds, KeyframeId reference,
-                          const LocalViewOptions& options);
+// Returns all landmarks observed by a selection of keyframes, each once, beginning with the `seeds` (distinct, alive
+// landmarks). The keyframes are those that observe the seeds, covisible neighbours of the best of them, and always
+// `reference`.
+std::vector<LandmarkId> local_landmarks(const BundledMap& map, std::span<const LandmarkId> seeds, KeyframeId reference,
+                                        const LocalViewOptions& options);
 
 }  // namespace bslam::map

@@ -14,10 +14,14 @@ MapSnapshot MapStore::snapshot() const {
   return current_;
 }
 
-void MapStore::restart(BundledMap initial) {
+void MapStore::restart() {
   const std::lock_guard writer(commit_mutex_);
-  initial.set_version(snapshot()->version().next());
-  auto fresh = std::make_shared<const BundledMap>(std::move(initial));
+  BundledMap emptied = *snapshot();
+  for (const KeyframeId root : emptied.roots()) emptied.remove_submap(root);
+  emptied.free_removed(emptied.landmark_slots());
+  emptied.set_scale(Scale::kMetric);  // as of a new map
+  emptied.set_version(emptied.version().next());
+  auto fresh = std::make_shared<const BundledMap>(std::move(emptied));
   const std::lock_guard lock(mutex_);
   current_.swap(fresh);
 }

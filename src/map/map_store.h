@@ -26,8 +26,9 @@ class MapStore {
   // Returns the newest version. Thread-safe.
   MapSnapshot snapshot() const;
 
-  // Discards everything and publishes `initial`. Drafts of earlier versions must not be committed afterwards.
-  void restart(BundledMap initial);
+  // Publishes a version from which all keyframes and landmarks are removed; their ids are not used again. Drafts of
+  // earlier versions must not be committed afterwards.
+  void restart();
 
   // Publishes the draft as the next version. If its base is still the newest version, its working copy is published
   // unchanged, and provisional ids become final; otherwise its operations are applied to the newest version by the

@@ -222,7 +222,6 @@ std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Pa
   AlignedKeypoint out;
   out.pixel = {target.to_base_x(level, at.x()), target.to_base_y(level, at.y())};
   out.sigma = options.sigma(std::sqrt(c.residual_variance / t->min_eigenvalue), scale);
-  out.ncc = c.ncc;
   return out;
 }
 

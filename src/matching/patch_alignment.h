@@ -72,7 +72,6 @@ std::optional<PatchWarp> patch_warp(const camera::Camera& reference_camera, cons
 struct AlignedKeypoint {
   Eigen::Vector2d pixel;  // level-0 pixels of the target image
   double sigma = 0;       // level-0 pixels per axis, in the direction of the largest standard deviation
-  double ncc = 0;
 };
 
 // Aligns `patch` in `target` by inverse-compositional Lucas-Kanade steps for translation with gain and offset (Baker

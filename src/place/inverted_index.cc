@@ -28,11 +28,6 @@ void InvertedIndex::remove(KeyframeId keyframe) {
   keyframes_.erase(found);
 }
 
-void InvertedIndex::clear() {
-  keyframes_.clear();
-  by_word_.clear();
-}
-
 std::shared_ptr<const WordVector> InvertedIndex::words_of(KeyframeId keyframe) const {
   const auto found = keyframes_.find(keyframe);
   return found != keyframes_.end() ? found->second : nullptr;

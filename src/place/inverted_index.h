@@ -23,7 +23,6 @@ class InvertedIndex {
   // The keyframe must not be in the index yet; `words` must not be null.
   void add(KeyframeId keyframe, std::shared_ptr<const WordVector> words);
   void remove(KeyframeId keyframe);  // does nothing if the keyframe is not in the index
-  void clear();
 
   bool contains(KeyframeId keyframe) const { return keyframes_.contains(keyframe); }
   std::size_t size() const { return keyframes_.size(); }

@@ -101,18 +101,6 @@ std::optional<double> peak_memory_mb() {
 
 }  // namespace
 
-std::string scale_name(map::Scale scale) {
-  switch (scale) {
-    case map::Scale::kMetric:
-      return "metric";
-    case map::Scale::kUpToScale:
-      return "up-to-scale";
-    case map::Scale::kUnobservable:
-      return "unobservable";
-  }
-  return "";
-}
-
 std::string trajectory_file(const std::string& stem, std::size_t submap) {
   return submap == 0 ? stem + ".tum" : stem + "_part" + std::to_string(submap + 1) + ".tum";
 }
@@ -137,7 +125,7 @@ RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameReco
   record.map = {static_cast<std::int64_t>(map->num_keyframes()),
                 static_cast<std::int64_t>(map->num_landmarks()),
                 static_cast<std::int64_t>(map->num_observations()),
-                scale_name(map->scale()),
+                std::string(map::scale_name(map->scale())),
                 input.loaded,
                 {}};
   if (std::isfinite(map->scale_deviation()) && map->scale_deviation() > 0)

@@ -28,9 +28,6 @@ struct RecordInput {
   double start_up_s = 0, wall_s = 0;
 };
 
-// Returns the name of a scale in files: metric, up-to-scale, unobservable.
-std::string scale_name(map::Scale scale);
-
 // Returns the name of the file with the poses of submap `submap`: "trajectory.tum", "trajectory_part2.tum".
 std::string trajectory_file(const std::string& stem, std::size_t submap);
 

@@ -77,8 +77,8 @@ struct ReprojectionResidual {
 // normal equations of those that are left are too small by the ratio of the two (docs/math.md, section 4).
 constexpr double kFractionLeft = 0.95, kVarianceLeft = 0.80;
 
-// Bounds of chi-square at 95 %.
-constexpr double kChi2OneDof95 = 3.841, kChi2TwoDof95 = 5.991;
+// Bound of chi-square with two degrees of freedom at 95 %.
+constexpr double kChi2TwoDof95 = 5.991;
 
 // Squared normalised error at which the cost of an observation is truncated. Observations with a larger error, and
 // those that do not project, have the cost of this bound and no gradient, so that a step cannot decrease the cost by

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <optional>
-#include <span>
+#include <string>
 
 #include "base/result.h"
 #include "camera/rig.h"
@@ -20,8 +20,9 @@ struct FrameStamp {
 // id or time is not larger than that of the previous frame `before`, if there is one.
 Status check_frame(const image::ImageBundle& images, const camera::Rig& rig, const std::optional<FrameStamp>& before);
 
-// Errors: the number of masks differs from the number of cameras and is not 0; the size of a mask differs from the size
-// of its camera's images, and it is not empty.
-Status check_masks(std::span<const image::Image> masks, const camera::Rig& rig);
+// The single checks. `where` names the input in the error.
+Status check_count(std::size_t images, const camera::Rig& rig, const std::string& where);
+Status check_size(int width, int height, const camera::Camera& camera, const std::string& where);
+Status check_later(TimeNs time_ns, TimeNs before_ns, const std::string& where);
 
 }  // namespace bslam::system

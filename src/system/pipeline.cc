@@ -78,6 +78,7 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
 
   tracking::TrackOutcome tracked =
       tracker_.process(std::move(state_), std::move(frame), builder_.pyramids(), outcome.seen);
+  tracked.record.scale = outcome.seen->scale();
   if (tracked.edit) commit(tracked, executor, outcome);
   state_ = std::move(tracked.next);
   outcome.early = std::move(tracked.early);
@@ -96,6 +97,7 @@ void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor&
   tracking::ProposedEdit& edit = *tracked.edit;
   const map::CommitReport report = executor.commit(journal_step(edit.kind), std::move(edit.draft));
   tracker_.committed(report, tracked);
+  tracked.record.scale = report.published->scale();
   outcome.keyframes = report.keyframes;
   outcome.started_submap = edit.kind == tracking::ProposedEdit::Kind::kStart;
   tracked.record.stages.back().ms += watch.ms();  // added to the time of the stage that proposed the edit

@@ -1,48 +1,16 @@
 #include "system/stages.h"
 
-#include <algorithm>
-#include <iterator>
-
 #include "mapping/map_keyframe.h"
 
 namespace bslam::system {
 namespace {
 
-using Statistics = std::vector<execution::StageStatistic>;
-
-Statistics statistics(const adjustment::AdjustmentReport& report) {
-  return {{"observations", static_cast<double>(report.observations)},
-          {"outliers", static_cast<double>(report.outliers)},
-          {"initial cost", report.initial_cost},
-          {"final cost", report.final_cost}};
-}
-
-Statistics statistics(const mapping::MappingReport& report) {
-  Statistics out = {{"culled landmarks", static_cast<double>(report.culled_landmarks)},
-                    {"created landmarks", static_cast<double>(report.created)},
-                    {"fused observations", static_cast<double>(report.fusion.added)},
-                    {"merged landmarks", static_cast<double>(report.fusion.merged)},
-                    {"culled keyframes", static_cast<double>(report.culled_keyframes)},
-                    {"scale correction", report.scale.correction}};
-  std::ranges::copy(statistics(report.adjustment), std::back_inserter(out));
-  return out;
-}
-
-Statistics statistics(const looping::LoopClosure& closure) {
-  return {{"inliers", static_cast<double>(closure.inliers)},
-          {"reprojection error before [px]", closure.reprojection_error_px},
-          {"translation correction", closure.translation_correction},
-          {"rotation correction [rad]", closure.rotation_correction},
-          {"scale correction", closure.scale_correction}};
-}
-
 execution::StageResult map_keyframe(const Config& config, const execution::StageTask& task,
                                     const map::MapSnapshot& base, std::stop_token stop) {
   if (!base->alive(task.keyframe)) return {};
   map::MapDraft draft(base);
-  const mapping::MappingReport report =
-      mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop));
-  return {std::move(draft), {}, statistics(report)};
+  mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop));
+  return {std::move(draft), {}};
 }
 
 execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserver& observer,
@@ -53,14 +21,13 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
   if (!closure) return {};
   const auto time_of = [&](KeyframeId k) { return base->keyframe(k).frame->time_ns; };
   const LoopRecord record{*closure, time_of(closure->keyframe), time_of(closure->matched_keyframe)};
-  return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }, statistics(*closure)};
+  return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }};
 }
 
 execution::StageResult adjust_globally(const Config& config, const map::MapSnapshot& base, std::stop_token stop) {
   map::MapDraft draft(base);
-  const adjustment::AdjustmentReport report =
-      mapping::adjust_globally(config.mapping, config.feature_model(), draft, std::move(stop));
-  return {std::move(draft), {}, statistics(report)};
+  mapping::adjust_globally(config.mapping, config.feature_model(), draft, std::move(stop));
+  return {std::move(draft), {}};
 }
 
 }  // namespace

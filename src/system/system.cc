@@ -37,6 +37,7 @@ System::System(camera::Rig rig, Config config, Resources resources)
       config_(std::move(config)),
       loaded_(resources.map.has_value()),
       first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0),
+      first_of_map_(first_keyframe_),
       pipeline_(rig_, config_, std::move(resources.masks), make_relocaliser(resources.vocabulary, config_)),
       history_(resources.history),
       store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)),
@@ -47,9 +48,8 @@ System::System(camera::Rig rig, Config config, Resources resources)
     const std::lock_guard lock(records_mutex_);
     loops_.push_back(loop);
   };
-  const auto note_run = [this, observer = std::move(resources.observer)](const execution::StageRun& run) {
+  const auto note_run = [this](const execution::StageRun& run) {
     const StageRecord record{run, keyframe_time(run.task.keyframe)};
-    if (observer) observer(record);
     const std::lock_guard lock(records_mutex_);
     stage_runs_.push_back(record);
   };
@@ -70,7 +70,9 @@ void System::discard_map() {
   }
   early_.clear();
   pipeline_.restart();
-  executor_->restart(empty_map(rig_, config_));
+  executor_->restart();
+  first_of_map_ = KeyframeId(store_.snapshot()->keyframe_slots());
+  frames_.back().map_withdrawn = true;
 }
 
 void System::set_keyframe_time(KeyframeId k, TimeNs time_ns) {
@@ -106,7 +108,7 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
 bool System::initialisation_failed(const Pipeline::Outcome& outcome, bool had_pose) const {
   const map::BundledMap& seen = *outcome.seen;
   return had_pose && !loaded_ && disowns_map(outcome.record.result) && seen.scale() != map::Scale::kMetric &&
-         seen.keyframe_slots() <= kMaxFailedMap;
+         seen.keyframe_slots() - first_of_map_.index() <= kMaxFailedMap;
 }
 
 // Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.

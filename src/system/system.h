@@ -1,7 +1,6 @@
 // The SLAM system: computes poses and a map from images. Owns the map and the threads.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -28,9 +27,6 @@ struct StageRecord {
   TimeNs time_ns = 0;  // time of its keyframe
 };
 
-// Called after every run of a background stage. Must be thread-safe: called from any thread, also concurrently.
-using StageRecordObserver = std::function<void(const StageRecord&)>;
-
 // Optional input of a run.
 struct Resources {
   std::vector<image::Image> masks = {};  // one per camera of the rig, empty if it has no mask; or no masks at all
@@ -38,7 +34,6 @@ struct Resources {
   // Map of an earlier run with this rig. The run continues in it after relocalisation.
   std::optional<map::BundledMap> map = {};
   std::optional<execution::Journal> replay = {};  // repeats the run of this journal, regardless of the mode
-  StageRecordObserver observer = {};              // may be empty
   // Minimum number of last frames and stage runs whose records are kept, for runs of unlimited duration; no journal is
   // kept then. 0: all records and the journal are kept.
   std::size_t history = 0;
@@ -52,8 +47,8 @@ struct SubmapTrajectory {
 
 class System {
  public:
-  // The masks of `resources` must pass check_masks. If a journal is given, the frames must be those of the journal, and
-  // calls throw ReplayMismatch if the run differs from it.
+  // The masks of `resources` must have the size of their cameras' images. If a journal is given, the frames must be
+  // those of the journal, and calls throw ReplayMismatch if the run differs from it.
   System(camera::Rig rig, Config config, Resources resources = {});
   ~System();
 
@@ -108,6 +103,7 @@ class System {
   const Config config_;
   const bool loaded_;                // whether the run began with a loaded map
   const KeyframeId first_keyframe_;  // first keyframe of this run
+  KeyframeId first_of_map_;          // after the last map that was withdrawn
   Pipeline pipeline_;
   const std::size_t history_;  // see Resources
   std::optional<FrameStamp> last_input_;
@@ -116,7 +112,7 @@ class System {
   mutable std::mutex records_mutex_;
   std::vector<StageRecord> stage_runs_;  // this and the next two members are guarded by records_mutex_
   std::vector<LoopRecord> loops_;
-  std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId of the current map
+  std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId
   double final_adjustment_ms_ = 0, extrinsics_ms_ = 0;
   adjustment::AdjustmentReport final_adjustment_;
   calibration::RigRefinement extrinsics_;

@@ -36,8 +36,10 @@ struct FrameRecord {
   // T_map_odom only. The odometry pose does not change while the rig is lost. T_rig_odom = T_rig_world * T_map_odom,
   // with T_rig_world of `result`.
   geometry::SE3 T_rig_odom, T_map_odom;
-  KeyframeId root;  // root keyframe of the submap in which `result` gives the pose
+  KeyframeId root;                         // root keyframe of the submap in which `result` gives the pose
+  map::Scale scale = map::Scale::kMetric;  // of the map in which it gives the pose
   bool keyframe = false;
+  bool map_withdrawn = false;                  // after this frame the map was emptied, because it was not a good start
   int unique = 0, monocular = 0, matched = 0;  // features; unique = monocular + matched
 
   std::vector<StageTime> stages;  // in the caller's thread

@@ -147,11 +147,12 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
                            const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
   const frame::BundledFrame& frame = out.frame;
-  const map::LocalView view = map::make_local_view(map, landmarks, input.state.anchored.reference, options.local_view);
+  const std::vector<LandmarkId> near =
+      map::local_landmarks(map, landmarks, input.state.anchored.reference, options.local_view);
   auto wide = search_options(input, options.matching, options.matching.wide_radius);
   wide.level_slack = 2;
   wide.ratio = 0.8 * options.matching.ratio;
-  MatchSearch search = find_landmarks(map, frame, out.T_rig_world, view.landmarks, {}, wide, pool);
+  MatchSearch search = find_landmarks(map, frame, out.T_rig_world, near, {}, wide, pool);
   drop(out.excluded, search.found);
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return false;
   const auto observations = pose_observations(map, frame, search.found, input.features);
@@ -209,16 +210,16 @@ std::vector<LandmarkCounts> landmark_counts(const MatchSearch& search) {
 Fine track_local_view(const TrackInput& input, const Coarse& coarse, const TrackingOptions& options, ThreadPool& pool) {
   const map::BundledMap& map = input.map;
   const frame::BundledFrame& frame = coarse.frame;
-  const map::LocalView view =
-      map::make_local_view(map, landmarks_of(coarse.matches), input.state.anchored.reference, options.local_view);
-  MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, coarse.matches,
+  const std::vector<LandmarkId> near =
+      map::local_landmarks(map, landmarks_of(coarse.matches), input.state.anchored.reference, options.local_view);
+  MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, near, coarse.matches,
                                       search_options(input, options.matching, options.matching.local_radius), pool);
   Fine out;
   out.views = landmark_counts(search);
   if (any_due_for_retry(input.state, frame.time_ns, options.consensus)) {
     auto windows = search_options(input, options.matching, options.matching.wide_radius);
     windows.ratio = 0.8 * options.matching.ratio;
-    out.wide = landmark_counts(find_landmarks(map, frame, coarse.T_rig_world, view.landmarks, {}, windows, pool));
+    out.wide = landmark_counts(find_landmarks(map, frame, coarse.T_rig_world, near, {}, windows, pool));
   }
   drop(coarse.excluded, search.found);
   out.matches = merge(coarse.matches, search.found);

@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
+#include <type_traits>
+#include <utility>
 
 #include "api/textured_wall.h"
 #include "support/data_on_disk.h"
@@ -65,6 +68,33 @@ TEST(PublicRig, RejectsInvalidCameras) {
   EXPECT_FALSE(TexturedWall::rig().subset({0, 0}));
   EXPECT_FALSE(TexturedWall::rig().subset({2}));
   EXPECT_FALSE(TexturedWall::rig().subset({}));
+}
+
+TEST(PublicRig, NamesItsCamerasAndRefusesANameTwice) {
+  CameraCalibration nameless = TexturedWall::calibration(0), other = TexturedWall::calibration(1);
+  nameless.name.clear();
+  other.name.clear();
+  const Rig rig = Rig::make({nameless, other}).value();
+  EXPECT_EQ(rig.camera(0).name, "cam0");
+  EXPECT_EQ(rig.camera(1).name, "cam1");
+  const TemporaryFolder folder;
+  ASSERT_TRUE(rig.save(folder.path() / "rig.yaml"));
+  const auto back = Rig::load(folder.path() / "rig.yaml");
+  ASSERT_TRUE(back) << back.error().message();
+  EXPECT_EQ(back->camera(1).name, "cam1");
+  const auto twice = Rig::make({TexturedWall::calibration(0), TexturedWall::calibration(0)});
+  ASSERT_FALSE(twice);
+  EXPECT_NE(twice.error().message().find("left"), std::string::npos);
+  other.name = "cam0";
+  EXPECT_FALSE(Rig::make({nameless, other}));
+}
+
+TEST(PublicRig, IsNeverEmpty) {
+  static_assert(!std::is_constructible_v<Rig, std::nullptr_t> && !std::is_constructible_v<MapView, std::nullptr_t>);
+  Rig rig = TexturedWall::rig();
+  const Rig moved = std::move(rig);
+  EXPECT_EQ(moved.size(), 2u);
+  EXPECT_EQ(rig.size(), 2u);  // NOLINT: the state after a move is defined
 }
 
 TEST(PublicRig, LoadsFilesFoldersAndMasks) {

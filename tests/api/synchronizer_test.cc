@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <stdexcept>
 #include <thread>
 
 #include "base/random.h"
@@ -64,7 +65,7 @@ class Feed {
     }
   }
   Times close() {
-    synchronizer.close();
+    EXPECT_TRUE(synchronizer.close());
     fetch();
     return bundles;
   }
@@ -212,6 +213,26 @@ TEST(Synchronizer, HoldsABoundedNumberOfImagesAndBundles) {
   EXPECT_EQ(times_of(*synchronizer.pop()), (std::vector<std::int64_t>{600, -1}));
 }
 
+TEST(Synchronizer, ReportsAllDropsAndReturnsTheFirstException) {
+  std::vector<std::int64_t> reported;
+  SyncOptions options{.tolerance_s = 0.002, .max_wait_s = 1000, .silent_after_s = 1000};
+  options.on_drop = [&reported](const DroppedImage& d) {
+    reported.push_back(d.time_ns / kMs);
+    throw std::runtime_error("drop " + std::to_string(reported.size()));
+  };
+  auto synchronizer = Synchronizer::create(rig_of(2), options).value();
+  for (const std::int64_t ms : {0, 50, 100}) ASSERT_TRUE(synchronizer.push(0, image_at(ms * kMs)));
+  for (const std::int64_t ms : {20, 70}) ASSERT_TRUE(synchronizer.push(1, image_at(ms * kMs)));  // of no bundle
+  const Status closed = synchronizer.close();
+  ASSERT_FALSE(closed);
+  EXPECT_NE(closed.error().message().find("drop 1"), std::string::npos);
+  EXPECT_EQ(reported, (std::vector<std::int64_t>{20, 70}));
+  std::size_t bundles = 0;
+  while (synchronizer.wait()) ++bundles;
+  EXPECT_EQ(bundles, 3u);
+  EXPECT_TRUE(synchronizer.close());
+}
+
 TEST(Synchronizer, CopiesPixelsWithoutOwner) {
   auto synchronizer = Synchronizer::create(rig_of(1)).value();
   std::vector<std::uint8_t> pixels(2 * kSide * kSide, 1);
@@ -227,7 +248,7 @@ TEST(Synchronizer, CopiesPixelsWithoutOwner) {
 }
 
 TEST(Synchronizer, AddsTheTimeOffsetsOfTheRig) {
-  CameraCalibration late = rig_of(1).camera(0);
+  CameraCalibration late = rig_of(2).camera(1);
   late.time_offset_s = 0.03;
   auto synchronizer = Synchronizer::create(Rig::make({rig_of(1).camera(0), late}).value()).value();
   ASSERT_TRUE(synchronizer.push(0, image_at(100 * kMs)));
@@ -242,7 +263,7 @@ TEST(Synchronizer, RejectsInvalidImagesAndOptions) {
   EXPECT_FALSE(synchronizer.push(0, {g_pixels.data(), 8, kSide, kSide, 0, nullptr}));
   EXPECT_FALSE(synchronizer.push(0, {g_pixels.data(), kSide, kSide, kSide - 1, 0, nullptr}));
   EXPECT_FALSE(synchronizer.push(0, image_at(std::numeric_limits<std::int64_t>::max())));
-  synchronizer.close();
+  EXPECT_TRUE(synchronizer.close());
   EXPECT_FALSE(synchronizer.push(0, image_at(0)));
   EXPECT_FALSE(synchronizer.wait());
   EXPECT_FALSE(Synchronizer::create(rig_of(1), {.tolerance_s = -1}));
@@ -266,7 +287,7 @@ TEST(Synchronizer, AcceptsImagesFromOneThreadPerCamera) {
   }
   std::thread end([&] {
     for (std::thread& camera : cameras) camera.join();
-    synchronizer.close();
+    EXPECT_TRUE(synchronizer.close());
   });
   int bundles = 0;
   while (const auto bundle = synchronizer.wait()) {

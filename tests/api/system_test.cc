@@ -51,6 +51,7 @@ TEST_F(PublicSystem, ReportsPoseAndVelocityInTheDocumentedFrames) {
   for (int k = 0; k < kFrames; ++k) last = system.process(wall_.bundle(k)).value();
   ASSERT_TRUE(last.tracking());
   EXPECT_EQ(last.frame, kFrames - 1);
+  EXPECT_EQ(last.scale, Scale::kMetric);
   EXPECT_EQ(last.time_ns, TexturedWall::kStart + (kFrames - 1) * TexturedWall::kInterval);
   const double travelled = TexturedWall::kSpeed * 0.05 * (kFrames - 1);
   EXPECT_NEAR(last.T_world_cam0.translation[0], travelled, 0.05);
@@ -84,7 +85,7 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   ASSERT_TRUE(system.save_map(file));
   EXPECT_FALSE(system.save_map("/no/such/folder/map"));
 
-  const auto map = MapView::load(file);
+  auto map = MapView::load(file);
   ASSERT_TRUE(map) << map.error().message();
   EXPECT_EQ(map->scale(), Scale::kMetric);
   EXPECT_EQ(map->rig().size(), 2u);
@@ -100,6 +101,9 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   ASSERT_GE(keyframes.size(), 2u);
   EXPECT_EQ(keyframes[0].parent, -1);
   EXPECT_FALSE(map->covisibility(1).empty());
+
+  const MapView moved = *std::move(map);
+  EXPECT_EQ(map->num_landmarks(), moved.num_landmarks());  // NOLINT: the state after a move is defined
 
   const auto resumed = System::create(TexturedWall::rig(), sequential(), {.map = file});
   ASSERT_TRUE(resumed) << resumed.error().message();

@@ -59,11 +59,11 @@ struct WorldRun {
   }
   void frame_without() { seen.push_back(hash_of(*executor->begin_frame(FrameId(frames++)), 0)); }
 
-  // A complete run with keyframes in two of three frames and a restart in the middle.
+  // A complete run with keyframes in two of three frames and a restart with an empty map in the middle.
   void whole(int count = 60) {
     for (int half = 0; half < 2; ++half) {
       for (int i = 0; i < count / 2; ++i) i % 3 == 1 ? frame_without() : static_cast<void>(frame_with_keyframe());
-      if (half == 0) executor->restart(world.empty_map());
+      if (half == 0) executor->restart();
     }
     executor->drain();
     executor->end();
@@ -381,6 +381,101 @@ TEST(StageExecutorParallel, AnInterruptFromAnotherThreadEndsEveryWait) {
     EXPECT_TRUE(run.executor->over());
     EXPECT_EQ(run.gate.newest()->num_keyframes(), 31u);  // edits of the caller are committed
     EXPECT_EQ(count(run.gate.journal(), JournalStep::kMap), 0u);
+  }
+}
+
+TEST(StageExecutorLagged, DiscardsAResultThatWasDoneButNotDueWhenInterrupted) {
+  std::atomic<int> mapped = 0;
+  StageFunctions functions = hashing_stages(1, 3, 0);
+  functions[Stage::kMap] = [&, real = functions[Stage::kMap]](const auto& task, const auto& base, const auto& stop) {
+    StageResult result = real(task, base, stop);
+    mapped = 1;
+    mapped.notify_all();
+    return result;
+  };
+  ExecutionSetup s = setup(functions);
+  s.options.lag_map = 1000;
+  WorldRun run(execution::Mode::kLagged, std::move(s));
+  run.frame_with_keyframe();
+  mapped.wait(0);
+  EXPECT_GT(busy(1'000'000), 0);  // the worker returns from the stage meanwhile
+  run.executor->interrupt();
+  run.executor->drain();
+  EXPECT_EQ(count(run.gate.journal(), JournalStep::kMap), 0u);
+  EXPECT_EQ(run.gate.newest()->version(), MapVersion(1));
+}
+
+TEST(StageExecutorLagged, ObservesAnInterruptedTaskOnceAndIgnoresItsException) {
+  std::atomic<int> begun = 0, observed = 0;
+  StageFunctions functions = hashing_stages(1, 3, 0);
+  functions[Stage::kMap] = [&](const auto&, const auto&, const std::stop_token& stop) -> StageResult {
+    begun = 1;
+    begun.notify_all();
+    while (!stop.stop_requested()) std::this_thread::yield();
+    throw std::runtime_error("stopped");
+  };
+  WorldRun run(execution::Mode::kLagged, setup(functions, [&](const StageRun& r) {
+                 EXPECT_FALSE(r.committed);
+                 ++observed;
+                 observed.notify_all();
+               }));
+  run.frame_with_keyframe();
+  begun.wait(0);
+  run.executor->interrupt();
+  observed.wait(0);
+  EXPECT_NO_THROW(run.executor->drain());
+  EXPECT_NO_THROW(run.frame_with_keyframe());
+  EXPECT_EQ(observed, 1);
+}
+
+TEST(StageExecutorParallel, AnObserverMayInterrupt) {
+  for (const execution::Mode mode : kModes) {
+    std::atomic<StageExecutor*> executor = nullptr;
+    WorldRun run(mode, setup(hashing_stages(1, 1), [&](const StageRun& r) {
+                   if (r.task.stage == Stage::kLoop) executor.load()->interrupt();
+                 }));
+    executor = run.executor.get();
+    for (int i = 0; i < 10; ++i) run.frame_with_keyframe();
+    run.executor->drain();
+    EXPECT_TRUE(run.executor->over());
+    EXPECT_LE(count(run.gate.journal(), JournalStep::kGlobal), 1u);
+    run.executor.reset();
+  }
+}
+
+// A global adjustment that a second loop stops is observed by its worker.
+TEST(StageExecutorLagged, AnObserverInAWorkerMayInterruptOrThrow) {
+  for (const bool throws : {false, true}) {
+    std::atomic<int> begun = 0, stopped = 0;
+    std::atomic<bool> told = false;
+    std::atomic<StageExecutor*> executor = nullptr;
+    const auto observer = [&](const StageRun& r) {
+      if (r.task.stage != Stage::kGlobal || told.exchange(true)) return;
+      told.notify_all();
+      if (throws) throw std::runtime_error("observer failed");
+      executor.load()->interrupt();
+    };
+    WorldRun run(execution::Mode::kLagged, setup(endless_global(begun, stopped), observer));
+    executor = run.executor.get();
+    const auto second_loop = [&] {
+      run.frame_with_keyframe();
+      for (int i = 0; i < 9; ++i) run.frame_without();
+      begun.wait(0);
+      run.frame_with_keyframe();
+      for (int i = 0; i < 9; ++i) run.frame_without();
+      told.wait(false);
+      for (int i = 0; throws && i < 100'000; ++i) {  // until the exception is there
+        std::this_thread::yield();
+        run.frame_without();
+      }
+    };
+    if (throws) {
+      EXPECT_THROW(second_loop(), std::runtime_error);
+    } else {
+      second_loop();
+      while (!run.executor->over()) std::this_thread::yield();
+    }
+    run.executor.reset();
   }
 }
 

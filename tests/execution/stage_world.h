@@ -74,7 +74,7 @@ inline execution::StageFunctions hashing_stages(std::uint64_t delay_seed, int lo
       if (busy(rounds) < 0 || stop.stop_requested()) return {};
     }
     if (task.stage == execution::Stage::kLoop && task.keyframe.value() % loop_every != 0) return {};
-    map::MapDraft draft(execution::stage_name(task.stage), base);
+    map::MapDraft draft(base);
     const std::uint64_t hash = hash_of(*base, number);
     map::SetPoses poses;
     poses.landmarks.emplace_back(LandmarkId(hash % base->landmark_slots()), point_of(hash));

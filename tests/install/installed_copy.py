@@ -41,9 +41,24 @@ def check_package(prefix):
     needed = run('readelf', '-d', library)
     for word in ('opencv', 'embree'):
         check(word not in needed, f'the library does not need {word}')
-    exported = run('nm', '-D', '--defined-only', '-C', library)
-    for inner in ('bslam::tracking::', 'bslam::map::BundledMap::', 'bslam::solver::'):
-        check(not re.search(r' T ' + inner, exported), f'{inner} is not exported')
+    check_exports(prefix, run('nm', '-D', '--defined-only', '-C', library))
+
+
+def check_exports(prefix, exported):
+    """The library exports what its headers mark, and what templates of the standard library are made of."""
+    marked = set()
+    for header in prefix.rglob('include/bslam/*.h'):
+        text = header.read_text()
+        marked.update(re.findall(r'(?:class|struct) BSLAM_EXPORT (\w+)', text))
+        marked.update(re.findall(r'^(?:\[\[noreturn\]\] )?BSLAM_EXPORT [^;(]*?(\w+|operator\S+)\(', text, re.MULTILINE))
+    check('System' in marked and 'version' in marked, 'the headers mark what is exported')
+    allowed = re.compile(r'(?:(?:typeinfo|typeinfo name|vtable) for )?(?:bslam::(?:%s)(?:\(|::|\[|$)|std::|__gnu_cxx::)'
+                         % '|'.join(map(re.escape, sorted(marked))))
+    for line in exported.splitlines():
+        kind, name = line.split(None, 2)[-2:] if line[0] in '0123456789abcdef' else line.split(None, 1)
+        name = re.sub(r'^(?:guard variable for |VTT for )', '', name)
+        of_std = kind in 'WVu' and re.search(r'\bstd::|__gnu_cxx::', name) and 'bslam::' not in name.split('(')[0].split('<')[0]
+        check(of_std or allowed.match(name), f'{name} ({kind}) is exported only if a header marks it')
 
 
 def check_pkg_config(prefix, work):

@@ -86,15 +86,6 @@ TEST(LoopCloser, RequiresTheConfiguredNumberOfConsecutiveKeyframes) {
   EXPECT_FALSE(LoopCloserRun(single)(world, KeyframeId(kLapKeyframes)));
 }
 
-TEST(LoopCloser, ResetsTheHistoryForANewMap) {
-  const HallMap& world = map_with_drift(2);
-  LoopCloserRun run;
-  EXPECT_TRUE(run(world, KeyframeId(kLapKeyframes)));
-  // The ids do not increase, so this is a new map, and the first recognition of the place.
-  EXPECT_TRUE(run(world, KeyframeId(kLapKeyframes)));
-  EXPECT_FALSE(run(world, KeyframeId(kLapKeyframes + 1)));
-}
-
 TEST(LoopCloser, ClosesNothingWithoutARevisit) {
   LoopCloserRun run;
   const FeatureSimulator simulator = hall(rig_of(4));

@@ -30,6 +30,15 @@ TEST_P(RecogniserRig, RanksTheRevisitedPlaceFirst) {
   }
 }
 
+TEST_P(RecogniserRig, KeepsNoFrameAlive) {
+  const HallMap& world = drifted_walk(GetParam());
+  const auto recognises = recogniser();
+  const auto& frame = world.map.keyframe(KeyframeId(0)).frame;
+  const auto owners = frame.use_count();
+  EXPECT_FALSE(recognises->query_keyframe(world.map, KeyframeId(kRound)).empty());
+  EXPECT_EQ(frame.use_count(), owners);
+}
+
 TEST_P(RecogniserRig, RanksTheTrueNeighbourhoodOfAFrameFirst) {
   const HallMap& world = map_without_drift(GetParam());
   const FeatureSimulator simulator = hall(rig_of(GetParam()));

@@ -10,6 +10,30 @@
 namespace bslam::map {
 namespace {
 
+TEST(MapStore, DoesNotReuseIdsAfterARestart) {
+  Random random(1);
+  MapStore store{BundledMap(synthetic_rig(1))};
+  const auto add = [&] {
+    MapDraft draft(store.snapshot());
+    const KeyframeId k = draft.add_keyframe(synthetic_frame(random, 1, 10, 0), {}, {}, {});
+    draft.add_landmark({0, 0, 5}, {{k, FeatureId(3)}});
+    draft.set_scale(Scale::kUpToScale);
+    return store.commit(std::move(draft));
+  };
+  add();
+  const CommitReport before = add();
+  store.restart();
+  const MapSnapshot emptied = store.snapshot();
+  EXPECT_EQ(emptied->version(), before.published->version().next());
+  EXPECT_EQ(emptied->num_keyframes() + emptied->num_landmarks() + emptied->num_observations(), 0u);
+  EXPECT_EQ(emptied->scale(), Scale::kMetric);
+  EXPECT_EQ(emptied->check_invariants().value_or("valid"), "valid");
+  const CommitReport after = add();
+  EXPECT_EQ(after.keyframes, std::vector{before.keyframes[0].next()});
+  EXPECT_EQ(after.landmarks, std::vector{before.landmarks[0].next()});
+  EXPECT_EQ(after.published->roots(), after.keyframes);
+}
+
 TEST(MapStore, CountsVersionsAndKeepsProvisionalIdsWithoutOtherCommits) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};

