@@ -31,11 +31,11 @@ TEST_P(RecogniserRig, RanksTheRevisitedPlaceFirst) {
 }
 
 TEST_P(RecogniserRig, KeepsNoFrameAlive) {
-  const HallMap& world = drifted_walk(GetParam());
+  const HallMap& world = map_with_drift(GetParam());
   const auto recognises = recogniser();
   const auto& frame = world.map.keyframe(KeyframeId(0)).frame;
   const auto owners = frame.use_count();
-  EXPECT_FALSE(recognises->query_keyframe(world.map, KeyframeId(kRound)).empty());
+  EXPECT_FALSE(recognises->query_keyframe(world.map, KeyframeId(kLapKeyframes)).empty());
   EXPECT_EQ(frame.use_count(), owners);
 }
 

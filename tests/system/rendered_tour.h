@@ -49,7 +49,7 @@ class RenderedTour {
     pool_.for_each(shots.size(), [&](std::size_t i) {
       const simulator::Shot& shot = shots[i];
       const TimeNs time_ns = shot.stamp_ns + rig_.camera(shot.camera).time_offset_ns;
-      frames_[shot.frame].images[shot.camera] = {image::ImageState::kPresent, time_ns, recorder.picture(shot)};
+      frames_[shot.frame].images[shot.camera] = {image::ImageState::kPresent, time_ns, recorder.render(shot)};
     });
     for (const simulator::Shot& shot : shots) {
       rig_truth_[shot.camera].push_back({shot.stamp_ns, recorder.T_world_cam(0, shot.scene_time_s)});

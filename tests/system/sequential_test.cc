@@ -174,7 +174,9 @@ TEST(SystemSequential, DiscardsANewMapUpToScaleAndItsPosesIfLost) {
   for (std::size_t i = 0; i < tour.frames().size(); ++i) {
     const FrameRecord record = must_process(system, tour.replayed(i, k));
     EXPECT_FALSE(record.map_withdrawn);
-    if (record.keyframe) EXPECT_GT(record.result.anchored.reference, last);
+    if (record.keyframe) {
+      EXPECT_GT(record.result.anchored.reference, last);
+    }
   }
   system.finish();
   EXPECT_EQ(system.maps_started(), 2);
