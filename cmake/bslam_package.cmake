@@ -1,6 +1,5 @@
 # The library that other projects link, and what `cmake --install` puts where: the program, the headers, the shared library,
 # and files by which CMake (find_package(bslam)) and pkg-config find them.
-include(CheckLinkerFlag)
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -21,10 +20,9 @@ function(bslam_shared_library)
   if(NOT BSLAM_SANITIZE AND NOT BSLAM_FUZZ)  # whose symbols come with the program
     target_link_options(bslam_library PRIVATE LINKER:--no-undefined)
   endif()
-  check_linker_flag(CXX LINKER:--exclude-libs,ALL BSLAM_LINKER_EXCLUDES_LIBS)
-  if(BSLAM_LINKER_EXCLUDES_LIBS)  # symbols of static libraries stay inside, whatever visibility they were compiled with
-    target_link_options(bslam_library PRIVATE LINKER:--exclude-libs,ALL)
-  endif()
+  # Symbols of other libraries stay inside, whatever visibility they were compiled with.
+  target_link_options(bslam_library PRIVATE LINKER:--version-script=${PROJECT_SOURCE_DIR}/cmake/bslam.map)
+  set_target_properties(bslam_library PROPERTIES LINK_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/bslam.map)
 endfunction()
 
 function(bslam_install)

@@ -94,15 +94,16 @@ imageDelay: -0.5
   EXPECT_TRUE(file->notes.empty());
 }
 
-TEST_F(OkvisRig, IsChecked) {
+TEST_F(OkvisRig, RejectsInvalidValues) {
   struct Case {
     const char *from, *to, *key, *found, *expected;
   };
   for (const Case& c : {
            Case{"cameras:", "cameras: nobody\nold:", "cameras", "nobody", "a list of at least one map"},
            Case{"{T_SC", "{T_CS", "cameras[0].T_SC", "nothing", "a list of numbers"},
-           Case{"0.0, 0.0, 0.0, 1.0],", "0.0, 0.0, 1.0],", "cameras[0].T_SC", "15 numbers", "16, the rows of a 4x4"},
-           Case{"0.999557249008", "-0.999557249008", "cameras[0].T_SC", "no rotation", "a rigid transform"},
+           Case{"0.0, 0.0, 0.0, 1.0],", "0.0, 0.0, 1.0],", "cameras[0].T_SC", "15 numbers",
+                "16 (rows of a 4x4 transform)"},
+           Case{"0.999557249008", "-0.999557249008", "cameras[0].T_SC", "not a rotation", "a rigid transform"},
            Case{"image_dimension: [752, 480]", "image_dimension: [752]", "cameras[0].image_dimension", "1 numbers",
                 "width and height"},
            Case{"[752, 480]", "[752.5, 480]", "cameras[0].image_dimension", "752.5", "whole pixels"},
@@ -114,12 +115,13 @@ TEST_F(OkvisRig, IsChecked) {
                 "4 for radialtangential: k1 k2 p1 p2"},
            Case{"0.0739", "many", "cameras[0].distortion_coefficients[1]", "many", "a finite number"},
            Case{"[458.5, 457.5]", "[458.5]", "cameras[0].focal_length", "1 numbers", "two numbers: fx fy"},
-           Case{"[458.5, 457.5]", "[458.5, -457.5]", "cameras[0].focal_length", "focal length -457.5", "one above 0"},
+           Case{"[458.5, 457.5]", "[458.5, -457.5]", "cameras[0].focal_length", "focal length -457.5",
+                "a positive number"},
            Case{"principal_point: [254.9", "centre: [254.9", "cameras[1].principal_point", "nothing",
                 "a list of numbers"},
            Case{"image_delay: 0.0125", "image_delay: late", "camera_parameters.image_delay", "late", "a finite number"},
            Case{"image_delay: 0.0125", "image_delay: 2.0e6", "camera_parameters.image_delay", "-2000000",
-                "seconds, at most a million"},
+                "at most 1e6 seconds"},
        }) {
     const auto file = read_with(kOkvis, c.from, c.to);
     ASSERT_FALSE(file) << c.to;
