@@ -13,8 +13,8 @@ namespace bslam {
 
 enum class Scale {
   kMetric,       // lengths are metres
-  kUpToScale,    // one camera, or cameras that cannot tell: the unit of length is arbitrary
-  kUnobservable  // the rig could tell the unit of length, but its motion has not allowed it so far
+  kUpToScale,    // the cameras do not determine the scale, for example one camera: the unit of length is arbitrary
+  kUnobservable  // the rig can determine the scale, but its motion has not allowed it so far
 };
 BSLAM_EXPORT std::string_view to_string(Scale scale);  // "metric", "up-to-scale", "unobservable"
 

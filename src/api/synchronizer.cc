@@ -59,7 +59,7 @@ struct Synchronizer::Impl {
 
   Status push(std::size_t camera, const CameraImage& image);
   Status close();
-  Status tell(const std::vector<DroppedImage>& dropped, const char* name) const;
+  Status report(const std::vector<DroppedImage>& dropped, const char* name) const;
   void commit(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped, std::size_t limit);
   std::optional<ImageBundle> take();
 
@@ -106,7 +106,7 @@ Status Synchronizer::Impl::push(std::size_t camera, const CameraImage& image) {
     commit(std::move(bundles), dropped, options.max_bundles);
   }
   changed.notify_all();
-  return tell(dropped, "Synchronizer::push: on_drop");
+  return report(dropped, "Synchronizer::push: on_drop");
 }
 
 Status Synchronizer::Impl::close() {
@@ -120,19 +120,19 @@ Status Synchronizer::Impl::close() {
     commit(std::move(bundles), dropped, ready.max_size());
   }
   changed.notify_all();
-  return tell(dropped, "Synchronizer::close: on_drop");
+  return report(dropped, "Synchronizer::close: on_drop");
 }
 
-// Tells all of them, and returns the first error. `name`: of the call, for the error.
-Status Synchronizer::Impl::tell(const std::vector<DroppedImage>& dropped, const char* name) const {
+// Reports all images and returns the first error. `name`: name of the call, for the error.
+Status Synchronizer::Impl::report(const std::vector<DroppedImage>& dropped, const char* name) const {
   Status first;
   if (!options.on_drop) return first;
   for (const DroppedImage& d : dropped) {
-    const Status told = api::guarded(name, [&]() -> Status {
+    const Status reported = api::guarded(name, [&]() -> Status {
       options.on_drop(d);
       return {};
     });
-    if (first) first = told;
+    if (first) first = reported;
   }
   return first;
 }

@@ -112,11 +112,11 @@ Result<FrameResult> System::Impl::process(const ImageBundle& bundle) {
     if (!refused) failure = frame.error();
     return frame;
   }
-  const Status told = api::guarded("System::process: a callback", [&]() -> Status {
+  const Status reported = api::guarded("System::process: a callback", [&]() -> Status {
     notifier.processed(*frame, system);
     return {};
   });
-  if (!told) return told.error();
+  if (!reported) return reported.error();
   return frame;
 }
 

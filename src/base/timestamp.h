@@ -1,4 +1,5 @@
-// Times in data structures are integer nanoseconds. Only system/ reads the system clock.
+// Times in data structures are integer nanoseconds. No estimate depends on the system clock, which only
+// base/stopwatch.h and the pace of a run read.
 #pragma once
 
 #include <cstdint>

@@ -33,7 +33,7 @@ struct FastKernels {
 };
 
 const FastKernels& scalar_fast_kernels();
-const FastKernels& fast_kernels();  // the fastest available on this processor
+const FastKernels& fast_kernels();  // the fastest that this program was compiled for
 
 // Detection with 3 x 3 non-maximum suppression. Reuses its memory between images.
 class FastDetector {

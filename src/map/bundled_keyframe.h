@@ -30,8 +30,8 @@ struct BundledKeyframe {
   // Velocity of the rig during the capture, as BundledFrame::twist, in the unit of the map.
   geometry::Vector6d twist = geometry::Vector6d::Zero();
   bool alive = false;
-  // Accumulated scale factor of its submap since the keyframe was added. A length stored when it was u is multiplied by
-  // unit / u.
+  // Product of all factors by which lengths about this keyframe have changed since it was added. A length that was
+  // stored when this was s is now scale / s times as long.
   double scale = 1.0;
 };
 

@@ -133,7 +133,8 @@ void System::finish() {
     draft.set_twists(twists_from_neighbours(draft.map(), first_keyframe_, frames_));
     final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
     final_adjustment_ms_ = watch.ms();
-    check_extrinsics(draft, stop);
+    estimate_extrinsics(draft.map(), stop);
+    if (config_.extrinsics.refine && extrinsics_.done) apply_extrinsics(draft, stop);
     if (!stop.stop_requested()) executor_->commit(execution::JournalStep::kFinal, std::move(draft));
     extrinsics_refined_ = config_.extrinsics.refine && extrinsics_.done && !stop.stop_requested();
   }
@@ -154,17 +155,20 @@ void System::locate_early_frames() {
   }
 }
 
-// Estimates the extrinsics and, if configured, applies them to the map.
-void System::check_extrinsics(map::MapDraft& draft, const std::stop_token& stop) {
+void System::estimate_extrinsics(const map::BundledMap& map, const std::stop_token& stop) {
   const auto& options = config_.extrinsics;
   if ((!options.check && !options.refine) || stop.stop_requested()) return;
   const Stopwatch watch;
-  extrinsics_ = calibration::refine_rig(draft.map(), options, config_.feature_model(), stop);
-  if (options.refine && extrinsics_.done) {
-    draft.set_rig(calibration::refined(draft.map().rig(), extrinsics_));
-    mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
-  }
+  extrinsics_ = calibration::refine_rig(map, options, config_.feature_model(), stop);
   extrinsics_ms_ = watch.ms();
+}
+
+// Adjusts the map again with the estimated extrinsics.
+void System::apply_extrinsics(map::MapDraft& draft, const std::stop_token& stop) {
+  const Stopwatch watch;
+  draft.set_rig(calibration::refined(draft.map().rig(), extrinsics_));
+  final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
+  extrinsics_ms_ += watch.ms();
 }
 
 void System::interrupt() {

@@ -96,7 +96,8 @@ class System {
   void discard_map();
   void bound_history();
   void locate_early_frames();
-  void check_extrinsics(map::MapDraft& draft, const std::stop_token& stop);
+  void estimate_extrinsics(const map::BundledMap& map, const std::stop_token& stop);
+  void apply_extrinsics(map::MapDraft& draft, const std::stop_token& stop);
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
 
   const camera::Rig rig_;
