@@ -22,10 +22,10 @@ struct AlignmentOptions {
   double min_ncc = 0.8;       // minimum normalised cross-correlation after alignment
   // px of the level, minimum standard deviation of an aligned keypoint: errors of interpolation and warp
   double min_sigma_px = 0.12;
-  // Level-0 pixels, added in quadrature: initial value and upper bound of the calibration error estimated by tracking
-  // (tracking/calibration_error.h).
+  // Level-0 pixels, added in quadrature: initial value of the calibration error, and the bounds between which tracking
+  // estimates it (tracking/calibration_error.h). The upper bound keeps outlier thresholds below the radius of searches.
   double calibration_error_px = 0.3;
-  double min_calibration_error_px = 0.05;  // its lower bound
+  double min_calibration_error_px = 0.05, max_calibration_error_px = 2.0;
 
   // Standard deviation of an aligned keypoint in level-0 pixels. `aligned_px`: standard deviation of its alignment in
   // pixels of the level.
@@ -42,8 +42,9 @@ struct AlignmentOptions {
     visitor("min_sigma_px", self.min_sigma_px, Range{0.01, 5}, "px of the level",
             "minimum standard deviation of an aligned keypoint");
     visitor("calibration_error_px", self.calibration_error_px, Range{0, 10}, "px",
-            "initial value and upper bound of the calibration error estimated by tracking",
-            OptionNote{.formerly = "floor_px"});
+            "initial value of the calibration error estimated by tracking", OptionNote{.formerly = "floor_px"});
+    visitor("max_calibration_error_px", self.max_calibration_error_px, Range{0, 10}, "px",
+            "upper bound of the calibration error estimated by tracking");
     visitor("min_calibration_error_px", self.min_calibration_error_px, Range{0, 10}, "px",
             "lower bound of the calibration error estimated by tracking", OptionNote{.formerly = "least_floor_px"});
   }

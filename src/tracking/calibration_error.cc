@@ -20,15 +20,19 @@ double update_calibration_error(double before, std::vector<double> squared_error
   if (squared_errors.size() < kMinMatches) return before;
   const double measured = median(std::move(squared_errors)) / (2 * std::numbers::ln2) - median(std::move(variances));
   const double lower = std::min(options.min_calibration_error_px, options.calibration_error_px);
-  const double variance =
-      std::clamp(measured, lower * lower, options.calibration_error_px * options.calibration_error_px);
+  const double upper = std::max(options.max_calibration_error_px, options.calibration_error_px);
+  const double variance = std::clamp(measured, lower * lower, upper * upper);
   return std::sqrt((1 - kRate) * before * before + kRate * variance);
 }
 
 std::vector<double> calibration_errors(std::span<const double> before, const map::BundledMap& map,
                                        const frame::BundledFrame& frame, const TrackOutput& output,
                                        const matching::AlignmentOptions& options) {
-  if (output.result.status != TrackStatus::kTracking) return {};
+  if (output.result.status != TrackStatus::kTracking) {
+    std::vector<double> kept(before.begin(), before.end());
+    for (double& error : kept) error = std::max(error, options.calibration_error_px);
+    return kept;
+  }
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   std::vector<double> errors(before.begin(), before.end());
   errors.resize(rig.size(), options.calibration_error_px);

@@ -50,8 +50,11 @@ std::vector<LandmarkId> last_landmarks(const map::BundledMap& map, const Tracker
 
 bool supported(const solver::PoseSolution& solution, std::size_t num_matches, int min_inliers,
                const TrackingOptions& options) {
+  // Few inliers must be a sufficient fraction of the matches. More of them agree by chance with a smaller fraction.
+  constexpr double kFew = 100;
+  const double ratio = options.min_inlier_ratio * std::min(1.0, kFew / std::max(1, solution.num_inliers));
   return solution.ok && solution.num_inliers >= min_inliers &&
-         solution.num_inliers >= options.min_inlier_ratio * static_cast<double>(num_matches);
+         solution.num_inliers >= ratio * static_cast<double>(num_matches);
 }
 
 struct Coarse {
