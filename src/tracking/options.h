@@ -140,7 +140,7 @@ struct TrackingOptions {
   bool use_capture_times = true;  // the cameras of a frame have their own capture times; false: the time of the frame
   int min_inliers = 30;           // minimum number of inlier keypoints of a pose, all cameras together
   int min_inliers_wide = 50;      // the same after a search in wide windows
-  double min_inlier_ratio = 0.3;  // minimum ratio of inliers to matches of a pose
+  double min_inlier_ratio = 0.3;  // minimum ratio of inliers to matches of a pose, lower above 100 inliers
   MatchingOptions matching;
   ConsensusOptions consensus;
   KeyframeOptions keyframe;
