@@ -4,21 +4,13 @@
 
 #include "base/random.h"
 #include "calibration/rig_warnings.h"
+#include "camera/stereo_rig.h"
 #include "geometry/so3.h"
 
 namespace bslam::calibration {
 namespace {
 
 using geometry::SE3;
-
-camera::Camera pinhole(double f) { return {"p", camera::Pinhole({f, f, 319.5, 239.5}), 640, 480, 0, ""}; }
-
-// A stereo pair whose body frame is rotated and translated relative to camera 0.
-camera::Rig stereo() {
-  const SE3 T_body_cam0(geometry::so3_exp({0.4, -1.0, 0.7}), {0.2, -0.1, 0.3});
-  const SE3 step(geometry::so3_exp({0.02, -0.05, 0.01}), {0.12, 0.01, -0.01});
-  return camera::Rig({{pinhole(300), T_body_cam0}, {pinhole(330), T_body_cam0 * step}});
-}
 
 // Keypoints of random points in front of the cameras; every point has a unique descriptor.
 std::array<feature::Detections, 2> views_of(const camera::Rig& rig) {
@@ -45,7 +37,7 @@ PairEvidence judged(const camera::Rig& calibration, const std::array<feature::De
 }
 
 TEST(ConventionCheck, FindsTheIntendedConvention) {
-  const camera::Rig rig = stereo();
+  const camera::Rig rig = camera::stereo_rig();
   const auto views = views_of(rig);
   EXPECT_EQ(judged(rig, views).verdict, Convention::kAsGiven);
   EXPECT_EQ(judged(rig, views).agreeing[0], 150);
@@ -60,7 +52,7 @@ TEST(ConventionCheck, FindsTheIntendedConvention) {
 }
 
 TEST(ConventionCheck, HasNoVerdictIfNoConventionFits) {
-  const camera::Rig rig = stereo();
+  const camera::Rig rig = camera::stereo_rig();
   auto views = views_of(rig);
   EXPECT_FALSE(judged(rig, {views[0], feature::Detections()}).verdict);
   std::rotate(views[1].pixel.begin(), views[1].pixel.begin() + 1, views[1].pixel.end());  // every match is wrong
@@ -70,7 +62,7 @@ TEST(ConventionCheck, HasNoVerdictIfNoConventionFits) {
 }
 
 TEST(ConventionCheck, ReportsTheRotationOfACamera) {
-  const camera::Rig rig = stereo();
+  const camera::Rig rig = camera::stereo_rig();
   const SE3 rotated(geometry::so3_exp({0.02, 0.06, -0.03}), Eigen::Vector3d::Zero());  // 4 degrees
   const camera::Rig wrong({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1) * rotated}});
   const PairEvidence evidence = judged(wrong, views_of(rig));
@@ -84,7 +76,7 @@ TEST(ConventionCheck, ReportsTheRotationOfACamera) {
 }
 
 TEST(ConventionCheck, ReportsTheDisplacementOfACamera) {
-  const camera::Rig rig = stereo();
+  const camera::Rig rig = camera::stereo_rig();
   const SE3 step = rig.body_from_cam(0).inverse() * rig.body_from_cam(1);
   const SE3 above(step.rotation(), {step.translation().y(), step.translation().x(), step.translation().z()});
   const camera::Rig wrong({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(0) * above}});
@@ -96,7 +88,7 @@ TEST(ConventionCheck, ReportsTheDisplacementOfACamera) {
 
 // Too few matches consistent with the calibration for a verdict are not yet evidence of another pose.
 TEST(ConventionCheck, IgnoresOtherPosesWithSlightlyMoreMatches) {
-  const camera::Rig rig = stereo();
+  const camera::Rig rig = camera::stereo_rig();
   auto views = views_of(rig);
   for (feature::Detections& v : views) v.pixel.resize(40), v.descriptor.resize(40);
   for (std::size_t i = 0; i < 16; ++i)

@@ -5,8 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/random.h"
 #include "calibration/rig_warnings.h"
+#include "camera/stereo_rig.h"
 #include "rig_formats/rig_file.h"
 #include "simulator/simulation_writer.h"
 #include "synthetic/rigs.h"
@@ -15,16 +15,6 @@ namespace bslam::session {
 namespace {
 
 namespace fs = std::filesystem;
-using geometry::SE3;
-
-camera::Camera pinhole(double f) { return {"p", camera::Pinhole({f, f, 319.5, 239.5}), 640, 480, 0, ""}; }
-
-// A stereo pair whose body frame is rotated and translated relative to camera 0.
-camera::Rig stereo() {
-  const SE3 T_body_cam0(geometry::so3_exp({0.4, -1.0, 0.7}), {0.2, -0.1, 0.3});
-  const SE3 step(geometry::so3_exp({0.02, -0.05, 0.01}), {0.12, 0.01, -0.01});
-  return camera::Rig({{pinhole(300), T_body_cam0}, {pinhole(330), T_body_cam0 * step}});
-}
 
 class RigReport : public testing::Test {
  protected:
@@ -38,7 +28,7 @@ class RigReport : public testing::Test {
 TEST_F(RigReport, IsTextOrJson) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t i = 0; i < 2; ++i) {
-    cameras.push_back({stereo().camera(i), stereo().body_from_cam(i)});
+    cameras.push_back({camera::stereo_rig().camera(i), camera::stereo_rig().body_from_cam(i)});
     cameras.back().camera.name = "eye" + std::to_string(i);
   }
   ASSERT_TRUE(rig_formats::write_rig(camera::Rig(cameras), folder_ / "rig.yaml"));
@@ -56,7 +46,7 @@ TEST_F(RigReport, IsTextOrJson) {
 }
 
 TEST_F(RigReport, WarnsOfAnUnusableMask) {
-  camera::RigCamera camera{stereo().camera(0u), stereo().body_from_cam(0)};
+  camera::RigCamera camera{camera::stereo_rig().camera(0u), camera::stereo_rig().body_from_cam(0)};
   camera.camera.mask_file = (folder_ / "none.png").string();
   ASSERT_TRUE(rig_formats::write_rig(camera::Rig({camera}), folder_ / "rig.yaml"));
   const auto text = report_rig({.file = (folder_ / "rig.yaml").string()});
