@@ -11,7 +11,7 @@
 namespace bslam::calibration {
 namespace {
 
-constexpr feature::FeatureModel kFeatures{0.7, 1.2};
+constexpr feature::FeatureModel kFeatures{.sigma_px = 0.7, .pyramid = {}};
 
 map::SimulatedMap true_map() {
   synthetic::FeatureSimulatorOptions options;

@@ -298,13 +298,15 @@ TEST(StageExecutorParallel, QueuesAreBounded) {
   for (const int room : {1, 3}) {
     std::atomic<int> mapped = 0, closed = 0;
     StageFunctions functions = hashing_stages(3, 2);
-    for (auto [stage, counter] : {std::pair{Stage::kMap, &mapped}, std::pair{Stage::kLoop, &closed}}) {
-      functions[stage] = [real = functions[stage], counter](const auto& task, const auto& base, const auto& stop) {
+    const auto count_results = [&functions](Stage stage, std::atomic<int>& counter) {
+      functions[stage] = [real = functions[stage], &counter](const auto& task, const auto& base, const auto& stop) {
         StageResult result = real(task, base, stop);
-        ++*counter;
+        ++counter;
         return result;
       };
-    }
+    };
+    count_results(Stage::kMap, mapped);
+    count_results(Stage::kLoop, closed);
     ExecutionSetup s = setup(functions);
     s.options.max_pending_keyframes = room;
     WorldRun run(execution::Mode::kParallel, std::move(s));

@@ -222,7 +222,7 @@ TEST(MapKeyframe, BuildsAnAccurateMap) {
   for (const camera::Rig& rig : rigs) {
     SimulatedMap world(simulator(rig));
     Random random(3, "drift");
-    int created = 0, merged = 0;
+    int created = 0;
     for (int i = 0; i < 7; ++i) {
       const KeyframeId k = world.add_keyframe(FrameId(i), 0.3 * i, false);
       if (i == 0) continue;
@@ -233,7 +233,6 @@ TEST(MapKeyframe, BuildsAnAccurateMap) {
       const MappingReport report = map_keyframe(k, {}, kFeatures, draft);
       EXPECT_TRUE(report.adjustment.done);
       created += report.created;
-      merged += report.fusion.merged;
       ASSERT_EQ(draft.map().check_invariants(), std::nullopt) << "keyframe " << i;
       world.map = std::move(draft).finish().result;
       for (auto& [truth, l] : world.landmark_of) l = world.map.resolve(l);
