@@ -1,4 +1,4 @@
-// Options of the scheduling of background stages; part of system::Config.
+// Options that determine when background stages run; part of system::Config.
 #pragma once
 
 #include "base/options.h"

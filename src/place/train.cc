@@ -29,7 +29,7 @@ struct Division {
 struct Training {
   std::vector<Descriptor> descriptor;  // of all images, concatenated
   std::vector<std::uint32_t> image;    // index of the image of each descriptor
-  // permutation of the descriptors that keeps those of a node together, ascending within the node
+  // Permutation of the descriptors: the descriptors of a node are adjacent and in ascending order.
   std::vector<std::uint32_t> order;
 };
 
@@ -70,9 +70,10 @@ Division divide(Training& t, const Cell& cell, const TrainingOptions& options, R
 }
 
 float inverse_document_frequency(const Training& t, const Cell& cell, std::size_t images) {
-  std::size_t shown_by = 1;
-  for (std::size_t i = cell.begin + 1; i < cell.end; ++i) shown_by += t.image[t.order[i]] != t.image[t.order[i - 1]];
-  return static_cast<float>(std::log(static_cast<double>(images + 1) / static_cast<double>(shown_by)));
+  std::size_t images_with_word = 1;
+  for (std::size_t i = cell.begin + 1; i < cell.end; ++i)
+    images_with_word += t.image[t.order[i]] != t.image[t.order[i - 1]];
+  return static_cast<float>(std::log(static_cast<double>(images + 1) / static_cast<double>(images_with_word)));
 }
 
 // Thread-safe progress counter.

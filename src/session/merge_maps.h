@@ -17,7 +17,7 @@ struct MergeResult {
 
 // Adds the keyframes and landmarks of `b` to `a`, searches a loop closure for every keyframe of `b`, and finally runs a
 // global bundle adjustment. Maps without a common place become separate submaps. Both maps must be of the same rig and
-// vocabulary. Errors: a map of another rig or vocabulary, or without metric scale.
+// vocabulary. Errors: the maps have different rigs or vocabularies, or a map has no metric scale.
 Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedMap& b,
                                const place::VocabularyPtr& vocabulary, const system::Config& config);
 

@@ -1,4 +1,4 @@
-// The observations of one rig pose, sorted by camera for the loops of motion-only bundle adjustment.
+// Motion-only bundle adjustment: the observations of one rig pose, sorted by camera.
 #pragma once
 
 #include <limits>
@@ -10,7 +10,8 @@
 
 namespace bslam::solver {
 
-// For the left perturbation of T_rig_world; the cost is half the sum of kernel costs over the items in use.
+// Normal equations for the left perturbation of T_rig_world. The cost is half the sum of the kernel costs of the items
+// in use.
 using PoseEquations = NormalEquations<6>;
 
 class PoseProblem {
@@ -67,8 +68,8 @@ class PoseProblem {
 SE3 refine_pose(const PoseProblem& problem, const SE3& T_rig_world, const PoseEquations& equations, Kernel kernel,
                 int iterations, double tolerance);
 
-// Rounds of minimisation, each after a classification of all items. `first_bound`: bound of the squared error in the
-// first round.
+// Minimises in several rounds. Each round first selects the items whose squared error is at most a bound:
+// `first_bound` in the first round, kChi2TwoDof95 in the others.
 PoseSolution solve_rounds(PoseProblem& problem, const SE3& T_rig_world, double first_bound,
                           const PoseSolverOptions& options);
 

@@ -18,7 +18,7 @@ namespace bslam::synthetic {
 
 struct FeatureSimulatorOptions {
   std::uint64_t scene_seed = 1;  // seed of the landmarks
-  // seed of detection, pixel noise, descriptors and outliers; the trajectory has its own seed
+  // seed of detection, pixel noise, descriptors and outliers; the trajectory has a separate seed
   std::uint64_t noise_seed = 1;
 
   // metres; landmarks lie near the walls, floor and ceiling of this box

@@ -14,7 +14,7 @@ namespace {
 constexpr int kMaxMissedFrames = 10;  // frames without an image of a working camera with a lower rate than the others
 constexpr int kSampleStep = 4;        // only every fourth row and column is used to measure brightness
 
-// A hash of every pixel, eight at a time.
+// Returns a hash of all pixels, which are read eight at a time.
 std::uint64_t content(const image::ImageView& image) {
   std::uint64_t hash = 0x2545f4914f6cdd1dull;
   for (int y = 0; y < image.height; ++y) {
@@ -47,7 +47,8 @@ struct Edges {
   int all = 0, sharp = 0;
 };
 
-// Counts the edges among spans of pixels `step` bytes apart that begin at `first`, span after span.
+// Divides a line of `pixels` pixels, which begins at `first` and has a distance of `step` bytes between pixels, into
+// spans, and counts the spans that contain an edge and those whose edge is sharp.
 void count_edges(const std::uint8_t* first, std::ptrdiff_t step, int pixels, double sharp_slope, Edges& edges) {
   constexpr int kSpan = 16, kContrast = 40;  // pixels; grey values
   for (int begin = 0; begin + kSpan < pixels; begin += kSpan) {
