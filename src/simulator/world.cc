@@ -309,7 +309,7 @@ float World::radiance(const Hit& hit, double footprint) const {
 void World::radiance(const Eigen::Vector3f& origin, const RayPacket& rays, float spread, float detail,
                      float* out) const {
   constexpr int kN = RayPacket::kSize;
-  static constexpr int kAllValid[kN] = {-1, -1, -1, -1, -1, -1, -1, -1};
+  alignas(32) static constexpr int kAllValid[kN] = {-1, -1, -1, -1, -1, -1, -1, -1};  // Embree requires the alignment
   alignas(32) RTCRayHit8 query;
   for (int i = 0; i < kN; ++i) {
     query.ray.org_x[i] = origin.x();
@@ -326,8 +326,7 @@ void World::radiance(const Eigen::Vector3f& origin, const RayPacket& rays, float
     query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
-  alignas(32) static constexpr auto& valid = kAllValid;
-  intersect_coherent(valid, scene_->scene, query);
+  intersect_coherent(kAllValid, scene_->scene, query);
   const float scale = spread * std::exp2(detail);
   for (int i = 0; i < kN; ++i) {
     if (query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
