@@ -164,7 +164,8 @@ TEST(Epipolar, RefinementReachesTheTruthWithoutNoise) {
   EpipolarPose start{(geometry::so3_exp(Vector3d(0.01, -0.02, 0.01)) * views.T_b_a.rotation()).toRotationMatrix(),
                      (views.T_b_a.translation().normalized() + Vector3d(0.05, -0.04, 0.03)).normalized()};
   const std::vector<std::uint8_t> all(views.pairs.size(), 1);
-  const EpipolarPose found = refine_epipolar(start, views.pairs, all, 1.0);
+  constexpr double kKnee = 1e-4;  // radians; a step is negligible relative to it
+  const EpipolarPose found = refine_epipolar(start, views.pairs, all, kKnee);
   EXPECT_LT((found.R_b_a - views.T_b_a.matrix3()).norm(), 1e-9);
   EXPECT_LT((found.t_b_a - views.T_b_a.translation().normalized()).norm(), 1e-8);
   EXPECT_LT((midpoint_in_a(found, views.pairs[0]) * views.T_b_a.translation().norm() - views.points_a[0]).norm(), 1e-5);

@@ -44,7 +44,7 @@ std::unique_ptr<scene::BundleScene> seen_from(const std::vector<SE3>& T_rig_worl
       for (std::size_t i = 0; i < cameras; ++i) {
         auto pixel = scene::see(out->rig, i, T_rig_world[k], out->points.back());
         if (!pixel) continue;
-        *pixel += (random.uniform() < outlier_ratio ? 10.0 : 0.5) * Vector2d(random.normal(), random.normal());
+        *pixel += (random.uniform() < outlier_ratio ? 10.0 : 0.5) * scene::random_noise(random);
         out->problem.observations.push_back({static_cast<int>(k), p, CameraIndex(i), pixel->cast<float>(), 0.5f});
       }
     }

@@ -136,7 +136,7 @@ TEST(PoseSolver, FailsWithPointsAlongOneRay) {
     const Vector3d ray = Vector3d(0.2, -0.1, 1).normalized();
     for (int i = 0; i < 40; ++i) {
       const Vector3d point = (2.0 + 0.5 * i) * ray;
-      const Vector2d pixel = *rig.camera(0).project(point) + noise * Vector2d(random.normal(), random.normal());
+      const Vector2d pixel = *rig.camera(0).project(point) + noise * scene::random_noise(random);
       observations.push_back({CameraIndex(0), point, pixel, 1.0});
     }
     EXPECT_FALSE(solve_pose(rig, observations, SE3::exp(scene::random_twist(random, 0.01, 0.02)), {}).ok);

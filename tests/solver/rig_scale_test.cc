@@ -35,7 +35,7 @@ std::unique_ptr<SimulatedMotion> make_motion(double turn_rad, Random& random, st
         auto pixel = scene::see(out->rig, i, problem.T_rig_world[static_cast<std::size_t>(k)], point);
         if (!pixel || i != static_cast<std::size_t>(p) % cameras)
           continue;  // each point is observed by one camera only
-        *pixel += Vector2d(random.normal(), random.normal());
+        *pixel += scene::random_noise(random);
         problem.observations.push_back({k, p, CameraIndex(i), pixel->cast<float>(), 1.0f});
       }
     }

@@ -46,10 +46,12 @@ inline Rig make_rig(std::size_t cameras, Models models) {
   return Rig(std::move(out));
 }
 
+// The components of random vectors are drawn by separate statements, because compilers differ in the order in which
+// they evaluate the arguments of a function, and the test data must not depend on the compiler.
 inline Vector3d random_direction(Random& random) {
   Vector3d v;
   do {
-    v = Vector3d(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+    for (int i = 2; i >= 0; --i) v[i] = random.uniform(-1, 1);
   } while (v.squaredNorm() > 1 || v.squaredNorm() < 1e-4);
   return v.normalized();
 }
@@ -67,12 +69,22 @@ inline std::optional<Vector2d> see(const Rig& rig, std::size_t i, const SE3& T_r
   return pixel;
 }
 
+// Noise of a pixel with a standard deviation of 1 px per axis.
+inline Vector2d random_noise(Random& random) {
+  const double y = random.normal(), x = random.normal();
+  return {x, y};
+}
+
+inline Vector2d random_pixel(const camera::Camera& camera, Random& random) {
+  const double y = random.uniform(0, camera.height - 1), x = random.uniform(0, camera.width - 1);
+  return {x, y};
+}
+
 // A point visible in some camera of the rig, at least 2 m away, uniform in inverse distance.
 inline Vector3d random_visible_point(const Rig& rig, const SE3& T_rig_world, Random& random, double farthest = 30) {
   const std::size_t i = random.below(static_cast<std::uint32_t>(rig.size()));
   for (;;) {
-    const Vector2d pixel(random.uniform(0, rig.camera(i).width - 1), random.uniform(0, rig.camera(i).height - 1));
-    const auto bearing = rig.camera(i).unproject(pixel);
+    const auto bearing = rig.camera(i).unproject(random_pixel(rig.camera(i), random));
     if (!bearing) continue;
     return T_rig_world.inverse() * (rig.rig_from_cam(i) * (*bearing / random.uniform(1.0 / farthest, 1.0 / 2)));
   }
@@ -95,7 +107,7 @@ inline PoseScene make_pose_scene(const Rig& rig, int count, double noise, double
       if (!pixel) continue;
       const bool outlier = random.uniform() < outlier_ratio;
       const double sigma = random.below(2) == 0 ? 1.0 : 1.2;
-      Vector2d seen = *pixel + noise * sigma * Vector2d(random.normal(), random.normal());
+      Vector2d seen = *pixel + noise * sigma * random_noise(random);
       while (outlier && (seen - *pixel).norm() < 20) {
         seen = {random.uniform(0, rig.camera(i).width), random.uniform(0, rig.camera(i).height)};
       }
@@ -155,8 +167,8 @@ inline std::unique_ptr<BundleScene> make_bundle_scene(const BundleSpec& spec, Ra
       for (std::size_t i = 0; i < out->rig.size() && left > 0; ++i) {
         auto pixel = see(out->rig, i, out->T_rig_world[static_cast<std::size_t>(k)], point);
         if (!pixel) continue;
-        *pixel += spec.noise * Vector2d(random.normal(), random.normal());
-        if (random.uniform() < spec.outlier_ratio) *pixel += 12 * Vector2d(random.normal(), random.normal());
+        *pixel += spec.noise * random_noise(random);
+        if (random.uniform() < spec.outlier_ratio) *pixel += 12 * random_noise(random);
         out->problem.observations.push_back({k, p, CameraIndex(i), pixel->cast<float>(), 1.0f});
         --left;
       }
