@@ -293,7 +293,8 @@ TEST_F(CommandLine, AJournalReplaysItsRun) {
   EXPECT_EQ(summary_of("replayed", "--cameras 0,1 --mode parallel --replay " + out("run.journal"))["mode"], "replay");
   expect_same_trajectories("recorded", "replayed");
   expect_rejected("run " + data() + " --out " + out("other") +
-                  " --cameras 0,1 --set features.per_image=300 --progress never" + " --replay " + out("run.journal"));
+                  " --cameras 0,1 --set features.per_image=500 --end 0.25 --progress never --replay " +
+                  out("run.journal"));
 }
 
 TEST_F(CommandLine, LaggedRunsAreDeterministic) {
