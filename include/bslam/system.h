@@ -73,8 +73,8 @@ struct Startup {
 // destructor stops background work.
 class BSLAM_EXPORT System {
  public:
-  // Errors: inconsistent settings (localize_only without a map, extrinsics.refine without final_adjustment); a map or
-  // vocabulary that cannot be read; a map without keyframes, or of another rig, feature pyramid or vocabulary.
+  // Errors: inconsistent settings (localize_only without a map, calibration.refine=true without final_adjustment); a
+  // map or vocabulary that cannot be read; a map without keyframes, or of another rig, feature pyramid or vocabulary.
   static Result<System> create(const Rig& rig, const Config& config, Startup startup = {});
   System(System&& other) noexcept;
   System& operator=(System&& other) noexcept;

@@ -24,6 +24,9 @@ namespace bslam::adjustment {
 std::vector<double> landmark_variances(const solver::ReprojectionProblem& problem, std::span<const double> chi2,
                                        std::span<const std::uint8_t> skip);
 
+// Multiplies the standard deviations of each point's observations by the square root of its variance factor.
+void apply_variances(std::span<const double> variances, solver::ReprojectionProblem& problem);
+
 // Adjusts the problem with the standard deviations of each point's observations multiplied by the square root of its
 // variance factor. The standard deviations are restored afterwards.
 solver::LmSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,

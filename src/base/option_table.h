@@ -65,7 +65,8 @@ class OptionTable {
     void operator()(std::string_view name, Field& field, Range range, std::string_view unit, std::string_view help,
                     OptionNote note = {}) {
       Option option{prefix + std::string(name), {}, range, std::string(unit), std::string(help), note.common, {}};
-      if (!note.formerly.empty()) option.former_key = prefix + std::string(note.formerly);
+      const bool complete = note.formerly.find('.') != std::string_view::npos;
+      if (!note.formerly.empty()) option.former_key = (complete ? "" : prefix) + std::string(note.formerly);
       if constexpr (std::is_enum_v<Field>) {
         option.field = enum_field(field);
       } else {

@@ -38,8 +38,9 @@ struct Range {
 
 // Properties of an option beyond its value.
 struct OptionNote {
-  bool common = false;             // in the supported set of docs/settings.md; all other options are advanced
-  std::string_view formerly = {};  // its previous name in the same section, still accepted for one release
+  bool common = false;  // in the supported set of docs/settings.md; all other options are advanced
+  // Its previous name in the same section, or with a dot its complete previous key; still accepted for one release.
+  std::string_view formerly = {};
 };
 inline constexpr OptionNote kCommon{.common = true};
 

@@ -67,19 +67,20 @@ std::vector<matching::SearchExclusions> known_in(const map::BundledMap& map, Key
 }
 
 // Adds the observations of `points` in the images of one keyframe; `T_cam_world`: poses of its cameras.
-void search_keyframe(const map::BundledMap& map, std::size_t pose, std::span<const geometry::SE3> T_cam_world,
-                     std::span<const matching::SearchPoint> points, std::span<const std::vector<Observation>> seen,
-                     const feature::FeatureModel& features, adjustment::BundleProblem& flat) {
+void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::size_t pose,
+                     std::span<const geometry::SE3> T_cam_world, std::span<const matching::SearchPoint> points,
+                     std::span<const std::vector<Observation>> seen, const feature::FeatureModel& features,
+                     adjustment::BundleProblem& flat) {
   const KeyframeId keyframe = flat.keyframes[pose];
   const frame::BundledFrame& frame = *map.keyframe(keyframe).frame;
   const matching::ProjectionSearchOptions options{
       .radius = kRadius, .max_hamming = kMaxHamming, .ratio = kRatio, .scale_factor = features.pyramid.scale_factor};
-  const auto results = matching::search_cameras(map.rig(), frame, T_cam_world, points,
-                                                known_in(map, keyframe, seen, points.size()), options);
+  const auto results =
+      matching::search_cameras(rig, frame, T_cam_world, points, known_in(map, keyframe, seen, points.size()), options);
   for (std::size_t c = 0; c < results.size(); ++c) {
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     for (const matching::ProjectionMatch& m : results[c].matches) {
-      const auto projected = map.rig().camera(c).project(T_cam_world[c] * points[m.point].position);
+      const auto projected = rig.camera(c).project(T_cam_world[c] * points[m.point].position);
       const Eigen::Vector2f pixel = keypoints.pixel[m.keypoint.index()];
       const double sigma = features.sigma(keypoints.level[m.keypoint.index()]);
       if (!projected || (pixel.cast<double>() - *projected).squaredNorm() > kMaxChi2 * sigma * sigma) continue;
@@ -92,10 +93,10 @@ void search_keyframe(const map::BundledMap& map, std::size_t pose, std::span<con
 
 }  // namespace
 
-int recover_observations(const map::BundledMap& map, std::span<const geometry::SE3> T_cam_rig,
-                         const feature::FeatureModel& features, adjustment::BundleProblem& flat) {
+int recover_observations(const map::BundledMap& map, const camera::Rig& rig, const feature::FeatureModel& features,
+                         adjustment::BundleProblem& flat) {
   const solver::ReprojectionProblem& problem = flat.problem;
-  const std::size_t cameras = T_cam_rig.size(), before = problem.observations.size();
+  const std::size_t cameras = rig.size(), before = problem.observations.size();
   const auto seen = observations_by_image(problem);
   std::vector<matching::SearchPoint> points = map::search_points(map, flat.landmarks);
   for (std::size_t i = 0; i < points.size(); ++i) points[i].position = problem.points[i];
@@ -105,9 +106,10 @@ int recover_observations(const map::BundledMap& map, std::span<const geometry::S
       const geometry::SE3 T_rig_world = problem.motion.empty()
                                             ? problem.T_rig_world[pose]
                                             : problem.motion[pose * cameras + c] * problem.T_rig_world[pose];
-      T_cam_world[c] = T_cam_rig[c] * T_rig_world;
+      T_cam_world[c] = rig.cam_from_rig(c) * T_rig_world;
     }
-    search_keyframe(map, pose, T_cam_world, points, std::span(seen).subspan(pose * cameras, cameras), features, flat);
+    search_keyframe(map, rig, pose, T_cam_world, points, std::span(seen).subspan(pose * cameras, cameras), features,
+                    flat);
   }
   sort_observations(flat);
   return static_cast<int>(flat.problem.observations.size() - before);

@@ -1,18 +1,16 @@
 // Recovers keypoints that show a landmark but were rejected because of wrong extrinsics.
 #pragma once
 
-#include <span>
-
 #include "adjustment/bundle_problem.h"
 #include "feature/feature_model.h"
 
 namespace bslam::calibration {
 
-// Searches for every point of the problem in every image of its keyframes, with the extrinsics `T_cam_rig` (one per
-// camera) and the problem's poses and points, and adds the matches as observations that are not aligned. Only keypoints
+// Searches for every point of the problem in every image of its keyframes, with the given rig and the
+// problem's poses and points, and adds the matches as observations that are not aligned. Only keypoints
 // without a landmark in the map and the problem are matched, and only in images in which the point is not observed yet.
 // The thresholds are wide; the next adjustment has to classify the observations. Returns the number of added ones.
-int recover_observations(const map::BundledMap& map, std::span<const geometry::SE3> T_cam_rig,
-                         const feature::FeatureModel& features, adjustment::BundleProblem& flat);
+int recover_observations(const map::BundledMap& map, const camera::Rig& rig, const feature::FeatureModel& features,
+                         adjustment::BundleProblem& flat);
 
 }  // namespace bslam::calibration

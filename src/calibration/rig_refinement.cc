@@ -7,8 +7,9 @@
 #include <numeric>
 
 #include "adjustment/bundle_problem.h"
+#include "adjustment/landmark_noise.h"
 #include "calibration/lost_observations.h"
-#include "solver/extrinsic_bundle_adjustment.h"
+#include "solver/rig_bundle_adjustment.h"
 
 namespace bslam::calibration {
 namespace {
@@ -20,6 +21,7 @@ constexpr double kMillimetres = 1000.0;
 constexpr std::size_t kSegment = 10;  // consecutive keyframes chosen together, so that they share landmarks
 // maximum number of passes; each searches again for observations that the previous extrinsics rejected
 constexpr int kPasses = 4;
+constexpr int kQuickKeyframes = 40, kQuickLandmarks = 1000;  // enough for a verdict
 constexpr int kMinShared = 15;  // minimum number of shared landmarks for one keyframe to constrain another
 
 // Returns all keyframes, or evenly spaced segments of consecutive ones if there are more than `limit`; in order of id.
@@ -131,7 +133,7 @@ struct RigProblem {
 };
 
 // Each group has its own gauge freedom. One keyframe per group is fixed, which does not constrain the extrinsics.
-RigProblem choose(const map::BundledMap& map, const RigRefinementOptions& options,
+RigProblem choose(const map::BundledMap& map, const CalibrationOptions& options,
                   const feature::FeatureModel& features) {
   adjustment::Selection selection;
   const std::vector<KeyframeId> keyframes = choose_keyframes(map, static_cast<std::size_t>(options.keyframes));
@@ -177,11 +179,19 @@ double mahalanobis_distance(const Vector3d& change, const Matrix3d& covariance) 
   return std::sqrt(change.dot(covariance.llt().solve(change)));
 }
 
-CameraRefinement evaluate_camera(const solver::ExtrinsicEstimate& estimate, const RigRefinementOptions& options) {
-  CameraRefinement out;
-  out.T_cam_rig_after = estimate.T_cam_rig;
-  out.observed = estimate.observed;
-  out.observations = estimate.observations;
+std::vector<ParameterRefinement> evaluate_intrinsics(const solver::CameraEstimate& estimate,
+                                                     const camera::CameraModel& model) {
+  std::vector<ParameterRefinement> out;
+  for (const std::string& name : camera::parameter_names(model)) {
+    const auto k = static_cast<Eigen::Index>(out.size());
+    out.push_back(
+        {name, estimate.intrinsics_change(k), estimate.intrinsics_sigma(k), estimate.intrinsics_observed[out.size()]});
+  }
+  return out;
+}
+
+void evaluate_extrinsics(const solver::CameraEstimate& estimate, const CalibrationOptions& options,
+                         CameraRefinement& out) {
   const Vector3d rotation = estimate.change.head<3>(), translation = estimate.change.tail<3>();
   const Matrix3d rotation_covariance = estimate.covariance.topLeftCorner<3, 3>(),
                  translation_covariance = estimate.covariance.bottomRightCorner<3, 3>();
@@ -193,72 +203,155 @@ CameraRefinement evaluate_camera(const solver::ExtrinsicEstimate& estimate, cons
   out.translation_sigmas = mahalanobis_distance(translation, translation_covariance);
   out.suspect = (out.rotation_sigmas > options.suspect_sigmas && out.change_deg > options.suspect_deg) ||
                 (out.translation_sigmas > options.suspect_sigmas && out.change_mm > options.suspect_mm);
-  return out;
 }
 
 // Returns true if no extrinsics have moved from `before` by more than their own uncertainty.
-bool converged(const solver::ExtrinsicAdjustment& adjusted, const std::vector<geometry::SE3>& before) {
-  for (std::size_t c = 1; c < before.size(); ++c) {
-    const geometry::Vector6d change = solver::extrinsic_change(adjusted.cameras[c].T_cam_rig, before[c]);
+bool converged(const solver::RigAdjustment& adjusted, const solver::RigValues& before) {
+  for (std::size_t c = 1; c < before.T_cam_rig.size(); ++c) {
+    const geometry::Vector6d change = solver::extrinsic_change(adjusted.values.T_cam_rig[c], before.T_cam_rig[c]);
     if (change.dot(adjusted.cameras[c].covariance.llt().solve(change)) > static_cast<double>(change.size()))
       return false;
   }
   return true;
 }
 
-// A map built with wrong extrinsics contains mostly the observations that agree with them, so adjusting it once stops
-// short of the truth. Therefore the rejected observations are searched again with the new extrinsics.
-solver::ExtrinsicAdjustment adjust_in_passes(const map::BundledMap& map, const feature::FeatureModel& features,
-                                             const solver::ExtrinsicAdjustmentOptions& options, RigProblem& problem,
-                                             const std::stop_token& stop) {
-  std::vector<geometry::SE3> T_cam_rig;
-  for (std::size_t c = 0; c < map.rig().size(); ++c) T_cam_rig.push_back(map.rig().cam_from_rig(c));
+// Adjusts again with the variance of each landmark (adjustment/landmark_noise.h), from the estimate `from`.
+solver::RigAdjustment adjust_weighted(const solver::RigAdjustmentOptions& options, solver::RigAdjustment from,
+                                      RigProblem& problem, const std::stop_token& stop) {
+  solver::ReprojectionProblem& flat = problem.flat.problem;
+  const auto chi2 = solver::squared_errors(flat, flat.T_rig_world, flat.points, from.values);
+  adjustment::apply_variances(adjustment::landmark_variances(flat, chi2, solver::beyond(chi2, solver::kChi2TwoDof95)),
+                              flat);
+  solver::RigAdjustment out = solver::adjust_rig(flat, options, from.values, stop);
+  if (!out.done) return from;
+  out.scale_change *= from.scale_change;
+  return out;
+}
+
+// A map built with a wrong calibration contains mostly the observations that agree with it, so adjusting it once stops
+// short of the truth. Therefore the rejected observations are searched again with the new calibration.
+solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const feature::FeatureModel& features,
+                                       const solver::RigAdjustmentOptions& options, RigProblem& problem,
+                                       const std::stop_token& stop) {
+  solver::RigValues before = solver::RigValues::of(map.rig());
   separate_groups(problem);
-  solver::ExtrinsicAdjustment out = solver::adjust_extrinsics(problem.flat.problem, options, T_cam_rig, stop);
-  for (int pass = 1; pass < kPasses && out.done && !converged(out, T_cam_rig); ++pass) {
-    for (std::size_t c = 0; c < T_cam_rig.size(); ++c) T_cam_rig[c] = out.cameras[c].T_cam_rig;
-    if (recover_observations(map, T_cam_rig, features, problem.flat) == 0) break;
+  solver::RigAdjustment out = solver::adjust_rig(problem.flat.problem, options, before, stop);
+  for (int pass = 1; pass < kPasses && out.done && !converged(out, before); ++pass) {
+    before = out.values;
+    if (recover_observations(map, before.applied_to(map.rig()), features, problem.flat) == 0) break;
     separate_groups(problem);
-    solver::ExtrinsicAdjustment again = solver::adjust_extrinsics(problem.flat.problem, options, T_cam_rig, stop);
+    solver::RigAdjustment again = solver::adjust_rig(problem.flat.problem, options, before, stop);
     if (!again.done) break;
+    again.scale_change *= out.scale_change;
     out = std::move(again);
+  }
+  return out.done ? adjust_weighted(options, std::move(out), problem, stop) : out;
+}
+
+solver::RigAdjustmentOptions prior_of(const camera::Rig& rig, const CalibrationOptions& options) {
+  solver::RigAdjustmentOptions out{.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
+                                   .sigma_translation = options.sigma_translation_mm / kMillimetres,
+                                   .sigma_scale = 0.01 * options.sigma_scale_percent,
+                                   .sigma_aspect = 0.01 * options.sigma_aspect_percent,
+                                   .correlated_observations = options.correlated_observations};
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const camera::Camera& camera = rig.camera(c);
+    out.sigma_intrinsics.push_back(camera::typical_sigmas(camera.model, 0.01 * options.sigma_focal_percent,
+                                                          0.01 * options.sigma_centre_percent * camera.width));
+  }
+  return out;
+}
+
+map::SetPoses poses_of(const adjustment::BundleProblem& flat) {
+  map::SetPoses out;
+  for (std::size_t i = 0; i < flat.keyframes.size(); ++i) {
+    if (flat.problem.pose_free[i] != 0) out.keyframes.emplace_back(flat.keyframes[i], flat.problem.T_rig_world[i]);
+  }
+  for (std::size_t i = 0; i < flat.landmarks.size(); ++i) {
+    if (flat.problem.points[i].allFinite()) out.landmarks.emplace_back(flat.landmarks[i], flat.problem.points[i]);
   }
   return out;
 }
 
 }  // namespace
 
-RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options,
+std::string_view verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kUnknown:
+      return "unknown";
+    case Verdict::kConsistent:
+      return "consistent";
+    case Verdict::kInconsistent:
+      return "inconsistent";
+  }
+  return "";
+}
+
+RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrated, const CalibrationOptions& options,
                          const feature::FeatureModel& features, std::stop_token stop) {
   RigRefinement out;
   // Without metric scale, calibration errors in millimetres have no meaning in the map.
   if (map.rig().size() < 2 || map.num_keyframes() == 0 || map.scale() != map::Scale::kMetric) return out;
   RigProblem problem = choose(map, options, features);
+  problem.flat.problem.rig = &calibrated;
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();
-  const solver::ExtrinsicAdjustmentOptions solve{.sigma_rotation = geometry::radians(options.calibration_deg),
-                                                 .sigma_translation = options.calibration_mm / kMillimetres};
-  const solver::ExtrinsicAdjustment adjusted = adjust_in_passes(map, features, solve, problem, stop);
+  const solver::RigAdjustment adjusted = adjust_in_passes(map, features, prior_of(calibrated, options), problem, stop);
   if (!adjusted.done) return out;
   out.done = true;
-  CameraRefinement& first = out.cameras.emplace_back();
-  first.observed = adjusted.cameras.front().observed;
-  first.observations = adjusted.cameras.front().observations;
-  for (std::size_t c = 1; c < map.rig().size(); ++c) {
-    out.cameras.push_back(evaluate_camera(adjusted.cameras[c], options));
+  for (std::size_t c = 0; c < map.rig().size(); ++c) {
+    CameraRefinement& camera = out.cameras.emplace_back();
+    camera.observed = adjusted.cameras[c].observed;
+    camera.observations = adjusted.cameras[c].observations;
+    camera.intrinsics = evaluate_intrinsics(adjusted.cameras[c], calibrated.camera(c).model);
+    if (c > 0) evaluate_extrinsics(adjusted.cameras[c], options, camera);
   }
+  out.excess_error = adjusted.excess_error;
+  out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
+  out.scale_change = adjusted.scale_change;
+  out.rig = adjusted.values.applied_to(calibrated);
+  out.poses = poses_of(problem.flat);
   return out;
 }
 
-camera::Rig refined(const camera::Rig& rig, const RigRefinement& refinement) {
-  if (!refinement.done) return rig;
-  std::vector<camera::RigCamera> cameras;
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    const geometry::SE3 T_body_cam =
-        c == 0 ? rig.body_from_cam(0) : rig.body_from_cam(0) * refinement.cameras[c].T_cam_rig_after.inverse();
-    cameras.push_back({rig.camera(c), T_body_cam});
+bool accepted(const RigRefinement& refinement, const CalibrationOptions& options) {
+  if (!refinement.done || options.refine == Refine::kFalse) return false;
+  return options.refine == Refine::kTrue || refinement.verdict == Verdict::kInconsistent;
+}
+
+std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,
+                                                const CalibrationOptions& options,
+                                                const feature::FeatureModel& features, const std::stop_token& stop) {
+  if (options.refine == Refine::kFalse) return std::nullopt;
+  if (options.refine == Refine::kAuto) {
+    CalibrationOptions quick = options;
+    quick.keyframes = std::min(options.keyframes, kQuickKeyframes);
+    quick.landmarks = std::min(options.landmarks, kQuickLandmarks);
+    if (!accepted(refine_rig(map, calibrated, quick, features, stop), options)) return std::nullopt;
   }
-  return camera::Rig(std::move(cameras));
+  RigRefinement out = refine_rig(map, calibrated, options, features, stop);
+  return accepted(out, options) ? std::optional(std::move(out)) : std::nullopt;
+}
+
+void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft) {
+  const map::BundledMap& map = draft.map();
+  const geometry::SE3 T_new_old = T_rig_world.inverse() * map.keyframe(keyframe).T_rig_world,
+                      T_old_new = T_new_old.inverse();
+  const KeyframeId root = map.root_of(keyframe);
+  map::SetPoses poses{.keyframes = {}, .landmarks = {}, .correction = true};
+  for (const KeyframeId k : map.keyframes_of_submap(root))
+    poses.keyframes.emplace_back(k, map.keyframe(k).T_rig_world * T_old_new);
+  for (const LandmarkId l : map.landmark_ids()) {
+    if (map.root_of(map.landmark(l).reference.keyframe) == root)
+      poses.landmarks.emplace_back(l, T_new_old * map.landmark(l).position);
+  }
+  draft.set_poses(std::move(poses));
+}
+
+void apply(const RigRefinement& refinement, map::MapDraft& draft) {
+  for (const KeyframeId root : draft.map().roots()) draft.scale_submap(root, refinement.scale_change);
+  draft.set_rig(*refinement.rig);
+  draft.set_poses(refinement.poses);
 }
 
 }  // namespace bslam::calibration

@@ -1,55 +1,107 @@
-// Extrinsic self-calibration: a part of a finished map is adjusted with free extrinsics. Their change shows whether the
+// Self-calibration: a part of a map is adjusted with free extrinsics and intrinsics. Their change shows whether the
 // calibration agrees with the images, and can be accepted as a better calibration.
 #pragma once
 
 #include <array>
+#include <optional>
 #include <stop_token>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/options.h"
-#include "map/bundled_map.h"
+#include "map/map_edit.h"
 
 namespace bslam::calibration {
 
-struct RigRefinementOptions {
-  bool check = true;     // at the end of a run, report cameras whose estimated extrinsics differ from the calibration
-  bool refine = false;   // at the end of a run, accept the estimated extrinsics
+// Whether the images contradict the calibration. kUnknown: too few observations to tell.
+enum class Verdict { kUnknown, kConsistent, kInconsistent };
+std::string_view verdict_name(Verdict verdict);  // "unknown", "consistent", "inconsistent"
+
+enum class Refine {
+  kFalse,  // the calibration is constant, as in the paper
+  kAuto,   // it is replaced by the estimate as soon as the images contradict it
+  kTrue,   // it is always replaced by the estimate
+};
+
+struct CalibrationOptions {
+  Refine refine = Refine::kAuto;
+  bool check = true;     // at the end of a run, estimate the calibration and report differences
   int keyframes = 120;   // maximum number, in segments of consecutive keyframes distributed over the map
   int landmarks = 6000;  // maximum number, distributed over segments and cameras
-  double calibration_deg = 2.0, calibration_mm = 30.0;  // standard deviations per axis of the calibrated extrinsics
+  // Standard deviations of the given calibration: the prior of the estimate. Extrinsics: per axis. Focal lengths
+  // and their ratio: relative. Principal points: per axis, of the image width. Distortion: of the model table
+  // (camera/model_table.h).
+  double sigma_rotation_deg = 2.0, sigma_translation_mm = 30.0;
+  double sigma_scale_percent = 0.1;  // of the common scale of all baselines, which images do not reveal
+  double sigma_focal_percent = 1.0, sigma_aspect_percent = 0.1, sigma_centre_percent = 0.5;
+  // Number of observations with the information of one: errors of a landmark in successive images are similar.
+  double correlated_observations = 10;
+  // The images contradict the calibration if it increases their mean squared error by more than this fraction.
+  double inconsistent_excess = 0.1;
   // A camera is suspect if its rotation or translation changed by more than both a number of standard deviations and an
   // absolute threshold. The latter allows for errors that the standard deviations do not include, such as slightly
-  // wrong intrinsics and timestamps: a camera with a time offset of 1 ms appears displaced by 10 mm at 10 m/s and
-  // rotated by 0.1 degrees at 100 degrees/s.
+  // wrong timestamps: a camera with a time offset of 1 ms appears displaced by 10 mm at 10 m/s and rotated by 0.1
+  // degrees at 100 degrees/s.
   double suspect_sigmas = 5.0, suspect_deg = 0.3, suspect_mm = 10.0;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
+    visitor("refine", self.refine, Range{}, "",
+            "replace the calibration by an estimate from the images: never, if they contradict it, or always",
+            OptionNote{.common = true, .formerly = "extrinsics.refine"});
     visitor("check", self.check, Range{}, "",
-            "at the end of a run, report cameras whose estimated extrinsics differ from the calibration", kCommon);
-    visitor("refine", self.refine, Range{}, "", "at the end of a run, accept the estimated extrinsics", kCommon);
-    visitor("keyframes", self.keyframes, Range{10, 500}, "", "maximum number of keyframes used");
-    visitor("landmarks", self.landmarks, Range{100, 1e5}, "", "maximum number of landmarks used");
-    visitor("calibration_deg", self.calibration_deg, Range{1e-3, 20}, "deg",
-            "standard deviation of calibrated rotations, per axis");
-    visitor("calibration_mm", self.calibration_mm, Range{1e-3, 1e4}, "mm",
-            "standard deviation of calibrated translations, per axis");
+            "at the end of a run, estimate the calibration and report cameras that differ from it",
+            OptionNote{.common = true, .formerly = "extrinsics.check"});
+    visitor("keyframes", self.keyframes, Range{10, 500}, "", "maximum number of keyframes used",
+            OptionNote{.formerly = "extrinsics.keyframes"});
+    visitor("landmarks", self.landmarks, Range{100, 1e5}, "", "maximum number of landmarks used",
+            OptionNote{.formerly = "extrinsics.landmarks"});
+    visitor("sigma_rotation_deg", self.sigma_rotation_deg, Range{1e-3, 20}, "deg",
+            "standard deviation of calibrated rotations, per axis",
+            OptionNote{.formerly = "extrinsics.calibration_deg"});
+    visitor("sigma_translation_mm", self.sigma_translation_mm, Range{1e-3, 1e4}, "mm",
+            "standard deviation of calibrated translations, per axis",
+            OptionNote{.formerly = "extrinsics.calibration_mm"});
+    visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-6, 100}, "%",
+            "standard deviation of the common scale of the distances between the cameras");
+    visitor("sigma_focal_percent", self.sigma_focal_percent, Range{1e-3, 50}, "%",
+            "standard deviation of calibrated focal lengths");
+    visitor("sigma_aspect_percent", self.sigma_aspect_percent, Range{1e-3, 50}, "%",
+            "standard deviation of the ratio of calibrated focal lengths, fx / fy");
+    visitor("sigma_centre_percent", self.sigma_centre_percent, Range{1e-3, 50}, "%",
+            "standard deviation of calibrated principal points, per axis, in percent of the image width");
+    visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
+            "number of observations with the information of one independent observation");
+    visitor(
+        "inconsistent_excess", self.inconsistent_excess, Range{0, 100}, "",
+        "the images contradict the calibration if it increases their mean squared error by more than this fraction");
     visitor("suspect_sigmas", self.suspect_sigmas, Range{1, 100}, "",
-            "a suspect camera changed by more than this number of standard deviations");
-    visitor("suspect_deg", self.suspect_deg, Range{0, 180}, "deg", "and rotated by more than this");
-    visitor("suspect_mm", self.suspect_mm, Range{0, 1e5}, "mm", "or moved by more than this");
+            "a suspect camera changed by more than this number of standard deviations",
+            OptionNote{.formerly = "extrinsics.suspect_sigmas"});
+    visitor("suspect_deg", self.suspect_deg, Range{0, 180}, "deg", "and rotated by more than this",
+            OptionNote{.formerly = "extrinsics.suspect_deg"});
+    visitor("suspect_mm", self.suspect_mm, Range{0, 1e5}, "mm", "or moved by more than this",
+            OptionNote{.formerly = "extrinsics.suspect_mm"});
   }
+};
+
+// A parameter of a camera model.
+struct ParameterRefinement {
+  std::string name;
+  double change = 0, std = 0;
+  bool observed = false;
 };
 
 // The result for one camera. Camera 0 defines the rig frame and does not move.
 struct CameraRefinement {
-  geometry::SE3 T_cam_rig_after;
   double change_deg = 0, change_mm = 0;  // rotation angle, and displacement of the camera centre
-  double std_deg = 0, std_mm = 0;  // standard deviations of T_cam_rig_after in the direction of largest uncertainty
+  double std_deg = 0, std_mm = 0;        // standard deviations of the pose in the direction of largest uncertainty
   double rotation_sigmas = 0, translation_sigmas = 0;  // changes in standard deviations (Mahalanobis distance)
   // Rotation around, then translation along the camera's axes: true if the images, and not only the calibration,
   // constrain it.
   std::array<bool, 6> observed = {};
+  std::vector<ParameterRefinement> intrinsics;
   int observations = 0;  // number of keypoints
   bool suspect = false;
 
@@ -61,15 +113,39 @@ struct RigRefinement {
   bool done = false;  // false: one camera only, no metric scale, too few observations, stopped or failed
   std::vector<CameraRefinement> cameras;     // all cameras in the order of the rig, if done
   std::size_t keyframes = 0, landmarks = 0;  // numbers used
+  double excess_error = 0;  // increase of the mean squared error by the given calibration, as a fraction
+  Verdict verdict = Verdict::kUnknown;
+  // If done: the estimated rig, and the poses and landmarks that belong to it, of the keyframes and landmarks used.
+  std::optional<camera::Rig> rig;
+  double scale_change = 1;  // factor by which the lengths of the map change
+  map::SetPoses poses;      // after this change
 };
 
-// Selects keyframes and landmarks and adjusts them; the map is not changed. `features` as in adjust_map. Deterministic.
-// Takes seconds with the default options.
-RigRefinement refine_rig(const map::BundledMap& map, const RigRefinementOptions& options,
+// Selects keyframes and landmarks and adjusts them with free calibration, beginning with the rig of the map; the map is
+// not changed. `calibrated`: the given calibration, from which changes are counted. `features` as in adjust_map.
+// Deterministic. Takes seconds with the default options.
+RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrated, const CalibrationOptions& options,
                          const feature::FeatureModel& features, std::stop_token stop = {});
 
-// Returns the rig with the estimated extrinsics; camera 0 keeps its pose in the body. Returns `rig` unchanged if
-// nothing was estimated.
-camera::Rig refined(const camera::Rig& rig, const RigRefinement& refinement);
+// Whether the rig of a map is to be replaced by the estimate.
+bool accepted(const RigRefinement& refinement, const CalibrationOptions& options);
+// As refine_rig, if the estimate is to be accepted. If this depends on the verdict, it is determined first from a
+// fraction of the keyframes and landmarks.
+std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,
+                                                const CalibrationOptions& options,
+                                                const feature::FeatureModel& features,
+                                                const std::stop_token& stop = {});
+// Moves the submap of a keyframe as a whole so that the keyframe has the given pose.
+void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft);
+// Replaces the rig of the draft's map by the estimate, with the poses and landmarks that belong to it; all others have
+// to be adjusted afterwards. The refinement must be done, and its map the draft's.
+void apply(const RigRefinement& refinement, map::MapDraft& draft);
 
 }  // namespace bslam::calibration
+
+template <>
+struct bslam::EnumNames<bslam::calibration::Refine> {
+  static constexpr EnumName<calibration::Refine> kNames[] = {{calibration::Refine::kFalse, "false"},
+                                                             {calibration::Refine::kAuto, "auto"},
+                                                             {calibration::Refine::kTrue, "true"}};
+};

@@ -82,6 +82,20 @@ PinholeRadTan::Distorted PinholeRadTan::distort(const Vector2d& m) const {
   return out;
 }
 
+void PinholeRadTan::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const {
+  const Vector2d m = point.head<2>() / point.z();
+  const double x = m.x(), y = m.y(), r2 = m.squaredNorm();
+  const double a = 1 + r2 * (d_[0] + r2 * (d_[1] + r2 * d_[4])), b = 1 + r2 * (d_[5] + r2 * (d_[6] + r2 * d_[7]));
+  const double numerator = r2 / b, denominator = -r2 * a / (b * b);  // d (a / b) / d k1, and / d k4
+  J.col(0) = numerator * m;
+  J.col(1) = r2 * numerator * m;
+  J.col(2) << 2 * x * y, r2 + 2 * y * y;
+  J.col(3) << r2 + 2 * x * x, 2 * x * y;
+  if (count_ > 4) J.col(4) = r2 * r2 * numerator * m;
+  if (count_ == 4 || count_ == 5) return;
+  for (int i = 0; i < 3; ++i) J.col(5 + i) = std::pow(r2, i) * denominator * m;
+}
+
 std::optional<Vector2d> PinholeRadTan::project(const Vector3d& point) const {
   if (!(point.z() > kMinDepth)) return std::nullopt;
   const Vector2d m = point.head<2>() / point.z();
@@ -164,6 +178,16 @@ std::optional<Projection> KannalaBrandt::project_with_jacobian(const Vector3d& p
   out.jacobian.row(0) *= k_.fx;
   out.jacobian.row(1) *= k_.fy;
   return out;
+}
+
+void KannalaBrandt::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const {
+  const double rho = point.head<2>().norm(), theta = std::atan2(rho, point.z());
+  const Vector2d u = rho > 0 ? Vector2d(point.head<2>() / rho) : Vector2d(Vector2d::Zero());
+  double power = theta;
+  for (int i = 0; i < 4; ++i) {
+    power *= theta * theta;
+    J.col(i) = power * u;
+  }
 }
 
 std::optional<Vector3d> KannalaBrandt::unproject(const Vector2d& pixel) const {

@@ -1,6 +1,8 @@
 // Camera models: a closed set behind one interface. Points are in the camera frame (x right, y down, z forward) in
 // metres. Pixels refer to the raw image, with (0, 0) at the centre of the top-left pixel. Each model has a
-// domain and returns nullopt outside of it.
+// domain and returns nullopt outside of it. `distortion_jacobian` computes the derivative of the point on the image
+// plane (the pixel without focal lengths and principal point) with respect to the parameters of `distortion()`, one
+// column each, for a point in the domain.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,6 +17,7 @@ namespace bslam::camera {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Matrix23d = Eigen::Matrix<double, 2, 3>;
+using Matrix2Xd = Eigen::Matrix<double, 2, Eigen::Dynamic>;
 
 struct Projection {
   Vector2d pixel;
@@ -35,6 +38,8 @@ class Pinhole {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;  // returns a unit vector
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {}; }
+  static constexpr int num_distortion() { return 0; }  // size of distortion()
+  void distortion_jacobian(const Vector3d&, const Eigen::Ref<Matrix2Xd>&) const {}
   static constexpr std::string_view kName = "pinhole";
 
  private:
@@ -54,6 +59,8 @@ class PinholeRadTan {
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {d_.begin(), d_.begin() + count_}; }
   double max_radius() const { return max_radius_; }  // tangent of the maximum valid angle, or infinity
+  int num_distortion() const { return count_; }      // size of distortion()
+  void distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const;
   static constexpr std::string_view kName = "pinhole-radtan";
 
  private:
@@ -80,7 +87,9 @@ class KannalaBrandt {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {d_.begin(), d_.end()}; }
-  double max_theta() const { return max_theta_; }  // radians
+  double max_theta() const { return max_theta_; }      // radians
+  static constexpr int num_distortion() { return 4; }  // size of distortion()
+  void distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const;
   static constexpr std::string_view kName = "kannala-brandt";
 
  private:
@@ -102,6 +111,8 @@ class Unified {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {alpha_}; }
+  static constexpr int num_distortion() { return 1; }  // size of distortion()
+  void distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const;
   static constexpr std::string_view kName = "ucm";
 
  private:
@@ -119,6 +130,8 @@ class ExtendedUnified {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {alpha_, beta_}; }
+  static constexpr int num_distortion() { return 2; }  // size of distortion()
+  void distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const;
   static constexpr std::string_view kName = "eucm";
 
  private:
@@ -137,6 +150,8 @@ class DoubleSphere {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {xi_, alpha_}; }
+  static constexpr int num_distortion() { return 2; }  // size of distortion()
+  void distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const;
   static constexpr std::string_view kName = "double-sphere";
 
  private:
@@ -155,6 +170,8 @@ class Fov {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {w_}; }
+  static constexpr int num_distortion() { return 1; }  // size of distortion()
+  void distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const;
   static constexpr std::string_view kName = "fov";
 
  private:

@@ -46,6 +46,12 @@ std::optional<Projection> Fov::project_with_jacobian(const Vector3d& point) cons
   return out;
 }
 
+void Fov::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const {
+  const Vector2d m = point.head<2>() / point.z();
+  const double tangent = slope_ * m.norm(), slope_change = 1 + 0.25 * slope_ * slope_;  // d slope / d w
+  J.col(0) = (slope_change / (1 + tangent * tangent) - scale(m.norm())) / w_ * m;
+}
+
 std::optional<Vector3d> Fov::unproject(const Vector2d& pixel) const {
   if (!pixel.allFinite()) return std::nullopt;
   const Vector2d m((pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy);

@@ -8,7 +8,12 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-ModelParameter coefficient(std::string_view name) { return {name, -kInf, kInf}; }
+constexpr double kSigmaShape = 0.01;         // radial coefficients and shape parameters
+constexpr double kSigmaTangential = 0.0005;  // p1, p2
+
+ModelParameter coefficient(std::string_view name) {
+  return {name, name.front() == 'p' ? kSigmaTangential : kSigmaShape, -kInf, kInf};
+}
 
 ModelRow pinhole() {
   return {Pinhole::kName, {}, {0}, [](const Intrinsics& k, const auto&) -> CameraModel { return Pinhole(k); }};
@@ -33,28 +38,28 @@ ModelRow kannala_brandt() {
 }
 
 ModelRow unified() {
-  return {Unified::kName, {{"alpha", 0, 1}}, {1}, [](const Intrinsics& k, const auto& p) -> CameraModel {
+  return {Unified::kName, {{"alpha", kSigmaShape, 0, 1}}, {1}, [](const Intrinsics& k, const auto& p) -> CameraModel {
             return Unified(k, p[0]);
           }};
 }
 
 ModelRow extended_unified() {
   return {ExtendedUnified::kName,
-          {{"alpha", 0, 1}, {"beta", 0, 1e6, true}},
+          {{"alpha", kSigmaShape, 0, 1}, {"beta", kSigmaShape, 0, 1e6, true}},
           {2},
           [](const Intrinsics& k, const auto& p) -> CameraModel { return ExtendedUnified(k, p[0], p[1]); }};
 }
 
 ModelRow double_sphere() {
   return {DoubleSphere::kName,
-          {{"xi", -1, 1, true}, {"alpha", 0, 1}},
+          {{"xi", kSigmaShape, -1, 1, true}, {"alpha", kSigmaShape, 0, 1}},
           {2},
           [](const Intrinsics& k, const auto& p) -> CameraModel { return DoubleSphere(k, p[0], p[1]); }};
 }
 
 // A smaller w is a pinhole to all digits; tan(w / 2) is infinite at pi.
 ModelRow fov() {
-  return {Fov::kName, {{"w", 1e-6, 3.14}}, {1}, [](const Intrinsics& k, const auto& p) -> CameraModel {
+  return {Fov::kName, {{"w", kSigmaShape, 1e-6, 3.14}}, {1}, [](const Intrinsics& k, const auto& p) -> CameraModel {
             return Fov(k, p[0]);
           }};
 }

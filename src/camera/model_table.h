@@ -14,6 +14,7 @@ namespace bslam::camera {
 // A parameter in addition to the focal lengths and the principal point, and its valid range.
 struct ModelParameter {
   std::string_view name;
+  double sigma;                  // typical standard deviation of a calibrated value, as a prior for its estimation
   double low, high;              // bounds; infinite if there is none
   bool low_is_excluded = false;  // `low` is not part of the range
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/assert.h"
+#include "camera/model_parameters.h"
 
 namespace bslam::camera {
 
@@ -72,12 +73,33 @@ Rig Rig::subset(std::span<const int> indices) const {
   return Rig(std::move(chosen));
 }
 
-Rig Rig::with_extrinsics_of(const Rig& part, std::span<const int> indices) const {
+Rig Rig::with_calibration_of(const Rig& part, std::span<const int> indices) const {
   BSLAM_ASSERT(part.size() == indices.size(), "there must be one index per camera of `part`");
   std::vector<RigCamera> cameras = calibration_->cameras;
-  for (std::size_t i = 0; i < part.size(); ++i)
-    cameras[static_cast<std::size_t>(indices[i])].T_body_cam = part.body_from_cam(i);
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    RigCamera& camera = cameras[static_cast<std::size_t>(indices[i])];
+    camera.camera.model = part.camera(i).model;
+    camera.T_body_cam = part.body_from_cam(i);
+  }
   return Rig(std::move(cameras));
+}
+
+bool Rig::same_intrinsics(const Rig& other) const {
+  BSLAM_ASSERT(size() == other.size(), "rigs with other cameras cannot be compared");
+  if (calibration_ == other.calibration_) return true;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const CameraModel &a = camera(i).model, &b = other.camera(i).model;
+    if (a.index() != b.index() || parameters(a) != parameters(b)) return false;
+  }
+  return true;
+}
+
+bool Rig::same_calibration(const Rig& other) const {
+  if (!same_intrinsics(other)) return false;
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (body_from_cam(i).matrix() != other.body_from_cam(i).matrix()) return false;
+  }
+  return true;
 }
 
 Rig Rig::moving(std::span<const double> delay_s, const geometry::Vector6d& twist) const {

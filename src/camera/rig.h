@@ -48,9 +48,14 @@ class Rig {
   // Returns the rig that consists of the given cameras, in the given order; the first becomes camera 0. The indices
   // must be valid and distinct.
   Rig subset(std::span<const int> indices) const;
-  // The inverse of `subset`: returns this rig with the extrinsics (T_body_cam) of the cameras `indices` taken from
-  // `part`.
-  Rig with_extrinsics_of(const Rig& part, std::span<const int> indices) const;
+  // The inverse of `subset`: returns this rig with the models and extrinsics (T_body_cam) of the cameras `indices`
+  // taken from `part`.
+  Rig with_calibration_of(const Rig& part, std::span<const int> indices) const;
+
+  // Whether all cameras of two rigs have the same model with the same parameters, and whether they also have the same
+  // extrinsics. The rigs must have the same number of cameras.
+  bool same_intrinsics(const Rig& other) const;
+  bool same_calibration(const Rig& other) const;
 
   // Returns the rig for cameras with different capture times, under a constant-velocity model. Camera i takes its image
   // `delay_s[i]` seconds after the time of the rig; in that time the rig moves by exp(delay twist), so T_cam_rig of

@@ -98,6 +98,18 @@ std::optional<Vector3d> ExtendedUnified::unproject(const Vector2d& pixel) const 
   return unproject_ellipsoid(k_, alpha_, beta_, pixel);
 }
 
+// The plane's point is (x, y) / n: its derivative is -(x, y) / n^2 dn.
+void Unified::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const {
+  const double d = point.norm(), n = alpha_ * d + (1 - alpha_) * point.z();
+  J.col(0) = -(d - point.z()) / (n * n) * point.head<2>();
+}
+
+void ExtendedUnified::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const {
+  const double d = ellipsoid_norm(point, beta_), n = alpha_ * d + (1 - alpha_) * point.z();
+  J.col(0) = -(d - point.z()) / (n * n) * point.head<2>();
+  J.col(1) = -alpha_ * point.head<2>().squaredNorm() / (2 * d * n * n) * point.head<2>();
+}
+
 DoubleSphere::DoubleSphere(const Intrinsics& k, double xi, double alpha) : k_(k), xi_(xi), alpha_(alpha) {
   BSLAM_ASSERT(xi > -1 && xi <= 1 && alpha >= 0 && alpha <= 1, "xi must be in (-1, 1] and alpha in [0, 1]");
 }
@@ -114,6 +126,13 @@ std::optional<Projection> DoubleSphere::project_with_jacobian(const Vector3d& po
   const Eigen::RowVector3d dk = xi_ / norm * point.transpose() + Eigen::RowVector3d::UnitZ();
   const Eigen::RowVector3d dd = (Eigen::RowVector3d(point.x(), point.y(), 0) + k * dk) / d;
   return divided(k_, point, divisor(alpha_, k, d), alpha_ * dd + (1 - alpha_) * dk);
+}
+
+void DoubleSphere::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const {
+  const double norm = point.norm(), k = xi_ * norm + point.z();
+  const double d = std::sqrt(point.head<2>().squaredNorm() + k * k), n = alpha_ * d + (1 - alpha_) * k;
+  J.col(0) = -norm * (alpha_ * k / d + 1 - alpha_) / (n * n) * point.head<2>();
+  J.col(1) = -(d - k) / (n * n) * point.head<2>();
 }
 
 std::optional<Vector3d> DoubleSphere::unproject(const Vector2d& pixel) const {

@@ -33,7 +33,17 @@ void warn_of_extrinsics(const session::CameraRecord& camera) {
              "warning: {}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm, provided that "
              "its time offset is correct{}\n",
              camera.name, e->change_deg, e->change_mm,
-             e->refined ? "" : "; use the estimate with --set extrinsics.refine=true");
+             e->refined ? "" : "; use the estimate with --set calibration.refine=true");
+}
+
+void warn_of_calibration(const session::CalibrationRecord& calibration) {
+  if (calibration.estimate.verdict != calibration::Verdict::kInconsistent) return;
+  fmt::print(stderr,
+             "warning: the images contradict the calibration, which multiplies their squared reprojection error by "
+             "{:.1f}; {}\n",
+             1 + calibration.estimate.excess_error,
+             calibration.refined ? "it was refined: see calibration in summary.json, and rig_refined.yaml"
+                                 : "refine it with --set calibration.refine=auto");
 }
 
 // Warns about a camera that is still inconsistent with the others at the end of the run: its extrinsics are probably
@@ -103,6 +113,7 @@ void print_warnings(const session::RunRecord& record, const camera::Rig& rig, co
     warn_of_extrinsics(camera);
     warn_of_disagreement(record, c, check_command);
   }
+  warn_of_calibration(record.calibration);
   const auto dropped = count(record, session::FrameOutcome::kDropped);
   if (dropped > 0) fmt::print(stderr, "warning: {} frames dropped: processing is slower than real time\n", dropped);
   warn_if_nothing_matches(record, rig, check_command);

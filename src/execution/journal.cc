@@ -16,10 +16,11 @@ struct StepName {
   JournalStep step;
   std::string_view name;
 };
-constexpr StepName kSteps[] = {{JournalStep::kFrame, "frame"}, {JournalStep::kStart, "start"},
-                               {JournalStep::kTrack, "track"}, {JournalStep::kMap, "map"},
-                               {JournalStep::kLoop, "loop"},   {JournalStep::kGlobal, "global"},
-                               {JournalStep::kFinal, "final"}, {JournalStep::kRestart, "restart"}};
+constexpr StepName kSteps[] = {{JournalStep::kFrame, "frame"},         {JournalStep::kStart, "start"},
+                               {JournalStep::kTrack, "track"},         {JournalStep::kMap, "map"},
+                               {JournalStep::kLoop, "loop"},           {JournalStep::kGlobal, "global"},
+                               {JournalStep::kCalibrate, "calibrate"}, {JournalStep::kFinal, "final"},
+                               {JournalStep::kRestart, "restart"}};
 
 std::string_view step_name(JournalStep step) {
   for (const StepName& s : kSteps) {
@@ -91,6 +92,8 @@ JournalStep journal_step(Stage stage) {
       return JournalStep::kLoop;
     case Stage::kGlobal:
       return JournalStep::kGlobal;
+    case Stage::kCalibrate:
+      return JournalStep::kCalibrate;
   }
   return JournalStep::kMap;
 }

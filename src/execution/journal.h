@@ -20,12 +20,13 @@ enum class JournalStep {
   kMap,    // a background stage ended
   kLoop,
   kGlobal,
+  kCalibrate,
   kFinal,    // the adjustment at the end
   kRestart,  // the map was replaced by an empty one
 };
 
 JournalStep journal_step(Stage stage);
-std::optional<Stage> background_stage(JournalStep step);  // nullopt unless kMap, kLoop or kGlobal
+std::optional<Stage> background_stage(JournalStep step);  // nullopt if it is not one of a background stage
 
 struct JournalEntry {
   JournalStep step = JournalStep::kFrame;

@@ -102,6 +102,8 @@ class LaggedExecutor : public StageExecutor {
     switch (stage) {
       case Stage::kMap:
         return setup_.options.lag_map;
+      case Stage::kCalibrate:
+        return setup_.options.lag_calibrate;
       case Stage::kLoop:
         return setup_.options.lag_loop;
       case Stage::kGlobal:
@@ -143,13 +145,15 @@ class LaggedExecutor : public StageExecutor {
     changed_.notify_all();
   }
 
-  // Waits for the running task of a stage and commits it. Then starts the task that follows and the next one of the
+  // Waits for the running task of a stage and commits it. Then starts the tasks that follow and the next one of the
   // stage. A stopped task is only removed. It stays in the queue until then, so that interrupt() can still stop it.
   void finish_running(Stage stage) {
     const std::shared_ptr<Job> job = queue(stage).running;
     const bool committed = wait_for(*job) && commit_result(*job);
     leave(stage);
-    if (const auto next = following(job->task, setup_.functions); committed && next) push(*next);
+    if (committed) {
+      for (const StageTask& next : following(job->task, setup_.functions)) push(next);
+    }
     start_next(stage);
   }
 
@@ -167,7 +171,7 @@ class LaggedExecutor : public StageExecutor {
       fail(job.failure);
       rethrow();
     }
-    if (const auto superseded = superseded_by(job.task.stage, job.result, *gate_.newest())) supersede(*superseded);
+    for (const Stage s : superseded_by(job.task.stage, job.result, *gate_.newest())) supersede(s);
     const bool committed = gate_.commit_stage(job.task, job.base->version(), std::move(job.result), stop);
     if (!job.observed) observe(setup_, {job.task, job.ms, committed});
     return committed;

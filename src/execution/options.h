@@ -17,7 +17,7 @@ struct ExecutionOptions {
   int max_pending_keyframes = 3;  // queue length of a background stage; adding to a full queue waits
   // Lagged mode: a stage's result is used this number of frames after the frame at which the stage started. It should
   // be slightly longer than the stage takes, to avoid waiting; lag_global is for maps of some hundred keyframes.
-  int lag_map = 3, lag_loop = 5, lag_global = 40;
+  int lag_map = 3, lag_loop = 5, lag_calibrate = 40, lag_global = 40;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -28,6 +28,7 @@ struct ExecutionOptions {
     visitor("lag_map", self.lag_map, Range{1, 10000}, "frames",
             "lagged mode: delay from the start of mapping to the use of its result");
     visitor("lag_loop", self.lag_loop, Range{1, 10000}, "frames", "lagged mode: the same for loop closing");
+    visitor("lag_calibrate", self.lag_calibrate, Range{1, 10000}, "frames", "lagged mode: the same for calibration");
     visitor("lag_global", self.lag_global, Range{1, 10000}, "frames", "lagged mode: the same for global adjustment");
   }
 };

@@ -139,7 +139,9 @@ class ParallelExecutor : public StageExecutor {
       failure_ = failure;
       close();
     }
-    if (const auto next = following(task, setup_.functions); committed && next) push(*next, lock);
+    if (committed) {
+      for (const StageTask& next : following(task, setup_.functions)) push(next, lock);
+    }
     queue(task.stage).running.reset();
     changed_.notify_all();
   }
@@ -149,9 +151,10 @@ class ParallelExecutor : public StageExecutor {
     const map::MapSnapshot base = gate_.newest();
     StageResult result = setup_.functions[task.stage](task, base, stop);
     // Before the commit, so that no result of a superseded task is committed after it.
-    if (const auto superseded = superseded_by(task.stage, result, *gate_.newest())) {
+    for (const Stage superseded : superseded_by(task.stage, result, *gate_.newest())) {
       const std::lock_guard lock(mutex_);
-      drop(queue(*superseded));
+      drop(queue(superseded));
+      changed_.notify_all();  // its queue has space
     }
     const bool committed = gate_.commit_stage(task, base->version(), std::move(result), stop);
     observe(setup_, {task, watch.ms(), committed});

@@ -92,8 +92,9 @@ class ReplayExecutor : public StageExecutor {
 
   void run(const StageTask& task) {
     std::deque<KeyframeId>& tasks = waiting(task.stage);
-    // A superseded adjustment leaves no entry.
-    while (task.stage == Stage::kGlobal && !tasks.empty() && tasks.front() != task.keyframe) tasks.pop_front();
+    // A superseded adjustment or calibration leaves no entry.
+    const bool droppable = task.stage == Stage::kGlobal || task.stage == Stage::kCalibrate;
+    while (droppable && !tasks.empty() && tasks.front() != task.keyframe) tasks.pop_front();
     if (tasks.empty() || tasks.front() != task.keyframe) fail("no such task");
     const map::MapSnapshot base = recorded_base();
     const bool committed = run_to_commit(task, base, gate_, setup_, stop_.get_token());
@@ -102,8 +103,7 @@ class ReplayExecutor : public StageExecutor {
     tasks.pop_front();
     if (committed) {
       keep(gate_.newest());
-      if (const auto superseded = superseded_by(task.stage)) waiting(*superseded).clear();
-      if (const auto next = following(task, setup_.functions)) waiting(next->stage).push_back(next->keyframe);
+      for (const StageTask& next : following(task, setup_.functions)) waiting(next.stage).push_back(next.keyframe);
     }
     advance();
   }

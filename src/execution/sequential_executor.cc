@@ -1,3 +1,5 @@
+#include <deque>
+
 #include "execution/schedules.h"
 
 namespace bslam::execution {
@@ -13,10 +15,10 @@ class SequentialExecutor : public StageExecutor {
   }
 
   void enqueue(KeyframeId keyframe) override {
-    std::optional<StageTask> task = StageTask{Stage::kMap, keyframe};
-    while (task && !over()) {
-      const bool committed = run_to_commit(*task, gate_.newest(), gate_, setup_, stop_.get_token());
-      task = committed ? following(*task, setup_.functions) : std::nullopt;
+    std::deque<StageTask> tasks = {{Stage::kMap, keyframe}};
+    for (; !tasks.empty() && !over(); tasks.pop_front()) {
+      if (!run_to_commit(tasks.front(), gate_.newest(), gate_, setup_, stop_.get_token())) continue;
+      for (const StageTask& next : following(tasks.front(), setup_.functions)) tasks.push_back(next);
     }
   }
 

@@ -6,6 +6,8 @@ std::string_view stage_name(Stage stage) {
   switch (stage) {
     case Stage::kMap:
       return "map";
+    case Stage::kCalibrate:
+      return "calibrate";
     case Stage::kLoop:
       return "loop";
     case Stage::kGlobal:
@@ -14,19 +16,33 @@ std::string_view stage_name(Stage stage) {
   return "";
 }
 
-std::optional<StageTask> following(const StageTask& task, const StageFunctions& functions) {
-  if (task.stage == Stage::kGlobal) return std::nullopt;
-  const StageTask next{task.stage == Stage::kMap ? Stage::kLoop : Stage::kGlobal, task.keyframe};
-  if (!functions[next.stage]) return std::nullopt;
-  return next;
+bool calibration_due(KeyframeId keyframe) {
+  constexpr std::size_t kFirst = 8;  // keyframes
+  for (std::size_t due = kFirst; due <= keyframe.index(); due += due / 2) {
+    if (due == keyframe.index()) return true;
+  }
+  return false;
 }
 
-std::optional<Stage> superseded_by(Stage stage) {
-  return stage == Stage::kLoop ? std::optional(Stage::kGlobal) : std::nullopt;
+std::vector<StageTask> following(const StageTask& task, const StageFunctions& functions) {
+  std::vector<StageTask> out;
+  const auto add = [&](Stage stage) {
+    if (functions[stage]) out.push_back({stage, task.keyframe});
+  };
+  if (task.stage == Stage::kMap && calibration_due(task.keyframe)) add(Stage::kCalibrate);
+  if (task.stage == Stage::kMap) add(Stage::kLoop);
+  if (task.stage == Stage::kLoop) add(Stage::kGlobal);
+  return out;
 }
 
-std::optional<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest) {
-  if (!result.draft || result.draft->superseded(newest)) return std::nullopt;
+std::vector<Stage> superseded_by(Stage stage) {
+  if (stage == Stage::kLoop) return {Stage::kCalibrate, Stage::kGlobal};
+  if (stage == Stage::kCalibrate) return {Stage::kGlobal};
+  return {};
+}
+
+std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest) {
+  if (!result.draft || result.draft->superseded(newest)) return {};
   return superseded_by(stage);
 }
 

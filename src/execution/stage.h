@@ -1,5 +1,5 @@
-// Background stages (mapping, loop closing, global adjustment) as functions of values: their input, their result, and
-// the stage that follows. A StageExecutor decides when and in which thread they run.
+// Background stages (mapping, self-calibration, loop closing, global adjustment) as functions of values: their input,
+// their result, and the stage that follows. A StageExecutor decides when and in which thread they run.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include <optional>
 #include <stop_token>
 #include <string_view>
+#include <vector>
 
 #include "base/id.h"
 #include "map/map_store.h"
@@ -15,9 +16,9 @@
 namespace bslam::execution {
 
 // Each stage has its own first-in, first-out queue and runs one task at a time. A new keyframe creates a task of kMap,
-// a commit of kMap a task of kLoop, and a commit of kLoop a task of kGlobal.
-enum class Stage { kMap, kLoop, kGlobal };
-inline constexpr std::array<Stage, 3> kStages = {Stage::kMap, Stage::kLoop, Stage::kGlobal};
+// a commit of kMap a task of kLoop and sometimes one of kCalibrate, and a commit of kLoop a task of kGlobal.
+enum class Stage { kMap, kCalibrate, kLoop, kGlobal };
+inline constexpr std::array<Stage, 4> kStages = {Stage::kMap, Stage::kCalibrate, Stage::kLoop, Stage::kGlobal};
 
 std::string_view stage_name(Stage stage);
 
@@ -46,14 +47,20 @@ struct StageFunctions {
   StageFunction& operator[](Stage s) { return by_stage[static_cast<std::size_t>(s)]; }
 };
 
-// The task that follows the commit of another one, if any.
-std::optional<StageTask> following(const StageTask& task, const StageFunctions& functions);
+// The tasks that follow the commit of another one, in order.
+std::vector<StageTask> following(const StageTask& task, const StageFunctions& functions);
 
-// The stage whose waiting and running tasks are dropped when a result of `stage` is committed. A loop closure corrects
-// the map, so that a global adjustment of an earlier version is useless, and another one follows.
-std::optional<Stage> superseded_by(Stage stage);
-// The same before the commit of a result; `newest` is the newest version. Returns nullopt if nothing will be committed.
-std::optional<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest);
+// Whether the rig is calibrated after the mapping of a keyframe: at keyframe numbers that grow by the same factor,
+// since a calibration costs as much as the map is large, and what another one can improve decreases with the size of
+// the map.
+bool calibration_due(KeyframeId keyframe);
+
+// The stages whose waiting and running tasks are dropped when a result of `stage` is committed. A loop closure and a
+// calibration correct the map, so that a global adjustment of an earlier version is useless; they adjust the map
+// themselves or another adjustment follows. A loop closure also supersedes a calibration.
+std::vector<Stage> superseded_by(Stage stage);
+// The same before the commit of a result; `newest` is the newest version. Returns none if nothing will be committed.
+std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest);
 
 // Report of one run of a stage for the observer.
 struct StageRun {

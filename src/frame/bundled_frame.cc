@@ -22,6 +22,19 @@ CameraFrame refined(CameraFrame camera_frame, feature::Refinement&& refinement, 
   return camera_frame;
 }
 
+BundledFrame with_bearings_of(BundledFrame frame, const camera::Rig& rig) {
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    feature::Keypoints& keypoints = frame.cameras[c].keypoints;
+    feature::Refinement positions = keypoints.positions();
+    for (std::size_t k = 0; k < keypoints.size(); ++k) {
+      if (const auto bearing = rig.camera(c).unproject(positions.pixel[k].cast<double>()))
+        positions.bearing[k] = *bearing;
+    }
+    keypoints = keypoints.refined(std::move(positions));
+  }
+  return frame;
+}
+
 std::vector<double> delays_of(const BundledFrame& frame) {
   std::vector<double> delays(frame.cameras.size());
   for (std::size_t c = 0; c < delays.size(); ++c) delays[c] = frame.delay_s(c);

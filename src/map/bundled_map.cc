@@ -1,6 +1,7 @@
 #include "map/bundled_map.h"
 
 #include <algorithm>
+#include <map>
 
 #include "base/assert.h"
 
@@ -103,6 +104,22 @@ geometry::SE3 BundledMap::cam_from_world(KeyframeId k, CameraIndex c) const {
   const geometry::SE3& T_cam_rig = rig_->cam_from_rig(c);
   if (entry.frame->delay_s(c.index()) == 0.0) return T_cam_rig * entry.T_rig_world;
   return T_cam_rig * motion_of(entry, c) * entry.T_rig_world;
+}
+
+std::vector<BundledMap::ReplacedFrame> BundledMap::set_rig(std::shared_ptr<const camera::Rig> rig,
+                                                           std::span<const ReplacedFrame> known) {
+  std::vector<ReplacedFrame> out;
+  const bool other_bearings = !rig->same_intrinsics(*rig_);
+  rig_ = std::move(rig);
+  if (!other_bearings) return out;
+  std::map<KeyframeId, std::shared_ptr<const frame::BundledFrame>> frames(known.begin(), known.end());
+  for (const KeyframeId k : keyframe_ids()) {
+    std::shared_ptr<const frame::BundledFrame>& frame = frames[k];
+    if (!frame) frame = std::make_shared<const frame::BundledFrame>(frame::with_bearings_of(*keyframe(k).frame, *rig_));
+    keyframes_.mutate(k.index(), owner_.tag()).frame = frame;
+    out.emplace_back(k, frame);
+  }
+  return out;
 }
 
 KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,

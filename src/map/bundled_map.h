@@ -35,6 +35,7 @@ class BundledMap {
 
   // ---- Reading
   const camera::Rig& rig() const { return *rig_; }
+  std::shared_ptr<const camera::Rig> shared_rig() const { return rig_; }
   // The pyramid on which keypoints were detected.
   const feature::PyramidShape& pyramid() const { return pyramid_; }
   MapVersion version() const { return version_; }
@@ -111,8 +112,12 @@ class BundledMap {
     scale_deviation_ = deviation;
   }
   void set_version(MapVersion v) { version_ = v; }
-  // Replaces the extrinsics; the cameras must be the same. Poses and landmarks are not changed.
-  void set_rig(std::shared_ptr<const camera::Rig> rig) { rig_ = std::move(rig); }
+  // A keyframe and a frame that replaces its own: the same keypoints with other bearings.
+  using ReplacedFrame = std::pair<KeyframeId, std::shared_ptr<const frame::BundledFrame>>;
+  // Replaces the calibration; the cameras must be the same. Poses and landmarks are not changed. Bearings are computed
+  // again if the intrinsics differ: those of `known` are taken as they are, if their keyframe is alive. Returns all
+  // frames that were replaced.
+  std::vector<ReplacedFrame> set_rig(std::shared_ptr<const camera::Rig> rig, std::span<const ReplacedFrame> known = {});
   void begin_gauge_epoch() { ++gauge_epoch_; }
 
   // Appends a keyframe that observes the given landmarks (alive; distinct features, distinct landmarks). Its parent is

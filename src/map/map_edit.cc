@@ -114,8 +114,7 @@ void MapDraft::set_scale(Scale scale, double deviation) {
 
 void MapDraft::set_rig(camera::Rig rig) {
   const auto shared = std::make_shared<const camera::Rig>(std::move(rig));
-  working_.set_rig(shared);
-  edit_.operations.emplace_back(SetRig{shared});
+  edit_.operations.emplace_back(SetRig{shared, working_.set_rig(shared)});
 }
 
 MapDraft::Finished MapDraft::finish() && { return {std::move(edit_), std::move(working_)}; }

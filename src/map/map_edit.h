@@ -28,7 +28,8 @@
 // | RemoveSubmap        | dropped if the submap was already removed or merged                                      |
 // | AddVisibilityCounts | forwarded along merges; entries of removed landmarks are dropped                         |
 // | RefreshLandmarks    | forwarded along merges; entries of removed landmarks are dropped                         |
-// | SetScale, SetRig    | the last one committed wins                                                              |
+// | SetScale            | the last one committed wins                                                              |
+// | SetRig              | the same; newer keyframes get the bearings of the rig                                    |
 // An edit that corrects the map (SetPoses::correction, ScaleSubmap) is rejected as a whole if another correction was
 // committed since its base: applying only part of it, for example merged landmarks and joined submaps without the
 // corrected poses, would break the map. With these rules the final pose of a new keyframe does not depend on whether it
@@ -113,6 +114,7 @@ struct SetScale {
 
 struct SetRig {
   std::shared_ptr<const camera::Rig> rig;
+  std::vector<BundledMap::ReplacedFrame> frames;  // of the base's keyframes, with the bearings of the rig
 };
 
 using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark,
@@ -160,7 +162,7 @@ class MapDraft {
   void refresh_landmarks(std::vector<LandmarkId> landmarks);
   void set_scale(Scale scale);  // with deviation 0 for kMetric, infinite otherwise
   void set_scale(Scale scale, double deviation);
-  void set_rig(camera::Rig rig);  // the same cameras with other extrinsics
+  void set_rig(camera::Rig rig);  // the same cameras with another calibration
 
   // The edit, and the working copy. MapStore publishes the copy unchanged if the base is still the newest version.
   struct Finished {

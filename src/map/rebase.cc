@@ -75,7 +75,7 @@ class Rebase {
   bool operator()(const RefreshLandmarks& op);
   bool operator()(const SetScale& op) { return map_.set_scale(op.scale, op.deviation), true; }
 
-  bool operator()(const SetRig& op) { return map_.set_rig(op.rig), true; }
+  bool operator()(const SetRig& op) { return map_.set_rig(op.rig, op.frames), true; }
 
   RebaseReport take_report() && { return std::move(report_); }
   void count(bool was_applied) { ++(was_applied ? report_.applied : report_.dropped); }
@@ -120,7 +120,10 @@ bool Rebase::operator()(const AddKeyframe& op) {
   const Motion motion = motion_since_base(op.parent);
   const SE3 T_rig_world = motion ? motion->pose(op.T_rig_world) : op.T_rig_world;
   const KeyframeId parent = map_.nearest_alive_ancestor(map_id(op.parent));
-  const KeyframeId added = map_.add_keyframe(op.frame, T_rig_world, usable_matches(map_, matches), parent);
+  auto frame = op.frame;
+  if (!map_.rig().same_intrinsics(base_.rig()))
+    frame = std::make_shared<const frame::BundledFrame>(frame::with_bearings_of(*frame, map_.rig()));
+  const KeyframeId added = map_.add_keyframe(std::move(frame), T_rig_world, usable_matches(map_, matches), parent);
   if (motion) map_.set_twist(added, apply_scale_change(op.frame->twist, motion->scale_change));
   report_.keyframes.push_back(added);
   own_motions_.push_back(motion);

@@ -15,19 +15,18 @@ namespace bslam::matching {
 // tracking and replaced by the next extraction. Masks: one per camera; an empty image means no mask.
 class FrameBuilder {
  public:
-  FrameBuilder(const camera::Rig& rig, const feature::FeatureOptions& options, std::vector<image::Image> masks);
+  FrameBuilder(std::size_t cameras, const feature::FeatureOptions& options, std::vector<image::Image> masks);
 
   // Extracts the keypoints of all images; the Bundled table of the result is empty. Cameras with skipped[i] != 0
   // (empty: no camera) are treated as if they had no image. budgets[i]: maximum number of keypoints of camera i (empty:
   // per_image of the options).
-  frame::BundledFrame extract(const image::ImageBundle& images, ThreadPool& pool,
+  frame::BundledFrame extract(const camera::Rig& rig, const image::ImageBundle& images, ThreadPool& pool,
                               std::span<const std::uint8_t> skipped = {}, std::span<const int> budgets = {});
 
   // Pyramids of the last extracted frame; empty for cameras without an image.
   std::span<const image::Pyramid> pyramids() const { return pyramids_; }
 
  private:
-  const camera::Rig& rig_;
   std::vector<feature::Extractor> extractors_;
   std::vector<image::Image> masks_;
   std::vector<image::Pyramid> pyramids_;

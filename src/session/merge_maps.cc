@@ -20,7 +20,9 @@ Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedM
     if (const Status s = storage::fits(*saved, a.map.rig(), a.map.pyramid(), vocabulary.get()); !s) return s.error();
   }
   map::BundledMap both = a.map;
-  const map::AppendedIds ids = map::append_map(both, b.map);
+  map::BundledMap other = b.map;
+  other.set_rig(both.shared_rig());
+  const map::AppendedIds ids = map::append_map(both, other);
   map::MapStore store(std::move(both));
   MergeResult result{.map = a.map};
   looping::LoopCloser closer(std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition),

@@ -24,7 +24,7 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
       camera.first_skipped = dataset::describe_damage(input.dataset, frame.record->result.frame.index(), c);
     }
     camera.states = camera_intervals(record.frames, c);
-    const auto& found = input.system.extrinsics().cameras;
+    const auto& found = input.system.calibration().cameras;
     if (c > 0 && c < found.size()) {
       const calibration::CameraRefinement& r = found[c];
       camera.extrinsics = {r.change_deg,
@@ -34,7 +34,7 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
                            r.rotation_observed(),
                            r.translation_observed(),
                            r.suspect,
-                           input.system.extrinsics_refined()};
+                           input.system.calibration_refined()};
     }
     record.cameras.push_back(std::move(camera));
   }
@@ -56,9 +56,9 @@ void add_stages(const RecordInput& input, RunRecord& record) {
     add_stage_sample(record, "global adjustment", StageThread::kBackground,
                      {seconds(input, input.inputs.back().time_ns), input.system.final_adjustment_ms()});
   }
-  if (input.system.extrinsics_ms() > 0 && !input.inputs.empty()) {
-    add_stage_sample(record, "extrinsics", StageThread::kBackground,
-                     {seconds(input, input.inputs.back().time_ns), input.system.extrinsics_ms()});
+  if (input.system.calibration_ms() > 0 && !input.inputs.empty()) {
+    add_stage_sample(record, "calibration", StageThread::kBackground,
+                     {seconds(input, input.inputs.back().time_ns), input.system.calibration_ms()});
   }
 }
 
@@ -130,6 +130,7 @@ RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameReco
                 {}};
   if (std::isfinite(map->scale_deviation()) && map->scale_deviation() > 0)
     record.map.scale_deviation = map->scale_deviation();
+  record.calibration = {input.system.calibration(), input.system.calibration_refined()};
   record.maps_started = input.system.maps_started();
   add_places(input, record);
   record.start_up_s = input.start_up_s;

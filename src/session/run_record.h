@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "calibration/rig_refinement.h"
 #include "tracking/frame_record.h"
 
 namespace bslam::session {
@@ -66,6 +67,12 @@ struct CameraRecord {
   std::string first_skipped = {};                   // file and cause of damage of the first skipped image
 };
 
+// The estimate of the calibration at the end of the run.
+struct CalibrationRecord {
+  calibration::RigRefinement estimate;
+  bool refined = false;  // the final map uses an estimated rig
+};
+
 struct MapRecord {
   std::int64_t keyframes = 0, landmarks = 0, observations = 0;
   std::string scale = "metric";  // metric, up-to-scale, unobservable
@@ -96,6 +103,7 @@ struct RunRecord {
   std::vector<CameraRecord> cameras;  // in the order of cameras_used
   std::vector<StageSeries> stages;
   MapRecord map;
+  CalibrationRecord calibration;
   std::vector<PlaceEvent> loops, relocalisations;
   int maps_started = 0;
   std::vector<SubmapRecord> submaps;  // in decreasing order of frames

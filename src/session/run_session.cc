@@ -75,9 +75,9 @@ Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const Sess
 
 namespace {
 
-// Returns the calibration of all cameras, with the extrinsics of `found` for the cameras in use.
-camera::Rig with_refined_extrinsics(const camera::Rig& found, const dataset::Dataset& dataset) {
-  return dataset.whole_rig ? dataset.whole_rig->with_extrinsics_of(found, dataset.cameras_used) : found;
+// Returns the calibration of all cameras, with that of `found` for the cameras in use.
+camera::Rig with_refined_calibration(const camera::Rig& found, const dataset::Dataset& dataset) {
+  return dataset.whole_rig ? dataset.whole_rig->with_calibration_of(found, dataset.cameras_used) : found;
 }
 
 }  // namespace
@@ -118,7 +118,7 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
                     .wall_s = wall_s},
                    system.take_frames());
   result.map = system.snapshot();
-  if (system.extrinsics_refined()) result.refined_rig = with_refined_extrinsics(result.map->rig(), dataset);
+  if (system.calibration_refined()) result.refined_rig = with_refined_calibration(result.map->rig(), dataset);
   result.journal = system.journal();
   return result;
 }

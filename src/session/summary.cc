@@ -72,6 +72,32 @@ ordered_json cameras_json(const RunRecord& record) {
   return cameras;
 }
 
+ordered_json calibrated_camera_json(const std::string& name, const calibration::CameraRefinement& camera) {
+  ordered_json intrinsics = ordered_json::object();
+  for (const calibration::ParameterRefinement& p : camera.intrinsics)
+    intrinsics[p.name] = {{"change", rounded(p.change, 7)}, {"std", p.observed ? rounded(p.std, 7) : ordered_json()}};
+  const auto known = [](double deviation, bool observed) {
+    return observed ? ordered_json(rounded(deviation, 4)) : ordered_json();
+  };
+  return {{"name", name},
+          {"intrinsics", intrinsics},
+          {"rotation_deg", rounded(camera.change_deg, 4)},
+          {"rotation_std_deg", known(camera.std_deg, camera.rotation_observed())},
+          {"translation_mm", rounded(camera.change_mm, 3)},
+          {"translation_std_mm", known(camera.std_mm, camera.translation_observed())}};
+}
+
+ordered_json calibration_json(const RunRecord& record) {
+  const calibration::RigRefinement& estimate = record.calibration.estimate;
+  ordered_json cameras = ordered_json::array();
+  for (std::size_t c = 0; c < estimate.cameras.size() && c < record.cameras.size(); ++c)
+    cameras.push_back(calibrated_camera_json(record.cameras[c].name, estimate.cameras[c]));
+  return {{"verdict", calibration::verdict_name(estimate.verdict)},
+          {"excess_error", estimate.done ? rounded(estimate.excess_error, 4) : ordered_json()},
+          {"refined", record.calibration.refined},
+          {"cameras", cameras}};
+}
+
 ordered_json features_json(const RunRecord& record) {
   double keypoints = 0.0, unique = 0.0, monocular = 0.0, matched = 0.0;
   std::size_t images = 0, frames = 0;
@@ -161,6 +187,7 @@ ordered_json summary_json(const RunRecord& record) {
       {"cameras_used", record.cameras_used},
       {"frames", frames_json(record)},
       {"cameras", cameras_json(record)},
+      {"calibration", calibration_json(record)},
       {"features", features_json(record)},
       {"map",
        {{"keyframes", record.map.keyframes},

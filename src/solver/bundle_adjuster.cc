@@ -29,9 +29,7 @@ LmSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std
 }
 
 std::vector<double> squared_errors(const ReprojectionProblem& problem) {
-  std::vector<SE3> T_cam_rig;
-  for (std::size_t i = 0; i < problem.rig->size(); ++i) T_cam_rig.push_back(problem.rig->cam_from_rig(i));
-  return squared_errors(problem, problem.T_rig_world, problem.points, T_cam_rig);
+  return squared_errors(problem, problem.T_rig_world, problem.points, RigValues::of(*problem.rig));
 }
 
 std::vector<std::uint8_t> beyond(const std::vector<double>& chi2, double bound) {
@@ -41,15 +39,15 @@ std::vector<std::uint8_t> beyond(const std::vector<double>& chi2, double bound) 
 }
 
 std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span<const SE3> T_rig_world,
-                                   std::span<const Vector3d> points, std::span<const SE3> T_cam_rig) {
+                                   std::span<const Vector3d> points, const RigValues& rig) {
   std::vector<double> out;
   out.reserve(problem.observations.size());
   for (const ReprojectionProblem::Observation& o : problem.observations) {
     const auto pose = static_cast<std::size_t>(o.pose);
     Vector3d point_rig = T_rig_world[pose] * points[static_cast<std::size_t>(o.point)];
     if (!problem.motion.empty()) point_rig = problem.motion[pose * problem.rig->size() + o.camera.index()] * point_rig;
-    const auto error = residual_error(problem.rig->camera(o.camera).model, T_cam_rig[o.camera.index()] * point_rig,
-                                      o.pixel.cast<double>());
+    const std::size_t camera = o.camera.index();
+    const auto error = residual_error(rig.models[camera], rig.T_cam_rig[camera] * point_rig, o.pixel.cast<double>());
     const double sigma = static_cast<double>(o.sigma);
     out.push_back(error ? error->squaredNorm() / (sigma * sigma) : std::numeric_limits<double>::infinity());
   }

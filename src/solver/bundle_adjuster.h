@@ -9,6 +9,7 @@
 #include "base/options.h"
 #include "solver/lm.h"
 #include "solver/reprojection.h"
+#include "solver/rig_block.h"
 
 namespace bslam::solver {
 
@@ -50,8 +51,8 @@ LmSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std
 std::vector<double> squared_errors(const ReprojectionProblem& problem);
 // Flags the errors that exceed `bound` or are NaN.
 std::vector<std::uint8_t> beyond(const std::vector<double>& chi2, double bound);
-// The errors at the given values: one pose, point and T_cam_rig for each of the problem's poses, points and cameras.
+// The errors at other values: one pose and point for each of the problem's poses and points.
 std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span<const SE3> T_rig_world,
-                                   std::span<const Vector3d> points, std::span<const SE3> T_cam_rig);
+                                   std::span<const Vector3d> points, const RigValues& rig);
 
 }  // namespace bslam::solver

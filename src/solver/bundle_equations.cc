@@ -39,9 +39,7 @@ int rig_size(const RigBlocks& blocks) {
 }  // namespace
 
 BundleState state_of(const ReprojectionProblem& problem) {
-  BundleState out{problem.T_rig_world, problem.points, {}};
-  for (std::size_t i = 0; i < problem.rig->size(); ++i) out.rig.T_cam_rig.push_back(problem.rig->cam_from_rig(i));
-  return out;
+  return {problem.T_rig_world, problem.points, RigValues::of(*problem.rig)};
 }
 
 BundleEquations::BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure,
@@ -49,6 +47,7 @@ BundleEquations::BundleEquations(const ReprojectionProblem& problem, const Bundl
     : problem_(problem),
       structure_(structure),
       kernel_(kernel),
+      cameras_(problem.rig->size()),
       state_(std::move(start)),
       trial_(state_),
       pose_blocks_(structure.pose_of_slot.size()),
@@ -56,7 +55,6 @@ BundleEquations::BundleEquations(const ReprojectionProblem& problem, const Bundl
       L_(structure.num_points()),
       system_(structure.pattern, structure.frame_sizes, rig_size(rig_blocks), storage_for(structure, dense_poses)),
       rig_(structure, problem.rig->size(), rig_blocks, system_.frames().rows()) {
-  for (std::size_t i = 0; i < problem.rig->size(); ++i) models_.push_back(&problem.rig->camera(i).model);
   std::size_t free_groups = 0, most_in_point = 0;
   for (std::size_t i = 0; i < structure.num_points(); ++i) {
     first_W_.push_back(free_groups);
@@ -77,9 +75,9 @@ void BundleEquations::set_poses(const BundleState& state) {
   }
   if (rig_.size() == 0 && !cam_from_rig_.empty()) return;  // constant
   cam_from_rig_.clear();
-  cam_from_rig_.reserve(poses_.size() * models_.size());
-  for (std::size_t k = 0; k < poses_.size() * models_.size(); ++k) {
-    const SE3& T_cam_rig = state.rig.T_cam_rig[k % models_.size()];
+  cam_from_rig_.reserve(poses_.size() * cameras_);
+  for (std::size_t k = 0; k < poses_.size() * cameras_; ++k) {
+    const SE3& T_cam_rig = state.rig.T_cam_rig[k % cameras_];
     const SE3 T = problem_.motion.empty() ? T_cam_rig : T_cam_rig * problem_.motion[k];
     cam_from_rig_.push_back({T.matrix3(), T.translation()});
   }
@@ -97,8 +95,8 @@ void BundleEquations::for_each_error(const BundleState& state, const Visit& visi
       for (std::size_t k = structure_.groups[g].first_term; k < structure_.groups[g + 1].first_term; ++k) {
         const BundleStructure::Term& term = structure_.terms[k];
         const Rigid& T = cam_from_rig(structure_.groups[g].pose, term.camera);
-        const auto error = residual_error(*models_[static_cast<std::size_t>(term.camera)], T.R * point_rig + T.t,
-                                          term.pixel.cast<double>());
+        const auto error = residual_error(state.rig.models[static_cast<std::size_t>(term.camera)],
+                                          T.R * point_rig + T.t, term.pixel.cast<double>());
         visit(error ? (term.inverse_sigma * *error).squaredNorm() : std::numeric_limits<double>::infinity());
       }
     }
@@ -127,7 +125,7 @@ BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const R
     const Rigid& T = cam_from_rig(structure_.groups[group].pose, term.camera);
     const Vector3d p = T.R * point_rig + T.t;
     const auto camera = static_cast<std::size_t>(term.camera);
-    const auto r = residual(*models_[camera], p, term.pixel.cast<double>());
+    const auto r = residual(state_.rig.models[camera], p, term.pixel.cast<double>());
     Vector2d e = Vector2d::Zero();
     double chi2 = kMaxChi2;
     if (r) {
@@ -142,7 +140,7 @@ BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const R
     const Matrix23d wA = weight * A;
     out.M.noalias() += A.transpose() * wA;
     out.m.noalias() += wA.transpose() * e;
-    if (rig_.size() > 0) rig_.add({term.camera, state_.rig.T_cam_rig[camera], p, J}, A, e, weight, point);
+    if (rig_.size() > 0) rig_.add({term.camera, state_.rig, p, J, term.inverse_sigma}, A, e, weight, point);
   }
   return out;
 }

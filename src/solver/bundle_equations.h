@@ -19,7 +19,7 @@ struct BundleState {
   RigValues rig;
 };
 
-// The values of a problem, with the extrinsics of its rig.
+// The values of a problem, with those of its rig.
 BundleState state_of(const ReprojectionProblem& problem);
 
 class BundleEquations {
@@ -79,7 +79,7 @@ class BundleEquations {
 
   void set_poses(const BundleState& state);
   const Rigid& cam_from_rig(int pose, int camera) const {
-    return cam_from_rig_[static_cast<std::size_t>(pose) * models_.size() + static_cast<std::size_t>(camera)];
+    return cam_from_rig_[static_cast<std::size_t>(pose) * cameras_ + static_cast<std::size_t>(camera)];
   }
   template <class Visit>
   void for_each_error(const BundleState& state, const Visit& visit);
@@ -94,7 +94,7 @@ class BundleEquations {
   const ReprojectionProblem& problem_;
   const BundleStructure& structure_;
   Kernel kernel_;
-  std::vector<const camera::CameraModel*> models_;  // per camera
+  std::size_t cameras_;
   BundleState state_, trial_;
   std::vector<Rigid> cam_from_rig_;        // (poses, cameras): T_cam_rig motion
   std::vector<Rigid> poses_;               // R_rig_world, t_rig_world; every pose of the problem

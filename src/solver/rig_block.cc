@@ -23,9 +23,53 @@ Matrix6d change_jacobian(const Vector6d& change) {
 
 }  // namespace
 
+RigValues RigValues::of(const Rig& rig) {
+  RigValues out;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    out.T_cam_rig.push_back(rig.cam_from_rig(i));
+    out.models.push_back(rig.camera(i).model);
+  }
+  return out;
+}
+
+Rig RigValues::applied_to(const Rig& rig) const {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    camera::Camera camera = rig.camera(i);
+    camera.model = models[i];
+    const SE3 T_body_cam = i == 0 ? rig.body_from_cam(0) : rig.body_from_cam(0) * T_cam_rig[i].inverse();
+    cameras.push_back({std::move(camera), T_body_cam});
+  }
+  return Rig(std::move(cameras));
+}
+
+double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated) {
+  double sum = 0.0, reference = 0.0;
+  for (std::size_t c = 0; c < calibrated.size(); ++c) {
+    const Vector3d centre = calibrated[c].inverse().translation();
+    sum += T_cam_rig[c].inverse().translation().dot(centre);
+    reference += centre.squaredNorm();
+  }
+  return reference > 0 ? sum / reference : 1.0;
+}
+
 Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference) {
   const SE3 D = T_cam_rig * reference.inverse();
   return (Vector6d() << geometry::so3_log(D.rotation()), D.translation()).finished();
+}
+
+ExtrinsicsBlock::ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)) {
+  double sum = 0.0;
+  for (const SE3& T : prior_.T_cam_rig) {
+    centres_.emplace_back(T.inverse().translation());
+    sum += centres_.back().squaredNorm();
+  }
+  if (prior_.sigma_scale > 0 && sum > 0) scale_gradient_ = 1.0 / (prior_.sigma_scale * sum);
+}
+
+double ExtrinsicsBlock::scale_error(const RigValues& values) const {
+  if (scale_gradient_ == 0) return 0.0;
+  return (baseline_scale(values.T_cam_rig, prior_.T_cam_rig) - 1.0) / prior_.sigma_scale;
 }
 
 void ExtrinsicsBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {
@@ -45,7 +89,8 @@ double ExtrinsicsBlock::prior_cost(const RigValues& values) const {
   for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c) {
     sum += extrinsic_change(values.T_cam_rig[c], prior_.T_cam_rig[c]).cwiseAbs2().dot(information);
   }
-  return 0.5 * sum;
+  const double scale = scale_error(values);
+  return 0.5 * (sum + scale * scale);
 }
 
 void ExtrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H,
@@ -59,10 +104,77 @@ void ExtrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::Matri
     H.block<6, 6>(at, at) += JtI * J;
     b.segment<6>(at) -= JtI * change;
   }
+  // The centre changes by -R^T v for the left perturbation (w, v) of T_cam_rig with the rotation R.
+  Eigen::VectorXd scale_jacobian = Eigen::VectorXd::Zero(size());
+  for (std::size_t c = 1; c < centres_.size(); ++c)
+    scale_jacobian.segment<3>(6 * (static_cast<Eigen::Index>(c) - 1) + 3) =
+        -scale_gradient_ * (values.T_cam_rig[c].rotation() * centres_[c]);
+  H += scale_jacobian * scale_jacobian.transpose();
+  b -= scale_error(values) * scale_jacobian;
+}
+
+IntrinsicsBlock::IntrinsicsBlock(IntrinsicPrior prior) : prior_(std::move(prior)), first_{0} {
+  for (const camera::ModelParameters& p : prior_.values) first_.push_back(first_.back() + static_cast<int>(p.size()));
+}
+
+RigBlock::Range IntrinsicsBlock::columns(int camera) const {
+  const auto c = static_cast<std::size_t>(camera);
+  return {first_[c], first_[c + 1] - first_[c]};
+}
+
+void IntrinsicsBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {
+  const auto c = static_cast<std::size_t>(observation.camera);
+  J = camera::parameter_jacobian(observation.values.models[c], observation.point_cam) *
+      (observation.inverse_sigma * prior_.sigmas[c]).asDiagonal();
+}
+
+void IntrinsicsBlock::apply(const Eigen::VectorXd& delta, RigValues& values) const {
+  for (std::size_t c = 0; c < values.models.size(); ++c) {
+    const camera::ModelParameters step =
+        delta.segment(first_[c], first_[c + 1] - first_[c]).cwiseProduct(prior_.sigmas[c]);
+    values.models[c] = camera::with_parameters(values.models[c], camera::parameters(values.models[c]) + step);
+  }
+}
+
+Eigen::VectorXd IntrinsicsBlock::normalised_change(const RigValues& values) const {
+  Eigen::VectorXd out(size());
+  for (std::size_t c = 0; c < values.models.size(); ++c) {
+    out.segment(first_[c], first_[c + 1] - first_[c]) =
+        (camera::parameters(values.models[c]) - prior_.values[c]).cwiseQuotient(prior_.sigmas[c]);
+  }
+  return out;
+}
+
+Vector2d IntrinsicsBlock::aspect_gradient(std::size_t camera) const {
+  const camera::ModelParameters &value = prior_.values[camera], &sigma = prior_.sigmas[camera];
+  if (prior_.sigma_aspect == 0) return Vector2d::Zero();
+  return Vector2d(sigma(0) / value(0), -sigma(1) / value(1)) / prior_.sigma_aspect;
+}
+
+double IntrinsicsBlock::prior_cost(const RigValues& values) const {
+  const Eigen::VectorXd change = normalised_change(values);
+  double sum = change.squaredNorm();
+  for (std::size_t c = 0; c < values.models.size(); ++c) {
+    const double aspect = aspect_gradient(c).dot(change.segment<2>(first_[c]));
+    sum += aspect * aspect;
+  }
+  return 0.5 * sum;
+}
+
+void IntrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H,
+                                Eigen::Ref<Eigen::VectorXd> b) const {
+  const Eigen::VectorXd change = normalised_change(values);
+  H.diagonal().array() += 1.0;
+  b -= change;
+  for (std::size_t c = 0; c < values.models.size(); ++c) {
+    const Vector2d gradient = aspect_gradient(c);
+    H.block<2, 2>(first_[c], first_[c]) += gradient * gradient.transpose();
+    b.segment<2>(first_[c]) -= gradient.dot(change.segment<2>(first_[c])) * gradient;
+  }
 }
 
 void BaselineScaleBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {
-  J = observation.J * observation.T_cam_rig.translation();
+  J = observation.J * observation.values.T_cam_rig[static_cast<std::size_t>(observation.camera)].translation();
 }
 
 void BaselineScaleBlock::apply(const Eigen::VectorXd& delta, RigValues& values) const {

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
+#include "camera/model_parameters.h"
 #include "solver/reprojection.h"
 
 namespace bslam::solver {
@@ -12,14 +14,20 @@ namespace bslam::solver {
 // Values of the parameters.
 struct RigValues {
   std::vector<SE3> T_cam_rig;  // per camera; camera 0 is the identity
+  std::vector<camera::CameraModel> models;
+
+  static RigValues of(const Rig& rig);
+  // `rig` with these values; camera 0 keeps its pose in the body.
+  Rig applied_to(const Rig& rig) const;
 };
 
 // An observation at the values of the linearisation.
 struct RigObservation {
   int camera = 0;
-  const SE3& T_cam_rig;       // extrinsics, without the motion from the time of the pose to that of the image
+  const RigValues& values;    // the extrinsics do not include the motion from the time of the pose to that of the image
   const Vector3d& point_cam;  // metres, at the capture time of the image
   const Matrix23d& J;         // d pixel / d point_cam, divided by sigma
+  double inverse_sigma;       // 1 / px
 };
 
 class RigBlock {
@@ -45,11 +53,19 @@ class RigBlock {
 using RigBlocks =
     std::vector<std::unique_ptr<RigBlock>>;  // blocks of one adjustment; each must change different values
 
-// Prior for the extrinsics of all cameras but the first: a normal distribution around the calibrated values.
+// Prior for the extrinsics of all cameras but the first: normal distributions around the calibrated values, and one of
+// the common scale of all baselines, sum c c' / sum c' c' with the estimated and calibrated camera centres c and c' in
+// the rig frame. Images do not reveal this scale, so that it needs a prior of its own, however uncertain the extrinsics
+// are.
 struct ExtrinsicPrior {
   std::vector<SE3> T_cam_rig;                        // calibrated, per camera
   double sigma_rotation = 0, sigma_translation = 0;  // radians, metres; per axis
+  double sigma_scale = 0;                            // relative; 0: no prior of its own
 };
+
+// The common scale of the baselines relative to that of the calibration: sum c c' / sum c' c', see above. 1 if
+// all cameras of the calibration have the same centre.
+double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated);
 
 // Difference of extrinsics to a reference: for D = T_cam_rig reference^-1, the logarithm of the rotation (radians),
 // then the translation (metres), both in the axes of the camera. The length of the translation is the distance by which
@@ -59,7 +75,7 @@ geometry::Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference);
 // The extrinsics of cameras 1 to N-1: left perturbations of T_cam_rig, rotation first.
 class ExtrinsicsBlock : public RigBlock {
  public:
-  explicit ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)) {}
+  explicit ExtrinsicsBlock(ExtrinsicPrior prior);
 
   int size() const override { return 6 * (static_cast<int>(prior_.T_cam_rig.size()) - 1); }
   Range columns(int camera) const override { return camera == 0 ? Range{} : Range{6 * (camera - 1), 6}; }
@@ -69,7 +85,42 @@ class ExtrinsicsBlock : public RigBlock {
   void add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H, Eigen::Ref<Eigen::VectorXd> b) const override;
 
  private:
+  double scale_error(const RigValues& values) const;  // divided by its standard deviation
+
   ExtrinsicPrior prior_;
+  std::vector<Vector3d> centres_;  // calibrated, per camera, in the rig frame
+  double scale_gradient_ = 0;      // 1 / (sigma_scale sum c' c'); 0 without a prior of the scale
+};
+
+// Prior for the intrinsics: normal distributions around the calibrated values, and one of the ratio fx / fy, which is
+// known better than either.
+struct IntrinsicPrior {
+  std::vector<camera::ModelParameters> values, sigmas;  // per camera; the sigmas must be positive
+  double sigma_aspect = 0;                              // of fx / fy, relative; 0: no prior of its own
+};
+
+// The parameters of the camera models of all cameras (camera/model_parameters.h), relative to their standard deviations
+// in the prior, so that all unknowns have the same order of magnitude.
+class IntrinsicsBlock : public RigBlock {
+ public:
+  explicit IntrinsicsBlock(IntrinsicPrior prior);
+
+  int size() const override { return first_.back(); }
+  Range columns(int camera) const override;
+  void evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const override;
+  void apply(const Eigen::VectorXd& delta, RigValues& values) const override;
+  double prior_cost(const RigValues& values) const override;
+  void add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H, Eigen::Ref<Eigen::VectorXd> b) const override;
+  // Differences to the prior's values in standard deviations, all cameras one after the other.
+  Eigen::VectorXd normalised_change(const RigValues& values) const;
+
+ private:
+  // Derivative of the error of a camera's fx / fy, divided by its standard deviation, with respect to the first two
+  // unknowns of the camera.
+  Vector2d aspect_gradient(std::size_t camera) const;
+
+  IntrinsicPrior prior_;
+  std::vector<int> first_;  // per camera, and the end
 };
 
 // A common scale factor of the translations of all extrinsics, as its relative change.

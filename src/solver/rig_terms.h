@@ -54,21 +54,26 @@ class RigTerms {
   const Eigen::VectorXd& b() const { return b_; }
 
  private:
-  struct Coupling {  // of a point and an unknown of the rig
-    int unknown = 0;
-    Vector3d w;
+  // Consecutive unknowns of the rig, and where they begin among those that are coupled with a point.
+  struct Run {
+    int unknown = 0, size = 0, first = 0;
   };
+  using Matrix3Xd = Eigen::Matrix<double, 3, Eigen::Dynamic>;
+
+  void couple(const BundleStructure& structure);
 
   const RigBlocks& blocks_;
-  std::vector<int> first_of_block_;         // per block: its first unknown
-  std::vector<std::vector<int>> unknowns_;  // per camera: unknowns on which its pixels depend
+  std::vector<int> first_of_block_;       // per block: its first unknown
+  std::vector<std::vector<Run>> ranges_;  // per camera: the unknowns on which its pixels depend, one range per block
   Eigen::MatrixXd H_, border_;
   Eigen::VectorXd b_;
-  std::vector<Coupling> couplings_;          // per point, unknowns ascending
-  std::vector<std::size_t> first_coupling_;  // per point, and the end
-  std::vector<Coupling*> coupling_of_;       // per unknown, of the current point
+  Matrix3Xd W_;                              // coupling of each point with its unknowns, point by point
+  std::vector<std::size_t> first_coupling_;  // per point, and the end: columns of W_
+  std::vector<Run> runs_;                    // of each point, ascending
+  std::vector<std::size_t> first_run_;       // per point, and the end
+  std::vector<Eigen::Index> column_of_;      // per unknown: its column of W_ for the current point
   RigBlock::Jacobian J_;                     // scratch memory of one observation
-  std::vector<Vector3d> u_;                  // scratch memory of one elimination: L^-1 w
+  Matrix3Xd U_;                              // scratch memory of one elimination: L^-1 W
 };
 
 }  // namespace bslam::solver

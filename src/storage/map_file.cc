@@ -111,17 +111,37 @@ Result<SavedMap> build(const Sections& sections, std::string file) {
   return saved;
 }
 
-// Functions for comparing rigs.
+// Functions for comparing rigs: the same cameras, whose calibration may have been refined.
 
-bool near(double a, double b) { return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a)); }
+// Largest differences between two calibrations of the same camera.
+constexpr double kMaxFocal = 0.05;                  // relative
+constexpr double kMaxCentre = 0.05;                 // of the image width
+constexpr double kMaxDistortion = 0.3;              // any coefficient or shape parameter
+constexpr double kMaxAngle = 0.1, kMaxShift = 0.1;  // rad, metres
 
 std::string numbers_text(const std::vector<double>& values) {
   return values.empty() ? "none" : fmt::format("{:.12g}", fmt::join(values, " "));
 }
 
-std::vector<double> transform_numbers(const geometry::SE3& T) {
+std::string transform_text(const geometry::SE3& T) {
   const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = T.matrix().topRows<3>();
-  return {rows.data(), rows.data() + rows.size()};
+  return numbers_text({rows.data(), rows.data() + rows.size()});
+}
+
+bool near(const camera::Intrinsics& a, const camera::Intrinsics& b, int width) {
+  const auto focal = [](double x, double y) { return std::abs(x - y) <= kMaxFocal * std::abs(y); };
+  const auto centre = [&](double x, double y) { return std::abs(x - y) <= kMaxCentre * width; };
+  return focal(a.fx, b.fx) && focal(a.fy, b.fy) && centre(a.cx, b.cx) && centre(a.cy, b.cy);
+}
+
+bool near(const std::vector<double>& a, const std::vector<double>& b) {
+  const auto close = [](double x, double y) { return std::abs(x - y) <= kMaxDistortion; };
+  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), close);
+}
+
+bool near(const geometry::SE3& a, const geometry::SE3& b) {
+  const geometry::SE3 D = a * b.inverse();
+  return geometry::so3_log(D.rotation()).norm() <= kMaxAngle && D.translation().norm() <= kMaxShift;
 }
 
 Status compare_camera(const SavedMap& saved, const camera::Rig& rig, std::size_t i) {
@@ -130,26 +150,22 @@ Status compare_camera(const SavedMap& saved, const camera::Rig& rig, std::size_t
     return Error{saved.file, fmt::format("camera {} ({}): {}", i, saved_camera.name, field), std::move(found),
                  std::move(expected) + " (this rig)"};
   };
-  const auto compare = [&](std::string_view field, const std::vector<double>& a,
-                           const std::vector<double>& b) -> Status {
-    if (a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), near)) return {};
-    return error(field, numbers_text(a), numbers_text(b));
-  };
   const auto model = camera::model_name(saved_camera.model), camera_model = camera::model_name(camera.model);
   if (model != camera_model) return error("model", std::string(model), std::string(camera_model));
   if (saved_camera.width != camera.width || saved_camera.height != camera.height) {
     return error("resolution", fmt::format("{}x{}", saved_camera.width, saved_camera.height),
                  fmt::format("{}x{}", camera.width, camera.height));
   }
-  const auto list = [](const camera::Intrinsics& k) { return std::vector<double>{k.fx, k.fy, k.cx, k.cy}; };
-  if (Status s =
-          compare("intrinsics", list(camera::intrinsics(saved_camera.model)), list(camera::intrinsics(camera.model)));
-      !s)
-    return s;
-  if (Status s = compare("distortion", camera::distortion(saved_camera.model), camera::distortion(camera.model)); !s)
-    return s;
-  return compare("extrinsics", transform_numbers(saved.map.rig().cam_from_rig(i)),
-                 transform_numbers(rig.cam_from_rig(i)));
+  const camera::Intrinsics &saved_k = camera::intrinsics(saved_camera.model), &k = camera::intrinsics(camera.model);
+  if (!near(saved_k, k, camera.width)) {
+    return error("intrinsics", numbers_text({saved_k.fx, saved_k.fy, saved_k.cx, saved_k.cy}),
+                 numbers_text({k.fx, k.fy, k.cx, k.cy}));
+  }
+  const std::vector<double> saved_d = camera::distortion(saved_camera.model), d = camera::distortion(camera.model);
+  if (!near(saved_d, d)) return error("distortion", numbers_text(saved_d), numbers_text(d));
+  const geometry::SE3 &saved_T = saved.map.rig().cam_from_rig(i), &T = rig.cam_from_rig(i);
+  if (!near(saved_T, T)) return error("extrinsics", transform_text(saved_T), transform_text(T));
+  return {};
 }
 
 }  // namespace

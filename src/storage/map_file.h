@@ -38,8 +38,9 @@ Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std:
 Result<SavedMap> read_map(const std::filesystem::path& file);
 
 // Checks that a run with this rig, pyramid and vocabulary (null: none) can continue the map: equal number of cameras,
-// with equal models, resolutions, intrinsics, distortion and extrinsics up to 1e-9; equal vocabularies, if both have
-// one. The Error names the camera and the difference.
+// with equal models and resolutions, and with calibrations that may be two estimates of the same one; equal
+// vocabularies, if both have one. The run continues with the calibration of the map. The Error names the camera and the
+// difference.
 Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary);
 

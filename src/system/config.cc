@@ -6,8 +6,8 @@ Status check_config(const Config& config, bool with_map) {
   if (config.localize_only && !with_map) {
     return Error{"", "localize_only", "true without a loaded map", "a map to localise in"};
   }
-  if (config.extrinsics.refine && (config.localize_only || !config.final_adjustment)) {
-    return Error{"", "extrinsics.refine",
+  if (config.calibration.refine == calibration::Refine::kTrue && (config.localize_only || !config.final_adjustment)) {
+    return Error{"", "calibration.refine",
                  config.localize_only ? "true with localize_only" : "true without final_adjustment",
                  "the adjustment at the end of the run, which refines them"};
   }

@@ -37,7 +37,7 @@ struct Config {
   tracking::TrackingOptions tracking;
   mapping::MappingOptions mapping;
   looping::LoopingOptions looping;
-  calibration::RigRefinementOptions extrinsics;
+  calibration::CalibrationOptions calibration;
 
   feature::FeatureModel feature_model() const { return features.model(); }
 
@@ -56,7 +56,7 @@ struct Config {
     visitor.section("tracking", self.tracking);
     visitor.section("mapping", self.mapping);
     visitor.section("looping", self.looping);
-    visitor.section("extrinsics", self.extrinsics);
+    visitor.section("calibration", self.calibration);
   }
 };
 

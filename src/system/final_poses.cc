@@ -31,7 +31,56 @@ std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, co
   return before + (before_s + delay_s) / (before_s + after_s) * (after - before);
 }
 
+// A frame that is a keyframe of the final map: its index among the frames, and the keyframe.
+struct KeyframeAt {
+  std::size_t frame;
+  KeyframeId keyframe;
+};
+
+std::vector<KeyframeAt> keyframes_among(const map::BundledMap& map, KeyframeId first,
+                                        std::span<const FrameRecord> frames) {
+  std::vector<KeyframeAt> out;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    const FrameId id = map.keyframe(k).frame->id;
+    const auto at = std::ranges::lower_bound(frames, id, {}, [](const FrameRecord& r) { return r.result.frame; });
+    if (k.index() < first.index() || at == frames.end() || at->result.frame != id) continue;
+    out.push_back({static_cast<std::size_t>(at - frames.begin()), k});
+  }
+  std::ranges::sort(out, {}, &KeyframeAt::frame);
+  return out;
+}
+
+// Whether the rig was tracked without interruption from the first to the last of these frames.
+bool tracked_throughout(std::span<const FrameRecord> frames) {
+  return std::ranges::all_of(frames, [&](const FrameRecord& r) {
+    return r.result.status == tracking::TrackStatus::kTracking && (!r.relocalisation || &r == &frames.front());
+  });
+}
+
 }  // namespace
+
+std::vector<std::optional<SE3>> poses_between_keyframes(const map::BundledMap& map, KeyframeId first,
+                                                        std::span<const FrameRecord> frames) {
+  std::vector<std::optional<SE3>> out;
+  for (const FrameRecord& record : frames) out.push_back(T_rig_world_of(record, map));
+  const std::vector<KeyframeAt> keyframes = keyframes_among(map, first, frames);
+  for (std::size_t i = 0; i + 1 < keyframes.size(); ++i) {
+    const auto [begin, before] = keyframes[i];
+    const auto [end, after] = keyframes[i + 1];
+    if (map.root_of(before) != map.root_of(after) || !tracked_throughout(frames.subspan(begin, end - begin + 1)))
+      continue;
+    const double duration_s = to_seconds(frames[end].result.time_ns - frames[begin].result.time_ns);
+    if (!(duration_s > 0)) continue;
+    for (std::size_t f = begin; f <= end; ++f) {
+      const SE3& odometry = frames[f].T_rig_odom;
+      const SE3 from_before = odometry * frames[begin].T_rig_odom.inverse() * map.keyframe(before).T_rig_world;
+      const SE3 from_after = odometry * frames[end].T_rig_odom.inverse() * map.keyframe(after).T_rig_world;
+      const double weight = to_seconds(frames[f].result.time_ns - frames[begin].result.time_ns) / duration_s;
+      out[f] = SE3::exp(weight * (from_after * from_before.inverse()).log()) * from_before;
+    }
+  }
+  return out;
+}
 
 std::optional<SE3> T_rig_world_of(const FrameRecord& record, const map::BundledMap& map) {
   const tracking::TrackResult& r = record.final_result();

@@ -48,12 +48,12 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
 
 Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
                    std::unique_ptr<tracking::Relocaliser> relocaliser)
-    : rig_(rig),
+    : rig_(std::make_shared<const camera::Rig>(rig)),
       config_(config),
       pool_(thread_count(config.execution.threads, rig.size())),
       monitor_(rig.size(), config.health),
       status_(rig.size()),
-      builder_(rig, config.features, std::move(masks)),
+      builder_(rig.size(), config.features, std::move(masks)),
       tracker_(rig, tracker_options(config), pool_, std::move(relocaliser)) {}
 
 Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution::StageExecutor& executor) {
@@ -74,6 +74,7 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   timed("bundle", bundling);
   const Stopwatch results;
   outcome.seen = executor.begin_frame(frame.id);
+  adopt_rig(*outcome.seen, frame);
   if (config_.mode == execution::Mode::kLagged) timed("results", results);
 
   tracking::TrackOutcome tracked =
@@ -90,6 +91,13 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   for (const image::CameraImage& i : images.images) record.images.push_back(i.state);
   record.frame_ms = whole.ms();
   return outcome;
+}
+
+// Continues with the rig of the map, which a stage may have replaced since the last frame.
+void Pipeline::adopt_rig(const map::BundledMap& map, BundledFrame& frame) {
+  if (map.shared_rig() == rig_) return;
+  if (!map.rig().same_intrinsics(*rig_)) frame = frame::with_bearings_of(std::move(frame), map.rig());
+  rig_ = map.shared_rig();
 }
 
 void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome) {
@@ -109,7 +117,7 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images) {
 }
 
 BundledFrame Pipeline::extract(const image::ImageBundle& images, const tracking::FramePlan& plan) {
-  BundledFrame frame = builder_.extract(images, pool_, plan.skipped, plan.budgets);
+  BundledFrame frame = builder_.extract(*rig_, images, pool_, plan.skipped, plan.budgets);
   frame.twist = plan.twist;
   if (config_.tracking.use_capture_times) return frame;
   for (frame::CameraFrame& c : frame.cameras) c.time_ns = frame.time_ns;
@@ -117,7 +125,7 @@ BundledFrame Pipeline::extract(const image::ImageBundle& images, const tracking:
 }
 
 BundledFrame Pipeline::bundle(const tracking::FramePlan& plan, const BundledFrame& frame) {
-  return matching::bundle(frame::rig_of(rig_, frame), frame, builder_.pyramids(), config_.bundling, plan.alignment,
+  return matching::bundle(frame::rig_of(*rig_, frame), frame, builder_.pyramids(), config_.bundling, plan.alignment,
                           pool_);
 }
 

@@ -48,9 +48,10 @@ class Pipeline {
  private:
   frame::BundledFrame extract(const image::ImageBundle& images, const tracking::FramePlan& plan);
   frame::BundledFrame bundle(const tracking::FramePlan& plan, const frame::BundledFrame& frame);
+  void adopt_rig(const map::BundledMap& map, frame::BundledFrame& frame);
   void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);
 
-  const camera::Rig& rig_;
+  std::shared_ptr<const camera::Rig> rig_;  // of the map that the last frame saw
   const Config& config_;
   ThreadPool pool_;
   tracking::CameraMonitor monitor_;

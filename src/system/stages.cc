@@ -24,6 +24,21 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
   return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }};
 }
 
+// Replaces the rig by its estimate from the map so far, and adjusts the map with it. The newest keyframe keeps its
+// pose, so that the current pose of the rig does not jump.
+execution::StageResult calibrate(const Config& config, const camera::Rig& calibrated, const map::MapSnapshot& base,
+                                 const std::stop_token& stop) {
+  const auto refinement =
+      calibration::refine_if_accepted(*base, calibrated, config.calibration, config.feature_model(), stop);
+  if (!refinement) return {};
+  map::MapDraft draft(base);
+  calibration::apply(*refinement, draft);
+  mapping::adjust_globally(config.mapping, config.feature_model(), draft, stop);
+  const KeyframeId newest = base->newest_keyframe();
+  if (draft.map().alive(newest)) calibration::move_submap(newest, base->keyframe(newest).T_rig_world, draft);
+  return {std::move(draft), {}};
+}
+
 execution::StageResult adjust_globally(const Config& config, const map::MapSnapshot& base, std::stop_token stop) {
   map::MapDraft draft(base);
   mapping::adjust_globally(config.mapping, config.feature_model(), draft, std::move(stop));
@@ -32,8 +47,8 @@ execution::StageResult adjust_globally(const Config& config, const map::MapSnaps
 
 }  // namespace
 
-execution::StageFunctions make_stages(const Config& config, const place::VocabularyPtr& vocabulary,
-                                      LoopObserver observer) {
+execution::StageFunctions make_stages(const Config& config, const camera::Rig& calibrated,
+                                      const place::VocabularyPtr& vocabulary, LoopObserver observer) {
   execution::StageFunctions functions;
   functions[execution::Stage::kMap] = [&config](const execution::StageTask& task, const map::MapSnapshot& base,
                                                 std::stop_token stop) {
@@ -43,6 +58,12 @@ execution::StageFunctions make_stages(const Config& config, const place::Vocabul
                                                    std::stop_token stop) {
     return adjust_globally(config, base, std::move(stop));
   };
+  if (config.calibration.refine != calibration::Refine::kFalse) {
+    functions[execution::Stage::kCalibrate] =
+        [&config, &calibrated](const execution::StageTask&, const map::MapSnapshot& base, const std::stop_token& stop) {
+          return calibrate(config, calibrated, base, stop);
+        };
+  }
   if (!config.looping.loop.enabled || !vocabulary) return functions;
   auto recogniser = std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition);
   const auto closer = std::make_shared<looping::LoopCloser>(

@@ -19,8 +19,9 @@ struct LoopRecord {
 // Called for every loop closure that was committed, in the committing thread.
 using LoopObserver = std::function<void(const LoopRecord&)>;
 
-// `config` must outlive the functions. Without a vocabulary no loops are closed.
-execution::StageFunctions make_stages(const Config& config, const place::VocabularyPtr& vocabulary,
-                                      LoopObserver observer);
+// `config` and `calibrated`, the given calibration, must outlive the functions. Without a vocabulary no loops are
+// closed.
+execution::StageFunctions make_stages(const Config& config, const camera::Rig& calibrated,
+                                      const place::VocabularyPtr& vocabulary, LoopObserver observer);
 
 }  // namespace bslam::system

@@ -41,6 +41,7 @@ System::System(camera::Rig rig, Config config, Resources resources)
       pipeline_(rig_, config_, std::move(resources.masks), make_relocaliser(resources.vocabulary, config_)),
       history_(resources.history),
       store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)),
+      initial_rig_(store_.snapshot()->shared_rig()),
       gate_(store_, history_ == 0) {
   const map::MapSnapshot map = store_.snapshot();
   for (const KeyframeId k : map->keyframe_ids()) set_keyframe_time(k, map->keyframe(k).frame->time_ns);
@@ -53,7 +54,8 @@ System::System(camera::Rig rig, Config config, Resources resources)
     const std::lock_guard lock(records_mutex_);
     stage_runs_.push_back(record);
   };
-  execution::ExecutionSetup setup{make_stages(config_, resources.vocabulary, note_loop), config_.execution, note_run};
+  execution::ExecutionSetup setup{make_stages(config_, rig_, resources.vocabulary, note_loop), config_.execution,
+                                  note_run};
   executor_ = resources.replay ? execution::make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
                                : execution::make_stage_executor(config_.mode, gate_, std::move(setup));
 }
@@ -133,11 +135,10 @@ void System::finish() {
     draft.set_twists(twists_from_neighbours(draft.map(), first_keyframe_, frames_));
     final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
     final_adjustment_ms_ = watch.ms();
-    estimate_extrinsics(draft.map(), stop);
-    if (config_.extrinsics.refine && extrinsics_.done) apply_extrinsics(draft, stop);
+    calibrate(draft, stop);
     if (!stop.stop_requested()) executor_->commit(execution::JournalStep::kFinal, std::move(draft));
-    extrinsics_refined_ = config_.extrinsics.refine && extrinsics_.done && !stop.stop_requested();
   }
+  calibration_refined_ = !store_.snapshot()->rig().same_calibration(*initial_rig_);
   locate_early_frames();
   executor_->end();
 }
@@ -155,20 +156,21 @@ void System::locate_early_frames() {
   }
 }
 
-void System::estimate_extrinsics(const map::BundledMap& map, const std::stop_token& stop) {
-  const auto& options = config_.extrinsics;
-  if ((!options.check && !options.refine) || stop.stop_requested()) return;
+// Estimates the calibration from the map. If it is accepted, adjusts the map again with it.
+void System::calibrate(map::MapDraft& draft, const std::stop_token& stop) {
+  const auto& options = config_.calibration;
+  if ((!options.check && options.refine == calibration::Refine::kFalse) || stop.stop_requested()) return;
   const Stopwatch watch;
-  extrinsics_ = calibration::refine_rig(map, options, config_.feature_model(), stop);
-  extrinsics_ms_ = watch.ms();
-}
-
-// Adjusts the map again with the estimated extrinsics.
-void System::apply_extrinsics(map::MapDraft& draft, const std::stop_token& stop) {
-  const Stopwatch watch;
-  draft.set_rig(calibration::refined(draft.map().rig(), extrinsics_));
-  final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
-  extrinsics_ms_ += watch.ms();
+  calibration_ = calibration::refine_rig(draft.map(), rig_, options, config_.feature_model(), stop);
+  if (calibration::accepted(calibration_, options)) {
+    calibration::apply(calibration_, draft);
+    final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
+  }
+  calibration_.poses = {};                                               // part of the map now
+  if (!loaded_ && !draft.map().rig().same_calibration(*initial_rig_)) {  // a calibration during the run moves the roots
+    for (const KeyframeId root : draft.map().roots()) calibration::move_submap(root, geometry::SE3(), draft);
+  }
+  calibration_ms_ = watch.ms();
 }
 
 void System::interrupt() {
@@ -194,11 +196,12 @@ TimeNs System::keyframe_time(KeyframeId k) const {
 std::vector<SubmapTrajectory> System::trajectories() const {
   const map::MapSnapshot map = store_.snapshot();
   std::vector<SubmapTrajectory> out;
-  for (const FrameRecord& record : frames_) {
-    const tracking::TrackResult& r = record.final_result();
-    if (const auto T_rig_world = T_rig_world_of(record, *map)) {
+  std::vector<std::optional<geometry::SE3>> between;
+  if (calibration_refined_) between = poses_between_keyframes(*map, first_keyframe_, frames_);
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    const tracking::TrackResult& r = frames_[i].final_result();
+    if (const auto T_rig_world = between.empty() ? T_rig_world_of(frames_[i], *map) : between[i])
       add_pose(out, map->root_of(r.anchored.reference), r.time_ns, T_rig_world->inverse());
-    }
   }
   std::stable_sort(out.begin(), out.end(), [](const SubmapTrajectory& a, const SubmapTrajectory& b) {
     return a.poses.size() > b.poses.size();

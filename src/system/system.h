@@ -31,7 +31,8 @@ struct StageRecord {
 struct Resources {
   std::vector<image::Image> masks = {};  // one per camera of the rig, empty if it has no mask; or no masks at all
   place::VocabularyPtr vocabulary = {};  // null: no place is recognised
-  // Map of an earlier run with this rig. The run continues in it after relocalisation.
+  // Map of an earlier run with this rig, whose calibration may have been refined. The run continues in it after
+  // relocalisation, with its calibration.
   std::optional<map::BundledMap> map = {};
   std::optional<execution::Journal> replay = {};  // repeats the run of this journal, regardless of the mode
   // Minimum number of last frames and stage runs whose records are kept, for runs of unlimited duration; no journal is
@@ -75,10 +76,10 @@ class System {
   execution::Journal journal() const { return gate_.journal(); }
   double final_adjustment_ms() const { return final_adjustment_ms_; }
   const adjustment::AdjustmentReport& final_adjustment() const { return final_adjustment_; }
-  // The refinement of the extrinsics by finish(); not `done` if it was not configured or not possible.
-  const calibration::RigRefinement& extrinsics() const { return extrinsics_; }
-  bool extrinsics_refined() const { return extrinsics_refined_; }  // true if the map uses the refined extrinsics
-  double extrinsics_ms() const { return extrinsics_ms_; }
+  // The estimate of the calibration by finish(); not `done` if it was not configured or not possible.
+  const calibration::RigRefinement& calibration() const { return calibration_; }
+  bool calibration_refined() const { return calibration_refined_; }  // true if the run replaced the rig of the map
+  double calibration_ms() const { return calibration_ms_; }
   int maps_started() const { return maps_started_; }
 
   std::vector<LoopRecord> loops() const;
@@ -96,8 +97,7 @@ class System {
   void discard_map();
   void bound_history();
   void locate_early_frames();
-  void estimate_extrinsics(const map::BundledMap& map, const std::stop_token& stop);
-  void apply_extrinsics(map::MapDraft& draft, const std::stop_token& stop);
+  void calibrate(map::MapDraft& draft, const std::stop_token& stop);
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
 
   const camera::Rig rig_;
@@ -114,13 +114,14 @@ class System {
   std::vector<StageRecord> stage_runs_;  // this and the next two members are guarded by records_mutex_
   std::vector<LoopRecord> loops_;
   std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId
-  double final_adjustment_ms_ = 0, extrinsics_ms_ = 0;
+  double final_adjustment_ms_ = 0, calibration_ms_ = 0;
   adjustment::AdjustmentReport final_adjustment_;
-  calibration::RigRefinement extrinsics_;
-  bool extrinsics_refined_ = false;
+  calibration::RigRefinement calibration_;
+  bool calibration_refined_ = false;
   int maps_started_ = 0;
   std::stop_source interruption_;
   map::MapStore store_;
+  const std::shared_ptr<const camera::Rig> initial_rig_;  // of the map at the beginning
   execution::MapGate gate_;
   std::unique_ptr<execution::StageExecutor> executor_;  // last member, so that its threads are joined first
 };

@@ -109,7 +109,7 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   ASSERT_TRUE(resumed) << resumed.error().message();
   EXPECT_EQ(resumed->map().num_landmarks(), landmarks.size());
   CameraCalibration other = TexturedWall::calibration(1);
-  other.intrinsics[0] += 1;
+  other.intrinsics[0] *= 1.1;
   EXPECT_FALSE(System::create(Rig::make({TexturedWall::calibration(0), other}).value(), sequential(), {.map = file}));
   EXPECT_FALSE(System::create(TexturedWall::rig().subset({0}).value(), sequential(), {.map = file}));
   Config pyramid = sequential();
@@ -150,7 +150,7 @@ TEST_F(PublicSystem, RejectsInconsistentSettingsAndFiles) {
   ASSERT_TRUE(localise.set("localize_only", "true"));
   EXPECT_FALSE(System::create(TexturedWall::rig(), localise));
   Config refine = sequential();
-  ASSERT_TRUE(refine.set("extrinsics.refine", "true"));
+  ASSERT_TRUE(refine.set("calibration.refine", "true"));
   ASSERT_TRUE(refine.set("final_adjustment", "false"));
   EXPECT_FALSE(System::create(TexturedWall::rig(), refine));
   EXPECT_FALSE(System::create(TexturedWall::rig(), sequential(), {.map = "/no/such/file"}));

@@ -30,12 +30,6 @@ adjustment::BundleProblem everything(const map::BundledMap& map) {
   return adjustment::build_problem(map, selection, kFeatures);
 }
 
-std::vector<geometry::SE3> extrinsics(const camera::Rig& rig) {
-  std::vector<geometry::SE3> out;
-  for (std::size_t c = 0; c < rig.size(); ++c) out.push_back(rig.cam_from_rig(c));
-  return out;
-}
-
 TEST(RecoverObservations, RecoversRejectedKeypointsWithFewErrors) {
   map::SimulatedMap world = true_map();
   const KeyframeId last(5);
@@ -49,7 +43,7 @@ TEST(RecoverObservations, RecoversRejectedKeypointsWithFewErrors) {
   ASSERT_GT(rejected, 60u);
   adjustment::BundleProblem flat = everything(world.map);
   const auto before = flat.problem.observations;
-  const int added = recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, flat);
+  const int added = recover_observations(world.map, world.map.rig(), kFeatures, flat);
   EXPECT_GT(added, 0.8 * static_cast<double>(rejected));
   ASSERT_EQ(flat.problem.observations.size(), before.size() + static_cast<std::size_t>(added));
   ASSERT_EQ(flat.sources.size(), flat.problem.observations.size());
@@ -86,12 +80,13 @@ TEST(RecoverObservations, UsesTheGivenExtrinsics) {
     }
   }
   adjustment::BundleProblem right = everything(world.map), wrong = right;
-  std::vector<geometry::SE3> T_cam_rig = extrinsics(world.map.rig());
-  const int found = recover_observations(world.map, T_cam_rig, kFeatures, right);
+  const camera::Rig& truth = world.map.rig();
+  const int found = recover_observations(world.map, truth, kFeatures, right);
   geometry::Vector6d off;
   off << 0.05, 0.05, 0, 0, 0, 0;
-  for (std::size_t c = 1; c < T_cam_rig.size(); ++c) T_cam_rig[c] = T_cam_rig[c].perturbed(off);
-  const int found_wrongly = recover_observations(world.map, T_cam_rig, kFeatures, wrong);
+  solver::RigValues turned = solver::RigValues::of(truth);
+  for (std::size_t c = 1; c < truth.size(); ++c) turned.T_cam_rig[c] = turned.T_cam_rig[c].perturbed(off);
+  const int found_wrongly = recover_observations(world.map, turned.applied_to(truth), kFeatures, wrong);
   EXPECT_GT(found, 100);
   EXPECT_LT(found_wrongly, found / 2);
 }
@@ -100,7 +95,7 @@ TEST(RecoverObservations, UsesNoKeypointWithALandmark) {
   const map::SimulatedMap world = true_map();
   adjustment::BundleProblem flat = everything(world.map);
   const std::size_t before = flat.problem.observations.size();
-  recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, flat);
+  recover_observations(world.map, world.map.rig(), kFeatures, flat);
   for (std::size_t i = 0; i < flat.problem.observations.size(); ++i) {
     const auto& o = flat.problem.observations[i];
     const KeyframeId k = flat.sources[i].keyframe;
@@ -122,7 +117,7 @@ TEST(RecoverObservations, UsesNoKeypointOfAnotherPointOfTheProblem) {
   }
   const adjustment::BundleProblem before = everything(world.map);
   adjustment::BundleProblem once = before, flat = before;
-  ASSERT_GT(recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, once), 0);
+  ASSERT_GT(recover_observations(world.map, world.map.rig(), kFeatures, once), 0);
   const auto known = [&](const auto& o) {
     return std::ranges::any_of(before.problem.observations, [&](const auto& b) {
       return b.pose == o.pose && b.camera == o.camera && b.pixel == o.pixel;
@@ -133,7 +128,7 @@ TEST(RecoverObservations, UsesNoKeypointOfAnotherPointOfTheProblem) {
   flat.problem.observations.push_back(given);
   flat.sources.push_back(
       {flat.landmarks[static_cast<std::size_t>(given.point)], flat.keyframes[static_cast<std::size_t>(given.pose)]});
-  recover_observations(world.map, extrinsics(world.map.rig()), kFeatures, flat);
+  recover_observations(world.map, world.map.rig(), kFeatures, flat);
   for (const auto& o : flat.problem.observations) {
     EXPECT_FALSE(o.point == rightful && o.pose == given.pose && o.camera == given.camera && o.pixel == given.pixel);
   }

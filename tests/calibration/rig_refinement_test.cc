@@ -5,7 +5,9 @@
 #include <numbers>
 
 #include "adjustment/map_adjustment.h"
+#include "camera/model_parameters.h"
 #include "mapping/simulated_map.h"
+#include "solver/rig_block.h"
 
 namespace bslam::calibration {
 namespace {
@@ -46,9 +48,21 @@ map::SimulatedMap mapped(const camera::Rig& truth, const camera::Rig& calibrated
   return out;
 }
 
-double rotation_error_deg(const CameraRefinement& camera, const SE3& T_cam_rig) {
-  return map::angle_rad(camera.T_cam_rig_after, T_cam_rig) / kDegree;
+// The estimate from a map that was built with the calibration of its rig.
+RigRefinement refine(const map::BundledMap& map, const CalibrationOptions& options = {}) {
+  return refine_rig(map, map.rig(), options, kFeatures);
 }
+
+double rotation_error_deg(const RigRefinement& result, std::size_t camera, const camera::Rig& truth) {
+  return map::angle_rad(result.rig->cam_from_rig(camera), truth.cam_from_rig(camera)) / kDegree;
+}
+
+// Simulated observations are independent, and the intrinsics of these rigs are exact unless a test changes them.
+const CalibrationOptions kIndependent{.correlated_observations = 1};
+const CalibrationOptions kExactIntrinsics{.sigma_focal_percent = 1e-3,
+                                          .sigma_aspect_percent = 1e-3,
+                                          .sigma_centre_percent = 1e-3,
+                                          .correlated_observations = 1};
 
 TEST(RefineRig, RecoversACameraThatWasInitiallyWrong) {
   const camera::Rig truth = synthetic::default_rig();
@@ -57,12 +71,11 @@ TEST(RefineRig, RecoversACameraThatWasInitiallyWrong) {
   for (std::size_t c = 0; c < 3; ++c) ASSERT_FALSE(truth.overlap(c, 3) && truth.overlap_share(c, 3) > 0.2);
   for (const std::size_t wrong : {1u, 3u}) {
     const map::SimulatedMap world = mapped(truth, with_error(truth, wrong), 30, 0.3);
-    const RigRefinement result = refine_rig(world.map, {}, kFeatures);
+    const RigRefinement result = refine(world.map, kExactIntrinsics);
     ASSERT_TRUE(result.done);
     ASSERT_EQ(result.cameras.size(), truth.size());
     for (std::size_t c = 0; c < truth.size(); ++c) {
-      EXPECT_LT(rotation_error_deg(result.cameras[c], truth.cam_from_rig(c)), 0.1)
-          << "wrong " << wrong << ", camera " << c;
+      EXPECT_LT(rotation_error_deg(result, c, truth), 0.1) << "wrong " << wrong << ", camera " << c;
       EXPECT_EQ(result.cameras[c].suspect, c == wrong)
           << "wrong " << wrong << ", camera " << c << ": " << result.cameras[c].change_deg << " deg, "
           << result.cameras[c].change_mm << " mm";
@@ -77,7 +90,7 @@ TEST(RefineRig, RecoversACameraThatWasInitiallyWrong) {
 TEST(RefineRig, SuspectsNoCameraIfTheCalibrationIsCorrect) {
   for (const int cameras : {2, 4}) {
     const camera::Rig truth = synthetic::ring_rig(cameras);
-    const RigRefinement result = refine_rig(mapped(truth, truth, 16, 0.5).map, {}, kFeatures);
+    const RigRefinement result = refine(mapped(truth, truth, 16, 0.5).map);
     ASSERT_TRUE(result.done);
     for (const CameraRefinement& camera : result.cameras) {
       EXPECT_FALSE(camera.suspect) << camera.change_deg << " deg, " << camera.change_mm << " mm";
@@ -92,14 +105,14 @@ TEST(RefineRig, SuspectsNoCameraIfTheCalibrationIsCorrect) {
 TEST(RefineRig, RespectsItsLimitsAndFindsTheError) {
   const camera::Rig truth = synthetic::default_rig();
   const map::SimulatedMap world = mapped(truth, with_error(truth, 2), 50, 0.3);
-  const RigRefinement result = refine_rig(world.map, {.keyframes = 30, .landmarks = 800}, kFeatures);
+  const RigRefinement result = refine(world.map, {.keyframes = 30, .landmarks = 800});
   ASSERT_TRUE(result.done);
   EXPECT_EQ(result.keyframes, 30u);
   EXPECT_LE(result.landmarks, 800u);
   EXPECT_GT(result.landmarks, 700u);
   for (std::size_t c = 0; c < truth.size(); ++c) EXPECT_GT(result.cameras[c].observations, 300) << "camera " << c;
   EXPECT_TRUE(result.cameras[2].suspect);
-  EXPECT_LT(rotation_error_deg(result.cameras[2], truth.cam_from_rig(2)), 0.15);
+  EXPECT_LT(rotation_error_deg(result, 2, truth), 0.15);
 }
 
 // Groups of keyframes that share few landmarks are fixed separately; this must not constrain the length of the
@@ -107,11 +120,13 @@ TEST(RefineRig, RespectsItsLimitsAndFindsTheError) {
 TEST(RefineRig, FixingSeveralKeyframesDoesNotConstrainTheLength) {
   const camera::Rig stereo = synthetic::ring_rig(2);
   const map::SimulatedMap world = mapped(stereo, stereo, 36, 0.33);
-  const RigRefinementOptions options{.keyframes = 20, .landmarks = 100};  // too few to connect all keyframes
-  const RigRefinement result = refine_rig(world.map, options, kFeatures);
+  // too few landmarks to connect all keyframes, and no prior of the length
+  const CalibrationOptions options{
+      .keyframes = 20, .landmarks = 100, .sigma_scale_percent = 100, .correlated_observations = 1};
+  const RigRefinement result = refine(world.map, options);
   ASSERT_TRUE(result.done);
   EXPECT_EQ(result.keyframes, 20u);
-  EXPECT_GT(result.cameras[1].std_mm, 0.95 * options.calibration_mm);
+  EXPECT_GT(result.cameras[1].std_mm, 0.95 * options.sigma_translation_mm);
   EXPECT_FALSE(result.cameras[1].translation_observed());
   EXPECT_TRUE(result.cameras[1].rotation_observed());
   EXPECT_FALSE(result.cameras[1].suspect);
@@ -119,40 +134,84 @@ TEST(RefineRig, FixingSeveralKeyframesDoesNotConstrainTheLength) {
 
 TEST(RefineRig, IsNotDoneIfNotObservable) {
   const camera::Rig one = synthetic::ring_rig(1), two = synthetic::ring_rig(2);
-  EXPECT_FALSE(refine_rig(mapped(one, one, 4, 0.5).map, {}, kFeatures).done);
-  EXPECT_FALSE(refine_rig(map::BundledMap(std::make_shared<const camera::Rig>(two)), {}, kFeatures).done);
+  EXPECT_FALSE(refine(mapped(one, one, 4, 0.5).map).done);
+  EXPECT_FALSE(refine(map::BundledMap(std::make_shared<const camera::Rig>(two))).done);
   map::SimulatedMap world = mapped(two, two, 4, 0.5);
-  EXPECT_TRUE(refine_rig(world.map, {}, kFeatures).done);
+  EXPECT_TRUE(refine(world.map).done);
   world.map.set_scale(map::Scale::kUpToScale);
-  EXPECT_FALSE(refine_rig(world.map, {}, kFeatures).done);
+  EXPECT_FALSE(refine(world.map).done);
 }
 
 TEST(RefineRig, IsDeterministic) {
   const camera::Rig truth = synthetic::ring_rig(3);
   const map::SimulatedMap world = mapped(truth, with_error(truth, 1), 12, 0.5);
-  const RigRefinement a = refine_rig(world.map, {}, kFeatures), b = refine_rig(world.map, {}, kFeatures);
+  const RigRefinement a = refine(world.map), b = refine(world.map);
   ASSERT_TRUE(a.done);
   for (std::size_t c = 0; c < truth.size(); ++c) {
-    EXPECT_EQ(a.cameras[c].T_cam_rig_after.matrix(), b.cameras[c].T_cam_rig_after.matrix());
+    EXPECT_EQ(a.rig->cam_from_rig(c).matrix(), b.rig->cam_from_rig(c).matrix());
     EXPECT_EQ(a.cameras[c].std_mm, b.cameras[c].std_mm);
   }
 }
 
-TEST(Refined, IsTheRigWithTheEstimatedExtrinsics) {
-  const camera::Rig rig = synthetic::default_rig();
-  RigRefinement refinement;
-  EXPECT_EQ(refined(rig, refinement).cam_from_rig(1).matrix(), rig.cam_from_rig(1).matrix());
-  refinement.done = true;
-  const camera::Rig wanted = with_error(rig, 2);
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    CameraRefinement& camera = refinement.cameras.emplace_back();
-    camera.T_cam_rig_after = wanted.cam_from_rig(c);
+// The rig with focal lengths that are half a per cent too long and principal points that are three pixels off.
+camera::Rig with_wrong_intrinsics(const camera::Rig& rig) {
+  solver::RigValues values = solver::RigValues::of(rig);
+  for (camera::CameraModel& model : values.models) {
+    camera::ModelParameters p = camera::parameters(model);
+    p.head<2>() *= 1.005;
+    p.segment<2>(2) += Eigen::Vector2d(3, -3);
+    model = camera::with_parameters(model, p);
   }
-  const camera::Rig out = refined(rig, refinement);
-  EXPECT_EQ(out.body_from_cam(0).matrix(), rig.body_from_cam(0).matrix());
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    EXPECT_LT((out.cam_from_rig(c).matrix() - wanted.cam_from_rig(c).matrix()).norm(), 1e-12);
-    EXPECT_EQ(out.camera(c).name, rig.camera(c).name);
+  return values.applied_to(rig);
+}
+
+TEST(RefineRig, TellsAWrongCalibrationFromARightOne) {
+  const camera::Rig truth = synthetic::default_rig(), wrong = with_wrong_intrinsics(truth);
+  const RigRefinement of_right = refine(mapped(truth, truth, 30, 0.3).map);
+  ASSERT_TRUE(of_right.done);
+  EXPECT_EQ(of_right.verdict, Verdict::kConsistent) << of_right.excess_error;
+  EXPECT_FALSE(accepted(of_right, {}));
+  EXPECT_TRUE(accepted(of_right, {.refine = Refine::kTrue}));
+  const RigRefinement of_wrong = refine(mapped(truth, wrong, 30, 0.3).map, kIndependent);
+  ASSERT_TRUE(of_wrong.done);
+  EXPECT_EQ(of_wrong.verdict, Verdict::kInconsistent) << of_wrong.excess_error;
+  EXPECT_TRUE(accepted(of_wrong, {}));
+  EXPECT_FALSE(accepted(of_wrong, {.refine = Refine::kFalse}));
+  for (std::size_t c = 0; c < truth.size(); ++c) {
+    const double focal = camera::intrinsics(truth.camera(c).model).fx;
+    EXPECT_NEAR(camera::intrinsics(of_wrong.rig->camera(c).model).fx, focal, 0.0015 * focal) << "camera " << c;
+  }
+}
+
+TEST(RefineRig, ARefinedMapUsesTheEstimateAndKeepsItsInvariants) {
+  const camera::Rig truth = synthetic::default_rig();
+  map::SimulatedMap world = mapped(truth, with_wrong_intrinsics(truth), 20, 0.3);
+  const RigRefinement estimate = refine(world.map);
+  ASSERT_TRUE(estimate.done);
+  map::MapDraft draft = world.draft();
+  apply(estimate, draft);
+  EXPECT_TRUE(draft.map().rig().same_calibration(*estimate.rig));
+  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+  const KeyframeId k = draft.map().newest_keyframe();
+  const feature::Keypoints& keypoints = draft.map().keypoints(k, CameraIndex(0));
+  const auto bearing = estimate.rig->camera(0).unproject(keypoints.pixel[0].cast<double>());
+  ASSERT_TRUE(bearing);
+  EXPECT_EQ(keypoints.bearing[0], *bearing);
+}
+
+TEST(MoveSubmap, MovesKeyframesAndLandmarksTogether) {
+  const camera::Rig truth = synthetic::ring_rig(2);
+  map::SimulatedMap world = mapped(truth, truth, 8, 0.3);
+  const KeyframeId k = world.map.newest_keyframe();
+  const SE3 wanted = SE3::exp((geometry::Vector6d() << 0.1, 0.2, -0.3, 1, 2, 3).finished());
+  map::MapDraft draft = world.draft();
+  move_submap(k, wanted, draft);
+  EXPECT_LT((draft.map().keyframe(k).T_rig_world.matrix() - wanted.matrix()).norm(), 1e-12);
+  for (const LandmarkId l : world.map.landmark_ids()) {
+    const auto seen_by = world.map.landmark(l).reference.keyframe;
+    const Eigen::Vector3d before = world.map.keyframe(seen_by).T_rig_world * world.map.landmark(l).position;
+    const Eigen::Vector3d after = draft.map().keyframe(seen_by).T_rig_world * draft.map().landmark(l).position;
+    EXPECT_LT((after - before).norm(), 1e-9);
   }
 }
 

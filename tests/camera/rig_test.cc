@@ -101,7 +101,7 @@ TEST(Rig, ReplacesTheExtrinsicsOfSomeCameras) {
   const std::array order = {2, 0};
   const SE3 moved = rig.body_from_cam(0) * rotated(0.1, {0.01, 0.02, 0.03});
   const Rig part({{rig.camera(std::size_t{2}), rig.body_from_cam(2)}, {rig.camera(std::size_t{0}), moved}});
-  const Rig found = rig.with_extrinsics_of(part, order);
+  const Rig found = rig.with_calibration_of(part, order);
   EXPECT_EQ(found.camera(std::size_t{0}).name, rig.camera(std::size_t{0}).name);
   EXPECT_LT(difference(found.body_from_cam(0), moved), 1e-15);
   EXPECT_LT(difference(found.body_from_cam(1), rig.body_from_cam(1)), 1e-15);

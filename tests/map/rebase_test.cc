@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "camera/model_parameters.h"
 #include "synthetic_map.h"
 
 namespace bslam::map {
@@ -546,6 +547,49 @@ TEST_F(RebaseTest, MotionScalesWithTheSubmapAndIsDroppedWithItsKeyframe) {
     EXPECT_EQ(report.published->keyframe(k).twist.tail<3>(), 2.0 * twist.tail<3>());
   }
   EXPECT_FALSE(report.published->alive(kThird));
+}
+
+// The rig with longer focal lengths.
+camera::Rig zoomed(const camera::Rig& rig) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    camera::Camera camera = rig.camera(c);
+    camera::ModelParameters p = camera::parameters(camera.model);
+    p.head<2>() *= 1.1;
+    camera.model = camera::with_parameters(camera.model, p);
+    cameras.push_back({camera, rig.body_from_cam(c)});
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+void expect_bearings_of_rig(const BundledMap& map, KeyframeId k) {
+  for (std::size_t c = 0; c < map.rig().size(); ++c) {
+    const feature::Keypoints& keypoints = map.keypoints(k, CameraIndex(c));
+    ASSERT_GT(keypoints.size(), 0u);
+    for (std::size_t i = 0; i < keypoints.size(); ++i) {
+      const auto bearing = map.rig().camera(c).unproject(keypoints.pixel[i].cast<double>());
+      if (bearing) {
+        EXPECT_EQ(keypoints.bearing[i], *bearing);
+      }
+    }
+  }
+}
+
+TEST_F(RebaseTest, NewerKeyframesGetTheBearingsOfANewRig) {
+  const KeyframeId newer = add_keyframe(*early, same_numbers(0, 10));
+  late->set_rig(zoomed(late->map().rig()));
+  const MapSnapshot map = commit().published;
+  EXPECT_TRUE(map->rig().same_calibration(zoomed(*synthetic_rig(2))));
+  for (const KeyframeId k : {kRoot, kSecond, newer}) expect_bearings_of_rig(*map, k);
+}
+
+TEST_F(RebaseTest, AKeyframeOfAnEarlierRigGetsTheBearingsOfTheNewOne) {
+  early->set_rig(zoomed(early->map().rig()));
+  add_keyframe(*late, same_numbers(0, 10));
+  const CommitReport report = commit();
+  ASSERT_EQ(report.keyframes.size(), 1u);
+  expect_bearings_of_rig(*report.published, report.keyframes.front());
+  expect_bearings_of_rig(*report.published, kThird);
 }
 
 }  // namespace

@@ -76,7 +76,7 @@ camera::Rig wall_rig() {
 
 class Bundle : public ::testing::Test {
  protected:
-  Bundle() : pool(2), builder(rig, options(), {}) {
+  Bundle() : pool(2), builder(rig.size(), options(), {}) {
     const Wall wall;
     images.images.resize(4);
     for (std::size_t c = 0; c < 3; ++c)
@@ -88,7 +88,7 @@ class Bundle : public ::testing::Test {
     return o;
   }
   frame::BundledFrame make() {
-    const frame::BundledFrame extracted = builder.extract(images, pool);
+    const frame::BundledFrame extracted = builder.extract(rig, images, pool);
     return bundle(rig, extracted, builder.pyramids(), {}, alignment, pool);
   }
   const camera::Rig rig = wall_rig();
@@ -149,7 +149,7 @@ TEST_F(Bundle, SatisfiesTheInvariantsOfTheTable) {
 TEST_F(Bundle, DoesNotDependOnTheNumberOfThreads) {
   const frame::BundledFrame once = make();
   ThreadPool alone(1);
-  const frame::BundledFrame extracted = builder.extract(images, alone);
+  const frame::BundledFrame extracted = builder.extract(rig, images, alone);
   const frame::BundledFrame again = bundle(rig, extracted, builder.pyramids(), {}, alignment, alone);
   ASSERT_EQ(once.bundled.size(), again.bundled.size());
   for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(once.cameras[c].keypoints.pixel, again.cameras[c].keypoints.pixel);
@@ -161,7 +161,7 @@ TEST_F(Bundle, DoesNotDependOnTheNumberOfThreads) {
 
 // Only keypoints of matched features are moved, and the detected keypoints are unchanged.
 TEST_F(Bundle, MovesOnlyKeypointsOfMatchedFeatures) {
-  const frame::BundledFrame extracted = builder.extract(images, pool);
+  const frame::BundledFrame extracted = builder.extract(rig, images, pool);
   std::vector<feature::Refinement> detected;
   for (const frame::CameraFrame& c : extracted.cameras) detected.push_back(c.keypoints.positions());
   const frame::BundledFrame frame = bundle(rig, extracted, builder.pyramids(), {}, alignment, pool);

@@ -10,7 +10,7 @@ namespace {
 // Two cameras and images of squares with far more corners than the budget.
 class FrameBuilderTest : public ::testing::Test {
  protected:
-  FrameBuilderTest() : pool(2), builder(rig, options(), {}) {
+  FrameBuilderTest() : pool(2), builder(rig.size(), options(), {}) {
     Random random(1, "squares");
     for (int c = 0; c < 2; ++c) {
       image::Image image(320, 240);
@@ -43,24 +43,24 @@ class FrameBuilderTest : public ::testing::Test {
 };
 
 TEST_F(FrameBuilderTest, ExtractsTheConfiguredNumberOfKeypoints) {
-  const frame::BundledFrame frame = builder.extract(images, pool);
+  const frame::BundledFrame frame = builder.extract(rig, images, pool);
   EXPECT_EQ(keypoints(frame, 0), 400u);
   EXPECT_EQ(keypoints(frame, 1), 400u);
 }
 
 TEST_F(FrameBuilderTest, RespectsTheBudgetOfEachCamera) {
-  const frame::BundledFrame frame = builder.extract(images, pool, {}, std::vector<int>{100, 300});
+  const frame::BundledFrame frame = builder.extract(rig, images, pool, {}, std::vector<int>{100, 300});
   EXPECT_EQ(keypoints(frame, 0), 100u);
   EXPECT_EQ(keypoints(frame, 1), 300u);
-  const frame::BundledFrame other = builder.extract(images, pool, {}, std::vector<int>{350, 9000});
+  const frame::BundledFrame other = builder.extract(rig, images, pool, {}, std::vector<int>{350, 9000});
   EXPECT_EQ(keypoints(other, 0), 350u);
   EXPECT_EQ(keypoints(other, 1), 800u);  // maximum: twice per_image
-  EXPECT_EQ(keypoints(builder.extract(images, pool), 1), 400u);
+  EXPECT_EQ(keypoints(builder.extract(rig, images, pool), 1), 400u);
 }
 
 TEST_F(FrameBuilderTest, SkipsCameras) {
   const frame::BundledFrame frame =
-      builder.extract(images, pool, std::vector<std::uint8_t>{1, 0}, std::vector<int>{0, 250});
+      builder.extract(rig, images, pool, std::vector<std::uint8_t>{1, 0}, std::vector<int>{0, 250});
   EXPECT_EQ(frame.cameras[0].state, image::ImageState::kMissing);
   EXPECT_EQ(keypoints(frame, 0), 0u);
   EXPECT_TRUE(builder.pyramids()[0].levels.empty());

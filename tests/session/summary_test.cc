@@ -37,9 +37,10 @@ TEST(Summary, HasTheDocumentedKeysInOrder) {
   record.frames = {frame(1.25, LostReason::kFewMatches)};
   add_stage_sample(record, "extract", StageThread::kCaller, {0.0, 9.1});
   const ordered_json json = summary_json(record);
-  EXPECT_EQ(keys(json), (std::vector<std::string>{"schema", "version", "complete", "data", "mode", "seed",
-                                                  "cameras_used", "frames", "cameras", "features", "map", "loops",
-                                                  "relocalisations", "maps_started", "parts", "time", "memory"}));
+  EXPECT_EQ(keys(json),
+            (std::vector<std::string>{"schema", "version", "complete", "data", "mode", "seed", "cameras_used", "frames",
+                                      "cameras", "calibration", "features", "map", "loops", "relocalisations",
+                                      "maps_started", "parts", "time", "memory"}));
   EXPECT_EQ(keys(json["frames"]), (std::vector<std::string>{"input", "tracked", "lost", "dropped", "lost_intervals"}));
   EXPECT_EQ(json["frames"]["lost_intervals"].dump(), R"([{"from":1.25,"to":1.25,"reason":"too few matches"}])");
   EXPECT_EQ(json["cameras"].dump(),

@@ -238,6 +238,18 @@ TEST(MapFits, TheSameRigWithAnotherBodyFrame) {
   EXPECT_TRUE(fits(saved, camera::Rig(std::move(cameras)), saved.map.pyramid(), nullptr));
 }
 
+TEST(MapFits, TheSameRigWithARefinedCalibration) {
+  const camera::Rig rig = synthetic::default_rig();
+  const SavedMap saved = read_back(small_map(rig));
+  const camera::Intrinsics k = camera::intrinsics(rig.camera(1).model);
+  const std::vector<double> d = camera::distortion(rig.camera(1).model);
+  const camera::Rig refined = changed(rig, 1, [&](camera::RigCamera& c) {
+    c.camera.model = camera::PinholeRadTan({1.01 * k.fx, 1.01 * k.fy, k.cx + 5, k.cy - 5}, d);
+    c.T_body_cam = c.T_body_cam * geometry::SE3::exp((geometry::Vector6d() << 0, 0.02, 0, 0.005, 0, 0).finished());
+  });
+  EXPECT_TRUE(fits(saved, refined, saved.map.pyramid(), nullptr));
+}
+
 TEST(MapFits, ErrorsNameTheCameraAndTheDifference) {
   const camera::Rig rig = synthetic::default_rig();
   const SavedMap saved = read_back(small_map(rig));
@@ -254,17 +266,18 @@ TEST(MapFits, ErrorsNameTheCameraAndTheDifference) {
   EXPECT_EQ(key(1, [&](camera::RigCamera& c) { c.camera.model = camera::Pinhole(k); }), second + "model");
   EXPECT_EQ(key(1,
                 [&](camera::RigCamera& c) {
-                  c.camera.model = camera::PinholeRadTan({k.fx + 1e-4, k.fy, k.cx, k.cy}, d);
+                  c.camera.model = camera::PinholeRadTan({1.06 * k.fx, k.fy, k.cx, k.cy}, d);
                 }),
             second + "intrinsics");
   EXPECT_EQ(key(1,
                 [&](camera::RigCamera& c) {
-                  c.camera.model = camera::PinholeRadTan(k, {d[0], d[1], d[2], d[3] + 1e-6});
+                  c.camera.model = camera::PinholeRadTan(k, {d[0], d[1], d[2], d[3] + 0.4});
                 }),
             second + "distortion");
   EXPECT_EQ(key(1,
                 [](camera::RigCamera& c) {
-                  c.T_body_cam = geometry::SE3(c.T_body_cam.rotation(), c.T_body_cam.translation() * 1.001);
+                  c.T_body_cam =
+                      geometry::SE3(c.T_body_cam.rotation(), c.T_body_cam.translation() + Eigen::Vector3d(0, 0.12, 0));
                 }),
             second + "extrinsics");
   const std::vector<int> fewer = {0, 1};

@@ -120,5 +120,36 @@ TEST(FinalPoses, NoMotionWithoutLateCameras) {
   EXPECT_TRUE(twists_from_neighbours(map, KeyframeId(0), scene.frames).empty());
 }
 
+// Odometry that drifts linearly between two keyframes is corrected exactly; frames at the keyframes have their poses.
+TEST(FinalPoses, FramesBetweenKeyframesFitBoth) {
+  const Scene scene(0.0, 11);
+  map::BundledMap map = scene.map;  // its keyframe is frame 5
+  auto last = std::make_shared<frame::BundledFrame>(*map.keyframe(KeyframeId(0)).frame);
+  last->id = FrameId(10);
+  const SE3 at_last(geometry::Quaterniond::Identity(), {-0.3, 0.1, 0.2});
+  ASSERT_EQ(map.add_keyframe(last, at_last * map.keyframe(KeyframeId(0)).T_rig_world, {}, KeyframeId(0)),
+            KeyframeId(1));
+  std::vector<FrameRecord> frames = scene.frames;
+  const SE3 odometry_at_last(geometry::Quaterniond::Identity(), {-0.31, 0.08, 0.23});
+  for (std::size_t i = 5; i < frames.size(); ++i) {
+    const double weight = static_cast<double>(i - 5) / 5;
+    frames[i].T_rig_odom = SE3(geometry::Quaterniond::Identity(), weight * odometry_at_last.translation());
+  }
+  const auto poses = poses_between_keyframes(map, KeyframeId(0), frames);
+  ASSERT_EQ(poses.size(), frames.size());
+  for (std::size_t i = 5; i < frames.size(); ++i) {
+    const double weight = static_cast<double>(i - 5) / 5;
+    const SE3 expected = SE3(geometry::Quaterniond::Identity(), weight * at_last.translation()) *
+                         map.keyframe(KeyframeId(0)).T_rig_world;
+    ASSERT_TRUE(poses[i]);
+    EXPECT_LT((poses[i]->matrix() - expected.matrix()).norm(), 1e-12) << i;
+  }
+  EXPECT_EQ(poses[2]->matrix(), T_rig_world_of(frames[2], map)->matrix());  // before the first keyframe
+  frames[7].result.status = tracking::TrackStatus::kLost;                   // interrupted: nothing is distributed
+  const auto interrupted = poses_between_keyframes(map, KeyframeId(0), frames);
+  EXPECT_FALSE(interrupted[7]);
+  EXPECT_EQ(interrupted[8]->matrix(), T_rig_world_of(frames[8], map)->matrix());
+}
+
 }  // namespace
 }  // namespace bslam::system

@@ -169,7 +169,7 @@ TEST_F(CommandLine, RejectsInvalidArguments) {
                            "--load-map /no/such/file",
                            "--vocabulary /no/such/file",
                            "--replay /no/such/file",
-                           "--no-final-ba --set extrinsics.refine=true"}) {
+                           "--no-final-ba --set calibration.refine=true"}) {
     expect_rejected(base + more);
   }
   expect_rejected("run /no/such/folder --out " + out("rejected"));

@@ -1,4 +1,4 @@
-#include "solver/extrinsic_bundle_adjustment.h"
+#include "solver/rig_bundle_adjustment.h"
 
 #include <gtest/gtest.h>
 
@@ -25,8 +25,8 @@ Rig with_error(const Rig& rig, std::size_t camera, const Vector6d& error) {
 }
 
 // Error of an estimate, as a left perturbation.
-Vector6d error_of(const ExtrinsicEstimate& estimate, const SE3& T_cam_rig) {
-  return extrinsic_change(estimate.T_cam_rig, T_cam_rig);
+Vector6d error_of(const RigAdjustment& estimate, std::size_t camera, const Rig& truth) {
+  return extrinsic_change(estimate.values.T_cam_rig[camera], truth.cam_from_rig(camera));
 }
 
 // Points that are visible from all poses, with 0.5 px of noise. The problem is initialised with the truth.
@@ -79,7 +79,7 @@ std::unique_ptr<scene::BundleScene> straight_line(std::size_t cameras, std::uint
   return seen_from(T_rig_world, cameras, 300, 0, random);
 }
 
-TEST(AdjustExtrinsics, EstimatesTheErrorOfOneCamera) {
+TEST(AdjustRig, EstimatesTheErrorOfOneCamera) {
   for (const std::size_t cameras : {2u, 4u}) {  // overlapping, without overlap
     for (const double outlier_ratio : {0.0, 0.08}) {
       const auto scene = walk(cameras, 7, outlier_ratio);
@@ -87,11 +87,11 @@ TEST(AdjustExtrinsics, EstimatesTheErrorOfOneCamera) {
       const std::size_t wrong = cameras - 1;
       const Rig calibrated = with_error(scene->rig, wrong, scene::random_twist(random, kDegree, 0.01));
       scene->problem.rig = &calibrated;
-      const ExtrinsicAdjustment result = adjust_extrinsics(scene->problem);
+      const RigAdjustment result = adjust_rig(scene->problem);
       ASSERT_TRUE(result.done);
       ASSERT_EQ(result.cameras.size(), cameras);
       for (std::size_t c = 1; c < cameras; ++c) {
-        const Vector6d error = error_of(result.cameras[c], scene->rig.cam_from_rig(c));
+        const Vector6d error = error_of(result, c, scene->rig);
         EXPECT_LT(error.head<3>().norm(), 0.1 * kDegree) << cameras << " cameras, camera " << c;
         EXPECT_TRUE(result.cameras[c].observed[0] && result.cameras[c].observed[1] && result.cameras[c].observed[2]);
       }
@@ -101,8 +101,62 @@ TEST(AdjustExtrinsics, EstimatesTheErrorOfOneCamera) {
   }
 }
 
-TEST(AdjustExtrinsics, ErrorsMatchTheirStandardDeviations) {
-  const ExtrinsicAdjustmentOptions options{.sigma_rotation = 0.5 * kDegree, .sigma_translation = 0.02};
+// The rig with other intrinsics: focal lengths and principal points that are wrong by some pixels.
+Rig with_wrong_intrinsics(const Rig& rig, Random& random) {
+  RigValues values = RigValues::of(rig);
+  for (camera::CameraModel& model : values.models) {
+    camera::ModelParameters p = camera::parameters(model);
+    p.head<2>() *= 1 + 0.005 * random.normal();
+    p.segment<2>(2) += 2.0 * Vector2d(random.normal(), random.normal());
+    model = camera::with_parameters(model, p);
+  }
+  return values.applied_to(rig);
+}
+
+std::vector<camera::ModelParameters> usual_sigmas(const Rig& rig) {
+  std::vector<camera::ModelParameters> out;
+  for (std::size_t c = 0; c < rig.size(); ++c) out.push_back(camera::typical_sigmas(rig.camera(c).model, 0.01, 5.0));
+  return out;
+}
+
+TEST(AdjustRig, FindsIntrinsicsAndKeepsTheScaleOfTheBaselines) {
+  for (const std::size_t cameras : {2u, 4u}) {
+    const auto scene = walk(cameras, 5, 0.05, 600);
+    Random random(4, "intrinsics");
+    const Rig calibrated = with_wrong_intrinsics(scene->rig, random);
+    scene->problem.rig = &calibrated;
+    RigAdjustmentOptions options;
+    options.sigma_intrinsics = usual_sigmas(calibrated);
+    options.sigma_scale = 1e-3;
+    const RigAdjustment result = adjust_rig(scene->problem, options);
+    ASSERT_TRUE(result.done);
+    EXPECT_NEAR(result.variance_factor, 1.0, 0.15);
+    EXPECT_GT(result.excess_error, 0.1);
+    for (std::size_t c = 0; c < cameras; ++c) {
+      const camera::ModelParameters error =
+          camera::parameters(result.values.models[c]) - camera::parameters(scene->rig.camera(c).model);
+      EXPECT_LT((error.cwiseQuotient(result.cameras[c].intrinsics_sigma)).cwiseAbs().maxCoeff(), 4.0) << "camera " << c;
+      EXPECT_TRUE(result.cameras[c].intrinsics_observed[0]) << "camera " << c;
+      EXPECT_LT(std::abs(error(0)), 0.002 * camera::parameters(scene->rig.camera(c).model)(0)) << "camera " << c;
+    }
+    const RigValues truth = RigValues::of(calibrated);
+    EXPECT_NEAR(baseline_scale(result.values.T_cam_rig, truth.T_cam_rig), 1.0, 1e-9);
+  }
+}
+
+// With a right calibration nothing that the images do not demand is changed.
+TEST(AdjustRig, ARightCalibrationHasNoExcessError) {
+  const auto scene = walk(4, 6, 0, 600);
+  RigAdjustmentOptions options;
+  options.sigma_intrinsics = usual_sigmas(scene->rig);
+  options.sigma_scale = 1e-3;
+  const RigAdjustment result = adjust_rig(scene->problem, options);
+  ASSERT_TRUE(result.done);
+  EXPECT_LT(result.excess_error, 0.02);
+}
+
+TEST(AdjustRig, ErrorsMatchTheirStandardDeviations) {
+  const RigAdjustmentOptions options{.sigma_rotation = 0.5 * kDegree, .sigma_translation = 0.02};
   for (const std::size_t cameras : {2u, 4u}) {
     Vector6d squared = Vector6d::Zero();  // normalised, by degree of freedom
     double distance = 0;                  // normalised, of all six together
@@ -118,10 +172,10 @@ TEST(AdjustExtrinsics, ErrorsMatchTheirStandardDeviations) {
         calibrated = with_error(calibrated, c, error);
       }
       scene->problem.rig = &calibrated;
-      const ExtrinsicAdjustment result = adjust_extrinsics(scene->problem, options);
+      const RigAdjustment result = adjust_rig(scene->problem, options);
       ASSERT_TRUE(result.done) << "seed " << seed;
       for (std::size_t c = 1; c < cameras; ++c) {
-        const Vector6d error = error_of(result.cameras[c], scene->rig.cam_from_rig(c));
+        const Vector6d error = error_of(result, c, scene->rig);
         const Matrix6d& covariance = result.cameras[c].covariance;
         squared += error.cwiseAbs2().cwiseQuotient(covariance.diagonal());
         distance += error.dot(covariance.ldlt().solve(error));
@@ -137,7 +191,7 @@ TEST(AdjustExtrinsics, ErrorsMatchTheirStandardDeviations) {
   }
 }
 
-TEST(AdjustExtrinsics, WithoutRotationTheTranslationOfACameraWithoutOverlapIsNotObserved) {
+TEST(AdjustRig, WithoutRotationTheTranslationOfACameraWithoutOverlapIsNotObserved) {
   const auto scene = straight_line(4, 5);
   // No point is observed by two cameras.
   std::vector<CameraIndex> owner(scene->points.size());
@@ -146,8 +200,8 @@ TEST(AdjustExtrinsics, WithoutRotationTheTranslationOfACameraWithoutOverlapIsNot
     if (!first.valid()) first = o.camera;
     return o.camera != first;
   });
-  const ExtrinsicAdjustmentOptions options;
-  const ExtrinsicAdjustment result = adjust_extrinsics(scene->problem, options);
+  const RigAdjustmentOptions options;
+  const RigAdjustment result = adjust_rig(scene->problem, options);
   ASSERT_TRUE(result.done);
   for (std::size_t c = 1; c < 4; ++c) {
     for (std::size_t k = 3; k < 6; ++k) {
@@ -166,10 +220,10 @@ TEST(AdjustExtrinsics, WithoutRotationTheTranslationOfACameraWithoutOverlapIsNot
   }
 }
 
-TEST(AdjustExtrinsics, LengthOfTheOnlyBaselineIsNotObserved) {
+TEST(AdjustRig, LengthOfTheOnlyBaselineIsNotObserved) {
   const auto scene = straight_line(2, 6);
-  const ExtrinsicAdjustmentOptions options;
-  const ExtrinsicAdjustment result = adjust_extrinsics(scene->problem, options);
+  const RigAdjustmentOptions options;
+  const RigAdjustment result = adjust_rig(scene->problem, options);
   ASSERT_TRUE(result.done);
   const Vector3d along = scene->rig.cam_from_rig(1).translation().normalized();
   const Eigen::Matrix3d covariance = result.cameras[1].covariance.bottomRightCorner<3, 3>();
@@ -178,14 +232,14 @@ TEST(AdjustExtrinsics, LengthOfTheOnlyBaselineIsNotObserved) {
   for (const std::size_t k : {0u, 1u, 2u, 4u}) EXPECT_TRUE(result.cameras[1].observed[k]) << k;
 }
 
-TEST(AdjustExtrinsics, CameraWithoutObservationsKeepsItsCalibration) {
+TEST(AdjustRig, CameraWithoutObservationsKeepsItsCalibration) {
   const auto scene = walk(4, 8);
   std::erase_if(scene->problem.observations,
                 [](const ReprojectionProblem::Observation& o) { return o.camera == CameraIndex(2); });
-  const ExtrinsicAdjustmentOptions options;
-  const ExtrinsicAdjustment result = adjust_extrinsics(scene->problem, options);
+  const RigAdjustmentOptions options;
+  const RigAdjustment result = adjust_rig(scene->problem, options);
   ASSERT_TRUE(result.done);
-  const ExtrinsicEstimate& silent = result.cameras[2];
+  const CameraEstimate& silent = result.cameras[2];
   EXPECT_EQ(silent.observations, 0);
   EXPECT_LT(silent.change.norm(), 1e-12);
   EXPECT_EQ(silent.observed, (std::array<bool, 6>{}));
@@ -195,7 +249,7 @@ TEST(AdjustExtrinsics, CameraWithoutObservationsKeepsItsCalibration) {
 }
 
 // Different capture times have the same effect as wrong extrinsics unless the motion between them is known.
-TEST(AdjustExtrinsics, DistinguishesMotionBetweenCamerasFromExtrinsics) {
+TEST(AdjustRig, DistinguishesMotionBetweenCamerasFromExtrinsics) {
   const auto scene = walk(4, 9);
   const std::size_t cameras = 4, late = 3;
   const SE3 moved = SE3::exp((Vector6d() << 0, 0.02, 0, 0.01, 0, 0.03).finished());
@@ -211,39 +265,38 @@ TEST(AdjustExtrinsics, DistinguishesMotionBetweenCamerasFromExtrinsics) {
   }
   ReprojectionProblem unaware = scene->problem;
   unaware.motion.clear();
-  const ExtrinsicAdjustment with_motion = adjust_extrinsics(scene->problem),
-                            without_motion = adjust_extrinsics(unaware);
+  const RigAdjustment with_motion = adjust_rig(scene->problem), without_motion = adjust_rig(unaware);
   ASSERT_TRUE(with_motion.done && without_motion.done);
   EXPECT_LT(with_motion.cameras[late].change.head<3>().norm(), 0.1 * kDegree);
   EXPECT_NEAR(without_motion.cameras[late].change.head<3>().norm(), 0.02, 0.1 * kDegree);
 }
 
-TEST(AdjustExtrinsics, DoesNotChangeTheProblemOnFailure) {
+TEST(AdjustRig, DoesNotChangeTheProblemOnFailure) {
   const auto scene = walk(2, 10);
   const ReprojectionProblem before = scene->problem;
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_FALSE(adjust_extrinsics(scene->problem, {}, {}, stop.get_token()).done);
+  EXPECT_FALSE(adjust_rig(scene->problem, {}, {}, stop.get_token()).done);
   const Rig alone = scene->rig.subset(std::array{0});
   ReprojectionProblem single = before;
   single.rig = &alone;
   std::erase_if(single.observations,
                 [](const ReprojectionProblem::Observation& o) { return o.camera != CameraIndex(0); });
-  const ExtrinsicAdjustment of_one = adjust_extrinsics(single);
+  const RigAdjustment of_one = adjust_rig(single);
   EXPECT_FALSE(of_one.done);
   EXPECT_EQ(of_one.cameras.size(), 1u);
   ReprojectionProblem empty = before;
   empty.observations.clear();
-  EXPECT_FALSE(adjust_extrinsics(empty).done);
+  EXPECT_FALSE(adjust_rig(empty).done);
   EXPECT_EQ(scene->problem.points, before.points);
   EXPECT_EQ(single.points, before.points);
 }
 
-TEST(AdjustExtrinsics, IsDeterministicAndKeepsFixedPoses) {
+TEST(AdjustRig, IsDeterministicAndKeepsFixedPoses) {
   const auto scene = walk(3, 12, 0.05);
   const SE3 fixed = scene->problem.T_rig_world.front();
   ReprojectionProblem a = scene->problem, b = scene->problem;
-  const ExtrinsicAdjustment first = adjust_extrinsics(a), second = adjust_extrinsics(b);
+  const RigAdjustment first = adjust_rig(a), second = adjust_rig(b);
   ASSERT_TRUE(first.done);
   EXPECT_EQ(first.final_cost, second.final_cost);
   EXPECT_EQ(a.points, b.points);

@@ -1,0 +1,190 @@
+#include "solver/rig_bundle_adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/assert.h"
+#include "solver/bundle_equations.h"
+
+namespace bslam::solver {
+namespace {
+
+constexpr int kDensePoses = 150;
+constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed one, relative to the prior's
+
+struct Round {
+  Kernel kernel;
+  double max_chi2;  // maximum squared normalised error of observations that are used
+};
+constexpr std::array kRounds = {Round{Kernel::kHuber, kMaxChi2}, Round{Kernel::kHuber, 16 * kChi2TwoDof95},
+                                Round{Kernel::kNone, kChi2TwoDof95}, Round{Kernel::kNone, kChi2TwoDof95}};
+
+// The blocks of an adjustment: the extrinsics, then the intrinsics unless they are constant.
+struct CalibrationBlocks {
+  RigBlocks blocks;
+  const ExtrinsicsBlock* extrinsics = nullptr;
+  const IntrinsicsBlock* intrinsics = nullptr;  // null if they are constant
+  int size = 0;                                 // number of unknowns
+};
+
+CalibrationBlocks make_blocks(const RigValues& calibrated, const RigAdjustmentOptions& options) {
+  CalibrationBlocks out;
+  const double tighter = 1.0 / std::sqrt(options.correlated_observations);
+  auto extrinsics = std::make_unique<ExtrinsicsBlock>(
+      ExtrinsicPrior{calibrated.T_cam_rig, tighter * options.sigma_rotation, tighter * options.sigma_translation,
+                     tighter * options.sigma_scale});
+  out.extrinsics = extrinsics.get();
+  out.size = extrinsics->size();
+  out.blocks.push_back(std::move(extrinsics));
+  if (options.sigma_intrinsics.empty()) return out;
+  IntrinsicPrior prior{{}, options.sigma_intrinsics, tighter * options.sigma_aspect};
+  for (camera::ModelParameters& sigma : prior.sigmas) sigma *= tighter;
+  for (const camera::CameraModel& model : calibrated.models) prior.values.push_back(camera::parameters(model));
+  auto intrinsics = std::make_unique<IntrinsicsBlock>(std::move(prior));
+  out.intrinsics = intrinsics.get();
+  out.size += intrinsics->size();
+  out.blocks.push_back(std::move(intrinsics));
+  return out;
+}
+
+// Number of residuals minus number of unknowns, at least 1.
+double redundancy(const BundleStructure& structure, int rig_unknowns) {
+  const double residuals = 2.0 * static_cast<double>(structure.terms.size());
+  const double unknowns = 3.0 * static_cast<double>(structure.num_points()) +
+                          6.0 * static_cast<double>(structure.pose_of_slot.size()) + rig_unknowns;
+  return std::max(1.0, residuals - unknowns);
+}
+
+// Mean squared error over its expectation for the truncated distribution, corrected for the number of unknowns.
+double variance_factor(const BundleStructure& structure, int rig_unknowns, double cost) {
+  return 2.0 * cost / (redundancy(structure, rig_unknowns) * kVarianceLeft / kFractionLeft);
+}
+
+void report_extrinsics(const Eigen::MatrixXd& covariance, const RigAdjustmentOptions& options, RigAdjustment& out) {
+  for (std::size_t c = 1; c < out.cameras.size(); ++c) {
+    CameraEstimate& camera = out.cameras[c];
+    const auto at = static_cast<Eigen::Index>(6 * (c - 1));
+    camera.covariance = covariance.block<6, 6>(at, at);
+    for (int k = 0; k < 6; ++k) {
+      const double sigma = k < 3 ? options.sigma_rotation : options.sigma_translation;
+      camera.observed[static_cast<std::size_t>(k)] = std::sqrt(camera.covariance(k, k)) < kObservedRatio * sigma;
+    }
+  }
+}
+
+// `sigma`: standard deviations of the unknowns of IntrinsicsBlock, which are relative to those of the prior.
+void report_intrinsics(const Eigen::VectorXd& sigma, const RigValues& calibrated, const RigAdjustmentOptions& options,
+                       RigAdjustment& out) {
+  Eigen::Index at = 0;
+  for (std::size_t c = 0; c < out.cameras.size(); ++c) {
+    CameraEstimate& camera = out.cameras[c];
+    camera.intrinsics_change = camera::parameters(out.values.models[c]) - camera::parameters(calibrated.models[c]);
+    const camera::ModelParameters relative =
+        sigma.segment(at, camera.intrinsics_change.size()) / std::sqrt(options.correlated_observations);
+    camera.intrinsics_sigma = relative.cwiseProduct(options.sigma_intrinsics[c]);
+    for (const double s : relative) camera.intrinsics_observed.push_back(s < kObservedRatio);
+    at += relative.size();
+  }
+}
+
+// Change of all unknowns from the calibration, in the order of the blocks.
+Eigen::VectorXd change_of(const RigAdjustment& out, const CalibrationBlocks& blocks) {
+  Eigen::VectorXd change(blocks.size);
+  for (std::size_t c = 1; c < out.cameras.size(); ++c)
+    change.segment<6>(static_cast<Eigen::Index>(6 * (c - 1))) = out.cameras[c].change;
+  if (blocks.intrinsics != nullptr)
+    change.tail(blocks.intrinsics->size()) = blocks.intrinsics->normalised_change(out.values);
+  return change;
+}
+
+// Computes covariances and observed degrees of freedom at the current values. Returns false if the information is
+// singular.
+bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const RigValues& calibrated,
+            const RigAdjustmentOptions& options, RigAdjustment& out) {
+  equations.linearise();
+  const auto information = equations.rig_information();
+  if (!information) return false;
+  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(blocks.size, blocks.size);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(blocks.size);
+  int at = 0;
+  for (const auto& block : blocks.blocks) {
+    block->add_prior(out.values, prior.block(at, at, block->size(), block->size()),
+                     gradient.segment(at, block->size()));
+    at += block->size();
+  }
+  const Eigen::MatrixXd of_images = *information - prior;
+  const double scale = kVarianceLeft / kFractionLeft / std::max(1.0, out.variance_factor);
+  const Eigen::LLT<Eigen::MatrixXd> factor(scale * of_images + prior);
+  if (factor.info() != Eigen::Success) return false;
+  const Eigen::MatrixXd covariance =
+      options.correlated_observations * factor.solve(Eigen::MatrixXd::Identity(blocks.size, blocks.size));
+  report_extrinsics(covariance, options, out);
+  if (blocks.intrinsics != nullptr)
+    report_intrinsics(covariance.diagonal().tail(blocks.intrinsics->size()).cwiseSqrt(), calibrated, options, out);
+  const Eigen::VectorXd change = change_of(out, blocks);
+  out.excess_error = change.dot(of_images * change) / std::max(1.0, 2.0 * out.final_cost);
+  return true;
+}
+
+// Multiplies all lengths by a factor that gives the baselines the scale of the calibration; returns it.
+double restore_scale(const RigValues& calibrated, ReprojectionProblem& problem, BundleState& state) {
+  const double factor = 1.0 / baseline_scale(state.rig.T_cam_rig, calibrated.T_cam_rig);
+  for (SE3& T : state.rig.T_cam_rig) T = geometry::scaled(T, factor);
+  for (SE3& T : state.T_rig_world) T = geometry::scaled(T, factor);
+  for (Vector3d& point : state.points) point *= factor;
+  for (SE3& T : problem.motion) T = geometry::scaled(T, factor);
+  return factor;
+}
+
+// Runs one round from `state` and leaves its result there. Returns false if it failed or was stopped.
+bool run_round(const ReprojectionProblem& problem, const Round& round, const CalibrationBlocks& blocks,
+               const RigValues& calibrated, const RigAdjustmentOptions& options, const std::stop_token& stop,
+               BundleState& state, RigAdjustment& out) {
+  const auto chi2 = squared_errors(problem, state.T_rig_world, state.points, state.rig);
+  const BundleStructure structure = make_structure(problem, chi2, beyond(chi2, round.max_chi2));
+  if (structure.num_points() == 0) return false;
+  BundleEquations equations(problem, structure, blocks.blocks, round.kernel, kDensePoses, std::move(state));
+  const LmSummary summary =
+      minimise(equations, {.iterations = options.iterations, .relative_decrease = options.relative_decrease}, stop);
+  if (!summary.usable() || stop.stop_requested()) return false;
+  if (&round == &kRounds.back()) {
+    out.final_cost = summary.final_cost;
+    out.variance_factor = variance_factor(structure, blocks.size, summary.final_cost);
+    out.values = equations.state().rig;
+    for (std::size_t c = 0; c < out.cameras.size(); ++c)
+      out.cameras[c].change = extrinsic_change(out.values.T_cam_rig[c], calibrated.T_cam_rig[c]);
+    for (const auto& term : structure.terms) ++out.cameras[static_cast<std::size_t>(term.camera)].observations;
+    out.done = assess(equations, blocks, calibrated, options, out);
+  }
+  state = std::move(equations.state());
+  return true;
+}
+
+}  // namespace
+
+RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjustmentOptions& options,
+                         std::optional<RigValues> start, std::stop_token stop) {
+  BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
+  BSLAM_ASSERT(options.sigma_rotation > 0 && options.sigma_translation > 0, "standard deviations must be positive");
+  RigAdjustment out;
+  out.cameras.resize(problem.rig->size());
+  out.cameras.front().observed.fill(true);
+  BundleState state = state_of(problem);
+  const RigValues calibrated = state.rig;
+  const CalibrationBlocks blocks = make_blocks(calibrated, options);
+  if (blocks.size == 0) return out;
+  if (start) state.rig = std::move(*start);
+  ReprojectionProblem scaled = problem;
+  for (const Round& round : kRounds) {
+    if (!run_round(scaled, round, blocks, calibrated, options, stop, state, out)) return out;
+    if (options.sigma_scale > 0) out.scale_change *= restore_scale(calibrated, scaled, state);
+  }
+  if (!out.done) return out;
+  out.values = std::move(state.rig);
+  problem.T_rig_world = std::move(state.T_rig_world);
+  problem.points = std::move(state.points);
+  problem.motion = std::move(scaled.motion);
+  return out;
+}
+
+}  // namespace bslam::solver

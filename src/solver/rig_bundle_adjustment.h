@@ -1,0 +1,70 @@
+// Bundle adjustment of rig poses, points and the calibration of the rig: the extrinsics of all cameras but the first
+// and, optionally, the intrinsics of all cameras, with the given calibration as a prior. Determines whether the images
+// agree with the calibration. Independent of the map.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <stop_token>
+#include <vector>
+
+#include "solver/bundle_adjuster.h"
+#include "solver/rig_block.h"
+
+namespace bslam::solver {
+
+struct RigAdjustmentOptions {
+  double sigma_rotation = 0.035;    // radians, per axis: standard deviation of the calibrated extrinsics (2 degrees)
+  double sigma_translation = 0.03;  // metres, per axis
+  // Of the common scale of all baselines, relative. If it is positive, all lengths are scaled so that the baselines
+  // keep this scale exactly: images do not reveal it, and iterations along a direction without information do not
+  // converge.
+  double sigma_scale = 0;
+  // Per camera: standard deviations of the calibrated intrinsics (camera/model_parameters.h). Empty: the intrinsics are
+  // constant.
+  std::vector<camera::ModelParameters> sigma_intrinsics = {};
+  double sigma_aspect = 0;  // of fx / fy, relative; 0: from the above
+  // Number of observations with the information of one independent observation. Errors of a landmark in successive
+  // images are similar, so that the normal equations overestimate the information of the images.
+  double correlated_observations = 1;
+  int iterations = 15;              // maximum number of steps per round
+  double relative_decrease = 1e-6;  // a round has converged if a step decreases the cost by a smaller fraction
+};
+
+// One camera. The six degrees of freedom of the extrinsics are rotation around the camera's x, y, z (radians), then
+// translation along them (metres): the left perturbation of T_cam_rig, which rotates the camera around its own centre.
+struct CameraEstimate {
+  geometry::Vector6d change = geometry::Vector6d::Zero();  // from the calibrated to the estimated extrinsics
+  // Covariance of the extrinsics, including the prior; all other unknowns are marginalised out.
+  geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
+  // The standard deviation is less than half of the prior's, so that at least three quarters of a calibration error in
+  // this degree of freedom appear in `change`. A common scale of all baselines is not observed unless the scale is
+  // determined otherwise.
+  std::array<bool, 6> observed = {};
+  // The same for the intrinsics; empty if they are constant.
+  camera::ModelParameters intrinsics_change, intrinsics_sigma;
+  std::vector<bool> intrinsics_observed;
+  int observations = 0;  // number of observations that agree with the estimate
+};
+
+struct RigAdjustment {
+  bool done = false;                    // false if there is nothing to estimate, or it was stopped or failed
+  RigValues values;                     // the estimate
+  std::vector<CameraEstimate> cameras;  // all cameras; the extrinsics of the first one are exact
+  double final_cost = 0;                // as in LmSummary, of the observations that agree and the prior
+  double variance_factor = 1;  // mean squared normalised error over its expectation; if > 1 it scales the covariances
+  double scale_change = 1;     // factor by which all lengths of the problem were multiplied, as described above
+  // How much the mean squared error of the observations would grow, as a fraction, if the calibration were constant.
+  double excess_error = 0;
+};
+
+// Optimises free poses and points in place; fixed poses and motions change by the scale only. The problem is unchanged
+// if the result is not `done`. The problem's rig must be the calibrated one. `start`: initial values of the rig;
+// nullopt: the calibrated ones. At least one pose must be fixed in every component that is connected by points. Rounds:
+// with Huber kernel over all observations, then over those within a widened bound, then twice without kernel within the
+// 95 % bound. Each round classifies all observations again, so that observations rejected because of a wrong
+// calibration are used again. Bitwise deterministic.
+RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjustmentOptions& options = {},
+                         std::optional<RigValues> start = {}, std::stop_token stop = {});
+
+}  // namespace bslam::solver
