@@ -25,9 +25,9 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
 }
 
 // Replaces the rig by its estimate from the map so far, and adjusts the map with it. The newest keyframe keeps its
-// pose, so that the current pose of the rig does not jump.
-execution::StageResult calibrate(const Config& config, const camera::Rig& calibrated, const map::MapSnapshot& base,
-                                 const std::stop_token& stop) {
+// pose, so that the current pose of the rig does not jump, unless it is in a loaded submap.
+execution::StageResult calibrate(const Config& config, const camera::Rig& calibrated, KeyframeId first,
+                                 const map::MapSnapshot& base, const std::stop_token& stop) {
   const auto refinement =
       calibration::refine_if_accepted(*base, calibrated, config.calibration, config.feature_model(), stop);
   if (!refinement) return {};
@@ -35,7 +35,8 @@ execution::StageResult calibrate(const Config& config, const camera::Rig& calibr
   calibration::apply(*refinement, draft);
   mapping::adjust_globally(config.mapping, config.feature_model(), draft, stop);
   const KeyframeId newest = base->newest_keyframe();
-  if (draft.map().alive(newest)) calibration::move_submap(newest, base->keyframe(newest).T_rig_world, draft);
+  if (draft.map().alive(newest) && draft.map().root_of(newest) >= first)
+    calibration::move_submap(newest, base->keyframe(newest).T_rig_world, draft);
   return {std::move(draft), {}};
 }
 
@@ -47,7 +48,7 @@ execution::StageResult adjust_globally(const Config& config, const map::MapSnaps
 
 }  // namespace
 
-execution::StageFunctions make_stages(const Config& config, const camera::Rig& calibrated,
+execution::StageFunctions make_stages(const Config& config, const camera::Rig& calibrated, KeyframeId first,
                                       const place::VocabularyPtr& vocabulary, LoopObserver observer) {
   execution::StageFunctions functions;
   functions[execution::Stage::kMap] = [&config](const execution::StageTask& task, const map::MapSnapshot& base,
@@ -59,10 +60,11 @@ execution::StageFunctions make_stages(const Config& config, const camera::Rig& c
     return adjust_globally(config, base, std::move(stop));
   };
   if (config.calibration.refine != calibration::Refine::kFalse) {
-    functions[execution::Stage::kCalibrate] =
-        [&config, &calibrated](const execution::StageTask&, const map::MapSnapshot& base, const std::stop_token& stop) {
-          return calibrate(config, calibrated, base, stop);
-        };
+    functions[execution::Stage::kCalibrate] = [&config, &calibrated, first](const execution::StageTask&,
+                                                                            const map::MapSnapshot& base,
+                                                                            const std::stop_token& stop) {
+      return calibrate(config, calibrated, first, base, stop);
+    };
   }
   if (!config.looping.loop.enabled || !vocabulary) return functions;
   auto recogniser = std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition);

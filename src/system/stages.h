@@ -19,9 +19,10 @@ struct LoopRecord {
 // Called for every loop closure that was committed, in the committing thread.
 using LoopObserver = std::function<void(const LoopRecord&)>;
 
-// `config` and `calibrated`, the given calibration, must outlive the functions. Without a vocabulary no loops are
+// `config` and `calibrated`, the given calibration, must outlive the functions. Keyframes before `first` belong to a
+// loaded map, whose world frame stays when the rig is calibrated. Without a vocabulary no loops are
 // closed.
-execution::StageFunctions make_stages(const Config& config, const camera::Rig& calibrated,
+execution::StageFunctions make_stages(const Config& config, const camera::Rig& calibrated, KeyframeId first,
                                       const place::VocabularyPtr& vocabulary, LoopObserver observer);
 
 }  // namespace bslam::system

@@ -54,8 +54,8 @@ System::System(camera::Rig rig, Config config, Resources resources)
     const std::lock_guard lock(records_mutex_);
     stage_runs_.push_back(record);
   };
-  execution::ExecutionSetup setup{make_stages(config_, rig_, resources.vocabulary, note_loop), config_.execution,
-                                  note_run};
+  execution::ExecutionSetup setup{make_stages(config_, rig_, first_keyframe_, resources.vocabulary, note_loop),
+                                  config_.execution, note_run};
   executor_ = resources.replay ? execution::make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
                                : execution::make_stage_executor(config_.mode, gate_, std::move(setup));
 }
@@ -166,9 +166,11 @@ void System::calibrate(map::MapDraft& draft, const std::stop_token& stop) {
     calibration::apply(calibration_, draft);
     final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
   }
-  calibration_.poses = {};                                               // part of the map now
-  if (!loaded_ && !draft.map().rig().same_calibration(*initial_rig_)) {  // a calibration during the run moves the roots
-    for (const KeyframeId root : draft.map().roots()) calibration::move_submap(root, geometry::SE3(), draft);
+  calibration_.poses = {};                                   // part of the map now
+  if (!draft.map().rig().same_calibration(*initial_rig_)) {  // a calibration during the run moves the roots
+    for (const KeyframeId root : draft.map().roots()) {
+      if (root >= first_keyframe_) calibration::move_submap(root, geometry::SE3(), draft);
+    }
   }
   calibration_ms_ = watch.ms();
 }
