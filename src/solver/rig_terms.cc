@@ -92,7 +92,10 @@ void RigTerms::add(const RigObservation& observation, const Matrix23d& A, const 
     columns += size;
   }
   const std::vector<Run>& ranges = ranges_[static_cast<std::size_t>(observation.camera)];
-  const Matrix3d P = geometry::skew(point.point_rig);
+  const Eigen::Matrix<double, 3, 2> wAt = weight * A.transpose();
+  const Eigen::Matrix<double, 3, 2> to_point = point.R_rig_world.transpose() * wAt;
+  Eigen::Matrix<double, 6, 2> to_pose;
+  to_pose << geometry::skew(point.point_rig) * wAt, wAt;
   for (std::size_t i = 0, column = 0; i < ranges.size(); ++i) {
     const Run& range = ranges[i];
     const auto J = J_.middleCols(static_cast<Eigen::Index>(column), range.size);
@@ -103,12 +106,8 @@ void RigTerms::add(const RigObservation& observation, const Matrix23d& A, const 
           (weight * J.transpose()).lazyProduct(J_.middleCols(static_cast<Eigen::Index>(other), ranges[k].size));
       other += static_cast<std::size_t>(ranges[k].size);
     }
-    const Eigen::Matrix<double, 3, 2> wAt = weight * A.transpose();
-    const Eigen::Matrix<double, 3, 2> to_point = point.R_rig_world.transpose() * wAt;
     W_.middleCols(column_of_[static_cast<std::size_t>(range.unknown)], range.size) += to_point.lazyProduct(J);
     if (point.pose_offset < 0) continue;
-    Eigen::Matrix<double, 6, 2> to_pose;
-    to_pose << P * wAt, wAt;
     border_.block(point.pose_offset, range.unknown, 6, range.size) += to_pose.lazyProduct(J);
   }
 }

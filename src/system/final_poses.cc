@@ -31,6 +31,12 @@ std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, co
   return before + (before_s + delay_s) / (before_s + after_s) * (after - before);
 }
 
+// The record of a frame, or the end.
+std::span<const FrameRecord>::iterator find_frame(std::span<const FrameRecord> frames, FrameId id) {
+  const auto at = std::ranges::lower_bound(frames, id, {}, [](const FrameRecord& r) { return r.result.frame; });
+  return at != frames.end() && at->result.frame == id ? at : frames.end();
+}
+
 // A frame that is a keyframe of the final map: its index among the frames, and the keyframe.
 struct KeyframeAt {
   std::size_t frame;
@@ -41,9 +47,8 @@ std::vector<KeyframeAt> keyframes_among(const map::BundledMap& map, KeyframeId f
                                         std::span<const FrameRecord> frames) {
   std::vector<KeyframeAt> out;
   for (const KeyframeId k : map.keyframe_ids()) {
-    const FrameId id = map.keyframe(k).frame->id;
-    const auto at = std::ranges::lower_bound(frames, id, {}, [](const FrameRecord& r) { return r.result.frame; });
-    if (k.index() < first.index() || at == frames.end() || at->result.frame != id) continue;
+    const auto at = find_frame(frames, map.keyframe(k).frame->id);
+    if (k.index() < first.index() || at == frames.end()) continue;
     out.push_back({static_cast<std::size_t>(at - frames.begin()), k});
   }
   std::ranges::sort(out, {}, &KeyframeAt::frame);
@@ -94,8 +99,8 @@ std::vector<std::pair<KeyframeId, Vector6d>> twists_from_neighbours(const map::B
     const frame::BundledFrame& seen = *map.keyframe(k).frame;
     const double delay_s = frame::farthest_delay_s(seen);
     if (k.index() < first.index() || delay_s == 0) continue;
-    const auto at = std::ranges::lower_bound(frames, seen.id, {}, [](const FrameRecord& r) { return r.result.frame; });
-    if (at == frames.end() || at->result.frame != seen.id || at == frames.begin() || at + 1 == frames.end()) continue;
+    const auto at = find_frame(frames, seen.id);
+    if (at == frames.end() || at == frames.begin() || at + 1 == frames.end()) continue;
     const std::span<const FrameRecord, 3> three(at - 1, 3);
     if (const auto twist = twist_through(three, map, delay_s)) out.emplace_back(k, *twist);
   }
