@@ -45,8 +45,8 @@ void SearchByProjection(benchmark::State& state) {
   }
   std::size_t matches = 0;
   for (auto _ : state) {
-    matches = matching::search_by_projection(world().map.rig().camera(0), seen.frame.cameras[0], T_cam_world, points,
-                                             {}, {.radius = 0.006})
+    matches = matching::search_by_projection(world().map.rig(), CameraIndex(0), seen.frame.cameras[0], T_cam_world,
+                                             points, {}, {.radius = 0.006})
                   .matches.size();
   }
   state.counters["points"] = static_cast<double>(points.size());

@@ -32,6 +32,9 @@ struct CameraCalibration {
   std::vector<double> distortion = {};
   Pose T_body_cam = {};      // metres; the body frame can be chosen freely and is common to all cameras
   double time_offset_s = 0;  // true time = stamp + offset
+  // Seconds from the exposure of the first row to that of the last; stamps are those of the middle row. 0: all rows are
+  // exposed together (global shutter).
+  double rolling_shutter_readout_s = 0;
   // Mask of size (height, width), row-major; 0 marks pixels to ignore, such as views of the robot. Empty if not used.
   std::vector<std::uint8_t> mask = {};
 };

@@ -69,6 +69,15 @@ std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector
   return out;
 }
 
+// Velocities of the keyframes; empty if no camera has a rolling shutter.
+std::vector<geometry::Vector6d> twists(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
+  std::vector<geometry::Vector6d> out;
+  bool rolling = false;
+  for (std::size_t c = 0; c < map.rig().size(); ++c) rolling |= map.rig().camera(c).readout_s != 0;
+  for (std::size_t i = 0; rolling && i < keyframes.size(); ++i) out.push_back(map.keyframe(keyframes[i]).twist);
+  return out;
+}
+
 }  // namespace
 
 BundleProblem build_problem(const map::BundledMap& map, const Selection& selection,
@@ -84,6 +93,7 @@ BundleProblem build_problem(const map::BundledMap& map, const Selection& selecti
         std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), k));
   }
   flat.problem.motion = motions(map, flat.keyframes);
+  flat.problem.twist = twists(map, flat.keyframes);
   const std::vector<int> position = pose_positions(map, flat.keyframes);
   for (const LandmarkId l : selection.landmarks) add_landmark(map, l, position, features, flat);
   return flat;

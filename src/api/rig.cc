@@ -43,9 +43,10 @@ Result<std::pair<camera::RigCamera, image::Image>> make_camera(const CameraCalib
                                               .distortion = c.distortion,
                                               .T_body_cam = camera::rows_of(*T_body_cam),
                                               .time_offset_s = c.time_offset_s,
-                                              .mask_file = ""};
-  auto made = camera::make_camera(
-      description, {key, "model", "width, height", "intrinsics", "distortion", "T_body_cam", "time_offset_s"});
+                                              .mask_file = "",
+                                              .readout_s = c.rolling_shutter_readout_s};
+  auto made = camera::make_camera(description, {key, "model", "width, height", "intrinsics", "distortion", "T_body_cam",
+                                                "time_offset_s", "rolling_shutter_readout_s"});
   if (!made) return made.error();
   image::Image mask;
   if (!c.mask.empty()) {
@@ -141,6 +142,7 @@ CameraCalibration Rig::camera(std::size_t i) const {
   out.distortion = camera::distortion(camera.model);
   out.T_body_cam = api::to_pose(impl_->rig.body_from_cam(i));
   out.time_offset_s = to_seconds(camera.time_offset_ns);
+  out.rolling_shutter_readout_s = camera.readout_s;
   const image::Image& mask = impl_->masks[i];
   if (!mask.empty()) out.mask.assign(mask.row(0), mask.row(mask.height() - 1) + mask.width());
   return out;

@@ -73,15 +73,17 @@ void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::si
                      adjustment::BundleProblem& flat) {
   const KeyframeId keyframe = flat.keyframes[pose];
   const frame::BundledFrame& frame = *map.keyframe(keyframe).frame;
+  const camera::Rig moving = frame::rig_of(rig, frame, map.keyframe(keyframe).twist);
   const matching::ProjectionSearchOptions options{
       .radius = kRadius, .max_hamming = kMaxHamming, .ratio = kRatio, .scale_factor = features.pyramid.scale_factor};
-  const auto results =
-      matching::search_cameras(rig, frame, T_cam_world, points, known_in(map, keyframe, seen, points.size()), options);
+  const auto results = matching::search_cameras(moving, frame, T_cam_world, points,
+                                                known_in(map, keyframe, seen, points.size()), options);
   for (std::size_t c = 0; c < results.size(); ++c) {
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     for (const matching::ProjectionMatch& m : results[c].matches) {
-      const auto projected = rig.camera(c).project(T_cam_world[c] * points[m.point].position);
       const Eigen::Vector2f pixel = keypoints.pixel[m.keypoint.index()];
+      const auto projected = rig.camera(c).project(
+          moving.shutter(c).at_row(T_cam_world[c] * points[m.point].position, static_cast<double>(pixel.y())));
       const double sigma = features.sigma(keypoints.level[m.keypoint.index()]);
       if (!projected || (pixel.cast<double>() - *projected).squaredNorm() > kMaxChi2 * sigma * sigma) continue;
       flat.problem.observations.push_back(

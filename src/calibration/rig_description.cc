@@ -74,6 +74,7 @@ std::string describe_camera(const camera::Rig& rig, std::size_t i) {
                         direction_in_words(T_rig_cam.rotation() * Vector3d::UnitZ()));
   }
   if (camera.time_offset_ns != 0) text += fmt::format("  time offset {:.6f} s\n", to_seconds(camera.time_offset_ns));
+  if (camera.readout_s != 0) text += fmt::format("  rolling shutter, readout {:.6f} s\n", camera.readout_s);
   if (!camera.mask_file.empty()) text += fmt::format("  mask {}\n", camera.mask_file);
   return text;
 }

@@ -1,6 +1,7 @@
 // One camera of a rig: its camera model and image size.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 
@@ -15,6 +16,9 @@ struct Camera {
   int width = 0, height = 0;  // pixels
   TimeNs time_offset_ns = 0;  // true time = timestamp + offset
   std::string mask_file;      // image in which 0 marks pixels to ignore; empty if there is none
+  // Rolling shutter: seconds from the exposure of the first row to that of the last; timestamps are those of the middle
+  // row. Negative if the last row is exposed first. 0: all rows are exposed together.
+  double readout_s = 0;
 
   std::optional<Vector2d> project(const Vector3d& point_cam) const;
   std::optional<Projection> project_with_jacobian(const Vector3d& point_cam) const;
@@ -25,6 +29,9 @@ struct Camera {
     return pixel.x() >= margin && pixel.y() >= margin && pixel.x() <= width - 1 - margin &&
            pixel.y() <= height - 1 - margin;
   }
+
+  // Exposure of the row at this height minus the exposure of the middle row, in seconds.
+  double row_delay_s(double pixel_y) const { return readout_s * (pixel_y / std::max(1, height - 1) - 0.5); }
 
   // Angle in radians covered by one pixel at the principal point: 1 / mean focal length.
   double radians_per_pixel() const;

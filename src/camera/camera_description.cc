@@ -22,6 +22,7 @@ using geometry::Vector3d;
 constexpr std::int64_t kMaxSidePx = 20000;
 constexpr double kMaxTranslation = 1e6;      // metres; a larger value is a unit mistake or a broken file
 constexpr double kMaxTimeOffset = 1e6;       // seconds; keeps sums of nanoseconds far from overflow
+constexpr double kMaxReadout = 1.0;          // seconds
 constexpr double kRotationTolerance = 1e-3;  // calibration files round to four or more digits
 
 // Returns the rotation nearest to R, with quaternion coefficients rounded to a grid. The grid is fine enough not to
@@ -88,6 +89,9 @@ Status check_numbers(const CameraDescription& d, const DescriptionKeys& keys) {
   }
   if (!(std::abs(d.time_offset_s) <= kMaxTimeOffset)) {
     return Error{keys.file, keys.time_offset, fmt::format("{}", d.time_offset_s), "at most 1e6 seconds"};
+  }
+  if (!(std::abs(d.readout_s) <= kMaxReadout)) {
+    return Error{keys.file, keys.readout, fmt::format("{}", d.readout_s), "at most 1 second"};
   }
   return {};
 }
@@ -169,7 +173,8 @@ Result<RigCamera> make_camera(const CameraDescription& d, const DescriptionKeys&
                       static_cast<int>(d.resolution[0]),
                       static_cast<int>(d.resolution[1]),
                       from_seconds(d.time_offset_s),
-                      d.mask_file};
+                      d.mask_file,
+                      d.readout_s};
   if (!camera.unproject({d.intrinsics[2], d.intrinsics[3]})) {
     return Error{keys.file, keys.distortion, "coefficients for which the model projects no point",
                  "coefficients of a lens"};

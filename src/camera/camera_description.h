@@ -20,17 +20,20 @@ struct CameraDescription {
   std::vector<double> T_body_cam;        // (4, 4) row-major, metres
   double time_offset_s = 0.0;
   std::string mask_file;
+  double readout_s = 0.0;  // see Camera::readout_s
 };
 
 // The file a description was read from, and the names of its keys in that file, for error messages.
 struct DescriptionKeys {
   std::string file;
   std::string model, resolution, intrinsics, distortion, T_body_cam, time_offset;
+  std::string readout = {};
 };
 
 // Validates a description and converts it. Errors: an unknown model; a resolution outside [1, 20000]; a focal length
 // that is not positive; a wrong number of coefficients; parameters outside the range of the model; a model that
-// projects nothing; an invalid T_body_cam (see rigid_transform); a time offset beyond a million seconds.
+// projects nothing; an invalid T_body_cam (see rigid_transform); a time offset beyond a million seconds; a readout time
+// beyond a second.
 Result<RigCamera> make_camera(const CameraDescription& description, const DescriptionKeys& keys);
 
 // Converts sixteen numbers, the rows of a 4x4 matrix, to a rigid transform. `file` and `key` are used in errors.

@@ -11,6 +11,8 @@ namespace bslam::camera {
 
 using geometry::SE3;
 
+const Shutter Rig::kGlobalShutter;
+
 Rig::Rig(std::vector<RigCamera> cameras) {
   BSLAM_ASSERT(!cameras.empty(), "a rig must have at least one camera");
   for (const RigCamera& c : cameras) {
@@ -79,6 +81,7 @@ Rig Rig::with_calibration_of(const Rig& part, std::span<const int> indices) cons
   for (std::size_t i = 0; i < part.size(); ++i) {
     RigCamera& camera = cameras[static_cast<std::size_t>(indices[i])];
     camera.camera.model = part.camera(i).model;
+    camera.camera.readout_s = part.camera(i).readout_s;
     camera.T_body_cam = part.body_from_cam(i);
   }
   return Rig(std::move(cameras));
@@ -110,6 +113,9 @@ Rig Rig::moving(std::span<const double> delay_s, const geometry::Vector6d& twist
     out.T_cam_rig_[i] = T_cam_rig_[i] * SE3::exp(delay_s[i] * twist);
     out.T_rig_cam_[i] = out.T_cam_rig_[i].inverse();
   }
+  const bool rolling =
+      std::ranges::any_of(calibration_->cameras, [](const RigCamera& c) { return c.camera.readout_s != 0; });
+  for (std::size_t i = 0; rolling && i < size(); ++i) out.shutters_.emplace_back(camera(i), out.T_cam_rig_[i], twist);
   return out;
 }
 

@@ -10,6 +10,7 @@
 #include "base/id.h"
 #include "base/result.h"
 #include "camera/camera.h"
+#include "camera/rolling_shutter.h"
 #include "geometry/se3.h"
 
 namespace bslam::camera {
@@ -33,6 +34,13 @@ class Rig {
   const geometry::SE3& cam_from_rig(std::size_t i) const { return T_cam_rig_[i]; }
   const geometry::SE3& cam_from_rig(CameraIndex i) const { return T_cam_rig_[i.index()]; }
   const geometry::SE3& rig_from_cam(std::size_t i) const { return T_rig_cam_[i]; }
+  // The motion of camera i during the exposure of its rows; none if the rig is not `moving`. The poses above are those
+  // at the exposure of the middle row.
+  const Shutter& shutter(std::size_t i) const { return shutters_.empty() ? kGlobalShutter : shutters_[i]; }
+  // T_cam_rig at the exposure of the row at this height.
+  geometry::SE3 cam_from_rig(CameraIndex i, double pixel_y) const {
+    return shutter(i.index()).pose_at_row(cam_from_rig(i), pixel_y);
+  }
 
   // T_body_cam. The body frame is used for input and output only.
   const geometry::SE3& body_from_cam(std::size_t i) const { return calibration_->cameras[i].T_body_cam; }
@@ -59,7 +67,8 @@ class Rig {
 
   // Returns the rig for cameras with different capture times, under a constant-velocity model. Camera i takes its image
   // `delay_s[i]` seconds after the time of the rig; in that time the rig moves by exp(delay twist), so T_cam_rig of
-  // camera i becomes T_i0 exp(delay twist), and the rig's pose refers to the time of the rig. `twist` (rad/s and m/s)
+  // camera i becomes T_i0 exp(delay twist), and the rig's pose refers to the time of the rig. Cameras with a rolling
+  // shutter move with the same velocity while their rows are exposed. `twist` (rad/s and m/s)
   // is defined by T_rig_world(t + dt) = exp(dt twist) T_rig_world(t). Cheap.
   Rig moving(std::span<const double> delay_s, const geometry::Vector6d& twist) const;
 
@@ -73,6 +82,8 @@ class Rig {
 
   std::shared_ptr<const Calibration> calibration_;
   std::vector<geometry::SE3> T_cam_rig_, T_rig_cam_;
+  static const Shutter kGlobalShutter;
+  std::vector<Shutter> shutters_;  // per camera; empty if none is rolling
 };
 
 }  // namespace bslam::camera

@@ -30,10 +30,11 @@ Result<camera::Rig> with_drops(camera::Rig rig, const std::vector<std::string>& 
   static const std::map<std::string, rig_formats::Droppable> kDroppable = {
       {"body", rig_formats::Droppable::kBodyFrame},
       {"mask", rig_formats::Droppable::kMasks},
+      {"rolling-shutter", rig_formats::Droppable::kRollingShutters},
       {"time-offset", rig_formats::Droppable::kTimeOffsets}};
   for (const std::string& drop : drops) {
     const auto what = kDroppable.find(drop);
-    if (what == kDroppable.end()) return Error{"--drop", "", drop, "body, mask or time-offset"};
+    if (what == kDroppable.end()) return Error{"--drop", "", drop, "body, mask, rolling-shutter or time-offset"};
     rig = rig_formats::without(rig, what->second);
   }
   return rig;
@@ -90,7 +91,8 @@ void add_convert(CLI::App& rig, int& exit_status) {
                    "a file (.json: basalt, else bslam), or a folder (euroc); the name of a new folder must end in /")
       ->required();
   convert->add_option("--to", arguments->to, "format of OUT: " + joined_formats());
-  convert->add_option("--drop", arguments->drop, "omit content that the format cannot store: body, mask, time-offset");
+  convert->add_option("--drop", arguments->drop,
+                      "omit content that the format cannot store: body, mask, rolling-shutter, time-offset");
   convert->add_flag("--overwrite", arguments->overwrite, "replace an existing calibration");
   convert->callback([arguments, &exit_status] { exit_status = rig_convert(*arguments); });
 }

@@ -106,6 +106,16 @@ geometry::SE3 BundledMap::cam_from_world(KeyframeId k, CameraIndex c) const {
   return T_cam_rig * motion_of(entry, c) * entry.T_rig_world;
 }
 
+geometry::SE3 BundledMap::cam_from_world(KeyframeId k, frame::KeypointRef keypoint) const {
+  const Eigen::Vector2f& pixel = keypoints(k, keypoint.camera).pixel[keypoint.keypoint.index()];
+  return shutter(k, keypoint.camera).pose_at_row(cam_from_world(k, keypoint.camera), static_cast<double>(pixel.y()));
+}
+
+camera::Shutter BundledMap::shutter(KeyframeId k, CameraIndex c) const {
+  const BundledKeyframe& entry = keyframe(k);
+  return {rig_->camera(c), rig_->cam_from_rig(c) * motion_of(entry, c), entry.twist};
+}
+
 std::vector<BundledMap::ReplacedFrame> BundledMap::set_rig(std::shared_ptr<const camera::Rig> rig,
                                                            std::span<const ReplacedFrame> known) {
   std::vector<ReplacedFrame> out;

@@ -88,6 +88,10 @@ class BundledMap {
   geometry::SE3 motion_until(KeyframeId k, CameraIndex c) const;
   // T_cam_world of a keyframe's camera at the capture time of its image.
   geometry::SE3 cam_from_world(KeyframeId k, CameraIndex c) const;
+  // The pose of a camera of a keyframe when the row of a keypoint was exposed.
+  geometry::SE3 cam_from_world(KeyframeId k, frame::KeypointRef keypoint) const;
+  // The motion of a camera of a keyframe while its rows were exposed.
+  camera::Shutter shutter(KeyframeId k, CameraIndex c) const;
 
   // Covisible keyframes with at least `min_weight`, by decreasing weight (newer first on ties), at most `limit`.
   std::vector<Covisible> best_covisible(KeyframeId k, std::size_t limit, int min_weight = 1) const;

@@ -57,7 +57,7 @@ void append(const map::BundledMap& map, KeyframeId k, FeatureId f, std::vector<m
   for (const KeypointRef r : keyframe.frame->bundled.keypoints(f)) {
     const feature::Keypoints& keypoints = keyframe.frame->keypoints(r.camera);
     const std::size_t i = r.keypoint.index();
-    out.push_back({&map.rig().camera(r.camera), cam_from_world(map, {k, r.camera}), keypoints.pixel[i].cast<double>(),
+    out.push_back({&map.rig().camera(r.camera), map.cam_from_world(k, r), keypoints.pixel[i].cast<double>(),
                    keypoints.bearing[i], features.sigma(keypoints.level[i])});
   }
 }
@@ -95,10 +95,15 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
   if (!shares_view(map, a, b, depth)) return 0;
   const std::vector<std::uint8_t> free_a = free_keypoints(map.keyframe(a.keyframe), a.camera);
   const std::vector<std::uint8_t> free_b = free_keypoints(map.keyframe(b.keyframe), b.camera);
-  const matching::EpipolarView view_a{&map.rig().camera(a.camera), &map.keypoints(a.keyframe, a.camera),
-                                      cam_from_world(map, a).inverse(), free_a, &features};
-  const matching::EpipolarView view_b{&map.rig().camera(b.camera), &map.keypoints(b.keyframe, b.camera),
-                                      cam_from_world(map, b).inverse(), free_b, &features};
+  const auto view = [&](View v, std::span<const std::uint8_t> free) {
+    return matching::EpipolarView{.camera = &map.rig().camera(v.camera),
+                                  .keypoints = &map.keypoints(v.keyframe, v.camera),
+                                  .T_common_cam = cam_from_world(map, v).inverse(),
+                                  .usable = free,
+                                  .features = &features,
+                                  .shutter = map.shutter(v.keyframe, v.camera)};
+  };
+  const matching::EpipolarView view_a = view(a, free_a), view_b = view(b, free_b);
   const matching::EpipolarOptions search{.min_depth_m = 0.05 * depth,
                                          .sigmas = 2.0,
                                          .max_hamming = options.max_hamming,

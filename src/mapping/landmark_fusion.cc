@@ -11,10 +11,11 @@ namespace {
 using geometry::SE3;
 
 // Returns true if the keypoint is close enough to the projection of the landmark.
-bool agrees(const map::BundledMap& map, LandmarkId l, const camera::Camera& camera, const SE3& T_cam_world,
+bool agrees(const map::BundledMap& map, LandmarkId l, const camera::Rig& rig, std::size_t c, const SE3& T_cam_world,
             const feature::Keypoints& keypoints, std::size_t k, const LandmarkFusionOptions& options,
             const feature::FeatureModel& features) {
-  const auto pixel = camera.project(T_cam_world * map.landmark(l).position);
+  const double row = static_cast<double>(keypoints.pixel[k].y());
+  const auto pixel = rig.camera(c).project(rig.shutter(c).at_row(T_cam_world * map.landmark(l).position, row));
   if (!pixel) return false;
   const double sigma = features.sigma(keypoints.level[k]);
   return (keypoints.pixel[k].cast<double>() - *pixel).squaredNorm() < options.max_chi2 * sigma * sigma;
@@ -81,8 +82,7 @@ FusionReport fuse_into(KeyframeId target, const SE3& T_rig_world, const std::vec
       const LandmarkId l = draft.map().resolve(absent[m.point]);
       if (!l.valid()) continue;
       const feature::Keypoints& keypoints = frame->cameras[c].keypoints;
-      if (!agrees(draft.map(), l, rig.camera(c), T_cam_world[c], keypoints, m.keypoint.index(), options, features))
-        continue;
+      if (!agrees(draft.map(), l, rig, c, T_cam_world[c], keypoints, m.keypoint.index(), options, features)) continue;
       join(l, target, frame->bundled.feature(CameraIndex(c), m.keypoint), keep, draft, report);
     }
   }

@@ -38,8 +38,9 @@ std::vector<CameraPair> overlapping_pairs(const camera::Rig& rig) {
 template <class Positions>
 PointObservation observation(const camera::Rig& rig, const Positions& positions, frame::KeypointRef ref) {
   const std::size_t i = ref.keypoint.index();
-  return {&rig.camera(ref.camera), rig.cam_from_rig(ref.camera), positions.pixel[i].template cast<double>(),
-          positions.bearing[i], positions.sigma[i]};
+  const Vector2d pixel = positions.pixel[i].template cast<double>();
+  return {&rig.camera(ref.camera), rig.cam_from_rig(ref.camera, pixel.y()), pixel, positions.bearing[i],
+          positions.sigma[i]};
 }
 
 // Aligns keypoint b of an edge to the patch of keypoint a. Returns false if the alignment fails.
@@ -71,8 +72,13 @@ bool align_edge(const camera::Rig& rig, std::span<const frame::CameraFrame> came
 std::vector<Edge> match_pair(const camera::Rig& rig, std::span<const frame::CameraFrame> cameras,
                              std::span<const image::Pyramid> pyramids, CameraPair pair, const BundlingOptions& options,
                              std::span<const AlignmentOptions> alignment) {
-  const EpipolarView a{&rig.camera(pair.a), &cameras[pair.a.index()].keypoints, rig.rig_from_cam(pair.a.index()), {}};
-  const EpipolarView b{&rig.camera(pair.b), &cameras[pair.b.index()].keypoints, rig.rig_from_cam(pair.b.index()), {}};
+  const auto view = [&](CameraIndex c) {
+    return EpipolarView{.camera = &rig.camera(c),
+                        .keypoints = &cameras[c.index()].keypoints,
+                        .T_common_cam = rig.rig_from_cam(c.index()),
+                        .shutter = rig.shutter(c.index())};
+  };
+  const EpipolarView a = view(pair.a), b = view(pair.b);
   const EpipolarOptions search{.min_depth_m = options.min_depth_m,
                                .sigmas = options.sigmas,
                                .max_hamming = options.max_hamming,
@@ -186,11 +192,10 @@ class AlignedPositions {
 
 // Returns true if all keypoints of the group have the same direction within their noise: the feature is too far for a
 // point.
-bool agrees_at_infinity(const camera::Rig& rig, std::span<const PointObservation> group, CameraIndex first_camera,
-                        double max_chi2) {
+bool agrees_at_infinity(std::span<const PointObservation> group, double max_chi2) {
   constexpr double kFar_m = 1e5;
   const PointObservation& first = group.front();
-  const Vector3d point_rig = rig.rig_from_cam(first_camera.index()) * (kFar_m * first.bearing);
+  const Vector3d point_rig = first.T_cam_common.inverse() * (kFar_m * first.bearing);
   return std::all_of(group.begin() + 1, group.end(), [&](const PointObservation& o) {
     const auto pixel = o.camera->project(o.T_cam_common * point_rig);
     return pixel && (*pixel - o.pixel).squaredNorm() <= max_chi2 * (o.sigma * o.sigma + first.sigma * first.sigma);
@@ -206,7 +211,7 @@ bool keep_agreeing(const camera::Rig& rig, const AlignedPositions& positions, do
     for (const frame::KeypointRef ref : group) observations.push_back(observation(rig, positions[ref.camera], ref));
     const auto estimated = estimate_point(observations, 0.0);
     if (!estimated) {  // the rays diverge because of their noise
-      return agrees_at_infinity(rig, observations, group.front().camera, max_chi2);
+      return agrees_at_infinity(observations, max_chi2);
     }
     if (estimated->worst_chi2 <= max_chi2) return true;
     group.erase(group.begin() + static_cast<std::ptrdiff_t>(estimated->worst));

@@ -39,7 +39,9 @@ std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame
   const double radians_per_px = view.camera->radians_per_pixel();
   for (std::size_t k = 0; k < view.keypoints->size(); ++k) {
     if (!view.usable.empty() && !view.usable[k]) continue;
-    const Vector3d d = view.T_common_cam.rotation() * view.keypoints->bearing[k];
+    const double pixel_y = static_cast<double>(view.keypoints->pixel[k].y());
+    const Vector3d d =
+        view.T_common_cam.rotation() * view.shutter.bearing_at_middle(view.keypoints->bearing[k], pixel_y);
     const double u = d.dot(frame.x), v = d.dot(frame.y);
     out.push_back({std::atan2(v, u), std::atan2(std::hypot(u, v), d.dot(frame.e)), sigma_px(view, k) * radians_per_px,
                    static_cast<std::uint32_t>(k)});

@@ -7,6 +7,7 @@
 
 #include "base/id.h"
 #include "camera/camera.h"
+#include "camera/rolling_shutter.h"
 #include "feature/feature_model.h"
 #include "feature/keypoints.h"
 #include "geometry/se3.h"
@@ -17,11 +18,12 @@ namespace bslam::matching {
 struct EpipolarView {
   const camera::Camera* camera = nullptr;
   const feature::Keypoints* keypoints = nullptr;
-  geometry::SE3 T_common_cam;
-  std::span<const std::uint8_t> usable;  // per keypoint, 0: ignored; empty: all are used
+  geometry::SE3 T_common_cam;                 // at the exposure of the middle row
+  std::span<const std::uint8_t> usable = {};  // per keypoint, 0: ignored; empty: all are used
   // Determines the standard deviations of the keypoints if the views belong to different frames. Null: the keypoints'
   // own standard deviations, which are valid between cameras of one frame.
   const feature::FeatureModel* features = nullptr;
+  camera::Shutter shutter = {};
 };
 
 struct EpipolarOptions {

@@ -36,12 +36,13 @@ struct Projection {
 };
 
 // Projection of a point. Returns nullopt if it is outside the image, its distances, or its cone of viewing directions.
-std::optional<Projection> visible_projection(const camera::Camera& camera, const geometry::SE3& T_cam_common,
-                                             const SearchPoint& p, double min_cosine) {
+std::optional<Projection> visible_projection(const camera::Camera& camera, const camera::Shutter& shutter,
+                                             const geometry::SE3& T_cam_common, const SearchPoint& p,
+                                             double min_cosine) {
   const Vector3d in_camera = T_cam_common * p.position;
   const double distance = in_camera.norm();
   if (!in_range(p, distance)) return std::nullopt;
-  const auto pixel = camera.project(in_camera);
+  const auto pixel = camera::project(camera, shutter, in_camera);
   if (!pixel || !camera.contains(*pixel)) return std::nullopt;
   const bool outside_cone = in_camera.dot(T_cam_common.rotation() * p.view_direction) < min_cosine * distance;
   if (outside_cone && p.view_direction != Vector3d::Zero()) return std::nullopt;
@@ -71,10 +72,11 @@ Candidate best_candidate(const feature::Keypoints& keypoints, const feature::Des
 
 }  // namespace
 
-ProjectionSearchResult search_by_projection(const camera::Camera& camera, const frame::CameraFrame& frame,
+ProjectionSearchResult search_by_projection(const camera::Rig& rig, CameraIndex c, const frame::CameraFrame& frame,
                                             const geometry::SE3& T_cam_common, std::span<const SearchPoint> points,
                                             const SearchExclusions& exclusions,
                                             const ProjectionSearchOptions& options) {
+  const camera::Camera& camera = rig.camera(c);
   ProjectionSearchResult result;
   const feature::Keypoints& keypoints = frame.keypoints;
   const double log_factor = std::log(options.scale_factor);
@@ -85,7 +87,7 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
   for (std::size_t i = 0; i < points.size(); ++i) {
     const SearchPoint& p = points[i];
     if (!exclusions.points.empty() && exclusions.points[i]) continue;
-    const auto projected = visible_projection(camera, T_cam_common, p, min_cosine);
+    const auto projected = visible_projection(camera, rig.shutter(c.index()), T_cam_common, p, min_cosine);
     if (!projected) continue;
     result.visible.push_back(static_cast<std::uint32_t>(i));
     const double level = predicted_level(p, projected->distance, log_factor);
@@ -94,16 +96,16 @@ ProjectionSearchResult search_by_projection(const camera::Camera& camera, const 
     frame.grid.near(keypoints, projected->pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
                     centre - options.level_slack, centre + options.level_slack, near);
     if (near.empty()) continue;
-    const Candidate c = best_candidate(keypoints, *p.descriptor, near, exclusions.keypoints);
-    if (c.best > options.max_hamming) continue;
-    if (c.best_level == c.second_level && c.best > options.ratio * c.second) continue;
-    auto& [owned, position] = owner[c.keypoint];
-    if (c.best >= owned) continue;
+    const Candidate best = best_candidate(keypoints, *p.descriptor, near, exclusions.keypoints);
+    if (best.best > options.max_hamming) continue;
+    if (best.best_level == best.second_level && best.best > options.ratio * best.second) continue;
+    auto& [owned, position] = owner[best.keypoint];
+    if (best.best >= owned) continue;
     if (owned < kNone) result.matches[position].hamming = -1;  // this point is more similar
-    owned = c.best;
+    owned = best.best;
     position = static_cast<std::uint32_t>(result.matches.size());
     result.matches.push_back(
-        {static_cast<std::uint32_t>(i), KeypointIndex(static_cast<std::int32_t>(c.keypoint)), c.best});
+        {static_cast<std::uint32_t>(i), KeypointIndex(static_cast<std::int32_t>(best.keypoint)), best.best});
   }
   std::erase_if(result.matches, [](const ProjectionMatch& m) { return m.hamming < 0; });
   return result;
@@ -118,7 +120,7 @@ std::vector<ProjectionSearchResult> search_cameras(const camera::Rig& rig, const
   std::vector<ProjectionSearchResult> out(rig.size());
   const auto search = [&](std::size_t c) {
     if (frame.cameras[c].keypoints.empty()) return;
-    out[c] = search_by_projection(rig.camera(c), frame.cameras[c], T_cam_common[c], points,
+    out[c] = search_by_projection(rig, CameraIndex(c), frame.cameras[c], T_cam_common[c], points,
                                   exclusions.empty() ? nothing : exclusions[c], options);
   };
   if (pool != nullptr) {
@@ -135,12 +137,12 @@ std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::
   return out;
 }
 
-std::vector<std::uint32_t> visible_points(const camera::Camera& camera, const geometry::SE3& T_cam_common,
+std::vector<std::uint32_t> visible_points(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common,
                                           std::span<const SearchPoint> points, double max_view_angle) {
   const double min_cosine = std::cos(max_view_angle);
   std::vector<std::uint32_t> out;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!visible_projection(camera, T_cam_common, points[i], min_cosine)) continue;
+    if (!visible_projection(rig.camera(c), rig.shutter(c.index()), T_cam_common, points[i], min_cosine)) continue;
     out.push_back(static_cast<std::uint32_t>(i));
   }
   return out;

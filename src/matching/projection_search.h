@@ -50,7 +50,7 @@ struct ProjectionSearchResult {
 };
 
 // Searches for the points in one camera. `T_cam_common` maps points to the camera frame.
-ProjectionSearchResult search_by_projection(const camera::Camera& camera, const frame::CameraFrame& frame,
+ProjectionSearchResult search_by_projection(const camera::Rig& rig, CameraIndex c, const frame::CameraFrame& frame,
                                             const geometry::SE3& T_cam_common, std::span<const SearchPoint> points,
                                             const SearchExclusions& exclusions, const ProjectionSearchOptions& options);
 
@@ -67,7 +67,7 @@ std::vector<ProjectionSearchResult> search_cameras(const camera::Rig& rig, const
 std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::SE3& T_rig_common);
 
 // Indices of the points predicted visible in a camera; see ProjectionSearchResult::visible. `max_view_angle`: radians.
-std::vector<std::uint32_t> visible_points(const camera::Camera& camera, const geometry::SE3& T_cam_common,
+std::vector<std::uint32_t> visible_points(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common,
                                           std::span<const SearchPoint> points, double max_view_angle);
 
 }  // namespace bslam::matching

@@ -18,11 +18,16 @@ namespace fs = std::filesystem;
 
 constexpr int kRigVersion = 1;
 
-Status read_time_and_mask(const yaml::YamlMap& yaml, camera::CameraDescription& d) {
+Status read_times_and_mask(const yaml::YamlMap& yaml, camera::CameraDescription& d) {
   if (yaml.has("time_offset_s")) {
     const auto offset = yaml.number("time_offset_s");
     if (!offset) return offset.error();
     d.time_offset_s = *offset;
+  }
+  if (yaml.has("rolling_shutter_readout_s")) {
+    const auto readout = yaml.number("rolling_shutter_readout_s");
+    if (!readout) return readout.error();
+    d.readout_s = *readout;
   }
   if (yaml.has("mask")) {
     const auto mask = yaml.text("mask");
@@ -37,8 +42,8 @@ Status read_time_and_mask(const yaml::YamlMap& yaml, camera::CameraDescription& 
 Result<camera::RigCamera> read_camera(const yaml::YamlMap& yaml, std::size_t index) {
   if (yaml.has("T_cam_body"))
     return yaml.error("T_cam_body", "the transform from body to camera", "T_body_cam, its inverse");
-  const Status known = yaml.allow_only(
-      {"name", "model", "resolution", "intrinsics", "distortion", "T_body_cam", "time_offset_s", "mask"});
+  const Status known = yaml.allow_only({"name", "model", "resolution", "intrinsics", "distortion", "T_body_cam",
+                                        "time_offset_s", "rolling_shutter_readout_s", "mask"});
   if (!known) return known.error();
   camera::CameraDescription d;
   d.name = fmt::format("cam{}", index);
@@ -66,10 +71,10 @@ Result<camera::RigCamera> read_camera(const yaml::YamlMap& yaml, std::size_t ind
   auto T_body_cam = yaml.rows("T_body_cam", 4);
   if (!T_body_cam) return T_body_cam.error();
   d.T_body_cam = *std::move(T_body_cam);
-  if (const Status status = read_time_and_mask(yaml, d); !status) return status.error();
-  return camera::make_camera(
-      d, {yaml.file(), yaml.key_path("model"), yaml.key_path("resolution"), yaml.key_path("intrinsics"),
-          yaml.key_path("distortion"), yaml.key_path("T_body_cam"), yaml.key_path("time_offset_s")});
+  if (const Status status = read_times_and_mask(yaml, d); !status) return status.error();
+  return camera::make_camera(d, {yaml.file(), yaml.key_path("model"), yaml.key_path("resolution"),
+                                 yaml.key_path("intrinsics"), yaml.key_path("distortion"), yaml.key_path("T_body_cam"),
+                                 yaml.key_path("time_offset_s"), yaml.key_path("rolling_shutter_readout_s")});
 }
 
 std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_body_cam) {
@@ -84,6 +89,8 @@ std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_
   // Divided instead of multiplied by 1e-9, since the quotient is the double closest to the decimal: its text is short
   // and exact.
   yaml += fmt::format("    time_offset_s: {}\n", format_double(static_cast<double>(camera.time_offset_ns) / 1e9));
+  if (camera.readout_s != 0)
+    yaml += fmt::format("    rolling_shutter_readout_s: {}\n", format_double(camera.readout_s));
   return yaml + fmt::format("    mask: {}\n", camera.mask_file.empty() ? "null" : yaml::yaml_quoted(camera.mask_file));
 }
 

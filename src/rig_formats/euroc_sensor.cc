@@ -87,13 +87,19 @@ Result<camera::RigCamera> read_euroc_sensor(const fs::path& file, const std::str
   auto data = T_BS->numbers("data");
   if (!data) return data.error();
   d.T_body_cam = *std::move(data);
+  if (yaml->has("rolling_shutter_readout_s")) {
+    const auto readout = yaml->number("rolling_shutter_readout_s");
+    if (!readout) return readout.error();
+    d.readout_s = *readout;
+  }
   return camera::make_camera(d, {.file = file.string(),
                                  .model = "distortion_model",
                                  .resolution = "resolution",
                                  .intrinsics = "intrinsics",
                                  .distortion = "distortion_coefficients",
                                  .T_body_cam = "T_BS.data",
-                                 .time_offset = ""});
+                                 .time_offset = "",
+                                 .readout = "rolling_shutter_readout_s"});
 }
 
 std::vector<fs::path> camera_folders(const fs::path& folder, const std::string& entry) {
@@ -130,7 +136,7 @@ std::string euroc_sensor_yaml(const camera::RigCamera& rig_camera, double rate_h
   const Eigen::Matrix4d T = rig_camera.T_body_cam.matrix();
   std::vector<std::string> distortion;
   for (const double value : camera::distortion(camera.model)) distortion.push_back(format_double(value));
-  return fmt::format(
+  std::string text = fmt::format(
       "sensor_type: camera\n"
       "comment: {}\n"
       "T_BS:\n"
@@ -149,10 +155,13 @@ std::string euroc_sensor_yaml(const camera::RigCamera& rig_camera, double rate_h
       yaml::yaml_quoted(camera.name), row_text(T, 0), row_text(T, 1), row_text(T, 2), row_text(T, 3),
       format_double(rate_hz), camera.width, camera.height, format_double(k.fx), format_double(k.fy),
       format_double(k.cx), format_double(k.cy), distortion_name(camera.model), fmt::join(distortion, ", "));
+  if (camera.readout_s != 0) text += fmt::format("rolling_shutter_readout_s: {}\n", format_double(camera.readout_s));
+  return text;
 }
 
 Status write_euroc_sensors(const camera::Rig& rig, const fs::path& folder, double rate_hz) {
-  const RigLimits limits{.format = "EuRoC sensor files", .models = {kModels.begin(), kModels.end()}};
+  const RigLimits limits{
+      .format = "EuRoC sensor files", .models = {kModels.begin(), kModels.end()}, .rolling_shutters = true};
   if (const Status status = check_limits(rig, folder.string(), limits); !status) return status;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const fs::path camera_folder = folder / "mav0" / fmt::format("cam{}", i);

@@ -258,6 +258,7 @@ camera::Rig without(const camera::Rig& rig, Droppable what) {
     camera::RigCamera c{rig.camera(i), what == Droppable::kBodyFrame ? rig.rig_from_cam(i) : rig.body_from_cam(i)};
     if (what == Droppable::kMasks) c.camera.mask_file.clear();
     if (what == Droppable::kTimeOffsets) c.camera.time_offset_ns = 0;
+    if (what == Droppable::kRollingShutters) c.camera.readout_s = 0;
     cameras.push_back(std::move(c));
   }
   return camera::Rig(std::move(cameras));

@@ -50,7 +50,7 @@ Result<std::vector<std::string>> write_rig_as(const camera::Rig& rig, RigFormat 
 std::vector<std::filesystem::path> files_in_the_way(RigFormat format, const std::filesystem::path& out);
 
 // Parts of a rig that can be omitted if a format cannot store them.
-enum class Droppable { kBodyFrame, kMasks, kTimeOffsets };
+enum class Droppable { kBodyFrame, kMasks, kRollingShutters, kTimeOffsets };
 // Returns the rig without this part. Without a body frame, the body is camera 0.
 camera::Rig without(const camera::Rig& rig, Droppable what);
 

@@ -22,6 +22,10 @@ Status check_camera(const camera::Camera& camera, const std::string& out, const 
     return error("a time offset, which " + format + " cannot store",
                  "cameras without time offsets, or --drop time-offset");
   }
+  if (!limits.rolling_shutters && camera.readout_s != 0) {
+    return error("a rolling shutter, which " + format + " cannot store",
+                 "cameras without rolling shutters, or --drop rolling-shutter");
+  }
   const std::string_view model = camera::model_name(camera.model);
   if (std::find(limits.models.begin(), limits.models.end(), model) == limits.models.end()) {
     return error(fmt::format("model {}, which {} cannot store", model, format),

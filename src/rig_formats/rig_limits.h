@@ -17,14 +17,15 @@ struct RigLimits {
   std::string_view format;               // name of the format in errors
   std::vector<std::string_view> models;  // names as in the rig file of bslam
   Supports time_offsets = Supports::kNothing;
+  bool rolling_shutters = false;
   bool body_frame = true;            // the body frame may differ from camera 0
   std::size_t max_coefficients = 8;  // maximum number of coefficients of pinhole-radtan
   std::size_t max_cameras = std::numeric_limits<std::size_t>::max();
 };
 
-// Returns an Error for the first part of the rig that the format cannot store: a mask, a time offset, a model, too many
-// radial-tangential coefficients, a body frame other than camera 0, too many cameras. `out` is the file named in the
-// error.
+// Returns an Error for the first part of the rig that the format cannot store: a mask, a time offset, a rolling
+// shutter, a model, too many radial-tangential coefficients, a body frame other than camera 0, too many cameras. `out`
+// is the file named in the error.
 Status check_limits(const camera::Rig& rig, const std::string& out, const RigLimits& limits);
 
 // Returns the distortion coefficients without trailing zeros: eight radial-tangential coefficients may become 5 or 4.

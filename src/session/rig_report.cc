@@ -43,6 +43,7 @@ Json camera_json(const camera::Rig& rig, std::size_t i) {
           {"position_cam0", vector_json(rig.rig_from_cam(i).translation())},
           {"optical_axis_cam0", vector_json(rig.rig_from_cam(i).rotation() * Eigen::Vector3d::UnitZ())},
           {"time_offset_s", static_cast<double>(camera.time_offset_ns) / 1e9},
+          {"rolling_shutter_readout_s", camera.readout_s},
           {"mask", camera.mask_file.empty() ? Json() : Json(camera.mask_file)},
           {"overlaps", std::move(overlaps)}};
 }

@@ -47,7 +47,15 @@ std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span
     Vector3d point_rig = T_rig_world[pose] * points[static_cast<std::size_t>(o.point)];
     if (!problem.motion.empty()) point_rig = problem.motion[pose * problem.rig->size() + o.camera.index()] * point_rig;
     const std::size_t camera = o.camera.index();
-    const auto error = residual_error(rig.models[camera], rig.T_cam_rig[camera] * point_rig, o.pixel.cast<double>());
+    Vector3d point_cam = rig.T_cam_rig[camera] * point_rig;
+    if (!problem.twist.empty()) {
+      const SE3 T_cam_rig = problem.motion.empty()
+                                ? rig.T_cam_rig[camera]
+                                : rig.T_cam_rig[camera] * problem.motion[pose * problem.rig->size() + camera];
+      const camera::Shutter shutter(problem.rig->camera(camera), T_cam_rig, problem.twist[pose]);
+      point_cam = shutter.at_row(point_cam, static_cast<double>(o.pixel.y()));
+    }
+    const auto error = residual_error(rig.models[camera], point_cam, o.pixel.cast<double>());
     const double sigma = static_cast<double>(o.sigma);
     out.push_back(error ? error->squaredNorm() / (sigma * sigma) : std::numeric_limits<double>::infinity());
   }

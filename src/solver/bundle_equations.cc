@@ -75,11 +75,14 @@ void BundleEquations::set_poses(const BundleState& state) {
   }
   if (rig_.size() == 0 && !cam_from_rig_.empty()) return;  // constant
   cam_from_rig_.clear();
+  shutters_.clear();
   cam_from_rig_.reserve(poses_.size() * cameras_);
   for (std::size_t k = 0; k < poses_.size() * cameras_; ++k) {
     const SE3& T_cam_rig = state.rig.T_cam_rig[k % cameras_];
     const SE3 T = problem_.motion.empty() ? T_cam_rig : T_cam_rig * problem_.motion[k];
     cam_from_rig_.push_back({T.matrix3(), T.translation()});
+    if (!problem_.twist.empty())
+      shutters_.emplace_back(problem_.rig->camera(k % cameras_), T, problem_.twist[k / cameras_]);
   }
 }
 
@@ -94,9 +97,9 @@ void BundleEquations::for_each_error(const BundleState& state, const Visit& visi
       const Vector3d point_rig = pose.R * point + pose.t;
       for (std::size_t k = structure_.groups[g].first_term; k < structure_.groups[g + 1].first_term; ++k) {
         const BundleStructure::Term& term = structure_.terms[k];
-        const Rigid& T = cam_from_rig(structure_.groups[g].pose, term.camera);
-        const auto error = residual_error(state.rig.models[static_cast<std::size_t>(term.camera)],
-                                          T.R * point_rig + T.t, term.pixel.cast<double>());
+        const auto error =
+            residual_error(state.rig.models[static_cast<std::size_t>(term.camera)],
+                           in_camera(structure_.groups[g].pose, term, point_rig), term.pixel.cast<double>());
         visit(error ? (term.inverse_sigma * *error).squaredNorm() : std::numeric_limits<double>::infinity());
       }
     }
@@ -123,7 +126,7 @@ BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const R
   for (std::size_t k = structure_.groups[group].first_term; k < structure_.groups[group + 1].first_term; ++k) {
     const BundleStructure::Term& term = structure_.terms[k];
     const Rigid& T = cam_from_rig(structure_.groups[group].pose, term.camera);
-    const Vector3d p = T.R * point_rig + T.t;
+    const Vector3d p = in_camera(structure_.groups[group].pose, term, point_rig);
     const auto camera = static_cast<std::size_t>(term.camera);
     const auto r = residual(state_.rig.models[camera], p, term.pixel.cast<double>());
     Vector2d e = Vector2d::Zero();

@@ -81,6 +81,12 @@ class BundleEquations {
   const Rigid& cam_from_rig(int pose, int camera) const {
     return cam_from_rig_[static_cast<std::size_t>(pose) * cameras_ + static_cast<std::size_t>(camera)];
   }
+  // A point in the frame of a camera when the row of a term's pixel was exposed.
+  Vector3d in_camera(int pose, const BundleStructure::Term& term, const Vector3d& point_rig) const {
+    const std::size_t k = static_cast<std::size_t>(pose) * cameras_ + static_cast<std::size_t>(term.camera);
+    const Vector3d p = cam_from_rig_[k].R * point_rig + cam_from_rig_[k].t;
+    return shutters_.empty() ? p : shutters_[k].at_row(p, static_cast<double>(term.pixel.y()));
+  }
   template <class Visit>
   void for_each_error(const BundleState& state, const Visit& visit);
   double cost(const BundleState& state);
@@ -97,6 +103,7 @@ class BundleEquations {
   std::size_t cameras_;
   BundleState state_, trial_;
   std::vector<Rigid> cam_from_rig_;        // (poses, cameras): T_cam_rig motion
+  std::vector<camera::Shutter> shutters_;  // (poses, cameras); empty if none is rolling
   std::vector<Rigid> poses_;               // R_rig_world, t_rig_world; every pose of the problem
   std::vector<PoseBlock> pose_blocks_;     // per slot
   std::vector<PointBlock> point_blocks_;   // per point of the structure

@@ -16,14 +16,22 @@ using geometry::Vector6d;
 struct CameraPose {
   Matrix3d R;  // R_cam_world
   Vector3d t;  // metres
+  const camera::Shutter& shutter;
+
+  // The item's point in the camera frame when the row of its pixel was exposed.
+  Vector3d at_exposure(const PoseProblem::Item& item) const {
+    return shutter.at_row(R * item.point_world + t, item.pixel.y());
+  }
 };
 
-CameraPose camera_pose(const SE3& T_cam_world) { return {T_cam_world.matrix3(), T_cam_world.translation()}; }
+CameraPose camera_pose(const SE3& T_cam_world, const camera::Shutter& shutter) {
+  return {T_cam_world.matrix3(), T_cam_world.translation(), shutter};
+}
 
 // Squared normalised error; infinite if the point does not project.
 template <class Model>
 double squared_error(const Model& model, const CameraPose& pose, const PoseProblem::Item& item) {
-  const auto error = residual_error(model, pose.R * item.point_world + pose.t, item.pixel);
+  const auto error = residual_error(model, pose.at_exposure(item), item.pixel);
   if (!error) return std::numeric_limits<double>::infinity();
   return error->squaredNorm() * item.inverse_sigma * item.inverse_sigma;
 }
@@ -42,7 +50,7 @@ void accumulate_camera(const Model& model, const CameraPose& pose, Items items, 
                        PoseEquations& out) {
   for (auto& item : items) {
     if (!admit.worth_a_look(item)) continue;
-    const Vector3d p = pose.R * item.point_world + pose.t;
+    const Vector3d p = pose.at_exposure(item);
     const auto r = residual(model, p, item.pixel);
     const double information = item.inverse_sigma * item.inverse_sigma;
     const double chi2 = r ? r->error.squaredNorm() * information : std::numeric_limits<double>::infinity();
@@ -97,21 +105,29 @@ PoseProblem::PoseProblem(const Rig& rig, std::span<const PoseObservation> observ
 // T exp(delta) = exp(Ad_T delta) T. With T_cam_rig = T_i0 exp(delay twist), the pose's change moves the camera directly
 // and by the change of the twist, gain * J_l^-1(step) delta, which moves it by J_l(delay twist) times delay. Both left
 // Jacobians J_l(x) of SE(3) are replaced by Ad(exp(x / 2)), which differs in second order (docs/math.md, section 13).
+// The change of the velocity moves the rows of a rolling shutter in opposite directions about the middle one; this is
+// not part of J.
 PoseProblem::CameraMotion PoseProblem::camera_motion(std::size_t i, const SE3& T_rig_world) const {
   const SE3& T_i0 = rig_->cam_from_rig(i);
-  const double delay = motion_ != nullptr ? motion_->delay_s[i] : 0.0;
-  if (delay == 0.0) return {T_i0, T_i0.adjoint()};
+  if (motion_ == nullptr) return {T_i0, T_i0.adjoint(), rig_->shutter(i)};
+  const double delay = motion_->delay_s[i];
+  if (delay == 0.0 && rig_->camera(i).readout_s == 0) return {T_i0, T_i0.adjoint(), {}};
   const geometry::Vector6d step = motion_->step(T_rig_world);
-  const SE3 half = SE3::exp(0.5 * delay * (motion_->gain * step + motion_->offset));
+  const geometry::Vector6d twist = motion_->gain * step + motion_->offset;
+  if (delay == 0.0) return {T_i0, T_i0.adjoint(), {rig_->camera(i), T_i0, twist}};
+  const SE3 half = SE3::exp(0.5 * delay * twist);
   const SE3 T_cam_rig = T_i0 * half * half;
-  return {T_cam_rig, T_cam_rig.adjoint() + delay * motion_->gain * (T_i0 * half * SE3::exp(-0.5 * step)).adjoint()};
+  return {T_cam_rig,
+          T_cam_rig.adjoint() + delay * motion_->gain * (T_i0 * half * SE3::exp(-0.5 * step)).adjoint(),
+          {rig_->camera(i), T_cam_rig, twist}};
 }
 
 int PoseProblem::select(const SE3& T_rig_world, double bound) {
   int changed = 0;
   const AdmitWithinBound admit{bound, changed, num_in_use_};
   for (std::size_t i = 0; i < rig_->size(); ++i) {
-    const CameraPose pose = camera_pose(camera_motion(i, T_rig_world).T_cam_rig * T_rig_world);
+    const CameraMotion motion = camera_motion(i, T_rig_world);
+    const CameraPose pose = camera_pose(motion.T_cam_rig * T_rig_world, motion.shutter);
     std::visit(
         [&](const auto& model) {
           for (Item& item : of_camera(i)) admit(item, squared_error(model, pose, item));
@@ -125,7 +141,7 @@ PoseEquations PoseProblem::linearise(const SE3& T_rig_world, Kernel kernel) cons
   PoseEquations out;
   for (std::size_t i = 0; i < rig_->size(); ++i) {
     const CameraMotion motion = camera_motion(i, T_rig_world);
-    const CameraPose pose = camera_pose(motion.T_cam_rig * T_rig_world);
+    const CameraPose pose = camera_pose(motion.T_cam_rig * T_rig_world, motion.shutter);
     PoseEquations camera;
     std::visit([&](const auto& model) { accumulate_camera(model, pose, of_camera(i), kernel, AdmitInUse{}, camera); },
                rig_->camera(i).model);
@@ -140,7 +156,7 @@ PoseEquations PoseProblem::reselect_and_linearise(const SE3& T_rig_world, Kernel
   const AdmitWithinBound admit{bound, changed, num_in_use_};
   for (std::size_t i = 0; i < rig_->size(); ++i) {
     const CameraMotion motion = camera_motion(i, T_rig_world);
-    const CameraPose pose = camera_pose(motion.T_cam_rig * T_rig_world);
+    const CameraPose pose = camera_pose(motion.T_cam_rig * T_rig_world, motion.shutter);
     PoseEquations camera;
     std::visit([&](const auto& model) { accumulate_camera(model, pose, of_camera(i), kernel, admit, camera); },
                rig_->camera(i).model);
@@ -152,7 +168,8 @@ PoseEquations PoseProblem::reselect_and_linearise(const SE3& T_rig_world, Kernel
 double PoseProblem::truncated_cost(const SE3& T_rig_world, double bound, double limit) const {
   double cost = 0.0;
   for (std::size_t i = 0; i < rig_->size() && cost <= limit; ++i) {
-    const CameraPose pose = camera_pose(camera_motion(i, T_rig_world).T_cam_rig * T_rig_world);
+    const CameraMotion motion = camera_motion(i, T_rig_world);
+    const CameraPose pose = camera_pose(motion.T_cam_rig * T_rig_world, motion.shutter);
     std::visit(
         [&](const auto& model) {
           for (const Item& item : of_camera(i)) {

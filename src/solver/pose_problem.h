@@ -53,6 +53,7 @@ class PoseProblem {
   struct CameraMotion {
     SE3 T_cam_rig;
     geometry::Matrix6d J;
+    camera::Shutter shutter;
   };
   CameraMotion camera_motion(std::size_t i, const SE3& T_rig_world) const;
 

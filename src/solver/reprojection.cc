@@ -7,7 +7,8 @@ std::optional<ReprojectionResidual> ReprojectionResidual::evaluate(const Rig& ri
                                                                    const Vector2d& pixel) {
   const Vector3d point_rig = T_rig_world * point_world;
   const SE3& T_cam_rig = rig.cam_from_rig(i);
-  const auto r = residual(rig.camera(i).model, T_cam_rig * point_rig, pixel);
+  const Vector3d point_cam = rig.shutter(i.index()).at_row(T_cam_rig * point_rig, pixel.y());
+  const auto r = residual(rig.camera(i).model, point_cam, pixel);
   if (!r) return std::nullopt;
   const Matrix23d J_rig = -r->J * T_cam_rig.matrix3();  // de / dP'
   return ReprojectionResidual{r->error, pose_jacobian_transposed(J_rig, point_rig).transpose(),
@@ -16,7 +17,8 @@ std::optional<ReprojectionResidual> ReprojectionResidual::evaluate(const Rig& ri
 
 std::optional<Vector2d> ReprojectionResidual::error_only(const Rig& rig, CameraIndex i, const SE3& T_rig_world,
                                                          const Vector3d& point_world, const Vector2d& pixel) {
-  return residual_error(rig.camera(i).model, rig.cam_from_rig(i) * (T_rig_world * point_world), pixel);
+  const Vector3d point_cam = rig.cam_from_rig(i) * (T_rig_world * point_world);
+  return residual_error(rig.camera(i).model, rig.shutter(i.index()).at_row(point_cam, pixel.y()), pixel);
 }
 
 }  // namespace bslam::solver

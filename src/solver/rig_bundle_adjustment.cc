@@ -133,6 +133,7 @@ double restore_scale(const RigValues& calibrated, ReprojectionProblem& problem, 
   for (SE3& T : state.T_rig_world) T = geometry::scaled(T, factor);
   for (Vector3d& point : state.points) point *= factor;
   for (SE3& T : problem.motion) T = geometry::scaled(T, factor);
+  for (geometry::Vector6d& twist : problem.twist) twist.tail<3>() *= factor;
   return factor;
 }
 
@@ -184,6 +185,7 @@ RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjustmentOption
   problem.T_rig_world = std::move(state.T_rig_world);
   problem.points = std::move(state.points);
   problem.motion = std::move(scaled.motion);
+  problem.twist = std::move(scaled.twist);
   return out;
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/atomic_file.h"
+#include "base/number_text.h"
 #include "storage/map_sections.h"
 
 namespace bslam::storage {
@@ -155,6 +156,9 @@ Status compare_camera(const SavedMap& saved, const camera::Rig& rig, std::size_t
   if (saved_camera.width != camera.width || saved_camera.height != camera.height) {
     return error("resolution", fmt::format("{}x{}", saved_camera.width, saved_camera.height),
                  fmt::format("{}x{}", camera.width, camera.height));
+  }
+  if (saved_camera.readout_s != camera.readout_s) {
+    return error("rolling_shutter_readout_s", format_double(saved_camera.readout_s), format_double(camera.readout_s));
   }
   const camera::Intrinsics &saved_k = camera::intrinsics(saved_camera.model), &k = camera::intrinsics(camera.model);
   if (!near(saved_k, k, camera.width)) {

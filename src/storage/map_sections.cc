@@ -55,8 +55,8 @@ std::optional<camera::RigCamera> take_rig_camera(ByteReader& in) {
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = T_body_cam.matrix();
   d.T_body_cam.assign(rows.data(), rows.data() + rows.size());
   d.time_offset_s = to_seconds(offset_ns);
-  auto camera =
-      camera::make_camera(d, {"", "model", "resolution", "intrinsics", "distortion", "T_body_cam", "time_offset"});
+  auto camera = camera::make_camera(
+      d, {"", "model", "resolution", "intrinsics", "distortion", "T_body_cam", "time_offset", "readout"});
   if (!camera) {
     const Error& error = camera.error();
     in.require(false, error.key + " " + error.found, error.expected);
@@ -65,6 +65,20 @@ std::optional<camera::RigCamera> take_rig_camera(ByteReader& in) {
   camera->T_body_cam = T_body_cam;
   camera->camera.time_offset_ns = offset_ns;
   return *std::move(camera);
+}
+
+std::vector<double> readouts_of(const camera::Rig& rig) {
+  std::vector<double> out;
+  for (std::size_t i = 0; i < rig.size(); ++i) out.push_back(rig.camera(i).readout_s);
+  return out;
+}
+
+// The readout times of rolling shutters, one per camera. They are omitted if all are 0.
+void take_readouts(ByteReader& in, std::vector<camera::RigCamera>& cameras) {
+  for (camera::RigCamera& camera : cameras) {
+    camera.camera.readout_s = in.number<double>();
+    in.require(std::abs(camera.camera.readout_s) <= 1, "an invalid readout time", "at most 1 second");
+  }
 }
 
 bool in_range(std::int32_t id, std::size_t end) { return id >= 0 && static_cast<std::size_t>(id) < end; }
@@ -177,6 +191,9 @@ void put_rig(const camera::Rig& rig, ByteWriter& out) {
     out.number(c.time_offset_ns);
     out.text(c.mask_file);
   }
+  const auto readouts = readouts_of(rig);
+  if (std::ranges::any_of(readouts, [](double readout) { return readout != 0; }))
+    out.numbers(readouts.data(), readouts.size());
 }
 
 std::optional<camera::Rig> take_rig(ByteReader& in) {
@@ -188,6 +205,7 @@ std::optional<camera::Rig> take_rig(ByteReader& in) {
     if (auto camera = take_rig_camera(in)) cameras.push_back(*std::move(camera));
     in.leave();
   }
+  if (in.ok() && in.remaining() > 0) take_readouts(in, cameras);
   if (!in.finish()) return {};
   return camera::Rig(std::move(cameras));
 }

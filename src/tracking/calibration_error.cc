@@ -42,7 +42,9 @@ std::vector<double> calibration_errors(std::span<const double> before, const map
     std::vector<double> squared_errors, variances;
     for (const Match& m : output.matches[c]) {
       const std::size_t k = m.keypoint.index();
-      const auto projected = rig.camera(c).project(T_cam_world * map.landmark(m.landmark).position);
+      const Eigen::Vector3d point_cam = rig.shutter(c).at_row(T_cam_world * map.landmark(m.landmark).position,
+                                                              static_cast<double>(keypoints.pixel[k].y()));
+      const auto projected = rig.camera(c).project(point_cam);
       if (!projected) continue;
       squared_errors.push_back((keypoints.pixel[k].cast<double>() - *projected).squaredNorm());
       const double variance = static_cast<double>(keypoints.sigma[k]) * keypoints.sigma[k];

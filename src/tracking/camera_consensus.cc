@@ -40,7 +40,7 @@ std::vector<LandmarkCounts> count_reobserved(const map::BundledMap& map, const f
     for (const LandmarkId before : states[c].landmarks) {
       const LandmarkId l = map.resolve(before);
       if (!l.valid()) continue;
-      const auto pixel = rig.camera(c).project(T_cam_world * map.landmark(l).position);
+      const auto pixel = camera::project(rig.camera(c), rig.shutter(c), T_cam_world * map.landmark(l).position);
       if (!pixel || !rig.camera(c).contains(*pixel)) continue;
       ++out[c].expected;
       out[c].found += std::binary_search(again.begin(), again.end(), l);

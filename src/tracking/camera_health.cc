@@ -30,7 +30,12 @@ std::uint64_t content(const image::ImageView& image) {
   return hash;
 }
 
-CameraReason exposure(const image::ImageView& image, const HealthOptions& options) {
+struct Exposure {
+  CameraReason reason = CameraReason::kNone;
+  bool shows_something = true;  // some pixels are neither dark nor bright
+};
+
+Exposure exposure(const image::ImageView& image, const HealthOptions& options) {
   int samples = 0, dark = 0, bright = 0;
   for (int y = 0; y < image.height; y += kSampleStep) {
     for (int x = 0; x < image.width; x += kSampleStep, ++samples) {
@@ -38,9 +43,10 @@ CameraReason exposure(const image::ImageView& image, const HealthOptions& option
       bright += image.row(y)[x] >= options.bright_level;
     }
   }
-  if (dark >= options.black_pixel_ratio * samples) return CameraReason::kBlack;
-  if (bright >= options.over_exposed_pixel_ratio * samples) return CameraReason::kOverExposed;
-  return CameraReason::kNone;
+  const bool shows_something = dark + bright < options.black_pixel_ratio * samples;
+  if (dark >= options.black_pixel_ratio * samples) return {CameraReason::kBlack, false};
+  if (bright >= options.over_exposed_pixel_ratio * samples) return {CameraReason::kOverExposed, shows_something};
+  return {};
 }
 
 struct Edges {
@@ -98,12 +104,14 @@ ImageFaults CameraMonitor::examine(const image::ImageBundle& images) {
 std::vector<CameraReason> CameraMonitor::find_outages(const image::ImageBundle& images) {
   BSLAM_ASSERT(images.images.size() == cameras_.size(), "there must be one image entry per camera");
   std::vector<CameraReason> found(cameras_.size(), CameraReason::kNoImages);
-  std::vector<std::uint8_t> same(cameras_.size(), 0);
+  std::vector<std::uint8_t> same(cameras_.size(), 0), shows_something(cameras_.size(), 0);
   bool any_changed = false;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const image::CameraImage& input = images.images[c];
     if (input.state != image::ImageState::kPresent) continue;
-    found[c] = exposure(input.view(), options_);
+    const Exposure exposed = exposure(input.view(), options_);
+    found[c] = exposed.reason;
+    shows_something[c] = exposed.shows_something;
     const std::uint64_t now = content(input.view());
     same[c] = cameras_[c].last == now;
     any_changed |= cameras_[c].last && !same[c];
@@ -124,12 +132,23 @@ std::vector<CameraReason> CameraMonitor::find_outages(const image::ImageBundle& 
       camera.outage = CameraReason::kNone;
     }
   }
-  if (std::ranges::find(found, CameraReason::kNone) != found.end()) return found;
-  for (std::size_t c = 0; c < cameras_.size(); ++c) {  // no camera is used: admit those with a good image
+  admit_if_none_is_left(shows_something, found);
+  return found;
+}
+
+void CameraMonitor::admit_if_none_is_left(const std::vector<std::uint8_t>& shows_something,
+                                          std::vector<CameraReason>& found) {
+  const auto any_used = [&] { return std::ranges::find(found, CameraReason::kNone) != found.end(); };
+  if (any_used()) return;
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (found[c] == CameraReason::kNoImages || cameras_[c].good == 0) continue;
     found[c] = cameras_[c].outage = CameraReason::kNone;
   }
-  return found;
+  if (any_used()) return;
+  // A large white object may cover the view. What remains of it is better than nothing.
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if (found[c] == CameraReason::kOverExposed && shows_something[c]) found[c] = CameraReason::kNone;
+  }
 }
 
 std::vector<std::uint8_t> CameraMonitor::blurred(const image::ImageBundle& images) {

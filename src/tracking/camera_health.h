@@ -58,7 +58,8 @@ class CameraMonitor {
   // Per camera, why it is not used in the next frame. An image is frozen if it is identical to the previous image of
   // its camera while the image of another camera has changed; frozen images are thus not detected with a single camera
   // or if all images are identical. A camera without an image is not used in that frame, and used again with its next
-  // image. If all other cameras are out as well, a camera with a good image is used immediately.
+  // image. If all other cameras are out as well, a camera with a good image is used immediately; if there is none,
+  // those are used whose image is over-exposed in part.
   std::vector<CameraReason> find_outages(const image::ImageBundle& images);
   // Per camera: whether it is out of focus or smeared, determined from the slope of the edges in its image. Rows and
   // columns are searched, so that motion blur in one direction is not detected as blur. A blurred camera is still
@@ -67,6 +68,8 @@ class CameraMonitor {
   std::vector<std::uint8_t> blurred(const image::ImageBundle& images);
 
  private:
+  void admit_if_none_is_left(const std::vector<std::uint8_t>& shows_something, std::vector<CameraReason>& found);
+
   struct Camera {
     std::optional<std::uint64_t> last;          // hash of its last image
     CameraReason outage = CameraReason::kNone;  // reason of its last outage, until it is used again

@@ -45,7 +45,8 @@ class SearchByProjection : public ::testing::Test {
     frame.grid = frame::FeatureGrid(frame.keypoints, camera.width, camera.height);
   }
   ProjectionSearchResult search(const ProjectionSearchOptions& options = {}) const {
-    return search_by_projection(camera, frame, T_cam_common, points, exclusions, options);
+    return search_by_projection(camera::Rig({{camera, {}}}), CameraIndex(0), frame, T_cam_common, points, exclusions,
+                                options);
   }
 
   camera::Camera camera{"pinhole", camera::Pinhole({400, 400, 319.5, 239.5}), 640, 480, 0, ""};

@@ -42,6 +42,7 @@ void expect_equal(const camera::Rig& a, const camera::Rig& b) {
     EXPECT_EQ((std::array{ca.width, ca.height}), (std::array{cb.width, cb.height}));
     EXPECT_EQ(ca.time_offset_ns, cb.time_offset_ns);
     EXPECT_EQ(ca.mask_file, cb.mask_file);
+    EXPECT_EQ(ca.readout_s, cb.readout_s);
     EXPECT_EQ(a.body_from_cam(i).translation(), b.body_from_cam(i).translation());
     EXPECT_LT((a.body_from_cam(i).matrix() - b.body_from_cam(i).matrix()).cwiseAbs().maxCoeff(), 2e-14);
   }
@@ -85,6 +86,19 @@ TEST_F(OwnRigFile, IsRead) {
   EXPECT_EQ(camera.time_offset_ns, -1'500'000);
   EXPECT_EQ(camera.mask_file, (folder_.path() / "masks" / "left.png").string());
   EXPECT_LT((rig->body_from_cam(0) * geometry::Vector3d(1, 0, 0) - geometry::Vector3d(0.5, 0.75, 0.125)).norm(), 1e-12);
+}
+
+TEST_F(OwnRigFile, KeepsRollingShutters) {
+  const auto rig = read_with("time_offset_s: -0.0015\n", "rolling_shutter_readout_s: 0.0185\n");
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(rig->camera(std::size_t{0}).readout_s, 0.0185);
+  const auto again = read(rig_to_yaml(*rig));
+  ASSERT_TRUE(again) << again.error().message();
+  expect_equal(*rig, *again);
+  EXPECT_EQ(without(*rig, Droppable::kRollingShutters).camera(std::size_t{0}).readout_s, 0);
+  const auto wrong = read_with("time_offset_s: -0.0015\n", "rolling_shutter_readout_s: 20\n");
+  ASSERT_FALSE(wrong);
+  EXPECT_EQ(wrong.error().key, "cameras[0].rolling_shutter_readout_s");
 }
 
 TEST_F(OwnRigFile, MayOmitKeysWithDefaults) {

@@ -66,6 +66,23 @@ TEST(PoseWithMotion, EqualsTheOrdinaryPoseForSimultaneousImages) {
   EXPECT_EQ(a.T_rig_world.matrix(), b.T_rig_world.matrix());
 }
 
+// A pose whose observations follow the rows of rolling shutters.
+TEST(PoseWithMotion, EqualsTheTruthForRollingShutters) {
+  const Rig rig = scene::with_readout(scene::make_rig(4, scene::Models::kMixed), 0.02);
+  Random random(5, "rolling");
+  for (int trial = 0; trial < 10; ++trial) {
+    const MotionScene s = make_motion_scene(rig, 0.013, 0.0, random);
+    const SE3 initial = s.seen.T_rig_world.perturbed(scene::random_twist(random, 0.01, 0.03));
+    const PoseSolution solution = solve_pose(rig, s.seen.observations, initial, s.motion, {});
+    ASSERT_TRUE(solution.ok) << trial;
+    EXPECT_LT(scene::centre_error(solution.T_rig_world, s.seen.T_rig_world), 1e-4) << trial;
+    EXPECT_LT(scene::rotation_error(solution.T_rig_world, s.seen.T_rig_world), 1e-5) << trial;
+    const Rig moving = rig.moving(s.motion.delay_s, s.motion.twist(s.seen.T_rig_world));
+    const PoseSolution known = solve_pose(moving, s.seen.observations, initial, {});
+    EXPECT_LT(scene::centre_error(known.T_rig_world, s.seen.T_rig_world), 1e-5) << trial;
+  }
+}
+
 // b is minus the gradient of the cost; to second order in delay times twist.
 TEST(PoseWithMotion, AgreesWithTheGradientOfItsCost) {
   const Rig rig = scene::make_rig(4, scene::Models::kMixed);

@@ -46,6 +46,16 @@ inline Rig make_rig(std::size_t cameras, Models models) {
   return Rig(std::move(out));
 }
 
+// The rig with rolling shutters of all cameras.
+inline Rig with_readout(const Rig& rig, double readout_s) {
+  std::vector<camera::RigCamera> out;
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    out.push_back({rig.camera(i), rig.body_from_cam(i)});
+    out.back().camera.readout_s = readout_s;
+  }
+  return Rig(std::move(out));
+}
+
 // The components of random vectors are drawn by separate statements, because compilers differ in the order in which
 // they evaluate the arguments of a function, and the test data must not depend on the compiler.
 inline Vector3d random_direction(Random& random) {
@@ -64,7 +74,7 @@ inline Vector6d random_twist(Random& random, double angle, double distance) {
 
 // Pixel of the point, or nullopt if it is outside the image.
 inline std::optional<Vector2d> see(const Rig& rig, std::size_t i, const SE3& T_rig_world, const Vector3d& point_world) {
-  const auto pixel = rig.camera(i).project(rig.cam_from_rig(i) * (T_rig_world * point_world));
+  const auto pixel = camera::project(rig.camera(i), rig.shutter(i), rig.cam_from_rig(i) * (T_rig_world * point_world));
   if (!pixel || !rig.camera(i).contains(*pixel)) return std::nullopt;
   return pixel;
 }

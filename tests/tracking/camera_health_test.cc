@@ -51,6 +51,23 @@ TEST(CameraMonitor, DistinguishesBlackOverExposedAndMissingImages) {
             (Outages{CameraReason::kBlack, CameraReason::kOverExposed, CameraReason::kNoImages}));
 }
 
+// A large white object covers the view of both cameras.
+TEST(CameraMonitor, UsesWhatRemainsOfOverExposedImagesIfThereIsNothingBetter) {
+  const auto covered = [](std::uint64_t seed) {
+    image::Image image = textured_image(seed, 251, 255);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < 30; ++x) image.row(y)[x] = good(seed + 100).row(y)[x];
+    }
+    return image;
+  };
+  CameraMonitor monitor(2, {});
+  EXPECT_EQ(monitor.find_outages(frame({covered(1), covered(2)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  EXPECT_EQ(monitor.find_outages(frame({covered(3), good(4)})),
+            (Outages{CameraReason::kOverExposed, CameraReason::kNone}));
+  EXPECT_EQ(monitor.find_outages(frame({textured_image(5, 251, 255), textured_image(6, 251, 255)})),
+            (Outages{CameraReason::kOverExposed, CameraReason::kOverExposed}));
+}
+
 TEST(CameraMonitor, ANightSceneWithLampsIsNotBlack) {
   image::Image night = textured_image(1, 0, 10);
   for (int y = 0; y < kHeight; ++y) {

@@ -1,0 +1,92 @@
+#include "tracking/robust_pose.h"
+
+#include <gtest/gtest.h>
+
+#include "tracking/simulated_tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+// A frame in which landmarks observed by one keyframe only have moved since, and outnumber all others.
+class RobustPose : public ::testing::Test {
+ protected:
+  RobustPose() {
+    ThreadPool pool(2);
+    const std::vector<LandmarkId> all = world.map.landmark_ids();
+    FrameMatches found = find_landmarks(world.map, seen.frame, truth, all, {}, {.radius = 0.02}, pool).found;
+    std::size_t moving = 0, at_rest = 0;
+    for (const auto& camera : found) {
+      for (const Match& m : camera) moving += few_observations(m);
+    }
+    matches.resize(found.size());
+    for (std::size_t c = 0; c < found.size(); ++c) {
+      for (const Match& m : found[c]) {
+        if (few_observations(m) || at_rest++ < 2 * moving / 3) matches[c].push_back(m);
+      }
+    }
+    observations = pose_observations(world.map, seen.frame, matches, {.sigma_px = 0.7, .pyramid = {}});
+  }
+
+  bool few_observations(const Match& m) const { return world.map.observations(m.landmark).size() == 1; }
+
+  // Moves the pixels of the moving landmarks.
+  void move(const Eigen::Vector3d& distance) {
+    std::size_t i = 0;
+    for (const auto& camera : matches) {
+      for (const Match& m : camera) {
+        solver::PoseObservation& o = observations[i++];
+        if (!few_observations(m)) continue;
+        const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
+        const auto& model = world.map.rig().camera(o.camera);
+        const auto before = model.project(T_cam_world * o.point_world),
+                   now = model.project(T_cam_world * (o.point_world + distance));
+        if (before && now) o.pixel += *now - *before;
+      }
+    }
+  }
+
+  double error(const solver::PoseSolution& solution) const {
+    return (solution.T_rig_world.inverse().translation() - truth.inverse().translation()).norm();
+  }
+
+  map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 1.0, 0.5);
+  synthetic::SimulatedFrame seen = world.sim.frame(FrameId(1), 0.1);
+  geometry::SE3 truth = seen.T_world_rig.inverse();
+  FrameMatches matches;
+  std::vector<solver::PoseObservation> observations;
+  solver::MotionModel motion{.delay_s = {0, 0, 0, 0}, .T_before = truth, .gain = 0.0};
+};
+
+TEST_F(RobustPose, FollowsLandmarksThatManyKeyframesObserve) {
+  move({0.2, 0.05, -0.1});
+  const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 1e-3, 0, 0.002, 0, 0.001).finished());
+  EXPECT_GT(error(solver::solve_pose(world.map.rig(), observations, predicted, motion, {})), 0.05);
+  const auto solution = robust_pose(world.map, matches, observations, predicted, motion, {});
+  ASSERT_TRUE(solution.ok);
+  EXPECT_LT(error(solution), 0.005);
+}
+
+TEST_F(RobustPose, FollowsTheMajorityIfThePredictionIsWrong) {
+  const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0.01, 0.02, 0, 0.1, 0.05, 0).finished());
+  const auto solution = robust_pose(world.map, matches, observations, predicted, motion, {});
+  ASSERT_TRUE(solution.ok);
+  EXPECT_LT(error(solution), 0.005);
+}
+
+TEST_F(RobustPose, CountsAtMostThreeKeyframesPerLandmark) {
+  std::vector<std::uint8_t> inlier(count(matches), 0);
+  EXPECT_EQ(support(world.map, matches, inlier), 0);
+  std::size_t i = 0;
+  int sum = 0;
+  for (const auto& camera : matches) {
+    for (const Match& m : camera) {
+      if (i++ % 2 != 0) continue;
+      inlier[i - 1] = 1;
+      sum += static_cast<int>(std::min<std::size_t>(3, world.map.observations(m.landmark).size()));
+    }
+  }
+  EXPECT_EQ(support(world.map, matches, inlier), sum);
+}
+
+}  // namespace
+}  // namespace bslam::tracking
