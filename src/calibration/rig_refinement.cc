@@ -17,12 +17,19 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kMillimetres = 1000.0;
+constexpr double kMillimetres = 1000.0, kMilliseconds = 1000.0;
 constexpr std::size_t kSegment = 10;  // consecutive keyframes chosen together, so that they share landmarks
 // maximum number of passes; each searches again for observations that the previous extrinsics rejected
 constexpr int kPasses = 4;
 constexpr int kQuickKeyframes = 40, kQuickLandmarks = 1000;  // enough for a verdict
 constexpr int kMinShared = 15;  // minimum number of shared landmarks for one keyframe to constrain another
+
+// The options for an estimate from a fraction of the map.
+CalibrationOptions quick(CalibrationOptions options) {
+  options.keyframes = std::min(options.keyframes, kQuickKeyframes);
+  options.landmarks = std::min(options.landmarks, kQuickLandmarks);
+  return options;
+}
 
 // Returns all keyframes, or evenly spaced segments of consecutive ones if there are more than `limit`; in order of id.
 std::vector<KeyframeId> choose_keyframes(const map::BundledMap& map, std::size_t limit) {
@@ -143,6 +150,8 @@ RigProblem choose(const map::BundledMap& map, const CalibrationOptions& options,
     (out.group[i] == i ? selection.fixed_keyframes : selection.free_keyframes).push_back(keyframes[i]);
   }
   out.flat = adjustment::build_problem(map, selection, features);
+  out.flat.problem.twist.clear();
+  for (const KeyframeId k : out.flat.keyframes) out.flat.problem.twist.push_back(map.keyframe(k).twist);
   return out;
 }
 
@@ -262,6 +271,68 @@ solver::RigAdjustmentOptions prior_of(const camera::Rig& rig, const CalibrationO
   return out;
 }
 
+// `rig` with the time offsets of the capture times of a map.
+camera::Rig with_time_offsets_of(const camera::Rig& of_map, const camera::Rig& rig) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+    cameras.back().camera.time_offset_ns = of_map.camera(c).time_offset_ns;
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+// The prior of all times, which refer to the capture times of the map.
+std::vector<solver::TimingPrior> timing_prior(const camera::Rig& of_map, const camera::Rig& calibrated,
+                                              const CalibrationOptions& options) {
+  std::vector<solver::TimingPrior> out;
+  for (std::size_t c = 0; c < calibrated.size(); ++c) {
+    const camera::Camera& camera = calibrated.camera(c);
+    const double shift_s = to_seconds(camera.time_offset_ns - of_map.camera(c).time_offset_ns);
+    out.push_back({{shift_s, camera.readout_s},
+                   c == 0 ? 0.0 : options.sigma_time_offset_ms / kMilliseconds,
+                   options.sigma_readout_ms / kMilliseconds});
+  }
+  return out;
+}
+
+// Whether a time changed by more than its uncertainty and than what matters.
+bool significant(double change_s, double sigma_s, const CalibrationOptions& options) {
+  return std::abs(change_s) > std::max(options.suspect_sigmas * sigma_s, options.suspect_ms / kMilliseconds);
+}
+
+// Estimates all times from a fraction of the map, and returns the prior of those that the images contradict; empty if
+// there are none. All others are constant.
+std::vector<solver::TimingPrior> contradicted_timing(const map::BundledMap& map, const camera::Rig& reference,
+                                                     std::vector<solver::TimingPrior> timing,
+                                                     const CalibrationOptions& options,
+                                                     const feature::FeatureModel& features,
+                                                     const std::stop_token& stop) {
+  RigProblem problem = choose(map, quick(options), features);
+  problem.flat.problem.rig = &reference;
+  separate_groups(problem);
+  solver::RigAdjustmentOptions with_timing = prior_of(reference, options);
+  with_timing.timing = timing;
+  const auto adjusted = solver::adjust_rig(problem.flat.problem, with_timing, solver::RigValues::of(map.rig()), stop);
+  if (!adjusted.done) return {};
+  bool any = false;
+  for (std::size_t c = 0; c < timing.size(); ++c) {
+    const solver::CameraEstimate& estimate = adjusted.cameras[c];
+    if (!significant(estimate.timing_change.shift_s, estimate.timing_sigma.shift_s, options)) timing[c].sigma_shift = 0;
+    if (!significant(estimate.timing_change.readout_s, estimate.timing_sigma.readout_s, options))
+      timing[c].sigma_readout = 0;
+    any |= timing[c].sigma_shift > 0 || timing[c].sigma_readout > 0;
+  }
+  return any ? timing : std::vector<solver::TimingPrior>{};
+}
+
+void evaluate_timing(const solver::CameraEstimate& estimate, CameraRefinement& out) {
+  const auto in_ms = [](double change_s, double sigma_s) {
+    return TimeRefinement{kMilliseconds * change_s, kMilliseconds * sigma_s, sigma_s > 0};
+  };
+  out.time_offset = in_ms(estimate.timing_change.shift_s, estimate.timing_sigma.shift_s);
+  out.readout = in_ms(estimate.timing_change.readout_s, estimate.timing_sigma.readout_s);
+}
+
 map::SetPoses poses_of(const adjustment::BundleProblem& flat) {
   map::SetPoses out;
   for (std::size_t i = 0; i < flat.keyframes.size(); ++i) {
@@ -292,11 +363,15 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
   RigRefinement out;
   // Without metric scale, calibration errors in millimetres have no meaning in the map.
   if (map.rig().size() < 2 || map.num_keyframes() == 0 || map.scale() != map::Scale::kMetric) return out;
+  const camera::Rig reference = with_time_offsets_of(map.rig(), calibrated);
+  solver::RigAdjustmentOptions prior = prior_of(calibrated, options);
+  prior.timing =
+      contradicted_timing(map, reference, timing_prior(map.rig(), calibrated, options), options, features, stop);
   RigProblem problem = choose(map, options, features);
-  problem.flat.problem.rig = &calibrated;
+  problem.flat.problem.rig = &reference;
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();
-  const solver::RigAdjustment adjusted = adjust_in_passes(map, features, prior_of(calibrated, options), problem, stop);
+  const solver::RigAdjustment adjusted = adjust_in_passes(map, features, prior, problem, stop);
   if (!adjusted.done) return out;
   out.done = true;
   for (std::size_t c = 0; c < map.rig().size(); ++c) {
@@ -305,11 +380,12 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
     camera.observations = adjusted.cameras[c].observations;
     camera.intrinsics = evaluate_intrinsics(adjusted.cameras[c], calibrated.camera(c).model);
     if (c > 0) evaluate_extrinsics(adjusted.cameras[c], options, camera);
+    evaluate_timing(adjusted.cameras[c], camera);
   }
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
   out.scale_change = adjusted.scale_change;
-  out.rig = adjusted.values.applied_to(calibrated);
+  out.rig = adjusted.values.applied_to(reference);
   out.poses = poses_of(problem.flat);
   return out;
 }
@@ -324,10 +400,7 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
                                                 const feature::FeatureModel& features, const std::stop_token& stop) {
   if (options.refine == Refine::kFalse) return std::nullopt;
   if (options.refine == Refine::kAuto) {
-    CalibrationOptions quick = options;
-    quick.keyframes = std::min(options.keyframes, kQuickKeyframes);
-    quick.landmarks = std::min(options.landmarks, kQuickLandmarks);
-    if (!accepted(refine_rig(map, calibrated, quick, features, stop), options)) return std::nullopt;
+    if (!accepted(refine_rig(map, calibrated, quick(options), features, stop), options)) return std::nullopt;
   }
   RigRefinement out = refine_rig(map, calibrated, options, features, stop);
   return accepted(out, options) ? std::optional(std::move(out)) : std::nullopt;

@@ -35,6 +35,9 @@ struct CalibrationOptions {
   double sigma_rotation_deg = 2.0, sigma_translation_mm = 30.0;
   double sigma_scale_percent = 0.1;  // of the common scale of all baselines, which images do not reveal
   double sigma_focal_percent = 1.0, sigma_aspect_percent = 0.1, sigma_centre_percent = 0.5;
+  // Of time offsets and of the readout times of rolling shutters. They are constant unless the images contradict them
+  // by more than `suspect_ms`.
+  double sigma_time_offset_ms = 5.0, sigma_readout_ms = 10.0;
   // Number of observations with the information of one: errors of a landmark in successive images are similar.
   double correlated_observations = 10;
   // The images contradict the calibration if it increases their mean squared error by more than this fraction.
@@ -44,6 +47,7 @@ struct CalibrationOptions {
   // wrong timestamps: a camera with a time offset of 1 ms appears displaced by 10 mm at 10 m/s and rotated by 0.1
   // degrees at 100 degrees/s.
   double suspect_sigmas = 5.0, suspect_deg = 0.3, suspect_mm = 10.0;
+  double suspect_ms = 0.5;  // the same for time offsets and readout times
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -71,6 +75,10 @@ struct CalibrationOptions {
             "standard deviation of the ratio of calibrated focal lengths, fx / fy");
     visitor("sigma_centre_percent", self.sigma_centre_percent, Range{1e-3, 50}, "%",
             "standard deviation of calibrated principal points, per axis, in percent of the image width");
+    visitor("sigma_time_offset_ms", self.sigma_time_offset_ms, Range{1e-6, 1e3}, "ms",
+            "standard deviation of calibrated time offsets");
+    visitor("sigma_readout_ms", self.sigma_readout_ms, Range{1e-6, 1e3}, "ms",
+            "standard deviation of calibrated readout times of rolling shutters");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
             "number of observations with the information of one independent observation");
     visitor(
@@ -83,6 +91,8 @@ struct CalibrationOptions {
             OptionNote{.formerly = "extrinsics.suspect_deg"});
     visitor("suspect_mm", self.suspect_mm, Range{0, 1e5}, "mm", "or moved by more than this",
             OptionNote{.formerly = "extrinsics.suspect_mm"});
+    visitor("suspect_ms", self.suspect_ms, Range{0, 1e3}, "ms",
+            "time offsets and readout times are estimated if they changed by more than this");
   }
 };
 
@@ -91,6 +101,12 @@ struct ParameterRefinement {
   std::string name;
   double change = 0, std = 0;
   bool observed = false;
+};
+
+// A time of a camera that was estimated.
+struct TimeRefinement {
+  double change_ms = 0, std_ms = 0;
+  bool refined = false;  // false: it is constant
 };
 
 // The result for one camera. Camera 0 defines the rig frame and does not move.
@@ -102,7 +118,8 @@ struct CameraRefinement {
   // constrain it.
   std::array<bool, 6> observed = {};
   std::vector<ParameterRefinement> intrinsics;
-  int observations = 0;  // number of keypoints
+  TimeRefinement time_offset, readout;  // the time offset of camera 0 is constant
+  int observations = 0;                 // number of keypoints
   bool suspect = false;
 
   bool rotation_observed() const { return observed[0] && observed[1] && observed[2]; }

@@ -5,12 +5,18 @@
 namespace bslam::camera {
 
 Shutter::Shutter(const Camera& camera, const geometry::SE3& T_cam_rig, const geometry::Vector6d& twist) {
-  if (camera.readout_s == 0 || twist.isZero(0)) return;
+  if (camera.readout_s != 0) *this = Shutter(camera, {0, camera.readout_s}, T_cam_rig, twist);
+}
+
+Shutter::Shutter(const Camera& camera, const CameraTiming& timing, const geometry::SE3& T_cam_rig,
+                 const geometry::Vector6d& twist) {
+  if (twist.isZero(0)) return;
   const geometry::Vector6d in_camera = T_cam_rig.adjoint() * twist;
   angular = in_camera.head<3>();
   linear = in_camera.tail<3>();
   const double last_row_px = std::max(1, camera.height - 1);
-  seconds_per_px = camera.readout_s / last_row_px;
+  shift_s = timing.shift_s;
+  seconds_per_px = timing.readout_s / last_row_px;
   middle_row_px = 0.5 * last_row_px;
 }
 

@@ -36,6 +36,20 @@ void warn_of_extrinsics(const session::CameraRecord& camera) {
              e->refined ? "" : "; use the estimate with --set calibration.refine=true");
 }
 
+// Warns if the images contradict the times of a camera.
+void warn_of_timing(const std::string& name, const calibration::CameraRefinement& camera) {
+  if (camera.time_offset.refined) {
+    fmt::print(stderr, "warning: {}: its images show the scene {:.2f} ms {} than its time stamps say (time_offset_s)\n",
+               name, std::abs(camera.time_offset.change_ms), camera.time_offset.change_ms > 0 ? "later" : "earlier");
+  }
+  if (camera.readout.refined) {
+    fmt::print(stderr,
+               "warning: {}: its images show a rolling shutter whose readout differs from the calibration by {:.2f} ms "
+               "(rolling_shutter_readout_s)\n",
+               name, camera.readout.change_ms);
+  }
+}
+
 void warn_of_calibration(const session::CalibrationRecord& calibration) {
   if (calibration.estimate.verdict != calibration::Verdict::kInconsistent) return;
   fmt::print(stderr,
@@ -113,6 +127,9 @@ void print_warnings(const session::RunRecord& record, const camera::Rig& rig, co
     warn_of_extrinsics(camera);
     warn_of_disagreement(record, c, check_command);
   }
+  const auto& estimates = record.calibration.estimate.cameras;
+  for (std::size_t c = 0; c < std::min(estimates.size(), record.cameras.size()); ++c)
+    warn_of_timing(record.cameras[c].name, estimates[c]);
   warn_of_calibration(record.calibration);
   const auto dropped = count(record, session::FrameOutcome::kDropped);
   if (dropped > 0) fmt::print(stderr, "warning: {} frames dropped: processing is slower than real time\n", dropped);

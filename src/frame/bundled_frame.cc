@@ -22,8 +22,16 @@ CameraFrame refined(CameraFrame camera_frame, feature::Refinement&& refinement, 
   return camera_frame;
 }
 
-BundledFrame with_bearings_of(BundledFrame frame, const camera::Rig& rig) {
+bool changes_frames(const camera::Rig& before, const camera::Rig& rig) {
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    if (before.camera(c).time_offset_ns != rig.camera(c).time_offset_ns) return true;
+  }
+  return !rig.same_intrinsics(before);
+}
+
+BundledFrame recalibrated(BundledFrame frame, const camera::Rig& before, const camera::Rig& rig) {
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    frame.cameras[c].time_ns += rig.camera(c).time_offset_ns - before.camera(c).time_offset_ns;
     feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     feature::Refinement positions = keypoints.positions();
     for (std::size_t k = 0; k < keypoints.size(); ++k) {

@@ -41,9 +41,11 @@ struct BundledFrame {
 // A camera's data with its keypoints at refined positions, and their grid.
 CameraFrame refined(CameraFrame camera_frame, feature::Refinement&& refinement, const camera::Camera& camera);
 
-// The frame with the bearings of its keypoints according to the intrinsics of `rig`. Keypoints that their camera does
-// not unproject keep their bearing.
-BundledFrame with_bearings_of(BundledFrame frame, const camera::Rig& rig);
+// The frame after a change of the calibration `before` to `rig`: with the bearings of its keypoints and the capture
+// times of its images. Keypoints that their camera does not unproject keep their bearing.
+BundledFrame recalibrated(BundledFrame frame, const camera::Rig& before, const camera::Rig& rig);
+// Whether such a change changes frames.
+bool changes_frames(const camera::Rig& before, const camera::Rig& rig);
 
 // BundledFrame::delay_s per camera.
 std::vector<double> delays_of(const BundledFrame& frame);

@@ -119,13 +119,14 @@ camera::Shutter BundledMap::shutter(KeyframeId k, CameraIndex c) const {
 std::vector<BundledMap::ReplacedFrame> BundledMap::set_rig(std::shared_ptr<const camera::Rig> rig,
                                                            std::span<const ReplacedFrame> known) {
   std::vector<ReplacedFrame> out;
-  const bool other_bearings = !rig->same_intrinsics(*rig_);
-  rig_ = std::move(rig);
-  if (!other_bearings) return out;
+  const std::shared_ptr<const camera::Rig> before = std::exchange(rig_, std::move(rig));
+  if (!frame::changes_frames(*before, *rig_)) return out;
   std::map<KeyframeId, std::shared_ptr<const frame::BundledFrame>> frames(known.begin(), known.end());
   for (const KeyframeId k : keyframe_ids()) {
     std::shared_ptr<const frame::BundledFrame>& frame = frames[k];
-    if (!frame) frame = std::make_shared<const frame::BundledFrame>(frame::with_bearings_of(*keyframe(k).frame, *rig_));
+    if (!frame) {
+      frame = std::make_shared<const frame::BundledFrame>(frame::recalibrated(*keyframe(k).frame, *before, *rig_));
+    }
     keyframes_.mutate(k.index(), owner_.tag()).frame = frame;
     out.emplace_back(k, frame);
   }

@@ -121,8 +121,8 @@ bool Rebase::operator()(const AddKeyframe& op) {
   const SE3 T_rig_world = motion ? motion->pose(op.T_rig_world) : op.T_rig_world;
   const KeyframeId parent = map_.nearest_alive_ancestor(map_id(op.parent));
   auto frame = op.frame;
-  if (!map_.rig().same_intrinsics(base_.rig()))
-    frame = std::make_shared<const frame::BundledFrame>(frame::with_bearings_of(*frame, map_.rig()));
+  if (frame::changes_frames(base_.rig(), map_.rig()))
+    frame = std::make_shared<const frame::BundledFrame>(frame::recalibrated(*frame, base_.rig(), map_.rig()));
   const KeyframeId added = map_.add_keyframe(std::move(frame), T_rig_world, usable_matches(map_, matches), parent);
   if (motion) map_.set_twist(added, apply_scale_change(op.frame->twist, motion->scale_change));
   report_.keyframes.push_back(added);

@@ -84,7 +84,11 @@ ordered_json calibrated_camera_json(const std::string& name, const calibration::
           {"rotation_deg", rounded(camera.change_deg, 4)},
           {"rotation_std_deg", known(camera.std_deg, camera.rotation_observed())},
           {"translation_mm", rounded(camera.change_mm, 3)},
-          {"translation_std_mm", known(camera.std_mm, camera.translation_observed())}};
+          {"translation_std_mm", known(camera.std_mm, camera.translation_observed())},
+          {"time_offset_ms", rounded(camera.time_offset.change_ms, 4)},
+          {"time_offset_std_ms", known(camera.time_offset.std_ms, camera.time_offset.refined)},
+          {"readout_ms", rounded(camera.readout.change_ms, 4)},
+          {"readout_std_ms", known(camera.readout.std_ms, camera.readout.refined)}};
 }
 
 ordered_json calibration_json(const RunRecord& record) {

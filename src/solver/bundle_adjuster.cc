@@ -52,7 +52,7 @@ std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span
       const SE3 T_cam_rig = problem.motion.empty()
                                 ? rig.T_cam_rig[camera]
                                 : rig.T_cam_rig[camera] * problem.motion[pose * problem.rig->size() + camera];
-      const camera::Shutter shutter(problem.rig->camera(camera), T_cam_rig, problem.twist[pose]);
+      const camera::Shutter shutter(problem.rig->camera(camera), rig.timing[camera], T_cam_rig, problem.twist[pose]);
       point_cam = shutter.at_row(point_cam, static_cast<double>(o.pixel.y()));
     }
     const auto error = residual_error(rig.models[camera], point_cam, o.pixel.cast<double>());

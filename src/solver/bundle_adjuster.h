@@ -27,7 +27,7 @@ struct ReprojectionProblem {
   // T_cam_world = T_cam_rig motion T_rig_world. Constant; empty if all cameras have the same capture time.
   std::vector<SE3> motion;
   // Per pose: the velocity of the rig while its images were captured, rad/s and m/s, as in Rig::moving. Constant; empty
-  // if no camera has a rolling shutter.
+  // if it is not needed: all shutters are global, and their timing is constant.
   std::vector<geometry::Vector6d> twist;
   std::vector<std::uint8_t> pose_free;    // per pose
   std::vector<Vector3d> points;           // metres, world; all free

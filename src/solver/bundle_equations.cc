@@ -82,7 +82,8 @@ void BundleEquations::set_poses(const BundleState& state) {
     const SE3 T = problem_.motion.empty() ? T_cam_rig : T_cam_rig * problem_.motion[k];
     cam_from_rig_.push_back({T.matrix3(), T.translation()});
     if (!problem_.twist.empty())
-      shutters_.emplace_back(problem_.rig->camera(k % cameras_), T, problem_.twist[k / cameras_]);
+      shutters_.emplace_back(problem_.rig->camera(k % cameras_), state.rig.timing[k % cameras_], T,
+                             problem_.twist[k / cameras_]);
   }
 }
 
@@ -143,7 +144,9 @@ BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const R
     const Matrix23d wA = weight * A;
     out.M.noalias() += A.transpose() * wA;
     out.m.noalias() += wA.transpose() * e;
-    if (rig_.size() > 0) rig_.add({term.camera, state_.rig, p, J, term.inverse_sigma}, A, e, weight, point);
+    if (rig_.size() == 0) continue;
+    const RowMotion row = row_motion(structure_.groups[group].pose, term, p);
+    rig_.add({term.camera, state_.rig, p, J, row.velocity, row.relative_row, term.inverse_sigma}, A, e, weight, point);
   }
   return out;
 }

@@ -87,6 +87,17 @@ class BundleEquations {
     const Vector3d p = cam_from_rig_[k].R * point_rig + cam_from_rig_[k].t;
     return shutters_.empty() ? p : shutters_[k].at_row(p, static_cast<double>(term.pixel.y()));
   }
+  // The velocity of a point in the frame of a camera, and the row of its pixel; zero if the velocity is not known.
+  struct RowMotion {
+    Vector3d velocity = Vector3d::Zero();
+    double relative_row = 0.0;
+  };
+  RowMotion row_motion(int pose, const BundleStructure::Term& term, const Vector3d& point_cam) const {
+    if (shutters_.empty()) return {};
+    const auto camera = static_cast<std::size_t>(term.camera);
+    const camera::Shutter& shutter = shutters_[static_cast<std::size_t>(pose) * cameras_ + camera];
+    return {shutter.velocity_of(point_cam), problem_.rig->camera(camera).relative_row(term.pixel.y())};
+  }
   template <class Visit>
   void for_each_error(const BundleState& state, const Visit& visit);
   double cost(const BundleState& state);

@@ -28,6 +28,7 @@ RigValues RigValues::of(const Rig& rig) {
   for (std::size_t i = 0; i < rig.size(); ++i) {
     out.T_cam_rig.push_back(rig.cam_from_rig(i));
     out.models.push_back(rig.camera(i).model);
+    out.timing.push_back({0.0, rig.camera(i).readout_s});
   }
   return out;
 }
@@ -37,6 +38,8 @@ Rig RigValues::applied_to(const Rig& rig) const {
   for (std::size_t i = 0; i < rig.size(); ++i) {
     camera::Camera camera = rig.camera(i);
     camera.model = models[i];
+    camera.readout_s = timing[i].readout_s;
+    camera.time_offset_ns += from_seconds(timing[i].shift_s);
     const SE3 T_body_cam = i == 0 ? rig.body_from_cam(0) : rig.body_from_cam(0) * T_cam_rig[i].inverse();
     cameras.push_back({std::move(camera), T_body_cam});
   }
@@ -171,6 +174,50 @@ void IntrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::Matri
     H.block<2, 2>(first_[c], first_[c]) += gradient * gradient.transpose();
     b.segment<2>(first_[c]) -= gradient.dot(change.segment<2>(first_[c])) * gradient;
   }
+}
+
+TimingBlock::TimingBlock(std::vector<TimingPrior> prior) : prior_(std::move(prior)), first_{0} {
+  for (const TimingPrior& p : prior_) first_.push_back(first_.back() + (p.sigma_shift > 0) + (p.sigma_readout > 0));
+}
+
+RigBlock::Range TimingBlock::columns(int camera) const {
+  const auto c = static_cast<std::size_t>(camera);
+  return {first_[c], first_[c + 1] - first_[c]};
+}
+
+void TimingBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {
+  const TimingPrior& p = prior_[static_cast<std::size_t>(observation.camera)];
+  const Vector2d per_second = observation.J * observation.velocity;
+  Eigen::Index column = 0;
+  if (p.sigma_shift > 0) J.col(column++) = p.sigma_shift * per_second;
+  if (p.sigma_readout > 0) J.col(column) = p.sigma_readout * observation.relative_row * per_second;
+}
+
+void TimingBlock::apply(const Eigen::VectorXd& delta, RigValues& values) const {
+  for (std::size_t c = 0; c < prior_.size(); ++c) {
+    Eigen::Index at = first_[c];
+    if (prior_[c].sigma_shift > 0) values.timing[c].shift_s += prior_[c].sigma_shift * delta(at++);
+    if (prior_[c].sigma_readout > 0) values.timing[c].readout_s += prior_[c].sigma_readout * delta(at);
+  }
+}
+
+Eigen::VectorXd TimingBlock::normalised_change(const RigValues& values) const {
+  Eigen::VectorXd out(size());
+  for (std::size_t c = 0; c < prior_.size(); ++c) {
+    const TimingPrior& p = prior_[c];
+    Eigen::Index at = first_[c];
+    if (p.sigma_shift > 0) out(at++) = (values.timing[c].shift_s - p.mean.shift_s) / p.sigma_shift;
+    if (p.sigma_readout > 0) out(at) = (values.timing[c].readout_s - p.mean.readout_s) / p.sigma_readout;
+  }
+  return out;
+}
+
+double TimingBlock::prior_cost(const RigValues& values) const { return 0.5 * normalised_change(values).squaredNorm(); }
+
+void TimingBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H,
+                            Eigen::Ref<Eigen::VectorXd> b) const {
+  H.diagonal().array() += 1.0;
+  b -= normalised_change(values);
 }
 
 void BaselineScaleBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {

@@ -15,9 +15,10 @@ namespace bslam::solver {
 struct RigValues {
   std::vector<SE3> T_cam_rig;  // per camera; camera 0 is the identity
   std::vector<camera::CameraModel> models;
+  std::vector<camera::CameraTiming> timing;
 
   static RigValues of(const Rig& rig);
-  // `rig` with these values; camera 0 keeps its pose in the body.
+  // `rig`, to whose capture times the timing refers, with these values; camera 0 keeps its pose in the body.
   Rig applied_to(const Rig& rig) const;
 };
 
@@ -27,6 +28,8 @@ struct RigObservation {
   const RigValues& values;    // the extrinsics do not include the motion from the time of the pose to that of the image
   const Vector3d& point_cam;  // metres, at the capture time of the image
   const Matrix23d& J;         // d pixel / d point_cam, divided by sigma
+  const Vector3d& velocity;   // d point_cam / d time, m/s; zero if it is not known
+  double relative_row;        // of the pixel: -1/2 for the first row, 1/2 for the last
   double inverse_sigma;       // 1 / px
 };
 
@@ -120,6 +123,33 @@ class IntrinsicsBlock : public RigBlock {
   Vector2d aspect_gradient(std::size_t camera) const;
 
   IntrinsicPrior prior_;
+  std::vector<int> first_;  // per camera, and the end
+};
+
+// Prior for the timing of a camera: normal distributions around the calibrated values, in seconds. A value with the
+// standard deviation 0 is constant.
+struct TimingPrior {
+  camera::CameraTiming mean;
+  double sigma_shift = 0, sigma_readout = 0;
+};
+
+// The times at which the rows of each camera are exposed, relative to their standard deviations in the prior. The
+// shift of camera 0 should be constant, because a common shift of all cameras changes nothing but the poses.
+class TimingBlock : public RigBlock {
+ public:
+  explicit TimingBlock(std::vector<TimingPrior> prior);
+
+  int size() const override { return first_.back(); }
+  Range columns(int camera) const override;
+  void evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const override;
+  void apply(const Eigen::VectorXd& delta, RigValues& values) const override;
+  double prior_cost(const RigValues& values) const override;
+  void add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H, Eigen::Ref<Eigen::VectorXd> b) const override;
+  // Differences to the prior's values in standard deviations, all cameras one after the other, shift before readout.
+  Eigen::VectorXd normalised_change(const RigValues& values) const;
+
+ private:
+  std::vector<TimingPrior> prior_;
   std::vector<int> first_;  // per camera, and the end
 };
 

@@ -19,13 +19,37 @@ struct Round {
 constexpr std::array kRounds = {Round{Kernel::kHuber, kMaxChi2}, Round{Kernel::kHuber, 16 * kChi2TwoDof95},
                                 Round{Kernel::kNone, kChi2TwoDof95}, Round{Kernel::kNone, kChi2TwoDof95}};
 
-// The blocks of an adjustment: the extrinsics, then the intrinsics unless they are constant.
+// The blocks of an adjustment: the extrinsics, then the intrinsics and the timing unless they are constant.
 struct CalibrationBlocks {
   RigBlocks blocks;
   const ExtrinsicsBlock* extrinsics = nullptr;
   const IntrinsicsBlock* intrinsics = nullptr;  // null if they are constant
+  const TimingBlock* timing = nullptr;          // null if it is constant
   int size = 0;                                 // number of unknowns
+
+  int first_intrinsics() const { return extrinsics->size(); }
+  void add(std::unique_ptr<RigBlock> block) {
+    size += block->size();
+    blocks.push_back(std::move(block));
+  }
 };
+
+std::unique_ptr<IntrinsicsBlock> make_intrinsics(const RigValues& calibrated, const RigAdjustmentOptions& options,
+                                                 double tighter) {
+  IntrinsicPrior prior{{}, options.sigma_intrinsics, tighter * options.sigma_aspect};
+  for (camera::ModelParameters& sigma : prior.sigmas) sigma *= tighter;
+  for (const camera::CameraModel& model : calibrated.models) prior.values.push_back(camera::parameters(model));
+  return std::make_unique<IntrinsicsBlock>(std::move(prior));
+}
+
+std::unique_ptr<TimingBlock> make_timing(const RigAdjustmentOptions& options, double tighter) {
+  std::vector<TimingPrior> prior = options.timing;
+  for (TimingPrior& p : prior) {
+    p.sigma_shift *= tighter;
+    p.sigma_readout *= tighter;
+  }
+  return std::make_unique<TimingBlock>(std::move(prior));
+}
 
 CalibrationBlocks make_blocks(const RigValues& calibrated, const RigAdjustmentOptions& options) {
   CalibrationBlocks out;
@@ -34,16 +58,17 @@ CalibrationBlocks make_blocks(const RigValues& calibrated, const RigAdjustmentOp
       ExtrinsicPrior{calibrated.T_cam_rig, tighter * options.sigma_rotation, tighter * options.sigma_translation,
                      tighter * options.sigma_scale});
   out.extrinsics = extrinsics.get();
-  out.size = extrinsics->size();
-  out.blocks.push_back(std::move(extrinsics));
-  if (options.sigma_intrinsics.empty()) return out;
-  IntrinsicPrior prior{{}, options.sigma_intrinsics, tighter * options.sigma_aspect};
-  for (camera::ModelParameters& sigma : prior.sigmas) sigma *= tighter;
-  for (const camera::CameraModel& model : calibrated.models) prior.values.push_back(camera::parameters(model));
-  auto intrinsics = std::make_unique<IntrinsicsBlock>(std::move(prior));
-  out.intrinsics = intrinsics.get();
-  out.size += intrinsics->size();
-  out.blocks.push_back(std::move(intrinsics));
+  out.add(std::move(extrinsics));
+  if (!options.sigma_intrinsics.empty()) {
+    auto intrinsics = make_intrinsics(calibrated, options, tighter);
+    out.intrinsics = intrinsics.get();
+    out.add(std::move(intrinsics));
+  }
+  if (!options.timing.empty()) {
+    auto timing = make_timing(options, tighter);
+    out.timing = timing.get();
+    out.add(std::move(timing));
+  }
   return out;
 }
 
@@ -87,13 +112,29 @@ void report_intrinsics(const Eigen::VectorXd& sigma, const RigValues& calibrated
   }
 }
 
+// `sigma`: standard deviations of the unknowns of TimingBlock, which are relative to those of the prior.
+void report_timing(const Eigen::VectorXd& sigma, const RigAdjustmentOptions& options, RigAdjustment& out) {
+  const double wider = 1.0 / std::sqrt(options.correlated_observations);
+  Eigen::Index at = 0;
+  for (std::size_t c = 0; c < out.cameras.size(); ++c) {
+    CameraEstimate& camera = out.cameras[c];
+    const TimingPrior& prior = options.timing[c];
+    camera.timing_change = {out.values.timing[c].shift_s - prior.mean.shift_s,
+                            out.values.timing[c].readout_s - prior.mean.readout_s};
+    if (prior.sigma_shift > 0) camera.timing_sigma.shift_s = wider * sigma(at++) * prior.sigma_shift;
+    if (prior.sigma_readout > 0) camera.timing_sigma.readout_s = wider * sigma(at++) * prior.sigma_readout;
+  }
+}
+
 // Change of all unknowns from the calibration, in the order of the blocks.
 Eigen::VectorXd change_of(const RigAdjustment& out, const CalibrationBlocks& blocks) {
   Eigen::VectorXd change(blocks.size);
   for (std::size_t c = 1; c < out.cameras.size(); ++c)
     change.segment<6>(static_cast<Eigen::Index>(6 * (c - 1))) = out.cameras[c].change;
   if (blocks.intrinsics != nullptr)
-    change.tail(blocks.intrinsics->size()) = blocks.intrinsics->normalised_change(out.values);
+    change.segment(blocks.first_intrinsics(), blocks.intrinsics->size()) =
+        blocks.intrinsics->normalised_change(out.values);
+  if (blocks.timing != nullptr) change.tail(blocks.timing->size()) = blocks.timing->normalised_change(out.values);
   return change;
 }
 
@@ -120,7 +161,10 @@ bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const R
       options.correlated_observations * factor.solve(Eigen::MatrixXd::Identity(blocks.size, blocks.size));
   report_extrinsics(covariance, options, out);
   if (blocks.intrinsics != nullptr)
-    report_intrinsics(covariance.diagonal().tail(blocks.intrinsics->size()).cwiseSqrt(), calibrated, options, out);
+    report_intrinsics(covariance.diagonal().segment(blocks.first_intrinsics(), blocks.intrinsics->size()).cwiseSqrt(),
+                      calibrated, options, out);
+  if (blocks.timing != nullptr)
+    report_timing(covariance.diagonal().tail(blocks.timing->size()).cwiseSqrt(), options, out);
   const Eigen::VectorXd change = change_of(out, blocks);
   out.excess_error = change.dot(of_images * change) / std::max(1.0, 2.0 * out.final_cost);
   return true;

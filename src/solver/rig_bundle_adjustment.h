@@ -24,6 +24,8 @@ struct RigAdjustmentOptions {
   // constant.
   std::vector<camera::ModelParameters> sigma_intrinsics = {};
   double sigma_aspect = 0;  // of fx / fy, relative; 0: from the above
+  // Per camera; needs ReprojectionProblem::twist. Empty: the timing is constant.
+  std::vector<TimingPrior> timing = {};
   // Number of observations with the information of one independent observation. Errors of a landmark in successive
   // images are similar, so that the normal equations overestimate the information of the images.
   double correlated_observations = 1;
@@ -44,6 +46,8 @@ struct CameraEstimate {
   // The same for the intrinsics; empty if they are constant.
   camera::ModelParameters intrinsics_change, intrinsics_sigma;
   std::vector<bool> intrinsics_observed;
+  // Differences to the prior's timing, and standard deviations, in seconds; 0 if constant.
+  camera::CameraTiming timing_change, timing_sigma;
   int observations = 0;  // number of observations that agree with the estimate
 };
 

@@ -48,7 +48,8 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
 
 Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
                    std::unique_ptr<tracking::Relocaliser> relocaliser)
-    : rig_(std::make_shared<const camera::Rig>(rig)),
+    : given_(rig),
+      rig_(std::make_shared<const camera::Rig>(rig)),
       config_(config),
       pool_(thread_count(config.execution.threads, rig.size())),
       monitor_(rig.size(), config.health),
@@ -96,7 +97,7 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
 // Continues with the rig of the map, which a stage may have replaced since the last frame.
 void Pipeline::adopt_rig(const map::BundledMap& map, BundledFrame& frame) {
   if (map.shared_rig() == rig_) return;
-  if (!map.rig().same_intrinsics(*rig_)) frame = frame::with_bearings_of(std::move(frame), map.rig());
+  if (frame::changes_frames(*rig_, map.rig())) frame = frame::recalibrated(std::move(frame), *rig_, map.rig());
   rig_ = map.shared_rig();
 }
 
@@ -119,8 +120,11 @@ BundledFrame Pipeline::make_frame(const image::ImageBundle& images) {
 BundledFrame Pipeline::extract(const image::ImageBundle& images, const tracking::FramePlan& plan) {
   BundledFrame frame = builder_.extract(*rig_, images, pool_, plan.skipped, plan.budgets);
   frame.twist = plan.twist;
-  if (config_.tracking.use_capture_times) return frame;
-  for (frame::CameraFrame& c : frame.cameras) c.time_ns = frame.time_ns;
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    const TimeNs correction = rig_->camera(c).time_offset_ns - given_.camera(c).time_offset_ns;
+    TimeNs& time_ns = frame.cameras[c].time_ns;
+    time_ns = config_.tracking.use_capture_times ? time_ns + correction : frame.time_ns;
+  }
   return frame;
 }
 

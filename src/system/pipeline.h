@@ -51,6 +51,7 @@ class Pipeline {
   void adopt_rig(const map::BundledMap& map, frame::BundledFrame& frame);
   void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);
 
+  const camera::Rig given_;                 // its time offsets are included in the capture times of the images
   std::shared_ptr<const camera::Rig> rig_;  // of the map that the last frame saw
   const Config& config_;
   ThreadPool pool_;
