@@ -42,6 +42,11 @@ struct Shutter {
     const Vector3d u = velocity_of(point_cam);
     return point_cam + s * (u + 0.5 * s * angular.cross(u));
   }
+  // The derivative of at_row with respect to the point.
+  geometry::Matrix3d row_jacobian(double pixel_y) const {
+    const geometry::Matrix3d S = delay_s(pixel_y) * geometry::skew(angular);
+    return geometry::Matrix3d::Identity() + S + 0.5 * S * S;
+  }
   // The bearing, at the capture time, of a distant point that appears at height `pixel_y` in the
   // direction `bearing`.
   Vector3d bearing_at_middle(const Vector3d& bearing, double pixel_y) const {

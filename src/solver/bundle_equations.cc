@@ -140,7 +140,7 @@ BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const R
     if (!(chi2 < kMaxChi2)) continue;
     const double weight = kernel_weight(kernel_, chi2);
     const Matrix23d J = term.inverse_sigma * r->J;
-    const Matrix23d A = J * T.R;
+    const Matrix23d A = at_capture(J, structure_.groups[group].pose, term) * T.R;
     const Matrix23d wA = weight * A;
     out.M.noalias() += A.transpose() * wA;
     out.m.noalias() += wA.transpose() * e;

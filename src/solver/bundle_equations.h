@@ -98,6 +98,12 @@ class BundleEquations {
     const camera::Shutter& shutter = shutters_[static_cast<std::size_t>(pose) * cameras_ + camera];
     return {shutter.velocity_of(point_cam), problem_.rig->camera(camera).relative_row(term.pixel.y())};
   }
+  // The derivative with respect to the point in the frame of the camera at the capture time, from that at the exposure.
+  Matrix23d at_capture(const Matrix23d& J, int pose, const BundleStructure::Term& term) const {
+    if (shutters_.empty()) return J;
+    const auto camera = static_cast<std::size_t>(term.camera);
+    return J * shutters_[static_cast<std::size_t>(pose) * cameras_ + camera].row_jacobian(term.pixel.y());
+  }
   template <class Visit>
   void for_each_error(const BundleState& state, const Visit& visit);
   double cost(const BundleState& state);

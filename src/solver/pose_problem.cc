@@ -18,10 +18,10 @@ struct CameraPose {
   Vector3d t;  // metres
   const camera::Shutter& shutter;
 
-  // The item's point in the camera frame when the row of its pixel was exposed.
-  Vector3d at_exposure(const PoseProblem::Item& item) const {
-    return shutter.at_row(R * item.point_world + t, item.pixel.y());
-  }
+  // The item's point in the camera frame at the capture time.
+  Vector3d at_capture(const PoseProblem::Item& item) const { return R * item.point_world + t; }
+  // The same when the row of its pixel was exposed.
+  Vector3d at_exposure(const PoseProblem::Item& item) const { return shutter.at_row(at_capture(item), item.pixel.y()); }
 };
 
 CameraPose camera_pose(const SE3& T_cam_world, const camera::Shutter& shutter) {
@@ -50,12 +50,13 @@ void accumulate_camera(const Model& model, const CameraPose& pose, Items items, 
                        PoseEquations& out) {
   for (auto& item : items) {
     if (!admit.worth_a_look(item)) continue;
-    const Vector3d p = pose.at_exposure(item);
-    const auto r = residual(model, p, item.pixel);
+    const Vector3d p = pose.at_capture(item);
+    auto r = residual(model, pose.shutter.at_row(p, item.pixel.y()), item.pixel);
     const double information = item.inverse_sigma * item.inverse_sigma;
     const double chi2 = r ? r->error.squaredNorm() * information : std::numeric_limits<double>::infinity();
     if (!admit(item, chi2)) continue;
     out.cost += 0.5 * kernel_cost(kernel, chi2);
+    if (r && pose.shutter.rolling()) r->J *= pose.shutter.row_jacobian(item.pixel.y());
     if (chi2 < kMaxChi2) accumulate(*r, p, kernel_weight(kernel, chi2) * information, out);
   }
 }

@@ -23,12 +23,16 @@ ExtrinsicPrior prior_of(const Rig& rig) {
   return prior;
 }
 
-enum class BlockType { kExtrinsics, kBaselineScale };
+enum class BlockType { kExtrinsics, kBaselineScale, kTiming };
 
 RigBlocks make_blocks(BlockType type, const Rig& rig) {
   RigBlocks blocks;
   if (type == BlockType::kExtrinsics) {
     blocks.push_back(std::make_unique<ExtrinsicsBlock>(prior_of(rig)));
+  } else if (type == BlockType::kTiming) {
+    std::vector<TimingPrior> prior(rig.size(), {{0.001, 0.02}, 0.004, 0.003});
+    prior[0].sigma_shift = prior[1].sigma_readout = 0;  // constant
+    blocks.push_back(std::make_unique<TimingBlock>(prior));
   } else {
     blocks.push_back(std::make_unique<BaselineScaleBlock>());
   }
@@ -58,6 +62,11 @@ TEST_P(BundleGradient, AgreesWithFiniteDifferences) {
   const BundleStructure structure = make_structure(scene->problem, {});
   const RigBlocks blocks = make_blocks(std::get<BlockType>(GetParam()), scene->rig);
   BundleState start = state_of(scene->problem);
+  if (std::get<BlockType>(GetParam()) != BlockType::kBaselineScale) {  // with rolling shutters of a moving rig
+    for (std::size_t k = 0; k < scene->problem.T_rig_world.size(); ++k)
+      scene->problem.twist.push_back(scene::random_twist(random, 0.9, 1.2));
+    for (std::size_t c = 0; c < scene->rig.size(); ++c) start.rig.timing[c] = {0.001 * static_cast<double>(c), 0.018};
+  }
   for (std::size_t c = 1; c < scene->rig.size(); ++c) {
     start.rig.T_cam_rig[c] = start.rig.T_cam_rig[c].perturbed(scene::random_twist(random, 0.02, 0.02));
   }
@@ -104,7 +113,8 @@ TEST_P(BundleGradient, AgreesWithFiniteDifferences) {
 INSTANTIATE_TEST_SUITE_P(EveryModelAndBlock, BundleGradient,
                          testing::Combine(testing::Values(Models::kPinhole, Models::kRadTan, Models::kFisheye,
                                                           Models::kMixed, Models::kSpheres),
-                                          testing::Values(BlockType::kExtrinsics, BlockType::kBaselineScale)));
+                                          testing::Values(BlockType::kExtrinsics, BlockType::kBaselineScale,
+                                                          BlockType::kTiming)));
 
 // Without noise the residuals at the minimum are zero and Gauss-Newton converges quadratically, which it does
 // only if all blocks, borders and couplings are correct.

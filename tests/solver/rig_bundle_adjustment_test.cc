@@ -101,6 +101,49 @@ TEST(AdjustRig, EstimatesTheErrorOfOneCamera) {
   }
 }
 
+// Cameras with rolling shutters, one of which is late, seen from a rig that walks and turns; the calibration tells
+// neither.
+TEST(AdjustRig, EstimatesTheTimesAtWhichRowsAreExposed) {
+  constexpr double kShift = 0.006, kReadout = 0.015;
+  const auto scene = walk(2, 3);
+  Random random(4, "timing");
+  std::vector<SE3>& poses = scene->problem.T_rig_world;
+  scene->problem.observations.clear();
+  for (std::size_t k = 0; k < poses.size(); ++k) scene->problem.twist.push_back(scene::random_twist(random, 0.8, 1.0));
+  for (int p = 0; p < static_cast<int>(scene->points.size()); ++p) {
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      for (std::size_t i = 0; i < 2; ++i) {
+        const camera::Shutter shutter(scene->rig.camera(i), {i == 1 ? kShift : 0.0, kReadout},
+                                      scene->rig.cam_from_rig(i), scene->problem.twist[k]);
+        const auto pixel =
+            camera::project(scene->rig.camera(i), shutter,
+                            scene->rig.cam_from_rig(i) * (poses[k] * scene->points[static_cast<std::size_t>(p)]));
+        if (!pixel || !scene->rig.camera(i).contains(*pixel)) continue;
+        const Vector2d seen = *pixel + 0.5 * scene::random_noise(random);
+        scene->problem.observations.push_back({static_cast<int>(k), p, CameraIndex(i), seen.cast<float>(), 0.5f});
+      }
+    }
+  }
+  RigAdjustmentOptions options;
+  options.timing = {{{}, 0.0, 0.01}, {{}, 0.01, 0.01}};
+  const RigAdjustment result = adjust_rig(scene->problem, options);
+  ASSERT_TRUE(result.done);
+  EXPECT_NEAR(result.variance_factor, 1.0, 0.15);
+  EXPECT_EQ(result.values.timing[0].shift_s, 0.0);
+  EXPECT_EQ(result.cameras[0].timing_sigma.shift_s, 0.0);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const CameraEstimate& camera = result.cameras[i];
+    EXPECT_NEAR(result.values.timing[i].readout_s, kReadout, 4 * camera.timing_sigma.readout_s);
+    EXPECT_LT(camera.timing_sigma.readout_s, 2e-4);
+    EXPECT_DOUBLE_EQ(camera.timing_change.readout_s, result.values.timing[i].readout_s);
+  }
+  EXPECT_NEAR(result.values.timing[1].shift_s, kShift, 4 * result.cameras[1].timing_sigma.shift_s);
+  EXPECT_LT(result.cameras[1].timing_sigma.shift_s, 2e-4);
+  const Rig applied = result.values.applied_to(scene->rig);
+  EXPECT_NEAR(to_seconds(applied.camera(std::size_t{1}).time_offset_ns), result.values.timing[1].shift_s, 1e-9);
+  EXPECT_EQ(applied.camera(std::size_t{1}).readout_s, result.values.timing[1].readout_s);
+}
+
 // The rig with other intrinsics: focal lengths and principal points that are wrong by some pixels.
 Rig with_wrong_intrinsics(const Rig& rig, Random& random) {
   RigValues values = RigValues::of(rig);
