@@ -31,9 +31,21 @@ CalibrationOptions quick(CalibrationOptions options) {
   return options;
 }
 
-// Returns all keyframes, or evenly spaced segments of consecutive ones if there are more than `limit`; in order of id.
-std::vector<KeyframeId> choose_keyframes(const map::BundledMap& map, std::size_t limit) {
-  const std::vector<KeyframeId> all = map.keyframe_ids();
+// Whether the velocity of a keyframe is known. The images of others show a rig whose late cameras and rolling shutters
+// are in the wrong place.
+bool motion_known(const map::BundledMap& map, KeyframeId k) { return !map.keyframe(k).twist.isZero(0); }
+
+// The keyframes that can be used, in order of id. `timing`: the timing of the cameras is estimated.
+std::vector<KeyframeId> usable_keyframes(const map::BundledMap& map, bool timing) {
+  std::vector<KeyframeId> out = map.keyframe_ids();
+  std::erase_if(out, [&](KeyframeId k) {
+    return !motion_known(map, k) && (timing || frame::depends_on_motion(map.rig(), *map.keyframe(k).frame));
+  });
+  return out;
+}
+
+// Returns all of these keyframes, or evenly spaced segments of consecutive ones if there are more than `limit`.
+std::vector<KeyframeId> choose_keyframes(const std::vector<KeyframeId>& all, std::size_t limit) {
   if (all.size() <= limit) return all;
   const std::size_t segments = std::max<std::size_t>(1, limit / kSegment);
   std::vector<KeyframeId> out;
@@ -140,10 +152,11 @@ struct RigProblem {
 };
 
 // Each group has its own gauge freedom. One keyframe per group is fixed, which does not constrain the extrinsics.
-RigProblem choose(const map::BundledMap& map, const CalibrationOptions& options,
+RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOptions& options,
                   const feature::FeatureModel& features) {
   adjustment::Selection selection;
-  const std::vector<KeyframeId> keyframes = choose_keyframes(map, static_cast<std::size_t>(options.keyframes));
+  const std::vector<KeyframeId> keyframes =
+      choose_keyframes(usable_keyframes(map, timing), static_cast<std::size_t>(options.keyframes));
   selection.landmarks = choose_landmarks(map, keyframes, static_cast<std::size_t>(options.landmarks));
   RigProblem out{{}, groups(map, keyframes, selection.landmarks)};
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
@@ -307,7 +320,7 @@ std::vector<solver::TimingPrior> contradicted_timing(const map::BundledMap& map,
                                                      const CalibrationOptions& options,
                                                      const feature::FeatureModel& features,
                                                      const std::stop_token& stop) {
-  RigProblem problem = choose(map, quick(options), features);
+  RigProblem problem = choose(map, true, quick(options), features);
   problem.flat.problem.rig = &reference;
   separate_groups(problem);
   solver::RigAdjustmentOptions with_timing = prior_of(reference, options);
@@ -367,7 +380,7 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
   solver::RigAdjustmentOptions prior = prior_of(calibrated, options);
   prior.timing =
       contradicted_timing(map, reference, timing_prior(map.rig(), calibrated, options), options, features, stop);
-  RigProblem problem = choose(map, options, features);
+  RigProblem problem = choose(map, !prior.timing.empty(), options, features);
   problem.flat.problem.rig = &reference;
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();

@@ -29,9 +29,7 @@ void warn_of_outages(const session::CameraRecord& camera) {
 void warn_of_extrinsics(const session::CameraRecord& camera) {
   const auto& e = camera.extrinsics;
   if (!e || !e->suspect) return;
-  fmt::print(stderr,
-             "warning: {}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm, provided that "
-             "its time offset is correct{}\n",
+  fmt::print(stderr, "warning: {}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm{}\n",
              camera.name, e->change_deg, e->change_mm,
              e->refined ? "" : "; use the estimate with --set calibration.refine=true");
 }

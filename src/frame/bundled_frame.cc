@@ -43,6 +43,13 @@ BundledFrame recalibrated(BundledFrame frame, const camera::Rig& before, const c
   return frame;
 }
 
+bool depends_on_motion(const camera::Rig& rig, const BundledFrame& frame) {
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    if (frame.delay_s(c) != 0 || rig.camera(c).readout_s != 0) return true;
+  }
+  return false;
+}
+
 std::vector<double> delays_of(const BundledFrame& frame) {
   std::vector<double> delays(frame.cameras.size());
   for (std::size_t c = 0; c < delays.size(); ++c) delays[c] = frame.delay_s(c);

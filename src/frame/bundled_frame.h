@@ -47,6 +47,10 @@ BundledFrame recalibrated(BundledFrame frame, const camera::Rig& before, const c
 // Whether such a change changes frames.
 bool changes_frames(const camera::Rig& before, const camera::Rig& rig);
 
+// Whether projections into the frame depend on the motion of the rig: some image was captured at another time than the
+// frame's, or has a rolling shutter.
+bool depends_on_motion(const camera::Rig& rig, const BundledFrame& frame);
+
 // BundledFrame::delay_s per camera.
 std::vector<double> delays_of(const BundledFrame& frame);
 // The delay with the largest absolute value.

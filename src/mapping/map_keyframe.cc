@@ -5,6 +5,7 @@
 #include "mapping/create_landmarks.h"
 #include "mapping/cull.h"
 #include "mapping/local_adjustment.h"
+#include "mapping/unknown_motion.h"
 
 namespace bslam::mapping {
 namespace {
@@ -32,6 +33,7 @@ void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const Fe
 MappingReport map_keyframe(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
                            map::MapDraft& draft, std::stop_token stop) {
   MappingReport report;
+  complete_motion_of_root(keyframe, draft);
   report.culled_landmarks = cull_landmarks(keyframe, options.culling, draft);
   report.created = create_landmarks(keyframe, options.creation, features, draft);
   report.fusion = fuse_landmarks(keyframe, options.fusion, features, draft);

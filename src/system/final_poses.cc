@@ -9,10 +9,11 @@ using geometry::SE3;
 using geometry::Vector6d;
 using tracking::FrameRecord;
 
-// Mean twist from the middle frame's time to `delay` after it, for constant acceleration through three poses: the mean
-// twist of an interval is the twist at its middle, and the result is the twist at half the delay.
-std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, const map::BundledMap& map,
-                                      double delay_s) {
+// Mean twist from the time of frame `at` of three, the first or the middle one, to `delay` after it, for constant
+// acceleration through the three poses: the mean twist of an interval is the twist at its middle, and the result is the
+// twist at half the delay.
+std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, std::size_t at,
+                                      const map::BundledMap& map, double delay_s) {
   const double before_s = to_seconds(frames[1].result.time_ns - frames[0].result.time_ns);
   const double after_s = to_seconds(frames[2].result.time_ns - frames[1].result.time_ns);
   const auto near = [](double interval_s) { return interval_s > 0 && interval_s <= tracking::kMaxPrediction_s; };
@@ -28,7 +29,8 @@ std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, co
   if (root[0] != root[1] || root[2] != root[1]) return std::nullopt;
   const Vector6d before = (*T[1] * T[0]->inverse()).log() / before_s;
   const Vector6d after = (*T[2] * T[1]->inverse()).log() / after_s;
-  return before + (before_s + delay_s) / (before_s + after_s) * (after - before);
+  const double from_middle_s = delay_s + (at == 0 ? -before_s : before_s);  // twice the time from the first middle
+  return before + from_middle_s / (before_s + after_s) * (after - before);
 }
 
 // The record of a frame, or the end.
@@ -98,11 +100,14 @@ std::vector<std::pair<KeyframeId, Vector6d>> twists_from_neighbours(const map::B
   for (const KeyframeId k : map.keyframe_ids()) {
     const frame::BundledFrame& seen = *map.keyframe(k).frame;
     const double delay_s = frame::farthest_delay_s(seen);
-    if (k.index() < first.index() || delay_s == 0) continue;
+    if (k.index() < first.index() || !frame::depends_on_motion(map.rig(), seen)) continue;
     const auto at = find_frame(frames, seen.id);
-    if (at == frames.end() || at == frames.begin() || at + 1 == frames.end()) continue;
-    const std::span<const FrameRecord, 3> three(at - 1, 3);
-    if (const auto twist = twist_through(three, map, delay_s)) out.emplace_back(k, *twist);
+    std::optional<Vector6d> twist;
+    if (frames.end() - at >= 2 && at != frames.begin())
+      twist = twist_through(std::span<const FrameRecord, 3>(at - 1, 3), 1, map, delay_s);
+    if (frames.end() - at >= 3 && !twist)  // the first frame after the start or a loss
+      twist = twist_through(std::span<const FrameRecord, 3>(at, 3), 0, map, delay_s);
+    if (twist) out.emplace_back(k, *twist);
   }
   return out;
 }

@@ -106,7 +106,9 @@ TEST_P(BundleGradient, AgreesWithFiniteDifferences) {
     const double gradient = slope([&](BundleState& s, double step) {
       equations.rig_terms().apply(step * Eigen::VectorXd::Unit(rig.size(), k), s.rig);
     });
-    EXPECT_NEAR(rig(k), -gradient, 1e-5 * rig.norm() + 1e-3) << "rig " << k;
+    // The velocity of a point is exact to second order of the motion between rows.
+    const double relative = std::get<BlockType>(GetParam()) == BlockType::kTiming ? 1e-4 : 1e-5;
+    EXPECT_NEAR(rig(k), -gradient, relative * rig.norm() + 1e-3) << "rig " << k;
   }
 }
 

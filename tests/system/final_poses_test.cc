@@ -87,12 +87,25 @@ TEST(FinalPoses, NoMotionIfAnAdjacentFrameIsMissing) {
   EXPECT_TRUE(twists_from_neighbours(alone.map, KeyframeId(0), alone.frames).empty());
 }
 
-TEST(FinalPoses, NoMotionAcrossARelocalisation) {
-  for (const std::size_t found : {2u, 3u}) {
-    Scene scene(0.3);
-    scene.frames[found].relocalisation = Relocalisation{KeyframeId(0), 50};
-    EXPECT_TRUE(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).empty()) << found;
+TEST(FinalPoses, MotionOfTheFirstFrameFollowsFromTheNextTwo) {
+  for (const double turn_rate : {0.0, 0.3}) {
+    Scene scene(turn_rate);
+    scene.frames[1].result.status = tracking::TrackStatus::kLost;
+    const auto found = twists_from_neighbours(scene.map, KeyframeId(0), scene.frames);
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_LT(scene.error(found[0].second, turn_rate), turn_rate == 0 ? 1e-12 : 1e-4);
   }
+}
+
+TEST(FinalPoses, NoMotionAcrossARelocalisation) {
+  Scene after(0.3);
+  after.frames[3].relocalisation = Relocalisation{KeyframeId(0), 50};
+  EXPECT_TRUE(twists_from_neighbours(after.map, KeyframeId(0), after.frames).empty());
+  Scene at(0.3);
+  at.frames[2].relocalisation = Relocalisation{KeyframeId(0), 50};
+  const auto found = twists_from_neighbours(at.map, KeyframeId(0), at.frames);  // from the frames after it
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_LT(at.error(found[0].second, 0.3), 1e-4);
   Scene scene(0.3);
   scene.frames[1].relocalisation = Relocalisation{KeyframeId(0), 50};  // the relocalisation precedes that pose
   EXPECT_EQ(twists_from_neighbours(scene.map, KeyframeId(0), scene.frames).size(), 1u);

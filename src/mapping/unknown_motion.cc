@@ -1,0 +1,22 @@
+#include "mapping/unknown_motion.h"
+
+namespace bslam::mapping {
+namespace {
+
+constexpr double kMaxInterval_s = 0.5;  // for which the velocity changes linearly
+
+}  // namespace
+
+void complete_motion_of_root(KeyframeId following, map::MapDraft& draft) {
+  const map::BundledMap& map = draft.map();
+  const KeyframeId root = map.root_of(following);
+  const map::BundledKeyframe &first = map.keyframe(root), &second = map.keyframe(following);
+  if (root == following || !first.twist.isZero(0) || second.twist.isZero(0)) return;
+  if (!frame::depends_on_motion(map.rig(), *first.frame)) return;
+  const double interval_s = to_seconds(second.frame->time_ns - first.frame->time_ns);
+  if (!(interval_s > 0 && interval_s <= kMaxInterval_s)) return;
+  const geometry::Vector6d mean = (second.T_rig_world * first.T_rig_world.inverse()).log() / interval_s;
+  draft.set_twists({{root, 2 * mean - second.twist}});
+}
+
+}  // namespace bslam::mapping

@@ -1,0 +1,13 @@
+// The velocity of keyframes from which it was not known when they were created.
+#pragma once
+
+#include "map/map_edit.h"
+
+namespace bslam::mapping {
+
+// Sets the velocity of the root of a submap, before which there is no frame to measure it from, by linear extrapolation
+// from a following keyframe: its own velocity, and the mean velocity between the two. Only if they are at most half a
+// second apart, and the velocity matters: images of the root have different capture times, or a rolling shutter.
+void complete_motion_of_root(KeyframeId following, map::MapDraft& draft);
+
+}  // namespace bslam::mapping
