@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,8 @@ struct CalibrateArguments {
   std::vector<std::string> paths;
   DatasetArguments data;
   ConfigArguments config;
-  std::string out, progress = "auto";
+  std::string out, model, progress = "auto";
+  std::optional<double> fov_deg;
   bool overwrite = false;
 };
 
@@ -50,6 +52,14 @@ Result<std::vector<dataset::Dataset>> open_recordings(const CalibrateArguments& 
       return Error{path, "", "another calibration than that of " + a.paths.front(),
                    "recordings of one rig, or --rig FILE"};
     out.push_back(*std::move(opened));
+  }
+  if (!a.fov_deg) return out;
+  for (dataset::Dataset& recording : out) {
+    auto rig = session::with_nominal_intrinsics(recording.rig, a.model, *a.fov_deg);
+    if (!rig) return rig.error();
+    if (recording.whole_rig)
+      recording.whole_rig = recording.whole_rig->with_calibration_of(*rig, recording.cameras_used);
+    recording.rig = *std::move(rig);
   }
   return out;
 }
@@ -85,6 +95,14 @@ void add_rig_calibrate(CLI::App& rig, int& exit_status) {
       "calibrate", "estimate the calibration from recordings of any scene, beginning with a rough one");
   verb->add_option("DATA", a->paths, "folders of one or several data sets of the same rig")->required();
   add_recording_options(*verb, a->data);
+  CLI::Option* model = verb->add_option("--model", a->model, "begin with this camera model for all cameras")
+                           ->check(CLI::IsMember({"pinhole", "pinhole-radtan", "kannala-brandt"}));
+  CLI::Option* fov =
+      verb->add_option("--fov", a->fov_deg,
+                       "begin with this horizontal field of view in degrees, and without distortion; the "
+                       "rig gives resolutions and extrinsics");
+  model->needs(fov);
+  fov->needs(model);
   verb->add_option("--out", a->out, "rig file to write")->required();
   add_config_options(*verb, a->config);
   verb->add_option("--progress", a->progress, "auto: show a progress bar if stderr is a terminal; never: show none")

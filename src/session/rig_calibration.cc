@@ -1,9 +1,12 @@
 #include "session/rig_calibration.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "base/assert.h"
+#include "camera/model_table.h"
 #include "session/run_session.h"
 
 namespace bslam::session {
@@ -15,7 +18,8 @@ Error nothing_estimated(const dataset::Dataset& recording, const SessionResult& 
   const std::string found = run.live.empty()                   ? "no frame that could be tracked"
                             : run.record.map.scale != "metric" ? "a map of scale " + run.record.map.scale
                                                                : "too few landmarks";
-  return {recording.name, "", found, "at least two cameras, and a map of metric scale with some hundred landmarks"};
+  return {recording.name, "", found,
+          "a map of metric scale with some hundred landmarks: two cameras that see near points"};
 }
 
 // Whether each value of two estimates from the same recording agrees within one standard deviation.
@@ -77,10 +81,33 @@ system::Config rig_calibration_config() {
   return config;
 }
 
+Result<camera::Rig> with_nominal_intrinsics(const camera::Rig& rig, const std::string& model, double fov_deg) {
+  const bool fisheye = model == camera::KannalaBrandt::kName;
+  const double largest = fisheye ? 300 : 160;
+  const camera::ModelRow* row = camera::find_model(model);
+  if (row == nullptr || (!fisheye && model != camera::Pinhole::kName && model != camera::PinholeRadTan::kName))
+    return Error{"command line", "--model", model, "pinhole, pinhole-radtan or kannala-brandt"};
+  if (!(fov_deg > 5 && fov_deg < largest))
+    return Error{"command line", "--fov", fmt::format("{}", fov_deg),
+                 fmt::format("5 to {} degrees for {}", largest, model)};
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    camera::Camera camera = rig.camera(c);
+    const double half = geometry::radians(fov_deg) / 2, half_width = 0.5 * camera.width;
+    const double focal = half_width / (fisheye ? half : std::tan(half));
+    camera.model = row->make({focal, focal, half_width - 0.5, 0.5 * camera.height - 0.5},
+                             std::vector<double>(row->counts.front(), 0.0));
+    cameras.push_back({std::move(camera), rig.body_from_cam(c)});
+  }
+  return camera::Rig(std::move(cameras));
+}
+
 Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recordings,
                                      const RigCalibrationRequest& request) {
   BSLAM_ASSERT(!recordings.empty(), "there must be a recording");
   const camera::Rig& start = recordings.front().rig;
+  if (start.size() < 2)
+    return Error{recordings.front().name, "", "a single camera", "at least two cameras with a rough calibration"};
   std::vector<calibration::RigRefinement> refinements;
   camera::Rig rig = start;
   int runs = 0;

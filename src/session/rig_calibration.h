@@ -34,6 +34,10 @@ struct RigCalibration {
 // The configuration of a calibration: sequential, always refined, and with the deviations of a rough start.
 system::Config rig_calibration_config();
 
+// The rig with a model without distortion and a horizontal field of view for all cameras, for rigs whose intrinsics are
+// not known: pinhole, pinhole-radtan or kannala-brandt. Error: a field of view that the model does not have.
+Result<camera::Rig> with_nominal_intrinsics(const camera::Rig& rig, const std::string& model, double fov_deg);
+
 // Runs SLAM on each recording, estimates the calibration from the map, and repeats this with the estimate until it does
 // not change any more, because the first map contains only the matches that the rough calibration permits. The start
 // remains the prior throughout. Estimates from several recordings are combined. The data sets must have the same rig,
