@@ -397,6 +397,7 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
   }
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
+  out.information = adjusted.information;
   out.scale_change = adjusted.scale_change;
   out.rig = adjusted.values.applied_to(reference);
   out.poses = poses_of(problem.flat);

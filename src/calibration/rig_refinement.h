@@ -11,6 +11,7 @@
 
 #include "base/options.h"
 #include "map/map_edit.h"
+#include "solver/rig_bundle_adjustment.h"
 
 namespace bslam::calibration {
 
@@ -134,8 +135,9 @@ struct RigRefinement {
   Verdict verdict = Verdict::kUnknown;
   // If done: the estimated rig, and the poses and landmarks that belong to it, of the keyframes and landmarks used.
   std::optional<camera::Rig> rig;
-  double scale_change = 1;  // factor by which the lengths of the map change
-  map::SetPoses poses;      // after this change
+  solver::RigInformation information;  // of the estimate, to combine it with those of other maps
+  double scale_change = 1;             // factor by which the lengths of the map change
+  map::SetPoses poses;                 // after this change
 };
 
 // Selects keyframes and landmarks and adjusts them with free calibration, beginning with the rig of the map; the map is

@@ -14,8 +14,7 @@ void add_config_options(CLI::App& verb, ConfigArguments& arguments) {
       ->take_all();
 }
 
-Result<system::Config> resolve_config(const ConfigArguments& arguments) {
-  system::Config config;
+Result<system::Config> resolve_config(const ConfigArguments& arguments, system::Config config) {
   OptionTable table(config);
   if (!arguments.file.empty()) {
     if (const Status s = yaml::apply_config_file(table, arguments.file); !s) return s.error();

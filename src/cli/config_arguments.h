@@ -17,8 +17,8 @@ struct ConfigArguments {
 
 void add_config_options(CLI::App& verb, ConfigArguments& arguments);
 
-// Returns the defaults, overridden by the file, overridden by single settings. Prints a warning for every former name
-// of a setting. Errors: those of yaml/config_file.h.
-Result<system::Config> resolve_config(const ConfigArguments& arguments);
+// Returns `config`, the defaults of the command, overridden by the file, overridden by single settings. Prints a
+// warning for every former name of a setting. Errors: those of yaml/config_file.h.
+Result<system::Config> resolve_config(const ConfigArguments& arguments, system::Config config = {});
 
 }  // namespace bslam::cli

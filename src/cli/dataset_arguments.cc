@@ -24,6 +24,10 @@ Result<std::vector<int>> parse_cameras(const std::string& text) {
 
 void add_dataset_options(CLI::App& verb, DatasetArguments& a) {
   verb.add_option("DATA", a.path, "folder of the data set")->required();
+  add_recording_options(verb, a);
+}
+
+void add_recording_options(CLI::App& verb, DatasetArguments& a) {
   verb.add_option("--format", a.format, "data set format")
       ->check(CLI::IsMember({"auto", "euroc", "kitti", "folder"}))
       ->capture_default_str();

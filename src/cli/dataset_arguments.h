@@ -16,6 +16,8 @@ struct DatasetArguments {
 };
 
 void add_dataset_options(CLI::App& verb, DatasetArguments& arguments);
+// The same without DATA, for commands that take several.
+void add_recording_options(CLI::App& verb, DatasetArguments& arguments);
 
 // Errors: a malformed list of cameras.
 Result<dataset::DatasetRequest> dataset_request(const DatasetArguments& arguments, double sync_tolerance_s);

@@ -1,4 +1,4 @@
-// bslam rig: describes, checks and converts a rig calibration.
+// bslam rig: describes, checks, converts and estimates a rig calibration.
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -100,10 +100,11 @@ void add_convert(CLI::App& rig, int& exit_status) {
 }  // namespace
 
 void add_rig(CLI::App& app, int& exit_status) {
-  CLI::App* rig = app.add_subcommand("rig", "describe, check and convert a rig calibration");
+  CLI::App* rig = app.add_subcommand("rig", "describe, check, convert and estimate a rig calibration");
   rig->require_subcommand(1);
   add_info(*rig, exit_status);
   add_convert(*rig, exit_status);
+  add_rig_calibrate(*rig, exit_status);
 }
 
 }  // namespace bslam::cli

@@ -16,6 +16,7 @@ void add_eval(CLI::App& app, int& exit_status);
 void add_simulate(CLI::App& app, int& exit_status);
 void add_inspect(CLI::App& app, int& exit_status);
 void add_rig(CLI::App& app, int& exit_status);
+void add_rig_calibrate(CLI::App& rig, int& exit_status);
 void add_vocab(CLI::App& app, int& exit_status);
 void add_map(CLI::App& app, int& exit_status);
 void add_settings(CLI::App& app, int& exit_status);

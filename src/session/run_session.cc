@@ -87,7 +87,7 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
   auto masks = image_decoding::read_masks(dataset.rig);
   if (!masks) return masks.error();
   system::System system(dataset.rig, options.config,
-                        {std::move(*masks), options.vocabulary, options.map, options.replay});
+                        {std::move(*masks), options.vocabulary, options.map, options.initial_rig, options.replay});
   const double start_up_s = options.start_up_s + 1e-3 * start_up.ms();
 
   const Stopwatch wall;
@@ -118,6 +118,7 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
                     .wall_s = wall_s},
                    system.take_frames());
   result.map = system.snapshot();
+  result.calibration = system.calibration();
   if (system.calibration_refined()) result.refined_rig = with_refined_calibration(result.map->rig(), dataset);
   result.journal = system.journal();
   return result;

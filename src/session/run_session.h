@@ -27,6 +27,7 @@ struct SessionOptions {
   std::optional<execution::Journal> replay;  // journal of a run to repeat: exactly its frames are processed
   place::VocabularyPtr vocabulary;           // null: no place recognition
   std::optional<map::BundledMap> map;        // map of an earlier run with this rig, which is continued
+  std::optional<camera::Rig> initial_rig;    // calibration with which the map begins; nullopt: that of the data set
   std::function<void(std::size_t done, std::size_t all)> progress;  // called after every frame; may be empty
 };
 
@@ -35,6 +36,7 @@ struct SessionResult {
   // One per submap. The first ones are written to trajectory.tum and trajectory_live.tum.
   std::vector<system::SubmapTrajectory> trajectories, live;
   map::MapSnapshot map;
+  calibration::RigRefinement calibration;  // the estimate of the calibration at the end of the run
   // If extrinsics were refined: the calibration of all cameras, with refined extrinsics for those in use.
   std::optional<camera::Rig> refined_rig;
   execution::Journal journal;

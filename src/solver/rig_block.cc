@@ -49,11 +49,10 @@ Rig RigValues::applied_to(const Rig& rig) const {
 double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated) {
   double sum = 0.0, reference = 0.0;
   for (std::size_t c = 0; c < calibrated.size(); ++c) {
-    const Vector3d centre = calibrated[c].inverse().translation();
-    sum += T_cam_rig[c].inverse().translation().dot(centre);
-    reference += centre.squaredNorm();
+    sum += T_cam_rig[c].translation().squaredNorm();
+    reference += calibrated[c].translation().squaredNorm();
   }
-  return reference > 0 ? sum / reference : 1.0;
+  return reference > 0 ? std::sqrt(sum / reference) : 1.0;
 }
 
 Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference) {
@@ -63,10 +62,7 @@ Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference) {
 
 ExtrinsicsBlock::ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)) {
   double sum = 0.0;
-  for (const SE3& T : prior_.T_cam_rig) {
-    centres_.emplace_back(T.inverse().translation());
-    sum += centres_.back().squaredNorm();
-  }
+  for (const SE3& T : prior_.T_cam_rig) sum += T.translation().squaredNorm();
   if (prior_.sigma_scale > 0 && sum > 0) scale_gradient_ = 1.0 / (prior_.sigma_scale * sum);
 }
 
@@ -107,11 +103,12 @@ void ExtrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::Matri
     H.block<6, 6>(at, at) += JtI * J;
     b.segment<6>(at) -= JtI * change;
   }
-  // The centre changes by -R^T v for the left perturbation (w, v) of T_cam_rig with the rotation R.
+  // The distance |t| of a camera changes by t . v / |t| for the left perturbation (w, v) of T_cam_rig = [R, t].
+  const double gradient = scale_gradient_ / baseline_scale(values.T_cam_rig, prior_.T_cam_rig);
   Eigen::VectorXd scale_jacobian = Eigen::VectorXd::Zero(size());
-  for (std::size_t c = 1; c < centres_.size(); ++c)
+  for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c)
     scale_jacobian.segment<3>(6 * (static_cast<Eigen::Index>(c) - 1) + 3) =
-        -scale_gradient_ * (values.T_cam_rig[c].rotation() * centres_[c]);
+        gradient * values.T_cam_rig[c].translation();
   H += scale_jacobian * scale_jacobian.transpose();
   b -= scale_error(values) * scale_jacobian;
 }

@@ -57,16 +57,16 @@ using RigBlocks =
     std::vector<std::unique_ptr<RigBlock>>;  // blocks of one adjustment; each must change different values
 
 // Prior for the extrinsics of all cameras but the first: normal distributions around the calibrated values, and one of
-// the common scale of all baselines, sum c c' / sum c' c' with the estimated and calibrated camera centres c and c' in
-// the rig frame. Images do not reveal this scale, so that it needs a prior of its own, however uncertain the extrinsics
-// are.
+// the common scale of all baselines, the root of sum |c|^2 / sum |c'|^2 with the estimated and calibrated camera
+// centres c and c' in the rig frame: distances keep their lengths also if their directions were wrong. Images do not
+// reveal this scale, so that it needs a prior of its own, however uncertain the extrinsics are.
 struct ExtrinsicPrior {
   std::vector<SE3> T_cam_rig;                        // calibrated, per camera
   double sigma_rotation = 0, sigma_translation = 0;  // radians, metres; per axis
   double sigma_scale = 0;                            // relative; 0: no prior of its own
 };
 
-// The common scale of the baselines relative to that of the calibration: sum c c' / sum c' c', see above. 1 if
+// The common scale of the baselines relative to that of the calibration, see above. 1 if
 // all cameras of the calibration have the same centre.
 double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated);
 
@@ -91,8 +91,7 @@ class ExtrinsicsBlock : public RigBlock {
   double scale_error(const RigValues& values) const;  // divided by its standard deviation
 
   ExtrinsicPrior prior_;
-  std::vector<Vector3d> centres_;  // calibrated, per camera, in the rig frame
-  double scale_gradient_ = 0;      // 1 / (sigma_scale sum c' c'); 0 without a prior of the scale
+  double scale_gradient_ = 0;  // 1 / (sigma_scale sum |c'|^2); 0 without a prior of the scale
 };
 
 // Prior for the intrinsics: normal distributions around the calibrated values, and one of the ratio fx / fy, which is

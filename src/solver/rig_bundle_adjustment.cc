@@ -138,6 +138,36 @@ Eigen::VectorXd change_of(const RigAdjustment& out, const CalibrationBlocks& blo
   return change;
 }
 
+// The information about extrinsics and intrinsics alone, with the timing marginalised out.
+Eigen::MatrixXd without_timing(const Eigen::MatrixXd& information, const CalibrationBlocks& blocks) {
+  if (blocks.timing == nullptr || blocks.timing->size() == 0) return information;
+  const Eigen::Index timing = blocks.timing->size(), kept = information.rows() - timing;
+  const Eigen::MatrixXd coupling = information.topRightCorner(kept, timing);
+  return information.topLeftCorner(kept, kept) -
+         coupling * information.bottomRightCorner(timing, timing).ldlt().solve(coupling.transpose());
+}
+
+// `information` and `prior` in the unknowns of the blocks, in which intrinsics are relative to their deviations.
+RigInformation in_physical_units(const Eigen::MatrixXd& information, const Eigen::MatrixXd& prior,
+                                 const RigAdjustmentOptions& options, const RigAdjustment& out) {
+  RigInformation physical;
+  physical.change.resize(information.rows());
+  Eigen::VectorXd unit = Eigen::VectorXd::Ones(information.rows());
+  Eigen::Index at = 0;
+  for (std::size_t c = 1; c < out.cameras.size(); ++c, at += 6) physical.change.segment<6>(at) = out.cameras[c].change;
+  for (std::size_t c = 0; c < out.cameras.size() && at < information.rows(); ++c) {
+    const camera::ModelParameters& change = out.cameras[c].intrinsics_change;
+    physical.change.segment(at, change.size()) = change;
+    unit.segment(at, change.size()) =
+        options.sigma_intrinsics[c].cwiseInverse() * std::sqrt(options.correlated_observations);
+    at += change.size();
+  }
+  const double weight = 1 / options.correlated_observations;
+  physical.information = weight * unit.asDiagonal() * information * unit.asDiagonal();
+  physical.prior = weight * unit.asDiagonal() * prior * unit.asDiagonal();
+  return physical;
+}
+
 // Computes covariances and observed degrees of freedom at the current values. Returns false if the information is
 // singular.
 bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const RigValues& calibrated,
@@ -165,6 +195,8 @@ bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const R
                       calibrated, options, out);
   if (blocks.timing != nullptr)
     report_timing(covariance.diagonal().tail(blocks.timing->size()).cwiseSqrt(), options, out);
+  out.information = in_physical_units(without_timing(scale * of_images + prior, blocks),
+                                      without_timing(prior, blocks), options, out);
   const Eigen::VectorXd change = change_of(out, blocks);
   out.excess_error = change.dot(of_images * change) / std::max(1.0, 2.0 * out.final_cost);
   return true;

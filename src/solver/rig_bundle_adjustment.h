@@ -51,11 +51,20 @@ struct CameraEstimate {
   int observations = 0;  // number of observations that agree with the estimate
 };
 
+// The estimate as a normal distribution of the change from the calibration, and the prior, whose mean is zero. The
+// unknowns are those of the extrinsics of cameras 1 to N-1 (radians, metres), then the intrinsics of all cameras, if
+// they are estimated.
+struct RigInformation {
+  Eigen::VectorXd change;
+  Eigen::MatrixXd information, prior;  // inverses of the covariances with and without the images
+};
+
 struct RigAdjustment {
   bool done = false;                    // false if there is nothing to estimate, or it was stopped or failed
   RigValues values;                     // the estimate
   std::vector<CameraEstimate> cameras;  // all cameras; the extrinsics of the first one are exact
-  double final_cost = 0;                // as in LmSummary, of the observations that agree and the prior
+  RigInformation information;
+  double final_cost = 0;       // as in LmSummary, of the observations that agree and the prior
   double variance_factor = 1;  // mean squared normalised error over its expectation; if > 1 it scales the covariances
   double scale_change = 1;     // factor by which all lengths of the problem were multiplied, as described above
   // How much the mean squared error of the observations would grow, as a fraction, if the calibration were constant.

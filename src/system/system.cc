@@ -40,7 +40,7 @@ System::System(camera::Rig rig, Config config, Resources resources)
       first_of_map_(first_keyframe_),
       pipeline_(rig_, config_, std::move(resources.masks), make_relocaliser(resources.vocabulary, config_)),
       history_(resources.history),
-      store_(resources.map ? std::move(*resources.map) : empty_map(rig_, config_)),
+      store_(resources.map ? std::move(*resources.map) : empty_map(resources.initial_rig.value_or(rig_), config_)),
       initial_rig_(store_.snapshot()->shared_rig()),
       gate_(store_, history_ == 0) {
   const map::MapSnapshot map = store_.snapshot();

@@ -34,6 +34,9 @@ struct Resources {
   // Map of an earlier run with this rig, whose calibration may have been refined. The run continues in it after
   // relocalisation, with its calibration.
   std::optional<map::BundledMap> map = {};
+  // Calibration with which the map begins, such as the estimate of an earlier run; nullopt: that of the rig, which is
+  // the prior of the calibration in either case. Not used with `map`, which has its own.
+  std::optional<camera::Rig> initial_rig = {};
   std::optional<execution::Journal> replay = {};  // repeats the run of this journal, regardless of the mode
   // Minimum number of last frames and stage runs whose records are kept, for runs of unlimited duration; no journal is
   // kept then. 0: all records and the journal are kept.

@@ -187,6 +187,16 @@ TEST(AdjustRig, FindsIntrinsicsAndKeepsTheScaleOfTheBaselines) {
   }
 }
 
+// A baseline whose direction is corrected keeps its length.
+TEST(AdjustRig, TheScaleOfTheBaselinesIsThatOfTheirLengths) {
+  const std::vector<SE3> given = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0.1, 0, 0))};
+  const std::vector<SE3> found = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0.08, 0.06, 0))};
+  EXPECT_NEAR(baseline_scale(found, given), 1.0, 1e-12);
+  const std::vector<SE3> twice = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0, 0, -0.2))};
+  EXPECT_NEAR(baseline_scale(twice, given), 2.0, 1e-12);
+  EXPECT_EQ(baseline_scale(std::vector{SE3(), SE3()}, std::vector{SE3(), SE3()}), 1.0);
+}
+
 // With a right calibration nothing that the images do not demand is changed.
 TEST(AdjustRig, ARightCalibrationHasNoExcessError) {
   const auto scene = walk(4, 6, 0, 600);

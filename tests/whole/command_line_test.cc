@@ -90,8 +90,9 @@ class CommandLine : public testing::Test {
 TEST_F(CommandLine, PrintsVersionAndHelpForEveryCommand) {
   EXPECT_EQ(run("--version").status, 0);
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
-  for (const char* verb : {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "map",
-                           "map info", "map export", "map merge", "vocab", "vocab info", "vocab train", "settings"}) {
+  for (const char* verb :
+       {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "rig calibrate", "map", "map info",
+        "map export", "map merge", "vocab", "vocab info", "vocab train", "settings"}) {
     EXPECT_EQ(run(std::string(verb) + " --help").status, 0) << verb;
   }
 }

@@ -1,0 +1,36 @@
+// The calibration that follows from several recordings of one rig.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "calibration/rig_refinement.h"
+
+namespace bslam::calibration {
+
+// A parameter of the calibration, and how well it is known.
+struct CalibratedValue {
+  double change =
+      0;           // from the given value; in px for intrinsics (distortion: no unit), radians or metres for extrinsics
+  double std = 0;  // standard deviation
+  bool observed = false;  // std is less than half of the given value's
+};
+
+struct CalibratedCamera {
+  std::vector<CalibratedValue> intrinsics;  // in the order of camera/model_parameters.h
+  // Rotation about the axes of the camera, then translation along them; those of camera 0 are zero and observed.
+  std::array<CalibratedValue, 6> extrinsics;
+};
+
+struct JointRefinement {
+  camera::Rig rig;
+  std::vector<CalibratedCamera> cameras;
+  solver::RigInformation information;
+};
+
+// Mean of estimates that were made from different recordings with the same prior, each weighted by its information. The
+// prior counts once in the deviations. `refinements`: at least one; all `done`, of the same rig `calibrated` and with
+// intrinsics. Returns nullopt if the information is singular.
+std::optional<JointRefinement> combine(const camera::Rig& calibrated, std::span<const RigRefinement> refinements);
+
+}  // namespace bslam::calibration

@@ -1,0 +1,132 @@
+#include "session/rig_calibration.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/assert.h"
+#include "camera/model_table.h"
+#include "session/run_session.h"
+
+namespace bslam::session {
+namespace {
+
+constexpr int kMaxRuns = 4;  // per recording
+
+Error nothing_estimated(const dataset::Dataset& recording, const SessionResult& run) {
+  const std::string found = run.live.empty()                   ? "no frame that could be tracked"
+                            : run.record.map.scale != "metric" ? "a map of scale " + run.record.map.scale
+                                                               : "too few landmarks";
+  return {recording.name, "", found,
+          "a map of metric scale with some hundred landmarks: two cameras that see near points"};
+}
+
+// Whether each value of two estimates from the same recording agrees within one standard deviation.
+bool agree(const solver::RigInformation& a, const solver::RigInformation& b) {
+  if (a.change.size() != b.change.size()) return false;
+  const Eigen::VectorXd difference = a.change - b.change;
+  const Eigen::MatrixXd covariance =
+      b.information.llt().solve(Eigen::MatrixXd::Identity(b.information.rows(), b.information.cols()));
+  return (difference.array().square() <= covariance.diagonal().array()).all();
+}
+
+// The common factor of the distances is the weighted mean of the factors of all cameras, whose positions are measured
+// independently of each other.
+double scale_deviation(const camera::Rig& rig, const calibration::CalibrationOptions& options) {
+  double squares = 0;
+  for (std::size_t c = 1; c < rig.size(); ++c) squares += rig.rig_from_cam(c).translation().squaredNorm();
+  if (squares == 0) return 0;
+  return std::max(1e-3 * options.sigma_translation_mm / std::sqrt(squares), 0.01 * options.sigma_scale_percent);
+}
+
+// The estimate from one recording, and the runs it took.
+struct Passes {
+  calibration::RigRefinement refinement;
+  int runs = 0;
+  bool converged = false;
+};
+
+Result<Passes> run_passes(const dataset::Dataset& recording, const RigCalibrationRequest& request, camera::Rig rig) {
+  SessionOptions options;
+  options.config = request.config;
+  options.interrupted = request.interrupted;
+  options.vocabulary = request.vocabulary;
+  options.progress = request.progress;
+  Passes out;
+  while (out.runs < kMaxRuns && !out.converged) {
+    options.initial_rig = rig;
+    auto run = run_session(recording, options);
+    if (!run) return run.error();
+    if (request.interrupted.stop_requested()) return Error{recording.name, "", "an interruption", "a complete run"};
+    if (!run->calibration.done) return nothing_estimated(recording, *run);
+    out.converged = out.runs > 0 && agree(out.refinement.information, run->calibration.information);
+    ++out.runs;
+    out.refinement = std::move(run->calibration);
+    rig = *out.refinement.rig;
+  }
+  return out;
+}
+
+}  // namespace
+
+system::Config rig_calibration_config() {
+  system::Config config;
+  config.mode = execution::Mode::kSequential;
+  config.calibration.refine = calibration::Refine::kTrue;
+  config.calibration.sigma_rotation_deg = 3.0;
+  config.calibration.sigma_translation_mm = 20.0;
+  config.calibration.sigma_focal_percent = 10.0;
+  config.calibration.sigma_centre_percent = 2.0;
+  return config;
+}
+
+Result<camera::Rig> with_nominal_intrinsics(const camera::Rig& rig, const std::string& model, double fov_deg) {
+  const bool fisheye = model == camera::KannalaBrandt::kName;
+  const double largest = fisheye ? 300 : 160;
+  const camera::ModelRow* row = camera::find_model(model);
+  if (row == nullptr || (!fisheye && model != camera::Pinhole::kName && model != camera::PinholeRadTan::kName))
+    return Error{"command line", "--model", model, "pinhole, pinhole-radtan or kannala-brandt"};
+  if (!(fov_deg > 5 && fov_deg < largest))
+    return Error{"command line", "--fov", fmt::format("{}", fov_deg),
+                 fmt::format("5 to {} degrees for {}", largest, model)};
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    camera::Camera camera = rig.camera(c);
+    const double half = geometry::radians(fov_deg) / 2, half_width = 0.5 * camera.width;
+    const double focal = half_width / (fisheye ? half : std::tan(half));
+    camera.model = row->make({focal, focal, half_width - 0.5, 0.5 * camera.height - 0.5},
+                             std::vector<double>(row->counts.front(), 0.0));
+    cameras.push_back({std::move(camera), rig.body_from_cam(c)});
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recordings,
+                                     const RigCalibrationRequest& request) {
+  BSLAM_ASSERT(!recordings.empty(), "there must be a recording");
+  const camera::Rig& start = recordings.front().rig;
+  if (start.size() < 2)
+    return Error{recordings.front().name, "", "a single camera", "at least two cameras with a rough calibration"};
+  std::vector<calibration::RigRefinement> refinements;
+  camera::Rig rig = start;
+  int runs = 0;
+  bool converged = true;
+  for (const dataset::Dataset& recording : recordings) {
+    auto passes = run_passes(recording, request, rig);
+    if (!passes) return passes.error();
+    runs += passes->runs;
+    converged = converged && passes->converged;
+    rig = *passes->refinement.rig;
+    refinements.push_back(std::move(passes->refinement));
+  }
+  auto joint = calibration::combine(start, refinements);
+  if (!joint) return Error{recordings.front().name, "", "an estimate without deviations", "more landmarks"};
+  const dataset::Dataset& first = recordings.front();
+  camera::Rig whole =
+      first.whole_rig ? first.whole_rig->with_calibration_of(joint->rig, first.cameras_used) : joint->rig;
+  return RigCalibration{
+      start, *std::move(joint), runs, converged, scale_deviation(start, request.config.calibration), std::move(whole)};
+}
+
+}  // namespace bslam::session

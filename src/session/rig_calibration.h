@@ -1,0 +1,55 @@
+// Calibration of a rig from recordings of any scene, beginning with a rough calibration.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <stop_token>
+#include <string>
+
+#include "calibration/joint_refinement.h"
+#include "dataset/dataset.h"
+#include "place/vocabulary.h"
+#include "system/config.h"
+
+namespace bslam::session {
+
+struct RigCalibrationRequest {
+  system::Config config;  // calibration.refine must be kTrue; calibration.sigma_*: how rough the start is
+  place::VocabularyPtr vocabulary;
+  std::stop_token interrupted;
+  std::function<void(std::size_t done, std::size_t all)> progress;  // frames of the present run; may be empty
+};
+
+struct RigCalibration {
+  camera::Rig start;  // the given calibration of the cameras in use
+  calibration::JointRefinement joint;
+  int runs = 0;
+  bool converged = false;  // the last run of each recording changed no value by more than its standard deviation
+  // Relative standard deviation of the common factor of all distances between cameras, which images do not reveal; 0
+  // for a single camera.
+  double scale_std = 0;
+  camera::Rig whole;  // as `joint.rig`, with the cameras of the calibration that were not used
+};
+
+// The configuration of a calibration: sequential, always refined, and with the deviations of a rough start.
+system::Config rig_calibration_config();
+
+// The rig with a model without distortion and a horizontal field of view for all cameras, for rigs whose intrinsics are
+// not known: pinhole, pinhole-radtan or kannala-brandt. Error: a field of view that the model does not have.
+Result<camera::Rig> with_nominal_intrinsics(const camera::Rig& rig, const std::string& model, double fov_deg);
+
+// Runs SLAM on each recording, estimates the calibration from the map, and repeats this with the estimate until it does
+// not change any more, because the first map contains only the matches that the rough calibration permits. The start
+// remains the prior throughout. Estimates from several recordings are combined. The data sets must have the same rig,
+// and `recordings` at least one. Errors: those of run_session; a recording from which nothing can be estimated; an
+// interruption.
+Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recordings,
+                                     const RigCalibrationRequest& request);
+
+// The result as a table with standard deviations, followed by what the recordings do not reveal and the motion or scene
+// that is missing.
+std::string calibration_text(const RigCalibration& calibration);
+// The rig file, with the table as a comment.
+std::string calibrated_rig_yaml(const RigCalibration& calibration);
+
+}  // namespace bslam::session
