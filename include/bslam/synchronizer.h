@@ -21,11 +21,10 @@ namespace bslam {
 enum class DropReason {
   kDuplicate,  // the camera has already delivered an image with this time
   kTooLate,    // its bundle or a later one is already complete
-  kNoFrame,    // not within the tolerance of an image of camera 0, or another image of its camera is nearer to it
   kFarAhead,   // its time stamp is far ahead of all earlier images, as with a broken clock
   kOverflow    // its bundle was not fetched in time
 };
-inline constexpr std::size_t kDropReasons = 5;
+inline constexpr std::size_t kDropReasons = 4;
 BSLAM_EXPORT std::string_view to_string(DropReason reason);  // "duplicate", "too-late", ...
 
 struct DroppedImage {
@@ -57,11 +56,13 @@ struct SyncCounts {
   std::size_t waiting = 0;                                     // images of all cameras that are in no bundle yet
 };
 
-// Images are grouped by the same rule as recorded data sets: each image of camera 0 defines a bundle, to which the
-// nearest image of every other camera within the tolerance belongs; while camera 0 is silent, the other cameras define
-// bundles. A bundle is ready when no missing image can be expected for it: each camera has delivered a later image, is
-// not due yet according to its rate, is silent, or max_wait_s has passed. All times are time stamps of images, never of
-// the system clock, so the same sequence of pushes gives the same bundles, as long as they are fetched in time.
+// Images are grouped by the same rule as recorded data sets, and every image belongs to exactly one bundle. Each image
+// of camera 0 defines a bundle, to which the nearest image of every other camera within the tolerance belongs. The
+// remaining images form bundles among themselves: the earliest defines one, to which the images of other cameras within
+// the tolerance after it belong. A bundle is ready when no missing image can be expected for it: each camera has
+// delivered a later image, is not due yet according to its rate, is silent, or max_wait_s has passed. All times are
+// time stamps of images, never of the system clock, so the same sequence of pushes gives the same bundles, as long as
+// they are fetched in time.
 //
 // All functions may be called from any thread. Bundles come in order of time.
 class BSLAM_EXPORT Synchronizer {

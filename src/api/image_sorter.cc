@@ -13,6 +13,14 @@ constexpr std::size_t kRateIntervals =
     16;                                // number of intervals between images from which the rate of a camera is computed
 constexpr int kClockChangeImages = 3;  // number of consecutive images far ahead after which the new clock is accepted
 
+// Returns the shortest interval between consecutive times, or 0 for fewer than two. Unlike the median it remains the
+// interval of a camera that loses many images.
+TimeNs shortest_interval(const std::vector<TimeNs>& times) {
+  TimeNs shortest = kForever;
+  for (std::size_t k = 1; k < times.size(); ++k) shortest = std::min(shortest, times[k] - times[k - 1]);
+  return times.size() < 2 ? 0 : shortest;
+}
+
 }  // namespace
 
 ImageSorter::ImageSorter(std::size_t cameras, const SyncOptions& options)
@@ -22,7 +30,8 @@ ImageSorter::ImageSorter(std::size_t cameras, const SyncOptions& options)
       reorder_(from_seconds(options.reorder_s)),
       silent_after_(from_seconds(options.silent_after_s)),
       max_ahead_(from_seconds(options.max_ahead_s)),
-      cameras_(cameras) {}
+      cameras_(cameras),
+      anchor_(cameras) {}
 
 std::size_t ImageSorter::waiting() const {
   std::size_t count = 0;
@@ -37,7 +46,6 @@ void ImageSorter::push(std::size_t camera, TimeNs time_ns, const CameraImage& im
 
 void ImageSorter::flush(std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped) {
   emit_complete(true, bundles, dropped);
-  drop_until(kForever, DropReason::kNoFrame, dropped);
 }
 
 // A single time stamp of a broken clock must not make all other images late.
@@ -65,11 +73,17 @@ bool ImageSorter::accept(std::size_t c, TimeNs time_ns, const CameraImage& image
   if (far_ahead(camera, time_ns)) return drop(DropReason::kFarAhead);
   update_times(camera, time_ns);
   if (last_bundle_ns_ && time_ns <= *last_bundle_ns_) return drop(DropReason::kTooLate);
-  const bool belongs_to_anchor = c > 0 && anchor_ns_ && time_ns - *anchor_ns_ <= tolerance_;
-  if (belongs_to_anchor) return drop(DropReason::kTooLate);
+  if (belongs_to_anchor(c, time_ns)) return drop(DropReason::kTooLate);
   const auto place = std::ranges::upper_bound(camera.waiting, time_ns, {}, &WaitingImage::time_ns);
   camera.waiting.insert(place, {time_ns, image});
   return true;
+}
+
+// Returns true if the image would be in the anchor if it had come earlier.
+bool ImageSorter::belongs_to_anchor(std::size_t c, TimeNs time_ns) const {
+  if (c == 0 || !anchor_[0]) return false;
+  const TimeNs distance = std::abs(time_ns - *anchor_[0]);
+  return distance <= tolerance_ && (!anchor_[c] || distance < std::abs(*anchor_[c] - *anchor_[0]));
 }
 
 // Returns the time up to which no further image of the camera is expected.
@@ -79,28 +93,29 @@ TimeNs ImageSorter::complete_until(std::size_t c) const {
   if (*newest_ns_ - last_ns > silent_after_) return kForever;
   const TimeNs timeout = *newest_ns_ - max_wait_;
   if (recent.empty()) return timeout;
-  const TimeNs next_due = last_ns + image::gap_after(image::median_interval(recent), 0) - reorder_;
+  const TimeNs next_due = last_ns + shortest_interval(recent) / 4 * 3 - reorder_;
   return std::max(next_due, timeout);
 }
 
-TimeNs ImageSorter::gap() const { return image::gap_after(image::median_interval(cameras_[0].recent), tolerance_); }
-
-// Groups all waiting images, following the last complete bundle with an image of camera 0.
+// Groups all waiting images. The anchor is grouped with them, since images that are nearest to its image of camera 0
+// join no other one.
 image::FrameGroups ImageSorter::grouped() const {
   std::vector<std::vector<TimeNs>> times(cameras_.size());
-  if (anchor_ns_) times[0].push_back(*anchor_ns_);
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if (anchor_[c]) times[c].push_back(*anchor_[c]);
     for (const WaitingImage& w : cameras_[c].waiting) times[c].push_back(w.time_ns);
   }
-  image::FrameGroups groups = image::group_frames(times, tolerance_, gap());
-  if (!anchor_ns_) return groups;
+  image::FrameGroups groups = image::group_frames(times, tolerance_);
+  if (!anchor_[0]) return groups;
   std::erase_if(groups.frames, [](const image::GroupedFrame& frame) { return frame.images[0] == 0; });
-  for (image::GroupedFrame& frame : groups.frames) frame.images[0] -= frame.images[0] > 0;
+  for (image::GroupedFrame& frame : groups.frames) {
+    for (std::size_t c = 0; c < cameras_.size(); ++c) frame.images[c] -= anchor_[c] && frame.images[c] > 0;
+  }
   return groups;
 }
 
-// Returns true if no future image can change the frame. A future image could be nearer to camera 0's image, or be the
-// image of a camera that has none in the frame.
+// Returns true if no future image can change the frame. A future image could be nearer to camera 0's image, be the
+// image of a camera that has none in the frame, or be an image of camera 0 that an image of the frame joins.
 bool ImageSorter::is_complete(const image::GroupedFrame& frame) const {
   const bool has_camera0 = frame.images[0] >= 0;
   TimeNs farthest = 0;
@@ -115,7 +130,7 @@ bool ImageSorter::is_complete(const image::GroupedFrame& frame) const {
     farthest = std::max(farthest, distance);
   }
   if (has_camera0) return complete_until(0) >= frame.time_ns + 2 * farthest;
-  return complete_until(0) > frame.time_ns + std::max(gap(), tolerance_);
+  return complete_until(0) > frame.time_ns + farthest + tolerance_;
 }
 
 bool ImageSorter::exceeds_limit() const {
@@ -125,47 +140,46 @@ bool ImageSorter::exceeds_limit() const {
 void ImageSorter::emit_complete(bool last, std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped) {
   while (waiting() > 0) {
     const image::FrameGroups groups = grouped();
-    if (groups.frames.empty()) {  // only images that belong to no frame
-      if (exceeds_limit()) drop_until(kForever, DropReason::kNoFrame, dropped);
-      return;
-    }
+    if (groups.frames.empty()) return;
     const image::GroupedFrame& frame = groups.frames.front();
+    if (last_bundle_ns_ && frame.time_ns <= *last_bundle_ns_) {
+      drop(frame, dropped);
+      continue;
+    }
     if (!last && !exceeds_limit() && !is_complete(frame)) return;
-    emit(frame, bundles, dropped);
+    emit(frame, bundles);
   }
 }
 
-void ImageSorter::emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles,
-                       std::vector<DroppedImage>& dropped) {
+void ImageSorter::emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles) {
+  if (frame.images[0] >= 0) {
+    for (std::size_t c = 0; c < cameras_.size(); ++c) {
+      anchor_[c] = frame.images[c] < 0
+                       ? std::nullopt
+                       : std::optional(cameras_[c].waiting[static_cast<std::size_t>(frame.images[c])].time_ns);
+    }
+  }
   ImageBundle& bundle = bundles.emplace_back();
   bundle.images.resize(cameras_.size());
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (frame.images[c] < 0) continue;
-    const auto at = cameras_[c].waiting.begin() + frame.images[c];
-    bundle.images[c] = std::move(at->image);
-    cameras_[c].waiting.erase(at);
+    if (frame.images[c] >= 0) bundle.images[c] = take(c, frame.images[c]);
   }
   last_bundle_ns_ = frame.time_ns;
-  if (frame.images[0] >= 0) anchor_ns_ = frame.time_ns;
-  drop_until(frame.time_ns, DropReason::kNoFrame, dropped);
-  if (frame.images[0] >= 0) {  // another image of a camera was nearer
-    for (std::size_t c = 1; c < cameras_.size(); ++c) {
-      auto& waiting = cameras_[c].waiting;
-      while (!waiting.empty() && waiting.front().time_ns - frame.time_ns <= tolerance_) {
-        dropped.push_back({c, waiting.front().image.time_ns, DropReason::kNoFrame});
-        waiting.erase(waiting.begin());
-      }
-    }
+}
+
+// Drops images whose place in another bundle was taken by a later, nearer one, after a later bundle was complete.
+void ImageSorter::drop(const image::GroupedFrame& frame, std::vector<DroppedImage>& dropped) {
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if (frame.images[c] >= 0) dropped.push_back({c, take(c, frame.images[c]).time_ns, DropReason::kTooLate});
   }
 }
 
-void ImageSorter::drop_until(TimeNs time_ns, DropReason reason, std::vector<DroppedImage>& dropped) {
-  for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    auto& waiting = cameras_[c].waiting;
-    const auto end = std::ranges::upper_bound(waiting, time_ns, {}, &WaitingImage::time_ns);
-    for (auto w = waiting.begin(); w != end; ++w) dropped.push_back({c, w->image.time_ns, reason});
-    waiting.erase(waiting.begin(), end);
-  }
+// Removes a waiting image.
+CameraImage ImageSorter::take(std::size_t c, int position) {
+  const auto at = cameras_[c].waiting.begin() + position;
+  CameraImage image = std::move(at->image);
+  cameras_[c].waiting.erase(at);
+  return image;
 }
 
 }  // namespace bslam::api

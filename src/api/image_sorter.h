@@ -39,12 +39,13 @@ class ImageSorter {
   bool far_ahead(Camera& camera, TimeNs time_ns) const;
   void update_times(Camera& camera, TimeNs time_ns);
   TimeNs complete_until(std::size_t camera) const;
-  TimeNs gap() const;
   bool is_complete(const image::GroupedFrame& frame) const;
   bool exceeds_limit() const;
   void emit_complete(bool last, std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped);
-  void emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped);
-  void drop_until(TimeNs time_ns, DropReason reason, std::vector<DroppedImage>& dropped);
+  void emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles);
+  void drop(const image::GroupedFrame& frame, std::vector<DroppedImage>& dropped);
+  CameraImage take(std::size_t camera, int position);
+  bool belongs_to_anchor(std::size_t camera, TimeNs time_ns) const;
   image::FrameGroups grouped() const;
 
   const std::size_t max_images_;
@@ -52,7 +53,8 @@ class ImageSorter {
   std::vector<Camera> cameras_;
   std::optional<TimeNs> first_ns_, newest_ns_;  // times of the first and the newest image of all cameras
   std::optional<TimeNs> last_bundle_ns_;        // time of the last complete bundle
-  std::optional<TimeNs> anchor_ns_;             // time of the last complete bundle with an image of camera 0
+  // Per camera: time of its image in the anchor, the last complete bundle with an image of camera 0; nullopt if none.
+  std::vector<std::optional<TimeNs>> anchor_;
 };
 
 }  // namespace bslam::api

@@ -43,8 +43,6 @@ std::string_view to_string(DropReason reason) {
       return "duplicate";
     case DropReason::kTooLate:
       return "too-late";
-    case DropReason::kNoFrame:
-      return "no-frame";
     case DropReason::kFarAhead:
       return "far-ahead";
     case DropReason::kOverflow:

@@ -178,30 +178,37 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Re
   return images;
 }
 
-double nearest_distance_s(const std::vector<image_files::ImageFile>& a, const std::vector<image_files::ImageFile>& b) {
-  TimeNs least = std::numeric_limits<TimeNs>::max();
-  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
-    least = std::min(least, std::abs(a[i].time_ns - b[j].time_ns));
-    ++(a[i].time_ns < b[j].time_ns ? i : j);
-  }
-  return to_seconds(least);
+// A camera that never captures while camera 0 does has another clock.
+Status check_common_clock(const std::vector<image_files::ImageFile>& images,
+                          const std::vector<image_files::ImageFile>& reference, const std::string& name,
+                          const camera::Camera& camera0, const fs::path& path) {
+  const TimeNs before_ns = reference.front().time_ns - images.back().time_ns;
+  const TimeNs after_ns = images.front().time_ns - reference.back().time_ns;
+  const TimeNs interval_ns =
+      (reference.back().time_ns - reference.front().time_ns) / std::max<TimeNs>(1, std::ssize(reference) - 1);
+  const TimeNs apart_ns = std::max(before_ns, after_ns);
+  if (apart_ns <= interval_ns) return {};
+  return Error{path.string(), name,
+               fmt::format("all images {:g} s or more {} those of {}", to_seconds(apart_ns),
+                           before_ns > 0 ? "before" : "after", camera0.name),
+               "time stamps of one clock for all cameras"};
 }
 
 Status group(const DatasetRequest& request, const std::vector<std::vector<image_files::ImageFile>>& images,
              Dataset& dataset) {
+  const camera::Camera& camera0 = dataset.rig.camera(std::size_t{0});
   FrameGrouping grouping = group_frames(images, from_seconds(request.sync_tolerance_s));
   for (std::size_t i = 0; i < images.size(); ++i) {
     const std::string& name = dataset.rig.camera(i).name;
     if (grouping.shared_with_camera0[i] == 0) {
-      return Error{request.path.string(), name,
-                   fmt::format("no image within {:g} ms of an image of {} (the nearest is {:g} ms away)",
-                               1e3 * request.sync_tolerance_s, dataset.rig.camera(std::size_t{0}).name,
-                               1e3 * nearest_distance_s(images[0], images[i])),
-                   "synchronised cameras, or a larger io.sync_tolerance"};
+      if (const Status status = check_common_clock(images[i], images[0], name, camera0, request.path); !status)
+        return status;
     }
-    if (grouping.unassigned[i] > 0) {
-      dataset.warnings.push_back(fmt::format("{}: {} of {} images match no frame in time and are not used", name,
-                                             grouping.unassigned[i], images[i].size()));
+    if (grouping.beside_camera0[i] > 0) {
+      dataset.warnings.push_back(fmt::format(
+          "{}: {} of {} images are not within {:g} ms of an image of {} and are in frames of their own "
+          "(see io.sync_tolerance)",
+          name, grouping.beside_camera0[i], images[i].size(), 1e3 * request.sync_tolerance_s, camera0.name));
     }
   }
   dataset.frames = std::move(grouping.frames);

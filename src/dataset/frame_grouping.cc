@@ -1,11 +1,24 @@
 #include "dataset/frame_grouping.h"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "base/assert.h"
 #include "image/frame_grouping.h"
 
 namespace bslam::dataset {
+namespace {
+
+// Returns the distance from `time_ns` to the nearest of `times`, which are increasing and at least one.
+TimeNs distance(const std::vector<TimeNs>& times, TimeNs time_ns) {
+  const auto after = std::ranges::lower_bound(times, time_ns);
+  if (after == times.begin()) return *after - time_ns;
+  const TimeNs before_ns = time_ns - *std::prev(after);
+  return after == times.end() ? before_ns : std::min(before_ns, *after - time_ns);
+}
+
+}  // namespace
 
 FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> images, TimeNs tolerance_ns) {
   BSLAM_ASSERT(!images.empty() && !images[0].empty(), "camera 0 must have images");
@@ -13,14 +26,17 @@ FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> 
   for (std::size_t c = 0; c < images.size(); ++c) {
     for (const image_files::ImageFile& image : images[c]) times[c].push_back(image.time_ns);
   }
-  const TimeNs gap_ns = image::gap_after(image::median_interval(times[0]), tolerance_ns);
-  image::FrameGroups groups = image::group_frames(times, tolerance_ns, gap_ns);
-  FrameGrouping out{{}, std::move(groups.shared_with_camera0), std::move(groups.unassigned)};
+  image::FrameGroups groups = image::group_frames(times, tolerance_ns);
+  FrameGrouping out{{}, std::move(groups.shared_with_camera0), std::vector<int>(images.size(), 0)};
+  const TimeNs near_ns = image::median_interval(times[0]) / 4 * 3;
   for (const image::GroupedFrame& group : groups.frames) {
     FrameEntry& frame = out.frames.emplace_back(
         FrameEntry{group.time_ns, std::vector<std::optional<image_files::ImageFile>>(images.size())});
+    const bool beside = group.images[0] < 0 && distance(times[0], group.time_ns) < near_ns;
     for (std::size_t c = 0; c < images.size(); ++c) {
-      if (group.images[c] >= 0) frame.images[c] = images[c][static_cast<std::size_t>(group.images[c])];
+      if (group.images[c] < 0) continue;
+      frame.images[c] = images[c][static_cast<std::size_t>(group.images[c])];
+      out.beside_camera0[c] += beside;
     }
   }
   return out;

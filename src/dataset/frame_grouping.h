@@ -12,12 +12,13 @@ namespace bslam::dataset {
 struct FrameGrouping {
   std::vector<FrameEntry> frames;        // in order of time
   std::vector<int> shared_with_camera0;  // per camera: number of images in frames with an image of camera 0
-  std::vector<int> unassigned;           // per camera: number of images in no frame
+  // Per camera: number of images that are in no frame of camera 0 although camera 0 was capturing: one of its images is
+  // less than 3/4 of its median interval away.
+  std::vector<int> beside_camera0;
 };
 
-// Groups images by the rule of image/frame_grouping.h. Camera 0 has a gap where two of its images are more than 3/4 of
-// its median interval apart. `images[i]` are the images of camera i, strictly increasing in time. Camera 0 must have at
-// least one.
+// Groups images by the rule of image/frame_grouping.h: every image belongs to one frame. `images[i]` are the images of
+// camera i, strictly increasing in time. Camera 0 must have at least one.
 FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> images, TimeNs tolerance_ns);
 
 }  // namespace bslam::dataset

@@ -15,22 +15,19 @@ struct GroupedFrame {
 };
 
 struct FrameGroups {
-  std::vector<GroupedFrame> frames;      // in order of time
+  std::vector<GroupedFrame> frames;      // in order of time, which is strictly increasing
   std::vector<int> shared_with_camera0;  // per camera: number of images in frames that have an image of camera 0
-  std::vector<int> unassigned;           // per camera: number of images in no frame
 };
 
-// Each image of camera 0 defines a frame. An image of another camera is assigned to the nearest frame within
-// `tolerance_ns`; of two images of the same camera the nearer one is kept. In a gap of camera 0 the other cameras
-// define frames: an image more than `gap_ns` away from any image of camera 0, together with the images of other cameras
-// within the tolerance after it. Images near an image of camera 0 but outside the tolerance belong to no frame, so that
-// cameras which do not capture simultaneously never double the frame rate. `times[i]` are the times of camera i's
-// images, strictly increasing; any list may be empty.
-FrameGroups group_frames(std::span<const std::vector<TimeNs>> times, TimeNs tolerance_ns, TimeNs gap_ns);
-
-// Returns the distance in time from camera 0's images beyond which camera 0 has a gap: 3/4 of the interval between its
-// images, but at least the tolerance.
-TimeNs gap_after(TimeNs interval_ns, TimeNs tolerance_ns);
+// Assigns every image to exactly one frame, which has at most one image of each camera:
+// 1. Each image of camera 0 defines a frame. An image of another camera joins the frame of the nearest image of camera
+//    0, if that is within `tolerance_ns`; of several images of one camera the nearest joins.
+// 2. The remaining images form frames among themselves. The earliest defines a frame, which the images of other cameras
+//    up to `tolerance_ns` after it join, but none on the other side of an image of camera 0.
+// Thus a camera that camera 0 does not accompany, because it lost images, is slower, or captures at other times, has
+// frames of its own. The images of each camera are in order of time across the frames. `times[i]` are the times of
+// camera i's images, strictly increasing; any list may be empty.
+FrameGroups group_frames(std::span<const std::vector<TimeNs>> times, TimeNs tolerance_ns);
 
 // Returns the median interval between consecutive times, the smaller of the two middle ones for an even number, and 0
 // for fewer than two times.

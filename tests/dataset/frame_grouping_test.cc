@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/random.h"
+
 namespace bslam::dataset {
 namespace {
 
@@ -31,20 +33,76 @@ TEST(FrameGrouping, JoinsImagesWithinTheToleranceAndKeepsTheirTimes) {
   const auto g = group({at_ms({0, 100, 200}), at_ms({0.5, 99, 202}), at_ms({1.9, 100, 199})});
   EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, 0.5, 1.9}, {100, 99, 100}, {200, 202, 199}}));
   EXPECT_EQ(g.frames[1].time_ns, 100 * kMs);
-  EXPECT_EQ(g.unassigned, (std::vector<int>{0, 0, 0}));
+  EXPECT_EQ(g.beside_camera0, (std::vector<int>{0, 0, 0}));
 }
 
-TEST(FrameGrouping, CamerasWithOtherCaptureTimesDefineNoFrames) {
+TEST(FrameGrouping, ImagesAtOtherTimesAreFramesOfTheirOwn) {
   const auto g = group({at_ms({0, 100, 200}), at_ms({10, 101, 150, 190})});
-  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, -1}, {100, 101}, {200, -1}}));
-  EXPECT_EQ(g.unassigned, (std::vector<int>{0, 3}));
+  EXPECT_EQ(times(g),
+            (std::vector<std::vector<double>>{{0, -1}, {-1, 10}, {100, 101}, {-1, 150}, {-1, 190}, {200, -1}}));
+  EXPECT_EQ(g.beside_camera0, (std::vector<int>{0, 3}));
   EXPECT_EQ(g.shared_with_camera0, (std::vector<int>{3, 1}));
 }
 
-TEST(FrameGrouping, AFasterCameraDoesNotRaiseTheFrameRate) {
-  const auto g = group({at_ms({0, 100, 200, 300}), at_ms({0, 50, 100, 150, 200, 250, 300})});
-  EXPECT_EQ(g.frames.size(), 4u);
-  EXPECT_EQ(g.unassigned[1], 3);
+TEST(FrameGrouping, AFasterCameraHasFramesOfItsOwn) {
+  const auto g = group({at_ms({0, 50, 100, 150}), at_ms({0, 33, 67, 100, 133})});
+  EXPECT_EQ(times(g),
+            (std::vector<std::vector<double>>{{0, 0}, {-1, 33}, {50, -1}, {-1, 67}, {100, 100}, {-1, 133}, {150, -1}}));
+  EXPECT_EQ(g.beside_camera0[1], 3);
+}
+
+TEST(FrameGrouping, ImagesAtTheTimesOfLostOnesOfCamera0AreFrames) {
+  const auto g = group({at_ms({0, 150, 200, 350}), at_ms({50, 100.5, 200, 250}), at_ms({100, 150.5, 300})});
+  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, -1, -1},
+                                                        {-1, 50, -1},
+                                                        {-1, 100.5, 100},
+                                                        {150, -1, 150.5},
+                                                        {200, 200, -1},
+                                                        {-1, 250, -1},
+                                                        {-1, -1, 300},
+                                                        {350, -1, -1}}));
+}
+
+TEST(FrameGrouping, ConstantDelaysWithinTheToleranceStayTogetherWithLostImages) {
+  const auto g =
+      group_frames(std::vector{at_ms({0, 50, 150}), at_ms({0, 100, 150}), at_ms({15, 65, 115, 165})}, 20 * kMs);
+  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, 0, 15}, {50, -1, 65}, {-1, 100, 115}, {150, 150, 165}}));
+}
+
+TEST(FrameGrouping, AlternatingCamerasAlternateInTheFrames) {
+  const auto g = group({at_ms({0, 100, 200}), at_ms({50, 150})});
+  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, -1}, {-1, 50}, {100, -1}, {-1, 150}, {200, -1}}));
+}
+
+// Random rates, delays, jitter and losses: the properties that every grouping has.
+TEST(FrameGrouping, EveryImageIsInOneFrameInOrderOfTime) {
+  Random random(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<std::vector<image_files::ImageFile>> images(1 + random.below(4));
+    for (auto& camera : images) {
+      const TimeNs interval = (20 + random.below(40)) * kMs, delay = random.below(30) * kMs;
+      const std::uint32_t lost = random.below(10);
+      for (int k = 0; k < 60; ++k) {
+        const TimeNs jitter = random.below(6) * kMs;
+        if (camera.empty() || random.below(10) >= lost) camera.push_back({"", k * interval + delay + jitter});
+      }
+    }
+    const FrameGrouping g = group_frames(images, random.below(25) * kMs);
+    std::vector<std::vector<TimeNs>> grouped(images.size());
+    for (std::size_t k = 0; k < g.frames.size(); ++k) {
+      if (k > 0) {
+        EXPECT_GT(g.frames[k].time_ns, g.frames[k - 1].time_ns);
+      }
+      for (std::size_t c = 0; c < images.size(); ++c) {
+        if (g.frames[k].images[c]) grouped[c].push_back(g.frames[k].images[c]->time_ns);
+      }
+    }
+    for (std::size_t c = 0; c < images.size(); ++c) {
+      std::vector<TimeNs> expected;
+      for (const auto& image : images[c]) expected.push_back(image.time_ns);
+      EXPECT_EQ(grouped[c], expected) << "trial " << trial << ", camera " << c;
+    }
+  }
 }
 
 TEST(FrameGrouping, OtherCamerasDefineFramesInAGapOfCamera0) {
@@ -68,10 +126,10 @@ TEST(FrameGrouping, OtherCamerasDefineFramesInAGapOfCamera0) {
   EXPECT_EQ(h.frames[5].time_ns, 499 * kMs);
 }
 
-TEST(FrameGrouping, KeepsTheNearerOfTwoImages) {
+TEST(FrameGrouping, TheNearerOfTwoImagesJoinsCamera0) {
   const auto g = group({at_ms({0, 100}), at_ms({-1.5, 0.5, 99, 100.5})});
-  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{0, 0.5}, {100, 100.5}}));
-  EXPECT_EQ(g.unassigned[1], 2);
+  EXPECT_EQ(times(g), (std::vector<std::vector<double>>{{-1, -1.5}, {0, 0.5}, {-1, 99}, {100, 100.5}}));
+  EXPECT_EQ(g.beside_camera0[1], 2);
   EXPECT_EQ(g.shared_with_camera0[1], 2);
 }
 
