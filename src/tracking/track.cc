@@ -164,7 +164,14 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
       estimators::ransac_pose(frame::rig_of(map.rig(), frame), observations, out.T_rig_world, options.pose, {},
                               Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
   out.reason = LostReason::kFewInliers;
-  if (!supported(solution, observations.size(), options.min_inliers_wide, options)) return false;
+  if (!solution.ok || solution.num_inliers < options.min_inliers_wide) return false;
+  if (!supported(solution, observations.size(), options.min_inliers_wide, options)) {
+    Coarse confirmed = out;
+    confirmed.T_rig_world = solution.T_rig_world;
+    if (!track_in_narrow_windows(input, landmarks, options, pool, confirmed)) return false;
+    out = std::move(confirmed);
+    return true;
+  }
   out.T_rig_world = solution.T_rig_world;
   out.matches = keep_inliers(search.found, solution.inlier);
   out.reason = LostReason::kNone;
@@ -307,7 +314,6 @@ TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, Lo
   out.result.cameras = camera_counts(frame, {}, {});
   out.state = state;
   out.state.status = TrackStatus::kLost;
-  out.state.twist.reset();
   return out;
 }
 

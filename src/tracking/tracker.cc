@@ -70,7 +70,7 @@ void update_odometry(const map::BundledMap& map, const TrackerState& before, Tra
 
 // Copies the motion from the state to the record.
 void record_motion(TrackOutcome& outcome) {
-  outcome.record.twist = outcome.next.track.twist;
+  if (is_tracking(outcome.record.result.status)) outcome.record.twist = outcome.next.track.twist;
   outcome.record.T_rig_odom = outcome.next.T_rig_odom;
   outcome.record.T_map_odom = outcome.next.T_map_odom;
 }
@@ -194,13 +194,14 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   }
 }
 
-// The next frames search for the rig near its last pose. After too many lost frames a new submap is started.
+// The next frames search for the rig where its last motion would have taken it, or near its last pose if that is too
+// long ago. After too many lost frames a new submap is started.
 void Tracker::handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome) {
   FrontEndState& state = outcome.next;
   const TrackResult result = outcome.record.result;
   state.track = before;
   state.track.status = TrackStatus::kLost;
-  state.track.twist.reset();
+  if (to_seconds(result.time_ns - before.time_ns) > kMaxPrediction_s) state.track.twist.reset();
   state.frames_lost += had_features(result);
   update_odometry(*input.map, before, outcome);
   const bool give_up = state.frames_lost >= options_.new_submap_after && !options_.localize_only;
