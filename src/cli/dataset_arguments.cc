@@ -1,6 +1,7 @@
 #include "cli/dataset_arguments.h"
 
 #include <charconv>
+#include <map>
 #include <sstream>
 
 namespace bslam::cli {
@@ -20,7 +21,48 @@ Result<std::vector<int>> parse_cameras(const std::string& text) {
   return cameras;
 }
 
+Result<std::vector<image_decoding::Bayer>> parse_bayer(const std::string& text) {
+  using image_decoding::Bayer;
+  static const std::map<std::string, Bayer> kPatterns = {{"none", Bayer::kNone},
+                                                         {"rggb", Bayer::kRggb},
+                                                         {"bggr", Bayer::kBggr},
+                                                         {"grbg", Bayer::kGrbg},
+                                                         {"gbrg", Bayer::kGbrg}};
+  std::vector<Bayer> patterns;
+  std::istringstream parts(text + ",");
+  for (std::string part; std::getline(parts, part, ',');) {
+    const auto pattern = kPatterns.find(part);
+    if (pattern == kPatterns.end())
+      return Error{"command line", "--bayer", "'" + text + "'",
+                   "rggb, bggr, grbg, gbrg or none, for all cameras or separated by commas"};
+    patterns.push_back(pattern->second);
+  }
+  return patterns;
+}
+
 }  // namespace
+
+void add_image_options(CLI::App& verb, ImageArguments& a) {
+  verb.add_option("--rate", a.rate_hz,
+                  "the time stamps of the images are their numbers, and they were taken at this rate [Hz]");
+  verb.add_option("--stamp-unit", a.stamp_unit, "unit of the time stamps; default: ns")
+      ->check(CLI::IsMember({"ns", "us", "ms", "s"}));
+  verb.add_option("--bayer", a.bayer,
+                  "colour filter of raw images: rggb, bggr, grbg, gbrg or none; one for all cameras, or one for each, "
+                  "separated by commas");
+}
+
+Status apply_image_options(const ImageArguments& a, dataset::DatasetRequest& request) {
+  static const std::map<std::string, TimeNs> kUnits = {
+      {"ns", 1}, {"us", 1'000}, {"ms", 1'000'000}, {"s", 1'000'000'000}};
+  request.time_stamps.rate_hz = a.rate_hz;
+  if (!a.stamp_unit.empty()) request.time_stamps.unit_ns = kUnits.at(a.stamp_unit);
+  if (a.bayer.empty()) return {};
+  auto patterns = parse_bayer(a.bayer);
+  if (!patterns) return patterns.error();
+  request.bayer = *std::move(patterns);
+  return {};
+}
 
 void add_dataset_options(CLI::App& verb, DatasetArguments& a) {
   verb.add_option("DATA", a.path, "folder of the data set")->required();
@@ -36,6 +78,7 @@ void add_recording_options(CLI::App& verb, DatasetArguments& a) {
                   "cameras of the rig to use, in this order, such as 0,1; the first becomes camera 0 of the run");
   verb.add_option("--begin", a.begin_s, "start of the interval to process, in seconds after the first image");
   verb.add_option("--end", a.end_s, "end of the interval to process, in seconds after the first image");
+  add_image_options(verb, a.images);
 }
 
 Result<dataset::DatasetRequest> dataset_request(const DatasetArguments& a, double sync_tolerance_s) {
@@ -53,6 +96,7 @@ Result<dataset::DatasetRequest> dataset_request(const DatasetArguments& a, doubl
   request.sync_tolerance_s = sync_tolerance_s;
   request.begin_s = a.begin_s;
   request.end_s = a.end_s;
+  if (const Status s = apply_image_options(a.images, request); !s) return s.error();
   return request;
 }
 

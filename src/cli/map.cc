@@ -12,6 +12,7 @@
 
 #include "base/atomic_file.h"
 #include "cli/config_arguments.h"
+#include "cli/dataset_arguments.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
 #include "dataset/dataset.h"
@@ -30,6 +31,7 @@ namespace fs = std::filesystem;
 
 struct MapArguments {
   std::string file, other, out, vocabulary, images, rig;
+  ImageArguments image_options;
   ConfigArguments config;
   bool json = false, overwrite = false;
 };
@@ -115,6 +117,7 @@ Result<storage::ImageNamer> image_namer(const camera::Rig& rig, const MapArgumen
   constexpr double kTolerance_s = 0.1;  // includes images of cameras that are not synchronised
   dataset::DatasetRequest request{.path = arguments.images, .sync_tolerance_s = kTolerance_s};
   if (!arguments.rig.empty()) request.rig_file = arguments.rig;
+  if (const Status s = apply_image_options(arguments.image_options, request); !s) return s.error();
   const auto data = dataset::open_dataset(request);
   if (!data) return data.error();
   std::map<std::pair<std::string, TimeNs>, std::string> names;  // by camera and time stamp
@@ -220,6 +223,7 @@ void add_map(CLI::App& app, int& exit_status) {
   out->add_option("--out", arguments->out, "folder to write to")->required();
   out->add_option("--images", arguments->images,
                   "data set of the map, so that the COLMAP model names images by their files in the data set");
+  add_image_options(*out, arguments->image_options);
   out->add_option("--rig", arguments->rig, "calibration of the data set, as for bslam run");
   out->add_flag("--overwrite", arguments->overwrite, "write into a folder that is not empty");
   out->callback([arguments, &exit_status] { exit_status = map_export(*arguments); });

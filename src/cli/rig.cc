@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/dataset_arguments.h"
 #include "cli/verbs.h"
 #include "rig_formats/rig_file.h"
 #include "session/rig_report.h"
@@ -40,7 +41,14 @@ Result<camera::Rig> with_drops(camera::Rig rig, const std::vector<std::string>& 
   return rig;
 }
 
-int rig_info(const session::RigReportRequest& request) {
+struct InfoArguments {
+  session::RigReportRequest report;
+  ImageArguments images;
+};
+
+int rig_info(const InfoArguments& arguments) {
+  session::RigReportRequest request = arguments.report;
+  if (const Status s = apply_image_options(arguments.images, request.recording); !s) return report_error(s.error());
   const auto report = session::report_rig(request);
   if (!report) return report_error(report.error());
   std::fputs(report->c_str(), stdout);
@@ -72,14 +80,16 @@ int rig_convert(const ConvertArguments& arguments) {
 }
 
 void add_info(CLI::App& rig, int& exit_status) {
-  const auto request = std::make_shared<session::RigReportRequest>();
+  const auto arguments = std::make_shared<InfoArguments>();
+  session::RigReportRequest* const request = &arguments->report;
   CLI::App* info = rig.add_subcommand(
       "info", "print cameras, fields of view, baselines and overlaps, and warn about likely mistakes");
   info->add_option("FILE", request->file, "a calibration, or the folder of a data set")->required();
   info->add_flag("--json", request->json, "print JSON");
   info->add_option("--svg", request->svg, "write a drawing of the rig from above and from the side to this SVG file");
   info->add_option("--images", request->images, "test the extrinsics against the images of this data set");
-  info->callback([request, &exit_status] { exit_status = rig_info(*request); });
+  add_image_options(*info, arguments->images);
+  info->callback([arguments, &exit_status] { exit_status = rig_info(*arguments); });
 }
 
 void add_convert(CLI::App& rig, int& exit_status) {

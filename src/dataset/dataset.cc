@@ -163,7 +163,8 @@ Status check_images(const std::vector<image_files::ImageFile>& images, const cam
 }
 
 // Returns the images of every camera in use, with time offsets applied to the time stamps.
-Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Recording& recording, ChosenRig& chosen) {
+Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const DatasetRequest& request,
+                                                                        const Recording& recording, ChosenRig& chosen) {
   std::vector<std::vector<image_files::ImageFile>> images;
   for (std::size_t i = 0; i < chosen.cameras.size(); ++i) {
     auto list = recording.images(static_cast<std::size_t>(chosen.cameras[i]));
@@ -172,10 +173,25 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Re
     const camera::Camera& camera = chosen.rig.camera(i);
     if (const Status status = check_images(list->images, camera); !status) return status.error();
     if (const auto mask = image_decoding::read_mask(camera); !mask) return mask.error();
+    const std::string source = list->images.front().path.parent_path().string();
+    if (const Status s = convert_time_stamps(request.time_stamps, source, list->images); !s) return s.error();
     for (image_files::ImageFile& image : list->images) image.time_ns += camera.time_offset_ns;
     images.push_back(std::move(list->images));
   }
   return images;
+}
+
+// Returns the formats of the images of every camera in use, with the bits that their 16-bit files use.
+std::vector<image_decoding::PixelFormat> pixel_formats(const DatasetRequest& request,
+                                                       const std::vector<std::vector<image_files::ImageFile>>& images) {
+  std::vector<image_decoding::PixelFormat> formats(images.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    std::vector<fs::path> files;
+    for (const image_files::ImageFile& image : images[i]) files.push_back(image.path);
+    formats[i].bits = image_decoding::bits_in_use(files);
+    if (!request.bayer.empty()) formats[i].bayer = request.bayer[request.bayer.size() == 1 ? 0 : i];
+  }
+  return formats;
 }
 
 // A camera that never captures while camera 0 does has another clock.
@@ -281,10 +297,14 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
   const Recording& recording = *opened->recording;
   const auto own_rig_file = request.rig_file ? std::nullopt : rig_file_in_folder(request);
   if (own_rig_file && !recording.calibrated()) request.rig_file = *own_rig_file;
+  if (opened->format == DatasetFormat::kKitti && (request.time_stamps.rate_hz || request.time_stamps.unit_ns)) {
+    return Error{request.time_stamps.rate_hz ? "--rate" : "--stamp-unit", "", "a data set with times.txt",
+                 "no unit, since times.txt contains seconds"};
+  }
   auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
   if (own_rig_file && !request.rig_file) warn_of_times(*own_rig_file, chosen->warnings);
-  const auto images = collect_images(recording, *chosen);
+  const auto images = collect_images(request, recording, *chosen);
   if (!images) return images.error();
   Dataset dataset{name_of(request.path),
                   opened->format,
@@ -295,6 +315,11 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
                   {},
                   recording.ground_truth(),
                   std::move(chosen->warnings)};
+  if (!(request.bayer.size() <= 1 || request.bayer.size() == images->size())) {
+    return Error{"--bayer", "", fmt::format("{} patterns", request.bayer.size()),
+                 fmt::format("one for all cameras, or one for each of the {} in use", images->size())};
+  }
+  dataset.pixel_formats = pixel_formats(request, *images);
   if (const Status status = group(request, *images, dataset); !status) return status.error();
   if (const Status status = keep_range(request, dataset); !status) return status.error();
   return dataset;

@@ -10,6 +10,8 @@
 #include "base/result.h"
 #include "base/timestamp.h"
 #include "camera/rig.h"
+#include "dataset/time_stamps.h"
+#include "image_decoding/pixel_format.h"
 #include "image_files/image_folder.h"
 
 namespace bslam::dataset {
@@ -23,6 +25,9 @@ struct DatasetRequest {
   std::vector<int> cameras = {};                       // in this order; the first becomes camera 0; empty: all
   double sync_tolerance_s = 0.002;                     // largest time difference within a frame
   std::optional<double> begin_s = {}, end_s = {};      // seconds from the first frame: begin <= t < end
+  TimeStampOptions time_stamps = {};                   // unit of the recorded time stamps
+  // Colour filters of the cameras in use, in their order, or one for all; empty: none.
+  std::vector<image_decoding::Bayer> bayer = {};
 };
 
 // Images taken at the same time, at most one of every camera.
@@ -45,13 +50,15 @@ struct Dataset {
       ground_truth;  // in the format of the data set: EuRoC csv (body) or KITTI poses (camera 0)
   std::vector<std::string>
       warnings;  // for the user: entries that were sorted or dropped, images in frames without camera 0
+  std::vector<image_decoding::PixelFormat> pixel_formats = {};  // one per camera in use
 };
 
 // Detects the format, reads the calibration and the lists of images, and groups the images into frames
 // (dataset/frame_grouping.h). An image that is listed but cannot be read is not an error here; read_frame reports it as
 // damaged. Errors: the folder does not exist or has an unknown format; the calibration is missing or invalid; a list is
 // missing, empty or malformed; a camera has no image file, or its images differ from the calibrated resolution; two
-// cameras have no common frame; a camera is requested twice or does not exist; the time range is empty or reversed.
+// cameras have no common frame; a camera is requested twice or does not exist; the time range is empty or reversed; the
+// time stamps are hardly nanoseconds (dataset/time_stamps.h).
 Result<Dataset> open_dataset(const DatasetRequest& request);
 
 }  // namespace bslam::dataset

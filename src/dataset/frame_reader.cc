@@ -11,8 +11,9 @@ namespace bslam::dataset {
 
 namespace {
 
-Result<image::Image> read_of_camera(const std::filesystem::path& file, const camera::Camera& camera) {
-  auto image = image_decoding::read_image(file);
+Result<image::Image> read_of_camera(const Dataset& dataset, const std::filesystem::path& file, std::size_t index) {
+  const camera::Camera& camera = dataset.rig.camera(index);
+  auto image = image_decoding::read_image(file, dataset.pixel_formats.at(index));
   if (!image || (image->width() == camera.width && image->height() == camera.height)) return image;
   return Error{file.string(), "", fmt::format("{}x{} pixels", image->width(), image->height()),
                fmt::format("{}x{}, the resolution of {}", camera.width, camera.height, camera.name)};
@@ -23,7 +24,7 @@ Result<image::Image> read_of_camera(const std::filesystem::path& file, const cam
 std::string describe_damage(const Dataset& dataset, std::size_t index, std::size_t camera) {
   const auto& file = dataset.frames.at(index).images.at(camera);
   if (!file) return "";
-  const auto image = read_of_camera(file->path, dataset.rig.camera(camera));
+  const auto image = read_of_camera(dataset, file->path, camera);
   return image ? file->path.string() + ": can be read now, although it could not be read before"
                : image.error().message();
 }
@@ -38,7 +39,7 @@ image::ImageBundle read_frame(const Dataset& dataset, std::size_t index) {
     image::CameraImage& out = bundle.images[i];
     out.time_ns = frame.images[i]->time_ns;
     out.state = image::ImageState::kDamaged;
-    auto image = read_of_camera(frame.images[i]->path, dataset.rig.camera(i));
+    auto image = read_of_camera(dataset, frame.images[i]->path, i);
     if (!image) continue;
     out.image = *std::move(image);
     out.state = image::ImageState::kPresent;

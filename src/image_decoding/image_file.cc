@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <string>
 #include <utility>
 
@@ -23,37 +24,102 @@ bool is_whole_jpeg(std::string_view bytes) {
   return last != std::string_view::npos && bytes.substr(0, last + 1).ends_with("\xff\xd9");
 }
 
-std::optional<image::Image> decode_with_opencv(std::string_view bytes) {
+// Decodes to one channel of 8 or, for 16-bit images, 16 bits. The result is empty if the bytes cannot be decoded.
+cv::Mat decode_to_grey(std::string_view bytes) {
   const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-  cv::Mat decoded;
   try {
-    decoded = cv::imdecode(buffer, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    return cv::imdecode(buffer, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception&) {
-    return std::nullopt;  // a header with an impossible size: the file is damaged
+    return {};  // a header with an impossible size: the file is damaged
   }
-  if (decoded.empty()) return std::nullopt;
+}
+
+// Returns the upper eight of `bits` bits; larger values are white.
+void copy_row(const std::uint16_t* in, int bits, int width, std::uint8_t* out) {
+  const int shift = bits - 8;
+  std::transform(in, in + width, out,
+                 [shift](std::uint16_t v) { return static_cast<std::uint8_t>(std::min(v >> shift, 255)); });
+}
+
+std::optional<image::Image> decode_with_opencv(std::string_view bytes, int bits) {
+  const cv::Mat decoded = decode_to_grey(bytes);
+  if (decoded.empty() || (decoded.depth() != CV_8U && decoded.depth() != CV_16U)) return std::nullopt;
   image::Image image(decoded.cols, decoded.rows);
-  for (int y = 0; y < decoded.rows; ++y) std::copy_n(decoded.ptr<std::uint8_t>(y), decoded.cols, image.row(y));
+  for (int y = 0; y < decoded.rows; ++y) {
+    if (decoded.depth() == CV_16U) {
+      copy_row(decoded.ptr<std::uint16_t>(y), bits, decoded.cols, image.row(y));
+    } else {
+      std::copy_n(decoded.ptr<std::uint8_t>(y), decoded.cols, image.row(y));
+    }
+  }
   return image;
+}
+
+// OpenCV names a pattern by the second and third pixel of the second row: its BG is RGGB.
+int bayer_conversion(Bayer bayer) {
+  if (bayer == Bayer::kRggb) return cv::COLOR_BayerBG2GRAY;
+  if (bayer == Bayer::kBggr) return cv::COLOR_BayerRG2GRAY;
+  return bayer == Bayer::kGrbg ? cv::COLOR_BayerGB2GRAY : cv::COLOR_BayerGR2GRAY;
+}
+
+// Interpolates the missing colours of every pixel and returns the luminance.
+image::Image without_colour_filter(image::Image raw, Bayer bayer) {
+  if (raw.width() < 4 || raw.height() < 4) return raw;
+  image::Image grey(raw.width(), raw.height());
+  cv::Mat in(raw.height(), raw.width(), CV_8UC1), out;
+  for (int y = 0; y < raw.height(); ++y) std::copy_n(raw.row(y), raw.width(), in.ptr<std::uint8_t>(y));
+  cv::cvtColor(in, out, bayer_conversion(bayer));
+  for (int y = 0; y < raw.height(); ++y) std::copy_n(out.ptr<std::uint8_t>(y), raw.width(), grey.row(y));
+  return grey;
+}
+
+bool is_16_bit_png(std::string_view bytes) {
+  constexpr std::size_t kBitDepth = 24;  // position of the bit depth in a PNG
+  return image_files::is_complete_png(bytes) && bytes[kBitDepth] == 16;
+}
+
+std::optional<image::Image> decode_values(std::string_view bytes, int bits) {
+  if (bytes.size() > kMaxImageBytes) return std::nullopt;
+  if (image_files::is_complete_png(bytes)) {
+    auto image = image_files::decode_grey_png(bytes);
+    return image ? std::move(image) : decode_with_opencv(bytes, bits);
+  }
+  return is_whole_jpeg(bytes) ? decode_with_opencv(bytes, bits) : std::nullopt;
 }
 
 }  // namespace
 
-std::optional<image::Image> decode_grey(std::string_view bytes) {
-  if (bytes.size() > kMaxImageBytes) return std::nullopt;
-  if (image_files::is_complete_png(bytes)) {
-    auto image = image_files::decode_grey_png(bytes);
-    return image ? std::move(image) : decode_with_opencv(bytes);
-  }
-  return is_whole_jpeg(bytes) ? decode_with_opencv(bytes) : std::nullopt;
+std::optional<image::Image> decode_grey(std::string_view bytes, const PixelFormat& format) {
+  auto image = decode_values(bytes, format.bits);
+  if (!image || format.bayer == Bayer::kNone) return image;
+  return without_colour_filter(*std::move(image), format.bayer);
 }
 
-Result<image::Image> read_image(const std::filesystem::path& file) {
+Result<image::Image> read_image(const std::filesystem::path& file, const PixelFormat& format) {
   const auto bytes = read_file(file, kMaxImageBytes);
   if (!bytes) return bytes.error();
-  auto image = decode_grey(*bytes);
+  auto image = decode_grey(*bytes, format);
   if (!image) return Error{file.string(), "", "an incomplete image or another format", "a complete PNG or JPEG image"};
   return *std::move(image);
+}
+
+int bits_in_use(std::span<const std::filesystem::path> files) {
+  constexpr std::size_t kSamples = 12;
+  const std::size_t count = std::min(kSamples, files.size());
+  double largest = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto bytes = read_file(files[k * files.size() / count], kMaxImageBytes);
+    if (!bytes || !(is_whole_jpeg(*bytes) || image_files::is_complete_png(*bytes))) continue;
+    if (!is_16_bit_png(*bytes)) return 16;
+    const cv::Mat decoded = decode_to_grey(*bytes);
+    double value = 0;
+    if (!decoded.empty()) cv::minMaxLoc(decoded, nullptr, &value);
+    largest = std::max(largest, value);
+  }
+  for (const int bits : {8, 10, 12, 14}) {
+    if (largest > 0 && largest < static_cast<double>(1 << bits)) return bits;
+  }
+  return 16;
 }
 
 Result<image::Image> read_mask(const camera::Camera& camera) {

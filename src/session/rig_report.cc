@@ -108,8 +108,11 @@ std::string as_text(const rig_formats::RigFile& file, const std::optional<std::v
 Result<std::vector<PairEvidence>> check_against_images(const RigReportRequest& request) {
   constexpr double kTolerance_s = 0.1;  // wide enough to group the images of cameras that capture late
   constexpr std::size_t kFrames = 6;
-  const auto dataset =
-      dataset::open_dataset({.path = request.images, .rig_file = request.file, .sync_tolerance_s = kTolerance_s});
+  dataset::DatasetRequest recording = request.recording;
+  recording.path = request.images;
+  recording.rig_file = request.file;
+  recording.sync_tolerance_s = kTolerance_s;
+  const auto dataset = dataset::open_dataset(recording);
   if (!dataset) return dataset.error();
   const auto masks = image_decoding::read_masks(dataset->rig);
   if (!masks) return masks.error();

@@ -4,14 +4,16 @@
 #include <string>
 
 #include "base/result.h"
+#include "dataset/dataset.h"
 
 namespace bslam::session {
 
 struct RigReportRequest {
-  std::string file;         // a calibration, or the folder of a data set
-  bool json = false;        // text otherwise
-  std::string svg = {};     // draw the rig into this file unless empty
-  std::string images = {};  // test the extrinsics against this data set unless empty
+  std::string file;                        // a calibration, or the folder of a data set
+  bool json = false;                       // text otherwise
+  std::string svg = {};                    // draw the rig into this file unless empty
+  std::string images = {};                 // test the extrinsics against this data set unless empty
+  dataset::DatasetRequest recording = {};  // how to read the data set; path and calibration are those above
 };
 
 // Returns text or JSON for stdout: format, cameras, poses, overlaps, notes, warnings. Errors: a file that cannot be

@@ -195,8 +195,8 @@ bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const R
                       calibrated, options, out);
   if (blocks.timing != nullptr)
     report_timing(covariance.diagonal().tail(blocks.timing->size()).cwiseSqrt(), options, out);
-  out.information = in_physical_units(without_timing(scale * of_images + prior, blocks),
-                                      without_timing(prior, blocks), options, out);
+  out.information =
+      in_physical_units(without_timing(scale * of_images + prior, blocks), without_timing(prior, blocks), options, out);
   const Eigen::VectorXd change = change_of(out, blocks);
   out.excess_error = change.dot(of_images * change) / std::max(1.0, 2.0 * out.final_cost);
   return true;

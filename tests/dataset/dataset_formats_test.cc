@@ -46,6 +46,12 @@ TEST_F(SmallKitti, Opens) {
   EXPECT_EQ(read_frame(*dataset, 9).images[1].image.width(), 60);
 }
 
+TEST_F(SmallKitti, HasSecondsAndTakesNoUnit) {
+  const auto rate = open_dataset({.path = data(), .time_stamps = {.rate_hz = 10}});
+  ASSERT_FALSE(rate);
+  EXPECT_EQ(rate.error().file, "--rate");
+}
+
 TEST_F(SmallKitti, AMissingImageIsDamagedAndKeepsItsIndex) {
   fs::remove(image(4, 1));
   const auto dataset = open();

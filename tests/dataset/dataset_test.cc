@@ -328,7 +328,8 @@ TEST_F(SmallEuroc, TimestampsOutOfOrderAreSortedWithAWarning) {
 TEST_F(SmallEuroc, CamerasWithNoCommonTime) {
   std::string list;
   for (int k = 0; k < 20; ++k)
-    list += std::to_string(9'000'000'000'000'000'000 + k) + "," + support::small_image_name(k) + "\n";
+    list += std::to_string(9'000'000'000'000'000'000 + k * support::kSmallInterval) + "," +
+            support::small_image_name(k) + "\n";
   support::write_text(camera(1) / "data.csv", list);
   expect_error(data(), "after those of cam0");
 }

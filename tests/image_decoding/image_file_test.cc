@@ -65,6 +65,74 @@ TEST(ImageFile, KeepsTheUpperEightOfSixteenBits) {
   }
 }
 
+// 12-bit values in 16-bit files, as many cameras record them, keep their upper eight bits; larger values are white.
+TEST(ImageFile, KeepsTheUpperEightOfTheBitsInUse) {
+  cv::Mat original = picture_of(40, 30, CV_16UC1) / 16;
+  original.at<std::uint16_t>(0, 0) = 5000;
+  const auto image = decode_grey(encoded(original, ".png"), {.bits = 12});
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->row(0)[0], 255);
+  for (int y = 1; y < 30; ++y) {
+    for (int x = 0; x < 40; ++x) EXPECT_EQ(image->row(y)[x], original.at<std::uint16_t>(y, x) >> 4);
+  }
+}
+
+// The number of bits is that of the camera, not of an image: dark images do not become bright.
+TEST(ImageFile, FindsTheBitsInUseOverAllImages) {
+  const support::TemporaryFolder folder;
+  std::vector<std::filesystem::path> files;
+  const auto write = [&](int largest, int type) {
+    files.push_back(folder.path() / (std::to_string(files.size()) + ".png"));
+    ASSERT_TRUE(cv::imwrite(files.back().string(), cv::Mat(8, 8, type, cv::Scalar(largest))));
+  };
+  write(200, CV_16UC1);
+  EXPECT_EQ(bits_in_use(files), 8);
+  write(1023, CV_16UC1);
+  EXPECT_EQ(bits_in_use(files), 10);
+  write(4080, CV_16UC1);
+  write(300, CV_16UC1);
+  EXPECT_EQ(bits_in_use(files), 12);
+  EXPECT_EQ(bits_in_use(std::span(files).last(1)), 10);
+  files.insert(files.begin(), folder.path() / "missing.png");
+  EXPECT_EQ(bits_in_use(files), 12);
+  write(65520, CV_16UC1);  // 12 bits in the upper part
+  EXPECT_EQ(bits_in_use(files), 16);
+  files.clear();
+  write(200, CV_8UC1);
+  EXPECT_EQ(bits_in_use(files), 16);
+  EXPECT_EQ(bits_in_use({}), 16);
+}
+
+TEST(ImageFile, ConvertsColoursOfSixteenBitsToGrey) {
+  const cv::Mat original(20, 30, CV_16UC3, cv::Scalar(3200, 1600, 800));
+  const auto image = decode_grey(encoded(original, ".png"), {.bits = 12});
+  ASSERT_TRUE(image);
+  EXPECT_NEAR(image->row(3)[4], (0.114 * 3200 + 0.587 * 1600 + 0.299 * 800) / 16, 1.01);
+}
+
+// A uniformly coloured scene behind each of the four filters has its luminance everywhere.
+TEST(ImageFile, InterpolatesTheColourFilterOfRawImages) {
+  const std::array<double, 3> colour = {200, 100, 50};  // red, green, blue
+  const double luminance = 0.299 * 200 + 0.587 * 100 + 0.114 * 50;
+  for (const auto& [bayer, pattern] : {std::pair(Bayer::kRggb, std::array{0, 1, 1, 2}),
+                                       {Bayer::kBggr, std::array{2, 1, 1, 0}},
+                                       {Bayer::kGrbg, std::array{1, 0, 2, 1}},
+                                       {Bayer::kGbrg, std::array{1, 2, 0, 1}}}) {
+    cv::Mat raw(16, 20, CV_8UC1);
+    for (int y = 0; y < raw.rows; ++y) {
+      for (int x = 0; x < raw.cols; ++x) {
+        const int channel = pattern[static_cast<std::size_t>(2 * (y % 2) + x % 2)];
+        raw.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(colour[static_cast<std::size_t>(channel)]);
+      }
+    }
+    const auto image = decode_grey(encoded(raw, ".png"), {.bayer = bayer});
+    ASSERT_TRUE(image);
+    for (int y = 0; y < raw.rows; ++y) {
+      for (int x = 0; x < raw.cols; ++x) EXPECT_NEAR(image->row(y)[x], luminance, 1.5) << x << " " << y;
+    }
+  }
+}
+
 TEST(ImageFile, ConvertsColoursToGrey) {
   const cv::Mat original(20, 30, CV_8UC3, cv::Scalar(200, 100, 50));  // blue, green, red
   const auto image = decode_grey(encoded(original, ".png"));

@@ -1,0 +1,15 @@
+// How the values in an image file represent brightness.
+#pragma once
+
+namespace bslam::image_decoding {
+
+// The colour filter of a raw image, named by the first two pixels of its first and second row.
+enum class Bayer { kNone, kRggb, kBggr, kGrbg, kGbrg };
+
+// The same for all images of a camera, so that brightness does not change between them.
+struct PixelFormat {
+  int bits = 16;               // of 16-bit files: 2^bits - 1 is white; larger values are limited to it
+  Bayer bayer = Bayer::kNone;  // of files with one channel
+};
+
+}  // namespace bslam::image_decoding
