@@ -275,7 +275,10 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
   }
   if (elsewhere > 0) return text + "warning: the images contradict the extrinsics, and no common mistake explains it\n";
   if (fitting == 0) return text + "  the extrinsics could not be tested\n";
-  return text + "  the extrinsics are consistent with the images" + unjudged(evidence) + "\n";
+  text += "  the extrinsics are consistent with the images" + unjudged(evidence) + "\n";
+  return text +
+         "  focal lengths and distortion are hardly tested by pairs of images: `bslam run` estimates them from the "
+         "motion of the rig\n";
 }
 
 }  // namespace bslam::calibration

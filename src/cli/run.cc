@@ -188,7 +188,9 @@ int run(const RunArguments& arguments) {
   if (const Status s = write_files(*result, *config, arguments, **vocabulary); !s) return report_error(s.error());
   print_after(result->record, *dataset, arguments);
   if (!result->record.complete) return kExitInterrupted;
-  return result->live.empty() ? kExitNothingTracked : kExitOk;
+  const session::RunRecord& record = result->record;
+  const bool nothing = record.map.loaded ? session::frames_in_loaded_map(record) == 0 : result->live.empty();
+  return nothing ? kExitNothingTracked : kExitOk;
 }
 
 }  // namespace

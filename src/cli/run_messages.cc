@@ -58,6 +58,43 @@ void warn_of_calibration(const session::CalibrationRecord& calibration) {
                                  : "refine it with --set calibration.refine=auto");
 }
 
+// Lists the intervals without a pose.
+void warn_of_losses(const session::RunRecord& record) {
+  constexpr std::size_t kShown = 5;
+  const std::vector<session::LostInterval> intervals = session::lost_intervals(record);
+  if (intervals.empty()) return;
+  std::string shown;
+  for (std::size_t i = 0; i < std::min(kShown, intervals.size()); ++i) {
+    shown += fmt::format("{}{:.2f} - {:.2f} s ({})", i == 0 ? "" : ", ", intervals[i].from_s, intervals[i].to_s,
+                         intervals[i].reason);
+  }
+  if (intervals.size() > kShown)
+    shown += fmt::format(" and {} more intervals, see summary.json", intervals.size() - kShown);
+  fmt::print(stderr, "warning: {} of {} frames have no pose: {}\n",
+             std::ranges::count(record.frames, session::FrameOutcome::kLost, &session::RunFrame::outcome),
+             record.frames.size(), shown);
+}
+
+// Warns if the poses have no common world frame, or not that of the loaded map.
+void warn_of_submaps(const session::RunRecord& record) {
+  if (record.submaps.size() > 1) {
+    fmt::print(stderr,
+               "warning: {} submaps remain, each with its own world frame, because no loop closure joined them: "
+               "trajectory.tum contains {} poses, trajectory_part2.tum {}{}\n",
+               record.submaps.size(), record.submaps[0].frames, record.submaps[1].frames,
+               record.submaps.size() > 2 ? " and so on" : "");
+  }
+  if (!record.map.loaded) return;
+  std::int64_t outside = 0;
+  for (const session::SubmapRecord& submap : record.submaps) outside += submap.loaded ? 0 : submap.frames;
+  if (outside == 0 && session::frames_in_loaded_map(record) > 0) return;
+  fmt::print(stderr,
+             "warning: {} frames have a pose in the frame of the loaded map; {} frames are in a new submap, since no "
+             "place of the loaded map was recognised there\n",
+             session::frames_in_loaded_map(record) == 0 ? "no" : std::to_string(session::frames_in_loaded_map(record)),
+             outside);
+}
+
 // Warns about a camera that is still inconsistent with the others at the end of the run: its extrinsics are probably
 // wrong.
 void warn_of_disagreement(const session::RunRecord& record, std::size_t camera, const std::string& check_command) {
@@ -129,10 +166,51 @@ void print_warnings(const session::RunRecord& record, const camera::Rig& rig, co
   for (std::size_t c = 0; c < std::min(estimates.size(), record.cameras.size()); ++c)
     warn_of_timing(record.cameras[c].name, estimates[c]);
   warn_of_calibration(record.calibration);
+  warn_of_losses(record);
+  warn_of_submaps(record);
   const auto dropped = count(record, session::FrameOutcome::kDropped);
   if (dropped > 0) fmt::print(stderr, "warning: {} frames dropped: processing is slower than real time\n", dropped);
   warn_if_nothing_matches(record, rig, check_command);
 }
+
+namespace {
+
+// In how many submaps the poses are, and how many of them are in the loaded map.
+std::string submaps_text(const session::RunRecord& record) {
+  std::string text;
+  if (record.submaps.size() > 1)
+    text += fmt::format(" in {} submaps ({} in trajectory.tum)", record.submaps.size(), record.submaps[0].frames);
+  if (record.map.loaded) text += fmt::format(", {} in the loaded map", session::frames_in_loaded_map(record));
+  return text;
+}
+
+// The reprojection error of every camera.
+void print_reprojection(const session::RunRecord& record) {
+  std::string text;
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    const session::CameraRecord& camera = record.cameras[c];
+    const auto share = session::inlier_share(record, c);
+    if (camera.residuals.observations == 0 || !share) continue;
+    text += fmt::format("{}{} {:.2f} px ({:.0f} % inliers)", text.empty() ? "" : ", ", camera.name,
+                        camera.residuals.rms_px, 100 * *share);
+  }
+  if (!text.empty()) fmt::print("reprojection error: {}\n", text);
+}
+
+// Whether the images agree with the calibration. Silence would be taken for agreement.
+void print_verdict(const session::RunRecord& record) {
+  if (record.map.keyframes == 0) return;
+  switch (record.calibration.estimate.verdict) {
+    case calibration::Verdict::kConsistent:
+      return fmt::print("calibration: consistent with the images\n");
+    case calibration::Verdict::kInconsistent:
+      return fmt::print("calibration: contradicted by the images\n");
+    case calibration::Verdict::kUnknown:
+      return fmt::print("calibration: not tested, which takes several cameras, enough motion and calibration.check\n");
+  }
+}
+
+}  // namespace
 
 void print_result(const session::RunRecord& record, const std::string& out) {
   const auto tracked = count(record, session::FrameOutcome::kTracked);
@@ -140,8 +218,11 @@ void print_result(const session::RunRecord& record, const std::string& out) {
       record.complete ? fmt::format("{} of {} frames have a pose", tracked, record.frames.size())
                       : fmt::format("interrupted after {} frames; {} have a pose", record.frames.size(), tracked);
   const std::string scale = record.map.keyframes > 0 ? ", scale " + record.map.scale : "";
-  fmt::print("{}, {} keyframes, {} landmarks{}; {:.1f} s\n{}\n", frames, record.map.keyframes, record.map.landmarks,
-             scale, record.wall_s, out);
+  fmt::print("{}{}, {} keyframes, {} landmarks{}; {:.1f} s\n", frames, submaps_text(record), record.map.keyframes,
+             record.map.landmarks, scale, record.wall_s);
+  print_reprojection(record);
+  print_verdict(record);
+  fmt::print("{}\n", out);
 }
 
 }  // namespace bslam::cli

@@ -327,8 +327,8 @@ Result<Trajectory> read_trajectory(const std::filesystem::path& file,
   return trajectory;
 }
 
-std::string trajectory_header(std::string_view frame, PoseState state) {
-  return fmt::format("bslam trajectory frame={} parent=world final={}", frame, state == PoseState::kFinal);
+std::string trajectory_header(std::string_view frame, PoseState state, std::string_view parent) {
+  return fmt::format("bslam trajectory frame={} parent={} final={}", frame, parent, state == PoseState::kFinal);
 }
 
 std::string tum_text(const Trajectory& trajectory, std::string_view header) {

@@ -33,7 +33,7 @@ std::optional<TimeNs> parse_seconds(std::string_view text);
 enum class PoseState { kFinal, kLive };
 
 // The comment line at the top of trajectories written by a run: "bslam trajectory frame=cam0 parent=world final=true".
-std::string trajectory_header(std::string_view frame, PoseState state);
+std::string trajectory_header(std::string_view frame, PoseState state, std::string_view parent = "world");
 
 // Returns the content of a trajectory file. TUM begins with "# HEADER" if `header` is not empty. Seconds, metres and
 // quaternions have nine decimals. KITTI contains poses only; `times_text` gives the matching times file.

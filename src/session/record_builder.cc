@@ -13,6 +13,7 @@ namespace {
 double seconds(const RecordInput& input, TimeNs time_ns) { return to_seconds(time_ns - input.dataset.first_time_ns); }
 
 void add_cameras(const RecordInput& input, RunRecord& record) {
+  const std::vector<calibration::ImageResiduals> residuals = calibration::image_residuals(*input.system.snapshot());
   for (std::size_t c = 0; c < input.dataset.rig.size(); ++c) {
     CameraRecord camera;
     camera.name = input.dataset.rig.camera(c).name;
@@ -24,6 +25,7 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
       camera.first_skipped = dataset::describe_damage(input.dataset, frame.record->result.frame.index(), c);
     }
     camera.states = camera_intervals(record.frames, c);
+    camera.residuals = residuals[c];
     const auto& found = input.system.calibration().cameras;
     if (c > 0 && c < found.size()) {
       const calibration::CameraRefinement& r = found[c];
@@ -77,7 +79,8 @@ void add_places(const RecordInput& input, RunRecord& record) {
   for (std::size_t i = 0; i < submaps.size(); ++i) {
     const evaluation::Trajectory& poses = submaps[i].poses;
     record.submaps.push_back({static_cast<std::int64_t>(poses.size()), seconds(input, poses.front().time_ns),
-                              seconds(input, poses.back().time_ns), trajectory_file("trajectory", i)});
+                              seconds(input, poses.back().time_ns), trajectory_file("trajectory", i),
+                              submaps[i].loaded});
   }
 }
 

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "report/figure.h"
+#include "session/residual_plot.h"
 
 namespace bslam::session {
 
@@ -203,6 +204,7 @@ std::string run_plot_svg(const RunRecord& record) {
     figure.rows.push_back(
         {.height_px = 90.0 + 20.0 * static_cast<double>(record.cameras.size()), .panels = {*std::move(states)}});
   }
+  for (PanelRow& row : residual_rows(record)) figure.rows.push_back(std::move(row));
   figure.rows.push_back({.height_px = 270.0, .panels = {frame_time_panel(record)}});
   std::vector<const StageSeries*> background;
   for (const StageSeries& stage : record.stages) {

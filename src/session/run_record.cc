@@ -48,4 +48,21 @@ std::vector<LostInterval> lost_intervals(const RunRecord& record) {
   return intervals;
 }
 
+std::int64_t frames_in_loaded_map(const RunRecord& record) {
+  std::int64_t frames = 0;
+  for (const SubmapRecord& submap : record.submaps) frames += submap.loaded ? submap.frames : 0;
+  return frames;
+}
+
+std::optional<double> inlier_share(const RunRecord& record, std::size_t camera) {
+  std::int64_t matched = 0, inliers = 0;
+  for (const RunFrame& frame : record.frames) {
+    if (frame.outcome() != FrameOutcome::kTracked || camera >= frame.record->final_result().cameras.size()) continue;
+    matched += frame.record->final_result().cameras[camera].matched;
+    inliers += frame.record->final_result().cameras[camera].inliers;
+  }
+  if (matched == 0) return std::nullopt;
+  return static_cast<double>(inliers) / static_cast<double>(matched);
+}
+
 }  // namespace bslam::session

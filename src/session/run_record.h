@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "calibration/image_residuals.h"
 #include "calibration/rig_refinement.h"
 #include "tracking/frame_record.h"
 
@@ -65,6 +66,7 @@ struct CameraRecord {
   std::vector<CameraInterval> states;
   std::optional<ExtrinsicsRecord> extrinsics = {};  // nullopt for camera 0, whose frame is the rig frame
   std::string first_skipped = {};                   // file and cause of damage of the first skipped image
+  calibration::ImageResiduals residuals = {};       // of the final map
 };
 
 // The estimate of the calibration at the end of the run.
@@ -92,6 +94,7 @@ struct SubmapRecord {
   std::int64_t frames = 0;  // number of frames with a pose in it
   double from_s = 0.0, to_s = 0.0;
   std::string trajectory;  // name of the file with its final poses
+  bool loaded = false;     // its world frame is that of the loaded map
 };
 
 struct RunRecord {
@@ -125,5 +128,11 @@ struct LostInterval {
 };
 
 std::vector<LostInterval> lost_intervals(const RunRecord& record);
+
+// Returns the number of frames with a pose in the world frame of the loaded map.
+std::int64_t frames_in_loaded_map(const RunRecord& record);
+
+// Returns the share of a camera's matches with landmarks that support the pose of their frame; nullopt without matches.
+std::optional<double> inlier_share(const RunRecord& record, std::size_t camera);
 
 }  // namespace bslam::session

@@ -14,6 +14,7 @@
 #include "session/record_builder.h"
 #include "session/run_plot.h"
 #include "session/summary.h"
+#include "session/trajectory_comments.h"
 #include "system/system.h"
 #include "yaml/config_file.h"
 
@@ -129,12 +130,12 @@ namespace {
 using Files = std::vector<std::pair<std::string, std::string>>;  // name and content
 
 // Adds one file per submap. The file of the first submap is written even if there is no submap.
-void add_trajectories(const std::vector<system::SubmapTrajectory>& submaps, const std::string& stem,
-                      evaluation::PoseState state, Files& files) {
-  const std::string header = evaluation::trajectory_header("cam0", state);
+void add_trajectories(const RunRecord& record, const std::vector<system::SubmapTrajectory>& submaps,
+                      const std::string& stem, evaluation::PoseState state, Files& files) {
   for (std::size_t i = 0; i < std::max<std::size_t>(submaps.size(), 1); ++i) {
     const evaluation::Trajectory poses = submaps.empty() ? evaluation::Trajectory() : submaps[i].poses;
-    files.emplace_back(trajectory_file(stem, i), evaluation::tum_text(poses, header));
+    files.emplace_back(trajectory_file(stem, i),
+                       evaluation::tum_text(poses, trajectory_comments(record, submaps, i, state)));
   }
 }
 
@@ -144,8 +145,8 @@ Files output_files(const SessionResult& result, const system::Config& config) {
   const OptionTable table(copy);
   Files files;
   files.emplace_back("summary.json", summary_text(result.record));
-  add_trajectories(result.trajectories, "trajectory", evaluation::PoseState::kFinal, files);
-  add_trajectories(result.live, "trajectory_live", evaluation::PoseState::kLive, files);
+  add_trajectories(result.record, result.trajectories, "trajectory", evaluation::PoseState::kFinal, files);
+  add_trajectories(result.record, result.live, "trajectory_live", evaluation::PoseState::kLive, files);
   files.emplace_back("config.yaml", yaml::config_to_yaml(table));
   if (result.refined_rig) files.emplace_back("rig_refined.yaml", rig_formats::rig_to_yaml(*result.refined_rig));
   const evaluation::Trajectory path =

@@ -36,6 +36,7 @@ ordered_json frames_json(const RunRecord& record) {
           {"tracked", count(FrameOutcome::kTracked)},
           {"lost", count(FrameOutcome::kLost)},
           {"dropped", count(FrameOutcome::kDropped)},
+          {"in_loaded_map", record.map.loaded ? ordered_json(frames_in_loaded_map(record)) : ordered_json()},
           {"lost_intervals", intervals}};
 }
 
@@ -53,9 +54,18 @@ ordered_json extrinsics_json(const std::optional<ExtrinsicsRecord>& e) {
           {"refined", e->refined}};
 }
 
+ordered_json reprojection_json(const RunRecord& record, std::size_t camera) {
+  const calibration::ImageResiduals& residuals = record.cameras[camera].residuals;
+  const auto share = inlier_share(record, camera);
+  return {{"rms_px", residuals.observations > 0 ? rounded(residuals.rms_px, 3) : ordered_json()},
+          {"observations", residuals.observations},
+          {"inlier_share", share ? rounded(*share, 4) : ordered_json()}};
+}
+
 ordered_json cameras_json(const RunRecord& record) {
   ordered_json cameras = ordered_json::array();
-  for (const CameraRecord& camera : record.cameras) {
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    const CameraRecord& camera = record.cameras[c];
     ordered_json states = ordered_json::array();
     for (const CameraInterval& interval : camera.states) {
       states.push_back({{"state", tracking::describe(interval.status.state)},
@@ -67,6 +77,7 @@ ordered_json cameras_json(const RunRecord& record) {
                        {"images", camera.images},
                        {"skipped", camera.skipped},
                        {"states", states},
+                       {"reprojection", reprojection_json(record, c)},
                        {"extrinsics", extrinsics_json(camera.extrinsics)}});
   }
   return cameras;
@@ -137,6 +148,7 @@ ordered_json submaps_json(const std::vector<SubmapRecord>& submaps) {
     list.push_back({{"frames", submap.frames},
                     {"from", seconds(submap.from_s)},
                     {"to", seconds(submap.to_s)},
+                    {"loaded", submap.loaded},
                     {"trajectory", submap.trajectory}});
   }
   return list;

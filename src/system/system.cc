@@ -26,7 +26,7 @@ map::BundledMap empty_map(const camera::Rig& rig, const Config& config) {
 void add_pose(std::vector<SubmapTrajectory>& submaps, KeyframeId root, TimeNs time_ns,
               const geometry::SE3& T_world_cam0) {
   auto submap = std::ranges::find(submaps, root, &SubmapTrajectory::root);
-  if (submap == submaps.end()) submap = submaps.insert(submaps.end(), {root, {}});
+  if (submap == submaps.end()) submap = submaps.insert(submaps.end(), {root, {}, false});
   submap->poses.push_back({time_ns, T_world_cam0});
 }
 
@@ -205,6 +205,7 @@ std::vector<SubmapTrajectory> System::trajectories() const {
     if (const auto T_rig_world = between.empty() ? T_rig_world_of(frames_[i], *map) : between[i])
       add_pose(out, map->root_of(r.anchored.reference), r.time_ns, T_rig_world->inverse());
   }
+  for (SubmapTrajectory& submap : out) submap.loaded = submap.root < first_keyframe_;
   std::stable_sort(out.begin(), out.end(), [](const SubmapTrajectory& a, const SubmapTrajectory& b) {
     return a.poses.size() > b.poses.size();
   });
@@ -217,6 +218,7 @@ std::vector<SubmapTrajectory> System::live_trajectories() const {
     if (record.result.status != tracking::TrackStatus::kTracking) continue;
     add_pose(out, record.root, record.result.time_ns, record.result.T_rig_world.inverse());
   }
+  for (SubmapTrajectory& submap : out) submap.loaded = submap.root < first_keyframe_;
   const std::vector<SubmapTrajectory> final = trajectories();
   const KeyframeId main = final.empty() ? KeyframeId() : final.front().root;
   std::stable_sort(out.begin(), out.end(), [&](const SubmapTrajectory& a, const SubmapTrajectory& b) {

@@ -47,6 +47,7 @@ struct Resources {
 struct SubmapTrajectory {
   KeyframeId root;
   evaluation::Trajectory poses;  // T_world_cam0
+  bool loaded = false;           // the submap is part of the loaded map, so the poses are in its world frame
 };
 
 class System {

@@ -55,6 +55,24 @@ std::size_t count(const std::string& text, std::string_view part) {
   return n;
 }
 
+// Two cells of one camera have enough observations for an arrow.
+TEST(RunPlot, ShowsMeanResidualsOverTheImage) {
+  RunRecord record = short_run(40);
+  EXPECT_FALSE(contains(run_plot_svg(record), "rms"));
+  calibration::ImageResiduals& r = record.cameras[1].residuals;
+  r = {.width = 640, .height = 480, .observations = 45, .rms_px = 0.46, .cells = {}};
+  r.cells.resize(calibration::ImageResiduals::kColumns * calibration::ImageResiduals::kRows);
+  r.cells[0] = {{0.3, 0.4}, 20};
+  r.cells[50] = {{-0.3, 0.0}, 20};
+  r.cells[51] = {{9.0, 9.0}, 5};  // too few
+  const std::string svg = run_plot_svg(record);
+  EXPECT_EQ(xml_fault(svg), "");
+  EXPECT_TRUE(contains(svg, "Mean image residuals, rear: rms 0.46 px"));
+  EXPECT_TRUE(contains(svg, "0.2 px")) << "the scale bar";
+  EXPECT_FALSE(contains(svg, "front: rms"));
+  EXPECT_FALSE(contains(svg, "nan"));
+}
+
 TEST(RunPlot, ShowsCameraFaultsByCamera) {
   constexpr std::string_view kBar = "stroke-width=\"6";
   const std::string without_faults = run_plot_svg(short_run(40));

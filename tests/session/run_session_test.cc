@@ -115,8 +115,8 @@ TEST_F(Session, WritesFilesForEverySubmap) {
     std::ifstream file(out / name);
     return std::count(std::istreambuf_iterator<char>(file), {}, '\n');
   };
-  EXPECT_EQ(lines("trajectory.tum"), 1 + 8);  // header and poses
-  EXPECT_EQ(lines("trajectory_part2.tum"), 1 + 3);
+  EXPECT_EQ(lines("trajectory.tum"), 2 + 8);  // comments and poses
+  EXPECT_EQ(lines("trajectory_part2.tum"), 2 + 3);
   EXPECT_EQ(lines("trajectory_live.tum"), 1 + 8);
   EXPECT_FALSE(fs::exists(out / "trajectory_live_part2.tum"));
 }

@@ -41,11 +41,13 @@ TEST(Summary, HasTheDocumentedKeysInOrder) {
             (std::vector<std::string>{"schema", "version", "complete", "data", "mode", "seed", "cameras_used", "frames",
                                       "cameras", "calibration", "features", "map", "loops", "relocalisations",
                                       "maps_started", "parts", "time", "memory"}));
-  EXPECT_EQ(keys(json["frames"]), (std::vector<std::string>{"input", "tracked", "lost", "dropped", "lost_intervals"}));
+  EXPECT_EQ(keys(json["frames"]),
+            (std::vector<std::string>{"input", "tracked", "lost", "dropped", "in_loaded_map", "lost_intervals"}));
   EXPECT_EQ(json["frames"]["lost_intervals"].dump(), R"([{"from":1.25,"to":1.25,"reason":"too few matches"}])");
   EXPECT_EQ(json["cameras"].dump(),
             R"([{"name":"cam0","images":400,"skipped":1,)"
-            R"("states":[{"state":"degraded","reason":"blurred","from":0.0,"to":1.5}],"extrinsics":null}])");
+            R"("states":[{"state":"degraded","reason":"blurred","from":0.0,"to":1.5}],)"
+            R"("reprojection":{"rms_px":null,"observations":0,"inlier_share":null},"extrinsics":null}])");
   EXPECT_EQ(keys(json["features"]),
             (std::vector<std::string>{"keypoints_per_image", "unique", "monocular", "matched"}));
   EXPECT_EQ(json["map"].dump(),
@@ -63,12 +65,14 @@ TEST(Summary, ReportsFramesTimesAndFileOfEverySubmap) {
   EXPECT_EQ(summary_json(record)["parts"], ordered_json::array());
   record.map.loaded = true;
   record.maps_started = 2;
-  record.submaps = {{60, 0.05, 7.5, "trajectory.tum"}, {12, 4.0, 5.25, "trajectory_part2.tum"}};
+  record.submaps = {{60, 0.05, 7.5, "trajectory.tum"}, {12, 4.0, 5.25, "trajectory_part2.tum", true}};
   const ordered_json json = summary_json(record);
   EXPECT_EQ(json["map"]["loaded"], true);
+  EXPECT_EQ(json["frames"]["in_loaded_map"], 12);
   EXPECT_EQ(json["maps_started"], 2);
-  EXPECT_EQ(json["parts"].dump(), R"([{"frames":60,"from":0.05,"to":7.5,"trajectory":"trajectory.tum"},)"
-                                  R"({"frames":12,"from":4.0,"to":5.25,"trajectory":"trajectory_part2.tum"}])");
+  EXPECT_EQ(json["parts"].dump(),
+            R"([{"frames":60,"from":0.05,"to":7.5,"loaded":false,"trajectory":"trajectory.tum"},)"
+            R"({"frames":12,"from":4.0,"to":5.25,"loaded":true,"trajectory":"trajectory_part2.tum"}])");
 }
 
 TEST(Summary, CountsFramesByOutcome) {

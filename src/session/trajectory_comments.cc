@@ -1,0 +1,28 @@
+#include "session/trajectory_comments.h"
+
+#include <fmt/format.h>
+
+namespace bslam::session {
+
+std::string trajectory_comments(const RunRecord& record, std::span<const system::SubmapTrajectory> submaps,
+                                std::size_t index, evaluation::PoseState state) {
+  const bool has_poses = index < submaps.size();
+  const bool separate = has_poses && (index > 0 || (record.map.loaded && !submaps[index].loaded));
+  std::string text =
+      evaluation::trajectory_header("cam0", state, separate ? fmt::format("world_of_submap_{}", index + 1) : "world");
+  if (submaps.size() > 1) {
+    text += fmt::format("\n# submap {} of {}, each with its own world frame: {} of the {} frames have a pose in it",
+                        index + 1, submaps.size(), submaps[index].poses.size(), record.frames.size());
+  }
+  if (has_poses && record.map.loaded) {
+    text += submaps[index].loaded ? "\n# in the world frame of the loaded map"
+                                  : "\n# not in the world frame of the loaded map, but in that of a new submap";
+  }
+  for (const LostInterval& interval : lost_intervals(record)) {
+    text += fmt::format("\n# no pose from {:.3f} to {:.3f} s after the first image: {}", interval.from_s, interval.to_s,
+                        interval.reason);
+  }
+  return text;
+}
+
+}  // namespace bslam::session

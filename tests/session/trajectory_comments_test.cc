@@ -1,0 +1,60 @@
+#include "session/trajectory_comments.h"
+
+#include <gtest/gtest.h>
+
+namespace bslam::session {
+namespace {
+
+using evaluation::PoseState;
+
+RunFrame frame(double time_s, tracking::LostReason reason = tracking::LostReason::kNone) {
+  tracking::FrameRecord record;
+  const bool tracked = reason == tracking::LostReason::kNone;
+  record.result.status = tracked ? tracking::TrackStatus::kTracking : tracking::TrackStatus::kLost;
+  record.result.reason = reason;
+  return {time_s, record};
+}
+
+system::SubmapTrajectory submap(std::size_t poses, bool loaded) {
+  return {KeyframeId(0), evaluation::Trajectory(poses), loaded};
+}
+
+TEST(TrajectoryComments, ARunWithoutLossesHasItsHeaderOnly) {
+  RunRecord record;
+  record.frames = {frame(0), frame(0.05)};
+  const std::vector<system::SubmapTrajectory> one = {submap(2, false)};
+  EXPECT_EQ(trajectory_comments(record, one, 0, PoseState::kFinal),
+            "bslam trajectory frame=cam0 parent=world final=true");
+  EXPECT_EQ(trajectory_comments(record, {}, 0, PoseState::kLive),
+            "bslam trajectory frame=cam0 parent=world final=false");
+}
+
+TEST(TrajectoryComments, NameSubmapsAndLosses) {
+  RunRecord record;
+  record.frames = {frame(0), frame(0.05, tracking::LostReason::kFewMatches),
+                   frame(0.1, tracking::LostReason::kFewMatches), frame(0.15), frame(0.2)};
+  const std::vector<system::SubmapTrajectory> two = {submap(2, false), submap(1, false)};
+  EXPECT_EQ(trajectory_comments(record, two, 0, PoseState::kFinal),
+            "bslam trajectory frame=cam0 parent=world final=true\n"
+            "# submap 1 of 2, each with its own world frame: 2 of the 5 frames have a pose in it\n"
+            "# no pose from 0.050 to 0.100 s after the first image: too few matches");
+  EXPECT_TRUE(trajectory_comments(record, two, 1, PoseState::kFinal)
+                  .starts_with("bslam trajectory frame=cam0 parent=world_of_submap_2 final=true\n# submap 2 of 2"));
+}
+
+TEST(TrajectoryComments, SayWhetherPosesAreInTheLoadedMap) {
+  RunRecord record;
+  record.frames = {frame(0)};
+  record.map.loaded = true;
+  EXPECT_EQ(trajectory_comments(record, std::vector{submap(1, true)}, 0, PoseState::kFinal),
+            "bslam trajectory frame=cam0 parent=world final=true\n# in the world frame of the loaded map");
+  EXPECT_EQ(trajectory_comments(record, std::vector{submap(1, false)}, 0, PoseState::kFinal),
+            "bslam trajectory frame=cam0 parent=world_of_submap_1 final=true\n"
+            "# not in the world frame of the loaded map, but in that of a new submap");
+  record.submaps = {{.frames = 7, .trajectory = "a", .loaded = false},
+                    {.frames = 3, .trajectory = "b", .loaded = true}};
+  EXPECT_EQ(frames_in_loaded_map(record), 3);
+}
+
+}  // namespace
+}  // namespace bslam::session
