@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   int exit_status = kExitOk;
   add_run(app, exit_status);
   add_eval(app, exit_status);
+  add_bench(app, exit_status);
 #ifdef BSLAM_SIMULATOR
   add_simulate(app, exit_status);
 #endif

@@ -13,6 +13,7 @@ constexpr int kExitFailed = 1;  // the program failed, not the request
 
 void add_run(CLI::App& app, int& exit_status);
 void add_eval(CLI::App& app, int& exit_status);
+void add_bench(CLI::App& app, int& exit_status);
 void add_simulate(CLI::App& app, int& exit_status);
 void add_inspect(CLI::App& app, int& exit_status);
 void add_rig(CLI::App& app, int& exit_status);

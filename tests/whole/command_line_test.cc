@@ -91,8 +91,8 @@ TEST_F(CommandLine, PrintsVersionAndHelpForEveryCommand) {
   EXPECT_EQ(run("--version").status, 0);
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
   for (const char* verb :
-       {"", "run", "eval", "simulate", "inspect", "rig", "rig info", "rig convert", "rig calibrate", "map", "map info",
-        "map export", "map merge", "vocab", "vocab info", "vocab train", "settings"}) {
+       {"", "run", "eval", "bench", "simulate", "inspect", "rig", "rig info", "rig convert", "rig calibrate", "map",
+        "map info", "map export", "map merge", "vocab", "vocab info", "vocab train", "settings"}) {
     EXPECT_EQ(run(std::string(verb) + " --help").status, 0) << verb;
   }
 }
@@ -353,6 +353,54 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
       << ran.err;
   const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
   EXPECT_EQ(right.err, "");
+}
+
+TEST_F(CommandLine, BenchReportsEverySequenceAndFailsIfOneFailed) {
+  const fs::path root = folder_ / "sequences";
+  fs::create_directories(root / "broken/mav0/cam0");
+  fs::create_directory_symlink(data(), root / "tour");
+  const Ran ran = run("bench " + root.string() + " --runs 2 --out " + out("bench") +
+                      " --mode sequential --cameras 0,1 --set features.per_image=500");
+  EXPECT_EQ(ran.status, 2) << ran.err;
+  const std::string report = slurp(out("bench") + "/report.md");
+  EXPECT_EQ(ran.out, report);
+  EXPECT_NE(report.find("| broken | none: no errors | 2 | - | - | - | - | - / - | - | 2 of 2 runs failed: "),
+            std::string::npos)
+      << report;
+  EXPECT_NE(report.find("| tour | body | 2 | 0.0"), std::string::npos) << report;
+  EXPECT_NE(report.find("| 15 of 15 |"), std::string::npos) << report;
+  EXPECT_NE(slurp(out("bench") + "/report.html").find("<td>tour</td>"), std::string::npos);
+  EXPECT_TRUE(fs::exists(out("bench") + "/tour/run2/trajectory.tum"));
+}
+
+TEST_F(CommandLine, BenchRejectsAFolderWithoutSequences) {
+  const fs::path empty = folder_ / "empty";
+  fs::create_directories(empty);
+  const Ran ran = run("bench " + empty.string() + " --out " + out("rejected"));
+  EXPECT_EQ(ran.status, 2);
+  EXPECT_NE(ran.err.find("found no sequence"), std::string::npos) << ran.err;
+}
+
+TEST_F(CommandLine, AnInterruptedBenchKeepsTheTableSoFar) {
+  const std::string folder = out("bench_interrupted"), log = folder + "/data/run2/log.txt";
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string path = data();
+    std::freopen("/dev/null", "w", stdout);
+    ::execl(BSLAM_PROGRAM, BSLAM_PROGRAM, "bench", path.c_str(), "--out", folder.c_str(), "--runs", "1000", "--pace",
+            "realtime", static_cast<char*>(nullptr));
+    std::_Exit(127);
+  }
+  while (!fs::exists(log) && ::waitpid(child, nullptr, WNOHANG) == 0) std::this_thread::yield();
+  ::kill(child, SIGINT);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << status;
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  const std::string report = slurp(folder + "/report.md");
+  EXPECT_NE(report.find("Not complete"), std::string::npos) << report;
+  EXPECT_NE(report.find("| data | 1 | "), std::string::npos) << report;
 }
 
 TEST_F(CommandLine, AnInterruptedRunWritesItsResultsAndReportsIt) {

@@ -1,0 +1,34 @@
+// Measures one finished run of a sequence: errors by two protocols, coverage, time and memory.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "base/result.h"
+#include "benchmark/sequence.h"
+#include "geometry/se3.h"
+
+namespace bslam::benchmark {
+
+// RMSE of the positions in metres after rigid alignment, over all frames with a pose.
+//   P: the path of camera 0 against the released positions of the body. Since the camera is not at the body's origin,
+//   even
+//      a perfect path has an error of some centimetres. Earlier publications used this protocol.
+//   T: the path of the camera, moved to the body with the calibration, against the corrected truth if there is one,
+//      otherwise against the released one. If the truth contains poses of camera 0, the path is compared directly.
+struct RunMeasurement {
+  int run = 1;               // counted from 1
+  std::string failure = {};  // why there is no result; empty if the run succeeded
+  std::optional<double> ate_p_m = {}, ate_t_m = {};
+  std::optional<double> ate_t_live_m = {};  // protocol T, poses as reported during the run
+  std::string truth_problem = {};           // why there are no errors although there is ground truth
+  int frames = 0, frames_with_pose = 0, submaps = 0, loops = 0;
+  std::optional<double> frame_ms_median = {}, frame_ms_p95 = {}, peak_mb = {};
+};
+
+// Reads the files of a run from `folder`. `body_from_camera` is the calibrated pose of camera 0 of the run in the body.
+// A ground truth that cannot be read or compared is described in `truth_problem`. Error: summary.json cannot be read.
+Result<RunMeasurement> measure_run(const std::filesystem::path& folder, const Sequence& sequence,
+                                   const geometry::SE3& body_from_camera);
+
+}  // namespace bslam::benchmark

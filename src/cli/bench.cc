@@ -1,0 +1,264 @@
+// bslam bench: runs the SLAM system on all sequences of a folder and writes a table of the results.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/atomic_file.h"
+#include "benchmark/benchmark_report.h"
+#include "cli/child_process.h"
+#include "cli/config_arguments.h"
+#include "cli/dataset_arguments.h"
+#include "cli/interruption.h"
+#include "cli/shell_command.h"
+#include "cli/verbs.h"
+#include "cli/version.h"
+
+namespace bslam::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using benchmark::RunMeasurement;
+using benchmark::Sequence;
+using benchmark::SequenceResult;
+
+constexpr std::size_t kMaxLogBytes = std::size_t{1} << 26;
+
+struct BenchArguments {
+  DatasetArguments data;  // `path` is the folder of the sequences
+  ConfigArguments config;
+  std::string out = "bench", mode, pace, late, vocabulary;
+  int runs = 5;
+  bool no_loop = false, no_final_ba = false, overwrite = false;
+};
+
+// Returns the options that every run receives as they are.
+std::vector<std::string> run_options(const BenchArguments& a) {
+  std::vector<std::string> words;
+  const auto add = [&words](const char* option, const std::string& value) {
+    if (!value.empty()) words.insert(words.end(), {option, value});
+  };
+  if (a.data.format != "auto") add("--format", a.data.format);
+  if (a.data.cameras) add("--cameras", *a.data.cameras);
+  if (a.data.begin_s) add("--begin", fmt::format("{}", *a.data.begin_s));
+  if (a.data.end_s) add("--end", fmt::format("{}", *a.data.end_s));
+  add("--config", a.config.file);
+  for (const std::string& setting : a.config.settings) add("--set", setting);
+  add("--mode", a.mode);
+  add("--pace", a.pace);
+  add("--late", a.late);
+  add("--vocabulary", a.vocabulary);
+  if (a.no_loop) words.emplace_back("--no-loop");
+  if (a.no_final_ba) words.emplace_back("--no-final-ba");
+  return words;
+}
+
+std::string rig_of(const BenchArguments& a, const Sequence& sequence) {
+  if (!a.data.rig.empty()) return a.data.rig;
+  return sequence.rig ? sequence.rig->string() : "";
+}
+
+// Name of the processor as the kernel reports it; empty if it does not.
+std::string processor_name() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t colon = line.find(": ");
+    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "";
+}
+
+// Returns the error that a run printed: its last line, without the name of the program.
+std::string message_in(const fs::path& log) {
+  const auto text = read_file(log, kMaxLogBytes);
+  if (!text) return text.error().message();
+  std::string last = text->substr(0, text->find_last_not_of('\n') + 1);
+  last.erase(0, last.find_last_of('\n') + 1);
+  constexpr std::string_view kPrefix = "bslam: ";
+  return last.starts_with(kPrefix) ? last.substr(kPrefix.size()) : last;
+}
+
+std::string failure_of(const ProcessEnd& end, const fs::path& log) {
+  if (end.signal > 0) return fmt::format("ended by signal {} ({})", end.signal, ::strsignal(end.signal));
+  switch (end.exit_status) {
+    case kExitOk:
+      return "";
+    case kExitNothingTracked:
+      return "no frame could be tracked";
+    case kExitInterrupted:
+      return "interrupted";
+    default:
+      return message_in(log);
+  }
+}
+
+// Returns the calibrated pose of the run's camera 0 in the body.
+Result<geometry::SE3> body_from_camera(const BenchArguments& a, const Sequence& sequence) {
+  DatasetArguments data = a.data;
+  data.path = sequence.folder.string();
+  data.rig = rig_of(a, sequence);
+  const auto config = resolve_config(a.config);
+  if (!config) return config.error();
+  const auto request = dataset_request(data, config->io.sync_tolerance);
+  if (!request) return request.error();
+  const auto dataset = dataset::open_dataset(*request);
+  if (!dataset) return dataset.error();
+  return dataset->rig.body_from_cam(0);
+}
+
+// What one run produced, and the status with which the benchmark should end because of it.
+struct RunOutcome {
+  RunMeasurement measurement;
+  int status = kExitOk;
+};
+
+Result<RunMeasurement> measured(const BenchArguments& a, const Sequence& sequence, const fs::path& folder) {
+  const auto pose = body_from_camera(a, sequence);
+  if (!pose) return pose.error();
+  return benchmark::measure_run(folder, sequence, *pose);
+}
+
+// Runs a sequence in a process of its own: its peak memory is then its own, and a crash ends only this run.
+RunOutcome run_sequence(const BenchArguments& a, const Sequence& sequence, int run, const std::stop_token& stop) {
+  const fs::path folder = fs::path(a.out) / sequence.name / fmt::format("run{}", run);
+  const auto failed = [run](std::string message, int status) {
+    RunOutcome outcome{.measurement = {}, .status = status};
+    outcome.measurement.run = run;
+    outcome.measurement.failure = std::move(message);
+    return outcome;
+  };
+  std::error_code error;
+  fs::remove_all(folder, error);
+  fs::create_directories(folder, error);
+  if (error) return failed(folder.string() + ": " + error.message(), kExitBadInput);
+  std::vector<std::string> words{
+      "run",    sequence.folder.string(), "--out", folder.string(), "--overwrite", "--progress", "never",
+      "--seed", std::to_string(run)};
+  const auto options = run_options(a);
+  words.insert(words.end(), options.begin(), options.end());
+  if (const std::string rig = rig_of(a, sequence); !rig.empty()) words.insert(words.end(), {"--rig", rig});
+  const fs::path log = folder / "log.txt";
+  const auto end = run_this_program(words, log, stop);
+  if (!end) return failed(end.error().message(), kExitFailed);
+  std::string failure = failure_of(*end, log);
+  const int status = end->signal > 0 ? kExitFailed : end->exit_status;
+  if (status != kExitOk && status != kExitNothingTracked) return failed(std::move(failure), status);
+  auto measurement = measured(a, sequence, folder);
+  if (!measurement) return failed(measurement.error().message(), kExitBadInput);
+  measurement->run = run;
+  measurement->failure = std::move(failure);
+  return {*std::move(measurement), status};
+}
+
+Status write_report(const std::vector<SequenceResult>& results, const benchmark::BenchmarkConditions& conditions,
+                    const fs::path& folder) {
+  const report::Document document = benchmark::benchmark_report(results, conditions);
+  if (const Status s = write_atomically(folder / "report.md", report::markdown_text(document)); !s) return s;
+  return write_atomically(folder / "report.html", report::html_text(document));
+}
+
+Status prepare_folder(const BenchArguments& a) {
+  const fs::path folder = a.out;
+  std::error_code error;
+  const bool exists = fs::exists(folder, error);
+  if (exists && !fs::is_directory(folder, error)) return Error{a.out, "--out", "a file", "a folder"};
+  if (exists && !a.overwrite && !fs::is_empty(folder, error)) {
+    return Error{a.out, "--out", "a folder that is not empty", "an empty or new folder, or --overwrite"};
+  }
+  fs::create_directories(folder, error);
+  if (error) return Error{a.out, "--out", error.message(), "a folder that can be created"};
+  return check_writable(folder / "report.md");
+}
+
+benchmark::BenchmarkConditions conditions_of(const BenchArguments& a, bool loops) {
+  std::vector<std::string> words{"bslam", "bench", a.data.path, "--runs", std::to_string(a.runs)};
+  if (!a.data.rig.empty()) words.insert(words.end(), {"--rig", a.data.rig});
+  const auto options = run_options(a);
+  words.insert(words.end(), options.begin(), options.end());
+  const std::string version = version_text();
+  return {.version = version.substr(0, version.find('\n')),
+          .processor = processor_name(),
+          .command = shell_command(words),
+          .runs = a.runs,
+          .partial = a.data.begin_s || a.data.end_s,
+          .loops = loops && !a.no_loop,
+          .complete = false};
+}
+
+// Runs everything; writes the report after every run. Returns the status of the first run that failed.
+Result<int> run_all(const BenchArguments& a, const std::vector<Sequence>& sequences,
+                    benchmark::BenchmarkConditions conditions, const std::stop_token& stop) {
+  std::vector<SequenceResult> results;
+  int status = kExitOk;
+  if (const Status s = write_report(results, conditions, a.out); !s) return s.error();
+  for (const Sequence& sequence : sequences) {
+    results.push_back({sequence, {}});
+    for (int run = 1; run <= a.runs; ++run) {
+      if (stop.stop_requested()) return kExitInterrupted;
+      const RunOutcome outcome = run_sequence(a, sequence, run, stop);
+      if (stop.stop_requested() && !outcome.measurement.failure.empty()) return kExitInterrupted;
+      results.back().runs.push_back(outcome.measurement);
+      if (status == kExitOk) status = outcome.status;
+      std::fprintf(stderr, "%s, run %d: %s\n", sequence.name.c_str(), run,
+                   outcome.measurement.failure.empty() ? "done" : outcome.measurement.failure.c_str());
+      if (const Status s = write_report(results, conditions, a.out); !s) return s.error();
+    }
+  }
+  conditions.complete = true;
+  if (const Status s = write_report(results, conditions, a.out); !s) return s.error();
+  return status;
+}
+
+int bench(const BenchArguments& a) {
+  const Interruption interruption;
+  const auto config = resolve_config(a.config);
+  if (!config) return report_error(config.error());
+  if (const auto request = dataset_request(a.data, 0.0); !request) return report_error(request.error());
+  const auto sequences = benchmark::find_sequences(a.data.path);
+  if (!sequences) return report_error(sequences.error());
+  if (const Status s = prepare_folder(a); !s) return report_error(s.error());
+  const auto conditions = conditions_of(a, config->looping.loop.enabled);
+  const auto status = run_all(a, *sequences, conditions, interruption.token());
+  if (!status) return report_error(status.error());
+  if (*status == kExitInterrupted) std::fprintf(stderr, "interrupted\n");
+  if (const auto text = read_file(fs::path(a.out) / "report.md", kMaxLogBytes)) {
+    std::fwrite(text->data(), 1, text->size(), stdout);
+  }
+  return *status;
+}
+
+void add_run_options(CLI::App& verb, BenchArguments& a) {
+  add_config_options(verb, a.config);
+  verb.add_option("--mode", a.mode, "sequential, lagged or parallel (default)")
+      ->check(CLI::IsMember({"sequential", "lagged", "parallel"}));
+  verb.add_option("--pace", a.pace, "fast (default) or realtime")->check(CLI::IsMember({"fast", "realtime"}));
+  verb.add_option("--late", a.late, "block (default) or drop")->check(CLI::IsMember({"block", "drop"}));
+  verb.add_option("--vocabulary", a.vocabulary, "vocabulary for place recognition");
+  verb.add_flag("--no-loop", a.no_loop, "disable loop closing");
+  verb.add_flag("--no-final-ba", a.no_final_ba, "skip the global bundle adjustment at the end");
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app, int& exit_status) {
+  const auto a = std::make_shared<BenchArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "bench", "run all EuRoC, TUM-VI or KITTI sequences of a folder and write a table of errors, time and memory");
+  add_dataset_options(*verb, a->data);
+  verb->get_option("DATA")->description("folder of the sequences, or one sequence");
+  verb->add_option("--out", a->out, "folder for report.md, report.html and the files of every run")
+      ->capture_default_str();
+  verb->add_option("--runs", a->runs, "runs of each sequence; run K has seed K")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  add_run_options(*verb, *a);
+  verb->add_flag("--overwrite", a->overwrite, "write into a folder that is not empty; earlier results are replaced");
+  verb->callback([a, &exit_status] { exit_status = bench(*a); });
+}
+
+}  // namespace bslam::cli

@@ -1,0 +1,25 @@
+// Runs another process and waits for it.
+#pragma once
+
+#include <filesystem>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+
+namespace bslam::cli {
+
+// How a process ended: with an exit status, or by a signal (then `signal` is positive).
+struct ProcessEnd {
+  int exit_status = 0;
+  int signal = 0;
+};
+
+// Runs the executable of this process with the given arguments (without the name of the program), with stdout and
+// stderr in `log`, and waits for its end. When a stop is requested, the process receives SIGINT. Error: the process
+// cannot be started.
+Result<ProcessEnd> run_this_program(const std::vector<std::string>& arguments, const std::filesystem::path& log,
+                                    const std::stop_token& stop);
+
+}  // namespace bslam::cli
