@@ -1,0 +1,164 @@
+#include "calibration/rig_problem.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace bslam::calibration {
+namespace {
+
+constexpr std::size_t kSegment = 10;  // consecutive keyframes chosen together, so that they share landmarks
+constexpr int kMinShared = 15;        // minimum number of shared landmarks for one keyframe to constrain another
+
+// Whether the velocity of a keyframe is known. The images of others show a rig whose late cameras and rolling shutters
+// are in the wrong place.
+bool motion_known(const map::BundledMap& map, KeyframeId k) { return !map.keyframe(k).twist.isZero(0); }
+
+// The keyframes that can be used, in order of id. `timing`: the timing of the cameras is estimated.
+std::vector<KeyframeId> usable_keyframes(const map::BundledMap& map, bool timing) {
+  std::vector<KeyframeId> out = map.keyframe_ids();
+  std::erase_if(out, [&](KeyframeId k) {
+    return !motion_known(map, k) && (timing || frame::depends_on_motion(map.rig(), *map.keyframe(k).frame));
+  });
+  return out;
+}
+
+// Returns all of these keyframes, or evenly spaced segments of consecutive ones if there are more than `limit`.
+std::vector<KeyframeId> choose_keyframes(const std::vector<KeyframeId>& all, std::size_t limit) {
+  if (all.size() <= limit) return all;
+  const std::size_t segments = std::max<std::size_t>(1, limit / kSegment);
+  std::vector<KeyframeId> out;
+  for (std::size_t s = 0; s < segments; ++s) {
+    const std::size_t first = segments == 1 ? 0 : s * (all.size() - kSegment) / (segments - 1);
+    for (std::size_t k = first; k < std::min(first + kSegment, all.size()); ++k) out.push_back(all[k]);
+  }
+  return out;
+}
+
+// Observations of a landmark: the number of chosen keyframes, the first segment, and the cameras that observe it.
+struct Candidate {
+  int keyframes = 0;
+  std::size_t segment = 0;
+  std::vector<std::uint8_t> cameras;
+};
+
+Candidate look_up(const map::BundledMap& map, LandmarkId landmark, const std::vector<int>& position) {
+  Candidate out;
+  out.cameras.assign(map.rig().size(), 0);
+  for (const map::Observation& o : map.observations(landmark)) {
+    const int at = position[o.keyframe.index()];
+    if (at < 0) continue;
+    if (out.keyframes++ == 0) out.segment = static_cast<std::size_t>(at) / kSegment;
+    for (const frame::KeypointRef r : map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature))
+      out.cameras[r.camera.index()] = 1;
+  }
+  return out;
+}
+
+std::vector<int> positions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
+  std::vector<int> out(map.keyframe_slots(), -1);
+  for (std::size_t i = 0; i < keyframes.size(); ++i) out[keyframes[i].index()] = static_cast<int>(i);
+  return out;
+}
+
+// Segments and cameras alternate in choosing the landmark observed by the most keyframes; the result is in order of
+// id.
+std::vector<LandmarkId> choose_landmarks(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
+                                         std::size_t limit) {
+  const std::vector<int> position = positions(map, keyframes);
+  const std::size_t segments = (keyframes.size() + kSegment - 1) / kSegment, cameras = map.rig().size();
+  // negated number of keyframes, so that sorting puts the largest first
+  std::vector<std::vector<std::pair<int, LandmarkId>>> queues(segments * cameras);
+  for (const LandmarkId l : map.landmark_ids()) {
+    const Candidate candidate = look_up(map, l, position);
+    if (candidate.keyframes < 2) continue;
+    for (std::size_t c = 0; c < cameras; ++c) {
+      if (candidate.cameras[c] != 0) queues[candidate.segment * cameras + c].emplace_back(-candidate.keyframes, l);
+    }
+  }
+  for (auto& queue : queues) std::sort(queue.begin(), queue.end());
+  std::vector<std::uint8_t> taken(map.landmark_slots(), 0);
+  std::vector<std::size_t> next(queues.size(), 0);
+  std::vector<LandmarkId> out;
+  for (bool any = true; any && out.size() < limit;) {
+    any = false;
+    for (std::size_t q = 0; q < queues.size() && out.size() < limit; ++q) {
+      while (next[q] < queues[q].size() && taken[queues[q][next[q]].second.index()] != 0) ++next[q];
+      if (next[q] == queues[q].size()) continue;
+      const LandmarkId l = queues[q][next[q]++].second;
+      taken[l.index()] = 1;
+      out.push_back(l);
+      any = true;
+    }
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Assigns each keyframe to a group of keyframes connected, directly or indirectly, by shared landmarks. Returns, per
+// keyframe, the index of the first keyframe of its group.
+std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
+                                const std::vector<LandmarkId>& landmarks) {
+  const std::vector<int> position = positions(map, keyframes);
+  const std::size_t n = keyframes.size();
+  std::vector<int> shared(n * n, 0);
+  std::vector<std::size_t> seen;
+  for (const LandmarkId l : landmarks) {
+    seen.clear();
+    for (const map::Observation& o : map.observations(l)) {
+      if (position[o.keyframe.index()] >= 0) seen.push_back(static_cast<std::size_t>(position[o.keyframe.index()]));
+    }
+    for (const std::size_t a : seen) {
+      for (const std::size_t b : seen) ++shared[a * n + b];
+    }
+  }
+  std::vector<std::size_t> group(n);
+  std::iota(group.begin(), group.end(), 0u);
+  for (std::size_t a = 0; a < n; ++a) {
+    for (std::size_t b = a + 1; b < n; ++b) {
+      if (shared[a * n + b] < kMinShared || group[a] == group[b]) continue;
+      const std::size_t kept = std::min(group[a], group[b]), gone = std::max(group[a], group[b]);
+      std::replace(group.begin(), group.end(), gone, kept);
+    }
+  }
+  return group;
+}
+
+}  // namespace
+
+RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOptions& options,
+                  const feature::FeatureModel& features) {
+  adjustment::Selection selection;
+  const std::vector<KeyframeId> keyframes =
+      choose_keyframes(usable_keyframes(map, timing), static_cast<std::size_t>(options.keyframes));
+  selection.landmarks = choose_landmarks(map, keyframes, static_cast<std::size_t>(options.landmarks));
+  RigProblem out{{}, groups(map, keyframes, selection.landmarks)};
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    (out.group[i] == i ? selection.fixed_keyframes : selection.free_keyframes).push_back(keyframes[i]);
+  }
+  out.flat = adjustment::build_problem(map, selection, features);
+  out.flat.problem.twist.clear();
+  for (const KeyframeId k : out.flat.keyframes) out.flat.problem.twist.push_back(map.keyframe(k).twist);
+  return out;
+}
+
+void separate_groups(RigProblem& problem) {
+  std::vector<solver::ReprojectionProblem::Observation>& observations = problem.flat.problem.observations;
+  std::vector<int> count(problem.group.size());
+  std::size_t kept = 0;
+  for (std::size_t begin = 0, end = 0; begin < observations.size(); begin = end) {
+    std::fill(count.begin(), count.end(), 0);
+    const auto group_of = [&](std::size_t o) { return problem.group[static_cast<std::size_t>(observations[o].pose)]; };
+    for (; end < observations.size() && observations[end].point == observations[begin].point; ++end)
+      ++count[group_of(end)];
+    const auto most = static_cast<std::size_t>(std::max_element(count.begin(), count.end()) - count.begin());
+    for (std::size_t o = begin; o < end; ++o) {
+      if (group_of(o) != most) continue;
+      problem.flat.sources[kept] = problem.flat.sources[o];
+      observations[kept++] = observations[o];
+    }
+  }
+  observations.resize(kept);
+  problem.flat.sources.resize(kept);
+}
+
+}  // namespace bslam::calibration

@@ -1,0 +1,28 @@
+// The part of a map from which the calibration is estimated.
+#pragma once
+
+#include <vector>
+
+#include "adjustment/bundle_problem.h"
+#include "calibration/rig_refinement.h"
+
+namespace bslam::calibration {
+
+// The adjustment problem and the group of each of its poses.
+struct RigProblem {
+  adjustment::BundleProblem flat;
+  std::vector<std::size_t> group;
+};
+
+// Chooses keyframes and landmarks that are distributed over the map. Each group has its own gauge freedom: one keyframe
+// per group is fixed, which does not constrain the extrinsics. `timing`: the timing of the cameras is estimated, for
+// which only keyframes of known velocity are used.
+RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOptions& options,
+                  const feature::FeatureModel& features);
+
+// Removes the observations of a point by groups other than the one with the most observations (the first one on ties).
+// Otherwise the point would connect two fixed keyframes, and their distance would constrain lengths, which the
+// extrinsics have to determine.
+void separate_groups(RigProblem& problem);
+
+}  // namespace bslam::calibration
