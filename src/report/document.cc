@@ -4,6 +4,8 @@
 
 #include <string_view>
 
+#include "report/markup.h"
+
 namespace bslam::report {
 namespace {
 
@@ -29,29 +31,6 @@ std::string markdown_row(const std::vector<std::string>& cells) {
   std::string out = "|";
   for (const std::string& cell : cells) out += fmt::format(" {} |", markdown_cell(cell));
   return out + "\n";
-}
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
 }
 
 std::string html_row(const std::vector<std::string>& cells, std::string_view tag) {

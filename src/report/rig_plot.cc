@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "report/figure.h"
+#include "report/markup.h"
 
 namespace bslam::report {
 namespace {
@@ -19,29 +20,6 @@ using geometry::Vector3d;
 constexpr double kWidth = 1000, kMargin = 28, kHeader = 64, kFooter = 44;
 constexpr double kPanelWidth = (kWidth - 3 * kMargin) / 2, kMinPanelHeight = 180, kMaxPanelHeight = 460;
 constexpr double kNameMargin = 150, kTopMargin = 60;  // pixels
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '&':
-        out += "&amp;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return out;
-}
 
 // Bearings of pixels on lines from the principal point to the image border, up to the limit of the camera model.
 std::vector<Vector3d> fan_bearings(const camera::Camera& camera) {
