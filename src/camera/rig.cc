@@ -82,6 +82,7 @@ Rig Rig::with_calibration_of(const Rig& part, std::span<const int> indices) cons
     RigCamera& camera = cameras[static_cast<std::size_t>(indices[i])];
     camera.camera.model = part.camera(i).model;
     camera.camera.readout_s = part.camera(i).readout_s;
+    camera.camera.time_offset_ns = part.camera(i).time_offset_ns;
     camera.T_body_cam = part.body_from_cam(i);
   }
   return Rig(std::move(cameras));

@@ -56,7 +56,7 @@ class Rig {
   // Returns the rig that consists of the given cameras, in the given order; the first becomes camera 0. The indices
   // must be valid and distinct.
   Rig subset(std::span<const int> indices) const;
-  // The inverse of `subset`: returns this rig with the models and extrinsics (T_body_cam) of the cameras `indices`
+  // The inverse of `subset`: returns this rig with models, timing and extrinsics (T_body_cam) of the cameras `indices`
   // taken from `part`.
   Rig with_calibration_of(const Rig& part, std::span<const int> indices) const;
 

@@ -119,6 +119,7 @@ constexpr double kMaxFocal = 0.05;                  // relative
 constexpr double kMaxCentre = 0.05;                 // of the image width
 constexpr double kMaxDistortion = 0.3;              // any coefficient or shape parameter
 constexpr double kMaxAngle = 0.1, kMaxShift = 0.1;  // rad, metres
+constexpr double kMaxReadout = 0.05;                // seconds
 
 std::string numbers_text(const std::vector<double>& values) {
   return values.empty() ? "none" : fmt::format("{:.12g}", fmt::join(values, " "));
@@ -157,7 +158,7 @@ Status compare_camera(const SavedMap& saved, const camera::Rig& rig, std::size_t
     return error("resolution", fmt::format("{}x{}", saved_camera.width, saved_camera.height),
                  fmt::format("{}x{}", camera.width, camera.height));
   }
-  if (saved_camera.readout_s != camera.readout_s) {
+  if (!(std::abs(saved_camera.readout_s - camera.readout_s) <= kMaxReadout)) {
     return error("rolling_shutter_readout_s", format_double(saved_camera.readout_s), format_double(camera.readout_s));
   }
   const camera::Intrinsics &saved_k = camera::intrinsics(saved_camera.model), &k = camera::intrinsics(camera.model);

@@ -108,6 +108,18 @@ TEST(Rig, ReplacesTheExtrinsicsOfSomeCameras) {
   EXPECT_LT(difference(found.body_from_cam(2), rig.body_from_cam(2)), 1e-15);
 }
 
+TEST(Rig, ReplacesTheTimingOfSomeCameras) {
+  const Rig rig = three_cameras();
+  Camera late = rig.camera(std::size_t{2});
+  late.time_offset_ns = 4'000'000;
+  late.readout_s = 0.015;
+  const std::array order = {2};
+  const Rig found = rig.with_calibration_of(Rig({{late, rig.body_from_cam(2)}}), order);
+  EXPECT_EQ(found.camera(std::size_t{2}).time_offset_ns, 4'000'000);
+  EXPECT_EQ(found.camera(std::size_t{2}).readout_s, 0.015);
+  EXPECT_EQ(found.camera(std::size_t{0}).time_offset_ns, rig.camera(std::size_t{0}).time_offset_ns);
+}
+
 TEST(Rig, OneCameraOverlapsNothing) {
   const Rig rig({{pinhole("only"), SE3()}});
   EXPECT_EQ(rig.size(), 1u);
