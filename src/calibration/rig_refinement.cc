@@ -183,6 +183,17 @@ void evaluate_timing(const solver::CameraEstimate& estimate, CameraRefinement& o
   out.readout = in_ms(estimate.timing_change.readout_s, estimate.timing_sigma.readout_s);
 }
 
+// Sum of the distances between successive keyframes of the same group.
+double path_length(const RigProblem& problem) {
+  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
+  double sum = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    if (problem.group[i] == problem.group[i - 1])
+      sum += (poses[i].inverse().translation() - poses[i - 1].inverse().translation()).norm();
+  }
+  return sum;
+}
+
 map::SetPoses poses_of(const adjustment::BundleProblem& flat) {
   map::SetPoses out;
   for (std::size_t i = 0; i < flat.keyframes.size(); ++i) {
@@ -221,6 +232,7 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
   problem.flat.problem.rig = &reference;
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();
+  const double path_before = path_length(problem);
   const solver::RigAdjustment adjusted = adjust_in_passes(map, features, prior, problem, stop);
   if (!adjusted.done) return out;
   out.done = true;
@@ -238,6 +250,7 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
   out.scale_change = adjusted.scale_change;
   out.rig = adjusted.values.applied_to(reference);
   out.poses = poses_of(problem.flat);
+  if (path_before > 0) out.path_change = path_length(problem) / path_before;
   return out;
 }
 
@@ -255,6 +268,18 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
   }
   RigRefinement out = refine_rig(map, calibrated, options, features, stop);
   return accepted(out, options) ? std::optional(std::move(out)) : std::nullopt;
+}
+
+void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
+  const double factor = 1 / refinement.path_change;
+  if (!(std::abs(std::log(factor)) < 0.01 * options.scale_tolerance_percent)) return;
+  solver::RigValues values = solver::RigValues::of(*refinement.rig);
+  for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);
+  refinement.rig = values.applied_to(*refinement.rig);
+  for (auto& [keyframe, T_rig_world] : refinement.poses.keyframes) T_rig_world = geometry::scaled(T_rig_world, factor);
+  for (auto& [landmark, position] : refinement.poses.landmarks) position *= factor;
+  refinement.scale_change *= factor;
+  refinement.path_change = 1;
 }
 
 void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft) {

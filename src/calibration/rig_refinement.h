@@ -35,6 +35,8 @@ struct CalibrationOptions {
   // (camera/model_table.h).
   double sigma_rotation_deg = 2.0, sigma_translation_mm = 30.0;
   double sigma_scale_percent = 0.1;  // of the common scale of all baselines, which images do not reveal
+  // During a run, the map keeps its scale while it differs from that of the calibrated baselines by less than this.
+  double scale_tolerance_percent = 1.0;
   double sigma_focal_percent = 1.0, sigma_aspect_percent = 0.1, sigma_centre_percent = 0.5;
   // Of time offsets and of the readout times of rolling shutters. They are constant unless the images contradict them
   // by more than `suspect_ms`.
@@ -70,6 +72,8 @@ struct CalibrationOptions {
             OptionNote{.formerly = "extrinsics.calibration_mm"});
     visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-6, 100}, "%",
             "standard deviation of the common scale of the distances between the cameras");
+    visitor("scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
+            "during a run, the map keeps its scale while the baselines differ from theirs by less than this");
     visitor("sigma_focal_percent", self.sigma_focal_percent, Range{1e-3, 50}, "%",
             "standard deviation of calibrated focal lengths");
     visitor("sigma_aspect_percent", self.sigma_aspect_percent, Range{1e-3, 50}, "%",
@@ -138,6 +142,7 @@ struct RigRefinement {
   solver::RigInformation information;  // of the estimate, to combine it with those of other maps
   double scale_change = 1;             // factor by which the lengths of the map change
   map::SetPoses poses;                 // after this change
+  double path_change = 1;              // factor by which the distances between the keyframes change
 };
 
 // Selects keyframes and landmarks and adjusts them with free calibration, beginning with the rig of the map; the map is
@@ -154,6 +159,11 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
                                                 const CalibrationOptions& options,
                                                 const feature::FeatureModel& features,
                                                 const std::stop_token& stop = {});
+// Scales the estimate so that the distances between the keyframes remain, if this changes the scale of the baselines by
+// less than `scale_tolerance_percent`. The baselines have exactly their calibrated scale before. How the images
+// distribute it over them is uncertain at first; without this function each estimate would change the scale of the live
+// trajectory.
+void keep_scale(const CalibrationOptions& options, RigRefinement& refinement);
 // Moves the submap of a keyframe as a whole so that the keyframe has the given pose.
 void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft);
 // Replaces the rig of the draft's map by the estimate, with the poses and landmarks that belong to it; all others have

@@ -39,21 +39,29 @@ std::span<const FrameRecord>::iterator find_frame(std::span<const FrameRecord> f
   return at != frames.end() && at->result.frame == id ? at : frames.end();
 }
 
-// A frame that is a keyframe of the final map: its index among the frames, and the keyframe.
-struct KeyframeAt {
+// A frame whose pose in the final map is kept: its index among the frames, the pose and the root of its submap.
+struct KnownPose {
   std::size_t frame;
-  KeyframeId keyframe;
+  SE3 T_rig_world;
+  KeyframeId root;
 };
 
-std::vector<KeyframeAt> keyframes_among(const map::BundledMap& map, KeyframeId first,
-                                        std::span<const FrameRecord> frames) {
-  std::vector<KeyframeAt> out;
+// The keyframes of the final map, and the first frames after changes of the calibration.
+std::vector<KnownPose> known_poses(const map::BundledMap& map, KeyframeId first, std::span<const FrameRecord> frames) {
+  std::vector<KnownPose> out;
   for (const KeyframeId k : map.keyframe_ids()) {
     const auto at = find_frame(frames, map.keyframe(k).frame->id);
     if (k.index() < first.index() || at == frames.end()) continue;
-    out.push_back({static_cast<std::size_t>(at - frames.begin()), k});
+    out.push_back({static_cast<std::size_t>(at - frames.begin()), map.keyframe(k).T_rig_world, map.root_of(k)});
   }
-  std::ranges::sort(out, {}, &KeyframeAt::frame);
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    if (!frames[f].recalibrated) continue;
+    if (const auto T_rig_world = T_rig_world_of(frames[f], map))
+      out.push_back({f, *T_rig_world, map.root_of(frames[f].final_result().anchored.reference)});
+  }
+  std::ranges::stable_sort(out, {}, &KnownPose::frame);  // keyframes first
+  const auto repeated = std::ranges::unique(out, {}, &KnownPose::frame);
+  out.erase(repeated.begin(), repeated.end());
   return out;
 }
 
@@ -70,18 +78,17 @@ std::vector<std::optional<SE3>> poses_between_keyframes(const map::BundledMap& m
                                                         std::span<const FrameRecord> frames) {
   std::vector<std::optional<SE3>> out;
   for (const FrameRecord& record : frames) out.push_back(T_rig_world_of(record, map));
-  const std::vector<KeyframeAt> keyframes = keyframes_among(map, first, frames);
-  for (std::size_t i = 0; i + 1 < keyframes.size(); ++i) {
-    const auto [begin, before] = keyframes[i];
-    const auto [end, after] = keyframes[i + 1];
-    if (map.root_of(before) != map.root_of(after) || !tracked_throughout(frames.subspan(begin, end - begin + 1)))
-      continue;
+  const std::vector<KnownPose> known = known_poses(map, first, frames);
+  for (std::size_t i = 0; i + 1 < known.size(); ++i) {
+    const auto& [begin, T_before, root_before] = known[i];
+    const auto& [end, T_after, root_after] = known[i + 1];
+    if (root_before != root_after || !tracked_throughout(frames.subspan(begin, end - begin + 1))) continue;
     const double duration_s = to_seconds(frames[end].result.time_ns - frames[begin].result.time_ns);
     if (!(duration_s > 0)) continue;
     for (std::size_t f = begin; f <= end; ++f) {
       const SE3& odometry = frames[f].T_rig_odom;
-      const SE3 from_before = odometry * frames[begin].T_rig_odom.inverse() * map.keyframe(before).T_rig_world;
-      const SE3 from_after = odometry * frames[end].T_rig_odom.inverse() * map.keyframe(after).T_rig_world;
+      const SE3 from_before = odometry * frames[begin].T_rig_odom.inverse() * T_before;
+      const SE3 from_after = odometry * frames[end].T_rig_odom.inverse() * T_after;
       const double weight = to_seconds(frames[f].result.time_ns - frames[begin].result.time_ns) / duration_s;
       out[f] = SE3::exp(weight * (from_after * from_before.inverse()).log()) * from_before;
     }

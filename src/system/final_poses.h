@@ -16,7 +16,9 @@ std::optional<geometry::SE3> T_rig_world_of(const tracking::FrameRecord& record,
 
 // Poses of all frames of a run in which the rig was calibrated. Frames between two keyframes were tracked with another
 // calibration than that of the final map, so that their motion relative to one keyframe does not fit the other. The
-// difference is distributed over the frames between them in proportion to time. `first`: the first keyframe of the run.
+// difference is distributed over the frames between them in proportion to time. Where the calibration changed between
+// two keyframes, only those before the change have the larger difference: the first frame after it keeps its pose like
+// a keyframe. `first`: the first keyframe of the run.
 std::vector<std::optional<geometry::SE3>> poses_between_keyframes(const map::BundledMap& map, KeyframeId first,
                                                                   std::span<const tracking::FrameRecord> frames);
 

@@ -75,12 +75,13 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   timed("bundle", bundling);
   const Stopwatch results;
   outcome.seen = executor.begin_frame(frame.id);
-  adopt_rig(*outcome.seen, frame);
+  const bool recalibrated = adopt_rig(*outcome.seen, frame);
   if (config_.mode == execution::Mode::kLagged) timed("results", results);
 
   tracking::TrackOutcome tracked =
       tracker_.process(std::move(state_), std::move(frame), builder_.pyramids(), outcome.seen);
   tracked.record.scale = outcome.seen->scale();
+  tracked.record.recalibrated = recalibrated;
   if (tracked.edit) commit(tracked, executor, outcome);
   state_ = std::move(tracked.next);
   outcome.early = std::move(tracked.early);
@@ -94,11 +95,12 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   return outcome;
 }
 
-// Continues with the rig of the map, which a stage may have replaced since the last frame.
-void Pipeline::adopt_rig(const map::BundledMap& map, BundledFrame& frame) {
-  if (map.shared_rig() == rig_) return;
+// Continues with the rig of the map. Returns whether a stage has replaced it since the last frame.
+bool Pipeline::adopt_rig(const map::BundledMap& map, BundledFrame& frame) {
+  if (map.shared_rig() == rig_) return false;
   if (frame::changes_frames(*rig_, map.rig())) frame = frame::recalibrated(std::move(frame), *rig_, map.rig());
   rig_ = map.shared_rig();
+  return true;
 }
 
 void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome) {

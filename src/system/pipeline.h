@@ -48,7 +48,7 @@ class Pipeline {
  private:
   frame::BundledFrame extract(const image::ImageBundle& images, const tracking::FramePlan& plan);
   frame::BundledFrame bundle(const tracking::FramePlan& plan, const frame::BundledFrame& frame);
-  void adopt_rig(const map::BundledMap& map, frame::BundledFrame& frame);
+  bool adopt_rig(const map::BundledMap& map, frame::BundledFrame& frame);
   void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);
 
   const camera::Rig given_;                 // its time offsets are included in the capture times of the images

@@ -28,9 +28,10 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
 // pose, so that the current pose of the rig does not jump, unless it is in a loaded submap.
 execution::StageResult calibrate(const Config& config, const camera::Rig& calibrated, KeyframeId first,
                                  const map::MapSnapshot& base, const std::stop_token& stop) {
-  const auto refinement =
+  auto refinement =
       calibration::refine_if_accepted(*base, calibrated, config.calibration, config.feature_model(), stop);
   if (!refinement) return {};
+  calibration::keep_scale(config.calibration, *refinement);
   map::MapDraft draft(base);
   calibration::apply(*refinement, draft);
   mapping::adjust_globally(config.mapping, config.feature_model(), draft, stop);

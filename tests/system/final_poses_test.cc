@@ -164,5 +164,29 @@ TEST(FinalPoses, FramesBetweenKeyframesFitBoth) {
   EXPECT_EQ(interrupted[8]->matrix(), T_rig_world_of(frames[8], map)->matrix());
 }
 
+// Odometry of a wrong scale until the calibration changes: the frames after the change keep the poses that they have
+// relative to the last keyframe, and the difference is distributed over the frames before it.
+TEST(FinalPoses, FramesAfterAChangeOfTheCalibrationDoNotShareTheErrorOfThoseBeforeIt) {
+  Scene scene(0.0, 11);
+  map::BundledMap& map = scene.map;  // its keyframe is frame 5
+  auto last = std::make_shared<frame::BundledFrame>(*map.keyframe(KeyframeId(0)).frame);
+  last->id = FrameId(10);
+  const SE3 T_start = map.keyframe(KeyframeId(0)).T_rig_world;
+  const auto moved = [](double steps) { return SE3(geometry::Quaterniond::Identity(), {-0.1 * steps, 0, 0}); };
+  ASSERT_EQ(map.add_keyframe(last, moved(5) * T_start, {}, KeyframeId(0)), KeyframeId(1));
+  for (std::size_t i = 5; i < scene.frames.size(); ++i) {
+    const double step = static_cast<double>(i - 5);
+    scene.frames[i].result.anchored = map::AnchoredPose::at(map, KeyframeId(0), moved(step) * T_start);
+    scene.frames[i].T_rig_odom = i < 8 ? moved(0.5 * step) : moved(1.0 + step - 2);
+  }
+  scene.frames[8].recalibrated = true;
+  const auto poses = poses_between_keyframes(map, KeyframeId(0), scene.frames);
+  for (std::size_t i = 8; i < scene.frames.size(); ++i) {
+    ASSERT_TRUE(poses[i]);
+    EXPECT_LT((poses[i]->matrix() - (moved(static_cast<double>(i - 5)) * T_start).matrix()).norm(), 1e-12) << i;
+  }
+  EXPECT_LT((poses[6]->matrix() - (moved(1) * T_start).matrix()).norm(), 0.02);
+}
+
 }  // namespace
 }  // namespace bslam::system
