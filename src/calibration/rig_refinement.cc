@@ -194,11 +194,17 @@ double path_length(const RigProblem& problem) {
   return sum;
 }
 
+// The size of a rig: the longest distance of a camera from camera 0.
+double longest_baseline(const camera::Rig& rig) {
+  double longest = 0;
+  for (std::size_t c = 1; c < rig.size(); ++c) longest = std::max(longest, rig.cam_from_rig(c).translation().norm());
+  return longest;
+}
+
 map::SetPoses poses_of(const adjustment::BundleProblem& flat) {
   map::SetPoses out;
-  for (std::size_t i = 0; i < flat.keyframes.size(); ++i) {
-    if (flat.problem.pose_free[i] != 0) out.keyframes.emplace_back(flat.keyframes[i], flat.problem.T_rig_world[i]);
-  }
+  for (std::size_t i = 0; i < flat.keyframes.size(); ++i)
+    out.keyframes.emplace_back(flat.keyframes[i], flat.problem.T_rig_world[i]);
   for (std::size_t i = 0; i < flat.landmarks.size(); ++i) {
     if (flat.problem.points[i].allFinite()) out.landmarks.emplace_back(flat.landmarks[i], flat.problem.points[i]);
   }
@@ -247,10 +253,12 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
   out.information = adjusted.information;
-  out.scale_change = adjusted.scale_change;
   out.rig = adjusted.values.applied_to(reference);
   out.poses = poses_of(problem.flat);
-  if (path_before > 0) out.path_change = path_length(problem) / path_before;
+  // Distances between keyframes that are longer than the rig tell how the calibration changes the scale; a rig that
+  // hardly moved only follows the scale of the baselines.
+  out.scale_change =
+      path_before > longest_baseline(calibrated) ? path_length(problem) / path_before : adjusted.scale_change;
   return out;
 }
 
@@ -271,15 +279,14 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
 }
 
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
-  const double factor = 1 / refinement.path_change;
+  const double factor = 1 / refinement.scale_change;
   if (!(std::abs(std::log(factor)) < 0.01 * options.scale_tolerance_percent)) return;
   solver::RigValues values = solver::RigValues::of(*refinement.rig);
   for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);
   refinement.rig = values.applied_to(*refinement.rig);
   for (auto& [keyframe, T_rig_world] : refinement.poses.keyframes) T_rig_world = geometry::scaled(T_rig_world, factor);
   for (auto& [landmark, position] : refinement.poses.landmarks) position *= factor;
-  refinement.scale_change *= factor;
-  refinement.path_change = 1;
+  refinement.scale_change = 1;
 }
 
 void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft) {

@@ -142,7 +142,6 @@ struct RigRefinement {
   solver::RigInformation information;  // of the estimate, to combine it with those of other maps
   double scale_change = 1;             // factor by which the lengths of the map change
   map::SetPoses poses;                 // after this change
-  double path_change = 1;              // factor by which the distances between the keyframes change
 };
 
 // Selects keyframes and landmarks and adjusts them with free calibration, beginning with the rig of the map; the map is
