@@ -71,9 +71,9 @@ struct CalibrationOptions {
             "standard deviation of calibrated translations, per axis",
             OptionNote{.formerly = "extrinsics.calibration_mm"});
     visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-6, 100}, "%",
-            "standard deviation of the common scale of the distances between the cameras");
+            "deviation of the baselines' common scale");
     visitor("scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
-            "during a run, the map keeps its scale while the baselines differ from theirs by less than this");
+            "change of the scale of the baselines below which the map keeps its scale during a run");
     visitor("sigma_focal_percent", self.sigma_focal_percent, Range{1e-3, 50}, "%",
             "standard deviation of calibrated focal lengths");
     visitor("sigma_aspect_percent", self.sigma_aspect_percent, Range{1e-3, 50}, "%",
@@ -85,10 +85,9 @@ struct CalibrationOptions {
     visitor("sigma_readout_ms", self.sigma_readout_ms, Range{1e-6, 1e3}, "ms",
             "standard deviation of calibrated readout times of rolling shutters");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
-            "number of observations with the information of one independent observation");
-    visitor(
-        "inconsistent_excess", self.inconsistent_excess, Range{0, 100}, "",
-        "the images contradict the calibration if it increases their mean squared error by more than this fraction");
+            "number of observations with the information of one");
+    visitor("inconsistent_excess", self.inconsistent_excess, Range{0, 100}, "",
+            "increase of the mean squared error by a calibration that the images contradict, as a fraction");
     visitor("suspect_sigmas", self.suspect_sigmas, Range{1, 100}, "",
             "a suspect camera changed by more than this number of standard deviations",
             OptionNote{.formerly = "extrinsics.suspect_sigmas"});
@@ -96,8 +95,7 @@ struct CalibrationOptions {
             OptionNote{.formerly = "extrinsics.suspect_deg"});
     visitor("suspect_mm", self.suspect_mm, Range{0, 1e5}, "mm", "or moved by more than this",
             OptionNote{.formerly = "extrinsics.suspect_mm"});
-    visitor("suspect_ms", self.suspect_ms, Range{0, 1e3}, "ms",
-            "time offsets and readout times are estimated if they changed by more than this");
+    visitor("suspect_ms", self.suspect_ms, Range{0, 1e3}, "ms", "minimum change of a time that is estimated");
   }
 };
 

@@ -31,6 +31,14 @@ TrackResult not_started(const BundledFrame& frame) {
   return result;
 }
 
+// Returns true if some camera has keypoints in both frames.
+bool share_cameras(const BundledFrame& a, const BundledFrame& b) {
+  for (std::size_t c = 0; c < a.cameras.size(); ++c) {
+    if (!a.cameras[c].keypoints.empty() && !b.cameras[c].keypoints.empty()) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 void Tracker::start(const Input& input, TrackOutcome& outcome) const {
@@ -65,14 +73,16 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   return initialise_monocular(*state.start_reference, input.frame, input.pyramids, options, random, draft);
 }
 
-// Stores the frame. It replaces the reference frame if that is too old or has too few matches with it.
+// Stores the frame. It replaces the reference frame if that is too old or has too few matches with it; frames of other
+// cameras, which cannot have any, do not replace it.
 void Tracker::keep_reference_frame(const Input& input, FrontEndState& state) const {
   const InitialisationOptions& options = options_.tracking.initialisation;
   if (state.start_reference && input.frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular))
     return;  // too few keypoints to compare
   const bool good = state.start_reference &&
                     input.frame.id.value() - state.start_reference->frame->id.value() <= kMaxStartAge &&
-                    comparable(*state.start_reference->frame, input.frame, options);
+                    (!share_cameras(*state.start_reference->frame, input.frame) ||
+                     comparable(*state.start_reference->frame, input.frame, options));
   const auto kept = std::make_shared<const BundledFrame>(std::move(input.frame));
   if (!good) {
     state.start_reference =
