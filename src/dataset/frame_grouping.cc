@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/assert.h"
+#include "dataset/capture_phase.h"
 #include "image/frame_grouping.h"
 
 namespace bslam::dataset {
@@ -25,6 +26,11 @@ FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> 
   std::vector<std::vector<TimeNs>> times(images.size());
   for (std::size_t c = 0; c < images.size(); ++c) {
     for (const image_files::ImageFile& image : images[c]) times[c].push_back(image.time_ns);
+  }
+  const std::vector<TimeNs> phases = capture_phases(times, tolerance_ns);
+  for (std::size_t c = 0; c < times.size(); ++c) {
+    for (TimeNs& time_ns : times[c]) time_ns -= phases[c];
+    if (phases[c] != 0) tolerance_ns = std::max(tolerance_ns, image::median_interval(times[0]) / 10);
   }
   image::FrameGroups groups = image::group_frames(times, tolerance_ns);
   FrameGrouping out{{}, std::move(groups.shared_with_camera0), std::vector<int>(images.size(), 0)};

@@ -143,5 +143,55 @@ TEST(FrameGrouping, OneCameraKeepsEveryImage) {
   EXPECT_EQ(g.frames.size(), 4u);
 }
 
+std::vector<double> every_ms(double first, double period, int count, double jitter = 0, std::uint64_t seed = 1) {
+  Random random(seed);
+  std::vector<double> out;
+  for (int k = 0; k < count; ++k) out.push_back(first + period * k + random.uniform(-jitter, jitter));
+  return out;
+}
+
+TEST(FrameGrouping, CamerasThatTakeTurnsShareFrames) {
+  for (const double phase : {20.0, 50.0, -30.0}) {
+    const auto g = group({at_ms(every_ms(100, 100, 40, 2)), at_ms(every_ms(100 + phase, 100, 40, 2, 2))});
+    EXPECT_GE(g.shared_with_camera0[1], 39) << phase;
+    EXPECT_LE(g.frames.size(), 41u) << phase;
+    TimeNs last_ns = -1;
+    for (const FrameEntry& frame : g.frames) {
+      EXPECT_GT(frame.time_ns, last_ns);
+      last_ns = frame.time_ns;
+      if (!frame.images[0] || !frame.images[1]) continue;
+      const double later_ms = static_cast<double>(frame.images[1]->time_ns - frame.images[0]->time_ns) / 1e6;
+      EXPECT_NEAR(phase == 50 ? std::abs(later_ms) : later_ms, phase, 5);
+    }
+  }
+}
+
+TEST(FrameGrouping, AConstantDelayIsFoundDespiteLostImages) {
+  std::vector<double> camera0 = every_ms(0, 50, 60), camera1 = every_ms(20, 50, 60);
+  Random random(3);
+  std::erase_if(camera0, [&](double) { return random.uniform() < 0.3; });
+  std::erase_if(camera1, [&](double) { return random.uniform() < 0.3; });
+  const auto g = group({at_ms(camera0), at_ms(camera1)});
+  for (const FrameEntry& frame : g.frames) {
+    if (!frame.images[0] || !frame.images[1]) continue;
+    EXPECT_EQ(frame.images[1]->time_ns - frame.images[0]->time_ns, 20 * kMs);
+  }
+  EXPECT_GT(g.shared_with_camera0[1], 20);
+}
+
+TEST(FrameGrouping, LostImagesAndOtherRatesAreNoConstantDelay) {
+  std::vector<double> camera0 = every_ms(0, 50, 200), camera1 = camera0;
+  Random random(3);
+  std::erase_if(camera0, [&](double) { return random.uniform() < 0.8; });
+  std::erase_if(camera1, [&](double) { return random.uniform() < 0.8; });
+  for (const auto& [a, b] : {std::pair(camera0, camera1), std::pair(every_ms(0, 50, 60), every_ms(0, 33.3, 90)),
+                             std::pair(every_ms(0, 50, 60), every_ms(10, 25, 120))}) {
+    for (const FrameEntry& frame : group({at_ms(a), at_ms(b)}).frames) {
+      if (!frame.images[0] || !frame.images[1]) continue;
+      EXPECT_LE(std::abs(frame.images[1]->time_ns - frame.images[0]->time_ns), 2 * kMs);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace bslam::dataset

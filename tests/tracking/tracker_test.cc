@@ -119,6 +119,18 @@ TEST(Tracker, OneCameraInitialisesUpToScaleAndLocatesTheEarlierFrames) {
   }
 }
 
+// Each frame has an image of one camera only, so that no two successive frames can be compared.
+TEST(Tracker, CamerasThatTakeTurnsInitialiseFromFramesOfTheSameCamera) {
+  TrackerRun run(simulator(synthetic::ring_rig(2), room(1, 0.25), {.radius = 2.2, .period_s = 20}));
+  bool started = false;
+  for (int i = 0; i < 60 && !started; ++i) {
+    const int missing[] = {i % 2};
+    const FrameRecord record = run.process(run.sim.frame(FrameId(i), TrackerRun::time_s(i), missing).frame);
+    started = record.result.status == TrackStatus::kTracking;
+  }
+  EXPECT_TRUE(started);
+}
+
 TEST(Tracker, OutcomeDependsOnlyOnTheArguments) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 4; ++i) run.process(run.frame(i));

@@ -1,0 +1,60 @@
+#include "dataset/capture_phase.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <iterator>
+
+#include "base/median.h"
+#include "image/frame_grouping.h"
+
+namespace bslam::dataset {
+namespace {
+
+constexpr std::size_t kMinImages = 5;
+constexpr double kMinShare = 0.9;  // of the images that are within a tenth of the period of the phase
+
+// `time_ns` plus a multiple of the period, between minus and plus half of it.
+TimeNs wrapped(TimeNs time_ns, TimeNs period_ns) {
+  const TimeNs rest = time_ns % period_ns;
+  return 2 * rest > period_ns ? rest - period_ns : 2 * rest <= -period_ns ? rest + period_ns : rest;
+}
+
+// Times of a camera relative to the nearest image of camera 0, of those at most 0.6 periods away.
+std::vector<TimeNs> offsets(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times, TimeNs period_ns) {
+  std::vector<TimeNs> out;
+  for (const TimeNs time_ns : times) {
+    const auto after = std::ranges::lower_bound(camera0, time_ns);
+    TimeNs nearest = after == camera0.end() ? time_ns - camera0.back() : time_ns - *after;
+    if (after != camera0.begin() && time_ns - *std::prev(after) < std::abs(nearest))
+      nearest = time_ns - *std::prev(after);
+    if (10 * std::abs(nearest) <= 6 * period_ns) out.push_back(nearest);
+  }
+  return out;
+}
+
+TimeNs phase(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times, TimeNs period_ns) {
+  std::vector<TimeNs> relative = offsets(camera0, times, period_ns);
+  if (relative.size() < kMinImages || 2 * relative.size() < times.size()) return 0;
+  const TimeNs first = relative.front();  // differences from it do not wrap around, unlike offsets near half a period
+  for (TimeNs& offset : relative) offset = wrapped(offset - first, period_ns);
+  const TimeNs middle = median(relative);
+  const auto agree = std::ranges::count_if(
+      relative, [&](TimeNs offset) { return 10 * std::abs(wrapped(offset - middle, period_ns)) <= period_ns; });
+  if (static_cast<double>(agree) < kMinShare * static_cast<double>(relative.size())) return 0;
+  return wrapped(first + middle, period_ns);
+}
+
+}  // namespace
+
+std::vector<TimeNs> capture_phases(std::span<const std::vector<TimeNs>> times, TimeNs tolerance_ns) {
+  std::vector<TimeNs> out(times.size(), 0);
+  const TimeNs period_ns = image::median_interval(times[0]);
+  if (period_ns <= 0) return out;
+  for (std::size_t c = 1; c < times.size(); ++c) {
+    const TimeNs found = phase(times[0], times[c], period_ns);
+    if (std::abs(found) > tolerance_ns) out[c] = found;
+  }
+  return out;
+}
+
+}  // namespace bslam::dataset
