@@ -8,6 +8,7 @@
 #include "adjustment/landmark_noise.h"
 #include "calibration/lost_observations.h"
 #include "calibration/rig_problem.h"
+#include "calibration/single_view_landmarks.h"
 #include "solver/rig_bundle_adjustment.h"
 
 namespace bslam::calibration {
@@ -308,6 +309,7 @@ void apply(const RigRefinement& refinement, map::MapDraft& draft) {
   for (const KeyframeId root : draft.map().roots()) draft.scale_submap(root, refinement.scale_change);
   draft.set_rig(*refinement.rig);
   draft.set_poses(refinement.poses);
+  triangulate_single_views(draft);
 }
 
 }  // namespace bslam::calibration

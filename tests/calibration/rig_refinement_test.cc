@@ -199,6 +199,47 @@ TEST(RefineRig, ARefinedMapUsesTheEstimateAndKeepsItsInvariants) {
   EXPECT_EQ(keypoints.bearing[0], *bearing);
 }
 
+// The estimate is a map of another scale, as if the images had distributed it otherwise over the baselines.
+RigRefinement scaled(RigRefinement estimate, double factor) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < estimate.rig->size(); ++c) {
+    cameras.push_back({estimate.rig->camera(c), estimate.rig->body_from_cam(0) *
+                                                    geometry::scaled(estimate.rig->cam_from_rig(c), factor).inverse()});
+  }
+  estimate.rig = camera::Rig(std::move(cameras));
+  for (auto& [keyframe, T] : estimate.poses.keyframes) T = geometry::scaled(T, factor);
+  for (auto& [landmark, position] : estimate.poses.landmarks) position *= factor;
+  estimate.scale_change *= factor;
+  return estimate;
+}
+
+double path_length(const map::BundledMap& map) {
+  double sum = 0;
+  const std::vector<KeyframeId> ids = map.keyframe_ids();
+  for (std::size_t i = 1; i < ids.size(); ++i)
+    sum += map::distance_m(map.keyframe(ids[i]).T_rig_world, map.keyframe(ids[i - 1]).T_rig_world);
+  return sum;
+}
+
+TEST(KeepScale, TheMapKeepsItsScaleUnlessTheBaselinesDifferTooMuch) {
+  const camera::Rig truth = synthetic::default_rig();
+  map::SimulatedMap world = mapped(truth, with_wrong_intrinsics(truth), 20, 0.3);
+  const RigRefinement estimate = refine(world.map);
+  ASSERT_TRUE(estimate.done);
+  const double before = path_length(world.map);
+  for (const double factor : {0.994, 1.006, 1.1}) {
+    RigRefinement kept = scaled(estimate, factor / estimate.scale_change);  // changes the path by `factor`
+    const bool keeps = factor < 1.05;
+    keep_scale({}, kept);
+    map::MapDraft draft = world.draft();
+    apply(kept, draft);
+    EXPECT_NEAR(path_length(draft.map()) / before, keeps ? 1.0 : factor, 2e-3) << factor;
+    EXPECT_NEAR(kept.rig->cam_from_rig(1).translation().norm() / estimate.rig->cam_from_rig(1).translation().norm(),
+                (keeps ? 1.0 : factor) / estimate.scale_change, 1e-9);
+    EXPECT_EQ(kept.scale_change, keeps ? 1.0 : factor);
+  }
+}
+
 TEST(MoveSubmap, MovesKeyframesAndLandmarksTogether) {
   const camera::Rig truth = synthetic::ring_rig(2);
   map::SimulatedMap world = mapped(truth, truth, 8, 0.3);
