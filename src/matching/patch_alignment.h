@@ -25,7 +25,7 @@ struct AlignmentOptions {
   // Level-0 pixels, added in quadrature: initial value of the calibration error, and the bounds between which tracking
   // estimates it (tracking/calibration_error.h). The upper bound keeps outlier thresholds below the radius of searches.
   double calibration_error_px = 0.3;
-  double min_calibration_error_px = 0.05, max_calibration_error_px = 2.0;
+  double min_calibration_error_px = 0.05, max_calibration_error_px = 10.0;
 
   // Standard deviation of an aligned keypoint in level-0 pixels. `aligned_px`: standard deviation of its alignment in
   // pixels of the level.

@@ -41,7 +41,7 @@ TEST(CalibrationError, FollowsAChangeWithinAboutTenFrames) {
 TEST(CalibrationError, StaysWithinItsBounds) {
   EXPECT_NEAR(after(100, 0.0, 300), kOptions.min_calibration_error_px, 0.01);
   EXPECT_GE(after(100, 0.0, 300), kOptions.min_calibration_error_px);
-  EXPECT_NEAR(after(100, 3.0, 300), kOptions.max_calibration_error_px, 1e-6);
+  EXPECT_NEAR(after(100, 15.0, 300), kOptions.max_calibration_error_px, 1e-6);
 }
 
 TEST(CalibrationError, NeedsEnoughKeypoints) { EXPECT_EQ(after(10, 0.0, 10), kOptions.calibration_error_px); }
