@@ -27,6 +27,10 @@ Status check_image(const CameraImage& image, const camera::Camera& camera, const
     return Error{name, camera.name, fmt::format("a stride of {} bytes", image.stride),
                  fmt::format("at least {}, the width", image.width)};
   }
+  if (image.mask != nullptr && image.mask_stride < image.width) {
+    return Error{name, camera.name, fmt::format("a mask with a stride of {} bytes", image.mask_stride),
+                 fmt::format("at least {}, the width", image.width)};
+  }
   if (image.time_ns < -kMaxTime || image.time_ns > kMaxTime) {
     return Error{name, camera.name, fmt::format("time {} ns", image.time_ns), "nanoseconds within +-4e18"};
   }
@@ -45,6 +49,7 @@ Result<image::ImageBundle> BundleReader::convert(const ImageBundle& bundle) cons
     image.state = image::ImageState::kPresent;
     image.time_ns = in.time_ns + rig_.camera(c).time_offset_ns;
     image.borrowed = {in.data, in.width, in.height, in.stride};
+    if (in.mask != nullptr) image.borrowed_mask = {in.mask, in.width, in.height, in.mask_stride};
     const bool sets_time = !any || (image.time_ns < out.time_ns && out.images[0].state != image::ImageState::kPresent);
     if (sets_time) out.time_ns = image.time_ns;
     any = true;

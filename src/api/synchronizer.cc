@@ -35,15 +35,25 @@ Status check_options(const SyncOptions& options) {
   return {};
 }
 
-// Returns the image with shared ownership of its pixels, which are copied if it has no owner.
+// Copies rows of `width` bytes to `to` without gaps between them; returns the end of the copy.
+std::uint8_t* copy_rows(const std::uint8_t* from, std::ptrdiff_t stride, std::size_t width, int height,
+                        std::uint8_t* to) {
+  for (int y = 0; y < height; ++y, to += width) std::memcpy(to, from + y * stride, width);
+  return to;
+}
+
+// Returns the image with shared ownership of its pixels and its mask, which are copied if it has no owner.
 CameraImage with_owner(const CameraImage& image) {
   if (image.owner) return image;
   const auto width = static_cast<std::size_t>(image.width), height = static_cast<std::size_t>(image.height);
-  const std::shared_ptr<std::uint8_t[]> pixels(new std::uint8_t[width * height]);
-  for (std::size_t y = 0; y < height; ++y) {
-    std::memcpy(pixels.get() + y * width, image.data + static_cast<std::ptrdiff_t>(y) * image.stride, width);
-  }
-  return {pixels.get(), image.width, image.height, image.width, image.time_ns, pixels};
+  const std::shared_ptr<std::uint8_t[]> pixels(new std::uint8_t[width * height * (image.mask == nullptr ? 1 : 2)]);
+  std::uint8_t* const mask = copy_rows(image.data, image.stride, width, image.height, pixels.get());
+  CameraImage out{pixels.get(), image.width, image.height, image.width, image.time_ns, pixels};
+  if (image.mask == nullptr) return out;
+  copy_rows(image.mask, image.mask_stride, width, image.height, mask);
+  out.mask = mask;
+  out.mask_stride = image.width;
+  return out;
 }
 
 Error moved_from() { return {"Synchronizer::push", "", "a Synchronizer that was moved from", "a valid Synchronizer"}; }

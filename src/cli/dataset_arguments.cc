@@ -50,6 +50,9 @@ void add_image_options(CLI::App& verb, ImageArguments& a) {
   verb.add_option("--bayer", a.bayer,
                   "colour filter of raw images: rggb, bggr, grbg, gbrg or none; one for all cameras, or one for each, "
                   "separated by commas");
+  verb.add_option("--masks", a.masks,
+                  "folder with masks, in which 0 marks pixels to ignore: camN.png for all images of camera N of the "
+                  "recording, camN/STAMP.png for the image with this time stamp in ns");
 }
 
 Status apply_image_options(const ImageArguments& a, dataset::DatasetRequest& request) {
@@ -57,6 +60,7 @@ Status apply_image_options(const ImageArguments& a, dataset::DatasetRequest& req
       {"ns", 1}, {"us", 1'000}, {"ms", 1'000'000}, {"s", 1'000'000'000}};
   request.time_stamps.rate_hz = a.rate_hz;
   if (!a.stamp_unit.empty()) request.time_stamps.unit_ns = kUnits.at(a.stamp_unit);
+  if (!a.masks.empty()) request.masks = a.masks;
   if (a.bayer.empty()) return {};
   auto patterns = parse_bayer(a.bayer);
   if (!patterns) return patterns.error();

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "dataset/frame_grouping.h"
+#include "dataset/mask_folder.h"
 #include "dataset/recording.h"
 #include "image_decoding/image_file.h"
 #include "rig_formats/rig_file.h"
@@ -175,6 +176,11 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Da
     if (const auto mask = image_decoding::read_mask(camera); !mask) return mask.error();
     const std::string source = list->images.front().path.parent_path().string();
     if (const Status s = convert_time_stamps(request.time_stamps, source, list->images); !s) return s.error();
+    if (request.masks) {
+      const auto warnings = add_image_masks(*request.masks, chosen.cameras[i], camera, list->images);
+      if (!warnings) return warnings.error();
+      chosen.warnings.insert(chosen.warnings.end(), warnings->begin(), warnings->end());
+    }
     for (image_files::ImageFile& image : list->images) image.time_ns += camera.time_offset_ns;
     images.push_back(std::move(list->images));
   }
@@ -303,6 +309,11 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
   }
   auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
+  if (request.masks) {
+    auto masked = with_masks(chosen->rig, chosen->cameras, *request.masks);
+    if (!masked) return masked.error();
+    chosen->rig = *std::move(masked);
+  }
   if (own_rig_file && !request.rig_file) warn_of_times(*own_rig_file, chosen->warnings);
   const auto images = collect_images(request, recording, *chosen);
   if (!images) return images.error();

@@ -28,6 +28,7 @@ struct DatasetRequest {
   TimeStampOptions time_stamps = {};                   // unit of the recorded time stamps
   // Colour filters of the cameras in use, in their order, or one for all; empty: none.
   std::vector<image_decoding::Bayer> bayer = {};
+  std::optional<std::filesystem::path> masks = {};  // folder of masks (dataset/mask_folder.h)
 };
 
 // Images taken at the same time, at most one of every camera.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/assert.h"
+#include "dataset/mask_folder.h"
 #include "image_decoding/image_file.h"
 
 namespace bslam::dataset {
@@ -19,12 +20,19 @@ Result<image::Image> read_of_camera(const Dataset& dataset, const std::filesyste
                fmt::format("{}x{}, the resolution of {}", camera.width, camera.height, camera.name)};
 }
 
+// The mask of an image; empty if it has none.
+Result<image::Image> read_mask(const Dataset& dataset, const image_files::ImageFile& file, std::size_t index) {
+  if (file.mask.empty()) return image::Image();
+  return read_image_mask(file.mask, dataset.rig.camera(index));
+}
+
 }  // namespace
 
 std::string describe_damage(const Dataset& dataset, std::size_t index, std::size_t camera) {
   const auto& file = dataset.frames.at(index).images.at(camera);
   if (!file) return "";
   const auto image = read_of_camera(dataset, file->path, camera);
+  if (const auto mask = read_mask(dataset, *file, camera); image && !mask) return mask.error().message();
   return image ? file->path.string() + ": can be read now, although it could not be read before"
                : image.error().message();
 }
@@ -40,8 +48,10 @@ image::ImageBundle read_frame(const Dataset& dataset, std::size_t index) {
     out.time_ns = frame.images[i]->time_ns;
     out.state = image::ImageState::kDamaged;
     auto image = read_of_camera(dataset, frame.images[i]->path, i);
-    if (!image) continue;
+    auto mask = read_mask(dataset, *frame.images[i], i);
+    if (!image || !mask) continue;
     out.image = *std::move(image);
+    out.mask = *std::move(mask);
     out.state = image::ImageState::kPresent;
   }
   return bundle;

@@ -22,8 +22,13 @@ struct CameraImage {
   // Pixels owned by the caller, which must remain valid while the frame is processed. If empty, the pixels are in
   // `image`.
   ImageView borrowed = {};
+  // Pixels of this image to ignore, where the mask is 0, in addition to those of the camera's mask; of the size of the
+  // image, or empty if there is none. As for the image, the pixels are owned or borrowed.
+  Image mask = {};
+  ImageView borrowed_mask = {};
 
   ImageView view() const { return borrowed.empty() ? image.view() : borrowed; }
+  ImageView mask_view() const { return borrowed_mask.empty() ? mask.view() : borrowed_mask; }
 };
 
 struct ImageBundle {

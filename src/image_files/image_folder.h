@@ -14,7 +14,8 @@ namespace bslam::image_files {
 
 struct ImageFile {
   std::filesystem::path path;
-  TimeNs time_ns = 0;  // time of capture, with the time offset of the camera applied
+  TimeNs time_ns = 0;               // time of capture, with the time offset of the camera applied
+  std::filesystem::path mask = {};  // file of a mask of this image alone; empty: none
 };
 
 // Images of one camera with their recorded time stamps, strictly increasing.

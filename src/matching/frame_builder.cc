@@ -1,5 +1,6 @@
 #include "matching/frame_builder.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -8,7 +9,7 @@
 namespace bslam::matching {
 
 FrameBuilder::FrameBuilder(std::size_t cameras, const feature::FeatureOptions& options, std::vector<image::Image> masks)
-    : masks_(std::move(masks)), pyramids_(cameras) {
+    : masks_(std::move(masks)), combined_masks_(cameras), pyramids_(cameras) {
   masks_.resize(cameras);
   for (std::size_t i = 0; i < cameras; ++i) extractors_.emplace_back(options);
 }
@@ -30,13 +31,28 @@ frame::BundledFrame FrameBuilder::extract(const camera::Rig& rig, const image::I
     if (camera.state == image::ImageState::kPresent) {
       const std::optional<int> budget = budgets.empty() ? std::nullopt : std::optional(budgets[i]);
       feature::Detections detections;
-      extractors_[i].extract(input.view(), masks_[i].view(), rig.camera(i), pyramids_[i], detections, budget);
+      extractors_[i].extract(input.view(), mask_of(i, input), rig.camera(i), pyramids_[i], detections, budget);
       camera.keypoints = std::move(detections);
     } else {
       pyramids_[i].levels.clear();
     }
   });
   return frame;
+}
+
+image::ImageView FrameBuilder::mask_of(std::size_t camera, const image::CameraImage& image) {
+  const image::ImageView of_camera = masks_[camera].view(), of_image = image.mask_view();
+  if (of_image.empty()) return of_camera;
+  BSLAM_ASSERT(of_image.width == image.view().width && of_image.height == image.view().height,
+               "a mask must have the size of its image");
+  if (of_camera.empty()) return of_image;
+  image::Image& combined = combined_masks_[camera];
+  combined.resize(of_image.width, of_image.height);
+  for (int y = 0; y < of_image.height; ++y) {
+    std::transform(of_image.row(y), of_image.row(y) + of_image.width, of_camera.row(y), combined.row(y),
+                   [](std::uint8_t a, std::uint8_t b) { return std::min(a, b); });
+  }
+  return combined.view();
 }
 
 }  // namespace bslam::matching

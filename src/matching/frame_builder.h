@@ -12,7 +12,8 @@
 namespace bslam::matching {
 
 // Owns the extractors and the pyramids of the last extracted frame, which are needed for sub-pixel alignment in
-// tracking and replaced by the next extraction. Masks: one per camera; an empty image means no mask.
+// tracking and replaced by the next extraction. Masks: one per camera; an empty image means no mask. Images may have
+// masks of their own (image/image_bundle.h); a pixel is ignored if either mask is 0.
 class FrameBuilder {
  public:
   FrameBuilder(std::size_t cameras, const feature::FeatureOptions& options, std::vector<image::Image> masks);
@@ -27,8 +28,11 @@ class FrameBuilder {
   std::span<const image::Pyramid> pyramids() const { return pyramids_; }
 
  private:
+  image::ImageView mask_of(std::size_t camera, const image::CameraImage& image);
+
   std::vector<feature::Extractor> extractors_;
   std::vector<image::Image> masks_;
+  std::vector<image::Image> combined_masks_;  // of images that have a mask and whose camera has one
   std::vector<image::Pyramid> pyramids_;
 };
 

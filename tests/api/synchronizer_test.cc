@@ -111,6 +111,26 @@ TEST(Synchronizer, ReturnsACompleteBundleImmediately) {
   EXPECT_EQ(feed.synchronizer.counts().waiting, 0u);
 }
 
+TEST(Synchronizer, CopiesTheMasksOfImagesWithoutOwner) {
+  Feed feed(1);
+  CameraImage image = image_at(0);
+  const std::ptrdiff_t stride = image.width + 3;
+  std::vector<std::uint8_t> mask(static_cast<std::size_t>(stride * image.height), 9);
+  for (int y = 0; y < image.height; ++y) std::fill_n(mask.data() + y * stride, image.width, std::uint8_t{1});
+  image.mask = mask.data();
+  image.mask_stride = stride;
+  ASSERT_TRUE(feed.synchronizer.push(0, image));
+  std::ranges::fill(mask, std::uint8_t{0});
+  ASSERT_TRUE(feed.synchronizer.close());
+  const auto bundle = feed.synchronizer.pop();
+  ASSERT_TRUE(bundle);
+  const CameraImage& copy = bundle->images[0];
+  ASSERT_NE(copy.mask, nullptr);
+  for (int y = 0; y < copy.height; ++y) {
+    for (int x = 0; x < copy.width; ++x) EXPECT_EQ(copy.mask[y * copy.mask_stride + x], 1);
+  }
+}
+
 TEST(Synchronizer, GroupsShuffledImagesLikeARecording) {
   std::vector<Shot> shots = regular(4, 60);
   const Times expected = as_recorded(shots, 4);

@@ -241,5 +241,21 @@ TEST_F(PublicSystem, ReadsImagesWithAnyStride) {
   }
 }
 
+// The mask of camera 1 is 0 everywhere, and so that camera has no keypoints.
+TEST_F(PublicSystem, IgnoresPixelsMaskedInAnImage) {
+  System system = make_system();
+  ImageBundle bundle = wall_.bundle(0);
+  CameraImage& image = bundle.images[1];
+  const std::vector<std::uint8_t> mask(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height),
+                                       0);
+  image.mask = mask.data();
+  EXPECT_NE(system.process(bundle).error().message().find("stride"), std::string::npos);
+  image.mask_stride = image.width;
+  const auto frame = system.process(bundle);
+  ASSERT_TRUE(frame) << frame.error().message();
+  EXPECT_GT(frame->cameras[0].keypoints, 100);
+  EXPECT_EQ(frame->cameras[1].keypoints, 0);
+}
+
 }  // namespace
 }  // namespace bslam

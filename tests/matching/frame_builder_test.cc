@@ -48,6 +48,36 @@ TEST_F(FrameBuilderTest, ExtractsTheConfiguredNumberOfKeypoints) {
   EXPECT_EQ(keypoints(frame, 1), 400u);
 }
 
+// Left half of the image masked by the camera, upper half by the image: keypoints remain in one quarter.
+TEST_F(FrameBuilderTest, IgnoresPixelsThatEitherMaskIgnores) {
+  const auto mask = [](int left, int top) {
+    image::Image out(320, 240);
+    for (int y = 0; y < 240; ++y) {
+      for (int x = 0; x < 320; ++x) out.row(y)[x] = x >= left && y >= top ? 255 : 0;
+    }
+    return out;
+  };
+  FrameBuilder masked(rig.size(), options(), {mask(160, 0), image::Image()});
+  const image::Image borrowed = mask(0, 120);
+  images.images[0].mask = mask(0, 120);
+  images.images[1].borrowed_mask = borrowed.view();
+  const frame::BundledFrame frame = masked.extract(rig, images, pool);
+  ASSERT_GT(keypoints(frame, 0), 50u);
+  ASSERT_GT(keypoints(frame, 1), 50u);
+  for (const Eigen::Vector2f& pixel : frame.cameras[0].keypoints.pixel) {
+    EXPECT_GT(pixel.x(), 158.f);
+    EXPECT_GT(pixel.y(), 118.f);
+  }
+  bool left = false;
+  for (const Eigen::Vector2f& pixel : frame.cameras[1].keypoints.pixel) {
+    EXPECT_GT(pixel.y(), 118.f);
+    left |= pixel.x() < 150;
+  }
+  EXPECT_TRUE(left);
+  for (image::CameraImage& image : images.images) image.mask = image::Image(), image.borrowed_mask = {};
+  EXPECT_EQ(keypoints(masked.extract(rig, images, pool), 1), 400u);
+}
+
 TEST_F(FrameBuilderTest, RespectsTheBudgetOfEachCamera) {
   const frame::BundledFrame frame = builder.extract(rig, images, pool, {}, std::vector<int>{100, 300});
   EXPECT_EQ(keypoints(frame, 0), 100u);
