@@ -31,12 +31,12 @@ TrackResult not_started(const BundledFrame& frame) {
   return result;
 }
 
-// Returns true if some camera has keypoints in both frames.
-bool share_cameras(const BundledFrame& a, const BundledFrame& b) {
+// Returns true if both frames have keypoints, but no camera has them in both.
+bool from_other_cameras(const BundledFrame& a, const BundledFrame& b) {
   for (std::size_t c = 0; c < a.cameras.size(); ++c) {
-    if (!a.cameras[c].keypoints.empty() && !b.cameras[c].keypoints.empty()) return true;
+    if (!a.cameras[c].keypoints.empty() && !b.cameras[c].keypoints.empty()) return false;
   }
-  return false;
+  return a.num_keypoints() > 0 && b.num_keypoints() > 0;
 }
 
 }  // namespace
@@ -81,7 +81,7 @@ void Tracker::keep_reference_frame(const Input& input, FrontEndState& state) con
     return;  // too few keypoints to compare
   const bool good = state.start_reference &&
                     input.frame.id.value() - state.start_reference->frame->id.value() <= kMaxStartAge &&
-                    (!share_cameras(*state.start_reference->frame, input.frame) ||
+                    (from_other_cameras(*state.start_reference->frame, input.frame) ||
                      comparable(*state.start_reference->frame, input.frame, options));
   const auto kept = std::make_shared<const BundledFrame>(std::move(input.frame));
   if (!good) {
