@@ -40,14 +40,14 @@ void apply_variances(std::span<const double> variances, solver::ReprojectionProb
     o.sigma *= static_cast<float>(std::sqrt(variances[static_cast<std::size_t>(o.point)]));
 }
 
-solver::LmSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
-                                        const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
-                                        std::stop_token stop) {
+solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
+                                            const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
+                                            std::stop_token stop) {
   std::vector<float> sigmas;
   sigmas.reserve(problem.observations.size());
   for (const auto& o : problem.observations) sigmas.push_back(o.sigma);
   apply_variances(variances, problem);
-  const solver::LmSummary summary = solver::adjust(problem, options, skip, std::move(stop));
+  solver::BundleSummary summary = solver::adjust(problem, options, skip, std::move(stop));
   for (std::size_t i = 0; i < sigmas.size(); ++i) problem.observations[i].sigma = sigmas[i];
   return summary;
 }

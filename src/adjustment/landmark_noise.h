@@ -29,8 +29,8 @@ void apply_variances(std::span<const double> variances, solver::ReprojectionProb
 
 // Adjusts the problem with the standard deviations of each point's observations multiplied by the square root of its
 // variance factor. The standard deviations are restored afterwards.
-solver::LmSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
-                                        const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
-                                        std::stop_token stop);
+solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
+                                            const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
+                                            std::stop_token stop);
 
 }  // namespace bslam::adjustment

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "adjustment/landmark_noise.h"
+#include "adjustment/pose_covariance.h"
 
 namespace bslam::adjustment {
 namespace {
@@ -64,6 +65,21 @@ map::SetPoses poses_of(const map::BundledMap& map, const BundleProblem& flat) {
   return poses;
 }
 
+// The round without robust kernel, on the inliers, with a variance for each landmark. Returns the covariances that the
+// selection asks for.
+PoseCovariances adjust_inliers(const map::BundledMap& map, const Selection& selection, const AdjustmentOptions& options,
+                               BundleProblem& flat, std::stop_token stop) {
+  const std::vector<double> chi2 = solver::squared_errors(flat.problem);
+  const auto skip = solver::beyond(chi2, options.outlier_chi2);
+  const auto variances = landmark_variances(flat.problem, chi2, skip);
+  const solver::BundleOptions solve{.iterations = options.final_iterations,
+                                    .relative_decrease = options.relative_decrease,
+                                    .robust = false,
+                                    .marginals = poses_with_covariance(selection, flat)};
+  const auto summary = adjust_with_variances(flat.problem, variances, solve, skip, std::move(stop));
+  return pose_covariances(map, flat, solve.marginals, summary.covariances, options.correlated_observations);
+}
+
 }  // namespace
 
 AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options,
@@ -75,23 +91,19 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
       std::any_of(flat.problem.pose_free.begin(), flat.problem.pose_free.end(), [](std::uint8_t f) { return !f; });
   if (selection.free_keyframes.empty() || !any_fixed || flat.problem.observations.empty()) return report;
 
-  solver::BundleOptions solve{
+  const solver::BundleOptions solve{
       .iterations = options.robust_iterations, .relative_decrease = options.relative_decrease, .robust = true};
   const auto robust = solver::adjust(flat.problem, solve, {}, stop);
   if (!robust.usable()) return report;
   report.initial_cost = robust.initial_cost;
   report.final_cost = robust.final_cost;
-  if (!stop.stop_requested() && options.final_iterations > 0) {
-    const std::vector<double> chi2 = solver::squared_errors(flat.problem);
-    const auto skip = solver::beyond(chi2, options.outlier_chi2);
-    solve.iterations = options.final_iterations;
-    solve.robust = false;
-    const auto variances = landmark_variances(flat.problem, chi2, skip);
-    adjust_with_variances(flat.problem, variances, solve, skip, stop);
-  }
+  PoseCovariances covariances;
+  if (!stop.stop_requested() && options.final_iterations > 0)
+    covariances = adjust_inliers(draft.map(), selection, options, flat, stop);
   const std::vector<ObservationSource> bad = outlier_observations(flat, options.outlier_chi2);
   map::SetPoses poses = poses_of(draft.map(), flat);
   poses.correction = selection.whole_map;
+  poses.covariances = std::move(covariances);
   std::vector<LandmarkId> touched;
   for (const auto& [landmark, position] : poses.landmarks) touched.push_back(landmark);
   draft.set_poses(std::move(poses));

@@ -15,6 +15,9 @@ struct AdjustmentOptions {
   int final_iterations = 5;                     // without robust kernel, on the inliers
   double relative_decrease = 1e-4;              // of the cost; smaller means converged
   double outlier_chi2 = solver::kChi2TwoDof95;  // squared normalised error above which an observation is removed
+  // Number of observations of a landmark that together carry the information of one: errors of a landmark in successive
+  // images are similar. For the covariances of the poses only.
+  double correlated_observations = 10;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -25,6 +28,8 @@ struct AdjustmentOptions {
             "relative decrease of the cost below which the adjustment has converged");
     visitor("outlier_chi2", self.outlier_chi2, Range{0.1, 1e6}, "",
             "squared normalised error above which an observation is removed");
+    visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
+            "number of observations that carry the information of one, for the covariances of poses");
   }
 };
 
@@ -35,9 +40,9 @@ struct AdjustmentReport {
   double initial_cost = 0, final_cost = 0;  // robust cost before and after the robust round
 };
 
-// Adjusts the free keyframes and the landmarks, using the observations of all cameras, in two rounds. Writes poses,
-// positions and the removal of outlier observations to the draft. `features` determines the standard deviation of a
-// keypoint that is not aligned to its landmark's patch.
+// Adjusts the free keyframes and the landmarks, using the observations of all cameras, in two rounds. Writes poses with
+// their covariances (adjustment/pose_covariance.h), positions and the removal of outlier observations to the draft.
+// `features` determines the standard deviation of a keypoint that is not aligned to its landmark's patch.
 AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options,
                             const feature::FeatureModel& features, map::MapDraft& draft, std::stop_token stop = {});
 

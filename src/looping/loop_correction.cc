@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/median.h"
+#include "geometry/covariance.h"
 #include "looping/essential_graph.h"
 #include "map/scene_depth.h"
 #include "solver/reprojection.h"
@@ -166,6 +167,22 @@ void move_map(map::SetPoses poses, map::MapDraft& draft) {
   draft.refresh_landmarks(std::move(moved));
 }
 
+// Covariances of the keyframes of the submap of `from`, which `motion` (world of `to` from that of `from`) moves into
+// the submap of `to`. The errors of a keyframe, of `from` relative to its root and of `to` relative to its own count as
+// independent; the global adjustment that follows replaces this upper bound.
+void move_covariances(const map::BundledMap& map, KeyframeId from, KeyframeId to, const SE3& motion,
+                      map::SetPoses& poses) {
+  const SE3& T_from_world = map.keyframe(from).T_rig_world;
+  const SE3 T_from_to = T_from_world * motion.inverse() * map.keyframe(to).T_rig_world.inverse();
+  const geometry::Matrix6d joint =
+      map.keyframe(from).covariance + geometry::transported(map.keyframe(to).covariance, T_from_to);
+  for (const auto& [k, T_new] : poses.keyframes) {
+    const map::BundledKeyframe& keyframe = map.keyframe(k);
+    const SE3 T_k_from = keyframe.T_rig_world * T_from_world.inverse();
+    poses.covariances.emplace_back(k, keyframe.covariance + geometry::transported(joint, T_k_from));
+  }
+}
+
 }  // namespace
 
 LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const PlaceMatch& place_match) {
@@ -206,14 +223,16 @@ bool merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, co
   for (const KeyframeId k : map.keyframe_ids()) {
     if (map.root_of(k) == moving) poses.keyframes.emplace_back(k, map.keyframe(k).T_rig_world * motion.inverse());
   }
+  const KeyframeId from = here_moves ? closure.keyframe : closure.matched_keyframe;
+  const KeyframeId to = here_moves ? closure.matched_keyframe : closure.keyframe;
+  move_covariances(map, from, to, motion, poses);
   for (const LandmarkId l : map.landmark_ids()) {
     if (map.root_of(map.landmark(l).reference.keyframe) == moving)
       poses.landmarks.emplace_back(l, motion * map.landmark(l).position);
   }
   const std::vector<KeyframeId> window = window_of(map, closure.keyframe, options.window);
   move_map(std::move(poses), draft);
-  draft.merge_submaps(here_moves ? closure.keyframe : closure.matched_keyframe,
-                      here_moves ? closure.matched_keyframe : closure.keyframe);
+  draft.merge_submaps(from, to);
   std::vector<SE3> T_window;
   for (const KeyframeId k : window) T_window.push_back(draft.map().keyframe(k).T_rig_world);
   fuse(window, T_window, closure, place_match, options, features, draft);

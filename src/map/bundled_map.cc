@@ -4,6 +4,7 @@
 #include <map>
 
 #include "base/assert.h"
+#include "geometry/covariance.h"
 
 namespace bslam::map {
 namespace {
@@ -159,7 +160,10 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
   edit(k).landmarks = CowArray<LandmarkId>(std::move(table), owner_.tag());
   connect_new_keyframe(k);
   const KeyframeId parent = choose_parent(k, fallback_parent);
-  if (parent.valid()) attach(k, parent);
+  if (!parent.valid()) return k;
+  attach(k, parent);
+  const geometry::SE3 T_rig_parent = T_rig_world * keyframe(parent).T_rig_world.inverse();
+  edit(k).covariance = geometry::transported(keyframe(parent).covariance, T_rig_parent);
   return k;
 }
 
@@ -278,6 +282,7 @@ bool BundledMap::scale_submap(KeyframeId root, double factor) {
     geometry::SE3& T = entry.alive ? entry.T_rig_world : entry.T_rig_parent;
     T = geometry::scaled(T, factor);
     entry.twist.tail<3>() *= factor;
+    entry.covariance = geometry::scaled(entry.covariance, factor);
   }
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (!landmarks_[i].alive || !inside[landmarks_[i].reference.keyframe.index()]) continue;
@@ -299,6 +304,7 @@ void BundledMap::scale_keyframes(std::span<const std::pair<KeyframeId, double>> 
     BundledKeyframe& entry = edit(KeyframeId(i));
     entry.scale *= factor_of[now.index()];
     entry.twist.tail<3>() *= factor_of[now.index()];
+    entry.covariance = geometry::scaled(entry.covariance, factor_of[now.index()]);
     if (!entry.alive) entry.T_rig_parent = geometry::scaled(entry.T_rig_parent, factor_of[now.index()]);
   }
 }
@@ -306,6 +312,12 @@ void BundledMap::scale_keyframes(std::span<const std::pair<KeyframeId, double>> 
 bool BundledMap::set_twist(KeyframeId k, const geometry::Vector6d& twist) {
   if (!alive(k)) return false;
   edit(k).twist = twist;
+  return true;
+}
+
+bool BundledMap::set_covariance(KeyframeId k, const geometry::Matrix6d& covariance) {
+  if (!alive(k)) return false;
+  edit(k).covariance = covariance;
   return true;
 }
 

@@ -126,7 +126,7 @@ class BundledMap {
 
   // Appends a keyframe that observes the given landmarks (alive; distinct features, distinct landmarks). Its parent is
   // the keyframe with which it shares most landmarks (the newer one on ties), otherwise `fallback_parent`; if that is
-  // not alive, the keyframe becomes the root of a new submap.
+  // not alive, the keyframe becomes the root of a new submap. Its covariance is that of its parent.
   KeyframeId add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                           std::span<const std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent);
   // Appends a landmark with one or more observations (distinct, alive keyframes; features without a landmark). The
@@ -155,10 +155,11 @@ class BundledMap {
   // gauge epoch. Returns false if `root` is not the root of a submap.
   bool scale_submap(KeyframeId root, double factor);
   // Records that lengths about keyframes have changed by these factors: what is stored relative to one of them (frames,
-  // removed keyframes, its twist) follows. Poses and positions in the world are set separately.
+  // removed keyframes, its twist), and its covariance, follow. Poses and positions in the world are set separately.
   void scale_keyframes(std::span<const std::pair<KeyframeId, double>> factors);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
   bool set_twist(KeyframeId k, const geometry::Vector6d& twist);
+  bool set_covariance(KeyframeId k, const geometry::Matrix6d& covariance);
   bool set_position(LandmarkId l, const Eigen::Vector3d& position);
   bool add_visibility_counts(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes viewing direction, distance range and descriptor from the observations.

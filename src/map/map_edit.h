@@ -19,7 +19,8 @@
 // | SetPoses            | dropped if a correction was committed since the base (the next adjustment starts from    |
 // |                     | it); entries of removed keyframes and of removed or merged landmarks are dropped; newer  |
 // |                     | keyframes move with their parent (chains of them with the nearest ancestor that is not   |
-// |                     | newer), newer landmarks with the keyframe of their reference                             |
+// |                     | newer), newer landmarks with the keyframe of their reference; newer keyframes keep their |
+// |                     | covariances                                                                              |
 // | SetTwists           | entries of removed keyframes are dropped; translational velocities are multiplied by the |
 // |                     | change of scale at the keyframe since the base                                           |
 // | ScaleSubmap         | also scales newer keyframes and landmarks; dropped if the submap was removed or merged   |
@@ -93,6 +94,8 @@ struct SetPoses {
   bool correction = false;  // a correction of the whole map: begins a gauge epoch
   // Factors by which lengths about a keyframe change (BundledMap::scale_keyframes); keyframes without one keep theirs.
   std::vector<std::pair<KeyframeId, double>> scale_changes = {};
+  // BundledKeyframe::covariance, of some of `keyframes`; the others keep theirs.
+  std::vector<std::pair<KeyframeId, geometry::Matrix6d>> covariances = {};
 };
 struct SetTwists {
   std::vector<std::pair<KeyframeId, geometry::Vector6d>> keyframes;  // BundledKeyframe::twist

@@ -175,6 +175,7 @@ bool Rebase::operator()(const SetPoses& op) {
     any |= map_.set_pose(k, T_rig_world);
   }
   for (const auto& [edit_id, position] : op.landmarks) any |= map_.set_position(map_id(edit_id), position);
+  for (const auto& [edit_id, covariance] : op.covariances) map_.set_covariance(map_id(edit_id), covariance);
   if (op.correction && any) map_.begin_gauge_epoch();
   std::vector<std::pair<KeyframeId, double>> scaled = move_newer(motions);
   for (const auto& [k, factor] : scale_changes) {

@@ -80,6 +80,8 @@ adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyfra
   for (const KeyframeId k : window)
     (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
   fix_gauge(map, selection);
+  if (std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), keyframe))
+    selection.with_covariance = {keyframe};
   return selection;
 }
 
@@ -109,6 +111,7 @@ adjustment::Selection select_all(const map::BundledMap& map) {
   selection.landmarks = map.landmark_ids();
   selection.whole_map = true;
   fix_gauge(map, selection);
+  if (map.scale() != map::Scale::kUnobservable) selection.with_covariance = selection.free_keyframes;
   return selection;
 }
 

@@ -8,8 +8,8 @@
 
 namespace bslam::solver {
 
-LmSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip,
-                 std::stop_token stop) {
+BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip,
+                     std::stop_token stop) {
   const auto count = [&](std::uint8_t free) {
     return std::count(problem.pose_free.begin(), problem.pose_free.end(), free);
   };
@@ -19,9 +19,11 @@ LmSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std
   const Kernel kernel = options.robust ? Kernel::kHuber : Kernel::kNone;
   const RigBlocks constant_rig;
   BundleEquations equations(problem, structure, constant_rig, kernel, options.dense_poses, state_of(problem));
-  const LmSummary summary =
-      minimise(equations, {.iterations = options.iterations, .relative_decrease = options.relative_decrease}, stop);
+  BundleSummary summary{
+      minimise(equations, {.iterations = options.iterations, .relative_decrease = options.relative_decrease}, stop),
+      {}};
   if (summary.usable()) {
+    if (!options.marginals.empty()) summary.covariances = equations.pose_covariances(options.marginals);
     problem.T_rig_world = std::move(equations.state().T_rig_world);
     problem.points = std::move(equations.state().points);
   }

@@ -2,6 +2,7 @@
 // bundle adjustment. Independent of the map.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <vector>
@@ -39,6 +40,15 @@ struct BundleOptions {
   double relative_decrease = 1e-4;  // converged if a step decreases the cost by a smaller fraction
   bool robust = true;               // use a Huber kernel with the 95 % bound as threshold
   int dense_poses = 150;            // maximum number of free poses for a dense reduced camera system
+  std::vector<int> marginals = {};  // free poses whose covariance is computed
+};
+
+struct BundleSummary : LmSummary {
+  // One for each of BundleOptions::marginals: the covariance of the left perturbation of its pose, rotation first,
+  // given the fixed poses, with all other poses and points marginalised out. It is computed at the last linearisation,
+  // from the standard deviations of the observations. Nullopt if the pose has no observations that are used, or if the
+  // observations do not determine the poses.
+  std::vector<std::optional<geometry::Matrix6d>> covariances;
 };
 
 // Optimises the free poses and all points in place; on LmStop::kFailed, also if no observations remain, the problem is
@@ -47,8 +57,8 @@ struct BundleOptions {
 // or have a squared error above kMaxChi2 at the initial values, and those of points with fewer than two remaining
 // observations. A stop request ends the optimisation after the current step and keeps the improvement so far. Bitwise
 // deterministic.
-LmSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip = {},
-                 std::stop_token stop = {});
+BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
+                     std::span<const std::uint8_t> skip = {}, std::stop_token stop = {});
 
 // Squared normalised error of each observation at the problem's values; infinite if it does not project.
 std::vector<double> squared_errors(const ReprojectionProblem& problem);

@@ -1,5 +1,6 @@
 #include "solver/bundle_equations.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -249,6 +250,18 @@ ReducedSystem& BundleEquations::reduce(double damping) {
 std::optional<Eigen::MatrixXd> BundleEquations::rig_information() {
   if (!reduce(kInformationDamping).solve(delta_)) return std::nullopt;
   return system_.rig_information();
+}
+
+std::vector<std::optional<geometry::Matrix6d>> BundleEquations::pose_covariances(std::span<const int> poses) {
+  std::vector<std::optional<Matrix6d>> out(poses.size());
+  if (!reduce(kInformationDamping).factorise()) return out;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto slot = std::find(structure_.pose_of_slot.begin(), structure_.pose_of_slot.end(), poses[i]);
+    if (slot == structure_.pose_of_slot.end()) continue;
+    const Matrix6d covariance = system_.pose_covariance(static_cast<int>(slot - structure_.pose_of_slot.begin()));
+    if (covariance.allFinite()) out[i] = covariance;
+  }
+  return out;
 }
 
 // V delta_p = b - sum of W^T delta over the point's free poses and the rig.

@@ -50,6 +50,10 @@ class BundleEquations {
   // if it is singular.
   std::optional<Eigen::MatrixXd> rig_information();
 
+  // Covariance of each of these poses at the last linearise(), with all other unknowns marginalised out; nullopt if the
+  // pose is not a variable or the equations are singular.
+  std::vector<std::optional<Matrix6d>> pose_covariances(std::span<const int> poses);
+
   struct PoseBlock {
     Matrix6d H;  // lower triangle
     Vector6d b;

@@ -45,4 +45,31 @@ bool ReducedSystem::solve(Eigen::VectorXd& delta) {
   return solve_with(Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(dense_), delta);
 }
 
+bool ReducedSystem::factorise() {
+  if (storage_ == Storage::kSparse && frames_.rows() > 0) {
+    frames_.copy_to(sparse_);
+    sparse_factor_.factorize(sparse_);
+    return sparse_factor_.info() == Eigen::Success;
+  }
+  dense_.setZero(frames_.rows(), frames_.rows());
+  frames_.copy_to(dense_);
+  return Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(dense_).info() == Eigen::Success;
+}
+
+// With S = L L^T, the block is E^T S^-1 E = Y^T Y, Y = L^-1 E, for the six unit vectors E of the pose.
+geometry::Matrix6d ReducedSystem::pose_covariance(int frame) const {
+  Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(frames_.rows(), 6);
+  const bool sparse = storage_ == Storage::kSparse;
+  for (int k = 0; k < 6; ++k) {
+    const int row = frames_.offset(frame) + k;
+    Y(sparse ? sparse_factor_.permutationP().indices()(row) : row, k) = 1.0;
+  }
+  if (sparse) {
+    sparse_factor_.matrixL().solveInPlace(Y);
+  } else {
+    dense_.triangularView<Eigen::Lower>().solveInPlace(Y);
+  }
+  return Y.transpose() * Y;
+}
+
 }  // namespace bslam::solver

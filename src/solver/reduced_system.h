@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <span>
 
+#include "geometry/so3.h"
 #include "solver/block_matrix.h"
 
 namespace bslam::solver {
@@ -31,6 +32,10 @@ class ReducedSystem {
 
   // Factorises and solves. Returns false if the matrix is not positive definite to machine precision.
   bool solve(Eigen::VectorXd& delta);
+  // Factorises S. Returns false if it is not positive definite to machine precision.
+  bool factorise();
+  // The block of S^-1 of the pose of a frame. Valid after factorise(), for a system without rig.
+  geometry::Matrix6d pose_covariance(int frame) const;
   // C - B^T S^-1 B, the information matrix of the rig with the frames marginalised out. Valid after solve().
   const Eigen::MatrixXd& rig_information() const { return rig_information_; }
 

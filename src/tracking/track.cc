@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "estimators/pose_ransac.h"
+#include "geometry/covariance.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/robust_pose.h"
 
@@ -319,10 +320,15 @@ TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, Lo
 
 namespace {
 
-// The inverse of the information, corrected for the inliers that the bound on their errors has cut off.
-geometry::Matrix6d covariance_of(const solver::PoseSolution& solution) {
-  const geometry::Matrix6d covariance = solution.information.ldlt().solve(geometry::Matrix6d::Identity());
-  return 0.5 * solver::kFractionLeft / solver::kVarianceLeft * (covariance + covariance.transpose());
+// The noise of the image relative to the map, and the error of the reference keyframe. The noise is the inverse of the
+// information, corrected for the inliers that the bound on their errors has cut off.
+geometry::Matrix6d covariance_of(const solver::PoseSolution& solution, const map::BundledMap& map,
+                                 const map::AnchoredPose& anchored) {
+  const geometry::Matrix6d noise =
+      solver::kFractionLeft / solver::kVarianceLeft * solution.information.ldlt().solve(geometry::Matrix6d::Identity());
+  const geometry::Matrix6d covariance =
+      noise + geometry::transported(map.keyframe(anchored.reference).covariance, anchored.T_rig_reference);
+  return 0.5 * (covariance + covariance.transpose());
 }
 
 TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& fine, const TrackingOptions& options) {
@@ -344,7 +350,7 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& f
   state.anchored =
       map::AnchoredPose::at(map, map.nearest_alive_ancestor(input.state.anchored.reference), result.T_rig_world);
   result.anchored = state.anchored;
-  result.covariance = covariance_of(fine.solution);
+  result.covariance = covariance_of(fine.solution, map, result.anchored);
 
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
   state.twist.reset();

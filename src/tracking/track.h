@@ -44,8 +44,9 @@ struct TrackResult {
   geometry::SE3 T_rig_world;   // meaningful while tracking
   map::AnchoredPose anchored;  // the same pose relative to a keyframe, so that it follows corrections of the map
   // Covariance of the pose, as a perturbation delta of T_rig_world = exp(delta) T_rig_world: rotation (rad) first, then
-  // translation (map units). Computed from the keypoints of this frame with the landmarks held fixed. Empty if the pose
-  // was not estimated by tracking: in a frame that initialised a map, or was located at the end of the run.
+  // translation (map units), relative to the root of the submap: the noise of the keypoints of this frame relative to
+  // the map, and the covariance of the reference keyframe. Empty if the pose was not estimated by tracking: in a frame
+  // that initialised a map, or was located at the end of the run.
   std::optional<geometry::Matrix6d> covariance;
   std::vector<CameraCounts> cameras;
 };

@@ -25,7 +25,10 @@ BundledMap worn_map(std::uint64_t seed) {
 }
 
 TEST(AppendMap, KeepsPosesTreesAndObservations) {
-  const BundledMap first = worn_map(11), other = worn_map(12);
+  const BundledMap first = worn_map(11);
+  BundledMap other = worn_map(12);
+  for (const KeyframeId k : other.keyframe_ids())
+    other.set_covariance(k, static_cast<double>(k.index()) * geometry::Matrix6d::Identity());
   ASSERT_GT(other.roots().size(), 1u);
   ASSERT_GT(other.keyframe_slots(), other.num_keyframes());
   BundledMap map = first;
@@ -43,6 +46,7 @@ TEST(AppendMap, KeepsPosesTreesAndObservations) {
     EXPECT_EQ(added.frame, source.frame);
     EXPECT_EQ(added.T_rig_world.rotation().coeffs(), source.T_rig_world.rotation().coeffs());
     EXPECT_EQ(added.T_rig_world.translation(), source.T_rig_world.translation());
+    EXPECT_EQ(added.covariance, source.covariance);
     EXPECT_EQ(added.parent, source.parent.valid() ? ids.keyframes[source.parent.index()] : KeyframeId());
   }
 }

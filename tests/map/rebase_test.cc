@@ -309,6 +309,28 @@ TEST_F(RebaseTest, PosesAreDroppedAfterACorrection) {
   EXPECT_EQ(report.published->gauge_epoch(), before->gauge_epoch() + 1);
 }
 
+TEST_F(RebaseTest, CovariancesAreSetAndDroppedWithThePoses) {
+  const geometry::Matrix6d own = geometry::Matrix6d::Identity(), theirs = 2 * own;
+  const KeyframeId newer = add_keyframe(*early, same_numbers(0, 5));
+  early->remove_keyframe(kThird);
+  const KeyframeId added = add_keyframe(*late, same_numbers(0, 5));
+  const SE3 pose = random_pose(random, 1);
+  late->set_poses({.keyframes = {{kSecond, pose}, {kThird, pose}, {added, pose}},
+                   .landmarks = {},
+                   .covariances = {{kSecond, own}, {kThird, own}, {added, theirs}}});
+  EXPECT_EQ(late->map().keyframe(added).covariance, theirs);
+  const CommitReport report = commit();
+  EXPECT_EQ(report.published->keyframe(kSecond).covariance, own);
+  EXPECT_EQ(report.published->keyframe(report.keyframes.at(0)).covariance, theirs);
+  EXPECT_EQ(report.published->keyframe(newer).covariance, geometry::Matrix6d::Zero());
+
+  early.emplace(store.snapshot());
+  late.emplace(store.snapshot());
+  early->set_poses({{{kSecond, random_pose(random, 1)}}, {}, true});
+  late->set_poses({.keyframes = {{kSecond, pose}}, .landmarks = {}, .covariances = {{kSecond, theirs}}});
+  EXPECT_EQ(commit().published->keyframe(kSecond).covariance, own);
+}
+
 TEST_F(RebaseTest, TheSecondOfTwoConcurrentCorrectionsIsRejected) {
   const SE3 corrected = random_pose(random, 1);
   early->set_poses({{{kThird, corrected}}, {}, true});

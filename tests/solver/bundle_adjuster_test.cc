@@ -149,6 +149,65 @@ TEST(BundleAdjuster, SparseAndDenseSolutionsAgree) {
   EXPECT_LT(largest_difference(dense, sparse), 1e-8);
 }
 
+// The normalised errors of all observations after a change of the free poses (six each), then of the points.
+Eigen::VectorXd errors_after(const ReprojectionProblem& problem, const Eigen::VectorXd& change) {
+  std::vector<SE3> poses = problem.T_rig_world;
+  Eigen::Index at = 0;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    if (!problem.pose_free[k]) continue;
+    poses[k] = poses[k].perturbed(change.segment<6>(at));
+    at += 6;
+  }
+  Eigen::VectorXd out(2 * static_cast<Eigen::Index>(problem.observations.size()));
+  for (std::size_t i = 0; i < problem.observations.size(); ++i) {
+    const auto& o = problem.observations[i];
+    const Vector3d point =
+        problem.points[static_cast<std::size_t>(o.point)] + change.segment<3>(at + 3 * Eigen::Index{o.point});
+    const Vector3d point_cam =
+        problem.rig->cam_from_rig(o.camera.index()) * (poses[static_cast<std::size_t>(o.pose)] * point);
+    const auto pixel = problem.rig->camera(o.camera.index()).project(point_cam);
+    out.segment<2>(2 * static_cast<Eigen::Index>(i)) =
+        (o.pixel.cast<double>() - pixel.value_or(Vector2d::Zero())) / static_cast<double>(o.sigma);
+  }
+  return out;
+}
+
+TEST(BundleAdjuster, CovariancesAreBlocksOfTheInverseOfTheDenseInformation) {
+  Random random(8);
+  BundleSpec spec;
+  spec.points = 60;
+  spec.free_poses = 4;
+  spec.farthest = 8;
+  spec.point_distance = 0.01;
+  const auto scene = scene::make_bundle_scene(spec, random);
+  ReprojectionProblem& problem = scene->problem;
+  for (std::size_t i = 0; i < problem.observations.size(); i += 3) problem.observations[i].sigma = 2.0f;
+  const Eigen::Index size = 6 * spec.free_poses + 3 * spec.points;
+  constexpr double kStep = 1e-6;
+  Eigen::MatrixXd J(2 * static_cast<Eigen::Index>(problem.observations.size()), size);
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const Eigen::VectorXd step = kStep * Eigen::VectorXd::Unit(size, k);
+    J.col(k) = (errors_after(problem, step) - errors_after(problem, -step)) / (2 * kStep);
+  }
+  const Eigen::MatrixXd covariance = (J.transpose() * J).ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+  for (const int dense_poses : {150, 0}) {
+    // No iteration: the covariances are those at the given values.
+    const BundleSummary summary =
+        adjust(problem, {.iterations = 0, .robust = false, .dense_poses = dense_poses, .marginals = {2, 3, 5, 0}});
+    ASSERT_EQ(summary.covariances.size(), 4u);
+    EXPECT_FALSE(summary.covariances[3]);  // fixed
+    const Eigen::Index first[] = {0, 6, 18};
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_TRUE(summary.covariances[static_cast<std::size_t>(i)]);
+      const geometry::Matrix6d expected = covariance.block<6, 6>(first[i], first[i]);
+      const geometry::Matrix6d& found = *summary.covariances[static_cast<std::size_t>(i)];
+      // Compared in units of the standard deviations, since angles and metres differ in magnitude.
+      const geometry::Vector6d unit = expected.diagonal().cwiseSqrt().cwiseInverse();
+      EXPECT_LT((unit.asDiagonal() * (found - expected) * unit.asDiagonal()).norm(), 1e-4);
+    }
+  }
+}
+
 TEST(BundleAdjuster, IgnoresSkippedObservations) {
   Random random(8);
   BundleSpec spec;

@@ -148,6 +148,18 @@ TEST_F(Track, StoresThePoseRelativeToItsReference) {
   EXPECT_EQ(out.state.landmarks, landmarks_of(out.matches));
 }
 
+TEST_F(Track, AddsTheErrorOfTheReferenceToTheNoiseOfTheImage) {
+  map::BundledMap uncertain = world().map;
+  const geometry::Matrix6d of_reference = 1e-4 * geometry::Matrix6d::Identity();
+  for (const KeyframeId k : uncertain.keyframe_ids()) uncertain.set_covariance(k, of_reference);
+  SimulatedTracker a(world()), b(world());
+  const TrackResult exact = a.track(seen(3).frame).result, result = b.track(uncertain, seen(3).frame).result;
+  ASSERT_TRUE(exact.covariance && result.covariance);
+  const geometry::Matrix6d A = result.anchored.T_rig_reference.adjoint();
+  EXPECT_LT((*result.covariance - *exact.covariance - A * of_reference * A.transpose()).norm(), 1e-12);
+  EXPECT_EQ(result.T_rig_world.translation(), exact.T_rig_world.translation());
+}
+
 TEST_F(Track, FollowsCorrectionsOfTheMap) {
   SimulatedTracker tracker(world());
   for (int i = 1; i <= 4; ++i) ASSERT_EQ(tracker.track(seen(i).frame).result.status, TrackStatus::kTracking);
