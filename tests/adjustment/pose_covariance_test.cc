@@ -58,7 +58,6 @@ TEST(PoseCovariances, MatchTheErrorsOfOneAdjustment) {
     for (const KeyframeId k : selection.free_keyframes) sum += nees(world, k) / 3;
     EXPECT_EQ(world.map.keyframe(KeyframeId(0)).covariance, geometry::Matrix6d::Zero());
   }
-  std::fprintf(stderr, "NEES %g\n", sum / kSeeds);
   EXPECT_GT(sum / kSeeds, 0.75);
   EXPECT_LT(sum / kSeeds, 1.3);
 }
@@ -72,7 +71,6 @@ TEST(PoseCovariances, MatchTheErrorsOfAChainOfWindows) {
     for (int k = 1; k < kKeyframes; ++k) adjust(window(world.map, k, 3, 3), kIndependent, world.map);
     sum += nees(world, KeyframeId(kKeyframes - 1));
   }
-  std::fprintf(stderr, "NEES %g\n", sum / kSeeds);
   EXPECT_GT(sum / kSeeds, 0.6);
   EXPECT_LT(sum / kSeeds, 1.5);
 }
