@@ -30,12 +30,13 @@ camera::Rig with_error(const camera::Rig& rig, std::size_t camera) {
 }
 
 // Builds a map from the images of the true rig, adjusted with the given calibration.
-map::SimulatedMap mapped(const camera::Rig& truth, const camera::Rig& calibrated, int keyframes, double step_s) {
+map::SimulatedMap mapped(const camera::Rig& truth, const camera::Rig& calibrated, int keyframes, double step_s,
+                         const synthetic::Trajectory& trajectory = synthetic::make_orbit({.duration_s = 60})) {
   synthetic::FeatureSimulatorOptions options;
   options.landmarks = 2500;
   options.max_keypoints = 250;
   options.sigma_px = kFeatures.sigma_px;
-  map::SimulatedMap out(synthetic::FeatureSimulator(truth, synthetic::make_orbit({.duration_s = 60}), options));
+  map::SimulatedMap out(synthetic::FeatureSimulator(truth, trajectory, options));
   out.map = map::BundledMap(std::make_shared<const camera::Rig>(calibrated));
   for (int i = 0; i < keyframes; ++i) out.add_keyframe(FrameId(i), step_s * i);
   adjustment::Selection all;
@@ -140,6 +141,31 @@ TEST(RefineRig, IsNotDoneIfNotObservable) {
   EXPECT_TRUE(refine(world.map).done);
   world.map.set_scale(map::Scale::kUpToScale);
   EXPECT_FALSE(refine(world.map).done);
+}
+
+// Without any rotation, images do not reveal where a camera is that shares no landmarks with others. Neither a right
+// nor a wrong position may be replaced by an invented one.
+TEST(RefineRig, OnAStraightLineWhatIsNotObservableStaysAsItWas) {
+  std::vector<synthetic::ControlPose> control;
+  for (int i = 0; i < 8; ++i) control.push_back({{0.1 * i, 0.3, 1.5}, 0.0, 0.0, 0.0});
+  const synthetic::Trajectory straight(std::move(control), 1.0);
+  const camera::Rig truth = synthetic::default_rig();
+  for (const bool wrong : {false, true}) {
+    const camera::Rig given = wrong ? with_error(truth, 3) : truth;
+    const RigRefinement result = refine(mapped(truth, given, 10, 0.5, straight).map, kIndependent);
+    ASSERT_TRUE(result.done);
+    for (std::size_t c = 0; c < truth.size(); ++c) {
+      const CameraRefinement& camera = result.cameras[c];
+      EXPECT_FALSE(c >= 2 && camera.translation_observed()) << c;
+      EXPECT_LT(camera.translation_sigmas, 3.5) << c << (wrong ? ", wrong" : "");
+      EXPECT_LT(camera.rotation_sigmas, 3.5) << c << (wrong ? ", wrong" : "");
+      EXPECT_FALSE(camera.suspect) << c << (wrong ? ", wrong" : "");
+      for (const ParameterRefinement& parameter : camera.intrinsics)
+        EXPECT_LT(std::abs(parameter.change), 3 * parameter.std) << c << ' ' << parameter.name;
+    }
+    EXPECT_GT(result.cameras[3].std_mm, 0.6 * CalibrationOptions().sigma_translation_mm);
+    EXPECT_TRUE(wrong || result.verdict == Verdict::kConsistent);
+  }
 }
 
 TEST(RefineRig, IsDeterministic) {
