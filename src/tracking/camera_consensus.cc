@@ -61,6 +61,24 @@ std::vector<std::uint8_t> conflicting_cameras(const FrameMatches& matches, const
   return out;
 }
 
+std::vector<std::uint8_t> contradicting_cameras(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
+                                                const std::vector<CameraConsensusState>& states,
+                                                const ConsensusOptions& options) {
+  constexpr double kClearlyLess = 0.5;  // of the largest inlier ratio
+  const auto ratio = [&](std::size_t c) {
+    return matches[c].empty() ? 0.0 : inliers_per_camera[c] / static_cast<double>(matches[c].size());
+  };
+  std::vector<std::uint8_t> out = conflicting_cameras(matches, inliers_per_camera, states, options);
+  double best = 0;
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    if (static_cast<int>(matches[c].size()) >= options.min_expected) best = std::max(best, ratio(c));
+  }
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    if (ratio(c) >= kClearlyLess * best) out[c] = 0;
+  }
+  return out;
+}
+
 solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, const FrameMatches& matches,
                                                     std::span<const solver::PoseObservation> observations,
                                                     const SE3& predicted, const ConsensusOptions& options,

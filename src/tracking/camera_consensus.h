@@ -48,6 +48,11 @@ std::vector<LandmarkCounts> count_reobserved(const map::BundledMap& map, const f
 std::vector<std::uint8_t> conflicting_cameras(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
                                               const std::vector<CameraConsensusState>& states,
                                               const ConsensusOptions& options);
+// Flags those of the conflicting cameras that agree clearly less with the pose than the best camera does. In a blurred
+// or badly predicted frame all cameras agree little; this is no reason to exclude one.
+std::vector<std::uint8_t> contradicting_cameras(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
+                                                const std::vector<CameraConsensusState>& states,
+                                                const ConsensusOptions& options);
 
 // The pose if cameras contradict each other. A pose is estimated from each camera with enough matches, and used if it
 // has enough inliers (`healthy_reobservation_ratio`). The one nearest to the prediction of the motion model is refined

@@ -126,7 +126,7 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
         pose_of_most_consistent_camera(rig, found, observations, from_motion, options.consensus, options.pose);
     if (consistent.ok) {
       const auto wrong =
-          conflicting_cameras(found, consistent.inliers_per_camera, input.state.cameras, options.consensus);
+          contradicting_cameras(found, consistent.inliers_per_camera, input.state.cameras, options.consensus);
       for (std::size_t c = 0; c < wrong.size(); ++c) excluded[c] |= wrong[c];
       drop(excluded, found);
       observations = pose_observations(map, frame, found, input.features);

@@ -87,6 +87,19 @@ TEST(CameraConsensus, ReadmitsOnlyCamerasThatObserveThePlaceAfterALoss) {
   EXPECT_TRUE(after[1].established);
 }
 
+// In a blurred frame few matches of any camera agree with the pose. Only a camera with clearly fewer than the best one
+// contradicts it.
+TEST(CameraConsensus, FewInliersInAllCamerasAreNoContradiction) {
+  const FrameMatches matches{FrameMatches::value_type(100), FrameMatches::value_type(200)};
+  std::vector<CameraConsensusState> cameras(2);
+  for (CameraConsensusState& camera : cameras) camera.established = true;
+  EXPECT_EQ(conflicting_cameras(matches, {34, 56}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(contradicting_cameras(matches, {34, 56}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(contradicting_cameras(matches, {34, 30}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(contradicting_cameras(matches, {90, 56}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(contradicting_cameras(matches, {90, 120}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
+}
+
 // A camera that captures late is skipped until the motion is known. Its first matches are to landmarks observed by
 // other cameras only, and may be wrong.
 TEST(CameraConsensus, DoesNotFlagACameraThatIsNotEstablished) {
