@@ -123,12 +123,16 @@ struct LoopOptions {
 struct RecoveryOptions {
   // Number of frames with enough features but without a pose after which a new submap is started.
   int new_submap_after = 50;
+  // The same time in seconds, which matters if there are few frames per second; five frames at least.
+  double new_submap_after_s = 5.0;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("new_submap_after", self.new_submap_after, Range{1, 1000000}, "frames",
             "number of frames with features but without a pose after which a new submap is started",
             OptionNote{.common = true, .formerly = "new_part_after"});
+    visitor("new_submap_after_s", self.new_submap_after_s, Range{0, 1e6}, "s",
+            "or after this time, if five such frames or more take longer", OptionNote{.common = true});
   }
 };
 

@@ -20,7 +20,8 @@ tracking::TrackerOptions tracker_options(const Config& config) {
           .features = config.features,
           .seed = static_cast<std::uint64_t>(config.seed),
           .localize_only = config.localize_only,
-          .new_submap_after = config.looping.recovery.new_submap_after};
+          .new_submap_after = config.looping.recovery.new_submap_after,
+          .new_submap_after_s = config.looping.recovery.new_submap_after_s};
 }
 
 execution::JournalStep journal_step(tracking::ProposedEdit::Kind kind) {

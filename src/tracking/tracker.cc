@@ -194,6 +194,12 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   }
 }
 
+bool Tracker::gives_up(const FrontEndState& state, TimeNs time_ns) const {
+  constexpr int kFew = 5;  // frames in which the map is searched at least
+  return state.frames_lost >= options_.new_submap_after ||
+         (state.frames_lost >= kFew && to_seconds(time_ns - state.lost_since_ns) >= options_.new_submap_after_s);
+}
+
 // The next frames search for the rig where its last motion would have taken it, or near its last pose if that is too
 // long ago. After too many lost frames a new submap is started.
 void Tracker::handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome) {
@@ -202,10 +208,10 @@ void Tracker::handle_lost(const Input& input, const TrackerState& before, TrackO
   state.track = before;
   state.track.status = TrackStatus::kLost;
   if (to_seconds(result.time_ns - before.time_ns) > kMaxPrediction_s) state.track.twist.reset();
-  state.frames_lost += had_features(result);
   update_odometry(*input.map, before, outcome);
-  const bool give_up = state.frames_lost >= options_.new_submap_after && !options_.localize_only;
-  if (!give_up || !had_features(result)) return;
+  if (!had_features(result)) return;
+  if (state.frames_lost++ == 0) state.lost_since_ns = result.time_ns;
+  if (options_.localize_only || !gives_up(state, result.time_ns)) return;
   start(input, outcome);
   if (!outcome.edit) outcome.record.result = result;
 }

@@ -25,6 +25,7 @@ struct TrackerOptions {
   std::uint64_t seed = 1;
   bool localize_only = false;  // never propose an edit of the map
   int new_submap_after = 50;   // number of frames with features but without a pose after which a new submap is started
+  double new_submap_after_s = 5.0;  // or time from the first of them, s, if there are a few
 };
 
 // Parameters for the extraction and bundling of the next frame, per camera.
@@ -45,7 +46,8 @@ struct FrontEndState {
   // During a monocular initialisation: the reference frame, and all frames since, beginning with the reference.
   std::shared_ptr<const StartCandidate> start_reference;
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
-  int frames_lost = 0;  // consecutive lost frames with features
+  int frames_lost = 0;       // consecutive lost frames with features
+  TimeNs lost_since_ns = 0;  // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
 
   // The state for the initialisation of another map; the odometry pose is continued.
@@ -104,6 +106,7 @@ class Tracker {
   void track(const Input& input, TrackOutcome& outcome);
   TrackOutput follow(const Input& input, const FrontEndState& state) const;
   bool relocalise(const Input& input, TrackOutcome& outcome);
+  bool gives_up(const FrontEndState& state, TimeNs time_ns) const;
   void handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome);
   void propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const;
   void complete_keyframe(const map::CommitReport& report, TrackOutcome& outcome) const;

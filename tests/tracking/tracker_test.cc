@@ -206,6 +206,18 @@ TEST(Tracker, StartsANewSubmapIfItStaysLost) {
   EXPECT_EQ(started.root, run.store.snapshot()->roots().back());
 }
 
+// At few frames per second, the number of frames alone would mean a long time.
+TEST(Tracker, StartsANewSubmapAfterATimeAndAFewFrames) {
+  TrackerOptions options;
+  options.new_submap_after_s = 0.0;
+  TrackerRun run(synthetic::ring_rig(2), options);
+  for (int i = 0; i < 3; ++i) run.process(run.frame(i));
+  run.state.track.anchored = {};
+  for (int i = 3; i < 7; ++i) EXPECT_EQ(run.process(run.frame(i)).result.reason, LostReason::kNotFound) << i;
+  EXPECT_EQ(run.process(run.frame(7)).result.status, TrackStatus::kTracking);
+  EXPECT_EQ(run.store.snapshot()->roots().size(), 2u);
+}
+
 TEST(Tracker, LocaliseOnlyProposesNoEdits) {
   TrackerRun made(synthetic::ring_rig(2));
   for (int i = 0; i < 3; ++i) made.process(made.frame(i));
