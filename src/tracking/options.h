@@ -10,7 +10,8 @@ namespace bslam::tracking {
 
 struct MatchingOptions {
   double predicted_radius = 0.025;  // rad, search radius around the prediction of the motion model
-  double wide_radius = 0.12;        // rad, search radius if that finds too few landmarks
+  double wide_radius = 0.12;        // rad, search radius if that finds too few landmarks, 0.1 s after the last pose
+  double widest_radius = 0.5;       // rad, maximum of the same, which grows in proportion to the time
   double local_radius = 0.006;      // rad, search radius for landmarks of the local view, at the estimated pose
   int max_hamming = 80;             // bits, maximum descriptor distance of a match
   double ratio = 0.9;               // maximum ratio of best to second best descriptor distance on one pyramid level
@@ -19,8 +20,10 @@ struct MatchingOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("predicted_radius", self.predicted_radius, Range{1e-4, 1}, "rad",
             "search radius around the prediction of the motion model", kCommon);
-    visitor("wide_radius", self.wide_radius, Range{1e-4, 1.5}, "rad", "search radius if that finds too few landmarks",
-            kCommon);
+    visitor("wide_radius", self.wide_radius, Range{1e-4, 1.5}, "rad",
+            "search radius if that finds too few landmarks, up to 0.1 s after the last pose", kCommon);
+    visitor("widest_radius", self.widest_radius, Range{1e-4, 1.5}, "rad",
+            "maximum of this radius, which grows in proportion to the time after the last pose");
     visitor("local_radius", self.local_radius, Range{1e-4, 1}, "rad",
             "search radius for landmarks of the local view, at the estimated pose");
     visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "maximum descriptor distance of a match");

@@ -146,15 +146,15 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   return true;
 }
 
-// Pose by RANSAC from landmarks around those of the last frame, found in wide windows. Returns false if there are too
-// few.
-bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks,
+// Pose by RANSAC from landmarks around those of the last frame, found in windows of this radius. Returns false if there
+// are too few.
+bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks, double radius,
                            const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
   const frame::BundledFrame& frame = out.frame;
   const std::vector<LandmarkId> near =
       map::local_landmarks(map, landmarks, input.state.anchored.reference, options.local_view);
-  auto wide = search_options(input, options.matching, options.matching.wide_radius);
+  auto wide = search_options(input, options.matching, radius);
   wide.level_slack = 2;
   wide.ratio = 0.8 * options.matching.ratio;
   MatchSearch search = find_landmarks(map, frame, out.T_rig_world, near, {}, wide, pool);
@@ -177,6 +177,18 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   out.matches = keep_inliers(search.found, solution.inlier);
   out.reason = LostReason::kNone;
   return true;
+}
+
+// The search in wide windows, and if it fails some time after the last pose, in wider ones: the rig may have turned the
+// further the longer nothing is known of it.
+bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks,
+                           const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
+  constexpr double kUsualInterval_s = 0.1;
+  const double radius = options.matching.wide_radius;
+  if (track_in_wide_windows(input, landmarks, radius, options, pool, out)) return true;
+  const double intervals = to_seconds(out.frame.time_ns - input.state.time_ns) / kUsualInterval_s;
+  const double wider = std::min(radius * intervals, options.matching.widest_radius);
+  return wider > radius && track_in_wide_windows(input, landmarks, wider, options, pool, out);
 }
 
 // Pose from the landmarks of the last frame, searched for near the prediction of the motion model. If that finds too

@@ -270,6 +270,21 @@ TEST_F(Track, SearchesInWideWindowsIfThePredictionIsWrong) {
   expect_true(tracker.track(frame.frame).result, frame.T_world_rig, "wrong prediction");
 }
 
+// Where the rig has turned so far that the next frame would be lost, a frame after a pause is not.
+TEST_F(Track, SearchesTheFurtherTheLongerThePauseWas) {
+  const auto after = [&](double pause_s, const synthetic::SimulatedFrame& frame) {
+    auto shown = frame.frame;
+    shown.time_ns = from_seconds(pause_s);
+    for (frame::CameraFrame& c : shown.cameras) c.time_ns = shown.time_ns;
+    return SimulatedTracker(world()).track(shown).result;
+  };
+  int i = 1;
+  while (i < 60 && after(0.05, seen(i)).status == TrackStatus::kTracking) ++i;
+  ASSERT_LT(i, 60);
+  EXPECT_GT(map::angle_rad(seen(i).T_world_rig, world().frames[0].T_world_rig), MatchingOptions{}.wide_radius);
+  expect_true(after(0.5, seen(i)), seen(i).T_world_rig, "after a pause");
+}
+
 // The motion is unknown in the first frame after the initialisation and after a long pause. Two of five keypoints are
 // at their previous position, as with a repetitive pattern: narrow windows around the old pose would contain only
 // these.
