@@ -8,28 +8,13 @@
 #include "estimators/pose_ransac.h"
 #include "geometry/covariance.h"
 #include "tracking/keyframe_decision.h"
+#include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
 
 namespace bslam::tracking {
 namespace {
 
 using geometry::SE3;
-
-// Motion from the last pose to `time_ns`. Returns nullopt if it is not known.
-std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) {
-  const double dt = to_seconds(time_ns - state.time_ns);
-  if (dt == 0) return SE3();
-  if (!state.twist || dt < 0 || dt > kMaxPrediction_s) return std::nullopt;
-  return SE3::exp(dt * *state.twist);
-}
-
-// The last pose in the current map.
-SE3 last_pose(const TrackInput& input) { return input.state.anchored.resolve(input.map).value(); }
-
-// The last pose, advanced by the motion model if the motion is known.
-SE3 predict(const TrackInput& input, TimeNs time_ns) {
-  return motion_since_last(input.state, time_ns).value_or(SE3()) * last_pose(input);
-}
 
 // Landmarks of the last frame, and of the last image of cameras without an image in that frame, that still exist in the
 // map.
@@ -83,25 +68,6 @@ matching::ProjectionSearchOptions search_options(const TrackInput& input, const 
           .max_hamming = matching.max_hamming,
           .ratio = matching.ratio,
           .scale_factor = input.features.pyramid.scale_factor};
-}
-
-// Motion during the capture of a frame: the motion since the last frame, extrapolated with its acceleration with
-// respect to the interval before. It is a function of the poses. It must not be estimated from the late cameras: the
-// landmarks they re-observe were first observed with the same error.
-solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFrame& frame) {
-  solver::MotionModel motion{.delay_s = frame::delays_of(frame), .T_before = last_pose(input)};
-  const double dt = to_seconds(frame.time_ns - input.state.time_ns);
-  if (dt <= 0 || dt > kMaxPrediction_s) {
-    motion.offset = frame.twist;  // nothing newer is known
-    return motion;
-  }
-  motion.gain = 1.0 / dt;
-  if (!input.state.twist) return motion;
-  // From the middle of this interval to the middle of the delays, in distances of the middles of the two intervals.
-  const double ahead = (dt + frame::farthest_delay_s(frame)) / (dt + input.state.twist_interval_s);
-  motion.gain = (1.0 + ahead) / dt;
-  motion.offset = -ahead * *input.state.twist;
-  return motion;
 }
 
 // Pose from landmarks found near their projections at the current estimate. Returns false if there are too few.

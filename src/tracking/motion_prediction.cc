@@ -1,0 +1,36 @@
+#include "tracking/motion_prediction.h"
+
+namespace bslam::tracking {
+
+using geometry::SE3;
+
+SE3 last_pose(const TrackInput& input) { return input.state.anchored.resolve(input.map).value(); }
+
+std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) {
+  const double dt = to_seconds(time_ns - state.time_ns);
+  if (dt == 0) return SE3();
+  if (!state.twist || dt < 0 || dt > kMaxPrediction_s) return std::nullopt;
+  return SE3::exp(dt * *state.twist);
+}
+
+SE3 predict(const TrackInput& input, TimeNs time_ns) {
+  return motion_since_last(input.state, time_ns).value_or(SE3()) * last_pose(input);
+}
+
+solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFrame& frame) {
+  solver::MotionModel motion{.delay_s = frame::delays_of(frame), .T_before = last_pose(input)};
+  const double dt = to_seconds(frame.time_ns - input.state.time_ns);
+  if (dt <= 0 || dt > kMaxPrediction_s) {
+    motion.offset = frame.twist;  // nothing newer is known
+    return motion;
+  }
+  motion.gain = 1.0 / dt;
+  if (!input.state.twist) return motion;
+  // From the middle of this interval to the middle of the delays, in distances of the middles of the two intervals.
+  const double ahead = (dt + frame::farthest_delay_s(frame)) / (dt + input.state.twist_interval_s);
+  motion.gain = (1.0 + ahead) / dt;
+  motion.offset = -ahead * *input.state.twist;
+  return motion;
+}
+
+}  // namespace bslam::tracking

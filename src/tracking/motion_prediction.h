@@ -1,0 +1,23 @@
+// Poses predicted by a motion model of constant velocity.
+#pragma once
+
+#include <optional>
+
+#include "tracking/track.h"
+
+namespace bslam::tracking {
+
+// Motion from the last pose to `time_ns`. Returns nullopt if it is not known.
+std::optional<geometry::SE3> motion_since_last(const TrackerState& state, TimeNs time_ns);
+
+// The last pose, T_rig_world, in the current map.
+geometry::SE3 last_pose(const TrackInput& input);
+// The last pose, advanced by the motion model if the motion is known.
+geometry::SE3 predict(const TrackInput& input, TimeNs time_ns);
+
+// Motion during the capture of a frame: the motion since the last frame, extrapolated with its acceleration with
+// respect to the interval before. It is a function of the poses. It must not be estimated from the late cameras: the
+// landmarks they re-observe were first observed with the same error.
+solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFrame& frame);
+
+}  // namespace bslam::tracking
