@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <system_error>
 #include <utility>
 
+#include "base/number_text.h"
 #include "image_decoding/image_file.h"
 
 namespace bslam::dataset {
@@ -17,15 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string name_of(int camera) { return fmt::format("cam{}", camera); }
-
-// The number by which a file is named.
-std::optional<std::int64_t> number_of(const fs::path& file) {
-  const std::string stem = file.stem().string();
-  std::int64_t number = 0;
-  const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
-  if (error != std::errc() || end != stem.data() + stem.size()) return std::nullopt;
-  return number;
-}
 
 }  // namespace
 
@@ -63,7 +53,8 @@ Result<std::vector<std::string>> add_image_masks(const fs::path& folder, int num
   const fs::path* first = nullptr;
   for (image_files::ImageFile& image : images) {
     auto mask = masks.find(image.time_ns);
-    if (const auto named = number_of(image.path); mask == masks.end() && named) mask = masks.find(*named);
+    if (const auto named = parse_integer(image.path.stem().string()); mask == masks.end() && named)
+      mask = masks.find(*named);
     if (mask == masks.end()) continue;
     image.mask = *mask->second;
     if (used++ == 0) first = mask->second;

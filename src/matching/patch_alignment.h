@@ -23,7 +23,7 @@ struct AlignmentOptions {
   // px of the level, minimum standard deviation of an aligned keypoint: errors of interpolation and warp
   double min_sigma_px = 0.12;
   // Level-0 pixels, added in quadrature: initial value of the calibration error, and the bounds between which tracking
-  // estimates it (tracking/calibration_error.h). The upper bound keeps outlier thresholds below the radius of searches.
+  // estimates it (tracking/calibration_error.h).
   double calibration_error_px = 0.3;
   double min_calibration_error_px = 0.05, max_calibration_error_px = 10.0;
 

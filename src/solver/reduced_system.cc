@@ -34,26 +34,24 @@ bool ReducedSystem::solve_with(const Factor& factor, Eigen::VectorXd& delta) {
   return delta.allFinite();
 }
 
-bool ReducedSystem::solve(Eigen::VectorXd& delta) {
+template <class Use>
+bool ReducedSystem::with_factor(const Use& use) {
   if (storage_ == Storage::kSparse && frames_.rows() > 0) {
     frames_.copy_to(sparse_);
     sparse_factor_.factorize(sparse_);
-    return solve_with(sparse_factor_, delta);
+    return use(sparse_factor_);
   }
   dense_.setZero(frames_.rows(), frames_.rows());
   frames_.copy_to(dense_);
-  return solve_with(Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(dense_), delta);
+  return use(Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(dense_));
+}
+
+bool ReducedSystem::solve(Eigen::VectorXd& delta) {
+  return with_factor([&](const auto& factor) { return solve_with(factor, delta); });
 }
 
 bool ReducedSystem::factorise() {
-  if (storage_ == Storage::kSparse && frames_.rows() > 0) {
-    frames_.copy_to(sparse_);
-    sparse_factor_.factorize(sparse_);
-    return sparse_factor_.info() == Eigen::Success;
-  }
-  dense_.setZero(frames_.rows(), frames_.rows());
-  frames_.copy_to(dense_);
-  return Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(dense_).info() == Eigen::Success;
+  return with_factor([](const auto& factor) { return factor.info() == Eigen::Success; });
 }
 
 // With S = L L^T, the block is E^T S^-1 E = Y^T Y, Y = L^-1 E, for the six unit vectors E of the pose.

@@ -40,6 +40,9 @@ class ReducedSystem {
   const Eigen::MatrixXd& rig_information() const { return rig_information_; }
 
  private:
+  // Factorises S and returns `use(factor)`.
+  template <class Use>
+  bool with_factor(const Use& use);
   template <class Factor>
   bool solve_with(const Factor& factor, Eigen::VectorXd& delta);
 
