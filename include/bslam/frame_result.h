@@ -69,7 +69,8 @@ struct FrameResult {
   int submap = -1;               // id of the first keyframe of the submap of these poses
   // Covariance of T_world_cam0, if known: of the small motion d, rotation first, in the axes of camera 0, with
   // T_world_cam0(true) = T_world_cam0 exp(d). Relative to the first keyframe of the submap, or to a loaded map: image
-  // noise and the drift of the map, but not errors of the calibration, such as that of the scale of the baselines.
+  // noise, the drift of the map and, if the calibration was estimated from the images, its remaining error, such as
+  // that of the scale of the baselines. A given calibration counts as exact.
   std::optional<Covariance6> covariance;
   std::optional<Velocity> velocity;  // of the body frame, in its own axes; nullopt if unknown
 

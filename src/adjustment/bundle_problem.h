@@ -16,7 +16,7 @@ struct Selection {
   std::vector<LandmarkId> landmarks;
   // the result is a correction of the map, which must not be undone by work based on older versions
   bool whole_map = false;
-  std::vector<KeyframeId> with_covariance = {};  // free keyframes whose covariance is estimated
+  std::vector<KeyframeId> with_uncertainty = {};  // free keyframes whose uncertainty is estimated
 };
 
 // The landmark and keyframe that an observation of the problem belongs to.

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "adjustment/landmark_noise.h"
-#include "adjustment/pose_covariance.h"
+#include "adjustment/pose_uncertainty.h"
 
 namespace bslam::adjustment {
 namespace {
@@ -65,19 +65,20 @@ map::SetPoses poses_of(const map::BundledMap& map, const BundleProblem& flat) {
   return poses;
 }
 
-// The round without robust kernel, on the inliers, with a variance for each landmark. Returns the covariances that the
-// selection asks for.
-PoseCovariances adjust_inliers(const map::BundledMap& map, const Selection& selection, const AdjustmentOptions& options,
-                               BundleProblem& flat, std::stop_token stop) {
+// The round without robust kernel, on the inliers, with a variance for each landmark. Returns the uncertainties that
+// the selection asks for.
+PoseUncertainties adjust_inliers(const map::BundledMap& map, const Selection& selection,
+                                 const AdjustmentOptions& options, BundleProblem& flat, std::stop_token stop) {
   const std::vector<double> chi2 = solver::squared_errors(flat.problem);
   const auto skip = solver::beyond(chi2, options.outlier_chi2);
   const auto variances = landmark_variances(flat.problem, chi2, skip);
   const solver::BundleOptions solve{.iterations = options.final_iterations,
                                     .relative_decrease = options.relative_decrease,
                                     .robust = false,
-                                    .marginals = poses_with_covariance(selection, flat)};
+                                    .marginals = poses_with_uncertainty(selection, flat),
+                                    .rig_deviation = map.rig_deviation()};
   const auto summary = adjust_with_variances(flat.problem, variances, solve, skip, std::move(stop));
-  return pose_covariances(map, flat, solve.marginals, summary.covariances, options.correlated_observations);
+  return pose_uncertainties(map, flat, solve.marginals, summary.uncertainties, options.correlated_observations);
 }
 
 }  // namespace
@@ -97,13 +98,13 @@ AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions&
   if (!robust.usable()) return report;
   report.initial_cost = robust.initial_cost;
   report.final_cost = robust.final_cost;
-  PoseCovariances covariances;
+  PoseUncertainties uncertainties;
   if (!stop.stop_requested() && options.final_iterations > 0)
-    covariances = adjust_inliers(draft.map(), selection, options, flat, stop);
+    uncertainties = adjust_inliers(draft.map(), selection, options, flat, stop);
   const std::vector<ObservationSource> bad = outlier_observations(flat, options.outlier_chi2);
   map::SetPoses poses = poses_of(draft.map(), flat);
   poses.correction = selection.whole_map;
-  poses.covariances = std::move(covariances);
+  poses.uncertainties = std::move(uncertainties);
   std::vector<LandmarkId> touched;
   for (const auto& [landmark, position] : poses.landmarks) touched.push_back(landmark);
   draft.set_poses(std::move(poses));

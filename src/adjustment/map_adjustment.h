@@ -41,7 +41,7 @@ struct AdjustmentReport {
 };
 
 // Adjusts the free keyframes and the landmarks, using the observations of all cameras, in two rounds. Writes poses with
-// their covariances (adjustment/pose_covariance.h), positions and the removal of outlier observations to the draft.
+// their uncertainties (adjustment/pose_uncertainty.h), positions and the removal of outlier observations to the draft.
 // `features` determines the standard deviation of a keypoint that is not aligned to its landmark's patch.
 AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options,
                             const feature::FeatureModel& features, map::MapDraft& draft, std::stop_token stop = {});

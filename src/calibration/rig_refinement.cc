@@ -288,6 +288,7 @@ void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
   for (auto& [keyframe, T_rig_world] : refinement.poses.keyframes) T_rig_world = geometry::scaled(T_rig_world, factor);
   for (auto& [landmark, position] : refinement.poses.landmarks) position *= factor;
   refinement.scale_change = 1;
+  refinement.kept_scale *= factor;
 }
 
 void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft) {
@@ -295,9 +296,16 @@ void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::Map
   const geometry::SE3 T_new_old = T_rig_world.inverse() * map.keyframe(keyframe).T_rig_world,
                       T_old_new = T_new_old.inverse();
   const KeyframeId root = map.root_of(keyframe);
+  const map::BundledKeyframe& before = map.keyframe(root);
+  const geometry::Vector6d displacement = (before.T_rig_world * T_old_new).log();
+  const geometry::PoseUncertainty added{displacement * displacement.transpose() - before.uncertainty.noise};
   map::SetPoses poses{.keyframes = {}, .landmarks = {}, .correction = true};
-  for (const KeyframeId k : map.keyframes_of_submap(root))
-    poses.keyframes.emplace_back(k, map.keyframe(k).T_rig_world * T_old_new);
+  for (const KeyframeId k : map.keyframes_of_submap(root)) {
+    const geometry::SE3& T_k_world = map.keyframe(k).T_rig_world;
+    poses.keyframes.emplace_back(k, T_k_world * T_old_new);
+    poses.uncertainties.emplace_back(
+        k, map.keyframe(k).uncertainty + geometry::transported(added, T_k_world * before.T_rig_world.inverse()));
+  }
   for (const LandmarkId l : map.landmark_ids()) {
     if (map.root_of(map.landmark(l).reference.keyframe) == root)
       poses.landmarks.emplace_back(l, T_new_old * map.landmark(l).position);
@@ -305,9 +313,27 @@ void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::Map
   draft.set_poses(std::move(poses));
 }
 
+namespace {
+
+// L with L L^T the covariance of the estimate, whose last column is the effect of the scale that was kept; null if the
+// covariance is singular.
+std::shared_ptr<const Eigen::MatrixXd> deviation_of(const RigRefinement& refinement) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(refinement.information.information);
+  if (factor.info() != Eigen::Success) return nullptr;
+  const auto n = factor.rows();
+  Eigen::MatrixXd L = Eigen::MatrixXd::Zero(n, n + 1);
+  L.leftCols(n) = factor.matrixU().solve(Eigen::MatrixXd::Identity(n, n));
+  for (std::size_t c = 1; c < refinement.rig->size(); ++c)
+    L.col(n).segment<3>(6 * (static_cast<Eigen::Index>(c) - 1) + 3) =
+        std::log(refinement.kept_scale) * refinement.rig->cam_from_rig(c).translation();
+  return std::make_shared<const Eigen::MatrixXd>(std::move(L));
+}
+
+}  // namespace
+
 void apply(const RigRefinement& refinement, map::MapDraft& draft) {
   for (const KeyframeId root : draft.map().roots()) draft.scale_submap(root, refinement.scale_change);
-  draft.set_rig(*refinement.rig);
+  draft.set_rig(*refinement.rig, deviation_of(refinement));
   draft.set_poses(refinement.poses);
   triangulate_single_views(draft);
 }

@@ -34,7 +34,7 @@ struct CalibrationOptions {
   // and their ratio: relative. Principal points: per axis, of the image width. Distortion: of the model table
   // (camera/model_table.h).
   double sigma_rotation_deg = 2.0, sigma_translation_mm = 30.0;
-  double sigma_scale_percent = 0.1;  // of the common scale of all baselines, which images do not reveal
+  double sigma_scale_percent = 0.5;  // of the common scale of all baselines, which images do not reveal
   // During a run, the map keeps its scale while it differs from that of the calibrated baselines by less than this.
   double scale_tolerance_percent = 1.0;
   double sigma_focal_percent = 1.0, sigma_aspect_percent = 0.1, sigma_centre_percent = 0.5;
@@ -139,6 +139,7 @@ struct RigRefinement {
   std::optional<camera::Rig> rig;
   solver::RigInformation information;  // of the estimate, to combine it with those of other maps
   double scale_change = 1;             // factor by which the lengths of the map change
+  double kept_scale = 1;               // factor by which keep_scale() multiplied the baselines
   map::SetPoses poses;                 // after this change
 };
 
@@ -159,9 +160,10 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
 // Scales the estimate so that the distances between the keyframes remain, if this changes the scale of the baselines by
 // less than `scale_tolerance_percent`. The baselines have exactly their calibrated scale before. How the images
 // distribute it over them is uncertain at first; without this function each estimate would change the scale of the live
-// trajectory.
+// trajectory. The kept difference counts as a deviation of the scale.
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement);
-// Moves the submap of a keyframe as a whole so that the keyframe has the given pose.
+// Moves the submap of a keyframe as a whole so that the keyframe has the given pose. The world frame is where the root
+// was at first: the distance of the root from the origin is an error of all keyframes, and added to their uncertainty.
 void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft);
 // Replaces the rig of the draft's map by the estimate, with the poses and landmarks that belong to it; all others have
 // to be adjusted afterwards. The refinement must be done, and its map the draft's.

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "base/median.h"
-#include "geometry/covariance.h"
 #include "looping/essential_graph.h"
 #include "map/scene_depth.h"
 #include "solver/reprojection.h"
@@ -167,19 +166,20 @@ void move_map(map::SetPoses poses, map::MapDraft& draft) {
   draft.refresh_landmarks(std::move(moved));
 }
 
-// Covariances of the keyframes of the submap of `from`, which `motion` (world of `to` from that of `from`) moves into
-// the submap of `to`. The errors of a keyframe, of `from` relative to its root and of `to` relative to its own count as
-// independent; the global adjustment that follows replaces this upper bound.
-void move_covariances(const map::BundledMap& map, KeyframeId from, KeyframeId to, const SE3& motion,
-                      map::SetPoses& poses) {
+// Uncertainty of the keyframes of the submap of `from`, which `motion` (world of `to` from that of `from`) moves into
+// the submap of `to`. A keyframe k has the error e_k - e_from + e_to, each transported to k. The noise in the three
+// counts as independent; the global adjustment that follows replaces this upper bound.
+void move_uncertainties(const map::BundledMap& map, KeyframeId from, KeyframeId to, const SE3& motion,
+                        map::SetPoses& poses) {
   const SE3& T_from_world = map.keyframe(from).T_rig_world;
   const SE3 T_from_to = T_from_world * motion.inverse() * map.keyframe(to).T_rig_world.inverse();
-  const geometry::Matrix6d joint =
-      map.keyframe(from).covariance + geometry::transported(map.keyframe(to).covariance, T_from_to);
+  geometry::PoseUncertainty minus_from = map.keyframe(from).uncertainty;
+  minus_from.calibration *= -1;
+  const geometry::PoseUncertainty joint = minus_from + geometry::transported(map.keyframe(to).uncertainty, T_from_to);
   for (const auto& [k, T_new] : poses.keyframes) {
     const map::BundledKeyframe& keyframe = map.keyframe(k);
     const SE3 T_k_from = keyframe.T_rig_world * T_from_world.inverse();
-    poses.covariances.emplace_back(k, keyframe.covariance + geometry::transported(joint, T_k_from));
+    poses.uncertainties.emplace_back(k, keyframe.uncertainty + geometry::transported(joint, T_k_from));
   }
 }
 
@@ -225,7 +225,7 @@ bool merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, co
   }
   const KeyframeId from = here_moves ? closure.keyframe : closure.matched_keyframe;
   const KeyframeId to = here_moves ? closure.matched_keyframe : closure.keyframe;
-  move_covariances(map, from, to, motion, poses);
+  move_uncertainties(map, from, to, motion, poses);
   for (const LandmarkId l : map.landmark_ids()) {
     if (map.root_of(map.landmark(l).reference.keyframe) == moving)
       poses.landmarks.emplace_back(l, motion * map.landmark(l).position);

@@ -12,7 +12,7 @@ void append_keyframes(BundledMap& onto, const BundledMap& other, AppendedIds& id
     const BundledKeyframe& source = other.keyframe(k);
     ids.keyframes[k.index()] = onto.add_keyframe(source.frame, source.T_rig_world, {}, {});
     onto.set_twist(ids.keyframes[k.index()], source.twist);
-    onto.set_covariance(ids.keyframes[k.index()], source.covariance);
+    onto.set_uncertainty(ids.keyframes[k.index()], source.uncertainty);
   }
   std::vector<KeyframeId> parents;
   for (const KeyframeId k : sources) {

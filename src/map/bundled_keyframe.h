@@ -6,6 +6,7 @@
 
 #include "base/id.h"
 #include "frame/bundled_frame.h"
+#include "geometry/pose_uncertainty.h"
 #include "geometry/se3.h"
 #include "map/cow_vector.h"
 
@@ -29,9 +30,9 @@ struct BundledKeyframe {
   geometry::SE3 T_rig_parent;                        // once removed: its pose relative to `parent`
   // Velocity of the rig during the capture, as BundledFrame::twist, in the unit of the map.
   geometry::Vector6d twist = geometry::Vector6d::Zero();
-  // Covariance of T_rig_world relative to the root of its submap (adjustment/pose_covariance.h): of the left
-  // perturbation, rotation (rad) first, then translation (map units). Zero for the root and in a loaded map.
-  geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
+  // Of T_rig_world relative to the root of its submap (adjustment/pose_uncertainty.h), in radians and map units. Zero
+  // for the root and in a loaded map.
+  geometry::PoseUncertainty uncertainty = {};
   bool alive = false;
   // Product of all factors by which lengths about this keyframe have changed since it was added. A length that was
   // stored when this was s is now scale / s times as long.

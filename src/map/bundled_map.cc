@@ -4,7 +4,6 @@
 #include <map>
 
 #include "base/assert.h"
-#include "geometry/covariance.h"
 
 namespace bslam::map {
 namespace {
@@ -163,7 +162,7 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
   if (!parent.valid()) return k;
   attach(k, parent);
   const geometry::SE3 T_rig_parent = T_rig_world * keyframe(parent).T_rig_world.inverse();
-  edit(k).covariance = geometry::transported(keyframe(parent).covariance, T_rig_parent);
+  edit(k).uncertainty = geometry::transported(keyframe(parent).uncertainty, T_rig_parent);
   return k;
 }
 
@@ -282,7 +281,7 @@ bool BundledMap::scale_submap(KeyframeId root, double factor) {
     geometry::SE3& T = entry.alive ? entry.T_rig_world : entry.T_rig_parent;
     T = geometry::scaled(T, factor);
     entry.twist.tail<3>() *= factor;
-    entry.covariance = geometry::scaled(entry.covariance, factor);
+    entry.uncertainty = geometry::scaled(std::move(entry.uncertainty), factor);
   }
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (!landmarks_[i].alive || !inside[landmarks_[i].reference.keyframe.index()]) continue;
@@ -304,7 +303,7 @@ void BundledMap::scale_keyframes(std::span<const std::pair<KeyframeId, double>> 
     BundledKeyframe& entry = edit(KeyframeId(i));
     entry.scale *= factor_of[now.index()];
     entry.twist.tail<3>() *= factor_of[now.index()];
-    entry.covariance = geometry::scaled(entry.covariance, factor_of[now.index()]);
+    entry.uncertainty = geometry::scaled(std::move(entry.uncertainty), factor_of[now.index()]);
     if (!entry.alive) entry.T_rig_parent = geometry::scaled(entry.T_rig_parent, factor_of[now.index()]);
   }
 }
@@ -315,9 +314,9 @@ bool BundledMap::set_twist(KeyframeId k, const geometry::Vector6d& twist) {
   return true;
 }
 
-bool BundledMap::set_covariance(KeyframeId k, const geometry::Matrix6d& covariance) {
+bool BundledMap::set_uncertainty(KeyframeId k, geometry::PoseUncertainty uncertainty) {
   if (!alive(k)) return false;
-  edit(k).covariance = covariance;
+  edit(k).uncertainty = std::move(uncertainty);
   return true;
 }
 

@@ -36,6 +36,9 @@ class BundledMap {
   // ---- Reading
   const camera::Rig& rig() const { return *rig_; }
   std::shared_ptr<const camera::Rig> shared_rig() const { return rig_; }
+  // Of the calibration: L with the covariance L L^T of the extrinsics of cameras 1 to N-1 and the intrinsics of all
+  // cameras (solver::RigInformation). Null if the calibration counts as exact.
+  const std::shared_ptr<const Eigen::MatrixXd>& rig_deviation() const { return rig_deviation_; }
   // The pyramid on which keypoints were detected.
   const feature::PyramidShape& pyramid() const { return pyramid_; }
   MapVersion version() const { return version_; }
@@ -122,11 +125,12 @@ class BundledMap {
   // again if the intrinsics differ: those of `known` are taken as they are, if their keyframe is alive. Returns all
   // frames that were replaced.
   std::vector<ReplacedFrame> set_rig(std::shared_ptr<const camera::Rig> rig, std::span<const ReplacedFrame> known = {});
+  void set_rig_deviation(std::shared_ptr<const Eigen::MatrixXd> deviation) { rig_deviation_ = std::move(deviation); }
   void begin_gauge_epoch() { ++gauge_epoch_; }
 
   // Appends a keyframe that observes the given landmarks (alive; distinct features, distinct landmarks). Its parent is
   // the keyframe with which it shares most landmarks (the newer one on ties), otherwise `fallback_parent`; if that is
-  // not alive, the keyframe becomes the root of a new submap. Its covariance is that of its parent.
+  // not alive, the keyframe becomes the root of a new submap. Its uncertainty is that of its parent.
   KeyframeId add_keyframe(std::shared_ptr<const frame::BundledFrame> frame, const geometry::SE3& T_rig_world,
                           std::span<const std::pair<FeatureId, LandmarkId>> matches, KeyframeId fallback_parent);
   // Appends a landmark with one or more observations (distinct, alive keyframes; features without a landmark). The
@@ -155,11 +159,11 @@ class BundledMap {
   // gauge epoch. Returns false if `root` is not the root of a submap.
   bool scale_submap(KeyframeId root, double factor);
   // Records that lengths about keyframes have changed by these factors: what is stored relative to one of them (frames,
-  // removed keyframes, its twist), and its covariance, follow. Poses and positions in the world are set separately.
+  // removed keyframes, its twist), and its uncertainty, follow. Poses and positions in the world are set separately.
   void scale_keyframes(std::span<const std::pair<KeyframeId, double>> factors);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
   bool set_twist(KeyframeId k, const geometry::Vector6d& twist);
-  bool set_covariance(KeyframeId k, const geometry::Matrix6d& covariance);
+  bool set_uncertainty(KeyframeId k, geometry::PoseUncertainty uncertainty);
   bool set_position(LandmarkId l, const Eigen::Vector3d& position);
   bool add_visibility_counts(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes viewing direction, distance range and descriptor from the observations.
@@ -194,6 +198,7 @@ class BundledMap {
   void make_root(KeyframeId k);  // makes k the root of its submap
 
   std::shared_ptr<const camera::Rig> rig_;
+  std::shared_ptr<const Eigen::MatrixXd> rig_deviation_;
   feature::PyramidShape pyramid_;
   MapVersion version_{0};
   Scale scale_ = Scale::kMetric;

@@ -74,8 +74,8 @@ void MapDraft::set_poses(SetPoses poses) {
   std::erase_if(poses.keyframes, [&](const auto& entry) { return !working_.set_pose(entry.first, entry.second); });
   std::erase_if(poses.landmarks, [&](const auto& entry) { return !working_.set_position(entry.first, entry.second); });
   std::erase_if(poses.scale_changes, [&](const auto& entry) { return !working_.alive(entry.first); });
-  std::erase_if(poses.covariances,
-                [&](const auto& entry) { return !working_.set_covariance(entry.first, entry.second); });
+  std::erase_if(poses.uncertainties,
+                [&](const auto& entry) { return !working_.set_uncertainty(entry.first, entry.second); });
   if (poses.keyframes.empty() && poses.landmarks.empty()) return;
   if (!poses.scale_changes.empty()) working_.scale_keyframes(poses.scale_changes);
   if (poses.correction) working_.begin_gauge_epoch();
@@ -114,9 +114,10 @@ void MapDraft::set_scale(Scale scale, double deviation) {
   edit_.operations.emplace_back(SetScale{scale, deviation});
 }
 
-void MapDraft::set_rig(camera::Rig rig) {
+void MapDraft::set_rig(camera::Rig rig, std::shared_ptr<const Eigen::MatrixXd> deviation) {
   const auto shared = std::make_shared<const camera::Rig>(std::move(rig));
-  edit_.operations.emplace_back(SetRig{shared, working_.set_rig(shared)});
+  working_.set_rig_deviation(deviation);
+  edit_.operations.emplace_back(SetRig{shared, std::move(deviation), working_.set_rig(shared)});
 }
 
 MapDraft::Finished MapDraft::finish() && { return {std::move(edit_), std::move(working_)}; }

@@ -20,7 +20,7 @@
 // |                     | it); entries of removed keyframes and of removed or merged landmarks are dropped; newer  |
 // |                     | keyframes move with their parent (chains of them with the nearest ancestor that is not   |
 // |                     | newer), newer landmarks with the keyframe of their reference; newer keyframes keep their |
-// |                     | covariances                                                                              |
+// |                     | uncertainties                                                                            |
 // | SetTwists           | entries of removed keyframes are dropped; translational velocities are multiplied by the |
 // |                     | change of scale at the keyframe since the base                                           |
 // | ScaleSubmap         | also scales newer keyframes and landmarks; dropped if the submap was removed or merged   |
@@ -94,8 +94,8 @@ struct SetPoses {
   bool correction = false;  // a correction of the whole map: begins a gauge epoch
   // Factors by which lengths about a keyframe change (BundledMap::scale_keyframes); keyframes without one keep theirs.
   std::vector<std::pair<KeyframeId, double>> scale_changes = {};
-  // BundledKeyframe::covariance, of some of `keyframes`; the others keep theirs.
-  std::vector<std::pair<KeyframeId, geometry::Matrix6d>> covariances = {};
+  // BundledKeyframe::uncertainty, of some of `keyframes`; the others keep theirs.
+  std::vector<std::pair<KeyframeId, geometry::PoseUncertainty>> uncertainties = {};
 };
 struct SetTwists {
   std::vector<std::pair<KeyframeId, geometry::Vector6d>> keyframes;  // BundledKeyframe::twist
@@ -117,7 +117,8 @@ struct SetScale {
 
 struct SetRig {
   std::shared_ptr<const camera::Rig> rig;
-  std::vector<BundledMap::ReplacedFrame> frames;  // of the base's keyframes, with the bearings of the rig
+  std::shared_ptr<const Eigen::MatrixXd> deviation;  // BundledMap::rig_deviation
+  std::vector<BundledMap::ReplacedFrame> frames;     // of the base's keyframes, with the bearings of the rig
 };
 
 using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark,
@@ -165,7 +166,8 @@ class MapDraft {
   void refresh_landmarks(std::vector<LandmarkId> landmarks);
   void set_scale(Scale scale);  // with deviation 0 for kMetric, infinite otherwise
   void set_scale(Scale scale, double deviation);
-  void set_rig(camera::Rig rig);  // the same cameras with another calibration
+  // The same cameras with another calibration. `deviation` as in BundledMap::rig_deviation.
+  void set_rig(camera::Rig rig, std::shared_ptr<const Eigen::MatrixXd> deviation = {});
 
   // The edit, and the working copy. MapStore publishes the copy unchanged if the base is still the newest version.
   struct Finished {

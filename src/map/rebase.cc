@@ -75,7 +75,11 @@ class Rebase {
   bool operator()(const RefreshLandmarks& op);
   bool operator()(const SetScale& op) { return map_.set_scale(op.scale, op.deviation), true; }
 
-  bool operator()(const SetRig& op) { return map_.set_rig(op.rig, op.frames), true; }
+  bool operator()(const SetRig& op) {
+    map_.set_rig(op.rig, op.frames);
+    map_.set_rig_deviation(op.deviation);
+    return true;
+  }
 
   RebaseReport take_report() && { return std::move(report_); }
   void count(bool was_applied) { ++(was_applied ? report_.applied : report_.dropped); }
@@ -175,7 +179,7 @@ bool Rebase::operator()(const SetPoses& op) {
     any |= map_.set_pose(k, T_rig_world);
   }
   for (const auto& [edit_id, position] : op.landmarks) any |= map_.set_position(map_id(edit_id), position);
-  for (const auto& [edit_id, covariance] : op.covariances) map_.set_covariance(map_id(edit_id), covariance);
+  for (const auto& [edit_id, uncertainty] : op.uncertainties) map_.set_uncertainty(map_id(edit_id), uncertainty);
   if (op.correction && any) map_.begin_gauge_epoch();
   std::vector<std::pair<KeyframeId, double>> scaled = move_newer(motions);
   for (const auto& [k, factor] : scale_changes) {

@@ -81,7 +81,7 @@ adjustment::Selection select_local(const map::BundledMap& map, KeyframeId keyfra
     (is_root(map, k) ? selection.fixed_keyframes : selection.free_keyframes).push_back(k);
   fix_gauge(map, selection);
   if (std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), keyframe))
-    selection.with_covariance = {keyframe};
+    selection.with_uncertainty = {keyframe};
   return selection;
 }
 
@@ -111,7 +111,7 @@ adjustment::Selection select_all(const map::BundledMap& map) {
   selection.landmarks = map.landmark_ids();
   selection.whole_map = true;
   fix_gauge(map, selection);
-  if (map.scale() != map::Scale::kUnobservable) selection.with_covariance = selection.free_keyframes;
+  if (map.scale() != map::Scale::kUnobservable) selection.with_uncertainty = selection.free_keyframes;
   return selection;
 }
 

@@ -8,6 +8,37 @@
 
 namespace bslam::solver {
 
+namespace {
+
+// Extrinsics and intrinsics in radians, metres and the units of the models, without a prior.
+RigBlocks calibration_blocks(const RigValues& rig) {
+  IntrinsicPrior intrinsics;
+  for (const camera::CameraModel& model : rig.models) {
+    const camera::ModelParameters values = camera::parameters(model);
+    intrinsics.values.push_back(values);
+    intrinsics.sigmas.push_back(camera::ModelParameters::Ones(values.size()));
+  }
+  RigBlocks blocks;
+  blocks.push_back(std::make_unique<ExtrinsicsBlock>(ExtrinsicPrior{rig.T_cam_rig, 1.0, 1.0}));
+  blocks.push_back(std::make_unique<IntrinsicsBlock>(std::move(intrinsics)));
+  return blocks;
+}
+
+// The uncertainty of the poses at the values of `adjusted`, whose rig is constant.
+std::vector<std::optional<geometry::PoseUncertainty>> uncertainties_of(const ReprojectionProblem& problem,
+                                                                       const BundleStructure& structure,
+                                                                       const BundleOptions& options, Kernel kernel,
+                                                                       BundleEquations& adjusted) {
+  if (options.marginals.empty()) return {};
+  if (!options.rig_deviation) return adjusted.pose_uncertainties(options.marginals, Eigen::MatrixXd(0, 0));
+  const RigBlocks calibration = calibration_blocks(adjusted.state().rig);
+  BundleEquations equations(problem, structure, calibration, kernel, options.dense_poses, adjusted.state());
+  equations.linearise();
+  return equations.pose_uncertainties(options.marginals, *options.rig_deviation);
+}
+
+}  // namespace
+
 BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip,
                      std::stop_token stop) {
   const auto count = [&](std::uint8_t free) {
@@ -23,7 +54,7 @@ BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
       minimise(equations, {.iterations = options.iterations, .relative_decrease = options.relative_decrease}, stop),
       {}};
   if (summary.usable()) {
-    if (!options.marginals.empty()) summary.covariances = equations.pose_covariances(options.marginals);
+    summary.uncertainties = uncertainties_of(problem, structure, options, kernel, equations);
     problem.T_rig_world = std::move(equations.state().T_rig_world);
     problem.points = std::move(equations.state().points);
   }

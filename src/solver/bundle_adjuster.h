@@ -2,12 +2,14 @@
 // bundle adjustment. Independent of the map.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <stop_token>
 #include <vector>
 
 #include "base/options.h"
+#include "geometry/pose_uncertainty.h"
 #include "solver/lm.h"
 #include "solver/reprojection.h"
 #include "solver/rig_block.h"
@@ -40,15 +42,17 @@ struct BundleOptions {
   double relative_decrease = 1e-4;  // converged if a step decreases the cost by a smaller fraction
   bool robust = true;               // use a Huber kernel with the 95 % bound as threshold
   int dense_poses = 150;            // maximum number of free poses for a dense reduced camera system
-  std::vector<int> marginals = {};  // free poses whose covariance is computed
+  std::vector<int> marginals = {};  // free poses whose uncertainty is computed
+  // Of the calibration, which is constant: L with the covariance L L^T, for the unknowns of RigInformation. Null:
+  // exact.
+  std::shared_ptr<const Eigen::MatrixXd> rig_deviation = {};
 };
 
 struct BundleSummary : LmSummary {
-  // One for each of BundleOptions::marginals: the covariance of the left perturbation of its pose, rotation first,
-  // given the fixed poses, with all other poses and points marginalised out. It is computed at the last linearisation,
-  // from the standard deviations of the observations. Nullopt if the pose has no observations that are used, or if the
-  // observations do not determine the poses.
-  std::vector<std::optional<geometry::Matrix6d>> covariances;
+  // One for each of BundleOptions::marginals, given the fixed poses, with all other poses and points marginalised out.
+  // The noise follows from the standard deviations of the observations. Nullopt if the pose has no observations that
+  // are used, or if the observations do not determine the poses.
+  std::vector<std::optional<geometry::PoseUncertainty>> uncertainties;
 };
 
 // Optimises the free poses and all points in place; on LmStop::kFailed, also if no observations remain, the problem is

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "geometry/pose_uncertainty.h"
 #include "solver/bundle_structure.h"
 #include "solver/reduced_system.h"
 #include "solver/rig_terms.h"
@@ -50,9 +51,11 @@ class BundleEquations {
   // if it is singular.
   std::optional<Eigen::MatrixXd> rig_information();
 
-  // Covariance of each of these poses at the last linearise(), with all other unknowns marginalised out; nullopt if the
-  // pose is not a variable or the equations are singular.
-  std::vector<std::optional<Matrix6d>> pose_covariances(std::span<const int> poses);
+  // Uncertainty of each of these poses at the last linearise(), with all other poses and points marginalised out, given
+  // a rig whose unknowns have the error rig_deviation z, z ~ N(0, I); (0, 0) without rig blocks. Nullopt if the pose is
+  // not a variable or the equations are singular.
+  std::vector<std::optional<geometry::PoseUncertainty>> pose_uncertainties(std::span<const int> poses,
+                                                                           const Eigen::MatrixXd& rig_deviation);
 
   struct PoseBlock {
     Matrix6d H;  // lower triangle

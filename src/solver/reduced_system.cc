@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "solver/selected_inverse.h"
+
 namespace bslam::solver {
 
 ReducedSystem::ReducedSystem(const BlockPattern& pattern, std::span<const int> frame_sizes, int rig_size,
@@ -55,19 +57,38 @@ bool ReducedSystem::factorise() {
 }
 
 // With S = L L^T, the block is E^T S^-1 E = Y^T Y, Y = L^-1 E, for the six unit vectors E of the pose.
-geometry::Matrix6d ReducedSystem::pose_covariance(int frame) const {
+geometry::Matrix6d ReducedSystem::dense_pose_covariance(int frame) const {
   Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(frames_.rows(), 6);
-  const bool sparse = storage_ == Storage::kSparse;
-  for (int k = 0; k < 6; ++k) {
-    const int row = frames_.offset(frame) + k;
-    Y(sparse ? sparse_factor_.permutationP().indices()(row) : row, k) = 1.0;
-  }
-  if (sparse) {
-    sparse_factor_.matrixL().solveInPlace(Y);
-  } else {
-    dense_.triangularView<Eigen::Lower>().solveInPlace(Y);
-  }
+  Y.middleRows<6>(frames_.offset(frame)).setIdentity();
+  dense_.triangularView<Eigen::Lower>().solveInPlace(Y);
   return Y.transpose() * Y;
+}
+
+std::vector<geometry::Matrix6d> ReducedSystem::pose_covariances(std::span<const int> frames) const {
+  std::vector<geometry::Matrix6d> out;
+  if (storage_ == Storage::kDense) {
+    for (const int frame : frames) out.push_back(dense_pose_covariance(frame));
+    return out;
+  }
+  const Eigen::SparseMatrix<double> inverse = selected_inverse(sparse_factor_.matrixL().nestedExpression());
+  const auto& position = sparse_factor_.permutationP().indices();
+  for (const int frame : frames) {
+    geometry::Matrix6d& block = out.emplace_back();
+    for (int k = 0; k < 36; ++k) {
+      const auto [low, high] =
+          std::minmax(position(frames_.offset(frame) + k / 6), position(frames_.offset(frame) + k % 6));
+      block(k / 6, k % 6) = inverse.coeff(high, low);
+    }
+  }
+  return out;
+}
+
+Eigen::MatrixXd ReducedSystem::rig_sensitivity() const {
+  if (storage_ == Storage::kSparse) return -sparse_factor_.solve(border_);
+  Eigen::MatrixXd X = -border_;
+  dense_.triangularView<Eigen::Lower>().solveInPlace(X);
+  dense_.triangularView<Eigen::Lower>().transpose().solveInPlace(X);
+  return X;
 }
 
 }  // namespace bslam::solver

@@ -34,8 +34,10 @@ class ReducedSystem {
   bool solve(Eigen::VectorXd& delta);
   // Factorises S. Returns false if it is not positive definite to machine precision.
   bool factorise();
-  // The block of S^-1 of the pose of a frame. Valid after factorise(), for a system without rig.
-  geometry::Matrix6d pose_covariance(int frame) const;
+  // The blocks of S^-1 of the poses of these frames: their covariances, given the rig. Valid after factorise().
+  std::vector<geometry::Matrix6d> pose_covariances(std::span<const int> frames) const;
+  // -S^-1 B: how the frames change with the rig's unknowns. Valid after factorise().
+  Eigen::MatrixXd rig_sensitivity() const;
   // C - B^T S^-1 B, the information matrix of the rig with the frames marginalised out. Valid after solve().
   const Eigen::MatrixXd& rig_information() const { return rig_information_; }
 
@@ -43,6 +45,7 @@ class ReducedSystem {
   // Factorises S and returns `use(factor)`.
   template <class Use>
   bool with_factor(const Use& use);
+  geometry::Matrix6d dense_pose_covariance(int frame) const;
   template <class Factor>
   bool solve_with(const Factor& factor, Eigen::VectorXd& delta);
 

@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "estimators/pose_ransac.h"
-#include "geometry/covariance.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
@@ -304,8 +303,9 @@ geometry::Matrix6d covariance_of(const solver::PoseSolution& solution, const map
                                  const map::AnchoredPose& anchored) {
   const geometry::Matrix6d noise =
       solver::kFractionLeft / solver::kVarianceLeft * solution.information.ldlt().solve(geometry::Matrix6d::Identity());
-  const geometry::Matrix6d covariance =
-      noise + geometry::transported(map.keyframe(anchored.reference).covariance, anchored.T_rig_reference);
+  const geometry::PoseUncertainty of_reference =
+      geometry::transported(map.keyframe(anchored.reference).uncertainty, anchored.T_rig_reference);
+  const geometry::Matrix6d covariance = noise + of_reference.covariance();
   return 0.5 * (covariance + covariance.transpose());
 }
 

@@ -218,11 +218,40 @@ TEST(RefineRig, ARefinedMapUsesTheEstimateAndKeepsItsInvariants) {
   apply(estimate, draft);
   EXPECT_TRUE(draft.map().rig().same_calibration(*estimate.rig));
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+  ASSERT_TRUE(draft.map().rig_deviation());
+  const Eigen::MatrixXd& L = *draft.map().rig_deviation();
+  EXPECT_TRUE((L * L.transpose() * estimate.information.information).isIdentity(1e-6));
   const KeyframeId k = draft.map().newest_keyframe();
   const feature::Keypoints& keypoints = draft.map().keypoints(k, CameraIndex(0));
   const auto bearing = estimate.rig->camera(0).unproject(keypoints.pixel[0].cast<double>());
   ASSERT_TRUE(bearing);
   EXPECT_EQ(keypoints.bearing[0], *bearing);
+}
+
+TEST(MoveSubmap, TheDisplacementOfTheRootIsAnErrorOfAllKeyframes) {
+  const camera::Rig truth = synthetic::default_rig();
+  map::SimulatedMap world = mapped(truth, truth, 4, 0.3);
+  const KeyframeId root(0), last(3);
+  const geometry::PoseUncertainty own{2e-4 * geometry::Matrix6d::Identity(), 1e-3 * geometry::Matrix6d::Identity()};
+  world.map.set_pose(root, geometry::SE3());
+  world.map.set_uncertainty(last, own);
+  const geometry::SE3 T_last_world = world.map.keyframe(last).T_rig_world;
+  geometry::Vector6d step;
+  step << 0.01, 0.02, -0.03, 0.1, 0.2, 0.3;
+  map::MapDraft draft = world.draft();
+  move_submap(last, T_last_world * geometry::SE3::exp(step), draft);
+  EXPECT_LT((draft.map().keyframe(root).T_rig_world.log() - step).norm(), 1e-12);
+  const auto expect_near = [&](KeyframeId k, const geometry::PoseUncertainty& expected) {
+    const geometry::PoseUncertainty& found = draft.map().keyframe(k).uncertainty;
+    EXPECT_LT((found.noise - expected.noise).norm(), 1e-12);
+    EXPECT_LT((geometry::sum(found.calibration, -expected.calibration)).norm(), 1e-12);
+  };
+  const geometry::PoseUncertainty of_root{step * step.transpose()};
+  expect_near(root, of_root);
+  expect_near(last, own + geometry::transported(of_root, T_last_world));
+  move_submap(root, geometry::SE3(), draft);
+  expect_near(root, {});
+  expect_near(last, own);
 }
 
 // The estimate is a map of another scale, as if the images had distributed it otherwise over the baselines.

@@ -261,7 +261,7 @@ class MergeSubmaps : public ::testing::TestWithParam<int> {
     const Sim3 elsewhere(Sim3::exp((geometry::Vector7d() << 0.2, -0.3, 1.9, 5, -7, 2, 0).finished()));
     for (int i = 8; i < 18; ++i)
       world.add(simulator.frame(FrameId(i), kStepS * (i - 4) + 0.5), elsewhere, 0, {}, i == 8);
-    for (const KeyframeId k : world.map.keyframe_ids()) world.map.set_covariance(k, kInside);
+    for (const KeyframeId k : world.map.keyframe_ids()) world.map.set_uncertainty(k, {kInside});
   }
   std::optional<PlaceMatch> located(int keyframe, int with) const {
     return verify_place(world.map, world.map.rig_of(KeyframeId(keyframe)),
@@ -280,14 +280,14 @@ class MergeSubmaps : public ::testing::TestWithParam<int> {
     EXPECT_EQ(after.roots(), std::vector{KeyframeId(0)});
     EXPECT_EQ(after.gauge_epoch(), world.map.gauge_epoch() + 1);
     const auto [older, younger] = std::minmax(keyframe, with);
-    const geometry::Matrix6d joint = after.keyframe(KeyframeId(younger)).covariance;
+    const geometry::Matrix6d joint = after.keyframe(KeyframeId(younger)).uncertainty.noise;
     const geometry::Matrix6d A =
         (after.keyframe(KeyframeId(younger)).T_rig_world * after.keyframe(KeyframeId(older)).T_rig_world.inverse())
             .adjoint();
     EXPECT_LT((joint - 2 * kInside - A * kInside * A.transpose()).norm(), 1e-9 * joint.norm());
     for (const KeyframeId k : after.keyframe_ids()) {
       if (k < KeyframeId(8)) {
-        EXPECT_EQ(after.keyframe(k).covariance, kInside);
+        EXPECT_EQ(after.keyframe(k).uncertainty.noise, kInside);
         EXPECT_EQ(after.keyframe(k).T_rig_world.translation(), world.map.keyframe(k).T_rig_world.translation());
       }
       EXPECT_LT(error_of(world, after, k), 0.02);

@@ -28,7 +28,7 @@ TEST(AppendMap, KeepsPosesTreesAndObservations) {
   const BundledMap first = worn_map(11);
   BundledMap other = worn_map(12);
   for (const KeyframeId k : other.keyframe_ids())
-    other.set_covariance(k, static_cast<double>(k.index()) * geometry::Matrix6d::Identity());
+    other.set_uncertainty(k, {static_cast<double>(k.index()) * geometry::Matrix6d::Identity()});
   ASSERT_GT(other.roots().size(), 1u);
   ASSERT_GT(other.keyframe_slots(), other.num_keyframes());
   BundledMap map = first;
@@ -46,7 +46,7 @@ TEST(AppendMap, KeepsPosesTreesAndObservations) {
     EXPECT_EQ(added.frame, source.frame);
     EXPECT_EQ(added.T_rig_world.rotation().coeffs(), source.T_rig_world.rotation().coeffs());
     EXPECT_EQ(added.T_rig_world.translation(), source.T_rig_world.translation());
-    EXPECT_EQ(added.covariance, source.covariance);
+    EXPECT_EQ(added.uncertainty.noise, source.uncertainty.noise);
     EXPECT_EQ(added.parent, source.parent.valid() ? ids.keyframes[source.parent.index()] : KeyframeId());
   }
 }

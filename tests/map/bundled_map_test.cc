@@ -154,24 +154,24 @@ TEST_F(BundledMapTest, ANewKeyframeHasTheErrorOfItsParent) {
   geometry::Vector6d deviations;
   deviations << 1, 2, 3, 4, 5, 6;
   const geometry::Matrix6d covariance = deviations.asDiagonal();
-  ASSERT_TRUE(map.set_covariance(KeyframeId(0), covariance));
+  ASSERT_TRUE(map.set_uncertainty(KeyframeId(0), {covariance}));
   const KeyframeId k = add(matches(0, 20), {});
   const geometry::Matrix6d A =
       (map.keyframe(k).T_rig_world * map.keyframe(KeyframeId(0)).T_rig_world.inverse()).adjoint();
-  EXPECT_LT((map.keyframe(k).covariance - A * covariance * A.transpose()).norm(), 1e-12 * covariance.norm());
-  EXPECT_EQ(map.keyframe(add({}, {})).covariance, geometry::Matrix6d::Zero());  // a root
+  EXPECT_LT((map.keyframe(k).uncertainty.noise - A * covariance * A.transpose()).norm(), 1e-12 * covariance.norm());
+  EXPECT_EQ(map.keyframe(add({}, {})).uncertainty.noise, geometry::Matrix6d::Zero());  // a root
 }
 
-TEST_F(BundledMapTest, CovariancesFollowChangesOfTheScale) {
+TEST_F(BundledMapTest, UncertaintiesFollowChangesOfTheScale) {
   const KeyframeId k = add(matches(0, 20), {});
   geometry::Matrix6d expected = geometry::Matrix6d::Ones();
-  map.set_covariance(k, expected);
+  map.set_uncertainty(k, {expected});
   map.scale_submap(KeyframeId(0), 2.0);
   map.scale_keyframes(std::vector<std::pair<KeyframeId, double>>{{k, 1.5}});
   expected.bottomLeftCorner<3, 3>().setConstant(3.0);
   expected.topRightCorner<3, 3>().setConstant(3.0);
   expected.bottomRightCorner<3, 3>().setConstant(9.0);
-  EXPECT_EQ(map.keyframe(k).covariance, expected);
+  EXPECT_EQ(map.keyframe(k).uncertainty.noise, expected);
 }
 
 TEST_F(BundledMapTest, ResolvesRemovedKeyframesToTheNearestAliveAncestor) {

@@ -309,7 +309,7 @@ TEST_F(RebaseTest, PosesAreDroppedAfterACorrection) {
   EXPECT_EQ(report.published->gauge_epoch(), before->gauge_epoch() + 1);
 }
 
-TEST_F(RebaseTest, CovariancesAreSetAndDroppedWithThePoses) {
+TEST_F(RebaseTest, UncertaintiesAreSetAndDroppedWithThePoses) {
   const geometry::Matrix6d own = geometry::Matrix6d::Identity(), theirs = 2 * own;
   const KeyframeId newer = add_keyframe(*early, same_numbers(0, 5));
   early->remove_keyframe(kThird);
@@ -317,18 +317,18 @@ TEST_F(RebaseTest, CovariancesAreSetAndDroppedWithThePoses) {
   const SE3 pose = random_pose(random, 1);
   late->set_poses({.keyframes = {{kSecond, pose}, {kThird, pose}, {added, pose}},
                    .landmarks = {},
-                   .covariances = {{kSecond, own}, {kThird, own}, {added, theirs}}});
-  EXPECT_EQ(late->map().keyframe(added).covariance, theirs);
+                   .uncertainties = {{kSecond, {own}}, {kThird, {own}}, {added, {theirs}}}});
+  EXPECT_EQ(late->map().keyframe(added).uncertainty.noise, theirs);
   const CommitReport report = commit();
-  EXPECT_EQ(report.published->keyframe(kSecond).covariance, own);
-  EXPECT_EQ(report.published->keyframe(report.keyframes.at(0)).covariance, theirs);
-  EXPECT_EQ(report.published->keyframe(newer).covariance, geometry::Matrix6d::Zero());
+  EXPECT_EQ(report.published->keyframe(kSecond).uncertainty.noise, own);
+  EXPECT_EQ(report.published->keyframe(report.keyframes.at(0)).uncertainty.noise, theirs);
+  EXPECT_EQ(report.published->keyframe(newer).uncertainty.noise, geometry::Matrix6d::Zero());
 
   early.emplace(store.snapshot());
   late.emplace(store.snapshot());
   early->set_poses({{{kSecond, random_pose(random, 1)}}, {}, true});
-  late->set_poses({.keyframes = {{kSecond, pose}}, .landmarks = {}, .covariances = {{kSecond, theirs}}});
-  EXPECT_EQ(commit().published->keyframe(kSecond).covariance, own);
+  late->set_poses({.keyframes = {{kSecond, pose}}, .landmarks = {}, .uncertainties = {{kSecond, {theirs}}}});
+  EXPECT_EQ(commit().published->keyframe(kSecond).uncertainty.noise, own);
 }
 
 TEST_F(RebaseTest, TheSecondOfTwoConcurrentCorrectionsIsRejected) {
@@ -599,8 +599,10 @@ void expect_bearings_of_rig(const BundledMap& map, KeyframeId k) {
 
 TEST_F(RebaseTest, NewerKeyframesGetTheBearingsOfANewRig) {
   const KeyframeId newer = add_keyframe(*early, same_numbers(0, 10));
-  late->set_rig(zoomed(late->map().rig()));
+  const auto deviation = std::make_shared<const Eigen::MatrixXd>(Eigen::MatrixXd::Identity(14, 14));
+  late->set_rig(zoomed(late->map().rig()), deviation);
   const MapSnapshot map = commit().published;
+  EXPECT_EQ(map->rig_deviation(), deviation);
   EXPECT_TRUE(map->rig().same_calibration(zoomed(*synthetic_rig(2))));
   for (const KeyframeId k : {kRoot, kSecond, newer}) expect_bearings_of_rig(*map, k);
 }

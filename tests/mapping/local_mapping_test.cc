@@ -262,13 +262,13 @@ TEST(MapKeyframe, LeavesAValidMapWhenStopped) {
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
-TEST(MapKeyframe, EstimatesTheCovarianceOfTheKeyframeOnly) {
+TEST(MapKeyframe, EstimatesTheUncertaintyOfTheKeyframeOnly) {
   const SimulatedMap world = stereo_map(synthetic::ring_rig(2), 4);
   map::MapDraft draft = world.draft();
   map_keyframe(KeyframeId(3), {}, kFeatures, draft);
   for (int k = 0; k < 3; ++k)
-    EXPECT_EQ(draft.map().keyframe(KeyframeId(k)).covariance, geometry::Matrix6d::Zero()) << k;
-  const geometry::Matrix6d& covariance = draft.map().keyframe(KeyframeId(3)).covariance;
+    EXPECT_EQ(draft.map().keyframe(KeyframeId(k)).uncertainty.noise, geometry::Matrix6d::Zero()) << k;
+  const geometry::Matrix6d& covariance = draft.map().keyframe(KeyframeId(3)).uncertainty.noise;
   const geometry::Vector6d deviations = covariance.diagonal().cwiseSqrt();
   EXPECT_GT(deviations.head<3>().norm(), 1e-4);  // rad; noise of 0.7 px
   EXPECT_LT(deviations.head<3>().norm(), 1e-2);
@@ -276,19 +276,20 @@ TEST(MapKeyframe, EstimatesTheCovarianceOfTheKeyframeOnly) {
   EXPECT_LT(deviations.tail<3>().norm(), 1e-1);
 }
 
-TEST(AdjustGlobally, EstimatesTheCovariancesOfAllKeyframesButTheRoot) {
+TEST(AdjustGlobally, EstimatesTheUncertaintyOfAllKeyframesButTheRoot) {
   SimulatedMap world(simulator(synthetic::ring_rig(2)));
   for (int i = 0; i < 4; ++i) world.add_keyframe(FrameId(i), 0.3 * i);
   map::MapDraft draft = world.draft();
   ASSERT_TRUE(adjust_globally({}, kFeatures, draft).done);
-  EXPECT_EQ(draft.map().keyframe(KeyframeId(0)).covariance, geometry::Matrix6d::Zero());
-  for (int k = 1; k < 4; ++k) EXPECT_GT(draft.map().keyframe(KeyframeId(k)).covariance.diagonal().minCoeff(), 0.0) << k;
+  EXPECT_EQ(draft.map().keyframe(KeyframeId(0)).uncertainty.noise, geometry::Matrix6d::Zero());
+  for (int k = 1; k < 4; ++k)
+    EXPECT_GT(draft.map().keyframe(KeyframeId(k)).uncertainty.noise.diagonal().minCoeff(), 0.0) << k;
 
   world.map.set_scale(map::Scale::kUnobservable);  // without the scale they are not determined
   map::MapDraft undetermined = world.draft();
   ASSERT_TRUE(adjust_globally({}, kFeatures, undetermined).done);
   for (int k = 0; k < 4; ++k)
-    EXPECT_EQ(undetermined.map().keyframe(KeyframeId(k)).covariance, geometry::Matrix6d::Zero()) << k;
+    EXPECT_EQ(undetermined.map().keyframe(KeyframeId(k)).uncertainty.noise, geometry::Matrix6d::Zero()) << k;
 }
 
 TEST(AdjustGlobally, ImprovesAPerturbedMap) {

@@ -194,16 +194,66 @@ TEST(BundleAdjuster, CovariancesAreBlocksOfTheInverseOfTheDenseInformation) {
     // No iteration: the covariances are those at the given values.
     const BundleSummary summary =
         adjust(problem, {.iterations = 0, .robust = false, .dense_poses = dense_poses, .marginals = {2, 3, 5, 0}});
-    ASSERT_EQ(summary.covariances.size(), 4u);
-    EXPECT_FALSE(summary.covariances[3]);  // fixed
+    ASSERT_EQ(summary.uncertainties.size(), 4u);
+    EXPECT_FALSE(summary.uncertainties[3]);  // fixed
     const Eigen::Index first[] = {0, 6, 18};
     for (int i = 0; i < 3; ++i) {
-      ASSERT_TRUE(summary.covariances[static_cast<std::size_t>(i)]);
+      ASSERT_TRUE(summary.uncertainties[static_cast<std::size_t>(i)]);
       const geometry::Matrix6d expected = covariance.block<6, 6>(first[i], first[i]);
-      const geometry::Matrix6d& found = *summary.covariances[static_cast<std::size_t>(i)];
+      const geometry::Matrix6d& found = summary.uncertainties[static_cast<std::size_t>(i)]->noise;
       // Compared in units of the standard deviations, since angles and metres differ in magnitude.
       const geometry::Vector6d unit = expected.diagonal().cwiseSqrt().cwiseInverse();
       EXPECT_LT((unit.asDiagonal() * (found - expected) * unit.asDiagonal()).norm(), 1e-4);
+    }
+  }
+}
+
+// A calibration that differs by the error moves the adjusted poses by its effect.
+TEST(BundleAdjuster, EffectOfTheCalibrationIsTheChangeOfTheAdjustedPoses) {
+  Random random(9);
+  BundleSpec spec;
+  spec.cameras = 3;
+  spec.models = Models::kMixed;
+  spec.points = 200;
+  spec.free_poses = 4;
+  spec.noise = 0.0;
+  const auto scene = scene::make_bundle_scene(spec, random);
+  const RigValues rig = RigValues::of(*scene->problem.rig);
+  Eigen::Index size = 6 * 2;
+  for (const camera::CameraModel& model : rig.models) size += camera::parameters(model).size();
+  Eigen::VectorXd error = Eigen::VectorXd::Zero(size);  // of the rotation of camera 2, the position of camera 1
+  error.segment<3>(6) << 1e-5, -2e-5, 1e-5;
+  error.segment<3>(3) << 1e-5, 1e-5, -1e-5;
+  error(12) = 0.01;  // of fx of camera 0
+  const auto adjusted_with = [&](double sign) {
+    RigValues values = rig;
+    for (std::size_t c : {1, 2})
+      values.T_cam_rig[c] =
+          values.T_cam_rig[c].perturbed(sign * error.segment<6>(6 * (static_cast<Eigen::Index>(c) - 1)));
+    camera::ModelParameters step = camera::ModelParameters::Zero(camera::parameters(values.models[0]).size());
+    step(0) = sign * error(12);
+    values.models[0] = camera::with_parameters(values.models[0], camera::parameters(values.models[0]) + step);
+    const Rig changed = values.applied_to(*scene->problem.rig);
+    ReprojectionProblem problem = scene->problem;
+    problem.rig = &changed;
+    EXPECT_TRUE(adjust(problem, to_the_end(false)).usable());
+    return problem.T_rig_world;
+  };
+  const std::vector<SE3> plus = adjusted_with(1), minus = adjusted_with(-1);
+  for (const int dense_poses : {150, 0}) {
+    ReprojectionProblem problem = scene->problem;
+    BundleOptions options = to_the_end(false);
+    options.dense_poses = dense_poses;
+    options.marginals = {2, 3, 4};
+    options.rig_deviation = std::make_shared<const Eigen::MatrixXd>(error);
+    const BundleSummary summary = adjust(problem, options);
+    for (std::size_t i = 0; i < options.marginals.size(); ++i) {
+      const auto pose = static_cast<std::size_t>(options.marginals[i]);
+      ASSERT_TRUE(problem.pose_free[pose]);
+      ASSERT_TRUE(summary.uncertainties[i]);
+      const geometry::Vector6d change = 0.5 * (plus[pose] * minus[pose].inverse()).log();
+      EXPECT_GT(change.norm(), 1e-6);
+      EXPECT_LT((summary.uncertainties[i]->calibration - change).norm(), 1e-3 * change.norm());
     }
   }
 }

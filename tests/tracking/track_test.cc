@@ -151,7 +151,7 @@ TEST_F(Track, StoresThePoseRelativeToItsReference) {
 TEST_F(Track, AddsTheErrorOfTheReferenceToTheNoiseOfTheImage) {
   map::BundledMap uncertain = world().map;
   const geometry::Matrix6d of_reference = 1e-4 * geometry::Matrix6d::Identity();
-  for (const KeyframeId k : uncertain.keyframe_ids()) uncertain.set_covariance(k, of_reference);
+  for (const KeyframeId k : uncertain.keyframe_ids()) uncertain.set_uncertainty(k, {of_reference});
   SimulatedTracker a(world()), b(world());
   const TrackResult exact = a.track(seen(3).frame).result, result = b.track(uncertain, seen(3).frame).result;
   ASSERT_TRUE(exact.covariance && result.covariance);

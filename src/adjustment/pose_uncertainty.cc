@@ -1,13 +1,9 @@
-#include "adjustment/pose_covariance.h"
+#include "adjustment/pose_uncertainty.h"
 
 #include <algorithm>
 
-#include "geometry/covariance.h"
-
 namespace bslam::adjustment {
 namespace {
-
-using geometry::Matrix6d;
 
 // The fixed pose of the submap of `root` with the most observations, the older one on ties; -1 if there is none.
 int anchor_pose(const map::BundledMap& map, const BundleProblem& flat, std::span<const int> observations,
@@ -22,22 +18,23 @@ int anchor_pose(const map::BundledMap& map, const BundleProblem& flat, std::span
 
 }  // namespace
 
-std::vector<int> poses_with_covariance(const Selection& selection, const BundleProblem& flat) {
+std::vector<int> poses_with_uncertainty(const Selection& selection, const BundleProblem& flat) {
   std::vector<int> poses;
-  for (const KeyframeId k : selection.with_covariance) {
+  for (const KeyframeId k : selection.with_uncertainty) {
     const auto at = std::lower_bound(flat.keyframes.begin(), flat.keyframes.end(), k);
     poses.push_back(static_cast<int>(at - flat.keyframes.begin()));
   }
   return poses;
 }
 
-PoseCovariances pose_covariances(const map::BundledMap& map, const BundleProblem& flat, std::span<const int> poses,
-                                 std::span<const std::optional<Matrix6d>> marginals, double correlated_observations) {
+PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundleProblem& flat, std::span<const int> poses,
+                                     std::span<const std::optional<geometry::PoseUncertainty>> marginals,
+                                     double correlated_observations) {
   constexpr double kCutOff = solver::kFractionLeft / solver::kVarianceLeft;
   const double factor = correlated_observations * kCutOff * kCutOff;
   std::vector<int> observations(flat.keyframes.size(), 0);
   for (const auto& o : flat.problem.observations) ++observations[static_cast<std::size_t>(o.pose)];
-  PoseCovariances out;
+  PoseUncertainties out;
   for (std::size_t i = 0; i < marginals.size(); ++i) {
     const KeyframeId k = flat.keyframes[static_cast<std::size_t>(poses[i])];
     const int anchor = anchor_pose(map, flat, observations, map.root_of(k));
@@ -45,8 +42,10 @@ PoseCovariances pose_covariances(const map::BundledMap& map, const BundleProblem
     const auto& T_rig_world = flat.problem.T_rig_world;
     const geometry::SE3 T_k_anchor =
         T_rig_world[static_cast<std::size_t>(poses[i])] * T_rig_world[static_cast<std::size_t>(anchor)].inverse();
-    const Matrix6d& of_anchor = map.keyframe(flat.keyframes[static_cast<std::size_t>(anchor)]).covariance;
-    out.emplace_back(k, factor * *marginals[i] + geometry::transported(of_anchor, T_k_anchor));
+    const geometry::PoseUncertainty of_adjustment{factor * marginals[i]->noise, marginals[i]->calibration};
+    const geometry::PoseUncertainty& of_anchor =
+        map.keyframe(flat.keyframes[static_cast<std::size_t>(anchor)]).uncertainty;
+    out.emplace_back(k, of_adjustment + geometry::transported(of_anchor, T_k_anchor));
   }
   return out;
 }

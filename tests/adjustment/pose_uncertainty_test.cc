@@ -1,5 +1,5 @@
 // Covariances of poses against the errors of maps adjusted to simulated features, whose noise is independent.
-#include "adjustment/pose_covariance.h"
+#include "adjustment/pose_uncertainty.h"
 
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ Selection window(const map::BundledMap& map, int newest, int free, int fixed) {
   for (int k = std::max(0, first_free - fixed); k < first_free; ++k) out.fixed_keyframes.emplace_back(k);
   for (int k = first_free; k <= newest; ++k) out.free_keyframes.emplace_back(k);
   out.landmarks = map.landmark_ids();
-  out.with_covariance = {KeyframeId(newest)};
+  out.with_uncertainty = {KeyframeId(newest)};
   return out;
 }
 
@@ -41,29 +41,29 @@ void adjust(const Selection& selection, const AdjustmentOptions& options, map::B
   map = std::move(draft).finish().result;
 }
 
-// Normalised estimation error squared per degree of freedom: 1 on average if the covariance is right.
+// Normalised estimation error squared per degree of freedom: 1 on average if the uncertainty is right.
 double nees(const map::SimulatedMap& world, KeyframeId k) {
   const map::BundledKeyframe& keyframe = world.map.keyframe(k);
   const geometry::Vector6d error = (world.true_pose(k) * keyframe.T_rig_world.inverse()).log();
-  return error.dot(keyframe.covariance.ldlt().solve(error)) / 6;
+  return error.dot(keyframe.uncertainty.covariance().ldlt().solve(error)) / 6;
 }
 
-TEST(PoseCovariances, MatchTheErrorsOfOneAdjustment) {
+TEST(PoseUncertainties, MatchTheErrorsOfOneAdjustment) {
   double sum = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     map::SimulatedMap world = simulated(seed, 4);
     Selection selection = window(world.map, 3, 3, 1);
-    selection.with_covariance = selection.free_keyframes;
+    selection.with_uncertainty = selection.free_keyframes;
     adjust(selection, kIndependent, world.map);
     for (const KeyframeId k : selection.free_keyframes) sum += nees(world, k) / 3;
-    EXPECT_EQ(world.map.keyframe(KeyframeId(0)).covariance, geometry::Matrix6d::Zero());
+    EXPECT_EQ(world.map.keyframe(KeyframeId(0)).uncertainty.noise, geometry::Matrix6d::Zero());
   }
   EXPECT_GT(sum / kSeeds, 0.75);
   EXPECT_LT(sum / kSeeds, 1.3);
 }
 
 // Each window has fixed keyframes with errors of their own.
-TEST(PoseCovariances, MatchTheErrorsOfAChainOfWindows) {
+TEST(PoseUncertainties, MatchTheErrorsOfAChainOfWindows) {
   constexpr int kKeyframes = 9;
   double sum = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -75,31 +75,60 @@ TEST(PoseCovariances, MatchTheErrorsOfAChainOfWindows) {
   EXPECT_LT(sum / kSeeds, 1.5);
 }
 
-TEST(PoseCovariances, AddTheTransportedCovarianceOfTheAnchor) {
+// Keyframes are adjusted with a wrong calibration. Its error is the same in all windows, so that its effect grows with
+// the distance from the root.
+TEST(PoseUncertainties, IncludeTheErrorOfTheCalibration) {
+  constexpr int kKeyframes = 9;
+  double given_rig = 0, sum = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    map::SimulatedMap world = simulated(seed, kKeyframes);
+    solver::RigValues values = solver::RigValues::of(world.map.rig());
+    const auto intrinsics = camera::parameters(values.models[0]).size();
+    Eigen::VectorXd deviations = Eigen::VectorXd::Zero(6 + 2 * intrinsics);
+    deviations.head<6>() << 1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3;
+    Random random(seed, "calibration");
+    geometry::Vector6d error;
+    for (int i = 0; i < 6; ++i) error(i) = deviations(i) * random.normal();
+    values.T_cam_rig[1] = values.T_cam_rig[1].perturbed(error);
+    world.map.set_rig(std::make_shared<const camera::Rig>(values.applied_to(world.map.rig())));
+    world.map.set_rig_deviation(std::make_shared<const Eigen::MatrixXd>(deviations.asDiagonal()));
+    for (int k = 1; k < kKeyframes; ++k) adjust(window(world.map, k, 3, 3), kIndependent, world.map);
+    sum += nees(world, KeyframeId(kKeyframes - 1));
+    world.map.set_uncertainty(KeyframeId(kKeyframes - 1),
+                              {world.map.keyframe(KeyframeId(kKeyframes - 1)).uncertainty.noise});
+    given_rig += nees(world, KeyframeId(kKeyframes - 1));
+  }
+  EXPECT_GT(given_rig / kSeeds, 5.0);
+  EXPECT_GT(sum / kSeeds, 0.6);
+  EXPECT_LT(sum / kSeeds, 1.5);
+}
+
+TEST(PoseUncertainties, AddTheTransportedCovarianceOfTheAnchor) {
   map::SimulatedMap world = simulated(1, 6);
   map::SimulatedMap displaced = simulated(1, 6);
   geometry::Vector6d deviations;
   deviations << 1e-3, 2e-3, 3e-3, 0.01, 0.02, 0.03;
   const geometry::Matrix6d of_fixed = deviations.cwiseAbs2().asDiagonal();
-  displaced.map.set_covariance(KeyframeId(2), of_fixed);
+  displaced.map.set_uncertainty(KeyframeId(2), {of_fixed});
   for (map::SimulatedMap* map : {&world, &displaced}) adjust(window(map->map, 5, 3, 1), kIndependent, map->map);
   const KeyframeId newest(5);
   const geometry::SE3 T_newest_fixed =
       world.map.keyframe(newest).T_rig_world * world.map.keyframe(KeyframeId(2)).T_rig_world.inverse();
   const geometry::Matrix6d A = T_newest_fixed.adjoint();
-  const geometry::Matrix6d added = displaced.map.keyframe(newest).covariance - world.map.keyframe(newest).covariance;
+  const geometry::Matrix6d added =
+      displaced.map.keyframe(newest).uncertainty.noise - world.map.keyframe(newest).uncertainty.noise;
   EXPECT_LT((added - A * of_fixed * A.transpose()).norm(), 1e-12);
 }
 
-TEST(PoseCovariances, GrowWithTheNumberOfCorrelatedObservations) {
+TEST(PoseUncertainties, GrowWithTheNumberOfCorrelatedObservations) {
   map::SimulatedMap one = simulated(2, 4), ten = simulated(2, 4);
   adjust(window(one.map, 3, 3, 1), kIndependent, one.map);
   AdjustmentOptions options = kIndependent;
   options.correlated_observations = 10;
   adjust(window(ten.map, 3, 3, 1), options, ten.map);
-  const geometry::Matrix6d& covariance = one.map.keyframe(KeyframeId(3)).covariance;
+  const geometry::Matrix6d& covariance = one.map.keyframe(KeyframeId(3)).uncertainty.noise;
   EXPECT_GT(covariance.norm(), 0.0);
-  EXPECT_LT((ten.map.keyframe(KeyframeId(3)).covariance - 10 * covariance).norm(), 1e-9 * covariance.norm());
+  EXPECT_LT((ten.map.keyframe(KeyframeId(3)).uncertainty.noise - 10 * covariance).norm(), 1e-9 * covariance.norm());
   EXPECT_EQ(one.map.keyframe(KeyframeId(3)).T_rig_world.translation(),
             ten.map.keyframe(KeyframeId(3)).T_rig_world.translation());
 }

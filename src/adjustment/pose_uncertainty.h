@@ -1,0 +1,38 @@
+// Uncertainty of the poses of keyframes relative to the root of their submap, which is the origin of its world frame.
+//
+// A bundle adjustment determines the pose of a keyframe relative to the fixed keyframes. The covariance M of its noise
+// follows from that of the images, with all other variables marginalised out. Two corrections apply. Estimation without
+// outliers makes both the remaining noise, from which the variances of the landmarks are estimated, and the information
+// that the observations contain seem better than they are. And the errors of a landmark in successive images are
+// similar, so that only one of several observations adds information.
+//
+// The errors of the fixed keyframes are added. These drift together, so the one with the most observations, the anchor
+// a, represents all:
+//     C_k = correlated_observations (0.95 / 0.80)^2 M + Ad(T_ka) C_a Ad(T_ka)^T        (docs/math.md, section 5)
+//     F_k = F + Ad(T_ka) F_a
+// where F is the effect of the calibration's error on the pose relative to the fixed keyframes. The root has C = 0 and
+// F = 0. Not included are errors of the velocities of the rig.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "adjustment/bundle_problem.h"
+
+namespace bslam::adjustment {
+
+using PoseUncertainties = std::vector<std::pair<KeyframeId, geometry::PoseUncertainty>>;
+
+// Positions of the selection's keyframes `with_uncertainty` in the poses of the problem.
+std::vector<int> poses_with_uncertainty(const Selection& selection, const BundleProblem& flat);
+
+// Returns the uncertainties of T_rig_world, in radians and map units, of the keyframes at these poses. `marginals`: M
+// and F of each, as in solver::BundleSummary; keyframes without one are left out. `map` has the uncertainties of the
+// fixed keyframes.
+PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundleProblem& flat, std::span<const int> poses,
+                                     std::span<const std::optional<geometry::PoseUncertainty>> marginals,
+                                     double correlated_observations);
+
+}  // namespace bslam::adjustment
