@@ -65,8 +65,9 @@ std::array<double, 2> at(double u, double v) { return {u, -v}; }
 Panel residual_panel(const CameraRecord& camera, const ArrowScale& scale) {
   const ImageResiduals& r = camera.residuals;
   const double w = r.width, h = r.height, cell_w = w / ImageResiduals::kColumns, cell_h = h / ImageResiduals::kRows;
-  Panel panel{
-      .title = fmt::format("{}: rms {:.2f} px", camera.name, r.rms_px), .x_label = "u [px]", .y_label = "v [px]"};
+  Panel panel{.title = fmt::format("{}: residuals, rms {:.2f} px", camera.name, r.rms_px),
+              .x_label = "u [px]",
+              .y_label = "v [px]"};
   panel.scale = AxisScale::kEqual;
   for (const double v : {0.0, std::round(h / 2), h}) panel.y_ticks.push_back({-v, fmt::format("{:.0f}", v)});
   panel.series.push_back(line({at(0, 0), at(w, 0), at(w, h), at(0, h), at(0, 0)}, kGrey, 1.0));
@@ -92,12 +93,14 @@ std::vector<PanelRow> residual_rows(const RunRecord& record) {
   std::vector<PanelRow> rows;
   const auto scale = arrow_scale(record);
   if (!scale) return rows;
+  std::vector<Panel> panels;
   for (const CameraRecord& camera : record.cameras) {
-    if (camera.residuals.observations == 0) continue;
-    if (rows.empty() || rows.back().panels.size() == kPanelsPerRow) rows.push_back({.height_px = 300.0});
-    rows.back().panels.push_back(residual_panel(camera, *scale));
+    if (camera.residuals.observations > 0) panels.push_back(residual_panel(camera, *scale));
   }
-  if (!rows.empty()) rows.front().panels.front().title = "Mean image residuals, " + rows.front().panels.front().title;
+  const std::size_t num_rows = (panels.size() + kPanelsPerRow - 1) / kPanelsPerRow;
+  rows.resize(num_rows, {.height_px = 300.0});
+  for (std::size_t i = 0; i < panels.size(); ++i)  // rows of the same length, except that the last may be shorter
+    rows[i / ((panels.size() + num_rows - 1) / num_rows)].panels.push_back(std::move(panels[i]));
   return rows;
 }
 

@@ -67,9 +67,9 @@ TEST(RunPlot, ShowsMeanResidualsOverTheImage) {
   r.cells[51] = {{9.0, 9.0}, 5};  // too few
   const std::string svg = run_plot_svg(record);
   EXPECT_EQ(xml_fault(svg), "");
-  EXPECT_TRUE(contains(svg, "Mean image residuals, rear: rms 0.46 px"));
+  EXPECT_TRUE(contains(svg, "rear: residuals, rms 0.46 px"));
   EXPECT_TRUE(contains(svg, "0.2 px")) << "the scale bar";
-  EXPECT_FALSE(contains(svg, "front: rms"));
+  EXPECT_FALSE(contains(svg, "front: residuals"));
   EXPECT_FALSE(contains(svg, "nan"));
 }
 
