@@ -53,6 +53,9 @@ void add_image_options(CLI::App& verb, ImageArguments& a) {
   verb.add_option("--masks", a.masks,
                   "folder with masks, in which 0 marks pixels to ignore: camN.png for all images of camera N of the "
                   "recording, camN/STAMP.png for the image with this time stamp in ns");
+  verb.add_option("--vignettes", a.vignettes,
+                  "folder with vignettes camN.png, the relative brightness of the images of camera N of the recording, "
+                  "which are corrected for it");
 }
 
 Status apply_image_options(const ImageArguments& a, dataset::DatasetRequest& request) {
@@ -61,6 +64,7 @@ Status apply_image_options(const ImageArguments& a, dataset::DatasetRequest& req
   request.time_stamps.rate_hz = a.rate_hz;
   if (!a.stamp_unit.empty()) request.time_stamps.unit_ns = kUnits.at(a.stamp_unit);
   if (!a.masks.empty()) request.masks = a.masks;
+  if (!a.vignettes.empty()) request.vignettes = a.vignettes;
   if (a.bayer.empty()) return {};
   auto patterns = parse_bayer(a.bayer);
   if (!patterns) return patterns.error();

@@ -12,7 +12,7 @@ namespace bslam::cli {
 // How the time stamps and the pixels of a recording are to be read.
 struct ImageArguments {
   std::optional<double> rate_hz;
-  std::string stamp_unit, bayer, masks;
+  std::string stamp_unit, bayer, masks, vignettes;
 };
 
 struct DatasetArguments {

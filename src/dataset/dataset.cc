@@ -15,6 +15,7 @@
 #include "dataset/frame_grouping.h"
 #include "dataset/mask_folder.h"
 #include "dataset/recording.h"
+#include "dataset/vignette_folder.h"
 #include "image_decoding/image_file.h"
 #include "rig_formats/rig_file.h"
 
@@ -293,6 +294,21 @@ void warn_of_times(const fs::path& file, std::vector<std::string>& warnings) {
                                  fmt::join(offsets, ", "), file.string()));
 }
 
+// Sets what the values of pixels mean: the formats of the images and the vignettes of the cameras.
+Status describe_pixels(const DatasetRequest& request, const std::vector<std::vector<image_files::ImageFile>>& images,
+                       Dataset& dataset) {
+  if (!(request.bayer.size() <= 1 || request.bayer.size() == images.size())) {
+    return Error{"--bayer", "", fmt::format("{} patterns", request.bayer.size()),
+                 fmt::format("one for all cameras, or one for each of the {} in use", images.size())};
+  }
+  dataset.pixel_formats = pixel_formats(request, images);
+  if (!request.vignettes) return {};
+  auto vignettes = read_vignettes(dataset.rig, dataset.cameras_used, *request.vignettes);
+  if (!vignettes) return vignettes.error();
+  dataset.vignettes = *std::move(vignettes);
+  return {};
+}
+
 }  // namespace
 
 Result<Dataset> open_dataset(const DatasetRequest& original) {
@@ -326,11 +342,7 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
                   {},
                   recording.ground_truth(),
                   std::move(chosen->warnings)};
-  if (!(request.bayer.size() <= 1 || request.bayer.size() == images->size())) {
-    return Error{"--bayer", "", fmt::format("{} patterns", request.bayer.size()),
-                 fmt::format("one for all cameras, or one for each of the {} in use", images->size())};
-  }
-  dataset.pixel_formats = pixel_formats(request, *images);
+  if (const Status status = describe_pixels(request, *images, dataset); !status) return status.error();
   if (const Status status = group(request, *images, dataset); !status) return status.error();
   if (const Status status = keep_range(request, dataset); !status) return status.error();
   return dataset;

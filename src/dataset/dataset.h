@@ -12,6 +12,7 @@
 #include "camera/rig.h"
 #include "dataset/time_stamps.h"
 #include "image_decoding/pixel_format.h"
+#include "image_decoding/vignette.h"
 #include "image_files/image_folder.h"
 
 namespace bslam::dataset {
@@ -28,7 +29,8 @@ struct DatasetRequest {
   TimeStampOptions time_stamps = {};                   // unit of the recorded time stamps
   // Colour filters of the cameras in use, in their order, or one for all; empty: none.
   std::vector<image_decoding::Bayer> bayer = {};
-  std::optional<std::filesystem::path> masks = {};  // folder of masks (dataset/mask_folder.h)
+  std::optional<std::filesystem::path> masks = {};      // folder of masks (dataset/mask_folder.h)
+  std::optional<std::filesystem::path> vignettes = {};  // folder of vignettes (dataset/vignette_folder.h)
 };
 
 // Images taken at the same time, at most one of every camera.
@@ -52,6 +54,7 @@ struct Dataset {
   std::vector<std::string>
       warnings;  // for the user: entries that were sorted or dropped, images in frames without camera 0
   std::vector<image_decoding::PixelFormat> pixel_formats = {};  // one per camera in use
+  std::vector<image_decoding::Vignette> vignettes = {};         // one per camera in use, or none
 };
 
 // Detects the format, reads the calibration and the lists of images, and groups the images into frames

@@ -50,6 +50,7 @@ image::ImageBundle read_frame(const Dataset& dataset, std::size_t index) {
     auto image = read_of_camera(dataset, frame.images[i]->path, i);
     auto mask = read_mask(dataset, *frame.images[i], i);
     if (!image || !mask) continue;
+    if (!dataset.vignettes.empty()) dataset.vignettes[i].correct(*image);
     out.image = *std::move(image);
     out.mask = *std::move(mask);
     out.state = image::ImageState::kPresent;

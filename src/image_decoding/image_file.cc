@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <utility>
 
 #include "base/atomic_file.h"
+#include "image_decoding/opencv_decoder.h"
 #include "image_files/mask.h"
 #include "image_files/png_decoder.h"
 
@@ -22,16 +22,6 @@ bool is_whole_jpeg(std::string_view bytes) {
   if (!bytes.starts_with("\xff\xd8\xff")) return false;
   const std::size_t last = bytes.find_last_not_of('\0');
   return last != std::string_view::npos && bytes.substr(0, last + 1).ends_with("\xff\xd9");
-}
-
-// Decodes to one channel of 8 or, for 16-bit images, 16 bits. The result is empty if the bytes cannot be decoded.
-cv::Mat decode_to_grey(std::string_view bytes) {
-  const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-  try {
-    return cv::imdecode(buffer, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
-  } catch (const cv::Exception&) {
-    return {};  // a header with an impossible size: the file is damaged
-  }
 }
 
 // Returns the upper eight of `bits` bits; larger values are white.

@@ -60,8 +60,8 @@ std::vector<KnownPose> known_poses(const map::BundledMap& map, KeyframeId first,
       out.push_back({f, *T_rig_world, map.root_of(frames[f].final_result().anchored.reference)});
   }
   std::ranges::stable_sort(out, {}, &KnownPose::frame);  // keyframes first
-  const auto repeated = std::ranges::unique(out, {}, &KnownPose::frame);
-  out.erase(repeated.begin(), repeated.end());
+  const auto same_frame = [](const KnownPose& a, const KnownPose& b) { return a.frame == b.frame; };
+  out.erase(std::unique(out.begin(), out.end(), same_frame), out.end());
   return out;
 }
 
