@@ -13,10 +13,11 @@ namespace {
 constexpr std::size_t kMinImages = 5;
 constexpr double kMinShare = 0.9;  // of the images that are within a tenth of the period of the phase
 
-// `time_ns` plus a multiple of the period, between minus and plus half of it.
+// `time_ns` plus a multiple of the period, between minus and plus half of it. Here and below times are not multiplied:
+// time stamps may be any, so that products could overflow.
 TimeNs wrapped(TimeNs time_ns, TimeNs period_ns) {
   const TimeNs rest = time_ns % period_ns;
-  return 2 * rest > period_ns ? rest - period_ns : 2 * rest <= -period_ns ? rest + period_ns : rest;
+  return rest > period_ns - rest ? rest - period_ns : rest <= -(period_ns + rest) ? rest + period_ns : rest;
 }
 
 // Times of a camera relative to the nearest image of camera 0, of those at most 0.6 periods away.
@@ -27,7 +28,7 @@ std::vector<TimeNs> offsets(const std::vector<TimeNs>& camera0, const std::vecto
     TimeNs nearest = after == camera0.end() ? time_ns - camera0.back() : time_ns - *after;
     if (after != camera0.begin() && time_ns - *std::prev(after) < std::abs(nearest))
       nearest = time_ns - *std::prev(after);
-    if (10 * std::abs(nearest) <= 6 * period_ns) out.push_back(nearest);
+    if (std::abs(nearest) <= period_ns - period_ns / 10 * 4) out.push_back(nearest);
   }
   return out;
 }
@@ -39,7 +40,7 @@ TimeNs phase(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& time
   for (TimeNs& offset : relative) offset = wrapped(offset - first, period_ns);
   const TimeNs middle = median(relative);
   const auto agree = std::ranges::count_if(
-      relative, [&](TimeNs offset) { return 10 * std::abs(wrapped(offset - middle, period_ns)) <= period_ns; });
+      relative, [&](TimeNs offset) { return std::abs(wrapped(offset - middle, period_ns)) <= period_ns / 10; });
   if (static_cast<double>(agree) < kMinShare * static_cast<double>(relative.size())) return 0;
   return wrapped(first + middle, period_ns);
 }
