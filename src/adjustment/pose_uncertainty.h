@@ -10,8 +10,9 @@
 // a, represents all:
 //     C_k = correlated_observations (0.95 / 0.80)^2 M + Ad(T_ka) C_a Ad(T_ka)^T        (docs/math.md, section 5)
 //     F_k = F + Ad(T_ka) F_a
-// where F is the effect of the calibration's error on the pose relative to the fixed keyframes. The root has C = 0 and
-// F = 0. Not included are errors of the velocities of the rig.
+// where F is the effect of the calibration's error on the pose relative to the fixed keyframes. The root has F = 0,
+// and C = 0 unless it was moved away from the origin (calibration::move_submap). Not included are errors of the
+// velocities of the rig.
 #pragma once
 
 #include <optional>

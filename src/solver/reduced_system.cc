@@ -38,7 +38,7 @@ bool ReducedSystem::solve_with(const Factor& factor, Eigen::VectorXd& delta) {
 
 template <class Use>
 bool ReducedSystem::with_factor(const Use& use) {
-  if (storage_ == Storage::kSparse && frames_.rows() > 0) {
+  if (sparse()) {
     frames_.copy_to(sparse_);
     sparse_factor_.factorize(sparse_);
     return use(sparse_factor_);
@@ -66,7 +66,7 @@ geometry::Matrix6d ReducedSystem::dense_pose_covariance(int frame) const {
 
 std::vector<geometry::Matrix6d> ReducedSystem::pose_covariances(std::span<const int> frames) const {
   std::vector<geometry::Matrix6d> out;
-  if (storage_ == Storage::kDense) {
+  if (!sparse()) {
     for (const int frame : frames) out.push_back(dense_pose_covariance(frame));
     return out;
   }
@@ -84,7 +84,7 @@ std::vector<geometry::Matrix6d> ReducedSystem::pose_covariances(std::span<const 
 }
 
 Eigen::MatrixXd ReducedSystem::rig_sensitivity() const {
-  if (storage_ == Storage::kSparse) return -sparse_factor_.solve(border_);
+  if (sparse()) return -sparse_factor_.solve(border_);
   Eigen::MatrixXd X = -border_;
   dense_.triangularView<Eigen::Lower>().solveInPlace(X);
   dense_.triangularView<Eigen::Lower>().transpose().solveInPlace(X);

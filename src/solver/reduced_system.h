@@ -42,6 +42,8 @@ class ReducedSystem {
   const Eigen::MatrixXd& rig_information() const { return rig_information_; }
 
  private:
+  // Whether S is factorised sparsely; without frames it never is.
+  bool sparse() const { return storage_ == Storage::kSparse && frames_.rows() > 0; }
   // Factorises S and returns `use(factor)`.
   template <class Use>
   bool with_factor(const Use& use);
