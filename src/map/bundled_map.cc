@@ -117,8 +117,10 @@ camera::Shutter BundledMap::shutter(KeyframeId k, CameraIndex c) const {
 }
 
 std::vector<BundledMap::ReplacedFrame> BundledMap::set_rig(std::shared_ptr<const camera::Rig> rig,
+                                                           std::shared_ptr<const Eigen::MatrixXd> deviation,
                                                            std::span<const ReplacedFrame> known) {
   std::vector<ReplacedFrame> out;
+  rig_deviation_ = std::move(deviation);
   const std::shared_ptr<const camera::Rig> before = std::exchange(rig_, std::move(rig));
   if (!frame::changes_frames(*before, *rig_)) return out;
   std::map<KeyframeId, std::shared_ptr<const frame::BundledFrame>> frames(known.begin(), known.end());

@@ -121,11 +121,12 @@ class BundledMap {
   void set_version(MapVersion v) { version_ = v; }
   // A keyframe and a frame that replaces its own: the same keypoints with other bearings.
   using ReplacedFrame = std::pair<KeyframeId, std::shared_ptr<const frame::BundledFrame>>;
-  // Replaces the calibration; the cameras must be the same. Poses and landmarks are not changed. Bearings are computed
-  // again if the intrinsics differ: those of `known` are taken as they are, if their keyframe is alive. Returns all
-  // frames that were replaced.
-  std::vector<ReplacedFrame> set_rig(std::shared_ptr<const camera::Rig> rig, std::span<const ReplacedFrame> known = {});
-  void set_rig_deviation(std::shared_ptr<const Eigen::MatrixXd> deviation) { rig_deviation_ = std::move(deviation); }
+  // Replaces the calibration and its deviation; the cameras must be the same. Poses and landmarks are not changed.
+  // Bearings are computed again if the intrinsics differ: those of `known` are taken as they are, if their keyframe is
+  // alive. Returns all frames that were replaced.
+  std::vector<ReplacedFrame> set_rig(std::shared_ptr<const camera::Rig> rig,
+                                     std::shared_ptr<const Eigen::MatrixXd> deviation = {},
+                                     std::span<const ReplacedFrame> known = {});
   void begin_gauge_epoch() { ++gauge_epoch_; }
 
   // Appends a keyframe that observes the given landmarks (alive; distinct features, distinct landmarks). Its parent is

@@ -116,8 +116,8 @@ void MapDraft::set_scale(Scale scale, double deviation) {
 
 void MapDraft::set_rig(camera::Rig rig, std::shared_ptr<const Eigen::MatrixXd> deviation) {
   const auto shared = std::make_shared<const camera::Rig>(std::move(rig));
-  working_.set_rig_deviation(deviation);
-  edit_.operations.emplace_back(SetRig{shared, std::move(deviation), working_.set_rig(shared)});
+  auto frames = working_.set_rig(shared, deviation);
+  edit_.operations.emplace_back(SetRig{shared, std::move(deviation), std::move(frames)});
 }
 
 MapDraft::Finished MapDraft::finish() && { return {std::move(edit_), std::move(working_)}; }

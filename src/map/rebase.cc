@@ -75,11 +75,7 @@ class Rebase {
   bool operator()(const RefreshLandmarks& op);
   bool operator()(const SetScale& op) { return map_.set_scale(op.scale, op.deviation), true; }
 
-  bool operator()(const SetRig& op) {
-    map_.set_rig(op.rig, op.frames);
-    map_.set_rig_deviation(op.deviation);
-    return true;
-  }
+  bool operator()(const SetRig& op) { return map_.set_rig(op.rig, op.deviation, op.frames), true; }
 
   RebaseReport take_report() && { return std::move(report_); }
   void count(bool was_applied) { ++(was_applied ? report_.applied : report_.dropped); }

@@ -90,8 +90,8 @@ TEST(PoseUncertainties, IncludeTheErrorOfTheCalibration) {
     geometry::Vector6d error;
     for (int i = 0; i < 6; ++i) error(i) = deviations(i) * random.normal();
     values.T_cam_rig[1] = values.T_cam_rig[1].perturbed(error);
-    world.map.set_rig(std::make_shared<const camera::Rig>(values.applied_to(world.map.rig())));
-    world.map.set_rig_deviation(std::make_shared<const Eigen::MatrixXd>(deviations.asDiagonal()));
+    world.map.set_rig(std::make_shared<const camera::Rig>(values.applied_to(world.map.rig())),
+                      std::make_shared<const Eigen::MatrixXd>(deviations.asDiagonal()));
     for (int k = 1; k < kKeyframes; ++k) adjust(window(world.map, k, 3, 3), kIndependent, world.map);
     sum += nees(world, KeyframeId(kKeyframes - 1));
     world.map.set_uncertainty(KeyframeId(kKeyframes - 1),
