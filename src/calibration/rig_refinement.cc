@@ -226,15 +226,28 @@ std::string_view verdict_name(Verdict verdict) {
   return "";
 }
 
-RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrated, const CalibrationOptions& options,
-                         const feature::FeatureModel& features, std::stop_token stop) {
-  RigRefinement out;
-  // Without metric scale, calibration errors in millimetres have no meaning in the map.
-  if (map.rig().size() < 2 || map.num_keyframes() == 0 || map.scale() != map::Scale::kMetric) return out;
-  const camera::Rig reference = with_time_offsets_of(map.rig(), calibrated);
+namespace {
+
+// Without metric scale, calibration errors in millimetres have no meaning in the map.
+bool can_refine(const map::BundledMap& map) {
+  return map.rig().size() >= 2 && map.num_keyframes() > 0 && map.scale() == map::Scale::kMetric;
+}
+
+// The prior of all parameters that are estimated from the map.
+solver::RigAdjustmentOptions prior_for(const map::BundledMap& map, const camera::Rig& calibrated,
+                                       const CalibrationOptions& options, const feature::FeatureModel& features,
+                                       const std::stop_token& stop) {
   solver::RigAdjustmentOptions prior = prior_of(calibrated, options);
-  prior.timing =
-      contradicted_timing(map, reference, timing_prior(map.rig(), calibrated, options), options, features, stop);
+  prior.timing = contradicted_timing(map, with_time_offsets_of(map.rig(), calibrated),
+                                     timing_prior(map.rig(), calibrated, options), options, features, stop);
+  return prior;
+}
+
+RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& calibrated,
+                                const solver::RigAdjustmentOptions& prior, const CalibrationOptions& options,
+                                const feature::FeatureModel& features, const std::stop_token& stop) {
+  RigRefinement out;
+  const camera::Rig reference = with_time_offsets_of(map.rig(), calibrated);
   RigProblem problem = choose(map, !prior.timing.empty(), options, features);
   problem.flat.problem.rig = &reference;
   out.keyframes = problem.flat.keyframes.size();
@@ -263,19 +276,42 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
   return out;
 }
 
+}  // namespace
+
+RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrated, const CalibrationOptions& options,
+                         const feature::FeatureModel& features, std::stop_token stop) {
+  if (!can_refine(map)) return {};
+  const auto prior = prior_for(map, calibrated, options, features, stop);
+  return refine_with_prior(map, calibrated, prior, options, features, stop);
+}
+
 bool accepted(const RigRefinement& refinement, const CalibrationOptions& options) {
   if (!refinement.done || options.refine == Refine::kFalse) return false;
   return options.refine == Refine::kTrue || refinement.verdict == Verdict::kInconsistent;
 }
 
+namespace {
+
+// Whether an earlier estimate has replaced the calibration.
+bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated) {
+  for (std::size_t c = 1; c < calibrated.size(); ++c) {
+    if (of_map.body_from_cam(c).matrix() != calibrated.body_from_cam(c).matrix()) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,
                                                 const CalibrationOptions& options,
                                                 const feature::FeatureModel& features, const std::stop_token& stop) {
-  if (options.refine == Refine::kFalse) return std::nullopt;
-  if (options.refine == Refine::kAuto) {
-    if (!accepted(refine_rig(map, calibrated, quick(options), features, stop), options)) return std::nullopt;
+  if (options.refine == Refine::kFalse || !can_refine(map)) return std::nullopt;
+  const auto prior = prior_for(map, calibrated, options, features, stop);
+  if (options.refine == Refine::kAuto && !replaced(map.rig(), calibrated)) {
+    const RigRefinement first = refine_with_prior(map, calibrated, prior, quick(options), features, stop);
+    if (!accepted(first, options)) return std::nullopt;
   }
-  RigRefinement out = refine_rig(map, calibrated, options, features, stop);
+  RigRefinement out = refine_with_prior(map, calibrated, prior, options, features, stop);
   return accepted(out, options) ? std::optional(std::move(out)) : std::nullopt;
 }
 

@@ -29,7 +29,7 @@ struct CalibrationOptions {
   Refine refine = Refine::kAuto;
   bool check = true;     // at the end of a run, estimate the calibration and report differences
   int keyframes = 120;   // maximum number, in segments of consecutive keyframes distributed over the map
-  int landmarks = 6000;  // maximum number, distributed over segments and cameras
+  int landmarks = 3000;  // maximum number, distributed over segments and cameras
   // Standard deviations of the given calibration: the prior of the estimate. Extrinsics: per axis. Focal lengths
   // and their ratio: relative. Principal points: per axis, of the image width. Distortion: of the model table
   // (camera/model_table.h).

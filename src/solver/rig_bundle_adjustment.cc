@@ -12,6 +12,9 @@ namespace {
 constexpr int kDensePoses = 150;
 constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed one, relative to the prior's
 
+// Convergence of all rounds but the last: they only determine which observations the next one uses.
+constexpr double kEarlyDecrease = 1e-4;
+
 struct Round {
   Kernel kernel;
   double max_chi2;  // maximum squared normalised error of observations that are used
@@ -221,10 +224,12 @@ bool run_round(const ReprojectionProblem& problem, const Round& round, const Cal
   const BundleStructure structure = make_structure(problem, chi2, beyond(chi2, round.max_chi2));
   if (structure.num_points() == 0) return false;
   BundleEquations equations(problem, structure, blocks.blocks, round.kernel, kDensePoses, std::move(state));
+  const bool last = &round == &kRounds.back();
+  const double decrease = last ? options.relative_decrease : std::max(kEarlyDecrease, options.relative_decrease);
   const LmSummary summary =
-      minimise(equations, {.iterations = options.iterations, .relative_decrease = options.relative_decrease}, stop);
+      minimise(equations, {.iterations = options.iterations, .relative_decrease = decrease}, stop);
   if (!summary.usable() || stop.stop_requested()) return false;
-  if (&round == &kRounds.back()) {
+  if (last) {
     out.final_cost = summary.final_cost;
     out.variance_factor = variance_factor(structure, blocks.size, summary.final_cost);
     out.values = equations.state().rig;
