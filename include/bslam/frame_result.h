@@ -43,7 +43,7 @@ struct CameraResult {
   // "" if ok, otherwise no-images, black, over-exposed, frozen, inconsistent, blurred or few-features. Points to static
   // storage.
   std::string_view reason;
-  int keypoints = 0;  // number of keypoints in the image
+  int keypoints = 0;  // number of keypoints in the image; without extraction: landmarks searched for in it
   int matched = 0;    // keypoints matched to landmarks of the map
   int inliers = 0;    // matched keypoints that are consistent with the pose
 };

@@ -58,14 +58,6 @@ struct Extractor::Scratch {
 
 namespace {
 
-// Returns true if the level-0 pixel nearest to (x, y) is not masked.
-bool allowed(const image::ImageView& mask, double x, double y) {
-  if (mask.empty()) return true;
-  const int column = std::clamp(static_cast<int>(std::lround(x)), 0, mask.width - 1);
-  const int row = std::clamp(static_cast<int>(std::lround(y)), 0, mask.height - 1);
-  return mask.at(column, row) != 0;
-}
-
 int max_keypoints(const FeatureOptions& options) { return FeatureOptions::kMaxFactorIfOthersFail * options.per_image; }
 
 Region inner_region(const image::Image& level) {
@@ -97,7 +89,7 @@ void Extractor::Scratch::detect(const image::Pyramid& pyramid, const image::Imag
     detector.detect(softened.view(), kBorder, threshold, level.corners);
     if (!mask.empty()) {
       std::erase_if(level.corners, [&](const Corner& c) {
-        return !allowed(mask, pyramid.to_base_x(l, c.x), pyramid.to_base_y(l, c.y));
+        return !image::allows(mask, pyramid.to_base_x(l, c.x), pyramid.to_base_y(l, c.y));
       });
     }
     distribution.non_maximum_suppression(level.corners, level.region, spacing, level.ranked);
@@ -118,7 +110,7 @@ void Extractor::Scratch::describe(const image::Pyramid& pyramid, std::size_t lev
     const Eigen::Vector2f offset = refine(image, corner.x, corner.y);
     const float x = static_cast<float>(corner.x) + offset.x(), y = static_cast<float>(corner.y) + offset.y();
     const Eigen::Vector2d pixel(pyramid.to_base_x(level, x), pyramid.to_base_y(level, y));
-    if (!allowed(mask, pixel.x(), pixel.y())) continue;
+    if (!image::allows(mask, pixel.x(), pixel.y())) continue;
     const std::optional<Eigen::Vector3d> bearing = camera.unproject(pixel);
     if (!bearing) continue;
     const float angle = orientation(intensity_moments(sample_window(image, x, y)));
@@ -140,14 +132,20 @@ Extractor& Extractor::operator=(Extractor&&) noexcept = default;
 
 void Extractor::extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
                         image::Pyramid& pyramid, Detections& detections, std::optional<int> budget) {
-  BSLAM_ASSERT(mask.empty() || (mask.width == image.width && mask.height == image.height),
-               "mask and image must have the same size");
+  image::build_pyramid(image, options_.levels, options_.scale_factor, pyramid);
+  extract(pyramid, mask, camera, detections, budget);
+}
+
+void Extractor::extract(const image::Pyramid& pyramid, const image::ImageView& mask, const camera::Camera& camera,
+                        Detections& detections, std::optional<int> budget) {
   const int wanted = std::clamp(budget.value_or(options_.per_image), 0, max_keypoints(options_));
   detections.clear();
   detections.reserve(static_cast<std::size_t>(wanted));
-  image::build_pyramid(image, options_.levels, options_.scale_factor, pyramid);
-  if (wanted == 0) return;
-  scratch_->smoothed.resize(image.width, image.height);  // memory for all levels, even if this image has no keypoint
+  if (wanted == 0 || pyramid.size() == 0) return;
+  const image::Image& base = pyramid.levels.front();
+  BSLAM_ASSERT(mask.empty() || (mask.width == base.width() && mask.height == base.height()),
+               "mask and image must have the same size");
+  scratch_->smoothed.resize(base.width(), base.height());  // memory for all levels, even if this image has no keypoint
   scratch_->detect(pyramid, mask, wanted, options_);
   for (std::size_t l = 0; l < pyramid.size(); ++l) {
     const LevelCorners& level = scratch_->levels[l];

@@ -61,6 +61,9 @@ class Extractor {
   // bearing in `camera`, or at which `mask` (same size as the image, or empty) is 0, are ignored.
   void extract(const image::ImageView& image, const image::ImageView& mask, const camera::Camera& camera,
                image::Pyramid& pyramid, Detections& detections, std::optional<int> budget = {});
+  // The same from the pyramid of the image.
+  void extract(const image::Pyramid& pyramid, const image::ImageView& mask, const camera::Camera& camera,
+               Detections& detections, std::optional<int> budget = {});
 
  private:
   struct Scratch;

@@ -1,6 +1,8 @@
 // 8-bit grey images: Image owns its pixels, ImageView refers to pixels owned elsewhere.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -17,6 +19,14 @@ struct ImageView {
   const std::uint8_t* row(int y) const { return data + y * stride; }
   std::uint8_t at(int x, int y) const { return row(y)[x]; }
 };
+
+// Returns true if the pixel of `mask` nearest to (x, y) is not 0, or the mask is empty.
+inline bool allows(const ImageView& mask, double x, double y) {
+  if (mask.empty()) return true;
+  const int column = std::clamp(static_cast<int>(std::lround(x)), 0, mask.width - 1);
+  const int row = std::clamp(static_cast<int>(std::lround(y)), 0, mask.height - 1);
+  return mask.at(column, row) != 0;
+}
 
 class Image {
  public:

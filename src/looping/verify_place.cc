@@ -102,9 +102,9 @@ std::vector<LandmarkId> expected_landmarks(const camera::Rig& rig, const frame::
   std::vector<LandmarkId> out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (frame.cameras[c].keypoints.empty()) continue;
-    for (const std::uint32_t i : matching::visible_points(rig, CameraIndex(c), rig.cam_from_rig(c) * T_rig_world,
-                                                          place.points, max_viewing_angle)) {
-      out.push_back(place.landmarks[i]);
+    for (const auto& visible : matching::visible_points(rig, CameraIndex(c), rig.cam_from_rig(c) * T_rig_world,
+                                                        place.points, max_viewing_angle)) {
+      out.push_back(place.landmarks[visible.point]);
     }
   }
   std::sort(out.begin(), out.end());

@@ -9,34 +9,55 @@
 namespace bslam::matching {
 
 FrameBuilder::FrameBuilder(std::size_t cameras, const feature::FeatureOptions& options, std::vector<image::Image> masks)
-    : masks_(std::move(masks)), combined_masks_(cameras), pyramids_(cameras) {
+    : shape_(options.model().pyramid),
+      masks_(std::move(masks)),
+      combined_masks_(cameras),
+      pyramids_(cameras),
+      current_masks_(cameras) {
   masks_.resize(cameras);
   for (std::size_t i = 0; i < cameras; ++i) extractors_.emplace_back(options);
 }
 
-frame::BundledFrame FrameBuilder::extract(const camera::Rig& rig, const image::ImageBundle& images, ThreadPool& pool,
-                                          std::span<const std::uint8_t> skipped, std::span<const int> budgets) {
-  BSLAM_ASSERT(rig.size() == pyramids_.size() && images.images.size() == rig.size(),
-               "there must be one image entry per camera of the rig");
-  BSLAM_ASSERT(budgets.empty() || budgets.size() == rig.size(), "there must be one budget per camera of the rig");
+frame::BundledFrame FrameBuilder::begin(const image::ImageBundle& images, ThreadPool& pool,
+                                        std::span<const std::uint8_t> skipped) {
+  BSLAM_ASSERT(images.images.size() == pyramids_.size(), "there must be one image entry per camera of the rig");
   frame::BundledFrame frame;
   frame.id = images.id;
   frame.time_ns = images.time_ns;
-  frame.cameras.resize(rig.size());
-  pool.for_each(rig.size(), [&](std::size_t i) {
+  frame.cameras.resize(pyramids_.size());
+  pool.for_each(pyramids_.size(), [&](std::size_t i) {
     const image::CameraImage& input = images.images[i];
     frame::CameraFrame& camera = frame.cameras[i];
     camera.state = !skipped.empty() && skipped[i] ? image::ImageState::kMissing : input.state;
     camera.time_ns = input.time_ns;
+    current_masks_[i] = {};
     if (camera.state == image::ImageState::kPresent) {
-      const std::optional<int> budget = budgets.empty() ? std::nullopt : std::optional(budgets[i]);
-      feature::Detections detections;
-      extractors_[i].extract(input.view(), mask_of(i, input), rig.camera(i), pyramids_[i], detections, budget);
-      camera.keypoints = std::move(detections);
+      image::build_pyramid(input.view(), shape_.levels, shape_.scale_factor, pyramids_[i]);
+      current_masks_[i] = mask_of(i, input);
     } else {
       pyramids_[i].levels.clear();
     }
   });
+  return frame;
+}
+
+void FrameBuilder::extract(const camera::Rig& rig, frame::BundledFrame& frame, ThreadPool& pool,
+                           std::span<const int> budgets) {
+  BSLAM_ASSERT(rig.size() == pyramids_.size(), "the rig must have one camera per image");
+  BSLAM_ASSERT(budgets.empty() || budgets.size() == rig.size(), "there must be one budget per camera of the rig");
+  pool.for_each(rig.size(), [&](std::size_t i) {
+    if (frame.cameras[i].state != image::ImageState::kPresent) return;
+    const std::optional<int> budget = budgets.empty() ? std::nullopt : std::optional(budgets[i]);
+    feature::Detections detections;
+    extractors_[i].extract(pyramids_[i], current_masks_[i], rig.camera(i), detections, budget);
+    frame.cameras[i].keypoints = std::move(detections);
+  });
+}
+
+frame::BundledFrame FrameBuilder::extract(const camera::Rig& rig, const image::ImageBundle& images, ThreadPool& pool,
+                                          std::span<const std::uint8_t> skipped, std::span<const int> budgets) {
+  frame::BundledFrame frame = begin(images, pool, skipped);
+  extract(rig, frame, pool, budgets);
   return frame;
 }
 

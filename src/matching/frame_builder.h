@@ -1,4 +1,4 @@
-// Extraction of the keypoints of all cameras of a frame, in parallel.
+// Pyramids and keypoints of all cameras of a frame, computed in parallel.
 #pragma once
 
 #include <vector>
@@ -11,29 +11,39 @@
 
 namespace bslam::matching {
 
-// Owns the extractors and the pyramids of the last extracted frame, which are needed for sub-pixel alignment in
-// tracking and replaced by the next extraction. Masks: one per camera; an empty image means no mask. Images may have
+// Owns the extractors and the pyramids of the last frame, which are needed for alignment in tracking and replaced by
+// those of the next frame. Masks: one per camera; an empty image means no mask. Images may have
 // masks of their own (image/image_bundle.h); a pixel is ignored if either mask is 0.
 class FrameBuilder {
  public:
   FrameBuilder(std::size_t cameras, const feature::FeatureOptions& options, std::vector<image::Image> masks);
 
-  // Extracts the keypoints of all images; the Bundled table of the result is empty. Cameras with skipped[i] != 0
-  // (empty: no camera) are treated as if they had no image. budgets[i]: maximum number of keypoints of camera i (empty:
-  // per_image of the options).
+  // Builds the pyramids of all images. The result has no keypoints. Cameras with skipped[i] != 0 (empty: no camera) are
+  // treated as if they had no image.
+  frame::BundledFrame begin(const image::ImageBundle& images, ThreadPool& pool,
+                            std::span<const std::uint8_t> skipped = {});
+
+  // Extracts the keypoints of all images of the frame that was begun last. budgets[i]: maximum number of keypoints of
+  // camera i (empty: per_image of the options). The Bundled table of the frame stays empty.
+  void extract(const camera::Rig& rig, frame::BundledFrame& frame, ThreadPool& pool, std::span<const int> budgets = {});
+
+  // Both steps.
   frame::BundledFrame extract(const camera::Rig& rig, const image::ImageBundle& images, ThreadPool& pool,
                               std::span<const std::uint8_t> skipped = {}, std::span<const int> budgets = {});
 
-  // Pyramids of the last extracted frame; empty for cameras without an image.
+  // Pyramids and masks of the frame that was begun last; empty for cameras without an image, without a mask.
   std::span<const image::Pyramid> pyramids() const { return pyramids_; }
+  std::span<const image::ImageView> masks() const { return current_masks_; }
 
  private:
   image::ImageView mask_of(std::size_t camera, const image::CameraImage& image);
 
+  feature::PyramidShape shape_;
   std::vector<feature::Extractor> extractors_;
   std::vector<image::Image> masks_;
   std::vector<image::Image> combined_masks_;  // of images that have a mask and whose camera has one
   std::vector<image::Pyramid> pyramids_;
+  std::vector<image::ImageView> current_masks_;
 };
 
 }  // namespace bslam::matching

@@ -137,13 +137,14 @@ std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::
   return out;
 }
 
-std::vector<std::uint32_t> visible_points(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common,
-                                          std::span<const SearchPoint> points, double max_view_angle) {
+std::vector<VisiblePoint> visible_points(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common,
+                                         std::span<const SearchPoint> points, double max_view_angle) {
   const double min_cosine = std::cos(max_view_angle);
-  std::vector<std::uint32_t> out;
+  std::vector<VisiblePoint> out;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!visible_projection(rig.camera(c), rig.shutter(c.index()), T_cam_common, points[i], min_cosine)) continue;
-    out.push_back(static_cast<std::uint32_t>(i));
+    const auto projected =
+        visible_projection(rig.camera(c), rig.shutter(c.index()), T_cam_common, points[i], min_cosine);
+    if (projected) out.push_back({static_cast<std::uint32_t>(i), projected->pixel, projected->distance});
   }
   return out;
 }

@@ -66,8 +66,15 @@ std::vector<ProjectionSearchResult> search_cameras(const camera::Rig& rig, const
 // Poses of the cameras of a rig at `T_rig_common`.
 std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::SE3& T_rig_common);
 
-// Indices of the points predicted visible in a camera; see ProjectionSearchResult::visible. `max_view_angle`: radians.
-std::vector<std::uint32_t> visible_points(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common,
-                                          std::span<const SearchPoint> points, double max_view_angle);
+// A point predicted visible in a camera.
+struct VisiblePoint {
+  std::uint32_t point = 0;
+  Eigen::Vector2d pixel;  // level-0 pixels
+  double distance = 0;    // metres
+};
+
+// The points predicted visible in a camera, in order; see ProjectionSearchResult::visible. `max_view_angle`: radians.
+std::vector<VisiblePoint> visible_points(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common,
+                                         std::span<const SearchPoint> points, double max_view_angle);
 
 }  // namespace bslam::matching

@@ -30,15 +30,16 @@ execution::JournalStep journal_step(tracking::ProposedEdit::Kind kind) {
 
 // Observations about each camera after the frame was tracked.
 std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images, const tracking::ImageFaults& faults,
-                                               const tracking::FramePlan& plan, const tracking::TrackResult& result) {
+                                               const tracking::FramePlan& plan, const tracking::FrameRecord& record) {
   std::vector<tracking::CameraEvidence> out;
   for (std::size_t c = 0; c < images.images.size(); ++c) {
-    const tracking::CameraCounts& counts = result.cameras[c];
+    const tracking::CameraCounts& counts = record.result.cameras[c];
     out.push_back({.image = images.images[c].state,
                    .outage = faults.outage[c],
                    .blurred = faults.blurred[c] != 0,
                    .inconsistent = counts.excluded,
                    .postponed = plan.postponed[c] != 0,
+                   .extracted = !record.direct,
                    .keypoints = counts.keypoints,
                    .inliers = counts.inliers});
   }
@@ -65,24 +66,8 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   const tracking::FramePlan plan = tracker_.plan(images, faults, state_);
 
   std::vector<StageTime> stages;
-  const auto timed = [&stages](std::string_view stage, const Stopwatch& watch) {
-    stages.push_back({stage, watch.ms()});
-  };
-  const Stopwatch extraction;
-  const BundledFrame detected = extract(images, plan);
-  timed("extract", extraction);
-  const Stopwatch bundling;
-  BundledFrame frame = bundle(plan, detected);
-  timed("bundle", bundling);
-  const Stopwatch results;
-  outcome.seen = executor.begin_frame(frame.id);
-  const bool recalibrated = adopt_rig(*outcome.seen, frame);
-  if (config_.mode == execution::Mode::kLagged) timed("results", results);
-
-  tracking::TrackOutcome tracked =
-      tracker_.process(std::move(state_), std::move(frame), builder_.pyramids(), outcome.seen);
+  tracking::TrackOutcome tracked = track(images, plan, executor, outcome, stages);
   tracked.record.scale = outcome.seen->scale();
-  tracked.record.recalibrated = recalibrated;
   if (tracked.edit) commit(tracked, executor, outcome);
   state_ = std::move(tracked.next);
   outcome.early = std::move(tracked.early);
@@ -90,10 +75,48 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   outcome.record = std::move(tracked.record);
   FrameRecord& record = outcome.record;
   record.stages.insert(record.stages.begin(), stages.begin(), stages.end());
-  record.cameras = status_.update(evidence(images, faults, plan, record.result));
+  record.cameras = status_.update(evidence(images, faults, plan, record));
   for (const image::CameraImage& i : images.images) record.images.push_back(i.state);
   record.frame_ms = whole.ms();
   return outcome;
+}
+
+// Tracks the frame without features if possible. Its features are extracted otherwise, before the map is needed if this
+// is known from the start.
+tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const tracking::FramePlan& plan,
+                                       execution::StageExecutor& executor, Outcome& outcome,
+                                       std::vector<StageTime>& stages) {
+  Stopwatch watch;
+  const auto end_stage = [&](std::string_view stage) {
+    stages.push_back({stage, watch.ms()});
+    watch = Stopwatch();
+  };
+  BundledFrame frame = begin(images, plan);
+  end_stage("pyramids");
+  const auto add_features = [&] {
+    builder_.extract(*rig_, frame, pool_, plan.budgets);
+    end_stage("extract");
+    frame = bundle(plan, frame);
+    end_stage("bundle");
+  };
+  const bool directly = tracker_.tracks_directly(state_);
+  if (!directly) add_features();
+  outcome.seen = executor.begin_frame(frame.id);
+  const bool recalibrated = adopt_rig(*outcome.seen, frame);
+  if (config_.mode == execution::Mode::kLagged) end_stage("results");
+
+  tracking::DirectHint hint;
+  std::optional<tracking::TrackOutcome> found;
+  if (directly) {
+    found = tracker_.process_directly(state_, frame, {builder_.pyramids(), builder_.masks()}, outcome.seen, hint);
+    if (!found) {
+      end_stage("align");
+      add_features();
+    }
+  }
+  if (!found) found = tracker_.process(std::move(state_), std::move(frame), builder_.pyramids(), outcome.seen, hint);
+  found->record.recalibrated = recalibrated;
+  return *std::move(found);
 }
 
 // Continues with the rig of the map. Returns whether a stage has replaced it since the last frame.
@@ -117,11 +140,13 @@ void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor&
 
 BundledFrame Pipeline::make_frame(const image::ImageBundle& images) {
   const tracking::FramePlan plan = tracker_.plan();
-  return bundle(plan, extract(images, plan));
+  BundledFrame frame = begin(images, plan);
+  builder_.extract(*rig_, frame, pool_, plan.budgets);
+  return bundle(plan, frame);
 }
 
-BundledFrame Pipeline::extract(const image::ImageBundle& images, const tracking::FramePlan& plan) {
-  BundledFrame frame = builder_.extract(*rig_, images, pool_, plan.skipped, plan.budgets);
+BundledFrame Pipeline::begin(const image::ImageBundle& images, const tracking::FramePlan& plan) {
+  BundledFrame frame = builder_.begin(images, pool_, plan.skipped);
   frame.twist = plan.twist;
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     const TimeNs correction = rig_->camera(c).time_offset_ns - given_.camera(c).time_offset_ns;

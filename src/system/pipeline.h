@@ -1,5 +1,6 @@
-// Processing of a frame in the caller's thread: camera monitoring, extraction, bundling, tracking, commit. Decisions
-// are made by the tracker (tracking/tracker.h); background stages are run by the executor.
+// Processing of a frame in the caller's thread: camera monitoring, pyramids, direct tracking or extraction, bundling
+// and tracking, commit. Decisions are made by the tracker (tracking/tracker.h); background stages are run by the
+// executor.
 #pragma once
 
 #include <memory>
@@ -46,7 +47,9 @@ class Pipeline {
   const tracking::Tracker& tracker() const { return tracker_; }
 
  private:
-  frame::BundledFrame extract(const image::ImageBundle& images, const tracking::FramePlan& plan);
+  tracking::TrackOutcome track(const image::ImageBundle& images, const tracking::FramePlan& plan,
+                               execution::StageExecutor& executor, Outcome& outcome, std::vector<StageTime>& stages);
+  frame::BundledFrame begin(const image::ImageBundle& images, const tracking::FramePlan& plan);
   frame::BundledFrame bundle(const tracking::FramePlan& plan, const frame::BundledFrame& frame);
   bool adopt_rig(const map::BundledMap& map, frame::BundledFrame& frame);
   void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);

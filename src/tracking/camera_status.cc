@@ -16,6 +16,12 @@ constexpr double kHealthyInlierRatio = 0.1, kMaxInconsistentInlierRatio = 0.02;
 constexpr double kMinKeypoints = 1000;
 constexpr int kMinFrames = 10;
 
+// Whether the number of keypoints tells something about the image.
+bool counts_features(const CameraEvidence& e) {
+  return e.extracted && e.image == image::ImageState::kPresent && e.outage == CameraReason::kNone && !e.inconsistent &&
+         !e.postponed;
+}
+
 }  // namespace
 
 std::string_view describe(CameraState state) {
@@ -84,7 +90,7 @@ CameraStatus CameraStatusMonitor::status(const CameraEvidence& evidence, std::si
   if (!image_is_good) return {CameraState::kOut, evidence.outage};
   if (evidence.inconsistent) return {CameraState::kOut, CameraReason::kInconsistent};
   if (evidence.postponed) return {};
-  if (evidence.keypoints < kFewKeypoints) return {CameraState::kDegraded, CameraReason::kFewFeatures};
+  if (cameras_[camera].few_features) return {CameraState::kDegraded, CameraReason::kFewFeatures};
   if (is_inconsistent(camera)) return {CameraState::kDegraded, CameraReason::kInconsistent};
   return {};
 }
@@ -94,6 +100,7 @@ std::vector<CameraStatus> CameraStatusMonitor::update(std::span<const CameraEvid
   const bool any_agrees = std::ranges::any_of(evidence, [](const CameraEvidence& e) { return e.inliers > 0; });
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     record_image(evidence[c].image == image::ImageState::kPresent, cameras_[c]);
+    if (counts_features(evidence[c])) cameras_[c].few_features = evidence[c].keypoints < kFewKeypoints;
     if (!any_agrees || evidence[c].keypoints == 0) continue;
     cameras_[c].keypoints += evidence[c].keypoints;
     cameras_[c].inliers += evidence[c].inliers;

@@ -45,6 +45,7 @@ struct CameraEvidence {
   bool blurred = false;
   bool inconsistent = false;  // excluded by tracking (tracking/camera_consensus.h)
   bool postponed = false;     // not used: it captures after camera 0, and the motion until then is not known
+  bool extracted = true;      // false: the frame was tracked directly, and `keypoints` are landmarks searched for
   int keypoints = 0, inliers = 0;
 };
 
@@ -67,6 +68,7 @@ class CameraStatusMonitor {
     std::size_t num_steps = 0;          // total number of intervals so far
     double keypoints = 0, inliers = 0;  // sums over the frames in which some camera has inliers
     int frames = 0;                     // number of these frames
+    bool few_features = false;          // in the last image whose features were extracted
   };
   static void record_image(bool present, Camera& camera);
   static bool between_images(const Camera& camera);

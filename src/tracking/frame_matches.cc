@@ -71,16 +71,13 @@ FrameMatches merge(const FrameMatches& a, const FrameMatches& b) {
   return out;
 }
 
-namespace {
-
-// Aligns one matched keypoint to its landmark's reference patch.
-std::optional<matching::AlignedKeypoint> align_to_reference(const map::BundledMap& map, const camera::Camera& camera,
-                                                            const SE3& T_cam_world, const image::Pyramid& pyramid,
-                                                            const map::Landmark& landmark,
-                                                            const Eigen::Vector2d& initial,
-                                                            const matching::AlignmentOptions& options) {
-  const map::LandmarkReference& reference = landmark.reference;
-  const camera::Rig& rig = map.rig();
+std::optional<matching::AlignedKeypoint> align_landmark(const map::BundledMap& map, const camera::Rig& rig,
+                                                        std::size_t c, const SE3& T_rig_world,
+                                                        const image::Pyramid& pyramid, LandmarkId landmark,
+                                                        const Eigen::Vector2d& initial,
+                                                        const matching::AlignmentOptions& options) {
+  const map::Landmark& l = map.landmark(landmark);
+  const map::LandmarkReference& reference = l.reference;
   const feature::Keypoints& keypoints = map.keypoints(reference.keyframe, reference.keypoint.camera);
   const std::size_t k = reference.keypoint.keypoint.index();
   const SE3 T_ref_world = map.cam_from_world(reference.keyframe, reference.keypoint.camera);
@@ -88,13 +85,12 @@ std::optional<matching::AlignedKeypoint> align_to_reference(const map::BundledMa
   const std::size_t level = keypoints.level[k];
   const double scale =
       level < pyramid.size() ? pyramid.scale_x[level] : map.pyramid().scale(static_cast<double>(level));
-  const auto warp = matching::patch_warp(rig.camera(reference.keypoint.camera), camera,
-                                         T_cam_world * T_ref_world.inverse(), T_ref_world * landmark.position, scale);
+  const SE3 T_cam_ref = rig.cam_from_rig(c) * T_rig_world * T_ref_world.inverse();
+  const auto warp = matching::patch_warp(map.rig().camera(reference.keypoint.camera), rig.camera(c), T_cam_ref,
+                                         T_ref_world * l.position, scale);
   if (!warp) return std::nullopt;
   return matching::align_patch(keypoints.patch[k], *warp, pyramid, initial, options);
 }
-
-}  // namespace
 
 AlignedMatches align_matches(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
                              FrameMatches& matches, std::span<const image::Pyramid> pyramids,
@@ -105,11 +101,10 @@ AlignedMatches align_matches(const map::BundledMap& map, const frame::BundledFra
   pool.for_each(matches.size(), [&](std::size_t c) {
     out[c].reserve(matches[c].size());
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
-    const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
     for (Match& m : matches[c]) {
       const std::size_t k = m.keypoint.index();
-      const auto aligned = align_to_reference(map, rig.camera(c), T_cam_world, pyramids[c], map.landmark(m.landmark),
-                                              keypoints.pixel[k].cast<double>(), alignment[c]);
+      const auto aligned = align_landmark(map, rig, c, T_rig_world, pyramids[c], m.landmark,
+                                          keypoints.pixel[k].cast<double>(), alignment[c]);
       const auto bearing = aligned ? rig.camera(c).unproject(aligned->pixel) : std::nullopt;
       m.aligned = bearing.has_value();
       if (bearing) {

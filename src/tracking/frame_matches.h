@@ -54,6 +54,14 @@ struct AlignedMatch {
 // Per camera, in the order of the matches.
 using AlignedMatches = std::vector<std::vector<AlignedMatch>>;
 
+// Aligns the image of a landmark to its reference patch, starting at `initial`, a pixel of the image of camera c, with
+// the camera poses of `rig` at T_rig_world. Returns nullopt if it cannot be aligned; see matching::align_patch.
+std::optional<matching::AlignedKeypoint> align_landmark(const map::BundledMap& map, const camera::Rig& rig,
+                                                        std::size_t c, const geometry::SE3& T_rig_world,
+                                                        const image::Pyramid& pyramid, LandmarkId landmark,
+                                                        const Eigen::Vector2d& initial,
+                                                        const matching::AlignmentOptions& options);
+
 // Aligns each matched keypoint of `frame` to the reference patch of its landmark as seen from `T_rig_world`, and sets
 // Match::aligned. A keypoint whose patch cannot be aligned keeps its position, with the detector's standard deviation.
 // `pyramids` and `alignment`: one per camera.

@@ -31,6 +31,24 @@ bool untracked_depth(const frame::BundledFrame& frame, const FrameMatches& inlie
 
 }  // namespace
 
+namespace {
+
+bool observes(const map::BundledMap& map, KeyframeId k, LandmarkId l) {
+  return std::ranges::any_of(map.observations(l), [&](const map::Observation& o) { return o.keyframe == k; });
+}
+
+}  // namespace
+
+std::vector<int> overlap_by_camera(const map::BundledMap& map, const FrameMatches& inliers, KeyframeId reference) {
+  std::vector<int> out;
+  for (const std::vector<Match>& camera : inliers) {
+    const auto shared =
+        std::ranges::count_if(camera, [&](const Match& m) { return observes(map, reference, m.landmark); });
+    out.push_back(static_cast<int>(shared));
+  }
+  return out;
+}
+
 KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::BundledFrame& frame,
                                    const FrameMatches& inliers, KeyframeId reference, const geometry::SE3& T_rig_world,
                                    const TrackingOptions& options) {
@@ -39,10 +57,7 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
   const Eigen::Vector3d centre_then = map.resolved_pose(reference).inverse().translation();
   std::vector<double> parallaxes;
   for (const LandmarkId l : landmarks_of(inliers)) {
-    const auto observations = map.observations(l);
-    const bool shared = std::any_of(observations.begin(), observations.end(),
-                                    [&](const map::Observation& o) { return o.keyframe == reference; });
-    if (!shared) continue;
+    if (!observes(map, reference, l)) continue;
     const Eigen::Vector3d& p = map.landmark(l).position;
     parallaxes.push_back(geometry::angle_between(p - centre_now, p - centre_then));
   }

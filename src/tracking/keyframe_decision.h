@@ -22,6 +22,9 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
                                    const FrameMatches& inliers, KeyframeId reference, const geometry::SE3& T_rig_world,
                                    const TrackingOptions& options);
 
+// Per camera: the number of inliers whose landmark the reference keyframe observes.
+std::vector<int> overlap_by_camera(const map::BundledMap& map, const FrameMatches& inliers, KeyframeId reference);
+
 bool keyframe_due(const KeyframeEvidence& evidence, const KeyframeOptions& options);
 
 }  // namespace bslam::tracking

@@ -139,7 +139,44 @@ struct ConsensusOptions {
   }
 };
 
+// How the pose of a frame between keyframes is found.
+enum class FrontEnd {
+  kFeatures,  // from extracted features, in every frame
+  kDirect,    // from landmarks aligned directly in the images; from features where this does not suffice
+  kAuto,      // as kDirect, with pauses while the alignment fails
+};
+
+// Direct tracking (tracking/track_directly.h).
+struct DirectOptions {
+  int per_image = 300;         // maximum number of landmarks aligned in an image
+  int per_rig = 900;           // the same in all images of a frame
+  int coarse_per_image = 60;   // landmarks of the coarsest levels that are aligned first
+  double coarse_shift_px = 4;  // px of the level, maximum distance of these from their predicted positions
+  // As KeyframeOptions::min_overlap. Landmarks are aligned from farther away than they are detected again.
+  double min_overlap = 0.85;
+  // Features are extracted if a camera has fewer inliers than this fraction of its largest number since the last
+  // extraction.
+  double min_support = 0.6;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor& visitor) {
+    visitor("per_image", self.per_image, Range{50, 20000}, "", "maximum number of landmarks aligned in an image");
+    visitor("per_rig", self.per_rig, Range{50, 100000}, "",
+            "maximum number of landmarks aligned in all images of a frame");
+    visitor("coarse_per_image", self.coarse_per_image, Range{10, 1000}, "",
+            "number of landmarks of coarse pyramid levels that are aligned first");
+    visitor("coarse_shift_px", self.coarse_shift_px, Range{0.5, 20}, "px of the level",
+            "maximum distance of these from their predicted positions");
+    visitor("min_overlap", self.min_overlap, Range{0, 1}, "",
+            "as tracking.keyframe.min_overlap, for frames without features");
+    visitor("min_support", self.min_support, Range{0, 1}, "",
+            "features are extracted if a camera has fewer inliers than this fraction of its largest number since the "
+            "last extraction");
+  }
+};
+
 struct TrackingOptions {
+  FrontEnd frontend = FrontEnd::kAuto;
   bool use_capture_times = true;  // the cameras of a frame have their own capture times; false: the time of the frame
   int min_inliers = 30;           // minimum number of inlier keypoints of a pose, all cameras together
   int min_inliers_wide = 50;      // the same after a search in wide windows
@@ -148,12 +185,17 @@ struct TrackingOptions {
   ConsensusOptions consensus;
   KeyframeOptions keyframe;
   InitialisationOptions initialisation;
+  DirectOptions direct;
   matching::AlignmentOptions alignment;
   map::LocalViewOptions local_view;
   solver::PoseSolverOptions pose;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
+    visitor("frontend", self.frontend, Range{}, "",
+            "features: features are extracted in every frame; direct: landmarks are aligned directly in the images "
+            "between keyframes; auto: the same, with pauses while this fails",
+            kCommon);
     visitor("use_capture_times", self.use_capture_times, Range{}, "",
             "use the capture time of each camera; false: the time of the frame",
             OptionNote{.common = true, .formerly = "own_times"});
@@ -167,6 +209,7 @@ struct TrackingOptions {
     visitor.section("consensus", self.consensus);
     visitor.section("keyframe", self.keyframe);
     visitor.section("initialisation", self.initialisation);
+    visitor.section("direct", self.direct);
     visitor.section("alignment", self.alignment);
     visitor.section("local_view", self.local_view);
     visitor.section("pose", self.pose);
@@ -174,3 +217,10 @@ struct TrackingOptions {
 };
 
 }  // namespace bslam::tracking
+
+template <>
+struct bslam::EnumNames<bslam::tracking::FrontEnd> {
+  static constexpr EnumName<tracking::FrontEnd> kNames[] = {{tracking::FrontEnd::kFeatures, "features"},
+                                                            {tracking::FrontEnd::kDirect, "direct"},
+                                                            {tracking::FrontEnd::kAuto, "auto"}};
+};

@@ -1,6 +1,5 @@
 #include "tracking/track.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cstdlib>
 #include <numeric>
@@ -9,39 +8,12 @@
 #include "tracking/keyframe_decision.h"
 #include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
+#include "tracking/track_output.h"
 
 namespace bslam::tracking {
 namespace {
 
 using geometry::SE3;
-
-// Landmarks of the last frame, and of the last image of cameras without an image in that frame, that still exist in the
-// map.
-std::vector<LandmarkId> last_landmarks(const map::BundledMap& map, const TrackerState& state) {
-  std::vector<LandmarkId> out;
-  const auto add = [&](const std::vector<LandmarkId>& landmarks) {
-    for (const LandmarkId l : landmarks) {
-      const LandmarkId now = map.resolve(l);
-      if (now.valid()) out.push_back(now);
-    }
-  };
-  add(state.landmarks);
-  for (const CameraConsensusState& camera : state.cameras) {
-    if (camera.last_image_ns != state.time_ns) add(camera.landmarks);
-  }
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
-  return out;
-}
-
-bool supported(const solver::PoseSolution& solution, std::size_t num_matches, int min_inliers,
-               const TrackingOptions& options) {
-  // Few inliers must be a sufficient fraction of the matches. More of them agree by chance with a smaller fraction.
-  constexpr double kFew = 100;
-  const double ratio = options.min_inlier_ratio * std::min(1.0, kFew / std::max(1, solution.num_inliers));
-  return solution.ok && solution.num_inliers >= min_inliers &&
-         solution.num_inliers >= ratio * static_cast<double>(num_matches);
-}
 
 struct Coarse {
   frame::BundledFrame frame;  // its twist is estimated together with the pose
@@ -172,6 +144,22 @@ Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& fram
   return out;
 }
 
+// The pose that was estimated before, without matches.
+Coarse estimated(const TrackInput& input, const frame::BundledFrame& frame) {
+  Coarse out{frame, input.estimate->T_rig_world, {}, LostReason::kNone, excluded(input.state, input.map.rig().size())};
+  out.matches.resize(frame.cameras.size());
+  out.frame.twist = motion_model(input, frame).twist(out.T_rig_world);
+  return out;
+}
+
+// The coarse pose: the one estimated before if all cameras support it or no other is found.
+Coarse coarse_pose(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
+                   ThreadPool& pool) {
+  if (input.estimate && input.estimate->all_cameras) return estimated(input, frame);
+  Coarse out = track_last_frame(input, frame, options, pool);
+  return input.estimate && out.reason != LostReason::kNone ? estimated(input, frame) : out;
+}
+
 bool any_due_for_retry(const TrackerState& state, TimeNs time_ns, const ConsensusOptions& options) {
   return std::ranges::any_of(state.cameras,
                              [&](const CameraConsensusState& c) { return due_for_retry(c, time_ns, options); });
@@ -199,8 +187,10 @@ std::vector<LandmarkCounts> landmark_counts(const MatchSearch& search) {
 Fine track_local_view(const TrackInput& input, const Coarse& coarse, const TrackingOptions& options, ThreadPool& pool) {
   const map::BundledMap& map = input.map;
   const frame::BundledFrame& frame = coarse.frame;
+  const bool any_matches = count(coarse.matches) > 0;
+  const std::vector<LandmarkId> seeds = any_matches ? landmarks_of(coarse.matches) : last_landmarks(map, input.state);
   const std::vector<LandmarkId> near =
-      map::local_landmarks(map, landmarks_of(coarse.matches), input.state.anchored.reference, options.local_view);
+      map::local_landmarks(map, seeds, input.state.anchored.reference, options.local_view);
   MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, near, coarse.matches,
                                       search_options(input, options.matching, options.matching.local_radius), pool);
   Fine out;
@@ -233,122 +223,36 @@ frame::BundledFrame refined_frame(const camera::Rig& rig, const Coarse& coarse, 
   return frame;
 }
 
-std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const FrameMatches& matched,
-                                        const FrameMatches& inliers) {
-  std::vector<CameraCounts> counts(frame.cameras.size());
-  for (std::size_t c = 0; c < counts.size(); ++c) {
-    counts[c].keypoints = static_cast<int>(frame.cameras[c].keypoints.size());
-    if (c < matched.size()) counts[c].matched = static_cast<int>(matched[c].size());
-    if (c < inliers.size()) counts[c].inliers = static_cast<int>(inliers[c].size());
-  }
-  return counts;
-}
-
-// Each landmark predicted visible counts once, even if it is visible in several cameras.
-void count_visibility(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found,
-                      TrackerState& state) {
-  for (const LandmarkId l : found) state.visibility_counts.push_back({l, 1, 1});
-  for (const LandmarkId l : visible) {
-    if (!std::binary_search(found.begin(), found.end(), l)) state.visibility_counts.push_back({l, 1, 0});
-  }
-}
-
 // Updates the states of the cameras for the next frame.
-void update_cameras(const frame::BundledFrame& frame, const Coarse& coarse, const Fine& fine,
-                    const FrameMatches& inliers, const TrackingOptions& options, TrackOutput& out) {
-  std::vector<CameraConsensusState>& cameras = out.state.cameras;
-  cameras.resize(inliers.size());
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    CameraConsensusState& camera = cameras[c];
+void update_cameras(const Coarse& coarse, const Fine& fine, const ConsensusOptions& options, TrackOutput& out) {
+  const frame::BundledFrame& frame = out.frame;
+  for (std::size_t c = 0; c < out.state.cameras.size(); ++c) {
+    CameraConsensusState& camera = out.state.cameras[c];
     out.result.cameras[c].excluded = coarse.excluded[c];
     if (coarse.excluded[c]) {
-      update_exclusion(camera, fine.views[c], frame.time_ns, options.consensus);
+      update_exclusion(camera, fine.views[c], frame.time_ns, options);
       const bool tried = !fine.wide.empty() && fine.wide[c].expected > 0;
-      if (tried && due_for_retry(camera, frame.time_ns, options.consensus))
-        retry(camera, fine.wide[c], frame.time_ns, options.consensus);
+      if (tried && due_for_retry(camera, frame.time_ns, options)) retry(camera, fine.wide[c], frame.time_ns, options);
       continue;
     }
-    if (frame.cameras[c].state != image::ImageState::kPresent) {
-      if (to_seconds(frame.time_ns - camera.last_image_ns) > kMaxPrediction_s)
-        camera.landmarks.clear();  // too old: the view may have changed since
-      continue;
-    }
-    if (!coarse.reobserved.empty()) update_reobservation_ratio(camera, coarse.reobserved[c], options.consensus);
-    camera.last_image_ns = frame.time_ns;
-    camera.established |= static_cast<int>(inliers[c].size()) >= options.consensus.min_expected;
-    camera.landmarks.clear();
-    for (const Match& m : inliers[c]) camera.landmarks.push_back(m.landmark);
+    const bool present = frame.cameras[c].state == image::ImageState::kPresent;
+    if (present && !coarse.reobserved.empty()) update_reobservation_ratio(camera, coarse.reobserved[c], options);
+    update_used_camera(frame, c, out.matches[c], options, camera);
   }
 }
 
-}  // namespace
-
-TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, LostReason reason) {
-  TrackOutput out;
-  out.result.frame = frame.id;
-  out.result.time_ns = frame.time_ns;
-  out.result.status = TrackStatus::kLost;
-  out.result.reason = reason;
-  out.result.cameras = camera_counts(frame, {}, {});
-  out.state = state;
-  out.state.status = TrackStatus::kLost;
-  return out;
-}
-
-namespace {
-
-// The noise of the image relative to the map, and the error of the reference keyframe. The noise is the inverse of the
-// information, corrected for the inliers that the bound on their errors has cut off.
-geometry::Matrix6d covariance_of(const solver::PoseSolution& solution, const map::BundledMap& map,
-                                 const map::AnchoredPose& anchored) {
-  const geometry::Matrix6d noise =
-      solver::kFractionLeft / solver::kVarianceLeft * solution.information.ldlt().solve(geometry::Matrix6d::Identity());
-  const geometry::PoseUncertainty of_reference =
-      geometry::transported(map.keyframe(anchored.reference).uncertainty, anchored.T_rig_reference);
-  const geometry::Matrix6d covariance = noise + of_reference.covariance();
-  return 0.5 * (covariance + covariance.transpose());
-}
-
-TrackOutput tracked(const TrackInput& input, const Coarse& coarse, const Fine& fine, const TrackingOptions& options) {
-  const map::BundledMap& map = input.map;
-  TrackOutput out;
-  out.frame = refined_frame(map.rig(), coarse, fine, options.initialisation);
-  const frame::BundledFrame& frame = out.frame;
-  out.matches = keep_inliers(fine.matches, fine.solution.inlier);
-  TrackResult& result = out.result;
-  result.frame = frame.id;
-  result.time_ns = frame.time_ns;
-  result.status = TrackStatus::kTracking;
-  result.reason = LostReason::kNone;
-  result.T_rig_world = fine.solution.T_rig_world;
-  result.cameras = camera_counts(frame, fine.matches, out.matches);
-
+TrackOutput tracked(const TrackInput& input, const Coarse& coarse, Fine fine, const TrackingOptions& options) {
+  frame::BundledFrame refined = refined_frame(input.map.rig(), coarse, fine, options.initialisation);
+  TrackOutput out = output_of(input, {std::move(refined), fine.solution, fine.matches, fine.visible});
+  update_cameras(coarse, fine, options.consensus, out);
   TrackerState& state = out.state;
-  state = input.state;
-  state.anchored =
-      map::AnchoredPose::at(map, map.nearest_alive_ancestor(input.state.anchored.reference), result.T_rig_world);
-  result.anchored = state.anchored;
-  result.covariance = covariance_of(fine.solution, map, result.anchored);
-
-  const double dt = to_seconds(frame.time_ns - input.state.time_ns);
-  state.twist.reset();
-  if (dt > 0 && dt <= kMaxPrediction_s) {
-    state.twist = (result.T_rig_world * last_pose(input).inverse()).log() / dt;
-    state.twist_interval_s = dt;
-  }
-  state.status = TrackStatus::kTracking;
-  state.time_ns = frame.time_ns;
-  state.landmarks = landmarks_of(out.matches);
-  count_visibility(fine.visible, state.landmarks, state);
-  update_cameras(frame, coarse, fine, out.matches, options, out);
-
-  ++state.frames_since_keyframe;
   KeyframeEvidence evidence =
-      keyframe_evidence(map, frame, out.matches, state.anchored.reference, result.T_rig_world, options);
+      keyframe_evidence(input.map, out.frame, out.matches, state.anchored.reference, out.result.T_rig_world, options);
   state.best_overlap = std::max(state.best_overlap, evidence.overlap);
   evidence.best_overlap = state.best_overlap;
   evidence.frames_since_keyframe = state.frames_since_keyframe;
   out.keyframe_due = keyframe_due(evidence, options.keyframe);
+  state.direct = {};
   return out;
 }
 
@@ -362,7 +266,7 @@ TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, con
   if (!any_image) return lost(input.state, frame, LostReason::kNoImages);
   if (frame.num_keypoints() < static_cast<std::size_t>(options.min_inliers))
     return lost(input.state, frame, LostReason::kFewFeatures);
-  const Coarse coarse = track_last_frame(input, frame, options, pool);
+  const Coarse coarse = coarse_pose(input, frame, options, pool);
   if (coarse.reason != LostReason::kNone) return lost(input.state, frame, coarse.reason);
   const Fine fine = track_local_view(input, coarse, options, pool);
   if (!supported(fine.solution, count(fine.matches), options.min_inliers, options)) {

@@ -32,6 +32,8 @@ enum class LostReason {
 std::string_view describe(LostReason reason);
 
 struct CameraCounts {
+  // Extracted keypoints, those matched to landmarks, and inliers; in a frame that was tracked directly: landmarks
+  // searched for, aligned, and inliers.
   int keypoints = 0, matched = 0, inliers = 0;
   bool excluded = false;  // its image is not consistent with the map (tracking/camera_consensus.h)
 };
@@ -51,6 +53,12 @@ struct TrackResult {
   std::vector<CameraCounts> cameras;
 };
 
+// State of direct tracking since the last frame with extracted features.
+struct DirectState {
+  int frames = 0;                 // number of frames tracked directly
+  std::vector<int> best_inliers;  // per camera, largest number of inliers
+};
+
 // State of tracking that is carried from frame to frame.
 struct TrackerState {
   TrackStatus status = TrackStatus::kNotStarted;
@@ -62,6 +70,8 @@ struct TrackerState {
   std::vector<CameraConsensusState> cameras;  // empty until a frame was tracked
   int frames_since_keyframe = 0;
   int best_overlap = 0;  // maximum number of landmarks of the reference keyframe matched in a frame since then
+  std::vector<int> best_direct_overlap;  // per camera, the same of frames that were tracked directly
+  DirectState direct;
   std::vector<map::VisibilityCount> visibility_counts;  // not yet added to the map
 };
 
@@ -78,6 +88,12 @@ struct TrackOutput {
   bool keyframe_due = false;
 };
 
+// A pose that direct tracking found for a frame.
+struct EstimatedPose {
+  geometry::SE3 T_rig_world;
+  bool all_cameras = true;  // every camera supports it
+};
+
 struct TrackInput {
   const map::BundledMap& map;
   std::span<const image::Pyramid> pyramids;               // per camera
@@ -85,6 +101,8 @@ struct TrackInput {
   const TrackerState& state;
   feature::FeatureModel features = {};
   std::uint64_t seed = 1;
+  std::span<const image::ImageView> masks = {};  // per camera, an empty view if it has no mask; or empty
+  std::optional<EstimatedPose> estimate = {};    // if the pose of this frame was estimated before
 };
 
 // Estimates the pose of `frame`. The map must have at least one keyframe.

@@ -7,6 +7,7 @@
 #include "tracking/calibration_error.h"
 #include "tracking/feature_budget.h"
 #include "tracking/make_keyframe.h"
+#include "tracking/track_directly.h"
 
 namespace bslam::tracking {
 namespace {
@@ -68,6 +69,20 @@ void update_odometry(const map::BundledMap& map, const TrackerState& before, Tra
   record.root = map.root_of(record.result.anchored.reference);
 }
 
+// After a few failures in a row, the next frames are tracked with features.
+void pause_direct_tracking(const DirectHint& hint, FrontEndState& state) {
+  constexpr int kFailures = 3, kPause = 10;
+  if (state.direct_pause > 0) --state.direct_pause;
+  if (!hint.failed) return;
+  if (++state.direct_failures >= kFailures) state.direct_pause = kPause;
+}
+
+void count_features(const BundledFrame& frame, FrameRecord& record) {
+  record.unique = static_cast<int>(frame.bundled.size());
+  record.matched = static_cast<int>(frame.bundled.num_matched());
+  record.monocular = static_cast<int>(frame.bundled.num_monocular());
+}
+
 // Copies the motion from the state to the record.
 void record_motion(TrackOutcome& outcome) {
   if (is_tracking(outcome.record.result.status)) outcome.record.twist = outcome.next.track.twist;
@@ -118,15 +133,59 @@ FramePlan Tracker::plan() const {
   return plan;
 }
 
+bool Tracker::tracks_directly(const FrontEndState& state) const {
+  const FrontEnd front_end = options_.tracking.frontend;
+  if (front_end == FrontEnd::kFeatures || (front_end == FrontEnd::kAuto && state.direct_pause > 0)) return false;
+  return is_tracking(state.track.status) && state.track.twist &&
+         std::ranges::none_of(state.track.cameras, &CameraConsensusState::excluded);
+}
+
+std::optional<TrackOutcome> Tracker::process_directly(const FrontEndState& state, const BundledFrame& frame,
+                                                      const FrameImages& images, const map::MapSnapshot& map,
+                                                      DirectHint& hint) const {
+  const Stopwatch watch;
+  TrackOutcome outcome;
+  outcome.next = state;
+  TrackerState& track = outcome.next.track;
+  apply_scale_change(*map, track);
+  const auto alignment = this->alignment(state);
+  const TrackInput input{.map = *map,
+                         .pyramids = images.pyramids,
+                         .alignment = alignment,
+                         .state = track,
+                         .features = options_.features.model(),
+                         .seed = options_.seed,
+                         .masks = images.masks};
+  DirectOutput direct = track_directly(input, frame, options_.tracking, pool_);
+  const bool keyframe_due = direct.failure == DirectFailure::kKeyframeDue;
+  if (direct.failure != DirectFailure::kNone && !(keyframe_due && options_.localize_only)) {
+    hint = {direct.estimate, keyframe_due, direct.failure == DirectFailure::kNoPose};
+    return std::nullopt;
+  }
+  const TrackerState before = track;
+  TrackOutput& output = direct.output;
+  outcome.next.direct_failures = 0;
+  outcome.record.result = output.result;
+  outcome.record.direct = true;
+  count_features(output.frame, outcome.record);
+  outcome.next.calibration_errors =
+      calibration_errors(state.calibration_errors, *map, output.frame, output, options_.tracking.alignment);
+  track = std::move(output.state);
+  if (options_.localize_only) track.visibility_counts.clear();
+  update_odometry(*map, before, outcome);
+  record_motion(outcome);
+  outcome.record.stages.push_back({"align", watch.ms()});
+  return outcome;
+}
+
 TrackOutcome Tracker::process(FrontEndState state, BundledFrame frame, std::span<const image::Pyramid> pyramids,
-                              const map::MapSnapshot& map) {
+                              const map::MapSnapshot& map, const DirectHint& hint) {
   TrackOutcome outcome;
   outcome.next = std::move(state);
-  outcome.record.unique = static_cast<int>(frame.bundled.size());
-  outcome.record.matched = static_cast<int>(frame.bundled.num_matched());
-  outcome.record.monocular = static_cast<int>(frame.bundled.num_monocular());
+  count_features(frame, outcome.record);
   apply_scale_change(*map, outcome.next.track);
-  const Input input{frame, pyramids, map};
+  pause_direct_tracking(hint, outcome.next);
+  const Input input{frame, pyramids, map, hint};
   if (map->num_keyframes() == 0) {
     start(input, outcome);
   } else {
@@ -161,7 +220,8 @@ TrackOutput Tracker::follow(const Input& input, const FrontEndState& state) cons
                                .alignment = alignment,
                                .state = state.track,
                                .features = options_.features.model(),
-                               .seed = options_.seed};
+                               .seed = options_.seed,
+                               .estimate = input.hint.estimate};
   return tracking::track(track_input, input.frame, options_.tracking, pool_);
 }
 
@@ -189,7 +249,7 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   update_odometry(*input.map, before, outcome);
   if (options_.localize_only) {
     state.track.visibility_counts.clear();
-  } else if (output.keyframe_due) {
+  } else if (output.keyframe_due || input.hint.keyframe_due) {
     propose_keyframe(input, output, outcome);
   }
 }

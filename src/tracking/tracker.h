@@ -46,6 +46,8 @@ struct FrontEndState {
   // During a monocular initialisation: the reference frame, and all frames since, beginning with the reference.
   std::shared_ptr<const StartCandidate> start_reference;
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
+  int direct_failures = 0;   // consecutive attempts of direct tracking that found no pose
+  int direct_pause = 0;      // number of frames until the next attempt
   int frames_lost = 0;       // consecutive lost frames with features
   TimeNs lost_since_ns = 0;  // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
@@ -61,6 +63,19 @@ struct ProposedEdit {
   map::MapDraft draft;
   std::vector<LandmarkId> landmarks;  // landmarks of the newest keyframe, with ids of the draft
   std::size_t base_landmarks = 0;     // landmark slots of the base version; ids from there on are provisional
+};
+
+// The images of a frame.
+struct FrameImages {
+  std::span<const image::Pyramid> pyramids;  // per camera
+  std::span<const image::ImageView> masks;   // per camera
+};
+
+// What direct tracking found out about a frame that needs features.
+struct DirectHint {
+  std::optional<EstimatedPose> estimate = {};
+  bool keyframe_due = false;
+  bool failed = false;  // no pose was found
 };
 
 struct TrackOutcome {
@@ -83,11 +98,19 @@ class Tracker {
   // Plan for a single frame without a state: all cameras are used, with equal budgets.
   FramePlan plan() const;
 
+  // Returns true if the next frame is to be tracked without features first.
+  bool tracks_directly(const FrontEndState& state) const;
+  // Tracks a frame without features. Returns nullopt if it has to be processed with features; `hint` then contains what
+  // was found out.
+  std::optional<TrackOutcome> process_directly(const FrontEndState& state, const frame::BundledFrame& frame,
+                                               const FrameImages& images, const map::MapSnapshot& map,
+                                               DirectHint& hint) const;
+
   // Tracks a frame in a version of the map, or attempts to initialise a map with it. `pyramids`: one per camera. If the
   // outcome contains an edit, the caller must commit it and call `committed`, which completes the record and the next
   // state.
   TrackOutcome process(FrontEndState state, frame::BundledFrame frame, std::span<const image::Pyramid> pyramids,
-                       const map::MapSnapshot& map);
+                       const map::MapSnapshot& map, const DirectHint& hint = {});
 
   // Completes an outcome with the ids assigned by the commit of its edit.
   void committed(const map::CommitReport& report, TrackOutcome& outcome) const;
@@ -100,6 +123,7 @@ class Tracker {
     frame::BundledFrame& frame;
     std::span<const image::Pyramid> pyramids;
     const map::MapSnapshot& map;
+    DirectHint hint = {};
   };
   std::vector<matching::AlignmentOptions> alignment(const FrontEndState& state) const;
 

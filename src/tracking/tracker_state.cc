@@ -40,6 +40,8 @@ TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, Keyfr
   state.landmarks = std::move(landmarks);
   state.frames_since_keyframe = 0;
   state.best_overlap = 0;
+  state.best_direct_overlap.clear();
+  state.direct = {};
   state.visibility_counts.clear();
   return state;
 }

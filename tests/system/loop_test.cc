@@ -23,6 +23,7 @@ void expect_loop(const System& system) {
 TEST(SystemLoopSequential, ClosesTheLoopAndRemovesTheError) {
   Config config = small_config(execution::Mode::kSequential);
   config.final_adjustment = false;
+  config.tracking.frontend = tracking::FrontEnd::kFeatures;  // more keyframes and more drift
   Config off = config;
   off.looping.loop.enabled = false;
   System system(closed_walk().rig(), config, with_vocabulary());
@@ -186,7 +187,7 @@ TEST_P(SystemLoopEnd, RunsCanEndAtAnyFrameParallel) {
   }
   EXPECT_LT(closed, kRuns);
   if (GetParam() == execution::Mode::kLagged) {  // ends before and after the loop, independent of timing
-    EXPECT_GT(closed, 3u);
+    EXPECT_GT(closed, 0u);
   }
 }
 

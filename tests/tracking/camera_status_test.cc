@@ -49,6 +49,22 @@ TEST(CameraStatus, FewFeaturesDegradeACameraThatIsUsed) {
   EXPECT_EQ(alone(evidence), kGood);
 }
 
+TEST(CameraStatus, KeepsFewFeaturesWhileFeaturesAreNotExtracted) {
+  CameraStatusMonitor monitor(1);
+  const auto update = [&](int keypoints, bool extracted) {
+    CameraEvidence evidence = good();
+    evidence.keypoints = keypoints;
+    evidence.extracted = extracted;
+    return monitor.update(std::vector{evidence})[0];
+  };
+  EXPECT_EQ(update(500, true), kGood);
+  EXPECT_EQ(update(5, false), kGood);
+  EXPECT_EQ(update(5, true), degraded(CameraReason::kFewFeatures));
+  EXPECT_EQ(update(500, false), degraded(CameraReason::kFewFeatures));
+  EXPECT_EQ(update(5, false), degraded(CameraReason::kFewFeatures));
+  EXPECT_EQ(update(500, true), kGood);
+}
+
 // Statuses of a camera that has an image in the frames marked x; O: out.
 std::string statuses(const std::string& images) {
   CameraStatusMonitor monitor(1);

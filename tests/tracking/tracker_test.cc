@@ -36,12 +36,12 @@ class TrackerRun {
   frame::BundledFrame frame(int i) const { return sim.frame(FrameId(i), time_s(i)).frame; }
   static double time_s(int i) { return 0.05 * i; }
 
-  TrackOutcome propose(frame::BundledFrame frame) {
+  TrackOutcome propose(frame::BundledFrame frame, const DirectHint& hint = {}) {
     frame.twist = state.track.twist.value_or(geometry::Vector6d::Zero());
-    return tracker.process(state, std::move(frame), pyramids_, store.snapshot());
+    return tracker.process(state, std::move(frame), pyramids_, store.snapshot(), hint);
   }
-  FrameRecord process(frame::BundledFrame frame) {
-    TrackOutcome outcome = propose(std::move(frame));
+  FrameRecord process(frame::BundledFrame frame, const DirectHint& hint = {}) {
+    TrackOutcome outcome = propose(std::move(frame), hint);
     if (outcome.edit) tracker.committed(store.commit(std::move(outcome.edit->draft)), outcome);
     state = std::move(outcome.next);
     return outcome.record;
@@ -93,6 +93,37 @@ TEST(Tracker, InitialisesAMetricMapAndTracksTheRig) {
   }
   EXPECT_EQ(run.store.snapshot()->num_keyframes(), static_cast<std::size_t>(keyframes));
   EXPECT_EQ(run.store.snapshot()->check_invariants(), std::nullopt);
+}
+
+TEST(Tracker, DirectTrackingPausesAfterFailures) {
+  for (const auto& [front_end, expected] :
+       {std::pair{FrontEnd::kFeatures, "................"}, std::pair{FrontEnd::kDirect, "xxxxxxxxxxxxxxxx"},
+        std::pair{FrontEnd::kAuto, "xxx..........x.."}}) {
+    TrackerOptions options;
+    options.tracking.frontend = front_end;
+    TrackerRun run(synthetic::ring_rig(2), options);
+    run.process(run.frame(0));
+    EXPECT_FALSE(run.tracker.tracks_directly(run.state));  // the motion is not known
+    run.process(run.frame(1));
+    std::string attempts;
+    for (int i = 2; i < 18; ++i) {
+      attempts += run.tracker.tracks_directly(run.state) ? 'x' : '.';
+      run.process(run.frame(i), {.failed = attempts.back() == 'x'});
+    }
+    EXPECT_EQ(attempts, expected);
+    run.state.direct_pause = 0;
+    run.state.track.cameras[1].excluded = true;
+    EXPECT_FALSE(run.tracker.tracks_directly(run.state));
+  }
+}
+
+TEST(Tracker, AKeyframeThatIsDueIsInsertedWithFeatures) {
+  TrackerRun run(synthetic::ring_rig(2));
+  for (int i = 0; i < 3; ++i) run.process(run.frame(i));
+  EXPECT_FALSE(run.propose(run.frame(3)).edit);
+  const TrackOutcome outcome = run.propose(run.frame(3), {.keyframe_due = true});
+  ASSERT_TRUE(outcome.edit);
+  EXPECT_EQ(outcome.edit->kind, ProposedEdit::Kind::kKeyframe);
 }
 
 TEST(Tracker, OneCameraInitialisesUpToScaleAndLocatesTheEarlierFrames) {

@@ -1,0 +1,284 @@
+#include "tracking/track_directly.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "map/search_points.h"
+#include "matching/projection_search.h"
+#include "tracking/keyframe_decision.h"
+#include "tracking/motion_prediction.h"
+#include "tracking/robust_pose.h"
+#include "tracking/track_output.h"
+
+namespace bslam::tracking {
+namespace {
+
+using geometry::SE3;
+
+constexpr double kMaxViewAngle = 1.05;  // rad, as in the search by projection
+// Minimum fraction of the aligned landmarks that agree with the pose: with fewer, features decide between motions.
+constexpr double kMinInlierRatio = 0.5;
+// A camera with few inliers gets features after this number of frames: it may see something new.
+constexpr int kFewInliersInterval = 8;
+
+// A landmark that is predicted visible in a camera.
+struct Candidate {
+  LandmarkId landmark;
+  Eigen::Vector2d pixel;  // predicted
+  double coarseness = 0;  // size of its reference patch in the image, relative to that of a patch of level 0
+};
+using Candidates = std::vector<std::vector<Candidate>>;  // per camera
+
+// Landmarks aligned in the images of a frame.
+struct AlignedLandmarks {
+  FrameMatches matches;    // keypoint i of a camera is its i-th aligned landmark
+  AlignedMatches aligned;  // their positions
+};
+
+bool used(const frame::BundledFrame& frame, std::size_t c) {
+  return frame.cameras[c].state == image::ImageState::kPresent;
+}
+
+Candidates visible(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                   std::span<const LandmarkId> landmarks, ThreadPool& pool) {
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  const std::vector<matching::SearchPoint> points = map::search_points(map, landmarks);
+  Candidates out(rig.size());
+  pool.for_each(rig.size(), [&](std::size_t c) {
+    if (!used(frame, c)) return;
+    const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
+    for (const auto& v : matching::visible_points(rig, CameraIndex(c), T_cam_world, points, kMaxViewAngle))
+      out[c].push_back({landmarks[v.point], v.pixel, points[v.point].max_distance / v.distance});
+  });
+  return out;
+}
+
+// The `count` landmarks with the largest patches in the image: their alignment tolerates the largest errors of the
+// prediction.
+void keep_coarsest(std::size_t count, std::vector<Candidate>& candidates) {
+  if (candidates.size() <= count) return;
+  std::nth_element(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(count), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) {
+                     return a.coarseness != b.coarseness ? a.coarseness > b.coarseness : a.landmark < b.landmark;
+                   });
+  candidates.resize(count);
+  std::ranges::sort(candidates, {}, &Candidate::landmark);
+}
+
+// At most `count` landmarks, spread over the image: the first ones of each cell of a grid.
+void keep_spread(int count, const camera::Camera& camera, std::vector<Candidate>& candidates) {
+  constexpr int kPerCell = 2;
+  if (static_cast<int>(candidates.size()) <= count) return;
+  const double cell = std::sqrt(static_cast<double>(camera.width) * camera.height * kPerCell / count);
+  const auto columns = static_cast<std::size_t>(camera.width / cell) + 1;
+  std::vector<std::uint8_t> taken(columns * (static_cast<std::size_t>(camera.height / cell) + 1));
+  std::erase_if(candidates, [&](const Candidate& l) {
+    const auto x = static_cast<std::size_t>(std::max(0.0, l.pixel.x() / cell));
+    const auto y = static_cast<std::size_t>(std::max(0.0, l.pixel.y() / cell));
+    return ++taken[std::min(y * columns + x, taken.size() - 1)] > kPerCell;
+  });
+}
+
+// Adds the landmarks of a camera to `landmarks`, which are in order of id, each once.
+void add_sorted(const std::vector<Candidate>& camera, std::vector<LandmarkId>& landmarks) {
+  for (const Candidate& l : camera) landmarks.push_back(l.landmark);
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+}
+
+AlignedLandmarks align(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                       const Candidates& candidates, std::span<const matching::AlignmentOptions> options,
+                       ThreadPool& pool) {
+  const map::BundledMap& map = input.map;
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  AlignedLandmarks out{FrameMatches(rig.size()), AlignedMatches(rig.size())};
+  pool.for_each(rig.size(), [&](std::size_t c) {
+    out.aligned[c].reserve(candidates[c].size());
+    out.matches[c].reserve(candidates[c].size());
+    for (const Candidate& candidate : candidates[c]) {
+      const auto aligned =
+          align_landmark(map, rig, c, T_rig_world, input.pyramids[c], candidate.landmark, candidate.pixel, options[c]);
+      if (!aligned || (!input.masks.empty() && !image::allows(input.masks[c], aligned->pixel.x(), aligned->pixel.y())))
+        continue;
+      const auto bearing = rig.camera(c).unproject(aligned->pixel);
+      if (!bearing) continue;
+      out.matches[c].push_back({KeypointIndex(out.matches[c].size()), candidate.landmark, true});
+      out.aligned[c].push_back({aligned->pixel.cast<float>(), *bearing, static_cast<float>(aligned->sigma)});
+    }
+  });
+  return out;
+}
+
+// The frame with the aligned landmarks as keypoints.
+frame::BundledFrame with_keypoints(frame::BundledFrame frame, const AlignedLandmarks& found) {
+  std::vector<std::pair<LandmarkId, frame::KeypointRef>> all;
+  std::vector<std::size_t> counts;
+  for (std::size_t c = 0; c < found.matches.size(); ++c) {
+    feature::Detections keypoints;
+    for (const AlignedMatch& a : found.aligned[c]) {
+      keypoints.pixel.push_back(a.pixel);
+      keypoints.bearing.push_back(a.bearing);
+      keypoints.sigma.push_back(a.sigma);
+    }
+    for (const Match& m : found.matches[c]) all.push_back({m.landmark, {CameraIndex(c), m.keypoint}});
+    counts.push_back(keypoints.size());
+    frame.cameras[c].keypoints = std::move(keypoints);
+  }
+  std::sort(all.begin(), all.end());
+  std::vector<std::vector<frame::KeypointRef>> matched;
+  for (std::size_t i = 0; i < all.size();) {
+    const std::size_t begin = i;
+    while (i < all.size() && all[i].first == all[begin].first) ++i;
+    if (i - begin < 2) continue;
+    std::vector<frame::KeypointRef>& feature = matched.emplace_back();
+    for (std::size_t k = begin; k < i; ++k) feature.push_back(all[k].second);
+  }
+  const std::vector<std::optional<frame::BundledPoint>> points(matched.size());
+  frame.bundled = frame::Bundled(counts, matched, points);
+  return frame;
+}
+
+bool enough(const solver::PoseSolution& solution, std::size_t num_matches, const TrackingOptions& options) {
+  return supported(solution, num_matches, options.min_inliers, options) &&
+         solution.num_inliers >= kMinInlierRatio * static_cast<double>(num_matches);
+}
+
+// Pose from the landmarks of the last frame with the largest patches. Updates the pose and the motion of the frame.
+bool track_coarsely(const TrackInput& input, const TrackingOptions& options, ThreadPool& pool,
+                    frame::BundledFrame& frame, SE3& T_rig_world) {
+  Candidates candidates = visible(input.map, frame, T_rig_world, last_landmarks(input.map, input.state), pool);
+  for (auto& camera : candidates) keep_coarsest(static_cast<std::size_t>(options.direct.coarse_per_image), camera);
+  std::vector<matching::AlignmentOptions> alignment(input.alignment.begin(), input.alignment.end());
+  for (auto& camera : alignment) camera.max_shift_px = options.direct.coarse_shift_px;
+  const AlignedLandmarks found = align(input, frame, T_rig_world, candidates, alignment, pool);
+  const auto observations = pose_observations(input.map, found.matches, found.aligned);
+  const solver::MotionModel motion = motion_model(input, frame);
+  const auto solution = robust_pose(input.map, found.matches, observations, T_rig_world, motion, options.pose);
+  if (!enough(solution, observations.size(), options)) return false;
+  frame.twist = motion.twist(solution.T_rig_world);
+  T_rig_world = solution.T_rig_world;
+  return true;
+}
+
+// Updates the support of each camera. Returns true if some camera has lost a considerable part of it.
+bool support_is_low(const frame::BundledFrame& frame, const FrameMatches& inliers, const TrackingOptions& options,
+                    DirectState& state) {
+  state.best_inliers.resize(inliers.size());
+  bool low = false;
+  for (std::size_t c = 0; c < inliers.size(); ++c) {
+    if (!used(frame, c)) continue;
+    const auto found = static_cast<int>(inliers[c].size());
+    int& best = state.best_inliers[c];
+    best = std::max(best, found);
+    low |= best >= options.consensus.min_expected && found < options.direct.min_support * best;
+    low |= found < options.keyframe.min_camera_inliers && state.frames >= kFewInliersInterval;
+  }
+  ++state.frames;
+  return low;
+}
+
+// The overlap with the reference keyframe is summed over the cameras of this frame, and compared with the sum of their
+// largest values: it must not depend on which cameras have an image.
+bool keyframe_is_due(const TrackInput& input, const TrackingOptions& options, TrackOutput& out) {
+  TrackerState& state = out.state;
+  KeyframeEvidence evidence =
+      keyframe_evidence(input.map, out.frame, out.matches, state.anchored.reference, out.result.T_rig_world, options);
+  const std::vector<int> overlap = overlap_by_camera(input.map, out.matches, state.anchored.reference);
+  std::vector<int>& best = state.best_direct_overlap;
+  best.resize(overlap.size());
+  evidence.overlap = evidence.best_overlap = 0;
+  for (std::size_t c = 0; c < overlap.size(); ++c) {
+    if (!used(out.frame, c)) continue;
+    best[c] = std::max(best[c], overlap[c]);
+    evidence.overlap += overlap[c];
+    evidence.best_overlap += best[c];
+  }
+  evidence.frames_since_keyframe = state.frames_since_keyframe;
+  KeyframeOptions keyframe = options.keyframe;
+  keyframe.min_overlap = std::max(keyframe.min_overlap, options.direct.min_overlap);
+  return keyframe_due(evidence, keyframe);
+}
+
+bool predictable(const TrackInput& input, const frame::BundledFrame& frame) {
+  const TrackerState& state = input.state;
+  return state.anchored.known_in(input.map) && motion_since_last(state, frame.time_ns).has_value();
+}
+
+// The landmarks to align at the pose: those of the last frame and of the local view, spread over the images. Cameras
+// align the same landmarks if they see them, so that their number depends little on which cameras have an image.
+struct LocalLandmarks {
+  std::vector<LandmarkId> last, in_view;  // of the last frame; all in view
+  Candidates candidates;
+  std::vector<LandmarkId> expected;  // those of the candidates
+};
+
+LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                               const TrackingOptions& options, ThreadPool& pool) {
+  const map::BundledMap& map = input.map;
+  LocalLandmarks out;
+  out.last = last_landmarks(map, input.state);
+  const auto near = map::local_landmarks(map, out.last, input.state.anchored.reference, options.local_view);
+  out.candidates = visible(map, frame, T_rig_world, near, pool);
+  for (const auto& camera : out.candidates) add_sorted(camera, out.in_view);
+  const auto images = std::ranges::count_if(out.candidates, [](const auto& camera) { return !camera.empty(); });
+  const int budget = std::min(options.direct.per_image, options.direct.per_rig / std::max(1, static_cast<int>(images)));
+  for (std::size_t c = 0; c < out.candidates.size(); ++c) {
+    std::vector<Candidate>& candidates = out.candidates[c];
+    std::ranges::stable_partition(
+        candidates, [&](LandmarkId l) { return std::ranges::binary_search(out.expected, l); }, &Candidate::landmark);
+    keep_spread(budget, map.rig().camera(c), candidates);
+    add_sorted(candidates, out.expected);
+  }
+  return out;
+}
+
+// Adds to `landmarks` those of the last frame that are in view but were not aligned because there are enough others: a
+// search with features finds them again. All are in order of id.
+void carry_over(const LocalLandmarks& local, std::vector<LandmarkId>& landmarks) {
+  const auto found = static_cast<std::ptrdiff_t>(landmarks.size());
+  for (const LandmarkId l : local.last) {
+    if (std::ranges::binary_search(local.in_view, l) && !std::ranges::binary_search(local.expected, l))
+      landmarks.push_back(l);
+  }
+  std::inplace_merge(landmarks.begin(), landmarks.begin() + found, landmarks.end());
+}
+
+// Completes the output for the pose, and decides whether the frame needs features nevertheless.
+DirectOutput judged(const TrackInput& input, const LocalLandmarks& local, TrackedFrame found,
+                    const TrackingOptions& options) {
+  DirectOutput out;
+  out.output = output_of(input, std::move(found));
+  TrackResult& result = out.output.result;
+  TrackerState& state = out.output.state;
+  carry_over(local, state.landmarks);
+  for (std::size_t c = 0; c < state.cameras.size(); ++c) {
+    result.cameras[c].keypoints = static_cast<int>(local.candidates[c].size());
+    update_used_camera(out.output.frame, c, out.output.matches[c], options.consensus, state.cameras[c]);
+  }
+  const bool low = support_is_low(out.output.frame, out.output.matches, options, state.direct);
+  out.estimate = {result.T_rig_world, !low};
+  if (low) out.failure = DirectFailure::kFewInliers;
+  if (keyframe_is_due(input, options, out.output)) out.failure = DirectFailure::kKeyframeDue;
+  return out;
+}
+
+}  // namespace
+
+DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, const TrackingOptions& options,
+                            ThreadPool& pool) {
+  if (!predictable(input, frame)) return {.failure = DirectFailure::kNoPrediction};
+  SE3 T_rig_world = predict(input, frame.time_ns);
+  if (!track_coarsely(input, options, pool, frame, T_rig_world)) return {.failure = DirectFailure::kNoPose};
+  const LocalLandmarks local = local_landmarks(input, frame, T_rig_world, options, pool);
+  AlignedLandmarks found = align(input, frame, T_rig_world, local.candidates, input.alignment, pool);
+  const auto observations = pose_observations(input.map, found.matches, found.aligned);
+  const solver::MotionModel motion = motion_model(input, frame);
+  auto solution = robust_pose(input.map, found.matches, observations, T_rig_world, motion, options.pose);
+  if (!enough(solution, observations.size(), options)) return {.failure = DirectFailure::kNoPose};
+  frame.twist = motion.twist(solution.T_rig_world);
+  frame = with_keypoints(std::move(frame), found);
+  return judged(input, local, {std::move(frame), std::move(solution), std::move(found.matches), local.expected},
+                options);
+}
+
+}  // namespace bslam::tracking

@@ -1,0 +1,33 @@
+// What both front ends do with the pose of a frame: the result, and the state for the next frame.
+#pragma once
+
+#include <vector>
+
+#include "tracking/track.h"
+
+namespace bslam::tracking {
+
+// Landmarks of the last frame, and of the last image of cameras without an image in that frame, that still exist in the
+// map; in order of id.
+std::vector<LandmarkId> last_landmarks(const map::BundledMap& map, const TrackerState& state);
+
+// Whether a pose has enough inliers: at least `min_inliers`, and a sufficient fraction of `num_matches`.
+bool supported(const solver::PoseSolution& solution, std::size_t num_matches, int min_inliers,
+               const TrackingOptions& options);
+
+// What was found in a frame.
+struct TrackedFrame {
+  frame::BundledFrame frame;  // see TrackOutput::frame
+  solver::PoseSolution solution;
+  FrameMatches matches;             // all, inliers and outliers
+  std::vector<LandmarkId> visible;  // landmarks that were searched for, each once
+};
+
+// The output for a frame with a pose. The states of its cameras and the decision on a keyframe are left to the caller.
+TrackOutput output_of(const TrackInput& input, TrackedFrame found);
+
+// Updates the state of a camera that is used for the next frame; `inliers`: those of the camera.
+void update_used_camera(const frame::BundledFrame& frame, std::size_t c, const std::vector<Match>& inliers,
+                        const ConsensusOptions& options, CameraConsensusState& camera);
+
+}  // namespace bslam::tracking
