@@ -15,7 +15,7 @@ namespace {
 
 using geometry::SE3;
 
-constexpr double kMaxViewAngle = 1.05;  // rad, as in the search by projection
+constexpr double kMaxViewAngle = 1.05;  // rad, as in ProjectionSearchOptions
 // Minimum fraction of the aligned landmarks that agree with the pose: with fewer, features decide between motions.
 constexpr double kMinInlierRatio = 0.5;
 // A camera with few inliers gets features after this number of frames: it may see something new.
@@ -75,7 +75,10 @@ void keep_spread(int count, const camera::Camera& camera, std::vector<Candidate>
   std::erase_if(candidates, [&](const Candidate& l) {
     const auto x = static_cast<std::size_t>(std::max(0.0, l.pixel.x() / cell));
     const auto y = static_cast<std::size_t>(std::max(0.0, l.pixel.y() / cell));
-    return ++taken[std::min(y * columns + x, taken.size() - 1)] > kPerCell;
+    std::uint8_t& in_cell = taken[std::min(y * columns + x, taken.size() - 1)];
+    if (in_cell == kPerCell) return true;
+    ++in_cell;
+    return false;
   });
 }
 
