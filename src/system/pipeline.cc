@@ -105,18 +105,20 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   const bool recalibrated = adopt_rig(*outcome.seen, frame);
   if (config_.mode == execution::Mode::kLagged) end_stage("results");
 
-  tracking::DirectHint hint;
-  std::optional<tracking::TrackOutcome> found;
+  tracking::DirectAttempt direct;
   if (directly) {
-    found = tracker_.process_directly(state_, frame, {builder_.pyramids(), builder_.masks()}, outcome.seen, hint);
-    if (!found) {
+    direct = tracker_.process_directly(state_, frame, {builder_.pyramids(), builder_.masks()}, outcome.seen);
+    if (direct.failure != tracking::DirectFailure::kNone) {
       end_stage("align");
       add_features();
     }
   }
-  if (!found) found = tracker_.process(std::move(state_), std::move(frame), builder_.pyramids(), outcome.seen, hint);
-  found->record.recalibrated = recalibrated;
-  return *std::move(found);
+  tracking::TrackOutcome found =
+      direct.failure == tracking::DirectFailure::kNone
+          ? *std::move(direct.outcome)
+          : tracker_.process(std::move(state_), std::move(frame), builder_.pyramids(), outcome.seen, std::move(direct));
+  found.record.recalibrated = recalibrated;
+  return found;
 }
 
 // Continues with the rig of the map. Returns whether a stage has replaced it since the last frame.

@@ -29,10 +29,6 @@ bool untracked_depth(const frame::BundledFrame& frame, const FrameMatches& inlie
   return num_tracked < kMinTrackedClose && num_untracked > kMinUntrackedClose;
 }
 
-}  // namespace
-
-namespace {
-
 bool observes(const map::BundledMap& map, KeyframeId k, LandmarkId l) {
   return std::ranges::any_of(map.observations(l), [&](const map::Observation& o) { return o.keyframe == k; });
 }

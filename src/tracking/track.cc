@@ -241,9 +241,10 @@ void update_cameras(const Coarse& coarse, const Fine& fine, const ConsensusOptio
   }
 }
 
-TrackOutput tracked(const TrackInput& input, const Coarse& coarse, Fine fine, const TrackingOptions& options) {
+TrackOutput tracked(const TrackInput& input, const Coarse& coarse, Fine&& fine, const TrackingOptions& options) {
   frame::BundledFrame refined = refined_frame(input.map.rig(), coarse, fine, options.initialisation);
-  TrackOutput out = output_of(input, {std::move(refined), fine.solution, fine.matches, fine.visible});
+  TrackOutput out = output_of(
+      input, {std::move(refined), std::move(fine.solution), std::move(fine.matches), std::move(fine.visible)});
   update_cameras(coarse, fine, options.consensus, out);
   TrackerState& state = out.state;
   KeyframeEvidence evidence =
@@ -268,12 +269,12 @@ TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, con
     return lost(input.state, frame, LostReason::kFewFeatures);
   const Coarse coarse = coarse_pose(input, frame, options, pool);
   if (coarse.reason != LostReason::kNone) return lost(input.state, frame, coarse.reason);
-  const Fine fine = track_local_view(input, coarse, options, pool);
+  Fine fine = track_local_view(input, coarse, options, pool);
   if (!supported(fine.solution, count(fine.matches), options.min_inliers, options)) {
     const bool few = fine.solution.num_inliers < options.min_inliers;
     return lost(input.state, frame, few ? LostReason::kFewInliers : LostReason::kUnstablePose);
   }
-  return tracked(input, coarse, fine, options);
+  return tracked(input, coarse, std::move(fine), options);
 }
 
 }  // namespace bslam::tracking

@@ -147,9 +147,9 @@ bool enough(const solver::PoseSolution& solution, std::size_t num_matches, const
 }
 
 // Pose from the landmarks of the last frame with the largest patches. Updates the pose and the motion of the frame.
-bool track_coarsely(const TrackInput& input, const TrackingOptions& options, ThreadPool& pool,
-                    frame::BundledFrame& frame, SE3& T_rig_world) {
-  Candidates candidates = visible(input.map, frame, T_rig_world, last_landmarks(input.map, input.state), pool);
+bool track_coarsely(const TrackInput& input, const std::vector<LandmarkId>& last, const TrackingOptions& options,
+                    ThreadPool& pool, frame::BundledFrame& frame, SE3& T_rig_world) {
+  Candidates candidates = visible(input.map, frame, T_rig_world, last, pool);
   for (auto& camera : candidates) keep_coarsest(static_cast<std::size_t>(options.direct.coarse_per_image), camera);
   std::vector<matching::AlignmentOptions> alignment(input.alignment.begin(), input.alignment.end());
   for (auto& camera : alignment) camera.max_shift_px = options.direct.coarse_shift_px;
@@ -210,17 +210,16 @@ bool predictable(const TrackInput& input, const frame::BundledFrame& frame) {
 // The landmarks to align at the pose: those of the last frame and of the local view, spread over the images. Cameras
 // align the same landmarks if they see them, so that their number depends little on which cameras have an image.
 struct LocalLandmarks {
-  std::vector<LandmarkId> last, in_view;  // of the last frame; all in view
+  std::vector<LandmarkId> in_view;  // all
   Candidates candidates;
   std::vector<LandmarkId> expected;  // those of the candidates
 };
 
 LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
-                               const TrackingOptions& options, ThreadPool& pool) {
+                               const std::vector<LandmarkId>& last, const TrackingOptions& options, ThreadPool& pool) {
   const map::BundledMap& map = input.map;
   LocalLandmarks out;
-  out.last = last_landmarks(map, input.state);
-  const auto near = map::local_landmarks(map, out.last, input.state.anchored.reference, options.local_view);
+  const auto near = map::local_landmarks(map, last, input.state.anchored.reference, options.local_view);
   out.candidates = visible(map, frame, T_rig_world, near, pool);
   for (const auto& camera : out.candidates) add_sorted(camera, out.in_view);
   const auto images = std::ranges::count_if(out.candidates, [](const auto& camera) { return !camera.empty(); });
@@ -237,9 +236,9 @@ LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFram
 
 // Adds to `landmarks` those of the last frame that are in view but were not aligned because there are enough others: a
 // search with features finds them again. All are in order of id.
-void carry_over(const LocalLandmarks& local, std::vector<LandmarkId>& landmarks) {
+void carry_over(const std::vector<LandmarkId>& last, const LocalLandmarks& local, std::vector<LandmarkId>& landmarks) {
   const auto found = static_cast<std::ptrdiff_t>(landmarks.size());
-  for (const LandmarkId l : local.last) {
+  for (const LandmarkId l : last) {
     if (std::ranges::binary_search(local.in_view, l) && !std::ranges::binary_search(local.expected, l))
       landmarks.push_back(l);
   }
@@ -249,19 +248,18 @@ void carry_over(const LocalLandmarks& local, std::vector<LandmarkId>& landmarks)
 // Completes the output for the pose, and decides whether the frame needs features nevertheless.
 DirectOutput judged(const TrackInput& input, const LocalLandmarks& local, TrackedFrame found,
                     const TrackingOptions& options) {
-  DirectOutput out;
-  out.output = output_of(input, std::move(found));
-  TrackResult& result = out.output.result;
-  TrackerState& state = out.output.state;
-  carry_over(local, state.landmarks);
+  DirectOutput out{.failure = DirectFailure::kNone};
+  TrackOutput& output = out.output.emplace(output_of(input, std::move(found)));
+  TrackResult& result = output.result;
+  TrackerState& state = output.state;
   for (std::size_t c = 0; c < state.cameras.size(); ++c) {
     result.cameras[c].keypoints = static_cast<int>(local.candidates[c].size());
-    update_used_camera(out.output.frame, c, out.output.matches[c], options.consensus, state.cameras[c]);
+    update_used_camera(output.frame, c, output.matches[c], options.consensus, state.cameras[c]);
   }
-  const bool low = support_is_low(out.output.frame, out.output.matches, options, state.direct);
-  out.estimate = {result.T_rig_world, !low};
+  const bool low = support_is_low(output.frame, output.matches, options, state.direct);
+  out.all_cameras = !low;
   if (low) out.failure = DirectFailure::kFewInliers;
-  if (keyframe_is_due(input, options, out.output)) out.failure = DirectFailure::kKeyframeDue;
+  if (keyframe_is_due(input, options, output)) out.failure = DirectFailure::kKeyframeDue;
   return out;
 }
 
@@ -270,9 +268,10 @@ DirectOutput judged(const TrackInput& input, const LocalLandmarks& local, Tracke
 DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, const TrackingOptions& options,
                             ThreadPool& pool) {
   if (!predictable(input, frame)) return {.failure = DirectFailure::kNoPrediction};
+  const std::vector<LandmarkId> last = last_landmarks(input.map, input.state);
   SE3 T_rig_world = predict(input, frame.time_ns);
-  if (!track_coarsely(input, options, pool, frame, T_rig_world)) return {.failure = DirectFailure::kNoPose};
-  const LocalLandmarks local = local_landmarks(input, frame, T_rig_world, options, pool);
+  if (!track_coarsely(input, last, options, pool, frame, T_rig_world)) return {.failure = DirectFailure::kNoPose};
+  const LocalLandmarks local = local_landmarks(input, frame, T_rig_world, last, options, pool);
   AlignedLandmarks found = align(input, frame, T_rig_world, local.candidates, input.alignment, pool);
   const auto observations = pose_observations(input.map, found.matches, found.aligned);
   const solver::MotionModel motion = motion_model(input, frame);
@@ -280,8 +279,10 @@ DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, 
   if (!enough(solution, observations.size(), options)) return {.failure = DirectFailure::kNoPose};
   frame.twist = motion.twist(solution.T_rig_world);
   frame = with_keypoints(std::move(frame), found);
-  return judged(input, local, {std::move(frame), std::move(solution), std::move(found.matches), local.expected},
-                options);
+  DirectOutput out =
+      judged(input, local, {std::move(frame), std::move(solution), std::move(found.matches), local.expected}, options);
+  carry_over(last, local, out.output->state.landmarks);
+  return out;
 }
 
 }  // namespace bslam::tracking

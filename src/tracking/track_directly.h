@@ -11,6 +11,7 @@ namespace bslam::tracking {
 // Why a frame needs extracted features.
 enum class DirectFailure {
   kNone,
+  kNotTried,
   kNoPrediction,  // the motion of the rig is not known
   kNoPose,        // too few landmarks could be aligned
   kFewInliers,    // some camera has lost a considerable part of its inliers since the last extraction
@@ -18,9 +19,9 @@ enum class DirectFailure {
 };
 
 struct DirectOutput {
-  DirectFailure failure = DirectFailure::kNone;
-  TrackOutput output = {};                     // if there is no failure
-  std::optional<EstimatedPose> estimate = {};  // also if there are few inliers or a keyframe is due
+  DirectFailure failure = DirectFailure::kNotTried;
+  std::optional<TrackOutput> output = {};  // if a pose was found, also if there are few inliers or a keyframe is due
+  bool all_cameras = false;                // every camera supports the pose
 };
 
 // Estimates the pose of `frame`, whose cameras have no keypoints. The map must have at least one keyframe. The

@@ -1,13 +1,13 @@
 #include "tracking/tracker.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/stopwatch.h"
 #include "frame/capture_times.h"
 #include "tracking/calibration_error.h"
 #include "tracking/feature_budget.h"
 #include "tracking/make_keyframe.h"
-#include "tracking/track_directly.h"
 
 namespace bslam::tracking {
 namespace {
@@ -70,10 +70,10 @@ void update_odometry(const map::BundledMap& map, const TrackerState& before, Tra
 }
 
 // After a few failures in a row, the next frames are tracked with features.
-void pause_direct_tracking(const DirectHint& hint, FrontEndState& state) {
+void pause_direct_tracking(DirectFailure failure, FrontEndState& state) {
   constexpr int kFailures = 3, kPause = 10;
   if (state.direct_pause > 0) --state.direct_pause;
-  if (!hint.failed) return;
+  if (failure != DirectFailure::kNoPose) return;
   if (++state.direct_failures >= kFailures) state.direct_pause = kPause;
 }
 
@@ -140,52 +140,53 @@ bool Tracker::tracks_directly(const FrontEndState& state) const {
          std::ranges::none_of(state.track.cameras, &CameraConsensusState::excluded);
 }
 
-std::optional<TrackOutcome> Tracker::process_directly(const FrontEndState& state, const BundledFrame& frame,
-                                                      const FrameImages& images, const map::MapSnapshot& map,
-                                                      DirectHint& hint) const {
+TrackInput Tracker::track_input(const map::BundledMap& map, std::span<const image::Pyramid> pyramids,
+                                std::span<const matching::AlignmentOptions> alignment,
+                                const FrontEndState& state) const {
+  return {.map = map,
+          .pyramids = pyramids,
+          .alignment = alignment,
+          .state = state.track,
+          .features = options_.features.model(),
+          .seed = options_.seed};
+}
+
+DirectAttempt Tracker::process_directly(const FrontEndState& state, const BundledFrame& frame,
+                                        const FrameImages& images, const map::MapSnapshot& map) const {
   const Stopwatch watch;
   TrackOutcome outcome;
   outcome.next = state;
   TrackerState& track = outcome.next.track;
   apply_scale_change(*map, track);
   const auto alignment = this->alignment(state);
-  const TrackInput input{.map = *map,
-                         .pyramids = images.pyramids,
-                         .alignment = alignment,
-                         .state = track,
-                         .features = options_.features.model(),
-                         .seed = options_.seed,
-                         .masks = images.masks};
+  TrackInput input = track_input(*map, images.pyramids, alignment, outcome.next);
+  input.masks = images.masks;
   DirectOutput direct = track_directly(input, frame, options_.tracking, pool_);
-  const bool keyframe_due = direct.failure == DirectFailure::kKeyframeDue;
-  if (direct.failure != DirectFailure::kNone && !(keyframe_due && options_.localize_only)) {
-    hint = {direct.estimate, keyframe_due, direct.failure == DirectFailure::kNoPose};
-    return std::nullopt;
-  }
-  const TrackerState before = track;
-  TrackOutput& output = direct.output;
+  if (direct.failure == DirectFailure::kKeyframeDue && options_.localize_only) direct.failure = DirectFailure::kNone;
+  if (!direct.output) return {.failure = direct.failure};
+  TrackOutput& output = *direct.output;
+  const TrackerState before = std::exchange(track, std::move(output.state));
   outcome.next.direct_failures = 0;
   outcome.record.result = output.result;
   outcome.record.direct = true;
   count_features(output.frame, outcome.record);
   outcome.next.calibration_errors =
       calibration_errors(state.calibration_errors, *map, output.frame, output, options_.tracking.alignment);
-  track = std::move(output.state);
   if (options_.localize_only) track.visibility_counts.clear();
   update_odometry(*map, before, outcome);
   record_motion(outcome);
   outcome.record.stages.push_back({"align", watch.ms()});
-  return outcome;
+  return {direct.failure, std::move(outcome), direct.all_cameras};
 }
 
 TrackOutcome Tracker::process(FrontEndState state, BundledFrame frame, std::span<const image::Pyramid> pyramids,
-                              const map::MapSnapshot& map, const DirectHint& hint) {
+                              const map::MapSnapshot& map, DirectAttempt direct) {
   TrackOutcome outcome;
   outcome.next = std::move(state);
   count_features(frame, outcome.record);
   apply_scale_change(*map, outcome.next.track);
-  pause_direct_tracking(hint, outcome.next);
-  const Input input{frame, pyramids, map, hint};
+  pause_direct_tracking(direct.failure, outcome.next);
+  const Input input{frame, pyramids, map, std::move(direct)};
   if (map->num_keyframes() == 0) {
     start(input, outcome);
   } else {
@@ -215,13 +216,9 @@ TrackOutput Tracker::follow(const Input& input, const FrontEndState& state) cons
     return lost(state.track, input.frame, blind ? LostReason::kFewFeatures : LostReason::kNotFound);
   }
   const auto alignment = this->alignment(state);
-  const TrackInput track_input{.map = *input.map,
-                               .pyramids = input.pyramids,
-                               .alignment = alignment,
-                               .state = state.track,
-                               .features = options_.features.model(),
-                               .seed = options_.seed,
-                               .estimate = input.hint.estimate};
+  TrackInput track_input = this->track_input(*input.map, input.pyramids, alignment, state);
+  if (const auto& direct = input.direct.outcome)
+    track_input.estimate = {direct->record.result.T_rig_world, input.direct.all_cameras};
   return tracking::track(track_input, input.frame, options_.tracking, pool_);
 }
 
@@ -232,6 +229,7 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   const TrackerState before = state.track;
   TrackOutput output = follow(input, state);
   record.stages.push_back({"track", watch.ms()});
+  if (!is_tracking(output.result.status) && input.direct.outcome) return keep_direct_pose(input, outcome);
   if (!is_tracking(output.result.status) && had_features(output.result) && relocalise(input, outcome)) {
     output = follow(input, state);
     if (!is_tracking(output.result.status)) record.relocalisation.reset();
@@ -249,9 +247,16 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   update_odometry(*input.map, before, outcome);
   if (options_.localize_only) {
     state.track.visibility_counts.clear();
-  } else if (output.keyframe_due || input.hint.keyframe_due) {
+  } else if (output.keyframe_due || input.direct.failure == DirectFailure::kKeyframeDue) {
     propose_keyframe(input, output, outcome);
   }
+}
+
+// The features of the frame give no pose, but direct tracking has found one.
+void Tracker::keep_direct_pose(const Input& input, TrackOutcome& outcome) const {
+  std::vector<StageTime> stages = std::move(outcome.record.stages);
+  outcome = *input.direct.outcome;
+  outcome.record.stages = std::move(stages);
 }
 
 bool Tracker::gives_up(const FrontEndState& state, TimeNs time_ns) const {

@@ -16,6 +16,7 @@
 #include "tracking/initialise.h"
 #include "tracking/pose_between.h"
 #include "tracking/relocaliser.h"
+#include "tracking/track_directly.h"
 
 namespace bslam::tracking {
 
@@ -71,18 +72,18 @@ struct FrameImages {
   std::span<const image::ImageView> masks;   // per camera
 };
 
-// What direct tracking found out about a frame that needs features.
-struct DirectHint {
-  std::optional<EstimatedPose> estimate = {};
-  bool keyframe_due = false;
-  bool failed = false;  // no pose was found
-};
-
 struct TrackOutcome {
   FrameRecord record;
   FrontEndState next;
   std::optional<ProposedEdit> edit;
   std::vector<BetweenKeyframes> early;  // frames of a monocular initialisation, once it succeeded
+};
+
+// What direct tracking found in a frame.
+struct DirectAttempt {
+  DirectFailure failure = DirectFailure::kNotTried;
+  std::optional<TrackOutcome> outcome = {};  // if a pose was found; final if there is no failure
+  bool all_cameras = false;                  // every camera supports the pose
 };
 
 class Tracker {
@@ -100,17 +101,15 @@ class Tracker {
 
   // Returns true if the next frame is to be tracked without features first.
   bool tracks_directly(const FrontEndState& state) const;
-  // Tracks a frame without features. Returns nullopt if it has to be processed with features; `hint` then contains what
-  // was found out.
-  std::optional<TrackOutcome> process_directly(const FrontEndState& state, const frame::BundledFrame& frame,
-                                               const FrameImages& images, const map::MapSnapshot& map,
-                                               DirectHint& hint) const;
+  // Tracks a frame without features. If that fails, the frame has to be processed with features, and with the attempt.
+  DirectAttempt process_directly(const FrontEndState& state, const frame::BundledFrame& frame,
+                                 const FrameImages& images, const map::MapSnapshot& map) const;
 
   // Tracks a frame in a version of the map, or attempts to initialise a map with it. `pyramids`: one per camera. If the
   // outcome contains an edit, the caller must commit it and call `committed`, which completes the record and the next
   // state.
   TrackOutcome process(FrontEndState state, frame::BundledFrame frame, std::span<const image::Pyramid> pyramids,
-                       const map::MapSnapshot& map, const DirectHint& hint = {});
+                       const map::MapSnapshot& map, DirectAttempt direct = {});
 
   // Completes an outcome with the ids assigned by the commit of its edit.
   void committed(const map::CommitReport& report, TrackOutcome& outcome) const;
@@ -123,13 +122,16 @@ class Tracker {
     frame::BundledFrame& frame;
     std::span<const image::Pyramid> pyramids;
     const map::MapSnapshot& map;
-    DirectHint hint = {};
+    DirectAttempt direct = {};
   };
   std::vector<matching::AlignmentOptions> alignment(const FrontEndState& state) const;
 
   void track(const Input& input, TrackOutcome& outcome);
+  TrackInput track_input(const map::BundledMap& map, std::span<const image::Pyramid> pyramids,
+                         std::span<const matching::AlignmentOptions> alignment, const FrontEndState& state) const;
   TrackOutput follow(const Input& input, const FrontEndState& state) const;
   bool relocalise(const Input& input, TrackOutcome& outcome);
+  void keep_direct_pose(const Input& input, TrackOutcome& outcome) const;
   bool gives_up(const FrontEndState& state, TimeNs time_ns) const;
   void handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome);
   void propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const;

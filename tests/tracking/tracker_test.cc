@@ -36,12 +36,12 @@ class TrackerRun {
   frame::BundledFrame frame(int i) const { return sim.frame(FrameId(i), time_s(i)).frame; }
   static double time_s(int i) { return 0.05 * i; }
 
-  TrackOutcome propose(frame::BundledFrame frame, const DirectHint& hint = {}) {
+  TrackOutcome propose(frame::BundledFrame frame, DirectAttempt direct = {}) {
     frame.twist = state.track.twist.value_or(geometry::Vector6d::Zero());
-    return tracker.process(state, std::move(frame), pyramids_, store.snapshot(), hint);
+    return tracker.process(state, std::move(frame), pyramids_, store.snapshot(), std::move(direct));
   }
-  FrameRecord process(frame::BundledFrame frame, const DirectHint& hint = {}) {
-    TrackOutcome outcome = propose(std::move(frame), hint);
+  FrameRecord process(frame::BundledFrame frame, DirectAttempt direct = {}) {
+    TrackOutcome outcome = propose(std::move(frame), std::move(direct));
     if (outcome.edit) tracker.committed(store.commit(std::move(outcome.edit->draft)), outcome);
     state = std::move(outcome.next);
     return outcome.record;
@@ -108,7 +108,7 @@ TEST(Tracker, DirectTrackingPausesAfterFailures) {
     std::string attempts;
     for (int i = 2; i < 18; ++i) {
       attempts += run.tracker.tracks_directly(run.state) ? 'x' : '.';
-      run.process(run.frame(i), {.failed = attempts.back() == 'x'});
+      run.process(run.frame(i), {attempts.back() == 'x' ? DirectFailure::kNoPose : DirectFailure::kNotTried});
     }
     EXPECT_EQ(attempts, expected);
     run.state.direct_pause = 0;
@@ -121,9 +121,22 @@ TEST(Tracker, AKeyframeThatIsDueIsInsertedWithFeatures) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 3; ++i) run.process(run.frame(i));
   EXPECT_FALSE(run.propose(run.frame(3)).edit);
-  const TrackOutcome outcome = run.propose(run.frame(3), {.keyframe_due = true});
+  const TrackOutcome outcome = run.propose(run.frame(3), {DirectFailure::kKeyframeDue});
   ASSERT_TRUE(outcome.edit);
   EXPECT_EQ(outcome.edit->kind, ProposedEdit::Kind::kKeyframe);
+}
+
+TEST(Tracker, KeepsThePoseFoundDirectlyIfTheFeaturesOfTheFrameGiveNone) {
+  TrackerRun run(synthetic::ring_rig(2));
+  for (int i = 0; i < 4; ++i) run.process(run.frame(i));
+  TrackOutcome direct = run.propose(run.frame(4));
+  direct.edit.reset();
+  const TrackOutcome outcome = run.propose(elsewhere(run.frame(4)), {DirectFailure::kFewInliers, direct});
+  EXPECT_EQ(outcome.record.result.status, TrackStatus::kTracking);
+  EXPECT_EQ(map::distance_m(outcome.record.result.T_rig_world, direct.record.result.T_rig_world), 0);
+  EXPECT_EQ(outcome.next.track.time_ns, direct.next.track.time_ns);
+  EXPECT_EQ(outcome.next.frames_lost, 0);
+  EXPECT_FALSE(outcome.edit);
 }
 
 TEST(Tracker, OneCameraInitialisesUpToScaleAndLocatesTheEarlierFrames) {
