@@ -56,7 +56,7 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   auto observations = pose_observations(map, frame, found, input.features);
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
   const solver::MotionModel motion = motion_model(input, frame);
-  auto solution = robust_pose(map, found, observations, predicted, motion, options.pose);
+  auto solution = robust_pose(input, frame, found, observations, predicted, motion, options.pose);
   if (any(conflicting_cameras(found, solution.inliers_per_camera, input.state.cameras, options.consensus))) {
     const SE3 from_motion = predict(input, frame.time_ns);
     const auto consistent =
@@ -206,8 +206,8 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   out.aligned =
       align_matches(map, frame, coarse.T_rig_world, out.matches, input.pyramids, input.alignment, input.features, pool);
   const solver::MotionModel motion = motion_model(input, frame);
-  out.solution = robust_pose(map, out.matches, pose_observations(map, out.matches, out.aligned), coarse.T_rig_world,
-                             motion, options.pose);
+  out.solution = robust_pose(input, frame, out.matches, pose_observations(map, out.matches, out.aligned),
+                             coarse.T_rig_world, motion, options.pose);
   out.twist = motion.twist(out.solution.T_rig_world);
   return out;
 }

@@ -156,7 +156,7 @@ bool track_coarsely(const TrackInput& input, const std::vector<LandmarkId>& last
   const AlignedLandmarks found = align(input, frame, T_rig_world, candidates, alignment, pool);
   const auto observations = pose_observations(input.map, found.matches, found.aligned);
   const solver::MotionModel motion = motion_model(input, frame);
-  const auto solution = robust_pose(input.map, found.matches, observations, T_rig_world, motion, options.pose);
+  const auto solution = robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
   if (!enough(solution, observations.size(), options)) return false;
   frame.twist = motion.twist(solution.T_rig_world);
   T_rig_world = solution.T_rig_world;
@@ -275,7 +275,7 @@ DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, 
   AlignedLandmarks found = align(input, frame, T_rig_world, local.candidates, input.alignment, pool);
   const auto observations = pose_observations(input.map, found.matches, found.aligned);
   const solver::MotionModel motion = motion_model(input, frame);
-  auto solution = robust_pose(input.map, found.matches, observations, T_rig_world, motion, options.pose);
+  auto solution = robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
   if (!enough(solution, observations.size(), options)) return {.failure = DirectFailure::kNoPose};
   frame.twist = motion.twist(solution.T_rig_world);
   frame = with_keypoints(std::move(frame), found);

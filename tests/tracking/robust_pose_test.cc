@@ -29,13 +29,14 @@ class RobustPose : public ::testing::Test {
 
   bool few_observations(const Match& m) const { return world.map.observations(m.landmark).size() == 1; }
 
-  // Moves the pixels of the moving landmarks.
-  void move(const Eigen::Vector3d& distance) {
+  // Moves the pixels of the moving landmarks, of those with odd ids by another distance.
+  void move(const Eigen::Vector3d& of_even, const Eigen::Vector3d& of_odd) {
     std::size_t i = 0;
     for (const auto& camera : matches) {
       for (const Match& m : camera) {
         solver::PoseObservation& o = observations[i++];
         if (!few_observations(m)) continue;
+        const Eigen::Vector3d& distance = m.landmark.value() % 2 == 0 ? of_even : of_odd;
         const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
         const auto& model = world.map.rig().camera(o.camera);
         const auto before = model.project(T_cam_world * o.point_world),
@@ -49,6 +50,12 @@ class RobustPose : public ::testing::Test {
     return (solution.T_rig_world.inverse().translation() - truth.inverse().translation()).norm();
   }
 
+  solver::PoseSolution pose(const geometry::SE3& predicted) const {
+    const TrackerState state;
+    return robust_pose({.map = world.map, .pyramids = {}, .alignment = {}, .state = state}, seen.frame, matches,
+                       observations, predicted, motion, {});
+  }
+
   map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 1.0, 0.5);
   synthetic::SimulatedFrame seen = world.sim.frame(FrameId(1), 0.1);
   geometry::SE3 truth = seen.T_world_rig.inverse();
@@ -58,19 +65,29 @@ class RobustPose : public ::testing::Test {
 };
 
 TEST_F(RobustPose, FollowsLandmarksThatManyKeyframesObserve) {
-  move({0.2, 0.05, -0.1});
+  move({0.2, 0.05, -0.1}, {0.2, 0.05, -0.1});
   const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 1e-3, 0, 0.002, 0, 0.001).finished());
   EXPECT_GT(error(solver::solve_pose(world.map.rig(), observations, predicted, motion, {})), 0.05);
-  const auto solution = robust_pose(world.map, matches, observations, predicted, motion, {});
+  const auto solution = pose(predicted);
   ASSERT_TRUE(solution.ok);
   EXPECT_LT(error(solution), 0.005);
 }
 
 TEST_F(RobustPose, FollowsTheMajorityIfThePredictionIsWrong) {
   const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0.01, 0.02, 0, 0.1, 0.05, 0).finished());
-  const auto solution = robust_pose(world.map, matches, observations, predicted, motion, {});
+  const auto solution = pose(predicted);
   ASSERT_TRUE(solution.ok);
   EXPECT_LT(error(solution), 0.005);
+}
+
+// Neither the majority of the matches nor those near the prediction lead to the pose.
+TEST_F(RobustPose, IsFoundBySamplesIfTheInitialPoseAgreesWithFew) {
+  move({0.3, 0, 0.1}, {0.6, 0, 0.2});
+  const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 0, 0, -0.4, 0, 0).finished());
+  EXPECT_GT(error(solver::solve_pose(world.map.rig(), observations, predicted, motion, {})), 0.05);
+  const auto solution = pose(predicted);
+  ASSERT_TRUE(solution.ok);
+  EXPECT_LT(error(solution), 0.01);
 }
 
 TEST_F(RobustPose, CountsAtMostThreeKeyframesPerLandmark) {
