@@ -68,21 +68,30 @@ bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map,
   });
 }
 
+std::optional<std::pair<PlaceMatch, LoopClosure>> LoopCloser::closure_at(KeyframeId keyframe,
+                                                                         const map::BundledMap& map,
+                                                                         PlaceMatch place_match) const {
+  const auto scale = relative_scale(map, keyframe, place_match);
+  if (!scale) return std::nullopt;
+  place_match.scale = *scale;
+  place_match.matched_keyframe = closest_keyframe_of_place(map, keyframe, place_match, options_);
+  const LoopClosure closure = measure(map, keyframe, place_match);
+  if (!plausible(map, closure, options_.loop)) return std::nullopt;
+  if (closure.merged && !is_unambiguous(keyframe, map, place_match)) return std::nullopt;
+  return std::pair(std::move(place_match), closure);
+}
+
 std::optional<std::pair<PlaceMatch, LoopClosure>> LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map) {
+  const auto joined = joined_.find(map, keyframe, options_);
   const std::vector<Candidate> candidates = recogniser_->query_keyframe(map, keyframe);
   for (const Candidate& candidate : consistent_candidates(map, keyframe, candidates, options_.loop, history_)) {
     auto place_match = verify(keyframe, map, candidate);
     if (!place_match || !is_revisit(map, keyframe, *place_match, options_.loop)) continue;
-    const auto scale = relative_scale(map, keyframe, *place_match);
-    if (!scale) continue;
-    place_match->scale = *scale;
-    place_match->matched_keyframe = closest_keyframe_of_place(map, keyframe, *place_match, options_);
-    const LoopClosure closure = measure(map, keyframe, *place_match);
-    if (!plausible(map, closure, options_.loop)) continue;
-    if (!closure.merged || is_unambiguous(keyframe, map, *place_match))
-      return std::pair(*std::move(place_match), closure);
+    if (auto closure = closure_at(keyframe, map, *std::move(place_match))) return closure;
   }
-  return std::nullopt;
+  if (!joined) return std::nullopt;
+  auto place_match = verify(keyframe, map, {*joined});
+  return place_match ? closure_at(keyframe, map, *std::move(place_match)) : std::nullopt;
 }
 
 std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft& draft) {
@@ -95,6 +104,7 @@ std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft&
   if (!done) return std::nullopt;
   draft = std::move(attempt);
   history_ = {};
+  joined_.closed(keyframe);
   return closure;
 }
 

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "looping/consistency.h"
+#include "looping/joined_return.h"
 #include "looping/verify_place.h"
 #include "map/map_edit.h"
 
@@ -36,12 +37,15 @@ class LoopCloser {
   std::optional<PlaceMatch> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const;
   bool is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const PlaceMatch& place_match) const;
   std::optional<std::pair<PlaceMatch, LoopClosure>> find(KeyframeId keyframe, const map::BundledMap& map);
+  std::optional<std::pair<PlaceMatch, LoopClosure>> closure_at(KeyframeId keyframe, const map::BundledMap& map,
+                                                               PlaceMatch place_match) const;
 
   const std::unique_ptr<PlaceRecogniser> recogniser_;
   const LoopingOptions options_;
   const feature::FeatureModel features_;
   const std::uint64_t seed_;
   RecognitionHistory history_;
+  JoinedReturns joined_;
 };
 
 }  // namespace bslam::looping

@@ -112,13 +112,13 @@ class HallMap {
  public:
   using Shown = std::pair<int, int>;  // room, landmark of the simulator
   using Vector3d = Eigen::Vector3d;
-  static constexpr int kMaxLandmarkAge = 8;
 
-  explicit HallMap(const camera::Rig& rig) : map(std::make_shared<const camera::Rig>(rig)) {}
+  explicit HallMap(const camera::Rig& rig, int max_landmark_age = 8)
+      : map(std::make_shared<const camera::Rig>(rig)), max_landmark_age_(max_landmark_age) {}
 
   // Adds a keyframe of the features of hall number `room`, whose pose is `T_world_room`; its parent is the newest
   // keyframe, or it becomes the root of a submap. `error` is the drift of the estimate, from the true world to the
-  // world of the map. Landmarks last seen more than `kMaxLandmarkAge` keyframes ago, or in another submap, are not
+  // world of the map. Landmarks last seen more than `max_landmark_age` keyframes ago, or in another submap, are not
   // matched again and are therefore duplicated.
   KeyframeId add(const SimulatedFrame& seen, const Sim3& error = {}, int room = 0, const SE3& T_world_room = {},
                  bool new_submap = false) {
@@ -133,7 +133,7 @@ class HallMap {
       const Shown shown{room, map::shown_by(seen, FeatureId(f))};
       if (shown.second < 0 || std::exchange(taken[shown], true)) continue;
       const auto at = known_.find(shown);
-      if (at != known_.end() && k.value() - at->second.last.value() <= kMaxLandmarkAge) {
+      if (at != known_.end() && k.value() - at->second.last.value() <= max_landmark_age_) {
         matches.emplace_back(f, at->second.landmark);
         at->second.last = k;
       } else {
@@ -172,6 +172,7 @@ class HallMap {
     LandmarkId landmark;
     KeyframeId last;
   };
+  int max_landmark_age_;
   std::map<Shown, Known> known_;
 };
 

@@ -1,0 +1,49 @@
+#include "looping/joined_return.h"
+
+#include <algorithm>
+
+#include "looping/place_recogniser.h"
+#include "map/scene_depth.h"
+
+namespace bslam::looping {
+namespace {
+
+constexpr int kAway = 10;  // number of keyframes without sight of a place after which seeing it again is a return
+
+double distance(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
+  const auto centre = [&](KeyframeId k) -> Eigen::Vector3d {
+    return map.keyframe(k).T_rig_world.inverse().translation();
+  };
+  return (centre(a) - centre(b)).norm();
+}
+
+// Whether some keyframes between the two are not neighbours of the earlier one.
+bool was_away(const map::BundledMap& map, KeyframeId earlier, KeyframeId later, const RecognitionOptions& options) {
+  const auto neighbours = neighbours_of(map, earlier, options);
+  int away = 0;
+  for (std::size_t i = earlier.index() + 1; i < later.index() && away < kAway; ++i) {
+    const KeyframeId k(i);
+    if (map.alive(k) && !std::ranges::binary_search(neighbours, k, {}, &map::Covisible::keyframe)) ++away;
+  }
+  return away == kAway;
+}
+
+}  // namespace
+
+std::optional<KeyframeId> JoinedReturns::find(const map::BundledMap& map, KeyframeId keyframe,
+                                              const LoopingOptions& options) {
+  std::optional<KeyframeId> closest;
+  double least = options.loop.max_distance_over_depth * map::median_depth(map, keyframe);
+  for (const map::Covisible& c : map.keyframe(keyframe).covisible) {
+    if (c.keyframe > keyframe || c.weight < options.verification.min_inliers) continue;
+    const double d = distance(map, c.keyframe, keyframe);
+    if (d > least || !was_away(map, c.keyframe, keyframe, options.recognition)) continue;
+    least = d;
+    closest = c.keyframe;
+  }
+  const bool goes_on = last_.valid() && keyframe.value() - last_.value() <= options.loop.max_keyframe_gap;
+  if (closest && goes_on) last_ = keyframe;
+  return goes_on ? std::nullopt : closest;
+}
+
+}  // namespace bslam::looping
