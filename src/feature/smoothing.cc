@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "base/vectorised.h"
+
 namespace bslam::feature {
 namespace {
 
@@ -28,7 +30,7 @@ template <class Kernel>
 using Rows = std::array<const std::uint8_t*, 2 * Kernel::kHalf + 1>;
 
 template <class Kernel>
-void down(const Rows<Kernel>& in, int width, std::uint16_t* __restrict out) {
+[[gnu::always_inline]] inline void down(const Rows<Kernel>& in, int width, std::uint16_t* __restrict out) {
   const Rows<Kernel> rows = in;  // a copy, which cannot alias `out`
   for (int x = 0; x < width; ++x) {
     out[x] = static_cast<std::uint16_t>(Kernel::sum([&](int k) -> unsigned { return rows[k][x]; }));
@@ -36,12 +38,30 @@ void down(const Rows<Kernel>& in, int width, std::uint16_t* __restrict out) {
 }
 
 template <class Kernel>
-void across(const std::uint16_t* __restrict in, int width, std::uint8_t* __restrict out) {
+[[gnu::always_inline]] inline void across(const std::uint16_t* __restrict in, int width, std::uint8_t* __restrict out) {
   constexpr unsigned kRound = 1u << (Kernel::kShift - 1);
   for (int x = 0; x < width; ++x) {
     const auto sum = static_cast<std::uint16_t>(Kernel::sum([&](int k) -> unsigned { return in[x + k]; }) + kRound);
     out[x] = static_cast<std::uint8_t>(sum >> Kernel::kShift);
   }
+}
+
+// One row of the output; `row`: memory for the sums of the columns and kHalf more on either side.
+template <class Kernel>
+[[gnu::always_inline]] inline void filter_row(const Rows<Kernel>& rows, int width, std::uint16_t* row,
+                                              std::uint8_t* out) {
+  constexpr int kHalf = Kernel::kHalf;
+  down<Kernel>(rows, width, row + kHalf);
+  std::fill_n(row, kHalf, row[kHalf]);
+  std::fill_n(row + kHalf + width, kHalf, row[kHalf + width - 1]);
+  across<Kernel>(row, width, out);
+}
+
+BSLAM_VECTORISED void filter_row(Soften, const Rows<Soften>& rows, int width, std::uint16_t* row, std::uint8_t* out) {
+  filter_row<Soften>(rows, width, row, out);
+}
+BSLAM_VECTORISED void filter_row(Smooth, const Rows<Smooth>& rows, int width, std::uint16_t* row, std::uint8_t* out) {
+  filter_row<Smooth>(rows, width, row, out);
 }
 
 }  // namespace
@@ -56,10 +76,7 @@ void Smoother::filter(const image::ImageView& in, image::Image& out) {
   for (int y = 0; y < in.height; ++y) {
     Rows<Kernel> rows;
     for (int k = 0; k <= 2 * kHalf; ++k) rows[k] = in.row(std::clamp(y + k - kHalf, 0, in.height - 1));
-    down<Kernel>(rows, in.width, row_.data() + kHalf);
-    std::fill_n(row_.begin(), kHalf, row_[kHalf]);
-    std::fill_n(row_.end() - kHalf, kHalf, row_[static_cast<std::size_t>(in.width + kHalf - 1)]);
-    across<Kernel>(row_.data(), in.width, out.row(y));
+    filter_row(Kernel(), rows, in.width, row_.data(), out.row(y));
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "base/vectorised.h"
+
 namespace bslam::feature {
 namespace {
 
@@ -22,8 +24,8 @@ struct Phase {
 };
 
 // One row of a window; 16 bits hold the sums: 255 * 256 + 128 < 2^16.
-void blend_row(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b, const Phase<16>& phase,
-               std::uint8_t* __restrict out) {
+[[gnu::always_inline]] inline void blend_row(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b,
+                                             const Phase<16>& phase, std::uint8_t* __restrict out) {
   const auto w00 = static_cast<std::uint16_t>(phase.w00), w01 = static_cast<std::uint16_t>(phase.w01);
   const auto w10 = static_cast<std::uint16_t>(phase.w10), w11 = static_cast<std::uint16_t>(phase.w11);
   for (int i = 0; i < kWindowStride; ++i) {
@@ -32,15 +34,17 @@ void blend_row(const std::uint8_t* __restrict a, const std::uint8_t* __restrict 
   }
 }
 
+BSLAM_VECTORISED void sample_rows(const std::uint8_t* row, std::ptrdiff_t stride, const Phase<16>& phase,
+                                  std::uint8_t* out) {
+  for (int j = 0; j < kWindowRows; ++j, row += stride, out += kWindowStride) blend_row(row, row + stride, phase, out);
+}
+
 }  // namespace
 
 Window sample_window(const image::ImageView& level, float x, float y) {
   const Phase<16> phase(x, y);
   Window window;
-  const std::uint8_t* row = level.row(phase.y - kWindowRadius) + phase.x - kWindowRadius;
-  for (int j = 0; j < kWindowRows; ++j, row += level.stride) {
-    blend_row(row, row + level.stride, phase, window.data() + j * kWindowStride);
-  }
+  sample_rows(level.row(phase.y - kWindowRadius) + phase.x - kWindowRadius, level.stride, phase, window.data());
   return window;
 }
 

@@ -11,6 +11,7 @@
 #endif
 
 #include "base/assert.h"
+#include "base/vectorised.h"
 
 namespace bslam::image {
 namespace {
@@ -71,8 +72,8 @@ void make_strip(int begin, int end, int inputs, int outputs, Strip& strip) {
 }
 
 // Vertical pass: `out` is half the weighted sum of four rows (15 bits).
-void blend_rows(const std::array<const std::uint8_t*, kTaps>& rows, const std::array<int, kTaps>& weight, int count,
-                std::int16_t* __restrict out) {
+BSLAM_VECTORISED void blend_rows(const std::array<const std::uint8_t*, kTaps>& rows,
+                                 const std::array<int, kTaps>& weight, int count, std::int16_t* __restrict out) {
   const auto *r0 = rows[0], *r1 = rows[1], *r2 = rows[2], *r3 = rows[3];
   const auto w0 = static_cast<std::uint16_t>(weight[0]), w1 = static_cast<std::uint16_t>(weight[1]);
   const auto w2 = static_cast<std::uint16_t>(weight[2]), w3 = static_cast<std::uint16_t>(weight[3]);

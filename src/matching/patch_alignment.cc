@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+
+#include "base/vectorised.h"
 
 namespace bslam::matching {
 namespace {
@@ -11,59 +14,83 @@ namespace {
 constexpr int kInner = feature::kPatchSize - 2;  // samples with a gradient
 constexpr int kSamples = kInner * kInner;
 
+// A row of the patch, one lane per column. Sums over all samples are sums of one partial sum per lane.
+using Lanes = float __attribute__((vector_size(sizeof(float) * kInner)));
+using IntLanes = std::int32_t __attribute__((vector_size(sizeof(std::int32_t) * kInner)));
+using PairLanes = std::uint16_t __attribute__((vector_size(sizeof(std::uint16_t) * kInner)));  // two pixels per lane
+using ByteLanes = std::uint8_t __attribute__((vector_size(2 * kInner)));  // a pixel in every second
+static_assert(kInner == 8);
+
+[[gnu::always_inline]] inline float sum(const Lanes& v) {
+  return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
+}
+
+// Sets a vector to eight pixels.
+[[gnu::always_inline]] inline void load(const std::uint8_t* pixels, Lanes& to) {
+  ByteLanes bytes{};
+  std::memcpy(&bytes, pixels, kInner);
+  const ByteLanes spread =
+      __builtin_shufflevector(bytes, ByteLanes{}, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+  PairLanes wide;
+  std::memcpy(&wide, &spread, sizeof(wide));  // little-endian
+  to = __builtin_convertvector(__builtin_convertvector(wide, IntLanes), Lanes);
+}
+
 // The template: zero-mean samples, zero-mean gradients, and the inverse of their 2x2 Hessian.
 struct Template {
-  std::array<float, kSamples> value, gx, gy;
+  std::array<Lanes, kInner> value, gx, gy;
   float variance = 0;  // sum of squares of `value`
   Eigen::Matrix2f inverse_hessian;
   float min_eigenvalue = 0;  // smaller eigenvalue of the Hessian
 };
 
-std::optional<Template> make_template(const feature::Patch& patch) {
-  Template t;
-  float mean = 0, mean_x = 0, mean_y = 0;
+// Sums of products of the zero-mean samples and gradients.
+struct Moments {
+  float variance = 0, xx = 0, xy = 0, yy = 0;
+};
+
+// Sets the zero-mean samples and gradients.
+BSLAM_VECTORISED Moments set_samples(const std::uint8_t* patch, Template& t) {
+  std::array<Lanes, feature::kPatchSize> row;  // columns 1 to 8 of the patch
+  Lanes mean{}, mean_x{}, mean_y{};
+  for (int y = 0; y < feature::kPatchSize; ++y) load(patch + y * feature::kPatchSize + 1, row[y]);
   for (int y = 0; y < kInner; ++y) {
-    for (int x = 0; x < kInner; ++x) {
-      const std::uint8_t* p = patch.data() + (y + 1) * feature::kPatchSize + x + 1;
-      const auto i = static_cast<std::size_t>(y * kInner + x);
-      t.value[i] = p[0];
-      t.gx[i] = 0.5f * static_cast<float>(p[1] - p[-1]);
-      t.gy[i] = 0.5f * static_cast<float>(p[feature::kPatchSize] - p[-feature::kPatchSize]);
-      mean += t.value[i];
-      mean_x += t.gx[i];
-      mean_y += t.gy[i];
-    }
+    const std::uint8_t* p = patch + (y + 1) * feature::kPatchSize;
+    Lanes left, right;
+    load(p, left);
+    load(p + 2, right);
+    t.value[y] = row[y + 1];
+    t.gx[y] = 0.5f * (right - left);
+    t.gy[y] = 0.5f * (row[y + 2] - row[y]);
+    mean += t.value[y];
+    mean_x += t.gx[y];
+    mean_y += t.gy[y];
   }
   constexpr float kInverse = 1.0f / kSamples;
-  mean *= kInverse;
-  mean_x *= kInverse;
-  mean_y *= kInverse;
-  float xx = 0, xy = 0, yy = 0;
-  for (std::size_t i = 0; i < kSamples; ++i) {
-    t.value[i] -= mean;
-    t.gx[i] -= mean_x;
-    t.gy[i] -= mean_y;
-    t.variance += t.value[i] * t.value[i];
-    xx += t.gx[i] * t.gx[i];
-    xy += t.gx[i] * t.gy[i];
-    yy += t.gy[i] * t.gy[i];
+  const float m = sum(mean) * kInverse, mx = sum(mean_x) * kInverse, my = sum(mean_y) * kInverse;
+  Lanes variance{}, xx{}, xy{}, yy{};
+  for (int y = 0; y < kInner; ++y) {
+    t.value[y] -= m;
+    t.gx[y] -= mx;
+    t.gy[y] -= my;
+    variance += t.value[y] * t.value[y];
+    xx += t.gx[y] * t.gx[y];
+    xy += t.gx[y] * t.gy[y];
+    yy += t.gy[y] * t.gy[y];
   }
+  return {sum(variance), sum(xx), sum(xy), sum(yy)};
+}
+
+std::optional<Template> make_template(const feature::Patch& patch) {
+  Template t;
+  const auto [variance, xx, xy, yy] = set_samples(patch.data(), t);
+  t.variance = variance;
   const float half_trace = 0.5f * (xx + yy), det = xx * yy - xy * xy;
   t.min_eigenvalue = half_trace - std::sqrt(std::max(0.0f, half_trace * half_trace - det));
   // Root mean square gradient below one grey value per pixel in some direction: an edge or no texture.
   if (!(t.min_eigenvalue > 1.0f * kSamples)) return std::nullopt;
   t.inverse_hessian << yy / det, -xy / det, -xy / det, xx / det;
   return t;
-}
-
-float bilinear(const image::Image& image, float x, float y) {
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const float fx = x - static_cast<float>(ix), fy = y - static_cast<float>(iy);
-  const std::uint8_t* a = image.row(iy) + ix;
-  const std::uint8_t* b = a + image.width();
-  const float top = static_cast<float>(a[0]) + fx * static_cast<float>(a[1] - a[0]);
-  const float bottom = static_cast<float>(b[0]) + fx * static_cast<float>(b[1] - b[0]);
-  return top + fy * (bottom - top);
 }
 
 // Returns the level whose pixel size is closest to the size of a patch pixel in the target, `scale`.
@@ -90,10 +117,41 @@ LevelWarp on_level(const PatchWarp& warp, const image::Pyramid& pyramid, std::si
           (per_pixel.asDiagonal() * warp.quadratic).cast<float>()};
 }
 
+// Samples the image by bilinear interpolation at the warped patch positions around (x, y), which must be inside of it.
+BSLAM_VECTORISED void sample_inside(const std::uint8_t* pixels, int width, const LevelWarp& warp, float x, float y,
+                                    std::array<Lanes, kInner>& out) {
+  const float a00 = warp.linear(0, 0), a01 = warp.linear(0, 1), a10 = warp.linear(1, 0), a11 = warp.linear(1, 1);
+  const Eigen::Matrix<float, 2, 3>& Q = warp.quadratic;
+  const Lanes dx = {0 - kHalf, 1 - kHalf, 2 - kHalf, 3 - kHalf, 4 - kHalf, 5 - kHalf, 6 - kHalf, 7 - kHalf};
+  const Lanes along_x = x + dx * (a00 + dx * Q(0, 0)), along_y = y + dx * (a10 + dx * Q(1, 0));
+  for (int r = 0; r < kInner; ++r) {
+    const float dy = static_cast<float>(r) - kHalf;
+    const Lanes warped_x = along_x + dx * (dy * Q(0, 1)) + dy * (a01 + dy * Q(0, 2)),
+                warped_y = along_y + dx * (dy * Q(1, 1)) + dy * (a11 + dy * Q(1, 2));
+    const Lanes px = warped_x > 0 ? warped_x : Lanes{}, py = warped_y > 0 ? warped_y : Lanes{};
+    const IntLanes ix = __builtin_convertvector(px, IntLanes), iy = __builtin_convertvector(py, IntLanes);
+    const IntLanes offset = iy * width + ix;
+    std::array<std::uint16_t, kInner> above, below;  // pixels ix and ix + 1 of rows iy and iy + 1
+    for (int i = 0; i < kInner; ++i) {
+      std::memcpy(&above[i], pixels + offset[i], 2);
+      std::memcpy(&below[i], pixels + offset[i] + width, 2);
+    }
+    PairLanes pairs;
+    std::memcpy(&pairs, above.data(), sizeof(pairs));
+    const IntLanes top = __builtin_convertvector(pairs, IntLanes);
+    std::memcpy(&pairs, below.data(), sizeof(pairs));
+    const IntLanes bottom = __builtin_convertvector(pairs, IntLanes);
+    const Lanes fx = px - __builtin_convertvector(ix, Lanes), fy = py - __builtin_convertvector(iy, Lanes);
+    const Lanes a = __builtin_convertvector(top & 255, Lanes), b = __builtin_convertvector(top >> 8, Lanes),
+                c = __builtin_convertvector(bottom & 255, Lanes), d = __builtin_convertvector(bottom >> 8, Lanes);
+    const Lanes upper = a + fx * (b - a), lower = c + fx * (d - c);
+    out[r] = upper + fy * (lower - upper);
+  }
+}
+
 // Samples the target at the warped patch positions around (x, y), pixels of the level. Returns false if some position
 // is outside the image.
-bool sample_target(const image::Image& image, const LevelWarp& warp, float x, float y,
-                   std::array<float, kSamples>& out) {
+bool sample_target(const image::Image& image, const LevelWarp& warp, float x, float y, std::array<Lanes, kInner>& out) {
   constexpr float kRounding = 0.01f;
   const Eigen::Matrix2f& A = warp.linear;
   const Eigen::Matrix<float, 2, 3>& Q = warp.quadratic;
@@ -102,17 +160,7 @@ bool sample_target(const image::Image& image, const LevelWarp& warp, float x, fl
         y + reach.y() < static_cast<float>(image.height() - 1) - kRounding)) {
     return false;
   }
-  std::size_t i = 0;
-  for (int r = 0; r < kInner; ++r) {
-    const float dx = -kHalf, dy = static_cast<float>(r) - kHalf;
-    // The step from column to column increases by 2 Q_xx per column.
-    Eigen::Vector2f p =
-        Eigen::Vector2f(x, y) + A * Eigen::Vector2f(dx, dy) + Q * Eigen::Vector3f(dx * dx, dx * dy, dy * dy);
-    Eigen::Vector2f step = A.col(0) + (2 * dx + 1) * Q.col(0) + dy * Q.col(1);
-    for (int c = 0; c < kInner; ++c, ++i, p += step, step += 2 * Q.col(0)) {
-      out[i] = bilinear(image, std::max(p.x(), 0.0f), std::max(p.y(), 0.0f));
-    }
-  }
+  sample_inside(image.row(0), image.width(), warp, x, y, out);
   return true;
 }
 
@@ -122,27 +170,47 @@ struct Comparison {
   Eigen::Vector2f shift;  // shift of the template, in its pixels, that minimises the difference
 };
 
-Comparison compare(const Template& t, const std::array<float, kSamples>& samples) {
-  float mean = 0;
-  for (const float s : samples) mean += s;
-  mean /= kSamples;
-  float cross = 0, variance = 0;
-  for (std::size_t i = 0; i < kSamples; ++i) {
-    const float v = samples[i] - mean;
-    cross += v * t.value[i];
+// Sums of products of zero-mean target samples with themselves and with the template.
+struct Correlation {
+  float mean = 0, cross = 0, variance = 0;
+};
+
+BSLAM_VECTORISED Correlation correlate(const Template& t, const std::array<Lanes, kInner>& samples) {
+  Lanes total{}, cross{}, variance{};
+  for (const Lanes& row : samples) total += row;
+  const float mean = sum(total) / kSamples;
+  for (int y = 0; y < kInner; ++y) {
+    const Lanes v = samples[y] - mean;
+    cross += v * t.value[y];
     variance += v * v;
   }
+  return {mean, sum(cross), sum(variance)};
+}
+
+// Right side of the normal equations of the shift, and the sum of squared differences.
+struct Difference {
+  float bx = 0, by = 0, squares = 0;
+};
+
+BSLAM_VECTORISED Difference difference(const Template& t, const std::array<Lanes, kInner>& samples, float mean,
+                                       float inverse_gain) {
+  Lanes bx{}, by{}, squares{};
+  for (int y = 0; y < kInner; ++y) {
+    const Lanes r = (samples[y] - mean) * inverse_gain - t.value[y];
+    bx += t.gx[y] * r;
+    by += t.gy[y] * r;
+    squares += r * r;
+  }
+  return {sum(bx), sum(by), sum(squares)};
+}
+
+Comparison compare(const Template& t, const std::array<Lanes, kInner>& samples) {
+  const auto [mean, cross, variance] = correlate(t, samples);
   Comparison c;
   c.gain = cross / t.variance;
   c.ncc = cross / std::sqrt(std::max(1e-6f, variance * t.variance));
   if (!(c.gain > 0)) return c;
-  float bx = 0, by = 0, squares = 0;
-  for (std::size_t i = 0; i < kSamples; ++i) {
-    const float r = (samples[i] - mean) / c.gain - t.value[i];
-    bx += t.gx[i] * r;
-    by += t.gy[i] * r;
-    squares += r * r;
-  }
+  const auto [bx, by, squares] = difference(t, samples, mean, 1.0f / c.gain);
   c.shift = t.inverse_hessian * Eigen::Vector2f(bx, by);
   c.residual_variance = squares / (kSamples - 4);  // four estimated parameters: shift (2), gain, offset
   return c;
@@ -207,7 +275,7 @@ std::optional<AlignedKeypoint> align_patch(const feature::Patch& patch, const Pa
   const Eigen::Vector2f start(static_cast<float>(target.from_base_x(level, initial.x())),
                               static_cast<float>(target.from_base_y(level, initial.y())));
   Eigen::Vector2f at = start;
-  std::array<float, kSamples> samples;
+  std::array<Lanes, kInner> samples;
   bool converged = false;
   Comparison c;
   for (int i = 0; i < options.iterations && !converged; ++i) {
