@@ -104,7 +104,7 @@ std::vector<CameraStatus> CameraStatusMonitor::update(std::span<const CameraEvid
     if (!any_agrees || evidence[c].keypoints == 0) continue;
     cameras_[c].keypoints += evidence[c].keypoints;
     cameras_[c].inliers += evidence[c].inliers;
-    ++cameras_[c].frames;
+    if (evidence[c].keypoints >= kFewKeypoints) ++cameras_[c].frames;  // few landmarks are searched for directly
   }
   std::vector<CameraStatus> out;
   for (std::size_t c = 0; c < cameras_.size(); ++c) out.push_back(status(evidence[c], c));

@@ -253,7 +253,12 @@ DirectOutput judged(const TrackInput& input, const LocalLandmarks& local, Tracke
   TrackResult& result = output.result;
   TrackerState& state = output.state;
   for (std::size_t c = 0; c < state.cameras.size(); ++c) {
-    result.cameras[c].keypoints = static_cast<int>(local.candidates[c].size());
+    const auto expected = static_cast<int>(local.candidates[c].size());
+    result.cameras[c].keypoints = expected;
+    if (used(output.frame, c)) {
+      const LandmarkCounts reobserved{expected, static_cast<int>(output.matches[c].size())};
+      update_reobservation_ratio(state.cameras[c], reobserved, options.consensus);
+    }
     update_used_camera(output.frame, c, output.matches[c], options.consensus, state.cameras[c]);
   }
   const bool low = support_is_low(output.frame, output.matches, options, state.direct);
