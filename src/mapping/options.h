@@ -121,7 +121,7 @@ struct MappingOptions {
   CullingOptions culling;
   LocalWindowOptions window;
   ScaleOptions scale;
-  adjustment::AdjustmentOptions local{.relative_decrease = 3e-3};  // the next keyframe continues the adjustment
+  adjustment::AdjustmentOptions local{.relative_decrease = 1e-3};  // the next keyframe continues the adjustment
   // After a loop closure the remaining error is distributed over the whole map, which changes the cost only slightly;
   // hence the stricter convergence threshold.
   adjustment::AdjustmentOptions global{.robust_iterations = 10, .final_iterations = 10, .relative_decrease = 1e-7};
