@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <libdeflate.h>
+#include <png.h>
 
 #include <CLI/Version.hpp>
 #include <Eigen/Core>
@@ -29,7 +30,7 @@ std::string version_text() {
   std::string text =
       fmt::format("bslam {}\nrevision {}\ncompiler {}\n", version_number(), BSLAM_GIT_REVISION, compiler());
   text += fmt::format("Eigen {}.{}.{}\n", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION);
-  text += fmt::format("OpenCV {}\n", CV_VERSION);
+  text += fmt::format("OpenCV {}\nlibpng {}\n", CV_VERSION, PNG_LIBPNG_VER_STRING);
   text += fmt::format("yaml-cpp {}\n", BSLAM_YAML_CPP_VERSION);
 #ifdef BSLAM_SIMULATOR
   text += fmt::format("Embree {}\n", BSLAM_EMBREE_VERSION);

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cstdint>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <set>
@@ -14,6 +13,7 @@
 #include <utility>
 
 #include "base/atomic_file.h"
+#include "image_decoding/codecs.h"
 #include "image_decoding/image_file.h"
 
 namespace bslam::dataset {
@@ -58,7 +58,7 @@ std::optional<int> header_number(std::string_view& bytes) {
   return value;
 }
 
-// Binary PGM with 8 bits per pixel. OpenCV is not used, since it prints a message if the file is truncated.
+// Binary PGM with 8 bits per pixel.
 std::optional<image::Image> decode_pgm(std::string_view bytes) {
   bytes.remove_prefix(2);  // "P5"
   const auto width = header_number(bytes), height = header_number(bytes), most = header_number(bytes);
@@ -72,13 +72,7 @@ std::optional<image::Image> decode_pgm(std::string_view bytes) {
 }
 
 std::optional<image::Image> decode_webp(std::string_view bytes) {
-  const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-  cv::Mat decoded;
-  try {
-    decoded = cv::imdecode(buffer, cv::IMREAD_GRAYSCALE);
-  } catch (const cv::Exception&) {
-    return std::nullopt;  // a header with an impossible size
-  }
+  const cv::Mat decoded = image_decoding::decode_to_grey(bytes);
   if (decoded.empty()) return std::nullopt;
   image::Image image(decoded.cols, decoded.rows);
   for (int y = 0; y < decoded.rows; ++y) std::copy_n(decoded.ptr<std::uint8_t>(y), decoded.cols, image.row(y));

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/atomic_file.h"
-#include "image_decoding/opencv_decoder.h"
+#include "image_decoding/codecs.h"
 #include "image_files/mask.h"
 #include "image_files/png_decoder.h"
 
@@ -31,7 +31,7 @@ void copy_row(const std::uint16_t* in, int bits, int width, std::uint8_t* out) {
                  [shift](std::uint16_t v) { return static_cast<std::uint8_t>(std::min(v >> shift, 255)); });
 }
 
-std::optional<image::Image> decode_with_opencv(std::string_view bytes, int bits) {
+std::optional<image::Image> decode_with_library(std::string_view bytes, int bits) {
   const cv::Mat decoded = decode_to_grey(bytes);
   if (decoded.empty() || (decoded.depth() != CV_8U && decoded.depth() != CV_16U)) return std::nullopt;
   image::Image image(decoded.cols, decoded.rows);
@@ -72,9 +72,9 @@ std::optional<image::Image> decode_values(std::string_view bytes, int bits) {
   if (bytes.size() > kMaxImageBytes) return std::nullopt;
   if (image_files::is_complete_png(bytes)) {
     auto image = image_files::decode_grey_png(bytes);
-    return image ? std::move(image) : decode_with_opencv(bytes, bits);
+    return image ? std::move(image) : decode_with_library(bytes, bits);
   }
-  return is_whole_jpeg(bytes) ? decode_with_opencv(bytes, bits) : std::nullopt;
+  return is_whole_jpeg(bytes) ? decode_with_library(bytes, bits) : std::nullopt;
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// PNG and JPEG files of every kind as 8-bit grey images, decoded by OpenCV if our own PNG decoder does not support
-// them.
+// PNG and JPEG files of every kind as 8-bit grey images, decoded by libpng and libjpeg-turbo if our own PNG decoder
+// does not support them.
 #pragma once
 
 #include <filesystem>

@@ -8,7 +8,7 @@
 
 #include "base/assert.h"
 #include "base/atomic_file.h"
-#include "image_decoding/opencv_decoder.h"
+#include "image_decoding/codecs.h"
 
 namespace bslam::image_decoding {
 namespace {

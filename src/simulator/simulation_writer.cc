@@ -1,10 +1,10 @@
 #include "simulator/simulation_writer.h"
 
 #include <fmt/format.h>
+#include <png.h>
 
 #include <cmath>
 #include <mutex>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -107,14 +107,17 @@ fs::path image_file(const fs::path& folder, const Shot& shot) {
 }
 
 Status write_image(const fs::path& file, const image::Image& image) {
-  // OpenCV has no matrix of constant pixels; the pixels are only read.
-  const cv::Mat pixels(image.height(), image.width(), CV_8UC1, const_cast<std::uint8_t*>(image.row(0)));
-  std::vector<unsigned char> png;
-  constexpr int kFast = 1;
-  if (!cv::imencode(".png", pixels, png, {cv::IMWRITE_PNG_COMPRESSION, kFast})) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  header.width = static_cast<png_uint_32>(image.width());
+  header.height = static_cast<png_uint_32>(image.height());
+  header.format = PNG_FORMAT_GRAY;
+  header.flags = PNG_IMAGE_FLAG_FAST;
+  std::string png(PNG_IMAGE_PNG_SIZE_MAX(header), '\0');
+  png_alloc_size_t size = png.size();
+  if (!png_image_write_to_memory(&header, png.data(), &size, 0, image.row(0), image.width(), nullptr))
     return Error{file.string(), "", "an image that cannot be stored as PNG", "a grey image"};
-  }
-  return write_atomically(file, {reinterpret_cast<const char*>(png.data()), png.size()});
+  return write_atomically(file, {png.data(), size});
 }
 
 // Writes all images that do not exist yet. Returns false if a stop was requested before all were written.

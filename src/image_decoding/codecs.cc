@@ -1,0 +1,111 @@
+#include "image_decoding/codecs.h"
+
+#include <png.h>
+#include <turbojpeg.h>
+#include <webp/decode.h>
+
+#include <csetjmp>
+#include <cstring>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+namespace bslam::image_decoding {
+namespace {
+
+constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;  // a header with more is damaged
+
+const unsigned char* data(std::string_view bytes) { return reinterpret_cast<const unsigned char*>(bytes.data()); }
+
+void read_png(png_structp png, png_bytep to, std::size_t count) {
+  auto& rest = *static_cast<std::string_view*>(png_get_io_ptr(png));
+  if (count > rest.size()) png_error(png, "truncated");
+  std::memcpy(to, rest.data(), count);
+  rest.remove_prefix(count);
+}
+
+// Leaves libpng's function that met the error.
+void leave(png_structp png, png_const_charp) { std::longjmp(*static_cast<std::jmp_buf*>(png_get_error_ptr(png)), 1); }
+
+// A decoder and what it needs while it runs; released also after an error.
+struct PngReader {
+  explicit PngReader(std::string_view bytes)
+      : rest(bytes), png(png_create_read_struct(PNG_LIBPNG_VER_STRING, &on_error, leave, [](png_structp, auto) {})) {
+    if (png) info = png_create_info_struct(png);
+  }
+  ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+
+  std::string_view rest;
+  std::jmp_buf on_error;
+  png_structp png;
+  png_infop info = nullptr;
+  cv::Mat image;
+  std::vector<png_bytep> rows;
+};
+
+// Reads the header, asks for grey values, and reserves the image. Returns false if the size is impossible.
+bool prepare(PngReader& r) {
+  png_set_read_fn(r.png, &r.rest, read_png);
+  png_read_info(r.png, r.info);
+  const png_uint_32 width = png_get_image_width(r.png, r.info), height = png_get_image_height(r.png, r.info);
+  if (std::uint64_t{width} * height > kMaxPixels) return false;
+  const int depth = png_get_bit_depth(r.png, r.info), colour = png_get_color_type(r.png, r.info);
+  if (colour == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(r.png);
+  if (colour == PNG_COLOR_TYPE_GRAY && depth < 8) png_set_expand_gray_1_2_4_to_8(r.png);
+  if (depth == 16) png_set_swap(r.png);  // little-endian
+  png_set_strip_alpha(r.png);
+  if (colour & PNG_COLOR_MASK_COLOR) png_set_rgb_to_gray(r.png, PNG_ERROR_ACTION_NONE, 0.299, 0.587);
+  png_set_interlace_handling(r.png);
+  png_read_update_info(r.png, r.info);
+  r.image.create(static_cast<int>(height), static_cast<int>(width), depth == 16 ? CV_16UC1 : CV_8UC1);
+  for (int y = 0; y < r.image.rows; ++y) r.rows.push_back(r.image.ptr<png_byte>(y));
+  return png_get_rowbytes(r.png, r.info) == r.image.step;
+}
+
+cv::Mat decode_png(std::string_view bytes) {
+  PngReader reader(bytes);
+  if (!reader.info) return {};
+  // Errors return here; nothing with a destructor is created in this function after this line.
+  if (setjmp(reader.on_error)) return {};
+  if (!prepare(reader)) return {};
+  png_read_image(reader.png, reader.rows.data());
+  return reader.image;
+}
+
+cv::Mat decode_jpeg(std::string_view bytes) {
+  const std::unique_ptr<void, int (*)(tjhandle)> decoder(tjInitDecompress(), tjDestroy);
+  int width = 0, height = 0, subsampling = 0, colours = 0;
+  if (!decoder ||
+      tjDecompressHeader3(decoder.get(), data(bytes), bytes.size(), &width, &height, &subsampling, &colours) != 0)
+    return {};
+  if (static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) > kMaxPixels) return {};
+  cv::Mat image(height, width, CV_8UC1);
+  const int failed = tjDecompress2(decoder.get(), data(bytes), bytes.size(), image.data, width,
+                                   static_cast<int>(image.step), height, TJPF_GRAY, 0);
+  // Cameras write files with small irregularities, of which the decoder only warns.
+  if (failed != 0 && tjGetErrorCode(decoder.get()) != TJERR_WARNING) return {};
+  return image;
+}
+
+cv::Mat decode_webp(std::string_view bytes) {
+  int width = 0, height = 0;
+  if (!WebPGetInfo(data(bytes), bytes.size(), &width, &height)) return {};
+  cv::Mat colours(height, width, CV_8UC3), grey;
+  if (!WebPDecodeBGRInto(data(bytes), bytes.size(), colours.data, colours.total() * 3, static_cast<int>(colours.step)))
+    return {};
+  cv::cvtColor(colours, grey, cv::COLOR_BGR2GRAY);
+  return grey;
+}
+
+}  // namespace
+
+cv::Mat decode_to_grey(std::string_view bytes) {
+  if (bytes.starts_with("\x89PNG")) return decode_png(bytes);
+  if (bytes.starts_with("\xff\xd8")) return decode_jpeg(bytes);
+  if (bytes.starts_with("RIFF")) return decode_webp(bytes);
+  return {};
+}
+
+}  // namespace bslam::image_decoding

@@ -1,0 +1,13 @@
+// PNG, JPEG and WebP files in memory as matrices of grey values, decoded by the libraries of these formats.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <string_view>
+
+namespace bslam::image_decoding {
+
+// Decodes to one channel of 8 or, for PNG files with 16 bits, 16 bits. Colours become luminance, transparency and
+// orientation tags are ignored. The result is empty if the bytes cannot be decoded.
+cv::Mat decode_to_grey(std::string_view bytes);
+
+}  // namespace bslam::image_decoding
