@@ -70,6 +70,7 @@ if(BSLAM_SANITIZE)
   target_compile_options(bslam_flags INTERFACE -fsanitize=${BSLAM_SANITIZE} -fno-omit-frame-pointer)
   # GCC warns of values that the instrumented code seems to use uninitialised.
   target_compile_options(bslam_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+  target_compile_definitions(bslam_flags INTERFACE BSLAM_ONE_VERSION)  # base/vectorised.h
   # Under AddressSanitizer Eigen would choose another allocator than the OpenGV library it shares vectors with.
   target_compile_definitions(bslam_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
   target_link_options(bslam_flags INTERFACE -fsanitize=${BSLAM_SANITIZE})

@@ -64,14 +64,17 @@ bool prepare(PngReader& r) {
   return png_get_rowbytes(r.png, r.info) == r.image.step;
 }
 
+// Returns false after an error.
+bool decode(PngReader& reader) {
+  if (setjmp(reader.on_error)) return false;
+  if (!prepare(reader)) return false;
+  png_read_image(reader.png, reader.rows.data());
+  return true;
+}
+
 cv::Mat decode_png(std::string_view bytes) {
   PngReader reader(bytes);
-  if (!reader.info) return {};
-  // Errors return here; nothing with a destructor is created in this function after this line.
-  if (setjmp(reader.on_error)) return {};
-  if (!prepare(reader)) return {};
-  png_read_image(reader.png, reader.rows.data());
-  return reader.image;
+  return reader.info && decode(reader) ? reader.image : cv::Mat();
 }
 
 cv::Mat decode_jpeg(std::string_view bytes) {
@@ -102,9 +105,12 @@ cv::Mat decode_webp(std::string_view bytes) {
 }  // namespace
 
 cv::Mat decode_to_grey(std::string_view bytes) {
-  if (bytes.starts_with("\x89PNG")) return decode_png(bytes);
-  if (bytes.starts_with("\xff\xd8")) return decode_jpeg(bytes);
-  if (bytes.starts_with("RIFF")) return decode_webp(bytes);
+  try {
+    if (bytes.starts_with("\x89PNG")) return decode_png(bytes);
+    if (bytes.starts_with("\xff\xd8")) return decode_jpeg(bytes);
+    if (bytes.starts_with("RIFF")) return decode_webp(bytes);
+  } catch (const cv::Exception&) {  // no memory for the size in the header: the file is damaged
+  }
   return {};
 }
 

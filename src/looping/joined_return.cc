@@ -8,7 +8,7 @@
 namespace bslam::looping {
 namespace {
 
-constexpr int kAway = 10;  // number of keyframes without sight of a place after which seeing it again is a return
+constexpr int kAway = 10;  // successive keyframes without sight of a place after which seeing it again is a return
 
 double distance(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
   const auto centre = [&](KeyframeId k) -> Eigen::Vector3d {
@@ -17,13 +17,15 @@ double distance(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
   return (centre(a) - centre(b)).norm();
 }
 
-// Whether some keyframes between the two are not neighbours of the earlier one.
+// Whether kAway successive keyframes between the two are not neighbours of the earlier one.
 bool was_away(const map::BundledMap& map, KeyframeId earlier, KeyframeId later, const RecognitionOptions& options) {
   const auto neighbours = neighbours_of(map, earlier, options);
+  const KeyframeId root = map.root_of(earlier);
   int away = 0;
   for (std::size_t i = earlier.index() + 1; i < later.index() && away < kAway; ++i) {
     const KeyframeId k(i);
-    if (map.alive(k) && !std::ranges::binary_search(neighbours, k, {}, &map::Covisible::keyframe)) ++away;
+    if (!map.alive(k) || map.root_of(k) != root) continue;
+    away = std::ranges::binary_search(neighbours, k, {}, &map::Covisible::keyframe) ? 0 : away + 1;
   }
   return away == kAway;
 }
@@ -34,8 +36,8 @@ std::optional<KeyframeId> JoinedReturns::find(const map::BundledMap& map, Keyfra
                                               const LoopingOptions& options) {
   std::optional<KeyframeId> closest;
   double least = options.loop.max_distance_over_depth * map::median_depth(map, keyframe);
-  for (const map::Covisible& c : map.keyframe(keyframe).covisible) {
-    if (c.keyframe > keyframe || c.weight < options.verification.min_inliers) continue;
+  for (const map::Covisible& c : neighbours_of(map, keyframe, options.recognition)) {
+    if (c.keyframe > keyframe) continue;
     const double d = distance(map, c.keyframe, keyframe);
     if (d > least || !was_away(map, c.keyframe, keyframe, options.recognition)) continue;
     least = d;

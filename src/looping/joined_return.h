@@ -9,11 +9,11 @@
 
 namespace bslam::looping {
 
-// Finds the first keyframe of each return. A value type.
+// Finds returns that have not been closed yet. A value type.
 class JoinedReturns {
  public:
-  // The earlier keyframe to whose place the rig has returned after it had lost sight of that place, if `keyframe`
-  // shares landmarks with it. Nothing is returned while the return of one of the last keyframes goes on. Keyframes must
+  // The earlier keyframe to whose place the rig has returned after it had lost sight of that place, if it is a
+  // neighbour of `keyframe` (neighbours_of). Nothing is returned while a return that was closed goes on. Keyframes must
   // come in order of their ids.
   std::optional<KeyframeId> find(const map::BundledMap& map, KeyframeId keyframe, const LoopingOptions& options);
 

@@ -18,7 +18,7 @@ constexpr int kSamples = kInner * kInner;
 using Lanes = float __attribute__((vector_size(sizeof(float) * kInner)));
 using IntLanes = std::int32_t __attribute__((vector_size(sizeof(std::int32_t) * kInner)));
 using PairLanes = std::uint16_t __attribute__((vector_size(sizeof(std::uint16_t) * kInner)));  // two pixels per lane
-using ByteLanes = std::uint8_t __attribute__((vector_size(2 * kInner)));  // a pixel in every second
+using ByteLanes = std::uint8_t __attribute__((vector_size(2 * kInner)));  // a pixel in every second lane
 static_assert(kInner == 8);
 
 [[gnu::always_inline]] inline float sum(const Lanes& v) {

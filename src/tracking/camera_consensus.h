@@ -16,7 +16,7 @@ struct CameraConsensusState {
   int consistent_frames = 0;  // consecutive frames in which an excluded camera was consistent with the map
   TimeNs last_judged_ns = 0;  // when an excluded camera last had enough landmarks in view to be checked
   TimeNs excluded_since_ns = 0;       // start of the exclusion, or when its view was last found to be displaced
-  double reobservation_ratio = 1.0;   // in the last frame with enough expected landmarks
+  double reobservation_ratio = 1.0;   // in the last frame with enough expected landmarks, or of those aligned directly
   TimeNs last_image_ns = 0;           // time of its last image that was used
   std::vector<LandmarkId> landmarks;  // inliers of that image
 };

@@ -101,10 +101,11 @@ std::vector<CameraStatus> CameraStatusMonitor::update(std::span<const CameraEvid
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     record_image(evidence[c].image == image::ImageState::kPresent, cameras_[c]);
     if (counts_features(evidence[c])) cameras_[c].few_features = evidence[c].keypoints < kFewKeypoints;
-    if (!any_agrees || evidence[c].keypoints == 0) continue;
+    // Direct tracking searches for few landmarks of some cameras, which tells little.
+    if (!any_agrees || evidence[c].keypoints < kFewKeypoints) continue;
     cameras_[c].keypoints += evidence[c].keypoints;
     cameras_[c].inliers += evidence[c].inliers;
-    if (evidence[c].keypoints >= kFewKeypoints) ++cameras_[c].frames;  // few landmarks are searched for directly
+    ++cameras_[c].frames;
   }
   std::vector<CameraStatus> out;
   for (std::size_t c = 0; c < cameras_.size(); ++c) out.push_back(status(evidence[c], c));

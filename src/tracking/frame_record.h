@@ -39,7 +39,7 @@ struct FrameRecord {
   KeyframeId root;                         // root keyframe of the submap in which `result` gives the pose
   map::Scale scale = map::Scale::kMetric;  // of the map in which it gives the pose
   bool keyframe = false;
-  bool direct = false;                         // the frame was tracked directly, without extracted features
+  bool direct = false;                         // the pose was found by direct tracking
   bool recalibrated = false;                   // the calibration of the rig differs from that of the previous frame
   bool map_withdrawn = false;                  // after this frame the map was emptied, because it was not a good start
   int unique = 0, monocular = 0, matched = 0;  // features; unique = monocular + matched

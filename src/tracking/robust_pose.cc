@@ -10,8 +10,8 @@ namespace {
 constexpr std::size_t kTrusted = 3;  // number of keyframes beyond which more do not count
 // Fractions of the matches below which a second pose is estimated, and a third one by RANSAC.
 constexpr double kFewInliers = 0.8, kMinority = 0.5;
-// Maximum squared normalised error, at the prediction, of the matches that agree with it: four standard deviations.
-constexpr double kAgreesWithPrediction = 16.0;
+// Maximum squared normalised error, at the initial pose, of the matches that agree with it: four standard deviations.
+constexpr double kAgreesWithStart = 16.0;
 
 // Ratio of supports from which on another pose is another motion and not a variation of the first one.
 constexpr double kMoreSupport = 1.1;
@@ -45,17 +45,16 @@ solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFr
   const camera::Rig& rig = input.map.rig();
   solver::PoseSolution solution = solver::solve_pose(rig, observations, predicted, motion, options);
   if (!few(solution, kFewInliers, observations.size())) return solution;
-  solver::PoseSolverOptions near_prediction = options;
-  near_prediction.first_chi2 = kAgreesWithPrediction;
-  replace_if_better(input.map, matches, solver::solve_pose(rig, observations, predicted, motion, near_prediction),
-                    solution);
+  solver::PoseSolverOptions near_start = options;
+  near_start.first_chi2 = kAgreesWithStart;
+  replace_if_better(input.map, matches, solver::solve_pose(rig, observations, predicted, motion, near_start), solution);
   if (!few(solution, kMinority, observations.size())) return solution;
   const solver::PoseSolution sampled =
       estimators::ransac_pose(frame::rig_of(rig, frame), observations, predicted, options, {},
                               Random(input.seed, "pose", static_cast<std::uint64_t>(frame.id.value())));
   if (sampled.ok) {
     replace_if_better(input.map, matches,
-                      solver::solve_pose(rig, observations, sampled.T_rig_world, motion, near_prediction), solution);
+                      solver::solve_pose(rig, observations, sampled.T_rig_world, motion, near_start), solution);
   }
   return solution;
 }

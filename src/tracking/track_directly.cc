@@ -253,16 +253,16 @@ DirectOutput judged(const TrackInput& input, const LocalLandmarks& local, Tracke
   TrackResult& result = output.result;
   TrackerState& state = output.state;
   for (std::size_t c = 0; c < state.cameras.size(); ++c) {
-    const auto expected = static_cast<int>(local.candidates[c].size());
-    result.cameras[c].keypoints = expected;
-    if (used(output.frame, c)) {
-      const LandmarkCounts reobserved{expected, static_cast<int>(output.matches[c].size())};
-      update_reobservation_ratio(state.cameras[c], reobserved, options.consensus);
-    }
+    result.cameras[c].keypoints = static_cast<int>(local.candidates[c].size());
     update_used_camera(output.frame, c, output.matches[c], options.consensus, state.cameras[c]);
   }
   const bool low = support_is_low(output.frame, output.matches, options, state.direct);
   out.all_cameras = !low;
+  for (std::size_t c = 0; !low && c < state.cameras.size(); ++c) {
+    if (!used(output.frame, c)) continue;
+    const LandmarkCounts found_again{result.cameras[c].keypoints, result.cameras[c].inliers};
+    update_reobservation_ratio(state.cameras[c], found_again, options.consensus);
+  }
   if (low) out.failure = DirectFailure::kFewInliers;
   if (keyframe_is_due(input, options, output)) out.failure = DirectFailure::kKeyframeDue;
   return out;

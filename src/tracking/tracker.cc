@@ -73,6 +73,7 @@ void update_odometry(const map::BundledMap& map, const TrackerState& before, Tra
 void pause_direct_tracking(DirectFailure failure, FrontEndState& state) {
   constexpr int kFailures = 3, kPause = 10;
   if (state.direct_pause > 0) --state.direct_pause;
+  if (failure == DirectFailure::kFewInliers || failure == DirectFailure::kKeyframeDue) state.direct_failures = 0;
   if (failure != DirectFailure::kNoPose) return;
   if (++state.direct_failures >= kFailures) state.direct_pause = kPause;
 }
@@ -140,9 +141,8 @@ bool Tracker::tracks_directly(const FrontEndState& state) const {
          std::ranges::none_of(state.track.cameras, &CameraConsensusState::excluded);
 }
 
-TrackInput Tracker::track_input(const map::BundledMap& map, std::span<const image::Pyramid> pyramids,
-                                std::span<const matching::AlignmentOptions> alignment,
-                                const FrontEndState& state) const {
+TrackInput Tracker::input_of(const map::BundledMap& map, std::span<const image::Pyramid> pyramids,
+                             std::span<const matching::AlignmentOptions> alignment, const FrontEndState& state) const {
   return {.map = map,
           .pyramids = pyramids,
           .alignment = alignment,
@@ -159,10 +159,11 @@ DirectAttempt Tracker::process_directly(const FrontEndState& state, const Bundle
   TrackerState& track = outcome.next.track;
   apply_scale_change(*map, track);
   const auto alignment = this->alignment(state);
-  TrackInput input = track_input(*map, images.pyramids, alignment, outcome.next);
+  TrackInput input = input_of(*map, images.pyramids, alignment, outcome.next);
   input.masks = images.masks;
   DirectOutput direct = track_directly(input, frame, options_.tracking, pool_);
-  if (direct.failure == DirectFailure::kKeyframeDue && options_.localize_only) direct.failure = DirectFailure::kNone;
+  if (direct.failure == DirectFailure::kKeyframeDue && options_.localize_only)
+    direct.failure = direct.all_cameras ? DirectFailure::kNone : DirectFailure::kFewInliers;
   if (!direct.output) return {.failure = direct.failure};
   TrackOutput& output = *direct.output;
   const TrackerState before = std::exchange(track, std::move(output.state));
@@ -216,7 +217,7 @@ TrackOutput Tracker::follow(const Input& input, const FrontEndState& state) cons
     return lost(state.track, input.frame, blind ? LostReason::kFewFeatures : LostReason::kNotFound);
   }
   const auto alignment = this->alignment(state);
-  TrackInput track_input = this->track_input(*input.map, input.pyramids, alignment, state);
+  TrackInput track_input = input_of(*input.map, input.pyramids, alignment, state);
   if (const auto& direct = input.direct.outcome)
     track_input.estimate = {direct->record.result.T_rig_world, input.direct.all_cameras};
   return tracking::track(track_input, input.frame, options_.tracking, pool_);
@@ -229,9 +230,9 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   const TrackerState before = state.track;
   TrackOutput output = follow(input, state);
   record.stages.push_back({"track", watch.ms()});
-  if (!is_tracking(output.result.status) && input.direct.outcome) return keep_direct_pose(input, outcome);
+  if (!is_tracking(output.result.status) && keep_direct_pose(input, outcome)) return;
   if (!is_tracking(output.result.status) && had_features(output.result) && relocalise(input, outcome)) {
-    output = follow(input, state);
+    output = follow({input.frame, input.pyramids, input.map}, state);
     if (!is_tracking(output.result.status)) record.relocalisation.reset();
   }
   if (is_tracking(output.result.status)) input.frame = output.frame;  // refined by tracking
@@ -240,7 +241,7 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   state.calibration_errors =
       calibration_errors(state.calibration_errors, *input.map, input.frame, output, options_.tracking.alignment);
   if (!is_tracking(output.result.status)) return handle_lost(input, before, outcome);
-  state.frames_lost = 0;
+  state.frames_lost = state.direct_kept = 0;
   state.start_reference.reset();
   state.waiting.clear();
   state.track = std::move(output.state);
@@ -252,11 +253,17 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   }
 }
 
-// The features of the frame give no pose, but direct tracking has found one.
-void Tracker::keep_direct_pose(const Input& input, TrackOutcome& outcome) const {
+// If the features of the frame give no pose but direct tracking has found one, it is kept, except after several frames
+// in a row of which the features gave none: they are better evidence then. Returns true if it is kept.
+bool Tracker::keep_direct_pose(const Input& input, TrackOutcome& outcome) const {
+  constexpr int kMaxKept = 5;
+  if (!input.direct.outcome || outcome.next.direct_kept >= kMaxKept) return false;
   std::vector<StageTime> stages = std::move(outcome.record.stages);
+  const int kept = outcome.next.direct_kept + 1;
   outcome = *input.direct.outcome;
+  outcome.next.direct_kept = kept;
   outcome.record.stages = std::move(stages);
+  return true;
 }
 
 bool Tracker::gives_up(const FrontEndState& state, TimeNs time_ns) const {

@@ -49,6 +49,7 @@ struct FrontEndState {
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
   int direct_failures = 0;   // consecutive attempts of direct tracking that found no pose
   int direct_pause = 0;      // number of frames until the next attempt
+  int direct_kept = 0;       // poses found directly that were kept since the features of a frame last gave a pose
   int frames_lost = 0;       // consecutive lost frames with features
   TimeNs lost_since_ns = 0;  // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
@@ -127,11 +128,11 @@ class Tracker {
   std::vector<matching::AlignmentOptions> alignment(const FrontEndState& state) const;
 
   void track(const Input& input, TrackOutcome& outcome);
-  TrackInput track_input(const map::BundledMap& map, std::span<const image::Pyramid> pyramids,
-                         std::span<const matching::AlignmentOptions> alignment, const FrontEndState& state) const;
+  TrackInput input_of(const map::BundledMap& map, std::span<const image::Pyramid> pyramids,
+                      std::span<const matching::AlignmentOptions> alignment, const FrontEndState& state) const;
   TrackOutput follow(const Input& input, const FrontEndState& state) const;
   bool relocalise(const Input& input, TrackOutcome& outcome);
-  void keep_direct_pose(const Input& input, TrackOutcome& outcome) const;
+  bool keep_direct_pose(const Input& input, TrackOutcome& outcome) const;
   bool gives_up(const FrontEndState& state, TimeNs time_ns) const;
   void handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome);
   void propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const;

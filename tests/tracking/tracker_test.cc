@@ -137,6 +137,11 @@ TEST(Tracker, KeepsThePoseFoundDirectlyIfTheFeaturesOfTheFrameGiveNone) {
   EXPECT_EQ(outcome.next.track.time_ns, direct.next.track.time_ns);
   EXPECT_EQ(outcome.next.frames_lost, 0);
   EXPECT_FALSE(outcome.edit);
+  run.state.direct_kept = 5;  // as often before
+  const TrackOutcome contradicted = run.propose(elsewhere(run.frame(4)), {DirectFailure::kFewInliers, direct});
+  EXPECT_EQ(contradicted.record.result.status, TrackStatus::kLost);
+  EXPECT_EQ(run.process(run.frame(4)).result.status, TrackStatus::kTracking);
+  EXPECT_EQ(run.state.direct_kept, 0);
 }
 
 TEST(Tracker, OneCameraInitialisesUpToScaleAndLocatesTheEarlierFrames) {
