@@ -101,8 +101,7 @@ std::vector<CameraStatus> CameraStatusMonitor::update(std::span<const CameraEvid
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     record_image(evidence[c].image == image::ImageState::kPresent, cameras_[c]);
     if (counts_features(evidence[c])) cameras_[c].few_features = evidence[c].keypoints < kFewKeypoints;
-    // Direct tracking searches for few landmarks of some cameras, which tells little.
-    if (!any_agrees || evidence[c].keypoints < kFewKeypoints) continue;
+    if (!any_agrees || evidence[c].keypoints == 0) continue;
     cameras_[c].keypoints += evidence[c].keypoints;
     cameras_[c].inliers += evidence[c].inliers;
     ++cameras_[c].frames;

@@ -116,21 +116,6 @@ TEST(CameraStatus, ACameraWithHardlyAnyInliersIsInconsistent) {
   EXPECT_EQ(after(12, 0, 0), kGood);     // lost
 }
 
-// Between frames with features, direct tracking searches for few landmarks of a camera that has few.
-TEST(CameraStatus, FramesWithFewSearchedLandmarksDoNotShowThatACameraIsInconsistent) {
-  CameraStatusMonitor monitor(2);
-  CameraEvidence with_features = good(), first = good();
-  with_features.keypoints = 1200;
-  with_features.inliers = 2;
-  first.keypoints = 1000;
-  first.inliers = 200;
-  CameraEvidence searched = good();
-  searched.keypoints = searched.inliers = 2;
-  searched.extracted = false;
-  EXPECT_EQ(monitor.update(std::vector{first, with_features})[1], kGood);
-  for (int i = 0; i < 20; ++i) EXPECT_EQ(monitor.update(std::vector{first, searched})[1], kGood) << i;
-}
-
 TEST(CameraStatus, NamesMatchTheSummary) {
   EXPECT_EQ(describe(CameraState::kOk), "ok");
   EXPECT_EQ(describe(CameraState::kDegraded), "degraded");
