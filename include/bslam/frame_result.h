@@ -83,7 +83,9 @@ struct FrameResult {
   int unique_features = 0;            // number of features of all cameras; features matched between cameras count once
   int matched_features = 0;           // unique features observed by several cameras
 
-  bool keyframe = false;     // the frame became a keyframe
+  // The frame became a keyframe. Keyframes that are created of a frame after its call of System::process are reported
+  // by Callbacks::keyframe.
+  bool keyframe = false;
   int keyframe_id = -1;      // its id if it became a keyframe, otherwise the reference keyframe; -1 if none
   bool relocalised = false;  // tracking was recovered by place recognition
   // The initial map was up to scale and wrong: the rig was lost in it soon after. All poses and keyframes reported so

@@ -25,7 +25,7 @@ enum class LogLevel { kInfo, kWarning };
 
 struct KeyframeEvent {
   int keyframe = -1;  // id in the map
-  FrameResult frame;  // result of its frame
+  FrameResult frame;  // result of its frame, which may be one before the last
 };
 
 // A place was recognised and the map corrected.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "api/frame_conversion.h"
 #include "api/map_view_impl.h"
 
 namespace bslam::api {
@@ -70,15 +71,25 @@ void Notifier::report_map(const system::System& system) {
   if (callbacks_.map) callbacks_.map(make_map_view(std::move(map)));
 }
 
+void Notifier::report_created_keyframes(const system::System& system) {
+  if (!callbacks_.keyframe) return;
+  for (const tracking::FrameRecord& record : system.created_keyframes()) {
+    const FrameResult frame = to_frame_result(record, rig_);
+    callbacks_.keyframe({frame.keyframe_id, frame});
+  }
+}
+
 void Notifier::processed(const FrameResult& frame, const system::System& system) {
   report_status(frame);
   report_withdrawal(frame);
   report_cameras(frame);
+  report_created_keyframes(system);
   if (frame.keyframe && callbacks_.keyframe) callbacks_.keyframe({frame.keyframe_id, frame});
   report_map(system);
 }
 
 void Notifier::finished(const system::System& system) {
+  report_created_keyframes(system);
   report_map(system);
   report_loops(system);
 }

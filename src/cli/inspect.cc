@@ -9,7 +9,7 @@
 #include "cli/verbs.h"
 #include "dataset/frame_reader.h"
 #include "image_decoding/image_file.h"
-#include "system/pipeline.h"
+#include "system/single_frame.h"
 
 namespace bslam::cli {
 namespace {
@@ -58,8 +58,8 @@ int inspect(const InspectArguments& arguments) {
   }
   auto masks = image_decoding::read_masks(dataset->rig);
   if (!masks) return report_error(masks.error());
-  system::Pipeline pipeline(dataset->rig, *config, std::move(*masks));
-  const auto frame = pipeline.make_frame(dataset::read_frame(*dataset, static_cast<std::size_t>(arguments.frame)));
+  const auto images = dataset::read_frame(*dataset, static_cast<std::size_t>(arguments.frame));
+  const auto frame = system::single_frame(dataset->rig, *config, *std::move(masks), images);
   const Status written = write_atomically(arguments.out, to_json(frame, *dataset).dump(1) + "\n");
   if (!written) return report_error(written.error());
   std::printf("%zu keypoints, %zu unique features = %zu monocular + %zu matched\n%s\n", frame.num_keypoints(),

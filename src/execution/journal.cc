@@ -16,11 +16,11 @@ struct StepName {
   JournalStep step;
   std::string_view name;
 };
-constexpr StepName kSteps[] = {{JournalStep::kFrame, "frame"},         {JournalStep::kStart, "start"},
-                               {JournalStep::kTrack, "track"},         {JournalStep::kMap, "map"},
-                               {JournalStep::kLoop, "loop"},           {JournalStep::kGlobal, "global"},
-                               {JournalStep::kCalibrate, "calibrate"}, {JournalStep::kFinal, "final"},
-                               {JournalStep::kRestart, "restart"}};
+constexpr StepName kSteps[] = {{JournalStep::kFrame, "frame"},   {JournalStep::kStart, "start"},
+                               {JournalStep::kTrack, "track"},   {JournalStep::kKeyframe, "keyframe"},
+                               {JournalStep::kMap, "map"},       {JournalStep::kLoop, "loop"},
+                               {JournalStep::kGlobal, "global"}, {JournalStep::kCalibrate, "calibrate"},
+                               {JournalStep::kFinal, "final"},   {JournalStep::kRestart, "restart"}};
 
 std::string_view step_name(JournalStep step) {
   for (const StepName& s : kSteps) {
@@ -86,6 +86,8 @@ std::string objection(const JournalEntry& entry, MapVersion newest, std::int32_t
 
 JournalStep journal_step(Stage stage) {
   switch (stage) {
+    case Stage::kKeyframe:
+      return JournalStep::kKeyframe;
     case Stage::kMap:
       return JournalStep::kMap;
     case Stage::kLoop:

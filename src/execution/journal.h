@@ -14,10 +14,11 @@
 namespace bslam::execution {
 
 enum class JournalStep {
-  kFrame,  // a frame began; base: the version it uses
-  kStart,  // the frame initialised a map
-  kTrack,  // the frame became a keyframe
-  kMap,    // a background stage ended
+  kFrame,     // a frame began; base: the version it uses
+  kStart,     // the frame initialised a map
+  kTrack,     // the frame became a keyframe
+  kKeyframe,  // a background stage ended
+  kMap,
   kLoop,
   kGlobal,
   kCalibrate,
@@ -30,8 +31,8 @@ std::optional<Stage> background_stage(JournalStep step);  // nullopt if it is no
 
 struct JournalEntry {
   JournalStep step = JournalStep::kFrame;
-  std::int32_t input = -1;              // id of the keyframe of a background stage, else of the frame; -1: no frame yet
-  MapVersion base;                      // version that was read
+  std::int32_t input = -1;  // StageTask::input() of a background stage, else id of the frame; -1: no frame yet
+  MapVersion base;          // version that was read
   std::optional<MapVersion> committed;  // version that was created, if any
   friend bool operator==(const JournalEntry&, const JournalEntry&) = default;
 };

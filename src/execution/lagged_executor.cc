@@ -54,9 +54,9 @@ class LaggedExecutor : public StageExecutor {
     return gate_.commit(step, std::move(draft));
   }
 
-  void enqueue(KeyframeId keyframe) override {
+  void enqueue(const StageTask& task) override {
     rethrow();
-    push({Stage::kMap, keyframe});
+    push(task);
   }
 
   void drain() override {
@@ -100,6 +100,8 @@ class LaggedExecutor : public StageExecutor {
 
   int lag(Stage stage) const {
     switch (stage) {
+      case Stage::kKeyframe:
+        return setup_.options.lag_keyframe;
       case Stage::kMap:
         return setup_.options.lag_map;
       case Stage::kCalibrate:

@@ -1,6 +1,10 @@
 // Options that determine when background stages run; part of system::Config.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <thread>
+
 #include "base/options.h"
 
 namespace bslam::execution {
@@ -17,7 +21,13 @@ struct ExecutionOptions {
   int max_pending_keyframes = 3;  // queue length of a background stage; adding to a full queue waits
   // Lagged mode: a stage's result is used this number of frames after the frame at which the stage started. It should
   // be slightly longer than the stage takes, to avoid waiting; lag_global is for maps of some hundred keyframes.
-  int lag_map = 3, lag_loop = 5, lag_calibrate = 40, lag_global = 40;
+  int lag_keyframe = 1, lag_map = 3, lag_loop = 5, lag_calibrate = 40, lag_global = 40;
+
+  // Number of threads for loops over this number of cameras.
+  int threads_for(std::size_t cameras) const {
+    const int available = threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    return std::min(available, static_cast<int>(cameras));
+  }
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -25,6 +35,8 @@ struct ExecutionOptions {
             kCommon);
     visitor("max_pending_keyframes", self.max_pending_keyframes, Range{1, 1000}, "",
             "maximum number of keyframes waiting for a background stage", OptionNote{.formerly = "pending_keyframes"});
+    visitor("lag_keyframe", self.lag_keyframe, Range{1, 10000}, "frames",
+            "lagged mode: delay from the request of a keyframe to its use");
     visitor("lag_map", self.lag_map, Range{1, 10000}, "frames",
             "lagged mode: delay from the start of mapping to the use of its result");
     visitor("lag_loop", self.lag_loop, Range{1, 10000}, "frames", "lagged mode: the same for loop closing");

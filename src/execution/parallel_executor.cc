@@ -30,10 +30,10 @@ class ParallelExecutor : public StageExecutor {
     return gate_.commit(step, std::move(draft));
   }
 
-  void enqueue(KeyframeId keyframe) override {
+  void enqueue(const StageTask& task) override {
     {
       std::unique_lock lock(mutex_);
-      push({Stage::kMap, keyframe}, lock);
+      push(task, lock);
     }
     rethrow();
   }
@@ -108,7 +108,7 @@ class ParallelExecutor : public StageExecutor {
 
   void work(Stage stage) {
     std::stop_token stop;
-    while (const std::optional<StageTask> task = take(stage, stop)) {
+    while (std::optional<StageTask> task = take(stage, stop)) {
       bool committed = false;
       std::exception_ptr failure;
       try {
@@ -146,7 +146,7 @@ class ParallelExecutor : public StageExecutor {
     changed_.notify_all();
   }
 
-  bool run(const StageTask& task, const std::stop_token& stop) {
+  bool run(StageTask& task, const std::stop_token& stop) {
     const Stopwatch watch;
     const map::MapSnapshot base = gate_.newest();
     StageResult result = setup_.functions[task.stage](task, base, stop);

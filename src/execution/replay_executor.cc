@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <deque>
 #include <map>
@@ -36,7 +37,7 @@ class ReplayExecutor : public StageExecutor {
     return report;
   }
 
-  void enqueue(KeyframeId keyframe) override { waiting(Stage::kMap).push_back(keyframe); }
+  void enqueue(const StageTask& task) override { waiting(task.stage).push_back(task); }
 
   void drain() override { run_background(); }
 
@@ -61,7 +62,7 @@ class ReplayExecutor : public StageExecutor {
   bool interrupted() const { return stop_.stop_requested(); }
   bool at_end() const { return next_ == journal_.entries.size(); }
   const JournalEntry& entry() const { return journal_.entries[next_]; }
-  std::deque<KeyframeId>& waiting(Stage stage) { return waiting_[static_cast<std::size_t>(stage)]; }
+  std::deque<StageTask>& waiting(Stage stage) { return waiting_[static_cast<std::size_t>(stage)]; }
 
   [[noreturn]] void fail(const std::string& this_run) const {
     throw ReplayMismatch({journal_.name, "entry " + std::to_string(next_), at_end() ? "the end" : entry_text(entry()),
@@ -75,9 +76,9 @@ class ReplayExecutor : public StageExecutor {
   }
 
   void expect_nothing_waits() const {
-    for (const Stage stage : {Stage::kMap, Stage::kLoop}) {
+    for (const Stage stage : {Stage::kKeyframe, Stage::kMap, Stage::kLoop}) {
       const auto& tasks = waiting_[static_cast<std::size_t>(stage)];
-      if (!tasks.empty()) fail(step_text(journal_step(stage), tasks.front().value()));
+      if (!tasks.empty()) fail(step_text(journal_step(stage), tasks.front().input()));
     }
   }
 
@@ -86,26 +87,38 @@ class ReplayExecutor : public StageExecutor {
     while (!over()) {
       const std::optional<Stage> stage = background_stage(entry().step);
       if (!stage) return;
-      run({*stage, KeyframeId(entry().input)});
+      run(StageTask::of_input(*stage, entry().input));
     }
   }
 
-  void run(const StageTask& task) {
-    std::deque<KeyframeId>& tasks = waiting(task.stage);
+  void run(StageTask task) {
+    std::deque<StageTask>& tasks = waiting(task.stage);
     // A superseded adjustment or calibration leaves no entry.
     const bool droppable = task.stage == Stage::kGlobal || task.stage == Stage::kCalibrate;
-    while (droppable && !tasks.empty() && tasks.front() != task.keyframe) tasks.pop_front();
-    if (tasks.empty() || tasks.front() != task.keyframe) fail("no such task");
+    while (droppable && !tasks.empty() && tasks.front() != task) tasks.pop_front();
+    const auto waiting_task = std::ranges::find(tasks, task);
+    if (waiting_task == tasks.end() ||
+        !std::all_of(tasks.begin(), waiting_task, [&](const StageTask& ahead) { return runs_later(ahead); }))
+      fail("no such task");
+    tasks.erase(waiting_task);
     const map::MapSnapshot base = recorded_base();
+    if (task.stage != Stage::kKeyframe && task.keyframe.index() >= base->keyframe_slots()) fail("no such keyframe");
     const bool committed = run_to_commit(task, base, gate_, setup_, stop_.get_token());
     if (interrupted()) return;
     if (committed != entry().committed.has_value()) fail(committed ? "a commit" : "no commit");
-    tasks.pop_front();
     if (committed) {
       keep(gate_.newest());
-      for (const StageTask& next : following(task, setup_.functions)) waiting(next.stage).push_back(next.keyframe);
+      for (const StageTask& next : following(task, setup_.functions)) waiting(next.stage).push_back(next);
     }
     advance();
+  }
+
+  // Whether a later entry is that of a task: keyframes of the caller and of the stage kKeyframe may have been enqueued
+  // in another order than they were committed.
+  bool runs_later(const StageTask& task) const {
+    return std::any_of(
+        journal_.entries.begin() + static_cast<std::ptrdiff_t>(next_), journal_.entries.end(),
+        [&](const JournalEntry& e) { return e.step == journal_step(task.stage) && e.input == task.input(); });
   }
 
   map::MapSnapshot recorded_base() const {
@@ -130,7 +143,7 @@ class ReplayExecutor : public StageExecutor {
   std::size_t next_ = 0;                         // index of the current entry
   std::map<MapVersion, std::size_t> last_use_;   // index of the last entry that uses a version
   std::map<MapVersion, map::MapSnapshot> kept_;  // versions still needed
-  std::array<std::deque<KeyframeId>, kStages.size()> waiting_;
+  std::array<std::deque<StageTask>, kStages.size()> waiting_;
   std::stop_source stop_;
 };
 

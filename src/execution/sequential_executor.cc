@@ -14,8 +14,8 @@ class SequentialExecutor : public StageExecutor {
     return gate_.commit(step, std::move(draft));
   }
 
-  void enqueue(KeyframeId keyframe) override {
-    std::deque<StageTask> tasks = {{Stage::kMap, keyframe}};
+  void enqueue(const StageTask& task) override {
+    std::deque<StageTask> tasks = {task};
     for (; !tasks.empty() && !over(); tasks.pop_front()) {
       if (!run_to_commit(tasks.front(), gate_.newest(), gate_, setup_, stop_.get_token())) continue;
       for (const StageTask& next : following(tasks.front(), setup_.functions)) tasks.push_back(next);

@@ -4,6 +4,8 @@ namespace bslam::execution {
 
 std::string_view stage_name(Stage stage) {
   switch (stage) {
+    case Stage::kKeyframe:
+      return "keyframe";
     case Stage::kMap:
       return "map";
     case Stage::kCalibrate:
@@ -14,6 +16,11 @@ std::string_view stage_name(Stage stage) {
       return "global";
   }
   return "";
+}
+
+StageTask StageTask::of_input(Stage stage, std::int32_t input) {
+  return stage == Stage::kKeyframe ? StageTask{stage, KeyframeId(), FrameId(input)}
+                                   : StageTask{stage, KeyframeId(input)};
 }
 
 bool calibration_due(KeyframeId keyframe) {
@@ -29,6 +36,7 @@ std::vector<StageTask> following(const StageTask& task, const StageFunctions& fu
   const auto add = [&](Stage stage) {
     if (functions[stage]) out.push_back({stage, task.keyframe});
   };
+  if (task.stage == Stage::kKeyframe) add(Stage::kMap);
   if (task.stage == Stage::kMap && calibration_due(task.keyframe)) add(Stage::kCalibrate);
   if (task.stage == Stage::kMap) add(Stage::kLoop);
   if (task.stage == Stage::kLoop) add(Stage::kGlobal);

@@ -1,9 +1,11 @@
-// Background stages (mapping, self-calibration, loop closing, global adjustment) as functions of values: their input,
-// their result, and the stage that follows. A StageExecutor decides when and in which thread they run.
+// Background stages (creation of keyframes, mapping, self-calibration, loop closing, global adjustment) as functions of
+// values: their input, their result, and the stage that follows. A StageExecutor decides when and in which thread they
+// run.
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <stop_token>
@@ -15,16 +17,23 @@
 
 namespace bslam::execution {
 
-// Each stage has its own first-in, first-out queue and runs one task at a time. A new keyframe creates a task of kMap,
-// a commit of kMap a task of kLoop and sometimes one of kCalibrate, and a commit of kLoop a task of kGlobal.
-enum class Stage { kMap, kCalibrate, kLoop, kGlobal };
-inline constexpr std::array<Stage, 4> kStages = {Stage::kMap, Stage::kCalibrate, Stage::kLoop, Stage::kGlobal};
+// Each stage has its own first-in, first-out queue and runs one task at a time. A frame that is to become a keyframe
+// creates a task of kKeyframe, a new keyframe one of kMap, a commit of kMap a task of kLoop and sometimes one of
+// kCalibrate, and a commit of kLoop a task of kGlobal. A stage is followed by later ones only.
+enum class Stage { kKeyframe, kMap, kCalibrate, kLoop, kGlobal };
+inline constexpr std::array<Stage, 5> kStages = {Stage::kKeyframe, Stage::kMap, Stage::kCalibrate, Stage::kLoop,
+                                                 Stage::kGlobal};
 
 std::string_view stage_name(Stage stage);
 
 struct StageTask {
   Stage stage = Stage::kMap;
-  KeyframeId keyframe;  // the keyframe that caused the task
+  KeyframeId keyframe;  // the keyframe that caused the task; of kKeyframe: the one it has created, once committed
+  FrameId frame = {};   // of kKeyframe: the frame that caused the task
+
+  // The id that identifies the task among those of its stage: of the frame or keyframe that caused it.
+  std::int32_t input() const { return stage == Stage::kKeyframe ? frame.value() : keyframe.value(); }
+  static StageTask of_input(Stage stage, std::int32_t input);
   friend bool operator==(const StageTask&, const StageTask&) = default;
 };
 
@@ -47,7 +56,7 @@ struct StageFunctions {
   StageFunction& operator[](Stage s) { return by_stage[static_cast<std::size_t>(s)]; }
 };
 
-// The tasks that follow the commit of another one, in order.
+// The tasks that follow the commit of another one, in order. The keyframe of the task must be known.
 std::vector<StageTask> following(const StageTask& task, const StageFunctions& functions);
 
 // Whether the rig is calibrated after the mapping of a keyframe: at keyframe numbers that grow by the same factor,

@@ -18,7 +18,7 @@ std::unique_ptr<StageExecutor> make_stage_executor(Mode mode, MapGate& gate, Exe
   return nullptr;
 }
 
-bool run_to_commit(const StageTask& task, const map::MapSnapshot& base, MapGate& gate, const ExecutionSetup& setup,
+bool run_to_commit(StageTask& task, const map::MapSnapshot& base, MapGate& gate, const ExecutionSetup& setup,
                    const std::stop_token& stop) {
   const Stopwatch watch;
   StageResult result = setup.functions[task.stage](task, base, stop);

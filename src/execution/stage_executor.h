@@ -24,8 +24,10 @@ class StageExecutor {
   // Commits an edit of the caller's thread.
   virtual map::CommitReport commit(JournalStep step, map::MapDraft draft) = 0;
 
-  // Passes a committed keyframe to the stages. May block while too many tasks are waiting.
-  virtual void enqueue(KeyframeId keyframe) = 0;
+  // Adds a task of kKeyframe or kMap. May block while too many tasks are waiting.
+  virtual void enqueue(const StageTask& task) = 0;
+  // The same for the mapping of a committed keyframe.
+  void enqueue(KeyframeId keyframe) { enqueue({Stage::kMap, keyframe}); }
 
   // Returns when all enqueued tasks, and the tasks that follow them, are done and committed.
   virtual void drain() = 0;

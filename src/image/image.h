@@ -52,4 +52,11 @@ class Image {
   std::vector<std::uint8_t> pixels_;
 };
 
+// An image with the pixels of a view.
+inline Image copy_of(const ImageView& view) {
+  Image out(view.width, view.height);
+  for (int y = 0; y < view.height; ++y) std::copy_n(view.row(y), view.width, out.row(y));
+  return out;
+}
+
 }  // namespace bslam::image

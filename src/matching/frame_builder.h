@@ -11,6 +11,12 @@
 
 namespace bslam::matching {
 
+// Pyramids and masks of a frame, which own their memory.
+struct FrameImages {
+  std::vector<image::Pyramid> pyramids;  // per camera, empty without an image
+  std::vector<image::Image> masks;       // per camera, empty without a mask
+};
+
 // Owns the extractors and the pyramids of the last frame, which are needed for alignment in tracking and replaced by
 // those of the next frame. Masks: one per camera; an empty image means no mask. Images may have
 // masks of their own (image/image_bundle.h); a pixel is ignored if either mask is 0.
@@ -35,13 +41,18 @@ class FrameBuilder {
   std::span<const image::Pyramid> pyramids() const { return pyramids_; }
   std::span<const image::ImageView> masks() const { return current_masks_; }
 
+  // Moves the images of the frame that was begun last to another builder, which can extract its keypoints later. After
+  // release() this one has none until the next frame begins.
+  FrameImages release();
+  void adopt(FrameImages images);
+
  private:
   image::ImageView mask_of(std::size_t camera, const image::CameraImage& image);
 
   feature::PyramidShape shape_;
   std::vector<feature::Extractor> extractors_;
   std::vector<image::Image> masks_;
-  std::vector<image::Image> combined_masks_;  // of images that have a mask and whose camera has one
+  std::vector<image::Image> combined_masks_;  // of images that have a mask and whose camera has one, or adopted
   std::vector<image::Pyramid> pyramids_;
   std::vector<image::ImageView> current_masks_;
 };

@@ -1,6 +1,17 @@
 #include "system/config.h"
 
+#include "tracking/tracker.h"
+
 namespace bslam::system {
+
+tracking::TrackerOptions tracker_options(const Config& config) {
+  return {.tracking = config.tracking,
+          .features = config.features,
+          .seed = static_cast<std::uint64_t>(config.seed),
+          .localize_only = config.localize_only,
+          .new_submap_after = config.looping.recovery.new_submap_after,
+          .new_submap_after_s = config.looping.recovery.new_submap_after_s};
+}
 
 Status check_config(const Config& config, bool with_map) {
   if (config.localize_only && !with_map) {

@@ -12,6 +12,10 @@
 #include "tracking/camera_health.h"
 #include "tracking/options.h"
 
+namespace bslam::tracking {
+struct TrackerOptions;
+}
+
 namespace bslam::system {
 
 struct IoOptions {
@@ -59,6 +63,9 @@ struct Config {
     visitor.section("calibration", self.calibration);
   }
 };
+
+// The options of the front end.
+tracking::TrackerOptions tracker_options(const Config& config);
 
 // Returns an Error with the key, without a file, if options contradict each other or a required loaded map is missing.
 Status check_config(const Config& config, bool with_map);

@@ -1,7 +1,6 @@
 #include "system/pipeline.h"
 
 #include <algorithm>
-#include <thread>
 
 #include "base/stopwatch.h"
 
@@ -10,28 +9,20 @@ namespace {
 
 using frame::BundledFrame;
 
-int thread_count(int wanted, std::size_t cameras) {
-  const int available = wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  return std::min(available, static_cast<int>(cameras));
-}
-
-tracking::TrackerOptions tracker_options(const Config& config) {
-  return {.tracking = config.tracking,
-          .features = config.features,
-          .seed = static_cast<std::uint64_t>(config.seed),
-          .localize_only = config.localize_only,
-          .new_submap_after = config.looping.recovery.new_submap_after,
-          .new_submap_after_s = config.looping.recovery.new_submap_after_s};
-}
-
 execution::JournalStep journal_step(tracking::ProposedEdit::Kind kind) {
   return kind == tracking::ProposedEdit::Kind::kStart ? execution::JournalStep::kStart : execution::JournalStep::kTrack;
 }
 
 // Observations about each camera after the frame was tracked.
 std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images, const tracking::ImageFaults& faults,
-                                               const tracking::FramePlan& plan, const tracking::FrameRecord& record) {
+                                               const tracking::FramePlan& plan, const Pipeline::Outcome& outcome) {
   std::vector<tracking::CameraEvidence> out;
+  const tracking::FrameRecord& record = outcome.record;
+  const auto extracted = [&](std::size_t c) -> std::optional<int> {
+    if (!record.direct) return record.result.cameras[c].keypoints;
+    if (!record.created) return std::nullopt;
+    return static_cast<int>(outcome.seen->keyframe(record.created->keyframe).frame->cameras[c].keypoints.size());
+  };
   for (std::size_t c = 0; c < images.images.size(); ++c) {
     const tracking::CameraCounts& counts = record.result.cameras[c];
     out.push_back({.image = images.images[c].state,
@@ -39,7 +30,7 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
                    .blurred = faults.blurred[c] != 0,
                    .inconsistent = counts.excluded,
                    .postponed = plan.postponed[c] != 0,
-                   .extracted = !record.direct,
+                   .extracted = extracted(c),
                    .keypoints = counts.keypoints,
                    .inliers = counts.inliers});
   }
@@ -49,15 +40,16 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
 }  // namespace
 
 Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
-                   std::unique_ptr<tracking::Relocaliser> relocaliser)
+                   std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker& keyframe_maker)
     : given_(rig),
       rig_(std::make_shared<const camera::Rig>(rig)),
       config_(config),
-      pool_(thread_count(config.execution.threads, rig.size())),
+      pool_(config.execution.threads_for(rig.size())),
       monitor_(rig.size(), config.health),
       status_(rig.size()),
       builder_(rig.size(), config.features, std::move(masks)),
-      tracker_(rig, tracker_options(config), pool_, std::move(relocaliser)) {}
+      tracker_(rig, tracker_options(config), pool_, std::move(relocaliser)),
+      keyframe_maker_(keyframe_maker) {}
 
 Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution::StageExecutor& executor) {
   const Stopwatch whole;
@@ -75,7 +67,7 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   outcome.record = std::move(tracked.record);
   FrameRecord& record = outcome.record;
   record.stages.insert(record.stages.begin(), stages.begin(), stages.end());
-  record.cameras = status_.update(evidence(images, faults, plan, record));
+  record.cameras = status_.update(evidence(images, faults, plan, outcome));
   for (const image::CameraImage& i : images.images) record.images.push_back(i.state);
   record.frame_ms = whole.ms();
   return outcome;
@@ -103,6 +95,7 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   if (!directly) add_features();
   outcome.seen = executor.begin_frame(frame.id);
   const bool recalibrated = adopt_rig(*outcome.seen, frame);
+  const auto created = adopt_keyframe(*outcome.seen);
   if (config_.mode == execution::Mode::kLagged) end_stage("results");
 
   tracking::DirectAttempt direct;
@@ -118,7 +111,24 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
           ? *std::move(direct.outcome)
           : tracker_.process(std::move(state_), std::move(frame), builder_.pyramids(), outcome.seen, std::move(direct));
   found.record.recalibrated = recalibrated;
+  found.record.created = created;
+  if (found.keyframe_wanted) outcome.deferred = defer_keyframe(plan, std::move(frame), found);
   return found;
+}
+
+// Passes the images of a frame that was tracked directly on, so that a keyframe is created of it.
+FrameId Pipeline::defer_keyframe(const tracking::FramePlan& plan, BundledFrame frame,
+                                 const tracking::TrackOutcome& found) {
+  const FrameId id = frame.id;
+  tracking::KeyframeRequest request{std::move(frame), std::move(state_), found.record.result.anchored};
+  keyframe_maker_.request({std::move(request), builder_.release(), plan.budgets, plan.alignment, rig_});
+  return id;
+}
+
+std::optional<tracking::CreatedKeyframe> Pipeline::adopt_keyframe(const map::BundledMap& map) {
+  const auto created = tracker_.adopt_keyframe(map, state_);
+  if (created) state_.budget_fractions = keyframe_maker_.take_budget_fractions(created->frame);
+  return created;
 }
 
 // Continues with the rig of the map. Returns whether a stage has replaced it since the last frame.
@@ -138,13 +148,6 @@ void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor&
   outcome.keyframes = report.keyframes;
   outcome.started_submap = edit.kind == tracking::ProposedEdit::Kind::kStart;
   tracked.record.stages.back().ms += watch.ms();  // added to the time of the stage that proposed the edit
-}
-
-BundledFrame Pipeline::make_frame(const image::ImageBundle& images) {
-  const tracking::FramePlan plan = tracker_.plan();
-  BundledFrame frame = begin(images, plan);
-  builder_.extract(*rig_, frame, pool_, plan.budgets);
-  return bundle(plan, frame);
 }
 
 BundledFrame Pipeline::begin(const image::ImageBundle& images, const tracking::FramePlan& plan) {

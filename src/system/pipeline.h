@@ -9,6 +9,7 @@
 #include "execution/stage_executor.h"
 #include "matching/frame_builder.h"
 #include "system/config.h"
+#include "system/keyframe_maker.h"
 #include "tracking/tracker.h"
 
 namespace bslam::system {
@@ -19,16 +20,18 @@ using tracking::StageTime;
 
 class Pipeline {
  public:
-  // `rig` and `config` must outlive the pipeline. Without a relocaliser a lost rig is only searched for near its last
-  // pose.
+  // `rig`, `config` and `keyframe_maker` must outlive the pipeline. Without a relocaliser a lost rig is only searched
+  // for near its last pose.
   Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
-           std::unique_ptr<tracking::Relocaliser> relocaliser = nullptr);
+           std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker& keyframe_maker);
 
   struct Outcome {
     FrameRecord record;
     map::MapSnapshot seen;  // version of the map the frame was tracked in
     std::vector<KeyframeId>
-        keyframes;                // added to the map, in order; the caller enqueues them for the background stages
+        keyframes;  // added to the map, in order; the caller enqueues them for the background stages
+    std::optional<FrameId>
+        deferred;                 // the frame was passed to the keyframe maker; the caller enqueues it for its stage
     bool started_submap = false;  // the first of `keyframes` is the root of a new submap
     std::vector<tracking::BetweenKeyframes> early;  // frames of a monocular initialisation, including the first
   };
@@ -36,9 +39,6 @@ class Pipeline {
   // Tracks a frame in the version of the map that `executor` returns for it, and commits keyframes through `executor`.
   // `images`: one entry per camera of the rig.
   Outcome process(const image::ImageBundle& images, execution::StageExecutor& executor);
-
-  // Extracts and bundles a single frame.
-  frame::BundledFrame make_frame(const image::ImageBundle& images);
 
   // Resets tracking; the next frames initialise another map.
   void restart() { state_ = state_.restarted(); }
@@ -51,6 +51,9 @@ class Pipeline {
                                execution::StageExecutor& executor, Outcome& outcome, std::vector<StageTime>& stages);
   frame::BundledFrame begin(const image::ImageBundle& images, const tracking::FramePlan& plan);
   frame::BundledFrame bundle(const tracking::FramePlan& plan, const frame::BundledFrame& frame);
+  FrameId defer_keyframe(const tracking::FramePlan& plan, frame::BundledFrame frame,
+                         const tracking::TrackOutcome& found);
+  std::optional<tracking::CreatedKeyframe> adopt_keyframe(const map::BundledMap& map);
   bool adopt_rig(const map::BundledMap& map, frame::BundledFrame& frame);
   void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);
 
@@ -63,6 +66,7 @@ class Pipeline {
   matching::FrameBuilder builder_;
   tracking::Tracker tracker_;
   tracking::FrontEndState state_;
+  KeyframeMaker& keyframe_maker_;
 };
 
 }  // namespace bslam::system

@@ -49,9 +49,14 @@ execution::StageResult adjust_globally(const Config& config, const map::MapSnaps
 
 }  // namespace
 
-execution::StageFunctions make_stages(const Config& config, const camera::Rig& calibrated, KeyframeId first,
+execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyframe_maker,
+                                      const camera::Rig& calibrated, KeyframeId first,
                                       const place::VocabularyPtr& vocabulary, LoopObserver observer) {
   execution::StageFunctions functions;
+  functions[execution::Stage::kKeyframe] = [&keyframe_maker](const execution::StageTask& task,
+                                                             const map::MapSnapshot& base, std::stop_token) {
+    return keyframe_maker.make(task.frame, base);
+  };
   functions[execution::Stage::kMap] = [&config](const execution::StageTask& task, const map::MapSnapshot& base,
                                                 std::stop_token stop) {
     return map_keyframe(config, task, base, std::move(stop));

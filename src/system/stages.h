@@ -7,6 +7,7 @@
 #include "execution/stage.h"
 #include "looping/loop_closer.h"
 #include "system/config.h"
+#include "system/keyframe_maker.h"
 
 namespace bslam::system {
 
@@ -19,10 +20,11 @@ struct LoopRecord {
 // Called for every loop closure that was committed, in the committing thread.
 using LoopObserver = std::function<void(const LoopRecord&)>;
 
-// `config` and `calibrated`, the given calibration, must outlive the functions. Keyframes before `first` belong to a
-// loaded map, whose world frame stays when the rig is calibrated. Without a vocabulary no loops are
+// `config`, `keyframe_maker` and `calibrated`, the given calibration, must outlive the functions. Keyframes before
+// `first` belong to a loaded map, whose world frame stays when the rig is calibrated. Without a vocabulary no loops are
 // closed.
-execution::StageFunctions make_stages(const Config& config, const camera::Rig& calibrated, KeyframeId first,
+execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyframe_maker,
+                                      const camera::Rig& calibrated, KeyframeId first,
                                       const place::VocabularyPtr& vocabulary, LoopObserver observer);
 
 }  // namespace bslam::system

@@ -38,7 +38,10 @@ System::System(camera::Rig rig, Config config, Resources resources)
       loaded_(resources.map.has_value()),
       first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0),
       first_of_map_(first_keyframe_),
-      pipeline_(rig_, config_, std::move(resources.masks), make_relocaliser(resources.vocabulary, config_)),
+      keyframe_maker_(rig_, config_, make_relocaliser(resources.vocabulary, config_),
+                      [this](const tracking::CreatedKeyframe& created, TimeNs time_ns) { note(created, time_ns); }),
+      pipeline_(rig_, config_, std::move(resources.masks), make_relocaliser(resources.vocabulary, config_),
+                keyframe_maker_),
       history_(resources.history),
       store_(resources.map ? std::move(*resources.map) : empty_map(resources.initial_rig.value_or(rig_), config_)),
       initial_rig_(store_.snapshot()->shared_rig()),
@@ -50,12 +53,12 @@ System::System(camera::Rig rig, Config config, Resources resources)
     loops_.push_back(loop);
   };
   const auto note_run = [this](const execution::StageRun& run) {
-    const StageRecord record{run, keyframe_time(run.task.keyframe)};
     const std::lock_guard lock(records_mutex_);
-    stage_runs_.push_back(record);
+    stage_runs_.push_back({run, time_of(run.task)});
   };
-  execution::ExecutionSetup setup{make_stages(config_, rig_, first_keyframe_, resources.vocabulary, note_loop),
-                                  config_.execution, note_run};
+  execution::ExecutionSetup setup{
+      make_stages(config_, keyframe_maker_, rig_, first_keyframe_, resources.vocabulary, note_loop), config_.execution,
+      note_run};
   executor_ = resources.replay ? execution::make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
                                : execution::make_stage_executor(config_.mode, gate_, std::move(setup));
 }
@@ -73,6 +76,10 @@ void System::discard_map() {
   early_.clear();
   pipeline_.restart();
   executor_->restart();
+  {
+    const std::lock_guard lock(records_mutex_);
+    created_.clear();
+  }
   first_of_map_ = KeyframeId(store_.snapshot()->keyframe_slots());
   frames_.back().map_withdrawn = true;
 }
@@ -94,16 +101,50 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
   for (const KeyframeId k : outcome.keyframes) set_keyframe_time(k, outcome.record.result.time_ns);
   const Stopwatch watch;
   for (const KeyframeId k : outcome.keyframes) executor_->enqueue(k);
-  if (!outcome.keyframes.empty() && config_.mode != execution::Mode::kSequential) {
+  if (outcome.deferred) enqueue(*outcome.deferred, outcome.record.result.time_ns);
+  if ((outcome.deferred || !outcome.keyframes.empty()) && config_.mode != execution::Mode::kSequential) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
   const bool refuted = initialisation_failed(outcome, had_pose);
   frames_.push_back(std::move(outcome.record));
+  mark_created_keyframes();
   if (refuted) discard_map();
   FrameRecord record = frames_.back();
   bound_history();
   return record;
+}
+
+void System::enqueue(FrameId frame, TimeNs time_ns) {
+  {
+    const std::lock_guard lock(records_mutex_);
+    deferred_time_ns_[frame] = time_ns;
+  }
+  executor_->enqueue({execution::Stage::kKeyframe, KeyframeId(), frame});
+}
+
+void System::note(const tracking::CreatedKeyframe& created, TimeNs time_ns) {
+  set_keyframe_time(created.keyframe, time_ns);
+  const std::lock_guard lock(records_mutex_);
+  created_.push_back(created);
+}
+
+// Marks the frames of which keyframes were created since the last call; they have the poses of these from then on.
+void System::mark_created_keyframes() {
+  std::vector<tracking::CreatedKeyframe> all;
+  {
+    const std::lock_guard lock(records_mutex_);
+    all.swap(created_);
+  }
+  created_keyframes_.clear();
+  for (const tracking::CreatedKeyframe& created : all) {
+    const auto record =
+        std::ranges::lower_bound(frames_, created.frame, {}, [](const FrameRecord& r) { return r.result.frame; });
+    if (record == frames_.end() || record->result.frame != created.frame) continue;
+    record->keyframe = true;
+    record->result.anchored = {.reference = created.keyframe, .T_rig_reference = geometry::SE3()};
+    created_keyframes_.push_back(*record);
+  }
 }
 
 // Returns true if a recent monocular initialisation was wrong, because the frames after it are lost.
@@ -116,18 +157,20 @@ bool System::initialisation_failed(const Pipeline::Outcome& outcome, bool had_po
 // Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.
 void System::bound_history() {
   if (history_ == 0 || frames_.size() < 2 * history_) return;
+  const std::lock_guard lock(records_mutex_);
+  if ((!deferred_time_ns_.empty() || !created_.empty()) && !executor_->over()) return;  // their frames will be marked
   const auto drop_oldest = [this](auto& records) {
     if (records.size() > history_)
       records.erase(records.begin(), records.end() - static_cast<std::ptrdiff_t>(history_));
   };
   drop_oldest(frames_);
   std::erase_if(early_, [&](const auto& early) { return early.frame->id < frames_.front().result.frame; });
-  const std::lock_guard lock(records_mutex_);
   drop_oldest(stage_runs_);
 }
 
 void System::finish() {
   executor_->drain();
+  mark_created_keyframes();
   if (config_.final_adjustment && !config_.localize_only && !executor_->over()) {
     const Stopwatch watch;
     map::MapDraft draft(gate_.newest());
@@ -188,6 +231,14 @@ std::vector<StageRecord> System::stage_runs() const {
 std::vector<LoopRecord> System::loops() const {
   const std::lock_guard lock(records_mutex_);
   return loops_;
+}
+
+// Time of the frame that caused a task. Requires records_mutex_.
+TimeNs System::time_of(const execution::StageTask& task) {
+  if (task.stage != execution::Stage::kKeyframe) return keyframe_time_ns_[task.keyframe.index()];
+  const TimeNs time_ns = deferred_time_ns_.at(task.frame);
+  deferred_time_ns_.erase(task.frame);
+  return time_ns;
 }
 
 TimeNs System::keyframe_time(KeyframeId k) const {

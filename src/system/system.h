@@ -1,6 +1,7 @@
 // The SLAM system: computes poses and a map from images. Owns the map and the threads.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -73,6 +74,8 @@ class System {
   // The last frames in order: all of the run, or at least Resources::history of them. Valid until the next
   // process().
   const std::vector<FrameRecord>& frames() const { return frames_; }
+  // Frames of earlier calls of which the last call of process() or finish() has learnt that a keyframe was created.
+  const std::vector<FrameRecord>& created_keyframes() const { return created_keyframes_; }
   // Moves the frames out; frames() is empty afterwards.
   std::vector<FrameRecord> take_frames() { return std::exchange(frames_, {}); }
   std::vector<StageRecord> stage_runs() const;
@@ -102,6 +105,10 @@ class System {
   void bound_history();
   void locate_early_frames();
   void calibrate(map::MapDraft& draft, const std::stop_token& stop);
+  void enqueue(FrameId frame, TimeNs time_ns);
+  void note(const tracking::CreatedKeyframe& created, TimeNs time_ns);
+  void mark_created_keyframes();
+  TimeNs time_of(const execution::StageTask& task);
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
 
   const camera::Rig rig_;
@@ -109,15 +116,19 @@ class System {
   const bool loaded_;                // whether the run began with a loaded map
   const KeyframeId first_keyframe_;  // first keyframe of this run
   KeyframeId first_of_map_;          // after the last map that was withdrawn
+  KeyframeMaker keyframe_maker_;
   Pipeline pipeline_;
   const std::size_t history_;  // see Resources
   std::optional<FrameStamp> last_input_;
   std::vector<FrameRecord> frames_;
+  std::vector<FrameRecord> created_keyframes_;
   std::vector<tracking::BetweenKeyframes> early_;  // frames of monocular initialisations, in order of id
   mutable std::mutex records_mutex_;
-  std::vector<StageRecord> stage_runs_;  // this and the next two members are guarded by records_mutex_
+  std::vector<StageRecord> stage_runs_;  // this and the next four members are guarded by records_mutex_
   std::vector<LoopRecord> loops_;
-  std::vector<TimeNs> keyframe_time_ns_;  // by KeyframeId
+  std::vector<TimeNs> keyframe_time_ns_;            // by KeyframeId
+  std::map<FrameId, TimeNs> deferred_time_ns_;      // of frames of which keyframes are being created
+  std::vector<tracking::CreatedKeyframe> created_;  // whose frames are not marked yet
   double final_adjustment_ms_ = 0, calibration_ms_ = 0;
   adjustment::AdjustmentReport final_adjustment_;
   calibration::RigRefinement calibration_;

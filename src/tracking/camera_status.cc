@@ -100,7 +100,7 @@ std::vector<CameraStatus> CameraStatusMonitor::update(std::span<const CameraEvid
   const bool any_agrees = std::ranges::any_of(evidence, [](const CameraEvidence& e) { return e.inliers > 0; });
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     record_image(evidence[c].image == image::ImageState::kPresent, cameras_[c]);
-    if (counts_features(evidence[c])) cameras_[c].few_features = evidence[c].keypoints < kFewKeypoints;
+    if (counts_features(evidence[c])) cameras_[c].few_features = *evidence[c].extracted < kFewKeypoints;
     if (!any_agrees || evidence[c].keypoints == 0) continue;
     cameras_[c].keypoints += evidence[c].keypoints;
     cameras_[c].inliers += evidence[c].inliers;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -45,7 +46,8 @@ struct CameraEvidence {
   bool blurred = false;
   bool inconsistent = false;  // excluded by tracking (tracking/camera_consensus.h)
   bool postponed = false;     // not used: it captures after camera 0, and the motion until then is not known
-  bool extracted = true;      // false: the frame was tracked directly, and `keypoints` are landmarks searched for
+  // Number of keypoints extracted from its last image, if known; nullopt: no keypoints were extracted.
+  std::optional<int> extracted;
   int keypoints = 0, inliers = 0;
 };
 

@@ -22,6 +22,13 @@ struct Relocalisation {
   int inliers = 0;  // keypoints
 };
 
+// A keyframe that was created of an earlier frame after that had been processed.
+struct CreatedKeyframe {
+  FrameId frame;
+  KeyframeId keyframe;
+  friend bool operator==(const CreatedKeyframe&, const CreatedKeyframe&) = default;
+};
+
 struct FrameRecord {
   TrackResult result;  // as returned when the frame was processed
   // The result found at the end of the run for a frame that had no pose when it was processed; else null.
@@ -39,6 +46,7 @@ struct FrameRecord {
   KeyframeId root;                         // root keyframe of the submap in which `result` gives the pose
   map::Scale scale = map::Scale::kMetric;  // of the map in which it gives the pose
   bool keyframe = false;
+  std::optional<CreatedKeyframe> created;      // a keyframe that tracking used for the first time in this frame
   bool direct = false;                         // the pose was found by direct tracking
   bool recalibrated = false;                   // the calibration of the rig differs from that of the previous frame
   bool map_withdrawn = false;                  // after this frame the map was emptied, because it was not a good start

@@ -112,6 +112,9 @@ TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, con
 // A frame without a pose, and the state after it.
 TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, LostReason reason);
 
+// Mapping may have rescaled the submap since the last frame: rescales pose and velocity.
+void apply_scale_change(const map::BundledMap& map, TrackerState& state);
+
 // The state of tracking after `keyframe` was created from the frame of `time_ns`, which observes `landmarks`.
 TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,
                                std::vector<LandmarkId> landmarks);

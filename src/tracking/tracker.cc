@@ -7,7 +7,6 @@
 #include "frame/capture_times.h"
 #include "tracking/calibration_error.h"
 #include "tracking/feature_budget.h"
-#include "tracking/make_keyframe.h"
 
 namespace bslam::tracking {
 namespace {
@@ -21,23 +20,6 @@ bool had_features(const TrackResult& result) {
   return result.reason != LostReason::kNoImages && result.reason != LostReason::kFewFeatures;
 }
 
-// Sums the counts of each landmark, in order of id.
-std::vector<map::VisibilityCount> folded(std::vector<map::VisibilityCount> counts) {
-  std::stable_sort(counts.begin(), counts.end(), [](const map::VisibilityCount& a, const map::VisibilityCount& b) {
-    return a.landmark < b.landmark;
-  });
-  std::vector<map::VisibilityCount> out;
-  for (const map::VisibilityCount& s : counts) {
-    if (out.empty() || out.back().landmark != s.landmark) {
-      out.push_back(s);
-    } else {
-      out.back().expected += s.expected;
-      out.back().found += s.found;
-    }
-  }
-  return out;
-}
-
 // Readmits cameras that were excluded while they were blurred and are sharp now.
 void readmit_sharp_cameras(const std::vector<std::uint8_t>& blurred, FrontEndState& state) {
   for (std::size_t c = 0; c < state.blurred.size() && c < state.track.cameras.size(); ++c) {
@@ -45,12 +27,6 @@ void readmit_sharp_cameras(const std::vector<std::uint8_t>& blurred, FrontEndSta
     if (state.blurred[c] && !blurred[c] && camera.excluded) camera = readmitted(camera.established);
   }
   state.blurred = blurred;
-}
-
-// Mapping may have rescaled the submap since the last frame: rescales pose and velocity.
-void apply_scale_change(const map::BundledMap& map, TrackerState& state) {
-  if (state.twist) state.twist->tail<3>() *= state.anchored.scale_change(map);
-  state.anchored.rescale(map);
 }
 
 // Attributes the change of the pose since the last frame to the motion of the rig (T_rig_odom) if tracking was
@@ -82,6 +58,11 @@ void count_features(const BundledFrame& frame, FrameRecord& record) {
   record.unique = static_cast<int>(frame.bundled.size());
   record.matched = static_cast<int>(frame.bundled.num_matched());
   record.monocular = static_cast<int>(frame.bundled.num_monocular());
+}
+
+std::optional<EstimatedPose> estimate_of(const DirectAttempt& direct) {
+  if (!direct.outcome) return std::nullopt;
+  return EstimatedPose{direct.outcome->record.result.T_rig_world, direct.all_cameras};
 }
 
 // Copies the motion from the state to the record.
@@ -122,15 +103,6 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
   plan.budgets = feature_budgets(rig_.size(), state.budget_fractions, plan.skipped, failing, options_.features);
   plan.alignment = alignment(state);
   if (state.track.twist) plan.twist = *state.track.twist;
-  return plan;
-}
-
-FramePlan Tracker::plan() const {
-  FramePlan plan;
-  plan.skipped.assign(rig_.size(), 0);
-  plan.postponed = plan.skipped;
-  plan.budgets = feature_budgets(rig_.size(), {}, {}, plan.skipped, options_.features);
-  plan.alignment = alignment({});
   return plan;
 }
 
@@ -176,6 +148,10 @@ DirectAttempt Tracker::process_directly(const FrontEndState& state, const Bundle
   if (options_.localize_only) track.visibility_counts.clear();
   update_odometry(*map, before, outcome);
   record_motion(outcome);
+  if (direct.failure == DirectFailure::kKeyframeDue && direct.all_cameras) {
+    direct.failure = DirectFailure::kNone;
+    want_keyframe(*map, outcome);
+  }
   outcome.record.stages.push_back({"align", watch.ms()});
   return {direct.failure, std::move(outcome), direct.all_cameras};
 }
@@ -211,15 +187,15 @@ std::optional<TrackResult> Tracker::locate_early(const map::BundledMap& map, con
   return pose_between(map, early, options_.features.model(), options_.tracking, pool_);
 }
 
-TrackOutput Tracker::follow(const Input& input, const FrontEndState& state) const {
+TrackOutput Tracker::follow(const Input& input, const FrontEndState& state,
+                            const std::optional<EstimatedPose>& estimate) const {
   if (!state.track.anchored.known_in(*input.map)) {  // no pose in this map yet
     const bool blind = input.frame.num_keypoints() < static_cast<std::size_t>(options_.tracking.min_inliers);
     return lost(state.track, input.frame, blind ? LostReason::kFewFeatures : LostReason::kNotFound);
   }
   const auto alignment = this->alignment(state);
   TrackInput track_input = input_of(*input.map, input.pyramids, alignment, state);
-  if (const auto& direct = input.direct.outcome)
-    track_input.estimate = {direct->record.result.T_rig_world, input.direct.all_cameras};
+  track_input.estimate = estimate;
   return tracking::track(track_input, input.frame, options_.tracking, pool_);
 }
 
@@ -228,11 +204,11 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   FrontEndState& state = outcome.next;
   FrameRecord& record = outcome.record;
   const TrackerState before = state.track;
-  TrackOutput output = follow(input, state);
+  TrackOutput output = follow(input, state, estimate_of(input.direct));
   record.stages.push_back({"track", watch.ms()});
   if (!is_tracking(output.result.status) && keep_direct_pose(input, outcome)) return;
   if (!is_tracking(output.result.status) && had_features(output.result) && relocalise(input, outcome)) {
-    output = follow({input.frame, input.pyramids, input.map}, state);
+    output = follow(input, state, std::nullopt);
     if (!is_tracking(output.result.status)) record.relocalisation.reset();
   }
   if (is_tracking(output.result.status)) input.frame = output.frame;  // refined by tracking
@@ -249,6 +225,7 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   if (options_.localize_only) {
     state.track.visibility_counts.clear();
   } else if (output.keyframe_due || input.direct.failure == DirectFailure::kKeyframeDue) {
+    state.pending.reset();
     propose_keyframe(input, output, outcome);
   }
 }
@@ -279,6 +256,7 @@ void Tracker::handle_lost(const Input& input, const TrackerState& before, TrackO
   const TrackResult result = outcome.record.result;
   state.track = before;
   state.track.status = TrackStatus::kLost;
+  state.pending.reset();
   if (to_seconds(result.time_ns - before.time_ns) > kMaxPrediction_s) state.track.twist.reset();
   update_odometry(*input.map, before, outcome);
   if (!had_features(result)) return;
@@ -310,41 +288,6 @@ bool Tracker::relocalise(const Input& input, TrackOutcome& outcome) {
   state.anchored = map::AnchoredPose::at(*input.map, place->matched_keyframe, place->T_rig_world);
   outcome.record.relocalisation = Relocalisation{place->matched_keyframe, place->inliers};
   return true;
-}
-
-void Tracker::propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const {
-  const Stopwatch watch;
-  map::MapDraft draft(input.map);
-  draft.add_visibility_counts(folded(std::move(outcome.next.track.visibility_counts)));
-  if (relocaliser_) relocaliser_->describe(input.frame);
-  NewKeyframe made = make_keyframe(input.frame, output.matches, output.result.T_rig_world, input.pyramids,
-                                   output.result.anchored.reference, options_.tracking.initialisation, draft);
-  outcome.edit = ProposedEdit{ProposedEdit::Kind::kKeyframe, std::move(draft), std::move(made.landmarks),
-                              input.map->landmark_slots()};
-  outcome.record.stages.push_back({"keyframe", watch.ms()});
-}
-
-void Tracker::complete_keyframe(const map::CommitReport& report, TrackOutcome& outcome) const {
-  TrackerState& state = outcome.next.track;
-  TrackResult& result = outcome.record.result;
-  // Mapping may have committed a new scale while the frame was tracked.
-  if (state.twist) state.twist->tail<3>() *= result.anchored.scale_change(*report.published);
-  state = state_at_keyframe(state, result.time_ns, report.keyframes.front(),
-                            committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
-  result.anchored = state.anchored;
-}
-
-std::vector<LandmarkId> committed_landmarks(const std::vector<LandmarkId>& proposed, std::size_t base_landmarks,
-                                            const map::CommitReport& report) {
-  std::vector<LandmarkId> out;
-  for (const LandmarkId l : proposed) {
-    const LandmarkId id =
-        l.index() < base_landmarks ? report.published->resolve(l) : report.landmarks[l.index() - base_landmarks];
-    if (report.published->alive(id)) out.push_back(id);
-  }
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
-  return out;
 }
 
 }  // namespace bslam::tracking

@@ -38,6 +38,14 @@ struct FramePlan {
   geometry::Vector6d twist = geometry::Vector6d::Zero();  // predicted motion of the rig, zero if unknown
 };
 
+// A keyframe that is being created of a frame that was tracked directly.
+struct PendingKeyframe {
+  FrameId frame;
+  map::AnchoredPose pose;          // of the frame, found directly
+  std::size_t first_keyframe = 0;  // number of keyframe slots of the map then: its id is not smaller
+  int frames = 0;                  // number of frames since
+};
+
 // State of the front end that is carried from frame to frame.
 struct FrontEndState {
   TrackerState track;
@@ -47,9 +55,10 @@ struct FrontEndState {
   // During a monocular initialisation: the reference frame, and all frames since, beginning with the reference.
   std::shared_ptr<const StartCandidate> start_reference;
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
-  int direct_failures = 0;   // consecutive attempts of direct tracking that found no pose
-  int direct_pause = 0;      // number of frames until the next attempt
-  int direct_kept = 0;       // poses found directly that were kept since the features of a frame last gave a pose
+  int direct_failures = 0;  // consecutive attempts of direct tracking that found no pose
+  int direct_pause = 0;     // number of frames until the next attempt
+  int direct_kept = 0;      // poses found directly that were kept since the features of a frame last gave a pose
+  std::optional<PendingKeyframe> pending;
   int frames_lost = 0;       // consecutive lost frames with features
   TimeNs lost_since_ns = 0;  // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
@@ -77,7 +86,15 @@ struct TrackOutcome {
   FrameRecord record;
   FrontEndState next;
   std::optional<ProposedEdit> edit;
+  bool keyframe_wanted = false;         // a keyframe is to be created of the frame later (see create_keyframe)
   std::vector<BetweenKeyframes> early;  // frames of a monocular initialisation, once it succeeded
+};
+
+// A frame that was tracked directly and is to become a keyframe.
+struct KeyframeRequest {
+  frame::BundledFrame frame;  // with extracted and bundled keypoints
+  FrontEndState before;       // state before the frame
+  map::AnchoredPose pose;     // found directly
 };
 
 // What direct tracking found in a frame.
@@ -97,8 +114,6 @@ class Tracker {
   // Called before extraction. Readmits excluded cameras in `state` that were blurred in the last frame and are not any
   // more.
   FramePlan plan(const image::ImageBundle& images, const ImageFaults& faults, FrontEndState& state) const;
-  // Plan for a single frame without a state: all cameras are used, with equal budgets.
-  FramePlan plan() const;
 
   // Returns true if the next frame is to be tracked without features first.
   bool tracks_directly(const FrontEndState& state) const;
@@ -111,6 +126,15 @@ class Tracker {
   // state.
   TrackOutcome process(FrontEndState state, frame::BundledFrame frame, std::span<const image::Pyramid> pyramids,
                        const map::MapSnapshot& map, DirectAttempt direct = {});
+
+  // Tracks a frame with features, beginning with the pose found directly, and proposes the keyframe. `map` is the
+  // version in which the frame was tracked directly or a later one. Returns nullopt if the features give no pose.
+  std::optional<TrackOutcome> create_keyframe(KeyframeRequest request, std::span<const image::Pyramid> pyramids,
+                                              const map::MapSnapshot& map) const;
+
+  // Continues from the keyframe that is pending if it is in the map, as a keyframe that the last frame but some has
+  // become. It is not waited for any more after several frames.
+  std::optional<CreatedKeyframe> adopt_keyframe(const map::BundledMap& map, FrontEndState& state) const;
 
   // Completes an outcome with the ids assigned by the commit of its edit.
   void committed(const map::CommitReport& report, TrackOutcome& outcome) const;
@@ -130,12 +154,16 @@ class Tracker {
   void track(const Input& input, TrackOutcome& outcome);
   TrackInput input_of(const map::BundledMap& map, std::span<const image::Pyramid> pyramids,
                       std::span<const matching::AlignmentOptions> alignment, const FrontEndState& state) const;
-  TrackOutput follow(const Input& input, const FrontEndState& state) const;
+  TrackOutput follow(const Input& input, const FrontEndState& state,
+                     const std::optional<EstimatedPose>& estimate) const;
   bool relocalise(const Input& input, TrackOutcome& outcome);
   bool keep_direct_pose(const Input& input, TrackOutcome& outcome) const;
   bool gives_up(const FrontEndState& state, TimeNs time_ns) const;
   void handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome);
+
+  // tracker_keyframe.cc
   void propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const;
+  void want_keyframe(const map::BundledMap& map, TrackOutcome& outcome) const;
   void complete_keyframe(const map::CommitReport& report, TrackOutcome& outcome) const;
 
   // tracker_start.cc

@@ -31,6 +31,11 @@ std::vector<std::uint8_t> excluded(const TrackerState& state, std::size_t camera
   return out;
 }
 
+void apply_scale_change(const map::BundledMap& map, TrackerState& state) {
+  if (state.twist) state.twist->tail<3>() *= state.anchored.scale_change(map);
+  state.anchored.rescale(map);
+}
+
 TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,
                                std::vector<LandmarkId> landmarks) {
   TrackerState state = before;

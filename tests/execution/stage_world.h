@@ -44,14 +44,17 @@ class StageWorld {
 
   map::BundledMap empty_map() const { return map::BundledMap(rig_); }
 
-  // Adds a keyframe with two landmarks, whose positions depend on the version that the frame uses.
-  KeyframeId add_keyframe(FrameId frame, const map::MapSnapshot& seen, execution::StageExecutor& executor) const {
+  // A keyframe with two landmarks, whose positions depend on the version that the frame uses.
+  map::MapDraft with_keyframe(FrameId frame, const map::MapSnapshot& seen) const {
     map::MapDraft draft(seen);
     const auto hash = hash_of(*seen, static_cast<std::uint64_t>(frame.value()));
     Random random(hash);
     const KeyframeId k = draft.add_keyframe(frame_, map::random_pose(random, 0.2), {}, KeyframeId());
     for (std::size_t f = 0; f < 2; ++f) draft.add_landmark(map::random_point(random), {{k, FeatureId(f)}});
-    return executor.commit(execution::JournalStep::kTrack, std::move(draft)).keyframes.front();
+    return draft;
+  }
+  KeyframeId add_keyframe(FrameId frame, const map::MapSnapshot& seen, execution::StageExecutor& executor) const {
+    return executor.commit(execution::JournalStep::kTrack, with_keyframe(frame, seen)).keyframes.front();
   }
 
  private:
@@ -59,9 +62,9 @@ class StageWorld {
   std::shared_ptr<const frame::BundledFrame> frame_;
 };
 
-// Stages that change two landmarks depending on their input: one is new, one is moved. kLoop returns a result for every
-// `loop_every`th keyframe only. A stage takes up to about 100 microseconds, depending on `delay_seed`; kGlobal four
-// times as long.
+// Stages that change two landmarks depending on their input: one is new, one is moved. kKeyframe adds a keyframe. kLoop
+// returns a result for every `loop_every`th keyframe only. A stage takes up to about 100 microseconds, depending on
+// `delay_seed`; kGlobal four times as long.
 inline execution::StageFunctions hashing_stages(std::uint64_t delay_seed, int loop_every = 3,
                                                 std::uint64_t max_delay = 100'000) {
   const auto stage = [=](const execution::StageTask& task, const map::MapSnapshot& base,
@@ -86,6 +89,10 @@ inline execution::StageFunctions hashing_stages(std::uint64_t delay_seed, int lo
   };
   execution::StageFunctions functions;
   for (const execution::Stage s : execution::kStages) functions[s] = stage;
+  functions[execution::Stage::kKeyframe] = [world = StageWorld()](const execution::StageTask& task,
+                                                                  const map::MapSnapshot& base, std::stop_token) {
+    return execution::StageResult{world.with_keyframe(task.frame, base), {}};
+  };
   return functions;
 }
 

@@ -12,9 +12,9 @@ constexpr CameraStatus kGood{};
 constexpr CameraStatus out(CameraReason reason) { return {CameraState::kOut, reason}; }
 constexpr CameraStatus degraded(CameraReason reason) { return {CameraState::kDegraded, reason}; }
 
-CameraEvidence good() { return {.image = ImageState::kPresent, .keypoints = 500, .inliers = 200}; }
+CameraEvidence good() { return {.image = ImageState::kPresent, .extracted = 500, .keypoints = 500, .inliers = 200}; }
 CameraEvidence no_image(ImageState why = ImageState::kMissing) {
-  return {.image = why, .outage = CameraReason::kNoImages};
+  return {.image = why, .outage = CameraReason::kNoImages, .extracted = 0};
 }
 
 // Status of the only camera of a rig.
@@ -42,7 +42,7 @@ TEST(CameraStatus, ABlurredCameraIsDegradedWhileItIsConsistent) {
 
 TEST(CameraStatus, FewFeaturesDegradeACameraThatIsUsed) {
   CameraEvidence evidence = good();
-  evidence.keypoints = evidence.inliers = 29;
+  evidence.extracted = evidence.keypoints = evidence.inliers = 29;
   EXPECT_EQ(alone(evidence), degraded(CameraReason::kFewFeatures));
   evidence.keypoints = 0;
   evidence.postponed = true;  // its image was not used
@@ -51,18 +51,18 @@ TEST(CameraStatus, FewFeaturesDegradeACameraThatIsUsed) {
 
 TEST(CameraStatus, KeepsFewFeaturesWhileFeaturesAreNotExtracted) {
   CameraStatusMonitor monitor(1);
-  const auto update = [&](int keypoints, bool extracted) {
+  const auto update = [&](int keypoints, std::optional<int> extracted) {
     CameraEvidence evidence = good();
     evidence.keypoints = keypoints;
     evidence.extracted = extracted;
     return monitor.update(std::vector{evidence})[0];
   };
-  EXPECT_EQ(update(500, true), kGood);
-  EXPECT_EQ(update(5, false), kGood);
-  EXPECT_EQ(update(5, true), degraded(CameraReason::kFewFeatures));
-  EXPECT_EQ(update(500, false), degraded(CameraReason::kFewFeatures));
-  EXPECT_EQ(update(5, false), degraded(CameraReason::kFewFeatures));
-  EXPECT_EQ(update(500, true), kGood);
+  EXPECT_EQ(update(500, 500), kGood);
+  EXPECT_EQ(update(5, {}), kGood);
+  EXPECT_EQ(update(5, 5), degraded(CameraReason::kFewFeatures));
+  EXPECT_EQ(update(500, {}), degraded(CameraReason::kFewFeatures));
+  EXPECT_EQ(update(5, {}), degraded(CameraReason::kFewFeatures));
+  EXPECT_EQ(update(20, 500), kGood);  // a keyframe was created of an earlier frame
 }
 
 // Statuses of a camera that has an image in the frames marked x; O: out.

@@ -1,0 +1,138 @@
+// Functions of tracking/tracker.h that create keyframes: of the current frame, or later of a frame that was tracked
+// directly.
+#include <algorithm>
+#include <utility>
+
+#include "base/stopwatch.h"
+#include "tracking/feature_budget.h"
+#include "tracking/make_keyframe.h"
+#include "tracking/tracker.h"
+
+namespace bslam::tracking {
+namespace {
+
+// Sums the counts of each landmark, in order of id.
+std::vector<map::VisibilityCount> folded(std::vector<map::VisibilityCount> counts) {
+  std::stable_sort(counts.begin(), counts.end(), [](const map::VisibilityCount& a, const map::VisibilityCount& b) {
+    return a.landmark < b.landmark;
+  });
+  std::vector<map::VisibilityCount> out;
+  for (const map::VisibilityCount& s : counts) {
+    if (out.empty() || out.back().landmark != s.landmark) {
+      out.push_back(s);
+    } else {
+      out.back().expected += s.expected;
+      out.back().found += s.found;
+    }
+  }
+  return out;
+}
+
+// The keyframe that was created of the pending frame; invalid if the map has none.
+KeyframeId keyframe_of(const map::BundledMap& map, const PendingKeyframe& pending) {
+  for (std::size_t k = pending.first_keyframe; k < map.keyframe_slots(); ++k) {
+    const KeyframeId id(k);
+    if (map.alive(id) && map.keyframe(id).frame->id == pending.frame) return id;
+  }
+  return {};
+}
+
+std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId keyframe) {
+  std::vector<LandmarkId> out;
+  for (const LandmarkId l : map.keyframe(keyframe).landmarks) {
+    if (l.valid()) out.push_back(l);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+}  // namespace
+
+void Tracker::propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const {
+  const Stopwatch watch;
+  map::MapDraft draft(input.map);
+  draft.add_visibility_counts(folded(std::move(outcome.next.track.visibility_counts)));
+  if (relocaliser_) relocaliser_->describe(input.frame);
+  NewKeyframe made = make_keyframe(input.frame, output.matches, output.result.T_rig_world, input.pyramids,
+                                   output.result.anchored.reference, options_.tracking.initialisation, draft);
+  outcome.edit = ProposedEdit{ProposedEdit::Kind::kKeyframe, std::move(draft), std::move(made.landmarks),
+                              input.map->landmark_slots()};
+  outcome.record.stages.push_back({"keyframe", watch.ms()});
+}
+
+void Tracker::complete_keyframe(const map::CommitReport& report, TrackOutcome& outcome) const {
+  TrackerState& state = outcome.next.track;
+  TrackResult& result = outcome.record.result;
+  // Mapping may have committed a new scale while the frame was tracked.
+  if (state.twist) state.twist->tail<3>() *= result.anchored.scale_change(*report.published);
+  state = state_at_keyframe(state, result.time_ns, report.keyframes.front(),
+                            committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
+  result.anchored = state.anchored;
+}
+
+// Marks the frame as pending unless another one is: its features are extracted later.
+void Tracker::want_keyframe(const map::BundledMap& map, TrackOutcome& outcome) const {
+  FrontEndState& state = outcome.next;
+  if (state.pending) return;
+  outcome.keyframe_wanted = true;
+  state.pending = {outcome.record.result.frame, state.track.anchored, map.keyframe_slots(), 0};
+  state.track.visibility_counts.clear();  // the keyframe adds them
+}
+
+std::optional<TrackOutcome> Tracker::create_keyframe(KeyframeRequest request, std::span<const image::Pyramid> pyramids,
+                                                     const map::MapSnapshot& map) const {
+  const auto T_rig_world = request.pose.resolve(*map);
+  if (!T_rig_world) return std::nullopt;
+  TrackOutcome outcome;
+  outcome.next = std::move(request.before);
+  FrontEndState& state = outcome.next;
+  apply_scale_change(*map, state.track);
+  const Input input{request.frame, pyramids, map};
+  TrackOutput output = follow(input, state, EstimatedPose{*T_rig_world, true});
+  if (output.result.status != TrackStatus::kTracking) return std::nullopt;
+  request.frame = output.frame;  // refined by tracking
+  state.budget_fractions = budget_fractions(state.budget_fractions, *map, request.frame, output);
+  state.track = std::move(output.state);
+  propose_keyframe(input, output, outcome);
+  return outcome;
+}
+
+std::optional<CreatedKeyframe> Tracker::adopt_keyframe(const map::BundledMap& map, FrontEndState& state) const {
+  constexpr int kMaxFrames = 10;
+  if (!state.pending) return std::nullopt;
+  const KeyframeId keyframe = keyframe_of(map, *state.pending);
+  if (!keyframe.valid()) {
+    if (++state.pending->frames > kMaxFrames) state.pending.reset();
+    return std::nullopt;
+  }
+  const PendingKeyframe pending = *std::exchange(state.pending, std::nullopt);
+  TrackerState& track = state.track;
+  apply_scale_change(map, track);
+  const auto T_rig_world = track.anchored.resolve(map), T_then_world = pending.pose.resolve(map);
+  const CreatedKeyframe created{pending.frame, keyframe};
+  if (!T_rig_world || !T_then_world) return created;
+  // The motion since the frame is that of direct tracking; the keyframe has the pose from its features.
+  const geometry::SE3 T_rig_keyframe = *T_rig_world * T_then_world->inverse();
+  std::vector<LandmarkId> landmarks = landmarks_of(map, keyframe);
+  std::vector<map::VisibilityCount> counts = std::move(track.visibility_counts);
+  track = state_at_keyframe(track, track.time_ns, keyframe, std::move(landmarks));
+  track.anchored = map::AnchoredPose::at(map, keyframe, T_rig_keyframe * map.keyframe(keyframe).T_rig_world);
+  track.frames_since_keyframe = pending.frames;
+  track.visibility_counts = std::move(counts);
+  return created;
+}
+
+std::vector<LandmarkId> committed_landmarks(const std::vector<LandmarkId>& proposed, std::size_t base_landmarks,
+                                            const map::CommitReport& report) {
+  std::vector<LandmarkId> out;
+  for (const LandmarkId l : proposed) {
+    const LandmarkId id =
+        l.index() < base_landmarks ? report.published->resolve(l) : report.landmarks[l.index() - base_landmarks];
+    if (report.published->alive(id)) out.push_back(id);
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+}  // namespace bslam::tracking
