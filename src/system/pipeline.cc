@@ -21,7 +21,9 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
   const auto extracted = [&](std::size_t c) -> std::optional<int> {
     if (!record.direct) return record.result.cameras[c].keypoints;
     if (!record.created) return std::nullopt;
-    return static_cast<int>(outcome.seen->keyframe(record.created->keyframe).frame->cameras[c].keypoints.size());
+    const frame::CameraFrame& camera = outcome.seen->keyframe(record.created->keyframe).frame->cameras[c];
+    if (camera.state != image::ImageState::kPresent) return std::nullopt;
+    return static_cast<int>(camera.keypoints.size());
   };
   for (std::size_t c = 0; c < images.images.size(); ++c) {
     const tracking::CameraCounts& counts = record.result.cameras[c];
