@@ -228,6 +228,30 @@ std::string_view verdict_name(Verdict verdict) {
 
 namespace {
 
+// The rotation from the axes of a camera with other intrinsics to those with the given ones, for which the centre of its
+// image shows the same direction: what a calibration with wrong intrinsics absorbs in the extrinsics.
+geometry::SE3 absorbed_rotation(const camera::Camera& given, const camera::CameraModel& estimated) {
+  camera::Camera changed = given;
+  changed.model = estimated;
+  const Eigen::Vector2d centre(0.5 * (given.width - 1), 0.5 * (given.height - 1));
+  const auto before = given.unproject(centre), after = changed.unproject(centre);
+  if (!before || !after) return {};
+  return {Eigen::Quaterniond::FromTwoVectors(*after, *before).toRotationMatrix(), Eigen::Vector3d::Zero()};
+}
+
+// The estimate, in which cameras that hardly any image has shown follow the intrinsics of camera 0: their extrinsics were
+// calibrated relative to its axes. With the given extrinsics they would contradict the others from then on.
+solver::RigValues with_unobserved_cameras(const solver::RigAdjustment& adjusted, const camera::Rig& calibrated) {
+  constexpr int kMinObservations = 100;
+  solver::RigValues values = adjusted.values;
+  const geometry::SE3 rotation = absorbed_rotation(calibrated.camera(0), values.models[0]);
+  for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c) {
+    if (adjusted.cameras[c].observations < kMinObservations)
+      values.T_cam_rig[c] = calibrated.cam_from_rig(c) * rotation;
+  }
+  return values;
+}
+
 // Without metric scale, calibration errors in millimetres have no meaning in the map.
 bool can_refine(const map::BundledMap& map) {
   return map.rig().size() >= 2 && map.num_keyframes() > 0 && map.scale() == map::Scale::kMetric;
@@ -267,7 +291,7 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
   out.information = adjusted.information;
-  out.rig = adjusted.values.applied_to(reference);
+  out.rig = with_unobserved_cameras(adjusted, calibrated).applied_to(reference);
   out.poses = poses_of(problem.flat);
   // Distances between keyframes that are longer than the rig tell how the calibration changes the scale; a rig that
   // hardly moved only follows the scale of the baselines.

@@ -33,7 +33,7 @@ struct CalibrationOptions {
   // Standard deviations of the given calibration: the prior of the estimate. Extrinsics: per axis. Focal lengths
   // and their ratio: relative. Principal points: per axis, of the image width. Distortion: of the model table
   // (camera/model_table.h).
-  double sigma_rotation_deg = 2.0, sigma_translation_mm = 30.0;
+  double sigma_rotation_deg = 2.0, sigma_translation_mm = 5.0;
   double sigma_scale_percent = 0.5;  // of the common scale of all baselines, which images do not reveal
   // During a run, the map keeps its scale while it differs from that of the calibrated baselines by less than this.
   double scale_tolerance_percent = 1.0;

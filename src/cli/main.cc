@@ -1,6 +1,9 @@
 // The command line of bslam. Every command has its own file; this file only combines them.
 #include <cstdio>
 #include <exception>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include "cli/command_line_error.h"
 #include "cli/verbs.h"
@@ -8,6 +11,10 @@
 
 int main(int argc, char** argv) {
   using namespace bslam::cli;
+#ifdef __GLIBC__
+  // One heap for all threads: images are allocated in one and released in another, which fragments a heap per thread.
+  mallopt(M_ARENA_MAX, 1);
+#endif
   CLI::App app{"bslam: visual SLAM for rigs of any number of cameras"};
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
