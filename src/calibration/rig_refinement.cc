@@ -228,8 +228,8 @@ std::string_view verdict_name(Verdict verdict) {
 
 namespace {
 
-// The rotation from the axes of a camera with other intrinsics to those with the given ones, for which the centre of its
-// image shows the same direction: what a calibration with wrong intrinsics absorbs in the extrinsics.
+// The rotation from the axes of a camera with other intrinsics to those with the given ones, for which the centre of
+// its image shows the same direction: what a calibration with wrong intrinsics absorbs in the extrinsics.
 geometry::SE3 absorbed_rotation(const camera::Camera& given, const camera::CameraModel& estimated) {
   camera::Camera changed = given;
   changed.model = estimated;
@@ -239,8 +239,8 @@ geometry::SE3 absorbed_rotation(const camera::Camera& given, const camera::Camer
   return {Eigen::Quaterniond::FromTwoVectors(*after, *before).toRotationMatrix(), Eigen::Vector3d::Zero()};
 }
 
-// The estimate, in which cameras that hardly any image has shown follow the intrinsics of camera 0: their extrinsics were
-// calibrated relative to its axes. With the given extrinsics they would contradict the others from then on.
+// The estimate, in which cameras that hardly any image has shown follow the intrinsics of camera 0: their extrinsics
+// were calibrated relative to its axes. With the given extrinsics they would contradict the others from then on.
 solver::RigValues with_unobserved_cameras(const solver::RigAdjustment& adjusted, const camera::Rig& calibrated) {
   constexpr int kMinObservations = 100;
   solver::RigValues values = adjusted.values;

@@ -8,6 +8,7 @@
 #include "camera/model_parameters.h"
 #include "mapping/simulated_map.h"
 #include "solver/rig_block.h"
+#include "tracking/camera_consensus.h"
 
 namespace bslam::calibration {
 namespace {
@@ -31,13 +32,16 @@ camera::Rig with_error(const camera::Rig& rig, std::size_t camera) {
 
 // Builds a map from the images of the true rig, adjusted with the given calibration.
 map::SimulatedMap mapped(const camera::Rig& truth, const camera::Rig& calibrated, int keyframes, double step_s,
-                         const synthetic::Trajectory& trajectory = synthetic::make_orbit({.duration_s = 60})) {
+                         const synthetic::Trajectory& trajectory = synthetic::make_orbit({.duration_s = 60}),
+                         std::optional<std::size_t> missing_camera = {}) {
   synthetic::FeatureSimulatorOptions options;
   options.landmarks = 2500;
   options.max_keypoints = 250;
   options.sigma_px = kFeatures.sigma_px;
   map::SimulatedMap out(synthetic::FeatureSimulator(truth, trajectory, options));
   out.map = map::BundledMap(std::make_shared<const camera::Rig>(calibrated));
+  if (missing_camera)
+    out.change_frame = [&](auto& frame) { tracking::remove_camera(truth, *missing_camera, 0.01, 16, frame); };
   for (int i = 0; i < keyframes; ++i) out.add_keyframe(FrameId(i), step_s * i);
   adjustment::Selection all;
   for (const KeyframeId k : out.map.keyframe_ids())
@@ -46,6 +50,7 @@ map::SimulatedMap mapped(const camera::Rig& truth, const camera::Rig& calibrated
   map::MapDraft draft = out.draft();
   EXPECT_TRUE(adjustment::adjust_map(all, {}, kFeatures, draft).done);
   out.map = draft.map();
+  out.change_frame = {};
   return out;
 }
 
@@ -207,6 +212,34 @@ TEST(RefineRig, TellsAWrongCalibrationFromARightOne) {
     const double focal = camera::intrinsics(truth.camera(c).model).fx;
     EXPECT_NEAR(camera::intrinsics(of_wrong.rig->camera(c).model).fx, focal, 0.0015 * focal) << "camera " << c;
   }
+}
+
+// The same rig with a principal point of camera 0 that is wrong by 12 px, and the extrinsics that a calibration finds
+// then: all relative to the axes that camera 0 seems to have.
+camera::Rig with_wrong_centre(const camera::Rig& truth) {
+  camera::Camera camera = truth.camera(0);
+  camera::ModelParameters parameters = camera::parameters(camera.model);
+  parameters(2) += 12;
+  camera.model = camera::with_parameters(camera.model, parameters);
+  const Eigen::Vector2d centre(0.5 * camera.width, 0.5 * camera.height);
+  const SE3 R_true_seeming(
+      Eigen::Quaterniond::FromTwoVectors(*camera.unproject(centre), *truth.camera(0).unproject(centre)),
+      Eigen::Vector3d::Zero());
+  std::vector<camera::RigCamera> cameras = {{camera, truth.body_from_cam(0)}};
+  for (std::size_t c = 1; c < truth.size(); ++c)
+    cameras.push_back({truth.camera(c), truth.body_from_cam(0) * (truth.cam_from_rig(c) * R_true_seeming).inverse()});
+  return camera::Rig(std::move(cameras));
+}
+
+TEST(RefineRig, ACameraWithoutImagesFollowsTheIntrinsicsOfCamera0) {
+  const camera::Rig truth = synthetic::default_rig(), calibrated = with_wrong_centre(truth);
+  ASSERT_GT(map::angle_rad(calibrated.cam_from_rig(3), truth.cam_from_rig(3)) / kDegree, 1.0);
+  const RigRefinement result =
+      refine(mapped(truth, calibrated, 30, 0.3, synthetic::make_orbit({.duration_s = 60}), 3).map, kIndependent);
+  ASSERT_TRUE(result.done);
+  ASSERT_EQ(result.cameras[3].observations, 0);
+  for (std::size_t c = 0; c < truth.size(); ++c)
+    EXPECT_LT(rotation_error_deg(result, c, truth), 0.25) << "camera " << c;
 }
 
 TEST(RefineRig, ARefinedMapUsesTheEstimateAndKeepsItsInvariants) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <span>
 #include <unordered_map>
@@ -47,6 +48,7 @@ class SimulatedMap {
   // landmark at its true position; if `all` is false, only matched features with a triangulated point do.
   KeyframeId add_keyframe(FrameId id, double time_s, bool all = true) {
     SimulatedFrame& seen = frames.emplace_back(sim.frame(id, time_s));
+    if (change_frame) change_frame(seen.frame);
     if (knows_motion) seen.frame.twist = true_twist(time_s);
     const auto stored = std::make_shared<const frame::BundledFrame>(seen.frame);
     std::vector<std::pair<FeatureId, LandmarkId>> known;
@@ -90,8 +92,9 @@ class SimulatedMap {
 
   FeatureSimulator sim;
   BundledMap map;
-  bool knows_motion = false;           // keyframes are added with the true twist of the rig
-  std::vector<SimulatedFrame> frames;  // one per keyframe
+  std::function<void(frame::BundledFrame&)> change_frame;  // applied to the frames of keyframes; may be empty
+  bool knows_motion = false;                               // keyframes are added with the true twist of the rig
+  std::vector<SimulatedFrame> frames;                      // one per keyframe
   std::unordered_map<int, LandmarkId> landmark_of;
   std::unordered_map<int, int> truth_of_landmark;  // by id
 };
