@@ -146,7 +146,8 @@ bool enough(const solver::PoseSolution& solution, std::size_t num_matches, const
          solution.num_inliers >= kMinInlierRatio * static_cast<double>(num_matches);
 }
 
-// Pose from the landmarks of the last frame with the largest patches. Updates the pose and the motion of the frame.
+// Pose from the landmarks of the last frame with the largest patches, from which all are aligned: whether the pose is
+// right is decided with these. Updates the pose and the motion of the frame.
 bool track_coarsely(const TrackInput& input, const std::vector<LandmarkId>& last, const TrackingOptions& options,
                     ThreadPool& pool, frame::BundledFrame& frame, SE3& T_rig_world) {
   Candidates candidates = visible(input.map, frame, T_rig_world, last, pool);
@@ -157,7 +158,7 @@ bool track_coarsely(const TrackInput& input, const std::vector<LandmarkId>& last
   const auto observations = pose_observations(input.map, found.matches, found.aligned);
   const solver::MotionModel motion = motion_model(input, frame);
   const auto solution = robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
-  if (!enough(solution, observations.size(), options)) return false;
+  if (!supported(solution, observations.size(), options.min_inliers, options)) return false;
   frame.twist = motion.twist(solution.T_rig_world);
   T_rig_world = solution.T_rig_world;
   return true;
