@@ -9,6 +9,7 @@
 #include "calibration/lost_observations.h"
 #include "calibration/rig_problem.h"
 #include "calibration/single_view_landmarks.h"
+#include "calibration/unobserved_cameras.h"
 #include "solver/rig_bundle_adjustment.h"
 
 namespace bslam::calibration {
@@ -227,30 +228,6 @@ std::string_view verdict_name(Verdict verdict) {
 }
 
 namespace {
-
-// The rotation from the axes of a camera with other intrinsics to those with the given ones, for which the centre of
-// its image shows the same direction: what a calibration with wrong intrinsics absorbs in the extrinsics.
-geometry::SE3 absorbed_rotation(const camera::Camera& given, const camera::CameraModel& estimated) {
-  camera::Camera changed = given;
-  changed.model = estimated;
-  const Eigen::Vector2d centre(0.5 * (given.width - 1), 0.5 * (given.height - 1));
-  const auto before = given.unproject(centre), after = changed.unproject(centre);
-  if (!before || !after) return {};
-  return {Eigen::Quaterniond::FromTwoVectors(*after, *before).toRotationMatrix(), Eigen::Vector3d::Zero()};
-}
-
-// The estimate, in which cameras that hardly any image has shown follow the intrinsics of camera 0: their extrinsics
-// were calibrated relative to its axes. With the given extrinsics they would contradict the others from then on.
-solver::RigValues with_unobserved_cameras(const solver::RigAdjustment& adjusted, const camera::Rig& calibrated) {
-  constexpr int kMinObservations = 100;
-  solver::RigValues values = adjusted.values;
-  const geometry::SE3 rotation = absorbed_rotation(calibrated.camera(0), values.models[0]);
-  for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c) {
-    if (adjusted.cameras[c].observations < kMinObservations)
-      values.T_cam_rig[c] = calibrated.cam_from_rig(c) * rotation;
-  }
-  return values;
-}
 
 // Without metric scale, calibration errors in millimetres have no meaning in the map.
 bool can_refine(const map::BundledMap& map) {

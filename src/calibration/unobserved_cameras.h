@@ -1,0 +1,16 @@
+// Extrinsics of cameras that the images do not show.
+#pragma once
+
+#include "camera/rig.h"
+#include "solver/rig_bundle_adjustment.h"
+
+namespace bslam::calibration {
+
+// The estimate, in which cameras with hardly any observation follow the intrinsics of camera 0: extrinsics are
+// calibrated relative to the axes that camera 0 has with its intrinsics. With intrinsics that turn these axes by
+// R_given_estimated, for the centre of the image, an unobserved camera has
+//     T_cam_rig = T_cam_rig,given R_given_estimated.
+// With the given extrinsics it would contradict the other cameras from then on.
+solver::RigValues with_unobserved_cameras(const solver::RigAdjustment& adjusted, const camera::Rig& given);
+
+}  // namespace bslam::calibration
