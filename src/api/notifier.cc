@@ -71,9 +71,11 @@ void Notifier::report_map(const system::System& system) {
   if (callbacks_.map) callbacks_.map(make_map_view(std::move(map)));
 }
 
-void Notifier::report_created_keyframes(const system::System& system) {
+// `reported`: the frame whose keyframe is reported with its result.
+void Notifier::report_created_keyframes(const system::System& system, FrameId reported) {
   if (!callbacks_.keyframe) return;
   for (const tracking::FrameRecord& record : system.created_keyframes()) {
+    if (record.result.frame == reported) continue;
     const FrameResult frame = to_frame_result(record, rig_);
     callbacks_.keyframe({frame.keyframe_id, frame});
   }
@@ -83,13 +85,13 @@ void Notifier::processed(const FrameResult& frame, const system::System& system)
   report_status(frame);
   report_withdrawal(frame);
   report_cameras(frame);
-  report_created_keyframes(system);
+  report_created_keyframes(system, FrameId(frame.frame));
   if (frame.keyframe && callbacks_.keyframe) callbacks_.keyframe({frame.keyframe_id, frame});
   report_map(system);
 }
 
 void Notifier::finished(const system::System& system) {
-  report_created_keyframes(system);
+  report_created_keyframes(system, FrameId());
   report_map(system);
   report_loops(system);
 }

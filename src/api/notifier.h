@@ -24,7 +24,7 @@ class Notifier {
   void report_status(const FrameResult& frame);
   void report_withdrawal(const FrameResult& frame);
   void report_cameras(const FrameResult& frame);
-  void report_created_keyframes(const system::System& system);
+  void report_created_keyframes(const system::System& system, FrameId reported);
   void report_map(const system::System& system);
   void report_loops(const system::System& system);
   void log(LogLevel level, const std::string& line) const;

@@ -35,7 +35,7 @@ struct ExecutionOptions {
             kCommon);
     visitor("max_pending_keyframes", self.max_pending_keyframes, Range{1, 1000}, "",
             "maximum number of keyframes waiting for a background stage", OptionNote{.formerly = "pending_keyframes"});
-    visitor("lag_keyframe", self.lag_keyframe, Range{1, 10000}, "frames",
+    visitor("lag_keyframe", self.lag_keyframe, Range{1, 10}, "frames",
             "lagged mode: delay from the request of a keyframe to its use");
     visitor("lag_map", self.lag_map, Range{1, 10000}, "frames",
             "lagged mode: delay from the start of mapping to the use of its result");

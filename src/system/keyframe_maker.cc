@@ -42,17 +42,17 @@ execution::StageResult KeyframeMaker::make(FrameId id, const map::MapSnapshot& b
   if (!created) return {};
   {
     const std::lock_guard lock(mutex_);
-    budget_fractions_[id] = std::move(created->next.budget_fractions);
+    evidence_[id] = {std::move(created->next.budget_fractions), std::move(created->record.result.cameras)};
   }
   return {std::move(created->edit->draft), [this, id, time_ns](const map::CommitReport& report) {
             observer_({id, report.keyframes.front()}, time_ns);
           }};
 }
 
-std::vector<double> KeyframeMaker::take_budget_fractions(FrameId frame) {
+FeatureEvidence KeyframeMaker::take_evidence(FrameId frame) {
   const std::lock_guard lock(mutex_);
-  std::vector<double> out = std::move(budget_fractions_.at(frame));
-  budget_fractions_.erase(budget_fractions_.begin(), budget_fractions_.upper_bound(frame));
+  FeatureEvidence out = std::move(evidence_.at(frame));
+  evidence_.erase(evidence_.begin(), evidence_.upper_bound(frame));
   return out;
 }
 

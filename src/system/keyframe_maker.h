@@ -25,6 +25,12 @@ struct DeferredKeyframe {
   std::shared_ptr<const camera::Rig> rig;             // with which the frame was tracked
 };
 
+// What the features of a frame have shown.
+struct FeatureEvidence {
+  std::vector<double> budget_fractions;         // of the feature budget, per camera
+  std::vector<tracking::CameraCounts> cameras;  // per camera
+};
+
 // Called for every keyframe that was committed, with the time of its frame, in the committing thread.
 using KeyframeObserver = std::function<void(const tracking::CreatedKeyframe&, TimeNs)>;
 
@@ -37,13 +43,15 @@ class KeyframeMaker {
   // Accepts a frame, of which `make` then creates the keyframe. Thread-safe.
   void request(DeferredKeyframe deferred);
 
+  // Forgets a request. Thread-safe.
+  void withdraw(FrameId frame) { take(frame); }
+
   // The stage: the draft of the keyframe of a frame that was requested, in `base`. No draft if its features give no
   // pose, or the map was emptied since. To be called by one thread at a time.
   execution::StageResult make(FrameId frame, const map::MapSnapshot& base);
 
-  // The fractions of the feature budget after the features of a frame were tracked; the caller gets them once its
-  // keyframe is in the map. Thread-safe.
-  std::vector<double> take_budget_fractions(FrameId frame);
+  // What the features of a frame have shown; known once its keyframe is in the map. Thread-safe.
+  FeatureEvidence take_evidence(FrameId frame);
 
  private:
   DeferredKeyframe take(FrameId frame);
@@ -55,7 +63,7 @@ class KeyframeMaker {
   tracking::Tracker tracker_;
   std::mutex mutex_;
   std::map<FrameId, DeferredKeyframe> requests_;  // guarded by mutex_, as the next member
-  std::map<FrameId, std::vector<double>> budget_fractions_;
+  std::map<FrameId, FeatureEvidence> evidence_;
 };
 
 }  // namespace bslam::system

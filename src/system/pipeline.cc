@@ -18,21 +18,17 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
                                                const tracking::FramePlan& plan, const Pipeline::Outcome& outcome) {
   std::vector<tracking::CameraEvidence> out;
   const tracking::FrameRecord& record = outcome.record;
-  const auto extracted = [&](std::size_t c) -> std::optional<int> {
-    if (!record.direct) return record.result.cameras[c].keypoints;
-    if (!record.created) return std::nullopt;
-    const frame::CameraFrame& camera = outcome.seen->keyframe(record.created->keyframe).frame->cameras[c];
-    if (camera.state != image::ImageState::kPresent) return std::nullopt;
-    return static_cast<int>(camera.keypoints.size());
-  };
   for (std::size_t c = 0; c < images.images.size(); ++c) {
-    const tracking::CameraCounts& counts = record.result.cameras[c];
+    // Features of a keyframe that was created of an earlier frame, if the camera had an image then, tell more than the
+    // landmarks that were searched for directly.
+    const bool of_keyframe = c < outcome.created_cameras.size() && outcome.created_cameras[c].keypoints > 0;
+    const tracking::CameraCounts& counts = of_keyframe ? outcome.created_cameras[c] : record.result.cameras[c];
     out.push_back({.image = images.images[c].state,
                    .outage = faults.outage[c],
                    .blurred = faults.blurred[c] != 0,
-                   .inconsistent = counts.excluded,
+                   .inconsistent = record.result.cameras[c].excluded,
                    .postponed = plan.postponed[c] != 0,
-                   .extracted = extracted(c),
+                   .extracted = of_keyframe || !record.direct ? std::optional(counts.keypoints) : std::nullopt,
                    .keypoints = counts.keypoints,
                    .inliers = counts.inliers});
   }
@@ -97,7 +93,7 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   if (!directly) add_features();
   outcome.seen = executor.begin_frame(frame.id);
   const bool recalibrated = adopt_rig(*outcome.seen, frame);
-  const auto created = adopt_keyframe(*outcome.seen);
+  const auto created = adopt_keyframe(outcome);
   if (config_.mode == execution::Mode::kLagged) end_stage("results");
 
   tracking::DirectAttempt direct;
@@ -127,9 +123,12 @@ FrameId Pipeline::defer_keyframe(const tracking::FramePlan& plan, BundledFrame f
   return id;
 }
 
-std::optional<tracking::CreatedKeyframe> Pipeline::adopt_keyframe(const map::BundledMap& map) {
-  const auto created = tracker_.adopt_keyframe(map, state_);
-  if (created) state_.budget_fractions = keyframe_maker_.take_budget_fractions(created->frame);
+std::optional<tracking::CreatedKeyframe> Pipeline::adopt_keyframe(Outcome& outcome) {
+  const auto created = tracker_.adopt_keyframe(*outcome.seen, state_);
+  if (!created) return std::nullopt;
+  FeatureEvidence evidence = keyframe_maker_.take_evidence(created->frame);
+  state_.budget_fractions = std::move(evidence.budget_fractions);
+  outcome.created_cameras = std::move(evidence.cameras);
   return created;
 }
 

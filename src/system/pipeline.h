@@ -31,8 +31,10 @@ class Pipeline {
     std::vector<KeyframeId>
         keyframes;  // added to the map, in order; the caller enqueues them for the background stages
     std::optional<FrameId>
-        deferred;                 // the frame was passed to the keyframe maker; the caller enqueues it for its stage
-    bool started_submap = false;  // the first of `keyframes` is the root of a new submap
+        deferred;  // the frame was passed to the keyframe maker; the caller enqueues it for its stage
+    std::vector<tracking::CameraCounts>
+        created_cameras;                            // of the features of FrameRecord::created, per camera; or empty
+    bool started_submap = false;                    // the first of `keyframes` is the root of a new submap
     std::vector<tracking::BetweenKeyframes> early;  // frames of a monocular initialisation, including the first
   };
 
@@ -53,7 +55,7 @@ class Pipeline {
   frame::BundledFrame bundle(const tracking::FramePlan& plan, const frame::BundledFrame& frame);
   FrameId defer_keyframe(const tracking::FramePlan& plan, frame::BundledFrame frame,
                          const tracking::TrackOutcome& found);
-  std::optional<tracking::CreatedKeyframe> adopt_keyframe(const map::BundledMap& map);
+  std::optional<tracking::CreatedKeyframe> adopt_keyframe(Outcome& outcome);
   bool adopt_rig(const map::BundledMap& map, frame::BundledFrame& frame);
   void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);
 

@@ -80,6 +80,7 @@ void System::discard_map() {
     const std::lock_guard lock(records_mutex_);
     created_.clear();
   }
+  created_keyframes_.clear();
   first_of_map_ = KeyframeId(store_.snapshot()->keyframe_slots());
   frames_.back().map_withdrawn = true;
 }
@@ -116,6 +117,7 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
 }
 
 void System::enqueue(FrameId frame, TimeNs time_ns) {
+  if (executor_->over()) return keyframe_maker_.withdraw(frame);
   {
     const std::lock_guard lock(records_mutex_);
     deferred_time_ns_[frame] = time_ns;

@@ -74,7 +74,8 @@ class System {
   // The last frames in order: all of the run, or at least Resources::history of them. Valid until the next
   // process().
   const std::vector<FrameRecord>& frames() const { return frames_; }
-  // Frames of earlier calls of which the last call of process() or finish() has learnt that a keyframe was created.
+  // Frames of which a keyframe was created after they were tracked, as the last call of process() or finish() has
+  // learnt. The frame of that call may be among them.
   const std::vector<FrameRecord>& created_keyframes() const { return created_keyframes_; }
   // Moves the frames out; frames() is empty afterwards.
   std::vector<FrameRecord> take_frames() { return std::exchange(frames_, {}); }

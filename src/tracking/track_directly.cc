@@ -146,8 +146,8 @@ bool enough(const solver::PoseSolution& solution, std::size_t num_matches, const
          solution.num_inliers >= kMinInlierRatio * static_cast<double>(num_matches);
 }
 
-// Pose from the landmarks of the last frame with the largest patches, from which all are aligned: whether the pose is
-// right is decided with these. Updates the pose and the motion of the frame.
+// Pose from the landmarks of the last frame with the largest patches, with which the others are predicted; all
+// landmarks together decide whether it is right. Updates the pose and the motion of the frame.
 bool track_coarsely(const TrackInput& input, const std::vector<LandmarkId>& last, const TrackingOptions& options,
                     ThreadPool& pool, frame::BundledFrame& frame, SE3& T_rig_world) {
   Candidates candidates = visible(input.map, frame, T_rig_world, last, pool);

@@ -148,7 +148,7 @@ DirectAttempt Tracker::process_directly(const FrontEndState& state, const Bundle
   if (options_.localize_only) track.visibility_counts.clear();
   update_odometry(*map, before, outcome);
   record_motion(outcome);
-  if (direct.failure == DirectFailure::kKeyframeDue && direct.all_cameras) {
+  if (direct.failure == DirectFailure::kKeyframeDue && direct.all_cameras && !state.keyframe_failed) {
     direct.failure = DirectFailure::kNone;
     want_keyframe(*map, outcome);
   }
@@ -163,6 +163,7 @@ TrackOutcome Tracker::process(FrontEndState state, BundledFrame frame, std::span
   count_features(frame, outcome.record);
   apply_scale_change(*map, outcome.next.track);
   pause_direct_tracking(direct.failure, outcome.next);
+  outcome.next.keyframe_failed = false;
   const Input input{frame, pyramids, map, std::move(direct)};
   if (map->num_keyframes() == 0) {
     start(input, outcome);
@@ -286,6 +287,7 @@ bool Tracker::relocalise(const Input& input, TrackOutcome& outcome) {
   state = state_at_keyframe({}, input.frame.time_ns, place->matched_keyframe, std::move(landmarks));
   state.cameras = std::move(cameras);
   state.anchored = map::AnchoredPose::at(*input.map, place->matched_keyframe, place->T_rig_world);
+  outcome.next.pending.reset();
   outcome.record.relocalisation = Relocalisation{place->matched_keyframe, place->inliers};
   return true;
 }

@@ -38,6 +38,8 @@ struct FramePlan {
   geometry::Vector6d twist = geometry::Vector6d::Zero();  // predicted motion of the rig, zero if unknown
 };
 
+inline constexpr int kMaxPendingFrames = 10;  // number of frames in which a pending keyframe is waited for
+
 // A keyframe that is being created of a frame that was tracked directly.
 struct PendingKeyframe {
   FrameId frame;
@@ -59,6 +61,8 @@ struct FrontEndState {
   int direct_pause = 0;     // number of frames until the next attempt
   int direct_kept = 0;      // poses found directly that were kept since the features of a frame last gave a pose
   std::optional<PendingKeyframe> pending;
+  bool keyframe_failed =
+      false;                 // the last pending keyframe was not created: the next one is made of a frame with features
   int frames_lost = 0;       // consecutive lost frames with features
   TimeNs lost_since_ns = 0;  // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
@@ -92,7 +96,7 @@ struct TrackOutcome {
 
 // A frame that was tracked directly and is to become a keyframe.
 struct KeyframeRequest {
-  frame::BundledFrame frame;  // with extracted and bundled keypoints
+  frame::BundledFrame frame;  // for Tracker::create_keyframe with extracted and bundled keypoints
   FrontEndState before;       // state before the frame
   map::AnchoredPose pose;     // found directly
 };
@@ -132,8 +136,8 @@ class Tracker {
   std::optional<TrackOutcome> create_keyframe(KeyframeRequest request, std::span<const image::Pyramid> pyramids,
                                               const map::MapSnapshot& map) const;
 
-  // Continues from the keyframe that is pending if it is in the map, as a keyframe that the last frame but some has
-  // become. It is not waited for any more after several frames.
+  // Continues from the pending keyframe if it is in the map, as if its frame had become a keyframe when it was tracked.
+  // It is not waited for any more after kMaxPendingFrames.
   std::optional<CreatedKeyframe> adopt_keyframe(const map::BundledMap& map, FrontEndState& state) const;
 
   // Completes an outcome with the ids assigned by the commit of its edit.

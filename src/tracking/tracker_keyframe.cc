@@ -76,7 +76,7 @@ void Tracker::want_keyframe(const map::BundledMap& map, TrackOutcome& outcome) c
   if (state.pending) return;
   outcome.keyframe_wanted = true;
   state.pending = {outcome.record.result.frame, state.track.anchored, map.keyframe_slots(), 0};
-  state.track.visibility_counts.clear();  // the keyframe adds them
+  state.track.visibility_counts.clear();  // the keyframe adds them; they are lost if its features give no pose
 }
 
 std::optional<TrackOutcome> Tracker::create_keyframe(KeyframeRequest request, std::span<const image::Pyramid> pyramids,
@@ -91,6 +91,7 @@ std::optional<TrackOutcome> Tracker::create_keyframe(KeyframeRequest request, st
   TrackOutput output = follow(input, state, EstimatedPose{*T_rig_world, true});
   if (output.result.status != TrackStatus::kTracking) return std::nullopt;
   request.frame = output.frame;  // refined by tracking
+  outcome.record.result = output.result;
   state.budget_fractions = budget_fractions(state.budget_fractions, *map, request.frame, output);
   state.track = std::move(output.state);
   propose_keyframe(input, output, outcome);
@@ -98,11 +99,11 @@ std::optional<TrackOutcome> Tracker::create_keyframe(KeyframeRequest request, st
 }
 
 std::optional<CreatedKeyframe> Tracker::adopt_keyframe(const map::BundledMap& map, FrontEndState& state) const {
-  constexpr int kMaxFrames = 10;
   if (!state.pending) return std::nullopt;
   const KeyframeId keyframe = keyframe_of(map, *state.pending);
   if (!keyframe.valid()) {
-    if (++state.pending->frames > kMaxFrames) state.pending.reset();
+    state.keyframe_failed = ++state.pending->frames > kMaxPendingFrames;
+    if (state.keyframe_failed) state.pending.reset();
     return std::nullopt;
   }
   const PendingKeyframe pending = *std::exchange(state.pending, std::nullopt);
@@ -110,7 +111,7 @@ std::optional<CreatedKeyframe> Tracker::adopt_keyframe(const map::BundledMap& ma
   apply_scale_change(map, track);
   const auto T_rig_world = track.anchored.resolve(map), T_then_world = pending.pose.resolve(map);
   const CreatedKeyframe created{pending.frame, keyframe};
-  if (!T_rig_world || !T_then_world) return created;
+  if (!T_rig_world || !T_then_world || map.root_of(track.anchored.reference) != map.root_of(keyframe)) return created;
   // The motion since the frame is that of direct tracking; the keyframe has the pose from its features.
   const geometry::SE3 T_rig_keyframe = *T_rig_world * T_then_world->inverse();
   std::vector<LandmarkId> landmarks = landmarks_of(map, keyframe);

@@ -167,7 +167,10 @@ TEST(Tracker, DoesNotWaitForeverForAKeyframe) {
   run.state.pending = {FrameId(2), run.state.track.anchored, run.store.snapshot()->keyframe_slots(), 0};
   int waited = 0;
   for (; run.state.pending && waited < 100; ++waited) run.tracker.adopt_keyframe(*run.store.snapshot(), run.state);
-  EXPECT_EQ(waited, 11);
+  EXPECT_EQ(waited, kMaxPendingFrames + 1);
+  EXPECT_TRUE(run.state.keyframe_failed);
+  run.process(run.frame(3));
+  EXPECT_FALSE(run.state.keyframe_failed);
 }
 
 TEST(Tracker, AFrameWithoutAPoseForgetsThePendingKeyframe) {
