@@ -6,6 +6,7 @@
 
 #include "base/median.h"
 #include "looping/essential_graph.h"
+#include "map/keyframe_landmarks.h"
 #include "map/scene_depth.h"
 #include "solver/reprojection.h"
 
@@ -93,7 +94,7 @@ void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_w
   }
   for (std::size_t i = 0; i < window.size(); ++i) {
     mapping::fuse_into(window[i], T_rig_world[i], place, mapping::Keep::kSearched, options.fusion, features, draft);
-    draft.refresh_landmarks(mapping::landmarks_of(draft.map(), window[i]));
+    draft.refresh_landmarks(map::landmarks_of(draft.map(), window[i]));
   }
 }
 
@@ -110,7 +111,7 @@ void move_window(const std::vector<KeyframeId>& window, const EssentialGraph& gr
   for (const KeyframeId k : window) {
     const auto v = static_cast<std::size_t>(graph.vertex(k));
     move_keyframe(k, before[v], graph.problem.S_world[v], poses);
-    for (const LandmarkId l : mapping::landmarks_of(draft.map(), k)) {
+    for (const LandmarkId l : map::landmarks_of(draft.map(), k)) {
       const map::Landmark& landmark = draft.map().landmark(l);
       if (landmark.reference.keyframe != k) continue;
       poses.landmarks.emplace_back(l, graph.problem.S_world[v].inverse() * (before[v] * landmark.position));

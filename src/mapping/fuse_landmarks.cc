@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "map/keyframe_landmarks.h"
+
 namespace bslam::mapping {
 namespace {
 

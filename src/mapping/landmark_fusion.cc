@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "map/keyframe_landmarks.h"
 #include "map/search_points.h"
 #include "matching/projection_search.h"
 
@@ -46,15 +47,6 @@ std::vector<LandmarkId> absent_from(const map::BundledMap& map, KeyframeId targe
 }
 
 }  // namespace
-
-std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId k) {
-  std::vector<LandmarkId> out;
-  for (const LandmarkId l : map.keyframe(k).landmarks) {
-    if (l.valid()) out.push_back(l);
-  }
-  std::sort(out.begin(), out.end());
-  return out;
-}
 
 FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
                        const LandmarkFusionOptions& options, const feature::FeatureModel& features,

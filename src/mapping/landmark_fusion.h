@@ -47,7 +47,4 @@ FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmar
                        const LandmarkFusionOptions& options, const feature::FeatureModel& features,
                        map::MapDraft& draft);
 
-// Returns the landmarks observed by a keyframe, in order of id.
-std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId k);
-
 }  // namespace bslam::mapping

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/stopwatch.h"
+#include "map/keyframe_landmarks.h"
 #include "tracking/feature_budget.h"
 #include "tracking/make_keyframe.h"
 #include "tracking/tracker.h"
@@ -35,15 +36,6 @@ KeyframeId keyframe_of(const map::BundledMap& map, const PendingKeyframe& pendin
     if (map.alive(id) && map.keyframe(id).frame->id == pending.frame) return id;
   }
   return {};
-}
-
-std::vector<LandmarkId> landmarks_of(const map::BundledMap& map, KeyframeId keyframe) {
-  std::vector<LandmarkId> out;
-  for (const LandmarkId l : map.keyframe(keyframe).landmarks) {
-    if (l.valid()) out.push_back(l);
-  }
-  std::sort(out.begin(), out.end());
-  return out;
 }
 
 }  // namespace
@@ -114,7 +106,7 @@ std::optional<CreatedKeyframe> Tracker::adopt_keyframe(const map::BundledMap& ma
   if (!T_rig_world || !T_then_world || map.root_of(track.anchored.reference) != map.root_of(keyframe)) return created;
   // The motion since the frame is that of direct tracking; the keyframe has the pose from its features.
   const geometry::SE3 T_rig_keyframe = *T_rig_world * T_then_world->inverse();
-  std::vector<LandmarkId> landmarks = landmarks_of(map, keyframe);
+  std::vector<LandmarkId> landmarks = map::landmarks_of(map, keyframe);
   std::vector<map::VisibilityCount> counts = std::move(track.visibility_counts);
   track = state_at_keyframe(track, track.time_ns, keyframe, std::move(landmarks));
   track.anchored = map::AnchoredPose::at(map, keyframe, T_rig_keyframe * map.keyframe(keyframe).T_rig_world);

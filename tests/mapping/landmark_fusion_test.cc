@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "map/keyframe_landmarks.h"
 #include "mapping/simulated_map.h"
 
 namespace bslam::mapping {
