@@ -1,0 +1,164 @@
+"""Functions that the program carries out: rendering and calibration of recordings take minutes and all cores."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Union
+
+from ._bslam import Error, Rig
+
+Path = Union[str, "os.PathLike[str]"]
+
+PROGRAM = pathlib.Path(__file__).parent / "bin" / "bslam"
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """An estimated calibration.
+
+    Attributes:
+        rig: the estimate.
+        text: table of given values, estimates and standard deviations, and what could not be observed.
+    """
+
+    rig: Rig
+    text: str
+
+
+def simulate(
+    out: Path,
+    *,
+    rig: Path | Rig | None = None,
+    world: Literal["building", "corridor", "twin-rooms"] = "building",
+    duration: float = 20.0,
+    rate: float = 20.0,
+    seed: int = 1,
+    laps: int = 0,
+    speed: float = 0.0,
+    back: bool = False,
+    exposure_ms: float = 5.0,
+    noise: float = 1.0,
+    faults: Path | None = None,
+    threads: int = 0,
+    overwrite: bool = False,
+) -> pathlib.Path:
+    """Renders images of a built-in world as seen by a rig, in EuRoC layout with ground truth, as `bslam simulate` does.
+
+    Args:
+        out: folder to write into.
+        rig: the cameras; default: four cameras, two of them in front.
+        world: building: different rooms; corridor, twin-rooms: places that look exactly alike.
+        duration: seconds.
+        rate: images per second of each camera.
+        seed: seed of world, motion and noise.
+        laps: laps of the tour within the duration; 0: as many as a walking pace allows.
+        speed: metres per second; 0: determined by duration and laps.
+        back: turn around after half of the duration and return along the same path.
+        exposure_ms: exposure time in milliseconds, which causes motion blur.
+        noise: factor applied to the sensor noise.
+        faults: YAML or JSON list of faults of the cameras.
+        threads: number of threads; 0: one per core.
+        overwrite: write into a folder that is not empty; an earlier recording in it is replaced.
+
+    Returns:
+        The folder, which Rig.load() and `bslam run` read.
+
+    Raises:
+        Error: a value out of range, a folder that is not empty, a file that cannot be read or written.
+    """
+    options = dict(
+        world=world, duration=duration, rate=rate, seed=seed, laps=laps, speed=speed, back=back, exposure_ms=exposure_ms,
+        noise=noise, faults=faults, threads=threads, overwrite=overwrite,
+    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as work:
+        _run("simulate", out=out, rig=_rig_file(rig, work), **options)
+    return pathlib.Path(out)
+
+
+def calibrate(
+    data: Path | Sequence[Path],
+    *,
+    rig: Path | Rig | None = None,
+    out: Path | None = None,
+    model: Literal["pinhole", "pinhole-radtan", "kannala-brandt"] | None = None,
+    fov: float | None = None,
+    format: Literal["auto", "euroc", "kitti", "folder"] = "auto",
+    cameras: Sequence[int] | None = None,
+    begin: float | None = None,
+    end: float | None = None,
+    settings: Mapping[str, object] | None = None,
+    config: Path | None = None,
+    rate: float | None = None,
+    stamp_unit: Literal["ns", "us", "ms", "s"] | None = None,
+    bayer: str | None = None,
+    masks: Path | None = None,
+    vignettes: Path | None = None,
+    overwrite: bool = False,
+) -> Calibration:
+    """Estimates intrinsics and extrinsics from recordings of any scene, as `bslam rig calibrate` does.
+
+    Args:
+        data: folder of a recording, or of several of the same rig.
+        rig: rough calibration to begin with; default: that of the first recording.
+        out: rig file to write.
+        model: begin with this camera model without distortion for all cameras; needs `fov`.
+        fov: horizontal field of view in degrees; needs `model`.
+        format: data set format.
+        cameras: cameras of the rig to use, in this order; default: all.
+        begin: start of the interval to process, in seconds after the first image.
+        end: end of the interval.
+        settings: names and values, such as {"calibration.sigma_focal_percent": 5}.
+        config: YAML file with settings.
+        rate: the time stamps are numbers of images that were taken at this rate, in Hz.
+        stamp_unit: unit of the time stamps; default: ns.
+        bayer: colour filter of raw images.
+        masks: folder with masks.
+        vignettes: folder with vignettes.
+        overwrite: replace `out` if it exists.
+
+    Raises:
+        Error: a recording that cannot be read, or from which nothing can be estimated.
+    """
+    folders = [data] if isinstance(data, (str, os.PathLike)) else list(data)
+    options = dict(
+        model=model, fov=fov, format=format, begin=begin, end=end, config=config, rate=rate, stamp_unit=stamp_unit,
+        bayer=bayer, masks=masks, vignettes=vignettes, overwrite=overwrite,
+        cameras=None if cameras is None else ",".join(map(str, cameras)),
+    )  # fmt: skip
+    assignments = [f"--set={name}={_text(value)}" for name, value in (settings or {}).items()]
+    with tempfile.TemporaryDirectory() as work:
+        file = pathlib.Path(work, "calibrated.yaml") if out is None else out
+        text = _run("rig", "calibrate", *folders, *assignments, out=file, rig=_rig_file(rig, work), **options)
+        table, _, _ = text.rstrip("\n").rpartition("\n")  # the last line is the name of the file
+        return Calibration(Rig.load(file), table + "\n")
+
+
+def _rig_file(rig: Path | Rig | None, folder: str) -> Path | None:
+    if not isinstance(rig, Rig):
+        return rig
+    rig.save(file := pathlib.Path(folder, "rig.yaml"))
+    return file
+
+
+def _text(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _run(*command: Path, **options: Any) -> str:
+    """Runs the program and returns what it prints. Options that are None or False are omitted."""
+    arguments = [str(PROGRAM), *map(os.fspath, command), "--progress=never"]
+    for name, value in options.items():
+        if value is None or value is False:
+            continue
+        option = "--" + name.replace("_", "-")
+        arguments.append(option if value is True else f"{option}={value}")
+    done = subprocess.run(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    if done.returncode != 0:
+        lines = done.stderr.strip().splitlines() or [f"bslam: ended with status {done.returncode}"]
+        raise Error(lines[-1].removeprefix("bslam: "))
+    return done.stdout

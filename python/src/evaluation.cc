@@ -1,0 +1,162 @@
+// Errors of a trajectory, as `bslam eval` computes them. bslam/_evaluation.py is the public function.
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/variant.h>
+
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "arrays.h"
+#include "base/atomic_file.h"
+#include "bindings.h"
+#include "errors.h"
+#include "evaluation/trajectory_error.h"
+#include "evaluation/trajectory_file.h"
+#include "report/trajectory_plot.h"
+#include "rig_formats/rig_file.h"
+
+namespace bslam::python {
+namespace {
+
+using Path = std::filesystem::path;
+using Rows = nb::ndarray<const double, nb::shape<-1, 8>, nb::c_contig, nb::device::cpu>;
+using Given = std::variant<Path, Rows>;
+
+struct Arguments {
+  std::string align, gt_frame;
+  double max_dt_s = 0, delta_s = 0;
+  std::optional<Path> rig, times, plot;
+  int camera = 0;
+};
+
+evaluation::TimedPose pose_of(const double* row, const std::string& name, std::size_t index) {
+  const std::string key = "row " + std::to_string(index);
+  for (int k = 0; k < 8; ++k) {
+    if (!std::isfinite(row[k])) raise({name, key, "a value that is not a finite number", "t, x, y, z, qx, qy, qz, qw"});
+  }
+  const Eigen::Quaterniond q(row[7], row[4], row[5], row[6]);
+  if (std::abs(q.norm() - 1) > 1e-3) raise({name, key, "a quaternion of norm " + std::to_string(q.norm()), "1"});
+  return {from_seconds(row[0]), geometry::SE3(q, {row[1], row[2], row[3]})};
+}
+
+evaluation::Trajectory from_rows(const Rows& rows, const std::string& name) {
+  evaluation::Trajectory out;
+  for (std::size_t i = 0; i < rows.shape(0); ++i) {
+    out.push_back(pose_of(rows.data() + 8 * i, name, i));
+    if (i > 0 && out[i].time_ns <= out[i - 1].time_ns) {
+      raise({name, "row " + std::to_string(i), "a time that is not after the one before", "times that increase"});
+    }
+  }
+  return out;
+}
+
+evaluation::Trajectory read(const Given& given, const std::string& name, const std::optional<Path>& times) {
+  if (const Path* path = std::get_if<Path>(&given)) return value_of(evaluation::read_trajectory(*path, times));
+  return from_rows(std::get<Rows>(given), name);
+}
+
+evaluation::Trajectory in_frame_of_truth(evaluation::Trajectory estimate, const Arguments& a) {
+  if (a.gt_frame != "body") return estimate;
+  if (!a.rig) raise({"evaluate", "gt_frame=body", "no rig", "rig=FILE with the pose of the camera on the body"});
+  const camera::Rig rig = value_of(rig_formats::read_rig(*a.rig));
+  const auto camera = static_cast<std::size_t>(a.camera);
+  if (a.camera < 0 || camera >= rig.size()) {
+    raise({a.rig->string(), "camera", std::to_string(a.camera), "a camera number below " + std::to_string(rig.size())});
+  }
+  return evaluation::moved_to_frame(estimate, rig.body_from_cam(camera).inverse());
+}
+
+evaluation::EvaluationOptions options_of(const Arguments& a) {
+  evaluation::EvaluationOptions options;
+  if (a.align != "none" && a.align != "se3" && a.align != "sim3")
+    raise({"evaluate", "align", a.align, "se3, sim3 or none"});
+  if (a.gt_frame != "cam0" && a.gt_frame != "body") raise({"evaluate", "gt_frame", a.gt_frame, "cam0 or body"});
+  if (!(a.max_dt_s >= 0 && a.max_dt_s <= 1e6)) raise({"evaluate", "max_dt", std::to_string(a.max_dt_s), "0 to 1e6 s"});
+  if (!(a.delta_s >= 1e-6 && a.delta_s <= 1e6))
+    raise({"evaluate", "delta", std::to_string(a.delta_s), "1e-6 to 1e6 s"});
+  if (a.align == "none") options.align = evaluation::AlignMode::kNone;
+  if (a.align == "sim3") options.align = evaluation::AlignMode::kSim3;
+  options.max_dt_ns = from_seconds(a.max_dt_s);
+  options.rpe_delta_s = a.delta_s;
+  return options;
+}
+
+nb::dict dict_of(const evaluation::ErrorStatistics& s) {
+  nb::dict out;
+  out["rmse"] = s.rmse;
+  out["mean"] = s.mean;
+  out["median"] = s.median;
+  out["max"] = s.max;
+  out["count"] = s.count;
+  return out;
+}
+
+Rows8 rows_of(const evaluation::Trajectory& trajectory) {
+  std::vector<double> values;
+  values.reserve(8 * trajectory.size());
+  for (const evaluation::TimedPose& pose : trajectory) {
+    const auto& t = pose.T_world_frame.translation();
+    const Eigen::Quaterniond& q = pose.T_world_frame.rotation();
+    values.insert(values.end(), {to_seconds(pose.time_ns), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()});
+  }
+  return make_array<Rows8>(std::move(values), {trajectory.size(), 8});
+}
+
+Array<double, -1, 2> rows_of(const std::vector<evaluation::PoseError>& errors) {
+  std::vector<double> values;
+  for (const evaluation::PoseError& e : errors) values.insert(values.end(), {to_seconds(e.time_ns), e.position_m});
+  return make_array<Array<double, -1, 2>>(std::move(values), {errors.size(), 2});
+}
+
+nb::dict dict_of(const evaluation::TrajectoryEvaluation& e) {
+  nb::dict out;
+  out["ate"] = dict_of(e.ate);
+  out["rpe_translation"] = dict_of(e.rpe.translation_m);
+  out["rpe_rotation_deg"] = dict_of(e.rpe.rotation_deg);
+  out["scale"] = e.scale;
+  out["coverage"] = e.coverage;
+  out["gt_length_m"] = e.gt_length_m;
+  out["aligned"] = rows_of(e.aligned_estimate);
+  out["errors"] = rows_of(e.errors);
+  return out;
+}
+
+nb::dict evaluate(const Given& est, const Given& gt, const Arguments& a) {
+  const evaluation::EvaluationOptions options = options_of(a);
+  const auto estimate = in_frame_of_truth(read(est, "est", a.times), a);
+  const auto truth = read(gt, "gt", a.times);
+  auto result = evaluation::evaluate(estimate, truth, options);
+  const Path* file = std::get_if<Path>(&est);
+  if (!result) {
+    Error error = result.error();
+    error.file = file != nullptr ? file->string() : "est";
+    raise(error);
+  }
+  if (a.plot) {
+    const std::string title = (file != nullptr ? file->filename().string() : "estimate") + std::string(" against ") +
+                              (gt.index() == 0 ? std::get<Path>(gt).filename().string() : "ground truth");
+    check(write_atomically(*a.plot, report::trajectory_plot_svg(report::evaluation_plot_input(*result, truth, title))));
+  }
+  return dict_of(*result);
+}
+
+}  // namespace
+
+void bind_evaluation(nb::module_& module) {
+  module.def(
+      "_evaluate",
+      [](const Given& est, const Given& gt, const std::string& align, double max_dt, double delta,
+         const std::string& gt_frame, const std::optional<Path>& rig, int camera, const std::optional<Path>& times,
+         const std::optional<Path>& plot) {
+        return evaluate(est, gt, {align, gt_frame, max_dt, delta, rig, times, plot, camera});
+      },
+      nb::arg("est"), nb::arg("gt"), nb::arg("align"), nb::arg("max_dt"), nb::arg("delta"), nb::arg("gt_frame"),
+      nb::arg("rig") = nb::none(), nb::arg("camera"), nb::arg("times") = nb::none(), nb::arg("plot") = nb::none());
+}
+
+}  // namespace bslam::python

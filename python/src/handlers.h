@@ -1,0 +1,35 @@
+// Python functions that a System calls to report events.
+#pragma once
+
+#include <bslam/system.h>
+#include <nanobind/nanobind.h>
+
+#include <array>
+#include <exception>
+#include <utility>
+
+namespace bslam::python {
+
+// Must not move while the callbacks exist, which refer to it. All members are used with the interpreter's lock only.
+class Handlers {
+ public:
+  // Each is a function or None.
+  nanobind::object keyframe, loop, camera, log;
+
+  // Functions for System::create(), which take the interpreter's lock.
+  Callbacks callbacks();
+  // Throws the first exception that one of the functions has raised since the last call.
+  void rethrow();
+  // All references to Python objects, for the garbage collector.
+  std::array<nanobind::object*, 4> references() { return {&keyframe, &loop, &camera, &log}; }
+
+ private:
+  template <class... Arguments>
+  void call(const nanobind::object& function, Arguments&&... arguments);
+
+  std::exception_ptr raised_;
+};
+
+void bind_events(nanobind::module_& module);
+
+}  // namespace bslam::python
