@@ -71,10 +71,20 @@ def simulate(
     Raises:
         Error: a value out of range, a folder that is not empty, a file that cannot be read or written.
     """
-    options = dict(
-        world=world, duration=duration, rate=rate, seed=seed, laps=laps, speed=speed, back=back, exposure_ms=exposure_ms,
-        noise=noise, faults=faults, threads=threads, overwrite=overwrite,
-    )  # fmt: skip
+    options = {
+        "world": world,
+        "duration": duration,
+        "rate": rate,
+        "seed": seed,
+        "laps": laps,
+        "speed": speed,
+        "back": back,
+        "exposure_ms": exposure_ms,
+        "noise": noise,
+        "faults": faults,
+        "threads": threads,
+        "overwrite": overwrite,
+    }
     with tempfile.TemporaryDirectory() as work:
         _run("simulate", out=out, rig=_rig_file(rig, work), **options)
     return pathlib.Path(out)
@@ -125,11 +135,21 @@ def calibrate(
         Error: a recording that cannot be read, or from which nothing can be estimated.
     """
     folders = [data] if isinstance(data, (str, os.PathLike)) else list(data)
-    options = dict(
-        model=model, fov=fov, format=format, begin=begin, end=end, config=config, rate=rate, stamp_unit=stamp_unit,
-        bayer=bayer, masks=masks, vignettes=vignettes, overwrite=overwrite,
-        cameras=None if cameras is None else ",".join(map(str, cameras)),
-    )  # fmt: skip
+    options = {
+        "model": model,
+        "fov": fov,
+        "format": format,
+        "cameras": None if cameras is None else ",".join(map(str, cameras)),
+        "begin": begin,
+        "end": end,
+        "config": config,
+        "rate": rate,
+        "stamp_unit": stamp_unit,
+        "bayer": bayer,
+        "masks": masks,
+        "vignettes": vignettes,
+        "overwrite": overwrite,
+    }
     assignments = [f"--set={name}={_text(value)}" for name, value in (settings or {}).items()]
     with tempfile.TemporaryDirectory() as work:
         file = pathlib.Path(work, "calibrated.yaml") if out is None else out
@@ -157,7 +177,7 @@ def _run(*command: Path, **options: Any) -> str:
             continue
         option = "--" + name.replace("_", "-")
         arguments.append(option if value is True else f"{option}={value}")
-    done = subprocess.run(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or [f"bslam: ended with status {done.returncode}"]
         raise Error(lines[-1].removeprefix("bslam: "))

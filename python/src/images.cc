@@ -35,7 +35,8 @@ std::int64_t integer(nb::handle object, const std::string& key) {
 
 std::string description(nb::handle object, const Pixels& array) {
   std::string out = "an array";
-  if (nb::hasattr(object, "dtype")) out += " of " + nb::cast<std::string>(nb::str(object.attr("dtype")));
+  const nb::object type = nb::getattr(object, "dtype", nb::none());
+  if (!type.is_none()) out += " of " + nb::cast<std::string>(nb::str(nb::handle(type)));
   out += ", shape (";
   for (std::size_t i = 0; i < array.ndim(); ++i) out += (i > 0 ? ", " : "") + std::to_string(array.shape(i));
   return out + ")";
@@ -75,8 +76,8 @@ void add_mask(CameraImage& image, const Pixels& mask, const std::string& key) {
   image.mask_stride = mask.stride(0);
 }
 
-void check_length(nb::handle sequence, const char* key, std::size_t images) {
-  if (!PySequence_Check(sequence.ptr())) raise({kProcess, key, type_of(sequence), "a list"});
+void check_length(nb::handle sequence, const char* key, std::size_t images, const char* expected) {
+  if (!PySequence_Check(sequence.ptr())) raise({kProcess, key, type_of(sequence), expected});
   if (const std::size_t length = nb::len(sequence); length != images)
     raise({kProcess, key, std::to_string(length), std::to_string(images) + ", one for each image"});
 }
@@ -88,8 +89,8 @@ BorrowedImages read_images(nb::handle stamps, nb::sequence images, nb::handle ma
   const std::size_t count = nb::len(images);
   std::optional<std::int64_t> common;
   if (PyIndex_Check(stamps.ptr())) common = integer(stamps, "stamps");
-  if (!common) check_length(stamps, "stamps", count);
-  if (!masks.is_none()) check_length(masks, "masks", count);
+  if (!common) check_length(stamps, "stamps", count, "an integer number of nanoseconds, or a list of them");
+  if (!masks.is_none()) check_length(masks, "masks", count, "a list of arrays");
   for (std::size_t i = 0; i < count; ++i) {
     CameraImage& image = out.bundle.images.emplace_back();
     const nb::object object = images[i];

@@ -1,0 +1,61 @@
+import json
+
+import bslam
+import numpy as np
+import pytest
+
+
+@pytest.mark.parametrize("align", ["se3", "sim3", "none"])
+def test_errors_are_those_of_the_program(recording, program, program_run, align):
+    files = program_run / "run/trajectory.tum", recording.ground_truth
+    found = bslam.evaluate(*files, align, delta=0.5)
+    json_text = program("eval", *files, "--align", align, "--delta=0.5", "--json")
+    theirs = json.loads(json_text)
+    for name, value in theirs["ate"].items():
+        assert getattr(found.ate, name) == value
+    assert found.rpe_translation.rmse == theirs["rpe"]["trans_rmse"]
+    assert found.rpe_rotation_deg.rmse == theirs["rpe"]["rot_rmse_deg"]
+    for name in ("scale", "coverage", "gt_length_m"):
+        assert getattr(found, name) == theirs[name]
+
+
+def test_arrays_are_evaluated_like_files(finished, recording, program_run):
+    mine = bslam.evaluate(finished[0].trajectory(), np.loadtxt(recording.ground_truth))
+    theirs = bslam.evaluate(program_run / "run/trajectory.tum", str(recording.ground_truth))
+    assert mine.ate.rmse == pytest.approx(theirs.ate.rmse, abs=1e-7) and mine.ate.rmse < 0.05
+    assert mine.aligned.shape == finished[0].trajectory().shape and mine.errors.shape == (mine.ate.count, 2)
+    assert np.sqrt(np.mean(mine.errors[:, 1] ** 2)) == pytest.approx(mine.ate.rmse)
+
+
+def test_poses_of_the_body_are_compared_with_the_rig(recording, program_run, program, tmp_path):
+    files = program_run / "run/trajectory.tum", recording.folder / "mav0/state_groundtruth_estimate0/data.csv"
+    rig = recording.folder / "rig.yaml"
+    found = bslam.evaluate(*files, gt_frame="body", rig=rig, plot=tmp_path / "plot.svg")
+    theirs = json.loads(program("eval", *files, "--gt-frame=body", "--rig", rig, "--json"))
+    assert found.ate.rmse == theirs["ate"]["rmse"]
+    assert (tmp_path / "plot.svg").read_text().rstrip().endswith("</svg>")
+
+
+def test_errors_are_the_line_of_the_program(recording, program, tmp_path):
+    (tmp_path / "bad.tum").write_text("1 2 3\n")
+    (tmp_path / "late.tum").write_text("".join(f"{900 + t} {t} 0 0 0 0 0 1\n" for t in range(5)))
+    for file in (tmp_path / "none.tum", tmp_path / "bad.tum", tmp_path / "late.tum"):
+        with pytest.raises(bslam.Error) as error:
+            bslam.evaluate(file, recording.ground_truth)
+        assert str(error.value) == program("eval", file, recording.ground_truth, status=2)
+
+
+def test_wrong_arrays_and_options_are_errors(recording):
+    truth = np.loadtxt(recording.ground_truth)
+    cases = [
+        (truth[:, :7], {}, r"^est: found shape \(\d+, 7\), expected \(n, 8\)"),
+        (truth[::-1], {}, "^est: row 1: found a time that is not after the one before, expected times that increase$"),
+        (truth * 2, {}, "^est: row 0: found a quaternion of norm 2.0+, expected 1$"),
+        (truth * np.nan, {}, "^est: row 0: found a value that is not a finite number"),
+        (truth, {"align": "se2"}, "^evaluate: align: found se2, expected se3, sim3 or none$"),
+        (truth, {"gt_frame": "body"}, "^evaluate: gt_frame=body: found no rig"),
+        (truth, {"max_dt": -1}, "^evaluate: max_dt: found -1"),
+    ]
+    for est, options, text in cases:
+        with pytest.raises(bslam.Error, match=text):
+            bslam.evaluate(est, truth, **options)

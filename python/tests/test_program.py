@@ -1,0 +1,36 @@
+import subprocess
+import sys
+
+import bslam
+import pytest
+from bslam._program import PROGRAM
+from conftest import RIG
+
+
+def test_simulate_makes_the_recording_of_the_program(recording, program):
+    arguments = ["--rig", RIG, "--duration=2.5", "--rate=10", "--exposure-ms=4"]
+    # The program compares a digest of everything that determines the images.
+    printed = program("simulate", "--out", recording.folder, *arguments)
+    assert printed == f"{recording.folder}: already complete\n"
+
+
+def test_errors_are_the_line_of_the_program(program, tmp_path):
+    with pytest.raises(bslam.Error) as error:
+        bslam.simulate(tmp_path / "new", duration=-1)
+    assert str(error.value) == program("simulate", "--out", tmp_path / "new", "--duration=-1", status=2)
+    with pytest.raises(bslam.Error) as error:
+        bslam.calibrate(tmp_path / "missing")
+    assert str(error.value) == program("rig", "calibrate", tmp_path / "missing", "--out", tmp_path / "o", status=2)
+
+
+def test_calibrate_returns_the_rig(recording, tmp_path):
+    found = bslam.calibrate(recording.folder, out=tmp_path / "rig.yaml", settings={"features.per_image": 300})
+    assert len(found.rig) == 2 and (tmp_path / "rig.yaml").exists()
+    assert found.rig[0].intrinsics[0] == pytest.approx(229.3, rel=0.05)
+    assert "std dev" in found.text and "rig.yaml" not in found.text
+
+
+def test_module_is_the_program():
+    done = subprocess.run([sys.executable, "-m", "bslam", "--version"], capture_output=True, text=True)
+    assert done.stdout == subprocess.run([PROGRAM, "--version"], capture_output=True, text=True).stdout
+    assert bslam.__version__ in done.stdout
