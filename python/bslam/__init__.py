@@ -21,9 +21,9 @@ from ._bslam import (
     Rig,
     Setting,
     System,
-    __version__,
     settings,
 )
+from ._bslam import version as __version__
 from ._evaluation import Evaluation, Statistics, evaluate
 from ._program import Calibration, calibrate, simulate
 

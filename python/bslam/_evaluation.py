@@ -80,7 +80,7 @@ def evaluate(
     Raises:
         Error: a file that cannot be read, a value out of range, fewer than three poses with ground truth.
     """
-    found: dict[str, Any] = _bslam._evaluate(
+    found: dict[str, Any] = _bslam.evaluate(
         _trajectory(est, "est"), _trajectory(gt, "gt"), align, max_dt, delta, gt_frame, rig, camera, times, plot
     )
     for name in ("ate", "rpe_translation", "rpe_rotation_deg"):

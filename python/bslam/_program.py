@@ -171,7 +171,7 @@ def _text(value: object) -> str:
 
 def _run(*command: Path, **options: Any) -> str:
     """Runs the program and returns what it prints. Options that are None or False are omitted."""
-    arguments = [str(PROGRAM), *map(os.fspath, command), "--progress=never"]
+    arguments = [str(PROGRAM), *(os.fspath(word) for word in command), "--progress=never"]
     for name, value in options.items():
         if value is None or value is False:
             continue

@@ -149,7 +149,7 @@ nb::dict evaluate(const Given& est, const Given& gt, const Arguments& a) {
 
 void bind_evaluation(nb::module_& module) {
   module.def(
-      "_evaluate",
+      "evaluate",
       [](const Given& est, const Given& gt, const std::string& align, double max_dt, double delta,
          const std::string& gt_frame, const std::optional<Path>& rig, int camera, const std::optional<Path>& times,
          const std::optional<Path>& plot) {

@@ -30,7 +30,7 @@ NB_MODULE(_bslam, module) {
   error.attr("__doc__") =
       "An error in the input: a file, image, setting or call. The text is one line, the same as that of the program: "
       "the location, what was found there and what was expected.";
-  module.attr("__version__") = nb::str(bslam::version().data(), bslam::version().size());
+  module.attr("version") = nb::str(bslam::version().data(), bslam::version().size());
   bind_rig(module);
   bind_frame(module);
   bind_map(module);
