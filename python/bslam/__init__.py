@@ -48,3 +48,7 @@ __all__ = [
     "settings",
     "simulate",
 ]
+
+for _name in __all__:  # where users find it, in messages and help
+    if _name not in ("__version__", "settings"):
+        globals()[_name].__module__ = __name__

@@ -156,7 +156,7 @@ void bind_evaluation(nb::module_& module) {
         return evaluate(est, gt, {align, gt_frame, max_dt, delta, rig, times, plot, camera});
       },
       nb::arg("est"), nb::arg("gt"), nb::arg("align"), nb::arg("max_dt"), nb::arg("delta"), nb::arg("gt_frame"),
-      nb::arg("rig") = nb::none(), nb::arg("camera"), nb::arg("times") = nb::none(), nb::arg("plot") = nb::none());
+      nb::arg("rig").none(), nb::arg("camera"), nb::arg("times").none(), nb::arg("plot").none());
 }
 
 }  // namespace bslam::python
