@@ -51,7 +51,7 @@ PythonSystem::PythonSystem(const Rig& rig, const Config& config, Startup startup
 }
 
 PythonSystem::~PythonSystem() {
-  const nb::gil_scoped_release unlocked;  // background work may still report an event
+  const nb::gil_scoped_release unlocked;  // it waits for background work
   system_.reset();
 }
 

@@ -1,3 +1,5 @@
+import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -34,3 +36,19 @@ def test_module_is_the_program():
     done = subprocess.run([sys.executable, "-m", "bslam", "--version"], capture_output=True, text=True)
     assert done.stdout == subprocess.run([PROGRAM, "--version"], capture_output=True, text=True).stdout
     assert bslam.__version__ in done.stdout
+
+
+@pytest.mark.parametrize("packages", ["lib/python3.11/site-packages", "local/lib/python3.11/dist-packages", "."])
+def test_command_finds_the_program_in_the_package(tmp_path, packages):
+    command = pathlib.Path(bslam.__file__).parents[1] / "bin/bslam"
+    if not command.exists():
+        pytest.skip("not the folder of a build")
+    (tmp_path / "bin").mkdir()
+    shutil.copy(command, tmp_path / "bin")
+    run = [tmp_path / "bin/bslam", "--version"]
+    found = subprocess.run(run, capture_output=True, text=True)
+    assert (found.returncode, found.stderr) == (1, f"bslam: cannot find the Python package below {tmp_path}\n")
+    folder = tmp_path / packages / "bslam/bin"
+    folder.mkdir(parents=True)
+    (folder / "bslam").symlink_to(PROGRAM.resolve())
+    assert subprocess.run(run, capture_output=True, text=True).stdout.startswith("bslam " + bslam.__version__)
