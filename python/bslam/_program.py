@@ -180,5 +180,7 @@ def _run(*command: Path, **options: Any) -> str:
     done = subprocess.run(arguments, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or [f"bslam: ended with status {done.returncode}"]
+        if lines[-1].startswith("bslam: unknown command"):
+            raise Error(f"{command[0]}: found a wheel without the simulator, expected one made by `pip install .`")
         raise Error(lines[-1].removeprefix("bslam: "))
     return done.stdout
