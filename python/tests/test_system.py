@@ -2,7 +2,6 @@ import gc
 import subprocess
 import sys
 import threading
-import time
 import tracemalloc
 import weakref
 
@@ -119,24 +118,20 @@ def test_wrong_settings_are_errors(recording):
 
 
 def test_other_threads_run_during_process(system, recording):
-    # While a call holds the interpreter, this thread cannot count.
-    counted, stop = [0], threading.Event()
-
-    def count():
-        while not stop.is_set():
-            counted[0] += 1
-            time.sleep(0.0005)
-
-    thread = threading.Thread(target=count)
+    # No thread is interrupted: the other one runs only if this one releases the interpreter.
+    interval, begin, ran = sys.getswitchinterval(), threading.Event(), []
+    thread = threading.Thread(target=lambda: (begin.wait(), ran.append(True)))
     thread.start()
+    sys.setswitchinterval(1000)
     try:
-        before = counted[0]
+        begin.set()
+        assert not ran
         for t, images in zip(recording.stamps, recording.images, strict=True):
             system.process(t, images)
-        system.finish()
-        assert counted[0] - before > 5 * len(recording.stamps)
+        assert ran
     finally:
-        stop.set()
+        sys.setswitchinterval(interval)
+        begin.set()
         thread.join()
 
 
