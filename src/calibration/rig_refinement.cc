@@ -77,12 +77,13 @@ bool converged(const solver::RigAdjustment& adjusted, const solver::RigValues& b
 }
 
 // Adjusts again with the variance of each landmark (adjustment/landmark_noise.h), from the estimate `from`.
-solver::RigAdjustment adjust_weighted(const solver::RigAdjustmentOptions& options, solver::RigAdjustment from,
+solver::RigAdjustment adjust_weighted(solver::RigAdjustmentOptions options, solver::RigAdjustment from,
                                       RigProblem& problem, const std::stop_token& stop) {
   solver::ReprojectionProblem& flat = problem.flat.problem;
   const auto chi2 = solver::squared_errors(flat, flat.T_rig_world, flat.points, from.values);
   adjustment::apply_variances(adjustment::landmark_variances(flat, chi2, solver::beyond(chi2, solver::kChi2TwoDof95)),
                               flat);
+  options.robust_rounds = false;
   solver::RigAdjustment out = solver::adjust_rig(flat, options, from.values, stop);
   if (!out.done) return from;
   out.scale_change *= from.scale_change;
