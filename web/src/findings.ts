@@ -1,0 +1,46 @@
+// What a reader should know first, in whole sentences: each with whether it is fine, worth a look, or a problem.
+import { isMetric, Run } from './data';
+import { verdictSentence } from './calibration';
+import { decimal, integer, plural, seconds } from './dom';
+
+export interface Finding { grade: 'fine' | 'note' | 'problem'; text: string; target: string }
+
+function tracking(run: Run): Finding {
+  const f = run.summary.frames, lost = f.lost_intervals;
+  if (!f.tracked) return { grade: 'problem', text: 'No frame could be tracked.', target: 'events' };
+  if (!f.lost) return { grade: 'fine', text: `All ${integer(f.tracked)} processed frames were tracked.`, target: 'timeline' };
+  const longest = Math.max(...lost.map((l) => l.to - l.from));
+  return {
+    grade: f.lost > 0.05 * f.input ? 'problem' : 'note', target: 'events',
+    text: `${plural(f.lost, 'frame')} of ${integer(f.input)} could not be tracked, in ${plural(lost.length, 'interval')}; the longest lasts ${seconds(longest)}.`,
+  };
+}
+
+export function findings(run: Run): Finding[] {
+  const { frames, cameras, calibration, map, complete, loops } = run.summary;
+  const list: Finding[] = [];
+  if (!complete) list.push({ grade: 'note', text: 'The run was interrupted; the results go as far as it did.', target: 'timeline' });
+  list.push(tracking(run));
+  if (frames.dropped) list.push({ grade: 'note', text: `${plural(frames.dropped, 'frame')} came too fast and were dropped.`, target: 'time' });
+  if (run.submaps.length > 1) {
+    list.push({ grade: 'note', text: `The map consists of ${run.submaps.length} submaps that could not be joined.`, target: 'map' });
+  }
+  if (!isMetric(run)) {
+    list.push({ grade: 'note', text: map.scale === 'up-to-scale' ? 'The rig cannot observe the scale: lengths are in map units.'
+      : 'The motion did not reveal the scale: lengths are in map units.', target: 'map' });
+  }
+  const grade = { consistent: 'fine', inconsistent: 'problem', unknown: 'note' } as const;
+  list.push({ grade: grade[calibration.verdict], text: verdictSentence(run), target: 'calibration' });
+  const faulty = cameras.filter((c) => c.states.some((s) => s.state !== 'ok'));
+  if (faulty.length) {
+    list.push({ grade: 'note', text: `Not ok all the time: ${faulty.map((c) => c.name).join(', ')}.`, target: 'timeline' });
+  }
+  const suspect = cameras.filter((c) => c.extrinsics?.suspect).map((c) => c.name);
+  if (suspect.length) list.push({ grade: 'problem', text: `The extrinsics are suspect: ${suspect.join(', ')}.`, target: 'calibration' });
+  if (loops.length) list.push({ grade: 'fine', text: `${plural(loops.length, 'loop')} closed.`, target: 'events' });
+  const truth = run.truth;
+  if (truth && !truth.error) {
+    list.push({ grade: 'fine', text: `Against ground truth the path is off by ${decimal(truth.ate_m.rmse, 3)} m (rms) over ${decimal(truth.length_m, 1)} m.`, target: 'truth' });
+  }
+  return list;
+}
