@@ -75,7 +75,8 @@ Status prepare_folder(const RunArguments& arguments) {
   std::filesystem::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
   if (const Status status = check_writable(folder / "summary.json"); !status) return status;
-  for (const char* name : {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "report.html", "rig_refined.yaml"}) {
+  for (const char* name :
+       {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "report.html", "rig_refined.yaml"}) {
     const auto is = [&](const std::string& input) {
       return !input.empty() && std::filesystem::equivalent(folder / name, input, error);
     };
@@ -189,7 +190,8 @@ int run(const RunArguments& arguments) {
   const auto result = session::run_session(*dataset, options);
   bar.finish();
   if (!result) return report_error(result.error());
-  if (const Status s = write_files(*result, *config, *dataset, arguments, **vocabulary); !s) return report_error(s.error());
+  if (const Status s = write_files(*result, *config, *dataset, arguments, **vocabulary); !s)
+    return report_error(s.error());
   print_after(result->record, *dataset, arguments);
   if (!result->record.complete) return kExitInterrupted;
   const session::RunRecord& record = result->record;

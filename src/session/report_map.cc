@@ -103,7 +103,9 @@ Vector3d ray_at_corner(const camera::Camera& camera, const Eigen::Vector2d& corn
 
 }  // namespace
 
-std::size_t report_stride(std::size_t count, std::size_t limit) { return std::max<std::size_t>(1, (count + limit - 1) / limit); }
+std::size_t report_stride(std::size_t count, std::size_t limit) {
+  return std::max<std::size_t>(1, (count + limit - 1) / limit);
+}
 
 Vector3d vertical_direction(std::span<const SE3> T_world_rig) {
   constexpr double kAlmostAsConstant = 0.9;
@@ -127,15 +129,16 @@ ordered_json report_submaps(const map::BundledMap& map, std::span<const system::
   for (std::size_t s = 0; s < submaps.size(); ++s) {
     const Submap& submap = submaps[s];
     const evaluation::Trajectory path = s < paths.size() ? paths[s].poses : evaluation::Trajectory();
-    list.push_back({{"loaded", s < paths.size() && paths[s].loaded},
-                    {"frames", path.size()},
-                    {"up", number_list(vertical_direction(submap.T_world_rig))},
-                    {"path", path_json(path, first_time_ns)},
-                    {"keyframes",
-                     {{"time", float_array(submap.keyframe_time)},
-                      {"position", float_array(submap.keyframe_position)},
-                      {"rotation", float_array(submap.keyframe_rotation)}}},
-                    {"points", {{"position", float_array(submap.point_position)}, {"time", float_array(submap.point_time)}}}});
+    list.push_back(
+        {{"loaded", s < paths.size() && paths[s].loaded},
+         {"frames", path.size()},
+         {"up", number_list(vertical_direction(submap.T_world_rig))},
+         {"path", path_json(path, first_time_ns)},
+         {"keyframes",
+          {{"time", float_array(submap.keyframe_time)},
+           {"position", float_array(submap.keyframe_position)},
+           {"rotation", float_array(submap.keyframe_rotation)}}},
+         {"points", {{"position", float_array(submap.point_position)}, {"time", float_array(submap.point_time)}}}});
   }
   return list;
 }
@@ -146,8 +149,9 @@ ordered_json report_rig(const camera::Rig& rig) {
     const camera::Camera& camera = rig.camera(c);
     const double right = camera.width - 1, bottom = camera.height - 1;
     ordered_json corners = ordered_json::array();
-    for (const Eigen::Vector2d& corner : std::array<Eigen::Vector2d, 4>{
-             Eigen::Vector2d{0, 0}, Eigen::Vector2d{right, 0}, Eigen::Vector2d{right, bottom}, Eigen::Vector2d{0, bottom}})
+    for (const Eigen::Vector2d& corner :
+         std::array<Eigen::Vector2d, 4>{Eigen::Vector2d{0, 0}, Eigen::Vector2d{right, 0},
+                                        Eigen::Vector2d{right, bottom}, Eigen::Vector2d{0, bottom}})
       corners.push_back(number_list(ray_at_corner(camera, corner)));
     const SE3& T_rig_cam = rig.rig_from_cam(c);
     const Eigen::Quaterniond& q = T_rig_cam.rotation();

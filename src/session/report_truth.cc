@@ -43,8 +43,8 @@ ordered_json report_truth(const dataset::Dataset& dataset, const Trajectory& pat
   const auto truth = evaluation::read_trajectory(*dataset.ground_truth);
   if (!truth) return {{"error", truth.error().message()}};
   const geometry::SE3& T_body_cam0 = dataset.rig.body_from_cam(0);
-  const evaluation::EvaluationOptions options{.align = metric ? evaluation::AlignMode::kSe3
-                                                              : evaluation::AlignMode::kSim3};
+  const evaluation::EvaluationOptions options{.align =
+                                                  metric ? evaluation::AlignMode::kSe3 : evaluation::AlignMode::kSim3};
   const auto found = evaluation::evaluate(moved_to_frame(path, T_body_cam0.inverse()), *truth, options);
   if (!found) return {{"error", found.error().found + "; expected " + found.error().expected}};
   std::vector<float> time, error;

@@ -4,7 +4,7 @@ import { decimal, h, table } from './dom';
 
 export function verdictSentence(run: Run): string {
   const c = run.summary.calibration;
-  const excess = c.excess_error === null ? '' : ` It increases the mean squared error by ${decimal(100 * c.excess_error, 1)} %.`;
+  const excess = c.excess_error === null ? '' : ` With it the mean squared error is ${decimal(100 * c.excess_error, 1)} % larger than with the best estimate.`;
   const texts = {
     consistent: `The images agree with the calibration.${excess}`,
     inconsistent: `The images contradict the calibration.${excess}`,

@@ -56,8 +56,17 @@ export function short(value: number | null | undefined): string {
   return decimal(value, magnitude >= 100 ? 0 : magnitude >= 10 ? 1 : magnitude >= 1 ? 2 : 3);
 }
 
+// A length in metres, in millimetres if it is small.
+export function metres(value: number | null | undefined): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return '–';
+  return value < 0.1 ? `${decimal(1000 * value, 1)}${kThinSpace}mm` : `${decimal(value, 3)}${kThinSpace}m`;
+}
+
 export const seconds = (value: number) => `${decimal(value, 2)}${kThinSpace}s`;
 export const plural = (count: number, noun: string) => `${integer(count)} ${noun}${count === 1 ? '' : 's'}`;
+
+// A round number, such as a tick, without superfluous digits.
+export const plain = (value: number) => String(+value.toPrecision(6)).replace('-', '\u2212');
 
 // The largest of 1, 2 and 5 times a power of ten that is not larger than `value`.
 export function roundedDown(value: number): number {

@@ -10,5 +10,5 @@ export function eventsSection(run: Run): HTMLElement[] {
     ...relocalisations.map((r) => ({ at: r.at, row: ['relocalised', `at the place of ${seconds(r.with)}, ${integer(r.inliers)} inliers`] })),
   ].sort((a, b) => a.at - b.at);
   if (!events.length) return [h('p', {}, 'Nothing was lost, and no place was recognised again.')];
-  return [table('Events', ['time [s]', 'event', 'details'], events.map((e) => [decimal(e.at, 2), ...e.row]))];
+  return [table('List of events', ['time [s]', 'event', 'details'], events.map((e) => [decimal(e.at, 2), ...e.row]))];
 }

@@ -1,7 +1,8 @@
 // What a reader should know first, in whole sentences: each with whether it is fine, worth a look, or a problem.
 import { isMetric, Run } from './data';
 import { verdictSentence } from './calibration';
-import { decimal, integer, plural, seconds } from './dom';
+import { integer, metres, plural, seconds } from './dom';
+import { stateText } from './timeline';
 
 export interface Finding { grade: 'fine' | 'note' | 'problem'; text: string; target: string }
 
@@ -29,18 +30,22 @@ export function findings(run: Run): Finding[] {
     list.push({ grade: 'note', text: map.scale === 'up-to-scale' ? 'The rig cannot observe the scale: lengths are in map units.'
       : 'The motion did not reveal the scale: lengths are in map units.', target: 'map' });
   }
-  const grade = { consistent: 'fine', inconsistent: 'problem', unknown: 'note' } as const;
+  const contradicted = calibration.refined ? 'note' : 'problem';  // a refined calibration has replaced it
+  const grade = { consistent: 'fine', inconsistent: contradicted, unknown: 'note' } as const;
   list.push({ grade: grade[calibration.verdict], text: verdictSentence(run), target: 'calibration' });
-  const faulty = cameras.filter((c) => c.states.some((s) => s.state !== 'ok'));
-  if (faulty.length) {
-    list.push({ grade: 'note', text: `Not ok all the time: ${faulty.map((c) => c.name).join(', ')}.`, target: 'timeline' });
+  for (const camera of cameras) {
+    const faults = camera.states.filter((s) => s.state !== 'ok');
+    if (!faults.length) continue;
+    const total = faults.reduce((sum, s) => sum + s.to - s.from, 0), reasons = [...new Set(faults.map(stateText))].join(', ');
+    list.push({ grade: 'note', target: 'timeline',
+                text: `${camera.name} was not ok ${total > 0 ? `for ${seconds(total)}` : 'in a single frame'} (${reasons}).` });
   }
   const suspect = cameras.filter((c) => c.extrinsics?.suspect).map((c) => c.name);
-  if (suspect.length) list.push({ grade: 'problem', text: `The extrinsics are suspect: ${suspect.join(', ')}.`, target: 'calibration' });
+  if (suspect.length) list.push({ grade: contradicted, text: `The extrinsics are suspect: ${suspect.join(', ')}.`, target: 'calibration' });
   if (loops.length) list.push({ grade: 'fine', text: `${plural(loops.length, 'loop')} closed.`, target: 'events' });
   const truth = run.truth;
   if (truth && !truth.error) {
-    list.push({ grade: 'fine', text: `Against ground truth the path is off by ${decimal(truth.ate_m.rmse, 3)} m (rms) over ${decimal(truth.length_m, 1)} m.`, target: 'truth' });
+    list.push({ grade: 'fine', text: `Against ground truth the path is off by ${metres(truth.ate_m.rmse)} (rms, after alignment).`, target: 'truth' });
   }
   return list;
 }

@@ -1,7 +1,7 @@
 // The section of the 3D map: the view, its controls, and the legend of its colours.
 import { onTime, selectTime } from './cursor';
 import { isMetric, lengthUnit, Run, timeRange } from './data';
-import { decimal, h, plural, seconds, short } from './dom';
+import { decimal, h, plain, plural, seconds, short } from './dom';
 import { cameraColour, onTheme, scaleColour } from './theme';
 import { MapView, ViewSettings } from './view3d';
 
@@ -42,7 +42,7 @@ export class MapSection {
     if (!this.view) {
       return h('p', { class: 'notice' }, 'This browser cannot draw in 3D (WebGL 2 is missing or switched off).');
     }
-    const element = h('div', { class: 'map' }, this.controls(run), h('div', { class: 'view' }, this.canvas, this.scale),
+    const element = h('div', { class: 'map' }, this.controls(run), h('div', { class: 'view' }, this.canvas, this.buttons(), this.scale),
       this.timeControl(run), this.status,
       h('p', { class: 'hint', id: 'map-keys' },
         'Drag to turn, right button or two fingers to move, wheel to zoom. Keys: arrows turn, + and \u2212 zoom, Home and End ' +
@@ -79,10 +79,15 @@ export class MapSection {
       checkbox('points', s.points, (points) => this.change({ points })),
       checkbox('keyframes', s.keyframes, (keyframes) => this.change({ keyframes })),
       summary.loops.length > 0 && checkbox('loops', s.loops, (loops) => this.change({ loops })),
-      run.truth && !run.truth.error && checkbox('ground truth', s.truth, (truth) => this.change({ truth })),
-      h('span', { class: 'buttons' },
-        h('button', { type: 'button', click: () => this.view!.oblique() }, 'oblique'),
-        h('button', { type: 'button', click: () => this.view!.fromAbove() }, 'from above')));
+      run.truth && !run.truth.error && checkbox('ground truth', s.truth, (truth) => this.change({ truth })));
+  }
+
+  private buttons() {
+    const view = this.view!;
+    const button = (text: string, click: () => void, label?: string) => h('button', { type: 'button', 'aria-label': label, click }, text);
+    return h('div', { class: 'buttons' },
+      button('oblique', () => view.oblique()), button('from above', () => view.fromAbove()),
+      button('+', () => view.zoom(1 / 1.3), 'zoom in (+)'), button('\u2212', () => view.zoom(1.3), 'zoom out (\u2212)'));
   }
 
   private timeControl(run: Run) {
@@ -128,6 +133,6 @@ export class MapSection {
       ...(this.settings.colouring === 'plain' ? [] : [h('div', { class: 'ramp' },
         h('span', {}, `${age ? 'created' : 'height'} ${short(from)}`), h('span', { class: 'swatches' }, ...swatches),
         h('span', {}, `${short(to)} ${unit}`))]),
-      h('span', { class: 'grid-note' }, `grid ${short(this.view!.gridSpacing)} ${lengthUnit(this.run)}`));
+      h('span', { class: 'grid-note' }, `grid ${plain(this.view!.gridSpacing)} ${lengthUnit(this.run)}`));
   }
 }

@@ -2,7 +2,7 @@
 import { camerasSection } from './cameras';
 import { calibrationSection } from './calibration';
 import { isMetric, pathLength, quantile, Run } from './data';
-import { decimal, h, integer, short } from './dom';
+import { decimal, h, integer, metres, short } from './dom';
 import { eventsSection } from './events';
 import { findings } from './findings';
 import { MapSection } from './map_section';
@@ -63,10 +63,10 @@ function figures(run: Run): HTMLElement {
     entry('path', short(pathLength(path)), isMetric(run) ? 'm' : 'map units'),
     entry('keyframes', integer(s.map.keyframes), ''),
     entry('landmarks', integer(s.map.landmarks), ''),
-    entry('inliers', integer(quantile(inliers, 0.5)), 'per frame'),
+    entry('inliers', integer(quantile(inliers, 0.5)), '/ frame'),
     entry('reprojection', total ? decimal(rms, 2) : '–', 'px rms'),
-    entry('time', decimal(s.time.frame_ms.median, 1), 'ms per frame'),
-    run.truth && !run.truth.error && entry('position error', decimal(run.truth.ate_m.rmse, 3), 'm rms'));
+    entry('time', decimal(s.time.frame_ms.median, 1), 'ms / frame'),
+    run.truth && !run.truth.error && entry('position error', metres(run.truth.ate_m.rmse), 'rms'));
 }
 
 function header(run: Run, shown: Section[]): HTMLElement {
@@ -90,6 +90,7 @@ export class Page {
   show(run: Run) {
     for (const remove of this.removals) remove();
     this.removals = [];
+    const focused = document.activeElement as HTMLElement | null, scrolled = scrollY;
     document.title = `${run.summary.data} - bslam run`;
     const shown = sections(this.map).filter((section) => section.when?.(run) ?? true);
     const bodies = shown.map(() => h('div', { class: 'body' }));
@@ -98,6 +99,8 @@ export class Page {
         h('div', { class: 'margin' }, h('h2', { id: `${section.id}-title` }, section.title), section.note && h('p', {}, section.note)), bodies[i]))),
       this.footer(run));
     shown.forEach((section, i) => this.removals.push(...(section.draw(run, bodies[i]) ?? [])));  // charts need their width
+    if (focused?.isConnected) focused.focus({ preventScroll: true });
+    scrollTo(0, scrolled);
   }
 
   private footer(run: Run): HTMLElement {

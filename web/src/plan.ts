@@ -1,6 +1,6 @@
 // The path seen from above, with a scale in metres.
 import { lengthUnit, nearest, Run, Submap, unbrokenParts } from './data';
-import { h, plural, roundedDown, short, svg } from './dom';
+import { h, plain, plural, roundedDown, svg } from './dom';
 
 type Point = [number, number];
 const kWidth = 860, kMaxHeight = 560, kMargin = 34;
@@ -84,7 +84,7 @@ function drawing(run: Run, submap: Submap, truth: Float32Array | null): SVGEleme
     svg('rect', { class: 'end', x: path[path.length - 1][0] - 4.5, y: path[path.length - 1][1] - 4.5, width: 9, height: 9 }));
   const bar = step * scale;
   children.push(svg('g', { class: 'bar' }, svg('path', { d: `M12 ${height - 12}h${bar.toFixed(1)}m0 -4v8m${(-bar).toFixed(1)} -8v8` }),
-    svg('text', { x: 12 + bar + 8, y: height - 8 }, `${short(step)} ${lengthUnit(run)}`)));
+    svg('text', { x: 12 + bar + 8, y: height - 8 }, `${plain(step)} ${lengthUnit(run)}`)));
   return svg('svg', { class: 'plan', viewBox: `0 0 ${kWidth} ${height.toFixed(1)}`, role: 'img', 'aria-label': 'Path from above' }, ...children);
 }
 

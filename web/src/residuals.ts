@@ -1,8 +1,9 @@
 // Mean residuals over the image of every camera.
 import { quantile, Residuals, Run } from './data';
-import { decimal, h, integer, plural, roundedDown, short, svg } from './dom';
+import { decimal, h, integer, plain, plural, roundedDown, svg } from './dom';
 
 const kMinObservations = 10;  // fewer say nothing about the mean
+const kMinLongest = 0.15;     // pixels: shorter arrows are not magnified to look like errors
 
 const counted = (r: Residuals) => Array.from(r.count, (n, i) => (n >= kMinObservations ? i : -1)).filter((i) => i >= 0);
 const length = (r: Residuals, i: number) => Math.hypot(r.mean_px[2 * i], r.mean_px[2 * i + 1]);
@@ -37,7 +38,7 @@ function drawing(r: Residuals, name: string, cellsPerPixel: number): SVGElement 
 export function residualsSection(run: Run): HTMLElement[] {
   const lengths = run.residuals.flatMap((r) => counted(r).map((i) => length(r, i)));
   if (!lengths.length) return [h('p', {}, 'The map has too few observations.')];
-  const longest = Math.max(quantile(lengths, 0.95), 0.01), bar = roundedDown(longest), cells = bar / longest;
+  const longest = Math.max(quantile(lengths, 0.95), kMinLongest), bar = roundedDown(longest), cells = bar / longest;
   const panels = run.residuals.map((r, c) => {
     const name = run.summary.cameras[c].name;
     if (!r.observations) return h('figure', { class: 'panel' }, h('h3', {}, name), h('p', {}, 'no observations'));
@@ -48,7 +49,7 @@ export function residualsSection(run: Run): HTMLElement[] {
     scale.setAttribute('preserveAspectRatio', 'none');
     return h('figure', { class: 'panel' }, h('h3', {}, name),
       drawing(r, name, 1 / longest),
-      h('div', { class: 'bar-line' }, scale, h('span', {}, `${short(bar)} px`)),
+      h('div', { class: 'bar-line' }, scale, h('span', {}, `${plain(bar)} px`)),
       h('figcaption', {}, `rms ${decimal(r.rms_px, 2)} px over ${plural(r.observations, 'observation')}; systematic part ${decimal(systematic(r), 3)} px`,
         counted(r).length < r.count.length && `; ${integer(r.count.length - counted(r).length)} of ${r.count.length} cells have too few observations`));
   });

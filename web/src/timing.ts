@@ -39,10 +39,10 @@ export function timingSection(run: Run, parent: HTMLElement): (() => void)[] {
   const frame: [string, Stage | null, Statistics] = ['frame, in all', null, { ...time.frame_ms, count: run.frames.ms.filter((v) => !Number.isNaN(v)).length }];
   const rows = [frame, ...stages.sort((a, b) => Number(a[1]!.background) - Number(b[1]!.background))];
   const scale = axis(rows.map((row) => row[2]));
-  const body = rows.map(([name, stage, s]) => [
+  const body: (Node | string)[][] = rows.map(([name, stage, s]) => [
     name, stage === null ? 'caller' : stage.background ? 'background' : 'caller', integer(s.count),
     decimal(s.median, 2), decimal(s.p95, 2), decimal(s.max, 2), stage ? decimal(stage.total_ms / 1000, 2) : '', rangeDrawing(s, scale.place)]);
-  body.push(['', '', '', '', '', '', '', axisDrawing(scale)]);
+  body.push([h('small', {}, 'axis of the drawings'), '', '', '', '', '', '', axisDrawing(scale)]);
   parent.append(table('Processing time of the stages',
     ['stage', 'thread', 'calls', 'median [ms]', '95 % [ms]', 'max [ms]', 'sum [s]', 'median, 95 %, max [ms]'], body, [2, 3, 4, 5, 6]),
     h('p', { class: 'hint' }, `Start ${decimal(time.start_up_s, 2)} s, run ${decimal(time.wall_s, 2)} s`,

@@ -1,7 +1,7 @@
 // Errors against the ground truth of the data set.
 import { addChart } from './charts';
 import { lengthUnit, Run } from './data';
-import { decimal, h, integer, short } from './dom';
+import { decimal, h, integer, metres, plain } from './dom';
 
 export function truthSection(run: Run, parent: HTMLElement): (() => void)[] {
   const truth = run.truth!;
@@ -10,9 +10,9 @@ export function truthSection(run: Run, parent: HTMLElement): (() => void)[] {
     return [];
   }
   const figure = (name: string, value: string, note: string) => h('div', {}, h('dt', {}, name), h('dd', {}, value, h('small', {}, ` ${note}`)));
-  parent.append(h('dl', { class: 'figures' },
-    figure('position error, rms', `${decimal(truth.ate_m.rmse, 3)} m`, `median ${decimal(truth.ate_m.median, 3)}, max ${decimal(truth.ate_m.max, 3)}`),
-    figure(`drift over ${short(truth.rpe_delta_s)} s, rms`, `${decimal(truth.rpe_m.rmse, 3)} m`, `${decimal(truth.rpe_deg.rmse, 3)}°`),
+  parent.append(h('dl', { class: 'figures wide' },
+    figure('position error, rms', metres(truth.ate_m.rmse), `median ${metres(truth.ate_m.median)}, max ${metres(truth.ate_m.max)}`),
+    figure(`drift over ${plain(truth.rpe_delta_s)} s, rms`, metres(truth.rpe_m.rmse), `and ${decimal(truth.rpe_deg.rmse, 3)}°`),
     figure('scale', decimal(truth.scale, 4), 'truth / estimate'),
     figure('coverage', `${decimal(truth.coverage === null ? null : 100 * truth.coverage, 1)} %`, `${integer(truth.ate_m.count)} poses`)));
   return [addChart(parent, run, {

@@ -5,9 +5,9 @@ import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { LineMaterial } from 'three/examples/jsm/lines/LineMaterial.js';
 import { LineSegments2 } from 'three/examples/jsm/lines/LineSegments2.js';
 import { LineSegmentsGeometry } from 'three/examples/jsm/lines/LineSegmentsGeometry.js';
-import { nearest, quantile, RigCamera, Run, Submap, unbrokenParts } from './data';
+import { nearest, quantile, RigCamera, Run, Submap, timeRange, unbrokenParts } from './data';
 import { roundedDown } from './dom';
-import { cameraColour, colour, isDark, onTheme, scaleColour } from './theme';
+import { cameraColour, colour, onTheme, scaleColour } from './theme';
 
 export interface ViewSettings {
   submap: number;
@@ -117,26 +117,29 @@ export class MapView {
     });
   }
 
+  // Position `i` in the scene, where y is up.
+  private inScene(values: ArrayLike<number>, i: number): three.Vector3 {
+    return new three.Vector3(...at(values, i)).applyMatrix4(this.world.matrixWorld);
+  }
+
+  // The path and most of the landmarks around it. Far landmarks, whose depth is uncertain, do not count.
   private measure(): Extent {
     const { path, points, keyframes } = this.submap;
     const positions = path.position.length ? path.position : keyframes.position;
     const box = new three.Box3();
-    const turned = new three.Vector3();
-    for (let i = 0; i < positions.length / 3; ++i) box.expandByPoint(turned.set(...at(positions, i)).applyMatrix4(this.world.matrixWorld));
+    for (let i = 0; i < positions.length / 3; ++i) box.expandByPoint(this.inScene(positions, i));
     if (box.isEmpty()) box.expandByPoint(new three.Vector3());
-    const pathRadius = box.getSize(new three.Vector3()).length() / 2;
-    const step = Math.max(1, Math.floor(points.time.length / 5000));
-    const distances: number[] = [], heights: number[] = [], near: three.Vector3[] = [];
-    const middle = box.getCenter(new three.Vector3());
-    for (let i = 0; i < points.time.length; i += step) {
-      turned.set(...at(points.position, i)).applyMatrix4(this.world.matrixWorld);
-      distances.push(turned.distanceTo(middle));
-      near.push(turned.clone());
+    const middle = box.getCenter(new three.Vector3()), pathRadius = box.getSize(new three.Vector3()).length() / 2;
+    const step = Math.max(1, Math.floor(points.time.length / 5000)), near: three.Vector3[] = [];
+    for (let i = 0; i < points.time.length; i += step) near.push(this.inScene(points.position, i));
+    if (near.length) {
+      const reach = Math.max(1.5 * pathRadius, quantile(near.map((p) => p.distanceTo(middle)), 0.8));
+      const kept = near.filter((p) => p.distanceTo(middle) <= reach);
+      const share = (s: number) => new three.Vector3(...(['x', 'y', 'z'] as const).map((axis) => quantile(kept.map((p) => p[axis]), s)));
+      if (kept.length) box.expandByPoint(share(0.04)).expandByPoint(share(0.94));
     }
-    const radius = Math.max(pathRadius * 1.15, Math.min(quantile(distances, 0.75) || 0, pathRadius * 6 + (quantile(distances, 0.3) || 0)), 1e-6);
-    for (const p of near) if (p.distanceTo(middle) < radius) heights.push(p.y);
-    const floor = heights.length ? quantile(heights, 0.03) : box.min.y;
-    return { centre: middle, radius, floor: Math.min(floor, box.min.y), path: pathRadius };
+    const size = box.getSize(new three.Vector3());
+    return { centre: box.getCenter(new three.Vector3()), radius: Math.max(size.length() / 2, 1e-6), floor: box.min.y, path: pathRadius };
   }
 
   private addGrid() {
@@ -152,17 +155,20 @@ export class MapView {
     this.world.add(holder);
   }
 
-  // The values by which points are coloured: height above the lowest camera, or time of creation.
+  // The values by which points are coloured: height above camera 0 at the start, or time of creation.
   private pointValues(): { values: Float32Array; range: ColourRange } {
     const { points, up } = this.submap;
     if (this.settings.colouring === 'age') {
-      return { values: points.time, range: { from: quantile(points.time, 0), to: quantile(points.time, 1) } };
+      const start = timeRange(this.run)[0];  // landmarks of a loaded map are older than the run
+      return { values: points.time, range: { from: Math.max(quantile(points.time, 0), start), to: quantile(points.time, 1) } };
     }
     const values = new Float32Array(points.time.length);
     for (let i = 0; i < values.length; ++i) {
       values[i] = up[0] * points.position[3 * i] + up[1] * points.position[3 * i + 1] + up[2] * points.position[3 * i + 2];
     }
-    return { values, range: { from: quantile(values, 0.03), to: quantile(values, 0.97) } };
+    const { centre, radius } = this.extent;
+    const near = values.filter((_, i) => i % 7 === 0 && this.inScene(points.position, i).distanceTo(centre) < radius);
+    return { values, range: { from: quantile(near, 0.02), to: quantile(near, 0.95) } };
   }
 
   colourRange(): ColourRange { return this.pointValues().range; }
@@ -313,7 +319,7 @@ export class MapView {
     const offset = direction.clone().normalize().applyAxisAngle(new three.Vector3(0, 1, 0), -heading);
     const half = three.MathUtils.degToRad(this.camera.fov / 2);
     this.controls.target.copy(centre);
-    this.camera.position.copy(centre).addScaledVector(offset, 1.0 * radius / Math.sin(half) / Math.min(1, aspect));
+    this.camera.position.copy(centre).addScaledVector(offset, 0.82 * radius / Math.sin(half) / Math.min(1, aspect));
     this.camera.near = radius / 300;
     this.camera.far = radius * 100;
     this.camera.updateProjectionMatrix();
@@ -386,6 +392,4 @@ export class MapView {
     this.renderer.setClearColor(colour('view-ground'));
     this.renderer.render(this.scene, this.camera);
   }
-
-  get dark() { return isDark(); }
 }
