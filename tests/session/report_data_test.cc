@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "evaluation/association.h"
 #include "evaluation/trajectory_file.h"
 #include "session/report_arrays.h"
 #include "session/report_map.h"
@@ -78,8 +79,9 @@ struct Path {
   evaluation::Trajectory poses;
 
   Path() {
-    for (int i = 0; i < 20; ++i)
-      poses.push_back({1'000'000'000 + i * 100'000'000, SE3(Eigen::Quaterniond::Identity(), Vector3d(i, i % 3, 0))});
+    for (TimeNs i = 0; i < 20; ++i)
+      poses.push_back({1'000'000'000 + i * 100'000'000,
+                       SE3(Eigen::Quaterniond::Identity(), Vector3d(double(i), double(i % 3), 0))});
   }
 };
 
@@ -101,7 +103,7 @@ TEST(ReportTruth, ExplainsWhyItCannotBeUsed) {
 TEST(ReportTruth, ComparesInTheFrameOfTheBody) {
   const support::TemporaryFolder folder;
   Path path;
-  const auto body = moved_to_frame(path.poses, path.dataset.rig.body_from_cam(0).inverse());
+  const auto body = evaluation::moved_to_frame(path.poses, path.dataset.rig.body_from_cam(0).inverse());
   support::write_text(folder.path() / "truth.tum", evaluation::tum_text(body, ""));
   path.dataset.ground_truth = folder.path() / "truth.tum";
   const auto truth = report_truth(path.dataset, path.poses, true);
