@@ -43,7 +43,7 @@ def browse(browser, page, width, dark, screenshot):
 
 
 def check(bslam, browser, folder):
-    run(bslam, 'simulate', '--out', folder / 'data', '--duration', 2, '--rate', 10, '--laps', 1, '--progress', 'never', '--overwrite')
+    run(bslam, 'simulate', '--out', folder / 'data', '--duration', 2, '--rate', 10, '--progress', 'never', '--overwrite')
     run(bslam, 'run', folder / 'data', '--out', folder / 'run', '--mode', 'sequential', '--progress', 'never', '--overwrite')
     page = folder / 'page.html'
     page.write_text((folder / 'run' / 'report.html').read_text().replace('</body>', PROBE + '</body>'))

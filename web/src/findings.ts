@@ -1,10 +1,11 @@
-// What a reader should know first, in whole sentences: each with whether it is fine, worth a look, or a problem.
+// What a reader should know first, in whole sentences: each with whether it is fine, worth a look, a problem,
+// or a result without judgement.
 import { isMetric, Run } from './data';
 import { verdictSentence } from './calibration';
 import { integer, metres, plural, seconds } from './dom';
 import { stateText } from './timeline';
 
-export interface Finding { grade: 'fine' | 'note' | 'problem'; text: string; target: string }
+export interface Finding { grade: 'fine' | 'note' | 'problem' | 'result'; text: string; target: string }
 
 function tracking(run: Run): Finding {
   const f = run.summary.frames, lost = f.lost_intervals;
@@ -42,10 +43,10 @@ export function findings(run: Run): Finding[] {
   }
   const suspect = cameras.filter((c) => c.extrinsics?.suspect).map((c) => c.name);
   if (suspect.length) list.push({ grade: contradicted, text: `The extrinsics are suspect: ${suspect.join(', ')}.`, target: 'calibration' });
-  if (loops.length) list.push({ grade: 'fine', text: `${plural(loops.length, 'loop')} closed.`, target: 'events' });
+  if (loops.length) list.push({ grade: 'result', text: `${plural(loops.length, 'loop')} closed.`, target: 'events' });
   const truth = run.truth;
   if (truth && !truth.error) {
-    list.push({ grade: 'fine', text: `Against ground truth the path is off by ${metres(truth.ate_m.rmse)} (rms, after alignment).`, target: 'truth' });
+    list.push({ grade: 'result', text: `Against ground truth the path is off by ${metres(truth.ate_m.rmse)} (rms, after alignment).`, target: 'truth' });
   }
   return list;
 }

@@ -1,7 +1,7 @@
 // The page: a header and the sections, drawn from the data of a run. `show` may be called again with newer data.
 import { camerasSection } from './cameras';
 import { calibrationSection } from './calibration';
-import { isMetric, pathLength, quantile, Run } from './data';
+import { isMetric, pathLength, quantile, Run, unbrokenParts } from './data';
 import { decimal, h, integer, metres, short } from './dom';
 import { eventsSection } from './events';
 import { findings } from './findings';
@@ -52,7 +52,8 @@ function themeSwitch(): HTMLElement {
 }
 
 function figures(run: Run): HTMLElement {
-  const s = run.summary, path = run.submaps[0]?.path.position ?? new Float32Array();
+  const s = run.summary, submap = run.submaps[0];
+  const path = submap ? unbrokenParts(run, submap).reduce((sum, [from, to]) => sum + pathLength(submap.path.position.subarray(3 * from, 3 * to)), 0) : 0;
   const inliers = run.frames.cameras.length ? run.frames.time.map((_, i) => run.frames.cameras.reduce((sum, c) => sum + (c.inliers[i] || 0), 0)) : [];
   const observed = run.residuals.filter((r) => r.observations);
   const total = observed.reduce((sum, r) => sum + r.observations, 0);
@@ -60,7 +61,7 @@ function figures(run: Run): HTMLElement {
   const entry = (name: string, value: string, note: string) => h('div', {}, h('dt', {}, name), h('dd', {}, value, h('small', {}, note)));
   return h('dl', { class: 'figures' },
     entry('frames tracked', integer(s.frames.tracked), `of ${integer(s.frames.input)}`),
-    entry('path', short(pathLength(path)), isMetric(run) ? 'm' : 'map units'),
+    entry('path', short(path), isMetric(run) ? 'm' : 'map units'),
     entry('keyframes', integer(s.map.keyframes), ''),
     entry('landmarks', integer(s.map.landmarks), ''),
     entry('inliers', integer(quantile(inliers, 0.5)), '/ frame'),
