@@ -1,6 +1,5 @@
 #include "session/report_truth.h"
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -21,17 +20,25 @@ ordered_json statistics_json(const evaluation::ErrorStatistics& s) {
   return {{"rmse", number(s.rmse)}, {"median", number(s.median)}, {"max", number(s.max)}, {"count", s.count}};
 }
 
-// The true path of camera 0 during the estimated path, in the world of the estimate.
-ordered_json true_path(const Trajectory& truth_of_cam0, const Trajectory& path, const geometry::Sim3& T_gt_estimate) {
-  const auto first = std::ranges::lower_bound(truth_of_cam0, path.front().time_ns, {}, &evaluation::TimedPose::time_ns);
-  const auto last = std::ranges::upper_bound(truth_of_cam0, path.back().time_ns, {}, &evaluation::TimedPose::time_ns);
+// The true poses of camera 0 while the recording was processed.
+Trajectory truth_of_camera(const Trajectory& truth, const dataset::Dataset& dataset, TimeNs tolerance_ns) {
+  Trajectory kept;
+  for (const evaluation::TimedPose& pose : truth) {
+    const bool outside = !dataset.frames.empty() && (pose.time_ns < dataset.frames.front().time_ns - tolerance_ns ||
+                                                     pose.time_ns > dataset.frames.back().time_ns + tolerance_ns);
+    if (!outside) kept.push_back(pose);
+  }
+  return moved_to_frame(kept, dataset.rig.body_from_cam(0));
+}
+
+// The true path in the world of the estimate.
+ordered_json true_path(const Trajectory& truth, const geometry::Sim3& T_gt_estimate) {
   const geometry::Sim3 T_estimate_gt = T_gt_estimate.inverse();
-  const auto stride = static_cast<std::ptrdiff_t>(
-      report_stride(static_cast<std::size_t>(std::max<std::ptrdiff_t>(last - first, 0)), kMaxReportPoses));
+  const std::size_t stride = report_stride(truth.size(), kMaxReportPoses);
   std::vector<float> positions;
-  for (auto pose = first; pose < last; pose += std::min(stride, last - pose)) {
-    const geometry::Vector3d position = T_estimate_gt * pose->T_world_frame.translation();
-    for (int i = 0; i < 3; ++i) positions.push_back(static_cast<float>(position[i]));
+  for (std::size_t i = 0; i < truth.size(); i += stride) {
+    const geometry::Vector3d position = T_estimate_gt * truth[i].T_world_frame.translation();
+    for (int k = 0; k < 3; ++k) positions.push_back(static_cast<float>(position[k]));
   }
   return float_array(positions);
 }
@@ -40,12 +47,12 @@ ordered_json true_path(const Trajectory& truth_of_cam0, const Trajectory& path, 
 
 ordered_json report_truth(const dataset::Dataset& dataset, const Trajectory& path, bool metric) {
   if (!dataset.ground_truth || path.empty()) return nullptr;
-  const auto truth = evaluation::read_trajectory(*dataset.ground_truth);
-  if (!truth) return {{"error", truth.error().message()}};
-  const geometry::SE3& T_body_cam0 = dataset.rig.body_from_cam(0);
+  const auto of_body = evaluation::read_trajectory(*dataset.ground_truth);
+  if (!of_body) return {{"error", of_body.error().message()}};
   const evaluation::EvaluationOptions options{.align =
                                                   metric ? evaluation::AlignMode::kSe3 : evaluation::AlignMode::kSim3};
-  const auto found = evaluation::evaluate(moved_to_frame(path, T_body_cam0.inverse()), *truth, options);
+  const Trajectory truth = truth_of_camera(*of_body, dataset, options.max_dt_ns);
+  const auto found = evaluation::evaluate(path, truth, options);
   if (!found) return {{"error", found.error().found + "; expected " + found.error().expected}};
   std::vector<float> time, error;
   const std::size_t stride = report_stride(found->errors.size(), kMaxReportPoses);
@@ -64,7 +71,7 @@ ordered_json report_truth(const dataset::Dataset& dataset, const Trajectory& pat
           {"length_m", number(found->gt_length_m)},
           {"time", float_array(time)},
           {"error_m", float_array(error)},
-          {"path", true_path(moved_to_frame(*truth, T_body_cam0), path, found->T_gt_estimate)}};
+          {"path", true_path(truth, found->T_gt_estimate)}};
 }
 
 }  // namespace bslam::session

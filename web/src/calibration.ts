@@ -8,7 +8,7 @@ export function verdictSentence(run: Run): string {
   const texts = {
     consistent: `The images agree with the calibration.${excess}`,
     inconsistent: `The images contradict the calibration.${excess}`,
-    unknown: 'Whether the calibration is right is not known: the run has too few observations, or the estimate was switched off.',
+    unknown: 'The calibration could not be tested, which takes several cameras, enough motion and calibration.check.',
   };
   return texts[c.verdict] + (c.refined ? ' The map uses the calibration estimated from the images (rig_refined.yaml).' : '');
 }

@@ -18,6 +18,20 @@ function tracking(run: Run): Finding {
   };
 }
 
+// Cameras that were not ok; one sentence for those with the same faults.
+function faults(run: Run): Finding[] {
+  const named = new Map<string, string[]>();
+  for (const camera of run.summary.cameras) {
+    const intervals = camera.states.filter((s) => s.state !== 'ok');
+    if (!intervals.length) continue;
+    const total = intervals.reduce((sum, s) => sum + s.to - s.from, 0), reasons = [...new Set(intervals.map(stateText))].join(', ');
+    const text = `not ok ${total > 0 ? `for ${seconds(total)}` : 'in a single frame'} (${reasons}).`;
+    named.set(text, [...(named.get(text) ?? []), camera.name]);
+  }
+  return [...named].map(([text, names]) => ({
+    grade: 'note', target: 'timeline', text: `${names.join(', ')} ${names.length > 1 ? 'were' : 'was'} ${text}` }));
+}
+
 export function findings(run: Run): Finding[] {
   const { frames, cameras, calibration, map, complete, loops } = run.summary;
   const list: Finding[] = [];
@@ -34,13 +48,7 @@ export function findings(run: Run): Finding[] {
   const contradicted = calibration.refined ? 'note' : 'problem';  // a refined calibration has replaced it
   const grade = { consistent: 'fine', inconsistent: contradicted, unknown: 'note' } as const;
   list.push({ grade: grade[calibration.verdict], text: verdictSentence(run), target: 'calibration' });
-  for (const camera of cameras) {
-    const faults = camera.states.filter((s) => s.state !== 'ok');
-    if (!faults.length) continue;
-    const total = faults.reduce((sum, s) => sum + s.to - s.from, 0), reasons = [...new Set(faults.map(stateText))].join(', ');
-    list.push({ grade: 'note', target: 'timeline',
-                text: `${camera.name} was not ok ${total > 0 ? `for ${seconds(total)}` : 'in a single frame'} (${reasons}).` });
-  }
+  list.push(...faults(run));
   const suspect = cameras.filter((c) => c.extrinsics?.suspect).map((c) => c.name);
   if (suspect.length) list.push({ grade: contradicted, text: `The extrinsics are suspect: ${suspect.join(', ')}.`, target: 'calibration' });
   if (loops.length) list.push({ grade: 'result', text: `${plural(loops.length, 'loop')} closed.`, target: 'events' });

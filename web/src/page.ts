@@ -29,7 +29,7 @@ function sections(map: MapSection): Section[] {
     { id: 'plan', title: 'Path from above', draw: fromElements(planSection),
       note: 'Projected along the vertical, which is estimated from how the rig was held.' },
     { id: 'truth', title: 'Ground truth', draw: truthSection, when: (run) => run.truth !== null,
-      note: 'Compared after the run; the estimator never sees it. The estimate is aligned to it as by bslam eval.' },
+      note: 'Compared after the run; the estimator never sees it. The path of camera 0 is aligned to it, as by bslam eval.' },
     { id: 'timeline', title: 'Timeline', draw: (run, body) => [addTimeline(body, run)],
       note: 'What was tracked, and the state of every camera.' },
     { id: 'cameras', title: 'Cameras', draw: camerasSection,

@@ -20,7 +20,7 @@ export function addTimeline(parent: HTMLElement, run: Run): () => void {
     h('div', { class: 'track' }, ...pieces.map((p) => h('span', {
       class: `piece ${p.kind}`, title: `${p.text}, ${seconds(p.from)}${p.to > p.from ? ` to ${seconds(p.to)}` : ''}`,
       style: `left: ${percent(p.from)}; width: ${p.to > p.from ? `calc(${percent(from + p.to - p.from)})` : '2px'}` },
-      p.to - p.from > 0.14 * width && p.kind !== 'ok' ? p.text : null)))];
+      p.to - p.from > 0.1 * width && p.kind !== 'ok' ? p.text : null)))];
   const lost = run.summary.frames.lost_intervals.map((l) => ({ from: l.from - interval / 2, to: l.to + interval / 2, kind: 'lost', text: `lost: ${l.reason}` }));
   const instants = (list: { at: number }[], kind: string, text: string) => list.map((e) => ({ from: e.at, to: e.at, kind, text }));
   const keyframes = run.submaps.flatMap((s) => (s.loaded ? [] : Array.from(s.keyframes.time))).map((at) => ({ at }));
