@@ -26,7 +26,7 @@ export interface SummaryCamera {
 // summary.json
 export interface Summary {
   version: string; complete: boolean; data: string; mode: string; seed: number; cameras_used: number[];
-  frames: { input: number; tracked: number; lost: number; dropped: number; lost_intervals: Interval[] };
+  frames: { input: number; tracked: number; lost: number; dropped: number; in_loaded_map: number | null; lost_intervals: Interval[] };
   cameras: SummaryCamera[];
   calibration: {
     verdict: 'consistent' | 'inconsistent' | 'unknown'; excess_error: number | null; refined: boolean;

@@ -38,6 +38,10 @@ export function findings(run: Run): Finding[] {
   if (!complete) list.push({ grade: 'note', text: 'The run was interrupted; the results go as far as it did.', target: 'timeline' });
   list.push(tracking(run));
   if (frames.dropped) list.push({ grade: 'note', text: `${plural(frames.dropped, 'frame')} came too fast and were dropped.`, target: 'time' });
+  if (frames.in_loaded_map !== null) {
+    list.push({ grade: frames.in_loaded_map ? 'result' : 'problem', target: 'map',
+                text: `The run continued a saved map; ${plural(frames.in_loaded_map, 'frame')} of ${integer(frames.input)} could be located in it.` });
+  }
   if (run.submaps.length > 1) {
     list.push({ grade: 'note', text: `The map consists of ${run.submaps.length} submaps that could not be joined.`, target: 'map' });
   }
