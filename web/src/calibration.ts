@@ -16,7 +16,7 @@ export function verdictSentence(run: Run): string {
 // A change with its standard deviation; a value that the images do not determine has none. A change of more than three
 // standard deviations is set in bold.
 function change(value: number, std: number | null, digits: number) {
-  if (std === null) return [`${decimal(value, digits)} `, h('span', { class: 'unknown' }, 'not observed')];
+  if (std === null) return [`${decimal(value, digits)} `, h('span', { class: 'unobserved' }, 'not observed')];
   const text = `${decimal(value, digits)} ± ${decimal(std, digits)}`;
   return [std > 0 && Math.abs(value) > 3 * std ? h('b', {}, text) : text];
 }
@@ -28,7 +28,7 @@ function digitsFor(values: number[]): number {
 
 function extrinsics(cameras: CalibratedCamera[]) {
   const times = cameras.some((c) => c.time_offset_std_ms !== null || c.readout_std_ms !== null);
-  const none = h('span', { class: 'unknown' }, 'constant');
+  const none = h('span', { class: 'unobserved' }, 'constant');
   const time = (value: number, std: number | null) => (std === null ? none.cloneNode(true) : change(value, std, 3));
   const rows = cameras.map((c, i) => [
     c.name,
