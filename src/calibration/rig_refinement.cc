@@ -77,12 +77,13 @@ bool converged(const solver::RigAdjustment& adjusted, const solver::RigValues& b
 }
 
 // Adjusts again with the variance of each landmark (adjustment/landmark_noise.h), from the estimate `from`.
-solver::RigAdjustment adjust_weighted(const solver::RigAdjustmentOptions& options, solver::RigAdjustment from,
+solver::RigAdjustment adjust_weighted(solver::RigAdjustmentOptions options, solver::RigAdjustment from,
                                       RigProblem& problem, const std::stop_token& stop) {
   solver::ReprojectionProblem& flat = problem.flat.problem;
   const auto chi2 = solver::squared_errors(flat, flat.T_rig_world, flat.points, from.values);
   adjustment::apply_variances(adjustment::landmark_variances(flat, chi2, solver::beyond(chi2, solver::kChi2TwoDof95)),
                               flat);
+  options.robust_rounds = false;
   solver::RigAdjustment out = solver::adjust_rig(flat, options, from.values, stop);
   if (!out.done) return from;
   out.scale_change *= from.scale_change;
@@ -254,8 +255,9 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();
   const double path_before = path_length(problem);
-  const solver::RigAdjustment adjusted = adjust_in_passes(map, features, prior, problem, stop);
+  solver::RigAdjustment adjusted = adjust_in_passes(map, features, prior, problem, stop);
   if (!adjusted.done) return out;
+  complete_unobserved_cameras(calibrated, adjusted);
   out.done = true;
   for (std::size_t c = 0; c < map.rig().size(); ++c) {
     CameraRefinement& camera = out.cameras.emplace_back();
@@ -268,7 +270,7 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
   out.information = adjusted.information;
-  out.rig = with_unobserved_cameras(adjusted, calibrated).applied_to(reference);
+  out.rig = adjusted.values.applied_to(reference);
   out.poses = poses_of(problem.flat);
   // Distances between keyframes that are longer than the rig tell how the calibration changes the scale; a rig that
   // hardly moved only follows the scale of the baselines.

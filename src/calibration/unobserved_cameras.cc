@@ -15,14 +15,15 @@ geometry::SE3 absorbed_rotation(const camera::Camera& given, const camera::Camer
 
 }  // namespace
 
-solver::RigValues with_unobserved_cameras(const solver::RigAdjustment& adjusted, const camera::Rig& given) {
+void complete_unobserved_cameras(const camera::Rig& given, solver::RigAdjustment& adjusted) {
   constexpr int kMinObservations = 100;
-  solver::RigValues values = adjusted.values;
+  solver::RigValues& values = adjusted.values;
   const geometry::SE3 rotation = absorbed_rotation(given.camera(0), values.models[0]);
   for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c) {
-    if (adjusted.cameras[c].observations < kMinObservations) values.T_cam_rig[c] = given.cam_from_rig(c) * rotation;
+    if (adjusted.cameras[c].observations >= kMinObservations) continue;
+    values.T_cam_rig[c] = given.cam_from_rig(c) * rotation;
+    adjusted.cameras[c].change = solver::extrinsic_change(values.T_cam_rig[c], given.cam_from_rig(c));
   }
-  return values;
 }
 
 }  // namespace bslam::calibration

@@ -69,14 +69,25 @@ PinholeRadTan::PinholeRadTan(const Intrinsics& k, const std::vector<double>& dis
   }
 }
 
-PinholeRadTan::Distorted PinholeRadTan::distort(const Vector2d& m) const {
+PinholeRadTan::Radial PinholeRadTan::radial(double r2) const {
   const auto [k1, k2, p1, p2, k3, k4, k5, k6] = d_;
-  const double x = m.x(), y = m.y(), r2 = m.squaredNorm();
   const double a = 1 + r2 * (k1 + r2 * (k2 + r2 * k3)), da = k1 + r2 * (2 * k2 + r2 * 3 * k3);
+  if (count_ < 8) return {a, da};
   const double b = 1 + r2 * (k4 + r2 * (k5 + r2 * k6)), db = k4 + r2 * (2 * k5 + r2 * 3 * k6);
-  const double f = a / b, df = (da * b - a * db) / (b * b);  // df = d f / d r2
+  return {a / b, (da * b - a * db) / (b * b)};
+}
+
+Vector2d PinholeRadTan::distorted(const Vector2d& m, double r2, const Radial& radial) const {
+  const double x = m.x(), y = m.y(), f = radial.factor, p1 = d_[2], p2 = d_[3];
+  return {x * f + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * f + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
+}
+
+PinholeRadTan::Distorted PinholeRadTan::distort(const Vector2d& m) const {
+  const double x = m.x(), y = m.y(), r2 = m.squaredNorm(), p1 = d_[2], p2 = d_[3];
+  const Radial r = radial(r2);
+  const double f = r.factor, df = r.derivative;
   Distorted out;
-  out.point << x * f + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * f + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
+  out.point = distorted(m, r2, r);
   out.jacobian << f + 2 * x * x * df + 2 * p1 * y + 6 * p2 * x, 2 * x * y * df + 2 * p1 * x + 2 * p2 * y,
       2 * x * y * df + 2 * p1 * x + 2 * p2 * y, f + 2 * y * y * df + 6 * p1 * y + 2 * p2 * x;
   return out;
@@ -99,8 +110,9 @@ void PinholeRadTan::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix
 std::optional<Vector2d> PinholeRadTan::project(const Vector3d& point) const {
   if (!(point.z() > kMinDepth)) return std::nullopt;
   const Vector2d m = point.head<2>() / point.z();
-  if (!(m.norm() < max_radius_)) return std::nullopt;
-  return to_pixel(k_, distort(m).point);
+  const double r2 = m.squaredNorm();
+  if (!(std::sqrt(r2) < max_radius_)) return std::nullopt;
+  return to_pixel(k_, distorted(m, r2, radial(r2)));
 }
 
 std::optional<Projection> PinholeRadTan::project_with_jacobian(const Vector3d& point) const {

@@ -68,6 +68,12 @@ class PinholeRadTan {
     Vector2d point;
     Eigen::Matrix2d jacobian;
   };
+  // The factor of the radius, and its derivative with respect to the squared radius r2.
+  struct Radial {
+    double factor, derivative;
+  };
+  Radial radial(double r2) const;
+  Vector2d distorted(const Vector2d& m, double r2, const Radial& radial) const;
   Distorted distort(const Vector2d& m) const;
 
   Intrinsics k_;

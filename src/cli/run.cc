@@ -4,6 +4,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,8 @@ struct RunArguments {
   std::string out, mode, journal, replay, vocabulary, save_map, load_map;
   std::string pace = "fast", late = "block", progress = "auto", log_level = "warning";
   std::optional<int> seed;
-  bool no_loop = false, localize_only = false, no_final_ba = false, overwrite = false;
+  bool no_loop = false, localize_only = false, no_final_ba = false, no_report = false, overwrite = false;
+  std::string command;  // the command line, as shown in the report
 };
 
 // Applies the command-line options that override --config and --set.
@@ -73,7 +75,8 @@ Status prepare_folder(const RunArguments& arguments) {
   std::filesystem::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
   if (const Status status = check_writable(folder / "summary.json"); !status) return status;
-  for (const char* name : {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "rig_refined.yaml"}) {
+  for (const char* name :
+       {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "report.html", "rig_refined.yaml"}) {
     const auto is = [&](const std::string& input) {
       return !input.empty() && std::filesystem::equivalent(folder / name, input, error);
     };
@@ -118,9 +121,11 @@ Result<std::optional<map::BundledMap>> read_map(const std::string& file, const c
   return std::optional(*std::move(map));
 }
 
-Status write_files(const session::SessionResult& result, const system::Config& config, const RunArguments& arguments,
-                   const place::Vocabulary& vocabulary) {
-  if (const Status status = session::write_outputs(result, config, arguments.out); !status) return status;
+Status write_files(const session::SessionResult& result, const system::Config& config, const dataset::Dataset& dataset,
+                   const RunArguments& arguments, const place::Vocabulary& vocabulary) {
+  const auto report =
+      arguments.no_report ? std::nullopt : std::optional(session::ReportSource{dataset, arguments.command});
+  if (const Status status = session::write_outputs(result, config, arguments.out, report); !status) return status;
   if (!arguments.journal.empty()) {
     const Status status = write_atomically(arguments.journal, execution::journal_text(result.journal));
     if (!status) return status;
@@ -185,7 +190,8 @@ int run(const RunArguments& arguments) {
   const auto result = session::run_session(*dataset, options);
   bar.finish();
   if (!result) return report_error(result.error());
-  if (const Status s = write_files(*result, *config, arguments, **vocabulary); !s) return report_error(s.error());
+  if (const Status s = write_files(*result, *config, *dataset, arguments, **vocabulary); !s)
+    return report_error(s.error());
   print_after(result->record, *dataset, arguments);
   if (!result->record.complete) return kExitInterrupted;
   const session::RunRecord& record = result->record;
@@ -193,13 +199,20 @@ int run(const RunArguments& arguments) {
   return nothing ? kExitNothingTracked : kExitOk;
 }
 
+std::string command_of(std::span<const char* const> command_line) {
+  std::vector<std::string> words(command_line.begin(), command_line.end());
+  if (!words.empty()) words.front() = std::filesystem::path(words.front()).filename();
+  return shell_command(words);
+}
+
 }  // namespace
 
-void add_run(CLI::App& app, int& exit_status) {
+void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit_status) {
   const auto a = std::make_shared<RunArguments>();
+  a->command = command_of(command_line);
   CLI::App* verb = app.add_subcommand("run", "run the SLAM system on a recorded data set");
   add_dataset_options(*verb, a->data);
-  verb->add_option("--out", a->out, "folder for trajectory, summary, configuration and plots")->required();
+  verb->add_option("--out", a->out, "folder for trajectory, summary, configuration, report and plots")->required();
   add_config_options(*verb, a->config);
   verb->add_option("--mode", a->mode,
                    "sequential, lagged or parallel (default). Repeated sequential runs give identical results, and so "
@@ -224,6 +237,7 @@ void add_run(CLI::App& app, int& exit_status) {
                    "vocabulary for place recognition, in bslam or DBoW2 text format; default: the vocabulary shipped "
                    "with this program");
   verb->add_flag("--no-final-ba", a->no_final_ba, "skip the global bundle adjustment at the end");
+  verb->add_flag("--no-report", a->no_report, "do not write report.html, the page that shows the run in a browser");
   verb->add_option("--seed", a->seed, "seed of all random numbers; default 1")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   verb->add_option("--progress", a->progress, "auto: show a progress bar if stderr is a terminal; never: show none")

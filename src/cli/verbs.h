@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <span>
 
 #include "base/result.h"
 
@@ -11,7 +12,8 @@ namespace bslam::cli {
 constexpr int kExitOk = 0, kExitBadInput = 2, kExitNothingTracked = 3, kExitInterrupted = 130;
 constexpr int kExitFailed = 1;  // the program failed, not the request
 
-void add_run(CLI::App& app, int& exit_status);
+// `command_line`: the arguments of the program, which the report of a run shows.
+void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit_status);
 void add_eval(CLI::App& app, int& exit_status);
 void add_bench(CLI::App& app, int& exit_status);
 void add_simulate(CLI::App& app, int& exit_status);

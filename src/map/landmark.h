@@ -35,7 +35,8 @@ struct Landmark {
   Eigen::Vector3d view_direction = Eigen::Vector3d::Zero();
   // Metres. Distances at which the landmark can be matched within one pyramid level of its reference level.
   float min_distance = 0, max_distance = 0;
-  feature::Descriptor descriptor{};  // the medoid of its observations' descriptors
+  feature::Descriptor descriptor{};     // the medoid of its observations' descriptors
+  std::uint64_t descriptor_source = 0;  // hash of the observations of which `descriptor` is the medoid; 0: unknown
   LandmarkReference reference;
   KeyframeId born;  // newest keyframe when the landmark was created
   // number of frames in which it was predicted visible, and in which it was matched

@@ -35,10 +35,38 @@ feature::Descriptor medoid(std::span<const feature::Descriptor> descriptors) {
   return descriptors[best];
 }
 
+// A step of the hash of a sequence of observations (the finaliser of SplitMix64).
+std::uint64_t mixed(std::uint64_t hash, const Observation& o) {
+  hash ^= static_cast<std::uint64_t>(o.keyframe.value()) << 32 | static_cast<std::uint32_t>(o.feature.value());
+  hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9u;
+  hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebu;
+  return hash ^ (hash >> 31);
+}
+
 }  // namespace
+
+void BundledMap::refresh_descriptor(LandmarkId l) {
+  Landmark& entry = edit(l);
+  std::uint64_t source = 1;
+  for (const Observation& o : observations(l)) source = mixed(source, o);
+  if (source == entry.descriptor_source) return;
+  entry.descriptor_source = source;
+  std::array<feature::Descriptor, kMaxDescriptors> ring;
+  std::size_t count = 0;
+  for (const Observation& o : observations(l)) {
+    const frame::BundledFrame& frame = *keyframe(o.keyframe).frame;
+    for (const frame::KeypointRef r : frame.bundled.keypoints(o.feature))
+      ring[count++ % kMaxDescriptors] = frame.keypoints(r.camera).descriptor[r.keypoint.index()];
+  }
+  if (count > kMaxDescriptors) {  // oldest first, for ties
+    std::rotate(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(count % kMaxDescriptors), ring.end());
+  }
+  entry.descriptor = medoid(std::span(ring).first(std::min(count, kMaxDescriptors)));
+}
 
 bool BundledMap::refresh_landmark(LandmarkId l) {
   if (!alive(l)) return false;
+  refresh_descriptor(l);
   Landmark& entry = edit(l);
   const auto centre_map = [&](const BundledKeyframe& k, CameraIndex camera) -> Eigen::Vector3d {
     const Eigen::Vector3d centre_rig = rig_from_cam(k, camera).translation();
@@ -46,20 +74,12 @@ bool BundledMap::refresh_landmark(LandmarkId l) {
   };
 
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  std::array<feature::Descriptor, kMaxDescriptors> ring;
-  std::size_t count = 0;
   for (const Observation& o : observations(l)) {
     const BundledKeyframe& k = keyframe(o.keyframe);
-    for (const frame::KeypointRef& r : k.frame->bundled.keypoints(o.feature)) {
+    for (const frame::KeypointRef& r : k.frame->bundled.keypoints(o.feature))
       sum += (entry.position - centre_map(k, r.camera)).normalized();
-      ring[count++ % kMaxDescriptors] = k.frame->keypoints(r.camera).descriptor[r.keypoint.index()];
-    }
   }
   entry.view_direction = sum.normalized();
-  if (count > kMaxDescriptors) {  // oldest first, for ties
-    std::rotate(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(count % kMaxDescriptors), ring.end());
-  }
-  entry.descriptor = medoid(std::span(ring).first(std::min(count, kMaxDescriptors)));
 
   // A patch detected on level n at distance d appears on level 0 at distance d * scale^n, and on the highest level at
   // that distance divided by the scale of the highest level.

@@ -23,22 +23,29 @@ int finest_level(const map::BundledMap& map, const map::Observation& o) {
   return finest;
 }
 
-bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& options) {
-  int landmarks = 0, observed_elsewhere = 0;
-  for (const LandmarkId l : map.keyframe(k).landmarks) {
-    if (!l.valid()) continue;
-    ++landmarks;
-    const auto observations = map.observations(l);
-    if (static_cast<int>(observations.size()) <= options.redundant_views) continue;
-    const auto own = std::find_if(observations.begin(), observations.end(),
-                                  [&](const map::Observation& o) { return o.keyframe == k; });
-    const int level = finest_level(map, *own);
-    const auto others = std::count_if(observations.begin(), observations.end(), [&](const map::Observation& o) {
-      return o.keyframe != k && finest_level(map, o) <= level + 1;
-    });
-    observed_elsewhere += others >= options.redundant_views;
+// Whether at least `count` other keyframes observe the landmark, on a level that is at most one coarser.
+bool observed_elsewhere(const map::BundledMap& map, LandmarkId landmark, KeyframeId k, int count) {
+  const auto observations = map.observations(landmark);
+  if (static_cast<int>(observations.size()) <= count) return false;
+  const auto own = std::ranges::find(observations, k, &map::Observation::keyframe);
+  const int level = finest_level(map, *own);
+  for (const map::Observation& o : observations) {
+    if (count <= 0) break;
+    count -= o.keyframe != k && finest_level(map, o) <= level + 1;
   }
-  return landmarks > 0 && observed_elsewhere > options.redundant_ratio * landmarks;
+  return count <= 0;
+}
+
+bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& options) {
+  const auto& landmarks = map.keyframe(k).landmarks;
+  const auto all = std::ranges::count_if(landmarks, &LandmarkId::valid);
+  const double needed = options.redundant_ratio * static_cast<double>(all);
+  std::ptrdiff_t possible = all;  // those observed elsewhere, and those not yet examined
+  for (const LandmarkId l : landmarks) {
+    if (!(static_cast<double>(possible) > needed)) return false;
+    possible -= l.valid() && !observed_elsewhere(map, l, k, options.redundant_views);
+  }
+  return static_cast<double>(possible) > needed;
 }
 
 }  // namespace

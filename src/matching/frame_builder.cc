@@ -61,19 +61,24 @@ frame::BundledFrame FrameBuilder::extract(const camera::Rig& rig, const image::I
   return frame;
 }
 
-FrameImages FrameBuilder::release() {
-  FrameImages out;
+ReleasedImages FrameBuilder::release() {
+  ReleasedImages out;
   out.pyramids = std::exchange(pyramids_, std::vector<image::Pyramid>(pyramids_.size()));
   for (image::ImageView& mask : current_masks_) out.masks.push_back(image::copy_of(std::exchange(mask, {})));
   return out;
 }
 
-void FrameBuilder::adopt(FrameImages images) {
+void FrameBuilder::adopt(ReleasedImages images) {
   BSLAM_ASSERT(images.pyramids.size() == pyramids_.size() && images.masks.size() == pyramids_.size(),
                "there must be one image per camera of the rig");
   pyramids_ = std::move(images.pyramids);
   combined_masks_ = std::move(images.masks);
   for (std::size_t i = 0; i < combined_masks_.size(); ++i) current_masks_[i] = combined_masks_[i].view();
+}
+
+void FrameBuilder::clear() {
+  pyramids_.assign(pyramids_.size(), {});
+  std::ranges::fill(current_masks_, image::ImageView());
 }
 
 image::ImageView FrameBuilder::mask_of(std::size_t camera, const image::CameraImage& image) {

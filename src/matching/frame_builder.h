@@ -12,7 +12,7 @@
 namespace bslam::matching {
 
 // Pyramids and masks of a frame, which own their memory.
-struct FrameImages {
+struct ReleasedImages {
   std::vector<image::Pyramid> pyramids;  // per camera, empty without an image
   std::vector<image::Image> masks;       // per camera, empty without a mask
 };
@@ -43,8 +43,10 @@ class FrameBuilder {
 
   // Moves the images of the frame that was begun last to another builder, which can extract its keypoints later. After
   // release() this one has none until the next frame begins.
-  FrameImages release();
-  void adopt(FrameImages images);
+  ReleasedImages release();
+  void adopt(ReleasedImages images);
+  // Discards the images.
+  void clear();
 
  private:
   image::ImageView mask_of(std::size_t camera, const image::CameraImage& image);

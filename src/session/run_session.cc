@@ -12,6 +12,7 @@
 #include "rig_formats/bslam_rig.h"
 #include "session/frame_source.h"
 #include "session/record_builder.h"
+#include "session/report_data.h"
 #include "session/run_plot.h"
 #include "session/summary.h"
 #include "session/trajectory_comments.h"
@@ -163,12 +164,15 @@ Files output_files(const SessionResult& result, const system::Config& config) {
 
 }  // namespace
 
-Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder) {
+Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder,
+                     const std::optional<ReportSource>& report) {
   Status first_failure;
-  for (const auto& [name, bytes] : output_files(result, config)) {
+  const auto write = [&](const std::string& name, const std::string& bytes) {
     const Status status = write_atomically(folder / name, bytes);
     if (!status && first_failure.ok()) first_failure = status;
-  }
+  };
+  for (const auto& [name, bytes] : output_files(result, config)) write(name, bytes);
+  if (report) write("report.html", report_page(result, config, *report));
   return first_failure;
 }
 

@@ -45,10 +45,17 @@ struct SessionResult {
 // Errors: a mask that cannot be read or differs in size from the images of its camera; a journal of another run.
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options);
 
+// What report.html shows in addition to the result of a run.
+struct ReportSource {
+  const dataset::Dataset& dataset;
+  std::string command;  // the command line of the run
+};
+
 // Writes summary.json, trajectory.tum, trajectory_live.tum (further submaps: ..._part2.tum), config.yaml,
-// rig_refined.yaml if extrinsics were refined, trajectory.svg and run.svg, in this order. Each file is written
-// completely or not at all. If one cannot be written, the others are written nevertheless, and the first error is
-// returned.
-Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder);
+// rig_refined.yaml if extrinsics were refined, trajectory.svg, run.svg and, with a `report`, report.html, in this
+// order. Each file is written completely or not at all. If one cannot be written, the others are written nevertheless,
+// and the first error is returned.
+Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder,
+                     const std::optional<ReportSource>& report = {});
 
 }  // namespace bslam::session

@@ -24,17 +24,45 @@ RigBlocks calibration_blocks(const RigValues& rig) {
   return blocks;
 }
 
-// The uncertainty of the poses at the values of `adjusted`, whose rig is constant.
-std::vector<std::optional<geometry::PoseUncertainty>> uncertainties_of(const ReprojectionProblem& problem,
-                                                                       const BundleStructure& structure,
-                                                                       const BundleOptions& options, Kernel kernel,
-                                                                       BundleEquations& adjusted) {
-  if (options.marginals.empty()) return {};
-  if (!options.rig_deviation) return adjusted.pose_uncertainties(options.marginals, Eigen::MatrixXd(0, 0));
-  const RigBlocks calibration = calibration_blocks(adjusted.state().rig);
-  BundleEquations equations(problem, structure, calibration, kernel, options.dense_poses, adjusted.state());
+// Flags all observations but those of every n-th point, with n such that about kPointsPerPose points per free pose
+// remain. `skip` is empty or flags observations that are ignored anyway.
+std::vector<std::uint8_t> thinned_out(const ReprojectionProblem& problem, const BundleStructure& structure,
+                                      std::span<const std::uint8_t> skip) {
+  constexpr std::size_t kPointsPerPose = 50;
+  const std::size_t wanted = kPointsPerPose * structure.pose_of_slot.size();
+  const std::size_t every = std::max<std::size_t>(1, structure.num_points() / std::max<std::size_t>(1, wanted));
+  std::vector<std::uint8_t> out(skip.begin(), skip.end());
+  out.resize(problem.observations.size(), 0);
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] |= static_cast<std::size_t>(problem.observations[i].point) % every != 0;
+  return out;
+}
+
+// The effect of the deviation of the rig on the poses: (6 x columns of the deviation) for each. It is a ratio of two
+// quantities that grow in the same way with the number of points, so that some of them suffice.
+std::vector<std::optional<geometry::PoseUncertainty>> effect_of_rig(
+    const ReprojectionProblem& problem, const BundleStructure& structure, const BundleOptions& options, Kernel kernel,
+    const BundleState& state, const std::vector<double>& chi2, std::span<const std::uint8_t> skip) {
+  const BundleStructure some = make_structure(problem, chi2, thinned_out(problem, structure, skip));
+  const RigBlocks calibration = calibration_blocks(state.rig);
+  BundleEquations equations(problem, some, calibration, kernel, options.dense_poses, state);
   equations.linearise();
   return equations.pose_uncertainties(options.marginals, *options.rig_deviation);
+}
+
+// The uncertainty of the poses at the values of `adjusted`, whose rig is constant.
+std::vector<std::optional<geometry::PoseUncertainty>> uncertainties_of(
+    const ReprojectionProblem& problem, const BundleStructure& structure, const BundleOptions& options, Kernel kernel,
+    const std::vector<double>& chi2, std::span<const std::uint8_t> skip, BundleEquations& adjusted) {
+  if (options.marginals.empty()) return {};
+  auto out = adjusted.pose_uncertainties(options.marginals, Eigen::MatrixXd(0, 0));
+  if (!options.rig_deviation) return out;
+  const auto effect = effect_of_rig(problem, structure, options, kernel, adjusted.state(), chi2, skip);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (out[i] && effect[i]) out[i]->calibration = effect[i]->calibration;
+    if (!effect[i]) out[i].reset();
+  }
+  return out;
 }
 
 }  // namespace
@@ -45,7 +73,8 @@ BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
     return std::count(problem.pose_free.begin(), problem.pose_free.end(), free);
   };
   BSLAM_ASSERT(problem.pose_free.empty() || count(0) > 0, "at least one pose must be fixed");
-  const BundleStructure structure = make_structure(problem, skip);
+  const std::vector<double> chi2 = squared_errors(problem);
+  const BundleStructure structure = make_structure(problem, chi2, skip);
   if (structure.num_points() == 0) return {};
   const Kernel kernel = options.robust ? Kernel::kHuber : Kernel::kNone;
   const RigBlocks constant_rig;
@@ -54,7 +83,7 @@ BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
       minimise(equations, {.iterations = options.iterations, .relative_decrease = options.relative_decrease}, stop),
       {}};
   if (summary.usable()) {
-    summary.uncertainties = uncertainties_of(problem, structure, options, kernel, equations);
+    summary.uncertainties = uncertainties_of(problem, structure, options, kernel, chi2, skip, equations);
     problem.T_rig_world = std::move(equations.state().T_rig_world);
     problem.points = std::move(equations.state().points);
   }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "solver/outer_product.h"
+
 namespace bslam::solver {
 namespace {
 
@@ -226,7 +228,12 @@ void BundleEquations::eliminate_point(std::size_t point, double damping) {
     U_[a].pose_offset = system_.frames().offset(slot);
     system_.rhs().segment<6>(U_[a].pose_offset).noalias() -= U * y;
     for (std::size_t b = 0; b <= a; ++b) {
-      system_.frames().leading<6>(*block++).noalias() -= U.lazyProduct(U_[b].U.transpose());
+      auto S = system_.frames().leading<6>(*block++);
+      if (S.outerStride() == 6) {
+        subtract_outer_product(U, U_[b].U, S.data());
+      } else {
+        S.noalias() -= U.lazyProduct(U_[b].U.transpose());
+      }
     }
     ++a;
   }

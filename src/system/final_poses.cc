@@ -33,12 +33,6 @@ std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, st
   return before + from_middle_s / (before_s + after_s) * (after - before);
 }
 
-// The record of a frame, or the end.
-std::span<const FrameRecord>::iterator find_frame(std::span<const FrameRecord> frames, FrameId id) {
-  const auto at = std::ranges::lower_bound(frames, id, {}, [](const FrameRecord& r) { return r.result.frame; });
-  return at != frames.end() && at->result.frame == id ? at : frames.end();
-}
-
 // A frame whose pose in the final map is kept: its index among the frames, the pose and the root of its submap.
 struct KnownPose {
   std::size_t frame;
@@ -50,7 +44,7 @@ struct KnownPose {
 std::vector<KnownPose> known_poses(const map::BundledMap& map, KeyframeId first, std::span<const FrameRecord> frames) {
   std::vector<KnownPose> out;
   for (const KeyframeId k : map.keyframe_ids()) {
-    const auto at = find_frame(frames, map.keyframe(k).frame->id);
+    const auto at = find_record(frames, map.keyframe(k).frame->id);
     if (k.index() < first.index() || at == frames.end()) continue;
     out.push_back({static_cast<std::size_t>(at - frames.begin()), map.keyframe(k).T_rig_world, map.root_of(k)});
   }
@@ -108,7 +102,7 @@ std::vector<std::pair<KeyframeId, Vector6d>> twists_from_neighbours(const map::B
     const frame::BundledFrame& seen = *map.keyframe(k).frame;
     const double delay_s = frame::farthest_delay_s(seen);
     if (k.index() < first.index() || !frame::depends_on_motion(map.rig(), seen)) continue;
-    const auto at = find_frame(frames, seen.id);
+    const auto at = find_record(frames, seen.id);
     std::optional<Vector6d> twist;
     if (frames.end() - at >= 2 && at != frames.begin())
       twist = twist_through(std::span<const FrameRecord, 3>(at - 1, 3), 1, map, delay_s);

@@ -1,6 +1,7 @@
 // Poses and motions of all frames in the final map.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <utility>
@@ -10,6 +11,14 @@
 #include "tracking/frame_record.h"
 
 namespace bslam::system {
+
+// The record of a frame, or the end. `records` are in order of frames.
+template <class Records>
+auto find_record(Records& records, FrameId frame) {
+  const auto at =
+      std::ranges::lower_bound(records, frame, {}, [](const tracking::FrameRecord& r) { return r.result.frame; });
+  return at != records.end() && at->result.frame == frame ? at : records.end();
+}
 
 // Pose of a frame in `map`. Returns nullopt if the frame has none or its submap was removed from `map`.
 std::optional<geometry::SE3> T_rig_world_of(const tracking::FrameRecord& record, const map::BundledMap& map);

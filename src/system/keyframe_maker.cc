@@ -38,7 +38,7 @@ execution::StageResult KeyframeMaker::make(FrameId id, const map::MapSnapshot& b
                            pool_);
   const TimeNs time_ns = frame.time_ns;
   auto created = tracker_.create_keyframe(std::move(deferred.request), builder_.pyramids(), base);
-  builder_.release();  // the images are not needed any more
+  builder_.clear();
   if (!created) return {};
   {
     const std::lock_guard lock(mutex_);

@@ -19,7 +19,7 @@ namespace bslam::system {
 // A frame that was tracked directly and is to become a keyframe.
 struct DeferredKeyframe {
   tracking::KeyframeRequest request;  // its frame has no keypoints
-  matching::FrameImages images;
+  matching::ReleasedImages images;
   std::vector<int> budgets;                           // number of keypoints, per camera
   std::vector<matching::AlignmentOptions> alignment;  // per camera
   std::shared_ptr<const camera::Rig> rig;             // with which the frame was tracked

@@ -140,9 +140,8 @@ void System::mark_created_keyframes() {
   }
   created_keyframes_.clear();
   for (const tracking::CreatedKeyframe& created : all) {
-    const auto record =
-        std::ranges::lower_bound(frames_, created.frame, {}, [](const FrameRecord& r) { return r.result.frame; });
-    if (record == frames_.end() || record->result.frame != created.frame) continue;
+    const auto record = find_record(frames_, created.frame);
+    if (record == frames_.end()) continue;
     record->keyframe = true;
     record->result.anchored = {.reference = created.keyframe, .T_rig_reference = geometry::SE3()};
     created_keyframes_.push_back(*record);
@@ -192,9 +191,8 @@ void System::finish() {
 void System::locate_early_frames() {
   const map::MapSnapshot map = store_.snapshot();
   for (const tracking::BetweenKeyframes& early : early_) {
-    const auto record =
-        std::ranges::lower_bound(frames_, early.frame->id, {}, [](const FrameRecord& r) { return r.result.frame; });
-    if (record == frames_.end() || record->result.frame != early.frame->id) continue;
+    const auto record = find_record(frames_, early.frame->id);
+    if (record == frames_.end()) continue;
     if (record->result.status == tracking::TrackStatus::kTracking) continue;
     if (auto found = pipeline_.tracker().locate_early(*map, early))
       record->found_later = std::make_shared<const tracking::TrackResult>(std::move(*found));

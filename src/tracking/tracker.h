@@ -61,8 +61,8 @@ struct FrontEndState {
   int direct_pause = 0;     // number of frames until the next attempt
   int direct_kept = 0;      // poses found directly that were kept since the features of a frame last gave a pose
   std::optional<PendingKeyframe> pending;
-  bool keyframe_failed =
-      false;                 // the last pending keyframe was not created: the next one is made of a frame with features
+  // The last pending keyframe was not created: the next one is made of a frame with features.
+  bool keyframe_failed = false;
   int frames_lost = 0;       // consecutive lost frames with features
   TimeNs lost_since_ns = 0;  // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;

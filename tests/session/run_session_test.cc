@@ -4,9 +4,11 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <sstream>
 
 #include "place/shipped_vocabulary.h"
 #include "session/frame_source.h"
+#include "session/report_data.h"
 #include "simulator/simulation_writer.h"
 #include "synthetic/rigs.h"
 
@@ -100,6 +102,68 @@ TEST_F(Session, WritesAllItsFiles) {
     EXPECT_GT(fs::file_size(out / name), 50u) << name;
   }
   EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 6);  // and no partially written file
+}
+
+// The text of the element of the page with the data.
+std::string data_of_page(const std::string& page) {
+  const std::string begin = R"(id="bslam-data">)";
+  const std::size_t from = page.find(begin) + begin.size();
+  return page.substr(from, page.find("</script>", from) - from);
+}
+
+TEST_F(Session, WritesTheReportIfItIsAskedFor) {
+  const dataset::Dataset data = dataset();
+  const SessionOptions o = options();
+  auto result = run_session(data, o);
+  ASSERT_TRUE(result.ok());
+  const std::string hostile = "a</script><script>alert('x')</script>&\xff";
+  result->record.data = hostile;
+  const fs::path out = folder() / "report";
+  fs::create_directory(out);
+  ASSERT_TRUE(write_outputs(*result, o.config, out, ReportSource{data, "bslam run '" + hostile + "'"}).ok());
+  EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 7);
+  std::ostringstream text;
+  text << std::ifstream(out / "report.html").rdbuf();
+  EXPECT_EQ(text.str().find("<script>alert"), std::string::npos);
+  const auto json = nlohmann::json::parse(data_of_page(text.str()));
+  EXPECT_EQ(json["summary"]["data"], "a</script><script>alert('x')</script>&\ufffd");
+  EXPECT_EQ(json["rig"].size(), 2u);
+  EXPECT_EQ(json["frames"]["cameras"].size(), 2u);
+  EXPECT_EQ(json["residuals"].size(), 2u);
+  EXPECT_EQ(json["submaps"].size(), 1u);
+  EXPECT_EQ(json["submaps"][0]["frames"], 8);
+  EXPECT_EQ(json["truth"]["ate_m"]["count"], 8);
+  EXPECT_LT(json["truth"]["ate_m"]["rmse"], 0.05);
+}
+
+TEST_F(Session, ReportsOfEqualRunsDifferInTimesOnly) {
+  const dataset::Dataset data = dataset();
+  const SessionOptions o = options();
+  const auto without_times = [&] {
+    const auto result = run_session(data, o);
+    EXPECT_TRUE(result.ok());
+    nlohmann::ordered_json json = report_json(*result, o.config, {data, "bslam run"});
+    for (const char* key : {"time", "memory"}) json["summary"].erase(key);
+    json["frames"].erase("ms");
+    for (auto& stage : json["stages"]) {
+      stage.erase("ms");
+      stage.erase("total_ms");
+    }
+    return json.dump();
+  };
+  EXPECT_EQ(without_times(), without_times());
+}
+
+TEST_F(Session, ReportListsTheSettingsWithTheirDefaults) {
+  const dataset::Dataset data = dataset();
+  SessionResult result;
+  result.map = std::make_shared<map::BundledMap>(std::make_shared<camera::Rig>(data.rig));
+  const auto json = report_json(result, options().config, {data, ""});
+  std::size_t changed = 0;
+  for (const auto& setting : json["settings"]) changed += setting["value"] != setting["default"];
+  EXPECT_EQ(changed, 2u);  // mode and features.per_image
+  EXPECT_TRUE(json["submaps"].empty());
+  EXPECT_TRUE(json["truth"].is_null());
 }
 
 TEST_F(Session, WritesFilesForEverySubmap) {

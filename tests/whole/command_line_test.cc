@@ -192,8 +192,8 @@ TEST_F(CommandLine, RunWritesItsFilesAndIsRepeatableFromItsConfiguration) {
   const Ran first = run("run " + data() + " --out " + out("first") +
                         " --mode sequential --progress never --set features.per_image=700");
   ASSERT_EQ(first.status, 0) << first.err;
-  for (const char* file :
-       {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg", "run.svg"}) {
+  for (const char* file : {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg",
+                           "run.svg", "report.html"}) {
     EXPECT_TRUE(fs::exists(folder_ / "first" / file)) << file;
   }
   const auto summary = nlohmann::json::parse(slurp(folder_ / "first/summary.json"));
@@ -209,6 +209,9 @@ TEST_F(CommandLine, RunWritesItsFilesAndIsRepeatableFromItsConfiguration) {
       run("run " + data() + " --out " + out("again") + " --progress never --config " + out("first/config.yaml"));
   ASSERT_EQ(again.status, 0) << again.err;
   EXPECT_EQ(slurp(folder_ / "first/trajectory.tum"), slurp(folder_ / "again/trajectory.tum"));
+  EXPECT_NE(slurp(folder_ / "first/report.html").find("--set features.per_image=700"), std::string::npos);
+  EXPECT_EQ(run("run " + data() + " --out " + out("again") + " --overwrite --no-report --end 0.3").status, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "again/report.html"));      // that of the earlier run is removed
   expect_rejected("run " + data() + " --out " + out("again"));  // exists already, and --overwrite is not given
 
   // A refined rig of an earlier run is removed, unless it is an input of this run.

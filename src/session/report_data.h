@@ -1,0 +1,22 @@
+// The data of report.html, the page that shows a run (web/).
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "session/run_session.h"
+
+namespace bslam::session {
+
+// Everything the page shows: the summary as in summary.json; the rig and the submaps (session/report_map.h); counts per
+// frame and camera; durations of stages; residuals over the images; settings with their defaults; errors against ground
+// truth (session/report_truth.h). Times are in seconds since the first image of the data set. Large arrays are
+// {"f32": base64}. web/src/data.ts describes the structure. The same result gives the same data, except for measured
+// times and memory.
+nlohmann::ordered_json report_json(const SessionResult& result, const system::Config& config,
+                                   const ReportSource& source);
+
+// The page with these data. It needs no other file and no network.
+std::string report_page(const SessionResult& result, const system::Config& config, const ReportSource& source);
+
+}  // namespace bslam::session

@@ -1,0 +1,169 @@
+#include "session/report_map.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "session/report_arrays.h"
+
+namespace bslam::session {
+namespace {
+
+using geometry::SE3;
+using geometry::Vector3d;
+using nlohmann::ordered_json;
+
+void append(const Vector3d& v, std::vector<float>& values) {
+  for (int i = 0; i < 3; ++i) values.push_back(static_cast<float>(v[i]));
+}
+
+void append(const Eigen::Quaterniond& q, std::vector<float>& values) {
+  for (const double c : {q.x(), q.y(), q.z(), q.w()}) values.push_back(static_cast<float>(c));
+}
+
+ordered_json number_list(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+// Collects the arrays of one submap.
+struct Submap {
+  KeyframeId root;
+  std::vector<SE3> T_world_rig;  // of the keyframes
+  std::vector<float> keyframe_time, keyframe_position, keyframe_rotation, point_position, point_time;
+};
+
+float seconds_since(TimeNs time_ns, TimeNs first_ns) { return static_cast<float>(to_seconds(time_ns - first_ns)); }
+
+// All submaps with keyframes: those of the trajectories first.
+std::vector<Submap> submaps_of(const map::BundledMap& map, std::span<const system::SubmapTrajectory> paths) {
+  std::vector<KeyframeId> roots;
+  for (const system::SubmapTrajectory& path : paths) roots.push_back(path.root);
+  for (const KeyframeId root : map.roots()) {
+    if (std::ranges::find(roots, root) == roots.end()) roots.push_back(root);
+  }
+  std::vector<Submap> submaps;
+  for (const KeyframeId root : roots) submaps.emplace_back().root = root;
+  return submaps;
+}
+
+// Adds the keyframes, and returns the number of the submap of each keyframe slot.
+std::vector<std::size_t> add_keyframes(const map::BundledMap& map, TimeNs first_ns, std::vector<Submap>& submaps) {
+  std::vector<std::size_t> submap_of(map.keyframe_slots(), 0);
+  for (std::size_t s = 0; s < submaps.size(); ++s) {
+    if (!map.alive(submaps[s].root)) continue;
+    std::vector<KeyframeId> keyframes = map.keyframes_of_submap(submaps[s].root);
+    std::ranges::sort(keyframes);
+    for (const KeyframeId k : keyframes) {
+      submap_of[k.index()] = s;
+      const SE3 T_world_rig = map.keyframe(k).T_rig_world.inverse();
+      submaps[s].T_world_rig.push_back(T_world_rig);
+      submaps[s].keyframe_time.push_back(seconds_since(map.keyframe(k).frame->time_ns, first_ns));
+      append(T_world_rig.translation(), submaps[s].keyframe_position);
+      append(T_world_rig.rotation(), submaps[s].keyframe_rotation);
+    }
+  }
+  return submap_of;
+}
+
+// The time of a landmark is that of its reference keyframe.
+void add_points(const map::BundledMap& map, TimeNs first_ns, const std::vector<std::size_t>& submap_of,
+                std::vector<Submap>& submaps) {
+  const std::vector<LandmarkId> landmarks = map.landmark_ids();
+  const std::size_t stride = report_stride(landmarks.size(), kMaxReportPoints);
+  for (std::size_t i = 0; i < landmarks.size(); i += stride) {
+    const map::Landmark& landmark = map.landmark(landmarks[i]);
+    const KeyframeId k = landmark.reference.keyframe;
+    Submap& submap = submaps[submap_of[k.index()]];
+    append(landmark.position, submap.point_position);
+    submap.point_time.push_back(seconds_since(map.keyframe(k).frame->time_ns, first_ns));
+  }
+}
+
+ordered_json path_json(const evaluation::Trajectory& path, TimeNs first_ns) {
+  std::vector<float> time, position, rotation;
+  const std::size_t stride = report_stride(path.size(), kMaxReportPoses);
+  for (std::size_t i = 0; i < path.size(); i += stride) {
+    time.push_back(seconds_since(path[i].time_ns, first_ns));
+    append(path[i].T_world_frame.translation(), position);
+    append(path[i].T_world_frame.rotation(), rotation);
+  }
+  return {{"time", float_array(time)}, {"position", float_array(position)}, {"rotation", float_array(rotation)}};
+}
+
+// Returns the ray of a pixel at depth 1. Rays farther than this from the optical axis are not drawn: instead the ray of
+// a pixel nearer to the centre is returned.
+Vector3d ray_at_corner(const camera::Camera& camera, const Eigen::Vector2d& corner) {
+  constexpr double kMinDepth = 0.35;  // of a ray of length 1
+  const Eigen::Vector2d centre(0.5 * (camera.width - 1), 0.5 * (camera.height - 1));
+  for (double share = 1.0; share > 0.2; share -= 0.05) {
+    const auto ray = camera.unproject(centre + share * (corner - centre));
+    if (ray && ray->z() > kMinDepth * ray->norm()) return *ray / ray->z();
+  }
+  return {0, 0, 1};
+}
+
+}  // namespace
+
+std::size_t report_stride(std::size_t count, std::size_t limit) {
+  return std::max<std::size_t>(1, (count + limit - 1) / limit);
+}
+
+Vector3d vertical_direction(std::span<const SE3> T_world_rig) {
+  constexpr double kAlmostAsConstant = 0.9;
+  const Vector3d up_rig(0, -1, 0);  // y points downward in an image
+  if (T_world_rig.empty()) return up_rig;
+  geometry::Matrix3d mean = geometry::Matrix3d::Zero();
+  for (const SE3& T : T_world_rig) mean += T.matrix3() / static_cast<double>(T_world_rig.size());
+  const Eigen::JacobiSVD<geometry::Matrix3d> svd(mean, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Vector3d mean_up = mean * up_rig;
+  if (mean_up.norm() >= kAlmostAsConstant * svd.singularValues()[0]) return mean_up.normalized();
+  const Vector3d most_constant = svd.matrixU().col(0);
+  return svd.matrixV().col(0).dot(up_rig) < 0 ? Vector3d(-most_constant) : most_constant;
+}
+
+ordered_json report_submaps(const map::BundledMap& map, std::span<const system::SubmapTrajectory> paths,
+                            TimeNs first_time_ns) {
+  std::vector<Submap> submaps = submaps_of(map, paths);
+  const std::vector<std::size_t> submap_of = add_keyframes(map, first_time_ns, submaps);
+  if (!submaps.empty()) add_points(map, first_time_ns, submap_of, submaps);
+  ordered_json list = ordered_json::array();
+  for (std::size_t s = 0; s < submaps.size(); ++s) {
+    const Submap& submap = submaps[s];
+    const evaluation::Trajectory path = s < paths.size() ? paths[s].poses : evaluation::Trajectory();
+    list.push_back(
+        {{"loaded", s < paths.size() && paths[s].loaded},
+         {"frames", path.size()},
+         {"up", number_list(vertical_direction(submap.T_world_rig))},
+         {"path", path_json(path, first_time_ns)},
+         {"keyframes",
+          {{"time", float_array(submap.keyframe_time)},
+           {"position", float_array(submap.keyframe_position)},
+           {"rotation", float_array(submap.keyframe_rotation)}}},
+         {"points", {{"position", float_array(submap.point_position)}, {"time", float_array(submap.point_time)}}}});
+  }
+  return list;
+}
+
+ordered_json report_rig(const camera::Rig& rig) {
+  ordered_json list = ordered_json::array();
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const camera::Camera& camera = rig.camera(c);
+    const double right = camera.width - 1, bottom = camera.height - 1;
+    ordered_json corners = ordered_json::array();
+    for (const Eigen::Vector2d& corner :
+         std::array<Eigen::Vector2d, 4>{Eigen::Vector2d{0, 0}, Eigen::Vector2d{right, 0},
+                                        Eigen::Vector2d{right, bottom}, Eigen::Vector2d{0, bottom}})
+      corners.push_back(number_list(ray_at_corner(camera, corner)));
+    const SE3& T_rig_cam = rig.rig_from_cam(c);
+    const Eigen::Quaterniond& q = T_rig_cam.rotation();
+    list.push_back({{"name", camera.name},
+                    {"model", std::visit([](const auto& model) { return model.kName; }, camera.model)},
+                    {"width", camera.width},
+                    {"height", camera.height},
+                    {"position", number_list(T_rig_cam.translation())},
+                    {"rotation", {q.x(), q.y(), q.z(), q.w()}},
+                    {"corners", corners}});
+  }
+  return list;
+}
+
+}  // namespace bslam::session

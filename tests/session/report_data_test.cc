@@ -1,0 +1,132 @@
+#include "session/report_data.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "evaluation/association.h"
+#include "evaluation/trajectory_file.h"
+#include "session/report_arrays.h"
+#include "session/report_map.h"
+#include "session/report_truth.h"
+#include "support/data_on_disk.h"
+#include "synthetic/rigs.h"
+
+namespace bslam::session {
+namespace {
+
+using geometry::SE3;
+using geometry::Vector3d;
+
+TEST(ReportArrays, AreBase64OfLittleEndianFloats) {
+  EXPECT_EQ(float_array({}).dump(), R"({"f32":""})");
+  EXPECT_EQ(float_array(std::vector<float>{1.0F}).dump(), R"({"f32":"AACAPw=="})");
+  EXPECT_EQ(float_array(std::vector<float>{1.0F, -2.0F}).dump(), R"({"f32":"AACAPwAAAMA="})");
+  EXPECT_EQ(float_array(std::vector<float>{1.0F, -2.0F, 0.5F}).dump(), R"({"f32":"AACAPwAAAMAAAAA/"})");
+}
+
+TEST(ReportArrays, AreThinnedToTheLimit) {
+  EXPECT_EQ(report_stride(0, 10), 1u);
+  EXPECT_EQ(report_stride(10, 10), 1u);
+  EXPECT_EQ(report_stride(11, 10), 2u);
+  EXPECT_EQ(report_stride(1'000'000, kMaxReportPoints), 10u);
+}
+
+// Poses of a camera that turns around the world's z axis, tilted downward.
+std::vector<SE3> turning_camera(double tilt, double turn) {
+  std::vector<SE3> poses;
+  for (int i = 0; i < 36; ++i) {
+    const Eigen::AngleAxisd yaw(turn * i / 36, Vector3d::UnitZ()), down(tilt, Vector3d::UnitX());
+    const Eigen::AngleAxisd forward(-std::numbers::pi / 2, Vector3d::UnitX());  // z of the camera is y of the world
+    poses.emplace_back(Eigen::Quaterniond(yaw * forward * down), Vector3d(std::cos(i), std::sin(i), 0));
+  }
+  return poses;
+}
+
+TEST(VerticalDirection, IsThatOfUprightImages) {
+  EXPECT_LT((vertical_direction({}) - Vector3d(0, -1, 0)).norm(), 1e-12);
+  EXPECT_LT((vertical_direction(turning_camera(0, 0)) - Vector3d::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((vertical_direction(turning_camera(0, 2 * std::numbers::pi)) - Vector3d::UnitZ()).norm(), 1e-12);
+}
+
+TEST(VerticalDirection, IsTheAxisAboutWhichATiltedCameraTurns) {
+  for (const double tilt : {-0.9, 0.9})
+    EXPECT_LT((vertical_direction(turning_camera(tilt, 2 * std::numbers::pi)) - Vector3d::UnitZ()).norm(), 1e-9);
+}
+
+TEST(ReportRig, LimitsTheRaysOfWideFieldsOfView) {
+  const auto rig = report_rig(synthetic::ring_rig(3, 240));
+  ASSERT_EQ(rig.size(), 3u);
+  for (const auto& camera : rig) {
+    ASSERT_EQ(camera["corners"].size(), 4u);
+    for (const auto& ray : camera["corners"]) EXPECT_LT(std::hypot(double(ray[0]), double(ray[1])), 3.0);
+  }
+}
+
+// A path along x, and its ground truth of the body in KITTI's or TUM's format.
+struct Path {
+  dataset::Dataset dataset{.name = "path",
+                           .format = dataset::DatasetFormat::kEuroc,
+                           .rig = synthetic::ring_rig(1, 240),
+                           .cameras_used = {0},
+                           .whole_rig = {},
+                           .first_time_ns = 1'000'000'000,
+                           .frames = {},
+                           .ground_truth = {},
+                           .warnings = {}};
+  evaluation::Trajectory poses;
+
+  Path() {
+    for (TimeNs i = 0; i < 20; ++i)
+      poses.push_back({1'000'000'000 + i * 100'000'000,
+                       SE3(Eigen::Quaterniond::Identity(), Vector3d(double(i), double(i % 3), 0))});
+  }
+};
+
+TEST(ReportTruth, IsNullWithoutGroundTruth) {
+  const Path path;
+  EXPECT_TRUE(report_truth(path.dataset, path.poses, true).is_null());
+}
+
+TEST(ReportTruth, ExplainsWhyItCannotBeUsed) {
+  const support::TemporaryFolder folder;
+  Path path;
+  path.dataset.ground_truth = folder.path() / "missing.tum";
+  EXPECT_NE(std::string(report_truth(path.dataset, path.poses, true)["error"]).find("missing.tum"), std::string::npos);
+  support::write_text(folder.path() / "elsewhere.tum", "500 0 0 0 0 0 0 1\n501 1 0 0 0 0 0 1\n");
+  path.dataset.ground_truth = folder.path() / "elsewhere.tum";
+  EXPECT_TRUE(report_truth(path.dataset, path.poses, true).contains("error"));
+}
+
+TEST(ReportTruth, IsMovedFromTheBodyToCamera0) {
+  const support::TemporaryFolder folder;
+  Path path;
+  const auto body = evaluation::moved_to_frame(path.poses, path.dataset.rig.body_from_cam(0).inverse());
+  support::write_text(folder.path() / "truth.tum", evaluation::tum_text(body, ""));
+  path.dataset.ground_truth = folder.path() / "truth.tum";
+  const auto truth = report_truth(path.dataset, path.poses, true);
+  EXPECT_EQ(truth["ate_m"]["count"], 20);
+  EXPECT_LT(double(truth["ate_m"]["rmse"]), 1e-6);
+  EXPECT_EQ(truth["file"], "truth.tum");
+
+  // Of unknown scale, the path agrees with the ground truth after alignment of the scale.
+  for (evaluation::TimedPose& pose : path.poses) pose.T_world_frame = geometry::scaled(pose.T_world_frame, 0.1);
+  const auto scaled = report_truth(path.dataset, path.poses, false);
+  EXPECT_LT(double(scaled["ate_m"]["rmse"]), 1e-6);
+  EXPECT_NEAR(double(scaled["scale"]), 10.0, 1e-6);
+}
+
+TEST(ReportTruth, CountsWhileTheRecordingWasProcessed) {
+  const support::TemporaryFolder folder;
+  Path path;
+  support::write_text(folder.path() / "truth.tum", evaluation::tum_text(path.poses, ""));
+  path.dataset.ground_truth = folder.path() / "truth.tum";
+  for (std::size_t i = 0; i < 10; ++i) path.dataset.frames.push_back({path.poses[i].time_ns, {}});
+  path.poses.resize(10);
+  EXPECT_NEAR(double(report_truth(path.dataset, path.poses, true)["coverage"]), 1.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace bslam::session
