@@ -83,7 +83,7 @@ solver::RigAdjustment adjust_weighted(solver::RigAdjustmentOptions options, solv
   const auto chi2 = solver::squared_errors(flat, flat.T_rig_world, flat.points, from.values);
   adjustment::apply_variances(adjustment::landmark_variances(flat, chi2, solver::beyond(chi2, solver::kChi2TwoDof95)),
                               flat);
-  options.robust_rounds = false;
+  options.start_is_estimate = true;
   solver::RigAdjustment out = solver::adjust_rig(flat, options, from.values, stop);
   if (!out.done) return from;
   out.scale_change *= from.scale_change;

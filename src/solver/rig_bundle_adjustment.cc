@@ -258,7 +258,7 @@ RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjustmentOption
   if (start) state.rig = std::move(*start);
   ReprojectionProblem scaled = problem;
   for (const Round& round : kRounds) {
-    if (round.kernel != Kernel::kNone && !options.robust_rounds) continue;
+    if (&round == &kRounds.front() && options.start_is_estimate) continue;
     if (!run_round(scaled, round, blocks, calibrated, options, stop, state, out)) return out;
     if (options.sigma_scale > 0) out.scale_change *= restore_scale(calibrated, scaled, state);
   }
