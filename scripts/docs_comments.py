@@ -1,0 +1,16 @@
+"""Filter for Doxygen: prints a header with its comments as documentation comments.
+
+The comment at the top describes the file, one before a declaration or after it on its line the declaration.
+"""
+import re
+import sys
+
+lines = open(sys.argv[1], encoding='utf-8').read().split('\n')
+for number, line in enumerate(lines):
+    if number == 0 and line.startswith('//'):
+        line = '/// \\file\n/// ' + line[2:].strip()
+    elif re.match(r'\s*//(\s|$)', line):
+        line = re.sub('//', '///', line, count=1)
+    elif not re.match(r'\s*(#|})', line):
+        line = re.sub(r'(\S)\s+// ', r'\1  ///< ', line, count=1)
+    print(line)

@@ -1,0 +1,58 @@
+"""Hooks of MkDocs for the documentation site (mkdocs.yml).
+
+Adds the pages of the root folder and the reference made by Doxygen, and adapts Markdown written for GitHub: a list needs a
+blank line before it, and drawings of docs/images/diagrams become part of the page, so that they have its colours.
+"""
+import os
+import pathlib
+import re
+
+from mkdocs.structure.files import File
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PAGES = {'ARCHITECTURE.md': 'architecture.md', 'CONTRIBUTING.md': 'contributing.md'}
+LIST_ITEM = re.compile(r'(?:[-*]|\d+\.) ')
+
+
+def with_local_links(text):
+    """The text of a page of the root folder, with links to pages of docs/ and to each other as they are in the site."""
+    text = re.sub(r'\]\(docs/', '](', text)
+    text = re.sub(r'`docs/([a-z_]+\.md)`', r'[\1](\1)', text)
+    for name, page in PAGES.items():
+        text = text.replace(f'`{name}`', f'[{name}]({page})').replace(f']({name})', f']({page})')
+    return text
+
+
+def on_files(files, config):
+    for name, page in PAGES.items():
+        files.append(File.generated(config, page, content=with_local_links((ROOT / name).read_text())))
+    reference = os.environ.get('BSLAM_REFERENCE')
+    if reference:
+        for path in sorted(pathlib.Path(reference).rglob('*')):
+            if path.is_file():
+                target = pathlib.PurePosixPath('reference', path.relative_to(reference).as_posix())
+                files.append(File.generated(config, str(target), abs_src_path=str(path)))
+    return files
+
+
+def with_blank_lines_before_lists(lines):
+    fenced, previous = False, ''
+    for line in lines:
+        if line.lstrip().startswith('```'):
+            fenced = not fenced
+        begins = LIST_ITEM.match(line) and previous.strip() and not LIST_ITEM.match(previous) and previous[0] != ' '
+        if begins and not fenced and not previous.startswith(('|', '#')):
+            yield ''
+        yield line
+        previous = line
+
+
+def with_diagrams(text):
+    def drawing(match):
+        svg = (ROOT / 'docs' / match.group(2)).read_text()
+        return f'<div class="diagram" role="img" aria-label="{match.group(1)}">{re.sub(chr(10), " ", svg)}</div>'
+    return re.sub(r'^!\[([^\]]*)\]\((images/diagrams/[^)]*\.svg)\)$', drawing, text, flags=re.MULTILINE)
+
+
+def on_page_markdown(markdown, page, config, files):
+    return with_diagrams('\n'.join(with_blank_lines_before_lists(markdown.split('\n'))))
