@@ -1,7 +1,8 @@
 """Hooks of MkDocs for the documentation site (mkdocs.yml).
 
 Adds the pages of the root folder and the reference made by Doxygen, and adapts Markdown written for GitHub: a list needs a
-blank line before it, and drawings of docs/images/diagrams become part of the page, so that they have its colours.
+blank line before it, `|` needs no backslash in code, and the text of a link is the title of a page instead of its file name.
+Drawings of docs/images/diagrams become part of the page, so that they have its colours.
 """
 import os
 import pathlib
@@ -54,5 +55,17 @@ def with_diagrams(text):
     return re.sub(r'^!\[([^\]]*)\]\((images/diagrams/[^)]*\.svg)\)$', drawing, text, flags=re.MULTILINE)
 
 
+def with_plain_bars(line):
+    return re.sub(r'`[^`]+`', lambda code: code.group(0).replace('\\|', '|'), line) if line.startswith('|') else line
+
+
+def with_titles(text, files):
+    def title(match):
+        file = files.get_file_from_path(match.group(1))
+        return f'[{file.page.title}]' if file and file.page and file.page.title else match.group(0)
+    return re.sub(r'\[([a-z_]+\.md)\](?=\(\1)', title, text)
+
+
 def on_page_markdown(markdown, page, config, files):
-    return with_diagrams('\n'.join(with_blank_lines_before_lists(markdown.split('\n'))))
+    lines = [with_plain_bars(line) for line in with_blank_lines_before_lists(markdown.split('\n'))]
+    return with_diagrams(with_titles('\n'.join(lines), files))

@@ -12,8 +12,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGE = (ROOT / 'docs/messages.md').read_text()
 # Strings of the sources below that are no messages of their own.
 NO_MESSAGES = {'more intervals', 'more intervals, see summary.json', 'and so on', 'keyframes', 'extrinsics check',
-               'with it as given', 'test against the images', '`bslam run` estimates them from the motion of the rig',
-               'there must be one entry per camera', '0123456789'}
+               'with it as given', 'with the calibration as given', 'test against the images', '0123456789',
+               '`bslam run` estimates them from the motion of the rig', 'there must be one entry per camera'}
 
 
 def literals(path):
