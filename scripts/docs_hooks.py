@@ -1,6 +1,6 @@
 """Hooks of MkDocs for the documentation site (mkdocs.yml).
 
-Adds the pages of the root folder and the reference made by Doxygen, and adapts Markdown written for GitHub: a list needs a
+Adds the pages of the root folder, the results of the README and the reference made by Doxygen, and adapts Markdown written for GitHub: a list needs a
 blank line before it, `|` needs no backslash in code, and the text of a link is the title of a page instead of its file name.
 Drawings of docs/images/diagrams become part of the page, so that they have its colours.
 """
@@ -27,6 +27,8 @@ def with_local_links(text):
 def on_files(files, config):
     for name, page in PAGES.items():
         files.append(File.generated(config, page, content=with_local_links((ROOT / name).read_text())))
+    results = re.search(r'^## (Results\n.*?)^## ', (ROOT / 'README.md').read_text(), re.MULTILINE | re.DOTALL)
+    files.append(File.generated(config, 'results.md', content='# ' + with_local_links(results.group(1))))
     reference = os.environ.get('BSLAM_REFERENCE')
     if reference:
         for path in sorted(pathlib.Path(reference).rglob('*')):
