@@ -4,7 +4,7 @@
 //   auto slam = bslam::System::create(*rig, bslam::Config());
 //   for (const bslam::ImageBundle& images : camera_driver) {
 //     auto frame = slam->process(images);
-//     if (frame && frame->tracking()) drive_to(frame->T_world_body);
+//     if (frame && frame->tracking()) publish_pose(frame->T_world_body);
 //   }
 //   slam->finish();
 //

@@ -142,7 +142,7 @@ def test_concurrent_call_is_an_error(recording):
     )
 
     def call_again():
-        with pytest.raises(bslam.Error, match="while another one is under way"):
+        with pytest.raises(bslam.Error, match="while another call is in progress"):
             system.trajectory()
         return system.map().num_keyframes  # may be called at any time
 

@@ -5,7 +5,8 @@
 namespace bslam::adjustment {
 namespace {
 
-// The fixed pose of the submap of `root` with the most observations, the older one on ties; -1 if there is none.
+// Returns the index of the fixed keyframe with the most observations among those of the submap whose root is `root`,
+// the older one on ties; -1 if there is none.
 int anchor_pose(const map::BundledMap& map, const BundleProblem& flat, std::span<const int> observations,
                 KeyframeId root) {
   int anchor = -1;
@@ -30,8 +31,9 @@ std::vector<int> poses_with_uncertainty(const Selection& selection, const Bundle
 PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundleProblem& flat, std::span<const int> poses,
                                      std::span<const std::optional<geometry::PoseUncertainty>> marginals,
                                      double correlated_observations) {
-  constexpr double kCutOff = solver::kFractionLeft / solver::kVarianceLeft;
-  const double factor = correlated_observations * kCutOff * kCutOff;
+  // The truncation at the bound of outliers biases both the noise and the information by this factor.
+  constexpr double kTruncation = solver::kFractionLeft / solver::kVarianceLeft;
+  const double factor = correlated_observations * kTruncation * kTruncation;
   std::vector<int> observations(flat.keyframes.size(), 0);
   for (const auto& o : flat.problem.observations) ++observations[static_cast<std::size_t>(o.pose)];
   PoseUncertainties out;

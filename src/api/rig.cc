@@ -25,7 +25,9 @@ Result<image::Image> read_mask(const camera::Camera& camera) {
   const auto bytes = read_file(camera.mask_file, kMaxMaskBytes);
   if (!bytes) return bytes.error();
   auto mask = image_files::is_complete_png(*bytes) ? image_files::decode_grey_png(*bytes) : std::nullopt;
-  if (!mask) return Error{camera.mask_file, "", "another kind of file", "an 8-bit grey PNG without interlacing"};
+  if (!mask)
+    return Error{camera.mask_file, "", "a damaged file or another format",
+                 "a complete 8-bit grey PNG without interlacing"};
   return image_files::checked_mask(*std::move(mask), camera);
 }
 
@@ -95,7 +97,7 @@ Result<Rig> Rig::make(const std::vector<CameraCalibration>& cameras) {
       if (calibration.name.empty()) calibration.name = fmt::format("cam{}", c);
       const std::string key = fmt::format("camera {} ({})", c, calibration.name);
       const bool taken = std::ranges::any_of(made, [&](const auto& m) { return m.camera.name == calibration.name; });
-      if (taken) return Error{"Rig::make", key, "the name of a camera before", "another name for each"};
+      if (taken) return Error{"Rig::make", key, "", "", "an earlier camera has this name; names must be unique"};
       auto camera = make_camera(calibration, key);
       if (!camera) return camera.error();
       made.push_back(std::move(camera->first));

@@ -21,27 +21,31 @@
 namespace bslam {
 namespace {
 
-// Holds the right to call for one thread at a time.
+// Tries, without waiting, to become the only running call of a System; converts to false if another call is in
+// progress.
 class Turn {
  public:
-  explicit Turn(std::atomic<bool>& taken) : taken_(taken), mine_(!taken.exchange(true)) {}
+  explicit Turn(std::atomic<bool>& in_progress) : in_progress_(in_progress), mine_(!in_progress.exchange(true)) {}
   ~Turn() {
-    if (mine_) taken_ = false;
+    if (mine_) in_progress_ = false;
   }
   Turn(const Turn&) = delete;
   Turn& operator=(const Turn&) = delete;
   explicit operator bool() const { return mine_; }
 
  private:
-  std::atomic<bool>& taken_;
+  std::atomic<bool>& in_progress_;
   const bool mine_;
 };
 
 Error out_of_turn(const char* name) {
-  return {name, "", "a call while another one is under way", "one thread at a time, and none from a callback"};
+  return {name, "", "", "",
+          "called while another call is in progress; call it from one thread at a time and not from a callback"};
 }
 
-Error moved_from(const char* name) { return {name, "", "a System that was moved from", "one that create() made"}; }
+Error moved_from(const char* name) {
+  return {name, "", "", "", "called on a System that was moved from; use the System that it was moved to"};
+}
 
 struct Resources {
   system::Resources for_system;
@@ -88,7 +92,7 @@ struct System::Impl {
   api::Notifier notifier;
   bool finished = false;
   std::optional<Error> failure;  // what ended the run
-  mutable std::atomic<bool> taken = false;
+  mutable std::atomic<bool> call_in_progress = false;
 };
 
 Result<FrameResult> System::Impl::process(const ImageBundle& bundle) {
@@ -101,7 +105,7 @@ Result<FrameResult> System::Impl::process(const ImageBundle& bundle) {
   }
   const auto images = reader.read(bundle);
   if (!images) return images.error();
-  bool refused = false;  // the frame was not taken, and the run goes on without it
+  bool refused = false;  // the frame was not accepted, and the run goes on without it
   auto frame = api::guarded("System::process", [&]() -> Result<FrameResult> {
     const auto record = system.process(*images);
     refused = !record.ok();
@@ -167,13 +171,13 @@ Result<System> System::create(const Rig& rig, const Config& config, Startup star
 
 Result<FrameResult> System::process(const ImageBundle& images) {
   if (!impl_) return moved_from("System::process");
-  const Turn turn(impl_->taken);
+  const Turn turn(impl_->call_in_progress);
   return turn ? impl_->process(images) : out_of_turn("System::process");
 }
 
 Status System::finish() {
   if (!impl_) return moved_from("System::finish");
-  const Turn turn(impl_->taken);
+  const Turn turn(impl_->call_in_progress);
   return turn ? impl_->finish() : out_of_turn("System::finish");
 }
 
@@ -192,7 +196,7 @@ Status System::save_map(const std::filesystem::path& file) const {
 
 Result<std::vector<Trajectory>> System::trajectories(RigFrame frame) const {
   if (!impl_) return moved_from("System::trajectories");
-  const Turn turn(impl_->taken);
+  const Turn turn(impl_->call_in_progress);
   if (!turn) return out_of_turn("System::trajectories");
   return api::guarded("System::trajectories", [&] { return impl_->trajectories(frame); });
 }

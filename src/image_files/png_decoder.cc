@@ -37,17 +37,17 @@ std::optional<Chunk> next_chunk(std::string_view& rest) {
   return chunk;
 }
 
-bool checksum_holds([[maybe_unused]] const Chunk& chunk) {
+bool checksum_holds(const Chunk& chunk) {
   return libdeflate_crc32(0, chunk.type.data(), chunk.type.size() + chunk.data.size()) == chunk.checksum;
 }
 
-constexpr std::uint32_t kMaxSidePx = 20000;
+constexpr std::uint32_t kMaxSidePx = 20000;  // as of a camera; bounds the memory that a damaged header can request
 
 struct Header {
   int width = 0, height = 0;
 };
 
-// Returns nullopt unless the image is 8-bit grey without interlacing.
+// Returns nullopt unless the image is 8-bit grey without interlacing, with sides from 1 to kMaxSidePx.
 std::optional<Header> read_header(const Chunk& chunk) {
   if (chunk.type != "IHDR" || chunk.data.size() != 13) return std::nullopt;
   const std::uint32_t width = big_endian(chunk.data.data()), height = big_endian(chunk.data.data() + 4);
@@ -119,7 +119,7 @@ bool is_complete_png(std::string_view bytes) {
   return false;
 }
 
-std::optional<image::Image> decode_grey_png([[maybe_unused]] std::string_view bytes) {
+std::optional<image::Image> decode_grey_png(std::string_view bytes) {
   bytes.remove_prefix(kSignature.size());
   const auto first = next_chunk(bytes);
   const auto header = first ? read_header(*first) : std::nullopt;

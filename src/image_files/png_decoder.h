@@ -8,13 +8,12 @@
 
 namespace bslam::image_files {
 
-// Returns true if the bytes are a PNG whose chunks are complete up to IEND and, if built with libdeflate, have correct
-// checksums.
+// Returns true if the bytes are a PNG whose chunks are complete up to IEND and have correct checksums.
 bool is_complete_png(std::string_view bytes);
 
 // Decodes an 8-bit grey PNG without interlacing at about twice the speed of libpng. `bytes` must have passed
-// is_complete_png. Returns nullopt for other kinds of PNG, for damaged data, and if built without libdeflate; the
-// caller then uses the general decoder.
+// is_complete_png. Returns nullopt for other kinds of PNG and for damaged data; the caller then uses the general
+// decoder.
 std::optional<image::Image> decode_grey_png(std::string_view bytes);
 
 }  // namespace bslam::image_files

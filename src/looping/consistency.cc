@@ -41,6 +41,7 @@ std::vector<Candidate> consistent_candidates(const map::BundledMap& map, Keyfram
   for (RecognitionHistory::Place& before : history.places) {
     const bool again =
         std::ranges::any_of(next.places, [&](const auto& p) { return intersect(p.keyframes, before.keyframes); });
+    // The next keyframe has a larger id, so only places within a smaller gap than the maximum can be continued.
     if (!again && keyframe.value() - before.last.value() < options.max_keyframe_gap)
       next.places.push_back(std::move(before));
   }

@@ -16,7 +16,7 @@ EssentialGraph essential_graph(const map::BundledMap& map, KeyframeId root, int 
   for (const KeyframeId k : map.keyframe_ids()) {
     if (map.root_of(k) == root) graph.keyframes.push_back(k);
   }
-  graph.problem.scale_free = map.scale() != map::Scale::kMetric;
+  graph.problem.free_scale = map.scale() != map::Scale::kMetric;
   for (const KeyframeId k : graph.keyframes) {
     graph.problem.S_world.emplace_back(map.keyframe(k).T_rig_world);
     graph.problem.fixed.push_back(k == root);

@@ -259,7 +259,7 @@ bool close_loop(const LoopClosure& closure, const PlaceMatch& place_match, const
   std::vector<SE3> T_window;
   for (const KeyframeId k : window)
     T_window.push_back(pose_of(graph.problem.S_world[static_cast<std::size_t>(graph.vertex(k))]));
-  if (closure.reprojection_error_px <= options.max_bundle_error_px && !graph.problem.scale_free) {
+  if (closure.reprojection_error_px <= options.max_bundle_error_px && !graph.problem.free_scale) {
     // The error is small enough for bundle adjustment to remove it, starting from the present map. The pose verified
     // for a single keyframe is no more accurate than the map.
     fuse(window, T_window, closure, place_match, options, features, draft);

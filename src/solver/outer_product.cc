@@ -9,14 +9,11 @@ namespace {
 
 using Vector4 = double __attribute__((vector_size(32)));
 
-}  // namespace
-
-// Two columns of S are 12 consecutive numbers, which are three vectors.
-BSLAM_VECTORISED void subtract_outer_product(const Eigen::Matrix<double, 6, 3>& Ua,
-                                             const Eigen::Matrix<double, 6, 3>& Ub, double* S) {
+// Two columns of S are 12 consecutive numbers, which are three vectors. Both U are column-major.
+BSLAM_VECTORISED void subtract(const double* Ua, const double* Ub, double* S) {
   Vector4 a[3][3];  // per column of U_a: the rows 0 to 3, 4 to 1, and 2 to 5
   for (int k = 0; k < 3; ++k) {
-    const double* u = Ua.data() + 6 * k;
+    const double* u = Ua + 6 * k;
     a[k][0] = Vector4{u[0], u[1], u[2], u[3]};
     a[k][1] = Vector4{u[4], u[5], u[0], u[1]};
     a[k][2] = Vector4{u[2], u[3], u[4], u[5]};
@@ -24,7 +21,7 @@ BSLAM_VECTORISED void subtract_outer_product(const Eigen::Matrix<double, 6, 3>& 
   for (int j = 0; j < 6; j += 2) {
     Vector4 sum[3];
     for (int k = 0; k < 3; ++k) {
-      const double left = Ub.data()[6 * k + j], right = Ub.data()[6 * k + j + 1];
+      const double left = Ub[6 * k + j], right = Ub[6 * k + j + 1];
       const Vector4 b[3] = {Vector4{left, left, left, left}, Vector4{left, left, right, right},
                             Vector4{right, right, right, right}};
       for (int v = 0; v < 3; ++v) sum[v] = k == 0 ? a[k][v] * b[v] : sum[v] + a[k][v] * b[v];
@@ -36,6 +33,12 @@ BSLAM_VECTORISED void subtract_outer_product(const Eigen::Matrix<double, 6, 3>& 
       std::memcpy(S + 6 * j + 4 * v, &s, sizeof s);
     }
   }
+}
+
+}  // namespace
+
+void subtract_outer_product(const Eigen::Matrix<double, 6, 3>& Ua, const Eigen::Matrix<double, 6, 3>& Ub, double* S) {
+  subtract(Ua.data(), Ub.data(), S);
 }
 
 }  // namespace bslam::solver

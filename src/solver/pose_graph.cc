@@ -230,17 +230,17 @@ void check(const PoseGraphProblem& problem) {
     BSLAM_ASSERT(edge.a >= 0 && edge.a < count && edge.b >= 0 && edge.b < count,
                  "an edge must refer to vertices of the graph");
     BSLAM_ASSERT(edge.a != edge.b && edge.weight > 0, "an edge must have two different vertices and a positive weight");
-    BSLAM_ASSERT(problem.scale_free || rigid(edge.S_a_b), "measured scales must be 1 unless the scale is free");
+    BSLAM_ASSERT(problem.free_scale || rigid(edge.S_a_b), "measured scales must be 1 unless the scale is free");
   }
   for (const Sim3& S : problem.S_world)
-    BSLAM_ASSERT(problem.scale_free || rigid(S), "scales must be 1 unless the scale is free");
+    BSLAM_ASSERT(problem.free_scale || rigid(S), "scales must be 1 unless the scale is free");
 }
 
 }  // namespace
 
 LmSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop) {
   check(problem);
-  return problem.scale_free ? optimise_with<7>(problem, options, stop) : optimise_with<6>(problem, options, stop);
+  return problem.free_scale ? optimise_with<7>(problem, options, stop) : optimise_with<6>(problem, options, stop);
 }
 
 }  // namespace bslam::solver

@@ -23,7 +23,7 @@ struct PoseGraphProblem {
   std::vector<std::uint8_t> fixed;      // per vertex
   std::vector<Edge> edges;              // there may be several edges between two vertices
   // False: all scales must be 1 and are constant; 6 unknowns per vertex. True: 7 unknowns per vertex.
-  bool scale_free = false;
+  bool free_scale = false;
 };
 
 struct PoseGraphOptions {

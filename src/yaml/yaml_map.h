@@ -17,8 +17,9 @@ namespace bslam::yaml {
 // type, and numbers that are not finite.
 class YamlMap {
  public:
-  // Parses a document whose root is a map or that is empty. A first line `%YAML:1.0`, which OpenCV and EuRoC write
-  // although it is not valid YAML, is ignored. Syntax errors name the line.
+  // Parses `text`, a document that is empty or whose root is a map. `file` is its name in errors and is not read. A
+  // first line `%YAML:1.0`, which OpenCV and EuRoC write although it is not valid YAML, is ignored. Syntax errors name
+  // the line.
   static Result<YamlMap> parse(const std::filesystem::path& file, std::string text);
 
   // Returns true if the key is present and its value is not null.

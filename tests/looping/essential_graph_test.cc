@@ -66,9 +66,9 @@ TEST(EssentialGraph, HasZeroResidualsAtTheCurrentPosesAndFixesOnlyTheRoot) {
 
 TEST(EssentialGraph, OptimisesTheScaleIfItIsNotObservable) {
   map::BundledMap map = map_without_drift(1).map;
-  EXPECT_FALSE(essential_graph(map, KeyframeId(0), 60).problem.scale_free);
+  EXPECT_FALSE(essential_graph(map, KeyframeId(0), 60).problem.free_scale);
   map.set_scale(map::Scale::kUpToScale);
-  EXPECT_TRUE(essential_graph(map, KeyframeId(0), 60).problem.scale_free);
+  EXPECT_TRUE(essential_graph(map, KeyframeId(0), 60).problem.free_scale);
 }
 
 TEST(EssentialGraph, ExcludesOtherSubmapsAndRemovedKeyframes) {

@@ -19,10 +19,10 @@ using geometry::Vector7d;
 
 constexpr bool kScaleFree = true, kRigid = false;
 
-Vector7d noise(Random& random, const PoseGraphOptions& sigma, bool scale_free) {
+Vector7d noise(Random& random, const PoseGraphOptions& sigma, bool free_scale) {
   Vector7d out;
   for (int k = 0; k < 7; ++k) out(k) = random.normal() * (k < 3 ? sigma.sigma_rotation : sigma.sigma_translation);
-  out(6) = scale_free ? sigma.sigma_log_scale * random.normal() : 0.0;
+  out(6) = free_scale ? sigma.sigma_log_scale * random.normal() : 0.0;
   return out;
 }
 
@@ -34,10 +34,10 @@ struct Circle {
   std::vector<Sim3> truth;
 };
 
-Circle make_circle(int count, int neighbours, bool closed, bool scale_free, double noise_factor, Random& random,
+Circle make_circle(int count, int neighbours, bool closed, bool free_scale, double noise_factor, Random& random,
                    double scale_drift = 0.0) {
   Circle out;
-  out.problem.scale_free = scale_free;
+  out.problem.free_scale = free_scale;
   const PoseGraphOptions sigma;
   for (int i = 0; i < count; ++i) {
     const double yaw = 2 * std::numbers::pi * i / count;
@@ -48,7 +48,7 @@ Circle make_circle(int count, int neighbours, bool closed, bool scale_free, doub
   }
   const auto link = [&](int a, int b, double log_scale) {
     const auto& S = out.truth;
-    Vector7d off = noise_factor * noise(random, sigma, scale_free);
+    Vector7d off = noise_factor * noise(random, sigma, free_scale);
     off(6) += log_scale;
     const Sim3 S_a_b = S[static_cast<std::size_t>(a)] * S[static_cast<std::size_t>(b)].inverse() * Sim3::exp(off);
     out.problem.edges.push_back({a, b, S_a_b, 1.0});
@@ -82,12 +82,12 @@ void expect_equal(const Sim3& x, const Sim3& y) {
 }
 
 TEST(PoseGraph, RecoversTruthFromExactEdges) {
-  for (const bool scale_free : {kRigid, kScaleFree}) {
+  for (const bool free_scale : {kRigid, kScaleFree}) {
     Random random(1);
-    Circle circle = make_circle(60, 3, true, scale_free, 0.0, random);
+    Circle circle = make_circle(60, 3, true, free_scale, 0.0, random);
     for (std::size_t i = 1; i < circle.truth.size(); ++i) {
       Vector7d off;
-      off << scene::random_twist(random, 0.3, 1.0), scale_free ? random.uniform(-0.3, 0.3) : 0.0;
+      off << scene::random_twist(random, 0.3, 1.0), free_scale ? random.uniform(-0.3, 0.3) : 0.0;
       circle.problem.S_world[i] = circle.problem.S_world[i].perturbed(off);
     }
     const LmSummary summary = optimise(circle.problem, {});
@@ -129,14 +129,14 @@ TEST(PoseGraph, ClosesALoopWithScaleDrift) {
 
 // At the minimum twice the cost follows a chi-square with residuals less unknowns degrees of freedom.
 TEST(PoseGraph, FinalCostMatchesTheNoise) {
-  for (const bool scale_free : {kRigid, kScaleFree}) {
+  for (const bool free_scale : {kRigid, kScaleFree}) {
     Random random(4);
     double sum = 0.0, dof = 0.0;
     for (int trial = 0; trial < 5; ++trial) {
-      Circle circle = make_circle(100, 4, true, scale_free, 1.0, random);
+      Circle circle = make_circle(100, 4, true, free_scale, 1.0, random);
       const LmSummary summary = optimise(circle.problem, {});
       sum += 2 * summary.final_cost;
-      dof += (scale_free ? 7.0 : 6.0) * static_cast<double>(circle.problem.edges.size() - circle.truth.size() + 1);
+      dof += (free_scale ? 7.0 : 6.0) * static_cast<double>(circle.problem.edges.size() - circle.truth.size() + 1);
     }
     EXPECT_NEAR(sum / dof, 1.0, 4 * std::sqrt(2 / dof) + 0.01);
   }
@@ -217,9 +217,9 @@ TEST(PoseGraph, StopsOnAStopRequest) {
 }
 
 TEST(PoseGraph, IsDeterministic) {
-  for (const bool scale_free : {kRigid, kScaleFree}) {
+  for (const bool free_scale : {kRigid, kScaleFree}) {
     Random random(10);
-    Circle circle = make_circle(80, 3, true, scale_free, 1.0, random);
+    Circle circle = make_circle(80, 3, true, free_scale, 1.0, random);
     PoseGraphProblem again = circle.problem;
     EXPECT_EQ(optimise(circle.problem, {}).final_cost, optimise(again, {}).final_cost);
     for (std::size_t i = 0; i < 80; ++i) expect_equal(circle.problem.S_world[i], again.S_world[i]);
@@ -296,7 +296,7 @@ double solve_by_ceres(PoseGraphProblem& problem, const PoseGraphOptions& options
                                    parameters[static_cast<std::size_t>(edge.b)].data());
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!problem.scale_free) {
+    if (!problem.free_scale) {
       ceres_problem.SetManifold(parameters[i].data(), new ceres::SubsetManifold(7, std::vector<int>{6}));
     }
     if (problem.fixed[i] != 0) ceres_problem.SetParameterBlockConstant(parameters[i].data());
@@ -316,9 +316,9 @@ double solve_by_ceres(PoseGraphProblem& problem, const PoseGraphOptions& options
 }
 
 TEST(PoseGraph, ReachesTheSameMinimumAsCeres) {
-  for (const bool scale_free : {kRigid, kScaleFree}) {
+  for (const bool free_scale : {kRigid, kScaleFree}) {
     Random random(11);
-    Circle circle = make_circle(40, 3, true, scale_free, 2.0, random, scale_free ? 0.01 : 0.0);
+    Circle circle = make_circle(40, 3, true, free_scale, 2.0, random, free_scale ? 0.01 : 0.0);
     for (auto& edge : circle.problem.edges) edge.weight = random.uniform(0.2, 3.0);
     PoseGraphProblem reference = circle.problem;
     PoseGraphOptions options;
@@ -336,12 +336,12 @@ TEST(PoseGraph, ReachesTheSameMinimumAsCeres) {
 
 // Gauss-Newton with exact Jacobians converges quadratically; with a wrong Jacobian it would need many steps.
 TEST(PoseGraph, NeedsFewStepsFromAPoorInitialGraph) {
-  for (const bool scale_free : {kRigid, kScaleFree}) {
+  for (const bool free_scale : {kRigid, kScaleFree}) {
     Random random(12);
-    Circle circle = make_circle(100, 3, true, scale_free, 1.0, random);
+    Circle circle = make_circle(100, 3, true, free_scale, 1.0, random);
     for (std::size_t i = 1; i < 100; ++i) {
       Vector7d off;
-      off << scene::random_twist(random, 0.2, 0.5), scale_free ? random.uniform(-0.2, 0.2) : 0.0;
+      off << scene::random_twist(random, 0.2, 0.5), free_scale ? random.uniform(-0.2, 0.2) : 0.0;
       circle.problem.S_world[i] = circle.problem.S_world[i].perturbed(off);
     }
     PoseGraphOptions options;
