@@ -12,10 +12,10 @@ using geometry::Sim3;
 
 // range(0) vertices on two laps of a circle, with edges from every vertex to the four previous ones and, in the second
 // lap, to the vertex at the same position of the first lap. The initial values are the concatenated odometry.
-PoseGraphProblem loop(int count, bool scale_free) {
+PoseGraphProblem loop(int count, bool free_scale) {
   Random random(1);
   PoseGraphProblem problem;
-  problem.scale_free = scale_free;
+  problem.free_scale = free_scale;
   std::vector<Sim3> truth;
   for (int i = 0; i < count; ++i) {
     const double yaw = 4 * std::numbers::pi * i / count;
@@ -24,7 +24,7 @@ PoseGraphProblem loop(int count, bool scale_free) {
   }
   const auto link = [&](int a, int b) {
     geometry::Vector7d off;
-    off << scene::random_twist(random, 0.005, 0.02), scale_free ? 0.005 * random.normal() : 0.0;
+    off << scene::random_twist(random, 0.005, 0.02), free_scale ? 0.005 * random.normal() : 0.0;
     const auto& S_a_world = truth[static_cast<std::size_t>(a)];
     problem.edges.push_back({a, b, S_a_world * truth[static_cast<std::size_t>(b)].inverse() * Sim3::exp(off), 1.0});
   };
@@ -42,8 +42,8 @@ PoseGraphProblem loop(int count, bool scale_free) {
   return problem;
 }
 
-void pose_graph(benchmark::State& state, bool scale_free) {
-  const PoseGraphProblem start = loop(static_cast<int>(state.range(0)), scale_free);
+void pose_graph(benchmark::State& state, bool free_scale) {
+  const PoseGraphProblem start = loop(static_cast<int>(state.range(0)), free_scale);
   LmSummary summary;
   for (auto _ : state) {
     PoseGraphProblem problem = start;
@@ -54,7 +54,7 @@ void pose_graph(benchmark::State& state, bool scale_free) {
   state.counters["steps"] = summary.iterations;
 }
 BENCHMARK_CAPTURE(pose_graph, rigid, false)->Arg(1000)->Arg(4000)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(pose_graph, scale_free, true)->Arg(1000)->Arg(4000)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(pose_graph, free_scale, true)->Arg(1000)->Arg(4000)->Unit(benchmark::kMillisecond);
 
 // 130 observations; range(0): number of cameras, range(1): percentage of outliers.
 void absolute(benchmark::State& state, scene::Models models) {
