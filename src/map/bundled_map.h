@@ -175,8 +175,8 @@ class BundledMap {
 
  private:
   BundledKeyframe& edit(KeyframeId k) { return keyframes_.mutate(k.index(), owner_.tag()); }
-  void refresh_descriptor(LandmarkId l);  // does nothing if the observations have not changed since its last call
   Landmark& edit(LandmarkId l) { return landmarks_.mutate(l.index(), owner_.tag()); }
+  void refresh_descriptor(LandmarkId l);  // does nothing if the observations have not changed since its last call
   geometry::SE3 rig_from_cam(const BundledKeyframe& k, CameraIndex c) const;
   std::size_t num_keypoints(Observation o) const {
     return keyframe(o.keyframe).frame->bundled.keypoints(o.feature).size();

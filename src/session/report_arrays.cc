@@ -1,5 +1,6 @@
 #include "session/report_arrays.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <string>
@@ -23,6 +24,10 @@ std::string base64(std::string_view bytes) {
 }
 
 }  // namespace
+
+std::size_t report_stride(std::size_t count, std::size_t limit) {
+  return std::max<std::size_t>(1, (count + limit - 1) / limit);
+}
 
 nlohmann::ordered_json float_array(std::span<const float> values) {
   static_assert(std::endian::native == std::endian::little);

@@ -103,10 +103,6 @@ Vector3d ray_at_corner(const camera::Camera& camera, const Eigen::Vector2d& corn
 
 }  // namespace
 
-std::size_t report_stride(std::size_t count, std::size_t limit) {
-  return std::max<std::size_t>(1, (count + limit - 1) / limit);
-}
-
 Vector3d vertical_direction(std::span<const SE3> T_world_rig) {
   constexpr double kAlmostAsConstant = 0.9;
   const Vector3d up_rig(0, -1, 0);  // y points downward in an image

@@ -1,7 +1,6 @@
 // The map and the rig as data of the report.
 #pragma once
 
-#include <cstddef>
 #include <nlohmann/json.hpp>
 #include <span>
 
@@ -10,12 +9,6 @@
 #include "system/system.h"
 
 namespace bslam::session {
-
-inline constexpr std::size_t kMaxReportPoints = 100'000;  // landmarks in the report
-inline constexpr std::size_t kMaxReportPoses = 20'000;    // poses and frames in the report
-
-// Returns a number n so that every n-th of `count` things are at most `limit`.
-std::size_t report_stride(std::size_t count, std::size_t limit);
 
 // The direction in the world that is vertical, if the rig stands or moves upright: the upward direction of camera 0's
 // images, unless another direction of the camera is clearly more constant over the keyframes.

@@ -6,7 +6,6 @@
 #include "evaluation/trajectory_error.h"
 #include "evaluation/trajectory_file.h"
 #include "session/report_arrays.h"
-#include "session/report_map.h"
 
 namespace bslam::session {
 namespace {

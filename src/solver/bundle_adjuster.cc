@@ -38,16 +38,16 @@ std::vector<std::uint8_t> thinned_out(const ReprojectionProblem& problem, const 
   return out;
 }
 
-// The effect of the deviation of the rig on the poses: (6 x columns of the deviation) for each. It is a ratio of two
-// quantities that grow in the same way with the number of points, so that some of them suffice.
-std::vector<std::optional<geometry::PoseUncertainty>> effect_of_rig(
+// The effect of the deviation of the rig on the poses. It is a ratio of two quantities that grow in the same way with
+// the number of points, so that some of them suffice.
+std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_of_rig(
     const ReprojectionProblem& problem, const BundleStructure& structure, const BundleOptions& options, Kernel kernel,
     const BundleState& state, const std::vector<double>& chi2, std::span<const std::uint8_t> skip) {
   const BundleStructure some = make_structure(problem, chi2, thinned_out(problem, structure, skip));
   const RigBlocks calibration = calibration_blocks(state.rig);
   BundleEquations equations(problem, some, calibration, kernel, options.dense_poses, state);
   equations.linearise();
-  return equations.pose_uncertainties(options.marginals, *options.rig_deviation);
+  return equations.rig_effects(options.marginals, *options.rig_deviation);
 }
 
 // The uncertainty of the poses at the values of `adjusted`, whose rig is constant.
@@ -55,12 +55,13 @@ std::vector<std::optional<geometry::PoseUncertainty>> uncertainties_of(
     const ReprojectionProblem& problem, const BundleStructure& structure, const BundleOptions& options, Kernel kernel,
     const std::vector<double>& chi2, std::span<const std::uint8_t> skip, BundleEquations& adjusted) {
   if (options.marginals.empty()) return {};
-  auto out = adjusted.pose_uncertainties(options.marginals, Eigen::MatrixXd(0, 0));
-  if (!options.rig_deviation) return out;
-  const auto effect = effect_of_rig(problem, structure, options, kernel, adjusted.state(), chi2, skip);
+  const auto noise = adjusted.pose_covariances(options.marginals);
+  std::vector<std::optional<geometry::PoseUncertainty::Effect>> effect(noise.size(),
+                                                                       geometry::PoseUncertainty::Effect(6, 0));
+  if (options.rig_deviation) effect = effects_of_rig(problem, structure, options, kernel, adjusted.state(), chi2, skip);
+  std::vector<std::optional<geometry::PoseUncertainty>> out(noise.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
-    if (out[i] && effect[i]) out[i]->calibration = effect[i]->calibration;
-    if (!effect[i]) out[i].reset();
+    if (noise[i] && effect[i]) out[i] = geometry::PoseUncertainty{*noise[i], *effect[i]};
   }
   return out;
 }

@@ -259,23 +259,39 @@ std::optional<Eigen::MatrixXd> BundleEquations::rig_information() {
   return system_.rig_information();
 }
 
-std::vector<std::optional<geometry::PoseUncertainty>> BundleEquations::pose_uncertainties(
-    std::span<const int> poses, const Eigen::MatrixXd& rig_deviation) {
-  std::vector<std::optional<geometry::PoseUncertainty>> out(poses.size());
+int BundleEquations::slot_of(int pose) const {
+  const auto slot = std::ranges::find(structure_.pose_of_slot, pose);
+  return slot == structure_.pose_of_slot.end() ? -1 : static_cast<int>(slot - structure_.pose_of_slot.begin());
+}
+
+std::vector<std::optional<geometry::Matrix6d>> BundleEquations::pose_covariances(std::span<const int> poses) {
+  std::vector<std::optional<Matrix6d>> out(poses.size());
   if (!reduce(kInformationDamping).factorise()) return out;
   std::vector<int> slots;
   std::vector<std::size_t> asked;  // position of each slot in `poses`
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const auto slot = std::find(structure_.pose_of_slot.begin(), structure_.pose_of_slot.end(), poses[i]);
-    if (slot == structure_.pose_of_slot.end()) continue;
-    slots.push_back(static_cast<int>(slot - structure_.pose_of_slot.begin()));
+    const int slot = slot_of(poses[i]);
+    if (slot < 0) continue;
+    slots.push_back(slot);
     asked.push_back(i);
   }
-  const std::vector<Matrix6d> noise = system_.pose_covariances(slots);
-  const Eigen::MatrixXd effect = system_.rig_sensitivity() * rig_deviation;
+  const std::vector<geometry::Matrix6d> covariances = system_.pose_covariances(slots);
   for (std::size_t i = 0; i < slots.size(); ++i) {
-    const geometry::PoseUncertainty found{noise[i], effect.middleRows<6>(system_.frames().offset(slots[i]))};
-    if (found.covariance().allFinite()) out[asked[i]] = found;
+    if (covariances[i].allFinite()) out[asked[i]] = covariances[i];
+  }
+  return out;
+}
+
+std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rig_effects(
+    std::span<const int> poses, const Eigen::MatrixXd& rig_deviation) {
+  std::vector<std::optional<geometry::PoseUncertainty::Effect>> out(poses.size());
+  if (!reduce(kInformationDamping).factorise()) return out;
+  const Eigen::MatrixXd effect = system_.rig_sensitivity() * rig_deviation;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const int slot = slot_of(poses[i]);
+    if (slot < 0) continue;
+    const auto of_pose = effect.middleRows<6>(system_.frames().offset(slot));
+    if (of_pose.allFinite()) out[i] = of_pose;
   }
   return out;
 }

@@ -51,11 +51,12 @@ class BundleEquations {
   // if it is singular.
   std::optional<Eigen::MatrixXd> rig_information();
 
-  // Uncertainty of each of these poses at the last linearise(), with all other poses and points marginalised out, given
-  // a rig whose unknowns have the error rig_deviation z, z ~ N(0, I); (0, 0) without rig blocks. Nullopt if the pose is
-  // not a variable or the equations are singular.
-  std::vector<std::optional<geometry::PoseUncertainty>> pose_uncertainties(std::span<const int> poses,
-                                                                           const Eigen::MatrixXd& rig_deviation);
+  // Of each of these poses at the last linearise(), with all other poses and points marginalised out: the covariance
+  // for a rig that is exact, and the effect of a rig whose unknowns have the error rig_deviation z, z ~ N(0, I).
+  // Nullopt if the pose is not a variable or the equations are singular.
+  std::vector<std::optional<geometry::Matrix6d>> pose_covariances(std::span<const int> poses);
+  std::vector<std::optional<geometry::PoseUncertainty::Effect>> rig_effects(std::span<const int> poses,
+                                                                            const Eigen::MatrixXd& rig_deviation);
 
   struct PoseBlock {
     Matrix6d H;  // lower triangle
@@ -85,6 +86,7 @@ class BundleEquations {
   };
 
   void set_poses(const BundleState& state);
+  int slot_of(int pose) const;  // -1 if the pose is not a variable
   const Rigid& cam_from_rig(int pose, int camera) const {
     return cam_from_rig_[static_cast<std::size_t>(pose) * cameras_ + static_cast<std::size_t>(camera)];
   }
