@@ -2,11 +2,8 @@
 
 #include <bit>
 #include <cstdint>
-#include <string>
-#include <string_view>
 
 namespace bslam::session {
-namespace {
 
 std::string base64(std::string_view bytes) {
   constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -21,8 +18,6 @@ std::string base64(std::string_view bytes) {
   }
   return text;
 }
-
-}  // namespace
 
 nlohmann::ordered_json float_array(std::span<const float> values) {
   static_assert(std::endian::native == std::endian::little);

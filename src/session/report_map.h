@@ -11,8 +11,12 @@
 
 namespace bslam::session {
 
-inline constexpr std::size_t kMaxReportPoints = 100'000;  // landmarks in the report
-inline constexpr std::size_t kMaxReportPoses = 20'000;    // poses and frames in the report
+inline constexpr std::size_t kMaxReportPoses = 20'000;
+
+// Beyond these numbers landmarks, and poses and frames, are thinned out.
+struct ReportLimits {
+  std::size_t points = 100'000, poses = kMaxReportPoses;
+};
 
 // Returns a number n so that every n-th of `count` things are at most `limit`.
 std::size_t report_stride(std::size_t count, std::size_t limit);
@@ -22,9 +26,9 @@ std::size_t report_stride(std::size_t count, std::size_t limit);
 geometry::Vector3d vertical_direction(std::span<const geometry::SE3> T_world_rig);
 
 // One entry per submap, in its own world frame: first those of the trajectories in their order, then those without
-// poses. Landmarks are thinned out if there are more than kMaxReportPoints. Times are in seconds since `first_time_ns`.
+// poses. Times are in seconds since `first_time_ns`.
 nlohmann::ordered_json report_submaps(const map::BundledMap& map, std::span<const system::SubmapTrajectory> paths,
-                                      TimeNs first_time_ns);
+                                      TimeNs first_time_ns, const ReportLimits& limits = {});
 
 // Per camera: name, model, image size, pose in the rig, and the rays of the image's corners at depth 1. The rays of a
 // field of view that is too wide to be drawn are limited.
