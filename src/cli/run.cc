@@ -164,6 +164,17 @@ void print_after(const session::RunRecord& record, const dataset::Dataset& datas
   print_result(record, arguments.out);
 }
 
+session::SessionOptions session_options(const RunArguments& arguments, const system::Config& config,
+                                        const Interruption& interruption) {
+  session::SessionOptions options;
+  options.config = config;
+  options.pace = arguments.pace == "realtime" ? session::Pace::kRealtime : session::Pace::kFast;
+  options.late = arguments.late == "drop" ? session::Late::kDrop : session::Late::kBlock;
+  options.start_up_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - g_program_start).count();
+  options.interrupted = interruption.token();
+  return options;
+}
+
 int run(const RunArguments& arguments) {
   // Created first: once the output folder exists, an interruption ends the run with complete output files.
   const Interruption interruption;
@@ -184,19 +195,15 @@ int run(const RunArguments& arguments) {
     if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return report_error(s.error());
   }
   session::RunControl control(arguments.pace == "realtime" ? 1.0 : 0.0);
-  auto view = start_view(arguments.view, {*dataset, *config, arguments.command, *map ? (*map)->keyframe_slots() : 0}, control);
+  auto view =
+      start_view(arguments.view, {*dataset, *config, arguments.command, *map ? (*map)->keyframe_slots() : 0}, control);
   if (!view) return report_error(view.error());
   if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
   if (*view) std::fprintf(stderr, "view: %s\n", (*view)->url().c_str());
   print_before(*dataset, log_verbosity(arguments.log_level));
 
   ProgressBar bar(arguments.progress == "auto", "frames");
-  session::SessionOptions options;
-  options.config = *config;
-  options.pace = arguments.pace == "realtime" ? session::Pace::kRealtime : session::Pace::kFast;
-  options.late = arguments.late == "drop" ? session::Late::kDrop : session::Late::kBlock;
-  options.start_up_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - g_program_start).count();
-  options.interrupted = interruption.token();
+  session::SessionOptions options = session_options(arguments, *config, interruption);
   options.replay = std::move(*replay);
   options.vocabulary = *vocabulary;
   options.map = std::move(*map);
@@ -220,6 +227,15 @@ std::string command_of(std::span<const char* const> command_line) {
   std::vector<std::string> words(command_line.begin(), command_line.end());
   if (!words.empty()) words.front() = std::filesystem::path(words.front()).filename();
   return shell_command(words);
+}
+
+void add_map_options(CLI::App& verb, RunArguments& a) {
+  verb.add_option("--save-map", a.save_map, "save the final map to this file");
+  verb.add_option("--load-map", a.load_map, "saved map to continue after relocalising in it");
+  verb.add_flag("--localize-only", a.localize_only, "localise in the loaded map without changing it");
+  verb.add_option("--vocabulary", a.vocabulary,
+                  "vocabulary for place recognition, in bslam or DBoW2 text format; default: the vocabulary shipped "
+                  "with this program");
 }
 
 }  // namespace
@@ -247,12 +263,7 @@ void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit
       ->check(CLI::IsMember({"block", "drop"}))
       ->capture_default_str();
   verb->add_flag("--no-loop", a->no_loop, "disable loop closing; relocalisation stays enabled");
-  verb->add_option("--save-map", a->save_map, "save the final map to this file");
-  verb->add_option("--load-map", a->load_map, "saved map to continue after relocalising in it");
-  verb->add_flag("--localize-only", a->localize_only, "localise in the loaded map without changing it");
-  verb->add_option("--vocabulary", a->vocabulary,
-                   "vocabulary for place recognition, in bslam or DBoW2 text format; default: the vocabulary shipped "
-                   "with this program");
+  add_map_options(*verb, *a);
   verb->add_flag("--no-final-ba", a->no_final_ba, "skip the global bundle adjustment at the end");
   verb->add_flag("--no-report", a->no_report, "do not write report.html, the page that shows the run in a browser");
   add_view_options(*verb, a->view);

@@ -22,10 +22,10 @@ std::string small_jpeg(const image::ImageView& image, int max_width) {
   const std::unique_ptr<void, int (*)(tjhandle)> encoder(tjInitCompress(), tjDestroy);
   unsigned char* bytes = nullptr;
   unsigned long size = 0;
-  const int failed =
-      !encoder ? -1
-               : tjCompress2(encoder.get(), small.data, small.cols, static_cast<int>(small.step), small.rows, TJPF_GRAY,
-                             &bytes, &size, TJSAMP_GRAY, kQuality, TJFLAG_FASTDCT);
+  const int failed = !encoder
+                         ? -1
+                         : tjCompress2(encoder.get(), small.data, small.cols, static_cast<int>(small.step), small.rows,
+                                       TJPF_GRAY, &bytes, &size, TJSAMP_GRAY, kQuality, TJFLAG_FASTDCT);
   const std::unique_ptr<unsigned char, void (*)(unsigned char*)> owned(bytes, tjFree);
   if (failed != 0) return {};
   return {reinterpret_cast<const char*>(bytes), size};

@@ -86,8 +86,11 @@ nlohmann::ordered_json LiveRecord::run_json(const map::BundledMap& map, const St
   record_.map = session::map_record(map, loaded_keyframes_ > 0);
   record_.submaps.clear();
   for (const system::SubmapTrajectory& s : submaps) {
-    record_.submaps.push_back({static_cast<std::int64_t>(s.poses.size()), seconds(s.poses.front().time_ns),
-                               seconds(s.poses.back().time_ns), {}, s.loaded});
+    record_.submaps.push_back({static_cast<std::int64_t>(s.poses.size()),
+                               seconds(s.poses.front().time_ns),
+                               seconds(s.poses.back().time_ns),
+                               {},
+                               s.loaded});
   }
   for (std::size_t c = 0; c < record_.cameras.size(); ++c)
     record_.cameras[c].states = session::camera_intervals(record_.frames, c);

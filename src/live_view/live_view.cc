@@ -23,7 +23,7 @@ using std::chrono::milliseconds;
 enum ChannelIndex : std::size_t { kState, kFrame, kRun };
 
 std::vector<web_server::Channel> channels() {
-  return {{"state", milliseconds(100)}, {"frame", milliseconds(100)}, {"run", milliseconds(1000)}};
+  return {{"state", milliseconds(100), true}, {"frame", milliseconds(100)}, {"run", milliseconds(1000)}};
 }
 
 enum class Phase { kFeeding, kFinishing, kEnded };
@@ -39,7 +39,7 @@ std::string text_of(const ordered_json& json) {
 
 // What the run hands over to the view.
 struct Mailbox {
-  std::vector<FedFrame> frames;                        // since the view has looked; none is left out
+  std::vector<FedFrame> frames;                         // since the view has looked; none is left out
   std::shared_ptr<const session::ProcessedFrame> last;  // the newest that was processed
   std::optional<StageResults> results;
   Phase phase = Phase::kFeeding;

@@ -1,5 +1,6 @@
-// Shows a run in web browsers while it goes on, and lets them pause it and set its pace. The thread that feeds the frames
-// only hands values over; everything else is done by the thread of the server, and only if a browser is connected.
+// Shows a run in web browsers while it goes on, and lets them pause it and set its pace. The thread that feeds the
+// frames only hands values over; everything else is done by the thread of the server, and only if a browser is
+// connected.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
-// Decides when the frames of a run are fed: as fast as possible or at a multiple of their recorded pace, with pauses and
-// single steps. It never changes which frames are processed, except at a recorded pace with Late::kDrop.
+// Decides when the frames of a run are fed: as fast as possible or at a multiple of their recorded pace, with pauses
+// and single steps. It never changes which frames are processed, except at a recorded pace with Late::kDrop.
 #pragma once
 
 #include <chrono>

@@ -91,8 +91,8 @@ struct TrackOutcome {
   FrameRecord record;
   FrontEndState next;
   std::optional<ProposedEdit> edit;
-  bool keyframe_wanted = false;         // a keyframe is to be created of the frame later (see create_keyframe)
-  std::vector<BetweenKeyframes> early;  // frames of a monocular initialisation, once it succeeded
+  bool keyframe_wanted = false;                  // a keyframe is to be created of the frame later (see create_keyframe)
+  std::vector<BetweenKeyframes> early;           // frames of a monocular initialisation, once it succeeded
   std::vector<ObservedKeypoints> observed = {};  // per camera
 };
 

@@ -1,5 +1,5 @@
-// Which requests a server answers. Web pages of other origins can send requests to a server on this machine, with any name of
-// a host that resolves to it (DNS rebinding): the token, the Host header and the Origin header are checked.
+// Which requests a server answers. Web pages of other origins can send requests to a server on this machine, with any
+// name of a host that resolves to it (DNS rebinding): the token, the Host header and the Origin header are checked.
 #pragma once
 
 #include <string>
@@ -21,8 +21,8 @@ struct RequestHead {
 // given, is that of the host. The time of the comparison does not depend on the token.
 bool is_allowed(const RequestHead& head, std::string_view token, bool loopback);
 
-// Whether a Host header names this machine: with `loopback`, as localhost or by a loopback address; else as localhost or
-// by any IP address. Other names could be those of another site. The port does not matter: it may be forwarded.
+// Whether a Host header names this machine: with `loopback`, as localhost or by a loopback address; else as localhost
+// or by any IP address. Other names could be those of another site. The port does not matter: it may be forwarded.
 bool is_own_host(std::string_view host, bool loopback);
 
 // The path of a target, without the query.

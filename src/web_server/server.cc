@@ -15,12 +15,8 @@
 #include <thread>
 #include <utility>
 
-#if defined(__linux__)
-#include <sys/resource.h>
-#endif
-
-#include "base/stopwatch.h"
 #include "web_server/request_check.h"
+#include "web_server/server_thread.h"
 
 namespace bslam::web_server {
 namespace {
@@ -38,15 +34,7 @@ constexpr std::uint32_t kMaxHeader = 16 * 1024;
 constexpr auto kRequestTime = std::chrono::seconds(10);
 constexpr auto kResponseTime = std::chrono::seconds(30);
 constexpr int kSendBuffer = 256 * 1024;  // bytes; more would only delay what is newest
-constexpr double kMaxShare = 0.05;       // of the time that updates of a channel may take
-
-// The thread takes the time that others leave. On Linux the nice value applies to the calling thread only.
-void lower_priority() {
-#if defined(__linux__)
-  constexpr int kNice = 19;
-  [[maybe_unused]] const int failed = setpriority(PRIO_PROCESS, 0, kNice);
-#endif
-}
+constexpr double kMaxShare = 0.03;       // of the processor time of a core that updates of a channel may take
 
 std::string_view view(boost::string_view text) { return {text.data(), text.size()}; }
 
@@ -66,6 +54,7 @@ struct Hub {
   std::size_t connections = 0;
   std::list<class Viewer*> viewers = {};
   std::function<void()> viewers_changed = {};
+  std::function<void()> answered = {};  // a message was received
 };
 
 // Counts a connection as long as it lives.
@@ -141,7 +130,10 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
 
   void handle(std::string_view message) {
     constexpr std::string_view kGot = "got ";
-    if (message.substr(0, kGot.size()) != kGot) return hub_.content.received(message);
+    if (message.substr(0, kGot.size()) != kGot) {
+      hub_.content.received(message);
+      return hub_.answered();
+    }
     const auto channel = std::ranges::find(hub_.channels, message.substr(kGot.size()), &Channel::name);
     if (channel == hub_.channels.end()) return;
     const auto c = static_cast<std::size_t>(channel - hub_.channels.begin());
@@ -251,6 +243,11 @@ class Server::Implementation {
   Implementation(std::vector<Channel> channels, Content& content)
       : hub_{.content = content, .channels = std::move(channels)} {
     hub_.viewers_changed = [this] { on_viewers_changed(); };
+    hub_.answered = [this] {
+      for (std::size_t c = 0; c < hub_.channels.size(); ++c) {
+        if (hub_.channels[c].answers) refresh(c);
+      }
+    };
     for (std::size_t c = 0; c < hub_.channels.size(); ++c) timers_.emplace_back(context_);
     ticking_.resize(hub_.channels.size());
   }
@@ -273,7 +270,8 @@ class Server::Implementation {
       return Error{"web server", "port", port + ", which is in use", "a free port, or 0 for any free one"};
     if (error == asio::error::access_denied)
       return Error{"web server", "port", port + ", which is not permitted", "a port above 1023, or 0 for any free one"};
-    if (error) return Error{"web server", "address", options.address + ": " + error.message(), "an address of this machine"};
+    if (error)
+      return Error{"web server", "address", options.address + ": " + error.message(), "an address of this machine"};
     const std::string host = address.is_unspecified() ? "127.0.0.1" : options.address;
     url_ = "http://" + (address.is_v6() && !address.is_unspecified() ? "[" + host + "]" : host) + ":" +
            std::to_string(acceptor_.local_endpoint().port()) + "/?token=" + hub_.token;
@@ -340,9 +338,9 @@ class Server::Implementation {
   void tick(std::size_t c) {
     ticking_[c] = !hub_.viewers.empty() && !hub_.finishing;
     if (!ticking_[c]) return;
-    const Stopwatch watch;
+    const double start_ms = thread_ms();
     if (std::ranges::any_of(hub_.viewers, [c](const Viewer* v) { return v->is_ready(c); })) refresh(c);
-    const auto pause = std::chrono::milliseconds(static_cast<int>(watch.ms() / kMaxShare));
+    const auto pause = std::chrono::milliseconds(static_cast<int>((thread_ms() - start_ms) / kMaxShare));
     timers_[c].expires_after(std::max(hub_.channels[c].interval, pause));
     timers_[c].async_wait([this, c](ErrorCode error) {
       if (!error) tick(c);

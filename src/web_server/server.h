@@ -27,7 +27,7 @@ class Content {
   virtual void received(std::string_view message) = 0;
 };
 
-inline constexpr std::size_t kMaxMessage = 256;    // bytes; a longer message closes its connection
+inline constexpr std::size_t kMaxMessage = 256;     // bytes; a longer message closes its connection
 inline constexpr std::size_t kMaxConnections = 16;  // further ones are closed at once
 
 // Updates of a channel replace each other: a browser gets the newest one when it has confirmed the previous one by the
@@ -35,6 +35,7 @@ inline constexpr std::size_t kMaxConnections = 16;  // further ones are closed a
 struct Channel {
   std::string name;
   std::chrono::milliseconds interval;  // between updates, at least
+  bool answers = false;                // updated after every message from a browser as well
 };
 
 struct ServerOptions {
@@ -45,9 +46,9 @@ struct ServerOptions {
 
 class Server {
  public:
-  // Begins to listen, and to answer. Without the token of url() every request is answered with 403 (Forbidden). `content`
-  // must outlive the server. Errors, with the keys "address" and "port": the address is not that of an interface, the
-  // port is in use or not permitted.
+  // Begins to listen, and to answer. Without the token of url() every request is answered with 403 (Forbidden).
+  // `content` must outlive the server. Errors, with the keys "address" and "port": the address is not that of an
+  // interface, the port is in use or not permitted.
   static Result<std::unique_ptr<Server>> start(const ServerOptions& options, std::vector<Channel> channels,
                                                Content& content);
   // Closes all connections.
@@ -58,8 +59,8 @@ class Server {
   const std::string& url() const;  // with the token
   bool is_watched() const;         // by a browser that gets updates; thread-safe
 
-  // Sends the newest update of all channels, and closes the connections of all browsers that have received them. Waits for
-  // them, if there are any, for at most `limit`.
+  // Sends the newest update of all channels, and closes the connections of all browsers that have received them. Waits
+  // for them, if there are any, for at most `limit`.
   void finish(std::chrono::milliseconds limit);
 
  private:

@@ -27,8 +27,9 @@ TEST(RequestCheck, OtherNamesOfTheHostAreRefused) {
     EXPECT_TRUE(is_own_host(host, true)) << host;
     EXPECT_TRUE(is_own_host(host, false)) << host;
   }
-  for (const char* host : {"", "evil.example", "evil.example:8642", "127.0.0.1.evil.example", "localhost.evil.example:1",
-                           "127.0.0.1:80@evil.example", "127.0.0.1:", "[::1]x", "1.2.3", "[]", "[::1"}) {
+  for (const char* host :
+       {"", "evil.example", "evil.example:8642", "127.0.0.1.evil.example", "localhost.evil.example:1",
+        "127.0.0.1:80@evil.example", "127.0.0.1:", "[::1]x", "1.2.3", "[]", "[::1"}) {
     EXPECT_FALSE(is_own_host(host, true)) << host;
     EXPECT_FALSE(is_own_host(host, false)) << host;
   }

@@ -60,7 +60,11 @@ export class LiveView {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(text);
   }
 
-  private togglePause() { this.send(this.state.paused ? 'resume' : 'pause'); }
+  private togglePause() {
+    this.state.paused = !this.state.paused;  // as it will be confirmed
+    this.send(this.state.paused ? 'pause' : 'resume');
+    this.showState();
+  }
 
   private onKey(event: KeyboardEvent) {
     if (event.target === this.speed || event.ctrlKey || event.metaKey || event.altKey) return;
