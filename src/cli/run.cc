@@ -18,7 +18,9 @@
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"
 #include "cli/verbs.h"
+#include "cli/view_arguments.h"
 #include "session/record_builder.h"
+#include "session/report_data.h"
 #include "session/run_session.h"
 #include "storage/map_file.h"
 #include "storage/vocabulary_file.h"
@@ -33,6 +35,7 @@ const auto g_program_start = std::chrono::steady_clock::now();
 struct RunArguments {
   DatasetArguments data;
   ConfigArguments config;
+  ViewArguments view;
   std::string out, mode, journal, replay, vocabulary, save_map, load_map;
   std::string pace = "fast", late = "block", progress = "auto", log_level = "warning";
   std::optional<int> seed;
@@ -135,6 +138,13 @@ Status write_files(const session::SessionResult& result, const system::Config& c
                             arguments.save_map);
 }
 
+// Shows the report of the run in the browsers that have followed it.
+void end_view(live_view::LiveView* view, const session::SessionResult& result, const system::Config& config,
+              const dataset::Dataset& dataset, const RunArguments& arguments) {
+  if (view == nullptr || !view->is_watched()) return;
+  view->end(session::report_text(result, config, {dataset, arguments.command}));
+}
+
 // Returns the command that tests the calibration of the run against its images.
 std::string check_command(const DatasetArguments& data) {
   return shell_command({"bslam", "rig", "info", data.rig.empty() ? data.path : data.rig, "--images", data.path});
@@ -152,6 +162,17 @@ void print_after(const session::RunRecord& record, const dataset::Dataset& datas
   if (verbosity >= LogVerbosity::kInfo) print_stage_statistics(record);
   if (verbosity >= LogVerbosity::kWarning) print_warnings(record, dataset.rig, check_command(arguments.data));
   print_result(record, arguments.out);
+}
+
+session::SessionOptions session_options(const RunArguments& arguments, const system::Config& config,
+                                        const Interruption& interruption) {
+  session::SessionOptions options;
+  options.config = config;
+  options.pace = arguments.pace == "realtime" ? session::Pace::kRealtime : session::Pace::kFast;
+  options.late = arguments.late == "drop" ? session::Late::kDrop : session::Late::kBlock;
+  options.start_up_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - g_program_start).count();
+  options.interrupted = interruption.token();
+  return options;
 }
 
 int run(const RunArguments& arguments) {
@@ -173,25 +194,28 @@ int run(const RunArguments& arguments) {
        {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
     if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return report_error(s.error());
   }
+  session::RunControl control(arguments.pace == "realtime" ? 1.0 : 0.0);
+  auto view =
+      start_view(arguments.view, {*dataset, *config, arguments.command, *map ? (*map)->keyframe_slots() : 0}, control);
+  if (!view) return report_error(view.error());
   if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
+  if (*view) std::fprintf(stderr, "view: %s\n", (*view)->url().c_str());
   print_before(*dataset, log_verbosity(arguments.log_level));
 
   ProgressBar bar(arguments.progress == "auto", "frames");
-  session::SessionOptions options;
-  options.config = *config;
-  options.pace = arguments.pace == "realtime" ? session::Pace::kRealtime : session::Pace::kFast;
-  options.late = arguments.late == "drop" ? session::Late::kDrop : session::Late::kBlock;
-  options.start_up_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - g_program_start).count();
-  options.interrupted = interruption.token();
+  session::SessionOptions options = session_options(arguments, *config, interruption);
   options.replay = std::move(*replay);
   options.vocabulary = *vocabulary;
   options.map = std::move(*map);
   options.progress = [&bar](std::size_t done, std::size_t all) { bar.show(done, all); };
+  options.observer = view->get();
+  options.control = &control;
   const auto result = session::run_session(*dataset, options);
   bar.finish();
   if (!result) return report_error(result.error());
   if (const Status s = write_files(*result, *config, *dataset, arguments, **vocabulary); !s)
     return report_error(s.error());
+  end_view(view->get(), *result, *config, *dataset, arguments);
   print_after(result->record, *dataset, arguments);
   if (!result->record.complete) return kExitInterrupted;
   const session::RunRecord& record = result->record;
@@ -203,6 +227,15 @@ std::string command_of(std::span<const char* const> command_line) {
   std::vector<std::string> words(command_line.begin(), command_line.end());
   if (!words.empty()) words.front() = std::filesystem::path(words.front()).filename();
   return shell_command(words);
+}
+
+void add_map_options(CLI::App& verb, RunArguments& a) {
+  verb.add_option("--save-map", a.save_map, "save the final map to this file");
+  verb.add_option("--load-map", a.load_map, "saved map to continue after relocalising in it");
+  verb.add_flag("--localize-only", a.localize_only, "localise in the loaded map without changing it");
+  verb.add_option("--vocabulary", a.vocabulary,
+                  "vocabulary for place recognition, in bslam or DBoW2 text format; default: the vocabulary shipped "
+                  "with this program");
 }
 
 }  // namespace
@@ -230,14 +263,10 @@ void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit
       ->check(CLI::IsMember({"block", "drop"}))
       ->capture_default_str();
   verb->add_flag("--no-loop", a->no_loop, "disable loop closing; relocalisation stays enabled");
-  verb->add_option("--save-map", a->save_map, "save the final map to this file");
-  verb->add_option("--load-map", a->load_map, "saved map to continue after relocalising in it");
-  verb->add_flag("--localize-only", a->localize_only, "localise in the loaded map without changing it");
-  verb->add_option("--vocabulary", a->vocabulary,
-                   "vocabulary for place recognition, in bslam or DBoW2 text format; default: the vocabulary shipped "
-                   "with this program");
+  add_map_options(*verb, *a);
   verb->add_flag("--no-final-ba", a->no_final_ba, "skip the global bundle adjustment at the end");
   verb->add_flag("--no-report", a->no_report, "do not write report.html, the page that shows the run in a browser");
+  add_view_options(*verb, a->view);
   verb->add_option("--seed", a->seed, "seed of all random numbers; default 1")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   verb->add_option("--progress", a->progress, "auto: show a progress bar if stderr is a terminal; never: show none")

@@ -51,8 +51,7 @@ void add_stages(const RecordInput& input, RunRecord& record) {
       add_stage_sample(record, s.stage, StageThread::kCaller, {frame.time_s, s.ms});
   }
   for (const system::StageRecord& s : input.system.stage_runs()) {
-    add_stage_sample(record, execution::stage_name(s.run.task.stage), StageThread::kBackground,
-                     {seconds(input, s.time_ns), s.run.ms});
+    add_stage_run(record, s, input.dataset.first_time_ns);
   }
   if (input.system.final_adjustment_ms() > 0 && !input.inputs.empty()) {
     add_stage_sample(record, "global adjustment", StageThread::kBackground,
@@ -84,15 +83,6 @@ void add_places(const RecordInput& input, RunRecord& record) {
   }
 }
 
-// Returns the name of the mode, which determines when stages run.
-std::string mode_name(const RecordInput& input) {
-  if (input.replayed) return "replay";
-  for (const auto& [mode, name] : EnumNames<execution::Mode>::kNames) {
-    if (mode == input.config.mode) return std::string(name);
-  }
-  return "";
-}
-
 // Returns the maximum resident size of this process, as reported by Linux, or nullopt.
 std::optional<double> peak_memory_mb() {
   std::ifstream status("/proc/self/status");
@@ -108,11 +98,34 @@ std::string trajectory_file(const std::string& stem, std::size_t submap) {
   return submap == 0 ? stem + ".tum" : stem + "_part" + std::to_string(submap + 1) + ".tum";
 }
 
+std::string_view mode_name(execution::Mode mode) {
+  for (const auto& [value, name] : EnumNames<execution::Mode>::kNames) {
+    if (value == mode) return name;
+  }
+  return "";
+}
+
+void add_stage_run(RunRecord& record, const system::StageRecord& run, TimeNs first_time_ns) {
+  add_stage_sample(record, execution::stage_name(run.run.task.stage), StageThread::kBackground,
+                   {to_seconds(run.time_ns - first_time_ns), run.run.ms});
+}
+
+MapRecord map_record(const map::BundledMap& map, bool loaded) {
+  MapRecord record{static_cast<std::int64_t>(map.num_keyframes()),
+                   static_cast<std::int64_t>(map.num_landmarks()),
+                   static_cast<std::int64_t>(map.num_observations()),
+                   std::string(map::scale_name(map.scale())),
+                   loaded,
+                   {}};
+  if (std::isfinite(map.scale_deviation()) && map.scale_deviation() > 0) record.scale_deviation = map.scale_deviation();
+  return record;
+}
+
 RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameRecord> frames) {
   RunRecord record;
   record.version = BSLAM_VERSION;
   record.data = input.dataset.name;
-  record.mode = mode_name(input);
+  record.mode = input.replayed ? "replay" : mode_name(input.config.mode);
   record.complete = input.complete;
   record.seed = static_cast<std::uint64_t>(input.config.seed);
   record.cameras_used = input.dataset.cameras_used;
@@ -125,14 +138,7 @@ RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameReco
   add_cameras(input, record);
   add_stages(input, record);
   const map::MapSnapshot map = input.system.snapshot();
-  record.map = {static_cast<std::int64_t>(map->num_keyframes()),
-                static_cast<std::int64_t>(map->num_landmarks()),
-                static_cast<std::int64_t>(map->num_observations()),
-                std::string(map::scale_name(map->scale())),
-                input.loaded,
-                {}};
-  if (std::isfinite(map->scale_deviation()) && map->scale_deviation() > 0)
-    record.map.scale_deviation = map->scale_deviation();
+  record.map = map_record(*map, input.loaded);
   record.calibration = {input.system.calibration(), input.system.calibration_refined()};
   record.maps_started = input.system.maps_started();
   add_places(input, record);

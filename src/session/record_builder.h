@@ -1,6 +1,8 @@
 // Builds the record of a run, from which summary and plots are written, from the state of the system.
 #pragma once
 
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "dataset/dataset.h"
@@ -30,6 +32,14 @@ struct RecordInput {
 
 // Returns the name of the file with the poses of submap `submap`: "trajectory.tum", "trajectory_part2.tum".
 std::string trajectory_file(const std::string& stem, std::size_t submap);
+
+std::string_view mode_name(execution::Mode mode);
+
+// A call of a background stage, for the record.
+void add_stage_run(RunRecord& record, const system::StageRecord& run, TimeNs first_time_ns);
+
+// The counts and the scale of a map, for the record.
+MapRecord map_record(const map::BundledMap& map, bool loaded);
 
 // `frames` contains all frames passed to the system, which are moved into the record.
 RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameRecord> frames);

@@ -3,11 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
-#include <string>
-#include <string_view>
 
 namespace bslam::session {
-namespace {
 
 std::string base64(std::string_view bytes) {
   constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -22,8 +19,6 @@ std::string base64(std::string_view bytes) {
   }
   return text;
 }
-
-}  // namespace
 
 std::size_t report_stride(std::size_t count, std::size_t limit) {
   return std::max<std::size_t>(1, (count + limit - 1) / limit);

@@ -34,9 +34,9 @@ ordered_json camera_counts(const std::vector<const RunFrame*>& frames, std::size
   return {{"keypoints", float_array(keypoints)}, {"matched", float_array(matched)}, {"inliers", float_array(inliers)}};
 }
 
-ordered_json frames_json(const RunRecord& record) {
+ordered_json frames_json(const RunRecord& record, std::size_t limit) {
   std::vector<const RunFrame*> frames;
-  const std::size_t stride = report_stride(record.frames.size(), kMaxReportPoses);
+  const std::size_t stride = report_stride(record.frames.size(), limit);
   for (std::size_t i = 0; i < record.frames.size(); i += stride) frames.push_back(&record.frames[i]);
   std::vector<float> time, ms;
   std::size_t direct = 0;
@@ -51,10 +51,10 @@ ordered_json frames_json(const RunRecord& record) {
 }
 
 // The longest calls of a stage are kept if there are too many.
-ordered_json stage_json(const StageSeries& series) {
+ordered_json stage_json(const StageSeries& series, std::size_t limit) {
   std::vector<float> time, ms;
   double total_ms = 0;
-  const std::size_t stride = report_stride(series.samples.size(), kMaxReportPoses);
+  const std::size_t stride = report_stride(series.samples.size(), limit);
   for (std::size_t i = 0; i < series.samples.size(); ++i) {
     const StageSample& sample = series.samples[i];
     total_ms += sample.ms;
@@ -88,6 +88,8 @@ ordered_json residuals_json(const calibration::ImageResiduals& residuals) {
           {"count", float_array(count)}};
 }
 
+}  // namespace
+
 ordered_json settings_json(const system::Config& config) {
   system::Config copy = config, defaults;
   const OptionTable table(copy), default_table(defaults);
@@ -102,32 +104,39 @@ ordered_json settings_json(const system::Config& config) {
   return list;
 }
 
-}  // namespace
+ordered_json run_json(const RunRecord& record, const map::BundledMap& map,
+                      std::span<const system::SubmapTrajectory> paths, TimeNs first_time_ns,
+                      const ReportLimits& limits) {
+  ordered_json stages = ordered_json::array(), residuals = ordered_json::array();
+  for (const StageSeries& series : record.stages) stages.push_back(stage_json(series, limits.poses));
+  for (const CameraRecord& camera : record.cameras) residuals.push_back(residuals_json(camera.residuals));
+  return {{"schema", 1},
+          {"summary", summary_json(record)},
+          {"rig", report_rig(map.rig())},
+          {"submaps", report_submaps(map, paths, first_time_ns, limits)},
+          {"landmarks", map.num_landmarks()},
+          {"frames", frames_json(record, limits.poses)},
+          {"stages", std::move(stages)},
+          {"residuals", std::move(residuals)}};
+}
 
 ordered_json report_json(const SessionResult& result, const system::Config& config, const ReportSource& source) {
   const RunRecord& record = result.record;
-  ordered_json stages = ordered_json::array(), residuals = ordered_json::array();
-  for (const StageSeries& series : record.stages) stages.push_back(stage_json(series));
-  for (const CameraRecord& camera : record.cameras) residuals.push_back(residuals_json(camera.residuals));
   const evaluation::Trajectory path =
       result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
-  return {{"schema", 1},
-          {"command", source.command},
-          {"summary", summary_json(record)},
-          {"rig", report_rig(result.map->rig())},
-          {"submaps", report_submaps(*result.map, result.trajectories, source.dataset.first_time_ns)},
-          {"landmarks", result.map->num_landmarks()},
-          {"frames", frames_json(record)},
-          {"stages", std::move(stages)},
-          {"residuals", std::move(residuals)},
-          {"truth", report_truth(source.dataset, path, record.map.scale == "metric")},
-          {"settings", settings_json(config)}};
+  ordered_json json = run_json(record, *result.map, result.trajectories, source.dataset.first_time_ns);
+  json["command"] = source.command;
+  json["truth"] = report_truth(source.dataset, path, record.map.scale == "metric");
+  json["settings"] = settings_json(config);
+  return json;
+}
+
+std::string report_text(const SessionResult& result, const system::Config& config, const ReportSource& source) {
+  return report_json(result, config, source).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
 std::string report_page(const SessionResult& result, const system::Config& config, const ReportSource& source) {
-  const std::string json =
-      report_json(result, config, source).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-  return report::page_with_data(json);
+  return report::page_with_data(report_text(result, config, source));
 }
 
 }  // namespace bslam::session

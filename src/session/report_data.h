@@ -2,11 +2,21 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 
+#include "session/report_map.h"
 #include "session/run_session.h"
 
 namespace bslam::session {
+
+// What is known of a run while it goes on as well: all of report_json but the command, settings and ground truth.
+nlohmann::ordered_json run_json(const RunRecord& record, const map::BundledMap& map,
+                                std::span<const system::SubmapTrajectory> paths, TimeNs first_time_ns,
+                                const ReportLimits& limits = {});
+
+// All settings with their defaults.
+nlohmann::ordered_json settings_json(const system::Config& config);
 
 // Everything the page shows: the summary as in summary.json; the rig and the submaps (session/report_map.h); counts per
 // frame and camera; durations of stages; residuals over the images; settings with their defaults; errors against ground
@@ -15,6 +25,9 @@ namespace bslam::session {
 // times and memory.
 nlohmann::ordered_json report_json(const SessionResult& result, const system::Config& config,
                                    const ReportSource& source);
+
+// The same as text.
+std::string report_text(const SessionResult& result, const system::Config& config, const ReportSource& source);
 
 // The page with these data. It needs no other file and no network.
 std::string report_page(const SessionResult& result, const system::Config& config, const ReportSource& source);

@@ -5,7 +5,6 @@
 #include <array>
 #include <vector>
 
-#include "session/report_arrays.h"
 
 namespace bslam::session {
 namespace {
@@ -66,9 +65,9 @@ std::vector<std::size_t> add_keyframes(const map::BundledMap& map, TimeNs first_
 
 // The time of a landmark is that of its reference keyframe.
 void add_points(const map::BundledMap& map, TimeNs first_ns, const std::vector<std::size_t>& submap_of,
-                std::vector<Submap>& submaps) {
+                std::size_t limit, std::vector<Submap>& submaps) {
   const std::vector<LandmarkId> landmarks = map.landmark_ids();
-  const std::size_t stride = report_stride(landmarks.size(), kMaxReportPoints);
+  const std::size_t stride = report_stride(landmarks.size(), limit);
   for (std::size_t i = 0; i < landmarks.size(); i += stride) {
     const map::Landmark& landmark = map.landmark(landmarks[i]);
     const KeyframeId k = landmark.reference.keyframe;
@@ -78,9 +77,9 @@ void add_points(const map::BundledMap& map, TimeNs first_ns, const std::vector<s
   }
 }
 
-ordered_json path_json(const evaluation::Trajectory& path, TimeNs first_ns) {
+ordered_json path_json(const evaluation::Trajectory& path, TimeNs first_ns, std::size_t limit) {
   std::vector<float> time, position, rotation;
-  const std::size_t stride = report_stride(path.size(), kMaxReportPoses);
+  const std::size_t stride = report_stride(path.size(), limit);
   for (std::size_t i = 0; i < path.size(); i += stride) {
     time.push_back(seconds_since(path[i].time_ns, first_ns));
     append(path[i].T_world_frame.translation(), position);
@@ -117,19 +116,20 @@ Vector3d vertical_direction(std::span<const SE3> T_world_rig) {
 }
 
 ordered_json report_submaps(const map::BundledMap& map, std::span<const system::SubmapTrajectory> paths,
-                            TimeNs first_time_ns) {
+                            TimeNs first_time_ns, const ReportLimits& limits) {
   std::vector<Submap> submaps = submaps_of(map, paths);
   const std::vector<std::size_t> submap_of = add_keyframes(map, first_time_ns, submaps);
-  if (!submaps.empty()) add_points(map, first_time_ns, submap_of, submaps);
+  if (!submaps.empty()) add_points(map, first_time_ns, submap_of, limits.points, submaps);
   ordered_json list = ordered_json::array();
   for (std::size_t s = 0; s < submaps.size(); ++s) {
     const Submap& submap = submaps[s];
     const evaluation::Trajectory path = s < paths.size() ? paths[s].poses : evaluation::Trajectory();
     list.push_back(
-        {{"loaded", s < paths.size() && paths[s].loaded},
+        {{"root", submap.root.index()},
+         {"loaded", s < paths.size() && paths[s].loaded},
          {"frames", path.size()},
          {"up", number_list(vertical_direction(submap.T_world_rig))},
-         {"path", path_json(path, first_time_ns)},
+         {"path", path_json(path, first_time_ns, limits.poses)},
          {"keyframes",
           {{"time", float_array(submap.keyframe_time)},
            {"position", float_array(submap.keyframe_position)},

@@ -6,6 +6,7 @@
 
 #include "base/timestamp.h"
 #include "map/bundled_map.h"
+#include "session/report_arrays.h"
 #include "system/system.h"
 
 namespace bslam::session {
@@ -15,9 +16,9 @@ namespace bslam::session {
 geometry::Vector3d vertical_direction(std::span<const geometry::SE3> T_world_rig);
 
 // One entry per submap, in its own world frame: first those of the trajectories in their order, then those without
-// poses. Landmarks are thinned out if there are more than kMaxReportPoints. Times are in seconds since `first_time_ns`.
+// poses. Times are in seconds since `first_time_ns`.
 nlohmann::ordered_json report_submaps(const map::BundledMap& map, std::span<const system::SubmapTrajectory> paths,
-                                      TimeNs first_time_ns);
+                                      TimeNs first_time_ns, const ReportLimits& limits = {});
 
 // Per camera: name, model, image size, pose in the rig, and the rays of the image's corners at depth 1. The rays of a
 // field of view that is too wide to be drawn are limited.

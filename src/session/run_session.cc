@@ -24,20 +24,6 @@ namespace {
 
 constexpr std::size_t kReadAhead = 4;  // frames
 
-// Replays the recorded pace: determines when each frame is due relative to the first frame.
-class Metronome {
- public:
-  using Clock = std::chrono::steady_clock;
-  explicit Metronome(TimeNs first_ns) : first_ns_(first_ns), start_(Clock::now()) {}
-  Clock::time_point due(TimeNs time_ns) const { return start_ + std::chrono::nanoseconds(time_ns - first_ns_); }
-  void wait_for(TimeNs time_ns) const { std::this_thread::sleep_until(due(time_ns)); }
-  bool is_past(TimeNs time_ns) const { return Clock::now() > due(time_ns); }
-
- private:
-  TimeNs first_ns_;
-  Clock::time_point start_;
-};
-
 // Returns the frames of the recorded run, in order. There are fewer than in the data set if the run was interrupted or
 // dropped frames.
 std::vector<FrameId> recorded_frames(const execution::Journal& journal) {
@@ -48,28 +34,43 @@ std::vector<FrameId> recorded_frames(const execution::Journal& journal) {
   return frames;
 }
 
+// Passes a frame and its images on to the observer of the run.
+void report_frame(RunObserver& observer, FrameSource::Item&& item, system::FrameRecord&& record,
+                  system::System& system) {
+  observer.processed(
+      {std::move(item.images), std::move(record), system.take_observed_keypoints(), system.snapshot(), item.read_ms},
+      system);
+}
+
 // Feeds the frames to the system in order and returns a list of them. Stops early if the run is interrupted.
 Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const SessionOptions& options,
                                      system::System& system) {
   std::vector<InputFrame> inputs;
   const bool sequential = options.config.mode == execution::Mode::kSequential;
   FrameSource source(dataset, kReadAhead, sequential ? ReaderPriority::kLow : ReaderPriority::kNormal);
-  const Metronome metronome(dataset.frames.front().time_ns);
+  RunControl recorded_pace(options.pace == Pace::kRealtime ? 1.0 : 0.0);
+  RunControl& control = options.control ? *options.control : recorded_pace;
   const std::vector<FrameId> recorded = options.replay ? recorded_frames(*options.replay) : std::vector<FrameId>();
   for (std::size_t i = 0; i < dataset.frames.size() && !options.interrupted.stop_requested(); ++i) {
     if (options.replay && (recorded.empty() || recorded.back() < FrameId(i))) break;
-    const auto item = source.next();
+    auto item = source.next();
     if (!item) break;
-    if (options.pace == Pace::kRealtime) metronome.wait_for(item->images.time_ns);
-    const bool late = i + 1 < dataset.frames.size() && metronome.is_past(dataset.frames[i + 1].time_ns);
+    control.wait_for(item->images.time_ns, options.interrupted);
+    if (options.interrupted.stop_requested()) break;
+    const bool late = i + 1 < dataset.frames.size() && control.is_overdue(dataset.frames[i + 1].time_ns);
     const bool drop = options.replay ? !std::binary_search(recorded.begin(), recorded.end(), FrameId(i))
-                                     : options.pace == Pace::kRealtime && options.late == Late::kDrop && late;
-    if (!drop) {
-      if (const auto processed = system.process(item->images); !processed) return processed.error();
-    }
+                                     : options.late == Late::kDrop && late;
     inputs.push_back({item->images.time_ns, drop, item->read_ms});
+    if (drop) {
+      if (options.observer) options.observer->dropped(item->images.time_ns, item->read_ms);
+    } else {
+      auto processed = system.process(item->images);
+      if (!processed) return processed.error();
+      if (options.observer) report_frame(*options.observer, *std::move(item), *std::move(processed), system);
+    }
     if (options.progress) options.progress(i + 1, dataset.frames.size());
   }
+  if (options.observer) options.observer->fed();
   return inputs;
 }
 

@@ -9,6 +9,8 @@
 
 #include "dataset/dataset.h"
 #include "evaluation/trajectory.h"
+#include "session/run_control.h"
+#include "session/run_observer.h"
 #include "session/run_record.h"
 #include "system/config.h"
 #include "system/system.h"
@@ -29,6 +31,8 @@ struct SessionOptions {
   std::optional<map::BundledMap> map;        // map of an earlier run with this rig, which is continued
   std::optional<camera::Rig> initial_rig;    // calibration with which the map begins; nullopt: that of the data set
   std::function<void(std::size_t done, std::size_t all)> progress;  // called after every frame; may be empty
+  RunObserver* observer = nullptr;                                  // may be null; must outlive the call
+  RunControl* control = nullptr;  // pauses and pace, instead of `pace`; may be null; must outlive the call
 };
 
 struct SessionResult {

@@ -61,6 +61,7 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   if (tracked.edit) commit(tracked, executor, outcome);
   state_ = std::move(tracked.next);
   outcome.early = std::move(tracked.early);
+  outcome.observed = std::move(tracked.observed);
 
   outcome.record = std::move(tracked.record);
   FrameRecord& record = outcome.record;

@@ -33,9 +33,10 @@ class Pipeline {
     std::optional<FrameId>
         deferred;  // the frame was passed to the keyframe maker; the caller enqueues it for its stage
     std::vector<tracking::CameraCounts>
-        created_cameras;                            // of the features of FrameRecord::created, per camera; or empty
-    bool started_submap = false;                    // the first of `keyframes` is the root of a new submap
-    std::vector<tracking::BetweenKeyframes> early;  // frames of a monocular initialisation, including the first
+        created_cameras;                                // of the features of FrameRecord::created, per camera; or empty
+    bool started_submap = false;                        // the first of `keyframes` is the root of a new submap
+    std::vector<tracking::BetweenKeyframes> early;      // frames of a monocular initialisation, including the first
+    std::vector<tracking::ObservedKeypoints> observed;  // per camera
   };
 
   // Tracks a frame in the version of the map that `executor` returns for it, and commits keyframes through `executor`.

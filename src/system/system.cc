@@ -97,6 +97,7 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
   const bool had_pose = pipeline_.status() != tracking::TrackStatus::kNotStarted;
   Pipeline::Outcome outcome = pipeline_.process(images, *executor_);
   maps_started_ += outcome.started_submap;
+  observed_ = std::move(outcome.observed);
   std::ranges::move(outcome.early, std::back_inserter(early_));
   // A monocular initialisation adds two keyframes, both with the time of the second frame.
   for (const KeyframeId k : outcome.keyframes) set_keyframe_time(k, outcome.record.result.time_ns);

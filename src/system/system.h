@@ -77,6 +77,8 @@ class System {
   // Frames of which a keyframe was created after they were tracked, as the last call of process() or finish() has
   // learnt. The frame of that call may be among them.
   const std::vector<FrameRecord>& created_keyframes() const { return created_keyframes_; }
+  // The keypoints of the last frame, per camera. Moves them out: they are empty until the next process().
+  std::vector<tracking::ObservedKeypoints> take_observed_keypoints() { return std::exchange(observed_, {}); }
   // Moves the frames out; frames() is empty afterwards.
   std::vector<FrameRecord> take_frames() { return std::exchange(frames_, {}); }
   std::vector<StageRecord> stage_runs() const;
@@ -123,6 +125,7 @@ class System {
   std::optional<FrameStamp> last_input_;
   std::vector<FrameRecord> frames_;
   std::vector<FrameRecord> created_keyframes_;
+  std::vector<tracking::ObservedKeypoints> observed_;
   std::vector<tracking::BetweenKeyframes> early_;  // frames of monocular initialisations, in order of id
   mutable std::mutex records_mutex_;
   std::vector<StageRecord> stage_runs_;  // this and the next four members are guarded by records_mutex_

@@ -82,6 +82,7 @@ struct TrackOutput {
   TrackResult result;
   TrackerState state;
   FrameMatches matches;  // inliers
+  FrameMatches matched;  // before outliers were removed
   // The refined frame: keypoints of the inliers are aligned to their landmarks, the velocity is the estimated one, and
   // excluded cameras have no keypoints. Empty if the frame has no pose.
   frame::BundledFrame frame;

@@ -93,6 +93,7 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found) {
   result.reason = LostReason::kNone;
   result.T_rig_world = found.solution.T_rig_world;
   result.cameras = camera_counts(frame, found.matches, out.matches);
+  out.matched = std::move(found.matches);
 
   TrackerState& state = out.state;
   state = input.state;

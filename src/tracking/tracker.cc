@@ -152,6 +152,7 @@ DirectAttempt Tracker::process_directly(const FrontEndState& state, const Bundle
     direct.failure = DirectFailure::kNone;
     want_keyframe(*map, outcome);
   }
+  outcome.observed = observed_keypoints(output.frame, std::move(output.matched), std::move(output.matches));
   outcome.record.stages.push_back({"align", watch.ms()});
   return {direct.failure, std::move(outcome), direct.all_cameras};
 }
@@ -160,6 +161,7 @@ TrackOutcome Tracker::process(FrontEndState state, BundledFrame frame, std::span
                               const map::MapSnapshot& map, DirectAttempt direct) {
   TrackOutcome outcome;
   outcome.next = std::move(state);
+  outcome.observed = observed_keypoints(frame);
   count_features(frame, outcome.record);
   apply_scale_change(*map, outcome.next.track);
   pause_direct_tracking(direct.failure, outcome.next);
@@ -229,6 +231,7 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
     state.pending.reset();
     propose_keyframe(input, output, outcome);
   }
+  outcome.observed = observed_keypoints(output.frame, std::move(output.matched), std::move(output.matches));
 }
 
 // If the features of the frame give no pose but direct tracking has found one, it is kept, except after several frames

@@ -14,6 +14,7 @@
 #include "tracking/camera_health.h"
 #include "tracking/frame_record.h"
 #include "tracking/initialise.h"
+#include "tracking/observed_keypoints.h"
 #include "tracking/pose_between.h"
 #include "tracking/relocaliser.h"
 #include "tracking/track_directly.h"
@@ -90,8 +91,9 @@ struct TrackOutcome {
   FrameRecord record;
   FrontEndState next;
   std::optional<ProposedEdit> edit;
-  bool keyframe_wanted = false;         // a keyframe is to be created of the frame later (see create_keyframe)
-  std::vector<BetweenKeyframes> early;  // frames of a monocular initialisation, once it succeeded
+  bool keyframe_wanted = false;                  // a keyframe is to be created of the frame later (see create_keyframe)
+  std::vector<BetweenKeyframes> early;           // frames of a monocular initialisation, once it succeeded
+  std::vector<ObservedKeypoints> observed = {};  // per camera
 };
 
 // A frame that was tracked directly and is to become a keyframe.

@@ -89,18 +89,26 @@ function legend(lines: Line[]) {
     h('span', { class: line.points ? 'swatch dot' : 'swatch', style: `--swatch: var(--${line.colour})` }), line.label)));
 }
 
-// Appends the chart to `parent`; the returned function removes it.
-export function addChart(parent: HTMLElement, run: Run, options: ChartOptions): () => void {
+export interface Chart {
+  update: (run: Run, options: ChartOptions) => void;  // the same lines with other values; keeps a selected time range
+  remove: () => void;
+}
+
+const gaps = (values: ArrayLike<number>) => Array.from(values, (v) => (Number.isNaN(v) ? null : v));
+const dataOf = (options: ChartOptions) =>
+  [Array.from(options.time), ...options.lines.map((line) => gaps(line.values))] as uPlot.AlignedData;
+
+// Appends the chart to `parent`.
+export function addChart(parent: HTMLElement, run: Run, options: ChartOptions): Chart {
   const host = h('div', { class: 'chart', role: 'img', 'aria-label': options.label });
   if (options.lines.length > 1) parent.append(legend(options.lines));
   parent.append(host);
-  const [from, to] = timeRange(run);
-  const gaps = (values: ArrayLike<number>) => Array.from(values, (v) => (Number.isNaN(v) ? null : v));
+  const whole = () => timeRange(run);
   const chart = new uPlot({
     width: Math.max(host.clientWidth, 200), height: options.height,
     legend: { show: false },
     padding: [8, 8, 0, 0],
-    scales: { x: { time: false, range: (_, low, high) => (low === null || low === high ? [from, to] : [low, high]) },
+    scales: { x: { time: false, range: (_, low, high) => (low === null || low === high ? whole() : [low, high]) },
               y: { range: (_, __, high) => [0, high > 0 ? high * 1.08 : 1] } },
     cursor: { sync: { key: 'time' }, y: false, points: { size: 6 }, drag: { x: true, y: false } },
     axes: axes(options),
@@ -112,9 +120,19 @@ export function addChart(parent: HTMLElement, run: Run, options: ChartOptions): 
         if (host.matches(':hover') && u.cursor.idx != null) selectTime(u.data[0][u.cursor.idx]);
       }],
     },
-  }, [Array.from(options.time), ...options.lines.map((line) => gaps(line.values))] as uPlot.AlignedData, host);
+  }, dataOf(options), host);
   const resize = new ResizeObserver(() => chart.setSize({ width: host.clientWidth, height: options.height }));
   resize.observe(host);
   const stop = onTheme(() => chart.redraw(false, true));
-  return () => { stop(); resize.disconnect(); chart.destroy(); };
+  return {
+    update: (newRun, newOptions) => {
+      const { min, max } = chart.scales.x, before = chart.data[0];
+      const zoomed = before.length > 1 && (min! > before[0] || max! < before[before.length - 1]);
+      run = newRun;
+      options = newOptions;
+      chart.setData(dataOf(options), !zoomed);
+      if (zoomed) chart.redraw();
+    },
+    remove: () => { stop(); resize.disconnect(); chart.destroy(); },
+  };
 }

@@ -50,6 +50,7 @@ export interface RigCamera {
 
 // A part of the map with its own world frame.
 export interface Submap {
+  root: number;  // identifies it while a run goes on
   loaded: boolean; frames: number;
   up: number[];
   path: { time: Float32Array; position: Float32Array; rotation: Float32Array };
@@ -86,19 +87,29 @@ export interface Run {
   schema: number; command: string; summary: Summary;
   rig: RigCamera[]; submaps: Submap[]; landmarks: number;
   frames: { time: Float32Array; ms: Float32Array; direct: number; cameras: FrameCounts[] };
+  live?: boolean;  // the run goes on: what is known at its end only is missing
   stages: Stage[]; residuals: Residuals[]; truth: Truth | null; settings: Setting[];
 }
 
 function floats(base64: string): Float32Array {
-  const text = atob(base64);
-  const bytes = new Uint8Array(text.length);
-  for (let i = 0; i < text.length; ++i) bytes[i] = text.charCodeAt(i);
-  return new Float32Array(bytes.buffer);
+  return new Float32Array(bytesOf(base64).buffer);
 }
 
 // Parses the data of a run; returns null if there are none.
 export function parseRun(json: string): Run | null {
+  return parseData(json);
+}
+
+// Parses JSON with arrays of numbers.
+export function parseData(json: string) {
   return JSON.parse(json, (_, value) => (typeof value?.f32 === 'string' ? floats(value.f32) : value));
+}
+
+export function bytesOf(base64: string): Uint8Array<ArrayBuffer> {
+  const text = atob(base64);
+  const bytes = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; ++i) bytes[i] = text.charCodeAt(i);
+  return bytes;
 }
 
 // ---- Values derived from the data

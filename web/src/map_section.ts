@@ -1,7 +1,10 @@
 // The section of the 3D map: the view, its controls, and the legend of its colours.
 import { onTime, selectTime } from './cursor';
-import { isMetric, lengthUnit, Run, timeRange } from './data';
+import { isMetric, lengthUnit, nearest, Run, timeRange } from './data';
 import { decimal, h, plain, plural, seconds, short } from './dom';
+import { LivePose } from './live_data';
+import { morph } from './morph';
+import { Drawing } from './section';
 import { cameraColour, onTheme, scaleColour } from './theme';
 import { MapView, ViewSettings } from './view3d';
 
@@ -16,7 +19,7 @@ function checkbox(text: string, checked: boolean, change: (value: boolean) => vo
   return h('label', { class: 'check' }, input, text);
 }
 
-// Owns the canvas, so that the point of view remains when the data of a run are shown again.
+// Owns the canvas. The controls are made once, and again only if there is something else to choose from.
 export class MapSection {
   private readonly canvas = h('canvas', {
     tabindex: 0, role: 'application', 'aria-describedby': 'map-keys',
@@ -24,53 +27,108 @@ export class MapSection {
   private readonly view = MapView.create(this.canvas);
   private settings: ViewSettings = { submap: 0, colouring: 'height', points: true, keyframes: true, loops: true, truth: true,
                                      frusta: 'time', time: Infinity };
+  private selected = Infinity;  // time of the marked pose; Infinity: the newest
+  private submapChosen = false;
+  private newest: { root: number; positions: number[]; rotation: number[] } | null = null;  // since the data of the run
   private shown = -1;
   private run!: Run;
+  private choices = '';
   private readonly scale = h('div', { class: 'scale' });
-  private readonly status = h('p', { class: 'status', role: 'status' });
-  private slider = h('input', { type: 'range' });
+  private readonly status = h('p', { class: 'status' });
+  private readonly slider = h('input', { type: 'range', step: 'any', 'aria-label': 'Time of the marked pose',
+                                         input: () => selectTime(Number(this.slider.value)) });
+  private readonly ends = [h('span', {}), h('span', {})];
+  private readonly controls = h('div', { class: 'controls' });
 
   constructor() {
     onTime((time) => this.setTime(time));
     onTheme(() => this.run && this.drawScale());
   }
 
-  show(run: Run): HTMLElement {
+  draw(run: Run, body: HTMLElement): Drawing {
     this.run = run;
-    if (!run.submaps.length) return h('p', {}, 'The run has no map: no frame could be tracked.');
-    if (this.settings.submap >= run.submaps.length) this.settings.submap = 0;
+    let drawn = false;
+    const update = (newer: Run) => {
+      this.run = newer;
+      if (!drawn && newer.submaps.length) body.replaceChildren(this.elements());
+      if (!newer.submaps.length) body.replaceChildren(h('p', {}, newer.live ? 'There is no map yet.' : 'The run has no map: no frame could be tracked.'));
+      drawn = newer.submaps.length > 0;
+      if (!drawn || !this.view) return;
+      this.updateControls();
+      requestAnimationFrame(() => this.fill());
+    };
+    update(run);
+    return { update, remove: () => {} };
+  }
+
+  // Shows a pose that is newer than the data of the run.
+  addNewest(pose: LivePose) {
+    if (this.newest?.root !== pose.root) this.newest = null;
+    this.newest ??= { root: pose.root, positions: [], rotation: pose.rotation };
+    this.newest.positions.push(...pose.position);
+    this.newest.rotation = pose.rotation;
+    this.showNewest();
+  }
+
+  private showNewest() {
+    const submap = this.run?.submaps[this.settings.submap];
+    if (!this.view || this.shown < 0 || !submap || !this.newest || this.newest.root !== submap.root) return;
+    if (this.selected !== Infinity) return;
+    this.view.setNewest(this.newest.positions, this.newest.rotation);
+    this.drawStatus('Newest pose', this.newest.positions.slice(-3));
+  }
+
+  private elements(): HTMLElement {
     if (!this.view) {
       return h('p', { class: 'notice' }, 'This browser cannot draw in 3D (WebGL 2 is missing or switched off).');
     }
-    const element = h('div', { class: 'map' }, this.controls(run), h('div', { class: 'view' }, this.canvas, this.buttons(), this.scale),
-      this.timeControl(run), this.status,
+    const newest = h('button', { type: 'button', click: () => this.setTime(Infinity) }, 'newest');
+    return h('div', { class: 'map' }, this.controls, h('div', { class: 'view' }, this.canvas, this.buttons(), this.scale),
+      h('div', { class: 'time' }, this.ends[0], this.slider, this.ends[1], newest), this.status,
       h('p', { class: 'hint', id: 'map-keys' },
         'Drag to turn, right button or two fingers to move, wheel to zoom. Keys: arrows turn, + and \u2212 zoom, Home and End ' +
         'look obliquely and from above. Click a keyframe to select its time.'));
-    requestAnimationFrame(() => this.fill());
-    return element;
   }
 
   private fill() {
-    this.view!.show(this.run, this.settings, this.shown === this.settings.submap);
-    this.shown = this.settings.submap;
+    const follows = this.run.live && !this.submapChosen && this.newest;
+    const current = follows ? this.run.submaps.findIndex((submap) => submap.root === this.newest!.root) : -1;
+    if (current >= 0) this.settings.submap = current;
+    if (this.settings.submap >= this.run.submaps.length) this.settings.submap = 0;
+    const root = this.run.submaps[this.settings.submap].root;
+    this.view!.show(this.run, this.settings, this.shown === root);
+    this.shown = root;
+    if (this.newest) this.newest.positions = this.newest.positions.slice(-3);  // the others are in the path now
     this.drawScale();
-    this.setTime(Math.min(this.settings.time, timeRange(this.run)[1]));
+    this.setTime(this.selected);
   }
 
   private change(settings: Partial<ViewSettings>) {
     Object.assign(this.settings, settings);
     this.view!.update(this.settings);
     this.drawScale();
+    this.setTime(this.selected);
   }
 
-  private controls(run: Run) {
+  private updateControls() {
+    const [from, to] = timeRange(this.run);
+    this.slider.min = String(from);
+    this.slider.max = String(to);
+    this.ends[0].textContent = seconds(from);
+    this.ends[1].textContent = seconds(to);
+    const { run } = this, truth = run.truth !== null && !run.truth.error, live = run.live === true;
+    const choices = JSON.stringify([run.submaps.map((s) => [s.root, live || s.frames, s.loaded]), run.summary.loops.length > 0, truth]);
+    if (choices !== this.choices) this.controls.replaceChildren(...this.controlsFor(run));
+    this.choices = choices;
+  }
+
+  private controlsFor(run: Run): Node[] {
     const s = this.settings, summary = run.summary;
     const submaps = run.submaps.length > 1 && h('label', { class: 'check' }, 'Submap ',
-      h('select', { change: (event) => { s.submap = Number((event.target as HTMLSelectElement).value); this.fill(); } },
+      h('select', { change: (event) => { s.submap = Number((event.target as HTMLSelectElement).value); this.submapChosen = true; this.fill(); } },
         ...run.submaps.map((submap, i) => h('option', { value: i, selected: i === s.submap },
-          `${i + 1}: ${plural(submap.frames, 'frame')}${submap.loaded ? ', loaded' : ''}`))));
-    return h('div', { class: 'controls' },
+          `${i + 1}${run.live ? '' : `: ${plural(submap.frames, 'frame')}`}${submap.loaded ? ', loaded' : ''}`))));
+    return [
       submaps,
       radios('Points by', 'colouring', [['height', 'height'], ['age', 'age'], ['plain', 'none']], s.colouring,
         (colouring) => this.change({ colouring })),
@@ -79,7 +137,8 @@ export class MapSection {
       checkbox('points', s.points, (points) => this.change({ points })),
       checkbox('keyframes', s.keyframes, (keyframes) => this.change({ keyframes })),
       summary.loops.length > 0 && checkbox('loops', s.loops, (loops) => this.change({ loops })),
-      run.truth && !run.truth.error && checkbox('ground truth', s.truth, (truth) => this.change({ truth })));
+      run.truth && !run.truth.error && checkbox('ground truth', s.truth, (truth) => this.change({ truth })),
+    ].filter((part) => part !== false && part !== null);
   }
 
   private buttons() {
@@ -90,25 +149,24 @@ export class MapSection {
       button('+', () => view.zoom(1 / 1.3), 'zoom in (+)'), button('\u2212', () => view.zoom(1.3), 'zoom out (\u2212)'));
   }
 
-  private timeControl(run: Run) {
-    const [from, to] = timeRange(run);
-    this.slider = h('input', { type: 'range', min: from, max: to, step: 'any', 'aria-label': 'Time of the marked pose',
-                               input: () => selectTime(Number(this.slider.value)) });
-    this.slider.value = String(Math.min(this.settings.time, to));
-    return h('div', { class: 'time' }, h('span', {}, seconds(from)), this.slider, h('span', {}, seconds(to)));
+  // Marks the pose at a time; that at the end or after it is the newest one.
+  private setTime(time: number) {
+    if (!this.view || !this.run?.submaps.length || this.shown < 0) return;
+    const end = timeRange(this.run)[1];
+    this.selected = time >= end ? Infinity : time;
+    this.settings.time = Math.min(time, end);
+    this.slider.value = String(this.settings.time);
+    const { path } = this.run.submaps[this.settings.submap];
+    if (this.selected === Infinity && this.newest && this.newest.root === this.shown) return this.showNewest();
+    this.view.setTime(this.settings.time);
+    if (!path.time.length) return;
+    const i = nearest(path.time, this.settings.time);
+    this.drawStatus(`Pose at ${seconds(path.time[i])}`, path.position.subarray(3 * i, 3 * i + 3));
   }
 
-  private setTime(time: number) {
-    if (!this.view || !this.run?.submaps.length) return;
-    this.slider.value = String(time);
-    this.settings.time = time;
-    this.view.setTime(time);
-    const { path } = this.run.submaps[this.settings.submap];
-    if (!path.time.length) return;
-    let i = 0;
-    path.time.forEach((t, k) => { if (Math.abs(t - time) < Math.abs(path.time[i] - time)) i = k; });
-    const p = [0, 1, 2].map((k) => decimal(path.position[3 * i + k], 3)).join(', ');
-    this.status.replaceChildren(h('b', {}, `Pose at ${seconds(path.time[i])}`), ` camera 0 at (${p}) ${lengthUnit(this.run)}`);
+  private drawStatus(what: string, position: ArrayLike<number>) {
+    const p = [0, 1, 2].map((k) => decimal(position[k], 3)).join(', ');
+    morph(this.status, [h('b', {}, what), ` camera 0 at (${p}) ${lengthUnit(this.run)}`]);
   }
 
   private select(event: PointerEvent) {

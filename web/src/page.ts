@@ -1,4 +1,4 @@
-// The page: a header and the sections, drawn from the data of a run. `show` may be called again with newer data.
+// The page: a header and the sections, drawn from the data of a run.
 import { camerasSection } from './cameras';
 import { calibrationSection } from './calibration';
 import { isMetric, pathLength, quantile, Run, unbrokenParts } from './data';
@@ -6,42 +6,46 @@ import { decimal, h, integer, metres, short } from './dom';
 import { eventsSection } from './events';
 import { findings } from './findings';
 import { MapSection } from './map_section';
+import { morph } from './morph';
 import { planSection } from './plan';
 import { residualsSection } from './residuals';
+import { Draw, Drawing, fromElements, remade } from './section';
 import { settingsSection } from './settings';
 import { currentTheme, setTheme, Theme } from './theme';
-import { addTimeline } from './timeline';
+import { timelineSection } from './timeline';
 import { timingSection } from './timing';
 import { truthSection } from './truth';
 
 interface Section {
   id: string; title: string; note: string;
-  draw: (run: Run, body: HTMLElement) => (() => void)[] | void;
+  draw: Draw;
   when?: (run: Run) => boolean;
 }
 
-const fromElements = (make: (run: Run) => HTMLElement[]) => (run: Run, body: HTMLElement) => { body.append(...make(run)); };
+// A section above the others, which is not drawn from the data of a run.
+export interface Lead { id: string; title: string; body: HTMLElement }
 
 function sections(map: MapSection): Section[] {
   return [
-    { id: 'map', title: 'Map', draw: (run, body) => { body.append(map.show(run)); },
+    { id: 'map', title: 'Map', draw: (run, body) => map.draw(run, body),
       note: 'Landmarks, the path of camera 0, and the rig. Pointing at a chart moves the marked pose.' },
     { id: 'plan', title: 'Path from above', draw: fromElements(planSection),
       note: 'Projected along the vertical, which is estimated from how the rig was held.' },
     { id: 'truth', title: 'Ground truth', draw: truthSection, when: (run) => run.truth !== null,
       note: 'Compared after the run; the estimator never sees it. The path of camera 0 is aligned to it, as by bslam eval.' },
-    { id: 'timeline', title: 'Timeline', draw: (run, body) => [addTimeline(body, run)],
+    { id: 'timeline', title: 'Timeline', draw: timelineSection,
       note: 'What was tracked, and the state of every camera.' },
     { id: 'cameras', title: 'Cameras', draw: camerasSection,
       note: 'Inliers support the pose. In frames tracked directly no keypoints are extracted: matched are the landmarks that were aligned.' },
-    { id: 'residuals', title: 'Residuals', draw: fromElements(residualsSection),
+    { id: 'residuals', title: 'Residuals', when: (run) => !run.live,
+      draw: remade(residualsSection, (run) => run.residuals.map((r) => [r.observations, r.rms_px])),
       note: 'Mean of observed minus projected position in each cell of the image, magnified equally. A good calibration leaves short ' +
             'arrows without order. Arrows toward or away from the centre: focal length or distortion. Whirls: rotation.' },
-    { id: 'calibration', title: 'Calibration', draw: fromElements(calibrationSection),
+    { id: 'calibration', title: 'Calibration', when: (run) => !run.live, draw: fromElements(calibrationSection),
       note: 'The map is adjusted once more with free calibration. Bold: more than three standard deviations.' },
     { id: 'time', title: 'Time', draw: timingSection, note: 'Per frame from images to pose, and per call of each stage.' },
     { id: 'events', title: 'Events', draw: fromElements(eventsSection), note: '' },
-    { id: 'settings', title: 'Settings', draw: fromElements(settingsSection), note: 'With config.yaml the run can be repeated.' },
+    { id: 'settings', title: 'Settings', draw: remade(settingsSection, (run) => [run.command, run.settings]), note: 'With config.yaml the run can be repeated.' },
   ];
 }
 
@@ -65,48 +69,84 @@ function figures(run: Run): HTMLElement {
     entry('keyframes', integer(s.map.keyframes), ''),
     entry('landmarks', integer(s.map.landmarks), ''),
     entry('inliers', integer(quantile(inliers, 0.5)), '/ frame'),
-    entry('reprojection', total ? decimal(rms, 2) : '–', 'px rms'),
+    !run.live && entry('reprojection', total ? decimal(rms, 2) : '–', 'px rms'),
     entry('time', decimal(s.time.frame_ms.median, 1), 'ms / frame'),
     run.truth && !run.truth.error && entry('position error', metres(run.truth.ate_m.rmse), 'rms'));
 }
 
-function header(run: Run, shown: Section[]): HTMLElement {
-  const s = run.summary;
-  const cameras = `camera${s.cameras_used.length === 1 ? '' : 's'} ${s.cameras_used.join(', ')}`;
-  return h('header', {},
-    h('div', { class: 'head' },
-      h('div', {}, h('h1', {}, s.data), h('p', { class: 'soft' }, `bslam ${s.version}, ${cameras}, mode ${s.mode}, seed ${s.seed}`)), themeSwitch()),
-    h('nav', { 'aria-label': 'Sections' }, h('ul', {}, ...shown.map((section) => h('li', {}, h('a', { href: `#${section.id}` }, section.title))))),
-    figures(run),
-    h('ul', { class: 'findings' }, ...findings(run).map((f) => h('li', { class: f.grade },
-      h('b', {}, f.grade), h('a', { href: `#${f.target}` }, f.text)))));
+function findingItems(run: Run): HTMLElement[] {
+  return findings(run).map((f) => h('li', { class: f.grade }, h('b', {}, f.grade), h('a', { href: `#${f.target}` }, f.text)));
 }
 
+function subtitle(run: Run): string {
+  const s = run.summary;
+  return `bslam ${s.version}, camera${s.cameras_used.length === 1 ? '' : 's'} ${s.cameras_used.join(', ')}, mode ${s.mode}, seed ${s.seed}`;
+}
+
+function footer(version: string): HTMLElement {
+  const licences = document.getElementById('licences') as HTMLTemplateElement;
+  return h('footer', {}, h('p', {}, `Written by bslam ${version}. This file is complete: it loads nothing from elsewhere.`),
+    h('details', {}, h('summary', {}, 'Licences of the libraries in this page'), h('pre', {}, licences.content.textContent ?? '')));
+}
+
+// Draws the run when `show` is called first, and changes what differs when it is called again: the point of view, the focus
+// and selected ranges remain.
 export class Page {
-  private readonly map = new MapSection();
-  private removals: (() => void)[] = [];
+  readonly map = new MapSection();
+  private readonly sections = sections(this.map);
+  private readonly drawn = new Map<string, { element: HTMLElement; drawing: Drawing }>();
+  private readonly title = h('h1', {});
+  private readonly subtitle = h('p', { class: 'soft' });
+  private readonly nav = h('ul', {});
+  private readonly figures = h('div', {});
+  private readonly findings = h('ul', { class: 'findings' });
+  private readonly main = h('main', {});
+  private version = '';
 
-  constructor(private readonly root: HTMLElement) {}
+  constructor(private readonly root: HTMLElement, private readonly lead: Lead | null = null) {}
 
-  show(run: Run) {
-    for (const remove of this.removals) remove();
-    this.removals = [];
-    const focused = document.activeElement as HTMLElement | null, scrolled = scrollY;
-    document.title = `${run.summary.data} - bslam run`;
-    const shown = sections(this.map).filter((section) => section.when?.(run) ?? true);
-    const bodies = shown.map(() => h('div', { class: 'body' }));
-    this.root.replaceChildren(header(run, shown), h('main', {}, ...shown.map((section, i) =>
-      h('section', { id: section.id, class: 'section', 'aria-labelledby': `${section.id}-title` },
-        h('div', { class: 'margin' }, h('h2', { id: `${section.id}-title` }, section.title), section.note && h('p', {}, section.note)), bodies[i]))),
-      this.footer(run));
-    shown.forEach((section, i) => this.removals.push(...(section.draw(run, bodies[i]) ?? [])));  // charts need their width
-    if (focused?.isConnected) focused.focus({ preventScroll: true });
-    scrollTo(0, scrolled);
+  // The page without data.
+  begin(name: string) {
+    document.title = `${name} - bslam run`;
+    this.title.textContent = name;
+    this.root.replaceChildren(h('header', {},
+      h('div', { class: 'head' }, h('div', {}, this.title, this.subtitle), themeSwitch()),
+      h('nav', { 'aria-label': 'Sections' }, this.nav), this.figures, this.findings), this.main);
+    if (this.lead) {
+      this.main.append(h('section', { id: this.lead.id, class: 'lead', 'aria-label': this.lead.title }, this.lead.body));
+    }
   }
 
-  private footer(run: Run): HTMLElement {
-    const licences = document.getElementById('licences') as HTMLTemplateElement;
-    return h('footer', {}, h('p', {}, `Written by bslam ${run.summary.version}. This file is complete: it loads nothing from elsewhere.`),
-      h('details', {}, h('summary', {}, 'Licences of the libraries in this page'), h('pre', {}, licences.content.textContent ?? '')));
+  show(run: Run) {
+    if (!this.root.contains(this.main)) this.begin(run.summary.data);
+    const shown = this.sections.filter((section) => section.when?.(run) ?? true);
+    this.subtitle.textContent = subtitle(run);
+    const links = [...(this.lead ? [this.lead] : []), ...shown];
+    morph(this.nav, links.map((section) => h('li', {}, h('a', { href: `#${section.id}` }, section.title))));
+    morph(this.figures, [figures(run)]);
+    morph(this.findings, run.live ? [] : findingItems(run));
+    for (const section of this.sections) this.showSection(section, run, shown.includes(section));
+    if (run.summary.version !== this.version) {
+      this.root.querySelector('footer')?.remove();
+      this.root.append(footer(this.version = run.summary.version));
+    }
+  }
+
+  private showSection(section: Section, run: Run, visible: boolean) {
+    const before = this.drawn.get(section.id);
+    if (before && visible) return before.drawing.update(run);
+    if (before) {
+      before.drawing.remove();
+      before.element.remove();
+      this.drawn.delete(section.id);
+    }
+    if (!visible) return;
+    const body = h('div', { class: 'body' });
+    const element = h('section', { id: section.id, class: 'section', 'aria-labelledby': `${section.id}-title` },
+      h('div', { class: 'margin' }, h('h2', { id: `${section.id}-title` }, section.title), section.note && h('p', {}, section.note)), body);
+    const later = this.sections.slice(this.sections.indexOf(section) + 1);
+    const next = later.map((s) => this.drawn.get(s.id)?.element).find((e) => e) ?? null;
+    this.main.insertBefore(element, next);
+    this.drawn.set(section.id, { element, drawing: section.draw(run, body) });  // charts need their width
   }
 }

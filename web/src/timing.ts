@@ -1,7 +1,9 @@
 // Processing time: per frame over the run, and the distribution of the calls of each stage.
-import { addChart } from './charts';
+import { addChart, ChartOptions } from './charts';
 import { Run, Stage, Statistics } from './data';
 import { decimal, h, integer, svg, table } from './dom';
+import { morph } from './morph';
+import { Drawing } from './section';
 
 const kWidth = 240, kHeight = 16;
 
@@ -30,11 +32,12 @@ function axisDrawing({ place, ticks }: ReturnType<typeof axis>): SVGElement {
     ...ticks.map((ms, i) => svg('text', { x: place(ms), y: 12, 'text-anchor': i === 0 ? 'start' : i === ticks.length - 1 ? 'end' : 'middle' }, label(ms))));
 }
 
-export function timingSection(run: Run, parent: HTMLElement): (() => void)[] {
+const chartOptions = (run: Run): ChartOptions => ({
+  label: 'Processing time per frame', unit: 'ms per frame', height: 170, time: run.frames.time,
+  lines: [{ label: 'time per frame', values: run.frames.ms, colour: 'inliers', width: 1.2 }] });
+
+function stagesTable(run: Run): Node[] {
   const { time, memory } = run.summary;
-  const remove = addChart(parent, run, {
-    label: 'Processing time per frame', unit: 'ms per frame', height: 170, time: run.frames.time,
-    lines: [{ label: 'time per frame', values: run.frames.ms, colour: 'inliers', width: 1.2 }] });
   const stages: [string, Stage | null, Statistics][] = run.stages.map((s) => [s.name, s, time.stages_ms[s.name]]);
   const frame: [string, Stage | null, Statistics] = ['frame, in all', null, { ...time.frame_ms, count: run.frames.ms.filter((v) => !Number.isNaN(v)).length }];
   const rows = [frame, ...stages.sort((a, b) => Number(a[1]!.background) - Number(b[1]!.background))];
@@ -43,9 +46,20 @@ export function timingSection(run: Run, parent: HTMLElement): (() => void)[] {
     name, stage === null ? 'caller' : stage.background ? 'background' : 'caller', integer(s.count),
     decimal(s.median, 2), decimal(s.p95, 2), decimal(s.max, 2), stage ? decimal(stage.total_ms / 1000, 2) : '', rangeDrawing(s, scale.place)]);
   body.push([h('small', {}, 'axis of the drawings'), '', '', '', '', '', '', axisDrawing(scale)]);
-  parent.append(table('Processing time of the stages',
+  return [table('Processing time of the stages',
     ['stage', 'thread', 'calls', 'median [ms]', '95 % [ms]', 'max [ms]', 'sum [s]', 'median, 95 %, max [ms]'], body, [2, 3, 4, 5, 6]),
-    h('p', { class: 'hint' }, `Start ${decimal(time.start_up_s, 2)} s, run ${decimal(time.wall_s, 2)} s`,
-      memory.peak_mb !== null && `, peak memory ${integer(memory.peak_mb)} MB`, '.'));
-  return [remove];
+    !run.live && h('p', { class: 'hint' }, `Start ${decimal(time.start_up_s, 2)} s, run ${decimal(time.wall_s, 2)} s`,
+      memory.peak_mb !== null && `, peak memory ${integer(memory.peak_mb)} MB`, '.')].filter((part) => part !== false);
+}
+
+export function timingSection(run: Run, parent: HTMLElement): Drawing {
+  const chart = addChart(parent, run, chartOptions(run)), stages = h('div', {}, ...stagesTable(run));
+  parent.append(stages);
+  return {
+    update: (newer) => {
+      chart.update(newer, chartOptions(newer));
+      morph(stages, stagesTable(newer));
+    },
+    remove: chart.remove,
+  };
 }

@@ -39,6 +39,10 @@ export class MapView {
   private cloud: three.Points | null = null;
   private extent: Extent = { centre: new three.Vector3(), radius: 1, floor: 0, path: 1 };
   private requested = false;
+  // Where the view was placed by `lookFrom`, and whether the user has moved it since.
+  private placed = { direction: new three.Vector3(-0.55, 0.75, 0.85), centre: new three.Vector3(), radius: 0 };
+  private moved = false;
+  private tail: LineSegments2 | null = null;  // the path since the data of the run
   private readonly stopTheme: () => void;
 
   // Returns null if the browser cannot draw in 3D.
@@ -55,6 +59,7 @@ export class MapView {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
     this.controls.addEventListener('change', () => this.request());
+    this.controls.addEventListener('start', () => { this.moved = true; });
     canvas.addEventListener('keydown', (event) => this.onKey(event));
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.stopTheme = onTheme(() => { this.recolour(); this.renderNow(); });
@@ -72,7 +77,8 @@ export class MapView {
   private submap!: Submap;
   private settings!: ViewSettings;
 
-  // Draws a run. `keepView`: the same submap was shown before, and is looked at from the same place.
+  // Draws a run. `keepView`: the same submap was shown before, and is looked at from the same place, except if the user has
+  // not moved and the scene has outgrown the view.
   show(run: Run, settings: ViewSettings, keepView: boolean) {
     this.run = run;
     this.settings = settings;
@@ -83,12 +89,31 @@ export class MapView {
     this.extent = this.measure();
     this.rebuild();
     if (!keepView) this.oblique();
+    else if (!this.moved && this.outgrown()) this.lookFrom(this.placed.direction);
     this.resize();
   }
 
   update(settings: ViewSettings) {
     this.settings = settings;
     this.rebuild();
+  }
+
+  private outgrown(): boolean {
+    const { centre, radius } = this.extent, before = this.placed;
+    return centre.distanceTo(before.centre) > 0.15 * before.radius || radius > 1.2 * before.radius || radius < 0.7 * before.radius;
+  }
+
+  // Marks a pose that is newer than the path, which is continued through `positions`.
+  setNewest(positions: number[], rotation: number[]) {
+    if (this.tail) this.discard(this.tail);
+    this.tail = null;
+    const path = this.submap.path.position, lines: number[] = [];
+    const all = path.length ? [...at(path, path.length / 3 - 1), ...positions] : positions;
+    for (let i = 1; i < all.length / 3; ++i) lines.push(...at(all, i - 1), ...at(all, i));
+    if (lines.length) this.world.add(this.tail = this.segments(lines, 'path', 2.5));
+    this.rig.position.set(...at(all, all.length / 3 - 1));
+    this.rig.quaternion.copy(quaternion(rotation, 0));
+    this.request();
   }
 
   setTime(time: number) {
@@ -99,6 +124,7 @@ export class MapView {
 
   private rebuild() {
     for (const child of [...this.world.children]) this.discard(child);
+    this.tail = null;
     this.addGrid();
     this.addPoints();
     this.addPath();
@@ -313,6 +339,8 @@ export class MapView {
 
   private lookFrom(direction: three.Vector3) {
     const { centre, radius } = this.extent;
+    this.placed = { direction: direction.clone(), centre: centre.clone(), radius };
+    this.moved = false;
     const aspect = this.element.clientWidth / Math.max(1, this.element.clientHeight);
     const forward = new three.Vector3(0, 0, 1).applyQuaternion(this.world.quaternion);
     const heading = Math.atan2(forward.x, -forward.z);  // the first camera of the rig looks away from the viewer
@@ -342,6 +370,7 @@ export class MapView {
   }
 
   private turn(azimuth: number, polar: number) {
+    this.moved = true;
     const offset = new three.Spherical().setFromVector3(this.camera.position.clone().sub(this.controls.target));
     offset.theta += azimuth;
     offset.phi = Math.min(Math.PI - 0.01, Math.max(0.01, offset.phi + polar));
@@ -351,6 +380,7 @@ export class MapView {
   }
 
   zoom(factor: number) {
+    this.moved = true;
     this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
     this.controls.update();
     this.request();

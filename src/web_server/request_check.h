@@ -1,0 +1,31 @@
+// Which requests a server answers. Web pages of other origins can send requests to a server on this machine, with any
+// name of a host that resolves to it (DNS rebinding): the token, the Host header and the Origin header are checked.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace bslam::web_server {
+
+// 32 random hexadecimal digits, of the random source of the operating system.
+std::string make_token();
+
+// The parts of a request that decide. Headers that are missing are empty.
+struct RequestHead {
+  std::string_view target;  // path and query, as sent
+  std::string_view host;
+  std::string_view origin;
+};
+
+// Whether the query of the target contains the token, the host is this machine (see is_own_host), and the origin, if
+// given, is that of the host. The time of the comparison does not depend on the token.
+bool is_allowed(const RequestHead& head, std::string_view token, bool loopback);
+
+// Whether a Host header names this machine: with `loopback`, as localhost or by a loopback address; else as localhost
+// or by any IP address. Other names could be those of another site. The port does not matter: it may be forwarded.
+bool is_own_host(std::string_view host, bool loopback);
+
+// The path of a target, without the query.
+std::string_view path_of(std::string_view target);
+
+}  // namespace bslam::web_server
