@@ -6,6 +6,7 @@
 #include <span>
 
 #include "base/timestamp.h"
+#include "geometry/vertical_direction.h"
 #include "map/bundled_map.h"
 #include "system/system.h"
 
@@ -17,9 +18,7 @@ inline constexpr std::size_t kMaxReportPoses = 20'000;    // poses and frames in
 // Returns a number n so that every n-th of `count` things are at most `limit`.
 std::size_t report_stride(std::size_t count, std::size_t limit);
 
-// The direction in the world that is vertical, if the rig stands or moves upright: the upward direction of camera 0's
-// images, unless another direction of the camera is clearly more constant over the keyframes.
-geometry::Vector3d vertical_direction(std::span<const geometry::SE3> T_world_rig);
+using geometry::vertical_direction;  // `up` of a submap
 
 // One entry per submap, in its own world frame: first those of the trajectories in their order, then those without
 // poses. Landmarks are thinned out if there are more than kMaxReportPoints. Times are in seconds since `first_time_ns`.
