@@ -14,8 +14,8 @@ namespace bslam::map_export {
 
 struct ColmapModel {
   std::string rigs, frames, cameras, images, points;  // rigs.txt, frames.txt, cameras.txt, images.txt, points3D.txt
-  double mean_error_px = 0;                           // mean reprojection error of all observations, as by COLMAP
-  std::vector<std::string> notes;                     // what COLMAP cannot hold
+  double mean_error_px = 0;        // mean over the points of their mean reprojection errors, as by COLMAP
+  std::vector<std::string> notes;  // what COLMAP cannot hold
 };
 
 // The model has one image with its keypoints for each entry of `images`, and a point for every landmark. 0.5 is added

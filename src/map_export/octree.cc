@@ -1,5 +1,6 @@
 #include "map_export/octree.h"
 
+#include <fmt/format.h>
 #include <octomap/octomap.h>
 
 #include <sstream>
@@ -15,11 +16,13 @@ octomap::point3d point(const Eigen::Vector3d& p) {
 bool insert(const Scan& scan, const CarvingOptions& options, octomap::OcTree& tree) {
   octomap::KeySet free, occupied;
   octomap::KeyRay cells;
+  octomap::OcTreeKey begin, end;
+  if (!tree.coordToKeyChecked(point(scan.origin), begin)) return false;
   for (const Ray& ray : scan.rays) {
     const CarvedRay carved = carve(scan.origin, ray, options);
+    if (!tree.coordToKeyChecked(point(carved.free_end), end)) return false;
     if (!tree.computeRayKeys(point(scan.origin), point(carved.free_end), cells)) return false;
     free.insert(cells.begin(), cells.end());
-    octomap::OcTreeKey end;
     if (!carved.occupied) continue;
     if (!tree.coordToKeyChecked(point(ray.end), end)) return false;
     occupied.insert(end);
@@ -46,8 +49,11 @@ Result<OctreeFile> octree_of(const std::vector<Scan>& scans, const CarvingOption
   OctreeFile file;
   for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf)
     ++(tree.isNodeOccupied(*leaf) ? file.occupied : file.free);
+  // As OcTree::writeBinary, which also prints.
   std::ostringstream out;
-  tree.writeBinary(out);
+  out << fmt::format("# Octomap OcTree binary file\nid {}\nsize {}\nres {}\ndata\n", tree.getTreeType(), tree.size(),
+                     options.resolution);
+  tree.writeBinaryData(out);
   file.bytes = std::move(out).str();
   return file;
 }

@@ -16,8 +16,8 @@ std::vector<Scan> scans_of(const Selection& selection) {
     int keypoints = 0;
     for_each_keypoint(selection, l, [&](KeyframeId, frame::KeypointRef) { ++keypoints; });
     const Eigen::Matrix3d covariance = landmark_covariance(selection, l);
-    if (keypoints < 2 || !covariance.allFinite()) continue;
     const Eigen::Vector3d& position = map.landmark(l).position;
+    if (keypoints < 2 || !covariance.allFinite() || !position.allFinite()) continue;
     for_each_keypoint(selection, l, [&](KeyframeId k, frame::KeypointRef r) {
       const Eigen::Vector3d centre = map.cam_from_world(k, r.camera).inverse().translation();
       const Eigen::Vector3d direction = (position - centre).normalized();

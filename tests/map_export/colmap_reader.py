@@ -43,9 +43,11 @@ for point_id, point in rec.points3D.items():
         errors.setdefault(camera.model_name, []).append(error)
     if own:
         errors.setdefault('stated', []).append(abs(np.mean(own) - point.error))
-frame_gap = max(np.abs(i.cam_from_world().matrix() - (rec.rigs[1].sensor_from_rig(i.camera.sensor_id).matrix()
-                if not rec.rigs[1].is_ref_sensor(i.camera.sensor_id) else np.eye(3, 4)) @
-                np.vstack([i.frame.rig_from_world.matrix(), [0, 0, 0, 1]])).max() for i in rec.images.values()) if len(rec.rigs) == 1 else None
+written = {}
+for line in open(sys.argv[1] + '/images.txt').read().splitlines()[2::2]:
+    v = line.split()
+    written[int(v[0])] = pycolmap.Rigid3d(pycolmap.Rotation3d(np.array([*v[2:5], v[1]], float)), np.array(v[5:8], float)).matrix()
+frame_gap = max(float(np.abs(i.cam_from_world().matrix() - written[k]).max()) for k, i in rec.images.items())
 print(json.dumps({'images': rec.num_images(), 'points': rec.num_points3D(), 'rigs': len(rec.rigs), 'frames': len(rec.frames),
                   'sensors': [r.num_sensors() for r in rec.rigs.values()], 'frame_gap': frame_gap,
                   'names': [i.name for i in rec.images.values()],

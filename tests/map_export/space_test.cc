@@ -18,7 +18,7 @@ std::vector<Scan> scans_of_room() {
   for (int i = 0; i < 12; ++i) {
     Scan scan{{-2.0 + 0.35 * i, 0.4 * std::sin(i), 0.0}, 0.0, {}};
     for (int a = 0; a < 360; ++a) {
-      const double angle = a * std::numbers::pi / 180;
+      const double angle = (a + 0.5) * std::numbers::pi / 180;
       const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
       const double to_x = ((direction.x() > 0 ? 3.0 : -3.0) - scan.origin.x()) / direction.x();
       const double to_y = ((direction.y() > 0 ? 2.0 : -2.0) - scan.origin.y()) / direction.y();
