@@ -27,16 +27,18 @@ endfunction()
 
 function(bslam_install)
   set(package ${CMAKE_INSTALL_LIBDIR}/cmake/bslam)
-  install(TARGETS bslam RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-  install(TARGETS bslam_library EXPORT bslam_targets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/bslam DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN *.h)
-  install(EXPORT bslam_targets NAMESPACE bslam:: DESTINATION ${package} FILE bslamTargets.cmake)
+  install(TARGETS bslam RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
+  install(TARGETS bslam_library EXPORT bslam_targets
+          LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/bslam DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
+          FILES_MATCHING PATTERN *.h)
+  install(EXPORT bslam_targets NAMESPACE bslam:: DESTINATION ${package} FILE bslamTargets.cmake COMPONENT development)
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/bslamConfig.cmake.in ${PROJECT_BINARY_DIR}/bslamConfig.cmake
                                 INSTALL_DESTINATION ${package})
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/bslamConfigVersion.cmake COMPATIBILITY SameMinorVersion)
   install(FILES ${PROJECT_BINARY_DIR}/bslamConfig.cmake ${PROJECT_BINARY_DIR}/bslamConfigVersion.cmake
-          DESTINATION ${package})
+          DESTINATION ${package} COMPONENT development)
   file(RELATIVE_PATH BSLAM_PC_TO_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/bslam.pc.in ${PROJECT_BINARY_DIR}/bslam.pc @ONLY)
-  install(FILES ${PROJECT_BINARY_DIR}/bslam.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+  install(FILES ${PROJECT_BINARY_DIR}/bslam.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 endfunction()

@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
   add_rig(app, exit_status);
   add_vocab(app, exit_status);
   add_map(app, exit_status);
+  add_export(app, exit_status);
   add_settings(app, exit_status);
   try {
     app.parse(argc, argv);

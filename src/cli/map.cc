@@ -3,25 +3,18 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "base/atomic_file.h"
 #include "cli/config_arguments.h"
-#include "cli/dataset_arguments.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
-#include "dataset/dataset.h"
-#include "evaluation/trajectory_file.h"
-#include "rig_formats/rig_file.h"
 #include "session/merge_maps.h"
-#include "session/record_builder.h"
-#include "storage/map_export.h"
 #include "storage/map_file.h"
+#include "storage/submaps.h"
 #include "storage/vocabulary_file.h"
 
 namespace bslam::cli {
@@ -30,8 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct MapArguments {
-  std::string file, other, out, vocabulary, images, rig;
-  ImageArguments image_options;
+  std::string file, other, out, vocabulary;
   ConfigArguments config;
   bool json = false, overwrite = false;
 };
@@ -110,77 +102,6 @@ int map_info(const MapArguments& arguments) {
   return kExitOk;
 }
 
-// Names the images of the map by their files in a data set. Without a data set, or for images that are not in it, the
-// default names are used.
-Result<storage::ImageNamer> image_namer(const camera::Rig& rig, const MapArguments& arguments) {
-  if (arguments.images.empty()) return storage::ImageNamer();
-  constexpr double kTolerance_s = 0.1;  // includes images of cameras that are not synchronised
-  dataset::DatasetRequest request{.path = arguments.images, .sync_tolerance_s = kTolerance_s};
-  if (!arguments.rig.empty()) request.rig_file = arguments.rig;
-  if (const Status s = apply_image_options(arguments.image_options, request); !s) return s.error();
-  const auto data = dataset::open_dataset(request);
-  if (!data) return data.error();
-  std::map<std::pair<std::string, TimeNs>, std::string> names;  // by camera and time stamp
-  for (const dataset::FrameEntry& frame : data->frames) {
-    for (std::size_t c = 0; c < frame.images.size(); ++c) {
-      if (!frame.images[c]) continue;
-      const camera::Camera& camera = data->rig.camera(c);
-      names[{camera.name, frame.images[c]->time_ns - camera.time_offset_ns}] =
-          frame.images[c]->path.lexically_relative(arguments.images).string();
-    }
-  }
-  return storage::ImageNamer([&rig, names = std::move(names)](std::size_t c, TimeNs stamp_ns) {
-    const std::string& camera = rig.camera(c).name;
-    const auto found = names.find({camera, stamp_ns});
-    return found != names.end() ? found->second : fmt::format("{}/{}.png", camera, stamp_ns);
-  });
-}
-
-Status write_exports(const map::BundledMap& map, const storage::ImageNamer& namer, const fs::path& folder) {
-  if (Status s = write_atomically(folder / "points.ply", storage::landmarks_ply(map)); !s) return s;
-  if (Status s = rig_formats::write_rig(map.rig(), folder / "rig.yaml"); !s) return s;
-  const std::string header = evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal);
-  const std::vector<storage::Submap> submaps = storage::submaps_of(map);
-  for (std::size_t i = 0; i < submaps.size(); ++i) {
-    const std::string name = submaps.size() == 1 ? "keyframes.tum" : fmt::format("keyframes_{}.tum", i);
-    const auto trajectory = storage::keyframe_trajectory(map, submaps[i]);
-    if (Status s = evaluation::write_trajectory(folder / name, trajectory, evaluation::TrajectoryFormat::kTum, header);
-        !s)
-      return s;
-  }
-  const auto model = storage::colmap_model(map, namer);
-  if (!model) {  // the other files are still useful
-    std::fprintf(stderr, "warning: no COLMAP model was written: %s\n", model.error().message().c_str());
-    return {};
-  }
-  if (Status s = write_atomically(folder / "cameras.txt", model->cameras); !s) return s;
-  if (Status s = write_atomically(folder / "images.txt", model->images); !s) return s;
-  return write_atomically(folder / "points3D.txt", model->points);
-}
-
-int map_export(const MapArguments& arguments) {
-  const auto saved = storage::read_map(arguments.file);
-  if (!saved) return report_error(saved.error());
-  const auto namer = image_namer(saved->map.rig(), arguments);
-  if (!namer) return report_error(namer.error());
-  std::error_code error;
-  if (fs::exists(arguments.out, error)) {
-    const bool folder = fs::is_directory(arguments.out, error);
-    if (!folder) return report_error({arguments.out, "--out", "a file", "a folder"});
-    if (!fs::is_empty(arguments.out, error) && !arguments.overwrite) {
-      return report_error(
-          {arguments.out, "--out", "a folder that is not empty", "an empty or new folder, or --overwrite"});
-    }
-  }
-  fs::create_directories(arguments.out, error);
-  if (error) return report_error({arguments.out, "--out", error.message(), "a folder that can be created"});
-  const Status status = write_exports(saved->map, *namer, arguments.out);
-  if (!status) return report_error(status.error());
-  std::printf("%s: %zu keyframes, %zu landmarks\n", arguments.out.c_str(), saved->map.num_keyframes(),
-              saved->map.num_landmarks());
-  return kExitOk;
-}
-
 int map_merge(const MapArguments& arguments) {
   const auto config = resolve_config(arguments.config);
   if (!config) return report_error(config.error());
@@ -218,15 +139,7 @@ void add_map(CLI::App& app, int& exit_status) {
   info->add_flag("--json", arguments->json, "print JSON");
   info->callback([arguments, &exit_status] { exit_status = map_info(*arguments); });
 
-  CLI::App* out = map->add_subcommand("export", "write points.ply, keyframes.tum, rig.yaml and a COLMAP text model");
-  out->add_option("FILE", arguments->file, "a saved map")->required();
-  out->add_option("--out", arguments->out, "folder to write to")->required();
-  out->add_option("--images", arguments->images,
-                  "data set of the map, so that the COLMAP model names images by their files in the data set");
-  add_image_options(*out, arguments->image_options);
-  out->add_option("--rig", arguments->rig, "calibration of the data set, as for bslam run");
-  out->add_flag("--overwrite", arguments->overwrite, "write into a folder that is not empty");
-  out->callback([arguments, &exit_status] { exit_status = map_export(*arguments); });
+  add_map_export(*map, exit_status);
 
   CLI::App* merge = map->add_subcommand("merge", "merge maps of separate runs that contain common places");
   merge->add_option("A", arguments->file, "a saved map, whose world frame is kept")->required();

@@ -22,6 +22,8 @@ void add_rig(CLI::App& app, int& exit_status);
 void add_rig_calibrate(CLI::App& rig, int& exit_status);
 void add_vocab(CLI::App& app, int& exit_status);
 void add_map(CLI::App& app, int& exit_status);
+void add_export(CLI::App& app, int& exit_status);
+void add_map_export(CLI::App& map, int& exit_status);
 void add_settings(CLI::App& app, int& exit_status);
 
 // Prints "bslam: MESSAGE" as one line on stderr and returns kExitBadInput.

@@ -1,10 +1,8 @@
 #include "session/report_map.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <vector>
-
 
 namespace bslam::session {
 namespace {
@@ -101,19 +99,6 @@ Vector3d ray_at_corner(const camera::Camera& camera, const Eigen::Vector2d& corn
 }
 
 }  // namespace
-
-Vector3d vertical_direction(std::span<const SE3> T_world_rig) {
-  constexpr double kAlmostAsConstant = 0.9;
-  const Vector3d up_rig(0, -1, 0);  // y points downward in an image
-  if (T_world_rig.empty()) return up_rig;
-  geometry::Matrix3d mean = geometry::Matrix3d::Zero();
-  for (const SE3& T : T_world_rig) mean += T.matrix3() / static_cast<double>(T_world_rig.size());
-  const Eigen::JacobiSVD<geometry::Matrix3d> svd(mean, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Vector3d mean_up = mean * up_rig;
-  if (mean_up.norm() >= kAlmostAsConstant * svd.singularValues()[0]) return mean_up.normalized();
-  const Vector3d most_constant = svd.matrixU().col(0);
-  return svd.matrixV().col(0).dot(up_rig) < 0 ? Vector3d(-most_constant) : most_constant;
-}
 
 ordered_json report_submaps(const map::BundledMap& map, std::span<const system::SubmapTrajectory> paths,
                             TimeNs first_time_ns, const ReportLimits& limits) {

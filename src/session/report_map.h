@@ -5,15 +5,14 @@
 #include <span>
 
 #include "base/timestamp.h"
+#include "geometry/vertical_direction.h"
 #include "map/bundled_map.h"
 #include "session/report_arrays.h"
 #include "system/system.h"
 
 namespace bslam::session {
 
-// The direction in the world that is vertical, if the rig stands or moves upright: the upward direction of camera 0's
-// images, unless another direction of the camera is clearly more constant over the keyframes.
-geometry::Vector3d vertical_direction(std::span<const geometry::SE3> T_world_rig);
+using geometry::vertical_direction;  // `up` of a submap
 
 // One entry per submap, in its own world frame: first those of the trajectories in their order, then those without
 // poses. Times are in seconds since `first_time_ns`.

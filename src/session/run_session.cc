@@ -10,6 +10,7 @@
 #include "image_decoding/image_file.h"
 #include "report/trajectory_plot.h"
 #include "rig_formats/bslam_rig.h"
+#include "session/covariance_file.h"
 #include "session/frame_source.h"
 #include "session/record_builder.h"
 #include "session/report_data.h"
@@ -149,6 +150,7 @@ Files output_files(const SessionResult& result, const system::Config& config) {
   files.emplace_back("summary.json", summary_text(result.record));
   add_trajectories(result.record, result.trajectories, "trajectory", evaluation::PoseState::kFinal, files);
   add_trajectories(result.record, result.live, "trajectory_live", evaluation::PoseState::kLive, files);
+  files.emplace_back("covariance_live.csv", covariance_text(result.record));
   files.emplace_back("config.yaml", yaml::config_to_yaml(table));
   if (result.refined_rig) files.emplace_back("rig_refined.yaml", rig_formats::rig_to_yaml(*result.refined_rig));
   const evaluation::Trajectory path =

@@ -1,4 +1,4 @@
-// Writes and reads numbers as little-endian bytes on any machine, for saved maps. Internal to this folder.
+// Writes and reads numbers as little-endian bytes on any machine, for saved maps.
 #pragma once
 
 #include <algorithm>

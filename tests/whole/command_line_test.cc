@@ -92,7 +92,7 @@ TEST_F(CommandLine, PrintsVersionAndHelpForEveryCommand) {
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
   for (const char* verb :
        {"", "run", "eval", "bench", "simulate", "inspect", "rig", "rig info", "rig convert", "rig calibrate", "map",
-        "map info", "map export", "map merge", "vocab", "vocab info", "vocab train", "settings"}) {
+        "map info", "map export", "map merge", "export", "vocab", "vocab info", "vocab train", "settings"}) {
     EXPECT_EQ(run(std::string(verb) + " --help").status, 0) << verb;
   }
 }
@@ -257,6 +257,27 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
   EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 1 + described["keyframes"].get<int>());
   expect_rejected("map export " + out("saved.map") + " --out " + out("exported"));
   EXPECT_EQ(run("map export " + out("saved.map") + " --overwrite --out " + out("exported")).status, 0);
+  for (const char* format : {"colmap", "ply", "g2o", "nerfstudio", "octomap", "nav2"}) {
+    const std::string command = "map export " + out("saved.map") + " --format " + format + " --out " + out(format);
+    const Ran exported = run(command);
+    ASSERT_EQ(exported.status, 0) << exported.err;
+    expect_rejected(command);  // it exists now
+  }
+  expect_rejected("map export " + out("saved.map") + " --format nav2 --height 1 0 --out " + out("wrong"));
+  expect_rejected("map export " + out("saved.map") + " --format ply --undistort --out " + out("wrong"));
+  expect_rejected("map export " + out("saved.map") + " --format colmap --submap 7 --out " + out("wrong"));
+
+  const std::string path = "export " + out("saved") + "/trajectory.tum --rig " + data();
+  ASSERT_EQ(run(path + " --format euroc --frame body --out " + out("body.csv")).status, 0);
+  const Ran error = run("eval " + out("saved") + "/trajectory.tum " + out("body.csv") + " --gt-frame body --rig " +
+                        data() + " --align none --json");
+  ASSERT_EQ(error.status, 0) << error.err;
+  EXPECT_LT(nlohmann::json::parse(error.out)["ate"]["max"], 1e-6);
+  ASSERT_EQ(
+      run(path + " --format kitti --frame cam1 --axes ros --map " + out("saved.map") + " --out " + out("k.txt")).status,
+      0);
+  expect_rejected(path + " --frame nobody --out " + out("wrong"));
+  expect_rejected("export " + out("saved") + "/trajectory.tum --frame body --out " + out("wrong"));
 
   const auto localised = summary_of("localised", "--cameras 0,1 --localize-only --load-map " + out("saved.map"));
   EXPECT_EQ(localised["map"]["loaded"], true);

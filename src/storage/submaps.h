@@ -1,12 +1,9 @@
-// Exports maps to formats of other programs, and computes their statistics.
+// The submaps of a map, their statistics and the trajectories of their keyframes.
 #pragma once
 
 #include <cstddef>
-#include <functional>
-#include <string>
 #include <vector>
 
-#include "base/result.h"
 #include "base/timestamp.h"
 #include "evaluation/trajectory.h"
 #include "map/bundled_map.h"
@@ -31,21 +28,5 @@ TimeNs last_time(const map::BundledMap& map, const Submap& submap);
 
 // Returns T_world_cam0 of the keyframes of a submap. Of keyframes with equal times only the first is included.
 evaluation::Trajectory keyframe_trajectory(const map::BundledMap& map, const Submap& submap);
-
-// Returns all landmarks as a binary PLY: x, y, z as doubles, and the number of observing keypoints.
-std::string landmarks_ply(const map::BundledMap& map);
-
-// Returns the name of the image of a camera with a given time stamp, relative to the image folder of COLMAP.
-using ImageNamer = std::function<std::string(std::size_t camera, TimeNs stamp_ns)>;
-
-// Returns the text model of COLMAP (cameras.txt, images.txt, points3D.txt): one image with all its keypoints for each
-// present camera of each keyframe, and a grey point for every landmark. Without `name`, images are called
-// CAMERA/STAMP.png with the time stamp in ns. 0.5 is added to pixel coordinates, since the origin is the corner of the
-// top-left pixel in COLMAP and its centre in bslam. Error (file left empty) if COLMAP does not support the model of a
-// camera.
-struct ColmapModel {
-  std::string cameras, images, points;
-};
-Result<ColmapModel> colmap_model(const map::BundledMap& map, const ImageNamer& name = {});
 
 }  // namespace bslam::storage

@@ -1,0 +1,146 @@
+// Exports of poses with images: COLMAP, nerfstudio, and the folder of all.
+#include <fmt/format.h>
+
+#include "evaluation/trajectory_file.h"
+#include "image_decoding/colour_image.h"
+#include "map_export/colmap_model.h"
+#include "map_export/map_exporter.h"
+#include "map_export/nerfstudio.h"
+#include "map_export/point_cloud.h"
+#include "rig_formats/bslam_rig.h"
+#include "storage/submaps.h"
+
+namespace bslam::map_export {
+namespace {
+
+namespace fs = std::filesystem;
+
+Status write_colmap(const ColmapModel& model, const AtomicFolder& folder) {
+  const std::pair<const char*, const std::string*> files[] = {{"rigs.txt", &model.rigs},
+                                                              {"frames.txt", &model.frames},
+                                                              {"cameras.txt", &model.cameras},
+                                                              {"images.txt", &model.images},
+                                                              {"points3D.txt", &model.points}};
+  for (const auto& [name, text] : files)
+    if (Status s = folder.write(name, *text); !s) return s;
+  return {};
+}
+
+std::string counts(const Exporter& exporter) {
+  return fmt::format("{} keyframes, {} landmarks", exporter.selection.keyframes.size(),
+                     exporter.selection.landmarks.size());
+}
+
+Status write_keyframes(const Exporter& exporter, const AtomicFolder& folder) {
+  const std::string header = evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal);
+  const std::vector<storage::Submap> submaps = storage::submaps_of(exporter.map());
+  for (std::size_t i = 0; i < submaps.size(); ++i) {
+    const std::string name = submaps.size() == 1 ? "keyframes.tum" : fmt::format("keyframes_{}.tum", i);
+    const auto trajectory = storage::keyframe_trajectory(exporter.map(), submaps[i]);
+    if (Status s = folder.write(name, evaluation::tum_text(trajectory, header)); !s) return s;
+  }
+  return {};
+}
+
+// file_path of every image: undistorted ones are in the folder, recorded ones are reached from it.
+std::vector<std::string> nerfstudio_paths(const Exporter& exporter) {
+  std::vector<std::string> paths;
+  const fs::path out = fs::absolute(exporter.request.out).lexically_normal();
+  for (const MapImage& image : exporter.images.images()) {
+    const bool in_folder = image.file.empty() || exporter.cameras.undistorted();
+    const fs::path file = in_folder ? fs::path() : fs::absolute(image.file).lexically_normal();
+    paths.push_back(in_folder ? "images/" + image.name : file.lexically_relative(out).string());
+  }
+  return paths;
+}
+
+Result<AtomicFolder> folder_of(const Exporter& exporter) {
+  return AtomicFolder::create(exporter.request.out, exporter.request.overwrite);
+}
+
+void note_all(const std::vector<std::string>& notes, Exporter& exporter) {
+  for (const std::string& note : notes) exporter.note(note);
+}
+
+}  // namespace
+
+Status write_undistorted(Exporter& exporter, const AtomicFolder& folder) {
+  std::size_t unread = 0;
+  exporter.images.set_extensions(".png");
+  for (const MapImage& image : exporter.images.images()) {
+    const camera::Camera& camera = exporter.map().rig().camera(image.camera);
+    const auto colours = image_decoding::read_colours(image.file, image.format);
+    if (!colours || colours->cols != camera.width || colours->rows != camera.height) {
+      ++unread;
+      continue;
+    }
+    const std::string png = image_decoding::encode_png(exporter.cameras.image(image.camera, *colours));
+    if (Status s = folder.write(fs::path("images") / image.name, png); !s) return s;
+  }
+  if (unread > 0)
+    exporter.note(fmt::format("{} of {} images could not be read and were not undistorted", unread,
+                              exporter.images.images().size()));
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < exporter.map().rig().size(); ++c)
+    cameras.push_back({exporter.cameras.camera(c), exporter.map().rig().body_from_cam(c)});
+  return folder.write("rig.yaml", rig_formats::rig_to_yaml(camera::Rig(std::move(cameras))));
+}
+
+Status export_colmap(Exporter& exporter) {
+  const LandmarkColours colours = exporter.colours();
+  auto folder = folder_of(exporter);
+  if (!folder) return folder.error();
+  if (!exporter.request.data) exporter.note("the images are named CAMERA/STAMP.png: --images DATA names their files");
+  if (exporter.cameras.undistorted()) exporter.images.set_extensions(".png");
+  const auto model = colmap_model(exporter.selection, exporter.images, exporter.cameras, colours);
+  if (!model) return model.error();
+  if (Status s = write_colmap(*model, *folder); !s) return s;
+  note_all(model->notes, exporter);
+  if (exporter.cameras.undistorted())
+    if (Status s = write_undistorted(exporter, *folder); !s) return s;
+  exporter.report.summary = fmt::format("{} images, {}, mean reprojection error {:.2f} px",
+                                        exporter.images.images().size(), counts(exporter), model->mean_error_px);
+  return folder->commit();
+}
+
+Status export_nerfstudio(Exporter& exporter) {
+  const LandmarkColours colours = exporter.colours();
+  auto folder = folder_of(exporter);
+  if (!folder) return folder.error();
+  if (!exporter.request.data)
+    exporter.note(
+        "the images are expected as images/CAMERA/STAMP.png beside transforms.json: --images DATA names their "
+        "files");
+  if (exporter.cameras.undistorted()) exporter.images.set_extensions(".png");
+  const auto json =
+      nerfstudio_json(exporter.selection, exporter.images, exporter.cameras, nerfstudio_paths(exporter), "points.ply");
+  if (!json) return json.error();
+  const std::string ply = landmarks_ply(exporter.selection, colours, exporter.selection.T_upright_world);
+  if (Status s = folder->write("transforms.json", *json); !s) return s;
+  if (Status s = folder->write("points.ply", ply); !s) return s;
+  if (exporter.cameras.undistorted())
+    if (Status s = write_undistorted(exporter, *folder); !s) return s;
+  exporter.report.summary = fmt::format("{} images, {}", exporter.images.images().size(), counts(exporter));
+  return folder->commit();
+}
+
+Status export_folder(Exporter& exporter) {
+  const LandmarkColours colours = exporter.colours();
+  auto folder = folder_of(exporter);
+  if (!folder) return folder.error();
+  if (Status s = folder->write("points.ply", landmarks_ply(exporter.selection, colours)); !s) return s;
+  if (Status s = folder->write("rig.yaml", rig_formats::rig_to_yaml(exporter.map().rig())); !s) return s;
+  if (Status s = write_keyframes(exporter, *folder); !s) return s;
+  const auto model = colmap_model(exporter.selection, exporter.images, exporter.cameras, colours);
+  if (model) {
+    if (Status s = write_colmap(*model, *folder); !s) return s;
+    note_all(model->notes, exporter);
+  } else {  // the other files are still useful
+    exporter.note("no COLMAP model was written: " + model.error().message());
+  }
+  exporter.report.summary =
+      fmt::format("{} keyframes, {} landmarks", exporter.map().num_keyframes(), exporter.map().num_landmarks());
+  return folder->commit();
+}
+
+}  // namespace bslam::map_export

@@ -1,0 +1,51 @@
+// Writes a map in the format of another program.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "dataset/dataset.h"
+#include "map/bundled_map.h"
+#include "map_export/occupancy_grid.h"
+
+namespace bslam::map_export {
+
+// kFolder: landmarks, keyframes and calibration in formats of bslam's own, and a COLMAP model.
+enum class Format { kFolder, kColmap, kPly, kG2o, kNerfstudio, kOctomap, kNav2 };
+
+struct FormatName {
+  std::string_view name;  // on the command line
+  Format format;
+  bool is_folder;  // whether a folder is written, or a file
+};
+std::span<const FormatName> formats();  // all but kFolder
+
+struct ExportRequest {
+  Format format = Format::kFolder;
+  std::filesystem::path out;
+  bool overwrite = false;
+  const dataset::Dataset* data = nullptr;  // the recording of the map, for names, colours and images; may be null
+  std::filesystem::path data_folder;       // names of images are relative to it
+  bool undistort = false;                  // kColmap, kNerfstudio: write undistorted images and pinhole cameras
+  std::optional<std::size_t> submap;       // default: the one with most landmarks
+  std::optional<double> resolution;        // kOctomap, kNav2: side of a cell; default: default_resolution
+  std::optional<double> max_range;         // kOctomap, kNav2: default: ten times the median depth
+  HeightBand band;                         // kNav2
+};
+
+struct ExportReport {
+  std::vector<std::string> notes;  // what the user should know, one sentence each
+  std::string summary;             // what was written
+};
+
+// Writes `request.out`, completely or not at all. Errors: the map is empty; `out` exists and is not to be overwritten,
+// or cannot be written; none of the images of the map is in the recording; the format cannot hold a camera; options
+// that do not fit the format.
+Result<ExportReport> export_map(const map::BundledMap& map, const ExportRequest& request);
+
+}  // namespace bslam::map_export

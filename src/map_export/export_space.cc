@@ -1,0 +1,69 @@
+// Exports of free and occupied space: OctoMap and nav2.
+#include <fmt/format.h>
+
+#include "base/atomic_file.h"
+#include "evaluation/trajectory_file.h"
+#include "map_export/map_exporter.h"
+#include "map_export/octree.h"
+#include "storage/submaps.h"
+
+namespace bslam::map_export {
+namespace {
+
+CarvingOptions carving_options(const Exporter& exporter) {
+  constexpr double kRangePerDepth = 10;
+  const double depth = median_depth(exporter.selection);
+  const double resolution = exporter.request.resolution.value_or(default_resolution(depth));
+  return {resolution, exporter.request.max_range.value_or(kRangePerDepth * (depth > 0 ? depth : 1.0))};
+}
+
+// The rotation of the upright axes, so that poses can be transformed into them.
+std::string axes_text(const Exporter& exporter) {
+  const geometry::Quaterniond& q = exporter.selection.T_upright_world.rotation();
+  return fmt::format(
+      "axes: x forward, y left, z up; rotation from the world of the trajectory, qx qy qz qw: {} {} {} {}", q.x(),
+      q.y(), q.z(), q.w());
+}
+
+// Poses of camera 0 in the frame of the map server, as a file of the format TUM.
+std::string keyframes_text(const Exporter& exporter) {
+  evaluation::Trajectory trajectory;
+  for (const KeyframeId k : exporter.selection.keyframes) {
+    const TimeNs time_ns = exporter.map().keyframe(k).frame->time_ns;
+    if (trajectory.empty() || trajectory.back().time_ns < time_ns)
+      trajectory.push_back({time_ns, exporter.selection.T_upright_world * exporter.selection.world_from_rig(k)});
+  }
+  return evaluation::tum_text(trajectory, evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal, "map"));
+}
+
+}  // namespace
+
+Status export_octomap(Exporter& exporter) {
+  const CarvingOptions options = carving_options(exporter);
+  const auto octree = octree_of(scans_of(exporter.selection), options);
+  if (!octree) return octree.error();
+  exporter.note(axes_text(exporter));
+  exporter.report.summary =
+      fmt::format("cells of {:g}, {} occupied and {} free leaves", options.resolution, octree->occupied, octree->free);
+  return write_atomically(exporter.request.out, octree->bytes);
+}
+
+Status export_nav2(Exporter& exporter) {
+  const CarvingOptions options = carving_options(exporter);
+  const HeightBand& band = exporter.request.band;
+  auto folder = AtomicFolder::create(exporter.request.out, exporter.request.overwrite);
+  if (!folder) return folder.error();
+  const auto grid = occupancy_grid(scans_of(exporter.selection), options, band);
+  if (!grid) return grid.error();
+  const std::vector<std::string> comments = {
+      axes_text(exporter),
+      fmt::format("obstacles between {:g} and {:g} above camera 0, whose keyframes are in keyframes.tum", band.below,
+                  band.above)};
+  if (Status s = folder->write("map.pgm", grid_pgm(*grid)); !s) return s;
+  if (Status s = folder->write("map.yaml", grid_yaml(*grid, "map.pgm", comments)); !s) return s;
+  if (Status s = folder->write("keyframes.tum", keyframes_text(exporter)); !s) return s;
+  exporter.report.summary = fmt::format("{} x {} cells of {:g}", grid->width, grid->height, options.resolution);
+  return folder->commit();
+}
+
+}  // namespace bslam::map_export

@@ -1,0 +1,38 @@
+// What the exports to all formats share. Internal to this folder.
+#pragma once
+
+#include "base/atomic_folder.h"
+#include "map_export/export_map.h"
+#include "map_export/image_table.h"
+#include "map_export/landmark_colours.h"
+#include "map_export/output_cameras.h"
+
+namespace bslam::map_export {
+
+struct Exporter {
+  const ExportRequest& request;
+  Selection selection;
+  ImageTable images;
+  OutputCameras cameras;
+  ExportReport report;
+
+  const map::BundledMap& map() const { return *selection.map; }
+  void note(std::string text) { report.notes.push_back(std::move(text)); }
+  // The colours of the landmarks; notes if they are grey because there are no images.
+  LandmarkColours colours();
+};
+
+// Writes undistorted images as images/NAME.png, and their calibration as rig.yaml. Names of images end in .png from
+// then on. An image that cannot be read is left out, and noted.
+Status write_undistorted(Exporter& exporter, const AtomicFolder& folder);
+
+// Each writes one format.
+Status export_folder(Exporter& exporter);
+Status export_colmap(Exporter& exporter);
+Status export_nerfstudio(Exporter& exporter);
+Status export_octomap(Exporter& exporter);
+Status export_nav2(Exporter& exporter);
+Status export_ply(Exporter& exporter);
+Status export_g2o(Exporter& exporter);
+
+}  // namespace bslam::map_export

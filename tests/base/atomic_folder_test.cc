@@ -1,0 +1,66 @@
+#include "base/atomic_folder.h"
+
+#include <gtest/gtest.h>
+
+#include "support/data_on_disk.h"
+
+namespace bslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::size_t entries_of(const fs::path& folder) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+TEST(AtomicFolder, AppearsWithAllFilesAtCommit) {
+  const support::TemporaryFolder folder;
+  const fs::path place = folder.path() / "deep/place";
+  auto written = AtomicFolder::create(place / "", false);
+  ASSERT_TRUE(written) << written.error().message();
+  ASSERT_TRUE(written->write("a.txt", "first"));
+  ASSERT_TRUE(written->write("sub/b.txt", "second"));
+  EXPECT_FALSE(fs::exists(place));
+  ASSERT_TRUE(written->commit());
+  EXPECT_EQ(support::read_text(place / "a.txt"), "first");
+  EXPECT_EQ(support::read_text(place / "sub/b.txt"), "second");
+  EXPECT_EQ(entries_of(place.parent_path()), 1u);
+}
+
+TEST(AtomicFolder, LeavesNothingWithoutCommit) {
+  const support::TemporaryFolder folder;
+  {
+    auto written = AtomicFolder::create(folder.path() / "place", false);
+    ASSERT_TRUE(written);
+    ASSERT_TRUE(written->write("a.txt", "first"));
+  }
+  EXPECT_EQ(entries_of(folder.path()), 0u);
+}
+
+TEST(AtomicFolder, KeepsOtherFilesOfAnExistingFolder) {
+  const support::TemporaryFolder folder;
+  const fs::path place = folder.path() / "place";
+  support::write_text(place / "mine.txt", "mine");
+  support::write_text(place / "sub/old.txt", "old");
+  EXPECT_FALSE(AtomicFolder::create(place, false));
+  {
+    auto written = AtomicFolder::create(place, true);
+    ASSERT_TRUE(written);
+    ASSERT_TRUE(written->write("sub/old.txt", "new"));
+    ASSERT_TRUE(written->commit());
+  }
+  EXPECT_EQ(support::read_text(place / "mine.txt"), "mine");
+  EXPECT_EQ(support::read_text(place / "sub/old.txt"), "new");
+  EXPECT_EQ(entries_of(folder.path()), 1u);
+}
+
+TEST(AtomicFolder, RejectsAFile) {
+  const support::TemporaryFolder folder;
+  support::write_text(folder.path() / "file", "");
+  EXPECT_FALSE(AtomicFolder::create(folder.path() / "file", true));
+  EXPECT_FALSE(AtomicFolder::create(folder.path() / "file/below", true));
+  EXPECT_EQ(entries_of(folder.path()), 1u);
+}
+
+}  // namespace
+}  // namespace bslam
