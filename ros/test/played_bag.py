@@ -142,7 +142,7 @@ class Session:
         return all('/bslam' in by_topic.get(topic, []) for topic in topics)
 
     def play(self, bag, *options):
-        command = ['rosbag', 'play', '--clock', '--quiet', '--delay=1', *options, bag]
+        command = ['rosbag', 'play', '--clock', '--quiet', '--delay=1', bag, *options]
         return self.processes.start(*command, log=self.work / 'play.log')
 
     def end(self):
