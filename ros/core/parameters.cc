@@ -110,6 +110,10 @@ std::string optical_axes_warning(const Parameters& parameters) {
          parameters.base_frame + ": set the parameter body_frame to the optical frame of camera 0, which tf must know";
 }
 
+bool subscribe_reliably(const std::vector<bool>& publishers) {
+  return !publishers.empty() && std::find(publishers.begin(), publishers.end(), false) == publishers.end();
+}
+
 bool is_compressed(const std::string& topic) {
   return topic.size() > kCompressed.size() &&
          topic.compare(topic.size() - kCompressed.size(), kCompressed.size(), kCompressed) == 0;

@@ -100,6 +100,10 @@ std::vector<std::string> camera_names(const Parameters& parameters);
 // What to tell if base_link would have the axes of camera 0 (body_has_optical_axes).
 std::string optical_axes_warning(const Parameters& parameters);
 
+// Whether to ask for reliable delivery of images (ROS 2), given which of the publishers offer it: a subscription that
+// does receives nothing from one that does not, whereas best effort is compatible with all.
+bool subscribe_reliably(const std::vector<bool>& publishers);
+
 // True for topics of sensor_msgs/CompressedImage.
 bool is_compressed(const std::string& topic);
 

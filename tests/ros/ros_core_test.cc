@@ -281,6 +281,12 @@ TEST(RosParameters, AreChecked) {
   EXPECT_EQ(camera_names(parameters), (std::vector<std::string>{"cam0", "cam1"}));
 }
 
+TEST(RosParameters, DeliveryIsReliableIfAllPublishersOfferIt) {
+  EXPECT_FALSE(subscribe_reliably({}));  // whoever comes later must be compatible
+  EXPECT_TRUE(subscribe_reliably({true, true}));
+  EXPECT_FALSE(subscribe_reliably({true, false}));
+}
+
 TEST(RosDiagnostics, LossAndFailedCamerasAreErrors) {
   Report report;
   report.cameras.resize(2);
