@@ -25,6 +25,7 @@ import time
 
 SCRIPTS = pathlib.Path(__file__).resolve().parent
 MAX_RATIO = 1.1  # error of the node / error of an offline run
+BODY_TRUTH = 'mav0/state_groundtruth_estimate0/data.csv'
 NOISE_M = 0.001  # errors of parallel runs differ by that much
 
 
@@ -186,8 +187,10 @@ def write_cam0(path, times, poses):
     path.write_text('# bslam trajectory frame=cam0 parent=world final=true\n' + '\n'.join(lines) + '\n')
 
 
-def ate(bslam, estimate, truth):
-    out = subprocess.run([bslam, 'eval', estimate, truth, '--json'], stdout=subprocess.PIPE, check=True, text=True).stdout
+def ate(arguments, estimate, truth):
+    of_body = ['--gt-frame', 'body', '--rig', arguments.data] if truth.suffix == '.csv' else []
+    command = [arguments.bslam, 'eval', estimate, truth, '--json', *of_body]
+    out = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout
     return json.loads(out)['ate']['rmse']
 
 
@@ -203,6 +206,7 @@ def check_images(listener, bag_counts, frames):
 def check_transforms(listener, T_base_cam0, camera_frame):
     """tf2 gives map -> camera at the time of each pose, and agrees with the topics."""
     import numpy as np
+    import yaml
     worst, times, poses, previous, jump = 0, [], [], None, 0
     for odometry, pose in zip(listener.odometry, listener.poses):
         stamp = odometry.header.stamp
@@ -218,7 +222,7 @@ def check_transforms(listener, T_base_cam0, camera_frame):
         times.append(stamp.to_nsec())
         poses.append(T_map_cam)
     check(len(times) > 0 and worst < 1e-6, f'tf2 agrees with pose and odometry in {len(times)} frames (difference {worst:.1e})')
-    tree = json.loads(json.dumps(__import__('yaml').safe_load(listener.buffer.all_frames_as_yaml())))
+    tree = yaml.safe_load(listener.buffer.all_frames_as_yaml())
     check(tree['odom']['parent'] == 'map' and tree['base_link']['parent'] == 'odom' and tree[camera_frame]['parent'] == 'base_link',
           f'the tree is map -> odom -> base_link -> {camera_frame}')
     print(f'largest step of the odometry pose: {jump * 1000:.1f} mm')
@@ -246,14 +250,32 @@ def write_bag(data, bag, *options):
     return {topic: info.message_count for topic, info in topics.items() if 'image_raw' in topic}
 
 
-def truth_of(arguments, data, work):
-    if arguments.truth:
-        return arguments.truth
-    return data / 'groundtruth_cam0.tum' if (data / 'groundtruth_cam0.tum').is_file() else None
+def truth_of(arguments):
+    for path in (arguments.truth, arguments.data / 'groundtruth_cam0.tum', arguments.data / BODY_TRUTH):
+        if path and path.is_file():
+            return path
+    sys.exit(f'check failed: {arguments.data} has ground truth')
+
+
+def check_axes(arguments, listener):
+    """Without any alignment, map begins at the body and has its axes then; for recordings with ground truth of the body."""
+    import numpy as np
+    if not (arguments.data / BODY_TRUTH).is_file():
+        return
+    rows = np.loadtxt(arguments.data / BODY_TRUTH, delimiter=',', comments='#', usecols=range(8), dtype=str)
+    times = rows[:, 0].astype('int64')
+    truth = rows[:, [1, 2, 3, 5, 6, 7, 4]].astype(float)  # the quaternions of EuRoC begin with w
+    nearest = [int(np.abs(times - m.header.stamp.to_nsec()).argmin()) for m in listener.poses]
+    start = np.linalg.inv(matrix(truth[nearest[0]]) @ np.linalg.inv(of_pose(listener.poses[0].pose.pose)))
+    error, way = 0, 0
+    for i, message in zip(nearest, listener.poses):
+        T = start @ matrix(truth[i])
+        error = max(error, np.linalg.norm(T[:3, 3] - of_pose(message.pose.pose)[:3, 3]))
+        way = max(way, np.linalg.norm(T[:3, 3]))
+    check(error < 0.02 * way + 0.02, f'base_link moves in map as the body does: largest error {error:.3f} m, {way:.1f} m from the start')
 
 
 def play_and_check(arguments, work, from_file):
-    import numpy as np
     options = ['--compressed'] if from_file else []
     counts = write_bag(arguments.data, work / 'images.bag', *options)
     parameters = {'image_topics': list(counts), 'trajectory_file': str(work / 'node.tum')}
@@ -281,15 +303,14 @@ def play_and_check(arguments, work, from_file):
         T_base_cam0 = of_transform(listener.buffer.lookup_transform('base_link', 'cam0_optical', listener.rospy.Time(0)).transform)
         times, poses = check_transforms(listener, T_base_cam0, 'cam0_optical')
         check_messages(listener)
+        check_axes(arguments, listener)
         check(session.end() == 0, 'the node ends without error')
     write_cam0(work / 'live.tum', times, poses)
     final = read_tum(work / 'node.tum')
     write_cam0(work / 'final.tum', (final[:, 0] * 1e9).round().astype('int64').tolist(), [matrix(row[1:]) @ T_base_cam0 for row in final])
-    truth = truth_of(arguments, arguments.data, work)
-    subprocess.run([arguments.bslam, 'run', arguments.data, '--out', work / 'offline', '--progress', 'never', '--no-report'], check=False)
-    if truth is None or not (work / 'offline/trajectory.tum').is_file():
-        return
-    offline, final, live = (ate(arguments.bslam, work / f, truth) for f in ('offline/trajectory.tum', 'final.tum', 'live.tum'))
+    truth = truth_of(arguments)
+    subprocess.run([arguments.bslam, 'run', arguments.data, '--out', work / 'offline', '--progress', 'never', '--no-report'], check=True)
+    offline, final, live = (ate(arguments, work / f, truth) for f in ('offline/trajectory.tum', 'final.tum', 'live.tum'))
     print(f'ATE: offline {offline:.4f} m, node {final:.4f} m, live poses through tf {live:.4f} m')
     check(final <= max(MAX_RATIO * offline, offline + NOISE_M), 'the trajectory is within 10 % of the offline run')
 
