@@ -11,6 +11,7 @@
 #include "core/image_conversion.h"
 #include "core/parameters.h"
 #include "core/pose_output.h"
+#include "support/data_on_disk.h"
 
 namespace bslam_ros {
 namespace {
@@ -279,6 +280,22 @@ TEST(RosParameters, AreChecked) {
   EXPECT_TRUE(refused([](Parameters& p) { p.sync_tolerance = std::nan(""); }));
   parameters.image_topics = {"image", "other"};
   EXPECT_EQ(camera_names(parameters), (std::vector<std::string>{"cam0", "cam1"}));
+}
+
+TEST(RosParameters, AreDocumented) {
+  const std::string page = bslam::support::read_text(BSLAM_SOURCE_DIR "/docs/ros.md");
+  int parameters = 0, rows = 0;
+  Parameters defaults;
+  Parameters::visit(defaults, [&](const char* name, const auto&, const char* help) {
+    const std::size_t row = page.find("\n| `" + std::string(name) + "` | ");
+    ASSERT_NE(row, std::string::npos) << name;
+    EXPECT_NE(page.substr(row, page.find('\n', row + 1) - row).find(help), std::string::npos) << name << ": " << help;
+    ++parameters;
+  });
+  const std::string table =
+      page.substr(page.find("## Parameters"), page.find("## Diagnostics") - page.find("## Parameters"));
+  for (std::size_t at = 0; (at = table.find("\n| `", at)) != std::string::npos; ++at) ++rows;
+  EXPECT_EQ(rows, parameters);
 }
 
 TEST(RosParameters, DeliveryIsReliableIfAllPublishersOfferIt) {
