@@ -114,7 +114,7 @@ ordered_json report_json(const SessionResult& result, const system::Config& conf
   return {{"schema", 1},
           {"command", source.command},
           {"summary", summary_json(record)},
-          {"rig", report_rig(result.map->rig())},
+          {"rig", report_rig(result.rig ? *result.rig : result.map->rig())},
           {"submaps", report_submaps(*result.map, result.trajectories, source.dataset.first_time_ns)},
           {"landmarks", result.map->num_landmarks()},
           {"frames", frames_json(record)},
