@@ -18,6 +18,7 @@
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"
 #include "cli/verbs.h"
+#include "map/rigs_of_map.h"
 #include "session/record_builder.h"
 #include "session/run_session.h"
 #include "storage/map_file.h"
@@ -123,8 +124,10 @@ Result<std::optional<map::BundledMap>> read_map(const RunArguments& arguments, c
   if (!map) return map.error();
   if (const Status status = system::check_settings(config, *map, rig); !status) return status.error();
   if (system::shared_with_other_rigs(*map, rig) && log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) {
-    std::fprintf(stderr, "note: %s was made with another rig or calibration; that of this run is kept as given\n",
-                 file.c_str());
+    const char* const text = map::find_rig(*map, rig)
+                                 ? "has cameras of other rigs; the calibration is that of the map and is not estimated"
+                                 : "was made with another rig or calibration; that of this run is kept as given";
+    std::fprintf(stderr, "note: %s %s\n", file.c_str(), text);
   }
   return std::optional(*std::move(map));
 }

@@ -37,6 +37,9 @@ const std::map<std::string, simulator::WorldKind> kWorlds = {{"building", simula
                                                              {"outdoor", simulator::WorldKind::kOutdoor}};
 
 Result<simulator::SimulationRequest> make_request(const SimulateArguments& arguments) {
+  constexpr double kMaxStart_s = 4e9;
+  if (!(arguments.start_s >= 0 && arguments.start_s <= kMaxStart_s))
+    return Error{"command line", "--start", fmt::format("{}", arguments.start_s), "seconds in [0, 4e9]"};
   std::optional<camera::Rig> rig;
   if (arguments.rig) {
     auto read = rig_formats::read_rig(*arguments.rig);
@@ -58,7 +61,7 @@ Result<simulator::SimulationRequest> make_request(const SimulateArguments& argum
   request.recording.rate_hz = arguments.rate_hz;
   request.recording.exposure_s = 1e-3 * arguments.exposure_ms;
   request.imaging.noise = arguments.noise;
-  request.recording.start_ns = from_seconds(std::clamp(arguments.start_s, -1.0, 5e9));  // the range is checked later
+  request.recording.start_ns = from_seconds(arguments.start_s);
   request.imaging.seed = request.tour.seed = arguments.tour_seed.value_or(arguments.seed);
   request.tour.laps = arguments.laps;
   request.tour.speed_mps = arguments.speed_mps;
