@@ -59,7 +59,9 @@ class BSLAM_EXPORT MapView {
   std::size_t num_keyframes() const;
   std::size_t num_landmarks() const;
   std::size_t num_observations() const;
-  Rig rig() const;  // rig of the map, without masks
+  // All cameras of the map, without masks: those of the first run, then those of other rigs that have continued the
+  // map.
+  Rig rig() const;
 
   std::vector<Keyframe> keyframes() const;  // in order of id
   std::vector<Landmark> landmarks() const;  // in order of id

@@ -74,7 +74,7 @@ struct Startup {
 class BSLAM_EXPORT System {
  public:
   // Errors: inconsistent settings (localize_only without a map, calibration.refine=true without final_adjustment); a
-  // map or vocabulary that cannot be read; a map without keyframes, or of another rig, feature pyramid or vocabulary.
+  // map or vocabulary that cannot be read; a map without keyframes, or of another feature pyramid or vocabulary.
   static Result<System> create(const Rig& rig, const Config& config, Startup startup = {});
   System(System&& other) noexcept;
   System& operator=(System&& other) noexcept;

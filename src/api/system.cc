@@ -17,6 +17,7 @@
 #include "api/rig_impl.h"
 #include "storage/map_file.h"
 #include "storage/vocabulary_file.h"
+#include "system/cameras_of_run.h"
 
 namespace bslam {
 namespace {
@@ -64,6 +65,7 @@ Result<Resources> load_resources(const Rig& rig, const system::Config& config, c
     auto map = storage::open_map(startup.map, api::Access::impl(rig).rig, config.feature_model().pyramid,
                                  out.for_system.vocabulary.get());
     if (!map) return map.error();
+    if (const Status s = system::check_settings(config, *map, api::Access::impl(rig).rig); !s) return s.error();
     out.for_system.map = *std::move(map);
   }
   out.for_system.masks = api::Access::impl(rig).masks;

@@ -42,8 +42,17 @@ std::string vector_text(const Vector3d& v) {
   return fmt::format("({:.4f}, {:.4f}, {:.4f})", shown[0], shown[1], shown[2]);
 }
 
-// The direction of the optical axis, seen from camera 0.
-std::string direction_in_words(const Vector3d& axis) {
+// The rotation about the optical axis after panning and tilting the camera from the direction of camera 0, clockwise in
+// degrees as seen by the camera; 0 if it looks straight up or down, where it is not defined.
+double roll_of(const geometry::Matrix3d& R_rig_cam) {
+  constexpr double kVertical = 0.02;  // cosine of the tilt
+  const double cos_roll = R_rig_cam(1, 1), sin_roll = R_rig_cam(1, 0);
+  return std::hypot(cos_roll, sin_roll) < kVertical ? 0.0 : degrees(std::atan2(sin_roll, cos_roll));
+}
+
+// The direction of the optical axis and the rotation about it, seen from camera 0.
+std::string direction_in_words(const geometry::Matrix3d& R_rig_cam) {
+  const Vector3d axis = R_rig_cam.col(2);
   constexpr double kStraight = 1.0;  // degrees
   const double right = degrees(std::atan2(axis.x(), axis.z()));
   const double down = degrees(std::asin(std::clamp(axis.y(), -1.0, 1.0)));
@@ -53,7 +62,12 @@ std::string direction_in_words(const Vector3d& axis) {
   }
   if (std::abs(down) >= kStraight)
     words.push_back(fmt::format("{:.1f} deg {}", std::abs(down), down > 0 ? "down" : "up"));
-  return words.empty() ? "same viewing direction" : fmt::format("looks {}", fmt::join(words, ", "));
+  std::string text = words.empty() ? "same viewing direction" : fmt::format("looks {}", fmt::join(words, ", "));
+  const double roll = roll_of(R_rig_cam);
+  if (std::abs(roll) >= 179.5) return text + ", rolled 180.0 deg (its image is upside down)";
+  if (std::abs(roll) >= kStraight)
+    text += fmt::format(", rolled {:.1f} deg {}", std::abs(roll), roll > 0 ? "clockwise" : "counter-clockwise");
+  return text;
 }
 
 std::string describe_camera(const camera::Rig& rig, std::size_t i) {
@@ -71,7 +85,7 @@ std::string describe_camera(const camera::Rig& rig, std::size_t i) {
   if (i > 0) {
     const SE3& T_rig_cam = rig.rig_from_cam(i);
     text += fmt::format("  from camera 0: {}; {}\n", displacement_in_words(T_rig_cam.translation()),
-                        direction_in_words(T_rig_cam.rotation() * Vector3d::UnitZ()));
+                        direction_in_words(T_rig_cam.matrix3()));
   }
   if (camera.time_offset_ns != 0) text += fmt::format("  time offset {:.6f} s\n", to_seconds(camera.time_offset_ns));
   if (camera.readout_s != 0) text += fmt::format("  rolling shutter, readout {:.6f} s\n", camera.readout_s);

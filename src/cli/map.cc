@@ -143,7 +143,7 @@ void add_map(CLI::App& app, int& exit_status) {
 
   CLI::App* merge = map->add_subcommand("merge", "merge maps of separate runs that contain common places");
   merge->add_option("A", arguments->file, "a saved map, whose world frame is kept")->required();
-  merge->add_option("B", arguments->other, "a saved map of the same rig")->required();
+  merge->add_option("B", arguments->other, "a saved map of the same rig and calibration")->required();
   merge->add_option("--out", arguments->out, "file for the merged map")->required();
   merge->add_option("--vocabulary", arguments->vocabulary,
                     "vocabulary of the maps; default: the vocabulary shipped with this program");

@@ -15,7 +15,8 @@ namespace bslam::cli {
 namespace {
 
 struct ConvertArguments {
-  std::string in, out, to;
+  std::vector<std::string> files;  // the last one is written
+  std::string to;
   std::vector<std::string> drop;
   bool overwrite = false;
 };
@@ -56,9 +57,11 @@ int rig_info(const InfoArguments& arguments) {
 }
 
 int rig_convert(const ConvertArguments& arguments) {
-  auto in = rig_formats::read_rig_file(arguments.in);
+  const std::vector<std::filesystem::path> inputs(arguments.files.begin(), arguments.files.end() - 1);
+  const std::string& out = arguments.files.back();
+  auto in = rig_formats::read_joined_rigs(inputs);
   if (!in) return report_error(in.error());
-  rig_formats::RigFormat format = rig_formats::format_of_output(arguments.out);
+  rig_formats::RigFormat format = rig_formats::format_of_output(out);
   if (!arguments.to.empty()) {
     const auto named = rig_formats::writable_format(arguments.to);
     if (!named) return report_error({"--to", "", arguments.to, "one of: " + joined_formats()});
@@ -66,15 +69,15 @@ int rig_convert(const ConvertArguments& arguments) {
   }
   const auto rig = with_drops(std::move(in->rig), arguments.drop);
   if (!rig) return report_error(rig.error());
-  const auto there = rig_formats::files_in_the_way(format, arguments.out);
+  const auto there = rig_formats::files_in_the_way(format, out);
   if (!there.empty() && !arguments.overwrite) {
     return report_error({there.front().string(), "", "an existing calibration", "a new name, or --overwrite"});
   }
-  const auto notes = rig_formats::write_rig_as(*rig, format, arguments.out);
+  const auto notes = rig_formats::write_rig_as(*rig, format, out);
   if (!notes) return report_error(notes.error());
   for (const std::string& note : in->notes) std::fprintf(stderr, "note: %s\n", note.c_str());
   for (const std::string& note : *notes) std::fprintf(stderr, "note: %s\n", note.c_str());
-  std::printf("%s: %zu camera%s as %s\n", arguments.out.c_str(), rig->size(), rig->size() == 1 ? "" : "s",
+  std::printf("%s: %zu camera%s as %s\n", out.c_str(), rig->size(), rig->size() == 1 ? "" : "s",
               std::string(rig_formats::format_name(format)).c_str());
   return kExitOk;
 }
@@ -95,11 +98,13 @@ void add_info(CLI::App& rig, int& exit_status) {
 void add_convert(CLI::App& rig, int& exit_status) {
   const auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* convert = rig.add_subcommand("convert", "write a calibration in another format");
-  convert->add_option("IN", arguments->in, "a calibration, or the folder of a data set")->required();
   convert
-      ->add_option("OUT", arguments->out,
-                   "a file (.json: basalt, else bslam), or a folder (euroc); the name of a new folder must end in /")
-      ->required();
+      ->add_option(
+          "IN... OUT", arguments->files,
+          "IN: a calibration, or the folder of a data set; several are joined by their common body frame. OUT: "
+          "a file (.json: basalt, else bslam), or a folder (euroc); the name of a new folder must end in /")
+      ->required()
+      ->expected(2, 100);
   convert->add_option("--to", arguments->to, "format of OUT: " + joined_formats());
   convert->add_option("--drop", arguments->drop,
                       "omit content that the format cannot store: body, mask, rolling-shutter, time-offset");

@@ -19,11 +19,13 @@
 #include "cli/shell_command.h"
 #include "cli/verbs.h"
 #include "cli/view_arguments.h"
+#include "map/rigs_of_map.h"
 #include "session/record_builder.h"
 #include "session/report_data.h"
 #include "session/run_session.h"
 #include "storage/map_file.h"
 #include "storage/vocabulary_file.h"
+#include "system/cameras_of_run.h"
 
 namespace bslam::cli {
 namespace {
@@ -39,7 +41,8 @@ struct RunArguments {
   std::string out, mode, journal, replay, vocabulary, save_map, load_map;
   std::string pace = "fast", late = "block", progress = "auto", log_level = "warning";
   std::optional<int> seed;
-  bool no_loop = false, localize_only = false, no_final_ba = false, no_report = false, overwrite = false;
+  bool no_loop = false, localize_only = false, no_final_ba = false, no_report = false, overwrite = false,
+       image_stamps = false;
   std::string command;  // the command line, as shown in the report
 };
 
@@ -116,11 +119,19 @@ Result<std::optional<execution::Journal>> read_journal(const std::string& file) 
 }
 
 // Reads the map of an earlier run if one is given, and checks that this run can continue with it.
-Result<std::optional<map::BundledMap>> read_map(const std::string& file, const camera::Rig& rig,
+Result<std::optional<map::BundledMap>> read_map(const RunArguments& arguments, const camera::Rig& rig,
                                                 const system::Config& config, const place::Vocabulary& vocabulary) {
+  const std::string& file = arguments.load_map;
   if (file.empty()) return std::optional<map::BundledMap>();
   auto map = storage::open_map(file, rig, config.feature_model().pyramid, &vocabulary);
   if (!map) return map.error();
+  if (const Status status = system::check_settings(config, *map, rig); !status) return status.error();
+  if (system::shared_with_other_rigs(*map, rig) && log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) {
+    const char* const text = map::find_rig(*map, rig)
+                                 ? "has cameras of other rigs; the calibration is that of the map and is not estimated"
+                                 : "was made with another rig or calibration; that of this run is kept as given";
+    std::fprintf(stderr, "note: %s %s\n", file.c_str(), text);
+  }
   return std::optional(*std::move(map));
 }
 
@@ -175,6 +186,13 @@ session::SessionOptions session_options(const RunArguments& arguments, const sys
   return options;
 }
 
+int exit_status_of(const session::SessionResult& result) {
+  const session::RunRecord& record = result.record;
+  if (!record.complete) return kExitInterrupted;
+  const bool nothing = record.map.loaded ? session::frames_in_loaded_map(record) == 0 : result.live.empty();
+  return nothing ? kExitNothingTracked : kExitOk;
+}
+
 int run(const RunArguments& arguments) {
   // Created first: once the output folder exists, an interruption ends the run with complete output files.
   const Interruption interruption;
@@ -188,7 +206,7 @@ int run(const RunArguments& arguments) {
   if (!dataset) return report_error(dataset.error());
   const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
-  auto map = read_map(arguments.load_map, dataset->rig, *config, **vocabulary);
+  auto map = read_map(arguments, dataset->rig, *config, **vocabulary);
   if (!map) return report_error(map.error());
   for (const auto& [option, file] :
        {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
@@ -210,17 +228,15 @@ int run(const RunArguments& arguments) {
   options.progress = [&bar](std::size_t done, std::size_t all) { bar.show(done, all); };
   options.observer = view->get();
   options.control = &control;
-  const auto result = session::run_session(*dataset, options);
+  auto result = session::run_session(*dataset, options);
   bar.finish();
   if (!result) return report_error(result.error());
+  if (arguments.image_stamps) result->written_stamps = session::image_stamps(*dataset);
   if (const Status s = write_files(*result, *config, *dataset, arguments, **vocabulary); !s)
     return report_error(s.error());
   end_view(view->get(), *result, *config, *dataset, arguments);
   print_after(result->record, *dataset, arguments);
-  if (!result->record.complete) return kExitInterrupted;
-  const session::RunRecord& record = result->record;
-  const bool nothing = record.map.loaded ? session::frames_in_loaded_map(record) == 0 : result->live.empty();
-  return nothing ? kExitNothingTracked : kExitOk;
+  return exit_status_of(*result);
 }
 
 std::string command_of(std::span<const char* const> command_line) {
@@ -231,7 +247,8 @@ std::string command_of(std::span<const char* const> command_line) {
 
 void add_map_options(CLI::App& verb, RunArguments& a) {
   verb.add_option("--save-map", a.save_map, "save the final map to this file");
-  verb.add_option("--load-map", a.load_map, "saved map to continue after relocalising in it");
+  verb.add_option("--load-map", a.load_map,
+                  "saved map to continue after relocalising in it; it may be of another rig or calibration");
   verb.add_flag("--localize-only", a.localize_only, "localise in the loaded map without changing it");
   verb.add_option("--vocabulary", a.vocabulary,
                   "vocabulary for place recognition, in bslam or DBoW2 text format; default: the vocabulary shipped "
@@ -264,6 +281,8 @@ void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit
       ->capture_default_str();
   verb->add_flag("--no-loop", a->no_loop, "disable loop closing; relocalisation stays enabled");
   add_map_options(*verb, *a);
+  verb->add_flag("--image-stamps", a->image_stamps,
+                 "write trajectories with the time stamps of the images, without the time offset of the camera");
   verb->add_flag("--no-final-ba", a->no_final_ba, "skip the global bundle adjustment at the end");
   verb->add_flag("--no-report", a->no_report, "do not write report.html, the page that shows the run in a browser");
   add_view_options(*verb, a->view);

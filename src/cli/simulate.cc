@@ -24,16 +24,22 @@ struct SimulateArguments {
   std::string folder, world = "building", progress = "auto";
   std::optional<std::string> rig, faults;
   double duration_s = 20.0, rate_hz = 20.0, exposure_ms = 5.0, noise = 1.0, speed_mps = 0.0;
+  double start_s = 1.0;
   std::uint64_t seed = 1;
+  std::optional<std::uint64_t> tour_seed;
   int laps = 0, threads = 0;
   bool back = false, overwrite = false;
 };
 
 const std::map<std::string, simulator::WorldKind> kWorlds = {{"building", simulator::WorldKind::kBuilding},
                                                              {"corridor", simulator::WorldKind::kCorridor},
-                                                             {"twin-rooms", simulator::WorldKind::kTwinRooms}};
+                                                             {"twin-rooms", simulator::WorldKind::kTwinRooms},
+                                                             {"outdoor", simulator::WorldKind::kOutdoor}};
 
 Result<simulator::SimulationRequest> make_request(const SimulateArguments& arguments) {
+  constexpr double kMaxStart_s = 4e9;
+  if (!(arguments.start_s >= 0 && arguments.start_s <= kMaxStart_s))
+    return Error{"command line", "--start", fmt::format("{}", arguments.start_s), "seconds in [0, 4e9]"};
   std::optional<camera::Rig> rig;
   if (arguments.rig) {
     auto read = rig_formats::read_rig(*arguments.rig);
@@ -55,7 +61,8 @@ Result<simulator::SimulationRequest> make_request(const SimulateArguments& argum
   request.recording.rate_hz = arguments.rate_hz;
   request.recording.exposure_s = 1e-3 * arguments.exposure_ms;
   request.imaging.noise = arguments.noise;
-  request.imaging.seed = request.tour.seed = arguments.seed;
+  request.recording.start_ns = from_seconds(arguments.start_s);
+  request.imaging.seed = request.tour.seed = arguments.tour_seed.value_or(arguments.seed);
   request.tour.laps = arguments.laps;
   request.tour.speed_mps = arguments.speed_mps;
   request.tour.back = arguments.back;
@@ -110,12 +117,16 @@ void add_simulate(CLI::App& app, int& exit_status) {
   verb->add_option("--out", a.folder, "folder to write into")->required();
   verb->add_option("--rig", a.rig, "calibration of the rig (default: four cameras, two of them in front)");
   verb->add_option("--world", a.world,
-                   "building: different rooms; corridor, twin-rooms: places that look exactly alike")
-      ->check(CLI::IsMember({"building", "corridor", "twin-rooms"}))
+                   "building: different rooms; corridor, twin-rooms: places that look exactly alike; outdoor: a square "
+                   "with houses and trees")
+      ->check(CLI::IsMember({"building", "corridor", "twin-rooms", "outdoor"}))
       ->capture_default_str();
   verb->add_option("--duration", a.duration_s, "duration in seconds")->capture_default_str();
   verb->add_option("--rate", a.rate_hz, "frame rate of each camera in images per second")->capture_default_str();
   verb->add_option("--seed", a.seed, "seed of world, motion and noise")->capture_default_str();
+  verb->add_option("--tour-seed", a.tour_seed,
+                   "seed of motion and noise, for further tours of one world (default: that of --seed)");
+  verb->add_option("--start", a.start_s, "time stamp of the first images in seconds")->capture_default_str();
   verb->add_option("--laps", a.laps, "laps of the tour within the duration; 0: as many as a walking pace allows")
       ->capture_default_str();
   verb->add_option("--speed", a.speed_mps, "speed in metres per second; 0: determined by duration and laps")

@@ -294,6 +294,32 @@ void warn_of_times(const fs::path& file, std::vector<std::string>& warnings) {
                                  fmt::join(offsets, ", "), file.string()));
 }
 
+camera::Rig with_names(const camera::Rig& rig, const std::vector<std::string>& names) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+    cameras.back().camera.name = names[c];
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+// The calibration of the recording itself has no names of cameras. Takes those of a rig file in its folder, if that has
+// the same cameras.
+void take_names(const fs::path& file, std::size_t camera_count, ChosenRig& chosen) {
+  const auto rig = rig_formats::read_rig(file);
+  if (!rig || rig->size() != camera_count) return;
+  std::vector<std::string> all, used;
+  for (std::size_t c = 0; c < rig->size(); ++c) all.push_back(rig->camera(c).name);
+  for (std::size_t c = 0; c < chosen.rig.size(); ++c) {
+    const camera::Camera &own = chosen.rig.camera(c), &named = rig->camera(static_cast<std::size_t>(chosen.cameras[c]));
+    const camera::Intrinsics &k = camera::intrinsics(own.model), &other = camera::intrinsics(named.model);
+    if (own.width != named.width || own.height != named.height || k.fx != other.fx || k.cx != other.cx) return;
+    used.push_back(named.name);
+  }
+  chosen.rig = with_names(chosen.rig, used);
+  if (chosen.whole && chosen.whole->size() == all.size()) chosen.whole = with_names(*chosen.whole, all);
+}
+
 // Sets what the values of pixels mean: the formats of the images and the vignettes of the cameras.
 Status describe_pixels(const DatasetRequest& request, const std::vector<std::vector<image_files::ImageFile>>& images,
                        Dataset& dataset) {
@@ -330,7 +356,10 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
     if (!masked) return masked.error();
     chosen->rig = *std::move(masked);
   }
-  if (own_rig_file && !request.rig_file) warn_of_times(*own_rig_file, chosen->warnings);
+  if (own_rig_file && !request.rig_file) {
+    warn_of_times(*own_rig_file, chosen->warnings);
+    take_names(*own_rig_file, recording.camera_count(), *chosen);
+  }
   const auto images = collect_images(request, recording, *chosen);
   if (!images) return images.error();
   Dataset dataset{name_of(request.path),

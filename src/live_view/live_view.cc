@@ -11,6 +11,7 @@
 
 #include "live_view/frame_data.h"
 #include "live_view/live_record.h"
+#include "map/rigs_of_map.h"
 #include "report/page.h"
 #include "session/report_data.h"
 
@@ -140,7 +141,8 @@ class LiveView::Content final : public web_server::Content {
 
   ordered_json run_json() {
     results_wanted_ = true;
-    ordered_json json = record_.run_json(*last_->map, results_);
+    const camera::Rig rig = map::cameras_of(last_->map->rig(), last_->first_camera, subject_.dataset.rig.size());
+    ordered_json json = record_.run_json(*last_->map, rig, results_);
     json["command"] = subject_.command;
     json["truth"] = nullptr;
     json["settings"] = settings_;

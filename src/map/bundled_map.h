@@ -31,11 +31,13 @@ std::string_view scale_name(Scale scale);  // "metric", "up-to-scale", "unobserv
 class BundledMap {
  public:
   explicit BundledMap(std::shared_ptr<const camera::Rig> rig, feature::PyramidShape pyramid = {})
-      : rig_(std::move(rig)), pyramid_(pyramid) {}
+      : rig_(std::move(rig)), given_rig_(rig_), pyramid_(pyramid) {}
 
   // ---- Reading
   const camera::Rig& rig() const { return *rig_; }
   std::shared_ptr<const camera::Rig> shared_rig() const { return rig_; }
+  // The same cameras with the calibration that runs were given, before any of them refined it.
+  const camera::Rig& given_rig() const { return *given_rig_; }
   // Of the calibration: L with the covariance L L^T of the extrinsics of cameras 1 to N-1 and the intrinsics of all
   // cameras (solver::RigInformation). Null if the calibration counts as exact.
   const std::shared_ptr<const Eigen::MatrixXd>& rig_deviation() const { return rig_deviation_; }
@@ -127,6 +129,11 @@ class BundledMap {
   std::vector<ReplacedFrame> set_rig(std::shared_ptr<const camera::Rig> rig,
                                      std::shared_ptr<const Eigen::MatrixXd> deviation = {},
                                      std::span<const ReplacedFrame> known = {});
+  // The cameras must be those of rig(), in the same order.
+  void set_given_rig(std::shared_ptr<const camera::Rig> given) { given_rig_ = std::move(given); }
+  // Replaces the rig by one with the same cameras and further ones after them, of which no keyframe has images so far.
+  // The deviation of the calibration is dropped.
+  void append_cameras(std::shared_ptr<const camera::Rig> rig, std::shared_ptr<const camera::Rig> given);
   void begin_gauge_epoch() { ++gauge_epoch_; }
 
   // Appends a keyframe that observes the given landmarks (alive; distinct features, distinct landmarks). Its parent is
@@ -199,7 +206,7 @@ class BundledMap {
   void reassign_children(KeyframeId removed);
   void make_root(KeyframeId k);  // makes k the root of its submap
 
-  std::shared_ptr<const camera::Rig> rig_;
+  std::shared_ptr<const camera::Rig> rig_, given_rig_;
   std::shared_ptr<const Eigen::MatrixXd> rig_deviation_;
   feature::PyramidShape pyramid_;
   MapVersion version_{0};

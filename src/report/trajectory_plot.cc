@@ -70,11 +70,43 @@ Series path_series(const Trajectory& trajectory, const Axis& horizontal, const A
   return series;
 }
 
+// The landmarks that are drawn: at most a few thousand, without the outermost ones, which would shrink the path.
+std::vector<Eigen::Vector3d> drawn_landmarks(const std::vector<Eigen::Vector3d>& landmarks) {
+  constexpr double kOutside = 0.03;  // fraction that is omitted at either end of each axis
+  constexpr std::size_t kMaxDrawn = 4000;
+  if (landmarks.empty()) return {};
+  Eigen::Vector3d low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Eigen::Vector3d& p : landmarks) values.push_back(p[axis]);
+    const auto rank = static_cast<std::ptrdiff_t>(kOutside * static_cast<double>(values.size()));
+    std::ranges::sort(values);
+    low[axis] = *(values.begin() + rank);
+    high[axis] = *(values.end() - 1 - rank);
+  }
+  const Eigen::AlignedBox3d box(low, high);
+  const std::size_t step = (landmarks.size() + kMaxDrawn - 1) / kMaxDrawn;
+  std::vector<Eigen::Vector3d> out;
+  for (std::size_t i = 0; i < landmarks.size(); i += step) {
+    if (box.contains(landmarks[i])) out.push_back(landmarks[i]);
+  }
+  return out;
+}
+
 Panel view_panel(const TrajectoryPlotInput& input, std::string title, const Axis& horizontal, const Axis& vertical) {
   Panel panel{.title = std::move(title),
               .x_label = horizontal.name() + " [m]",
               .y_label = vertical.name() + " [m]",
               .scale = AxisScale::kEqual};
+  if (!input.landmarks.empty()) {
+    Series landmarks;
+    landmarks.label = "landmarks";
+    landmarks.colour = kGrey;
+    landmarks.style = SeriesStyle::kPoints;
+    landmarks.width_px = 1.6;
+    for (const Eigen::Vector3d& p : input.landmarks) landmarks.points.push_back({horizontal.of(p), vertical.of(p)});
+    panel.series.push_back(std::move(landmarks));
+  }
   if (!input.ground_truth.empty()) {
     Series truth = path_series(input.ground_truth, horizontal, vertical);
     truth.label = "ground truth";
@@ -148,7 +180,9 @@ TrajectoryPlotInput evaluation_plot_input(const evaluation::TrajectoryEvaluation
           .errors = evaluation.errors};
 }
 
-std::string trajectory_plot_svg(const TrajectoryPlotInput& input) {
+std::string trajectory_plot_svg(const TrajectoryPlotInput& given) {
+  TrajectoryPlotInput input = given;
+  input.landmarks = drawn_landmarks(given.landmarks);
   const Eigen::Vector3d extent = extent_of(input.ground_truth.empty() ? input.estimate : input.ground_truth);
   const ViewAxes axes = view_axes(input.axes, extent);
   const auto title = [&](const char* name, const Axis& along) {

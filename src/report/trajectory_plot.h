@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "evaluation/trajectory.h"
 #include "evaluation/trajectory_error.h"
@@ -20,6 +21,7 @@ struct TrajectoryPlotInput {
   evaluation::Trajectory ground_truth;        // may be empty
   std::vector<evaluation::PoseError> errors;  // position error over time; may be empty
   WorldAxes axes = WorldAxes::kUnknown;
+  std::vector<Eigen::Vector3d> landmarks = {};  // in the frame of the estimate; may be empty
 };
 
 // Returns the input of the plot of `bslam eval --plot`: aligned estimate, ground truth and position error.
@@ -27,8 +29,8 @@ TrajectoryPlotInput evaluation_plot_input(const evaluation::TrajectoryEvaluation
                                           const evaluation::Trajectory& ground_truth, std::string title);
 
 // Returns an SVG document with the path seen from above and from the side, with equal scales on both axes and the
-// upward direction up the page, and with the position error over time if there is ground truth. Lines are interrupted
-// if poses are missing.
+// upward direction up the page, the landmarks except for those far outside, and with the position error over time if
+// there is ground truth. Lines are interrupted if poses are missing.
 std::string trajectory_plot_svg(const TrajectoryPlotInput& input);
 
 }  // namespace bslam::report

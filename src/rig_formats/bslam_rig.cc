@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
 #include <set>
 #include <utility>
 #include <vector>
@@ -39,11 +42,66 @@ Status read_times_and_mask(const yaml::YamlMap& yaml, camera::CameraDescription&
   return {};
 }
 
+// A camera with yaw, pitch and roll 0 looks along the x axis of the body with its image upright: x right = -y body,
+// y down = -z body, z forward = x body.
+geometry::Matrix3d looking_ahead() {
+  geometry::Matrix3d R_body_cam;
+  R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return R_body_cam;
+}
+
+Result<geometry::Matrix3d> read_rotation(const yaml::YamlMap& yaml) {
+  const bool quaternion = yaml.has("quaternion_xyzw");
+  const std::string key = quaternion ? "quaternion_xyzw" : "yaw_pitch_roll_deg";
+  const auto values = yaml.numbers(key);
+  if (!values) return values.error();
+  const std::vector<double>& v = *values;
+  if (v.size() != (quaternion ? 4 : 3))
+    return yaml.error(key, fmt::format("{} numbers", v.size()), quaternion ? "4: x, y, z, w" : "3: yaw, pitch, roll");
+  if (!quaternion) {
+    constexpr double kRadians = std::numbers::pi / 180;
+    using Eigen::AngleAxisd;
+    return geometry::Matrix3d(AngleAxisd(kRadians * v[0], geometry::Vector3d::UnitZ()) *
+                              AngleAxisd(kRadians * v[1], geometry::Vector3d::UnitY()) *
+                              AngleAxisd(kRadians * v[2], geometry::Vector3d::UnitX()) * looking_ahead());
+  }
+  constexpr double kUnit = 1e-3;
+  const geometry::Quaterniond q(v[3], v[0], v[1], v[2]);
+  if (!(std::abs(q.norm() - 1) <= kUnit)) return yaml.error(key, fmt::format("the norm {:.6g}", q.norm()), "1");
+  return q.normalized().toRotationMatrix();
+}
+
+// The pose of a camera on the body: a matrix, or a position with a quaternion or with angles.
+Result<std::vector<double>> read_pose(const yaml::YamlMap& yaml) {
+  const bool position = yaml.has("position"), quaternion = yaml.has("quaternion_xyzw"),
+             angles = yaml.has("yaw_pitch_roll_deg");
+  const int rotations = int{quaternion} + int{angles};
+  if (yaml.has("T_body_cam") && (position || rotations > 0))
+    return yaml.error("T_body_cam", "a second pose beside it", "T_body_cam alone, or position with a rotation");
+  if (!position && rotations == 0) return yaml.rows("T_body_cam", 4);
+  if (rotations != 1) {
+    return yaml.error(rotations == 0 ? "position" : "quaternion_xyzw",
+                      rotations == 0 ? "no rotation beside it" : "yaw_pitch_roll_deg beside it",
+                      "one of quaternion_xyzw and yaw_pitch_roll_deg");
+  }
+  const auto at = yaml.numbers("position");
+  if (!at) return at.error();
+  if (at->size() != 3) return yaml.error("position", fmt::format("{} numbers", at->size()), "3: x, y, z in metres");
+  const auto R = read_rotation(yaml);
+  if (!R) return R.error();
+  std::vector<double> rows;
+  for (int r = 0; r < 3; ++r)
+    rows.insert(rows.end(), {(*R)(r, 0), (*R)(r, 1), (*R)(r, 2), (*at)[static_cast<std::size_t>(r)]});
+  rows.insert(rows.end(), {0, 0, 0, 1});
+  return rows;
+}
+
 Result<camera::RigCamera> read_camera(const yaml::YamlMap& yaml, std::size_t index) {
   if (yaml.has("T_cam_body"))
     return yaml.error("T_cam_body", "the transform from body to camera", "T_body_cam, its inverse");
-  const Status known = yaml.allow_only({"name", "model", "resolution", "intrinsics", "distortion", "T_body_cam",
-                                        "time_offset_s", "rolling_shutter_readout_s", "mask"});
+  const Status known =
+      yaml.allow_only({"name", "model", "resolution", "intrinsics", "distortion", "T_body_cam", "position",
+                       "quaternion_xyzw", "yaw_pitch_roll_deg", "time_offset_s", "rolling_shutter_readout_s", "mask"});
   if (!known) return known.error();
   camera::CameraDescription d;
   d.name = fmt::format("cam{}", index);
@@ -68,7 +126,7 @@ Result<camera::RigCamera> read_camera(const yaml::YamlMap& yaml, std::size_t ind
     if (!distortion) return distortion.error();
     d.distortion = *std::move(distortion);
   }
-  auto T_body_cam = yaml.rows("T_body_cam", 4);
+  auto T_body_cam = read_pose(yaml);
   if (!T_body_cam) return T_body_cam.error();
   d.T_body_cam = *std::move(T_body_cam);
   if (const Status status = read_times_and_mask(yaml, d); !status) return status.error();

@@ -137,6 +137,16 @@ Result<RigFile> read_folder(const fs::path& folder) {
                "a folder with mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt, cameras.txt or rig.yaml"};
 }
 
+// Returns a name that no camera of `taken` has.
+std::string unused_name(const std::vector<camera::RigCamera>& taken, const std::string& name) {
+  const auto used = [&](const std::string& n) {
+    return std::ranges::any_of(taken, [&](const camera::RigCamera& c) { return c.camera.name == n; });
+  };
+  std::string out = name;
+  for (std::size_t i = taken.size(); used(out); ++i) out = "cam" + std::to_string(i);
+  return out;
+}
+
 Status make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -218,6 +228,29 @@ Result<RigFile> read_rig_file(const fs::path& path) {
   // A syntax error is more helpful than an unknown format.
   if (const auto yaml = yaml::YamlMap::parse(path, *text); !yaml && !yaml.error().key.empty()) return yaml.error();
   return Error{path.string(), "", "a file of unknown format", "one of: " + names};
+}
+
+Result<RigFile> read_joined_rigs(std::span<const fs::path> files) {
+  std::vector<camera::RigCamera> cameras;
+  std::vector<std::string> notes;
+  std::optional<RigFile> first;
+  for (const fs::path& file : files) {
+    auto part = read_rig_file(file);
+    if (!part) return part.error();
+    if (files.size() > 1 && part->rig.body_from_cam(0).matrix().isIdentity(0)) {
+      return Error{file.string(), "", "extrinsics relative to its camera 0 only",
+                   "extrinsics relative to a body frame that all files share, such as T_cam_imu, to join them"};
+    }
+    for (std::size_t c = 0; c < part->rig.size(); ++c) {
+      camera::RigCamera camera{part->rig.camera(c), part->rig.body_from_cam(c)};
+      camera.camera.name = unused_name(cameras, camera.camera.name);
+      cameras.push_back(std::move(camera));
+    }
+    notes.insert(notes.end(), part->notes.begin(), part->notes.end());
+    if (!first) first = std::move(*part);
+  }
+  if (files.size() == 1) return *std::move(first);
+  return RigFile{camera::Rig(std::move(cameras)), first->format, std::move(notes)};
 }
 
 Result<camera::Rig> read_rig(const fs::path& path) {

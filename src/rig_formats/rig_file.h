@@ -39,6 +39,11 @@ Result<RigFile> read_rig_file(const std::filesystem::path& path);
 // The same, without format and notes.
 Result<camera::Rig> read_rig(const std::filesystem::path& path);
 
+// Joins calibrations of parts of a rig, such as the camchains of several runs of Kalibr, by their common body frame, in
+// the order of the files. A name that is taken becomes camN, N being the index of the camera. Errors: as for
+// read_rig_file; the body frame of one of several files is its camera 0, so that the files have no common frame.
+Result<RigFile> read_joined_rigs(std::span<const std::filesystem::path> files);
+
 Status write_rig(const camera::Rig& rig, const std::filesystem::path& file);  // writes the format of bslam
 
 // Writes `out`, which is a file, or, for EuRoC and COLMAP, a folder that is created. Returns notes on content that was

@@ -25,7 +25,7 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
       camera.first_skipped = dataset::describe_damage(input.dataset, frame.record->result.frame.index(), c);
     }
     camera.states = camera_intervals(record.frames, c);
-    camera.residuals = residuals[c];
+    camera.residuals = residuals[input.system.first_camera() + c];
     const auto& found = input.system.calibration().cameras;
     if (c > 0 && c < found.size()) {
       const calibration::CameraRefinement& r = found[c];

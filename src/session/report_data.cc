@@ -104,7 +104,7 @@ ordered_json settings_json(const system::Config& config) {
   return list;
 }
 
-ordered_json run_json(const RunRecord& record, const map::BundledMap& map,
+ordered_json run_json(const RunRecord& record, const map::BundledMap& map, const camera::Rig& rig,
                       std::span<const system::SubmapTrajectory> paths, TimeNs first_time_ns,
                       const ReportLimits& limits) {
   ordered_json stages = ordered_json::array(), residuals = ordered_json::array();
@@ -112,7 +112,7 @@ ordered_json run_json(const RunRecord& record, const map::BundledMap& map,
   for (const CameraRecord& camera : record.cameras) residuals.push_back(residuals_json(camera.residuals));
   return {{"schema", 1},
           {"summary", summary_json(record)},
-          {"rig", report_rig(map.rig())},
+          {"rig", report_rig(rig)},
           {"submaps", report_submaps(map, paths, first_time_ns, limits)},
           {"landmarks", map.num_landmarks()},
           {"frames", frames_json(record, limits.poses)},
@@ -124,7 +124,8 @@ ordered_json report_json(const SessionResult& result, const system::Config& conf
   const RunRecord& record = result.record;
   const evaluation::Trajectory path =
       result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
-  ordered_json json = run_json(record, *result.map, result.trajectories, source.dataset.first_time_ns);
+  ordered_json json = run_json(record, *result.map, result.rig ? *result.rig : result.map->rig(), result.trajectories,
+                               source.dataset.first_time_ns);
   json["command"] = source.command;
   json["truth"] = report_truth(source.dataset, path, record.map.scale == "metric");
   json["settings"] = settings_json(config);

@@ -10,8 +10,9 @@
 
 namespace bslam::session {
 
-// What is known of a run while it goes on as well: all of report_json but the command, settings and ground truth.
-nlohmann::ordered_json run_json(const RunRecord& record, const map::BundledMap& map,
+// What is known of a run while it goes on as well: all of report_json but the command, settings and ground truth. `rig`
+// is that of the run.
+nlohmann::ordered_json run_json(const RunRecord& record, const map::BundledMap& map, const camera::Rig& rig,
                                 std::span<const system::SubmapTrajectory> paths, TimeNs first_time_ns,
                                 const ReportLimits& limits = {});
 

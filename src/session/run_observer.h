@@ -17,6 +17,7 @@ struct ProcessedFrame {
   tracking::FrameRecord record;
   std::vector<tracking::ObservedKeypoints> keypoints;  // per camera
   map::MapSnapshot map;                                // the newest version
+  std::size_t first_camera = 0;                        // of the run, in the rig of the map
   double read_ms = 0;
 };
 

@@ -1,5 +1,7 @@
 #include "session/run_session.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <thread>
@@ -38,9 +40,9 @@ std::vector<FrameId> recorded_frames(const execution::Journal& journal) {
 // Passes a frame and its images on to the observer of the run.
 void report_frame(RunObserver& observer, FrameSource::Item&& item, system::FrameRecord&& record,
                   system::System& system) {
-  observer.processed(
-      {std::move(item.images), std::move(record), system.take_observed_keypoints(), system.snapshot(), item.read_ms},
-      system);
+  observer.processed({std::move(item.images), std::move(record), system.take_observed_keypoints(), system.snapshot(),
+                      system.first_camera(), item.read_ms},
+                     system);
 }
 
 // Feeds the frames to the system in order and returns a list of them. Stops early if the run is interrupted.
@@ -86,6 +88,19 @@ camera::Rig with_refined_calibration(const camera::Rig& found, const dataset::Da
 
 }  // namespace
 
+std::map<TimeNs, TimeNs> image_stamps(const dataset::Dataset& dataset) {
+  std::map<TimeNs, TimeNs> out;
+  for (const dataset::FrameEntry& frame : dataset.frames) {
+    out[frame.time_ns] = frame.time_ns;
+    for (std::size_t c = 0; c < frame.images.size(); ++c) {
+      if (!frame.images[c] || frame.images[c]->time_ns != frame.time_ns) continue;
+      out[frame.time_ns] -= dataset.rig.camera(c).time_offset_ns;
+      break;
+    }
+  }
+  return out;
+}
+
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options) {
   const Stopwatch start_up;
   auto masks = image_decoding::read_masks(dataset.rig);
@@ -122,8 +137,9 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
                     .wall_s = wall_s},
                    system.take_frames());
   result.map = system.snapshot();
+  result.rig = system.rig();
   result.calibration = system.calibration();
-  if (system.calibration_refined()) result.refined_rig = with_refined_calibration(result.map->rig(), dataset);
+  if (system.calibration_refined()) result.refined_rig = with_refined_calibration(*result.rig, dataset);
   result.journal = system.journal();
   return result;
 }
@@ -134,12 +150,38 @@ using Files = std::vector<std::pair<std::string, std::string>>;  // name and con
 
 // Adds one file per submap. The file of the first submap is written even if there is no submap.
 void add_trajectories(const RunRecord& record, const std::vector<system::SubmapTrajectory>& submaps,
-                      const std::string& stem, evaluation::PoseState state, Files& files) {
+                      const std::string& stem, evaluation::PoseState state, const std::map<TimeNs, TimeNs>& stamps,
+                      Files& files) {
   for (std::size_t i = 0; i < std::max<std::size_t>(submaps.size(), 1); ++i) {
-    const evaluation::Trajectory poses = submaps.empty() ? evaluation::Trajectory() : submaps[i].poses;
-    files.emplace_back(trajectory_file(stem, i),
-                       evaluation::tum_text(poses, trajectory_comments(record, submaps, i, state)));
+    evaluation::Trajectory poses = submaps.empty() ? evaluation::Trajectory() : submaps[i].poses;
+    std::string comments = trajectory_comments(record, submaps, i, state);
+    if (!stamps.empty()) {
+      for (evaluation::TimedPose& pose : poses) pose.time_ns = stamps.at(pose.time_ns);
+      comments += "\n# time stamps are those of the images, without the time offset of the camera";
+    }
+    files.emplace_back(trajectory_file(stem, i), evaluation::tum_text(poses, comments));
   }
+}
+
+// The landmarks in the submap of trajectory.tum.
+std::vector<Eigen::Vector3d> landmarks_of_path(const SessionResult& result) {
+  std::vector<Eigen::Vector3d> out;
+  if (result.trajectories.empty() || !result.map) return out;
+  for (const LandmarkId l : result.map->landmark_ids()) {
+    const map::Landmark& landmark = result.map->landmark(l);
+    if (result.map->root_of(landmark.reference.keyframe) == result.trajectories.front().root)
+      out.push_back(landmark.position);
+  }
+  return out;
+}
+
+// Names the submap that trajectory.svg shows, and the files of the others.
+std::string submap_text(const SessionResult& result) {
+  const std::size_t n = result.trajectories.size();
+  if (n < 2) return {};
+  return fmt::format("submap 1 of {}, {} poses; the others, each in its own world frame, are in {}{}", n,
+                     result.trajectories.front().poses.size(), trajectory_file("trajectory", 1),
+                     n > 2 ? fmt::format(" to {}", trajectory_file("trajectory", n - 1)) : "");
 }
 
 // The plots, which are large, are written last: if the disk is full, the results are more important.
@@ -148,19 +190,22 @@ Files output_files(const SessionResult& result, const system::Config& config) {
   const OptionTable table(copy);
   Files files;
   files.emplace_back("summary.json", summary_text(result.record));
-  add_trajectories(result.record, result.trajectories, "trajectory", evaluation::PoseState::kFinal, files);
-  add_trajectories(result.record, result.live, "trajectory_live", evaluation::PoseState::kLive, files);
+  add_trajectories(result.record, result.trajectories, "trajectory", evaluation::PoseState::kFinal,
+                   result.written_stamps, files);
+  add_trajectories(result.record, result.live, "trajectory_live", evaluation::PoseState::kLive, result.written_stamps,
+                   files);
   files.emplace_back("covariance_live.csv", covariance_text(result.record));
   files.emplace_back("config.yaml", yaml::config_to_yaml(table));
   if (result.refined_rig) files.emplace_back("rig_refined.yaml", rig_formats::rig_to_yaml(*result.refined_rig));
   const evaluation::Trajectory path =
       result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
   files.emplace_back("trajectory.svg", report::trajectory_plot_svg({.title = result.record.data + ": path of camera 0",
-                                                                    .subtitle = {},
+                                                                    .subtitle = submap_text(result),
                                                                     .estimate = path,
                                                                     .ground_truth = {},
                                                                     .errors = {},
-                                                                    .axes = report::WorldAxes::kCamera}));
+                                                                    .axes = report::WorldAxes::kCamera,
+                                                                    .landmarks = landmarks_of_path(result)}));
   files.emplace_back("run.svg", run_plot_svg(result.record));
   return files;
 }

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -39,12 +40,19 @@ struct SessionResult {
   RunRecord record;
   // One per submap. The first ones are written to trajectory.tum and trajectory_live.tum.
   std::vector<system::SubmapTrajectory> trajectories, live;
-  map::MapSnapshot map;
+  map::MapSnapshot map;                    // its rig may have further cameras, if a map was loaded
+  std::optional<camera::Rig> rig;          // that of the run, with the calibration of the map
   calibration::RigRefinement calibration;  // the estimate of the calibration at the end of the run
   // If extrinsics were refined: the calibration of all cameras, with refined extrinsics for those in use.
   std::optional<camera::Rig> refined_rig;
   execution::Journal journal;
+  // If not empty: the time stamp to be written in trajectories for each time of a frame (image_stamps).
+  std::map<TimeNs, TimeNs> written_stamps = {};
 };
+
+// The time stamp of the image that determines the time of each frame: that of camera 0, or of the earliest other one.
+// The time is this stamp plus the time offset of the camera.
+std::map<TimeNs, TimeNs> image_stamps(const dataset::Dataset& dataset);
 
 // Errors: a mask that cannot be read or differs in size from the images of its camera; a journal of another run.
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options);

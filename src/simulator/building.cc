@@ -4,6 +4,7 @@
 
 #include "base/random.h"
 #include "simulator/furniture.h"
+#include "simulator/outdoor.h"
 #include "simulator/repeated_world.h"
 #include "simulator/walls.h"
 
@@ -92,6 +93,8 @@ Building make_building(WorldKind kind, std::uint64_t seed) {
       return make_corridor(seed);
     case WorldKind::kTwinRooms:
       return make_twin_rooms(seed);
+    case WorldKind::kOutdoor:
+      return make_outdoor(seed);
     case WorldKind::kBuilding:
       break;
   }

@@ -39,8 +39,8 @@ struct Building {
 // the same for every seed.
 Building make_building(std::uint64_t seed);
 
-// The available worlds: this building, and those of simulator/repeated_world.h.
-enum class WorldKind { kBuilding, kCorridor, kTwinRooms };
+// The available worlds: this building, those of simulator/repeated_world.h, and that of simulator/outdoor.h.
+enum class WorldKind { kBuilding, kCorridor, kTwinRooms, kOutdoor };
 Building make_building(WorldKind kind, std::uint64_t seed);
 
 }  // namespace bslam::simulator

@@ -261,6 +261,32 @@ float fabric(const Texture& t, float x, float y) {
          (1 + 0.5f * scattered_motifs(x, y, 0.09f, 0.35f, t.seed + 3));
 }
 
+float leaves(const Texture& t, float x, float y) {
+  const float large = scattered_motifs(x, y, 0.13f, 0.8f, t.seed),
+              small = scattered_motifs(x, y, 0.047f, 0.8f, t.seed + 1);
+  const float clumps = fractal_noise(2.1f * x, 2.1f * y, t.seed + 2, 5, 0.65f);
+  return t.shade * (1 + 0.55f * large) * (1 + 0.45f * small) * (1 + 0.5f * clumps) + 0.03f * speckle(x, y, t.seed + 3);
+}
+
+// Clouds of tens of metres.
+float clouds(const Texture& t, float x, float y) {
+  const float cover = fractal_noise(x / 30, y / 30, t.seed, 6, 0.55f);
+  return t.shade * mix(0.80f, 1.15f, smooth_step(-0.35f, 0.35f, cover));
+}
+
+// `y` is the height above the lower edge.
+float horizon(const Texture& t, float x, float y) {
+  const float ridge =
+      9 + 5 * fractal_noise(x / 35, 0.5f, t.seed, 3) + 0.8f * fractal_noise(x / 1.5f, 1.5f, t.seed + 1, 3);
+  if (y > ridge) return clouds({t.material, t.seed + 2, 0.8f}, x, 1.6f * y);
+  const float haze = 0.16f * y / ridge, woods = fractal_noise(x / 2, y / 2, t.seed + 3, 5, 0.7f);
+  const Cell house = cell_at(x, y, 7.0f, 4.0f);
+  const Seed cell_seed = hash(house.column, house.row, t.seed + 4);
+  const float wall = inside(box_distance(house.x - 3.5f, house.y - 2.0f, 1.6f, 1.1f));
+  const float built = unit(cell_seed) < 0.3f ? wall : 0.0f;
+  return mix(0.16f * (1 + 0.5f * woods), mix(0.3f, 0.7f, unit(hash(1, 8, cell_seed))), built) + haze;
+}
+
 float pattern(const Texture& t, float x, float y, float width, float height) {
   switch (t.material) {
     case Material::kPlain:
@@ -291,6 +317,12 @@ float pattern(const Texture& t, float x, float y, float width, float height) {
       return cardboard(t, x, y, width, height);
     case Material::kFabric:
       return fabric(t, x, y);
+    case Material::kLeaves:
+      return leaves(t, x, y);
+    case Material::kSky:
+      return clouds(t, x, y);
+    case Material::kHorizon:
+      return horizon(t, x, y);
     case Material::kLamp:
       return 0.9f;
   }

@@ -20,7 +20,10 @@ enum class Material {
   kBook,       // a spine with bands and glyphs
   kCardboard,  // tape, labels, dents
   kFabric,     // checks and folds
+  kLeaves,     // foliage and grass
   kLamp,       // emits light
+  kSky,        // clouds over tens of metres; emits light
+  kHorizon,    // hills with houses and trees below the sky; emits light
 };
 
 struct Texture {

@@ -14,6 +14,7 @@
 #include "evaluation/trajectory_file.h"
 #include "rig_formats/euroc_sensor.h"
 #include "rig_formats/rig_file.h"
+#include "simulator/clearance.h"
 
 namespace bslam::simulator {
 namespace {
@@ -44,6 +45,8 @@ Status check(const SimulationRequest& r) {
     }
   }
   if (!within(r.imaging.noise, 0, 1000)) return out_of_range("noise", r.imaging.noise, "a factor in [0, 1000]");
+  if (!within(to_seconds(r.recording.start_ns), 0, 4e9))
+    return out_of_range("start", to_seconds(r.recording.start_ns), "seconds in [0, 4e9]");
   if (!within(r.tour.speed_mps, 0, 5))
     return out_of_range("speed", r.tour.speed_mps, "metres per second in [0, 5] (0: walking pace)");
   if (!within(r.tour.laps, 0, 1000))
@@ -53,6 +56,17 @@ Status check(const SimulationRequest& r) {
                  "either a speed or a number of laps"};
   }
   return {};
+}
+
+Status check_clearance(const SimulationRequest& r, const Building& building, const synthetic::Trajectory& tour) {
+  const auto collision = first_collision(building.surfaces, r.rig, tour, r.recording.duration_s);
+  if (!collision) return {};
+  const std::string& camera = r.rig.camera(collision->camera).name;
+  const std::string place = collision->distance > 0 ? fmt::format("{:.3f} m from a surface", collision->distance)
+                                                    : std::string("behind a wall, the floor or the ceiling");
+  return Error{"", "rig", fmt::format("camera {} {} after {:.2f} s", camera, place, collision->time_s),
+               fmt::format("cameras that keep {} m from all surfaces: a smaller rig{}", kCameraClearance,
+                           r.kind == WorldKind::kOutdoor ? "" : ", or --world outdoor")};
 }
 
 Status make_folder(const fs::path& folder) {
@@ -240,6 +254,11 @@ std::string simulation_digest(const SimulationRequest& r) {
 Result<SimulationOutcome> write_simulation(const SimulationRequest& request, ThreadPool& pool,
                                            const SimulationProgress& progress, std::stop_token stop) {
   if (const Status s = check(request); !s) return s.error();
+  const Building building = make_building(request.kind, request.seed);
+  TourOptions tour_options = request.tour;
+  tour_options.duration_s = request.recording.duration_s;
+  const synthetic::Trajectory tour = make_tour(building, tour_options);
+  if (const Status s = check_clearance(request, building, tour); !s) return s.error();
   const std::string digest = simulation_digest(request);
   const auto state = prepare_folder(request, digest);
   if (!state) return state.error();
@@ -252,13 +271,9 @@ Result<SimulationOutcome> write_simulation(const SimulationRequest& request, Thr
     std::error_code code;
     for (const Shot& shot : shots) fs::remove(image_file(request.folder, shot), code);
   }
-  const Building building = make_building(request.kind, request.seed);
-  TourOptions tour = request.tour;
-  tour.duration_s = request.recording.duration_s;
   const World world(building, request.world, pool, stop);
   if (stop.stop_requested()) return SimulationOutcome::kInterrupted;
-  const Recorder recorder(world, request.rig, make_tour(building, tour), request.imaging, request.recording.exposure_s,
-                          pool);
+  const Recorder recorder(world, request.rig, tour, request.imaging, request.recording.exposure_s, pool);
   const auto all = write_images(request, shots, recorder, pool, progress, stop);
   if (!all) return all.error();
   if (!*all) return SimulationOutcome::kInterrupted;

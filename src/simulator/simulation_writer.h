@@ -41,6 +41,7 @@ using SimulationProgress = std::function<void(std::size_t done, std::size_t tota
 //   rig.yaml, faults.csv                         the rig in the format of bslam; images affected by a fault
 //   .partial, then .complete                     a digest of the request, and the version of the lists
 // An incomplete recording of the same request is completed, and its images are kept. Errors: a value out of range; a
+// camera that is too close to a wall or behind one; a
 // folder with other content, unless `overwrite` is set; a file that cannot be written.
 Result<SimulationOutcome> write_simulation(const SimulationRequest& request, ThreadPool& pool,
                                            const SimulationProgress& progress = {}, std::stop_token stop = {});

@@ -19,7 +19,16 @@ constexpr double kLampRadius = 0.14;   // metres; determines the softness of sha
 constexpr double kOffSurface = 0.006;  // metres between a surface and the origin of rays that start on it
 constexpr double kMinLight = 0.012;    // minimum irradiance by a lamp for which its shadow is computed
 const Vector3d kLampPoints[] = {{1, 0.2, 0}, {-0.3, 0.9, 0.1}, {-0.9, -0.4, -0.1}, {0.2, -0.9, 0}, {0, 0, -0.2}};
-constexpr float kLampLight = 2.2f, kDaylight = 0.75f;
+constexpr float kLampLight = 2.2f, kDaylight = 0.75f, kSkyLight = 0.95f;
+constexpr double kCoarsest = 4.0;  // largest texel size relative to the smallest, except far away
+
+// The light of materials that emit it.
+std::optional<float> uniform_light(Material material) {
+  if (material == Material::kLamp) return kLampLight;
+  if (material == Material::kWindow) return kDaylight;
+  if (material == Material::kSky || material == Material::kHorizon) return kSkyLight;
+  return std::nullopt;
+}
 
 Vector3d unit_normal(const Surface& s) { return s.u.cross(s.v).normalized(); }
 
@@ -116,7 +125,7 @@ World& World::operator=(World&&) noexcept = default;
 
 std::optional<double> World::texel_of(const Surface& s, double finest) const {
   constexpr double kTexelPerDistance = 0.002;  // radians; about one pixel of the default cameras
-  constexpr double kCoarsest = 4.0;            // largest texel size relative to the smallest
+  constexpr double kFar = 10.0;                // metres; surfaces of the indoor worlds are nearer
   const Vector3d n = unit_normal(s);
   bool seen = building_.tour.empty();
   double nearest = seen ? 0.0 : std::numeric_limits<double>::infinity();
@@ -132,6 +141,7 @@ std::optional<double> World::texel_of(const Surface& s, double finest) const {
     }
   }
   if (!seen) return std::nullopt;
+  if (nearest > kFar) return std::max(kTexelPerDistance * nearest, finest);
   return std::clamp(kTexelPerDistance * nearest, finest, kCoarsest * finest);
 }
 
@@ -157,8 +167,10 @@ void World::lay_out(const WorldOptions& options) {
         break;
       }
     }
-    b.light_width = 2 + (b.hidden ? 0 : static_cast<std::int32_t>(w / options.light_texel));
-    b.light_height = 2 + (b.hidden ? 0 : static_cast<std::int32_t>(h / options.light_texel));
+    const bool uniform = b.hidden || uniform_light(s.texture.material).has_value();
+    const double light_texel = options.light_texel * std::max(1.0, texel / (kCoarsest * options.texel));
+    b.light_width = 2 + (uniform ? 0 : static_cast<std::int32_t>(w / light_texel));
+    b.light_height = 2 + (uniform ? 0 : static_cast<std::int32_t>(h / light_texel));
     b.light = samples;
     samples += static_cast<std::uint32_t>(b.light_width * b.light_height);
     baked_.push_back(b);
@@ -209,10 +221,8 @@ void World::bake_light(const WorldOptions& options, ThreadPool& pool, const std:
     const Surface& s = building_.surfaces[i];
     const Baked& b = baked_[i];
     const Vector3d normal = unit_normal(s);
-    std::optional<float> constant;
-    if (b.hidden) constant = kAmbient;
-    if (s.texture.material == Material::kLamp) constant = kLampLight;
-    if (s.texture.material == Material::kWindow) constant = kDaylight;
+    std::optional<float> constant = uniform_light(s.texture.material);
+    if (b.hidden && !constant) constant = kAmbient;
     for (std::int32_t y = 0; y < b.light_height && !stop.stop_requested(); ++y) {
       for (std::int32_t x = 0; x < b.light_width; ++x) {
         const std::size_t at = b.light + static_cast<std::size_t>(y * b.light_width + x);

@@ -11,13 +11,14 @@
 
 #include "base/atomic_file.h"
 #include "base/number_text.h"
+#include "map/rigs_of_map.h"
 #include "storage/map_sections.h"
 
 namespace bslam::storage {
 namespace {
 
 constexpr std::string_view kMagic = "BSLAMMAP";
-constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 2;
+constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 3, kOldestVersion = 2;
 constexpr std::array<std::string_view, 4> kTags = {"RIG ", "INFO", "KEYF", "LAND"};
 constexpr std::array<const char*, 4> kNames = {"rig", "info", "keyframes", "landmarks"};
 constexpr std::size_t kTableEntryBytes = 4 + 4 + 8;
@@ -26,7 +27,10 @@ constexpr std::size_t kMaxMapBytes = std::size_t{1} << 36;
 
 std::uint32_t checksum(std::string_view bytes) { return libdeflate_crc32(0, bytes.data(), bytes.size()); }
 
-using Sections = std::array<std::string_view, kTags.size()>;
+struct Sections {
+  std::uint32_t version = kVersion;
+  std::array<std::string_view, kTags.size()> bytes = {};
+};
 
 std::string header_of(const std::array<std::string, kTags.size()>& sections) {
   std::size_t total = kHeaderBytes;
@@ -60,7 +64,9 @@ Result<Sections> take_apart(std::string_view bytes) {
   ByteReader in(bytes.substr(kMagic.size(), kHeaderBytes - kMagic.size()), "header");
   if (in.number<std::uint32_t>() != kOrderMark) return damaged("header", "another byte order", "little endian");
   const auto version = in.number<std::uint32_t>();
-  if (version != kVersion) return damaged("format version", std::to_string(version), std::to_string(kVersion));
+  if (version < kOldestVersion || version > kVersion) {
+    return damaged("format version", std::to_string(version), fmt::format("{} or {}", kOldestVersion, kVersion));
+  }
   const auto count = in.number<std::uint32_t>();
   const auto total = in.number<std::uint64_t>();
   struct Entry {
@@ -78,7 +84,7 @@ Result<Sections> take_apart(std::string_view bytes) {
     return damaged("header", "a wrong checksum", "an undamaged file");
   }
   if (total != bytes.size()) return damaged("size", fmt::format("{} bytes", bytes.size()), std::to_string(total));
-  Sections sections;
+  Sections sections{.version = version};
   std::string_view rest = bytes.substr(kHeaderBytes);
   for (std::size_t i = 0; i < kTags.size(); ++i) {
     const Entry& e = table[i];
@@ -86,23 +92,23 @@ Result<Sections> take_apart(std::string_view bytes) {
       return damaged("header", "unknown sections", "the sections of this format version");
     if (e.size > rest.size())
       return damaged(kNames[i], "a section beyond the end of the file", "a section within the file");
-    sections[i] = rest.substr(0, e.size);
+    sections.bytes[i] = rest.substr(0, e.size);
     rest.remove_prefix(e.size);
-    if (checksum(sections[i]) != e.checksum) return damaged(kNames[i], "a wrong checksum", "an undamaged file");
+    if (checksum(sections.bytes[i]) != e.checksum) return damaged(kNames[i], "a wrong checksum", "an undamaged file");
   }
   if (!rest.empty()) return damaged("size", "bytes after the last section", "the end of the file");
   return sections;
 }
 
 Result<SavedMap> build(const Sections& sections, std::string file) {
-  const auto reader = [&](std::size_t i) { return ByteReader(sections[i], kNames[i]); };
+  const auto reader = [&](std::size_t i) { return ByteReader(sections.bytes[i], kNames[i]); };
   ByteReader rig_in = reader(0), info_in = reader(1), keyframes_in = reader(2), landmarks_in = reader(3);
-  auto rig = take_rig(rig_in);
-  if (!rig) return rig_in.error();
+  auto rigs = take_rigs(rig_in, sections.version >= 3);
+  if (!rigs) return rig_in.error();
   InfoSection info = take_info(info_in);
   if (!info_in.ok()) return info_in.error();
-  SavedMap saved{std::move(file), map::BundledMap(std::make_shared<const camera::Rig>(*std::move(rig)), info.pyramid),
-                 std::move(info.info)};
+  SavedMap saved{std::move(file), map::BundledMap(rigs->rig, info.pyramid), std::move(info.info)};
+  saved.map.set_given_rig(rigs->given);
   saved.map.set_scale(info.scale);
   saved.words_end = take_keyframes(keyframes_in, saved.info.vocabulary != 0, saved.map);
   if (!keyframes_in.ok()) return keyframes_in.error();
@@ -178,7 +184,7 @@ Status compare_camera(const SavedMap& saved, const camera::Rig& rig, std::size_t
 std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info) {
   const FileIds ids(map);
   std::array<ByteWriter, kTags.size()> writers;
-  put_rig(map.rig(), writers[0]);
+  put_rigs(map, writers[0]);
   put_info(map, info, writers[1]);
   put_keyframes(map, ids, info.vocabulary != 0, writers[2]);
   put_landmarks(map, ids, writers[3]);
@@ -225,7 +231,12 @@ Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera
                                  const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {
   auto saved = read_map(file);
   if (!saved) return saved.error();
-  if (const Status status = fits(*saved, rig, pyramid, vocabulary); !status) return status.error();
+  if (const Status status = fits(*saved, pyramid, vocabulary); !status) return status.error();
+  const std::size_t cameras = saved->map.rig().size() + (map::find_rig(saved->map, rig) ? 0 : rig.size());
+  if (cameras > kMaxCameras) {
+    return Error{file.string(), "rig", fmt::format("{} cameras with those of this run", cameras),
+                 fmt::format("at most {}; a map with fewer rigs", kMaxCameras)};
+  }
   if (saved->map.num_keyframes() == 0) return Error{file.string(), "keyframes", "none", "a map with keyframes"};
   return std::move(saved->map);
 }
@@ -239,6 +250,10 @@ Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::Pyrami
   for (std::size_t i = 0; i < rig.size(); ++i) {
     if (Status status = compare_camera(saved, rig, i); !status) return status;
   }
+  return fits(saved, pyramid, vocabulary);
+}
+
+Status fits(const SavedMap& saved, const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {
   const feature::PyramidShape& saved_pyramid = saved.map.pyramid();
   if (saved_pyramid.levels != pyramid.levels || saved_pyramid.scale_factor != pyramid.scale_factor) {
     return Error{saved.file, "pyramid",

@@ -37,14 +37,17 @@ Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std:
 // (checksums), or is inconsistent.
 Result<SavedMap> read_map(const std::filesystem::path& file);
 
-// Checks that a run with this rig, pyramid and vocabulary (null: none) can continue the map: equal number of cameras,
-// with equal models and resolutions, and with calibrations that may be two estimates of the same one; equal
-// vocabularies, if both have one. The run continues with the calibration of the map. The Error names the camera and the
-// difference.
+// Checks that a run with this pyramid and vocabulary (null: none) can continue the map: equal vocabularies, if both
+// have one. The Error names the difference.
+Status fits(const SavedMap& saved, const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
+
+// Also checks that the map has the same cameras as `rig`: an equal number, with equal models and resolutions, and with
+// calibrations that may be two estimates of the same one. The Error names the camera and the difference.
 Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
             const place::Vocabulary* vocabulary);
 
-// Reads the map that a run continues. Errors: as for read_map and fits; the map has no keyframes.
+// Reads the map that a run with this rig, which may be any rig, continues. Errors: as for read_map and the first fits;
+// the map has no keyframes; it would have too many cameras with those of the run.
 Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
                                  const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
 

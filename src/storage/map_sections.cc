@@ -174,8 +174,9 @@ SE3 take_transform(ByteReader& in) {
   return with_exact_rotation(Quaterniond(xyzw), translation);
 }
 
-void put_rig(const camera::Rig& rig, ByteWriter& out) {
-  out.count(rig.size());
+namespace {
+
+void put_cameras(const camera::Rig& rig, ByteWriter& out) {
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const camera::Camera& c = rig.camera(i);
     out.text(c.name);
@@ -192,22 +193,39 @@ void put_rig(const camera::Rig& rig, ByteWriter& out) {
     out.text(c.mask_file);
   }
   const auto readouts = readouts_of(rig);
-  if (std::ranges::any_of(readouts, [](double readout) { return readout != 0; }))
-    out.numbers(readouts.data(), readouts.size());
+  out.numbers(readouts.data(), readouts.size());
 }
 
-std::optional<camera::Rig> take_rig(ByteReader& in) {
-  const std::size_t n = in.count(kCameraBytes);
-  in.require(n >= 1 && n <= kMaxCameras, std::to_string(n) + " cameras", "1 to " + std::to_string(kMaxCameras));
+// `readouts`: whether the readout times follow.
+std::shared_ptr<const camera::Rig> take_cameras(ByteReader& in, std::size_t n, bool readouts) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t i = 0; i < n && in.ok(); ++i) {
     in.enter("camera", i);
     if (auto camera = take_rig_camera(in)) cameras.push_back(*std::move(camera));
     in.leave();
   }
-  if (in.ok() && in.remaining() > 0) take_readouts(in, cameras);
+  if (in.ok() && (readouts || in.remaining() > 0)) take_readouts(in, cameras);
+  if (!in.ok()) return {};
+  return std::make_shared<const camera::Rig>(std::move(cameras));
+}
+
+}  // namespace
+
+void put_rigs(const map::BundledMap& map, ByteWriter& out) {
+  out.count(map.rig().size());
+  put_cameras(map.rig(), out);
+  put_cameras(map.given_rig(), out);
+}
+
+std::optional<RigSection> take_rigs(ByteReader& in, bool with_given) {
+  const std::size_t n = in.count(kCameraBytes);
+  in.require(n >= 1 && n <= kMaxCameras, std::to_string(n) + " cameras", "1 to " + std::to_string(kMaxCameras));
+  if (!in.ok()) return {};
+  RigSection section;
+  section.rig = section.given = take_cameras(in, n, with_given);
+  if (in.ok() && with_given) section.given = take_cameras(in, n, true);
   if (!in.finish()) return {};
-  return camera::Rig(std::move(cameras));
+  return section;
 }
 
 void put_info(const map::BundledMap& map, const MapFileInfo& info, ByteWriter& out) {

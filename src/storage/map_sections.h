@@ -27,13 +27,17 @@ struct FileIds {
 };
 
 // Functions that write sections.
-void put_rig(const camera::Rig& rig, ByteWriter& out);
+void put_rigs(const map::BundledMap& map, ByteWriter& out);
 void put_info(const map::BundledMap& map, const MapFileInfo& info, ByteWriter& out);
 void put_keyframes(const map::BundledMap& map, const FileIds& ids, bool with_words, ByteWriter& out);
 void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& out);
 
 // Functions that read sections. Results are only valid if the reader is ok afterwards.
-std::optional<camera::Rig> take_rig(ByteReader& in);
+struct RigSection {
+  std::shared_ptr<const camera::Rig> rig, given;  // BundledMap::rig and given_rig
+};
+// `with_given`: as of format version 3. Earlier ones do not contain the second rig, which is then the first one.
+std::optional<RigSection> take_rigs(ByteReader& in, bool with_given);
 
 struct InfoSection {
   feature::PyramidShape pyramid;

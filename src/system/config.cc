@@ -4,11 +4,13 @@
 
 namespace bslam::system {
 
-tracking::TrackerOptions tracker_options(const Config& config) {
+tracking::TrackerOptions tracker_options(const Config& config, CamerasOfRun cameras) {
   return {.tracking = config.tracking,
           .features = config.features,
           .seed = static_cast<std::uint64_t>(config.seed),
           .localize_only = config.localize_only,
+          .first_camera = cameras.first,
+          .num_cameras = cameras.size,
           .new_submap_after = config.looping.recovery.new_submap_after,
           .new_submap_after_s = config.looping.recovery.new_submap_after_s};
 }

@@ -37,16 +37,16 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
 
 }  // namespace
 
-Pipeline::Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
+Pipeline::Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& config, std::vector<image::Image> masks,
                    std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker& keyframe_maker)
     : given_(rig),
       rig_(std::make_shared<const camera::Rig>(rig)),
       config_(config),
-      pool_(config.execution.threads_for(rig.size())),
+      pool_(config.execution.threads_for(cameras.size)),
       monitor_(rig.size(), config.health),
       status_(rig.size()),
       builder_(rig.size(), config.features, std::move(masks)),
-      tracker_(rig, tracker_options(config), pool_, std::move(relocaliser)),
+      tracker_(rig, tracker_options(config, cameras), pool_, std::move(relocaliser)),
       keyframe_maker_(keyframe_maker) {}
 
 Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution::StageExecutor& executor) {

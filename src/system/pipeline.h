@@ -21,8 +21,8 @@ using tracking::StageTime;
 class Pipeline {
  public:
   // `rig`, `config` and `keyframe_maker` must outlive the pipeline. Without a relocaliser a lost rig is only searched
-  // for near its last pose.
-  Pipeline(const camera::Rig& rig, const Config& config, std::vector<image::Image> masks,
+  // for near its last pose. `cameras`: those of the rig that have images.
+  Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& config, std::vector<image::Image> masks,
            std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker& keyframe_maker);
 
   struct Outcome {

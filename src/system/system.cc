@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "base/stopwatch.h"
+#include "map/rigs_of_map.h"
 #include "mapping/map_keyframe.h"
+#include "system/cameras_of_run.h"
 #include "system/final_poses.h"
 #include "system/relocaliser.h"
 
@@ -19,8 +21,10 @@ bool disowns_map(const tracking::TrackResult& result) {
          result.reason == LostReason::kUnstablePose;
 }
 
-map::BundledMap empty_map(const camera::Rig& rig, const Config& config) {
-  return map::BundledMap(std::make_shared<const camera::Rig>(rig), config.feature_model().pyramid);
+map::BundledMap empty_map(const camera::Rig& rig, const camera::Rig& given, const Config& config) {
+  map::BundledMap map(std::make_shared<const camera::Rig>(rig), config.feature_model().pyramid);
+  map.set_given_rig(std::make_shared<const camera::Rig>(given));
+  return map;
 }
 
 void add_pose(std::vector<SubmapTrajectory>& submaps, KeyframeId root, TimeNs time_ns,
@@ -30,20 +34,36 @@ void add_pose(std::vector<SubmapTrajectory>& submaps, KeyframeId root, TimeNs ti
   submap->poses.push_back({time_ns, T_world_cam0});
 }
 
+// Finds the cameras of the run in a loaded map; if it does not have them, they are appended.
+CamerasOfRun find_cameras(std::optional<map::BundledMap>& map, const camera::Rig& rig) {
+  return {map ? map::find_or_append_rig(*map, rig) : 0, rig.size()};
+}
+
+// If the map has cameras of other rigs, their calibration is constant.
+Config config_for(Config config, std::size_t cameras_of_run, const camera::Rig& rig) {
+  if (cameras_of_run == rig.size()) return config;
+  config.calibration.refine = calibration::Refine::kFalse;
+  config.calibration.check = false;
+  return config;
+}
+
 }  // namespace
 
 System::System(camera::Rig rig, Config config, Resources resources)
-    : rig_(std::move(rig)),
-      config_(std::move(config)),
+    : cameras_(find_cameras(resources.map, rig)),
+      rig_(resources.map ? map::with_cameras(resources.map->given_rig(), cameras_.first, rig) : rig),
+      run_rig_(std::move(rig)),
+      config_(config_for(std::move(config), cameras_.size, rig_)),
       loaded_(resources.map.has_value()),
       first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0),
       first_of_map_(first_keyframe_),
       keyframe_maker_(rig_, config_, make_relocaliser(resources.vocabulary, config_),
                       [this](const tracking::CreatedKeyframe& created, TimeNs time_ns) { note(created, time_ns); }),
-      pipeline_(rig_, config_, std::move(resources.masks), make_relocaliser(resources.vocabulary, config_),
-                keyframe_maker_),
+      pipeline_(rig_, cameras_, config_, widened(std::move(resources.masks), cameras_, rig_.size()),
+                make_relocaliser(resources.vocabulary, config_), keyframe_maker_),
       history_(resources.history),
-      store_(resources.map ? std::move(*resources.map) : empty_map(resources.initial_rig.value_or(rig_), config_)),
+      store_(resources.map ? std::move(*resources.map)
+                           : empty_map(resources.initial_rig.value_or(rig_), rig_, config_)),
       initial_rig_(store_.snapshot()->shared_rig()),
       gate_(store_, history_ == 0) {
   const map::MapSnapshot map = store_.snapshot();
@@ -92,10 +112,13 @@ void System::set_keyframe_time(KeyframeId k, TimeNs time_ns) {
 }
 
 Result<FrameRecord> System::process(const image::ImageBundle& images) {
-  if (const Status valid = check_frame(images, rig_, last_input_); !valid) return valid.error();
+  if (const Status valid = check_frame(images, run_rig_, last_input_); !valid) return valid.error();
   last_input_ = FrameStamp{images.id, images.time_ns};
   const bool had_pose = pipeline_.status() != tracking::TrackStatus::kNotStarted;
-  Pipeline::Outcome outcome = pipeline_.process(images, *executor_);
+  const bool whole = cameras_.size == rig_.size();
+  Pipeline::Outcome outcome = pipeline_.process(whole ? images : widened(images, cameras_, rig_.size()), *executor_);
+  narrow(outcome.record, cameras_);
+  narrow(outcome.observed, cameras_);
   maps_started_ += outcome.started_submap;
   observed_ = std::move(outcome.observed);
   std::ranges::move(outcome.early, std::back_inserter(early_));
@@ -195,8 +218,10 @@ void System::locate_early_frames() {
     const auto record = find_record(frames_, early.frame->id);
     if (record == frames_.end()) continue;
     if (record->result.status == tracking::TrackStatus::kTracking) continue;
-    if (auto found = pipeline_.tracker().locate_early(*map, early))
+    if (auto found = pipeline_.tracker().locate_early(*map, early)) {
+      narrow(*found, cameras_);
       record->found_later = std::make_shared<const tracking::TrackResult>(std::move(*found));
+    }
   }
 }
 
@@ -218,6 +243,8 @@ void System::calibrate(map::MapDraft& draft, const std::stop_token& stop) {
   }
   calibration_ms_ = watch.ms();
 }
+
+camera::Rig System::rig() const { return map::cameras_of(snapshot()->rig(), cameras_.first, cameras_.size); }
 
 void System::interrupt() {
   interruption_.request_stop();

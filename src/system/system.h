@@ -32,8 +32,9 @@ struct StageRecord {
 struct Resources {
   std::vector<image::Image> masks = {};  // one per camera of the rig, empty if it has no mask; or no masks at all
   place::VocabularyPtr vocabulary = {};  // null: no place is recognised
-  // Map of an earlier run with this rig, whose calibration may have been refined. The run continues in it after
-  // relocalisation, with its calibration.
+  // Map of an earlier run with this rig or any other one. The run continues in it after relocalisation. A rig that is
+  // new to the map keeps the given calibration, which is not estimated then; that of a known one is in the map, and may
+  // have been refined (map/rigs_of_map.h).
   std::optional<map::BundledMap> map = {};
   // Calibration with which the map begins, such as the estimate of an earlier run; nullopt: that of the rig, which is
   // the prior of the calibration in either case. Not used with `map`, which has its own.
@@ -70,7 +71,12 @@ class System {
   // of the caller's thread returns soon. Results of stopped stages are discarded.
   void interrupt();
 
+  // The map. Its rig contains that of the run; if it was loaded, it may have cameras of other rigs as well.
   map::MapSnapshot snapshot() const { return store_.snapshot(); }
+  // Index in the rig of the map of the first camera of the run; the others follow in order.
+  std::size_t first_camera() const { return cameras_.first; }
+  // The rig of the run with its present calibration, that of the map.
+  camera::Rig rig() const;
   // The last frames in order: all of the run, or at least Resources::history of them. Valid until the next
   // process().
   const std::vector<FrameRecord>& frames() const { return frames_; }
@@ -114,7 +120,9 @@ class System {
   TimeNs time_of(const execution::StageTask& task);
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
 
-  const camera::Rig rig_;
+  const CamerasOfRun cameras_;  // in rig_
+  const camera::Rig rig_;       // of the map, with the calibration that was given
+  const camera::Rig run_rig_;   // as given
   const Config config_;
   const bool loaded_;                // whether the run began with a loaded map
   const KeyframeId first_keyframe_;  // first keyframe of this run

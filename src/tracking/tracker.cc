@@ -100,10 +100,22 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
   for (std::size_t c = 0; c < out.size(); ++c) plan.postponed.push_back(plan.skipped[c] && !out[c]);
   std::vector<std::uint8_t> failing = excluded(state.track, rig_.size());
   for (std::size_t c = 0; c < failing.size(); ++c) failing[c] |= faults.failing[c];
-  plan.budgets = feature_budgets(rig_.size(), state.budget_fractions, plan.skipped, failing, options_.features);
+  plan.budgets = budgets(state.budget_fractions, plan.skipped, failing);
   plan.alignment = alignment(state);
   if (state.track.twist) plan.twist = *state.track.twist;
   return plan;
+}
+
+// Per camera of the rig; the budget of the rig is divided among the cameras of the run.
+std::vector<int> Tracker::budgets(std::span<const double> fractions, std::span<const std::uint8_t> skipped,
+                                  std::span<const std::uint8_t> failing) const {
+  const std::size_t first = options_.first_camera, n = options_.num_cameras > 0 ? options_.num_cameras : rig_.size();
+  const auto of_run = [&](auto values) { return values.empty() ? values : values.subspan(first, n); };
+  const std::vector<int> found =
+      feature_budgets(n, of_run(fractions), of_run(skipped), of_run(failing), options_.features);
+  std::vector<int> out(rig_.size(), 0);
+  std::ranges::copy(found, out.begin() + static_cast<std::ptrdiff_t>(first));
+  return out;
 }
 
 bool Tracker::tracks_directly(const FrontEndState& state) const {

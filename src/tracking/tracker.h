@@ -26,7 +26,9 @@ struct TrackerOptions {
   feature::FeatureOptions features;
   std::uint64_t seed = 1;
   bool localize_only = false;  // never propose an edit of the map
-  int new_submap_after = 50;   // number of frames with features but without a pose after which a new submap is started
+  // The cameras of the rig that the run has, 0: all; the others belong to other rigs of the map, and never have images.
+  std::size_t first_camera = 0, num_cameras = 0;
+  int new_submap_after = 50;  // number of frames with features but without a pose after which a new submap is started
   double new_submap_after_s = 5.0;  // or time from the first of them, s, if there are a few
 };
 
@@ -149,6 +151,8 @@ class Tracker {
   std::optional<TrackResult> locate_early(const map::BundledMap& map, const BetweenKeyframes& early) const;
 
  private:
+  std::vector<int> budgets(std::span<const double> fractions, std::span<const std::uint8_t> skipped,
+                           std::span<const std::uint8_t> failing) const;
   struct Input {
     frame::BundledFrame& frame;
     std::span<const image::Pyramid> pyramids;

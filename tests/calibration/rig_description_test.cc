@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 namespace bslam::calibration {
 namespace {
 
@@ -20,6 +22,23 @@ TEST(RigDescription, MeasuresFieldsOfView) {
   EXPECT_NEAR(view.diagonal, 2 * std::atan(std::hypot(49.5, 39.5) / 50), 1e-9);
   const camera::Camera wide{"w", camera::KannalaBrandt({130, 130, 319.5, 239.5}, {0, 0, 0, 0}), 640, 480, 0, ""};
   EXPECT_NEAR(field_of_view(wide).horizontal, 2 * 319.5 / 130, 1e-9);  // 281 degrees: more than half the sphere
+}
+
+// Two cameras side by side, the second one rotated about its optical axis.
+camera::Rig rolled(double degrees) {
+  const camera::Camera camera{"p", camera::Pinhole({50, 50, 49.5, 39.5}), 100, 80, 0, ""};
+  const Eigen::AngleAxisd roll(degrees / 180 * std::numbers::pi, Eigen::Vector3d::UnitZ());
+  return camera::Rig({{camera, {}}, {camera, geometry::SE3(Eigen::Quaterniond(roll), {0.1, 0, 0})}});
+}
+
+TEST(RigDescription, TellsARotationAboutTheOpticalAxis) {
+  const auto contains = [](double degrees, const char* words) {
+    return describe_rig(rolled(degrees)).find(words) != std::string::npos;
+  };
+  EXPECT_TRUE(contains(180, "same viewing direction, rolled 180.0 deg (its image is upside down)"));
+  EXPECT_TRUE(contains(20, "same viewing direction, rolled 20.0 deg clockwise"));
+  EXPECT_TRUE(contains(-90, "rolled 90.0 deg counter-clockwise"));
+  EXPECT_FALSE(contains(0.5, "rolled"));
 }
 
 }  // namespace

@@ -148,6 +148,22 @@ TEST_F(SmallEuroc, IgnoresARigFileInItsFolderUnlessRequested) {
   EXPECT_FALSE(open_dataset({.path = data(), .rig_file = data() / "rig.yaml"}));
 }
 
+TEST_F(SmallEuroc, TakesTheNamesOfTheSameCamerasFromARigFileInItsFolder) {
+  std::string yaml = rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value());
+  yaml.replace(yaml.find("cam1"), 4, "right");
+  support::write_text(data() / "rig.yaml", yaml);
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->rig.camera(std::size_t{0}).name, "cam0");
+  EXPECT_EQ(dataset->rig.camera(std::size_t{1}).name, "right");
+  const auto second = open_dataset({.path = data(), .cameras = {1}});
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->rig.camera(std::size_t{0}).name, "right");
+  const std::size_t at = yaml.find("resolution: [") + 13;
+  support::write_text(data() / "rig.yaml", yaml.insert(at, "1"));  // another camera
+  EXPECT_EQ(open()->rig.camera(std::size_t{1}).name, "cam1");
+}
+
 TEST_F(SmallEuroc, UsesAnotherRig) {
   std::string yaml = rig_formats::rig_to_yaml(rig_formats::read_rig(data()).value());
   for (std::size_t at = 0; (at = yaml.find("time_offset_s: 0.0", at)) != std::string::npos; ++at) {

@@ -85,5 +85,23 @@ TEST(TrajectoryPlot, ShowsSmallErrorsInMillimetres) {
 
 TEST(TrajectoryPlot, DrawsAnEmptyTrajectory) { EXPECT_EQ(xml_fault(trajectory_plot_svg({})), ""); }
 
+TEST(TrajectoryPlot, DrawsLandmarksExceptForThoseFarOutside) {
+  TrajectoryPlotInput input;
+  input.estimate = circle(true);
+  const auto circles = [](const std::string& svg) {
+    std::size_t count = 0;
+    for (std::size_t at = 0; (at = svg.find("<circle", at)) != std::string::npos; ++at) ++count;
+    return count;
+  };
+  const std::size_t without = circles(trajectory_plot_svg(input));
+  for (int i = 0; i < 200; ++i) input.landmarks.push_back({0.01 * i, 0.005 * (i % 50), 0.02 * i});
+  input.landmarks.push_back({9e6, 9e6, 9e6});
+  const std::string svg = trajectory_plot_svg(input);
+  EXPECT_TRUE(contains(svg, "landmarks"));
+  EXPECT_GE(circles(svg), without + 2 * 150);
+  EXPECT_FALSE(contains(svg, "e+0"));
+  EXPECT_EQ(xml_fault(svg), "");
+}
+
 }  // namespace
 }  // namespace bslam::report

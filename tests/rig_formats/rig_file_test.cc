@@ -88,6 +88,71 @@ TEST_F(OwnRigFile, IsRead) {
   EXPECT_LT((rig->body_from_cam(0) * geometry::Vector3d(1, 0, 0) - geometry::Vector3d(0.5, 0.75, 0.125)).norm(), 1e-12);
 }
 
+constexpr const char* kMatrix = "T_body_cam: [[0, -1, 0, 0.5], [1, 0, 0, -0.25], [0, 0, 1, 0.125], [0, 0, 0, 1]]\n";
+
+TEST_F(OwnRigFile, TakesAPositionWithAQuaternion) {
+  const auto matrix = read(kGood);
+  const auto rig = read_with(
+      kMatrix, "position: [0.5, -0.25, 0.125]\n    quaternion_xyzw: [0, 0, 0.7071067811865476, 0.7071067811865476]\n");
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_LT((rig->body_from_cam(0).matrix() - matrix->body_from_cam(0).matrix()).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST_F(OwnRigFile, TakesAPositionWithYawPitchAndRoll) {
+  struct Mount {
+    const char* angles;
+    Eigen::Vector3d right, forward;  // of the image, in the body frame: x forward, y left, z up
+  };
+  const double h = std::sqrt(0.5);
+  for (const Mount& m : {Mount{"[0, 0, 0]", {0, -1, 0}, {1, 0, 0}}, Mount{"[90, 0, 0]", {1, 0, 0}, {0, 1, 0}},
+                         Mount{"[0, 45, 0]", {0, -1, 0}, {h, 0, -h}}, Mount{"[0, 0, 180]", {0, 1, 0}, {1, 0, 0}},
+                         Mount{"[0, 0, 90]", {0, 0, -1}, {1, 0, 0}}}) {
+    const auto rig = read_with(kMatrix, std::string("position: [1, 2, 3]\n    yaw_pitch_roll_deg: ") + m.angles + "\n");
+    ASSERT_TRUE(rig) << rig.error().message();
+    const Eigen::Matrix3d R = rig->body_from_cam(0).matrix3();
+    EXPECT_LT((R.col(0) - m.right).norm(), 1e-12) << m.angles;
+    EXPECT_LT((R.col(2) - m.forward).norm(), 1e-12) << m.angles;
+    EXPECT_EQ(rig->body_from_cam(0).translation(), Eigen::Vector3d(1, 2, 3));
+  }
+}
+
+TEST_F(OwnRigFile, TakesExactlyOneFormOfThePose) {
+  const auto key_of = [&](const std::string& pose) {
+    const auto rig = read_with(kMatrix, pose);
+    EXPECT_FALSE(rig) << pose;
+    return rig ? std::string() : rig.error().key;
+  };
+  const std::string position = "position: [1, 2, 3]\n    ", quaternion = "quaternion_xyzw: [0, 0, 0, 1]\n    ";
+  EXPECT_EQ(key_of(std::string(kMatrix) + "    position: [1, 2, 3]\n"), "cameras[0].T_body_cam");
+  EXPECT_EQ(key_of(position + "\n"), "cameras[0].position");
+  EXPECT_EQ(key_of(quaternion + "\n"), "cameras[0].position");
+  EXPECT_EQ(key_of(position + quaternion + "yaw_pitch_roll_deg: [0, 0, 0]\n"), "cameras[0].quaternion_xyzw");
+  EXPECT_EQ(key_of(position + "quaternion_xyzw: [0, 0, 0, 2]\n"), "cameras[0].quaternion_xyzw");
+  EXPECT_EQ(key_of(position + "yaw_pitch_roll_deg: [0, 0]\n"), "cameras[0].yaw_pitch_roll_deg");
+  EXPECT_EQ(key_of(""), "cameras[0].T_body_cam");
+}
+
+TEST_F(OwnRigFile, AreJoinedByTheirBodyFrame) {
+  const fs::path a = folder_.path() / "a.yaml", b = folder_.path() / "b.yaml";
+  const camera::Rig rig = mixed_rig();
+  ASSERT_TRUE(write_rig(rig.subset(std::vector<int>{0, 1}), a));
+  ASSERT_TRUE(write_rig(rig.subset(std::vector<int>{1, 2}), b));
+  const auto joined = read_joined_rigs(std::array{a, b});
+  ASSERT_TRUE(joined) << joined.error().message();
+  ASSERT_EQ(joined->rig.size(), 4u);
+  EXPECT_EQ(joined->rig.camera(std::size_t{1}).name, rig.camera(std::size_t{1}).name);
+  EXPECT_EQ(joined->rig.camera(std::size_t{2}).name, "cam2");  // its name is taken
+  for (std::size_t i = 0; i < 4; ++i) {
+    const geometry::SE3& expected = rig.body_from_cam(std::array<std::size_t, 4>{0, 1, 1, 2}[i]);
+    EXPECT_LT((joined->rig.body_from_cam(i).matrix() - expected.matrix()).cwiseAbs().maxCoeff(), 1e-12);
+  }
+  ASSERT_TRUE(write_rig(without(rig, Droppable::kBodyFrame), b));  // relative to its camera 0 only
+  const auto refused = read_joined_rigs(std::array{a, b});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().file, b.string());
+  EXPECT_TRUE(read_joined_rigs(std::array{b}));
+}
+
 TEST_F(OwnRigFile, KeepsRollingShutters) {
   const auto rig = read_with("time_offset_s: -0.0015\n", "rolling_shutter_readout_s: 0.0185\n");
   ASSERT_TRUE(rig) << rig.error().message();

@@ -185,6 +185,27 @@ TEST_F(Session, WritesFilesForEverySubmap) {
   EXPECT_FALSE(fs::exists(out / "trajectory_live_part2.tum"));
 }
 
+TEST_F(Session, WritesTheStampsOfImagesIfRequested) {
+  dataset::Dataset data = dataset();
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < data.rig.size(); ++c) cameras.push_back({data.rig.camera(c), data.rig.body_from_cam(c)});
+  cameras[0].camera.time_offset_ns = 3'000'000;  // the stamps of its images are earlier by this
+  data.rig = camera::Rig(std::move(cameras));
+  const auto stamps = image_stamps(data);
+  ASSERT_EQ(stamps.size(), 8u);
+  EXPECT_EQ(stamps.at(data.frames[2].time_ns), data.frames[2].time_ns - 3'000'000);
+  auto result = run_session(dataset(), options());
+  ASSERT_TRUE(result.ok());
+  result->written_stamps = stamps;
+  const fs::path out = folder() / "stamps";
+  fs::create_directories(out);
+  ASSERT_TRUE(write_outputs(*result, options().config, out).ok());
+  std::ostringstream text;
+  text << std::ifstream(out / "trajectory.tum").rdbuf();
+  EXPECT_NE(text.str().find("\n# time stamps are those of the images"), std::string::npos);
+  EXPECT_NE(text.str().find("\n1.197000000 "), std::string::npos) << text.str();
+}
+
 TEST_F(Session, ContinuesTheMapOfAnEarlierRun) {
   SessionOptions o = options();
   o.vocabulary = place::shipped_vocabulary().value();

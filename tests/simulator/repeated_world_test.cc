@@ -67,7 +67,7 @@ TEST(TwinRooms, LookAlikeAndThePassageIsUnique) {
 }
 
 TEST(RepeatedWorld, HasAClearTour) {
-  for (const WorldKind kind : {WorldKind::kCorridor, WorldKind::kTwinRooms}) {
+  for (const WorldKind kind : {WorldKind::kCorridor, WorldKind::kTwinRooms, WorldKind::kOutdoor}) {
     for (const std::uint64_t seed : {1u, 2u, 3u}) {
       const Building building = make_building(kind, seed);
       const synthetic::Trajectory t = make_tour(building, {.duration_s = 60, .seed = seed});

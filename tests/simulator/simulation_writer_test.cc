@@ -13,6 +13,7 @@
 #include "dataset/dataset.h"
 #include "evaluation/trajectory_file.h"
 #include "rig_formats/rig_file.h"
+#include "simulator/clearance.h"
 #include "synthetic/rigs.h"
 
 namespace bslam::simulator {
@@ -229,6 +230,61 @@ TEST_F(SimulationWriter, RejectsRequestsOutOfRange) {
   EXPECT_TRUE(rejected([](SimulationRequest& r) { r.tour.laps = -1; }));
   EXPECT_TRUE(rejected([](SimulationRequest& r) { r.recording.faults = {{FaultType::kBlack, {0}, 0.3, 0.4}}; }));
   EXPECT_TRUE(rejected([](SimulationRequest& r) { r.tour.laps = 1, r.tour.speed_mps = 1; }));
+}
+
+// The cameras of the ring, `metres` further forward on the body.
+camera::Rig moved_ahead(const camera::Rig& rig, double metres) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const geometry::SE3& T = rig.body_from_cam(c);
+    cameras.push_back({rig.camera(c), geometry::SE3(T.rotation(), T.translation() + Eigen::Vector3d(metres, 0, 0))});
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+TEST_F(SimulationWriter, RefusesARigThatPassesThroughWalls) {
+  SimulationRequest r = request();
+  r.recording.duration_s = 30;  // with turns to the left
+  r.rig = moved_ahead(r.rig, 2.5);
+  const auto refused = write_simulation(r, pool_);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().key, "rig");
+  EXPECT_TRUE(refused.error().found.starts_with("camera ")) << refused.error().found;
+  EXPECT_NE(refused.error().expected.find("--world outdoor"), std::string::npos);
+  EXPECT_FALSE(fs::exists(r.folder));
+}
+
+TEST(Clearance, FindsTheFirstCameraInAWallOrBehindIt) {
+  const camera::Rig rig = synthetic::ring_rig(2, 64);
+  const synthetic::Trajectory still(std::vector<synthetic::ControlPose>(5, {{0, 0, 1}}), 1.0);
+  const double ahead = rig.body_from_cam(0).translation().x();
+  const auto wall_at = [](double x) { return std::vector<Surface>{{{x, -2, 0}, {0, 4, 0}, {0, 0, 2}, {}}}; };
+  EXPECT_FALSE(first_collision(wall_at(ahead + 0.06), rig, still, 1));
+  const auto close = first_collision(wall_at(ahead + 0.04), rig, still, 1);
+  ASSERT_TRUE(close);
+  EXPECT_NEAR(close->distance, 0.04, 0.02);
+  const auto behind = first_collision(wall_at(ahead - 0.06), rig, still, 1);
+  ASSERT_TRUE(behind);
+  EXPECT_EQ(behind->distance, 0);
+}
+
+TEST_F(SimulationWriter, WorldAndTourHaveTheirOwnSeeds) {
+  const Building one = make_building(1), same = make_building(1);
+  EXPECT_EQ(one.surfaces.size(), same.surfaces.size());
+  SimulationRequest a = request(), b = request();
+  b.tour.seed = 2;
+  EXPECT_NE(simulation_digest(a), simulation_digest(b));
+  b.folder = folder_ / "other";
+  ASSERT_TRUE(write_simulation(a, pool_));
+  ASSERT_TRUE(write_simulation(b, pool_));
+  EXPECT_NE(contents(a.folder).at("groundtruth_cam0.tum"), contents(b.folder).at("groundtruth_cam0.tum"));
+}
+
+TEST_F(SimulationWriter, BeginsAtTheGivenTime) {
+  SimulationRequest r = request();
+  r.recording.start_ns = 1'700'000'000'000'000'000;
+  ASSERT_TRUE(write_simulation(r, pool_));
+  EXPECT_TRUE(contents(r.folder).contains("mav0/cam0/data/1700000000000000000.png"));
 }
 
 }  // namespace

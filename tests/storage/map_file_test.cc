@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "map/rigs_of_map.h"
+#include "storage/map_sections.h"
 #include "storage/small_map.h"
 #include "support/data_on_disk.h"
 #include "synthetic/rigs.h"
@@ -300,6 +302,40 @@ TEST(MapFits, OnlyTheVocabularyOfItsKeyframes) {
   // The id of the vocabulary is correct, but the keyframes contain words that it does not have.
   EXPECT_EQ(fits(read_back(map, {(*vocabulary)->id(), "", ""}), rig, map.pyramid(), vocabulary->get()).error().key,
             "vocabulary");
+}
+
+// ---- rigs
+
+TEST(MapFile, KeepsTheGivenCalibrationAndFurtherRigs) {
+  const camera::Rig rig = synthetic::ring_rig(2);
+  map::BundledMap map = small_map(rig);
+  const camera::Rig given = changed(rig, 1, [](camera::RigCamera& c) { c.camera.width += 2; });
+  map.set_given_rig(std::make_shared<const camera::Rig>(given));
+  EXPECT_EQ(map::find_or_append_rig(map, synthetic::fisheye_rig(3)), 2u);
+  const SavedMap saved = read_back(map);
+  expect_same_map(map, saved.map);
+  EXPECT_EQ(saved.map.given_rig().camera(1).width, rig.camera(1).width + 2);
+  EXPECT_EQ(map::find_rig(saved.map, rig), 0u);
+  EXPECT_EQ(map::find_rig(saved.map, given), 0u);
+  EXPECT_EQ(map::find_rig(saved.map, rig.subset(std::vector<int>{0})), 0u);
+  EXPECT_EQ(map::find_rig(saved.map, synthetic::fisheye_rig(3)), 2u);
+  EXPECT_FALSE(map::find_rig(saved.map, rig.subset(std::vector<int>{1})));
+  EXPECT_FALSE(map::find_rig(saved.map, synthetic::fisheye_rig(2)));
+}
+
+TEST(MapFile, ReadsTheRigOfVersion2) {
+  const map::BundledMap map = small_map(synthetic::ring_rig(2));
+  ByteWriter out;
+  put_rigs(map, out);
+  const std::string bytes = std::move(out).take();
+  const std::size_t one = (bytes.size() - 4) / 2, readouts = 2 * sizeof(double);
+  for (const std::size_t size : {4 + one - readouts, 4 + one}) {  // without and with the readout times
+    ByteReader in(std::string_view(bytes).substr(0, size), "rig");
+    const auto rigs = take_rigs(in, false);
+    ASSERT_TRUE(rigs) << in.error().message();
+    EXPECT_TRUE(rigs->rig->same_calibration(map.rig()));
+    EXPECT_EQ(rigs->given, rigs->rig);
+  }
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // A lost rig is relocalised anywhere in the map, also in the map of an earlier run, and not at unknown places.
 #include <gtest/gtest.h>
 
+#include "camera/model_parameters.h"
+#include "map/rigs_of_map.h"
 #include "system/closed_walk.h"
 
 namespace bslam::system {
@@ -47,6 +49,10 @@ TEST(SystemRelocalisation, HasNoPoseAtAnUnknownPlace) {
   EXPECT_EQ(system.maps_started(), 1);
 }
 
+RenderedTour walk_beside(const camera::Rig& rig) {
+  return {rig, 20, [](const auto& building, double duration_s) { return round_and_home(building, duration_s, 0.08); }};
+}
+
 // Another trajectory next to the first, in the map of the first.
 class SystemSavedMap : public ::testing::Test {
  protected:
@@ -64,8 +70,7 @@ class SystemSavedMap : public ::testing::Test {
     return out;
   }
   static const RenderedTour& beside() {
-    static const RenderedTour walk(
-        2, 20, [](const auto& building, double duration_s) { return round_and_home(building, duration_s, 0.08); });
+    static const RenderedTour walk = walk_beside(closed_walk().rig());
     return walk;
   }
   // Pose of the map's world frame.
@@ -133,6 +138,90 @@ TEST_F(SystemSavedMap, ARunContinuesInItAndCanBeRepeated) {
   EXPECT_TRUE(identical(*system.snapshot(), *replayed.snapshot()));
   EXPECT_TRUE(identical(system.live_trajectories(), replayed.live_trajectories()));
 }
+
+// ---- Rigs other than the map's
+
+camera::Rig with_focal_length(const camera::Rig& rig, double factor) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+    camera::ModelParameters values = camera::parameters(rig.camera(c).model);
+    values[0] *= factor;
+    values[1] *= factor;
+    cameras.back().camera.model = camera::with_parameters(rig.camera(c).model, values);
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+// The pose of camera `c` of `walk` in each frame.
+evaluation::Trajectory truth_of(const RenderedTour& walk, std::size_t c) {
+  evaluation::Trajectory out = walk.truth();
+  for (evaluation::TimedPose& p : out) p.T_world_frame = p.T_world_frame * walk.rig().rig_from_cam(c);
+  return out;
+}
+
+// The frames with the given cameras only, in this order.
+std::vector<image::ImageBundle> frames_of(const RenderedTour& walk, const std::vector<int>& cameras) {
+  std::vector<image::ImageBundle> out = walk.frames();
+  for (image::ImageBundle& frame : out) {
+    std::vector<image::CameraImage> images;
+    for (const int c : cameras) images.push_back(frame.images[static_cast<std::size_t>(c)]);
+    frame.images = std::move(images);
+  }
+  return out;
+}
+
+// Runs another rig in the saved map, and compares its poses with the truth in the frame of the map.
+void expect_located(const camera::Rig& rig, const std::vector<image::ImageBundle>& frames, Resources resources,
+                    const evaluation::Trajectory& truth, const geometry::SE3& origin, bool localize_only) {
+  const std::size_t cameras_before = resources.map->rig().size();
+  const std::size_t keyframes_before = resources.map->num_keyframes();
+  const bool known = map::find_rig(*resources.map, rig).has_value();
+  Config config = small_config(execution::Mode::kSequential);
+  config.localize_only = localize_only;
+  System system(rig, config, std::move(resources));
+  process_all(system, frames);
+  system.finish();
+  EXPECT_GE(tracked_frames(system), frames.size() - 1);
+  for (const FrameRecord& record : system.frames()) {
+    EXPECT_EQ(record.cameras.size(), rig.size());
+    EXPECT_EQ(record.images.size(), rig.size());
+    EXPECT_EQ(record.result.cameras.size(), rig.size());
+  }
+  expect_told_where_it_is(system, truth, origin);
+  EXPECT_EQ(system.maps_started(), 0);
+  EXPECT_EQ(system.snapshot()->rig().size(), cameras_before + (known ? 0 : rig.size()));
+  EXPECT_TRUE(system.rig().same_intrinsics(rig));
+  if (localize_only) EXPECT_EQ(system.snapshot()->num_keyframes(), keyframes_before);
+  if (!localize_only) EXPECT_GT(system.snapshot()->newest_keyframe(), KeyframeId(keyframes_before - 1));
+  EXPECT_EQ(system.snapshot()->check_invariants(), std::nullopt);
+}
+
+class SystemOtherRig : public SystemSavedMap, public ::testing::WithParamInterface<bool> {};  // whether localize_only
+
+TEST_P(SystemOtherRig, OneOfTheCamerasOfTheMap) {
+  const auto& walk = beside();
+  expect_located(walk.rig_of(1), frames_of(walk, {0}), resources(), walk.truth(), origin(), GetParam());
+}
+
+TEST_P(SystemOtherRig, TheCamerasInAnotherOrder) {
+  const auto& walk = beside();
+  const std::vector<int> order = {1, 0};
+  expect_located(walk.rig().subset(order), frames_of(walk, order), resources(), truth_of(walk, 1), origin(),
+                 GetParam());
+}
+
+TEST_P(SystemOtherRig, ARigWithOtherLenses) {
+  static const RenderedTour walk = walk_beside(with_focal_length(closed_walk().rig(), 1.08));
+  expect_located(walk.rig(), walk.frames(), resources(), walk.truth(), origin(), GetParam());
+}
+
+TEST_P(SystemOtherRig, AnotherRobot) {
+  static const RenderedTour walk = walk_beside(synthetic::fisheye_rig(3, 280));
+  expect_located(walk.rig(), walk.frames(), resources(), walk.truth(), origin(), GetParam());
+}
+
+INSTANTIATE_TEST_SUITE_P(LocaliseOnlyOrContinue, SystemOtherRig, ::testing::Bool());
 
 }  // namespace
 }  // namespace bslam::system

@@ -34,7 +34,10 @@ class RenderedTour {
 
   // `late_ns`: delay of the images of camera 2 and the following ones.
   RenderedTour(int cameras, std::size_t frames, const Motion& motion, TimeNs late_ns = 0)
-      : pool_(2), rig_(late(first_cameras(cameras), late_ns)), rig_truth_(rig_.size()) {
+      : RenderedTour(late(first_cameras(cameras), late_ns), frames, motion) {}
+
+  RenderedTour(camera::Rig rig, std::size_t frames, const Motion& motion)
+      : pool_(2), rig_(std::move(rig)), rig_truth_(rig_.size()) {
     const simulator::World world(simulator::make_building(3), {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2},
                                  pool_);
     const simulator::RecordingOptions options{.duration_s = static_cast<double>(frames) / kRateHz, .rate_hz = kRateHz};

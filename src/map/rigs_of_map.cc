@@ -1,0 +1,118 @@
+#include "map/rigs_of_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/assert.h"
+#include "camera/model_parameters.h"
+
+namespace bslam::map {
+namespace {
+
+// The text of a rig file rounds rotations.
+constexpr double kRelative = 1e-9, kMaxAngle = 1e-7, kMaxShift = 1e-7;  // -, rad, metres
+
+bool same_camera(const camera::Camera& a, const camera::Camera& b) {
+  if (a.model.index() != b.model.index() || a.width != b.width || a.height != b.height) return false;
+  if (a.time_offset_ns != b.time_offset_ns || std::abs(a.readout_s - b.readout_s) > kRelative) return false;
+  const auto pa = camera::parameters(a.model), pb = camera::parameters(b.model);
+  return std::ranges::equal(pa, pb, [](double x, double y) {
+    return std::abs(x - y) <= kRelative * std::max({1.0, std::abs(x), std::abs(y)});
+  });
+}
+
+bool same_pose(const geometry::SE3& a, const geometry::SE3& b) {
+  const geometry::SE3 D = a * b.inverse();
+  return geometry::so3_log(D.rotation()).norm() <= kMaxAngle && D.translation().norm() <= kMaxShift;
+}
+
+// Whether the cameras of `part` are those of `whole` from `first` on.
+bool contains(const camera::Rig& whole, std::size_t first, const camera::Rig& part) {
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    if (!same_camera(whole.camera(first + i), part.camera(i))) return false;
+    if (!same_pose(whole.cam_from_rig(first + i), part.cam_from_rig(i))) return false;
+  }
+  return true;
+}
+
+std::vector<camera::RigCamera> cameras(const camera::Rig& rig) {
+  std::vector<camera::RigCamera> out;
+  for (std::size_t i = 0; i < rig.size(); ++i) out.push_back({rig.camera(i), rig.body_from_cam(i)});
+  return out;
+}
+
+// The cameras of `part` as cameras of a rig with the body frame of `whole`.
+std::vector<camera::RigCamera> moved_into(const camera::Rig& whole, const camera::Rig& part) {
+  std::vector<camera::RigCamera> out;
+  for (std::size_t i = 0; i < part.size(); ++i)
+    out.push_back({part.camera(i), whole.body_from_cam(0) * part.rig_from_cam(i)});
+  return out;
+}
+
+std::string unused_name(const std::vector<camera::RigCamera>& taken, const std::string& name) {
+  const auto is_taken = [&](const std::string& n) {
+    return std::ranges::any_of(taken, [&](const camera::RigCamera& c) { return c.camera.name == n; });
+  };
+  std::string out = name;
+  for (int i = 2; is_taken(out); ++i) out = name + "_" + std::to_string(i);
+  return out;
+}
+
+}  // namespace
+
+void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::shared_ptr<const camera::Rig> given) {
+  BSLAM_ASSERT(rig->size() >= rig_->size() && rig->size() == given->size(), "cameras can only be added");
+  rig_ = std::move(rig);
+  given_rig_ = std::move(given);
+  rig_deviation_.reset();
+  for (const KeyframeId k : keyframe_ids()) {
+    frame::BundledFrame frame = *keyframe(k).frame;
+    frame.cameras.resize(rig_->size());
+    keyframes_.mutate(k.index(), owner_.tag()).frame = std::make_shared<const frame::BundledFrame>(std::move(frame));
+  }
+}
+
+std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig) {
+  for (std::size_t first = 0; first + rig.size() <= map.rig().size(); ++first) {
+    if (!same_pose(map.rig().cam_from_rig(first), geometry::SE3())) continue;
+    if (contains(map.given_rig(), first, rig) || contains(map.rig(), first, rig)) return first;
+  }
+  return std::nullopt;
+}
+
+std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig) {
+  if (const auto found = find_rig(map, rig)) return *found;
+  const std::size_t first = map.rig().size();
+  std::vector<camera::RigCamera> all = cameras(map.rig()), given = cameras(map.given_rig());
+  for (camera::RigCamera& added : moved_into(map.rig(), rig)) {
+    added.camera.name = unused_name(all, added.camera.name);
+    all.push_back(std::move(added));
+  }
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    given.push_back({all[first + i].camera, map.given_rig().body_from_cam(0) * rig.rig_from_cam(i)});
+  }
+  map.append_cameras(std::make_shared<const camera::Rig>(std::move(all)),
+                     std::make_shared<const camera::Rig>(std::move(given)));
+  return first;
+}
+
+camera::Rig with_cameras(const camera::Rig& whole, std::size_t first, const camera::Rig& part) {
+  BSLAM_ASSERT(first + part.size() <= whole.size(), "the cameras must be part of the rig");
+  if (part.size() == whole.size()) return part;
+  std::vector<camera::RigCamera> out = cameras(whole);
+  std::ranges::move(moved_into(whole, part), out.begin() + static_cast<std::ptrdiff_t>(first));
+  return camera::Rig(std::move(out));
+}
+
+camera::Rig cameras_of(const camera::Rig& whole, std::size_t first, std::size_t size) {
+  std::vector<int> indices(size);
+  std::iota(indices.begin(), indices.end(), static_cast<int>(first));
+  return whole.subset(indices);
+}
+
+}  // namespace bslam::map

@@ -1,0 +1,29 @@
+// A map serves any rig. The cameras of a rig that the map does not have yet are appended to those of the map, so that
+// old keyframes keep the cameras and the calibration with which they were recorded, and every image belongs to a camera
+// of its own calibration. All rigs of a map share the rig frame: the first camera of each has the identity as
+// T_cam_rig.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "map/bundled_map.h"
+
+namespace bslam::map {
+
+// Returns the index of the map's camera that is camera 0 of `rig`, if the cameras of `rig` are consecutive cameras of
+// the map and that one is the first camera of a rig. Cameras are equal if `rig` has their calibration, or that which
+// they had before a run refined it.
+std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig);
+
+// As find_rig, but appends the cameras if the map does not have them. Names that are taken get a number.
+std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig);
+
+// Returns `whole` with cameras `first`, `first` + 1, ... replaced by those of `part`, whose camera 0 takes the place of
+// camera `first`. If there are no other cameras, the result is `part`.
+camera::Rig with_cameras(const camera::Rig& whole, std::size_t first, const camera::Rig& part);
+
+// The inverse: cameras `first` to `first` + `size` - 1 of `whole`.
+camera::Rig cameras_of(const camera::Rig& whole, std::size_t first, std::size_t size);
+
+}  // namespace bslam::map
