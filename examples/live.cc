@@ -1,5 +1,6 @@
-// SLAM with live cameras: one thread per camera delivers images, and one thread runs SLAM. In this example the cameras
-// replay a data set in EuRoC layout at SPEED times its recorded rate. Usage: live DATA [SPEED]
+// SLAM with live cameras: one thread per camera delivers images, and one thread runs SLAM and prints poses and the
+// states of the cameras. Here the cameras replay a data set in EuRoC layout at SPEED times its recorded rate. Usage:
+// live DATA [SPEED]
 #include <bslam/bslam.h>
 
 #include <chrono>
@@ -17,6 +18,9 @@ int main(int argc, char** argv) {
   bslam::Startup startup;
   startup.history_frames = 10000;  // poses of older frames are discarded
   startup.callbacks.log = [](bslam::LogLevel, std::string_view line) { std::cerr << line << '\n'; };
+  startup.callbacks.camera = [](const bslam::CameraEvent& e) {  // the states of all cameras are also in FrameResult
+    std::cout << "camera " << e.camera << ": " << to_string(e.now.state) << ' ' << e.now.reason << '\n';
+  };
   auto slam = bslam::System::create(*rig, bslam::Config(), startup);
   if (!slam) return std::cerr << slam.error().message() << '\n', 1;
 
@@ -48,6 +52,10 @@ int main(int argc, char** argv) {
   while (const auto bundle = synchronizer->wait()) {
     const auto frame = slam->process(*bundle);
     if (!frame) std::cerr << frame.error().message() << '\n';
+    if (frame && frame->frame % 10 == 0) {
+      const auto& t = frame->T_world_body.translation;  // metres; valid while tracking
+      std::cout << to_string(frame->status) << ": " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+    }
     frames += frame.ok();
     tracked += frame && frame->tracking();
   }

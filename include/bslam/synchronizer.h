@@ -20,7 +20,7 @@ namespace bslam {
 // The reason for which an image is in no bundle.
 enum class DropReason {
   kDuplicate,  // the camera has already delivered an image with this time
-  kTooLate,    // its bundle or a later one is already complete
+  kTooLate,    // its bundle or a later one is already complete, or the time of its bundle would not increase
   kFarAhead,   // its time stamp is far ahead of all earlier images, as with a broken clock
   kOverflow    // its bundle was not fetched in time
 };
@@ -59,10 +59,14 @@ struct SyncCounts {
 // Images are grouped by the same rule as recorded data sets, and every image belongs to exactly one bundle. Each image
 // of camera 0 defines a bundle, to which the nearest image of every other camera within the tolerance belongs. The
 // remaining images form bundles among themselves: the earliest defines one, to which the images of other cameras within
-// the tolerance after it belong. A bundle is ready when no missing image can be expected for it: each camera has
-// delivered a later image, is not due yet according to its rate, is silent, or max_wait_s has passed. All times are
-// time stamps of images, never of the system clock, so the same sequence of pushes gives the same bundles, as long as
-// they are fetched in time.
+// the tolerance after it belong. A camera that always captures at the same time between two images of camera 0, such as
+// one of two cameras that take turns, is grouped as if it captured together with it, and the tolerance is at least a
+// tenth of the interval then: as soon as about five images of each have shown it, and again after the time has changed.
+// A recording shows it from its first image on.
+//
+// A bundle is ready when no missing image can be expected for it: each camera has delivered a later image, is not due
+// yet according to its rate, is silent, or max_wait_s has passed. All times are time stamps of images, never of the
+// system clock, so the same sequence of pushes gives the same bundles, as long as they are fetched in time.
 //
 // All functions may be called from any thread. Bundles come in order of time.
 class BSLAM_EXPORT Synchronizer {

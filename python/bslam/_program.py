@@ -181,6 +181,7 @@ def _run(*command: Path, **options: Any) -> str:
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or [f"bslam: ended with status {done.returncode}"]
         if lines[-1].startswith("bslam: unknown command"):
-            raise Error(f"{command[0]}: found a wheel without the simulator, expected one made by `pip install .`")
+            raise Error(f"{command[0]}: found a wheel without the simulator, expected one made by `pip install .`; "
+                        "`python -m bslam.demo` has a recording")
         raise Error(lines[-1].removeprefix("bslam: "))
     return done.stdout

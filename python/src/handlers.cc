@@ -43,15 +43,15 @@ void bind_events(nb::module_& module) {
   nb::class_<LoopEvent>(module, "LoopEvent", "A place was recognised and the map corrected.")
       .def_ro("keyframe", &LoopEvent::keyframe, "Id of the later keyframe.")
       .def_ro("with_keyframe", &LoopEvent::with, "Id of the keyframe that was recognised.")
-      .def_ro("time_ns", &LoopEvent::time_ns)
-      .def_ro("with_time_ns", &LoopEvent::with_time_ns)
+      .def_ro("time_ns", &LoopEvent::time_ns, "Time of the frame of the later keyframe, in nanoseconds.")
+      .def_ro("with_time_ns", &LoopEvent::with_time_ns, "Time of the frame of the other one, in nanoseconds.")
       .def_ro("inliers", &LoopEvent::inliers, "Number of keypoints that support the loop closure.")
       .def_ro("submaps_merged", &LoopEvent::submaps_merged, "Whether they belonged to different submaps.");
   nb::class_<CameraEvent>(module, "CameraEvent", "The state of a camera, or the reason of its state, has changed.")
       .def_ro("camera", &CameraEvent::camera, "Index in the rig.")
       .def_ro("time_ns", &CameraEvent::time_ns, "Time of the frame.")
-      .def_ro("before", &CameraEvent::before)
-      .def_ro("now", &CameraEvent::now);
+      .def_ro("before", &CameraEvent::before, "Its CameraStatus in the frame before.")
+      .def_ro("now", &CameraEvent::now, "Its CameraStatus in this frame.");
 }
 
 }  // namespace bslam::python

@@ -101,9 +101,10 @@ void bind_map(nb::module_& module) {
           "scale", [](const MapView& m) { return to_string(m.scale()); },
           "metric: lengths are metres; up-to-scale or unobservable: they are in the unit of the map.")
       .def_prop_ro("rig", &MapView::rig, "The rig of the map, without masks.")
-      .def_prop_ro("num_keyframes", &MapView::num_keyframes)
-      .def_prop_ro("num_landmarks", &MapView::num_landmarks)
-      .def_prop_ro("num_observations", &MapView::num_observations)
+      .def_prop_ro("num_keyframes", &MapView::num_keyframes, "Number of keyframes, k.")
+      .def_prop_ro("num_landmarks", &MapView::num_landmarks, "Number of landmarks, m.")
+      .def_prop_ro("num_observations", &MapView::num_observations,
+                   "Number of keypoints of keyframes that observe a landmark.")
       .def_prop_ro(
           "submaps", [](const MapView& m) { return column(m.submaps(), &MapView::Submap::root); }, nb::rv_policy::move,
           "(s,) ids of the submaps: connected parts of the map, each with its own world frame.")

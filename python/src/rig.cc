@@ -95,7 +95,7 @@ void bind_camera(nb::module_& module) {
           "    time_offset_s: true time = stamp + offset.\n"
           "    rolling_shutter_readout_s: from the exposure of the first row to that of the last.\n"
           "    mask: uint8 (height, width); 0 marks pixels to ignore in all images.")
-      .def_ro("name", &C::name)
+      .def_ro("name", &C::name, "Name, unique in the rig.")
       .def_ro("model", &C::model, "pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere or fov.")
       .def_prop_ro(
           "resolution", [](const C& c) { return std::pair(c.width, c.height); }, "(width, height) in pixels.")

@@ -39,8 +39,8 @@ void bind_settings(nb::module_& module) {
       .def_ro("name", &Setting::name, "Such as features.per_image.")
       .def_ro("value", &Setting::value, "The default, as text.")
       .def_ro("expected", &Setting::expected, "Accepted values.")
-      .def_ro("unit", &Setting::unit)
-      .def_ro("help", &Setting::help)
+      .def_ro("unit", &Setting::unit, "Unit of the value; may be empty.")
+      .def_ro("help", &Setting::help, "Meaning, one line.")
       .def("__repr__", [](const Setting& s) { return "Setting(" + s.name + " = " + s.value + ")"; });
   module.def(
       "settings", [] { return Config().settings(); }, "Returns all settings with their defaults, ranges and meanings.");

@@ -31,6 +31,8 @@ ImageSorter::ImageSorter(std::size_t cameras, const SyncOptions& options)
       silent_after_(from_seconds(options.silent_after_s)),
       max_ahead_(from_seconds(options.max_ahead_s)),
       cameras_(cameras),
+      recent_(cameras),
+      phases_{std::vector<TimeNs>(cameras, 0), tolerance_},
       anchor_(cameras) {}
 
 std::size_t ImageSorter::waiting() const {
@@ -55,11 +57,26 @@ bool ImageSorter::far_ahead(Camera& camera, TimeNs time_ns) const {
   return ahead && camera.far_ahead < kClockChangeImages;
 }
 
-void ImageSorter::update_times(Camera& camera, TimeNs time_ns) {
-  camera.recent.insert(std::ranges::upper_bound(camera.recent, time_ns), time_ns);
-  if (camera.recent.size() > kRateIntervals + 1) camera.recent.erase(camera.recent.begin());
+void ImageSorter::update_times(std::size_t c, TimeNs time_ns) {
+  std::vector<TimeNs>& recent = recent_[c];
+  recent.insert(std::ranges::upper_bound(recent, time_ns), time_ns);
+  if (recent.size() > kRateIntervals + 1) recent.erase(recent.begin());
   first_ns_ = std::min(first_ns_.value_or(time_ns), time_ns);
   newest_ns_ = std::max(newest_ns_.value_or(time_ns), time_ns);
+}
+
+// Learns the phases of the cameras from their newest images. New ones hold as soon as no waiting image would be too
+// late because of them.
+void ImageSorter::update_phases() {
+  if (recent_[0].empty()) return;
+  image::CapturePhases phases = image::capture_phases(recent_, tolerance_, phases_.later_ns);
+  if (phases.later_ns == phases_.later_ns && phases.tolerance_ns == phases_.tolerance_ns) return;
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    const std::vector<WaitingImage>& waiting = cameras_[c].waiting;
+    if (last_bundle_ns_ && !waiting.empty() && waiting[0].time_ns - phases.later_ns[c] <= *last_bundle_ns_) return;
+  }
+  phases_ = std::move(phases);
+  std::ranges::fill(anchor_, std::nullopt);  // which the former phases have made
 }
 
 // Returns true if the image was added to the waiting images of its camera.
@@ -69,32 +86,36 @@ bool ImageSorter::accept(std::size_t c, TimeNs time_ns, const CameraImage& image
     dropped.push_back({c, image.time_ns, reason});
     return false;
   };
-  if (std::ranges::binary_search(camera.recent, time_ns)) return drop(DropReason::kDuplicate);
+  if (std::ranges::binary_search(recent_[c], time_ns)) return drop(DropReason::kDuplicate);
   if (far_ahead(camera, time_ns)) return drop(DropReason::kFarAhead);
-  update_times(camera, time_ns);
-  if (last_bundle_ns_ && time_ns <= *last_bundle_ns_) return drop(DropReason::kTooLate);
+  update_times(c, time_ns);
+  if (last_bundle_ns_ && in_phase(c, time_ns) <= *last_bundle_ns_) return drop(DropReason::kTooLate);
+  if (camera.last_ns && time_ns <= *camera.last_ns)
+    return drop(DropReason::kTooLate);  // although its phase has changed
   if (belongs_to_anchor(c, time_ns)) return drop(DropReason::kTooLate);
   const auto place = std::ranges::upper_bound(camera.waiting, time_ns, {}, &WaitingImage::time_ns);
   camera.waiting.insert(place, {time_ns, image});
+  update_phases();
   return true;
 }
 
 // Returns true if the image would be in the anchor if it had come earlier.
 bool ImageSorter::belongs_to_anchor(std::size_t c, TimeNs time_ns) const {
   if (c == 0 || !anchor_[0]) return false;
-  const TimeNs distance = std::abs(time_ns - *anchor_[0]);
-  return distance <= tolerance_ && (!anchor_[c] || distance < std::abs(*anchor_[c] - *anchor_[0]));
+  const TimeNs distance = std::abs(in_phase(c, time_ns) - *anchor_[0]);
+  return distance <= phases_.tolerance_ns &&
+         (!anchor_[c] || distance < std::abs(in_phase(c, *anchor_[c]) - *anchor_[0]));
 }
 
-// Returns the time up to which no further image of the camera is expected.
+// Returns the time, in phase with camera 0, up to which no further image of the camera is expected.
 TimeNs ImageSorter::complete_until(std::size_t c) const {
-  const std::vector<TimeNs>& recent = cameras_[c].recent;
+  const std::vector<TimeNs>& recent = recent_[c];
   const TimeNs last_ns = recent.empty() ? *first_ns_ : recent.back();
   if (*newest_ns_ - last_ns > silent_after_) return kForever;
   const TimeNs timeout = *newest_ns_ - max_wait_;
   if (recent.empty()) return timeout;
   const TimeNs next_due = last_ns + shortest_interval(recent) / 4 * 3 - reorder_;
-  return std::max(next_due, timeout);
+  return in_phase(c, std::max(next_due, timeout));
 }
 
 // Groups all waiting images. The anchor is grouped with them, since images that are nearest to its image of camera 0
@@ -102,10 +123,10 @@ TimeNs ImageSorter::complete_until(std::size_t c) const {
 image::FrameGroups ImageSorter::grouped() const {
   std::vector<std::vector<TimeNs>> times(cameras_.size());
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (anchor_[c]) times[c].push_back(*anchor_[c]);
-    for (const WaitingImage& w : cameras_[c].waiting) times[c].push_back(w.time_ns);
+    if (anchor_[c]) times[c].push_back(in_phase(c, *anchor_[c]));
+    for (const WaitingImage& w : cameras_[c].waiting) times[c].push_back(in_phase(c, w.time_ns));
   }
-  image::FrameGroups groups = image::group_frames(times, tolerance_);
+  image::FrameGroups groups = image::group_frames(times, phases_.tolerance_ns);
   if (!anchor_[0]) return groups;
   std::erase_if(groups.frames, [](const image::GroupedFrame& frame) { return frame.images[0] == 0; });
   for (image::GroupedFrame& frame : groups.frames) {
@@ -122,15 +143,16 @@ bool ImageSorter::is_complete(const image::GroupedFrame& frame) const {
   for (std::size_t c = 1; c < cameras_.size(); ++c) {
     const int at = frame.images[c];
     if (at < 0) {
-      if (complete_until(c) <= frame.time_ns + tolerance_) return false;
+      if (complete_until(c) <= frame.time_ns + phases_.tolerance_ns) return false;
       continue;
     }
-    const TimeNs distance = std::abs(cameras_[c].waiting[static_cast<std::size_t>(at)].time_ns - frame.time_ns);
+    const TimeNs time_ns = cameras_[c].waiting[static_cast<std::size_t>(at)].time_ns;
+    const TimeNs distance = std::abs(in_phase(c, time_ns) - frame.time_ns);
     if (has_camera0 && complete_until(c) < frame.time_ns + distance) return false;
     farthest = std::max(farthest, distance);
   }
   if (has_camera0) return complete_until(0) >= frame.time_ns + 2 * farthest;
-  return complete_until(0) > frame.time_ns + farthest + tolerance_;
+  return complete_until(0) > frame.time_ns + farthest + phases_.tolerance_ns;
 }
 
 bool ImageSorter::exceeds_limit() const {
@@ -147,8 +169,24 @@ void ImageSorter::emit_complete(bool last, std::vector<ImageBundle>& bundles, st
       continue;
     }
     if (!last && !exceeds_limit() && !is_complete(frame)) return;
+    if (last_time_ns_ && bundle_time(frame) <= *last_time_ns_) {
+      drop(frame, dropped);
+      continue;
+    }
     emit(frame, bundles);
   }
+}
+
+// Returns the time of camera 0's image, or of the earliest image, which System::process takes as the time of the
+// bundle.
+TimeNs ImageSorter::bundle_time(const image::GroupedFrame& frame) const {
+  if (frame.images[0] >= 0) return frame.time_ns;
+  TimeNs earliest_ns = kForever;
+  for (std::size_t c = 1; c < cameras_.size(); ++c) {
+    if (frame.images[c] < 0) continue;
+    earliest_ns = std::min(earliest_ns, cameras_[c].waiting[static_cast<std::size_t>(frame.images[c])].time_ns);
+  }
+  return earliest_ns;
 }
 
 void ImageSorter::emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles) {
@@ -159,15 +197,19 @@ void ImageSorter::emit(const image::GroupedFrame& frame, std::vector<ImageBundle
                        : std::optional(cameras_[c].waiting[static_cast<std::size_t>(frame.images[c])].time_ns);
     }
   }
+  last_bundle_ns_ = frame.time_ns;
+  last_time_ns_ = bundle_time(frame);
   ImageBundle& bundle = bundles.emplace_back();
   bundle.images.resize(cameras_.size());
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (frame.images[c] >= 0) bundle.images[c] = take(c, frame.images[c]);
+    if (frame.images[c] < 0) continue;
+    cameras_[c].last_ns = cameras_[c].waiting[static_cast<std::size_t>(frame.images[c])].time_ns;
+    bundle.images[c] = take(c, frame.images[c]);
   }
-  last_bundle_ns_ = frame.time_ns;
 }
 
-// Drops images whose place in another bundle was taken by a later, nearer one, after a later bundle was complete.
+// Drops images whose place in another bundle was taken by a later, nearer one, after a later bundle was complete, or
+// which were captured before the last bundle although they follow it in phase with camera 0.
 void ImageSorter::drop(const image::GroupedFrame& frame, std::vector<DroppedImage>& dropped) {
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (frame.images[c] >= 0) dropped.push_back({c, take(c, frame.images[c]).time_ns, DropReason::kTooLate});

@@ -1,4 +1,6 @@
-// The single-threaded core of the synchroniser: groups images into bundles by their time stamps only.
+// The single-threaded core of the synchroniser: groups images into bundles by their time stamps only. A camera that
+// always captures at the same time between two images of camera 0 is grouped as if it captured together with it, as
+// soon as its images have shown that (image/capture_phase.h): "in phase with camera 0".
 #pragma once
 
 #include <bslam/synchronizer.h>
@@ -7,6 +9,7 @@
 #include <vector>
 
 #include "base/timestamp.h"
+#include "image/capture_phase.h"
 #include "image/frame_grouping.h"
 
 namespace bslam::api {
@@ -31,17 +34,20 @@ class ImageSorter {
   };
   struct Camera {
     std::vector<WaitingImage> waiting;  // in order of time
-    std::vector<TimeNs> recent;         // increasing times of its newest images, from which its rate is computed
     int far_ahead = 0;                  // number of consecutive images that are far ahead of all others
+    std::optional<TimeNs> last_ns;      // time of its last image in a bundle
   };
 
   bool accept(std::size_t camera, TimeNs time_ns, const CameraImage& image, std::vector<DroppedImage>& dropped);
   bool far_ahead(Camera& camera, TimeNs time_ns) const;
-  void update_times(Camera& camera, TimeNs time_ns);
+  void update_times(std::size_t camera, TimeNs time_ns);
+  void update_phases();
+  TimeNs in_phase(std::size_t camera, TimeNs time_ns) const { return time_ns - phases_.later_ns[camera]; }
   TimeNs complete_until(std::size_t camera) const;
   bool is_complete(const image::GroupedFrame& frame) const;
   bool exceeds_limit() const;
   void emit_complete(bool last, std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped);
+  TimeNs bundle_time(const image::GroupedFrame& frame) const;
   void emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles);
   void drop(const image::GroupedFrame& frame, std::vector<DroppedImage>& dropped);
   CameraImage take(std::size_t camera, int position);
@@ -51,8 +57,11 @@ class ImageSorter {
   const std::size_t max_images_;
   const TimeNs tolerance_, max_wait_, reorder_, silent_after_, max_ahead_;
   std::vector<Camera> cameras_;
+  std::vector<std::vector<TimeNs>> recent_;  // per camera: increasing times of its newest images, for rate and phase
+  image::CapturePhases phases_;
   std::optional<TimeNs> first_ns_, newest_ns_;  // times of the first and the newest image of all cameras
-  std::optional<TimeNs> last_bundle_ns_;        // time of the last complete bundle
+  std::optional<TimeNs> last_bundle_ns_;        // time of the last complete bundle, in phase with camera 0
+  std::optional<TimeNs> last_time_ns_;          // its bundle_time()
   // Per camera: time of its image in the anchor, the last complete bundle with an image of camera 0; nullopt if none.
   std::vector<std::optional<TimeNs>> anchor_;
 };

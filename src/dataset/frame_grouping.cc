@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/assert.h"
-#include "dataset/capture_phase.h"
+#include "image/capture_phase.h"
 #include "image/frame_grouping.h"
 
 namespace bslam::dataset {
@@ -27,12 +27,11 @@ FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> 
   for (std::size_t c = 0; c < images.size(); ++c) {
     for (const image_files::ImageFile& image : images[c]) times[c].push_back(image.time_ns);
   }
-  const std::vector<TimeNs> phases = capture_phases(times, tolerance_ns);
+  const image::CapturePhases phases = image::capture_phases(times, tolerance_ns);
   for (std::size_t c = 0; c < times.size(); ++c) {
-    for (TimeNs& time_ns : times[c]) time_ns -= phases[c];
-    if (phases[c] != 0) tolerance_ns = std::max(tolerance_ns, image::median_interval(times[0]) / 10);
+    for (TimeNs& time_ns : times[c]) time_ns -= phases.later_ns[c];
   }
-  image::FrameGroups groups = image::group_frames(times, tolerance_ns);
+  image::FrameGroups groups = image::group_frames(times, phases.tolerance_ns);
   FrameGrouping out{{}, std::move(groups.shared_with_camera0), std::vector<int>(images.size(), 0)};
   const TimeNs near_ns = image::median_interval(times[0]) / 4 * 3;
   for (const image::GroupedFrame& group : groups.frames) {

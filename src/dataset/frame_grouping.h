@@ -18,7 +18,7 @@ struct FrameGrouping {
 };
 
 // Groups images by the rule of image/frame_grouping.h: every image belongs to one frame. A camera that always captures
-// at about the same time between two images of camera 0 (dataset/capture_phase.h) is grouped as if it captured together
+// at about the same time between two images of camera 0 (image/capture_phase.h) is grouped as if it captured together
 // with it; its images keep their times, and the tolerance is at least a tenth of the period of camera 0. `images[i]`
 // are the images of camera i, strictly increasing in time. Camera 0 must have at least one.
 FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> images, TimeNs tolerance_ns);

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "base/random.h"
+#include "image/capture_phase.h"
 #include "image/frame_grouping.h"
 
 namespace bslam {
@@ -92,8 +93,13 @@ Times as_recorded(const std::vector<Shot>& shots, std::size_t cameras) {
   std::vector<std::vector<TimeNs>> times(cameras);
   for (const Shot& shot : shots) times[shot.camera].push_back(shot.time_ns);
   for (auto& t : times) std::ranges::sort(t);
+  const image::CapturePhases phases = image::capture_phases(times, 2 * kMs);
+  auto in_phase = times;
+  for (std::size_t c = 0; c < cameras; ++c) {
+    for (TimeNs& t : in_phase[c]) t -= phases.later_ns[c];
+  }
   Times out;
-  for (const image::GroupedFrame& frame : image::group_frames(times, 2 * kMs).frames) {
+  for (const image::GroupedFrame& frame : image::group_frames(in_phase, phases.tolerance_ns).frames) {
     out.emplace_back();
     for (std::size_t c = 0; c < cameras; ++c) {
       out.back().push_back(frame.images[c] < 0 ? -1 : times[c][static_cast<std::size_t>(frame.images[c])] / kMs);
@@ -207,18 +213,86 @@ TEST(Synchronizer, GroupsRandomLossesLikeARecording) {
   EXPECT_TRUE(feed.dropped.empty());
 }
 
+// Returns the bundles whose first image was captured at `ms` or later.
+Times from(const Times& bundles, std::int64_t ms) {
+  Times out;
+  std::ranges::copy_if(bundles, std::back_inserter(out), [ms](const std::vector<std::int64_t>& bundle) {
+    return std::ranges::all_of(bundle, [ms](std::int64_t t) { return t < 0 || t >= ms; });
+  });
+  return out;
+}
+
 TEST(Synchronizer, GroupsCamerasAtOtherTimesLikeARecording) {
   std::vector<Shot> shots;
   for (int k = 0; k < 60; ++k) {
     shots.push_back({0, k * 50 * kMs});
-    shots.push_back({1, (k * 50 + 25) * kMs});
+    shots.push_back({1, (k * 50 + 20) * kMs});
     shots.push_back({2, k * 33 * kMs});
+    shots.push_back({3, (k * 50 + 35) * kMs});
   }
   std::ranges::stable_sort(shots, {}, &Shot::time_ns);
-  Feed feed(3, {.max_bundles = 1000});
+  Feed feed(4, {.max_bundles = 1000});
   feed.push(shots);
-  EXPECT_EQ(feed.close(), as_recorded(shots, 3));
+  const Times bundles = feed.close(), expected = as_recorded(shots, 4);
+  EXPECT_EQ(from(bundles, 400), from(expected, 400));  // until then, images have shown the phases of the cameras
+  EXPECT_EQ(bundles.front(), (std::vector<std::int64_t>{0, -1, 0, -1}));
+  const auto together =
+      std::ranges::count_if(bundles, [](const auto& b) { return b[0] >= 0 && b[1] == b[0] + 20 && b[3] == b[0] - 15; });
+  EXPECT_GE(together, 50);
   EXPECT_TRUE(feed.dropped.empty());
+}
+
+TEST(Synchronizer, FollowsACameraWhosePhaseChanges) {
+  std::vector<Shot> shots;
+  for (int k = 0; k < 120; ++k) {
+    shots.push_back({0, k * 50 * kMs});
+    shots.push_back({1, (k * 50 + (k < 40 ? 25 : k < 80 ? -15 : 0)) * kMs});
+  }
+  std::ranges::stable_sort(shots, {}, &Shot::time_ns);
+  Feed feed(2);
+  feed.push(shots);
+  const Times bundles = feed.close();
+  for (const std::int64_t k : {30, 70, 110}) {
+    const std::int64_t phase = k < 40 ? 25 : k < 80 ? -15 : 0;
+    EXPECT_TRUE(std::ranges::count(bundles, std::vector<std::int64_t>{50 * k, 50 * k + phase})) << k;
+  }
+  EXPECT_LE(feed.dropped.size(), 1u);  // the image at 4000 ms would be a bundle of the same time as the last one
+}
+
+// Random rates, phases, jitter, losses and delays: what every sequence of bundles has, and what System::process needs.
+TEST(Synchronizer, EveryImageIsInOneBundleInOrderOfTimeOrDropped) {
+  Random random(8);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<std::pair<std::int64_t, Shot>> arrivals;
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::int64_t period = random.below(3) == 0 ? 33 : 50, phase = random.below(50);
+      for (int k = 0; k < 80; ++k) {
+        if (random.below(40) == 0) phase = random.below(50);  // as after a restart of the camera
+        if (random.below(8) == 0) continue;
+        const std::int64_t ms = 100 * static_cast<std::int64_t>(c) + k * period + phase + random.below(3);
+        arrivals.push_back({ms + random.below(trial % 2 == 0 ? 1 : 120), {c, ms * kMs}});
+      }
+    }
+    std::ranges::stable_sort(arrivals, {}, [](const auto& arrival) { return arrival.first; });
+    Feed feed(3, {.reorder_s = trial % 2 == 0 ? 0.0 : 0.1});
+    for (const auto& [ms, shot] : arrivals) feed.push({shot});
+    std::vector<std::int64_t> last(4, -1);
+    std::size_t images = 0;
+    for (const auto& bundle : feed.close()) {
+      std::int64_t time = bundle[0];
+      for (std::size_t c = 0; c < 3; ++c) {
+        if (bundle[c] < 0) continue;
+        EXPECT_GT(bundle[c], last[c]) << "camera " << c << ", trial " << trial;
+        last[c] = bundle[c];
+        if (bundle[0] < 0 && (time < 0 || bundle[c] < time)) time = bundle[c];
+        ++images;
+      }
+      EXPECT_GT(time, last[3]) << "trial " << trial;
+      last[3] = time;
+    }
+    EXPECT_EQ(images + feed.dropped.size(), arrivals.size());
+    ASSERT_FALSE(HasFailure());
+  }
 }
 
 TEST(Synchronizer, ReportsDroppedImagesAndReasons) {

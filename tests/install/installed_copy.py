@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Installs a build into a separate folder and uses it like an external project: builds the examples against it with
-find_package, as C++17 with warnings as errors, runs them on a rendered recording, and compares the result of the example
-`recorded` with `bslam run --mode sequential` byte by byte.
+find_package, as C++17 with warnings as errors, and runs them on a rendered recording. The same images give the same bytes of
+trajectory by `bslam run --mode sequential` (the folder), by the example `recorded` (the C++ library) and, if the build has it, by the
+Python package.
 
-    installed_copy.py --build BUILD --source SOURCE [--cmake CMAKE] [--data DATA]
+    installed_copy.py --build BUILD --source SOURCE [--cmake CMAKE] [--data DATA] [--python PYTHON]
 """
 import argparse
 import pathlib
@@ -72,7 +73,15 @@ def check_pkg_config(prefix, work):
     run(work / 'version')
 
 
-def check_examples(prefix, cmake, source, data, work):
+def check_trajectories(files):
+    poses = files[0].read_bytes()
+    check(poses.count(b'\n') > 2, f'{files[0].name} has poses')
+    for file in files[1:]:
+        check(file.read_bytes() == poses, f'{file} has the bytes of {files[0]}')
+    print(f'{len(files)} ways give the same {len(poses)} bytes of trajectory')
+
+
+def check_examples(prefix, cmake, source, data, work, python):
     build = work / 'examples'
     run(cmake, '-S', source / 'examples', '-B', build, f'-DCMAKE_PREFIX_PATH={prefix}', '-DCMAKE_BUILD_TYPE=Release',
         '-DCMAKE_CXX_STANDARD=17', '-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror')
@@ -84,9 +93,11 @@ def check_examples(prefix, cmake, source, data, work):
             '--rate', 10, '--progress', 'never')
     run(build / 'recorded', data, work / 'trajectory.tum', work / 'map.bmap')
     run(bslam, 'run', data, '--mode', 'sequential', '--out', work / 'run', '--progress', 'never')
-    poses = (work / 'trajectory.tum').read_bytes()
-    check(poses.count(b'\n') > 2, 'the example has poses')
-    check(poses == (work / 'run/trajectory.tum').read_bytes(), 'the trajectories of the example and of bslam run are identical')
+    ways = [work / 'run/trajectory.tum', work / 'trajectory.tum']
+    if python:
+        run('env', f'PYTHONPATH={python[1]}', 'PYTHONDONTWRITEBYTECODE=1', python[0], source / 'python/examples/folder.py', data, work / 'python.tum')
+        ways.append(work / 'python.tum')
+    check_trajectories(ways)
     check('keyframes in 1 submaps' in run(build / 'read_map', work / 'map.bmap', work / 'points.xyz'), 'the saved map can be read')
     check((work / 'points.xyz').stat().st_size > 0, 'the map has landmarks')
     run(build / 'live', data, 4)
@@ -98,13 +109,15 @@ def main():
     parser.add_argument('--source', type=pathlib.Path, required=True)
     parser.add_argument('--cmake', default='cmake')
     parser.add_argument('--data', type=pathlib.Path, help='a recording in EuRoC layout; default: rendered')
+    parser.add_argument('--python', type=pathlib.Path, help='interpreter of the Python package in BUILD/python; default: it is not run')
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         work = pathlib.Path(folder)
         run(arguments.cmake, '--install', arguments.build, '--prefix', work / 'prefix')
         check_package(work / 'prefix')
         check_pkg_config(work / 'prefix', work)
-        check_examples(work / 'prefix', arguments.cmake, arguments.source, arguments.data, work)
+        check_examples(work / 'prefix', arguments.cmake, arguments.source, arguments.data, work,
+                       arguments.python and (arguments.python, arguments.build / 'python'))
 
 
 if __name__ == '__main__':

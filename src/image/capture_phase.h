@@ -1,0 +1,39 @@
+// Cameras that capture with the same period as camera 0, but always at another time.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/timestamp.h"
+
+namespace bslam::image {
+
+// Returns how much later than camera 0 a camera captures, between minus and plus half a period of camera 0; 0 if there
+// is no constant time: at least 90 % of the images must be within a tenth of the period of it. Images are compared with
+// the nearest image of camera 0; where camera 0 has a gap, they are ignored. nullopt if fewer than 5 images, or less
+// than half of them, can be compared. `camera0` and `times` are the times of the images of both, strictly increasing;
+// `camera0` has at least one, and `period_ns`, its period, is positive.
+std::optional<TimeNs> capture_phase(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times,
+                                    TimeNs period_ns);
+
+// Returns `time_ns` plus the multiple of the positive period with which it is between minus and plus half a period.
+TimeNs wrapped(TimeNs time_ns, TimeNs period_ns);
+
+// How images are grouped into frames by image/frame_grouping.h: those of camera i as if they had been captured
+// later_ns[i] earlier, with this tolerance.
+struct CapturePhases {
+  std::vector<TimeNs>
+      later_ns;             // 0 for cameras that differ from camera 0 by at most the tolerance or by no constant time
+  TimeNs tolerance_ns = 0;  // at least a tenth of the period of camera 0 if one of them is not 0
+};
+
+// Returns the phases of cameras whose images have the times `times[i]`, strictly increasing. Those of camera 0 are at
+// least one. `tolerance_ns`: largest difference of cameras that capture together. `before`: the earlier phases of live
+// cameras, which remain as long as they are right to within a tenth of the period, or as long as there are too few
+// images to decide; empty if there are none. Cameras slower than 1 Hz have no phase, since the images of a frame must
+// not be more than a second apart.
+CapturePhases capture_phases(std::span<const std::vector<TimeNs>> times, TimeNs tolerance_ns,
+                             std::span<const TimeNs> before = {});
+
+}  // namespace bslam::image
