@@ -123,7 +123,7 @@ Result<storage::ImageNamer> image_namer(const camera::Rig& rig, const MapArgumen
   std::map<std::pair<std::string, TimeNs>, std::string> names;  // by camera and time stamp
   for (const dataset::FrameEntry& frame : data->frames) {
     for (std::size_t c = 0; c < frame.images.size(); ++c) {
-      if (!frame.images[c]) continue;
+      if (!frame.images[c] || frame.images[c]->store) continue;
       const camera::Camera& camera = data->rig.camera(c);
       names[{camera.name, frame.images[c]->time_ns - camera.time_offset_ns}] =
           frame.images[c]->path.lexically_relative(arguments.images).string();

@@ -1,0 +1,178 @@
+// ROS 2 bags in SQLite files: the tables topics (id, name, type, serialization_format) and messages (id, topic_id,
+// timestamp, data). Messages may be compressed one by one with zstd.
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "containers/compression.h"
+#include "containers/input_file.h"
+#include "containers/message_file.h"
+
+namespace bslam::containers {
+namespace {
+
+constexpr std::size_t kMaxMessageBytes = std::size_t{1} << 30;
+constexpr std::string_view kZstdMagic = "\x28\xb5\x2f\xfd";
+
+struct CloseDatabase {
+  void operator()(sqlite3* database) const { sqlite3_close(database); }
+};
+using Database = std::unique_ptr<sqlite3, CloseDatabase>;
+struct FinishStatement {
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using Statement = std::unique_ptr<sqlite3_stmt, FinishStatement>;
+struct CloseBlob {
+  void operator()(sqlite3_blob* blob) const { sqlite3_blob_close(blob); }
+};
+
+Statement prepare(sqlite3* database, const char* text) {
+  sqlite3_stmt* statement = nullptr;
+  sqlite3_prepare_v2(database, text, -1, &statement, nullptr);
+  return Statement(statement);
+}
+
+std::string text(sqlite3_stmt* row, int column) {
+  const auto* bytes = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
+  return bytes == nullptr ? "" : std::string(bytes, static_cast<std::size_t>(sqlite3_column_bytes(row, column)));
+}
+
+// The names of files may contain what a URI would read as its own.
+std::string uri_of(const std::filesystem::path& path) {
+  std::string uri = "file:";
+  for (const unsigned char c : path.string())
+    uri += (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '/' || c == '.' || c == '-'
+               ? std::string(1, static_cast<char>(c))
+               : fmt::format("%{:02x}", c);
+  return uri + "?mode=ro&immutable=1";
+}
+
+class SqliteBag : public MessageFile {
+ public:
+  SqliteBag(std::filesystem::path path, Database database) : database_(std::move(database)) {
+    path_ = std::move(path);
+    format_ = "ROS 2 bag (sqlite3)";
+  }
+
+  Status index(std::uint64_t file_bytes);
+
+  Result<std::string> read(const MessageRef& message, std::size_t max_bytes) const override {
+    const std::lock_guard lock(mutex_);
+    sqlite3_blob* opened = nullptr;
+    const int status =
+        sqlite3_blob_open(database_.get(), "main", "messages", "data", static_cast<sqlite3_int64>(message.at), 0, &opened);
+    const std::unique_ptr<sqlite3_blob, CloseBlob> blob(opened);
+    if (status != SQLITE_OK) return damaged();
+    const auto size = static_cast<std::size_t>(std::max(0, sqlite3_blob_bytes(blob.get())));
+    std::string data = part(blob.get(), std::min(size, max_bytes));
+    if (!data.starts_with(kZstdMagic)) return data.empty() && size > 0 ? damaged() : Result<std::string>(std::move(data));
+    // The output of a compressed message begins with the first bytes of the input, some of which do not suffice.
+    if (data.size() < size) data = part(blob.get(), size);
+    std::string plain = decompress(Compression::kZstd, data, std::min(max_bytes, kMaxMessageBytes));
+    return plain.empty() ? damaged() : Result<std::string>(std::move(plain));
+  }
+
+ private:
+  Result<std::string> damaged() const {
+    return Error{path_.string(), "", std::string("a message that cannot be read (") + sqlite3_errmsg(database_.get()) + ")",
+                 "a complete message"};
+  }
+  static std::string part(sqlite3_blob* blob, std::size_t count) {
+    std::string data(count, '\0');
+    if (count > 0 && sqlite3_blob_read(blob, data.data(), static_cast<int>(count), 0) != SQLITE_OK) data.clear();
+    return data;
+  }
+
+  Database database_;
+  mutable std::mutex mutex_;
+};
+
+// Views and virtual tables would run what an untrusted file says.
+bool has_plain_table(sqlite3* database, const char* name) {
+  const Statement row = prepare(database, "SELECT type, sql FROM sqlite_schema WHERE name = ?");
+  if (!row) return false;
+  sqlite3_bind_text(row.get(), 1, name, -1, SQLITE_STATIC);
+  return sqlite3_step(row.get()) == SQLITE_ROW && text(row.get(), 0) == "table" &&
+         sqlite3_strnicmp(text(row.get(), 1).c_str(), "create table", 12) == 0;
+}
+
+Status SqliteBag::index(std::uint64_t file_bytes) {
+  const auto error = [&](const std::string& found) {
+    return Error{path_.string(), "", found, "the tables topics and messages of a ROS 2 bag"};
+  };
+  if (!has_plain_table(database_.get(), "topics") || !has_plain_table(database_.get(), "messages"))
+    return error(sqlite3_errcode(database_.get()) == SQLITE_OK || sqlite3_errcode(database_.get()) == SQLITE_DONE ||
+                         sqlite3_errcode(database_.get()) == SQLITE_ROW
+                     ? "other tables"
+                     : sqlite3_errmsg(database_.get()));
+  std::map<std::int64_t, std::uint32_t> topic_of;
+  const Statement topics = prepare(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
+  if (!topics) return error(sqlite3_errmsg(database_.get()));
+  int status = SQLITE_ROW;
+  while ((status = sqlite3_step(topics.get())) == SQLITE_ROW) {
+    topic_of[sqlite3_column_int64(topics.get(), 0)] = static_cast<std::uint32_t>(topics_.size());
+    const std::string format = text(topics.get(), 3);
+    topics_.push_back({text(topics.get(), 1), plain_type(text(topics.get(), 2)), format,
+                       format == "cdr" ? Serialisation::kCdr : Serialisation::kOther});
+  }
+  if (topics_.empty()) return error(status == SQLITE_DONE ? "no topics" : sqlite3_errmsg(database_.get()));
+  const Statement rows = prepare(database_.get(), "SELECT id, topic_id, timestamp FROM messages");
+  if (!rows) return error(sqlite3_errmsg(database_.get()));
+  std::uint64_t seen = 0, unknown = 0;
+  while ((status = sqlite3_step(rows.get())) == SQLITE_ROW) {
+    if (++seen > file_bytes) {  // a damaged tree may come back to rows that were read
+      status = SQLITE_CORRUPT;
+      break;
+    }
+    const auto topic = topic_of.find(sqlite3_column_int64(rows.get(), 1));
+    if (topic == topic_of.end()) {
+      ++unknown;
+      continue;
+    }
+    const TimeNs received_ns = sqlite3_column_int64(rows.get(), 2);
+    Topic& of = topics_[topic->second];
+    of.first_ns = of.count == 0 ? received_ns : std::min(of.first_ns, received_ns);
+    of.last_ns = of.count == 0 ? received_ns : std::max(of.last_ns, received_ns);
+    ++of.count;
+    if (is_needed(of.type)) {
+      messages_.push_back(
+          {received_ns, static_cast<std::uint64_t>(sqlite3_column_int64(rows.get(), 0)), 0, topic->second});
+    }
+  }
+  if (status != SQLITE_DONE) {
+    warnings_.push_back(fmt::format("{}: damaged or cut off ({}) after {} messages; the rest is not read",
+                                    path_.string(), sqlite3_errmsg(database_.get()), seen));
+  }
+  if (unknown > 0)
+    warnings_.push_back(fmt::format("{}: {} messages of unknown topics are not used", path_.string(), unknown));
+  return {};
+}
+
+}  // namespace
+
+MessageFileResult open_sqlite_bag(const std::filesystem::path& path) {
+  const auto file = InputFile::open(path);
+  if (!file) return file.error();
+  std::error_code none;
+  sqlite3* opened = nullptr;
+  // A recording that was not closed has a write-ahead log, which only a file that is not taken as unchangeable uses.
+  const bool with_log = std::filesystem::exists(path.string() + "-wal", none);
+  const std::string name = with_log ? path.string() : uri_of(path);
+  const int status = sqlite3_open_v2(name.c_str(), &opened, SQLITE_OPEN_READONLY | (with_log ? 0 : SQLITE_OPEN_URI), nullptr);
+  Database database(opened);
+  if (status != SQLITE_OK || !database)
+    return Error{path.string(), "", database ? sqlite3_errmsg(database.get()) : "no memory", "an SQLite file"};
+  sqlite3_db_config(database.get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(database.get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  auto bag = std::make_unique<SqliteBag>(path, std::move(database));
+  if (const Status s = bag->index(file->size()); !s) return s.error();
+  return std::unique_ptr<MessageFile>(std::move(bag));
+}
+
+}  // namespace bslam::containers
