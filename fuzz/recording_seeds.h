@@ -16,8 +16,13 @@ namespace bslam::fuzz {
 inline std::vector<support::TestMessage> small_recording(support::Wire wire) {
   const bool foxglove = wire == support::Wire::kProtobuf;
   const support::TestImage image{1'000'000'007, 4, 3, 4, "mono8", std::string(12, 'p')};
-  const support::TestCalibration info{4, 3, "plumb_bob", {0, 0, 0, 0, 0}, {4, 0, 2, 0, 4, 1, 0, 0, 1},
-                                      {1, 0, 0, 0, 1, 0, 0, 0, 1}, {4, 0, 2, 0, 0, 4, 1, 0, 0, 0, 1, 0}};
+  const support::TestCalibration info{4,
+                                      3,
+                                      "plumb_bob",
+                                      {0, 0, 0, 0, 0},
+                                      {4, 0, 2, 0, 4, 1, 0, 0, 1},
+                                      {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                                      {4, 0, 2, 0, 0, 4, 1, 0, 0, 0, 1, 0}};
   return {{"/a/camera_info", foxglove ? "foxglove.CameraCalibration" : "sensor_msgs/CameraInfo", 1'000'000'000,
            support::calibration_message(wire, info)},
           {"/a/image", foxglove ? "foxglove.RawImage" : "sensor_msgs/Image", 1'000'000'010,

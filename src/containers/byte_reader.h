@@ -25,8 +25,7 @@ class ByteReader {
     const std::string_view from = take(sizeof(T));
     if (from.empty()) return T{};
     char raw[sizeof(T)];
-    for (std::size_t i = 0; i < sizeof(T); ++i)
-      raw[i] = from[order_ == std::endian::native ? i : sizeof(T) - 1 - i];
+    for (std::size_t i = 0; i < sizeof(T); ++i) raw[i] = from[order_ == std::endian::native ? i : sizeof(T) - 1 - i];
     T value;
     std::memcpy(&value, raw, sizeof(T));
     return value;

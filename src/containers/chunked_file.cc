@@ -56,8 +56,8 @@ std::string ChunkedFile::bytes(std::uint32_t index, std::uint64_t at, std::uint6
   }
   const Loaded loaded = load(index);
   if (at >= loaded.data->size()) return {};
-  return loaded.data->substr(static_cast<std::size_t>(at), static_cast<std::size_t>(std::min<std::uint64_t>(
-                                                               count, loaded.data->size())));
+  return loaded.data->substr(static_cast<std::size_t>(at),
+                             static_cast<std::size_t>(std::min<std::uint64_t>(count, loaded.data->size())));
 }
 
 std::uint64_t ChunkedFile::available(std::uint32_t index) const {
@@ -72,14 +72,6 @@ bool ChunkedFile::checksum_holds(std::uint32_t index) const {
   return load(index).checksum_holds;
 }
 
-void ChunkedFile::add_message(std::uint32_t topic, TimeNs received_ns, std::uint32_t chunk, std::uint64_t at) {
-  Topic& of = topics_.at(topic);
-  of.first_ns = of.count == 0 ? received_ns : std::min(of.first_ns, received_ns);
-  of.last_ns = of.count == 0 ? received_ns : std::max(of.last_ns, received_ns);
-  ++of.count;
-  if (is_needed(of.type)) messages_.push_back({received_ns, at, chunk, topic});
-}
-
 std::uint64_t ChunkedFile::chunk_after(std::uint64_t at) const {
   const auto next = std::ranges::upper_bound(chunk_positions_, at);
   return next == chunk_positions_.end() || *next >= file_.size() ? 0 : *next;
@@ -87,8 +79,9 @@ std::uint64_t ChunkedFile::chunk_after(std::uint64_t at) const {
 
 void ChunkedFile::note_damage(std::uint64_t at, std::uint64_t next) {
   if (damaged_.count++ > 0) return;
-  damaged_.first = next != 0 ? fmt::format("damaged at byte {}; {} bytes are not read", at, next - at)
-                             : fmt::format("damaged or cut off at byte {} of {}; the rest is not read", at, file_.size());
+  damaged_.first = next != 0
+                       ? fmt::format("damaged at byte {}; {} bytes are not read", at, next - at)
+                       : fmt::format("damaged or cut off at byte {} of {}; the rest is not read", at, file_.size());
 }
 
 void ChunkedFile::note_cut_chunk(std::uint32_t chunk, std::uint64_t good_bytes) {

@@ -42,8 +42,6 @@ class ChunkedFile : public MessageFile {
   // Positions of chunks that the index of the file names; used where the file between them is damaged.
   std::vector<std::uint64_t> chunk_positions_;
 
-  // Adds a message of the topic: counts it, and keeps its place if the topic is needed.
-  void add_message(std::uint32_t topic, TimeNs received_ns, std::uint32_t chunk, std::uint64_t at);
   // Returns the position of the first chunk after `at` that the index names, or 0.
   std::uint64_t chunk_after(std::uint64_t at) const;
   // Describes a damaged place, after which the file is read on at `next` (0: not at all).

@@ -85,8 +85,8 @@ class McapFile : public ChunkedFile {
   void finish_chunk();
   bool read_record(std::uint64_t at, const Record& record);
 
-  std::map<std::uint16_t, std::string> schemas_;           // their names by number
-  std::map<std::uint16_t, std::uint32_t> topic_of_;        // by number of the channel
+  std::map<std::uint16_t, std::string> schemas_;     // their names by number
+  std::map<std::uint16_t, std::uint32_t> topic_of_;  // by number of the channel
   bool has_summary_ = false, chunk_indexed_ = true;
   std::uint64_t unknown_ = 0;
 };
@@ -104,7 +104,8 @@ void McapFile::add_channel(std::string_view data) {
   const std::string name(in.counted()), encoding(in.counted());
   if (!in.ok() || topic_of_.contains(id)) return;
   const auto type = schemas_.find(schema);
-  const Topic topic{name, type == schemas_.end() ? "" : plain_type(type->second), encoding, serialisation_named(encoding)};
+  const Topic topic{name, type == schemas_.end() ? "" : plain_type(type->second), encoding,
+                    serialisation_named(encoding)};
   const auto same = std::ranges::find_if(topics_, [&](const Topic& t) {
     return t.name == topic.name && t.type == topic.type && t.serialisation == topic.serialisation;
   });
@@ -140,8 +141,7 @@ void McapFile::read_summary() {
   }
   std::ranges::sort(chunk_positions_);
   has_summary_ = at == size - kEnd && !topic_of_.empty();
-  if (at != size - kEnd)
-    warnings_.push_back(fmt::format("{}: damaged index; it is read without", path_.string()));
+  if (at != size - kEnd) warnings_.push_back(fmt::format("{}: damaged index; it is read without", path_.string()));
 }
 
 void McapFile::add_record(std::uint32_t chunk, std::uint64_t at, const Record& record) {
@@ -156,7 +156,7 @@ void McapFile::add_record(std::uint32_t chunk, std::uint64_t at, const Record& r
   if (!in.ok() || topic == topic_of_.end()) {
     ++unknown_;
   } else {
-    add_message(topic->second, static_cast<TimeNs>(time & ~(std::uint64_t{1} << 63)), chunk, at);
+    count_message(topic->second, static_cast<TimeNs>(time & ~(std::uint64_t{1} << 63)), chunk, at);
   }
 }
 
@@ -211,8 +211,8 @@ bool McapFile::add_index(const Record& record) {
   if (topic == topic_of_.end()) unknown_ += count;
   for (std::uint32_t k = 0; topic != topic_of_.end() && k < count; ++k) {
     const auto time = in.number<std::uint64_t>() & ~(std::uint64_t{1} << 63);
-    add_message(topic->second, static_cast<TimeNs>(time), static_cast<std::uint32_t>(chunks().size() - 1),
-                in.number<std::uint64_t>());
+    count_message(topic->second, static_cast<TimeNs>(time), static_cast<std::uint32_t>(chunks().size() - 1),
+                  in.number<std::uint64_t>());
   }
   chunk_indexed_ = true;
   return true;

@@ -7,6 +7,14 @@
 
 namespace bslam::containers {
 
+void MessageFile::count_message(std::uint32_t topic, TimeNs received_ns, std::uint32_t chunk, std::uint64_t at) {
+  Topic& of = topics_.at(topic);
+  of.first_ns = of.count == 0 ? received_ns : std::min(of.first_ns, received_ns);
+  of.last_ns = of.count == 0 ? received_ns : std::max(of.last_ns, received_ns);
+  ++of.count;
+  if (is_needed(of.type)) messages_.push_back({received_ns, at, chunk, topic});
+}
+
 MessageFileResult open_message_file(const std::filesystem::path& path) {
   const auto file = InputFile::open(path);
   if (!file) return file.error();
@@ -29,9 +37,9 @@ bool has_message_file_name(const std::filesystem::path& path) {
 }
 
 bool is_needed(std::string_view type) {
-  constexpr std::array<std::string_view, 6> kTypes{"sensor_msgs/Image",          "sensor_msgs/CompressedImage",
-                                                   "sensor_msgs/CameraInfo",     "foxglove/RawImage",
-                                                   "foxglove/CompressedImage",   "foxglove/CameraCalibration"};
+  constexpr std::array<std::string_view, 6> kTypes{"sensor_msgs/Image",        "sensor_msgs/CompressedImage",
+                                                   "sensor_msgs/CameraInfo",   "foxglove/RawImage",
+                                                   "foxglove/CompressedImage", "foxglove/CameraCalibration"};
   return std::ranges::find(kTypes, type) != kTypes.end();
 }
 

@@ -22,8 +22,8 @@ struct Topic {
   std::string type;           // such as sensor_msgs/Image; without the "/msg" of ROS 2
   std::string serialisation;  // as the file names it, such as cdr
   Serialisation parsed_as = Serialisation::kOther;
-  std::uint64_t count = 0;                  // of messages
-  TimeNs first_ns = 0, last_ns = 0;         // when the first and last were recorded
+  std::uint64_t count = 0;           // of messages
+  TimeNs first_ns = 0, last_ns = 0;  // when the first and last were recorded
 };
 
 // Where a message is in its file.
@@ -55,6 +55,9 @@ class MessageFile {
   virtual Result<std::string> read(const MessageRef& message, std::size_t max_bytes) const = 0;
 
  protected:
+  // Counts a message of a topic, and keeps its place if the topic is needed.
+  void count_message(std::uint32_t topic, TimeNs received_ns, std::uint32_t chunk, std::uint64_t at);
+
   std::filesystem::path path_;
   std::string format_;
   std::vector<Topic> topics_;

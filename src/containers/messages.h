@@ -20,7 +20,7 @@ struct ImageMessage {
   TimeNs stamp_ns = 0;  // of its header; 0 if it was not set
   std::string frame_id;
   bool compressed = false;
-  std::string encoding;                // of the pixels, such as mono8; of a compressed image its format, such as jpeg
+  std::string encoding;                 // of the pixels, such as mono8; of a compressed image its format, such as jpeg
   std::uint32_t width = 0, height = 0;  // pixels; 0 for compressed images
   std::uint32_t step = 0;               // bytes from one row to the next
   bool big_endian = false;              // of values with 16 bits

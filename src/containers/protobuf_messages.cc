@@ -13,10 +13,10 @@ constexpr std::size_t kMaxCoefficients = 1000;
 
 struct Field {
   std::uint32_t number = 0;
-  std::uint32_t wire = 0;       // 0 varint, 1 fixed 64 bits, 2 counted bytes, 5 fixed 32 bits
-  std::uint64_t value = 0;      // of fixed and varint fields; of counted ones the number of bytes
-  std::string_view bytes;       // of counted fields, as far as they are there
-  std::uint64_t at = 0;         // where the bytes begin in the message
+  std::uint32_t wire = 0;   // 0 varint, 1 fixed 64 bits, 2 counted bytes, 5 fixed 32 bits
+  std::uint64_t value = 0;  // of fixed and varint fields; of counted ones the number of bytes
+  std::string_view bytes;   // of counted fields, as far as they are there
+  std::uint64_t at = 0;     // where the bytes begin in the message
 };
 
 std::uint64_t varint(ByteReader& in) {

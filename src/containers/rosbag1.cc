@@ -131,8 +131,8 @@ void RosBag1::read_index_section(const Record& bag_header) {
   const auto connections = number<std::uint32_t>(bag_header.fields, "conn_count");
   expected_chunks_ = number<std::uint32_t>(bag_header.fields, "chunk_count").value_or(0);
   if (!at || *at == 0) {
-    warnings_.push_back(fmt::format("{}: no index, since the recording was not finished; it is read without",
-                                    path_.string()));
+    warnings_.push_back(
+        fmt::format("{}: no index, since the recording was not finished; it is read without", path_.string()));
     return;
   }
   std::uint64_t here = *at;
@@ -146,8 +146,7 @@ void RosBag1::read_index_section(const Record& bag_header) {
   }
   std::ranges::sort(chunk_positions_);
   has_index_ = connections && topic_of_.size() >= *connections && here == file().size();
-  if (!has_index_)
-    warnings_.push_back(fmt::format("{}: damaged or missing index; it is read without", path_.string()));
+  if (!has_index_) warnings_.push_back(fmt::format("{}: damaged or missing index; it is read without", path_.string()));
 }
 
 // Returns false if the chunk has an unknown compression.
@@ -179,7 +178,7 @@ void RosBag1::add_record(std::uint32_t chunk, std::uint64_t at, const Record& re
   if (topic == topic_of_.end() || !time) {
     ++unknown_;
   } else {
-    add_message(topic->second, time_of(*time), chunk, at);
+    count_message(topic->second, time_of(*time), chunk, at);
   }
 }
 
@@ -208,8 +207,8 @@ bool RosBag1::add_index(const Record& record) {
   ByteReader in(data);
   for (std::uint32_t k = 0; topic != topic_of_.end() && k < *count && in.left() >= kEntry; ++k) {
     const auto time = in.number<std::uint64_t>();
-    add_message(topic->second, time_of(time), static_cast<std::uint32_t>(chunks().size() - 1),
-                in.number<std::uint32_t>());
+    count_message(topic->second, time_of(time), static_cast<std::uint32_t>(chunks().size() - 1),
+                  in.number<std::uint32_t>());
   }
   chunk_indexed_ = true;
   return true;

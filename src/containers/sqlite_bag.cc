@@ -47,9 +47,10 @@ std::string text(sqlite3_stmt* row, int column) {
 std::string uri_of(const std::filesystem::path& path) {
   std::string uri = "file:";
   for (const unsigned char c : path.string())
-    uri += (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '/' || c == '.' || c == '-'
-               ? std::string(1, static_cast<char>(c))
-               : fmt::format("%{:02x}", c);
+    uri +=
+        (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '/' || c == '.' || c == '-'
+            ? std::string(1, static_cast<char>(c))
+            : fmt::format("%{:02x}", c);
   return uri + "?mode=ro&immutable=1";
 }
 
@@ -65,13 +66,14 @@ class SqliteBag : public MessageFile {
   Result<std::string> read(const MessageRef& message, std::size_t max_bytes) const override {
     const std::lock_guard lock(mutex_);
     sqlite3_blob* opened = nullptr;
-    const int status =
-        sqlite3_blob_open(database_.get(), "main", "messages", "data", static_cast<sqlite3_int64>(message.at), 0, &opened);
+    const int status = sqlite3_blob_open(database_.get(), "main", "messages", "data",
+                                         static_cast<sqlite3_int64>(message.at), 0, &opened);
     const std::unique_ptr<sqlite3_blob, CloseBlob> blob(opened);
     if (status != SQLITE_OK) return damaged();
     const auto size = static_cast<std::size_t>(std::max(0, sqlite3_blob_bytes(blob.get())));
     std::string data = part(blob.get(), std::min(size, max_bytes));
-    if (!data.starts_with(kZstdMagic)) return data.empty() && size > 0 ? damaged() : Result<std::string>(std::move(data));
+    if (!data.starts_with(kZstdMagic))
+      return data.empty() && size > 0 ? damaged() : Result<std::string>(std::move(data));
     // The output of a compressed message begins with the first bytes of the input, some of which do not suffice.
     if (data.size() < size) data = part(blob.get(), size);
     std::string plain = decompress(Compression::kZstd, data, std::min(max_bytes, kMaxMessageBytes));
@@ -80,7 +82,8 @@ class SqliteBag : public MessageFile {
 
  private:
   Result<std::string> damaged() const {
-    return Error{path_.string(), "", std::string("a message that cannot be read (") + sqlite3_errmsg(database_.get()) + ")",
+    return Error{path_.string(), "",
+                 std::string("a message that cannot be read (") + sqlite3_errmsg(database_.get()) + ")",
                  "a complete message"};
   }
   static std::string part(sqlite3_blob* blob, std::size_t count) {
@@ -89,7 +92,11 @@ class SqliteBag : public MessageFile {
     return data;
   }
 
+  Status read_topics();
+  Error bad_schema(const std::string& found) const;
+
   Database database_;
+  std::map<std::int64_t, std::uint32_t> topic_of_;  // by the ids of the file
   mutable std::mutex mutex_;
 };
 
@@ -102,48 +109,45 @@ bool has_plain_table(sqlite3* database, const char* name) {
          sqlite3_strnicmp(text(row.get(), 1).c_str(), "create table", 12) == 0;
 }
 
-Status SqliteBag::index(std::uint64_t file_bytes) {
-  const auto error = [&](const std::string& found) {
-    return Error{path_.string(), "", found, "the tables topics and messages of a ROS 2 bag"};
-  };
-  if (!has_plain_table(database_.get(), "topics") || !has_plain_table(database_.get(), "messages"))
-    return error(sqlite3_errcode(database_.get()) == SQLITE_OK || sqlite3_errcode(database_.get()) == SQLITE_DONE ||
-                         sqlite3_errcode(database_.get()) == SQLITE_ROW
-                     ? "other tables"
-                     : sqlite3_errmsg(database_.get()));
-  std::map<std::int64_t, std::uint32_t> topic_of;
-  const Statement topics = prepare(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
-  if (!topics) return error(sqlite3_errmsg(database_.get()));
+Error SqliteBag::bad_schema(const std::string& found) const {
+  return Error{path_.string(), "", found, "the tables topics and messages of a ROS 2 bag"};
+}
+
+Status SqliteBag::read_topics() {
+  if (!has_plain_table(database_.get(), "topics") || !has_plain_table(database_.get(), "messages")) {
+    const int status = sqlite3_errcode(database_.get());
+    const bool readable = status == SQLITE_OK || status == SQLITE_DONE || status == SQLITE_ROW;
+    return bad_schema(readable ? "other tables" : sqlite3_errmsg(database_.get()));
+  }
+  const Statement rows = prepare(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
+  if (!rows) return bad_schema(sqlite3_errmsg(database_.get()));
   int status = SQLITE_ROW;
-  while ((status = sqlite3_step(topics.get())) == SQLITE_ROW) {
-    topic_of[sqlite3_column_int64(topics.get(), 0)] = static_cast<std::uint32_t>(topics_.size());
-    const std::string format = text(topics.get(), 3);
-    topics_.push_back({text(topics.get(), 1), plain_type(text(topics.get(), 2)), format,
+  while ((status = sqlite3_step(rows.get())) == SQLITE_ROW) {
+    topic_of_[sqlite3_column_int64(rows.get(), 0)] = static_cast<std::uint32_t>(topics_.size());
+    const std::string format = text(rows.get(), 3);
+    topics_.push_back({text(rows.get(), 1), plain_type(text(rows.get(), 2)), format,
                        format == "cdr" ? Serialisation::kCdr : Serialisation::kOther});
   }
-  if (topics_.empty()) return error(status == SQLITE_DONE ? "no topics" : sqlite3_errmsg(database_.get()));
+  if (topics_.empty()) return bad_schema(status == SQLITE_DONE ? "no topics" : sqlite3_errmsg(database_.get()));
+  return {};
+}
+
+Status SqliteBag::index(std::uint64_t file_bytes) {
+  if (const Status s = read_topics(); !s) return s;
   const Statement rows = prepare(database_.get(), "SELECT id, topic_id, timestamp FROM messages");
-  if (!rows) return error(sqlite3_errmsg(database_.get()));
+  if (!rows) return bad_schema(sqlite3_errmsg(database_.get()));
   std::uint64_t seen = 0, unknown = 0;
+  int status = SQLITE_ROW;
   while ((status = sqlite3_step(rows.get())) == SQLITE_ROW) {
-    if (++seen > file_bytes) {  // a damaged tree may come back to rows that were read
-      status = SQLITE_CORRUPT;
-      break;
-    }
-    const auto topic = topic_of.find(sqlite3_column_int64(rows.get(), 1));
-    if (topic == topic_of.end()) {
+    // A damaged tree may come back to rows that were read.
+    if (++seen > file_bytes) break;
+    const auto topic = topic_of_.find(sqlite3_column_int64(rows.get(), 1));
+    if (topic == topic_of_.end()) {
       ++unknown;
       continue;
     }
-    const TimeNs received_ns = sqlite3_column_int64(rows.get(), 2);
-    Topic& of = topics_[topic->second];
-    of.first_ns = of.count == 0 ? received_ns : std::min(of.first_ns, received_ns);
-    of.last_ns = of.count == 0 ? received_ns : std::max(of.last_ns, received_ns);
-    ++of.count;
-    if (is_needed(of.type)) {
-      messages_.push_back(
-          {received_ns, static_cast<std::uint64_t>(sqlite3_column_int64(rows.get(), 0)), 0, topic->second});
-    }
+    count_message(topic->second, sqlite3_column_int64(rows.get(), 2), 0,
+                  static_cast<std::uint64_t>(sqlite3_column_int64(rows.get(), 0)));
   }
   if (status != SQLITE_DONE) {
     warnings_.push_back(fmt::format("{}: damaged or cut off ({}) after {} messages; the rest is not read",
@@ -164,7 +168,8 @@ MessageFileResult open_sqlite_bag(const std::filesystem::path& path) {
   // A recording that was not closed has a write-ahead log, which only a file that is not taken as unchangeable uses.
   const bool with_log = std::filesystem::exists(path.string() + "-wal", none);
   const std::string name = with_log ? path.string() : uri_of(path);
-  const int status = sqlite3_open_v2(name.c_str(), &opened, SQLITE_OPEN_READONLY | (with_log ? 0 : SQLITE_OPEN_URI), nullptr);
+  const int status =
+      sqlite3_open_v2(name.c_str(), &opened, SQLITE_OPEN_READONLY | (with_log ? 0 : SQLITE_OPEN_URI), nullptr);
   Database database(opened);
   if (status != SQLITE_OK || !database)
     return Error{path.string(), "", database ? sqlite3_errmsg(database.get()) : "no memory", "an SQLite file"};

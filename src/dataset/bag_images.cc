@@ -77,8 +77,8 @@ std::vector<ImageTopic> BagStore::find_images() {
         continue;
       }
       const ImageMessage& reference = first.try_emplace(&topic, *image).first->second;
-      topic.other_sizes += image->width != reference.width || image->height != reference.height ||
-                           image->encoding != reference.encoding;
+      topic.other_sizes +=
+          image->width != reference.width || image->height != reference.height || image->encoding != reference.encoding;
       topic.images.push_back({image->stamp_ns, message.received_ns, static_cast<std::int64_t>(entries_.size())});
       entries_.push_back({message, f});
     }
@@ -128,7 +128,8 @@ void BagStore::describe_first(ImageTopic& topic) const {
       return;
     }
   }
-  const bool known = topic.encoding.find("jp") != std::string::npos || topic.encoding.find("png") != std::string::npos ||
+  const bool known = topic.encoding.find("jp") != std::string::npos ||
+                     topic.encoding.find("png") != std::string::npos ||
                      topic.encoding.find("webp") != std::string::npos;
   if (!known) topic.unusable = "format " + topic.encoding + " is not supported";
 }

@@ -23,12 +23,12 @@ struct BagImage {
 // A topic of images of a recording, which may be spread over several files.
 struct ImageTopic {
   std::string name, type;
-  std::string encoding;         // of the first image: of its pixels, or the format of a compressed image
-  int width = 0, height = 0;    // pixels of the first image; 0 if they cannot be found
+  std::string encoding;          // of the first image: of its pixels, or the format of a compressed image
+  int width = 0, height = 0;     // pixels of the first image; 0 if they cannot be found
   std::vector<BagImage> images;  // in the order in which they were recorded
-  std::size_t unreadable = 0;   // messages whose beginning cannot be read, which have no time
-  std::size_t other_sizes = 0;  // images with another size or encoding than the first one
-  std::string unusable;         // why its images cannot be read; empty if they can
+  std::size_t unreadable = 0;    // messages whose beginning cannot be read, which have no time
+  std::size_t other_sizes = 0;   // images with another size or encoding than the first one
+  std::string unusable;          // why its images cannot be read; empty if they can
 };
 
 // The messages of a recording.

@@ -14,8 +14,8 @@
 #include "containers/input_file.h"
 #include "dataset/bag_images.h"
 #include "dataset/camera_info.h"
-#include "dataset/rosbag2_folder.h"
 #include "dataset/recording_description.h"
+#include "dataset/rosbag2_folder.h"
 
 namespace bslam::dataset {
 namespace {
@@ -115,8 +115,10 @@ Status BagRecording::choose(const std::vector<std::string>& requested, const std
   }
   for (std::size_t t = 0; proposed_ && t < topics_.size(); ++t) {
     const std::string why = why_unused(topics_[t]);
-    if (why.empty()) cameras_.push_back(t);
-    else warnings_.push_back(fmt::format("{}: {} is not used: {}", path, topics_[t].name, why));
+    if (why.empty())
+      cameras_.push_back(t);
+    else
+      warnings_.push_back(fmt::format("{}: {} is not used: {}", path, topics_[t].name, why));
   }
   for (const std::string& name : requested) {
     const auto found = std::ranges::find(topics_, name, &ImageTopic::name);
@@ -136,7 +138,8 @@ Status BagRecording::choose(const std::vector<std::string>& requested, const std
 std::string BagRecording::name_of(std::size_t camera) const {
   const std::string name = camera_name(topics_[cameras_[camera]].name);
   for (std::size_t other = 0; other < cameras_.size(); ++other) {
-    if (other != camera && camera_name(topics_[cameras_[other]].name) == name) return fmt::format("{}_{}", name, camera);
+    if (other != camera && camera_name(topics_[cameras_[other]].name) == name)
+      return fmt::format("{}_{}", name, camera);
   }
   return name;
 }
@@ -181,15 +184,17 @@ Result<camera::RigCamera> BagRecording::calibration(std::size_t camera) const {
   auto out = camera_of(found->info, name_of(camera), found->source);
   if (!out) return out;
   if (topic.width > 0 && (topic.width != out->camera.width || topic.height != out->camera.height)) {
-    return Error{found->source, "", fmt::format("a calibration for {}x{} pixels", out->camera.width, out->camera.height),
-                 fmt::format("{}x{}, the size of the images of {}; or --rig FILE", topic.width, topic.height, topic.name)};
+    return Error{
+        found->source, "", fmt::format("a calibration for {}x{} pixels", out->camera.width, out->camera.height),
+        fmt::format("{}x{}, the size of the images of {}; or --rig FILE", topic.width, topic.height, topic.name)};
   }
   const auto body = body_from_cam(camera);
   if (!body) {
-    return Error{found->source, "", "no extrinsics", "a rig file (--rig FILE)",
-                 fmt::format("{}: CameraInfo tells where cameras are only of a stereo pair with a baseline in P; specify "
-                             "the calibration of the {} cameras with --rig FILE, or use one with --topics",
-                             found->source, cameras_.size())};
+    return Error{
+        found->source, "", "no extrinsics", "a rig file (--rig FILE)",
+        fmt::format("{}: CameraInfo tells where cameras are only of a stereo pair with a baseline in P; specify "
+                    "the calibration of the {} cameras with --rig FILE, or use one with --topics",
+                    found->source, cameras_.size())};
   }
   return camera::RigCamera{std::move(out->camera), *body};
 }
@@ -272,8 +277,7 @@ RecordingDescription BagRecording::describe() const {
     }
   }
   for (const ImageTopic& topic : topics_) streams[topic.name] = describe(topic);
-  for (std::size_t c = 0; c < cameras_.size(); ++c)
-    streams[topics_[cameras_[c]].name].camera = static_cast<int>(c);
+  for (std::size_t c = 0; c < cameras_.size(); ++c) streams[topics_[cameras_[c]].name].camera = static_cast<int>(c);
   for (auto& [name, stream] : streams) out.streams.push_back(std::move(stream));
   out.proposed = proposed_;
   return out;
@@ -314,8 +318,7 @@ RecordingResult open_bag(const std::vector<fs::path>& paths, const std::vector<s
     warnings.push_back(one.error().message() + "; the file is not read");
   }
   if (opened.empty()) return *first_error;
-  auto recording =
-      std::make_unique<BagRecording>(std::make_shared<BagStore>(std::move(opened)), std::move(warnings));
+  auto recording = std::make_unique<BagRecording>(std::make_shared<BagStore>(std::move(opened)), std::move(warnings));
   if (const Status s = recording->choose(topics, paths.front().string()); !s) return s.error();
   return std::unique_ptr<Recording>(std::move(recording));
 }

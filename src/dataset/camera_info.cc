@@ -34,7 +34,8 @@ Result<Distortion> distortion_of(const CameraInfo& info, const std::string& sour
     return Error{source, "distortion_model", name, "plumb_bob, rational_polynomial, equidistant or fisheye"};
   const std::size_t most = fisheye ? 4 : name == "rational_polynomial" ? 8 : 5;
   if (!rest_is_zero(values, most))
-    return Error{source, "D", fmt::format("{} coefficients", values.size()), fmt::format("at most {} of {}", most, name)};
+    return Error{source, "D", fmt::format("{} coefficients", values.size()),
+                 fmt::format("at most {} of {}", most, name)};
   if (radtan && rest_is_zero(values, 0)) return Distortion{"pinhole", {}};
   // Missing coefficients are zero.
   const std::size_t full = fisheye || values.size() <= 4 ? 4 : values.size() <= 5 ? 5 : 8;

@@ -19,6 +19,7 @@ Result<camera::RigCamera> camera_of(const containers::CameraInfo& info, const st
 
 // Returns the pose of the second camera of a stereo pair in the frame of the first, from the rectification R and P of
 // both. Returns nullopt unless exactly one of them has a baseline in P, and both rotations are orthonormal.
-std::optional<geometry::SE3> stereo_extrinsics(const containers::CameraInfo& first, const containers::CameraInfo& second);
+std::optional<geometry::SE3> stereo_extrinsics(const containers::CameraInfo& first,
+                                               const containers::CameraInfo& second);
 
 }  // namespace bslam::dataset

@@ -1,5 +1,5 @@
-// The plain format: folders camN/, or left/ and right/, with images named by their time stamps in nanoseconds. The calibration is given
-// separately.
+// The plain format: folders camN/, or left/ and right/, with images named by their time stamps in nanoseconds. The
+// calibration is given separately.
 #include <algorithm>
 #include <utility>
 
@@ -60,7 +60,8 @@ bool looks_like_folder(const fs::path& folder) {
 RecordingResult open_folder(const fs::path& folder) {
   auto folders = image_folders(folder);
   if (folders.empty())
-    return Error{folder.string(), "", "no camera", "cam0, cam1, ..., or left and right, with images named by their time stamps in ns"};
+    return Error{folder.string(), "", "no camera",
+                 "cam0, cam1, ..., or left and right, with images named by their time stamps in ns"};
   return std::unique_ptr<Recording>(std::make_unique<FolderRecording>(std::move(folders)));
 }
 

@@ -72,8 +72,9 @@ class KittiRawRecording : public Recording {
     fs::path file = root_ / "calib_cam_to_cam.txt";
     if (!fs::exists(file, error)) file = fs::absolute(root_, error).lexically_normal().parent_path() / file.filename();
     if (!fs::exists(file, error)) {
-      return Error{root_.string(), "", "no calib_cam_to_cam.txt", "a rig file (--rig FILE)",
-                   "no calib_cam_to_cam.txt in " + root_.string() + " or above; specify the calibration with --rig FILE"};
+      return Error{
+          root_.string(), "", "no calib_cam_to_cam.txt", "a rig file (--rig FILE)",
+          "no calib_cam_to_cam.txt in " + root_.string() + " or above; specify the calibration with --rig FILE"};
     }
     const auto rig = rig_formats::read_rig(file);
     if (!rig) return rig.error();

@@ -17,10 +17,10 @@ Result<DatasetFormat> detect_format(const fs::path& folder) {
   if (looks_like_kitti(folder) || looks_like_kitti_raw(folder)) return DatasetFormat::kKitti;
   if (looks_like_folder(folder)) return DatasetFormat::kFolder;
   if (looks_like_bag(folder)) return DatasetFormat::kBag;
-  return Error{
-      folder.string(), "", "no data set of a known format",
-      "mav0/camN/data.csv (euroc), image_N with times.txt or image_NN with timestamps.txt (kitti), camN or left and right "
-      "with images named by their time stamps (folder), or a ROS 2 bag (metadata.yaml)"};
+  return Error{folder.string(), "", "no data set of a known format",
+               "mav0/camN/data.csv (euroc), image_N with times.txt or image_NN with timestamps.txt (kitti), camN or "
+               "left and right "
+               "with images named by their time stamps (folder), or a ROS 2 bag (metadata.yaml)"};
 }
 
 // The files that are joined by commas, or the only one, whose name may contain commas.
@@ -49,7 +49,8 @@ Result<DatasetFormat> format_of(const DatasetRequest& request, const std::vector
     return request.format == DatasetFormat::kAuto ? detect_format(files.front()) : request.format;
   for (const fs::path& file : files) {
     if (!fs::exists(file, error)) return Error{file.string(), "", "no such file or folder", "a recording"};
-    if (fs::is_directory(file, error)) return Error{file.string(), "", "a folder among files", "files joined by commas"};
+    if (fs::is_directory(file, error))
+      return Error{file.string(), "", "a folder among files", "files joined by commas"};
   }
   const DatasetFormat found = looks_like_bag(files.front()) ? DatasetFormat::kBag : DatasetFormat::kVideo;
   if (request.format == DatasetFormat::kAuto || request.format == found) return found;

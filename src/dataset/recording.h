@@ -46,10 +46,10 @@ struct OpenRecording {
 Result<OpenRecording> open_recording(const DatasetRequest& request);
 
 // Each function returns an Error that names the expected files if `folder` does not have its format.
-RecordingResult open_euroc(const std::filesystem::path& folder);   // mav0/camN/data.csv
-RecordingResult open_kitti(const std::filesystem::path& folder);   // image_N/NNNNNN.png and times.txt
+RecordingResult open_euroc(const std::filesystem::path& folder);      // mav0/camN/data.csv
+RecordingResult open_kitti(const std::filesystem::path& folder);      // image_N/NNNNNN.png and times.txt
 RecordingResult open_kitti_raw(const std::filesystem::path& folder);  // image_NN/data/*.png and timestamps.txt
-RecordingResult open_folder(const std::filesystem::path& folder);  // camN/<ns>.png, or left/ and right/
+RecordingResult open_folder(const std::filesystem::path& folder);     // camN/<ns>.png, or left/ and right/
 // Videos: one per camera, or one with the images of two cameras side by side. Their first images were taken together.
 RecordingResult open_video(const std::vector<std::filesystem::path>& files, bool side_by_side);
 

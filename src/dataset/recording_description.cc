@@ -55,16 +55,18 @@ std::vector<std::string> missing_for(const DatasetRequest& request, const Record
     const auto rig = rig_formats::read_rig(*request.rig_file);
     if (!rig) return {rig.error().message()};
     if (request.cameras.empty() && rig->size() > recording.camera_count()) {
-      missing.push_back(fmt::format("images of {} cameras: {} has {} cameras and the recording {}; --cameras selects "
-                                    "cameras of the rig",
-                                    rig->size(), request.rig_file->string(), rig->size(), recording.camera_count()));
+      missing.push_back(
+          fmt::format("images of {} cameras: {} has {} cameras and the recording {}; --cameras selects "
+                      "cameras of the rig",
+                      rig->size(), request.rig_file->string(), rig->size(), recording.camera_count()));
     }
     return missing;
   }
   std::error_code error;
   if (std::filesystem::exists(request.path / "rig.yaml", error)) return missing;
   for (std::size_t c = 0; c < recording.camera_count() && missing.empty(); ++c) {
-    if (const auto calibration = recording.calibration(c); !calibration) missing.push_back(calibration.error().message());
+    if (const auto calibration = recording.calibration(c); !calibration)
+      missing.push_back(calibration.error().message());
   }
   return missing;
 }

@@ -27,9 +27,9 @@ struct StreamDescription {
   std::vector<TimeNs> times = {};  // of all images in increasing order; of other messages the first and the last
   std::string stamps = {};         // where the times are from, such as "header"
   std::optional<LagDescription> lag = {};
-  int camera = -1;            // which camera it would be; -1: none
-  bool calibrated = false;    // the recording has intrinsics of it
-  std::string unused = {};    // why it would not be used, if it has images
+  int camera = -1;          // which camera it would be; -1: none
+  bool calibrated = false;  // the recording has intrinsics of it
+  std::string unused = {};  // why it would not be used, if it has images
   std::vector<std::string> notes = {};
 };
 
@@ -46,7 +46,7 @@ struct RecordingDescription {
   std::vector<StreamDescription> streams;
   bool proposed = true;  // which stream is which camera was not requested
   std::vector<std::string> warnings = {};
-  std::vector<std::string> missing = {};  // what `run` needs beside the recording
+  std::vector<std::string> missing = {};             // what `run` needs beside the recording
   std::vector<SynchronyDescription> synchrony = {};  // of all cameras except 0
 };
 

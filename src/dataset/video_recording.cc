@@ -92,8 +92,7 @@ class VideoRecording : public Recording {
     image_files::ImageList list;
     const std::vector<TimeNs>& times = store_->file_of(camera).video->times();
     for (std::size_t k = 0; k < times.size(); ++k) {
-      list.images.push_back(
-          {.path = {}, .time_ns = times[k], .store = store_, .entry = VideoStore::entry(camera, k)});
+      list.images.push_back({.path = {}, .time_ns = times[k], .store = store_, .entry = VideoStore::entry(camera, k)});
     }
     return list;
   }

@@ -109,7 +109,8 @@ Result<image::Image> read_image(const std::filesystem::path& file, const PixelFo
   const auto bytes = read_file(file, kMaxImageBytes);
   if (!bytes) return bytes.error();
   auto image = decode_grey(*bytes, format);
-  if (!image) return Error{file.string(), "", "an incomplete image or another format", "a complete PNG, JPEG or WebP image"};
+  if (!image)
+    return Error{file.string(), "", "an incomplete image or another format", "a complete PNG, JPEG or WebP image"};
   return *std::move(image);
 }
 
@@ -118,7 +119,8 @@ Result<image::Image> read_image(const image_files::ImageFile& file, const PixelF
   const auto stored = file.store->read(file.entry);
   if (!stored) return stored.error();
   auto image = decode_stored(*stored, format);
-  if (!image) return Error{file.store->name(file.entry), "", "an incomplete image or another format", "a complete image"};
+  if (!image)
+    return Error{file.store->name(file.entry), "", "an incomplete image or another format", "a complete image"};
   return *std::move(image);
 }
 

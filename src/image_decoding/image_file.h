@@ -16,10 +16,10 @@
 
 namespace bslam::image_decoding {
 
-// Decodes a PNG, JPEG or WebP in memory to grey values. Orientation tags are ignored, colours are converted to luminance, the
-// upper eight of `format.bits` bits of 16-bit images are kept, and raw images with a colour filter are interpolated.
-// Returns nullopt for other formats, truncated files and wrong checksums, for which decoders would return the readable
-// part.
+// Decodes a PNG, JPEG or WebP in memory to grey values. Orientation tags are ignored, colours are converted to
+// luminance, the upper eight of `format.bits` bits of 16-bit images are kept, and raw images with a colour filter are
+// interpolated. Returns nullopt for other formats, truncated files and wrong checksums, for which decoders would return
+// the readable part.
 std::optional<image::Image> decode_grey(std::string_view bytes, const PixelFormat& format = {});
 
 // The same from a file. Errors: the file cannot be read or is not a complete image.

@@ -17,10 +17,10 @@ struct StoredImage {
   std::string bytes;  // the image is `size` bytes from `begin`
   std::size_t begin = 0, size = 0;
   PixelLayout layout = PixelLayout::kFile;
-  int width = 0, height = 0;    // pixels; 0 for kFile
-  std::size_t step = 0;         // bytes from one row to the next
-  int bytes_per_value = 1;      // 1 or 2
-  bool big_endian = false;      // of values of two bytes
+  int width = 0, height = 0;  // pixels; 0 for kFile
+  std::size_t step = 0;       // bytes from one row to the next
+  int bytes_per_value = 1;    // 1 or 2
+  bool big_endian = false;    // of values of two bytes
 };
 
 // Reads images by their number in a recording. May be called from several threads at the same time.

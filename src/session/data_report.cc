@@ -120,9 +120,10 @@ std::string as_text(const std::string& path, const RecordingDescription& recordi
   for (const auto& s : recording.synchrony) {
     text += s.together == s.images
                 ? fmt::format("camera {} is synchronous with camera 0\n", s.camera)
-                : fmt::format("camera {}: {} of {} images have one of camera 0 at the same time; the nearest is {:.1f} ms "
-                              "away (median)\n",
-                              s.camera, s.together, s.images, s.median_ms);
+                : fmt::format(
+                      "camera {}: {} of {} images have one of camera 0 at the same time; the nearest is {:.1f} ms "
+                      "away (median)\n",
+                      s.camera, s.together, s.images, s.median_ms);
   }
   text += used_text(recording);
   for (const std::string& missing : recording.missing) text += "missing for bslam run: " + missing + "\n";
@@ -154,10 +155,8 @@ std::string as_json(const std::string& path, const RecordingDescription& recordi
   Json streams = Json::array(), synchrony = Json::array();
   for (const StreamDescription& s : recording.streams) streams.push_back(stream_json(s));
   for (const auto& s : recording.synchrony) {
-    synchrony.push_back({{"camera", s.camera},
-                         {"images", s.images},
-                         {"with_camera_0", s.together},
-                         {"median_ms", s.median_ms}});
+    synchrony.push_back(
+        {{"camera", s.camera}, {"images", s.images}, {"with_camera_0", s.together}, {"median_ms", s.median_ms}});
   }
   const Json json = {{"schema", 1},
                      {"data", path},

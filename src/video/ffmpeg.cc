@@ -24,7 +24,7 @@ Loaded load() {
   Loaded out;
   Ffmpeg& f = out.functions;
   void* library = nullptr;
-#define BSLAM_LOAD(name)                                                                  \
+#define BSLAM_LOAD(name)                                                                        \
   if (library != nullptr) f.name = reinterpret_cast<decltype(f.name)>(::dlsym(library, #name)); \
   if (f.name == nullptr && out.missing.empty()) out.missing = #name;
   library = open_library("avutil", LIBAVUTIL_VERSION_MAJOR, out.missing);
@@ -45,8 +45,9 @@ Loaded load() {
 Result<const Ffmpeg*> load_ffmpeg() {
   static const Loaded loaded = load();
   if (loaded.missing.empty()) return &loaded.functions;
-  return Error{"", "", "no " + loaded.missing, "FFmpeg's libraries",
-               "videos need FFmpeg, of which " + loaded.missing + " was not found (packages libavformat and libswscale)"};
+  return Error{
+      "", "", "no " + loaded.missing, "FFmpeg's libraries",
+      "videos need FFmpeg, of which " + loaded.missing + " was not found (packages libavformat and libswscale)"};
 }
 
 }  // namespace bslam::video

@@ -15,8 +15,8 @@
 namespace bslam::video {
 namespace {
 
-constexpr std::size_t kCachedImages = 24;     // of those decoded last; several threads read ahead
-constexpr std::size_t kFarAhead = 200;        // images; from there on seeking is faster than decoding all before
+constexpr std::size_t kCachedImages = 24;  // of those decoded last; several threads read ahead
+constexpr std::size_t kFarAhead = 200;     // images; from there on seeking is faster than decoding all before
 constexpr int kMaxSidePx = 20000;
 
 // Everything of one open file; released in the order FFmpeg needs.
@@ -112,8 +112,9 @@ std::optional<std::int64_t> Decoder::next_image() {
 std::optional<VideoImage> Decoder::grey() {
   if (frame_->width < 1 || frame_->height < 1 || frame_->width > kMaxSidePx || frame_->height > kMaxSidePx)
     return std::nullopt;
-  scaler_ = f_.sws_getCachedContext(scaler_, frame_->width, frame_->height, static_cast<AVPixelFormat>(frame_->format),
-                                    frame_->width, frame_->height, AV_PIX_FMT_GRAY8, SWS_POINT, nullptr, nullptr, nullptr);
+  scaler_ =
+      f_.sws_getCachedContext(scaler_, frame_->width, frame_->height, static_cast<AVPixelFormat>(frame_->format),
+                              frame_->width, frame_->height, AV_PIX_FMT_GRAY8, SWS_POINT, nullptr, nullptr, nullptr);
   if (scaler_ == nullptr) return std::nullopt;
   VideoImage image{"", frame_->width, frame_->height};
   // Its vector code may write up to the next multiple of its width.
@@ -166,8 +167,10 @@ Status FfmpegVideo::prepare() {
     return Error{path_.string(), "", wrong, "a video, a ROS bag (.bag, .db3, .mcap), or the folder of a data set"};
   std::size_t untimed = 0;
   while (const auto time = decoder_.next_time()) {
-    if (*time == AV_NOPTS_VALUE) ++untimed;
-    else stamps_.push_back(*time);
+    if (*time == AV_NOPTS_VALUE)
+      ++untimed;
+    else
+      stamps_.push_back(*time);
   }
   std::ranges::sort(stamps_);
   const auto repeated = std::ranges::unique(stamps_);

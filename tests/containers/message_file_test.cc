@@ -150,21 +150,22 @@ TEST_P(MessageFileOf, HandlesDamagedBytes) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Formats, MessageFileOf,
-    testing::Values(Layout{"Ros1", Format::kRos1, Wire::kRos1}, Layout{"Ros1Bz2", Format::kRos1, Wire::kRos1, {"bz2"}},
-                    Layout{"Ros1Lz4", Format::kRos1, Wire::kRos1, {"lz4"}},
-                    Layout{"Ros1WithoutIndex", Format::kRos1, Wire::kRos1, {"", 4, false}},
-                    Layout{"Ros1Lz4WithoutIndex", Format::kRos1, Wire::kRos1, {"lz4", 4, false}},
-                    Layout{"Mcap", Format::kMcap, Wire::kCdr}, Layout{"McapRos1", Format::kMcap, Wire::kRos1},
-                    Layout{"McapBigEndian", Format::kMcap, Wire::kCdrBigEndian},
-                    Layout{"McapLz4", Format::kMcap, Wire::kCdr, {"lz4"}},
-                    Layout{"McapZstdProtobuf", Format::kMcap, Wire::kProtobuf, {"zstd"}},
-                    Layout{"McapWithoutChunks", Format::kMcap, Wire::kProtobuf, {"", 0}},
-                    Layout{"McapWithoutIndex", Format::kMcap, Wire::kCdr, {"zstd", 4, false}},
-                    Layout{"Sqlite", Format::kSqlite, Wire::kCdr},
-                    Layout{"SqliteZstd", Format::kSqlite, Wire::kCdr, {"zstd"}}),
-    [](const auto& instance) { return std::string(instance.param.name); });
+INSTANTIATE_TEST_SUITE_P(Formats, MessageFileOf,
+                         testing::Values(Layout{"Ros1", Format::kRos1, Wire::kRos1},
+                                         Layout{"Ros1Bz2", Format::kRos1, Wire::kRos1, {"bz2"}},
+                                         Layout{"Ros1Lz4", Format::kRos1, Wire::kRos1, {"lz4"}},
+                                         Layout{"Ros1WithoutIndex", Format::kRos1, Wire::kRos1, {"", 4, false}},
+                                         Layout{"Ros1Lz4WithoutIndex", Format::kRos1, Wire::kRos1, {"lz4", 4, false}},
+                                         Layout{"Mcap", Format::kMcap, Wire::kCdr},
+                                         Layout{"McapRos1", Format::kMcap, Wire::kRos1},
+                                         Layout{"McapBigEndian", Format::kMcap, Wire::kCdrBigEndian},
+                                         Layout{"McapLz4", Format::kMcap, Wire::kCdr, {"lz4"}},
+                                         Layout{"McapZstdProtobuf", Format::kMcap, Wire::kProtobuf, {"zstd"}},
+                                         Layout{"McapWithoutChunks", Format::kMcap, Wire::kProtobuf, {"", 0}},
+                                         Layout{"McapWithoutIndex", Format::kMcap, Wire::kCdr, {"zstd", 4, false}},
+                                         Layout{"Sqlite", Format::kSqlite, Wire::kCdr},
+                                         Layout{"SqliteZstd", Format::kSqlite, Wire::kCdr, {"zstd"}}),
+                         [](const auto& instance) { return std::string(instance.param.name); });
 
 TEST(MessageFile, AWrongChecksumIsAnErrorOfItsMessages) {
   const support::TemporaryFolder folder;

@@ -65,8 +65,8 @@ class SmallBag : public testing::Test {
                                           {20, 0, 15.5, 0, 20, 11.5, 0, 0, 1},
                                           {1, 0, 0, 0, 1, 0, 0, 0, 1},
                                           {20, 0, 15.5, shift, 0, 20, 11.5, 0, 0, 0, 1, 0}};
-      to.insert(to.begin(), {"/cam" + std::to_string(c) + "/camera_info", "sensor_msgs/CameraInfo", support::kSmallStart,
-                             support::calibration_message(wire, info)});
+      to.insert(to.begin(), {"/cam" + std::to_string(c) + "/camera_info", "sensor_msgs/CameraInfo",
+                             support::kSmallStart, support::calibration_message(wire, info)});
     }
   }
   void write(const std::vector<TestMessage>& messages) const {
@@ -143,7 +143,8 @@ TEST_F(SmallBag, CompressedImagesAreReadAsTheFolder) {
     for (int c = 0; c < 2; ++c) {
       support::TestImage one = image(c, k);
       one.encoding = "mono8; png compressed ";
-      one.data = support::read_text(data() / "mav0" / ("cam" + std::to_string(c)) / "data" / support::small_image_name(k));
+      one.data =
+          support::read_text(data() / "mav0" / ("cam" + std::to_string(c)) / "data" / support::small_image_name(k));
       all.push_back({topic(c) + "/compressed", "sensor_msgs/CompressedImage", one.stamp_ns,
                      support::compressed_image_message(Wire::kRos1, one)});
     }
@@ -284,9 +285,10 @@ image::Image decoded(const std::string& encoding, const std::string& data, int s
     all.push_back({"/image", "sensor_msgs/Image", time_ns, support::image_message(Wire::kCdr, one)});
   }
   support::write_text(folder.path() / "a.mcap", support::mcap_bytes(all, Wire::kCdr));
-  support::write_text(folder.path() / "rig.yaml",
-                      "bslam_rig: 1\ncameras:\n  - name: a\n    model: pinhole\n    resolution: [4, 4]\n"
-                      "    intrinsics: [4, 4, 1.5, 1.5]\n    T_body_cam: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
+  support::write_text(
+      folder.path() / "rig.yaml",
+      "bslam_rig: 1\ncameras:\n  - name: a\n    model: pinhole\n    resolution: [4, 4]\n"
+      "    intrinsics: [4, 4, 1.5, 1.5]\n    T_body_cam: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
   const auto dataset = open_dataset({.path = folder.path() / "a.mcap", .rig_file = folder.path() / "rig.yaml"});
   EXPECT_TRUE(dataset) << dataset.error().message();
   if (!dataset) return {};
@@ -305,7 +307,8 @@ TEST(BagImages, DecodesAllEncodings) {
   };
   EXPECT_EQ(decoded("8UC1", rows(6, [](int y, int k) { return 10 * y + k; }), 6).row(2)[3], 23);
   // 10 bits are in use: 1000 / 4 and 40 / 4.
-  const std::string words = rows(8, [](int y, int k) { return k % 2 == 0 ? (y == 0 ? 0xe8 : 0x28) : (y == 0 ? 3 : 0); });
+  const std::string words =
+      rows(8, [](int y, int k) { return k % 2 == 0 ? (y == 0 ? 0xe8 : 0x28) : (y == 0 ? 3 : 0); });
   EXPECT_EQ(decoded("mono16", words, 8).row(0)[1], 250);
   EXPECT_EQ(decoded("16UC1", words, 8).row(1)[1], 10);
   std::string swapped = words;

@@ -119,13 +119,13 @@ std::string record1(unsigned char op, const Fields& fields, const std::string& d
 }
 
 std::string time1(TimeNs time_ns) {
-  return raw(static_cast<std::uint32_t>(time_ns / 1'000'000'000)) + raw(static_cast<std::uint32_t>(time_ns % 1'000'000'000));
+  return raw(static_cast<std::uint32_t>(time_ns / 1'000'000'000)) +
+         raw(static_cast<std::uint32_t>(time_ns % 1'000'000'000));
 }
 
 std::string connection1(std::uint32_t number, const TestMessage& message) {
-  const std::string data =
-      counted("topic=" + message.topic) + counted("type=" + message.type) + counted("md5sum=*") +
-      counted("message_definition=");
+  const std::string data = counted("topic=" + message.topic) + counted("type=" + message.type) + counted("md5sum=*") +
+                           counted("message_definition=");
   return record1(7, {{"conn", raw(number)}, {"topic", message.topic}}, data);
 }
 
@@ -256,9 +256,11 @@ std::string mcap_bytes(const std::vector<TestMessage>& messages, Wire wire, cons
   std::string channels;
   for (std::size_t t = 0; t < topics.size(); ++t) {
     const auto number = static_cast<std::uint16_t>(t + 1);
-    const std::string type = wire == Wire::kRos1 || wire == Wire::kProtobuf ? topics[t]->type : ros2_type(topics[t]->type);
+    const std::string type =
+        wire == Wire::kRos1 || wire == Wire::kProtobuf ? topics[t]->type : ros2_type(topics[t]->type);
     channels += record2(3, raw(number) + counted(type) + counted("") + counted(""));
-    channels += record2(4, raw(number) + raw(number) + counted(topics[t]->topic) + counted(serialisation) + counted(""));
+    channels +=
+        record2(4, raw(number) + raw(number) + counted(topics[t]->topic) + counted(serialisation) + counted(""));
   }
   const auto message_record = [&](const TestMessage& message) {
     const auto number = static_cast<std::uint16_t>(topic_number(topics, message) + 1);
@@ -270,13 +272,15 @@ std::string mcap_bytes(const std::vector<TestMessage>& messages, Wire wire, cons
     out += channels;
     for (const TestMessage& message : messages) out += message_record(message);
   }
-  for (std::size_t from = 0; layout.messages_per_chunk > 0 && from < messages.size(); from += layout.messages_per_chunk) {
+  for (std::size_t from = 0; layout.messages_per_chunk > 0 && from < messages.size();
+       from += layout.messages_per_chunk) {
     const std::size_t to = std::min(messages.size(), from + layout.messages_per_chunk);
     std::string chunk = channels;
     std::map<std::uint16_t, std::string> index;
     for (std::size_t k = from; k < to; ++k) {
       const auto number = static_cast<std::uint16_t>(topic_number(topics, messages[k]) + 1);
-      index[number] += raw(static_cast<std::uint64_t>(messages[k].time_ns)) + raw(static_cast<std::uint64_t>(chunk.size()));
+      index[number] +=
+          raw(static_cast<std::uint64_t>(messages[k].time_ns)) + raw(static_cast<std::uint64_t>(chunk.size()));
       chunk += message_record(messages[k]);
     }
     const std::string packed = compress(layout.compression, chunk);
@@ -286,10 +290,10 @@ std::string mcap_bytes(const std::vector<TestMessage>& messages, Wire wire, cons
     out += record2(6, times + raw(static_cast<std::uint64_t>(chunk.size())) +
                           raw(libdeflate_crc32(0, chunk.data(), chunk.size())) + counted(layout.compression) +
                           raw(static_cast<std::uint64_t>(packed.size())) + packed);
-    chunk_index += record2(8, times + raw(at) + raw(static_cast<std::uint64_t>(out.size() - at)) + counted("") +
-                                  raw<std::uint64_t>(0) + counted(layout.compression) +
-                                  raw(static_cast<std::uint64_t>(packed.size())) +
-                                  raw(static_cast<std::uint64_t>(chunk.size())));
+    chunk_index +=
+        record2(8, times + raw(at) + raw(static_cast<std::uint64_t>(out.size() - at)) + counted("") +
+                       raw<std::uint64_t>(0) + counted(layout.compression) +
+                       raw(static_cast<std::uint64_t>(packed.size())) + raw(static_cast<std::uint64_t>(chunk.size())));
     for (const auto& [number, entries] : index) {
       if (layout.index) out += record2(7, raw(number) + counted(entries));
     }
@@ -304,12 +308,13 @@ std::string mcap_bytes(const std::vector<TestMessage>& messages, Wire wire, cons
 void write_sqlite_bag(const std::filesystem::path& file, const std::vector<TestMessage>& messages, bool zstd) {
   sqlite3* database = nullptr;
   sqlite3_open(file.c_str(), &database);
-  sqlite3_exec(database,
-               "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format "
-               "TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);"
-               "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data "
-               "BLOB NOT NULL); BEGIN;",
-               nullptr, nullptr, nullptr);
+  sqlite3_exec(
+      database,
+      "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format "
+      "TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);"
+      "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data "
+      "BLOB NOT NULL); BEGIN;",
+      nullptr, nullptr, nullptr);
   const auto topics = first_of_topics(messages);
   const auto run = [&](const char* sql, const auto& bind) {
     sqlite3_stmt* statement = nullptr;

@@ -43,7 +43,7 @@ struct TestMessage {
 };
 
 struct BagLayout {
-  std::string compression = {};       // none, bz2, lz4 or zstd; MCAP has no bz2, ROS 1 bags no zstd
+  std::string compression = {};        // none, bz2, lz4 or zstd; MCAP has no bz2, ROS 1 bags no zstd
   std::size_t messages_per_chunk = 4;  // 0: no chunks (MCAP)
   bool index = true;
 };
