@@ -50,13 +50,20 @@ class McapFile : public ChunkedFile {
       return Error{path_.string(), fmt::format("chunk at byte {}", chunks()[message.chunk].at),
                    "data with another checksum", "the stored checksum"};
     }
-    const std::uint64_t wanted = std::min<std::uint64_t>(record->data_size - kMessageHead, max_bytes);
-    std::string data = bytes(message.chunk, record->data_at + kMessageHead, wanted);
-    if (data.size() < wanted) return Error{path_.string(), "", "a message that is cut off", "a complete message"};
-    return data;
+    const std::uint64_t size = record->data_size - kMessageHead;
+    const auto part = [&](std::uint64_t count) { return bytes(message.chunk, record->data_at + kMessageHead, count); };
+    const std::uint64_t wanted = std::min<std::uint64_t>(size, max_bytes);
+    std::string data = part(wanted);
+    const bool packed = is_compressed_message(data);
+    if (packed && wanted < size) data = part(size);
+    if (data.size() < (packed ? size : wanted)) return cut_off();
+    if (packed) data = decompressed_message(data, max_bytes);
+    return packed && data.empty() ? cut_off() : Result<std::string>(std::move(data));
   }
 
  private:
+  Error cut_off() const { return {path_.string(), "", "a message that is damaged or cut off", "a complete message"}; }
+
   static constexpr std::uint64_t kMessageHead = 22;  // channel, sequence, time of logging, time of publication
 
   std::optional<Record> record_at(std::uint32_t chunk, std::uint64_t at) const {

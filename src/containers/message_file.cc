@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "containers/compression.h"
 #include "containers/input_file.h"
 
 namespace bslam::containers {
@@ -15,6 +16,13 @@ void MessageFile::count_message(std::uint32_t topic, TimeNs received_ns, std::ui
   if (is_needed(of.type)) messages_.push_back({received_ns, at, chunk, topic});
 }
 
+bool MessageFile::is_compressed_message(std::string_view bytes) { return bytes.starts_with("\x28\xb5\x2f\xfd"); }
+
+std::string MessageFile::decompressed_message(std::string_view whole, std::size_t max_bytes) {
+  constexpr std::size_t kMaxMessageBytes = std::size_t{1} << 30;
+  return decompress(Compression::kZstd, whole, std::min(max_bytes, kMaxMessageBytes));
+}
+
 MessageFileResult open_message_file(const std::filesystem::path& path) {
   const auto file = InputFile::open(path);
   if (!file) return file.error();
@@ -22,7 +30,7 @@ MessageFileResult open_message_file(const std::filesystem::path& path) {
   if (start.starts_with("#ROSBAG V")) return open_rosbag1(path);
   if (start.starts_with("\x89MCAP")) return open_mcap(path);
   if (start.starts_with("SQLite format 3")) return open_sqlite_bag(path);
-  if (start.starts_with("\x28\xb5\x2f\xfd")) {
+  if (start.starts_with("\x28\xb5\x2f\xfd")) {  // zstd
     return Error{path.string(), "", "a compressed file", "a bag, MCAP or SQLite file",
                  path.string() + ": the whole file is compressed; decompress it with zstd -d"};
   }

@@ -58,6 +58,12 @@ class MessageFile {
   // Counts a message of a topic, and keeps its place if the topic is needed.
   void count_message(std::uint32_t topic, TimeNs received_ns, std::uint32_t chunk, std::uint64_t at);
 
+  // Recorders of ROS 2 can compress messages one by one with zstd. Returns true if a message begins as a compressed
+  // one.
+  static bool is_compressed_message(std::string_view bytes);
+  // Returns up to `max_bytes` of a compressed message; an empty string if it is damaged.
+  static std::string decompressed_message(std::string_view whole, std::size_t max_bytes);
+
   std::filesystem::path path_;
   std::string format_;
   std::vector<Topic> topics_;

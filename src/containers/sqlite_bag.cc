@@ -10,15 +10,11 @@
 #include <string>
 #include <utility>
 
-#include "containers/compression.h"
 #include "containers/input_file.h"
 #include "containers/message_file.h"
 
 namespace bslam::containers {
 namespace {
-
-constexpr std::size_t kMaxMessageBytes = std::size_t{1} << 30;
-constexpr std::string_view kZstdMagic = "\x28\xb5\x2f\xfd";
 
 struct CloseDatabase {
   void operator()(sqlite3* database) const { sqlite3_close(database); }
@@ -72,12 +68,11 @@ class SqliteBag : public MessageFile {
     if (status != SQLITE_OK) return damaged();
     const auto size = static_cast<std::size_t>(std::max(0, sqlite3_blob_bytes(blob.get())));
     std::string data = part(blob.get(), std::min(size, max_bytes));
-    if (!data.starts_with(kZstdMagic))
-      return data.empty() && size > 0 ? damaged() : Result<std::string>(std::move(data));
-    // The output of a compressed message begins with the first bytes of the input, some of which do not suffice.
+    if (data.empty() && size > 0) return damaged();
+    if (!is_compressed_message(data)) return data;
     if (data.size() < size) data = part(blob.get(), size);
-    std::string plain = decompress(Compression::kZstd, data, std::min(max_bytes, kMaxMessageBytes));
-    return plain.empty() ? damaged() : Result<std::string>(std::move(plain));
+    data = decompressed_message(data, max_bytes);
+    return data.empty() ? damaged() : Result<std::string>(std::move(data));
   }
 
  private:

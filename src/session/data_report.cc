@@ -63,6 +63,9 @@ std::string size_text(const StreamDescription& stream) {
 
 std::string stamps_text(const StreamDescription& stream) {
   if (!stream.lag) return stream.stamps;
+  constexpr double kNothing_s = 5e-5;
+  if (std::abs(stream.lag->least) < kNothing_s && std::abs(stream.lag->most) < kNothing_s)
+    return stream.stamps + ", as of recording";
   return fmt::format("{}; recorded {:.1f} ms later ({:.1f} to {:.1f})", stream.stamps, 1e3 * stream.lag->median,
                      1e3 * stream.lag->least, 1e3 * stream.lag->most);
 }

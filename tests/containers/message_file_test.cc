@@ -132,7 +132,7 @@ TEST_P(MessageFileOf, ReadsACutFileAsFarAsItGoes) {
     last = good;
     EXPECT_FALSE((*file)->warnings().empty() && good < kImages) << size;
   }
-  if (GetParam().format != Format::kSqlite) EXPECT_EQ(last, kImages);
+  EXPECT_TRUE(GetParam().format == Format::kSqlite || last == kImages) << last;
 }
 
 // Every byte may be wrong: nothing crashes, and no more images are found than there are.
@@ -240,7 +240,7 @@ TEST(Messages, ReadsCalibrations) {
     EXPECT_TRUE(std::ranges::equal(info->K, c.K));
     EXPECT_TRUE(std::ranges::equal(info->R, c.R));
     EXPECT_TRUE(std::ranges::equal(info->P, c.P));
-    if (wire != Wire::kProtobuf) EXPECT_FALSE(parse_camera_info(topic, bytes.substr(0, bytes.size() / 2)));
+    EXPECT_TRUE(wire == Wire::kProtobuf || !parse_camera_info(topic, bytes.substr(0, bytes.size() / 2)));
   }
 }
 
