@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "containers/byte_reader.h"
 #include "containers/input_file.h"
 #include "containers/message_file.h"
 
@@ -57,7 +58,7 @@ class SqliteBag : public MessageFile {
     format_ = "ROS 2 bag (sqlite3)";
   }
 
-  Status index(std::uint64_t file_bytes);
+  Status index(const InputFile& file);
 
   Result<std::string> read(const MessageRef& message, std::size_t max_bytes) const override {
     const std::lock_guard lock(mutex_);
@@ -88,6 +89,7 @@ class SqliteBag : public MessageFile {
   }
 
   Status read_topics();
+  void check_size(const InputFile& file);
   Error bad_schema(const std::string& found) const;
 
   Database database_;
@@ -127,7 +129,23 @@ Status SqliteBag::read_topics() {
   return {};
 }
 
-Status SqliteBag::index(std::uint64_t file_bytes) {
+// A file that is shorter than its header says has lost pages, which read as zeros.
+void SqliteBag::check_size(const InputFile& file) {
+  const std::string header = file.read(0, 100);
+  ByteReader in(header, std::endian::big);
+  in.skip(16);
+  const auto page_size = in.number<std::uint16_t>();  // 1 means 65536
+  in.skip(6);
+  const auto changes = in.number<std::uint32_t>(), pages = in.number<std::uint32_t>();
+  in.skip(60);
+  const auto valid_for = in.number<std::uint32_t>();  // the number of pages is valid for this number of changes
+  const std::uint64_t size = std::uint64_t{pages} * (page_size == 1 ? 65536u : page_size);
+  if (!in.ok() || changes != valid_for || size <= file.size()) return;
+  warnings_.push_back(fmt::format("{}: cut off at byte {} of {}", path_.string(), file.size(), size));
+}
+
+Status SqliteBag::index(const InputFile& file) {
+  check_size(file);
   if (const Status s = read_topics(); !s) return s;
   const Statement rows = prepare(database_.get(), "SELECT id, topic_id, timestamp FROM messages");
   if (!rows) return bad_schema(sqlite3_errmsg(database_.get()));
@@ -135,7 +153,7 @@ Status SqliteBag::index(std::uint64_t file_bytes) {
   int status = SQLITE_ROW;
   while ((status = sqlite3_step(rows.get())) == SQLITE_ROW) {
     // A damaged tree may come back to rows that were read.
-    if (++seen > file_bytes) break;
+    if (++seen > file.size()) break;
     const auto topic = topic_of_.find(sqlite3_column_int64(rows.get(), 1));
     if (topic == topic_of_.end()) {
       ++unknown;
@@ -171,7 +189,7 @@ MessageFileResult open_sqlite_bag(const std::filesystem::path& path) {
   sqlite3_db_config(database.get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   sqlite3_db_config(database.get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   auto bag = std::make_unique<SqliteBag>(path, std::move(database));
-  if (const Status s = bag->index(file->size()); !s) return s.error();
+  if (const Status s = bag->index(*file); !s) return s.error();
   return std::unique_ptr<MessageFile>(std::move(bag));
 }
 

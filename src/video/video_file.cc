@@ -69,7 +69,7 @@ std::string Decoder::open(const std::string& path) {
   if (packet_ == nullptr || frame_ == nullptr) return "no memory";
   // The protocol is named, since a path may look like an address.
   const std::string url = "file:" + path;
-  if (f_.avformat_open_input(&format_, url.c_str(), nullptr, nullptr) < 0) return "no video that FFmpeg can read";
+  if (f_.avformat_open_input(&format_, url.c_str(), nullptr, nullptr) < 0) return "a file that is no bag and no video";
   if (f_.avformat_find_stream_info(format_, nullptr) < 0) return "a video without readable streams";
   const AVCodec* codec = nullptr;
   stream_ = f_.av_find_best_stream(format_, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
@@ -164,7 +164,7 @@ class FfmpegVideo : public VideoFile {
 
 Status FfmpegVideo::prepare() {
   if (const std::string wrong = decoder_.open(path_.string()); !wrong.empty())
-    return Error{path_.string(), "", wrong, "a video, a ROS bag (.bag, .db3, .mcap), or the folder of a data set"};
+    return Error{path_.string(), "", wrong, "a ROS bag (.bag, .db3, .mcap), a video, or the folder of a data set"};
   std::size_t untimed = 0;
   while (const auto time = decoder_.next_time()) {
     if (*time == AV_NOPTS_VALUE)

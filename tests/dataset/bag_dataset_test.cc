@@ -328,7 +328,10 @@ TEST(BagImages, DecodesAllEncodings) {
 }
 
 TEST(CameraInfo, ChecksWhatItCannotRepresent) {
-  containers::CameraInfo info{.width = 640, .height = 480, .distortion_model = "equidistant"};
+  containers::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  info.distortion_model = "equidistant";
   info.K = {300, 0, 320, 0, 301, 240, 0, 0, 1};
   info.distortion = {0.1, 0.01, 0.001, 0.0001};
   ASSERT_TRUE(camera_of(info, "a", "/info"));
