@@ -186,7 +186,8 @@ MessageFileResult open_sqlite_bag(const std::filesystem::path& path) {
   Database database(opened);
   if (status != SQLITE_OK || !database)
     return Error{path.string(), "", database ? sqlite3_errmsg(database.get()) : "no memory", "an SQLite file"};
-  sqlite3_db_config(database.get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  // Otherwise a file that is shorter than its header says could not be read at all. Nothing is written: it is read-only.
+  sqlite3_db_config(database.get(), SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
   sqlite3_db_config(database.get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   auto bag = std::make_unique<SqliteBag>(path, std::move(database));
   if (const Status s = bag->index(*file); !s) return s.error();

@@ -45,7 +45,7 @@ class Decoder {
   }
   // Decodes the next image and returns its time; nullopt at the end or after a permanent error.
   std::optional<std::int64_t> next_image();
-  // The image that was decoded last; nullopt if its size is impossible.
+  // The image that was decoded last; nullopt if it is damaged or its size is impossible.
   std::optional<VideoImage> grey();
 
   TimeNs nanoseconds(std::int64_t time) const {
@@ -69,7 +69,7 @@ std::string Decoder::open(const std::string& path) {
   if (packet_ == nullptr || frame_ == nullptr) return "no memory";
   // The protocol is named, since a path may look like an address.
   const std::string url = "file:" + path;
-  if (f_.avformat_open_input(&format_, url.c_str(), nullptr, nullptr) < 0) return "a file that is no bag and no video";
+  if (f_.avformat_open_input(&format_, url.c_str(), nullptr, nullptr) < 0) return "a file that is no bag, and no video that FFmpeg can read";
   if (f_.avformat_find_stream_info(format_, nullptr) < 0) return "a video without readable streams";
   const AVCodec* codec = nullptr;
   stream_ = f_.av_find_best_stream(format_, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
@@ -110,6 +110,8 @@ std::optional<std::int64_t> Decoder::next_image() {
 }
 
 std::optional<VideoImage> Decoder::grey() {
+  // The decoder fills what it could not decode with other parts of the video.
+  if ((frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0) return std::nullopt;
   if (frame_->width < 1 || frame_->height < 1 || frame_->width > kMaxSidePx || frame_->height > kMaxSidePx)
     return std::nullopt;
   scaler_ =

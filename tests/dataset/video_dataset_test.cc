@@ -46,7 +46,7 @@ class Videos : public testing::Test {
     return out;
   }
   DatasetRequest request(const std::string& files, bool side_by_side = false) const {
-    return {.path = files, .side_by_side = side_by_side, .rig_file = file("rig.yaml")};
+    return {.path = files, .rig_file = file("rig.yaml"), .side_by_side = side_by_side};
   }
   std::string pair() const { return file("left.y4m").string() + "," + file("right.y4m").string(); }
 
