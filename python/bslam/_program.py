@@ -97,7 +97,9 @@ def calibrate(
     out: Path | None = None,
     model: Literal["pinhole", "pinhole-radtan", "kannala-brandt"] | None = None,
     fov: float | None = None,
-    format: Literal["auto", "euroc", "kitti", "folder"] = "auto",
+    format: Literal["auto", "euroc", "kitti", "folder", "bag", "video"] = "auto",
+    topics: Sequence[str] | None = None,
+    side_by_side: bool = False,
     cameras: Sequence[int] | None = None,
     begin: float | None = None,
     end: float | None = None,
@@ -113,12 +115,14 @@ def calibrate(
     """Estimates intrinsics and extrinsics from recordings of any scene, as `bslam rig calibrate` does.
 
     Args:
-        data: folder of a recording, or of several of the same rig.
+        data: folder, bag or videos of a recording, or of several of the same rig.
         rig: rough calibration to begin with; default: that of the first recording.
         out: rig file to write.
         model: begin with this camera model without distortion for all cameras; needs `fov`.
         fov: horizontal field of view in degrees; needs `model`.
         format: data set format.
+        topics: image topics of a bag, in the order of the rig's cameras; default: all, by name.
+        side_by_side: each image of the video consists of those of two cameras.
         cameras: cameras of the rig to use, in this order; default: all.
         begin: start of the interval to process, in seconds after the first image.
         end: end of the interval.
@@ -139,6 +143,8 @@ def calibrate(
         "model": model,
         "fov": fov,
         "format": format,
+        "topics": None if topics is None else ",".join(topics),
+        "side_by_side": side_by_side,
         "cameras": None if cameras is None else ",".join(map(str, cameras)),
         "begin": begin,
         "end": end,

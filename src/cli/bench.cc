@@ -47,6 +47,7 @@ std::vector<std::string> run_options(const BenchArguments& a) {
   if (a.data.cameras) add("--cameras", *a.data.cameras);
   if (a.data.begin_s) add("--begin", fmt::format("{}", *a.data.begin_s));
   if (a.data.end_s) add("--end", fmt::format("{}", *a.data.end_s));
+  add("--topics", a.data.images.topics);
   if (a.data.images.rate_hz) add("--rate", fmt::format("{}", *a.data.images.rate_hz));
   add("--stamp-unit", a.data.images.stamp_unit);
   add("--bayer", a.data.images.bayer);

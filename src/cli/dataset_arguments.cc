@@ -43,6 +43,10 @@ Result<std::vector<image_decoding::Bayer>> parse_bayer(const std::string& text) 
 }  // namespace
 
 void add_image_options(CLI::App& verb, ImageArguments& a) {
+  verb.add_option(
+      "--topics", a.topics,
+      "image topics of a bag in the order of the rig's cameras, separated by commas; default: all, by name");
+  verb.add_flag("--side-by-side", a.side_by_side, "each image of the video consists of those of two cameras");
   verb.add_option("--rate", a.rate_hz,
                   "the time stamps of the images are their numbers, and they were taken at this rate [Hz]");
   verb.add_option("--stamp-unit", a.stamp_unit, "unit of the time stamps; default: ns")
@@ -61,6 +65,11 @@ void add_image_options(CLI::App& verb, ImageArguments& a) {
 Status apply_image_options(const ImageArguments& a, dataset::DatasetRequest& request) {
   static const std::map<std::string, TimeNs> kUnits = {
       {"ns", 1}, {"us", 1'000}, {"ms", 1'000'000}, {"s", 1'000'000'000}};
+  std::istringstream topics(a.topics);
+  for (std::string topic; std::getline(topics, topic, ',');) {
+    if (!topic.empty()) request.topics.push_back(topic);
+  }
+  request.side_by_side = a.side_by_side;
   request.time_stamps.rate_hz = a.rate_hz;
   if (!a.stamp_unit.empty()) request.time_stamps.unit_ns = kUnits.at(a.stamp_unit);
   if (!a.masks.empty()) request.masks = a.masks;
@@ -73,13 +82,16 @@ Status apply_image_options(const ImageArguments& a, dataset::DatasetRequest& req
 }
 
 void add_dataset_options(CLI::App& verb, DatasetArguments& a) {
-  verb.add_option("DATA", a.path, "folder of the data set")->required();
+  verb.add_option("DATA", a.path,
+                  "folder of a data set, ROS 1 bag, ROS 2 bag, MCAP file, or videos; several bags of one recording, or "
+                  "a video of each camera, are joined by commas")
+      ->required();
   add_recording_options(verb, a);
 }
 
 void add_recording_options(CLI::App& verb, DatasetArguments& a) {
   verb.add_option("--format", a.format, "data set format")
-      ->check(CLI::IsMember({"auto", "euroc", "kitti", "folder"}))
+      ->check(CLI::IsMember({"auto", "euroc", "kitti", "folder", "bag", "video"}))
       ->capture_default_str();
   verb.add_option("--rig", a.rig, "calibration file; default: the calibration in DATA");
   verb.add_option("--cameras", a.cameras,
@@ -92,9 +104,11 @@ void add_recording_options(CLI::App& verb, DatasetArguments& a) {
 Result<dataset::DatasetRequest> dataset_request(const DatasetArguments& a, double sync_tolerance_s) {
   dataset::DatasetRequest request;
   request.path = a.path;
-  if (a.format == "euroc") request.format = dataset::DatasetFormat::kEuroc;
-  if (a.format == "kitti") request.format = dataset::DatasetFormat::kKitti;
-  if (a.format == "folder") request.format = dataset::DatasetFormat::kFolder;
+  using dataset::DatasetFormat;
+  for (const DatasetFormat format : {DatasetFormat::kEuroc, DatasetFormat::kKitti, DatasetFormat::kFolder,
+                                     DatasetFormat::kBag, DatasetFormat::kVideo}) {
+    if (a.format == dataset::format_name(format)) request.format = format;
+  }
   if (!a.rig.empty()) request.rig_file = a.rig;
   if (a.cameras) {
     auto cameras = parse_cameras(*a.cameras);

@@ -9,8 +9,10 @@
 
 namespace bslam::cli {
 
-// How the time stamps and the pixels of a recording are to be read.
+// Where the images of a recording are, and how its time stamps and pixels are to be read.
 struct ImageArguments {
+  std::string topics;
+  bool side_by_side = false;
   std::optional<double> rate_hz;
   std::string stamp_unit, bayer, masks, vignettes;
 };

@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
 #ifdef BSLAM_SIMULATOR
   add_simulate(app, exit_status);
 #endif
+  add_data(app, exit_status);
   add_inspect(app, exit_status);
   add_rig(app, exit_status);
   add_vocab(app, exit_status);

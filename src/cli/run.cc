@@ -161,8 +161,18 @@ std::string check_command(const DatasetArguments& data) {
   return shell_command({"bslam", "rig", "info", data.rig.empty() ? data.path : data.rig, "--images", data.path});
 }
 
-void print_before(const dataset::Dataset& dataset, LogVerbosity verbosity) {
+// Says which topic or video is which camera, if the command line does not say it.
+void print_sources(const dataset::Dataset& dataset) {
+  std::string text;
+  for (std::size_t c = 0; c < dataset.sources.size(); ++c) {
+    text += (c == 0 ? "" : ", ") + dataset.rig.camera(c).name + " = " + dataset.sources[c];
+  }
+  if (!text.empty()) std::fprintf(stderr, "cameras: %s (choose with --topics)\n", text.c_str());
+}
+
+void print_before(const dataset::Dataset& dataset, const DatasetArguments& data, LogVerbosity verbosity) {
   if (verbosity < LogVerbosity::kWarning) return;
+  if (dataset.format == dataset::DatasetFormat::kBag && data.images.topics.empty()) print_sources(dataset);
   for (const std::string& warning : dataset.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   print_rig_warnings(dataset.rig);
 }
@@ -218,7 +228,7 @@ int run(const RunArguments& arguments) {
   if (!view) return report_error(view.error());
   if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
   if (*view) std::fprintf(stderr, "view: %s\n", (*view)->url().c_str());
-  print_before(*dataset, log_verbosity(arguments.log_level));
+  print_before(*dataset, arguments.data, log_verbosity(arguments.log_level));
 
   ProgressBar bar(arguments.progress == "auto", "frames");
   session::SessionOptions options = session_options(arguments, *config, interruption);

@@ -17,6 +17,7 @@ void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit
 void add_eval(CLI::App& app, int& exit_status);
 void add_bench(CLI::App& app, int& exit_status);
 void add_simulate(CLI::App& app, int& exit_status);
+void add_data(CLI::App& app, int& exit_status);
 void add_inspect(CLI::App& app, int& exit_status);
 void add_rig(CLI::App& app, int& exit_status);
 void add_rig_calibrate(CLI::App& rig, int& exit_status);

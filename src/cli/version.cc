@@ -2,12 +2,17 @@
 
 #include <fmt/format.h>
 #include <libdeflate.h>
+#include <lz4.h>
 #include <png.h>
+#include <sqlite3.h>
+#include <zstd.h>
 
 #include <CLI/Version.hpp>
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/version.hpp>
+
+#include "video/video_file.h"
 
 namespace bslam::cli {
 namespace {
@@ -39,7 +44,10 @@ std::string version_text() {
                       NLOHMANN_JSON_VERSION_PATCH);
   text += fmt::format("fmt {}.{}.{}\n", FMT_VERSION / 10000, FMT_VERSION / 100 % 100, FMT_VERSION % 100);
   text += fmt::format("CLI11 {}\n", CLI11_VERSION);
-  return text + fmt::format("libdeflate {}", LIBDEFLATE_VERSION_STRING);
+  text += fmt::format("libdeflate {}\nLZ4 {}\nzstd {}\nSQLite {}\n", LIBDEFLATE_VERSION_STRING, LZ4_VERSION_STRING,
+                      ZSTD_VERSION_STRING, SQLITE_VERSION);
+  const std::string ffmpeg = video::ffmpeg_version();
+  return text + (ffmpeg.empty() ? "without FFmpeg" : "libavformat " + ffmpeg);
 }
 
 }  // namespace bslam::cli

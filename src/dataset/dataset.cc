@@ -24,47 +24,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct OpenRecording {
-  DatasetFormat format;
-  std::unique_ptr<Recording> recording;
-};
-
-Result<DatasetFormat> detect_format(const fs::path& folder) {
-  if (looks_like_euroc(folder)) return DatasetFormat::kEuroc;
-  if (looks_like_kitti(folder)) return DatasetFormat::kKitti;
-  if (looks_like_folder(folder)) return DatasetFormat::kFolder;
-  return Error{
-      folder.string(), "", "no data set of a known format",
-      "mav0/camN/data.csv (euroc), image_N with times.txt (kitti), or camN with images named by their time stamps "
-      "(folder)"};
-}
-
-Result<OpenRecording> open_recording(const DatasetRequest& request) {
-  std::error_code error;
-  if (!fs::is_directory(request.path, error)) {
-    const bool exists = fs::exists(request.path, error);
-    return Error{request.path.string(), "", exists ? "a file" : "no such folder", "the folder of a data set"};
-  }
-  DatasetFormat format = request.format;
-  if (format == DatasetFormat::kAuto) {
-    const auto detected = detect_format(request.path);
-    if (!detected) return detected.error();
-    format = *detected;
-  }
-  auto recording = format == DatasetFormat::kEuroc   ? open_euroc(request.path)
-                   : format == DatasetFormat::kKitti ? open_kitti(request.path)
-                                                     : open_folder(request.path);
-  if (!recording) return recording.error();
-  return OpenRecording{format, *std::move(recording)};
-}
-
 // Returns the name of the data set folder. Handles "DATA/mav0", "DATA/" and "." as well.
 std::string name_of(const fs::path& path) {
   std::error_code error;
   fs::path whole = fs::weakly_canonical(path, error);
   if (error) whole = fs::absolute(path, error);
   if (whole.filename().empty() || whole.filename() == "mav0") whole = whole.parent_path();
-  return whole.filename().string();
+  return fs::is_directory(whole, error) ? whole.filename().string() : whole.stem().string();
 }
 
 // Returns the requested cameras, or all `count` cameras if none were requested.
@@ -149,15 +115,15 @@ Status check_images(const std::vector<image_files::ImageFile>& images, const cam
   std::string found;
   for (const image_files::ImageFile& file : images) {
     std::error_code error;
-    if (!fs::exists(file.path, error)) continue;
+    if (!file.store && !fs::exists(file.path, error)) continue;
     any = true;
     if (++read > kTries) break;
-    const auto image = image_decoding::read_image(file.path);
+    const auto image = image_decoding::read_image(file);
     if (!image) continue;
     if (image->width() == camera.width && image->height() == camera.height) return {};
     found = fmt::format("{}x{} pixels", image->width(), image->height());
   }
-  const std::string folder = images.front().path.parent_path().string();
+  const std::string folder = image_files::source_of(images.front());
   if (!any) return Error{folder, camera.name, "none of the listed images", "at least one image"};
   if (found.empty()) return {};  // the first images are damaged, which is reported when they are read
   return Error{folder, camera.name, "images of " + found,
@@ -175,7 +141,7 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Da
     const camera::Camera& camera = chosen.rig.camera(i);
     if (const Status status = check_images(list->images, camera); !status) return status.error();
     if (const auto mask = image_decoding::read_mask(camera); !mask) return mask.error();
-    const std::string source = list->images.front().path.parent_path().string();
+    const std::string source = image_files::source_of(list->images.front());
     if (const Status s = convert_time_stamps(request.time_stamps, source, list->images); !s) return s.error();
     if (request.masks) {
       const auto warnings = add_image_masks(*request.masks, chosen.cameras[i], camera, list->images);
@@ -193,9 +159,7 @@ std::vector<image_decoding::PixelFormat> pixel_formats(const DatasetRequest& req
                                                        const std::vector<std::vector<image_files::ImageFile>>& images) {
   std::vector<image_decoding::PixelFormat> formats(images.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
-    std::vector<fs::path> files;
-    for (const image_files::ImageFile& image : images[i]) files.push_back(image.path);
-    formats[i].bits = image_decoding::bits_in_use(files);
+    formats[i].bits = image_decoding::bits_in_use(images[i]);
     if (!request.bayer.empty()) formats[i].bayer = request.bayer[request.bayer.size() == 1 ? 0 : i];
   }
   return formats;
@@ -335,6 +299,16 @@ Status describe_pixels(const DatasetRequest& request, const std::vector<std::vec
   return {};
 }
 
+// Time stamps have a unit that is not known, unless the recording has times.
+Status check_time_stamps(const DatasetRequest& request, const OpenRecording& opened) {
+  const TimeStampOptions& options = request.time_stamps;
+  if (!opened.recording->has_times() || !(options.rate_hz || options.unit_ns)) return {};
+  const bool kitti = opened.format == DatasetFormat::kKitti;
+  return Error{options.rate_hz ? "--rate" : "--stamp-unit", "",
+               kitti ? "a data set with times.txt" : "a recording with times of its own",
+               kitti ? "no unit, since times.txt contains seconds" : "no unit"};
+}
+
 }  // namespace
 
 Result<Dataset> open_dataset(const DatasetRequest& original) {
@@ -345,10 +319,7 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
   const Recording& recording = *opened->recording;
   const auto own_rig_file = request.rig_file ? std::nullopt : rig_file_in_folder(request);
   if (own_rig_file && !recording.calibrated()) request.rig_file = *own_rig_file;
-  if (opened->format == DatasetFormat::kKitti && (request.time_stamps.rate_hz || request.time_stamps.unit_ns)) {
-    return Error{request.time_stamps.rate_hz ? "--rate" : "--stamp-unit", "", "a data set with times.txt",
-                 "no unit, since times.txt contains seconds"};
-  }
+  if (const Status status = check_time_stamps(request, *opened); !status) return status.error();
   auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
   if (request.masks) {
@@ -360,6 +331,8 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
     warn_of_times(*own_rig_file, chosen->warnings);
     take_names(*own_rig_file, recording.camera_count(), *chosen);
   }
+  const std::vector<std::string> damage = recording.warnings();
+  chosen->warnings.insert(chosen->warnings.begin(), damage.begin(), damage.end());
   const auto images = collect_images(request, recording, *chosen);
   if (!images) return images.error();
   Dataset dataset{name_of(request.path),
@@ -371,6 +344,10 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
                   {},
                   recording.ground_truth(),
                   std::move(chosen->warnings)};
+  for (const std::vector<image_files::ImageFile>& of_camera : *images) {
+    const image_files::ImageFile& image = of_camera.front();
+    if (image.store) dataset.sources.push_back(image.store->stream(image.entry));
+  }
   if (const Status status = describe_pixels(request, *images, dataset); !status) return status.error();
   if (const Status status = group(request, *images, dataset); !status) return status.error();
   if (const Status status = keep_range(request, dataset); !status) return status.error();

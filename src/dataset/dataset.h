@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.h"
@@ -17,16 +18,23 @@
 
 namespace bslam::dataset {
 
-enum class DatasetFormat { kAuto, kEuroc, kKitti, kFolder };
+enum class DatasetFormat { kAuto, kEuroc, kKitti, kFolder, kBag, kVideo };
+
+// The name of a format, such as "euroc".
+std::string_view format_name(DatasetFormat format);
 
 struct DatasetRequest {
+  // A folder, a bag, an MCAP file or a video; several bags of one recording, or a video of each camera, are joined by
+  // commas.
   std::filesystem::path path;
   DatasetFormat format = DatasetFormat::kAuto;
   std::optional<std::filesystem::path> rig_file = {};  // default: the calibration in the data set
-  std::vector<int> cameras = {};                       // in this order; the first becomes camera 0; empty: all
-  double sync_tolerance_s = 0.002;                     // largest time difference within a frame
-  std::optional<double> begin_s = {}, end_s = {};      // seconds from the first frame: begin <= t < end
-  TimeStampOptions time_stamps = {};                   // unit of the recorded time stamps
+  std::vector<std::string> topics = {};  // of bags: image topics in the order of the cameras; empty: all, by name
+  bool side_by_side = false;             // of a video: each of its images is those of two cameras
+  std::vector<int> cameras = {};         // in this order; the first becomes camera 0; empty: all
+  double sync_tolerance_s = 0.002;       // largest time difference within a frame
+  std::optional<double> begin_s = {}, end_s = {};  // seconds from the first frame: begin <= t < end
+  TimeStampOptions time_stamps = {};               // unit of the recorded time stamps
   // Colour filters of the cameras in use, in their order, or one for all; empty: none.
   std::vector<image_decoding::Bayer> bayer = {};
   std::optional<std::filesystem::path> masks = {};      // folder of masks (dataset/mask_folder.h)
@@ -53,6 +61,7 @@ struct Dataset {
       ground_truth;  // in the format of the data set: EuRoC csv (body) or KITTI poses (camera 0)
   std::vector<std::string>
       warnings;  // for the user: entries that were sorted or dropped, images in frames without camera 0
+  std::vector<std::string> sources = {};  // of bags and videos: the topic or file of every camera in use
   std::vector<image_decoding::PixelFormat> pixel_formats = {};  // one per camera in use
   std::vector<image_decoding::Vignette> vignettes = {};         // one per camera in use, or none
 };

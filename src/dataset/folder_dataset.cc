@@ -1,5 +1,5 @@
-// The plain format: folders camN/ with images named by their time stamps in nanoseconds. The calibration is given
-// separately.
+// The plain format: folders camN/, or left/ and right/, with images named by their time stamps in nanoseconds. The
+// calibration is given separately.
 #include <algorithm>
 #include <utility>
 
@@ -38,18 +38,30 @@ class FolderRecording : public Recording {
   std::vector<fs::path> folders_;
 };
 
+// cam0, cam1, ..., or left and right.
+std::vector<fs::path> image_folders(const fs::path& folder) {
+  std::vector<fs::path> folders = rig_formats::camera_folders(folder, "");
+  std::error_code error;
+  if (!folders.empty()) return folders;
+  for (const char* side : {"left", "right"}) {
+    if (fs::is_directory(folder / side, error)) folders.push_back(folder / side);
+  }
+  return folders;
+}
+
 }  // namespace
 
 bool looks_like_folder(const fs::path& folder) {
-  const auto folders = rig_formats::camera_folders(folder, "");
+  const auto folders = image_folders(folder);
   return std::any_of(folders.begin(), folders.end(),
                      [](const fs::path& f) { return !image_files::images_in(f).empty(); });
 }
 
 RecordingResult open_folder(const fs::path& folder) {
-  auto folders = rig_formats::camera_folders(folder, "");
+  auto folders = image_folders(folder);
   if (folders.empty())
-    return Error{folder.string(), "", "no camera", "cam0, cam1, ... with images named by their time stamps in ns"};
+    return Error{folder.string(), "", "no camera",
+                 "cam0, cam1, ..., or left and right, with images named by their time stamps in ns"};
   return std::unique_ptr<Recording>(std::make_unique<FolderRecording>(std::move(folders)));
 }
 

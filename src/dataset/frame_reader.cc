@@ -12,11 +12,11 @@ namespace bslam::dataset {
 
 namespace {
 
-Result<image::Image> read_of_camera(const Dataset& dataset, const std::filesystem::path& file, std::size_t index) {
+Result<image::Image> read_of_camera(const Dataset& dataset, const image_files::ImageFile& file, std::size_t index) {
   const camera::Camera& camera = dataset.rig.camera(index);
   auto image = image_decoding::read_image(file, dataset.pixel_formats.at(index));
   if (!image || (image->width() == camera.width && image->height() == camera.height)) return image;
-  return Error{file.string(), "", fmt::format("{}x{} pixels", image->width(), image->height()),
+  return Error{image_files::name_of(file), "", fmt::format("{}x{} pixels", image->width(), image->height()),
                fmt::format("{}x{}, the resolution of {}", camera.width, camera.height, camera.name)};
 }
 
@@ -31,9 +31,9 @@ Result<image::Image> read_mask(const Dataset& dataset, const image_files::ImageF
 std::string describe_damage(const Dataset& dataset, std::size_t index, std::size_t camera) {
   const auto& file = dataset.frames.at(index).images.at(camera);
   if (!file) return "";
-  const auto image = read_of_camera(dataset, file->path, camera);
+  const auto image = read_of_camera(dataset, *file, camera);
   if (const auto mask = read_mask(dataset, *file, camera); image && !mask) return mask.error().message();
-  return image ? file->path.string() + ": can be read now, although it could not be read before"
+  return image ? image_files::name_of(*file) + ": can be read now, although it could not be read before"
                : image.error().message();
 }
 
@@ -47,7 +47,7 @@ image::ImageBundle read_frame(const Dataset& dataset, std::size_t index) {
     image::CameraImage& out = bundle.images[i];
     out.time_ns = frame.images[i]->time_ns;
     out.state = image::ImageState::kDamaged;
-    auto image = read_of_camera(dataset, frame.images[i]->path, i);
+    auto image = read_of_camera(dataset, *frame.images[i], i);
     auto mask = read_mask(dataset, *frame.images[i], i);
     if (!image || !mask) continue;
     if (!dataset.vignettes.empty()) dataset.vignettes[i].correct(*image);

@@ -87,6 +87,8 @@ class KittiRecording : public Recording {
     return list;
   }
 
+  bool has_times() const override { return true; }
+
   std::optional<fs::path> ground_truth() const override {
     fs::path file = root_ / "poses.txt";
     std::error_code error;

@@ -9,6 +9,7 @@
 
 #include "base/result.h"
 #include "camera/rig.h"
+#include "dataset/recording_description.h"
 #include "image_files/image_folder.h"
 
 namespace bslam::dataset {
@@ -26,18 +27,36 @@ class Recording {
   // Returns all listed images with their recorded time stamps; at least one.
   virtual Result<image_files::ImageList> images(std::size_t camera) const = 0;
   virtual std::optional<std::filesystem::path> ground_truth() const { return std::nullopt; }
+  // Returns true if its time stamps have a known unit.
+  virtual bool has_times() const { return false; }
+  // For the user: what was found damaged or missing when the recording was opened.
+  virtual std::vector<std::string> warnings() const { return {}; }
+  // Describes the images of the cameras, and what else the recording contains. Warnings and what is missing are added
+  // by the caller.
+  virtual RecordingDescription describe() const;
 };
 
 using RecordingResult = Result<std::unique_ptr<Recording>>;
 
+// A recording of any format. Errors: those of the format; nothing of a known format.
+struct OpenRecording {
+  DatasetFormat format;
+  std::unique_ptr<Recording> recording;
+};
+Result<OpenRecording> open_recording(const DatasetRequest& request);
+
 // Each function returns an Error that names the expected files if `folder` does not have its format.
-RecordingResult open_euroc(const std::filesystem::path& folder);   // mav0/camN/data.csv
-RecordingResult open_kitti(const std::filesystem::path& folder);   // image_N/NNNNNN.png and times.txt
-RecordingResult open_folder(const std::filesystem::path& folder);  // camN/<ns>.png
+RecordingResult open_euroc(const std::filesystem::path& folder);      // mav0/camN/data.csv
+RecordingResult open_kitti(const std::filesystem::path& folder);      // image_N/NNNNNN.png and times.txt
+RecordingResult open_kitti_raw(const std::filesystem::path& folder);  // image_NN/data/*.png and timestamps.txt
+RecordingResult open_folder(const std::filesystem::path& folder);     // camN/<ns>.png, or left/ and right/
+// Videos: one per camera, or one with the images of two cameras side by side. Their first images were taken together.
+RecordingResult open_video(const std::vector<std::filesystem::path>& files, bool side_by_side);
 
 // Each function returns true if the folder seems to have the format.
 bool looks_like_euroc(const std::filesystem::path& folder);
 bool looks_like_kitti(const std::filesystem::path& folder);
+bool looks_like_kitti_raw(const std::filesystem::path& folder);
 bool looks_like_folder(const std::filesystem::path& folder);
 
 }  // namespace bslam::dataset

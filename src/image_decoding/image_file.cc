@@ -1,6 +1,7 @@
 #include "image_decoding/image_file.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "image_decoding/codecs.h"
+#include "image_decoding/pixel_rows.h"
 #include "image_files/mask.h"
 #include "image_files/png_decoder.h"
 
@@ -63,6 +65,15 @@ image::Image without_colour_filter(image::Image raw, Bayer bayer) {
   return grey;
 }
 
+// WebP files state their size.
+bool is_whole_webp(std::string_view bytes) {
+  constexpr std::size_t kFrame = 8;  // bytes before what is counted
+  if (bytes.size() < 12 || !bytes.starts_with("RIFF") || bytes.substr(8, 4) != "WEBP") return false;
+  std::uint64_t size = 0;
+  for (std::size_t k = 0; k < 4; ++k) size |= std::uint64_t{static_cast<unsigned char>(bytes[4 + k])} << 8 * k;
+  return size + kFrame <= bytes.size();
+}
+
 bool is_16_bit_png(std::string_view bytes) {
   constexpr std::size_t kBitDepth = 24;  // position of the bit depth in a PNG
   return image_files::is_complete_png(bytes) && bytes[kBitDepth] == 16;
@@ -74,7 +85,16 @@ std::optional<image::Image> decode_values(std::string_view bytes, int bits) {
     auto image = image_files::decode_grey_png(bytes);
     return image ? std::move(image) : decode_with_library(bytes, bits);
   }
-  return is_whole_jpeg(bytes) ? decode_with_library(bytes, bits) : std::nullopt;
+  return is_whole_jpeg(bytes) || is_whole_webp(bytes) ? decode_with_library(bytes, bits) : std::nullopt;
+}
+
+// The bytes of an image in memory. Errors as of the file or the recording.
+Result<image_files::StoredImage> read_stored(const image_files::ImageFile& image) {
+  if (image.store) return image.store->read(image.entry);
+  auto bytes = read_file(image.path, kMaxImageBytes);
+  if (!bytes) return bytes.error();
+  const std::size_t size = bytes->size();
+  return image_files::StoredImage{.bytes = *std::move(bytes), .size = size};
 }
 
 }  // namespace
@@ -89,19 +109,48 @@ Result<image::Image> read_image(const std::filesystem::path& file, const PixelFo
   const auto bytes = read_file(file, kMaxImageBytes);
   if (!bytes) return bytes.error();
   auto image = decode_grey(*bytes, format);
-  if (!image) return Error{file.string(), "", "an incomplete image or another format", "a complete PNG or JPEG image"};
+  if (!image)
+    return Error{file.string(), "", "an incomplete image or another format", "a complete PNG, JPEG or WebP image"};
   return *std::move(image);
 }
 
-int bits_in_use(std::span<const std::filesystem::path> files) {
+Result<image::Image> read_image(const image_files::ImageFile& file, const PixelFormat& format) {
+  if (!file.store) return read_image(file.path, format);
+  const auto stored = file.store->read(file.entry);
+  if (!stored) return stored.error();
+  auto image = decode_stored(*stored, format);
+  if (!image)
+    return Error{file.store->name(file.entry), "", "an incomplete image or another format", "a complete image"};
+  return *std::move(image);
+}
+
+std::optional<image::Image> decode_stored(const image_files::StoredImage& stored, const PixelFormat& format) {
+  if (stored.begin > stored.bytes.size() || stored.size > stored.bytes.size() - stored.begin) return std::nullopt;
+  if (stored.layout == image_files::PixelLayout::kFile)
+    return decode_grey(std::string_view(stored.bytes).substr(stored.begin, stored.size), format);
+  auto image = grey_of_rows(stored, format.bits);
+  const Bayer filter = filter_of(stored.layout, format.bayer);
+  if (!image || filter == Bayer::kNone) return image;
+  return without_colour_filter(*std::move(image), filter);
+}
+
+int bits_in_use(std::span<const image_files::ImageFile> images) {
   constexpr std::size_t kSamples = 12;
-  const std::size_t count = std::min(kSamples, files.size());
+  const std::size_t count = std::min(kSamples, images.size());
   double largest = 0;
   for (std::size_t k = 0; k < count; ++k) {
-    const auto bytes = read_file(files[k * files.size() / count], kMaxImageBytes);
-    if (!bytes || !(is_whole_jpeg(*bytes) || image_files::is_complete_png(*bytes))) continue;
-    if (!is_16_bit_png(*bytes)) return 16;
-    const cv::Mat decoded = decode_to_grey(*bytes);
+    const auto stored = read_stored(images[k * images.size() / count]);
+    if (!stored) continue;
+    if (stored->layout != image_files::PixelLayout::kFile) {
+      if (stored->bytes_per_value != 2) return 16;
+      largest = std::max(largest, static_cast<double>(largest_value(*stored)));
+      continue;
+    }
+    const std::string_view bytes = stored->bytes;
+    const std::string_view file = bytes.substr(std::min(stored->begin, bytes.size()), stored->size);
+    if (!(is_whole_jpeg(file) || is_whole_webp(file) || image_files::is_complete_png(file))) continue;
+    if (!is_16_bit_png(file)) return 16;
+    const cv::Mat decoded = decode_to_grey(file);
     double value = 0;
     if (!decoded.empty()) cv::minMaxLoc(decoded, nullptr, &value);
     largest = std::max(largest, value);

@@ -1,5 +1,5 @@
-// PNG and JPEG files of every kind as 8-bit grey images, decoded by libpng and libjpeg-turbo if our own PNG decoder
-// does not support them.
+// PNG, JPEG and WebP files of every kind, and rows of pixels in recordings, as 8-bit grey images. Files are decoded by
+// libpng, libjpeg-turbo and libwebp if our own PNG decoder does not support them.
 #pragma once
 
 #include <filesystem>
@@ -12,22 +12,30 @@
 #include "camera/rig.h"
 #include "image/image.h"
 #include "image_decoding/pixel_format.h"
+#include "image_files/image_folder.h"
 
 namespace bslam::image_decoding {
 
-// Decodes a PNG or JPEG in memory to grey values. Orientation tags are ignored, colours are converted to luminance, the
-// upper eight of `format.bits` bits of 16-bit images are kept, and raw images with a colour filter are interpolated.
-// Returns nullopt for other formats, truncated files and wrong checksums, for which decoders would return the readable
-// part.
+// Decodes a PNG, JPEG or WebP in memory to grey values. Orientation tags are ignored, colours are converted to
+// luminance, the upper eight of `format.bits` bits of 16-bit images are kept, and raw images with a colour filter are
+// interpolated. Returns nullopt for other formats, truncated files and wrong checksums, for which decoders would return
+// the readable part.
 std::optional<image::Image> decode_grey(std::string_view bytes, const PixelFormat& format = {});
 
 // The same from a file. Errors: the file cannot be read or is not a complete image.
 Result<image::Image> read_image(const std::filesystem::path& file, const PixelFormat& format = {});
 
-// Returns the number of bits in use in the 16-bit PNG files of a camera: the smallest of 8, 10, 12, 14 and 16 that
-// holds all values of a few readable images spread over the list. Returns 16 if
-// one of them has 8 bits, since such a camera has no common number of bits.
-int bits_in_use(std::span<const std::filesystem::path> files);
+// The same from a file or a recording.
+Result<image::Image> read_image(const image_files::ImageFile& image, const PixelFormat& format = {});
+
+// Decodes an image of a recording. The colour filter of its layout takes precedence over that of `format`. Returns
+// nullopt if it is incomplete or damaged.
+std::optional<image::Image> decode_stored(const image_files::StoredImage& image, const PixelFormat& format = {});
+
+// Returns the number of bits in use in the 16-bit images of a camera: the smallest of 8, 10, 12, 14 and 16 that holds
+// all values of a few readable images spread over the list. Returns 16 if one of them has 8 bits, since such a camera
+// has no common number of bits.
+int bits_in_use(std::span<const image_files::ImageFile> images);
 
 // Reads the mask of a camera, in which 0 marks pixels to ignore; an empty image if the camera has none. Errors: the
 // file cannot be read, differs from the resolution of the camera, or is 0 everywhere.

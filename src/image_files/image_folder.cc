@@ -22,6 +22,14 @@ bool is_image_name(const fs::path& path) {
 
 }  // namespace
 
+std::string name_of(const ImageFile& image) {
+  return image.store ? image.store->name(image.entry) : image.path.string();
+}
+
+std::string source_of(const ImageFile& image) {
+  return image.store ? image.store->source(image.entry) : image.path.parent_path().string();
+}
+
 ImageList in_time_order(std::vector<image_files::ImageFile> images, const std::string& source) {
   ImageList list;
   const auto earlier = [](const image_files::ImageFile& a, const image_files::ImageFile& b) {

@@ -3,20 +3,30 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "base/timestamp.h"
 #include "image_files/image_size.h"
+#include "image_files/image_store.h"
 
 namespace bslam::image_files {
 
+// Where an image is: a file of its own, or a place in a recording.
 struct ImageFile {
-  std::filesystem::path path;
+  std::filesystem::path path;       // empty if the image is in a store
   TimeNs time_ns = 0;               // time of capture, with the time offset of the camera applied
   std::filesystem::path mask = {};  // file of a mask of this image alone; empty: none
+  std::shared_ptr<const ImageStore> store = {};
+  std::int64_t entry = 0;  // number of the image in the store
 };
+
+// For messages: the file of an image, or its place in a recording.
+std::string name_of(const ImageFile& image);
+// For messages: the folder or the topic of an image.
+std::string source_of(const ImageFile& image);
 
 // Images of one camera with their recorded time stamps, strictly increasing.
 struct ImageList {

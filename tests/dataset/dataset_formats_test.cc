@@ -86,6 +86,53 @@ TEST_F(SmallKitti, RequiresAProjectionForEveryCamera) {
   EXPECT_EQ(open().error().file, (data() / "calib.txt").string());
 }
 
+TEST(FolderDataset, LeftAndRightAreCameras) {
+  const support::TemporaryFolder folder;
+  support::write_small_euroc(folder.path() / "euroc");
+  const fs::path data = folder.path() / "plain";
+  fs::create_directories(data);
+  fs::rename(folder.path() / "euroc/mav0/cam0/data", data / "left");
+  fs::rename(folder.path() / "euroc/mav0/cam1/data", data / "right");
+  const auto dataset = open_dataset({.path = data, .rig_file = folder.path() / "euroc"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->format, DatasetFormat::kFolder);
+  EXPECT_EQ(dataset->frames[2].images[0]->path.parent_path(), data / "left");
+  EXPECT_EQ(dataset->frames[2].images[1]->path.parent_path(), data / "right");
+}
+
+// KITTI raw data: the calibration of the day is beside the folders of its drives.
+TEST(KittiRaw, DatesAndTheCalibrationOfTheDayAreRead) {
+  const support::TemporaryFolder day;
+  const fs::path data = day.path() / "drive_0001_sync";
+  std::string calibration = "calib_time: 09-Jan-2012 13:57:47\n";
+  for (int c = 0; c < 2; ++c) {
+    const std::string number = "_0" + std::to_string(c), shift = c == 0 ? "0" : "-25";
+    calibration += "S" + number + ": 60 20\nK" + number + ": 50 0 30 0 50 10 0 0 1\nD" + number + ": 0 0 0 0 0\nR" +
+                   number + ": 1 0 0 0 1 0 0 0 1\nT" + number + ": " + (c == 0 ? "0" : "-0.5") + " 0 0\nS_rect" +
+                   number + ": 60 20\nR_rect" + number + ": 1 0 0 0 1 0 0 0 1\nP_rect" + number + ": 50 0 30 " + shift +
+                   " 0 50 10 0 0 0 1 0\n";
+    const fs::path folder = data / ("image" + number);
+    std::string dates;
+    for (int k = 0; k < 5; ++k) {
+      dates += "2011-09-26 13:02:25." + std::to_string(100000445 + 100000000 * k) + "\n";
+      support::write_image(folder / "data" / ("000000000" + std::to_string(k) + ".png"), 60, 20, k);
+    }
+    support::write_text(folder / "timestamps.txt", dates);
+  }
+  support::write_text(day.path() / "calib_cam_to_cam.txt", calibration);
+  const DatasetRequest request{.path = data};
+  const auto dataset = open_dataset(request);
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->format, DatasetFormat::kKitti);
+  EXPECT_EQ(dataset->first_time_ns, 1317042145100000445);
+  ASSERT_EQ(dataset->frames.size(), 5u);
+  EXPECT_EQ(dataset->frames[3].time_ns - dataset->first_time_ns, 300'000'000);
+  EXPECT_NEAR(dataset->rig.rig_from_cam(1).translation().x(), 0.5, 1e-9);
+  EXPECT_EQ(read_frame(*dataset, 4).images[1].state, ImageState::kPresent);
+  support::write_text(data / "image_00/timestamps.txt", "2011-13-26 13:02:25.9\n");
+  EXPECT_EQ(open_dataset(request).error().key, "line 1");
+}
+
 TEST(FolderDataset, OpensWithARigFile) {
   const support::TemporaryFolder folder;
   support::write_small_euroc(folder.path() / "euroc");

@@ -212,7 +212,7 @@ TEST_F(SmallEuroc, ReportsMissingImages) {
 
 TEST_F(SmallEuroc, NoSuchFolder) {
   fs::remove_all(data());
-  expect_error(data(), "no such folder");
+  expect_error(data(), "no such file or folder");
 }
 
 TEST_F(SmallEuroc, AFileInsteadOfAFolder) {

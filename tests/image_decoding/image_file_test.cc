@@ -80,10 +80,10 @@ TEST(ImageFile, KeepsTheUpperEightOfTheBitsInUse) {
 // The number of bits is that of the camera, not of an image: dark images do not become bright.
 TEST(ImageFile, FindsTheBitsInUseOverAllImages) {
   const support::TemporaryFolder folder;
-  std::vector<std::filesystem::path> files;
+  std::vector<image_files::ImageFile> files;
   const auto write = [&](int largest, int type) {
-    files.push_back(folder.path() / (std::to_string(files.size()) + ".png"));
-    ASSERT_TRUE(cv::imwrite(files.back().string(), cv::Mat(8, 8, type, cv::Scalar(largest))));
+    files.push_back({folder.path() / (std::to_string(files.size()) + ".png")});
+    ASSERT_TRUE(cv::imwrite(files.back().path.string(), cv::Mat(8, 8, type, cv::Scalar(largest))));
   };
   write(200, CV_16UC1);
   EXPECT_EQ(bits_in_use(files), 8);
@@ -93,7 +93,7 @@ TEST(ImageFile, FindsTheBitsInUseOverAllImages) {
   write(300, CV_16UC1);
   EXPECT_EQ(bits_in_use(files), 12);
   EXPECT_EQ(bits_in_use(std::span(files).last(1)), 10);
-  files.insert(files.begin(), folder.path() / "missing.png");
+  files.insert(files.begin(), {folder.path() / "missing.png"});
   EXPECT_EQ(bits_in_use(files), 12);
   write(65520, CV_16UC1);  // 12 bits in the upper part
   EXPECT_EQ(bits_in_use(files), 16);

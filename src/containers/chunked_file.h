@@ -1,0 +1,75 @@
+// What ROS 1 bags and MCAP files have in common: messages in chunks, which may be compressed. Internal to this folder.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "containers/compression.h"
+#include "containers/input_file.h"
+#include "containers/message_file.h"
+
+namespace bslam::containers {
+
+struct Chunk {
+  std::uint64_t at = 0;           // position of its data in the file
+  std::uint64_t stored_size = 0;  // bytes of it in the file, as far as they are there
+  std::uint64_t size = 0;         // bytes after decompression, as the file says
+  Compression compression = Compression::kNone;
+  std::uint32_t checksum = 0;  // CRC-32 of the decompressed data; 0: none
+};
+
+class ChunkedFile : public MessageFile {
+ protected:
+  // Chunk 0 is the whole file, for messages outside of chunks.
+  ChunkedFile(InputFile file, std::string format);
+
+  const InputFile& file() const { return file_; }
+  const std::vector<Chunk>& chunks() const { return chunks_; }
+  void add_chunk(const Chunk& chunk) { chunks_.push_back(chunk); }
+
+  // Up to `count` bytes of the decompressed chunk from position `at`.
+  std::string bytes(std::uint32_t chunk, std::uint64_t at, std::uint64_t count) const;
+  // How far `bytes` reaches.
+  std::uint64_t available(std::uint32_t chunk) const;
+  // Returns false if the chunk has a checksum that differs from that of its data.
+  bool checksum_holds(std::uint32_t chunk) const;
+
+  // Positions of chunks that the index of the file names; used where the file between them is damaged.
+  std::vector<std::uint64_t> chunk_positions_;
+
+  // Returns the position of the first chunk after `at` that the index names, or 0.
+  std::uint64_t chunk_after(std::uint64_t at) const;
+  // Describes a damaged place, after which the file is read on at `next` (0: not at all).
+  void note_damage(std::uint64_t at, std::uint64_t next);
+  // Describes a chunk of which only the first bytes could be read.
+  void note_cut_chunk(std::uint32_t chunk, std::uint64_t good_bytes);
+  // Turns the notes into warnings: of each kind the first, and how many there are.
+  void finish_notes();
+
+ private:
+  struct Loaded {
+    std::uint32_t chunk = 0;
+    bool checksum_holds = true;
+    std::shared_ptr<const std::string> data;
+  };
+  // The decompressed chunk, which is kept for a while.
+  Loaded load(std::uint32_t chunk) const;
+
+  struct Notes {
+    std::string first;
+    std::uint64_t count = 0;
+  };
+
+  InputFile file_;
+  std::vector<Chunk> chunks_;
+  Notes damaged_, cut_;
+  mutable std::mutex mutex_;
+  mutable std::vector<Loaded> cache_;  // the last used one at the end
+};
+
+}  // namespace bslam::containers

@@ -1,0 +1,35 @@
+// A file that is read in places. Reading changes no state, so that several threads may do so.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "base/result.h"
+
+namespace bslam::containers {
+
+class InputFile {
+ public:
+  InputFile() = default;
+  InputFile(InputFile&& other) noexcept;
+  InputFile& operator=(InputFile&& other) noexcept;
+  ~InputFile();
+
+  // Errors: the file cannot be opened or is not a regular file.
+  static Result<InputFile> open(const std::filesystem::path& path);
+
+  const std::filesystem::path& path() const { return path_; }
+  std::uint64_t size() const { return size_; }  // bytes, when it was opened
+
+  // Returns `count` bytes from position `at`, or those up to the end of the file. What cannot be read ends it as well.
+  std::string read(std::uint64_t at, std::uint64_t count) const;
+
+ private:
+  std::filesystem::path path_;
+  std::uint64_t size_ = 0;
+  int descriptor_ = -1;
+};
+
+}  // namespace bslam::containers

@@ -1,0 +1,130 @@
+#include "dataset/recording.h"
+
+#include <algorithm>
+#include <sstream>
+#include <system_error>
+
+#include "dataset/bag_recording.h"
+#include "image_decoding/image_file.h"
+
+namespace bslam::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<DatasetFormat> detect_format(const fs::path& folder) {
+  if (looks_like_euroc(folder)) return DatasetFormat::kEuroc;
+  if (looks_like_kitti(folder) || looks_like_kitti_raw(folder)) return DatasetFormat::kKitti;
+  if (looks_like_folder(folder)) return DatasetFormat::kFolder;
+  if (looks_like_bag(folder)) return DatasetFormat::kBag;
+  return Error{folder.string(), "", "no data set of a known format",
+               "mav0/camN/data.csv (euroc), image_N with times.txt or image_NN with timestamps.txt (kitti), camN or "
+               "left and right "
+               "with images named by their time stamps (folder), or a ROS 2 bag (metadata.yaml)"};
+}
+
+// The files that are joined by commas, or the only one, whose name may contain commas.
+std::vector<fs::path> files_of(const fs::path& path) {
+  std::error_code error;
+  if (fs::exists(path, error)) return {path};
+  std::vector<fs::path> files;
+  std::istringstream parts(path.string());
+  for (std::string part; std::getline(parts, part, ',');) {
+    if (!part.empty()) files.emplace_back(part);
+  }
+  return files.empty() ? std::vector<fs::path>{path} : files;
+}
+
+Status check_bag_options(const DatasetRequest& request, DatasetFormat format) {
+  if (!request.topics.empty() && format != DatasetFormat::kBag)
+    return Error{"--topics", "", "data without topics", "a ROS bag or an MCAP file"};
+  if (request.side_by_side && format != DatasetFormat::kVideo)
+    return Error{"--side-by-side", "", "data that is no video", "a video"};
+  return {};
+}
+
+Result<DatasetFormat> format_of(const DatasetRequest& request, const std::vector<fs::path>& files) {
+  std::error_code error;
+  if (fs::is_directory(files.front(), error) && files.size() == 1)
+    return request.format == DatasetFormat::kAuto ? detect_format(files.front()) : request.format;
+  for (const fs::path& file : files) {
+    if (!fs::exists(file, error)) return Error{file.string(), "", "no such file or folder", "a recording"};
+    if (fs::is_directory(file, error))
+      return Error{file.string(), "", "a folder among files", "files joined by commas"};
+  }
+  const DatasetFormat found = looks_like_bag(files.front()) ? DatasetFormat::kBag : DatasetFormat::kVideo;
+  if (request.format == DatasetFormat::kAuto || request.format == found) return found;
+  return Error{files.front().string(), "", "a file", "the folder of a data set"};
+}
+
+// KITTI odometry, or the raw data of a day.
+RecordingResult open_kitti_of_any_kind(const fs::path& folder) {
+  return looks_like_kitti_raw(folder) && !looks_like_kitti(folder) ? open_kitti_raw(folder) : open_kitti(folder);
+}
+
+}  // namespace
+
+std::string_view format_name(DatasetFormat format) {
+  switch (format) {
+    case DatasetFormat::kAuto:
+      return "auto";
+    case DatasetFormat::kEuroc:
+      return "euroc";
+    case DatasetFormat::kKitti:
+      return "kitti";
+    case DatasetFormat::kFolder:
+      return "folder";
+    case DatasetFormat::kBag:
+      return "bag";
+    case DatasetFormat::kVideo:
+      return "video";
+  }
+  return "";
+}
+
+Result<OpenRecording> open_recording(const DatasetRequest& request) {
+  const std::vector<fs::path> files = files_of(request.path);
+  const auto format = format_of(request, files);
+  if (!format) return format.error();
+  if (const Status s = check_bag_options(request, *format); !s) return s.error();
+  auto recording = *format == DatasetFormat::kEuroc    ? open_euroc(files.front())
+                   : *format == DatasetFormat::kKitti  ? open_kitti_of_any_kind(files.front())
+                   : *format == DatasetFormat::kFolder ? open_folder(files.front())
+                   : *format == DatasetFormat::kBag    ? open_bag(files, request.topics)
+                                                       : open_video(files, request.side_by_side);
+  if (!recording) return recording.error();
+  return OpenRecording{*format, *std::move(recording)};
+}
+
+RecordingDescription Recording::describe() const {
+  RecordingDescription out;
+  for (std::size_t c = 0; c < camera_count(); ++c) {
+    StreamDescription stream{.name = "", .type = "images", .encoding = ""};
+    const auto list = images(c);
+    if (!list) {
+      stream.unused = list.error().message();
+      out.streams.push_back(std::move(stream));
+      continue;
+    }
+    out.warnings.insert(out.warnings.end(), list->warnings.begin(), list->warnings.end());
+    stream.name = image_files::source_of(list->images.front());
+    stream.count = list->images.size();
+    for (const image_files::ImageFile& image : list->images) stream.times.push_back(image.time_ns);
+    stream.stamps = has_times() ? "times.txt" : "names or data.csv";
+    stream.camera = static_cast<int>(c);
+    stream.calibrated = calibration(c).ok();
+    stream.encoding = list->images.front().path.extension().string();
+    stream.encoding.erase(0, stream.encoding.starts_with('.') ? 1 : 0);
+    constexpr std::size_t kTries = 5;
+    for (std::size_t k = 0; k < std::min(kTries, list->images.size()) && stream.width == 0; ++k) {
+      const auto image = image_decoding::read_image(list->images[k]);
+      if (!image) continue;
+      stream.width = image->width();
+      stream.height = image->height();
+    }
+    out.streams.push_back(std::move(stream));
+  }
+  return out;
+}
+
+}  // namespace bslam::dataset

@@ -1,0 +1,88 @@
+#include "dataset/recording_description.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <iterator>
+#include <limits>
+
+#include "base/median.h"
+#include "dataset/recording.h"
+#include "rig_formats/rig_file.h"
+
+namespace bslam::dataset {
+namespace {
+
+// Time from each image to the nearest one of the other camera.
+std::vector<TimeNs> distances(const std::vector<TimeNs>& times, const std::vector<TimeNs>& others) {
+  std::vector<TimeNs> out;
+  for (const TimeNs time_ns : times) {
+    const auto after = std::ranges::lower_bound(others, time_ns);
+    TimeNs nearest = std::numeric_limits<TimeNs>::max();
+    if (after != others.end()) nearest = *after - time_ns;
+    if (after != others.begin()) nearest = std::min(nearest, time_ns - *std::prev(after));
+    out.push_back(nearest);
+  }
+  return out;
+}
+
+// Finds which images of the other cameras have an image of camera 0 at the same time.
+std::vector<SynchronyDescription> synchrony(const std::vector<StreamDescription>& streams, double tolerance_s) {
+  std::vector<const StreamDescription*> cameras;
+  for (const StreamDescription& stream : streams) {
+    if (stream.camera < 0 || stream.times.empty()) continue;
+    cameras.resize(std::max<std::size_t>(cameras.size(), static_cast<std::size_t>(stream.camera) + 1));
+    cameras[static_cast<std::size_t>(stream.camera)] = &stream;
+  }
+  std::vector<SynchronyDescription> out;
+  for (std::size_t c = 1; c < cameras.size() && cameras[0] != nullptr; ++c) {
+    if (cameras[c] == nullptr) continue;
+    const std::vector<TimeNs> apart = distances(cameras[c]->times, cameras[0]->times);
+    const TimeNs tolerance_ns = from_seconds(tolerance_s);
+    const auto together = std::ranges::count_if(apart, [&](TimeNs distance) { return distance <= tolerance_ns; });
+    out.push_back({static_cast<int>(c), apart.size(), static_cast<std::size_t>(together),
+                   1e3 * to_seconds(median(std::vector<TimeNs>(apart)))});
+  }
+  return out;
+}
+
+// What is needed to run the recording beside its images.
+std::vector<std::string> missing_for(const DatasetRequest& request, const Recording& recording) {
+  std::vector<std::string> missing;
+  if (request.rig_file) {
+    const auto rig = rig_formats::read_rig(*request.rig_file);
+    if (!rig) return {rig.error().message()};
+    if (request.cameras.empty() && rig->size() > recording.camera_count()) {
+      missing.push_back(
+          fmt::format("images of {} cameras: {} has {} cameras and the recording {}; --cameras selects "
+                      "cameras of the rig",
+                      rig->size(), request.rig_file->string(), rig->size(), recording.camera_count()));
+    }
+    return missing;
+  }
+  std::error_code error;
+  if (std::filesystem::exists(request.path / "rig.yaml", error)) return missing;
+  for (std::size_t c = 0; c < recording.camera_count() && missing.empty(); ++c) {
+    if (const auto calibration = recording.calibration(c); !calibration)
+      missing.push_back(calibration.error().message());
+  }
+  return missing;
+}
+
+}  // namespace
+
+Result<RecordingDescription> describe_recording(const DatasetRequest& request) {
+  const auto opened = open_recording(request);
+  if (!opened) return opened.error();
+  RecordingDescription out = opened->recording->describe();
+  if (out.format.empty()) out.format = format_name(opened->format);
+  const std::vector<std::string> damage = opened->recording->warnings();
+  out.warnings.insert(out.warnings.begin(), damage.begin(), damage.end());
+  out.missing = missing_for(request, *opened->recording);
+  out.synchrony = synchrony(out.streams, request.sync_tolerance_s);
+  return out;
+}
+
+}  // namespace bslam::dataset

@@ -1,0 +1,24 @@
+// Rows of pixels in recordings as grey images. Internal to this folder.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "image/image.h"
+#include "image_decoding/pixel_format.h"
+#include "image_files/image_store.h"
+
+namespace bslam::image_decoding {
+
+// Returns the brightness of every pixel, of a colour filter as it is stored: the upper eight of `bits` bits of values
+// of two bytes. Returns nullopt if the size is impossible or the rows do not fit into the bytes. The layout is not
+// kFile.
+std::optional<image::Image> grey_of_rows(const image_files::StoredImage& image, int bits);
+
+// Returns the largest value of an image with values of two bytes; 0 if the rows do not fit into the bytes.
+std::uint16_t largest_value(const image_files::StoredImage& image);
+
+// Returns the colour filter of a layout; `other` for grey images.
+Bayer filter_of(image_files::PixelLayout layout, Bayer other);
+
+}  // namespace bslam::image_decoding

@@ -1,0 +1,234 @@
+#include "video/video_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <deque>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "video/ffmpeg.h"
+
+namespace bslam::video {
+namespace {
+
+constexpr std::size_t kCachedImages = 24;  // of those decoded last; several threads read ahead
+constexpr std::size_t kFarAhead = 200;     // images; from there on seeking is faster than decoding all before
+constexpr int kMaxSidePx = 20000;
+
+// Everything of one open file; released in the order FFmpeg needs.
+class Decoder {
+ public:
+  explicit Decoder(const Ffmpeg& f) : f_(f), packet_(f.av_packet_alloc()), frame_(f.av_frame_alloc()) {}
+  ~Decoder() {
+    f_.av_packet_free(&packet_);
+    f_.av_frame_free(&frame_);
+    f_.avcodec_free_context(&codec_);
+    f_.sws_freeContext(scaler_);
+    f_.avformat_close_input(&format_);
+  }
+  Decoder(const Decoder&) = delete;
+  Decoder& operator=(const Decoder&) = delete;
+
+  // Returns what is wrong; empty if nothing is.
+  std::string open(const std::string& path);
+  // Returns the presentation time of the next packet of the video, without decoding it; nullopt at the end.
+  std::optional<std::int64_t> next_time();
+  // Continues at or before a time, or at the beginning.
+  bool seek(std::int64_t time) {
+    ended_ = false;
+    f_.avcodec_flush_buffers(codec_);
+    return f_.av_seek_frame(format_, stream_, time, AVSEEK_FLAG_BACKWARD) >= 0;
+  }
+  // Decodes the next image and returns its time; nullopt at the end or after a permanent error.
+  std::optional<std::int64_t> next_image();
+  // The image that was decoded last; nullopt if it is damaged or its size is impossible.
+  std::optional<VideoImage> grey();
+
+  TimeNs nanoseconds(std::int64_t time) const {
+    return f_.av_rescale_q(time, format_->streams[stream_]->time_base, AVRational{1, 1'000'000'000});
+  }
+  const AVCodecParameters& parameters() const { return *format_->streams[stream_]->codecpar; }
+  std::string codec_name() const { return codec_->codec->name; }
+
+ private:
+  const Ffmpeg& f_;
+  AVPacket* packet_;
+  AVFrame* frame_;
+  AVFormatContext* format_ = nullptr;
+  AVCodecContext* codec_ = nullptr;
+  SwsContext* scaler_ = nullptr;
+  int stream_ = -1;
+  bool ended_ = false;
+};
+
+std::string Decoder::open(const std::string& path) {
+  if (packet_ == nullptr || frame_ == nullptr) return "no memory";
+  // The protocol is named, since a path may look like an address.
+  const std::string url = "file:" + path;
+  if (f_.avformat_open_input(&format_, url.c_str(), nullptr, nullptr) < 0)
+    return "a file that is no bag, and no video that FFmpeg can read";
+  if (f_.avformat_find_stream_info(format_, nullptr) < 0) return "a video without readable streams";
+  const AVCodec* codec = nullptr;
+  stream_ = f_.av_find_best_stream(format_, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
+  if (stream_ < 0 || codec == nullptr) return "no video stream with a supported codec";
+  codec_ = f_.avcodec_alloc_context3(codec);
+  if (codec_ == nullptr || f_.avcodec_parameters_to_context(codec_, &parameters()) < 0) return "no memory";
+  codec_->thread_count = 2;
+  if (f_.avcodec_open2(codec_, codec, nullptr) < 0) return "a codec that cannot be opened";
+  for (unsigned k = 0; k < format_->nb_streams; ++k)
+    format_->streams[k]->discard = static_cast<int>(k) == stream_ ? AVDISCARD_DEFAULT : AVDISCARD_ALL;
+  return "";
+}
+
+std::optional<std::int64_t> Decoder::next_time() {
+  while (f_.av_read_frame(format_, packet_) >= 0) {
+    const bool ours = packet_->stream_index == stream_;
+    const std::int64_t time = packet_->pts != AV_NOPTS_VALUE ? packet_->pts : packet_->dts;
+    f_.av_packet_unref(packet_);
+    if (ours) return time;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::int64_t> Decoder::next_image() {
+  for (;;) {
+    f_.av_frame_unref(frame_);
+    const int got = f_.avcodec_receive_frame(codec_, frame_);
+    if (got == 0) return frame_->best_effort_timestamp;
+    if (got == AVERROR_EOF || ended_) return std::nullopt;
+    // More input is wanted, or a damaged image is left out.
+    int status = 0;
+    while ((status = f_.av_read_frame(format_, packet_)) >= 0 && packet_->stream_index != stream_)
+      f_.av_packet_unref(packet_);
+    ended_ = status < 0;
+    f_.avcodec_send_packet(codec_, ended_ ? nullptr : packet_);
+    f_.av_packet_unref(packet_);
+  }
+}
+
+std::optional<VideoImage> Decoder::grey() {
+  // The decoder fills what it could not decode with other parts of the video.
+  if ((frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0) return std::nullopt;
+  if (frame_->width < 1 || frame_->height < 1 || frame_->width > kMaxSidePx || frame_->height > kMaxSidePx)
+    return std::nullopt;
+  scaler_ =
+      f_.sws_getCachedContext(scaler_, frame_->width, frame_->height, static_cast<AVPixelFormat>(frame_->format),
+                              frame_->width, frame_->height, AV_PIX_FMT_GRAY8, SWS_POINT, nullptr, nullptr, nullptr);
+  if (scaler_ == nullptr) return std::nullopt;
+  VideoImage image{"", frame_->width, frame_->height};
+  // Its vector code may write up to the next multiple of its width.
+  constexpr std::size_t kAlignment = 64;
+  const auto width = static_cast<std::size_t>(image.width), height = static_cast<std::size_t>(image.height);
+  const std::size_t step = (width + kAlignment - 1) / kAlignment * kAlignment;
+  std::string rows(step * height + kAlignment, '\0');
+  std::uint8_t* const to[4] = {reinterpret_cast<std::uint8_t*>(rows.data()), nullptr, nullptr, nullptr};
+  const int steps[4] = {static_cast<int>(step), 0, 0, 0};
+  if (f_.sws_scale(scaler_, frame_->data, frame_->linesize, 0, frame_->height, to, steps) != frame_->height)
+    return std::nullopt;
+  for (std::size_t y = 0; y < height; ++y) image.grey.append(rows, y * step, width);
+  return image;
+}
+
+class FfmpegVideo : public VideoFile {
+ public:
+  FfmpegVideo(std::filesystem::path path, const Ffmpeg& f) : path_(std::move(path)), decoder_(f) {}
+
+  Status prepare();
+
+  int width() const override { return decoder_.parameters().width; }
+  int height() const override { return decoder_.parameters().height; }
+  std::string codec() const override { return decoder_.codec_name(); }
+  const std::vector<TimeNs>& times() const override { return times_; }
+  const std::vector<std::string>& warnings() const override { return warnings_; }
+  Result<VideoImage> read(std::size_t index) override;
+
+ private:
+  // The number of the image that is shown at a time.
+  std::optional<std::size_t> index_of(std::int64_t time) const {
+    const auto after = std::ranges::lower_bound(stamps_, time);
+    if (after == stamps_.end() || *after != time) return std::nullopt;
+    return static_cast<std::size_t>(after - stamps_.begin());
+  }
+  bool decode_up_to(std::size_t index);
+
+  std::filesystem::path path_;
+  std::mutex mutex_;
+  Decoder decoder_;
+  std::vector<std::int64_t> stamps_;  // in units of the file, increasing
+  std::vector<TimeNs> times_;
+  std::vector<std::string> warnings_;
+  std::size_t next_ = 0;  // number of the image after the one that was decoded last
+  std::deque<std::pair<std::size_t, VideoImage>> cache_;
+};
+
+Status FfmpegVideo::prepare() {
+  if (const std::string wrong = decoder_.open(path_.string()); !wrong.empty())
+    return Error{path_.string(), "", wrong, "a ROS bag (.bag, .db3, .mcap), a video, or the folder of a data set"};
+  std::size_t untimed = 0;
+  while (const auto time = decoder_.next_time()) {
+    if (*time == AV_NOPTS_VALUE)
+      ++untimed;
+    else
+      stamps_.push_back(*time);
+  }
+  std::ranges::sort(stamps_);
+  const auto repeated = std::ranges::unique(stamps_);
+  untimed += repeated.size();
+  stamps_.erase(repeated.begin(), repeated.end());
+  if (untimed > 0)
+    warnings_.push_back(fmt::format("{}: {} images without a time of their own are not used", path_.string(), untimed));
+  if (stamps_.empty()) return Error{path_.string(), "", "no images with times", "a video"};
+  const TimeNs first = decoder_.nanoseconds(stamps_.front());
+  for (const std::int64_t time : stamps_) times_.push_back(decoder_.nanoseconds(time) - first);
+  if (!decoder_.seek(stamps_.front()))
+    return Error{path_.string(), "", "a video that cannot be read again from the start", "a file"};
+  return {};
+}
+
+// Decodes images into the cache until the image `index` was passed. Returns false at the end of the file.
+bool FfmpegVideo::decode_up_to(std::size_t index) {
+  while (next_ <= index) {
+    const auto time = decoder_.next_image();
+    if (!time) return false;
+    const auto number = index_of(*time);
+    if (!number) continue;
+    next_ = *number + 1;
+    auto image = decoder_.grey();
+    if (!image) continue;
+    cache_.emplace_back(*number, *std::move(image));
+    if (cache_.size() > kCachedImages) cache_.pop_front();
+  }
+  return true;
+}
+
+Result<VideoImage> FfmpegVideo::read(std::size_t index) {
+  const std::lock_guard lock(mutex_);
+  const auto cached = [&] { return std::ranges::find(cache_, index, &std::pair<std::size_t, VideoImage>::first); };
+  if (const auto found = cached(); found != cache_.end()) return found->second;
+  if (index < next_ || index > next_ + kFarAhead) {
+    cache_.clear();
+    decoder_.seek(stamps_.at(index));
+    next_ = 0;
+  }
+  decode_up_to(index);
+  if (const auto found = cached(); found != cache_.end()) return found->second;
+  return Error{path_.string(), fmt::format("image {}", index), "an image that cannot be decoded", "a complete image"};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<VideoFile>> VideoFile::open(const std::filesystem::path& path) {
+  const auto ffmpeg = load_ffmpeg();
+  if (!ffmpeg) return ffmpeg.error();
+  auto video = std::make_unique<FfmpegVideo>(path, **ffmpeg);
+  if (const Status s = video->prepare(); !s) return s.error();
+  return std::unique_ptr<VideoFile>(std::move(video));
+}
+
+std::string ffmpeg_version() { return fmt::format("{}.{}", LIBAVFORMAT_VERSION_MAJOR, LIBAVFORMAT_VERSION_MINOR); }
+
+}  // namespace bslam::video

@@ -1,0 +1,357 @@
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "dataset/camera_info.h"
+#include "dataset/dataset.h"
+#include "dataset/frame_reader.h"
+#include "dataset/recording_description.h"
+#include "image_decoding/image_file.h"
+#include "support/bag_writer.h"
+#include "support/data_on_disk.h"
+
+namespace bslam::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+using image::ImageState;
+using support::TestMessage;
+using support::Wire;
+
+// The small EuRoC data set as a bag, whose messages tests change.
+class SmallBag : public testing::Test {
+ protected:
+  void SetUp() override {
+    support::write_small_euroc(data());
+    support::write_text(folder_.path() / "rig.yaml", "");
+  }
+
+  fs::path data() const { return folder_.path() / "small"; }
+  fs::path bag() const { return folder_.path() / "small.bag"; }
+
+  std::string pixels(int camera, int k) const {
+    const fs::path file = data() / "mav0" / ("cam" + std::to_string(camera)) / "data" / support::small_image_name(k);
+    const image::Image image = image_decoding::read_image(file).value();
+    return {reinterpret_cast<const char*>(image.row(0)), static_cast<std::size_t>(image.width() * image.height())};
+  }
+  support::TestImage image(int camera, int k) const {
+    return {support::kSmallStart + k * support::kSmallInterval,
+            support::kSmallWidth,
+            support::kSmallHeight,
+            support::kSmallWidth,
+            "mono8",
+            pixels(camera, k)};
+  }
+  static std::string topic(int camera) { return "/cam" + std::to_string(camera) + "/image_raw"; }
+
+  // The images of two cameras, recorded 3 ms after their stamps.
+  std::vector<TestMessage> messages(Wire wire) const {
+    std::vector<TestMessage> out;
+    for (int k = 0; k < support::kSmallFrames; ++k) {
+      for (int c = 0; c < 2; ++c) {
+        const support::TestImage one = image(c, k);
+        out.push_back({topic(c), "sensor_msgs/Image", one.stamp_ns + 3'000'000, support::image_message(wire, one)});
+      }
+    }
+    return out;
+  }
+  static void add_calibration(std::vector<TestMessage>& to, Wire wire, double fx_times_baseline) {
+    for (int c = 0; c < 2; ++c) {
+      const double shift = c == 0 ? 0 : -fx_times_baseline;
+      const support::TestCalibration info{support::kSmallWidth,
+                                          support::kSmallHeight,
+                                          "plumb_bob",
+                                          {0, 0, 0, 0, 0},
+                                          {20, 0, 15.5, 0, 20, 11.5, 0, 0, 1},
+                                          {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                                          {20, 0, 15.5, shift, 0, 20, 11.5, 0, 0, 0, 1, 0}};
+      to.insert(to.begin(), {"/cam" + std::to_string(c) + "/camera_info", "sensor_msgs/CameraInfo",
+                             support::kSmallStart, support::calibration_message(wire, info)});
+    }
+  }
+  void write(const std::vector<TestMessage>& messages) const {
+    support::write_text(bag(), support::rosbag1_bytes(messages));
+  }
+  DatasetRequest request(fs::path path) const { return {.path = std::move(path), .rig_file = data()}; }
+
+  static bool has(const std::vector<std::string>& warnings, std::string_view part) {
+    return std::ranges::any_of(warnings, [&](const std::string& w) { return w.find(part) != std::string::npos; });
+  }
+
+  // Expects frames, times and pixels of the folder.
+  void expect_same(const DatasetRequest& of_bag) const {
+    const auto folder = open_dataset({.path = data()}), opened = open_dataset(of_bag);
+    ASSERT_TRUE(opened) << opened.error().message();
+    ASSERT_EQ(opened->frames.size(), folder->frames.size());
+    for (std::size_t k = 0; k < folder->frames.size(); ++k) {
+      const image::ImageBundle a = read_frame(*folder, k), b = read_frame(*opened, k);
+      EXPECT_EQ(a.time_ns, b.time_ns);
+      for (std::size_t c = 0; c < 2; ++c) {
+        ASSERT_EQ(b.images[c].state, ImageState::kPresent) << describe_damage(*opened, k, c);
+        EXPECT_EQ(a.images[c].time_ns, b.images[c].time_ns);
+        for (int y = 0; y < a.images[c].image.height(); ++y)
+          EXPECT_TRUE(std::equal(a.images[c].image.row(y), a.images[c].image.row(y) + a.images[c].image.width(),
+                                 b.images[c].image.row(y)));
+      }
+    }
+  }
+
+  support::TemporaryFolder folder_;
+};
+
+TEST_F(SmallBag, Ros1IsReadAsTheFolder) {
+  write(messages(Wire::kRos1));
+  expect_same(request(bag()));
+  const auto dataset = open_dataset(request(bag()));
+  EXPECT_EQ(dataset->format, DatasetFormat::kBag);
+  EXPECT_EQ(dataset->name, "small");
+  EXPECT_EQ(dataset->sources, (std::vector<std::string>{topic(0), topic(1)}));
+  EXPECT_TRUE(dataset->warnings.empty()) << dataset->warnings.front();
+}
+
+TEST_F(SmallBag, Ros2IsReadAsTheFolder) {
+  const auto all = messages(Wire::kCdr);
+  const fs::path folder = folder_.path() / "ros2";
+  fs::create_directories(folder);
+  // Two files of one recording, as a recorder splits it.
+  support::write_sqlite_bag(folder / "ros2_0.db3", {all.begin(), all.begin() + 10});
+  support::write_sqlite_bag(folder / "ros2_1.db3", {all.begin() + 10, all.end()});
+  support::write_text(folder / "metadata.yaml",
+                      "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: sqlite3\n"
+                      "  relative_file_paths:\n    - ros2_0.db3\n    - ros2_1.db3\n");
+  expect_same(request(folder));
+  expect_same(request((folder / "ros2_0.db3").string() + "," + (folder / "ros2_1.db3").string()));
+  support::write_text(folder_.path() / "a.mcap", support::mcap_bytes(all, Wire::kCdr, {"zstd"}));
+  expect_same(request(folder_.path() / "a.mcap"));
+
+  fs::remove(folder / "ros2_0.db3");
+  const auto rest = open_dataset(request(folder));
+  ASSERT_TRUE(rest) << rest.error().message();
+  EXPECT_TRUE(has(rest->warnings, "ros2_0.db3 is listed but not there"));
+}
+
+TEST_F(SmallBag, FoxgloveIsReadAsTheFolder) {
+  std::vector<TestMessage> all = messages(Wire::kProtobuf);
+  for (TestMessage& message : all) message.type = "foxglove.RawImage";
+  support::write_text(folder_.path() / "a.mcap", support::mcap_bytes(all, Wire::kProtobuf, {"lz4"}));
+  expect_same(request(folder_.path() / "a.mcap"));
+}
+
+TEST_F(SmallBag, CompressedImagesAreReadAsTheFolder) {
+  std::vector<TestMessage> all;
+  for (int k = 0; k < support::kSmallFrames; ++k) {
+    for (int c = 0; c < 2; ++c) {
+      support::TestImage one = image(c, k);
+      one.encoding = "mono8; png compressed ";
+      one.data =
+          support::read_text(data() / "mav0" / ("cam" + std::to_string(c)) / "data" / support::small_image_name(k));
+      all.push_back({topic(c) + "/compressed", "sensor_msgs/CompressedImage", one.stamp_ns,
+                     support::compressed_image_message(Wire::kRos1, one)});
+    }
+  }
+  write(all);
+  expect_same(request(bag()));
+  // A broken image is damaged, and the others are not.
+  all[8].bytes.resize(all[8].bytes.size() - 40);
+  write(all);
+  const auto dataset = open_dataset(request(bag()));
+  ASSERT_TRUE(dataset);
+  EXPECT_EQ(read_frame(*dataset, 4).images[0].state, ImageState::kDamaged);
+  EXPECT_NE(describe_damage(*dataset, 4, 0).find("/cam0/image_raw/compressed"), std::string::npos);
+  EXPECT_EQ(read_frame(*dataset, 5).images[0].state, ImageState::kPresent);
+}
+
+TEST_F(SmallBag, TopicsAreTheCamerasInTheirOrder) {
+  write(messages(Wire::kRos1));
+  DatasetRequest swapped = request(bag());
+  swapped.topics = {topic(1), topic(0)};
+  const auto dataset = open_dataset(swapped);
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->sources, (std::vector<std::string>{topic(1), topic(0)}));
+  EXPECT_EQ(read_frame(*dataset, 3).images[0].image.row(0)[5], static_cast<std::uint8_t>(pixels(1, 3)[5]));
+  swapped.topics = {"/cam7/image_raw"};
+  EXPECT_EQ(open_dataset(swapped).error().file, "--topics");
+  swapped.topics = {topic(0), topic(0)};
+  EXPECT_EQ(open_dataset(swapped).error().found, topic(0) + " twice");
+  DatasetRequest folder = request(data());
+  folder.topics = {topic(0)};
+  EXPECT_EQ(open_dataset(folder).error().file, "--topics");
+}
+
+TEST_F(SmallBag, CameraInfoOfAStereoPairIsItsCalibration) {
+  auto all = messages(Wire::kRos1);
+  add_calibration(all, Wire::kRos1, 20 * 0.11);
+  write(all);
+  const auto dataset = open_dataset({.path = bag()});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->rig.camera(std::size_t{0}).name, "cam0");
+  EXPECT_NEAR((dataset->rig.body_from_cam(1).translation() - Eigen::Vector3d(0.11, 0, 0)).norm(), 0, 1e-9);
+}
+
+TEST_F(SmallBag, WithoutABaselineTheRigIsMissing) {
+  auto all = messages(Wire::kRos1);
+  add_calibration(all, Wire::kRos1, 0);
+  write(all);
+  const auto dataset = open_dataset({.path = bag()});
+  ASSERT_FALSE(dataset);
+  EXPECT_NE(dataset.error().message().find("--rig"), std::string::npos) << dataset.error().message();
+  DatasetRequest one{.path = bag()};
+  one.topics = {topic(1)};
+  EXPECT_TRUE(open_dataset(one)) << open_dataset(one).error().message();
+}
+
+TEST_F(SmallBag, AnotherSizeThanTheCalibrationIsAnError) {
+  auto all = messages(Wire::kRos1);
+  add_calibration(all, Wire::kRos1, 2);
+  support::TestImage small = image(0, 0);
+  small.width = small.step = 16;
+  for (TestMessage& message : all) {
+    if (message.topic == topic(0)) message.bytes = support::image_message(Wire::kRos1, small);
+  }
+  write(all);
+  const auto own = open_dataset({.path = bag()}), given = open_dataset(request(bag()));
+  ASSERT_FALSE(own);
+  EXPECT_NE(own.error().message().find("16x24"), std::string::npos) << own.error().message();
+  ASSERT_FALSE(given);
+  EXPECT_EQ(given.error().found, "images of 16x24 pixels");
+}
+
+TEST_F(SmallBag, TimesOfTheHeadersThatGoBackAreSorted) {
+  auto all = messages(Wire::kRos1);
+  std::swap(all[10].bytes, all[14].bytes);
+  all[20].bytes = all[18].bytes;
+  write(all);
+  const auto dataset = open_dataset(request(bag()));
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_TRUE(has(dataset->warnings, "out of order"));
+  EXPECT_TRUE(has(dataset->warnings, "1 images with the time stamp of another"));
+}
+
+TEST_F(SmallBag, WithoutStampsTheTimesOfRecordingAreUsed) {
+  auto all = messages(Wire::kRos1);
+  for (std::size_t m = 0; m < all.size(); ++m) {
+    support::TestImage one = image(static_cast<int>(m % 2), static_cast<int>(m / 2));
+    one.stamp_ns = 0;
+    all[m].bytes = support::image_message(Wire::kRos1, one);
+  }
+  write(all);
+  const auto dataset = open_dataset(request(bag()));
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_TRUE(has(dataset->warnings, "the times of recording are used"));
+  EXPECT_EQ(dataset->first_time_ns, support::kSmallStart + 3'000'000);
+}
+
+TEST_F(SmallBag, TheDescriptionNamesCamerasTimesAndWhatIsMissing) {
+  auto all = messages(Wire::kRos1);
+  all.push_back({"/depth", "sensor_msgs/Image", support::kSmallStart,
+                 support::image_message(Wire::kRos1, {support::kSmallStart, 2, 1, 8, "32FC1", std::string(8, 'x')})});
+  all.push_back({"/imu", "sensor_msgs/Imu", support::kSmallStart, "imu"});
+  write(all);
+  const auto described = describe_recording({.path = bag()});
+  ASSERT_TRUE(described) << described.error().message();
+  EXPECT_EQ(described->format, "ROS 1 bag");
+  ASSERT_EQ(described->streams.size(), 4u);
+  const StreamDescription& first = described->streams[0];
+  EXPECT_EQ(first.name, topic(0));
+  EXPECT_EQ(first.camera, 0);
+  EXPECT_EQ(first.count, static_cast<std::uint64_t>(support::kSmallFrames));
+  EXPECT_EQ(first.width, support::kSmallWidth);
+  EXPECT_EQ(first.encoding, "mono8");
+  EXPECT_EQ(first.stamps, "header");
+  ASSERT_TRUE(first.lag);
+  EXPECT_NEAR(first.lag->median, 0.003, 1e-9);
+  EXPECT_EQ(described->streams[2].name, "/depth");
+  EXPECT_EQ(described->streams[2].camera, -1);
+  EXPECT_EQ(described->streams[2].unused, "encoding 32FC1 is not supported");
+  EXPECT_EQ(described->streams[3].count, 1u);
+  ASSERT_EQ(described->synchrony.size(), 1u);
+  EXPECT_EQ(described->synchrony[0].together, static_cast<std::size_t>(support::kSmallFrames));
+  ASSERT_EQ(described->missing.size(), 1u);
+  EXPECT_NE(described->missing[0].find("--rig FILE"), std::string::npos);
+  // Folders are described, too.
+  const auto folder = describe_recording({.path = data()});
+  ASSERT_TRUE(folder);
+  EXPECT_EQ(folder->streams.size(), 2u);
+  EXPECT_TRUE(folder->missing.empty());
+}
+
+// An image of one encoding, decoded.
+image::Image decoded(const std::string& encoding, const std::string& data, int step, bool big_endian = false) {
+  const support::TemporaryFolder folder;
+  std::vector<TestMessage> all;
+  for (int k = 0; k < 3; ++k) {
+    const TimeNs time_ns = 1'000'000'000 + k * 100'000'000;
+    const support::TestImage one{time_ns, 4, 4, static_cast<std::uint32_t>(step), encoding, data, big_endian};
+    all.push_back({"/image", "sensor_msgs/Image", time_ns, support::image_message(Wire::kCdr, one)});
+  }
+  support::write_text(folder.path() / "a.mcap", support::mcap_bytes(all, Wire::kCdr));
+  support::write_text(
+      folder.path() / "rig.yaml",
+      "bslam_rig: 1\ncameras:\n  - name: a\n    model: pinhole\n    resolution: [4, 4]\n"
+      "    intrinsics: [4, 4, 1.5, 1.5]\n    T_body_cam: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
+  const auto dataset = open_dataset({.path = folder.path() / "a.mcap", .rig_file = folder.path() / "rig.yaml"});
+  EXPECT_TRUE(dataset) << dataset.error().message();
+  if (!dataset) return {};
+  const image::ImageBundle frame = read_frame(*dataset, 1);
+  EXPECT_EQ(frame.images[0].state, ImageState::kPresent) << describe_damage(*dataset, 1, 0);
+  return frame.images[0].image;
+}
+
+TEST(BagImages, DecodesAllEncodings) {
+  const auto rows = [](int bytes, const std::function<int(int, int)>& value) {
+    std::string out;
+    for (int y = 0; y < 4; ++y) {
+      for (int k = 0; k < bytes; ++k) out += static_cast<char>(value(y, k));
+    }
+    return out;
+  };
+  EXPECT_EQ(decoded("8UC1", rows(6, [](int y, int k) { return 10 * y + k; }), 6).row(2)[3], 23);
+  // 10 bits are in use: 1000 / 4 and 40 / 4.
+  const std::string words =
+      rows(8, [](int y, int k) { return k % 2 == 0 ? (y == 0 ? 0xe8 : 0x28) : (y == 0 ? 3 : 0); });
+  EXPECT_EQ(decoded("mono16", words, 8).row(0)[1], 250);
+  EXPECT_EQ(decoded("16UC1", words, 8).row(1)[1], 10);
+  std::string swapped = words;
+  for (std::size_t k = 0; k < swapped.size(); k += 2) std::swap(swapped[k], swapped[k + 1]);
+  EXPECT_EQ(decoded("mono16", swapped, 8, true).row(0)[1], 250);
+  const std::string red = rows(12, [](int, int k) { return k % 3 == 0 ? 200 : 0; });
+  EXPECT_NEAR(decoded("rgb8", red, 12).row(1)[1], 0.299 * 200, 1);
+  EXPECT_NEAR(decoded("bgr8", red, 12).row(1)[1], 0.114 * 200, 1);
+  const std::string green = rows(16, [](int, int k) { return k % 4 == 1 ? 100 : k % 4 == 3 ? 255 : 0; });
+  EXPECT_NEAR(decoded("rgba8", green, 16).row(1)[1], 0.587 * 100, 1);
+  EXPECT_NEAR(decoded("bgra8", green, 16).row(1)[1], 0.587 * 100, 1);
+  const std::string pairs = rows(8, [](int, int k) { return k % 2 == 0 ? 11 : 77; });
+  EXPECT_EQ(decoded("yuv422", pairs, 8).row(1)[1], 77);
+  EXPECT_EQ(decoded("yuv422_yuy2", pairs, 8).row(1)[1], 11);
+  EXPECT_EQ(decoded("bayer_rggb8", rows(4, [](int, int) { return 90; }), 4).row(2)[2], 90);
+  EXPECT_EQ(decoded("bayer_gbrg16", rows(8, [](int, int) { return 0x50; }), 8).row(2)[2], 0x50);
+}
+
+TEST(CameraInfo, ChecksWhatItCannotRepresent) {
+  containers::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  info.distortion_model = "equidistant";
+  info.K = {300, 0, 320, 0, 301, 240, 0, 0, 1};
+  info.distortion = {0.1, 0.01, 0.001, 0.0001};
+  ASSERT_TRUE(camera_of(info, "a", "/info"));
+  EXPECT_EQ(camera::model_name(camera_of(info, "a", "/info")->camera.model), "kannala-brandt");
+  const auto key = [&](const std::function<void(containers::CameraInfo&)>& change) {
+    containers::CameraInfo changed = info;
+    change(changed);
+    const auto camera = camera_of(changed, "a", "/info");
+    return camera ? std::string() : camera.error().key;
+  };
+  EXPECT_EQ(key([](auto& i) { i.K[0] = 0; }), "K");
+  EXPECT_EQ(key([](auto& i) { i.binning_x = 2; }), "binning");
+  EXPECT_EQ(key([](auto& i) { i.roi_x = 8; }), "roi");
+  EXPECT_EQ(key([](auto& i) { i.distortion_model = "omni"; }), "distortion_model");
+  EXPECT_EQ(key([](auto& i) { i.distortion.push_back(1); }), "D");
+  info.distortion_model = "rational_polynomial";
+  info.distortion = {0.1, 0.01, 0.001, 0.0001, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  ASSERT_TRUE(camera_of(info, "a", "/info"));
+  EXPECT_EQ(camera::distortion(camera_of(info, "a", "/info")->camera.model).size(), 8u);
+}
+
+}  // namespace
+}  // namespace bslam::dataset
