@@ -1,4 +1,7 @@
-"""ros2 launch bslam_ros bslam.launch.py rig:=/path/to/rig.yaml image_topics:="['/left/image_raw', '/right/image_raw']" """
+"""Starts the node.
+
+ros2 launch bslam_ros bslam.launch.py rig:=/path/to/rig.yaml image_topics:="['/left/image_raw', '/right/image_raw']"
+"""
 from typing import List
 
 from launch import LaunchDescription
