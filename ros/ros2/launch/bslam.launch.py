@@ -11,7 +11,6 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 TEXTS = {'rig': '', 'config': '', 'map_file': '', 'base_frame': 'base_link', 'body_frame': ''}
-
 SWITCHES = ['publish_camera_tf', 'use_sim_time']
 
 
