@@ -6,6 +6,7 @@
 DATA: a recording in EuRoC layout, with ground truth of camera 0 in FILE.tum, or of the body in the recording. Cases:
   info         calibration from CameraInfo and tf, raw images
   rig          calibration from a file, compressed images, the node publishes the transforms of the cameras
+  faults       images that are late, missing or black: what is received, what diagnostics say, and what is not published
   services     save_map, load_map and localize_only, and what they answer to wrong requests
 Starts its own ROS master on a free port, and ends what it has started.
 """
@@ -315,6 +316,29 @@ def play_and_check(arguments, work, from_file):
     check(final <= max(MAX_RATIO * offline, offline + NOISE_M), 'the trajectory is within 10 % of the offline run')
 
 
+def play_faults(arguments, work):
+    counts = write_bag(arguments.data, work / 'images.bag', '--seconds', '9', '--faults')
+    topics, frames = list(counts), max(counts.values())
+    session = Session(arguments, work, {'image_topics': topics, 'rig': str(arguments.data), 'publish_camera_tf': True})
+    with session.processes:
+        listener = session.listener
+        wait_until(lambda: session.subscribed(topics), 60, 'the node subscribes')
+        session.play(work / 'images.bag', '--topics', *topics).wait()
+        wait_until(lambda: listener.frames() >= frames or session.node.poll() is not None, 30, 'all frames are processed')
+        time.sleep(2)  # the last diagnostics
+        check_images(listener, {topic.split('/')[1]: count for topic, count in counts.items()}, frames)
+        start = listener.odometry[0].header.stamp.to_sec()
+        at = [m.header.stamp.to_sec() - start for m in listener.odometry]
+        check(not [t for t in at if 5.0 < t < 6.45], 'nothing is published while all cameras are black')
+        check(len([t for t in at if t > 7.5]) > 25, f'{len([t for t in at if t > 7.5])} poses after 7.5 s')
+        check([m for m in listener.messages if m.startswith('lost: ')], 'diagnostics say the loss')
+        check('out: black' in listener.messages, 'diagnostics say that a camera is black')
+        check('out: no-images' in listener.messages, 'diagnostics say that images are missing')
+        print(sorted(listener.messages))
+        check_axes(arguments, listener)
+        check(session.end() == 0, 'the node ends without error')
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('data', type=pathlib.Path)
@@ -322,7 +346,7 @@ def main():
     parser.add_argument('--node', type=pathlib.Path, required=True)
     parser.add_argument('--devel', type=pathlib.Path, required=True, help='folder with the Python code of the services')
     parser.add_argument('--truth', type=pathlib.Path)
-    parser.add_argument('--case', default='info', choices=['info', 'rig', 'services'])
+    parser.add_argument('--case', default='info', choices=['info', 'rig', 'faults', 'services'])
     parser.add_argument('--work', type=pathlib.Path)
     arguments = parser.parse_args()
     sys.path[:0] = [str(p) for p in arguments.devel.rglob('dist-packages')]
@@ -332,6 +356,8 @@ def main():
         if arguments.case == 'services':
             import services
             services.run(arguments, work)
+        elif arguments.case == 'faults':
+            play_faults(arguments, work)
         else:
             play_and_check(arguments, work, from_file=arguments.case == 'rig')
     finally:

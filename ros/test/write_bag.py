@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Writes a ROS 1 bag of a recording in EuRoC layout: images, CameraInfo, and static transforms of the cameras.
 
-    write_bag.py DATA BAG [--compressed] [--seconds S] [--shift S]
+    write_bag.py DATA BAG [--compressed] [--seconds S] [--shift S] [--faults]
 
 Topics: /camN/image_raw (mono8) or /camN/image_raw/compressed, /camN/camera_info, /tf_static with base_link -> camN_optical,
 which is T_body_cam of the recording. --shift moves all stamps, so that two bags can be played one after the other.
+--faults: images of camera 1 arrive 30 ms late, every third of its second second is missing, it is black in the fourth,
+and all cameras are black from 5 to 6.5 s.
 """
 import argparse
 import csv
@@ -64,16 +66,24 @@ def info_of(sensor, camera):
     return out
 
 
-def image_of(path, compressed):
-    if compressed:
+def is_missing(camera, number, seconds):
+    return camera == 1 and 1 <= seconds < 2 and number % 3 == 0
+
+
+def is_black(camera, seconds):
+    return 5 <= seconds < 6.5 or camera == 1 and 3 <= seconds < 4
+
+
+def image_of(path, compressed, black):
+    if compressed and not black:
         out = CompressedImage()
         out.format = 'jpeg' if path.suffix in ('.jpg', '.jpeg') else 'png'
         out.data = path.read_bytes()
         return out
-    grey = np.asarray(Picture.open(io.BytesIO(path.read_bytes())).convert('L'))
+    grey = np.asarray(Picture.open(io.BytesIO(path.read_bytes())).convert('L')) * (0 if black else 1)
     out = Image()
     out.height, out.width = grey.shape
-    out.encoding, out.step, out.data = 'mono8', out.width, grey.tobytes()
+    out.encoding, out.step, out.data = 'mono8', out.width, grey.astype(np.uint8).tobytes()
     return out
 
 
@@ -88,6 +98,7 @@ def main():
     parser.add_argument('bag', type=pathlib.Path)
     parser.add_argument('--compressed', action='store_true')
     parser.add_argument('--seconds', type=float, default=1e9)
+    parser.add_argument('--faults', action='store_true')
     parser.add_argument('--shift', type=float, default=0)
     arguments = parser.parse_args()
     folders = sorted((arguments.data / 'mav0').glob('cam[0-9]'))
@@ -102,13 +113,18 @@ def main():
             transform.header.stamp = stamp(first + shift)
         bag.write('/tf_static', static, stamp(first + shift))
         for number, (time_ns, camera, path) in enumerate(images):
+            seconds = (time_ns - first) * 1e-9
+            if arguments.faults and is_missing(camera, number // len(folders), seconds):
+                continue
             time = stamp(time_ns + shift)
-            image, info = image_of(path, arguments.compressed), info_of(sensors[camera], camera)
+            arrival = stamp(time_ns + shift + (30_000_000 if arguments.faults and camera == 1 else 0))
+            image = image_of(path, arguments.compressed, arguments.faults and is_black(camera, seconds))
+            info = info_of(sensors[camera], camera)
             for message in (image, info):
                 message.header.stamp, message.header.frame_id, message.header.seq = time, f'cam{camera}_optical', number
             suffix = '/compressed' if arguments.compressed else ''
-            bag.write(f'/cam{camera}/camera_info', info, time)
-            bag.write(f'/cam{camera}/image_raw{suffix}', image, time)
+            bag.write(f'/cam{camera}/camera_info', info, arrival)
+            bag.write(f'/cam{camera}/image_raw{suffix}', image, arrival)
     print(f'{len(images)} images of {len(folders)} cameras')
 
 

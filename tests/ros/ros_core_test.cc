@@ -284,16 +284,17 @@ TEST(RosParameters, AreChecked) {
 
 TEST(RosParameters, AreDocumented) {
   const std::string page = bslam::support::read_text(BSLAM_SOURCE_DIR "/docs/ros.md");
+  const std::size_t begin = page.find("## Parameters"), end = page.find("## Diagnostics");
+  ASSERT_LT(begin, end);
+  const std::string table = page.substr(begin, end - begin);
   int parameters = 0, rows = 0;
   Parameters defaults;
   Parameters::visit(defaults, [&](const char* name, const auto&, const char* help) {
-    const std::size_t row = page.find("\n| `" + std::string(name) + "` | ");
+    const std::size_t row = table.find("\n| `" + std::string(name) + "` | ");
     ASSERT_NE(row, std::string::npos) << name;
-    EXPECT_NE(page.substr(row, page.find('\n', row + 1) - row).find(help), std::string::npos) << name << ": " << help;
+    EXPECT_NE(table.substr(row, table.find('\n', row + 1) - row).find(help), std::string::npos) << name << ": " << help;
     ++parameters;
   });
-  const std::string table =
-      page.substr(page.find("## Parameters"), page.find("## Diagnostics") - page.find("## Parameters"));
   for (std::size_t at = 0; (at = table.find("\n| `", at)) != std::string::npos; ++at) ++rows;
   EXPECT_EQ(rows, parameters);
 }

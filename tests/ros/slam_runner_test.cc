@@ -33,7 +33,7 @@ struct Published {
   }
   bool wait_for_poses(std::size_t count) {
     std::unique_lock<std::mutex> lock(mutex);
-    return changed.wait_for(lock, std::chrono::seconds(60), [&] { return poses.size() >= count; });
+    return changed.wait_for(lock, std::chrono::seconds(300), [&] { return poses.size() >= count; });
   }
   Outputs outputs() {
     Outputs out;

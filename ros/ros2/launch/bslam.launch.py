@@ -1,4 +1,7 @@
-"""ros2 launch bslam_ros bslam.launch.py rig:=/path/to/rig.yaml image_topics:="['/left/image_raw', '/right/image_raw']" """
+"""Starts the node.
+
+ros2 launch bslam_ros bslam.launch.py rig:=/path/to/rig.yaml image_topics:="['/left/image_raw', '/right/image_raw']"
+"""
 from typing import List
 
 from launch import LaunchDescription
@@ -8,14 +11,15 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 TEXTS = {'rig': '', 'config': '', 'map_file': '', 'base_frame': 'base_link', 'body_frame': ''}
+SWITCHES = ['publish_camera_tf', 'use_sim_time']
 
 
 def generate_launch_description():
     arguments = [DeclareLaunchArgument(name, default_value=default) for name, default in TEXTS.items()]
     arguments.append(DeclareLaunchArgument('image_topics', default_value="['/cam0/image_raw', '/cam1/image_raw']"))
-    arguments.append(DeclareLaunchArgument('use_sim_time', default_value='false'))
+    arguments += [DeclareLaunchArgument(name, default_value='false') for name in SWITCHES]
     parameters = {name: ParameterValue(LaunchConfiguration(name), value_type=str) for name in TEXTS}
     parameters['image_topics'] = ParameterValue(LaunchConfiguration('image_topics'), value_type=List[str])
-    parameters['use_sim_time'] = ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)
+    parameters.update({name: ParameterValue(LaunchConfiguration(name), value_type=bool) for name in SWITCHES})
     node = Node(package='bslam_ros', executable='bslam_node', name='bslam', output='screen', parameters=[parameters])
     return LaunchDescription(arguments + [node])
