@@ -39,7 +39,7 @@ class Decoder {
   std::optional<std::int64_t> next_time();
   // Continues at or before a time, or at the beginning.
   bool seek(std::int64_t time) {
-    ended_ = false;
+    ended_ = damaged_ = false;
     f_.avcodec_flush_buffers(codec_);
     return f_.av_seek_frame(format_, stream_, time, AVSEEK_FLAG_BACKWARD) >= 0;
   }
@@ -61,8 +61,20 @@ class Decoder {
   AVFormatContext* format_ = nullptr;
   AVCodecContext* codec_ = nullptr;
   SwsContext* scaler_ = nullptr;
+  // Images after a damaged one are built on it, up to the next that is complete by itself.
+  void note_damage() {
+#if LIBAVUTIL_VERSION_INT >= AV_VERSION_INT(58, 29, 100)
+    const bool complete = (frame_->flags & AV_FRAME_FLAG_KEY) != 0;
+#else
+    const bool complete = frame_->key_frame != 0;
+#endif
+    const bool wrong = (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
+    damaged_ = wrong || (damaged_ && !complete);
+  }
+
   int stream_ = -1;
   bool ended_ = false;
+  bool damaged_ = false;
 };
 
 std::string Decoder::open(const std::string& path) {
@@ -78,6 +90,8 @@ std::string Decoder::open(const std::string& path) {
   codec_ = f_.avcodec_alloc_context3(codec);
   if (codec_ == nullptr || f_.avcodec_parameters_to_context(codec_, &parameters()) < 0) return "no memory";
   codec_->thread_count = 2;
+  // Otherwise the decoder fills what it cannot decode with other parts of the video.
+  codec_->err_recognition = AV_EF_CRCCHECK | AV_EF_EXPLODE;
   if (f_.avcodec_open2(codec_, codec, nullptr) < 0) return "a codec that cannot be opened";
   for (unsigned k = 0; k < format_->nb_streams; ++k)
     format_->streams[k]->discard = static_cast<int>(k) == stream_ ? AVDISCARD_DEFAULT : AVDISCARD_ALL;
@@ -98,22 +112,24 @@ std::optional<std::int64_t> Decoder::next_image() {
   for (;;) {
     f_.av_frame_unref(frame_);
     const int got = f_.avcodec_receive_frame(codec_, frame_);
-    if (got == 0) return frame_->best_effort_timestamp;
+    if (got == 0) {
+      note_damage();
+      return frame_->best_effort_timestamp;
+    }
     if (got == AVERROR_EOF || ended_) return std::nullopt;
-    // More input is wanted, or a damaged image is left out.
+    if (got != AVERROR(EAGAIN)) damaged_ = true;  // else more input is wanted
     int status = 0;
     while ((status = f_.av_read_frame(format_, packet_)) >= 0 && packet_->stream_index != stream_)
       f_.av_packet_unref(packet_);
     ended_ = status < 0;
-    f_.avcodec_send_packet(codec_, ended_ ? nullptr : packet_);
+    const int sent = f_.avcodec_send_packet(codec_, ended_ ? nullptr : packet_);
+    if (sent < 0 && sent != AVERROR_EOF) damaged_ = true;
     f_.av_packet_unref(packet_);
   }
 }
 
 std::optional<VideoImage> Decoder::grey() {
-  // The decoder fills what it could not decode with other parts of the video.
-  if ((frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0) return std::nullopt;
-  if (frame_->width < 1 || frame_->height < 1 || frame_->width > kMaxSidePx || frame_->height > kMaxSidePx)
+  if (damaged_ || frame_->width < 1 || frame_->height < 1 || frame_->width > kMaxSidePx || frame_->height > kMaxSidePx)
     return std::nullopt;
   scaler_ =
       f_.sws_getCachedContext(scaler_, frame_->width, frame_->height, static_cast<AVPixelFormat>(frame_->format),
