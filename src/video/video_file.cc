@@ -45,6 +45,7 @@ class Decoder {
   }
   // Decodes the next image and returns its time; nullopt at the end or after a permanent error.
   std::optional<std::int64_t> next_image();
+  void send_packet();
   // The image that was decoded last; nullopt if it is damaged or its size is impossible.
   std::optional<VideoImage> grey();
 
@@ -68,6 +69,7 @@ class Decoder {
 #else
     const bool complete = frame_->key_frame != 0;
 #endif
+    // The decoder fills what it cannot decode with other parts of the video, and says so.
     const bool wrong = (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
     damaged_ = wrong || (damaged_ && !complete);
   }
@@ -90,8 +92,7 @@ std::string Decoder::open(const std::string& path) {
   codec_ = f_.avcodec_alloc_context3(codec);
   if (codec_ == nullptr || f_.avcodec_parameters_to_context(codec_, &parameters()) < 0) return "no memory";
   codec_->thread_count = 2;
-  // Otherwise the decoder fills what it cannot decode with other parts of the video.
-  codec_->err_recognition = AV_EF_CRCCHECK | AV_EF_EXPLODE;
+  codec_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM;
   if (f_.avcodec_open2(codec_, codec, nullptr) < 0) return "a codec that cannot be opened";
   for (unsigned k = 0; k < format_->nb_streams; ++k)
     format_->streams[k]->discard = static_cast<int>(k) == stream_ ? AVDISCARD_DEFAULT : AVDISCARD_ALL;
@@ -108,6 +109,24 @@ std::optional<std::int64_t> Decoder::next_time() {
   return std::nullopt;
 }
 
+// Gives the decoder the next packet of the video, or the end.
+void Decoder::send_packet() {
+  constexpr int kTries = 100;
+  int status = 0;
+  while ((status = f_.av_read_frame(format_, packet_)) >= 0 && packet_->stream_index != stream_)
+    f_.av_packet_unref(packet_);
+  ended_ = status < 0;
+  int sent = AVERROR(EAGAIN);
+  // After an error the decoder may first have to give what it has, which is damaged.
+  for (int k = 0; k < kTries && sent == AVERROR(EAGAIN); ++k) {
+    sent = f_.avcodec_send_packet(codec_, ended_ ? nullptr : packet_);
+    if (sent != AVERROR(EAGAIN)) break;
+    f_.avcodec_receive_frame(codec_, frame_);
+  }
+  if (sent < 0 && sent != AVERROR_EOF) damaged_ = true;
+  f_.av_packet_unref(packet_);
+}
+
 std::optional<std::int64_t> Decoder::next_image() {
   for (;;) {
     f_.av_frame_unref(frame_);
@@ -118,13 +137,7 @@ std::optional<std::int64_t> Decoder::next_image() {
     }
     if (got == AVERROR_EOF || ended_) return std::nullopt;
     if (got != AVERROR(EAGAIN)) damaged_ = true;  // else more input is wanted
-    int status = 0;
-    while ((status = f_.av_read_frame(format_, packet_)) >= 0 && packet_->stream_index != stream_)
-      f_.av_packet_unref(packet_);
-    ended_ = status < 0;
-    const int sent = f_.avcodec_send_packet(codec_, ended_ ? nullptr : packet_);
-    if (sent < 0 && sent != AVERROR_EOF) damaged_ = true;
-    f_.av_packet_unref(packet_);
+    send_packet();
   }
 }
 
@@ -170,6 +183,9 @@ class FfmpegVideo : public VideoFile {
     return static_cast<std::size_t>(after - stamps_.begin());
   }
   bool decode_up_to(std::size_t index);
+  Error damaged_image(std::size_t index) const {
+    return {path_.string(), fmt::format("image {}", index), "an image that cannot be decoded", "a complete image"};
+  }
 
   std::filesystem::path path_;
   std::mutex mutex_;
@@ -177,7 +193,9 @@ class FfmpegVideo : public VideoFile {
   std::vector<std::int64_t> stamps_;  // in units of the file, increasing
   std::vector<TimeNs> times_;
   std::vector<std::string> warnings_;
-  std::size_t next_ = 0;  // number of the image after the one that was decoded last
+  std::vector<bool> damaged_;  // images that could not be decoded
+  bool after_seek_ = false;    // nothing was decoded since then
+  std::size_t next_ = 0;       // number of the image after the one that was decoded last
   std::deque<std::pair<std::size_t, VideoImage>> cache_;
 };
 
@@ -200,6 +218,7 @@ Status FfmpegVideo::prepare() {
   if (stamps_.empty()) return Error{path_.string(), "", "no images with times", "a video"};
   const TimeNs first = decoder_.nanoseconds(stamps_.front());
   for (const std::int64_t time : stamps_) times_.push_back(decoder_.nanoseconds(time) - first);
+  damaged_.assign(stamps_.size(), false);
   if (!decoder_.seek(stamps_.front()))
     return Error{path_.string(), "", "a video that cannot be read again from the start", "a file"};
   return {};
@@ -212,8 +231,11 @@ bool FfmpegVideo::decode_up_to(std::size_t index) {
     if (!time) return false;
     const auto number = index_of(*time);
     if (!number) continue;
+    for (std::size_t k = next_; !after_seek_ && k < *number; ++k) damaged_[k] = true;
+    after_seek_ = false;
     next_ = *number + 1;
     auto image = decoder_.grey();
+    damaged_[*number] = !image.has_value();
     if (!image) continue;
     cache_.emplace_back(*number, *std::move(image));
     if (cache_.size() > kCachedImages) cache_.pop_front();
@@ -227,12 +249,14 @@ Result<VideoImage> FfmpegVideo::read(std::size_t index) {
   if (const auto found = cached(); found != cache_.end()) return found->second;
   if (index < next_ || index > next_ + kFarAhead) {
     cache_.clear();
+    if (damaged_.at(index)) return damaged_image(index);
     decoder_.seek(stamps_.at(index));
+    after_seek_ = true;
     next_ = 0;
   }
   decode_up_to(index);
   if (const auto found = cached(); found != cache_.end()) return found->second;
-  return Error{path_.string(), fmt::format("image {}", index), "an image that cannot be decoded", "a complete image"};
+  return damaged_image(index);
 }
 
 }  // namespace
