@@ -39,12 +39,13 @@ class Decoder {
   std::optional<std::int64_t> next_time();
   // Continues at or before a time, or at the beginning.
   bool seek(std::int64_t time) {
-    ended_ = false;
+    ended_ = damaged_ = false;
     f_.avcodec_flush_buffers(codec_);
     return f_.av_seek_frame(format_, stream_, time, AVSEEK_FLAG_BACKWARD) >= 0;
   }
   // Decodes the next image and returns its time; nullopt at the end or after a permanent error.
   std::optional<std::int64_t> next_image();
+  void send_packet();
   // The image that was decoded last; nullopt if it is damaged or its size is impossible.
   std::optional<VideoImage> grey();
 
@@ -61,8 +62,21 @@ class Decoder {
   AVFormatContext* format_ = nullptr;
   AVCodecContext* codec_ = nullptr;
   SwsContext* scaler_ = nullptr;
+  // Images after a damaged one are built on it, up to the next that is complete by itself.
+  void note_damage() {
+#if LIBAVUTIL_VERSION_INT >= AV_VERSION_INT(58, 29, 100)
+    const bool complete = (frame_->flags & AV_FRAME_FLAG_KEY) != 0;
+#else
+    const bool complete = frame_->key_frame != 0;
+#endif
+    // The decoder fills what it cannot decode with other parts of the video, and says so.
+    const bool wrong = (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
+    damaged_ = wrong || (damaged_ && !complete);
+  }
+
   int stream_ = -1;
   bool ended_ = false;
+  bool damaged_ = false;
 };
 
 std::string Decoder::open(const std::string& path) {
@@ -78,6 +92,7 @@ std::string Decoder::open(const std::string& path) {
   codec_ = f_.avcodec_alloc_context3(codec);
   if (codec_ == nullptr || f_.avcodec_parameters_to_context(codec_, &parameters()) < 0) return "no memory";
   codec_->thread_count = 2;
+  codec_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM;
   if (f_.avcodec_open2(codec_, codec, nullptr) < 0) return "a codec that cannot be opened";
   for (unsigned k = 0; k < format_->nb_streams; ++k)
     format_->streams[k]->discard = static_cast<int>(k) == stream_ ? AVDISCARD_DEFAULT : AVDISCARD_ALL;
@@ -94,26 +109,40 @@ std::optional<std::int64_t> Decoder::next_time() {
   return std::nullopt;
 }
 
+// Gives the decoder the next packet of the video, or the end.
+void Decoder::send_packet() {
+  constexpr int kTries = 100;
+  int status = 0;
+  while ((status = f_.av_read_frame(format_, packet_)) >= 0 && packet_->stream_index != stream_)
+    f_.av_packet_unref(packet_);
+  ended_ = status < 0;
+  int sent = AVERROR(EAGAIN);
+  // After an error the decoder may first have to give what it has, which is damaged.
+  for (int k = 0; k < kTries && sent == AVERROR(EAGAIN); ++k) {
+    sent = f_.avcodec_send_packet(codec_, ended_ ? nullptr : packet_);
+    if (sent != AVERROR(EAGAIN)) break;
+    f_.avcodec_receive_frame(codec_, frame_);
+  }
+  if (sent < 0 && sent != AVERROR_EOF) damaged_ = true;
+  f_.av_packet_unref(packet_);
+}
+
 std::optional<std::int64_t> Decoder::next_image() {
   for (;;) {
     f_.av_frame_unref(frame_);
     const int got = f_.avcodec_receive_frame(codec_, frame_);
-    if (got == 0) return frame_->best_effort_timestamp;
+    if (got == 0) {
+      note_damage();
+      return frame_->best_effort_timestamp;
+    }
     if (got == AVERROR_EOF || ended_) return std::nullopt;
-    // More input is wanted, or a damaged image is left out.
-    int status = 0;
-    while ((status = f_.av_read_frame(format_, packet_)) >= 0 && packet_->stream_index != stream_)
-      f_.av_packet_unref(packet_);
-    ended_ = status < 0;
-    f_.avcodec_send_packet(codec_, ended_ ? nullptr : packet_);
-    f_.av_packet_unref(packet_);
+    if (got != AVERROR(EAGAIN)) damaged_ = true;  // else more input is wanted
+    send_packet();
   }
 }
 
 std::optional<VideoImage> Decoder::grey() {
-  // The decoder fills what it could not decode with other parts of the video.
-  if ((frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0) return std::nullopt;
-  if (frame_->width < 1 || frame_->height < 1 || frame_->width > kMaxSidePx || frame_->height > kMaxSidePx)
+  if (damaged_ || frame_->width < 1 || frame_->height < 1 || frame_->width > kMaxSidePx || frame_->height > kMaxSidePx)
     return std::nullopt;
   scaler_ =
       f_.sws_getCachedContext(scaler_, frame_->width, frame_->height, static_cast<AVPixelFormat>(frame_->format),
@@ -154,6 +183,9 @@ class FfmpegVideo : public VideoFile {
     return static_cast<std::size_t>(after - stamps_.begin());
   }
   bool decode_up_to(std::size_t index);
+  Error damaged_image(std::size_t index) const {
+    return {path_.string(), fmt::format("image {}", index), "an image that cannot be decoded", "a complete image"};
+  }
 
   std::filesystem::path path_;
   std::mutex mutex_;
@@ -161,7 +193,9 @@ class FfmpegVideo : public VideoFile {
   std::vector<std::int64_t> stamps_;  // in units of the file, increasing
   std::vector<TimeNs> times_;
   std::vector<std::string> warnings_;
-  std::size_t next_ = 0;  // number of the image after the one that was decoded last
+  std::vector<bool> damaged_;  // images that could not be decoded
+  bool after_seek_ = false;    // nothing was decoded since then
+  std::size_t next_ = 0;       // number of the image after the one that was decoded last
   std::deque<std::pair<std::size_t, VideoImage>> cache_;
 };
 
@@ -184,6 +218,7 @@ Status FfmpegVideo::prepare() {
   if (stamps_.empty()) return Error{path_.string(), "", "no images with times", "a video"};
   const TimeNs first = decoder_.nanoseconds(stamps_.front());
   for (const std::int64_t time : stamps_) times_.push_back(decoder_.nanoseconds(time) - first);
+  damaged_.assign(stamps_.size(), false);
   if (!decoder_.seek(stamps_.front()))
     return Error{path_.string(), "", "a video that cannot be read again from the start", "a file"};
   return {};
@@ -196,8 +231,11 @@ bool FfmpegVideo::decode_up_to(std::size_t index) {
     if (!time) return false;
     const auto number = index_of(*time);
     if (!number) continue;
+    for (std::size_t k = next_; !after_seek_ && k < *number; ++k) damaged_[k] = true;
+    after_seek_ = false;
     next_ = *number + 1;
     auto image = decoder_.grey();
+    damaged_[*number] = !image.has_value();
     if (!image) continue;
     cache_.emplace_back(*number, *std::move(image));
     if (cache_.size() > kCachedImages) cache_.pop_front();
@@ -211,12 +249,14 @@ Result<VideoImage> FfmpegVideo::read(std::size_t index) {
   if (const auto found = cached(); found != cache_.end()) return found->second;
   if (index < next_ || index > next_ + kFarAhead) {
     cache_.clear();
+    if (damaged_.at(index)) return damaged_image(index);
     decoder_.seek(stamps_.at(index));
+    after_seek_ = true;
     next_ = 0;
   }
   decode_up_to(index);
   if (const auto found = cached(); found != cache_.end()) return found->second;
-  return Error{path_.string(), fmt::format("image {}", index), "an image that cannot be decoded", "a complete image"};
+  return damaged_image(index);
 }
 
 }  // namespace
