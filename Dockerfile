@@ -8,7 +8,7 @@ WORKDIR /src
 RUN apt-get update -q && scripts/build_debs
 
 FROM debian:12-slim
-COPY --from=build /src/build/debs/bslam_*.deb /tmp/
+COPY --from=build /src/build/packages/bslam_*.deb /tmp/
 RUN apt-get update -q && apt-get install -y -q --no-install-recommends /tmp/bslam_*.deb && \
     rm -rf /tmp/bslam_*.deb /var/lib/apt/lists/*
 WORKDIR /data

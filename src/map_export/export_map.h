@@ -33,7 +33,7 @@ struct ExportRequest {
   std::filesystem::path data_folder;       // names of images are relative to it
   bool undistort = false;                  // kColmap, kNerfstudio: write undistorted images and pinhole cameras
   std::optional<std::size_t> submap;       // default: the one with most landmarks
-  std::optional<double> resolution;        // kOctomap, kNav2: side of a cell; default: default_resolution
+  std::optional<double> resolution;        // kOctomap, kNav2: side of a cell; default: default_resolution, >= 5 cm
   std::optional<double> max_range;         // kOctomap, kNav2: default: ten times the median depth
   HeightBand band;                         // kNav2
 };

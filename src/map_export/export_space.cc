@@ -1,6 +1,8 @@
 // Exports of free and occupied space: OctoMap and nav2.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "base/atomic_file.h"
 #include "evaluation/trajectory_file.h"
 #include "map_export/map_exporter.h"
@@ -11,9 +13,10 @@ namespace bslam::map_export {
 namespace {
 
 CarvingOptions carving_options(const Exporter& exporter) {
-  constexpr double kRangePerDepth = 10;
+  constexpr double kRangePerDepth = 10, kLeastCell_m = 0.05;  // the usual cell of maps to drive by
   const double depth = median_depth(exporter.selection);
-  const double resolution = exporter.request.resolution.value_or(default_resolution(depth));
+  const double least = exporter.map().scale() == map::Scale::kMetric ? kLeastCell_m : 0.0;
+  const double resolution = exporter.request.resolution.value_or(std::max(least, default_resolution(depth)));
   return {resolution, exporter.request.max_range.value_or(kRangePerDepth * (depth > 0 ? depth : 1.0))};
 }
 

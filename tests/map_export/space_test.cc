@@ -12,7 +12,7 @@
 namespace bslam::map_export {
 namespace {
 
-// Scans of a room of 6 x 4 m around the origin, walls from -1 to 1 m, from several places in it.
+// Scans of a room of 6.1 x 4.1 m around the origin, walls from -1 to 1 m, from several places in it.
 std::vector<Scan> scans_of_room() {
   std::vector<Scan> scans;
   for (int i = 0; i < 12; ++i) {
@@ -20,8 +20,8 @@ std::vector<Scan> scans_of_room() {
     for (int a = 0; a < 360; ++a) {
       const double angle = (a + 0.5) * std::numbers::pi / 180;
       const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-      const double to_x = ((direction.x() > 0 ? 3.0 : -3.0) - scan.origin.x()) / direction.x();
-      const double to_y = ((direction.y() > 0 ? 2.0 : -2.0) - scan.origin.y()) / direction.y();
+      const double to_x = ((direction.x() > 0 ? 3.05 : -3.05) - scan.origin.x()) / direction.x();
+      const double to_y = ((direction.y() > 0 ? 2.05 : -2.05) - scan.origin.y()) / direction.y();
       const Eigen::Vector2d wall = scan.origin.head<2>() + std::min(to_x, to_y) * direction;
       for (const double z : {-0.8, 0.0, 0.8}) scan.rays.push_back({{wall.x(), wall.y(), z}, 0.01});
     }
@@ -65,8 +65,8 @@ TEST(OctreeExport, IsReadByOctomapWithFreeSpaceWithinWalls) {
     return node ? static_cast<int>(tree.isNodeOccupied(node)) : -1;
   };
   for (const float x : {-2.0f, 0.0f, 2.0f}) EXPECT_EQ(occupied(x, 0.05f, 0), 0) << x;
-  EXPECT_EQ(occupied(3.01f, 0.05f, 0), 1);
-  EXPECT_EQ(occupied(-3.01f, 0.05f, 0), 1);
+  EXPECT_EQ(occupied(3.05f, 0.05f, 0), 1);
+  EXPECT_EQ(occupied(-3.05f, 0.05f, 0), 1);
   EXPECT_EQ(occupied(5, 0, 0), -1);
   std::size_t leaves = 0;
   for (auto leaf = tree.begin_leafs(); leaf != tree.end_leafs(); ++leaf) ++leaves;
@@ -92,7 +92,7 @@ TEST(OccupancyGrid, HasFreeSpaceWithinWalls) {
   for (const Cell cell : grid.cells) walls += cell == Cell::kOccupied;
   EXPECT_GT(walls, 180);  // of 200 cells along the walls
   EXPECT_LT(walls, 420);
-  EXPECT_EQ(cell_at(grid, 3.15, 0), Cell::kUnknown);
+  EXPECT_EQ(cell_at(grid, 3.25, 0), Cell::kUnknown);
 }
 
 // A landmark above the band is no obstacle, and the ray to it is free only as long as it is within the band.
