@@ -89,6 +89,8 @@ export class LiveImages {
       this.panels.push(panel);
       this.grid.append(panel.element);
     }
+    const n = this.panels.length;  // in one row, or in two nearly full ones
+    this.grid.style.setProperty('--columns', String(n <= 4 ? n : Math.ceil(n / 2)));
     await Promise.all(frame.cameras.map((camera, c) => this.panels[c].show(camera, rig[c]?.name ?? `camera ${c}`, frame.direct)));
   }
 }
