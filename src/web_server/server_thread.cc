@@ -11,7 +11,7 @@ namespace bslam::web_server {
 // On Linux the nice value applies to the calling thread only.
 void lower_priority() {
 #if defined(__linux__)
-  constexpr int kNice = 19;
+  constexpr int kNice = 10;
   [[maybe_unused]] const int failed = setpriority(PRIO_PROCESS, 0, kNice);
 #endif
 }

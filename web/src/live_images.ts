@@ -22,7 +22,7 @@ class Panel {
 
   constructor(index: number) { this.swatch.style.setProperty('--swatch', `var(--${cameraColour(index)})`); }
 
-  async show(camera: LiveCamera, name: string) {
+  async show(camera: LiveCamera, name: string, direct: boolean) {
     if (camera.jpeg !== null) this.size = [camera.width, camera.height];
     const image = camera.jpeg === null ? null : await createImageBitmap(new Blob([bytesOf(camera.jpeg)], { type: 'image/jpeg' }));
     this.draw(camera, image);
@@ -31,7 +31,8 @@ class Panel {
     this.name.textContent = name;
     this.state.className = `camera-state ${camera.state}`;
     this.state.textContent = camera.reason ? `${camera.state}: ${camera.reason}` : camera.state;
-    morph(this.counts, [`${count(camera.tracked)} tracked, ${count(camera.outliers)} outliers, ${count(camera.unmatched)} not matched`]);
+    morph(this.counts, [`${count(camera.tracked)} tracked, ${count(camera.outliers)} outliers, ` +
+      (direct ? 'tracked directly' : `${count(camera.unmatched)} not matched`)]);
     this.canvas.setAttribute('aria-label', image ? `Image of ${name}` : `${name} has no image`);
   }
 
@@ -88,6 +89,8 @@ export class LiveImages {
       this.panels.push(panel);
       this.grid.append(panel.element);
     }
-    await Promise.all(frame.cameras.map((camera, c) => this.panels[c].show(camera, rig[c]?.name ?? `camera ${c}`)));
+    const n = this.panels.length;  // in one row, or in two nearly full ones
+    this.grid.style.setProperty('--columns', String(n <= 4 ? n : Math.ceil(n / 2)));
+    await Promise.all(frame.cameras.map((camera, c) => this.panels[c].show(camera, rig[c]?.name ?? `camera ${c}`, frame.direct)));
   }
 }

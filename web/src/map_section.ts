@@ -52,10 +52,12 @@ export class MapSection {
       this.run = newer;
       if (!drawn && newer.submaps.length) body.replaceChildren(this.elements());
       if (!newer.submaps.length) body.replaceChildren(h('p', {}, newer.live ? 'There is no map yet.' : 'The run has no map: no frame could be tracked.'));
+      const sized = drawn;
       drawn = newer.submaps.length > 0;
       if (!drawn || !this.view) return;
       this.updateControls();
-      requestAnimationFrame(() => this.fill());
+      if (sized) this.fill();
+      else requestAnimationFrame(() => this.fill());  // the canvas gets its size before
     };
     update(run);
     return { update, remove: () => {} };

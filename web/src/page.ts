@@ -83,9 +83,9 @@ function subtitle(run: Run): string {
   return `bslam ${s.version}, camera${s.cameras_used.length === 1 ? '' : 's'} ${s.cameras_used.join(', ')}, mode ${s.mode}, seed ${s.seed}`;
 }
 
-function footer(version: string): HTMLElement {
+function footer(version: string, live: boolean): HTMLElement {
   const licences = document.getElementById('licences') as HTMLTemplateElement;
-  return h('footer', {}, h('p', {}, `Written by bslam ${version}. This file is complete: it loads nothing from elsewhere.`),
+  return h('footer', {}, h('p', {}, live ? `Shown by bslam ${version}.` : `Written by bslam ${version}. This file is complete: it loads nothing from elsewhere.`),
     h('details', {}, h('summary', {}, 'Licences of the libraries in this page'), h('pre', {}, licences.content.textContent ?? '')));
 }
 
@@ -128,7 +128,7 @@ export class Page {
     for (const section of this.sections) this.showSection(section, run, shown.includes(section));
     if (run.summary.version !== this.version) {
       this.root.querySelector('footer')?.remove();
-      this.root.append(footer(this.version = run.summary.version));
+      this.root.append(footer(this.version = run.summary.version, this.lead !== null));
     }
   }
 
