@@ -129,7 +129,7 @@ TEST_F(OwnRigFile, TakesExactlyOneFormOfThePose) {
   EXPECT_EQ(key_of(position + quaternion + "yaw_pitch_roll_deg: [0, 0, 0]\n"), "cameras[0].quaternion_xyzw");
   EXPECT_EQ(key_of(position + "quaternion_xyzw: [0, 0, 0, 2]\n"), "cameras[0].quaternion_xyzw");
   EXPECT_EQ(key_of(position + "yaw_pitch_roll_deg: [0, 0]\n"), "cameras[0].yaw_pitch_roll_deg");
-  EXPECT_EQ(key_of(""), "cameras[0].T_body_cam");
+  EXPECT_EQ(key_of("\n"), "cameras[0].T_body_cam");
 }
 
 TEST_F(OwnRigFile, AreJoinedByTheirBodyFrame) {

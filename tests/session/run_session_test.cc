@@ -97,11 +97,11 @@ TEST_F(Session, WritesAllItsFiles) {
   EXPECT_FALSE(write_outputs(*result, o.config, out).ok());  // the caller must create the folder
   fs::create_directory(out);
   ASSERT_TRUE(write_outputs(*result, o.config, out).ok());
-  for (const char* name :
-       {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg", "run.svg"}) {
+  for (const char* name : {"trajectory.tum", "trajectory_live.tum", "covariance_live.csv", "summary.json",
+                           "config.yaml", "trajectory.svg", "run.svg"}) {
     EXPECT_GT(fs::file_size(out / name), 50u) << name;
   }
-  EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 6);  // and no partially written file
+  EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 7);  // and no partially written file
 }
 
 // The text of the element of the page with the data.
@@ -121,7 +121,7 @@ TEST_F(Session, WritesTheReportIfItIsAskedFor) {
   const fs::path out = folder() / "report";
   fs::create_directory(out);
   ASSERT_TRUE(write_outputs(*result, o.config, out, ReportSource{data, "bslam run '" + hostile + "'"}).ok());
-  EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 7);
+  EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 8);
   std::ostringstream text;
   text << std::ifstream(out / "report.html").rdbuf();
   EXPECT_EQ(text.str().find("<script>alert"), std::string::npos);
