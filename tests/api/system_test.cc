@@ -111,8 +111,16 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   EXPECT_EQ(resumed->map().num_landmarks(), landmarks.size());
   CameraCalibration other = TexturedWall::calibration(1);
   other.intrinsics[0] *= 1.1;
-  EXPECT_FALSE(System::create(Rig::make({TexturedWall::calibration(0), other}).value(), sequential(), {.map = file}));
-  EXPECT_FALSE(System::create(TexturedWall::rig().subset({0}).value(), sequential(), {.map = file}));
+  const Rig another = Rig::make({TexturedWall::calibration(0), other}).value();
+  const auto with_another = System::create(another, sequential(), {.map = file});
+  ASSERT_TRUE(with_another) << with_another.error().message();
+  EXPECT_EQ(with_another->map().rig().size(), 4u);  // the cameras of both rigs
+  const auto with_one = System::create(TexturedWall::rig().subset({0}).value(), sequential(), {.map = file});
+  ASSERT_TRUE(with_one) << with_one.error().message();
+  EXPECT_EQ(with_one->map().rig().size(), 2u);
+  Config refined = sequential();
+  ASSERT_TRUE(refined.set("calibration.refine", "true"));
+  EXPECT_FALSE(System::create(another, refined, {.map = file}));
   Config pyramid = sequential();
   ASSERT_TRUE(pyramid.set("features.levels", "5"));
   EXPECT_FALSE(System::create(TexturedWall::rig(), pyramid, {.map = file}));
