@@ -46,6 +46,7 @@ std::string version_text() {
   text += fmt::format("CLI11 {}\n", CLI11_VERSION);
   text += fmt::format("libdeflate {}\nLZ4 {}\nzstd {}\nSQLite {}\n", LIBDEFLATE_VERSION_STRING, LZ4_VERSION_STRING,
                       ZSTD_VERSION_STRING, SQLITE_VERSION);
+  text += fmt::format("OctoMap {}\n", BSLAM_OCTOMAP_VERSION);
   const std::string ffmpeg = video::ffmpeg_version();
   return text + (ffmpeg.empty() ? "without FFmpeg" : "libavformat " + ffmpeg);
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <opencv2/imgproc.hpp>
 #include <string_view>
 
 #include "base/atomic_file.h"
@@ -57,16 +58,52 @@ cv::Mat colours_of_jpeg(std::string_view bytes) {
   return failed == 0 || tjGetErrorCode(decoder.get()) == TJERR_WARNING ? out : cv::Mat();
 }
 
+cv::Mat colours_of_file(std::string_view bytes) {
+  if (bytes.starts_with("\x89PNG")) return colours_of_png(bytes);
+  return bytes.starts_with("\xff\xd8") ? colours_of_jpeg(bytes) : cv::Mat();
+}
+
+// Pixels that read_image has accepted before.
+cv::Mat colours_of_pixels(const image_files::StoredImage& stored) {
+  using enum image_files::PixelLayout;
+  const auto code = stored.layout == kRgb    ? -1
+                    : stored.layout == kBgr  ? cv::COLOR_BGR2RGB
+                    : stored.layout == kRgba ? cv::COLOR_RGBA2RGB
+                                             : cv::COLOR_BGRA2RGB;
+  const int type = stored.layout == kRgb || stored.layout == kBgr ? CV_8UC3 : CV_8UC4;
+  std::string bytes = stored.bytes.substr(stored.begin, stored.size);
+  const cv::Mat pixels(stored.height, stored.width, type, bytes.data(), stored.step);
+  if (code < 0) return pixels.clone();
+  cv::Mat out;
+  cv::cvtColor(pixels, out, code);
+  return out;
+}
+
+// The colours of an image in a recording; empty if it has none, or is read as grey values.
+cv::Mat colours_of_stored(const image_files::StoredImage& stored) {
+  using enum image_files::PixelLayout;
+  const std::string_view bytes = std::string_view(stored.bytes).substr(stored.begin, stored.size);
+  if (stored.layout == kFile) return colours_of_file(bytes);
+  const bool channels =
+      stored.layout == kRgb || stored.layout == kBgr || stored.layout == kRgba || stored.layout == kBgra;
+  return channels && stored.bytes_per_value == 1 ? colours_of_pixels(stored) : cv::Mat();
+}
+
 }  // namespace
 
-Result<cv::Mat> read_colours(const std::filesystem::path& file, const PixelFormat& format) {
-  const auto bytes = read_file(file, kMaxImageBytes);
-  if (!bytes) return bytes.error();
-  auto grey = read_image(file, format);  // which also checks that the file is complete
+Result<cv::Mat> read_colours(const image_files::ImageFile& image, const PixelFormat& format) {
+  const auto grey = read_image(image, format);  // which also checks that the image is complete
   if (!grey) return grey.error();
   cv::Mat colours;
-  if (bytes->starts_with("\x89PNG")) colours = colours_of_png(*bytes);
-  if (bytes->starts_with("\xff\xd8")) colours = colours_of_jpeg(*bytes);
+  if (image.store) {
+    const auto stored = image.store->read(image.entry);
+    if (!stored) return stored.error();
+    colours = colours_of_stored(*stored);
+  } else {
+    const auto bytes = read_file(image.path, kMaxImageBytes);
+    if (!bytes) return bytes.error();
+    colours = colours_of_file(*bytes);
+  }
   return colours.cols == grey->width() && colours.rows == grey->height() ? colours : from_grey(*grey);
 }
 

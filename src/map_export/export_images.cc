@@ -47,8 +47,9 @@ std::vector<std::string> nerfstudio_paths(const Exporter& exporter) {
   std::vector<std::string> paths;
   const fs::path out = fs::absolute(exporter.request.out).lexically_normal();
   for (const MapImage& image : exporter.images.images()) {
-    const bool in_folder = image.file.empty() || exporter.cameras.undistorted();
-    const fs::path file = in_folder ? fs::path() : fs::absolute(image.file).lexically_normal();
+    const bool is_file = image.recorded && !image.recorded->path.empty();
+    const bool in_folder = !is_file || exporter.cameras.undistorted();
+    const fs::path file = in_folder ? fs::path() : fs::absolute(image.recorded->path).lexically_normal();
     paths.push_back(in_folder ? "images/" + image.name : file.lexically_relative(out).string());
   }
   return paths;
@@ -69,7 +70,8 @@ Status write_undistorted(Exporter& exporter, const AtomicFolder& folder) {
   exporter.images.set_extensions(".png");
   for (const MapImage& image : exporter.images.images()) {
     const camera::Camera& camera = exporter.map().rig().camera(image.camera);
-    const auto colours = image_decoding::read_colours(image.file, image.format);
+    const Result<cv::Mat> colours =
+        image.recorded ? image_decoding::read_colours(*image.recorded, image.format) : Result<cv::Mat>(Error{});
     if (!colours || colours->cols != camera.width || colours->rows != camera.height) {
       ++unread;
       continue;

@@ -61,6 +61,10 @@ Status check_images(Exporter& exporter) {
   if (found < all)
     exporter.note(fmt::format("{} of {} images of the map are not in {}; they are named CAMERA/STAMP.png", all - found,
                               all, exporter.request.data_folder.string()));
+  const auto in_recording = [](const MapImage& image) { return image.recorded && image.recorded->path.empty(); };
+  if (!exporter.request.undistort && std::ranges::any_of(exporter.images.images(), in_recording))
+    exporter.note(
+        "the images are inside of a recording, and are named CAMERA/STAMP.png; --undistort writes them as files");
   return {};
 }
 

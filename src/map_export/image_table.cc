@@ -9,7 +9,7 @@ namespace bslam::map_export {
 namespace {
 
 struct RecordedImage {
-  const std::filesystem::path* file;
+  const image_files::ImageFile* image;
   std::size_t camera;  // of the recording
 };
 
@@ -42,7 +42,7 @@ class RecordedImages {
     const TimeNs offset_ns = data.rig.camera(camera).time_offset_ns;
     for (const dataset::FrameEntry& frame : data.frames) {
       const auto& image = frame.images[camera];
-      if (image && !image->path.empty()) images[image->time_ns - offset_ns] = {&image->path, camera};
+      if (image) images[image->time_ns - offset_ns] = {&*image, camera};
     }
   }
 
@@ -63,8 +63,9 @@ ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data,
       MapImage image{k, c, fmt::format("{}/{}.png", rig.camera(c).name, stamp_ns), {}, {}};
       const RecordedImage* found = recorded ? recorded->at(c, stamp_ns) : nullptr;
       if (found) {
-        image.name = found->file->lexically_relative(root).string();
-        image.file = *found->file;
+        image.recorded = *found->image;
+        const std::filesystem::path& path = found->image->path;
+        if (!path.empty()) image.name = path.lexically_relative(root).string();
         if (found->camera < data->pixel_formats.size()) image.format = data->pixel_formats[found->camera];
         ++found_;
       }

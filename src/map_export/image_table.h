@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,21 +14,21 @@ namespace bslam::map_export {
 struct MapImage {
   KeyframeId keyframe;
   std::size_t camera = 0;
-  std::string name;            // relative to the folder of the recording: front/1000.jpg
-  std::filesystem::path file;  // empty if it is not known
+  std::string name;                                // relative to the folder of the recording: front/1000.jpg
+  std::optional<image_files::ImageFile> recorded;  // absent if it is not known
   image_decoding::PixelFormat format = {};
 };
 
 class ImageTable {
  public:
   // Lists the present images of all cameras, in order of keyframe and camera. `data` is the recording of the map, or
-  // null: images that are not in it are named CAMERA/STAMP.png, with the time stamp in ns.
+  // null: images that are not files of it are named CAMERA/STAMP.png, with the time stamp in ns.
   ImageTable(const Selection& selection, const dataset::Dataset* data, const std::filesystem::path& root);
 
   const std::vector<MapImage>& images() const { return images_; }
   // Number of the image of a camera of a keyframe; -1 if it is missing.
   int of(KeyframeId k, std::size_t camera) const { return number_[k.index() * cameras_ + camera]; }
-  std::size_t found() const { return found_; }        // number of images with a known file
+  std::size_t found() const { return found_; }        // number of images that are in the recording
   void set_extensions(const std::string& extension);  // of all names, such as ".png"
 
  private:

@@ -46,8 +46,8 @@ LandmarkColours landmark_colours(const Selection& selection, const ImageTable& i
   std::vector<Sum> sums(selection.landmarks.size());
   LandmarkColours result;
   for (const MapImage& image : images.images()) {
-    if (image.file.empty()) continue;
-    const auto colours = image_decoding::read_colours(image.file, image.format);
+    if (!image.recorded) continue;
+    const auto colours = image_decoding::read_colours(*image.recorded, image.format);
     const camera::Camera& camera = selection.map->rig().camera(image.camera);
     if (!colours || colours->cols != camera.width || colours->rows != camera.height || colours->rows < 2) continue;
     add_colours(*colours, selection.map->keyframe(image.keyframe), image.camera, number, sums);

@@ -28,7 +28,7 @@ TEST(ColourImage, ReadsRedGreenBlue) {
   for (const auto& [name, tolerance] : {std::pair("a.png", 0), std::pair("a.jpg", 12)}) {
     const fs::path file = folder.path() / name;
     cv::imwrite(file.string(), written, {cv::IMWRITE_JPEG_QUALITY, 98, cv::IMWRITE_JPEG_CHROMA_QUALITY, 98});
-    const auto read = read_colours(file);
+    const auto read = read_colours({file});
     ASSERT_TRUE(read) << read.error().message();
     const cv::Vec3b in = written.at<cv::Vec3b>(12, 16), out = read->at<cv::Vec3b>(12, 16);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(out[c], in[2 - c], tolerance) << name;
@@ -40,12 +40,49 @@ TEST(ColourImage, GreyImagesHaveEqualChannels) {
   for (const auto& [name, type] :
        {std::pair("a.png", CV_8UC1), std::pair("a.jpg", CV_8UC1), std::pair("b.png", CV_16UC1)}) {
     cv::imwrite((folder.path() / name).string(), gradient(type));
-    const auto read = read_colours(folder.path() / name);
+    const auto read = read_colours({folder.path() / name});
     ASSERT_TRUE(read) << read.error().message();
     const cv::Vec3b out = read->at<cv::Vec3b>(10, 20);
     EXPECT_EQ(out[0], out[1]);
     EXPECT_EQ(out[1], out[2]);
     EXPECT_NEAR(out[0], 100, 3) << name;
+  }
+}
+
+// One image in memory.
+class OneImage : public image_files::ImageStore {
+ public:
+  explicit OneImage(image_files::StoredImage image) : image_(std::move(image)) {}
+  Result<image_files::StoredImage> read(std::int64_t) const override { return image_; }
+  std::string name(std::int64_t) const override { return "image"; }
+  std::string source(std::int64_t) const override { return "source"; }
+  std::string stream(std::int64_t) const override { return "stream"; }
+
+ private:
+  image_files::StoredImage image_;
+};
+
+TEST(ColourImage, OfARecordingHasTheColoursOfItsPixels) {
+  using enum image_files::PixelLayout;
+  for (const auto layout : {kRgb, kBgr, kRgba, kBgra}) {
+    const bool alpha = layout == kRgba || layout == kBgra, reversed = layout == kBgr || layout == kBgra;
+    image_files::StoredImage stored{"skip", 4, 0, layout, 4, 3, alpha ? 18u : 14u};
+    for (int y = 0; y < 3; ++y) {
+      std::string row;
+      for (int x = 0; x < 4; ++x) {
+        const std::string red_green_blue = {static_cast<char>(10 * x), static_cast<char>(20 * y), 99};
+        row += reversed ? std::string(red_green_blue.rbegin(), red_green_blue.rend()) : red_green_blue;
+        if (alpha) row += '\xff';
+      }
+      row.resize(stored.step);
+      stored.bytes += row;
+    }
+    stored.size = stored.bytes.size() - stored.begin;
+    image_files::ImageFile image;
+    image.store = std::make_shared<const OneImage>(stored);
+    const auto read = read_colours(image);
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_EQ(read->at<cv::Vec3b>(2, 3), cv::Vec3b(30, 40, 99));
   }
 }
 
@@ -55,18 +92,18 @@ TEST(ColourImage, DamagedFilesAreErrors) {
   cv::imwrite(file.string(), gradient(CV_8UC3));
   const std::string bytes = support::read_text(file);
   support::write_text(file, bytes.substr(0, bytes.size() / 2));
-  EXPECT_FALSE(read_colours(file));
-  EXPECT_FALSE(read_colours(folder.path() / "missing.png"));
+  EXPECT_FALSE(read_colours({file}));
+  EXPECT_FALSE(read_colours({folder.path() / "missing.png"}));
 }
 
 TEST(ColourImage, WrittenPngsAreReadBack) {
   const support::TemporaryFolder folder;
   const cv::Mat image = gradient(CV_8UC3);
   support::write_text(folder.path() / "a.png", encode_png(image));
-  const cv::Mat read = read_colours(folder.path() / "a.png").value();
+  const cv::Mat read = read_colours({folder.path() / "a.png"}).value();
   EXPECT_EQ(cv::norm(read, image, cv::NORM_INF), 0);
   support::write_text(folder.path() / "b.png", encode_png(gradient(CV_8UC1)));
-  EXPECT_EQ(read_colours(folder.path() / "b.png").value().at<cv::Vec3b>(10, 20)[1], 100);
+  EXPECT_EQ(read_colours({folder.path() / "b.png"}).value().at<cv::Vec3b>(10, 20)[1], 100);
 }
 
 }  // namespace

@@ -216,6 +216,48 @@ TEST_F(MapExportFiles, PathsOfNerfstudioLeadFromItsFolderToTheRecording) {
     EXPECT_TRUE(fs::exists(folder_.path() / "nerf" / frame["file_path"].get<std::string>())) << frame["file_path"];
 }
 
+// The images of a recording in one file, such as a bag: here the files of the folder.
+class StoredFiles : public image_files::ImageStore {
+ public:
+  std::int64_t add(const fs::path& file) {
+    files_.push_back(file);
+    return static_cast<std::int64_t>(files_.size() - 1);
+  }
+  Result<image_files::StoredImage> read(std::int64_t entry) const override {
+    image_files::StoredImage stored{slurp(files_.at(static_cast<std::size_t>(entry)))};
+    stored.size = stored.bytes.size();
+    return stored;
+  }
+  std::string name(std::int64_t) const override { return "image"; }
+  std::string source(std::int64_t) const override { return "bag"; }
+  std::string stream(std::int64_t) const override { return "topic"; }
+
+ private:
+  std::vector<fs::path> files_;
+};
+
+TEST_F(MapExportFiles, ImagesInsideOfARecordingGiveColoursAndUndistortedFiles) {
+  const auto store = std::make_shared<StoredFiles>();
+  for (dataset::FrameEntry& frame : data_.frames)
+    for (auto& image : frame.images) {
+      image->entry = store->add(image->path);
+      image->store = store;
+      image->path.clear();
+    }
+  const auto noted = export_map(map_, request(Format::kPly, "map.ply"));
+  ASSERT_TRUE(noted) << noted.error().message();
+  for (const std::string& note : noted->notes)
+    EXPECT_TRUE(note.find("grey") == note.npos && note.find("could not be read") == note.npos) << note;
+  ExportRequest undistort = request(Format::kColmap, "colmap");
+  undistort.undistort = true;
+  ASSERT_TRUE(export_map(map_, undistort));
+  std::istringstream images(slurp(folder_.path() / "colmap/images.txt"));
+  std::size_t named = 0;
+  for (std::string word; images >> word;)
+    if (word.ends_with(".png")) named += fs::exists(folder_.path() / "colmap/images" / word);
+  EXPECT_EQ(named, ImageTable(selection_, nullptr, {}).images().size());
+}
+
 TEST_F(MapExportFiles, ARecordingWithoutTheImagesIsAnError) {
   for (dataset::FrameEntry& frame : data_.frames)
     for (auto& image : frame.images) image->time_ns += 5'000'000;
