@@ -107,6 +107,16 @@ Result<cv::Mat> read_colours(const image_files::ImageFile& image, const PixelFor
   return colours.cols == grey->width() && colours.rows == grey->height() ? colours : from_grey(*grey);
 }
 
+cv::Vec3f colour_at(const cv::Mat& image, float x, float y) {
+  x = std::clamp(x, 0.0F, static_cast<float>(image.cols - 1));
+  y = std::clamp(y, 0.0F, static_cast<float>(image.rows - 1));
+  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const int x1 = std::min(x0 + 1, image.cols - 1), y1 = std::min(y0 + 1, image.rows - 1);
+  const float u = x - static_cast<float>(x0), v = y - static_cast<float>(y0);
+  const auto at = [&](int column, int row) { return cv::Vec3f(image.at<cv::Vec3b>(row, column)); };
+  return (1 - v) * ((1 - u) * at(x0, y0) + u * at(x1, y0)) + v * ((1 - u) * at(x0, y1) + u * at(x1, y1));
+}
+
 std::string encode_png(const cv::Mat& image) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;

@@ -18,4 +18,8 @@ Result<cv::Mat> read_colours(const image_files::ImageFile& image, const PixelFor
 // Returns a PNG file of an image with one channel or with red, green and blue, 8 bits each.
 std::string encode_png(const cv::Mat& image);
 
+// The colour at a position of an image of CV_8UC3, interpolated between its pixels. Positions outside of the image are
+// moved to its border.
+cv::Vec3f colour_at(const cv::Mat& image, float x, float y);
+
 }  // namespace bslam::image_decoding

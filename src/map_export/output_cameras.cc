@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+
+#include "image_decoding/colour_image.h"
 
 namespace bslam::map_export {
 namespace {
@@ -29,10 +30,24 @@ cv::Mat remap_table(const camera::Camera& from, const camera::Camera& to) {
     for (int x = 0; x < to.width; ++x) {
       const auto pixel = from.project({(x - k.cx) / k.fx, (y - k.cy) / k.fy, 1.0});
       table.at<cv::Vec2f>(y, x) =
-          pixel ? cv::Vec2f(static_cast<float>(pixel->x()), static_cast<float>(pixel->y())) : cv::Vec2f(-9, -9);
+          pixel ? cv::Vec2f(static_cast<float>(pixel->x()), static_cast<float>(pixel->y())) : cv::Vec2f(-1, -1);
     }
   }
   return table;
+}
+
+// cv::remap would do the same, but its archive refers to LAPACK.
+cv::Mat undistorted_image(const cv::Mat& recorded, const cv::Mat& table) {
+  cv::Mat out(table.rows, table.cols, CV_8UC3, cv::Scalar::all(0));
+  const auto right = static_cast<float>(recorded.cols - 1), bottom = static_cast<float>(recorded.rows - 1);
+  for (int y = 0; y < out.rows; ++y) {
+    for (int x = 0; x < out.cols; ++x) {
+      const cv::Vec2f from = table.at<cv::Vec2f>(y, x);
+      if (from[0] < 0 || from[1] < 0 || from[0] > right || from[1] > bottom) continue;
+      out.at<cv::Vec3b>(y, x) = image_decoding::colour_at(recorded, from[0], from[1]);  // rounded
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -65,9 +80,7 @@ std::optional<Eigen::Vector2d> OutputCameras::pixel(std::size_t c, const Eigen::
 cv::Mat OutputCameras::image(std::size_t c, const cv::Mat& recorded) {
   if (!undistort_) return recorded;
   if (maps_[c].empty()) maps_[c] = remap_table(rig_.camera(c), cameras_[c]);
-  cv::Mat out;
-  cv::remap(recorded, out, maps_[c], cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
-  return out;
+  return undistorted_image(recorded, maps_[c]);
 }
 
 }  // namespace bslam::map_export

@@ -28,7 +28,7 @@ class OutputCameras {
   camera::Rig rig_;
   bool undistort_;
   std::vector<camera::Camera> cameras_;
-  std::vector<cv::Mat> maps_;  // per camera, CV_32FC2: pixel of the recorded image; empty until needed
+  std::vector<cv::Mat> maps_;  // per camera, CV_32FC2: pixel of the recorded image or -1; empty until needed
 };
 
 }  // namespace bslam::map_export
