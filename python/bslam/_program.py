@@ -34,10 +34,12 @@ def simulate(
     out: Path,
     *,
     rig: Path | Rig | None = None,
-    world: Literal["building", "corridor", "twin-rooms"] = "building",
+    world: Literal["building", "corridor", "twin-rooms", "outdoor"] = "building",
     duration: float = 20.0,
     rate: float = 20.0,
     seed: int = 1,
+    tour_seed: int | None = None,
+    start: float = 1.0,
     laps: int = 0,
     speed: float = 0.0,
     back: bool = False,
@@ -52,10 +54,13 @@ def simulate(
     Args:
         out: folder to write into.
         rig: the cameras; default: four cameras, two of them in front.
-        world: building: different rooms; corridor, twin-rooms: places that look exactly alike.
+        world: building: different rooms; corridor, twin-rooms: places that look exactly alike; outdoor: a
+            square with houses and trees.
         duration: seconds.
         rate: images per second of each camera.
         seed: seed of world, motion and noise.
+        tour_seed: seed of motion and noise, for further tours of one world; default: that of seed.
+        start: time stamp of the first images in seconds.
         laps: laps of the tour within the duration; 0: as many as a walking pace allows.
         speed: metres per second; 0: determined by duration and laps.
         back: turn around after half of the duration and return along the same path.
@@ -76,6 +81,8 @@ def simulate(
         "duration": duration,
         "rate": rate,
         "seed": seed,
+        "tour_seed": tour_seed,
+        "start": start,
         "laps": laps,
         "speed": speed,
         "back": back,

@@ -11,7 +11,7 @@
 namespace bslam::cli {
 
 struct ViewArguments {
-  std::string port;  // empty: no view; kDefaultPort if the option has no value
+  std::string port;  // empty: no view; kUsual (view_arguments.cc) if the option has no value
   std::string address = "127.0.0.1";
 };
 

@@ -47,23 +47,24 @@ std::optional<RunControl::Clock::time_point> RunControl::due(TimeNs time_ns) con
   return anchor_->due + std::chrono::nanoseconds(std::llround(after_ns));
 }
 
-void RunControl::wait_for(TimeNs time_ns, const std::stop_token& stop) {
+bool RunControl::wait_for(TimeNs time_ns, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   for (;;) {
-    if (stop.stop_requested()) return;
     if (paused_) {
-      if (!changed_.wait(lock, stop, [this] { return !paused_ || steps_ > 0; })) return;
+      if (!changed_.wait(lock, stop, [this] { return !paused_ || steps_ > 0; })) return false;
       if (!paused_) continue;
       --steps_;
       anchor_.reset();
-      return;
+      return true;
     }
+    if (stop.stop_requested()) return false;
     const auto until = due(time_ns);
     if (!until || *until <= Clock::now()) break;
     const State before{paused_, speed_};
     changed_.wait_until(lock, stop, *until, [&] { return !(State{paused_, speed_} == before) || !anchor_; });
   }
   if (!anchor_) anchor_ = Anchor{time_ns, Clock::now()};
+  return true;
 }
 
 bool RunControl::is_overdue(TimeNs time_ns) const {

@@ -33,9 +33,9 @@ class RunControl {
   };
   State state() const;
 
-  // Waits until the next frame, which was captured at `time_ns`, is to be fed, or a stop is requested. Frames are due
-  // relative to the first one, or to the last one before the pace changed.
-  void wait_for(TimeNs time_ns, const std::stop_token& stop);
+  // Waits until the next frame, which was captured at `time_ns`, is to be fed, and returns true; or until a stop is
+  // requested, and returns false. Frames are due relative to the first one, or to the last one before the pace changed.
+  bool wait_for(TimeNs time_ns, const std::stop_token& stop);
 
   // Returns whether a frame captured at `time_ns` is overdue. Never the case if frames are fed as fast as possible.
   bool is_overdue(TimeNs time_ns) const;

@@ -58,8 +58,7 @@ Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const Sess
     if (options.replay && (recorded.empty() || recorded.back() < FrameId(i))) break;
     auto item = source.next();
     if (!item) break;
-    control.wait_for(item->images.time_ns, options.interrupted);
-    if (options.interrupted.stop_requested()) break;
+    if (!control.wait_for(item->images.time_ns, options.interrupted)) break;
     const bool late = i + 1 < dataset.frames.size() && control.is_overdue(dataset.frames[i + 1].time_ns);
     const bool drop = options.replay ? !std::binary_search(recorded.begin(), recorded.end(), FrameId(i))
                                      : options.late == Late::kDrop && late;

@@ -64,11 +64,12 @@ struct Config {
   }
 };
 
-// The options of the front end.
 // Cameras `first` to `first` + `size` - 1 of the rig of a map are those of the run; size 0: all cameras.
 struct CamerasOfRun {
   std::size_t first = 0, size = 0;
 };
+
+// The options of the front end.
 tracking::TrackerOptions tracker_options(const Config& config, CamerasOfRun cameras = {});
 
 // Returns an Error with the key, without a file, if options contradict each other or a required loaded map is missing.

@@ -51,11 +51,12 @@ bool is_own_host(std::string_view host, bool loopback) {
   const std::string_view name = host.substr(0, colon);
   const std::string_view port = colon == std::string_view::npos ? "0" : host.substr(colon + 1);
   if (!consists_of(port, "0123456789")) return false;
-  if (name == "localhost" || name == "[::1]" || name == "127.0.0.1") return true;
-  if (loopback) return false;
+  if (name == "localhost" || name == "[::1]") return true;
+  const bool ipv4 = consists_of(name, "0123456789.") && std::ranges::count(name, '.') == 3;
+  if (loopback) return ipv4 && name.starts_with("127.");
   const bool ipv6 = name.size() > 2 && name.front() == '[' && name.back() == ']' &&
                     consists_of(name.substr(1, name.size() - 2), "0123456789abcdefABCDEF:.");
-  return ipv6 || (consists_of(name, "0123456789.") && std::ranges::count(name, '.') == 3);
+  return ipv6 || ipv4;
 }
 
 bool is_allowed(const RequestHead& head, std::string_view token, bool loopback) {

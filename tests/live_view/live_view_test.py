@@ -148,6 +148,7 @@ class LiveView(unittest.TestCase):
             received[message['channel']] += 1
         for channel, count in received.items():  # the first one and, at the end, the last one
             self.assertLessEqual(count, 2, channel)
+        self.assertGreaterEqual(received['frame'], 1)
 
     def test_garbage_does_no_harm(self):
         view = self.view()

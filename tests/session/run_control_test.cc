@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <chrono>
 #include <thread>
 
@@ -34,14 +33,13 @@ TEST(SessionRunControl, AStepLetsOneFramePass) {
   control.step();
   control.step();
   EXPECT_TRUE(control.state().paused);
-  control.wait_for(0, {});
-  control.wait_for(kSecond, {});
-  std::atomic<bool> passed = false;
-  std::jthread feeder([&] {
-    control.wait_for(2 * kSecond, {});
-    passed = true;
-  });
-  EXPECT_FALSE(passed);  // nothing but the next call lets it pass
+  std::stop_source stop;
+  stop.request_stop();  // so that a frame that may not pass is not waited for
+  EXPECT_TRUE(control.wait_for(0, stop.get_token()));
+  EXPECT_TRUE(control.wait_for(kSecond, stop.get_token()));
+  EXPECT_FALSE(control.wait_for(2 * kSecond, stop.get_token()));
+  bool passed = false;
+  std::jthread feeder([&] { passed = control.wait_for(2 * kSecond, {}); });
   control.resume();
   feeder.join();
   EXPECT_TRUE(passed);

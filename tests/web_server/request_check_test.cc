@@ -23,7 +23,7 @@ TEST(RequestCheck, ARequestNeedsTheWholeToken) {
 }
 
 TEST(RequestCheck, OtherNamesOfTheHostAreRefused) {
-  for (const char* host : {"127.0.0.1", "127.0.0.1:80", "localhost:8642", "[::1]:8642"}) {
+  for (const char* host : {"127.0.0.1", "127.0.0.1:80", "127.0.1.1:80", "localhost:8642", "[::1]:8642"}) {
     EXPECT_TRUE(is_own_host(host, true)) << host;
     EXPECT_TRUE(is_own_host(host, false)) << host;
   }

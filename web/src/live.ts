@@ -50,10 +50,13 @@ export class LiveView {
   // A message is confirmed when it was shown: the program sends the next one of its channel then.
   private async receive(text: string) {
     const message = parseData(text) as LiveMessage;
-    if (message.channel === 'state') { this.state = message.value; this.showState(); }
-    if (message.channel === 'run') this.showRun(message.value);
-    if (message.channel === 'frame') await this.showFrame(message.value);
-    this.send(`got ${message.channel}`);
+    try {
+      if (message.channel === 'state') { this.state = message.value; this.showState(); }
+      if (message.channel === 'run') this.showRun(message.value);
+      if (message.channel === 'frame') await this.showFrame(message.value);
+    } finally {  // an image that cannot be decoded does not end the updates
+      this.send(`got ${message.channel}`);
+    }
   }
 
   private send(text: string) {
