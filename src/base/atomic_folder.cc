@@ -2,9 +2,11 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "base/atomic_file.h"
 
@@ -18,20 +20,82 @@ Error folder_error(const fs::path& place, const std::error_code& error) {
           "cannot write " + place.string() + ": " + error.message()};
 }
 
-// Moves all files below `from` to the same names below `to`.
-std::error_code move_files(const fs::path& from, const fs::path& to) {
-  std::error_code error;
-  for (fs::recursive_directory_iterator entry(from, error), end; !error && entry != end; entry.increment(error)) {
-    const fs::path target = to / entry->path().lexically_relative(from);
-    if (entry->is_directory(error)) {
-      fs::create_directories(target, error);
-    } else {
-      fs::rename(entry->path(), target, error);
-    }
-    if (error) return error;
-  }
-  return error;
+// Whether a relative path leads to a file below the folder it is relative to. Links are not followed.
+bool is_below(const fs::path& name) {
+  const fs::path normal = name.lexically_normal();
+  return !name.empty() && normal.is_relative() && normal.has_filename() && normal != "." && *normal.begin() != "..";
 }
+
+// Moves files into an existing folder. What was moved can be moved back.
+class Replacement {
+ public:
+  // Files of `to` that are replaced are kept in the new folder `aside` until finish().
+  Replacement(fs::path from, fs::path to, fs::path aside)
+      : from_(std::move(from)), to_(std::move(to)), aside_(std::move(aside)) {}
+
+  // Moves all files below `from` to the same names below `to`, in the order of their names.
+  std::error_code move_files() {
+    std::error_code error;
+    std::vector<fs::path> entries;
+    for (fs::recursive_directory_iterator entry(from_, error), end; !error && entry != end; entry.increment(error))
+      entries.push_back(entry->path());
+    std::ranges::sort(entries);
+    for (const fs::path& entry : entries) {
+      if (!error) error = move_entry(entry);
+    }
+    return error;
+  }
+
+  // Moves everything back. Returns false if something could not be moved; the replaced files are in `aside` then.
+  bool undo() {
+    bool all = true;
+    std::error_code error;
+    for (; !moved_.empty(); moved_.pop_back()) {
+      fs::rename(moved_.back().to, moved_.back().from, error);
+      all = all && !error;
+    }
+    for (; !created_.empty(); created_.pop_back()) fs::remove(created_.back(), error);
+    if (all) finish();
+    return all;
+  }
+
+  void finish() const {
+    std::error_code ignored;
+    fs::remove_all(aside_, ignored);
+  }
+
+ private:
+  struct Move {
+    fs::path from, to;
+  };
+
+  std::error_code move(const fs::path& from, const fs::path& to) {
+    std::error_code error;
+    fs::rename(from, to, error);
+    if (!error) moved_.push_back({from, to});
+    return error;
+  }
+
+  std::error_code move_entry(const fs::path& entry) {
+    const fs::path name = entry.lexically_relative(from_), target = to_ / name;
+    std::error_code error;
+    if (fs::is_directory(entry, error)) {
+      if (fs::create_directory(target, error)) created_.push_back(target);
+      return error;
+    }
+    const fs::file_status present = fs::symlink_status(target, error);
+    if (fs::is_directory(present)) return std::make_error_code(std::errc::is_a_directory);
+    if (fs::exists(present)) {
+      fs::create_directories((aside_ / name).parent_path(), error);
+      if (error || (error = move(target, aside_ / name))) return error;
+    }
+    return move(entry, target);
+  }
+
+  fs::path from_, to_, aside_;
+  std::vector<Move> moved_;
+  std::vector<fs::path> created_;
+};
 
 }  // namespace
 
@@ -62,7 +126,10 @@ AtomicFolder::~AtomicFolder() {
 }
 
 Status AtomicFolder::write(const fs::path& name, std::string_view bytes) const {
-  const fs::path file = part_ / name;
+  if (!is_below(name))
+    return Error{(place_ / name).string(), "", "the name of a file outside of the folder",
+                 "a name that leads to a file in " + place_.string()};
+  const fs::path file = part_ / name.lexically_normal();
   std::error_code error;
   fs::create_directories(file.parent_path(), error);
   if (error) return folder_error(place_ / name, error);
@@ -76,8 +143,17 @@ Status AtomicFolder::write(const fs::path& name, std::string_view bytes) const {
 Status AtomicFolder::commit() {
   std::error_code error;
   if (fs::is_directory(place_, error) && !fs::is_empty(place_, error)) {
-    if (const std::error_code failed = move_files(part_, place_)) return folder_error(place_, failed);
-    return {};  // the destructor removes the folders that are empty now
+    fs::path aside = part_;
+    aside += "-replaced";
+    Replacement replacement(part_, place_, aside);
+    const std::error_code failed = replacement.move_files();
+    if (!failed) {
+      replacement.finish();
+      return {};  // the destructor removes the folders that are empty now
+    }
+    Error reason = folder_error(place_, failed);
+    if (!replacement.undo()) reason.sentence += "; the files that were replaced are in " + aside.string();
+    return reason;
   }
   fs::rename(part_, place_, error);  // replaces an empty folder
   if (error) return folder_error(place_, error);

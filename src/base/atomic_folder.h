@@ -19,11 +19,13 @@ class AtomicFolder {
   AtomicFolder& operator=(AtomicFolder&&) = delete;
   ~AtomicFolder();  // removes what was not committed
 
-  // Writes a file of the folder; folders in `name` are created. Errors: as write_atomically.
+  // Writes a file of the folder; folders in `name` are created. Errors: `name` is absolute or leads out of the folder;
+  // as write_atomically.
   Status write(const std::filesystem::path& name, std::string_view bytes) const;
 
   // Moves the folder to its place by one rename. If a folder with files is there, the new files are moved into it one
-  // by one, and its other files remain.
+  // by one, since its other files may not be ours: they remain. After an error, all files of the folder are as before;
+  // only if the program is killed meanwhile, some are new and some are old (in a folder beside it, `PLACE.part-*`).
   Status commit();
 
  private:

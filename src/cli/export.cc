@@ -130,7 +130,7 @@ int run_export(const TrajectoryArguments& arguments) {
   const std::string frame = arguments.axes == "ros" ? arguments.frame + "_ros" : arguments.frame;
   const std::string header =
       evaluation::trajectory_header(frame, evaluation::PoseState::kFinal, arguments.axes == "ros" ? "map" : "world");
-  const Status status = evaluation::write_trajectory(arguments.out, *trajectory, format, header);
+  const Status status = evaluation::write_trajectory(arguments.out, *trajectory, format, header, arguments.overwrite);
   if (!status) return report_error(status.error());
   std::printf("%s: %zu poses\n", arguments.out.c_str(), trajectory->size());
   return kExitOk;
@@ -161,7 +161,7 @@ void add_export(CLI::App& app, int& exit_status) {
   verb->add_option("--camera", arguments->camera, "number in the rig file of the camera of the trajectory; default: 0")
       ->check(CLI::NonNegativeNumber);
   verb->add_option("--times", arguments->times, "times of KITTI poses; default: times.txt beside them");
-  verb->add_flag("--overwrite", arguments->overwrite, "replace an existing file");
+  verb->add_flag("--overwrite", arguments->overwrite, "replace existing files");
   verb->callback([arguments, &exit_status] { exit_status = run_export(*arguments); });
 }
 

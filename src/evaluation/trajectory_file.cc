@@ -371,7 +371,7 @@ std::string times_text(const Trajectory& trajectory) {
 }
 
 Status write_trajectory(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format,
-                        std::string_view header) {
+                        std::string_view header, bool replace_times) {
   switch (format) {
     case TrajectoryFormat::kTum:
       return write_atomically(file, tum_text(trajectory, header));
@@ -380,9 +380,15 @@ Status write_trajectory(const std::filesystem::path& file, const Trajectory& tra
     case TrajectoryFormat::kKitti:
       break;
   }
-  if (Status status = write_atomically(file.parent_path() / "times.txt", times_text(trajectory)); !status)
-    return status;
-  return write_atomically(file, kitti_text(trajectory));
+  const std::filesystem::path times = file.parent_path() / "times.txt";
+  std::error_code error;
+  if (file.filename() == times.filename())
+    return Error{file.string(), "--out", "the name of the times of KITTI poses", "another name"};
+  if (!replace_times && std::filesystem::exists(std::filesystem::symlink_status(times, error)))
+    return Error{times.string(), "--out", "an existing file, beside which the poses would be written",
+                 "a folder without times.txt, or --overwrite"};
+  if (Status status = write_atomically(file, kitti_text(trajectory)); !status) return status;
+  return write_atomically(times, times_text(trajectory));
 }
 
 }  // namespace bslam::evaluation

@@ -42,8 +42,10 @@ std::string euroc_csv_text(const evaluation::Trajectory& trajectory);
 std::string kitti_text(const evaluation::Trajectory& trajectory);
 std::string times_text(const evaluation::Trajectory& trajectory);
 
-// Writes a trajectory atomically. KITTI also writes times.txt into the same folder. `header` is used by TUM only.
+// Writes a trajectory atomically. KITTI then also writes times.txt into the same folder. `header` is used by TUM only.
+// Errors: a file cannot be written; times.txt exists, which may be that of a recording, unless `replace_times`;
+// times.txt is the name of the poses themselves. Nothing is written after the last two.
 Status write_trajectory(const std::filesystem::path& file, const evaluation::Trajectory& trajectory,
-                        TrajectoryFormat format, std::string_view header = {});
+                        TrajectoryFormat format, std::string_view header = {}, bool replace_times = false);
 
 }  // namespace bslam::evaluation

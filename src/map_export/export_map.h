@@ -28,7 +28,7 @@ std::span<const FormatName> formats();  // all but kFolder
 struct ExportRequest {
   Format format = Format::kFolder;
   std::filesystem::path out;
-  bool overwrite = false;
+  bool overwrite = false;                  // replace files of `out`
   const dataset::Dataset* data = nullptr;  // the recording of the map, for names, colours and images; may be null
   std::filesystem::path data_folder;       // names of images are relative to it
   bool undistort = false;                  // kColmap, kNerfstudio: write undistorted images and pinhole cameras
@@ -43,9 +43,11 @@ struct ExportReport {
   std::string summary;             // what was written
 };
 
-// Writes `request.out`, completely or not at all. Errors: the map is empty; `out` exists and is not to be overwritten,
-// or cannot be written; none of the images of the map is in the recording; the format cannot hold a camera; options
-// that do not fit the format.
+// Writes `request.out`, completely or not at all. With `overwrite`, files of an existing folder are replaced by those
+// of the same names, and its other files stay, since they may not be those of an export; after an error the folder is
+// unchanged, but not if the program is killed while files are moved there. Errors: the map is empty; `out` exists and
+// is not to be overwritten, or cannot be written; none of the images of the map is in the recording; the format cannot
+// hold a camera; options that do not fit the format.
 Result<ExportReport> export_map(const map::BundledMap& map, const ExportRequest& request);
 
 }  // namespace bslam::map_export

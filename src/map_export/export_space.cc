@@ -30,12 +30,11 @@ std::string axes_text(const Exporter& exporter) {
 
 // Poses of camera 0 in the frame of the map server, as a file of the format TUM.
 std::string keyframes_text(const Exporter& exporter) {
-  evaluation::Trajectory trajectory;
-  for (const KeyframeId k : exporter.selection.keyframes) {
-    const TimeNs time_ns = exporter.map().keyframe(k).frame->time_ns;
-    if (trajectory.empty() || trajectory.back().time_ns < time_ns)
-      trajectory.push_back({time_ns, exporter.selection.T_upright_world * exporter.selection.world_from_rig(k)});
-  }
+  storage::Submap submap;
+  submap.keyframes = exporter.selection.keyframes;
+  evaluation::Trajectory trajectory = storage::keyframe_trajectory(exporter.map(), submap);
+  for (evaluation::TimedPose& pose : trajectory)
+    pose.T_world_frame = exporter.selection.T_upright_world * pose.T_world_frame;
   return evaluation::tum_text(trajectory, evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal, "map"));
 }
 

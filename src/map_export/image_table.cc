@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <map>
 
+#include "map/rigs_of_map.h"
+
 namespace bslam::map_export {
 namespace {
 
@@ -13,13 +15,43 @@ struct RecordedImage {
   std::size_t camera;  // of the recording
 };
 
-// The images of each camera of the map by their time stamps in ns. Cameras are recognised by their names, and, if a
-// name is unknown and the numbers of cameras are equal, by their numbers.
+// Names come from files of others.
+std::string without_control_characters(std::string name) {
+  std::ranges::replace_if(
+      name, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '_');
+  return name;
+}
+
+// A folder for the images of each camera.
+std::vector<std::string> folders_of(const camera::Rig& rig) {
+  std::vector<std::string> folders;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    std::string name = without_control_characters(rig.camera(c).name);
+    std::ranges::replace(name, '/', '_');
+    if (name.empty() || name == "." || name == "..") name = fmt::format("cam{}", c);
+    const std::string base = name;
+    for (int i = 2; std::ranges::count(folders, name) > 0; ++i) name = fmt::format("{}_{}", base, i);
+    folders.push_back(name);
+  }
+  return folders;
+}
+
+// The path below a folder: "_" replaces "..", and an absolute path begins there.
+std::filesystem::path below_folder(const std::filesystem::path& path) {
+  std::filesystem::path out;
+  for (const std::filesystem::path& part : path.lexically_normal().relative_path()) out /= part == ".." ? "_" : part;
+  return out;
+}
+
+// The images of each camera of the map by their time stamps in ns. If the cameras of the recording are one of the rigs
+// of the map, these are its cameras. Otherwise they are recognised by their names, and, if a name is unknown and the
+// numbers of cameras are equal, by their numbers.
 class RecordedImages {
  public:
-  RecordedImages(const camera::Rig& rig, const dataset::Dataset& data) : by_time_(rig.size()) {
-    for (std::size_t c = 0; c < rig.size(); ++c) {
-      const std::size_t recorded = camera_of(rig, c, data.rig);
+  RecordedImages(const map::BundledMap& map, const dataset::Dataset& data) : by_time_(map.rig().size()) {
+    const std::optional<std::size_t> first = map::find_rig(map, data.rig);
+    for (std::size_t c = 0; c < by_time_.size(); ++c) {  // c - first wraps for cameras before the rig
+      const std::size_t recorded = first ? c - *first : camera_of(map.rig(), c, data.rig);
       if (recorded < data.rig.size()) collect(data, recorded, by_time_[c]);
     }
   }
@@ -54,18 +86,21 @@ class RecordedImages {
 ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data, const std::filesystem::path& root)
     : cameras_(selection.map->rig().size()), number_(selection.map->keyframe_slots() * cameras_, -1) {
   const camera::Rig& rig = selection.map->rig();
-  const std::optional<RecordedImages> recorded = data ? std::optional(RecordedImages(rig, *data)) : std::nullopt;
+  const std::optional<RecordedImages> recorded =
+      data ? std::optional(RecordedImages(*selection.map, *data)) : std::nullopt;
+  const std::vector<std::string> folders = folders_of(rig);
   for (const KeyframeId k : selection.keyframes) {
     const frame::BundledFrame& frame = *selection.map->keyframe(k).frame;
     for (std::size_t c = 0; c < cameras_; ++c) {
       if (frame.cameras[c].state != image::ImageState::kPresent) continue;
       const TimeNs stamp_ns = frame.cameras[c].time_ns - rig.camera(c).time_offset_ns;
-      MapImage image{k, c, fmt::format("{}/{}.png", rig.camera(c).name, stamp_ns), {}, {}};
+      MapImage image{k, c, fmt::format("{}/{}.png", folders[c], stamp_ns), {}, {}};
       const RecordedImage* found = recorded ? recorded->at(c, stamp_ns) : nullptr;
       if (found) {
         image.recorded = *found->image;
         const std::filesystem::path& path = found->image->path;
-        if (!path.empty()) image.name = path.lexically_relative(root).string();
+        const std::string file = path.empty() ? std::string() : path.lexically_relative(root).string();
+        if (!file.empty()) image.name = without_control_characters(file);
         if (found->camera < data->pixel_formats.size()) image.format = data->pixel_formats[found->camera];
         ++found_;
       }
@@ -76,7 +111,7 @@ ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data,
 }
 
 void ImageTable::set_extensions(const std::string& extension) {
-  for (MapImage& image : images_) image.name = std::filesystem::path(image.name).replace_extension(extension).string();
+  for (MapImage& image : images_) image.name = below_folder(image.name).replace_extension(extension).string();
 }
 
 }  // namespace bslam::map_export

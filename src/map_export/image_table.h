@@ -14,7 +14,7 @@ namespace bslam::map_export {
 struct MapImage {
   KeyframeId keyframe;
   std::size_t camera = 0;
-  std::string name;                                // relative to the folder of the recording: front/1000.jpg
+  std::string name;  // relative to the folder of the recording: front/1000.jpg; without control characters
   std::optional<image_files::ImageFile> recorded;  // absent if it is not known
   image_decoding::PixelFormat format = {};
 };
@@ -22,14 +22,17 @@ struct MapImage {
 class ImageTable {
  public:
   // Lists the present images of all cameras, in order of keyframe and camera. `data` is the recording of the map, or
-  // null: images that are not files of it are named CAMERA/STAMP.png, with the time stamp in ns.
+  // null: images that are not files of it are named CAMERA/STAMP.png, with the time stamp in ns. CAMERA is the name of
+  // the camera with "_" for slashes and control characters, and unlike those of the other cameras.
   ImageTable(const Selection& selection, const dataset::Dataset* data, const std::filesystem::path& root);
 
   const std::vector<MapImage>& images() const { return images_; }
   // Number of the image of a camera of a keyframe; -1 if it is missing.
   int of(KeyframeId k, std::size_t camera) const { return number_[k.index() * cameras_ + camera]; }
-  std::size_t found() const { return found_; }        // number of images that are in the recording
-  void set_extensions(const std::string& extension);  // of all names, such as ".png"
+  std::size_t found() const { return found_; }  // number of images that are in the recording
+  // Makes all names those of files in a new folder, with the extension, such as ".png": "_" replaces what leads out of
+  // the folder.
+  void set_extensions(const std::string& extension);
 
  private:
   std::size_t cameras_ = 0, found_ = 0;

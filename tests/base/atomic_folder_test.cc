@@ -54,6 +54,42 @@ TEST(AtomicFolder, KeepsOtherFilesOfAnExistingFolder) {
   EXPECT_EQ(entries_of(folder.path()), 1u);
 }
 
+// "b" cannot be replaced, since it is a folder. "a" and "new" come before and after it.
+TEST(AtomicFolder, AFailedCommitLeavesAnExistingFolderAsItWas) {
+  const support::TemporaryFolder folder;
+  const fs::path place = folder.path() / "place";
+  support::write_text(place / "a/old.txt", "old");
+  support::write_text(place / "b/mine.txt", "mine");
+  {
+    auto written = AtomicFolder::create(place, true);
+    ASSERT_TRUE(written);
+    for (const char* name : {"a/old.txt", "a/sub/added.txt", "b", "new.txt"}) ASSERT_TRUE(written->write(name, "new"));
+    const Status committed = written->commit();
+    ASSERT_FALSE(committed);
+    EXPECT_EQ(committed.error().message().find("the files that were replaced"), std::string::npos);
+  }
+  EXPECT_EQ(support::read_text(place / "a/old.txt"), "old");
+  EXPECT_EQ(support::read_text(place / "b/mine.txt"), "mine");
+  EXPECT_EQ(entries_of(place / "a"), 1u);
+  EXPECT_EQ(entries_of(place), 2u);
+  EXPECT_EQ(entries_of(folder.path()), 1u);
+}
+
+TEST(AtomicFolder, RejectsNamesThatLeadOutOfIt) {
+  const support::TemporaryFolder folder;
+  const fs::path outside = folder.path() / "outside.txt";
+  auto written = AtomicFolder::create(folder.path() / "place", false);
+  ASSERT_TRUE(written);
+  for (const fs::path& name : {fs::path("../outside.txt"), fs::path("sub/../../outside.txt"), outside, fs::path(""),
+                               fs::path("."), fs::path(".."), fs::path("sub/..")})
+    EXPECT_FALSE(written->write(name, "text")) << name;
+  EXPECT_FALSE(fs::exists(outside));
+  ASSERT_TRUE(written->write("sub/../inside.txt", "text"));
+  ASSERT_TRUE(written->commit());
+  EXPECT_EQ(support::read_text(folder.path() / "place/inside.txt"), "text");
+  EXPECT_EQ(entries_of(folder.path()), 1u);
+}
+
 TEST(AtomicFolder, RejectsAFile) {
   const support::TemporaryFolder folder;
   support::write_text(folder.path() / "file", "");

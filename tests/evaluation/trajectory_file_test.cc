@@ -106,6 +106,24 @@ TEST_F(TrajectoryFile, RoundTrips) {
   }
 }
 
+TEST_F(TrajectoryFile, KittiKeepsTheTimesOfARecordingUnlessTheyAreToBeReplaced) {
+  const auto times_in_folder = [&] {
+    std::ifstream in(folder_ / "times.txt");
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  const Trajectory trajectory = random_trajectory();
+  EXPECT_FALSE(write_trajectory(folder_ / "times.txt", trajectory, TrajectoryFormat::kKitti, {}, true));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "times.txt"));
+  write("times.txt", "those of the images");
+  const Status refused = write_trajectory(folder_ / "poses.txt", trajectory, TrajectoryFormat::kKitti);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().file, (folder_ / "times.txt").string());
+  EXPECT_EQ(times_in_folder(), "those of the images");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "poses.txt"));
+  ASSERT_TRUE(write_trajectory(folder_ / "poses.txt", trajectory, TrajectoryFormat::kKitti, {}, true));
+  EXPECT_EQ(times_in_folder(), times_text(trajectory));
+}
+
 TEST_F(TrajectoryFile, WritesTumWithHeaderAndNineDecimals) {
   const Trajectory trajectory = {{1'250'000'001, SE3(Quaterniond(1, 0, 0, 0), Vector3d(1, -2, 0.5))}};
   EXPECT_EQ(tum_text(trajectory, trajectory_header("cam0", PoseState::kFinal)),

@@ -1,11 +1,15 @@
 // Exports as files: point clouds, nerfstudio, undistorted images and colours of a recording.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <set>
+#include <tuple>
 
+#include "map/rigs_of_map.h"
 #include "map_export/export_map.h"
 #include "map_export/exported_map.h"
 #include "map_export/nerfstudio.h"
@@ -256,6 +260,72 @@ TEST_F(MapExportFiles, ImagesInsideOfARecordingGiveColoursAndUndistortedFiles) {
   for (std::string word; images >> word;)
     if (word.ends_with(".png")) named += fs::exists(folder_.path() / "colmap/images" / word);
   EXPECT_EQ(named, ImageTable(selection_, nullptr, {}).images().size());
+}
+
+// The same cameras mounted differently are another rig of the map, whose names are taken: cam0_2 and cam1_2.
+TEST_F(MapExportFiles, TheRecordingOfAnAppendedRigIsFound) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < 2; ++c) cameras.push_back({map_.rig().camera(c), map_.rig().body_from_cam(c)});
+  cameras[1].T_body_cam = cameras[1].T_body_cam * geometry::SE3(geometry::Matrix3d::Identity(), {0.1, 0, 0});
+  const camera::Rig other(std::move(cameras));
+  const std::size_t first = map::find_or_append_rig(map_, other);
+  ASSERT_EQ(first, 2u);
+  frame::BundledFrame frame = *map_.keyframe(selection_.keyframes.back()).frame;
+  std::swap(frame.cameras[0], frame.cameras[2]);
+  std::swap(frame.cameras[1], frame.cameras[3]);
+  for (std::size_t c = 2; c < 4; ++c) frame.cameras[c].time_ns += 50'000'000;
+  frame.bundled = {};
+  const KeyframeId added =
+      map_.add_keyframe(std::make_shared<const frame::BundledFrame>(std::move(frame)),
+                        map_.keyframe(selection_.keyframes.back()).T_rig_world, {}, selection_.keyframes.back());
+  // Recordings of both rigs, with images at the same times.
+  const auto recording = [&](const camera::Rig& rig, const std::string& folder) {
+    dataset::Dataset data{"", dataset::DatasetFormat::kFolder, rig, {0, 1}, {}, 0, {}, {}, {}};
+    for (const TimeNs shift_ns : {TimeNs{0}, TimeNs{50'000'000}}) {
+      dataset::FrameEntry entry;
+      for (std::size_t c = 0; c < 2; ++c) {
+        const TimeNs time_ns = map_.keyframe(added).frame->cameras[first + c].time_ns - 50'000'000 + shift_ns;
+        entry.images.push_back(image_files::ImageFile{root() / folder / std::to_string(c), time_ns});
+      }
+      data.frames.push_back(entry);
+    }
+    return data;
+  };
+  const Selection selection = select_submap(map_, 0).value();
+  const dataset::Dataset of_first = recording(map_.rig().subset(std::array{0, 1}), "first");
+  const dataset::Dataset of_second = recording(other, "second");
+  for (const auto& [data, folder, own] :
+       {std::tuple(&of_first, "first/", std::size_t{0}), {&of_second, "second/", first}}) {
+    const ImageTable images(selection, data, root());
+    EXPECT_EQ(images.found(), 2u) << folder;
+    for (const MapImage& image : images.images()) {
+      if (!image.recorded) continue;
+      EXPECT_EQ(image.name, folder + std::to_string(image.camera - own));
+      EXPECT_EQ(image.keyframe == added, own == first);
+    }
+  }
+}
+
+TEST_F(MapExportFiles, NamesFromFilesCannotLeadOutOfTheFolderOrBreakLines) {
+  std::vector<camera::RigCamera> cameras;
+  for (const char* name : {"../../x", "/abs\n1 2 3", "..", ".._.._x"}) {
+    camera::Camera camera = synthetic::ring_rig(4).camera(cameras.size());
+    camera.name = name;
+    cameras.push_back({camera, synthetic::ring_rig(4).body_from_cam(cameras.size())});
+  }
+  const ExportedMap map((camera::Rig(std::move(cameras))));
+  std::set<std::string> folders;
+  for (const MapImage& image : map.images.images()) folders.insert(fs::path(image.name).parent_path().string());
+  EXPECT_EQ(folders, (std::set<std::string>{".._.._x", "_abs_1 2 3", "cam2", ".._.._x_2"}));
+  // A list of images in a recording.
+  for (dataset::FrameEntry& frame : data_.frames)
+    for (auto& image : frame.images)
+      image->path = root() / ("../data/" + image->path.lexically_relative(root()).string() + "\n/../../../../up\n.jpg");
+  ImageTable images(selection_, &data_, root());
+  ASSERT_EQ(images.found(), images.images().size());
+  for (const MapImage& image : images.images()) EXPECT_EQ(image.name.find('\n'), std::string::npos);
+  images.set_extensions(".png");
+  for (const MapImage& image : images.images()) EXPECT_EQ(image.name, "_/_/up_.png");
 }
 
 TEST_F(MapExportFiles, ARecordingWithoutTheImagesIsAnError) {

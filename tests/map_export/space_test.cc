@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 #include <octomap/octomap.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <sstream>
 
@@ -109,7 +111,9 @@ TEST(OccupancyGrid, UsesThePartsOfRaysWithinTheBand) {
 }
 
 TEST(OccupancyGrid, RejectsCellsThatAreTooSmall) {
-  EXPECT_FALSE(occupancy_grid(scans_of_room(), {1e-4, 20.0}, {-0.5, 0.5}));
+  const auto grid = occupancy_grid(scans_of_room(), {1e-3, 20.0}, {-0.5, 0.5});  // 25 million cells
+  ASSERT_FALSE(grid);
+  EXPECT_EQ(grid.error().key, "--resolution");
 }
 
 // Reads image and description as the map server does: the first row of the image is the one with the largest y.
@@ -148,14 +152,28 @@ TEST(OccupancyGrid, IsAnImageWithItsDescription) {
 TEST(Scans, GoFromTheCamerasToTheLandmarksInUprightAxes) {
   const ExportedMap map(synthetic::ring_rig(3));
   const std::vector<Scan> scans = scans_of(map.selection);
-  EXPECT_EQ(scans.size(), map.images.images().size());
+  ASSERT_EQ(scans.size(), map.images.images().size());
   const Eigen::Vector3d up = map.selection.T_upright_world.rotation().inverse() * Eigen::Vector3d::UnitZ();
   EXPECT_GT(up.dot(map.selection.world_from_rig(map.selection.keyframes[0]).matrix3() * -Eigen::Vector3d::UnitY()),
             0.9);
+  // The scans are in order of keyframe and camera, as the images are.
+  std::vector<std::vector<Eigen::Vector3d>> seen(scans.size());
+  for (const LandmarkId l : map.selection.landmarks)
+    for_each_keypoint(map.selection, l, [&](KeyframeId k, frame::KeypointRef r) {
+      seen[static_cast<std::size_t>(map.images.of(k, r.camera.index()))].push_back(map.selection.T_upright_world *
+                                                                                   map.map.landmark(l).position);
+    });
   std::size_t rays = 0;
-  for (const Scan& scan : scans) {
-    rays += scan.rays.size();
-    for (const Ray& ray : scan.rays) EXPECT_GE(ray.sigma, 0);
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const MapImage& image = map.images.images()[i];
+    const geometry::SE3 T_world_cam = map.map.cam_from_world(image.keyframe, CameraIndex(image.camera)).inverse();
+    EXPECT_LT((scans[i].origin - map.selection.T_upright_world * T_world_cam.translation()).norm(), 1e-9);
+    for (const Ray& ray : scans[i].rays) {
+      EXPECT_TRUE(std::ranges::any_of(seen[i], [&](const auto& p) { return (p - ray.end).norm() < 1e-9; }));
+      EXPECT_GT(ray.sigma, 0);
+      EXPECT_TRUE(std::isfinite(ray.sigma));
+    }
+    rays += scans[i].rays.size();
   }
   EXPECT_GT(rays, 500u);
 }
