@@ -137,6 +137,32 @@ TEST_P(MessageFileOf, ReadsACutFileAsFarAsItGoes) {
   EXPECT_TRUE(GetParam().format == Format::kSqlite || last == kImages) << last;
 }
 
+// A chunk with an index of which any one record is damaged is read itself: its messages are neither lost nor twice.
+TEST_P(MessageFileOf, NoMessageIsLostByADamagedIndexOfAChunk) {
+  if (GetParam().format == Format::kSqlite || !GetParam().layout.index) GTEST_SKIP() << "no index of a chunk";
+  const std::string bytes = bytes_of(GetParam());
+  const bool ros1 = GetParam().format == Format::kRos1;
+  // The index of a connection in a ROS 1 bag has the fields conn and count; records of MCAP files with 2 and 1 entries.
+  const std::string two("\x07\x26\0\0\0\0\0\0\0", 9), one("\x07\x16\0\0\0\0\0\0\0", 9);
+  int damaged = 0;
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    const std::string_view here = std::string_view(bytes).substr(at);
+    const bool is_index = ros1 ? here.starts_with("count=") && bytes.compare(at - 13, 5, "conn=") == 0
+                               : here.starts_with(two) || here.starts_with(one);
+    if (!is_index) continue;
+    std::string wrong = bytes;
+    wrong[ros1 ? at + 6 : at + 11] = '\x77';  // the count of entries, or their size in bytes
+    const auto file = open(wrong);
+    ASSERT_TRUE(file) << file.error().message();
+    ++damaged;
+    EXPECT_FALSE((*file)->warnings().empty()) << at;
+    EXPECT_EQ((*file)->messages().size(), 2u * kImages) << at;
+    EXPECT_EQ(good_images(**file, "/left/image_raw", 0), kImages) << at;
+    EXPECT_EQ(good_images(**file, "/right/image_raw", 100), kImages) << at;
+  }
+  EXPECT_TRUE(GetParam().layout.messages_per_chunk == 0 || damaged >= 8) << damaged;
+}
+
 // Every byte may be wrong: nothing crashes, and no more images are found than there are.
 TEST_P(MessageFileOf, HandlesDamagedBytes) {
   const std::string bytes = bytes_of(GetParam());
