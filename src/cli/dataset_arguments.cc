@@ -2,15 +2,15 @@
 
 #include <charconv>
 #include <map>
-#include <sstream>
+
+#include "base/split.h"
 
 namespace bslam::cli {
 namespace {
 
 Result<std::vector<int>> parse_cameras(const std::string& text) {
   std::vector<int> cameras;
-  std::istringstream parts(text + ",");  // the added comma makes an empty last number an error as well
-  for (std::string part; std::getline(parts, part, ',');) {
+  for (const std::string& part : split(text, ',')) {
     int value = -1;
     const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
     if (error != std::errc() || end != part.data() + part.size() || value < 0) {
@@ -29,8 +29,7 @@ Result<std::vector<image_decoding::Bayer>> parse_bayer(const std::string& text) 
                                                          {"grbg", Bayer::kGrbg},
                                                          {"gbrg", Bayer::kGbrg}};
   std::vector<Bayer> patterns;
-  std::istringstream parts(text + ",");
-  for (std::string part; std::getline(parts, part, ',');) {
+  for (const std::string& part : split(text, ',')) {
     const auto pattern = kPatterns.find(part);
     if (pattern == kPatterns.end())
       return Error{"command line", "--bayer", "'" + text + "'",
@@ -65,8 +64,7 @@ void add_image_options(CLI::App& verb, ImageArguments& a) {
 Status apply_image_options(const ImageArguments& a, dataset::DatasetRequest& request) {
   static const std::map<std::string, TimeNs> kUnits = {
       {"ns", 1}, {"us", 1'000}, {"ms", 1'000'000}, {"s", 1'000'000'000}};
-  std::istringstream topics(a.topics);
-  for (std::string topic; std::getline(topics, topic, ',');) {
+  for (const std::string& topic : split(a.topics, ',')) {
     if (!topic.empty()) request.topics.push_back(topic);
   }
   request.side_by_side = a.side_by_side;

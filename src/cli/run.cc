@@ -241,7 +241,7 @@ int run(const RunArguments& arguments) {
   auto result = session::run_session(*dataset, options);
   bar.finish();
   if (!result) return report_error(result.error());
-  if (arguments.image_stamps) result->written_stamps = session::image_stamps(*dataset);
+  if (arguments.image_stamps) result->subtracted_ns = dataset->rig.camera(0).time_offset_ns;
   if (const Status s = write_files(*result, *config, *dataset, arguments, **vocabulary); !s)
     return report_error(s.error());
   end_view(view->get(), *result, *config, *dataset, arguments);
@@ -292,7 +292,7 @@ void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit
   verb->add_flag("--no-loop", a->no_loop, "disable loop closing; relocalisation stays enabled");
   add_map_options(*verb, *a);
   verb->add_flag("--image-stamps", a->image_stamps,
-                 "write trajectories with the time stamps of the images, without the time offset of the camera");
+                 "write trajectories with the time stamps of the images, without the time offset of camera 0");
   verb->add_flag("--no-final-ba", a->no_final_ba, "skip the global bundle adjustment at the end");
   verb->add_flag("--no-report", a->no_report, "do not write report.html, the page that shows the run in a browser");
   add_view_options(*verb, a->view);

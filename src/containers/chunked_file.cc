@@ -20,6 +20,26 @@ ChunkedFile::ChunkedFile(InputFile file, std::string format) : file_(std::move(f
   chunks_.push_back({0, file_.size(), file_.size(), Compression::kNone, 0});
 }
 
+void ChunkedFile::add_chunk(const Chunk& chunk) {
+  finish_chunk();
+  chunks_.push_back(chunk);
+  open_ = true;
+  index_damaged_ = false;
+}
+
+void ChunkedFile::add_index_entry(std::uint32_t topic, TimeNs received_ns, std::uint64_t at) {
+  entries_.push_back({topic, received_ns, at});
+}
+
+void ChunkedFile::finish_chunk() {
+  if (!open_) return;
+  open_ = false;
+  const std::vector<IndexEntry> entries = std::exchange(entries_, {});
+  const auto chunk = static_cast<std::uint32_t>(chunks_.size() - 1);
+  if (entries.empty() || index_damaged_) return scan_chunk(chunk);
+  for (const IndexEntry& entry : entries) count_message(entry.topic, entry.received_ns, chunk, entry.at);
+}
+
 ChunkedFile::Loaded ChunkedFile::load(std::uint32_t index) const {
   {
     const std::lock_guard lock(mutex_);

@@ -30,7 +30,19 @@ class ChunkedFile : public MessageFile {
 
   const InputFile& file() const { return file_; }
   const std::vector<Chunk>& chunks() const { return chunks_; }
-  void add_chunk(const Chunk& chunk) { chunks_.push_back(chunk); }
+  // Adds a chunk. Its messages are those of its index, which follows it, or are found by scan_chunk in finish_chunk.
+  void add_chunk(const Chunk& chunk);
+  // Returns true from add_chunk to finish_chunk.
+  bool has_open_chunk() const { return open_; }
+  // Keeps a message that the index of the open chunk names.
+  void add_index_entry(std::uint32_t topic, TimeNs received_ns, std::uint64_t at);
+  // The index of the open chunk, if there is one, is damaged or incomplete: the chunk will be scanned.
+  void note_damaged_index() { index_damaged_ = true; }
+  // Counts the messages of the open chunk, if there is one: those of its index, or all that are found in it if the
+  // index is missing or damaged.
+  void finish_chunk();
+  // Finds the messages of a chunk in its data.
+  virtual void scan_chunk(std::uint32_t chunk) = 0;
 
   // Up to `count` bytes of the decompressed chunk from position `at`.
   std::string bytes(std::uint32_t chunk, std::uint64_t at, std::uint64_t count) const;
@@ -60,6 +72,12 @@ class ChunkedFile : public MessageFile {
   // The decompressed chunk, which is kept for a while.
   Loaded load(std::uint32_t chunk) const;
 
+  struct IndexEntry {
+    std::uint32_t topic = 0;
+    TimeNs received_ns = 0;
+    std::uint64_t at = 0;
+  };
+
   struct Notes {
     std::string first;
     std::uint64_t count = 0;
@@ -67,6 +85,8 @@ class ChunkedFile : public MessageFile {
 
   InputFile file_;
   std::vector<Chunk> chunks_;
+  bool open_ = false, index_damaged_ = false;  // of the last chunk
+  std::vector<IndexEntry> entries_;
   Notes damaged_, cut_;
   mutable std::mutex mutex_;
   mutable std::vector<Loaded> cache_;  // the last used one at the end

@@ -88,13 +88,12 @@ class McapFile : public ChunkedFile {
   void add_record(std::uint32_t chunk, std::uint64_t at, const Record& record);
   bool add_chunk_of(const Record& record);
   bool add_index(const Record& record);
-  void scan_chunk(std::uint32_t chunk);
-  void finish_chunk();
+  void scan_chunk(std::uint32_t chunk) override;
   bool read_record(std::uint64_t at, const Record& record);
 
   std::map<std::uint16_t, std::string> schemas_;     // their names by number
   std::map<std::uint16_t, std::uint32_t> topic_of_;  // by number of the channel
-  bool has_summary_ = false, chunk_indexed_ = true;
+  bool has_summary_ = false;
   std::uint64_t unknown_ = 0;
 };
 
@@ -182,16 +181,8 @@ bool McapFile::add_chunk_of(const Record& record) {
   if (!in.ok() || !compression || stored > record.data_size) return false;
   const std::uint64_t there = std::min(stored, file().size() - std::min(file().size(), at));
   add_chunk({at, there, size, *compression, checksum});
-  chunk_indexed_ = false;
   if (!has_summary_ || there < stored) finish_chunk();
   return true;
-}
-
-// A chunk whose messages no index names is read itself.
-void McapFile::finish_chunk() {
-  if (chunk_indexed_ || chunks().size() < 2) return;
-  chunk_indexed_ = true;
-  scan_chunk(static_cast<std::uint32_t>(chunks().size() - 1));
 }
 
 void McapFile::scan_chunk(std::uint32_t chunk) {
@@ -207,7 +198,7 @@ void McapFile::scan_chunk(std::uint32_t chunk) {
 
 // Adds the messages of one channel in the last chunk. Returns false if the record is damaged.
 bool McapFile::add_index(const Record& record) {
-  if (!has_summary_ || chunks().size() < 2) return true;  // the chunk was scanned
+  if (!has_open_chunk()) return true;  // the chunk was scanned
   const std::string data = data_of(0, record);
   ByteReader in(data);
   const auto channel = in.number<std::uint16_t>();
@@ -215,13 +206,11 @@ bool McapFile::add_index(const Record& record) {
   const std::uint32_t count = in.number<std::uint32_t>() / kEntry;
   if (!in.ok() || in.left() < std::uint64_t{count} * kEntry) return false;
   const auto topic = topic_of_.find(channel);
-  if (topic == topic_of_.end()) unknown_ += count;
+  if (topic == topic_of_.end()) note_damaged_index();  // or the chunk describes the channel
   for (std::uint32_t k = 0; topic != topic_of_.end() && k < count; ++k) {
     const auto time = in.number<std::uint64_t>() & ~(std::uint64_t{1} << 63);
-    count_message(topic->second, static_cast<TimeNs>(time), static_cast<std::uint32_t>(chunks().size() - 1),
-                  in.number<std::uint64_t>());
+    add_index_entry(topic->second, static_cast<TimeNs>(time), in.number<std::uint64_t>());
   }
-  chunk_indexed_ = true;
   return true;
 }
 
@@ -246,6 +235,7 @@ Status McapFile::index() {
       at = record->end();
       continue;
     }
+    note_damaged_index();
     const std::uint64_t next = chunk_after(at);
     note_damage(at, next);
     if (next == 0) break;

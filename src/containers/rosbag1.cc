@@ -101,12 +101,10 @@ class RosBag1 : public ChunkedFile {
   bool add_index(const Record& record);
   bool read_record(std::uint64_t at, const Record& record);
   void add_record(std::uint32_t chunk, std::uint64_t at, const Record& record);
-  void scan_chunk(std::uint32_t chunk);
-  void finish_chunk();
+  void scan_chunk(std::uint32_t chunk) override;
 
   std::map<std::uint32_t, std::uint32_t> topic_of_;  // by number of the connection
   bool has_index_ = false;                           // its connections are known before its chunks
-  bool chunk_indexed_ = true;                        // the last chunk: an index of its messages was read
   std::uint64_t expected_chunks_ = 0, unknown_ = 0;
 };
 
@@ -157,19 +155,8 @@ bool RosBag1::add_chunk_of(const Record& record) {
   if (!compression || !size) return false;
   const std::uint64_t stored = std::min(record.data_size, file().size() - std::min(file().size(), record.data_at));
   add_chunk({record.data_at, stored, *compression == Compression::kNone ? stored : *size, *compression, 0});
-  chunk_indexed_ = false;
-  if (!has_index_ || stored < record.data_size) {
-    scan_chunk(static_cast<std::uint32_t>(chunks().size() - 1));
-    chunk_indexed_ = true;
-  }
+  if (!has_index_ || stored < record.data_size) finish_chunk();
   return true;
-}
-
-// A chunk whose messages no index names is read itself.
-void RosBag1::finish_chunk() {
-  if (chunk_indexed_ || chunks().size() < 2) return;
-  chunk_indexed_ = true;
-  scan_chunk(static_cast<std::uint32_t>(chunks().size() - 1));
 }
 
 void RosBag1::add_record(std::uint32_t chunk, std::uint64_t at, const Record& record) {
@@ -196,21 +183,19 @@ void RosBag1::scan_chunk(std::uint32_t chunk) {
 
 // Adds the messages of one connection in the last chunk. Returns false if the record is not an index.
 bool RosBag1::add_index(const Record& record) {
-  if (!has_index_ || chunks().size() < 2) return true;  // the chunk was scanned
+  if (!has_open_chunk()) return true;  // the chunk was scanned
   const auto conn = number<std::uint32_t>(record.fields, "conn");
   const auto count = number<std::uint32_t>(record.fields, "count");
   constexpr std::uint64_t kEntry = 12;
   if (!conn || !count || record.data_size != *count * kEntry || record.data_size > kMaxDataBytes) return false;
   const std::string data = bytes(0, record.data_at, record.data_size);
   const auto topic = topic_of_.find(*conn);
-  if (topic == topic_of_.end()) unknown_ += *count;
+  if (topic == topic_of_.end()) note_damaged_index();  // or the chunk describes the connection
   ByteReader in(data);
   for (std::uint32_t k = 0; topic != topic_of_.end() && k < *count && in.left() >= kEntry; ++k) {
     const auto time = in.number<std::uint64_t>();
-    count_message(topic->second, time_of(time), static_cast<std::uint32_t>(chunks().size() - 1),
-                  in.number<std::uint32_t>());
+    add_index_entry(topic->second, time_of(time), in.number<std::uint32_t>());
   }
-  chunk_indexed_ = true;
   return true;
 }
 
@@ -235,6 +220,7 @@ Status RosBag1::index() {
       at = record->end();
       continue;
     }
+    note_damaged_index();
     const std::uint64_t next = chunk_after(at);
     note_damage(at, next);
     if (next == 0) break;

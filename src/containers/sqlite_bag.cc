@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "containers/byte_reader.h"
@@ -53,8 +54,8 @@ std::string uri_of(const std::filesystem::path& path) {
 
 class SqliteBag : public MessageFile {
  public:
-  SqliteBag(std::filesystem::path path, Database database) : database_(std::move(database)) {
-    path_ = std::move(path);
+  SqliteBag(const InputFile& file, Database database) : database_(std::move(database)), file_size_(file.size()) {
+    path_ = file.path();
     format_ = "ROS 2 bag (sqlite3)";
   }
 
@@ -68,6 +69,10 @@ class SqliteBag : public MessageFile {
     const std::unique_ptr<sqlite3_blob, CloseBlob> blob(opened);
     if (status != SQLITE_OK) return damaged();
     const auto size = static_cast<std::size_t>(std::max(0, sqlite3_blob_bytes(blob.get())));
+    if (size > file_size_) {
+      return Error{path_.string(), "", fmt::format("a message of {} bytes in a file of {} bytes", size, file_size_),
+                   "a complete message"};
+    }
     std::string data = part(blob.get(), std::min(size, max_bytes));
     if (data.empty() && size > 0) return damaged();
     if (!is_compressed_message(data)) return data;
@@ -90,9 +95,12 @@ class SqliteBag : public MessageFile {
 
   Status read_topics();
   void check_size(const InputFile& file);
+  void check_log();
   Error bad_schema(const std::string& found) const;
 
   Database database_;
+  std::uint64_t file_size_;
+  bool has_log_ = false;
   std::map<std::int64_t, std::uint32_t> topic_of_;  // by the ids of the file
   mutable std::mutex mutex_;
 };
@@ -114,7 +122,8 @@ Status SqliteBag::read_topics() {
   if (!has_plain_table(database_.get(), "topics") || !has_plain_table(database_.get(), "messages")) {
     const int status = sqlite3_errcode(database_.get());
     const bool readable = status == SQLITE_OK || status == SQLITE_DONE || status == SQLITE_ROW;
-    return bad_schema(readable ? "other tables" : sqlite3_errmsg(database_.get()));
+    if (!readable) return bad_schema(sqlite3_errmsg(database_.get()));
+    return bad_schema(has_log_ ? "no such tables outside of its write-ahead log" : "other tables");
   }
   const Statement rows = prepare(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
   if (!rows) return bad_schema(sqlite3_errmsg(database_.get()));
@@ -144,8 +153,21 @@ void SqliteBag::check_size(const InputFile& file) {
   warnings_.push_back(fmt::format("{}: cut off at byte {} of {}", path_.string(), file.size(), size));
 }
 
+// SQLite would write an index of the log beside the recording, so the log is not read.
+void SqliteBag::check_log() {
+  const std::string log = path_.string() + "-wal";
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(log, error);
+  has_log_ = !error && size > 0;
+  if (!has_log_) return;
+  warnings_.push_back(
+      fmt::format("{}: the last messages may be missing: its recorder did not move them out of {}, which is not read",
+                  path_.string(), log));
+}
+
 Status SqliteBag::index(const InputFile& file) {
   check_size(file);
+  check_log();
   if (const Status s = read_topics(); !s) return s;
   const Statement rows = prepare(database_.get(), "SELECT id, topic_id, timestamp FROM messages");
   if (!rows) return bad_schema(sqlite3_errmsg(database_.get()));
@@ -176,21 +198,16 @@ Status SqliteBag::index(const InputFile& file) {
 MessageFileResult open_sqlite_bag(const std::filesystem::path& path) {
   const auto file = InputFile::open(path);
   if (!file) return file.error();
-  std::error_code none;
   sqlite3* opened = nullptr;
-  // A recording that was not closed has a write-ahead log, which only a file that is not taken as unchangeable uses.
-  const bool with_log = std::filesystem::exists(path.string() + "-wal", none);
-  const std::string name = with_log ? path.string() : uri_of(path);
-  const int status =
-      sqlite3_open_v2(name.c_str(), &opened, SQLITE_OPEN_READONLY | (with_log ? 0 : SQLITE_OPEN_URI), nullptr);
+  const int status = sqlite3_open_v2(uri_of(path).c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
   Database database(opened);
   if (status != SQLITE_OK || !database)
     return Error{path.string(), "", database ? sqlite3_errmsg(database.get()) : "no memory", "an SQLite file"};
   // Otherwise a file that is shorter than its header says could not be read at all. Nothing is written: it is
-  // read-only.
+  // read-only, and no files are made beside it, since it is opened as unchangeable.
   sqlite3_db_config(database.get(), SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
   sqlite3_db_config(database.get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-  auto bag = std::make_unique<SqliteBag>(path, std::move(database));
+  auto bag = std::make_unique<SqliteBag>(*file, std::move(database));
   if (const Status s = bag->index(*file); !s) return s.error();
   return std::unique_ptr<MessageFile>(std::move(bag));
 }

@@ -24,10 +24,16 @@ namespace fs = std::filesystem;
 
 constexpr TimeNs kMaxTime = 9'200'000'000'000'000'000;  // time offsets can be added without overflow
 
-// "/cam0/image_raw/compressed" -> "/cam0", where the calibration of its camera is as well.
-std::string namespace_of(std::string topic) {
+// "/cam0/image_raw/compressed" -> "/cam0/image_raw", the topic of which it is a copy.
+std::string without_transport(std::string topic) {
   constexpr std::string_view kTransport = "/compressed";
   if (topic.ends_with(kTransport)) topic.resize(topic.size() - kTransport.size());
+  return topic;
+}
+
+// "/cam0/image_raw/compressed" -> "/cam0", where the calibration of its camera is as well.
+std::string namespace_of(std::string topic) {
+  topic = without_transport(std::move(topic));
   const std::size_t slash = topic.rfind('/');
   return slash == std::string::npos ? "" : topic.substr(0, slash);
 }
@@ -45,6 +51,23 @@ std::string camera_name(const std::string& topic) {
 bool is_rectified(const std::string& topic) {
   const std::string last = topic.substr(namespace_of(topic).size());
   return last.starts_with("/image_rect") && !last.starts_with("/image_rect_raw");
+}
+
+bool has_header_stamps(const ImageTopic& topic) {
+  return std::ranges::any_of(topic.images, [](const BagImage& image) { return image.stamp_ns != 0; });
+}
+
+bool is_time(TimeNs time_ns) { return time_ns > 0 && time_ns <= kMaxTime; }
+
+// The time stamps of all images, from their headers or, if those are not set, of recording; nullopt: not a time.
+std::vector<std::optional<TimeNs>> stamps_of(const ImageTopic& topic) {
+  const bool from_header = has_header_stamps(topic);
+  std::vector<std::optional<TimeNs>> out;
+  for (const BagImage& image : topic.images) {
+    const TimeNs time_ns = from_header ? image.stamp_ns : image.received_ns;
+    out.push_back(is_time(time_ns) ? std::optional(time_ns) : std::nullopt);
+  }
+  return out;
 }
 
 class BagRecording : public Recording {
@@ -77,9 +100,6 @@ class BagRecording : public Recording {
   std::optional<Calibration> calibration_of(const std::string& topic) const;
   std::optional<geometry::SE3> body_from_cam(std::size_t camera) const;
   std::string name_of(std::size_t camera) const;
-  bool has_header_stamps(const ImageTopic& topic) const {
-    return std::ranges::any_of(topic.images, [](const BagImage& image) { return image.stamp_ns != 0; });
-  }
   StreamDescription describe(const ImageTopic& topic) const;
   std::string why_unused(const ImageTopic& topic) const;
 
@@ -93,9 +113,8 @@ class BagRecording : public Recording {
 // A topic and its compressed copy are one camera.
 std::string BagRecording::why_unused(const ImageTopic& topic) const {
   if (!topic.unusable.empty()) return topic.unusable;
-  constexpr std::string_view kTransport = "/compressed";
-  if (!topic.name.ends_with(kTransport)) return "";
-  const std::string plain = topic.name.substr(0, topic.name.size() - kTransport.size());
+  const std::string plain = without_transport(topic.name);
+  if (plain == topic.name) return "";
   const auto original = std::ranges::find(topics_, plain, &ImageTopic::name);
   return original != topics_.end() && original->unusable.empty() ? "the same images as " + plain : "";
 }
@@ -135,6 +154,7 @@ Status BagRecording::choose(const std::vector<std::string>& requested, const std
   return {};
 }
 
+// Two cameras at most have a calibration here (body_from_cam), so that a number tells them apart.
 std::string BagRecording::name_of(std::size_t camera) const {
   const std::string name = camera_name(topics_[cameras_[camera]].name);
   for (std::size_t other = 0; other < cameras_.size(); ++other) {
@@ -202,20 +222,16 @@ Result<camera::RigCamera> BagRecording::calibration(std::size_t camera) const {
 Result<image_files::ImageList> BagRecording::images(std::size_t camera) const {
   const ImageTopic& topic = topics_[cameras_[camera]];
   const std::string source = store_->source(topic.images.front().entry);
-  const bool from_header = has_header_stamps(topic);
+  const std::vector<std::optional<TimeNs>> stamps = stamps_of(topic);
   std::vector<image_files::ImageFile> images;
-  std::size_t without_stamp = 0;
-  for (const BagImage& image : topic.images) {
-    const TimeNs time_ns = from_header ? image.stamp_ns : image.received_ns;
-    if (time_ns <= 0 || time_ns > kMaxTime) {
-      ++without_stamp;
-      continue;
-    }
-    images.push_back({.path = {}, .time_ns = time_ns, .store = store_, .entry = image.entry});
+  for (std::size_t k = 0; k < stamps.size(); ++k) {
+    if (stamps[k])
+      images.push_back({.path = {}, .time_ns = *stamps[k], .store = store_, .entry = topic.images[k].entry});
   }
+  const std::size_t without_stamp = stamps.size() - images.size();
   if (images.empty()) return Error{source, "", "no image with a time stamp", "images with time stamps"};
   image_files::ImageList list = image_files::in_time_order(std::move(images), source);
-  if (!from_header)
+  if (!has_header_stamps(topic))
     list.warnings.push_back(source + ": the headers have no time stamps; the times of recording are used");
   if (without_stamp > 0)
     list.warnings.push_back(fmt::format("{}: {} images without a time stamp are not used", source, without_stamp));
@@ -228,8 +244,7 @@ Result<image_files::ImageList> BagRecording::images(std::size_t camera) const {
 std::optional<LagDescription> lag_of(const ImageTopic& topic) {
   std::vector<TimeNs> lags;
   for (const BagImage& image : topic.images) {
-    if (image.stamp_ns > 0 && image.stamp_ns <= kMaxTime && image.received_ns > 0)
-      lags.push_back(image.received_ns - image.stamp_ns);
+    if (is_time(image.stamp_ns) && image.received_ns > 0) lags.push_back(image.received_ns - image.stamp_ns);
   }
   if (lags.empty()) return std::nullopt;
   std::ranges::sort(lags);
@@ -245,14 +260,16 @@ StreamDescription BagRecording::describe(const ImageTopic& topic) const {
   out.height = topic.height;
   out.count = topic.images.size() + topic.unreadable;
   const bool from_header = has_header_stamps(topic);
-  std::vector<TimeNs> times;
-  for (const BagImage& image : topic.images) times.push_back(from_header ? image.stamp_ns : image.received_ns);
-  std::ranges::sort(times);
-  out.times = std::move(times);
+  for (const std::optional<TimeNs>& stamp : stamps_of(topic)) {
+    if (stamp) out.times.push_back(*stamp);
+  }
+  std::ranges::sort(out.times);
   out.stamps = from_header ? "header" : "recording";
   out.lag = from_header ? lag_of(topic) : std::nullopt;
   out.calibrated = calibration_of(topic.name).has_value();
   out.unused = why_unused(topic);
+  if (const std::size_t without = topic.images.size() - out.times.size(); without > 0)
+    out.notes.push_back(fmt::format("{} images have no time stamp", without));
   if (topic.unreadable > 0) out.notes.push_back(fmt::format("{} messages are damaged", topic.unreadable));
   if (topic.other_sizes > 0)
     out.notes.push_back(fmt::format("{} images have another size or encoding than the first", topic.other_sizes));

@@ -1,9 +1,9 @@
 #include "dataset/recording.h"
 
 #include <algorithm>
-#include <sstream>
 #include <system_error>
 
+#include "base/split.h"
 #include "dataset/bag_recording.h"
 #include "image_decoding/image_file.h"
 
@@ -28,8 +28,7 @@ std::vector<fs::path> files_of(const fs::path& path) {
   std::error_code error;
   if (fs::exists(path, error)) return {path};
   std::vector<fs::path> files;
-  std::istringstream parts(path.string());
-  for (std::string part; std::getline(parts, part, ',');) {
+  for (const std::string& part : split(path.string(), ',')) {
     if (!part.empty()) files.emplace_back(part);
   }
   return files.empty() ? std::vector<fs::path>{path} : files;

@@ -87,19 +87,6 @@ camera::Rig with_refined_calibration(const camera::Rig& found, const dataset::Da
 
 }  // namespace
 
-std::map<TimeNs, TimeNs> image_stamps(const dataset::Dataset& dataset) {
-  std::map<TimeNs, TimeNs> out;
-  for (const dataset::FrameEntry& frame : dataset.frames) {
-    out[frame.time_ns] = frame.time_ns;
-    for (std::size_t c = 0; c < frame.images.size(); ++c) {
-      if (!frame.images[c] || frame.images[c]->time_ns != frame.time_ns) continue;
-      out[frame.time_ns] -= dataset.rig.camera(c).time_offset_ns;
-      break;
-    }
-  }
-  return out;
-}
-
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options) {
   const Stopwatch start_up;
   auto masks = image_decoding::read_masks(dataset.rig);
@@ -149,14 +136,14 @@ using Files = std::vector<std::pair<std::string, std::string>>;  // name and con
 
 // Adds one file per submap. The file of the first submap is written even if there is no submap.
 void add_trajectories(const RunRecord& record, const std::vector<system::SubmapTrajectory>& submaps,
-                      const std::string& stem, evaluation::PoseState state, const std::map<TimeNs, TimeNs>& stamps,
+                      const std::string& stem, evaluation::PoseState state, std::optional<TimeNs> subtracted_ns,
                       Files& files) {
   for (std::size_t i = 0; i < std::max<std::size_t>(submaps.size(), 1); ++i) {
     evaluation::Trajectory poses = submaps.empty() ? evaluation::Trajectory() : submaps[i].poses;
     std::string comments = trajectory_comments(record, submaps, i, state);
-    if (!stamps.empty()) {
-      for (evaluation::TimedPose& pose : poses) pose.time_ns = stamps.at(pose.time_ns);
-      comments += "\n# time stamps are those of the images, without the time offset of the camera";
+    if (subtracted_ns) {
+      for (evaluation::TimedPose& pose : poses) pose.time_ns -= *subtracted_ns;
+      comments += "\n# time stamps are those of the images, without the time offset of camera 0";
     }
     files.emplace_back(trajectory_file(stem, i), evaluation::tum_text(poses, comments));
   }
@@ -190,8 +177,8 @@ Files output_files(const SessionResult& result, const system::Config& config) {
   Files files;
   files.emplace_back("summary.json", summary_text(result.record));
   add_trajectories(result.record, result.trajectories, "trajectory", evaluation::PoseState::kFinal,
-                   result.written_stamps, files);
-  add_trajectories(result.record, result.live, "trajectory_live", evaluation::PoseState::kLive, result.written_stamps,
+                   result.subtracted_ns, files);
+  add_trajectories(result.record, result.live, "trajectory_live", evaluation::PoseState::kLive, result.subtracted_ns,
                    files);
   files.emplace_back("covariance_live.csv", covariance_text(result.record));
   files.emplace_back("config.yaml", yaml::config_to_yaml(table));

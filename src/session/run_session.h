@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -46,13 +45,10 @@ struct SessionResult {
   // If extrinsics were refined: the calibration of all cameras, with refined extrinsics for those in use.
   std::optional<camera::Rig> refined_rig;
   execution::Journal journal;
-  // If not empty: the time stamp to be written in trajectories for each time of a frame (image_stamps).
-  std::map<TimeNs, TimeNs> written_stamps = {};
+  // If set: subtracted from the times of all poses that are written, so that they are time stamps of images. The times
+  // of frames contain the time offset of camera 0.
+  std::optional<TimeNs> subtracted_ns = {};
 };
-
-// The time stamp of the image that determines the time of each frame: that of camera 0, or of the earliest other one.
-// The time is this stamp plus the time offset of the camera.
-std::map<TimeNs, TimeNs> image_stamps(const dataset::Dataset& dataset);
 
 // Errors: a mask that cannot be read or differs in size from the images of its camera; a journal of another run.
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options);

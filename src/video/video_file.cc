@@ -15,8 +15,9 @@
 namespace bslam::video {
 namespace {
 
-constexpr std::size_t kCachedImages = 24;  // of those decoded last; several threads read ahead
-constexpr std::size_t kFarAhead = 200;     // images; from there on seeking is faster than decoding all before
+// Of the images decoded last, since several threads read ahead; at least one is kept.
+constexpr std::size_t kCachedImages = 24, kCachedBytes = std::size_t{1} << 26;
+constexpr std::size_t kFarAhead = 200;  // images; from there on seeking is faster than decoding all before
 constexpr int kMaxSidePx = 20000;
 
 // Everything of one open file; released in the order FFmpeg needs.
@@ -183,6 +184,7 @@ class FfmpegVideo : public VideoFile {
     return static_cast<std::size_t>(after - stamps_.begin());
   }
   bool decode_up_to(std::size_t index);
+  void keep(std::size_t index, VideoImage image);
   Error damaged_image(std::size_t index) const {
     return {path_.string(), fmt::format("image {}", index), "an image that cannot be decoded", "a complete image"};
   }
@@ -237,10 +239,20 @@ bool FfmpegVideo::decode_up_to(std::size_t index) {
     auto image = decoder_.grey();
     damaged_[*number] = !image.has_value();
     if (!image) continue;
-    cache_.emplace_back(*number, *std::move(image));
-    if (cache_.size() > kCachedImages) cache_.pop_front();
+    keep(*number, *std::move(image));
   }
   return true;
+}
+
+// Adds an image to the cache, from which the oldest ones are removed.
+void FfmpegVideo::keep(std::size_t index, VideoImage image) {
+  cache_.emplace_back(index, std::move(image));
+  std::size_t bytes = 0;
+  for (const auto& [other, cached] : cache_) bytes += cached.grey.size();
+  while (cache_.size() > 1 && (cache_.size() > kCachedImages || bytes > kCachedBytes)) {
+    bytes -= cache_.front().second.grey.size();
+    cache_.pop_front();
+  }
 }
 
 Result<VideoImage> FfmpegVideo::read(std::size_t index) {

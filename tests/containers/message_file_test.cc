@@ -1,9 +1,11 @@
 #include "containers/message_file.h"
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 
 #include "containers/compression.h"
 #include "containers/messages.h"
@@ -135,6 +137,32 @@ TEST_P(MessageFileOf, ReadsACutFileAsFarAsItGoes) {
   EXPECT_TRUE(GetParam().format == Format::kSqlite || last == kImages) << last;
 }
 
+// A chunk with an index of which any one record is damaged is read itself: its messages are neither lost nor twice.
+TEST_P(MessageFileOf, NoMessageIsLostByADamagedIndexOfAChunk) {
+  if (GetParam().format == Format::kSqlite || !GetParam().layout.index) GTEST_SKIP() << "no index of a chunk";
+  const std::string bytes = bytes_of(GetParam());
+  const bool ros1 = GetParam().format == Format::kRos1;
+  // The index of a connection in a ROS 1 bag has the fields conn and count; records of MCAP files with 2 and 1 entries.
+  const std::string two("\x07\x26\0\0\0\0\0\0\0", 9), one("\x07\x16\0\0\0\0\0\0\0", 9);
+  int damaged = 0;
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    const std::string_view here = std::string_view(bytes).substr(at);
+    const bool is_index = ros1 ? here.starts_with("count=") && bytes.compare(at - 13, 5, "conn=") == 0
+                               : here.starts_with(two) || here.starts_with(one);
+    if (!is_index) continue;
+    std::string wrong = bytes;
+    wrong[ros1 ? at + 6 : at + 11] = '\x77';  // the count of entries, or their size in bytes
+    const auto file = open(wrong);
+    ASSERT_TRUE(file) << file.error().message();
+    ++damaged;
+    EXPECT_FALSE((*file)->warnings().empty()) << at;
+    EXPECT_EQ((*file)->messages().size(), 2u * kImages) << at;
+    EXPECT_EQ(good_images(**file, "/left/image_raw", 0), kImages) << at;
+    EXPECT_EQ(good_images(**file, "/right/image_raw", 100), kImages) << at;
+  }
+  EXPECT_TRUE(GetParam().layout.messages_per_chunk == 0 || damaged >= 8) << damaged;
+}
+
 // Every byte may be wrong: nothing crashes, and no more images are found than there are.
 TEST_P(MessageFileOf, HandlesDamagedBytes) {
   const std::string bytes = bytes_of(GetParam());
@@ -195,6 +223,56 @@ TEST(MessageFile, AbsurdSizesAreNotBelieved) {
   for (const MessageRef& message : (*file)->messages()) EXPECT_TRUE((*file)->read(message, kWholeMessage));
 }
 
+TEST(MessageFile, ASqliteMessageCannotBeLargerThanItsFile) {
+  const support::TemporaryFolder folder;
+  const fs::path bag = folder.path() / "a.db3";
+  support::write_sqlite_bag(bag, {{"/image", "sensor_msgs/Image", kStart, std::string(20'000, 'x')}});
+  std::string bytes = support::read_text(bag);
+  // The header of the row: its own size, id, topic_id, timestamp, and the size of the data, times 2 and 12 more, in
+  // groups of 7 bits. Before it are the size of the row and its number.
+  const std::string header("\x07\0\x09\x06\x82\xb8\x4c", 7);
+  const std::size_t at = bytes.find(header);
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at + 4, 3, "\xff\xff\x7c");
+  bytes.replace(at - 4, 3, "\xc0\x80\x07");
+  support::write_text(bag, bytes);
+  const auto file = open_message_file(bag);
+  ASSERT_TRUE(file) << file.error().message();
+  ASSERT_EQ((*file)->messages().size(), 1u);
+  for (const std::size_t size : {std::size_t{512}, kWholeMessage}) {
+    const auto read = (*file)->read((*file)->messages().front(), size);
+    ASSERT_FALSE(read);
+    EXPECT_TRUE(read.error().found.starts_with("a message of 1048568 bytes in a file of")) << read.error().found;
+  }
+}
+
+TEST(MessageFile, NothingIsWrittenBesideAnSqliteBagWithALog) {
+  const support::TemporaryFolder folder;
+  const fs::path recorded = folder.path() / "recorded", copy = folder.path() / "copy";
+  fs::create_directories(recorded);
+  fs::create_directories(copy);
+  support::write_sqlite_bag(recorded / "a.db3", test_messages(Wire::kCdr));
+  sqlite3* recorder = nullptr;
+  ASSERT_EQ(sqlite3_open((recorded / "a.db3").c_str(), &recorder), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(recorder,
+                         "PRAGMA journal_mode=WAL; INSERT INTO messages(topic_id, timestamp, data) SELECT topic_id, "
+                         "timestamp, data FROM messages WHERE id = 1;",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  fs::copy_file(recorded / "a.db3", copy / "a.db3");  // as if the recorder was killed now
+  fs::copy_file(recorded / "a.db3-wal", copy / "a.db3-wal");
+  sqlite3_close(recorder);
+  const auto file = open_message_file(copy / "a.db3");
+  ASSERT_TRUE(file) << file.error().message();
+  ASSERT_EQ((*file)->messages().size(), 2u * kImages);
+  for (const MessageRef& message : (*file)->messages()) EXPECT_TRUE((*file)->read(message, kWholeMessage));
+  ASSERT_EQ((*file)->warnings().size(), 1u);
+  EXPECT_NE((*file)->warnings()[0].find("a.db3-wal, which is not read"), std::string::npos) << (*file)->warnings()[0];
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(copy)) names.insert(entry.path().filename());
+  EXPECT_EQ(names, (std::set<std::string>{"a.db3", "a.db3-wal"}));
+}
+
 TEST(MessageFile, RejectsOtherFiles) {
   const support::TemporaryFolder folder;
   const auto found = [&](const std::string& bytes) {
@@ -219,6 +297,19 @@ TEST(Compression, StopsAtTheLimit) {
   EXPECT_EQ(decompress(Compression::kBz2, "no bz2", 100), "");
   EXPECT_EQ(decompress(Compression::kLz4, "no lz4", 100), "");
   EXPECT_EQ(decompress(Compression::kZstd, "no zstd", 100), "");
+  // A few bytes may stand for very many.
+  const std::string zeros(std::size_t{1} << 22, '\0');
+  for (const auto& [name, compression] : {std::pair("bz2", Compression::kBz2), std::pair("lz4", Compression::kLz4),
+                                          std::pair("zstd", Compression::kZstd)}) {
+    const std::string packed = support::compress(name, zeros);
+    EXPECT_LT(packed.size(), zeros.size() / 100) << name;
+    for (const std::size_t limit : {std::size_t{1}, std::size_t{1000}, std::size_t{100'000}}) {
+      const std::string out = decompress(compression, packed, limit);
+      EXPECT_EQ(out, zeros.substr(0, limit)) << name;
+      EXPECT_LE(out.capacity(), 2 * limit + 64) << name;
+    }
+    EXPECT_EQ(decompress(compression, packed, 2 * zeros.size()), zeros) << name;
+  }
 }
 
 TEST(Messages, ReadsCalibrations) {

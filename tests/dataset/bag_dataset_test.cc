@@ -241,6 +241,24 @@ TEST_F(SmallBag, WithoutStampsTheTimesOfRecordingAreUsed) {
   EXPECT_EQ(dataset->first_time_ns, support::kSmallStart + 3'000'000);
 }
 
+TEST_F(SmallBag, ImagesWithoutAStampAreNeitherUsedNorDescribed) {
+  auto all = messages(Wire::kRos1);
+  support::TestImage one = image(0, 2);
+  one.stamp_ns = 0;
+  all[4].bytes = support::image_message(Wire::kRos1, one);
+  write(all);
+  const auto dataset = open_dataset(request(bag()));
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_TRUE(has(dataset->warnings, "1 images without a time stamp"));
+  const auto described = describe_recording({.path = bag()});
+  ASSERT_TRUE(described) << described.error().message();
+  const StreamDescription& first = described->streams[0];
+  EXPECT_EQ(first.count, static_cast<std::uint64_t>(support::kSmallFrames));
+  ASSERT_EQ(first.times.size(), static_cast<std::size_t>(support::kSmallFrames - 1));
+  EXPECT_EQ(first.times.front(), support::kSmallStart);
+  EXPECT_EQ(first.notes, (std::vector<std::string>{"1 images have no time stamp"}));
+}
+
 TEST_F(SmallBag, TheDescriptionNamesCamerasTimesAndWhatIsMissing) {
   auto all = messages(Wire::kRos1);
   all.push_back({"/depth", "sensor_msgs/Image", support::kSmallStart,

@@ -83,27 +83,6 @@ std::string packed_field(int number, const std::vector<double>& values) {
   return bytes_field(number, bytes);
 }
 
-std::string compress(const std::string& name, const std::string& bytes) {
-  if (name == "bz2") {
-    std::string out(bytes.size() + bytes.size() / 50 + 1000, '\0');
-    auto size = static_cast<unsigned>(out.size());
-    BZ2_bzBuffToBuffCompress(out.data(), &size, const_cast<char*>(bytes.data()), static_cast<unsigned>(bytes.size()), 1,
-                             0, 0);
-    return out.substr(0, size);
-  }
-  if (name == "lz4") {
-    std::string out(LZ4F_compressFrameBound(bytes.size(), nullptr), '\0');
-    out.resize(LZ4F_compressFrame(out.data(), out.size(), bytes.data(), bytes.size(), nullptr));
-    return out;
-  }
-  if (name == "zstd") {
-    std::string out(ZSTD_compressBound(bytes.size()), '\0');
-    out.resize(ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), 1));
-    return out;
-  }
-  return bytes;
-}
-
 std::string ros2_type(const std::string& type) {
   const std::size_t slash = type.find('/');
   return type.substr(0, slash) + "/msg" + type.substr(slash);
@@ -150,6 +129,27 @@ std::size_t topic_number(const std::vector<const TestMessage*>& topics, const Te
 }
 
 }  // namespace
+
+std::string compress(const std::string& name, const std::string& bytes) {
+  if (name == "bz2") {
+    std::string out(bytes.size() + bytes.size() / 50 + 1000, '\0');
+    auto size = static_cast<unsigned>(out.size());
+    BZ2_bzBuffToBuffCompress(out.data(), &size, const_cast<char*>(bytes.data()), static_cast<unsigned>(bytes.size()), 1,
+                             0, 0);
+    return out.substr(0, size);
+  }
+  if (name == "lz4") {
+    std::string out(LZ4F_compressFrameBound(bytes.size(), nullptr), '\0');
+    out.resize(LZ4F_compressFrame(out.data(), out.size(), bytes.data(), bytes.size(), nullptr));
+    return out;
+  }
+  if (name == "zstd") {
+    std::string out(ZSTD_compressBound(bytes.size()), '\0');
+    out.resize(ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), 1));
+    return out;
+  }
+  return bytes;
+}
 
 std::string image_message(Wire wire, const TestImage& image) {
   if (wire == Wire::kProtobuf) {

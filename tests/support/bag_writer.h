@@ -48,6 +48,9 @@ struct BagLayout {
   bool index = true;
 };
 
+// Compressed as one stream: "bz2", "lz4" or "zstd"; any other name: as it is.
+std::string compress(const std::string& name, const std::string& bytes);
+
 std::string rosbag1_bytes(const std::vector<TestMessage>& messages, const BagLayout& layout = {});
 // `wire` gives the serialisation; types become those of ROS 2 or Foxglove.
 std::string mcap_bytes(const std::vector<TestMessage>& messages, Wire wire, const BagLayout& layout = {});
