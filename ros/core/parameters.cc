@@ -30,6 +30,11 @@ bslam::Status Parameters::check() const {
     }
   }
   const std::string cameras_text = std::to_string(image_topics.size()) + ", one for each image topic";
+  for (const std::string& topic : image_topics) {
+    if (rig.empty() && is_rectified(topic))
+      return wrong("image_topics", topic + ", whose images are rectified, without a rig file",
+                   "a topic of raw images, or the parameter rig with the calibration of the rectified images");
+  }
   if (!camera_info_topics.empty() && camera_info_topics.size() != image_topics.size())
     return wrong("camera_info_topics", std::to_string(camera_info_topics.size()) + " topics", cameras_text);
   if (!cameras.empty() && cameras.size() != image_topics.size())
@@ -112,6 +117,13 @@ std::string optical_axes_warning(const Parameters& parameters) {
 
 bool subscribe_reliably(const std::vector<bool>& publishers) {
   return !publishers.empty() && std::find(publishers.begin(), publishers.end(), false) == publishers.end();
+}
+
+bool is_rectified(const std::string& topic) {
+  const std::string raw = is_compressed(topic) ? topic.substr(0, topic.size() - kCompressed.size()) : topic;
+  const std::string name = raw.substr(raw.rfind('/') + 1);  // without a slash: the topic
+  const auto begins = [&](std::string_view with) { return name.compare(0, with.size(), with) == 0; };
+  return begins("image_rect") && !begins("image_rect_raw");
 }
 
 bool is_compressed(const std::string& topic) {

@@ -129,7 +129,7 @@ void SlamRunner::take_over() {
     failure_.clear();
   }
   converter_.restart();
-  cloud_due_ = path_due_ = true;
+  cloud_due_ = true;
 }
 
 void SlamRunner::process(const bslam::ImageBundle& images) {
@@ -148,7 +148,7 @@ void SlamRunner::process(const bslam::ImageBundle& images) {
   if (!frame) return log(bslam::LogLevel::kWarning, frame.error().message());
   if (frame->tracking() && outputs_.pose) outputs_.pose(converter_.convert(*frame));
   report_changes(before, *frame);
-  if (map_changed_.exchange(false)) cloud_due_ = path_due_ = true;
+  if (map_changed_.exchange(false)) cloud_due_ = true;
   if (!frame->tracking()) return;
   publish_cloud(*frame);
   publish_path(*frame);

@@ -89,9 +89,9 @@ class SlamRunner {
   Clock::time_point last_frame_at_ = Clock::now();
 
   std::atomic<std::size_t> loops_ = 0;
-  std::atomic<bool> map_changed_ = false, path_changed_ = false;
-  std::int64_t cloud_ns_ = 0, path_ns_ = 0;  // times of the last ones; the next three are the thread's
-  bool cloud_due_ = false, path_due_ = false;
+  std::atomic<bool> map_changed_ = false;
+  std::int64_t cloud_ns_ = 0, path_ns_ = 0;  // times of the last ones; these and the next three are the thread's
+  bool cloud_due_ = false;
   bool cloud_published_ = false, path_published_ = false;
   bool stopped_ = false;
   std::mutex replacement_;  // held by the service that replaces the System

@@ -226,8 +226,20 @@ TEST(RosCameraInfo, DistortionModelsAreThoseOfTheLibrary) {
   EXPECT_EQ(model(info("plumb_bob", {0, 0, 0, 0, 0})), "pinhole");
   EXPECT_EQ(model(info("rational_polynomial", {0.1, 0.2, 0, 0, 0.01, 0.1, 0.1, 0.01})), "pinhole-radtan");
   EXPECT_EQ(model(info("equidistant", {0.01, 0.02, 0.001, 0})), "kannala-brandt");
+  EXPECT_EQ(model(info("kannala_brandt", {0.01, 0.02, 0.001, 0})), "kannala-brandt");
+  EXPECT_EQ(model(info("equidistant", {})), "kannala-brandt");
+  EXPECT_EQ(model(info("", {-0.28})), "pinhole-radtan");
+  const auto coefficients = [](const CameraInfo& i) { return to_calibration(i, "left", Pose()).value().distortion; };
+  using Numbers = std::vector<double>;
+  EXPECT_EQ(coefficients(info("plumb_bob", {-0.28})), (Numbers{-0.28, 0, 0, 0}));
+  EXPECT_EQ(coefficients(info("plumb_bob", {1, 2, 3, 4, 5, 0, 0, 0})), (Numbers{1, 2, 3, 4, 5}));
+  EXPECT_EQ(coefficients(info("rational_polynomial", {1, 2, 3, 4, 5, 6})), (Numbers{1, 2, 3, 4, 5, 6, 0, 0}));
+  EXPECT_EQ(coefficients(info("rational_polynomial", {1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0})).size(), 8u);
+  EXPECT_EQ(coefficients(info("equidistant", {0.1, 0.2, 0, 0, 0})), (Numbers{0.1, 0.2, 0, 0}));
   const auto found = [](const CameraInfo& i) { return to_calibration(i, "left", Pose()).error().message(); };
-  EXPECT_NE(found(info("plumb_bob", {1, 2, 3})).find("left: camera_info: D: found 3 coefficients"), std::string::npos);
+  EXPECT_NE(found(info("plumb_bob", {1, 2, 3, 4, 5, 6})).find("left: camera_info: D: found 6 coefficients"),
+            std::string::npos);
+  EXPECT_NE(found(info("fisheye", {1, 2, 3, 4, 5})).find("expected at most 4"), std::string::npos);
   EXPECT_NE(found(info("omni", {1})).find("give a rig file"), std::string::npos);
   CameraInfo uncalibrated = info("plumb_bob", {});
   uncalibrated.K = {};
@@ -280,6 +292,21 @@ TEST(RosParameters, AreChecked) {
   EXPECT_TRUE(refused([](Parameters& p) { p.sync_tolerance = std::nan(""); }));
   parameters.image_topics = {"image", "other"};
   EXPECT_EQ(camera_names(parameters), (std::vector<std::string>{"cam0", "cam1"}));
+}
+
+TEST(RosParameters, RectifiedImagesNeedARigFile) {
+  EXPECT_TRUE(is_rectified("/left/image_rect"));
+  EXPECT_TRUE(is_rectified("/left/image_rect_color/compressed"));
+  EXPECT_TRUE(is_rectified("image_rect"));
+  EXPECT_FALSE(is_rectified("/left/image_rect_raw"));  // of a RealSense: the lens's own images
+  EXPECT_FALSE(is_rectified("/image_rect/image_raw"));
+  Parameters parameters;
+  parameters.image_topics = {"/left/image_raw", "/right/image_rect"};
+  ASSERT_FALSE(parameters.check());
+  EXPECT_NE(parameters.check().error().message().find("/right/image_rect, whose images are rectified"),
+            std::string::npos);
+  parameters.rig = "rectified.yaml";
+  EXPECT_TRUE(parameters.check());
 }
 
 TEST(RosParameters, AreDocumented) {
