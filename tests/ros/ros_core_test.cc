@@ -11,6 +11,7 @@
 #include "core/image_conversion.h"
 #include "core/parameters.h"
 #include "core/pose_output.h"
+#include "messages/compressed_image.h"
 #include "support/data_on_disk.h"
 
 namespace bslam_ros {
@@ -207,6 +208,43 @@ TEST(RosImages, LyingImagesAreErrors) {
   EXPECT_EQ(to_grey(huge, 0).error().key, "size");
   EXPECT_EQ(to_grey(image_of("32FC1", bytes, 1, 4), 0).error().key, "encoding");
   EXPECT_EQ(to_grey(image_of("mono8", {}, 4, 4), 0).error().key, "size");
+}
+
+TEST(RosImages, CompressedImagesThatAreCutOffAreErrors) {
+  cv::Mat picture(40, 60, CV_8UC1);
+  for (int i = 0; i < 40 * 60; ++i) picture.data[i] = static_cast<std::uint8_t>(37 * i % 251);
+  for (const char* format : {".jpg", ".png"}) {
+    std::vector<std::uint8_t> bytes;
+    ASSERT_TRUE(cv::imencode(format, picture, bytes));
+    const auto image = decode(bytes, format);
+    ASSERT_TRUE(image) << image.error().message();
+    EXPECT_EQ(image->width, 60u);
+    std::vector<std::uint8_t> filled = bytes;
+    filled.resize(bytes.size() + 100);
+    EXPECT_TRUE(decode(filled, format)) << format;
+    for (const std::size_t size : {bytes.size() - 1, bytes.size() - 100, bytes.size() / 2, std::size_t{3}}) {
+      const std::vector<std::uint8_t> part(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+      const auto cut = decode(part, format);
+      ASSERT_FALSE(cut) << format << ' ' << size;
+      EXPECT_NE(cut.error().message().find("expected a complete JPEG or PNG image"), std::string::npos);
+    }
+  }
+  EXPECT_FALSE(decode({}, "jpeg"));
+  EXPECT_FALSE(decode(std::vector<std::uint8_t>(50), "jpeg"));
+}
+
+TEST(RosImages, MetadataDoNotTurnCompressedImages) {
+  std::vector<std::uint8_t> bytes;
+  ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(40, 60, CV_8UC1, cv::Scalar(90)), bytes));
+  // Exif with one entry: orientation (0x112), of type short, is 6, a quarter turn.
+  const std::vector<std::uint8_t> exif = {0xff, 0xe1, 0, 34, 'E', 'x', 'i',  'f',  0, 0, 'M', 'M', 0, 42, 0, 0, 0, 8,
+                                          0,    1,    1, 18, 0,   3,   0,    0,    0, 1, 0,   6,   0, 0,  0, 0, 0, 0};
+  bytes.insert(bytes.begin() + 2, exif.begin(), exif.end());
+  ASSERT_EQ(cv::imdecode(bytes, cv::IMREAD_GRAYSCALE).cols, 40);  // turned
+  const auto image = decode(bytes, "jpeg");
+  ASSERT_TRUE(image) << image.error().message();
+  EXPECT_EQ(image->width, 60u);
+  EXPECT_EQ(image->height, 40u);
 }
 
 CameraInfo info(const char* model, std::vector<double> D) {
