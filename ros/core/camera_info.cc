@@ -10,8 +10,8 @@ bslam::Error wrong(const std::string& camera, const char* key, std::string found
   return {camera + ": camera_info", key, std::move(found), std::move(expected)};
 }
 
-// Sets model and coefficients, as the reader of bags does. A lens without distortion is a pinhole. Coefficients that are
-// missing are zero, and ones that the model does not have must be.
+// Sets model and coefficients, as the reader of bags does. A lens without distortion is a pinhole. Coefficients that
+// are missing are zero, and ones that the model does not have must be.
 bslam::Status set_distortion(const CameraInfo& info, const std::string& camera, bslam::CameraCalibration& out) {
   const std::string& name = info.distortion_model;
   const bool fisheye = name == "equidistant" || name == "fisheye" || name == "kannala_brandt";

@@ -1,6 +1,7 @@
 #include "core/parameters.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 #include <string_view>
 
@@ -42,6 +43,8 @@ bslam::Status Parameters::check() const {
   if (map_frame == odom_frame || odom_frame == base_frame || map_frame == base_frame)
     return wrong("map_frame, odom_frame, base_frame", "'" + map_frame + "', '" + odom_frame + "', '" + base_frame + "'",
                  "three different frames");
+  if (map_frame.empty() || map_frame.find_first_of(" \t\r\n") != std::string::npos)
+    return wrong("map_frame", "'" + map_frame + "'", "the name of a frame, without spaces");
   for (const std::string& setting : settings) {
     if (setting.find('=') == std::string::npos) return wrong("settings", "'" + setting + "'", "name=value");
   }
@@ -117,6 +120,12 @@ std::string optical_axes_warning(const Parameters& parameters) {
 
 bool subscribe_reliably(const std::vector<bool>& publishers) {
   return !publishers.empty() && std::find(publishers.begin(), publishers.end(), false) == publishers.end();
+}
+
+std::string earlier_trajectory_file(const std::string& trajectory_file, std::size_t n) {
+  const std::filesystem::path path(trajectory_file);
+  const std::string name = path.stem().string() + "_" + std::to_string(n) + path.extension().string();
+  return (path.parent_path() / name).string();
 }
 
 bool is_rectified(const std::string& topic) {

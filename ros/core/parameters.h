@@ -48,7 +48,8 @@ struct Parameters {
     visit("settings", self.settings, "further settings of bslam, each `name=value`");
     visit("map_file", self.map_file, "saved map to continue, or to localise in; empty: a new map");
     visit("trajectory_file", self.trajectory_file,
-          "file for the final trajectory of the body frame (TUM format), written when the node ends; empty: none");
+          "file for the final trajectory of base_frame in map_frame (TUM format), written when the node ends; empty: "
+          "none");
     visit("map_frame", self.map_frame, "frame of the map");
     visit("odom_frame", self.odom_frame, "frame of the continuous odometry");
     visit("base_frame", self.base_frame, "frame of the robot, with x forward, y left, z up");
@@ -96,6 +97,9 @@ std::string optical_axes_warning(const Parameters& parameters);
 // Whether to ask for reliable delivery of images (ROS 2), given which of the publishers offer it: a subscription that
 // does receives nothing from one that does not, whereas best effort is compatible with all.
 bool subscribe_reliably(const std::vector<bool>& publishers);
+
+// The file of the poses before the n-th change of the map by a service, n from 1: /data/walk_1.tum of /data/walk.tum.
+std::string earlier_trajectory_file(const std::string& trajectory_file, std::size_t n);
 
 // True for topics of rectified images by their names, such as /left/image_rect_color: K and D of CameraInfo do not
 // describe them. The images of image_rect_raw have the lens's own distortion, which CameraInfo describes.

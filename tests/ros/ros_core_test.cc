@@ -237,8 +237,8 @@ TEST(RosImages, MetadataDoNotTurnCompressedImages) {
   std::vector<std::uint8_t> bytes;
   ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(40, 60, CV_8UC1, cv::Scalar(90)), bytes));
   // Exif with one entry: orientation (0x112), of type short, is 6, a quarter turn.
-  const std::vector<std::uint8_t> exif = {0xff, 0xe1, 0, 34, 'E', 'x', 'i',  'f',  0, 0, 'M', 'M', 0, 42, 0, 0, 0, 8,
-                                          0,    1,    1, 18, 0,   3,   0,    0,    0, 1, 0,   6,   0, 0,  0, 0, 0, 0};
+  const std::vector<std::uint8_t> exif = {0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f', 0, 0, 'M', 'M', 0, 42, 0, 0, 0, 8,
+                                          0,    1,    1, 18, 0,   3,   0,   0,   0, 1, 0,   6,   0, 0,  0, 0, 0, 0};
   bytes.insert(bytes.begin() + 2, exif.begin(), exif.end());
   ASSERT_EQ(cv::imdecode(bytes, cv::IMREAD_GRAYSCALE).cols, 40);  // turned
   const auto image = decode(bytes, "jpeg");
@@ -325,6 +325,7 @@ TEST(RosParameters, AreChecked) {
   EXPECT_TRUE(refused([](Parameters& p) { p.cameras = {0}; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.camera_info_topics = {"a"}; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.odom_frame = p.map_frame; }));
+  EXPECT_TRUE(refused([](Parameters& p) { p.map_frame = "my map"; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.settings = {"features.per_image"}; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.max_bundles = 0; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.sync_tolerance = std::nan(""); }));
