@@ -48,6 +48,14 @@ BslamNode::BslamNode(ros::NodeHandle topics, ros::NodeHandle own, Parameters par
     : topics_(topics), own_(own), parameters_(std::move(parameters)), tf_listener_(tf_buffer_) {}
 
 bslam::Status BslamNode::start() {
+  try {
+    return start_or_throw();
+  } catch (const std::exception& error) {  // ROS refuses a name of a topic or a service by an exception
+    return bslam::Error{"bslam_node", "", "", "", std::string("the node cannot start: ") + error.what()};
+  }
+}
+
+bslam::Status BslamNode::start_or_throw() {
   auto rig = wait_for_rig();
   if (!rig) return rig.error();
   if (!*rig) return {};
@@ -120,8 +128,12 @@ std::optional<Pose> BslamNode::wait_for_transform(const std::string& child) {
   ros::WallTime told = ros::WallTime::now();
   while (ros::ok()) {
     std::string why;
-    if (tf_buffer_.canTransform(parameters_.base_frame, child, ros::Time(0), &why))
-      return to_pose(tf_buffer_.lookupTransform(parameters_.base_frame, child, ros::Time(0)).transform);
+    try {  // the one call may succeed and the other fail: the buffer is cleared when time jumps back
+      if (tf_buffer_.canTransform(parameters_.base_frame, child, ros::Time(0), &why))
+        return to_pose(tf_buffer_.lookupTransform(parameters_.base_frame, child, ros::Time(0)).transform);
+    } catch (const tf2::TransformException& error) {
+      why = error.what();
+    }
     if ((ros::WallTime::now() - told).toSec() > kReminder_s) {
       told = ros::WallTime::now();
       ROS_WARN_STREAM("waiting for the transform from " << child << " to " << parameters_.base_frame << ": " << why);
