@@ -39,7 +39,13 @@ bool answer(const bslam::Status& status, Response& response) {
 
 bslam::Result<std::unique_ptr<BslamNode>> BslamNode::create(ros::NodeHandle topics, ros::NodeHandle own) {
   Parameters parameters;
-  Parameters::visit(parameters, [&](const char* name, auto& value, const char*) { own.param(name, value, value); });
+  std::string mistyped;
+  Parameters::visit(parameters, [&](const char* name, auto& value, const char*) {
+    if (own.hasParam(name) && !own.getParam(name, value)) mistyped = name;
+  });
+  if (!mistyped.empty())
+    return bslam::Error{"parameter", mistyped, "a value of another type",
+                        "one as in docs/ros.md; lists are set by a launch file or rosparam, not on the command line"};
   if (const bslam::Status status = parameters.check(); !status) return status.error();
   return std::unique_ptr<BslamNode>(new BslamNode(topics, own, parameters));
 }

@@ -26,7 +26,7 @@ namespace bslam_ros {
 
 class BslamNode {
  public:
-  // Reads the parameters. Errors: those of Parameters::check.
+  // Reads the parameters. Errors: those of Parameters::check; a parameter of another type.
   static bslam::Result<std::unique_ptr<BslamNode>> create(ros::NodeHandle topics, ros::NodeHandle own);
 
   // Waits for the rig, then advertises, subscribes and returns. Errors: a wrong calibration, map or setting; the name
