@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include "bslam/export.h"
@@ -23,7 +24,9 @@ using Trajectory = std::vector<TimedPose>;
 enum class RigFrame { kCamera0, kBody };
 
 // Writes the TUM format: a comment with the frame, then one line `t x y z qx qy qz qw` per pose, in seconds and metres
-// with nine decimals. The file is written completely or not at all. Error: it cannot be written.
-BSLAM_EXPORT Status write_tum(const std::filesystem::path& file, const Trajectory& trajectory, RigFrame frame);
+// with nine decimals. `parent` is the name of the frame that the poses are in, without spaces. The file is written
+// completely or not at all. Errors: it cannot be written; a name that is empty or contains white space.
+BSLAM_EXPORT Status write_tum(const std::filesystem::path& file, const Trajectory& trajectory, RigFrame frame,
+                              std::string_view parent = "world");
 
 }  // namespace bslam

@@ -10,25 +10,27 @@ bslam::Error wrong(const std::string& camera, const char* key, std::string found
   return {camera + ": camera_info", key, std::move(found), std::move(expected)};
 }
 
-// Sets model and coefficients. A lens without distortion is a pinhole.
+// Sets model and coefficients, as the reader of bags does. A lens without distortion is a pinhole. Coefficients that
+// are missing are zero, and ones that the model does not have must be.
 bslam::Status set_distortion(const CameraInfo& info, const std::string& camera, bslam::CameraCalibration& out) {
-  const bool zero = std::all_of(info.D.begin(), info.D.end(), [](double k) { return k == 0; });
-  const bool fisheye = info.distortion_model == "equidistant" || info.distortion_model == "fisheye";
-  const bool rational = info.distortion_model == "rational_polynomial";
-  if (fisheye) {
-    if (info.D.size() != 4) return wrong(camera, "D", std::to_string(info.D.size()) + " coefficients", "4");
-    out.model = "kannala-brandt";
-  } else if (info.distortion_model == "plumb_bob" || rational || (info.distortion_model.empty() && zero)) {
-    const bool fits = rational ? info.D.size() == 8 : info.D.size() == 4 || info.D.size() == 5;
-    if (!zero && !fits)
-      return wrong(camera, "D", std::to_string(info.D.size()) + " coefficients", rational ? "8" : "4 or 5");
-    out.model = zero ? "pinhole" : "pinhole-radtan";
-    if (zero) return {};
-  } else {
-    return wrong(camera, "distortion_model", "'" + info.distortion_model + "'",
+  const std::string& name = info.distortion_model;
+  const bool fisheye = name == "equidistant" || name == "fisheye" || name == "kannala_brandt";
+  const bool rational = name == "rational_polynomial";
+  if (!fisheye && !rational && name != "plumb_bob" && !name.empty())
+    return wrong(camera, "distortion_model", "'" + name + "'",
                  "plumb_bob, rational_polynomial, equidistant or fisheye; give a rig file for other models");
+  const std::size_t most = fisheye ? 4 : rational ? 8 : 5;
+  const std::size_t given = info.D.size();
+  const auto is_zero = [](double k) { return k == 0; };
+  if (given > most && !std::all_of(info.D.begin() + static_cast<std::ptrdiff_t>(most), info.D.end(), is_zero))
+    return wrong(camera, "D", std::to_string(given) + " coefficients", "at most " + std::to_string(most));
+  if (!fisheye && std::all_of(info.D.begin(), info.D.end(), is_zero)) {
+    out.model = "pinhole";
+    return {};
   }
+  out.model = fisheye ? "kannala-brandt" : "pinhole-radtan";
   out.distortion = info.D;
+  out.distortion.resize(fisheye || given <= 4 ? 4 : given <= 5 || !rational ? 5 : 8, 0.0);
   return {};
 }
 

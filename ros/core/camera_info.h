@@ -15,7 +15,8 @@ namespace bslam_ros {
 struct CameraInfo {
   std::string frame_id;
   std::size_t width = 0, height = 0;  // of the sensor, before binning and region of interest
-  std::string distortion_model;       // plumb_bob, rational_polynomial, equidistant or fisheye
+  std::string distortion_model;       // plumb_bob (or empty), rational_polynomial, equidistant, fisheye or
+                                      // kannala_brandt
   std::vector<double> D;
   std::array<double, 9> K = {};
   std::size_t binning_x = 0, binning_y = 0;
@@ -23,7 +24,7 @@ struct CameraInfo {
 };
 
 // The calibration of raw (neither rectified nor undistorted) images. Errors name the field: an unknown distortion
-// model, a wrong number of coefficients, a calibration that was not done (K is zero). Ranges are checked by Rig::make.
+// model, more coefficients than it has, a calibration that was not done (K is zero). Ranges are checked by Rig::make.
 bslam::Result<bslam::CameraCalibration> to_calibration(const CameraInfo& info, const std::string& camera,
                                                        const Pose& T_base_cam);
 

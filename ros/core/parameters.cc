@@ -1,6 +1,7 @@
 #include "core/parameters.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 #include <string_view>
 
@@ -30,6 +31,11 @@ bslam::Status Parameters::check() const {
     }
   }
   const std::string cameras_text = std::to_string(image_topics.size()) + ", one for each image topic";
+  for (const std::string& topic : image_topics) {
+    if (rig.empty() && is_rectified(topic))
+      return wrong("image_topics", topic + ", whose images are rectified, without a rig file",
+                   "a topic of raw images, or the parameter rig with the calibration of the rectified images");
+  }
   if (!camera_info_topics.empty() && camera_info_topics.size() != image_topics.size())
     return wrong("camera_info_topics", std::to_string(camera_info_topics.size()) + " topics", cameras_text);
   if (!cameras.empty() && cameras.size() != image_topics.size())
@@ -37,6 +43,8 @@ bslam::Status Parameters::check() const {
   if (map_frame == odom_frame || odom_frame == base_frame || map_frame == base_frame)
     return wrong("map_frame, odom_frame, base_frame", "'" + map_frame + "', '" + odom_frame + "', '" + base_frame + "'",
                  "three different frames");
+  if (map_frame.empty() || map_frame.find_first_of(" \t\r\n") != std::string::npos)
+    return wrong("map_frame", "'" + map_frame + "'", "the name of a frame, without spaces");
   for (const std::string& setting : settings) {
     if (setting.find('=') == std::string::npos) return wrong("settings", "'" + setting + "'", "name=value");
   }
@@ -112,6 +120,19 @@ std::string optical_axes_warning(const Parameters& parameters) {
 
 bool subscribe_reliably(const std::vector<bool>& publishers) {
   return !publishers.empty() && std::find(publishers.begin(), publishers.end(), false) == publishers.end();
+}
+
+std::string earlier_trajectory_file(const std::string& trajectory_file, std::size_t n) {
+  const std::filesystem::path path(trajectory_file);
+  const std::string name = path.stem().string() + "_" + std::to_string(n) + path.extension().string();
+  return (path.parent_path() / name).string();
+}
+
+bool is_rectified(const std::string& topic) {
+  const std::string raw = is_compressed(topic) ? topic.substr(0, topic.size() - kCompressed.size()) : topic;
+  const std::string name = raw.substr(raw.rfind('/') + 1);  // without a slash: the topic
+  const auto begins = [&](std::string_view with) { return name.compare(0, with.size(), with) == 0; };
+  return begins("image_rect") && !begins("image_rect_raw");
 }
 
 bool is_compressed(const std::string& topic) {

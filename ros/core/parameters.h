@@ -48,7 +48,8 @@ struct Parameters {
     visit("settings", self.settings, "further settings of bslam, each `name=value`");
     visit("map_file", self.map_file, "saved map to continue, or to localise in; empty: a new map");
     visit("trajectory_file", self.trajectory_file,
-          "file for the final trajectory of the body frame (TUM format), written when the node ends; empty: none");
+          "file for the final trajectory of base_frame in map_frame (TUM format), written when the node ends; empty: "
+          "none");
     visit("map_frame", self.map_frame, "frame of the map");
     visit("odom_frame", self.odom_frame, "frame of the continuous odometry");
     visit("base_frame", self.base_frame, "frame of the robot, with x forward, y left, z up");
@@ -72,7 +73,7 @@ struct Parameters {
   }
 
   // Errors name the parameter: no image topic, a value out of range, lists of different lengths, equal frames, a
-  // setting without '='.
+  // setting without '=', rectified images without a rig file.
   bslam::Status check() const;
 
   // The settings of `config` and `settings`. Errors: those of bslam::Config.
@@ -86,13 +87,6 @@ struct Parameters {
   std::string camera_info_topic(std::size_t i) const;
 };
 
-// Names of the cameras by their image topics, for a rig from CameraInfo: the topics without what they all begin and end
-// with, such as "left" and "right" of /stereo/left/image_raw and /stereo/right/image_raw.
-std::vector<std::string> camera_names(const Parameters& parameters);
-
-// What to tell if base_link would have the axes of camera 0 (body_has_optical_axes).
-std::string optical_axes_warning(const Parameters& parameters);
-
 // Names of the cameras of a rig from CameraInfo: the folders of their image topics, such as "left" of
 // /stereo/left/image_raw; "cam0", "cam1", ... unless these differ.
 std::vector<std::string> camera_names(const Parameters& parameters);
@@ -103,6 +97,13 @@ std::string optical_axes_warning(const Parameters& parameters);
 // Whether to ask for reliable delivery of images (ROS 2), given which of the publishers offer it: a subscription that
 // does receives nothing from one that does not, whereas best effort is compatible with all.
 bool subscribe_reliably(const std::vector<bool>& publishers);
+
+// The file of the poses before the n-th change of the map by a service, n from 1: /data/walk_1.tum of /data/walk.tum.
+std::string earlier_trajectory_file(const std::string& trajectory_file, std::size_t n);
+
+// True for topics of rectified images by their names, such as /left/image_rect_color: K and D of CameraInfo do not
+// describe them. The images of image_rect_raw have the lens's own distortion, which CameraInfo describes.
+bool is_rectified(const std::string& topic);
 
 // True for topics of sensor_msgs/CompressedImage.
 bool is_compressed(const std::string& topic);

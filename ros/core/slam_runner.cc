@@ -128,8 +128,17 @@ void SlamRunner::take_over() {
     localize_only_ = next_localize_only_;
     failure_.clear();
   }
+  keep_trajectory(*before);
   converter_.restart();
-  cloud_due_ = path_due_ = true;
+  cloud_due_ = true;
+}
+
+// The map of the System is gone with it, and with the map the corrections of the poses that are to come.
+void SlamRunner::keep_trajectory(const bslam::System& before) {
+  if (parameters_.trajectory_file.empty()) return;
+  auto trajectory = before.trajectory(bslam::RigFrame::kBody);
+  if (!trajectory) return log(bslam::LogLevel::kWarning, trajectory.error().message());
+  if (!trajectory->empty()) earlier_.push_back(*std::move(trajectory));
 }
 
 void SlamRunner::process(const bslam::ImageBundle& images) {
@@ -148,7 +157,7 @@ void SlamRunner::process(const bslam::ImageBundle& images) {
   if (!frame) return log(bslam::LogLevel::kWarning, frame.error().message());
   if (frame->tracking() && outputs_.pose) outputs_.pose(converter_.convert(*frame));
   report_changes(before, *frame);
-  if (map_changed_.exchange(false)) cloud_due_ = path_due_ = true;
+  if (map_changed_.exchange(false)) cloud_due_ = true;
   if (!frame->tracking()) return;
   publish_cloud(*frame);
   publish_path(*frame);
@@ -275,16 +284,23 @@ bslam::Status SlamRunner::stop() {
   if (const bslam::Status closed = synchronizer_->close(); !closed)
     log(bslam::LogLevel::kWarning, closed.error().message());
   if (thread_.joinable()) thread_.join();
-  return parameters_.trajectory_file.empty() ? bslam::Status() : write_trajectory();
+  return parameters_.trajectory_file.empty() ? bslam::Status() : write_trajectories();
 }
 
-bslam::Status SlamRunner::write_trajectory() {
+bslam::Status SlamRunner::write_trajectories() {
+  for (std::size_t i = 0; i < earlier_.size(); ++i) {
+    const std::string file = earlier_trajectory_file(parameters_.trajectory_file, i + 1);
+    if (const bslam::Status written = write_trajectory(file, earlier_[i]); !written) return written;
+  }
   if (const bslam::Status finished = system_->finish(); !finished) return finished;
   const auto trajectory = system_->trajectory(bslam::RigFrame::kBody);
   if (!trajectory) return trajectory.error();
-  bslam::Trajectory in_map = *trajectory;
-  for (bslam::TimedPose& pose : in_map) pose.T_world_frame = converter_.to_map(pose.T_world_frame);
-  return bslam::write_tum(parameters_.trajectory_file, in_map, bslam::RigFrame::kBody);
+  return write_trajectory(parameters_.trajectory_file, *trajectory);
+}
+
+bslam::Status SlamRunner::write_trajectory(const std::string& file, bslam::Trajectory trajectory) const {
+  for (bslam::TimedPose& pose : trajectory) pose.T_world_frame = converter_.to_map(pose.T_world_frame);
+  return bslam::write_tum(file, trajectory, bslam::RigFrame::kBody, parameters_.map_frame);
 }
 
 void SlamRunner::log(bslam::LogLevel level, const std::string& line) const {

@@ -49,7 +49,8 @@ class SlamRunner {
   std::vector<DiagnosticStatus> diagnostics() const;
 
   // Processes the images that have arrived and ends the thread; further images are rejected. Writes trajectory_file, if
-  // given, after adjusting the map. Outputs are not called afterwards.
+  // given, after adjusting the map, and beside it a numbered file for the time before each change of the map by a
+  // service (earlier_trajectory_file). Outputs are not called afterwards.
   bslam::Status stop();
 
  private:
@@ -65,12 +66,14 @@ class SlamRunner {
   bslam::Status replace_system(const std::string& map, bool localize_only);
   void run();
   void take_over();
+  void keep_trajectory(const bslam::System& before);
   void process(const bslam::ImageBundle& images);
   void report_changes(const std::optional<bslam::FrameResult>& before, const bslam::FrameResult& now);
   void publish_cloud(const bslam::FrameResult& frame);
   void publish_path(const bslam::FrameResult& frame);
   void log(bslam::LogLevel level, const std::string& line) const;
-  bslam::Status write_trajectory();
+  bslam::Status write_trajectories();
+  bslam::Status write_trajectory(const std::string& file, bslam::Trajectory trajectory) const;
 
   const bslam::Rig rig_;
   const Parameters parameters_;
@@ -89,10 +92,11 @@ class SlamRunner {
   Clock::time_point last_frame_at_ = Clock::now();
 
   std::atomic<std::size_t> loops_ = 0;
-  std::atomic<bool> map_changed_ = false, path_changed_ = false;
-  std::int64_t cloud_ns_ = 0, path_ns_ = 0;  // times of the last ones; the next three are the thread's
-  bool cloud_due_ = false, path_due_ = false;
+  std::atomic<bool> map_changed_ = false;
+  std::int64_t cloud_ns_ = 0, path_ns_ = 0;  // times of the last ones; these and the next three are the thread's
+  bool cloud_due_ = false;
   bool cloud_published_ = false, path_published_ = false;
+  std::vector<bslam::Trajectory> earlier_;  // of the Systems that were replaced; the thread's
   bool stopped_ = false;
   std::mutex replacement_;  // held by the service that replaces the System
   std::thread thread_;

@@ -39,7 +39,13 @@ bool answer(const bslam::Status& status, Response& response) {
 
 bslam::Result<std::unique_ptr<BslamNode>> BslamNode::create(ros::NodeHandle topics, ros::NodeHandle own) {
   Parameters parameters;
-  Parameters::visit(parameters, [&](const char* name, auto& value, const char*) { own.param(name, value, value); });
+  std::string mistyped;
+  Parameters::visit(parameters, [&](const char* name, auto& value, const char*) {
+    if (own.hasParam(name) && !own.getParam(name, value)) mistyped = name;
+  });
+  if (!mistyped.empty())
+    return bslam::Error{"parameter", mistyped, "a value of another type",
+                        "one as in docs/ros.md; lists are set by a launch file or rosparam, not on the command line"};
   if (const bslam::Status status = parameters.check(); !status) return status.error();
   return std::unique_ptr<BslamNode>(new BslamNode(topics, own, parameters));
 }
@@ -48,6 +54,14 @@ BslamNode::BslamNode(ros::NodeHandle topics, ros::NodeHandle own, Parameters par
     : topics_(topics), own_(own), parameters_(std::move(parameters)), tf_listener_(tf_buffer_) {}
 
 bslam::Status BslamNode::start() {
+  try {
+    return start_or_throw();
+  } catch (const std::exception& error) {  // ROS refuses a name of a topic or a service by an exception
+    return bslam::Error{"bslam_node", "", "", "", std::string("the node cannot start: ") + error.what()};
+  }
+}
+
+bslam::Status BslamNode::start_or_throw() {
   auto rig = wait_for_rig();
   if (!rig) return rig.error();
   if (!*rig) return {};
@@ -120,8 +134,12 @@ std::optional<Pose> BslamNode::wait_for_transform(const std::string& child) {
   ros::WallTime told = ros::WallTime::now();
   while (ros::ok()) {
     std::string why;
-    if (tf_buffer_.canTransform(parameters_.base_frame, child, ros::Time(0), &why))
-      return to_pose(tf_buffer_.lookupTransform(parameters_.base_frame, child, ros::Time(0)).transform);
+    try {  // the one call may succeed and the other fail: the buffer is cleared when time jumps back
+      if (tf_buffer_.canTransform(parameters_.base_frame, child, ros::Time(0), &why))
+        return to_pose(tf_buffer_.lookupTransform(parameters_.base_frame, child, ros::Time(0)).transform);
+    } catch (const tf2::TransformException& error) {
+      why = error.what();
+    }
     if ((ros::WallTime::now() - told).toSec() > kReminder_s) {
       told = ros::WallTime::now();
       ROS_WARN_STREAM("waiting for the transform from " << child << " to " << parameters_.base_frame << ": " << why);

@@ -26,11 +26,11 @@ namespace bslam_ros {
 
 class BslamNode {
  public:
-  // Reads the parameters. Errors: those of Parameters::check.
+  // Reads the parameters. Errors: those of Parameters::check; a parameter of another type.
   static bslam::Result<std::unique_ptr<BslamNode>> create(ros::NodeHandle topics, ros::NodeHandle own);
 
-  // Waits for the rig, then advertises, subscribes and returns. Errors: a wrong calibration, map or setting. Returns
-  // without error if ROS is shut down meanwhile.
+  // Waits for the rig, then advertises, subscribes and returns. Errors: a wrong calibration, map or setting; the name
+  // of a topic that ROS refuses. Returns without error if ROS is shut down meanwhile.
   bslam::Status start();
 
   // Ends the subscriptions and processes the images that have arrived.
@@ -39,6 +39,7 @@ class BslamNode {
  private:
   BslamNode(ros::NodeHandle topics, ros::NodeHandle own, Parameters parameters);
 
+  bslam::Status start_or_throw();
   bslam::Result<std::optional<bslam::Rig>> wait_for_rig();
   bslam::Result<std::optional<bslam::Rig>> rig_from_file();
   bslam::Result<std::optional<bslam::Rig>> rig_from_camera_info();

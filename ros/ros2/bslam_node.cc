@@ -61,6 +61,14 @@ BslamNode::BslamNode(rclcpp::Node::SharedPtr node, Parameters parameters)
       static_tf_(*node_) {}
 
 bslam::Status BslamNode::start() {
+  try {
+    return start_or_throw();
+  } catch (const std::exception& error) {  // ROS refuses a name of a topic or a service by an exception
+    return bslam::Error{"bslam_node", "", "", "", std::string("the node cannot start: ") + error.what()};
+  }
+}
+
+bslam::Status BslamNode::start_or_throw() {
   auto rig = parameters_.rig.empty() ? rig_from_camera_info() : rig_from_file();
   if (!rig) return rig.error();
   if (!*rig) return {};
@@ -150,8 +158,12 @@ std::optional<Pose> BslamNode::wait_for_transform(const std::string& child) {
   auto told = steady_clock::now();
   while (rclcpp::ok()) {
     std::string why;
-    if (tf_buffer_.canTransform(parameters_.base_frame, child, tf2::TimePointZero, &why))
-      return to_pose(tf_buffer_.lookupTransform(parameters_.base_frame, child, tf2::TimePointZero).transform);
+    try {  // the one call may succeed and the other fail: the buffer is cleared when time jumps back
+      if (tf_buffer_.canTransform(parameters_.base_frame, child, tf2::TimePointZero, &why))
+        return to_pose(tf_buffer_.lookupTransform(parameters_.base_frame, child, tf2::TimePointZero).transform);
+    } catch (const tf2::TransformException& error) {
+      why = error.what();
+    }
     if (steady_clock::now() - told > kReminder) {
       told = steady_clock::now();
       RCLCPP_WARN(node_->get_logger(), "waiting for the transform from %s to %s: %s", child.c_str(),

@@ -36,7 +36,8 @@ class BslamNode {
   static bslam::Result<std::unique_ptr<BslamNode>> create(rclcpp::Node::SharedPtr node);
 
   // Waits for the rig, then advertises, subscribes and returns; an executor must spin meanwhile. Errors: a wrong
-  // calibration, map or setting. Returns without error if ROS is shut down meanwhile.
+  // calibration, map or setting; the name of a topic that ROS refuses. Returns without error if ROS is shut down
+  // meanwhile.
   bslam::Status start();
 
   // Ends the subscriptions and processes the images that have arrived.
@@ -49,6 +50,7 @@ class BslamNode {
 
   BslamNode(rclcpp::Node::SharedPtr node, Parameters parameters);
 
+  bslam::Status start_or_throw();
   bslam::Result<std::optional<bslam::Rig>> rig_from_file();
   bslam::Result<std::optional<bslam::Rig>> rig_from_camera_info();
   std::optional<CameraInfo> wait_for_camera_info(const std::string& topic);

@@ -4,6 +4,44 @@
 
 #include "bslam_node.h"
 
+namespace {
+
+// Calls the callbacks of a node in a thread that ends with ROS, at the latest when this object is destroyed.
+class Spinner {
+ public:
+  explicit Spinner(const rclcpp::Node::SharedPtr& node) {
+    executor_.add_node(node);
+    thread_ = std::thread([this, logger = node->get_logger()] {
+      try {
+        executor_.spin();
+      } catch (const std::exception& error) {
+        RCLCPP_FATAL(logger, "bslam_node: %s", error.what());
+        failed_ = true;
+        rclcpp::shutdown();
+      }
+    });
+  }
+  ~Spinner() {
+    rclcpp::shutdown();
+    if (thread_.joinable()) thread_.join();
+  }
+  Spinner(const Spinner&) = delete;
+  Spinner& operator=(const Spinner&) = delete;
+
+  // Returns when ROS is shut down; false after an exception of a callback.
+  bool wait() {
+    thread_.join();
+    return !failed_;
+  }
+
+ private:
+  rclcpp::executors::MultiThreadedExecutor executor_;
+  bool failed_ = false;
+  std::thread thread_;
+};
+
+}  // namespace
+
 int main(int argc, char** argv) {
   rclcpp::init(argc, argv);
   const auto node = std::make_shared<rclcpp::Node>("bslam");
@@ -13,16 +51,14 @@ int main(int argc, char** argv) {
     rclcpp::shutdown();
     return 2;
   }
-  rclcpp::executors::MultiThreadedExecutor executor;
-  executor.add_node(node);
-  std::thread spinner([&executor] { executor.spin(); });
+  Spinner spinner(node);
   const bslam::Status started = (*ours)->start();
   if (!started) {
     RCLCPP_FATAL(node->get_logger(), "%s", started.error().message().c_str());
     rclcpp::shutdown();
   }
-  spinner.join();  // until ROS is shut down
+  const bool spun = spinner.wait();
   const bslam::Status stopped = (*ours)->stop();
   if (!stopped) RCLCPP_ERROR(node->get_logger(), "%s", stopped.error().message().c_str());
-  return !started ? 2 : stopped ? 0 : 1;
+  return !started ? 2 : stopped && spun ? 0 : 1;
 }

@@ -53,8 +53,9 @@ def free_port():
 class Processes(contextlib.ExitStack):
     """Ends the processes that it has started, the last one first."""
 
-    def start(self, *command, log):
-        process = subprocess.Popen([str(c) for c in command], stdout=open(log, 'w'), stderr=subprocess.STDOUT)
+    def start(self, *command, log, environment=None):
+        process = subprocess.Popen([str(c) for c in command], stdout=open(log, 'w'), stderr=subprocess.STDOUT,
+                                   env={**os.environ, **(environment or {})})
         self.callback(self.end, process)
         return process
 
@@ -116,7 +117,7 @@ class Listener:
 class Session:
     """A master, the node and a listener."""
 
-    def __init__(self, arguments, work, parameters):
+    def __init__(self, arguments, work, parameters, **environment):
         import rosgraph  # noqa: F401  the packages of Debian are there
         self.processes, self.work, self.arguments = Processes(), work, arguments
         os.environ.update(ROS_MASTER_URI=f'http://127.0.0.1:{free_port()}', ROS_IP='127.0.0.1', ROS_LOG_DIR=str(work / 'log'),
@@ -128,7 +129,7 @@ class Session:
         rospy.set_param('/use_sim_time', True)
         for name, value in parameters.items():
             rospy.set_param('/bslam/' + name, value)
-        self.node = self.processes.start(arguments.node, '__name:=bslam', log=work / 'node.log')
+        self.node = self.processes.start(arguments.node, '__name:=bslam', log=work / 'node.log', environment=environment)
         rospy.init_node('played_bag', disable_signals=True)
         self.listener = Listener()
 

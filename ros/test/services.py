@@ -1,5 +1,4 @@
 """The case `services` of played_bag.py: the same recording three times, with requests to the services in between."""
-import pathlib
 import subprocess
 import time
 
@@ -47,7 +46,10 @@ def run(arguments, work):
     for i, bag in enumerate(bags):
         counts = p.write_bag(arguments.data, bag, '--seconds', str(SECONDS), '--shift', str(SHIFT * i))
     topics, frames, shift_ns = list(counts), max(counts.values()), SHIFT * 10**9
-    session = p.Session(arguments, work, {'image_topics': topics, 'rig': str(arguments.data), 'publish_camera_tf': True})
+    temporary = work / 'temporary'
+    temporary.mkdir(exist_ok=True)
+    parameters = {'image_topics': topics, 'rig': str(arguments.data), 'publish_camera_tf': True, 'trajectory_file': str(work / 'node.tum')}
+    session = p.Session(arguments, work, parameters, TMPDIR=str(temporary))
     with session.processes:
         p.wait_until(lambda: session.subscribed(topics), 60, 'the node subscribes')
         refused('localize_only', 'to localise without a map', 'no map yet', data=True)
@@ -76,7 +78,9 @@ def run(arguments, work):
         check_pass(session, first, third, 2 * shift_ns, frames, 'tracking', 'false')
         check_continuity(session.listener)
         p.check(session.end() == 0, 'the node ends without error')
-        p.check(not list(pathlib.Path('/tmp').glob('bslam_*.bmap')), 'no temporary map is left')
+        p.check(not list(temporary.iterdir()), 'no temporary map is left')
+        written = sorted(path.name for path in work.glob('node*.tum'))
+        p.check(written == ['node.tum', 'node_1.tum', 'node_2.tum'], f'the trajectory of every map is written: {written}')
 
 
 def check_pass(session, first, later, shift_ns, frames, message, localize_only):

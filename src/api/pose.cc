@@ -1,5 +1,6 @@
 #include <bslam/pose.h>
 #include <bslam/trajectory.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 
@@ -33,13 +34,16 @@ std::array<double, 3> operator*(const Pose& T_a_b, const std::array<double, 3>& 
   return {p.x(), p.y(), p.z()};
 }
 
-Status write_tum(const std::filesystem::path& file, const Trajectory& trajectory, RigFrame frame) {
+Status write_tum(const std::filesystem::path& file, const Trajectory& trajectory, RigFrame frame,
+                 std::string_view parent) {
   return api::guarded("write_tum", [&]() -> Status {
+    if (parent.empty() || parent.find_first_of(" \t\r\n") != std::string_view::npos)
+      return Error{"write_tum", "parent", fmt::format("'{}'", parent), "the name of a frame, without spaces"};
     evaluation::Trajectory poses;
     for (const TimedPose& p : trajectory) poses.push_back({p.time_ns, api::to_se3(p.T_world_frame)});
     const char* name = frame == RigFrame::kBody ? "body" : "cam0";
-    return write_atomically(
-        file, evaluation::tum_text(poses, evaluation::trajectory_header(name, evaluation::PoseState::kFinal)));
+    const std::string header = evaluation::trajectory_header(name, evaluation::PoseState::kFinal, parent);
+    return write_atomically(file, evaluation::tum_text(poses, header));
   });
 }
 

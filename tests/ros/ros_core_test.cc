@@ -11,6 +11,7 @@
 #include "core/image_conversion.h"
 #include "core/parameters.h"
 #include "core/pose_output.h"
+#include "messages/compressed_image.h"
 #include "support/data_on_disk.h"
 
 namespace bslam_ros {
@@ -209,6 +210,43 @@ TEST(RosImages, LyingImagesAreErrors) {
   EXPECT_EQ(to_grey(image_of("mono8", {}, 4, 4), 0).error().key, "size");
 }
 
+TEST(RosImages, CompressedImagesThatAreCutOffAreErrors) {
+  cv::Mat picture(40, 60, CV_8UC1);
+  for (int i = 0; i < 40 * 60; ++i) picture.data[i] = static_cast<std::uint8_t>(37 * i % 251);
+  for (const char* format : {".jpg", ".png"}) {
+    std::vector<std::uint8_t> bytes;
+    ASSERT_TRUE(cv::imencode(format, picture, bytes));
+    const auto image = decode(bytes, format);
+    ASSERT_TRUE(image) << image.error().message();
+    EXPECT_EQ(image->width, 60u);
+    std::vector<std::uint8_t> filled = bytes;
+    filled.resize(bytes.size() + 100);
+    EXPECT_TRUE(decode(filled, format)) << format;
+    for (const std::size_t size : {bytes.size() - 1, bytes.size() - 100, bytes.size() / 2, std::size_t{3}}) {
+      const std::vector<std::uint8_t> part(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+      const auto cut = decode(part, format);
+      ASSERT_FALSE(cut) << format << ' ' << size;
+      EXPECT_NE(cut.error().message().find("expected a complete JPEG or PNG image"), std::string::npos);
+    }
+  }
+  EXPECT_FALSE(decode({}, "jpeg"));
+  EXPECT_FALSE(decode(std::vector<std::uint8_t>(50), "jpeg"));
+}
+
+TEST(RosImages, MetadataDoNotTurnCompressedImages) {
+  std::vector<std::uint8_t> bytes;
+  ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(40, 60, CV_8UC1, cv::Scalar(90)), bytes));
+  // Exif with one entry: orientation (0x112), of type short, is 6, a quarter turn.
+  const std::vector<std::uint8_t> exif = {0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f', 0, 0, 'M', 'M', 0, 42, 0, 0, 0, 8,
+                                          0,    1,    1, 18, 0,   3,   0,   0,   0, 1, 0,   6,   0, 0,  0, 0, 0, 0};
+  bytes.insert(bytes.begin() + 2, exif.begin(), exif.end());
+  ASSERT_EQ(cv::imdecode(bytes, cv::IMREAD_GRAYSCALE).cols, 40);  // turned
+  const auto image = decode(bytes, "jpeg");
+  ASSERT_TRUE(image) << image.error().message();
+  EXPECT_EQ(image->width, 60u);
+  EXPECT_EQ(image->height, 40u);
+}
+
 CameraInfo info(const char* model, std::vector<double> D) {
   CameraInfo out;
   out.frame_id = "left_optical";
@@ -226,8 +264,20 @@ TEST(RosCameraInfo, DistortionModelsAreThoseOfTheLibrary) {
   EXPECT_EQ(model(info("plumb_bob", {0, 0, 0, 0, 0})), "pinhole");
   EXPECT_EQ(model(info("rational_polynomial", {0.1, 0.2, 0, 0, 0.01, 0.1, 0.1, 0.01})), "pinhole-radtan");
   EXPECT_EQ(model(info("equidistant", {0.01, 0.02, 0.001, 0})), "kannala-brandt");
+  EXPECT_EQ(model(info("kannala_brandt", {0.01, 0.02, 0.001, 0})), "kannala-brandt");
+  EXPECT_EQ(model(info("equidistant", {})), "kannala-brandt");
+  EXPECT_EQ(model(info("", {-0.28})), "pinhole-radtan");
+  const auto coefficients = [](const CameraInfo& i) { return to_calibration(i, "left", Pose()).value().distortion; };
+  using Numbers = std::vector<double>;
+  EXPECT_EQ(coefficients(info("plumb_bob", {-0.28})), (Numbers{-0.28, 0, 0, 0}));
+  EXPECT_EQ(coefficients(info("plumb_bob", {1, 2, 3, 4, 5, 0, 0, 0})), (Numbers{1, 2, 3, 4, 5}));
+  EXPECT_EQ(coefficients(info("rational_polynomial", {1, 2, 3, 4, 5, 6})), (Numbers{1, 2, 3, 4, 5, 6, 0, 0}));
+  EXPECT_EQ(coefficients(info("rational_polynomial", {1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0})).size(), 8u);
+  EXPECT_EQ(coefficients(info("equidistant", {0.1, 0.2, 0, 0, 0})), (Numbers{0.1, 0.2, 0, 0}));
   const auto found = [](const CameraInfo& i) { return to_calibration(i, "left", Pose()).error().message(); };
-  EXPECT_NE(found(info("plumb_bob", {1, 2, 3})).find("left: camera_info: D: found 3 coefficients"), std::string::npos);
+  EXPECT_NE(found(info("plumb_bob", {1, 2, 3, 4, 5, 6})).find("left: camera_info: D: found 6 coefficients"),
+            std::string::npos);
+  EXPECT_NE(found(info("fisheye", {1, 2, 3, 4, 5})).find("expected at most 4"), std::string::npos);
   EXPECT_NE(found(info("omni", {1})).find("give a rig file"), std::string::npos);
   CameraInfo uncalibrated = info("plumb_bob", {});
   uncalibrated.K = {};
@@ -275,11 +325,27 @@ TEST(RosParameters, AreChecked) {
   EXPECT_TRUE(refused([](Parameters& p) { p.cameras = {0}; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.camera_info_topics = {"a"}; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.odom_frame = p.map_frame; }));
+  EXPECT_TRUE(refused([](Parameters& p) { p.map_frame = "my map"; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.settings = {"features.per_image"}; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.max_bundles = 0; }));
   EXPECT_TRUE(refused([](Parameters& p) { p.sync_tolerance = std::nan(""); }));
   parameters.image_topics = {"image", "other"};
   EXPECT_EQ(camera_names(parameters), (std::vector<std::string>{"cam0", "cam1"}));
+}
+
+TEST(RosParameters, RectifiedImagesNeedARigFile) {
+  EXPECT_TRUE(is_rectified("/left/image_rect"));
+  EXPECT_TRUE(is_rectified("/left/image_rect_color/compressed"));
+  EXPECT_TRUE(is_rectified("image_rect"));
+  EXPECT_FALSE(is_rectified("/left/image_rect_raw"));  // of a RealSense: the lens's own images
+  EXPECT_FALSE(is_rectified("/image_rect/image_raw"));
+  Parameters parameters;
+  parameters.image_topics = {"/left/image_raw", "/right/image_rect"};
+  ASSERT_FALSE(parameters.check());
+  EXPECT_NE(parameters.check().error().message().find("/right/image_rect, whose images are rectified"),
+            std::string::npos);
+  parameters.rig = "rectified.yaml";
+  EXPECT_TRUE(parameters.check());
 }
 
 TEST(RosParameters, AreDocumented) {

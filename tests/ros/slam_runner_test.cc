@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
@@ -120,10 +121,13 @@ TEST_F(RosRunner, PublishesPosesPointsPathAndTrajectory) {
   const auto statuses = runner->diagnostics();
   EXPECT_EQ(value(statuses, 0, "frames"), std::to_string(kFrames));
   EXPECT_EQ(value(statuses, 1, "images"), std::to_string(kFrames));
-  EXPECT_TRUE(std::filesystem::exists((folder_.path() / "end.tum").string()));
+  const std::string written = bslam::support::read_text((folder_.path() / "end.tum").string());
+  EXPECT_EQ(written.rfind("# bslam trajectory frame=body parent=map final=true\n", 0), 0u) << written.substr(0, 100);
+  EXPECT_FALSE(std::filesystem::exists((folder_.path() / "end_1.tum").string()));
 }
 
 TEST_F(RosRunner, ContinuesInALoadedMapWithTheSameOdometry) {
+  parameters_.trajectory_file = (folder_.path() / "walk.tum").string();
   const auto runner = make_runner();
   const std::string map = (folder_.path() / "wall.bmap").string();
   EXPECT_FALSE(runner->set_localize_only(true));  // no map yet
@@ -147,6 +151,12 @@ TEST_F(RosRunner, ContinuesInALoadedMapWithTheSameOdometry) {
     const Pose through_odom = pose.T_map_odom * pose.T_odom_base;
     EXPECT_NEAR(through_odom.translation[1], pose.T_map_base.translation[1], 1e-9);
   }
+  // The poses before the change of the map are not lost.
+  const std::string before = bslam::support::read_text((folder_.path() / "walk_1.tum").string());
+  const std::string after = bslam::support::read_text((folder_.path() / "walk.tum").string());
+  EXPECT_EQ(std::count(before.begin(), before.end(), '\n'), 1 + kFrames);
+  EXPECT_GT(std::count(after.begin(), after.end(), '\n'), 1 + 10);
+  EXPECT_FALSE(std::filesystem::exists((folder_.path() / "walk_2.tum").string()));
 }
 
 TEST_F(RosRunner, RejectedImagesAreCountedAndSaidOnce) {
