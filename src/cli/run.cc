@@ -128,7 +128,7 @@ Result<std::optional<map::BundledMap>> read_map(const RunArguments& arguments, c
   if (const Status status = system::check_settings(config, *map, rig); !status) return status.error();
   if (system::shared_with_other_rigs(*map, rig) && log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) {
     const char* const text = map::find_rig(*map, rig)
-                                 ? "has cameras of other rigs; the calibration is that of the map and is not estimated"
+                                 ? "has further cameras; the calibration is that of the map and is not estimated"
                                  : "was made with another rig or calibration; that of this run is kept as given";
     std::fprintf(stderr, "note: %s %s\n", file.c_str(), text);
   }

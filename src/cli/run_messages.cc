@@ -88,11 +88,16 @@ void warn_of_submaps(const session::RunRecord& record) {
   std::int64_t outside = 0;
   for (const session::SubmapRecord& submap : record.submaps) outside += submap.loaded ? 0 : submap.frames;
   if (outside == 0 && session::frames_in_loaded_map(record) > 0) return;
+  const std::int64_t inside = session::frames_in_loaded_map(record);
+  const std::string found = inside == 0 ? "no" : std::to_string(inside);
+  if (outside == 0) {
+    fmt::print(stderr, "warning: no frames have a pose, since no place of the loaded map was recognised\n");
+    return;
+  }
   fmt::print(stderr,
              "warning: {} frames have a pose in the frame of the loaded map; {} frames are in a new submap, since no "
              "place of the loaded map was recognised there\n",
-             session::frames_in_loaded_map(record) == 0 ? "no" : std::to_string(session::frames_in_loaded_map(record)),
-             outside);
+             found, outside);
 }
 
 // Warns about a camera that is still inconsistent with the others at the end of the run: its extrinsics are probably

@@ -5,7 +5,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <span>
@@ -48,15 +47,8 @@ std::string quoted(std::string_view text) {
 }
 
 Result<std::string> read_bytes(const std::filesystem::path& file) {
-  std::error_code error;
-  if (std::filesystem::is_directory(file, error)) {
-    return Error{.file = file.string(), .key = {}, .found = "a folder", .expected = "a file"};
-  }
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return Error{.file = file.string(), .key = {}, .found = "an unreadable file", .expected = "a file"};
-  std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (in.bad()) return Error{.file = file.string(), .key = {}, .found = "a read error", .expected = "a readable file"};
-  return bytes;
+  constexpr std::size_t kMaxBytes = std::size_t{1} << 32;  // 40 million poses
+  return read_file(file, kMaxBytes);
 }
 
 std::string_view trimmed(std::string_view text) {

@@ -33,6 +33,17 @@ TEST(PublicPose, ComposesInvertsAndConvertsFromItsMatrix) {
   EXPECT_FALSE(Pose::from_matrix(mirrored));
 }
 
+TEST(PublicTrajectory, NamesItsFrames) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "poses.tum";
+  ASSERT_TRUE(write_tum(file, {TimedPose{1'500'000'000, Pose()}}, RigFrame::kBody, "map"));
+  const std::string text = support::read_text(file);
+  EXPECT_EQ(text.rfind("# bslam trajectory frame=body parent=map final=true\n1.5", 0), 0u) << text;
+  EXPECT_EQ(write_tum(file, {}, RigFrame::kBody, "my map").error().key, "parent");
+  EXPECT_EQ(write_tum(file, {}, RigFrame::kBody, "").error().key, "parent");
+  EXPECT_EQ(support::read_text(file), text);
+}
+
 TEST(PublicRig, ReturnsTheCalibrationItWasMadeFrom) {
   CameraCalibration fisheye = TexturedWall::calibration(1);
   fisheye.model = "kannala-brandt";
