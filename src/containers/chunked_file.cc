@@ -110,12 +110,18 @@ void ChunkedFile::note_cut_chunk(std::uint32_t chunk, std::uint64_t good_bytes) 
                            good_bytes, chunks_.at(chunk).size);
 }
 
-void ChunkedFile::finish_notes() {
+void ChunkedFile::finish_notes(std::uint64_t unknown_messages, std::uint64_t expected_chunks) {
   for (const Notes& notes : {damaged_, cut_}) {
     if (notes.count == 0) continue;
     warnings_.push_back(fmt::format("{}: {}{}", path_.string(), notes.first,
                                     notes.count > 1 ? fmt::format(", and {} more such places", notes.count - 1) : ""));
   }
+  if (unknown_messages > 0)
+    warnings_.push_back(
+        fmt::format("{}: {} messages of unknown topics are not used", path_.string(), unknown_messages));
+  const std::size_t found = chunks_.size() - 1;  // the first is the whole file
+  if (found < expected_chunks)
+    warnings_.push_back(fmt::format("{}: {} of {} chunks can be read", path_.string(), found, expected_chunks));
 }
 
 }  // namespace bslam::containers

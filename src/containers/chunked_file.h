@@ -60,8 +60,9 @@ class ChunkedFile : public MessageFile {
   void note_damage(std::uint64_t at, std::uint64_t next);
   // Describes a chunk of which only the first bytes could be read.
   void note_cut_chunk(std::uint32_t chunk, std::uint64_t good_bytes);
-  // Turns the notes into warnings: of each kind the first, and how many there are.
-  void finish_notes();
+  // Turns the notes into warnings: of each kind the first, and how many there are. Warns as well of messages that
+  // belong to no topic, and if there are fewer chunks than the file says.
+  void finish_notes(std::uint64_t unknown_messages, std::uint64_t expected_chunks);
 
  private:
   struct Loaded {

@@ -242,13 +242,7 @@ Status McapFile::index() {
     at = next;
   }
   finish_chunk();
-  finish_notes();
-  if (unknown_ > 0)
-    warnings_.push_back(fmt::format("{}: {} messages of unknown topics are not used", path_.string(), unknown_));
-  if (chunks().size() - 1 < chunk_positions_.size()) {
-    warnings_.push_back(
-        fmt::format("{}: {} of {} chunks can be read", path_.string(), chunks().size() - 1, chunk_positions_.size()));
-  }
+  finish_notes(unknown_, chunk_positions_.size());
   if (topics_.empty()) return Error{path_.string(), "", "no messages", "an MCAP file with messages"};
   return {};
 }

@@ -227,13 +227,7 @@ Status RosBag1::index() {
     at = next;
   }
   finish_chunk();
-  finish_notes();
-  if (unknown_ > 0)
-    warnings_.push_back(fmt::format("{}: {} messages of unknown topics are not used", path_.string(), unknown_));
-  if (chunks().size() - 1 < expected_chunks_) {
-    warnings_.push_back(
-        fmt::format("{}: {} of {} chunks can be read", path_.string(), chunks().size() - 1, expected_chunks_));
-  }
+  finish_notes(unknown_, expected_chunks_);
   if (topics_.empty()) return Error{path_.string(), "", "no messages", "a bag with messages"};
   return {};
 }
