@@ -11,6 +11,7 @@ function(bslam_layer name)
     target_include_directories(bslam_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
     set_target_properties(bslam_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
                                                    VISIBILITY_INLINES_HIDDEN ON)
+    bslam_use_precompiled(bslam_${name} bslam_precompiled)
   else()  # headers only
     add_library(bslam_${name} INTERFACE)
     target_link_libraries(bslam_${name} INTERFACE ${ARG_USES} ${ARG_LINKS})
@@ -34,6 +35,7 @@ function(bslam_test name)
   add_executable(test_${name} ${sources})
   target_link_libraries(test_${name} PRIVATE ${ARG_USES} ${ARG_LINKS} GTest::gtest GTest::gtest_main bslam_flags)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  bslam_use_precompiled(test_${name} bslam_tests_precompiled)
   set(list ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
   list(JOIN CMAKE_CROSSCOMPILING_EMULATOR "," emulator)  # lists are handed on with commas
   foreach(label ${labels})
