@@ -72,7 +72,7 @@ std::vector<CameraResult> to_cameras(const tracking::FrameRecord& record) {
 
 FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::Rig& rig) {
   const tracking::TrackResult& result = record.result;
-  const SE3& T_body_rig = rig.body_from_cam(0);
+  const SE3 T_body_rig = rig.body_from_rig();
   const SE3 T_rig_body = T_body_rig.inverse();
   FrameResult out;
   out.frame = result.frame.value();

@@ -146,7 +146,7 @@ Status System::Impl::finish() {
 
 Result<std::vector<Trajectory>> System::Impl::trajectories(RigFrame frame) const {
   std::optional<geometry::SE3> T_rig_frame;
-  if (frame == RigFrame::kBody) T_rig_frame = rig.body_from_cam(0).inverse();
+  if (frame == RigFrame::kBody) T_rig_frame = rig.body_from_rig().inverse();
   std::vector<Trajectory> out;
   for (const system::SubmapTrajectory& part : system.trajectories()) {
     out.push_back(api::to_trajectory(part.poses, T_rig_frame));

@@ -136,8 +136,16 @@ RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOpti
     (out.group[i] == i ? selection.fixed_keyframes : selection.free_keyframes).push_back(keyframes[i]);
   }
   out.flat = adjustment::build_problem(map, selection, features);
+  const geometry::SE3 &T_cam0_rig = map.rig().cam_from_rig(0), &T_rig_cam0 = map.rig().rig_from_cam(0);
+  for (geometry::SE3& T_cam0_world : out.flat.problem.T_rig_world) T_cam0_world = T_cam0_rig * T_cam0_world;
+  for (geometry::SE3& motion : out.flat.problem.motion) motion = T_cam0_rig * motion * T_rig_cam0;
   out.flat.problem.twist.clear();
-  for (const KeyframeId k : out.flat.keyframes) out.flat.problem.twist.push_back(map.keyframe(k).twist);
+  const Eigen::Matrix3d R_cam0_rig = T_cam0_rig.matrix3();
+  for (const KeyframeId k : out.flat.keyframes) {
+    geometry::Vector6d twist = map.keyframe(k).twist;
+    twist << R_cam0_rig * twist.head<3>(), R_cam0_rig * twist.tail<3>();
+    out.flat.problem.twist.push_back(twist);
+  }
   return out;
 }
 

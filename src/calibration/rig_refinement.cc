@@ -7,6 +7,7 @@
 
 #include "adjustment/landmark_noise.h"
 #include "calibration/lost_observations.h"
+#include "calibration/rig_frame.h"
 #include "calibration/rig_problem.h"
 #include "calibration/single_view_landmarks.h"
 #include "calibration/unobserved_cameras.h"
@@ -95,7 +96,7 @@ solver::RigAdjustment adjust_weighted(solver::RigAdjustmentOptions options, solv
 solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const feature::FeatureModel& features,
                                        const solver::RigAdjustmentOptions& options, RigProblem& problem,
                                        const std::stop_token& stop) {
-  solver::RigValues before = solver::RigValues::of(map.rig());
+  solver::RigValues before = solver::RigValues::of(map.rig().in_frame_of_camera_0());
   separate_groups(problem);
   solver::RigAdjustment out = solver::adjust_rig(problem.flat.problem, options, before, stop);
   for (int pass = 1; pass < kPasses && out.done && !converged(out, before); ++pass) {
@@ -165,7 +166,8 @@ std::vector<solver::TimingPrior> contradicted_timing(const map::BundledMap& map,
   separate_groups(problem);
   solver::RigAdjustmentOptions with_timing = prior_of(reference, options);
   with_timing.timing = timing;
-  const auto adjusted = solver::adjust_rig(problem.flat.problem, with_timing, solver::RigValues::of(map.rig()), stop);
+  const auto adjusted = solver::adjust_rig(problem.flat.problem, with_timing,
+                                           solver::RigValues::of(map.rig().in_frame_of_camera_0()), stop);
   if (!adjusted.done) return {};
   bool any = false;
   for (std::size_t c = 0; c < timing.size(); ++c) {
@@ -270,7 +272,10 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
   out.information = adjusted.information;
-  out.rig = adjusted.values.applied_to(reference);
+  const camera::Rig refined = adjusted.values.applied_to(reference);
+  const geometry::SE3 T_cam0_rig = turn_of_rays(refined.camera(0), reference.camera(0));
+  out.rig = with_rig_frame(refined, T_cam0_rig, reference.body_from_rig());
+  move_to_rig_frame(T_cam0_rig, map.rig().cam_from_rig(0), problem);
   out.poses = poses_of(problem.flat);
   // Distances between keyframes that are longer than the rig tell how the calibration changes the scale; a rig that
   // hardly moved only follows the scale of the baselines.
@@ -321,9 +326,10 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
   const double factor = 1 / refinement.scale_change;
   if (!(std::abs(std::log(factor)) < 0.01 * options.scale_tolerance_percent)) return;
-  solver::RigValues values = solver::RigValues::of(*refinement.rig);
+  solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
   for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);
-  refinement.rig = values.applied_to(*refinement.rig);
+  refinement.rig = with_rig_frame(values.applied_to(*refinement.rig), refinement.rig->cam_from_rig(0),
+                                  refinement.rig->body_from_rig());
   for (auto& [keyframe, T_rig_world] : refinement.poses.keyframes) T_rig_world = geometry::scaled(T_rig_world, factor);
   for (auto& [landmark, position] : refinement.poses.landmarks) position *= factor;
   refinement.scale_change = 1;

@@ -13,13 +13,14 @@ using geometry::SE3;
 
 const Shutter Rig::kGlobalShutter;
 
-Rig::Rig(std::vector<RigCamera> cameras) {
+Rig::Rig(std::vector<RigCamera> cameras, const SE3& T_cam0_rig) {
   BSLAM_ASSERT(!cameras.empty(), "a rig must have at least one camera");
   for (const RigCamera& c : cameras) {
-    T_cam_rig_.push_back(c.T_body_cam.inverse() * cameras.front().T_body_cam);
+    T_cam_rig_.push_back(c.T_body_cam.inverse() * cameras.front().T_body_cam * T_cam0_rig);
     T_rig_cam_.push_back(T_cam_rig_.back().inverse());
   }
-  T_cam_rig_.front() = T_rig_cam_.front() = SE3();
+  T_cam_rig_.front() = T_cam0_rig;
+  T_rig_cam_.front() = T_cam0_rig.inverse();
   std::vector<double> overlap = measured_overlap(cameras);
   calibration_ = std::make_shared<const Calibration>(Calibration{std::move(cameras), std::move(overlap)});
 }
@@ -85,7 +86,7 @@ Rig Rig::with_calibration_of(const Rig& part, std::span<const int> indices) cons
     camera.camera.time_offset_ns = part.camera(i).time_offset_ns;
     camera.T_body_cam = part.body_from_cam(i);
   }
-  return Rig(std::move(cameras));
+  return Rig(std::move(cameras), cam_from_rig(0));
 }
 
 bool Rig::same_intrinsics(const Rig& other) const {

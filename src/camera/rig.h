@@ -1,6 +1,6 @@
-// The rig: N cameras and their constant extrinsics. The rig frame is the frame of camera 0 (the paper's camera 1), so
-// T_cam_rig of camera 0 is the identity. The paper's T_i1 is T_cam_rig of camera i, and c_i = T_i1 c_1 is
-// cam_from_rig(i) * T_rig_world.
+// The rig: N cameras and their constant extrinsics. The rig frame is the frame of camera 0 (the paper's camera 1) as it
+// was calibrated, so T_cam_rig of camera 0 is the identity, but for the rotation of a refined calibration (see the
+// constructor). The paper's T_i1 is T_cam_rig of camera i, and c_i = T_i1 c_1 is cam_from_rig(i) * T_rig_world.
 #pragma once
 
 #include <memory>
@@ -23,8 +23,10 @@ struct RigCamera {
 // Immutable; copies share the calibration.
 class Rig {
  public:
-  // There must be at least one camera; the first one becomes camera 0.
-  explicit Rig(std::vector<RigCamera> cameras);
+  // There must be at least one camera; the first one becomes camera 0. `T_cam0_rig`: a refined calibration that moves
+  // the principal point of camera 0 turns its frame, because the rays of the pixels stay where they are in the body.
+  // The rig frame, whose poses are reported, does not turn.
+  explicit Rig(std::vector<RigCamera> cameras, const geometry::SE3& T_cam0_rig = {});
 
   std::size_t size() const { return T_cam_rig_.size(); }
   const Camera& camera(CameraIndex i) const { return calibration_->cameras[i.index()].camera; }
@@ -44,6 +46,7 @@ class Rig {
 
   // T_body_cam. The body frame is used for input and output only.
   const geometry::SE3& body_from_cam(std::size_t i) const { return calibration_->cameras[i].T_body_cam; }
+  geometry::SE3 body_from_rig() const { return body_from_cam(0) * T_cam_rig_.front(); }
 
   // Returns true if the fields of view of cameras i and j overlap at some depth. Sampled from the calibration.
   bool overlap(std::size_t i, std::size_t j) const { return overlap_share(i, j) > kMinOverlap; }
@@ -53,6 +56,10 @@ class Rig {
   // per camera, non-zero for cameras to ignore; it may be empty.
   bool any_overlap(std::span<const std::uint8_t> ignored = {}) const;
 
+  // The same cameras, with the frame of camera 0 as the rig frame.
+  Rig in_frame_of_camera_0() const {
+    return T_cam_rig_.front().matrix().isIdentity(0) ? *this : Rig(calibration_->cameras);
+  }
   // Returns the rig that consists of the given cameras, in the given order; the first becomes camera 0. The indices
   // must be valid and distinct.
   Rig subset(std::span<const int> indices) const;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -50,7 +49,7 @@ std::vector<camera::RigCamera> cameras(const camera::Rig& rig) {
 std::vector<camera::RigCamera> moved_into(const camera::Rig& whole, const camera::Rig& part) {
   std::vector<camera::RigCamera> out;
   for (std::size_t i = 0; i < part.size(); ++i)
-    out.push_back({part.camera(i), whole.body_from_cam(0) * part.rig_from_cam(i)});
+    out.push_back({part.camera(i), whole.body_from_rig() * part.rig_from_cam(i)});
   return out;
 }
 
@@ -79,7 +78,6 @@ void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::sha
 
 std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig) {
   for (std::size_t first = 0; first + rig.size() <= map.rig().size(); ++first) {
-    if (!same_pose(map.rig().cam_from_rig(first), geometry::SE3())) continue;
     if (contains(map.given_rig(), first, rig) || contains(map.rig(), first, rig)) return first;
   }
   return std::nullopt;
@@ -94,10 +92,10 @@ std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig) {
     all.push_back(std::move(added));
   }
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    given.push_back({all[first + i].camera, map.given_rig().body_from_cam(0) * rig.rig_from_cam(i)});
+    given.push_back({all[first + i].camera, map.given_rig().body_from_rig() * rig.rig_from_cam(i)});
   }
-  map.append_cameras(std::make_shared<const camera::Rig>(std::move(all)),
-                     std::make_shared<const camera::Rig>(std::move(given)));
+  map.append_cameras(std::make_shared<const camera::Rig>(std::move(all), map.rig().cam_from_rig(0)),
+                     std::make_shared<const camera::Rig>(std::move(given), map.given_rig().cam_from_rig(0)));
   return first;
 }
 
@@ -106,13 +104,16 @@ camera::Rig with_cameras(const camera::Rig& whole, std::size_t first, const came
   if (part.size() == whole.size()) return part;
   std::vector<camera::RigCamera> out = cameras(whole);
   std::ranges::move(moved_into(whole, part), out.begin() + static_cast<std::ptrdiff_t>(first));
-  return camera::Rig(std::move(out));
+  return camera::Rig(std::move(out), first == 0 ? part.cam_from_rig(0) : whole.cam_from_rig(0));
 }
 
 camera::Rig cameras_of(const camera::Rig& whole, std::size_t first, std::size_t size) {
-  std::vector<int> indices(size);
-  std::iota(indices.begin(), indices.end(), static_cast<int>(first));
-  return whole.subset(indices);
+  if (size == whole.size()) return whole;
+  std::vector<camera::RigCamera> out = cameras(whole);
+  const auto begin = out.begin() + static_cast<std::ptrdiff_t>(first);
+  out.erase(begin + static_cast<std::ptrdiff_t>(size), out.end());
+  out.erase(out.begin(), begin);
+  return camera::Rig(std::move(out), whole.cam_from_rig(first));
 }
 
 }  // namespace bslam::map

@@ -77,7 +77,9 @@ class Writer {
     for (std::size_t c = 0; c < n; ++c) {
       model_.cameras += fmt::format("{} {}\n", c + 1, camera_text(cameras_.camera(c)));
       if (!rigid_) model_.rigs += fmt::format("{0} 1 CAMERA {0}\n", c + 1);
-      if (c > 0) sensors += fmt::format(" CAMERA {} 1 {}", c + 1, pose_text(map_.rig().cam_from_rig(c)));
+      if (c == 0) continue;
+      const SE3 T_cam_cam0 = map_.rig().cam_from_rig(c) * map_.rig().rig_from_cam(0);
+      sensors += fmt::format(" CAMERA {} 1 {}", c + 1, pose_text(T_cam_cam0));
     }
     if (rigid_) model_.rigs += fmt::format("1 {} CAMERA 1{}\n", n, sensors);
   }
@@ -97,8 +99,8 @@ class Writer {
         ++count;
       }
       if (count > 0 && rigid_)
-        model_.frames +=
-            fmt::format("{} 1 {} {}{}\n", k.value() + 1, pose_text(map_.keyframe(k).T_rig_world), count, data);
+        model_.frames += fmt::format("{} 1 {} {}{}\n", k.value() + 1,
+                                     pose_text(map_.rig().cam_from_rig(0) * map_.keyframe(k).T_rig_world), count, data);
     }
   }
 

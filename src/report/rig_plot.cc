@@ -214,7 +214,7 @@ Box box_of(const std::vector<DrawnCamera>& cameras, const Vector3d& body, View v
 
 std::string rig_plot_svg(const camera::Rig& rig) {
   const std::vector<DrawnCamera> cameras = drawn_cameras(rig);
-  const SE3 T_rig_body = rig.body_from_cam(0).inverse();
+  const SE3 T_rig_body = rig.body_from_rig().inverse();
   const std::array<View, 2> views = {from_above, from_right};
   const std::array<Box, 2> boxes = {box_of(cameras, T_rig_body.translation(), views[0]),
                                     box_of(cameras, T_rig_body.translation(), views[1])};

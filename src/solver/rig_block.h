@@ -13,12 +13,13 @@ namespace bslam::solver {
 
 // Values of the parameters.
 struct RigValues {
-  std::vector<SE3> T_cam_rig;  // per camera; camera 0 is the identity
+  std::vector<SE3> T_cam_rig;  // per camera
   std::vector<camera::CameraModel> models;
   std::vector<camera::CameraTiming> timing;
 
   static RigValues of(const Rig& rig);
-  // `rig`, to whose capture times the timing refers, with these values; camera 0 keeps its pose in the body.
+  // `rig`, to whose capture times the timing refers, with these values, whose rig frame must be that of camera 0; that
+  // camera keeps its pose in the body.
   Rig applied_to(const Rig& rig) const;
 };
 

@@ -18,7 +18,7 @@ namespace bslam::storage {
 namespace {
 
 constexpr std::string_view kMagic = "BSLAMMAP";
-constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 3, kOldestVersion = 2;
+constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 4, kOldestVersion = 2;
 constexpr std::array<std::string_view, 4> kTags = {"RIG ", "INFO", "KEYF", "LAND"};
 constexpr std::array<const char*, 4> kNames = {"rig", "info", "keyframes", "landmarks"};
 constexpr std::size_t kTableEntryBytes = 4 + 4 + 8;
@@ -65,7 +65,7 @@ Result<Sections> take_apart(std::string_view bytes) {
   if (in.number<std::uint32_t>() != kOrderMark) return damaged("header", "another byte order", "little endian");
   const auto version = in.number<std::uint32_t>();
   if (version < kOldestVersion || version > kVersion) {
-    return damaged("format version", std::to_string(version), fmt::format("{} or {}", kOldestVersion, kVersion));
+    return damaged("format version", std::to_string(version), fmt::format("{} to {}", kOldestVersion, kVersion));
   }
   const auto count = in.number<std::uint32_t>();
   const auto total = in.number<std::uint64_t>();
@@ -103,7 +103,7 @@ Result<Sections> take_apart(std::string_view bytes) {
 Result<SavedMap> build(const Sections& sections, std::string file) {
   const auto reader = [&](std::size_t i) { return ByteReader(sections.bytes[i], kNames[i]); };
   ByteReader rig_in = reader(0), info_in = reader(1), keyframes_in = reader(2), landmarks_in = reader(3);
-  auto rigs = take_rigs(rig_in, sections.version >= 3);
+  auto rigs = take_rigs(rig_in, sections.version);
   if (!rigs) return rig_in.error();
   InfoSection info = take_info(info_in);
   if (!info_in.ok()) return info_in.error();

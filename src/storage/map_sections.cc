@@ -194,19 +194,21 @@ void put_cameras(const camera::Rig& rig, ByteWriter& out) {
   }
   const auto readouts = readouts_of(rig);
   out.numbers(readouts.data(), readouts.size());
+  put_transform(rig.cam_from_rig(0), out);
 }
 
-// `readouts`: whether the readout times follow.
-std::shared_ptr<const camera::Rig> take_cameras(ByteReader& in, std::size_t n, bool readouts) {
+// `version`: of the file, see docs/map_file.md.
+std::shared_ptr<const camera::Rig> take_cameras(ByteReader& in, std::size_t n, std::uint32_t version) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t i = 0; i < n && in.ok(); ++i) {
     in.enter("camera", i);
     if (auto camera = take_rig_camera(in)) cameras.push_back(*std::move(camera));
     in.leave();
   }
-  if (in.ok() && (readouts || in.remaining() > 0)) take_readouts(in, cameras);
+  if (in.ok() && (version >= 3 || in.remaining() > 0)) take_readouts(in, cameras);
+  const SE3 T_cam0_rig = version >= 4 ? take_transform(in) : SE3();
   if (!in.ok()) return {};
-  return std::make_shared<const camera::Rig>(std::move(cameras));
+  return std::make_shared<const camera::Rig>(std::move(cameras), T_cam0_rig);
 }
 
 }  // namespace
@@ -217,13 +219,13 @@ void put_rigs(const map::BundledMap& map, ByteWriter& out) {
   put_cameras(map.given_rig(), out);
 }
 
-std::optional<RigSection> take_rigs(ByteReader& in, bool with_given) {
+std::optional<RigSection> take_rigs(ByteReader& in, std::uint32_t version) {
   const std::size_t n = in.count(kCameraBytes);
   in.require(n >= 1 && n <= kMaxCameras, std::to_string(n) + " cameras", "1 to " + std::to_string(kMaxCameras));
   if (!in.ok()) return {};
   RigSection section;
-  section.rig = section.given = take_cameras(in, n, with_given);
-  if (in.ok() && with_given) section.given = take_cameras(in, n, true);
+  section.rig = section.given = take_cameras(in, n, version);
+  if (in.ok() && version >= 3) section.given = take_cameras(in, n, version);
   if (!in.finish()) return {};
   return section;
 }

@@ -36,8 +36,8 @@ void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& o
 struct RigSection {
   std::shared_ptr<const camera::Rig> rig, given;  // BundledMap::rig and given_rig
 };
-// `with_given`: as of format version 3. Earlier ones do not contain the second rig, which is then the first one.
-std::optional<RigSection> take_rigs(ByteReader& in, bool with_given);
+// Files before version 3 do not contain the second rig, which is then the first one.
+std::optional<RigSection> take_rigs(ByteReader& in, std::uint32_t version);
 
 struct InfoSection {
   feature::PyramidShape pyramid;

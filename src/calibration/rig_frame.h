@@ -1,0 +1,21 @@
+// The rig frame of a refined calibration. An estimate that moves the principal point of camera 0 turns its frame, by
+// about a degree on some real rigs. What is known about the body, and the poses that were already reported, refer to
+// the calibrated rays of the camera, so the rig frame stays with the rays, and camera 0 turns in it.
+#pragma once
+
+#include "calibration/rig_problem.h"
+#include "camera/rig.h"
+
+namespace bslam::calibration {
+
+// The rotation that fits the rays of camera 0 best: ray of `refined` = T * ray of `calibrated`, over all pixels.
+geometry::SE3 turn_of_rays(const camera::Camera& refined, const camera::Camera& calibrated);
+
+// Changes poses and points of an adjusted problem from the frame of camera 0 to the rig frame T_cam0_rig. Each group is
+// turned as a whole, about its fixed keyframe. `before`: T_cam0_rig of the map from which the problem was chosen.
+void move_to_rig_frame(const geometry::SE3& T_cam0_rig, const geometry::SE3& before, RigProblem& problem);
+
+// `rig`, whose rig frame is that of camera 0, with another rig frame, which is at T_body_rig.
+camera::Rig with_rig_frame(const camera::Rig& rig, const geometry::SE3& T_cam0_rig, const geometry::SE3& T_body_rig);
+
+}  // namespace bslam::calibration
