@@ -1,9 +1,12 @@
 #include "tracking/keyframe_decision.h"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 #include "base/median.h"
 #include "geometry/triangulation.h"
+#include "map/keyframe_landmarks.h"
 #include "tracking/make_keyframe.h"
 
 namespace bslam::tracking {
@@ -13,7 +16,10 @@ namespace {
 constexpr int kMinTrackedClose = 100, kMinUntrackedClose = 70;
 constexpr double kRestMaxParallax = 0.01;  // rad; a rig at rest has a smaller parallax
 constexpr double kRestMinOverlap = 0.95;
-constexpr int kFewInliersInterval = 8;  // minimum number of frames between keyframes due to a camera with few inliers
+constexpr double kMinShared = 0.6;        // of the inliers, with a similar keyframe
+constexpr std::size_t kNewest = 5;        // number of keyframes that the rig has not left yet
+constexpr double kSimilarParallax = 0.5;  // maximum parallax to it, relative to that of a new keyframe
+constexpr int kFewInliersInterval = 8;    // minimum number of frames between keyframes due to a camera with few inliers
 
 bool untracked_depth(const frame::BundledFrame& frame, const FrameMatches& inliers,
                      const InitialisationOptions& options) {
@@ -33,6 +39,55 @@ bool observes(const map::BundledMap& map, KeyframeId k, LandmarkId l) {
   return std::ranges::any_of(map.observations(l), [&](const map::Observation& o) { return o.keyframe == k; });
 }
 
+// Angles at the landmarks that the keyframe `then` observes, between the rays to it and to the rig now; in radians.
+std::vector<double> parallaxes_to(const map::BundledMap& map, const std::vector<LandmarkId>& landmarks, KeyframeId then,
+                                  const geometry::SE3& T_world_now, const geometry::SE3& T_world_then) {
+  std::vector<double> out;
+  for (const LandmarkId l : landmarks) {
+    if (!observes(map, then, l)) continue;
+    const Eigen::Vector3d& p = map.landmark(l).position;
+    out.push_back(geometry::angle_between(p - T_world_now.translation(), p - T_world_then.translation()));
+  }
+  return out;
+}
+
+// The keyframes that observe most of the landmarks, in order of id. The reference does not count, nor do the newest
+// ones: a rig that is still near them has not come back.
+std::vector<KeyframeId> keyframes_that_share(const map::BundledMap& map, const std::vector<LandmarkId>& landmarks,
+                                             KeyframeId reference) {
+  std::map<KeyframeId, std::size_t> counts;
+  for (const LandmarkId l : landmarks) {
+    KeyframeId last;  // several features of a keyframe may observe a landmark
+    for (const map::Observation& o : map.observations(l))
+      counts[o.keyframe] += std::exchange(last, o.keyframe) != o.keyframe;
+  }
+  std::vector<KeyframeId> out;
+  for (const auto& [keyframe, count] : counts) {
+    if (keyframe.index() + kNewest > map.newest_keyframe().index()) break;
+    if (keyframe != reference && static_cast<double>(count) >= kMinShared * static_cast<double>(landmarks.size()))
+      out.push_back(keyframe);
+  }
+  return out;
+}
+
+// The fraction of the landmarks of a keyframe that are in the field of view of some camera.
+double share_in_view(const map::BundledMap& map, KeyframeId keyframe, const geometry::SE3& T_rig_world) {
+  const camera::Rig& rig = map.rig();
+  const auto in_view = [&](const Eigen::Vector3d& p_rig) {
+    for (std::size_t c = 0; c < rig.size(); ++c) {
+      const auto pixel = rig.camera(c).project(rig.cam_from_rig(c) * p_rig);
+      if (pixel && rig.camera(c).contains(*pixel)) return true;
+    }
+    return false;
+  };
+  int landmarks = 0, seen = 0;
+  for (const LandmarkId l : map::landmarks_of(map, keyframe)) {
+    ++landmarks;
+    seen += in_view(T_rig_world * map.landmark(l).position);
+  }
+  return landmarks > 0 ? static_cast<double>(seen) / landmarks : 0.0;
+}
+
 }  // namespace
 
 std::vector<int> overlap_by_camera(const map::BundledMap& map, const FrameMatches& inliers, KeyframeId reference) {
@@ -49,14 +104,8 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
                                    const FrameMatches& inliers, KeyframeId reference, const geometry::SE3& T_rig_world,
                                    const TrackingOptions& options) {
   KeyframeEvidence evidence;
-  const Eigen::Vector3d centre_now = T_rig_world.inverse().translation();
-  const Eigen::Vector3d centre_then = map.resolved_pose(reference).inverse().translation();
-  std::vector<double> parallaxes;
-  for (const LandmarkId l : landmarks_of(inliers)) {
-    if (!observes(map, reference, l)) continue;
-    const Eigen::Vector3d& p = map.landmark(l).position;
-    parallaxes.push_back(geometry::angle_between(p - centre_now, p - centre_then));
-  }
+  std::vector<double> parallaxes = parallaxes_to(map, landmarks_of(inliers), reference, T_rig_world.inverse(),
+                                                 map.resolved_pose(reference).inverse());
   evidence.overlap = static_cast<int>(parallaxes.size());
   if (!parallaxes.empty()) evidence.parallax = median(std::move(parallaxes));
   for (std::size_t c = 0; c < inliers.size(); ++c) {
@@ -76,6 +125,23 @@ bool keyframe_due(const KeyframeEvidence& e, const KeyframeOptions& options) {
   const bool at_rest = e.parallax < kRestMaxParallax && overlap > kRestMinOverlap;
   if (e.camera_with_few_inliers && e.frames_since_keyframe >= kFewInliersInterval && !at_rest) return true;
   return e.frames_since_keyframe >= options.max_interval && !at_rest;
+}
+
+std::optional<KeyframeId> similar_keyframe(const map::BundledMap& map, const FrameMatches& inliers,
+                                           KeyframeId reference, const geometry::SE3& T_rig_world,
+                                           const KeyframeOptions& options) {
+  const std::vector<LandmarkId> landmarks = landmarks_of(inliers);
+  const geometry::SE3 T_world_rig = T_rig_world.inverse();
+  std::optional<KeyframeId> similar;
+  double smallest = kSimilarParallax * options.max_parallax;
+  for (const KeyframeId k : keyframes_that_share(map, landmarks, reference)) {
+    const double parallax =
+        median(parallaxes_to(map, landmarks, k, T_world_rig, map.keyframe(k).T_rig_world.inverse()));
+    if (parallax >= smallest || share_in_view(map, k, T_rig_world) < options.min_overlap) continue;
+    similar = k;
+    smallest = parallax;
+  }
+  return similar;
 }
 
 }  // namespace bslam::tracking

@@ -38,7 +38,7 @@ struct KeyframeOptions {
   // A keyframe is inserted if the number of tracked landmarks of the reference keyframe, divided by the largest such
   // number of any frame since that keyframe, is smaller.
   double min_overlap = 0.75;
-  double max_parallax = 0.06;  // rad; a keyframe is inserted if the median parallax to the reference keyframe is larger
+  double max_parallax = 0.09;  // rad; a keyframe is inserted if the median parallax to the reference keyframe is larger
   int min_camera_inliers = 40;            // a keyframe is inserted if some camera has fewer inliers than this ...
   double min_camera_inlier_ratio = 0.15;  // ... and fewer than this fraction of its keypoints
 

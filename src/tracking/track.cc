@@ -252,7 +252,7 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, Fine&& fine, 
   state.best_overlap = std::max(state.best_overlap, evidence.overlap);
   evidence.best_overlap = state.best_overlap;
   evidence.frames_since_keyframe = state.frames_since_keyframe;
-  out.keyframe_due = keyframe_due(evidence, options.keyframe);
+  out.keyframe_due = keyframe_needed(input.map, evidence, options.keyframe, out);
   state.direct = {};
   return out;
 }

@@ -183,7 +183,7 @@ bool support_is_low(const frame::BundledFrame& frame, const FrameMatches& inlier
 
 // The overlap with the reference keyframe is summed over the cameras of this frame, and compared with the sum of their
 // largest values: it must not depend on which cameras have an image.
-bool keyframe_is_due(const TrackInput& input, const TrackingOptions& options, TrackOutput& out) {
+bool needs_keyframe(const TrackInput& input, const TrackingOptions& options, TrackOutput& out) {
   TrackerState& state = out.state;
   KeyframeEvidence evidence =
       keyframe_evidence(input.map, out.frame, out.matches, state.anchored.reference, out.result.T_rig_world, options);
@@ -200,7 +200,7 @@ bool keyframe_is_due(const TrackInput& input, const TrackingOptions& options, Tr
   evidence.frames_since_keyframe = state.frames_since_keyframe;
   KeyframeOptions keyframe = options.keyframe;
   keyframe.min_overlap = std::max(keyframe.min_overlap, options.direct.min_overlap);
-  return keyframe_due(evidence, keyframe);
+  return keyframe_needed(input.map, evidence, keyframe, out);
 }
 
 bool predictable(const TrackInput& input, const frame::BundledFrame& frame) {
@@ -265,7 +265,7 @@ DirectOutput judged(const TrackInput& input, const LocalLandmarks& local, Tracke
     update_reobservation_ratio(state.cameras[c], found_again, options.consensus);
   }
   if (low) out.failure = DirectFailure::kFewInliers;
-  if (keyframe_is_due(input, options, output)) out.failure = DirectFailure::kKeyframeDue;
+  if (needs_keyframe(input, options, output)) out.failure = DirectFailure::kKeyframeDue;
   return out;
 }
 

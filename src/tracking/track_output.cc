@@ -130,4 +130,18 @@ void update_used_camera(const frame::BundledFrame& frame, std::size_t c, const s
   for (const Match& m : inliers) camera.landmarks.push_back(m.landmark);
 }
 
+bool keyframe_needed(const map::BundledMap& map, const KeyframeEvidence& evidence, const KeyframeOptions& options,
+                     TrackOutput& out) {
+  if (!keyframe_due(evidence, options)) return false;
+  if (evidence.untracked_depth || evidence.camera_with_few_inliers) return true;
+  TrackerState& state = out.state;
+  const auto similar = similar_keyframe(map, out.matches, state.anchored.reference, out.result.T_rig_world, options);
+  if (!similar) return true;
+  state.anchored = map::AnchoredPose::at(map, *similar, out.result.T_rig_world);
+  state.frames_since_keyframe = 0;
+  state.best_direct_overlap = overlap_by_camera(map, out.matches, *similar);
+  state.best_overlap = 0;
+  return false;
+}
+
 }  // namespace bslam::tracking

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "tracking/keyframe_decision.h"
 #include "tracking/track.h"
 
 namespace bslam::tracking {
@@ -29,5 +30,10 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found);
 // Updates the state of a camera that is used for the next frame; `inliers`: those of the camera.
 void update_used_camera(const frame::BundledFrame& frame, std::size_t c, const std::vector<Match>& inliers,
                         const ConsensusOptions& options, CameraConsensusState& camera);
+
+// Whether the frame becomes a keyframe. If one is due because the rig has moved away from the reference keyframe, but
+// is back at a similar one, that becomes the reference instead, so that the map does not grow where it is complete.
+bool keyframe_needed(const map::BundledMap& map, const KeyframeEvidence& evidence, const KeyframeOptions& options,
+                     TrackOutput& out);
 
 }  // namespace bslam::tracking

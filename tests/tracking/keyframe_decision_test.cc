@@ -32,7 +32,7 @@ TEST(KeyframeDecision, DueIfOverlapFallsBelowAFractionOfItsMaximum) {
 
 TEST(KeyframeDecision, DueIfParallaxIsLarge) {
   KeyframeEvidence e = calm();
-  e.parallax = 0.061;
+  e.parallax = kOptions.max_parallax + 0.001;
   EXPECT_TRUE(keyframe_due(e, kOptions));
 }
 
@@ -142,6 +142,35 @@ TEST_F(KeyframeEvidenceTest, DetectsUntrackedFeaturesWithDepth) {
   const KeyframeEvidence e = keyframe_evidence(world().map, frame.frame, matches, KeyframeId(0),
                                                frame.T_world_rig.inverse(), TrackingOptions());
   EXPECT_TRUE(e.untracked_depth);
+}
+
+// Matches of camera 0 with all landmarks of a keyframe.
+FrameMatches matches_of(const map::BundledMap& map, KeyframeId k) {
+  FrameMatches out(map.rig().size());
+  for (const LandmarkId l : map.keyframe(k).landmarks) {
+    if (l.valid()) out[0].push_back({KeypointIndex(out[0].size()), l});
+  }
+  return out;
+}
+
+TEST(SimilarKeyframe, IsFoundWhereTheRigIsBackAtAnOldKeyframe) {
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
+  const KeyframeId newest = world.map.newest_keyframe(), old(1);
+  ASSERT_EQ(newest.index(), 8u);
+  const FrameMatches matches = matches_of(world.map, old);
+  const geometry::SE3 here = world.map.keyframe(old).T_rig_world;
+  EXPECT_EQ(similar_keyframe(world.map, matches, newest, here, kOptions), old);
+  EXPECT_NE(similar_keyframe(world.map, matches, old, here, kOptions), old);  // it is the reference already
+  const geometry::SE3 away(here.rotation(), here.translation() + Eigen::Vector3d(0, 0, 3));
+  EXPECT_FALSE(similar_keyframe(world.map, matches, newest, away, kOptions));
+}
+
+TEST(SimilarKeyframe, IsNotOneThatTheRigHasNotLeft) {
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
+  const KeyframeId recent(7);
+  EXPECT_NE(similar_keyframe(world.map, matches_of(world.map, recent), world.map.newest_keyframe(),
+                             world.map.keyframe(recent).T_rig_world, kOptions),
+            recent);
 }
 
 }  // namespace
