@@ -18,9 +18,9 @@ using FourCc = std::uint32_t;
 
 // What is asked of a camera.
 struct StreamRequest {
-  int width = 0, height = 0;     // pixels
-  std::optional<double> fps;     // default: the highest rate of the format
-  std::optional<FourCc> pixels;  // default: the one that needs least conversion at this rate
+  int width = 0, height = 0;          // pixels
+  std::optional<double> fps = {};     // default: the highest rate of the format
+  std::optional<FourCc> pixels = {};  // default: the one that needs least conversion at this rate
   enum class Exposure { kAsItIs, kAutomatic, kFixed } exposure = Exposure::kAsItIs;
   int exposure_us = 0;         // if it is fixed
   TimeNs clock_offset_ns = 0;  // added to times of CLOCK_MONOTONIC

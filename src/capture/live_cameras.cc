@@ -164,10 +164,6 @@ void LiveCameras::take(std::size_t c, const DeviceImage& image) {
   pixels->grey = *std::move(grey);
   if (is_jpeg(camera.stream.pixels)) pixels->jpeg = image.bytes;
   pixels->read_ms = watch.ms();
-  const image::ImageView view = pixels->grey.view();
-  const Status pushed =
-      synchronizer_->push(c, {view.data, view.width, view.height, view.stride, image.time_ns, std::move(pixels)});
-  if (!pushed) return count_damaged(c);  // its time is impossible
   bool back = false, unstamped = false;
   {
     const std::lock_guard lock(mutex_);
@@ -177,6 +173,10 @@ void LiveCameras::take(std::size_t c, const DeviceImage& image) {
   }
   if (back) say(c, "images arrive again");
   if (unstamped) say(c, "the driver gives no time stamps; the times at which images arrive are used");
+  const image::ImageView view = pixels->grey.view();
+  const Status pushed =
+      synchronizer_->push(c, {view.data, view.width, view.height, view.stride, image.time_ns, std::move(pixels)});
+  if (!pushed) return count_damaged(c);  // its time is impossible
   collect();
 }
 
@@ -257,14 +257,17 @@ Result<TimeNs> LiveCameras::wait_for_first_frame() {
   return Error{cameras_[c].path, rig_.camera(c).name, found, "images of this camera"};
 }
 
+void LiveCameras::begin() {
+  const std::lock_guard lock(mutex_);
+  begun_ = true;
+  waiting_.clear();
+  frames_waiting_ = 0;
+}
+
 std::optional<session::FrameSource::Item> LiveCameras::next() {
   Waiting frame;
   {
     std::unique_lock lock(mutex_);
-    if (!std::exchange(begun_, true) && !ended_) {
-      waiting_.clear();
-      frames_waiting_ = 0;
-    }
     changed_.wait(lock, [this] { return !waiting_.empty() || ended_; });
     if (failure_) std::rethrow_exception(failure_);
     if (waiting_.empty()) return std::nullopt;
@@ -293,7 +296,9 @@ std::vector<std::string> LiveCameras::notes() const {
     const std::string name = name_of(c);
     if (camera.damaged > 0) out.push_back(fmt::format("{}: {} damaged images were not used", name, camera.damaged));
     if (camera.losses > 0)
-      out.push_back(fmt::format("{}: lost {} times{}", name, camera.losses, camera.lost ? ", and not back" : ""));
+      out.push_back(fmt::format("{}: lost {}{}", name,
+                                camera.losses == 1 ? "once" : fmt::format("{} times", camera.losses),
+                                camera.lost ? ", and not back" : ""));
     std::size_t dropped = 0;
     for (const std::size_t count : counts.dropped[c]) dropped += count;
     if (dropped == 0) continue;

@@ -54,7 +54,10 @@ class LiveCameras final : public session::FrameSource {
   // Frames are recorded from now on as they are handed out. `recorder` must outlive this object.
   void record_to(Recorder* recorder) { recorder_ = recorder; }
 
-  // The first call begins the run: frames that are older are not counted. Returns nullopt after stop(), or when all
+  // Begins the run: frames that came before are not part of it. Called once, before next().
+  void begin();
+
+  // Returns nullopt after stop(), or when all
   // cameras have ended, once the frames before were handed out. Rethrows exceptions of the threads.
   std::optional<Item> next() override;
 

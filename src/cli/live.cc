@@ -188,6 +188,7 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
       recorder = *std::move(created);
       cameras.record_to(recorder.get());
     }
+    cameras.begin();
     if (a.duration_s) timer.emplace(*a.duration_s, [&cameras] { cameras.stop(); });
     return {};
   };
