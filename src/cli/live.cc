@@ -155,6 +155,15 @@ dataset::Dataset dataset_of(const LiveRig& rig, TimeNs first_time_ns) {
           .sources = rig.paths};
 }
 
+Result<std::unique_ptr<capture::Recorder>> start_recording(const std::string& file, const camera::Rig& rig,
+                                                           capture::LiveCameras& cameras) {
+  std::vector<bool> jpeg;
+  for (const capture::Stream& stream : cameras.streams()) jpeg.push_back(capture::is_jpeg(stream.pixels));
+  auto recorder = capture::Recorder::create(file, rig, jpeg);
+  if (recorder) cameras.record_to(recorder->get());
+  return recorder;
+}
+
 int run_live(const LiveArguments& a, const system::Config& config, const LiveRig& rig, const Interruption& interruption,
              capture::LiveCameras& cameras) {
   const bool quiet = log_verbosity(a.slam.log_level) < LogVerbosity::kWarning;
@@ -181,12 +190,9 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
   input.before = [&]() -> Status {
     if (!quiet) print_rig_warnings(rig.rig);
     if (!a.record.empty()) {
-      std::vector<bool> jpeg;
-      for (const capture::Stream& stream : cameras.streams()) jpeg.push_back(capture::is_jpeg(stream.pixels));
-      auto created = capture::Recorder::create(a.record, rig.rig, jpeg);
-      if (!created) return created.error();
-      recorder = *std::move(created);
-      cameras.record_to(recorder.get());
+      auto started = start_recording(a.record, rig.rig, cameras);
+      if (!started) return started.error();
+      recorder = *std::move(started);
     }
     cameras.begin();
     if (a.duration_s) timer.emplace(*a.duration_s, [&cameras] { cameras.stop(); });
