@@ -71,6 +71,11 @@ Error V4l2Device::failed(const char* what) const {
   if (errno == EBUSY)
     return {path_, "", "a camera that another program uses", "a camera that is free",
             path_ + ": another program uses this camera; end it first"};
+  if (errno == ENOSPC)
+    return {path_, "", "no room for the images", "room for the images",
+            path_ +
+                ": the USB port has no room for the images of this camera; use --pixels MJPG, a lower --fps or "
+                "another port"};
   if (errno == ENODEV) return {path_, "", "a camera that was unplugged", "a camera that is there"};
   return {path_, what, std::strerror(errno), "a camera that streams images"};
 }

@@ -146,6 +146,11 @@ TEST_F(V4l2, ACameraInUseIsSaidToBe) {
   camera().format_error = 0;
   camera().memory_error = EBUSY;
   EXPECT_EQ(error_of_starting(request()), "/dev/video0: another program uses this camera; end it first");
+  camera().memory_error = 0;
+  camera().stream_error = ENOSPC;
+  EXPECT_EQ(error_of_starting(request()),
+            "/dev/video0: the USB port has no room for the images of this camera; use --pixels MJPG, a lower --fps or "
+            "another port");
   EXPECT_EQ(camera().closed, camera().opened);
 }
 

@@ -37,7 +37,7 @@ struct StandInCamera {
   std::map<std::uint32_t, int> controls;  // those that it has
   int least_exposure = 1, most_exposure = 5000;
   std::deque<StandInImage> images;
-  int open_error = 0, format_error = 0, memory_error = 0;
+  int open_error = 0, format_error = 0, memory_error = 0, stream_error = 0;
   std::uint32_t forced_width = 0;  // of the driver, whatever is asked
   std::uint32_t extra_step = 0;    // bytes between rows
   std::uint32_t set_fps = 30;
@@ -119,8 +119,9 @@ class VideoStandIn : public VideoCalls {
       case VIDIOC_DQBUF:
         return fetch(c, *static_cast<v4l2_buffer*>(argument));
       case VIDIOC_STREAMON:
+        return c.streaming = c.stream_error == 0, c.stream_error;
       case VIDIOC_STREAMOFF:
-        return c.streaming = request == VIDIOC_STREAMON, 0;
+        return c.streaming = false, 0;
       default:
         return ENOTTY;
     }
