@@ -5,6 +5,7 @@
 
 #include <csignal>
 #include <future>
+#include <opencv2/imgcodecs.hpp>
 
 #include "capture/pixels.h"
 #include "dataset/frame_reader.h"
@@ -77,17 +78,18 @@ class Script {
   int gates_ = 0, ended_ = 0;
 };
 
+// Camera 0 delivers grey pixels, camera 1 JPEG files.
 class ScriptedDevice : public Device {
  public:
   ScriptedDevice(std::shared_ptr<Script> script, std::size_t camera) : script_(std::move(script)), camera_(camera) {}
   ~ScriptedDevice() override { script_->device_ended(); }
 
   Result<Stream> start(const StreamRequest& request) override {
-    bytes_.resize(static_cast<std::size_t>(request.width * request.height));
-    return Stream{.pixels = fourcc("GREY"),
+    image_.create(request.height, request.width, CV_8UC1);
+    return Stream{.pixels = camera_ == 0 ? fourcc("GREY") : fourcc("MJPG"),
                   .width = request.width,
                   .height = request.height,
-                  .step = static_cast<std::size_t>(request.width)};
+                  .step = camera_ == 0 ? static_cast<std::size_t>(request.width) : 0};
   }
   Result<DeviceImage> read(milliseconds) override {
     const auto [event, end] = script_->next(camera_);
@@ -96,15 +98,19 @@ class ScriptedDevice : public Device {
     if (event->kind == Event::Kind::kLost) return Error{"", "", "a camera that was unplugged", ""};
     if (event->kind == Event::Kind::kDamaged) return DeviceImage{.state = DeviceImage::State::kDamaged};
     if (event->kind != Event::Kind::kImage) return DeviceImage{};
-    for (std::size_t k = 0; k < bytes_.size(); ++k)
-      bytes_[k] = static_cast<char>(static_cast<std::size_t>(event->time_ns / kMs) * (camera_ + 1) + k);
-    return DeviceImage{DeviceImage::State::kImage, bytes_, event->time_ns};
+    for (int k = 0; k < image_.rows * image_.cols; ++k)
+      image_.data[k] = static_cast<std::uint8_t>(event->time_ns / kMs + k);
+    bytes_.assign(image_.data, image_.data + image_.rows * image_.cols);
+    if (camera_ == 1) cv::imencode(".jpg", image_, bytes_);
+    const std::string_view view(reinterpret_cast<const char*>(bytes_.data()), bytes_.size());
+    return DeviceImage{DeviceImage::State::kImage, view, event->time_ns};
   }
 
  private:
   const std::shared_ptr<Script> script_;
   const std::size_t camera_;
-  std::string bytes_;
+  cv::Mat image_;
+  std::vector<std::uint8_t> bytes_;
 };
 
 // Two cameras, the time stamps of the second with an offset in the rig file.
@@ -185,7 +191,7 @@ TEST_F(LiveCamerasTest, RecordingHasTheSameFrames) {
   auto live = open(eventful());
   const auto first_ns = live->wait_for_first_frame();
   ASSERT_TRUE(first_ns.ok()) << first_ns.error().message();
-  auto recorder = Recorder::create(file, rig_, {false, false});
+  auto recorder = Recorder::create(file, rig_, {false, true});
   ASSERT_TRUE(recorder.ok());
   live->record_to(recorder->get());
   live->begin();
@@ -199,6 +205,7 @@ TEST_F(LiveCamerasTest, RecordingHasTheSameFrames) {
   ASSERT_TRUE(data.ok()) << data.error().message();
   EXPECT_TRUE(data->warnings.empty()) << data->warnings.front();
   ASSERT_EQ(data->frames.size(), fed.size());
+  EXPECT_EQ(data->sources, (std::vector<std::string>{"/cam0/image_raw", "/cam1/image_raw/compressed"}));
   std::size_t missing = 0;
   for (std::size_t k = 0; k < fed.size(); ++k) {
     const image::ImageBundle again = dataset::read_frame(*data, k);
@@ -324,7 +331,7 @@ TEST_F(LiveCamerasTest, FailureOfTheDiskEndsTheRecordingOnly) {
   add_frames(events, 10, 200);
   auto live = open(std::move(events));
   const support::TemporaryFolder folder;
-  auto recorder = Recorder::create(folder.path() / "live.mcap", rig_, {false, false});
+  auto recorder = Recorder::create(folder.path() / "live.mcap", rig_, {false, true});
   ASSERT_TRUE(recorder.ok());
   ASSERT_TRUE(live->wait_for_first_frame().ok());
   live->record_to(recorder->get());

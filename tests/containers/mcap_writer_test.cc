@@ -105,6 +105,28 @@ TEST(McapWriter, RecordingThatWasCutOffIsReadAsFarAsItGoes) {
   EXPECT_NE((*file)->warnings()[0].find("was not finished"), std::string::npos);
 }
 
+TEST(McapWriter, DamageBeforeTheImagesLosesNoneSilently) {
+  const support::TemporaryFolder folder;
+  const auto path = folder.path() / "damaged.mcap";
+  write_recording(path, true);
+  const std::string whole = support::read_text(path);
+  const std::size_t end = whole.find("/left/image_raw") + 20;  // of attachment and metadata
+  ASSERT_LT(end, 400u);
+  int complete = 0, incomplete = 0;
+  for (std::size_t at = 8; at < end; ++at) {
+    for (const char value : {'\0', '\x7f', '\xff'}) {
+      std::string damaged = whole;
+      damaged[at] = value;
+      support::write_text(path, damaged);
+      const auto file = open_message_file(path);
+      const bool all = file.ok() && (*file)->messages().size() == 2 * kImages;
+      (all ? complete : incomplete) += 1;
+      EXPECT_TRUE(all || !file.ok() || !(*file)->warnings().empty()) << at;
+    }
+  }
+  EXPECT_GT(complete, 10 * incomplete);
+}
+
 TEST(McapWriter, ReportsAFullDisk) {
   const auto writer = McapWriter::create("/dev/full");
   ASSERT_FALSE(writer.ok());
