@@ -8,6 +8,7 @@
 
 #include "base/atomic_file.h"
 #include "base/option_table.h"
+#include "cli/rerun.h"
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"
 #include "cli/verbs.h"
@@ -159,6 +160,7 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
        {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
     if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return report_error(s.error());
   }
+  if (const Status s = arguments.rerun.empty() ? Status() : check_rerun(); !s) return report_error(s.error());
   auto view = start_view(arguments.view,
                          {dataset, input.config, arguments.command, *map ? (*map)->keyframe_slots() : 0}, control);
   if (!view) return report_error(view.error());
@@ -176,8 +178,10 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   if (arguments.image_stamps) result->subtracted_ns = dataset.rig.camera(0).time_offset_ns;
   if (const Status s = write_files(*result, input.config, dataset, arguments, **vocabulary); !s)
     return report_error(s.error());
+  const Status sent = arguments.rerun.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
   end_view(view->get(), *result, input.config, dataset, arguments);
   print_after(result->record, input, arguments);
+  if (!sent) return report_error(sent.error());
   return exit_status_of(*result);
 }
 
@@ -201,7 +205,13 @@ void add_slam_options(CLI::App& verb, SlamArguments& a) {
   verb.add_flag("--image-stamps", a.image_stamps,
                 "write trajectories with the time stamps of the images, without the time offset of camera 0");
   verb.add_flag("--no-final-ba", a.no_final_ba, "skip the global bundle adjustment at the end");
-  verb.add_flag("--no-report", a.no_report, "do not write report.html, the page that shows the run in a browser");
+  CLI::Option* no_report =
+      verb.add_flag("--no-report", a.no_report, "do not write report.html, the page that shows the run in a browser");
+  verb.add_option(
+          "--rerun", a.rerun,
+          "show the result in Rerun: a file to be written, such as run.rrd, or the address of a viewer, such as "
+          "rerun+http://127.0.0.1:9876/proxy; needs the Python packages bslam and rerun-sdk")
+      ->excludes(no_report);
   add_view_options(verb, a.view);
   verb.add_option("--seed", a.seed, "seed of all random numbers; default 1")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));

@@ -20,7 +20,7 @@ struct SlamArguments {
   ConfigArguments config;
   ViewArguments view;
   std::string rig;  // file of the calibration; empty: that of the data
-  std::string out, mode, journal, vocabulary, save_map, load_map;
+  std::string out, mode, journal, vocabulary, save_map, load_map, rerun;
   std::string progress = "auto", log_level = "warning";
   std::optional<int> seed;
   bool no_loop = false, localize_only = false, no_final_ba = false, no_report = false, overwrite = false,
