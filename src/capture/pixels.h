@@ -19,8 +19,12 @@ constexpr FourCc fourcc(const char (&name)[5]) {
 }
 std::string fourcc_text(FourCc pixels);
 
-// All formats that can be converted, those that need least work first: GREY, Y16, NV12, YUYV, UYVY, MJPG, JPEG.
+// All formats that can be converted, those that need least work first: GREY, Y16, Y12, Y10, NV12, YUYV, UYVY, RGB3,
+// BGR3, colour filters of 8 bits (RGGB, GRBG, GBRG, BA81), MJPG, JPEG.
 std::span<const FourCc> pixel_formats();
+
+// Bytes of a pixel in the first plane; 0 for whole files and unknown formats.
+int bytes_per_pixel(FourCc pixels);
 
 // Returns true if images are whole JPEG files.
 bool is_jpeg(FourCc pixels);

@@ -113,8 +113,8 @@ Status V4l2Device::set_format(const StreamRequest& request, const VideoMode& mod
   stream.pixels = mode.pixels;
   stream.width = request.width;
   stream.height = request.height;
-  const bool pairs = mode.pixels == fourcc("YUYV") || mode.pixels == fourcc("UYVY") || mode.pixels == fourcc("Y16 ");
-  const std::size_t row = static_cast<std::size_t>(request.width) * (pairs ? 2 : 1);
+  const std::size_t row =
+      static_cast<std::size_t>(request.width) * static_cast<std::size_t>(bytes_per_pixel(mode.pixels));
   if (!is_jpeg(mode.pixels)) stream.step = std::max<std::size_t>(set.bytesperline, row);
   return {};
 }

@@ -103,6 +103,12 @@ Result<capture::StreamRequest> stream_request(const LiveArguments& a) {
   return request;
 }
 
+std::vector<std::string> pixel_names() {
+  std::vector<std::string> out;
+  for (const capture::FourCc pixels : capture::pixel_formats()) out.push_back(capture::fourcc_text(pixels));
+  return out;
+}
+
 // Folders of images are played in place of cameras.
 capture::OpenDevice opener(const std::vector<std::string>& paths) {
   std::error_code error;
@@ -255,7 +261,7 @@ void add_live(CLI::App& app, std::span<const char* const> command_line, int& exi
   verb->add_option("--exposure", a->exposure,
                    "auto, or a fixed exposure time in microseconds; default: as it is set already");
   verb->add_option("--pixels", a->pixels, "pixel format; default: the one that needs least conversion at this rate")
-      ->check(CLI::IsMember({"GREY", "Y16", "NV12", "YUYV", "UYVY", "MJPG", "JPEG"}));
+      ->check(CLI::IsMember(pixel_names()));
   verb->add_option("--duration", a->duration_s, "end after this many seconds; default: at Ctrl-C")
       ->check(CLI::Range(0.0, 1e9));
   add_slam_options(*verb, a->slam);

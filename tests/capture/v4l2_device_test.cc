@@ -224,20 +224,35 @@ std::string ramp(int count, int from = 0) {
   return out;
 }
 
-TEST(Pixels, BrightnessOfEveryFormat) {
-  constexpr std::size_t kStep = 24;
-  for (const FourCc format : pixel_formats()) {
-    if (is_jpeg(format)) continue;
-    const bool pairs = format == fourcc("YUYV") || format == fourcc("UYVY") || format == fourcc("Y16 ");
-    std::string bytes;
-    for (int y = 0; y < kHeight; ++y) {
-      std::string row(kStep, '\x77');
-      for (int x = 0; x < kWidth; ++x) {
-        const int place = format == fourcc("UYVY") || format == fourcc("Y16 ") ? 2 * x + 1 : pairs ? 2 * x : x;
-        row[static_cast<std::size_t>(place)] = static_cast<char>(10 * y + 5 * x);
-      }
-      bytes += row;
+// A row of pixels of this brightness, whose other bytes are 0x77.
+std::string row_of(FourCc format, std::size_t step, int y) {
+  std::string row(step, '\x77');
+  for (int x = 0; x < kWidth; ++x) {
+    const int value = 10 * y + 5 * x, bytes = bytes_per_pixel(format);
+    if (bytes == 3) {
+      for (int k = 0; k < 3; ++k) row[static_cast<std::size_t>(3 * x + k)] = static_cast<char>(value);
+    } else if (format == fourcc("Y10 ") || format == fourcc("Y12 ")) {
+      const int word = value << (format == fourcc("Y10 ") ? 2 : 4);
+      row[static_cast<std::size_t>(2 * x)] = static_cast<char>(word & 255);
+      row[static_cast<std::size_t>(2 * x + 1)] = static_cast<char>(word >> 8);
+    } else {
+      const bool second = format == fourcc("UYVY") || format == fourcc("Y16 ");
+      row[static_cast<std::size_t>(bytes * x + (second ? 1 : 0))] = static_cast<char>(value);
     }
+  }
+  return row;
+}
+
+bool is_colour_filter(FourCc format) {
+  return format == fourcc("RGGB") || format == fourcc("GRBG") || format == fourcc("GBRG") || format == fourcc("BA81");
+}
+
+TEST(Pixels, BrightnessOfEveryFormat) {
+  constexpr std::size_t kStep = 32;
+  for (const FourCc format : pixel_formats()) {
+    if (is_jpeg(format) || is_colour_filter(format)) continue;
+    std::string bytes;
+    for (int y = 0; y < kHeight; ++y) bytes += row_of(format, kStep, y);
     if (format == fourcc("NV12")) bytes += std::string(kStep * kHeight / 2, '\x33');
     const Stream stream{.pixels = format, .width = kWidth, .height = kHeight, .step = kStep};
     const auto image = grey_image(stream, bytes);
@@ -247,6 +262,23 @@ TEST(Pixels, BrightnessOfEveryFormat) {
     }
     EXPECT_FALSE(grey_image(stream, bytes.substr(0, kStep * (kHeight - 1))).has_value()) << fourcc_text(format);
     EXPECT_FALSE(grey_image(stream, "").has_value()) << fourcc_text(format);
+  }
+}
+
+TEST(Pixels, ColourFilters) {
+  // A red scene: only the pixels with a red filter are bright, and its luminance is that of red.
+  for (const auto& [format, red] : {std::pair(fourcc("RGGB"), 0), std::pair(fourcc("GRBG"), 1),
+                                    std::pair(fourcc("GBRG"), 2), std::pair(fourcc("BA81"), 3)}) {
+    std::string bytes(kWidth * kHeight, '\0');
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        if (2 * (y % 2) + x % 2 == red) bytes[static_cast<std::size_t>(y * kWidth + x)] = '\xc8';
+      }
+    }
+    const Stream stream{.pixels = format, .width = kWidth, .height = kHeight, .step = kWidth};
+    const auto image = grey_image(stream, bytes);
+    ASSERT_TRUE(image.has_value()) << fourcc_text(format);
+    EXPECT_NEAR(image->row(1)[3], 0.299 * 200, 2) << fourcc_text(format);
   }
 }
 
