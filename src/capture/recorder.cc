@@ -40,6 +40,12 @@ std::vector<std::string> topics_of(const camera::Rig& rig, const std::vector<boo
 
 }  // namespace
 
+Result<camera::Rig> rig_as_recorded(const camera::Rig& rig) {
+  auto reading = rig_formats::read_bslam_rig(dataset::kLiveRigFile, rig_formats::rig_to_yaml(rig));
+  if (!reading) return reading.error();
+  return camera::Rig(std::move(reading->cameras));
+}
+
 Result<std::unique_ptr<Recorder>> Recorder::create(const std::filesystem::path& path, const camera::Rig& rig,
                                                    const std::vector<bool>& jpeg) {
   auto file = containers::McapWriter::create(path);

@@ -18,6 +18,10 @@
 
 namespace bslam::capture {
 
+// Returns the rig as it is read back from a recording. Rotations of other formats than that of bslam may differ in
+// their last bits. A run that is to be repeated exactly must use it.
+Result<camera::Rig> rig_as_recorded(const camera::Rig& rig);
+
 class Recorder {
  public:
   // `jpeg[i]`: camera i delivers JPEG files, which are recorded as they are; other images are recorded as grey values.

@@ -74,6 +74,10 @@ Result<LiveRig> read_live_rig(const LiveArguments& a) {
   }
   if (out.cameras.empty()) return Error{"command line", "--cameras", "no device", "one device or more"};
   out.rig = whole->subset(out.cameras);
+  if (a.record.empty()) return out;
+  auto recorded = capture::rig_as_recorded(out.rig);
+  if (!recorded) return recorded.error();
+  out.rig = *std::move(recorded);
   return out;
 }
 

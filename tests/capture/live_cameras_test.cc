@@ -225,6 +225,18 @@ TEST_F(LiveCamerasTest, RecordingHasTheSameFrames) {
   EXPECT_GE(missing, 8u);
 }
 
+TEST_F(LiveCamerasTest, RecordedRigIsThatOfTheRun) {
+  const auto once = rig_as_recorded(rig_);
+  ASSERT_TRUE(once.ok());
+  const auto twice = rig_as_recorded(*once);
+  ASSERT_TRUE(twice.ok());
+  for (std::size_t c = 0; c < 2; ++c) {
+    EXPECT_EQ(once->body_from_cam(c).matrix(), twice->body_from_cam(c).matrix());
+    EXPECT_LT((once->body_from_cam(c).matrix() - rig_.body_from_cam(c).matrix()).norm(), 1e-13);
+    EXPECT_EQ(twice->camera(c).time_offset_ns, rig_.camera(c).time_offset_ns);
+  }
+}
+
 TEST_F(LiveCamerasTest, TellsWhatWasNotUsed) {
   auto live = open(eventful());
   script_->open_gate();
