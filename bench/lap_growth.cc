@@ -76,7 +76,7 @@ Status play(const Arguments& arguments) {
   const TimeNs period = span + span / static_cast<TimeNs>(dataset->frames.size() - 1);
   std::size_t next = 0;
   for (int time = 0; time < arguments.times; ++time) {
-    session::FrameSource source(*dataset, 4);
+    session::DatasetFrames source(*dataset, 4);
     while (auto item = source.next()) {
       image::ImageBundle images = std::move(item->images);
       images.id = FrameId(next++);

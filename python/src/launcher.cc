@@ -5,6 +5,7 @@
 
 #include <climits>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 
 namespace {
@@ -23,6 +24,7 @@ std::string prefix() {
 
 int main(int, char** argv) {
   const std::string root = prefix();
+  setenv("BSLAM_PYTHON", (root + "/bin/python3").c_str(), 0);  // for --rerun
   for (const char* packages :
        {"/lib*/python3*/site-packages", "/lib*/python3*/dist-packages", "/local/lib*/python3*/dist-packages", ""}) {
     glob_t found{};

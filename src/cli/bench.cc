@@ -147,7 +147,7 @@ RunOutcome run_sequence(const BenchArguments& a, const Sequence& sequence, int r
   words.insert(words.end(), options.begin(), options.end());
   if (const std::string rig = rig_of(a, sequence); !rig.empty()) words.insert(words.end(), {"--rig", rig});
   const fs::path log = folder / "log.txt";
-  const auto end = run_this_program(words, log, stop);
+  const auto end = run_program(kThisProgram, words, log, stop);
   if (!end) return failed(end.error().message(), kExitFailed);
   std::string failure = failure_of(*end, log);
   const int status = end->signal > 0 ? kExitFailed : end->exit_status;

@@ -12,8 +12,6 @@
 namespace bslam::cli {
 namespace {
 
-constexpr const char* kThisProgram = "/proc/self/exe";
-
 // Waits until the process has ended. It is not reaped before the stop callback is removed, so that its id cannot belong
 // to another process when the signal is sent.
 ProcessEnd wait_for(pid_t process, const std::stop_token& stop) {
@@ -32,9 +30,9 @@ ProcessEnd wait_for(pid_t process, const std::stop_token& stop) {
 
 }  // namespace
 
-Result<ProcessEnd> run_this_program(const std::vector<std::string>& arguments, const std::filesystem::path& log,
-                                    const std::stop_token& stop) {
-  std::string name = "bslam";
+Result<ProcessEnd> run_program(const std::string& program, const std::vector<std::string>& arguments,
+                               const std::filesystem::path& log, const std::stop_token& stop) {
+  std::string name = program == kThisProgram ? "bslam" : program;
   std::vector<std::string> words = arguments;
   std::vector<char*> argv{name.data()};
   for (std::string& word : words) argv.push_back(word.data());
@@ -45,7 +43,7 @@ Result<ProcessEnd> run_this_program(const std::vector<std::string>& arguments, c
   ::posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
   ::posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
   pid_t process = 0;
-  const int failure = ::posix_spawn(&process, kThisProgram, &files, nullptr, argv.data(), environ);
+  const int failure = ::posix_spawnp(&process, program.c_str(), &files, nullptr, argv.data(), environ);
   ::posix_spawn_file_actions_destroy(&files);
   if (failure != 0) return Error{log.string(), "", std::strerror(failure), "a process that can be started"};
   return wait_for(process, stop);

@@ -20,9 +20,12 @@ Interruption::Interruption() {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   listener_ = std::jthread([this] {
-    while (::sem_wait(&g_signalled) != 0) {  // interrupted by another signal
+    for (std::stop_source* source : {&first_, &second_}) {
+      while (::sem_wait(&g_signalled) != 0) {  // interrupted by another signal
+      }
+      if (over_) return;
+      source->request_stop();
     }
-    if (!over_) source_.request_stop();
   });
 }
 

@@ -1,4 +1,4 @@
-// Converts SIGINT and SIGTERM to a stop request.
+// Converts SIGINT and SIGTERM to stop requests.
 #pragma once
 
 #include <atomic>
@@ -17,10 +17,12 @@ class Interruption {
   Interruption& operator=(const Interruption&) = delete;
 
   // The first signal requests a stop.
-  std::stop_token token() const { return source_.get_token(); }
+  std::stop_token token() const { return first_.get_token(); }
+  // The second signal requests this one.
+  std::stop_token second() const { return second_.get_token(); }
 
  private:
-  std::stop_source source_;
+  std::stop_source first_, second_;
   std::atomic<bool> over_ = false;
   std::jthread listener_;  // declared last, since it uses the other members
 };

@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_status = kExitOk;
   add_run(app, {argv, static_cast<std::size_t>(argc)}, exit_status);
+  add_live(app, {argv, static_cast<std::size_t>(argc)}, exit_status);
   add_eval(app, exit_status);
   add_bench(app, exit_status);
 #ifdef BSLAM_SIMULATOR

@@ -12,11 +12,16 @@ ProgressBar::ProgressBar(bool enabled, std::string unit)
 
 void ProgressBar::show(std::size_t done, std::size_t all) {
   const auto now = Clock::now();
-  if (!active_ || all == 0 || (done < all && now - drawn_ < std::chrono::milliseconds(100))) return;
+  if (!active_ || ((done < all || all == 0) && now - drawn_ < std::chrono::milliseconds(100))) return;
   drawn_ = now;
+  const double elapsed = std::chrono::duration<double>(now - start_).count();
+  if (all == 0) {
+    std::fprintf(stderr, "\r%zu %s in %.0f s ", done, unit_.c_str(), elapsed);
+    std::fflush(stderr);
+    return;
+  }
   constexpr std::size_t kWidth = 40;
   const std::size_t filled = kWidth * done / all;
-  const double elapsed = std::chrono::duration<double>(now - start_).count();
   const double left = done > 0 ? elapsed * static_cast<double>(all - done) / static_cast<double>(done) : 0.0;
   std::fprintf(stderr, "\r[%s%s] %zu/%zu %s, %.0f s left ", std::string(filled, '#').c_str(),
                std::string(kWidth - filled, '.').c_str(), done, all, unit_.c_str(), left);

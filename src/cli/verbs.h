@@ -14,6 +14,7 @@ constexpr int kExitFailed = 1;  // the program failed, not the request
 
 // `command_line`: the arguments of the program, which the report of a run shows.
 void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit_status);
+void add_live(CLI::App& app, std::span<const char* const> command_line, int& exit_status);
 void add_eval(CLI::App& app, int& exit_status);
 void add_bench(CLI::App& app, int& exit_status);
 void add_simulate(CLI::App& app, int& exit_status);

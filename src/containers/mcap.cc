@@ -18,7 +18,9 @@ constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
 constexpr std::uint64_t kHead = 9;  // bytes of opcode and length
 constexpr std::uint64_t kMaxDataBytes = std::uint64_t{1} << 26;
 constexpr unsigned char kFooter = 2, kSchema = 3, kChannel = 4, kMessage = 5, kChunkRecord = 6, kMessageIndex = 7,
-                        kChunkIndex = 8, kDataEnd = 15;
+                        kChunkIndex = 8, kAttachmentRecord = 9, kMetadata = 12, kDataEnd = 15;
+constexpr std::uint64_t kMaxAttachmentBytes = std::uint64_t{1} << 20;  // larger ones are not kept
+constexpr std::size_t kMaxAttachments = 16;
 
 struct Record {
   unsigned char op = 0;
@@ -85,6 +87,8 @@ class McapFile : public ChunkedFile {
   void read_summary();
   void add_schema(std::string_view data);
   void add_channel(std::string_view data);
+  void add_attachment(std::string_view data);
+  void add_metadata(std::string_view data);
   void add_record(std::uint32_t chunk, std::uint64_t at, const Record& record);
   bool add_chunk_of(const Record& record);
   bool add_index(const Record& record);
@@ -117,6 +121,31 @@ void McapFile::add_channel(std::string_view data) {
   });
   topic_of_[id] = static_cast<std::uint32_t>(same - topics_.begin());
   if (same == topics_.end()) topics_.push_back(topic);
+}
+
+void McapFile::add_attachment(std::string_view data) {
+  ByteReader in(data);
+  in.skip(16);  // the times of recording and creation
+  const std::string_view name = in.counted();
+  in.counted();  // its type
+  const auto size = in.number<std::uint64_t>();
+  if (!in.ok() || size > in.left()) return;
+  const std::string_view bytes = in.take(static_cast<std::size_t>(size));
+  if (attachments_.size() < kMaxAttachments) attachments_.push_back({std::string(name), std::string(bytes)});
+}
+
+void McapFile::add_metadata(std::string_view data) {
+  ByteReader in(data);
+  const std::string name(in.counted());
+  ByteReader pairs(in.counted());
+  if (!in.ok() || metadata_.size() >= kMaxAttachments) return;
+  auto& values = metadata_[name];
+  while (pairs.left() > 0) {
+    const std::string key(pairs.counted());
+    const std::string_view value = pairs.counted();
+    if (!pairs.ok()) return;
+    values.emplace(key, value);
+  }
 }
 
 // Reads the channels and the places of chunks from the end of the file.
@@ -220,6 +249,9 @@ bool McapFile::read_record(std::uint64_t at, const Record& record) {
   if (record.op == kChunkRecord) return add_chunk_of(record) && whole;  // the start of one that is cut off is read
   if (!whole) return false;
   if (record.op == kMessageIndex) return add_index(record);
+  const bool small = record.data_size <= kMaxAttachmentBytes;
+  if (record.op == kAttachmentRecord && small) add_attachment(data_of(0, record));
+  if (record.op == kMetadata && small) add_metadata(data_of(0, record));
   add_record(0, at, record);
   return true;
 }

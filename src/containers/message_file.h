@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -34,6 +35,11 @@ struct MessageRef {
   std::uint32_t topic = 0;  // index into topics()
 };
 
+// A file within a file, such as the calibration beside its images.
+struct Attachment {
+  std::string name, bytes;
+};
+
 constexpr std::size_t kWholeMessage = std::numeric_limits<std::size_t>::max();
 
 // An open file: its topics, and where the messages with images and calibrations are. Messages are read when asked for.
@@ -46,6 +52,9 @@ class MessageFile {
   const std::vector<Topic>& topics() const { return topics_; }
   // The messages of topics with a type for which is_needed is true, in the order of the file.
   const std::vector<MessageRef>& messages() const { return messages_; }
+  // Small attachments, and metadata by name and key. MCAP files only.
+  const std::vector<Attachment>& attachments() const { return attachments_; }
+  const std::map<std::string, std::map<std::string, std::string>>& metadata() const { return metadata_; }
   // For the user: what is damaged or missing, with counts.
   const std::vector<std::string>& warnings() const { return warnings_; }
 
@@ -68,6 +77,8 @@ class MessageFile {
   std::string format_;
   std::vector<Topic> topics_;
   std::vector<MessageRef> messages_;
+  std::vector<Attachment> attachments_;
+  std::map<std::string, std::map<std::string, std::string>> metadata_;
   std::vector<std::string> warnings_;
 };
 

@@ -14,6 +14,7 @@
 #include "containers/input_file.h"
 #include "dataset/bag_images.h"
 #include "dataset/camera_info.h"
+#include "dataset/live_recording.h"
 #include "dataset/recording_description.h"
 #include "dataset/rosbag2_folder.h"
 
@@ -77,13 +78,15 @@ class BagRecording : public Recording {
     for (const auto& file : store_->files())
       warnings_.insert(warnings_.end(), file->warnings().begin(), file->warnings().end());
     topics_ = store_->find_images();
+    if (store_->files().size() == 1) live_ = live_recording_of(*store_->files().front());
+    if (live_) warnings_.insert(warnings_.end(), live_->warnings.begin(), live_->warnings.end());
   }
 
   Status choose(const std::vector<std::string>& requested, const std::string& path);
 
   std::size_t camera_count() const override { return cameras_.size(); }
   bool calibrated() const override {
-    return std::ranges::any_of(cameras_, [&](std::size_t c) { return calibration_of(topics_[c].name).has_value(); });
+    return std::ranges::any_of(cameras_, [&](std::size_t c) { return is_calibrated(topics_[c].name); });
   }
   Result<camera::RigCamera> calibration(std::size_t camera) const override;
   Result<image_files::ImageList> images(std::size_t camera) const override;
@@ -98,6 +101,10 @@ class BagRecording : public Recording {
   };
   // The calibration in the namespace of an image topic.
   std::optional<Calibration> calibration_of(const std::string& topic) const;
+  bool is_calibrated(const std::string& topic) const {
+    return (live_ && live_->camera_of(topic) != nullptr) || calibration_of(topic).has_value();
+  }
+  Status choose_requested(const std::vector<std::string>& requested, const std::string& path);
   std::optional<geometry::SE3> body_from_cam(std::size_t camera) const;
   std::string name_of(std::size_t camera) const;
   StreamDescription describe(const ImageTopic& topic) const;
@@ -107,7 +114,8 @@ class BagRecording : public Recording {
   std::vector<std::string> warnings_;
   std::vector<ImageTopic> topics_;    // by name
   std::vector<std::size_t> cameras_;  // the topics of the cameras
-  bool proposed_ = true;              // the topics were not requested
+  std::optional<LiveRecording> live_;
+  bool proposed_ = true;  // the topics were not requested
 };
 
 // A topic and its compressed copy are one camera.
@@ -120,8 +128,6 @@ std::string BagRecording::why_unused(const ImageTopic& topic) const {
 }
 
 Status BagRecording::choose(const std::vector<std::string>& requested, const std::string& path) {
-  std::vector<std::string> names;
-  for (const ImageTopic& topic : topics_) names.push_back(topic.name);
   proposed_ = requested.empty();
   if (topics_.empty()) {
     std::set<std::string> types;
@@ -139,6 +145,19 @@ Status BagRecording::choose(const std::vector<std::string>& requested, const std
     else
       warnings_.push_back(fmt::format("{}: {} is not used: {}", path, topics_[t].name, why));
   }
+  if (live_ && proposed_) {  // in the order of the rig
+    const auto place = [&](std::size_t t) { return std::ranges::find(live_->topics, topics_[t].name); };
+    std::ranges::stable_sort(cameras_, {}, place);
+  }
+  if (const Status s = choose_requested(requested, path); !s) return s;
+  if (cameras_.empty())
+    return Error{path, topics_.front().name, topics_.front().unusable, "a topic with images that can be read"};
+  return {};
+}
+
+Status BagRecording::choose_requested(const std::vector<std::string>& requested, const std::string& path) {
+  std::vector<std::string> names;
+  for (const ImageTopic& topic : topics_) names.push_back(topic.name);
   for (const std::string& name : requested) {
     const auto found = std::ranges::find(topics_, name, &ImageTopic::name);
     if (found == topics_.end())
@@ -149,8 +168,6 @@ Status BagRecording::choose(const std::vector<std::string>& requested, const std
     if (!found->unusable.empty()) return Error{path, name, found->unusable, "images that can be read"};
     cameras_.push_back(index);
   }
-  if (cameras_.empty())
-    return Error{path, topics_.front().name, topics_.front().unusable, "a topic with images that can be read"};
   return {};
 }
 
@@ -195,6 +212,7 @@ std::optional<geometry::SE3> BagRecording::body_from_cam(std::size_t camera) con
 
 Result<camera::RigCamera> BagRecording::calibration(std::size_t camera) const {
   const ImageTopic& topic = topics_[cameras_[camera]];
+  if (const camera::RigCamera* recorded = live_ ? live_->camera_of(topic.name) : nullptr) return *recorded;
   const auto source = store_->source(topic.images.front().entry);
   const auto found = calibration_of(topic.name);
   if (!found) {
@@ -225,8 +243,9 @@ Result<image_files::ImageList> BagRecording::images(std::size_t camera) const {
   const std::vector<std::optional<TimeNs>> stamps = stamps_of(topic);
   std::vector<image_files::ImageFile> images;
   for (std::size_t k = 0; k < stamps.size(); ++k) {
-    if (stamps[k])
-      images.push_back({.path = {}, .time_ns = *stamps[k], .store = store_, .entry = topic.images[k].entry});
+    if (!stamps[k]) continue;
+    images.push_back({.path = {}, .time_ns = *stamps[k], .store = store_, .entry = topic.images[k].entry});
+    if (live_) images.back().frame_ns = topic.images[k].received_ns;
   }
   const std::size_t without_stamp = stamps.size() - images.size();
   if (images.empty()) return Error{source, "", "no image with a time stamp", "images with time stamps"};
@@ -266,7 +285,7 @@ StreamDescription BagRecording::describe(const ImageTopic& topic) const {
   std::ranges::sort(out.times);
   out.stamps = from_header ? "header" : "recording";
   out.lag = from_header ? lag_of(topic) : std::nullopt;
-  out.calibrated = calibration_of(topic.name).has_value();
+  out.calibrated = is_calibrated(topic.name);
   out.unused = why_unused(topic);
   if (const std::size_t without = topic.images.size() - out.times.size(); without > 0)
     out.notes.push_back(fmt::format("{} images have no time stamp", without));

@@ -184,7 +184,9 @@ Status check_common_clock(const std::vector<image_files::ImageFile>& images,
 Status group(const DatasetRequest& request, const std::vector<std::vector<image_files::ImageFile>>& images,
              Dataset& dataset) {
   const camera::Camera& camera0 = dataset.rig.camera(std::size_t{0});
-  FrameGrouping grouping = group_frames(images, from_seconds(request.sync_tolerance_s));
+  auto recorded = recorded_frames(images);
+  FrameGrouping grouping =
+      recorded ? *std::move(recorded) : group_frames(images, from_seconds(request.sync_tolerance_s));
   for (std::size_t i = 0; i < images.size(); ++i) {
     const std::string& name = dataset.rig.camera(i).name;
     if (grouping.shared_with_camera0[i] == 0) {

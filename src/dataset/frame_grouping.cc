@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <utility>
 
 #include "base/assert.h"
@@ -43,6 +44,45 @@ FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> 
       frame.images[c] = images[c][static_cast<std::size_t>(group.images[c])];
       out.beside_camera0[c] += beside;
     }
+  }
+  return out;
+}
+
+namespace {
+
+constexpr TimeNs kMaxApart = 1'000'000'000;
+
+// Sets the time of the frame. Returns false if its images are too far apart.
+bool set_time(FrameEntry& frame) {
+  std::optional<TimeNs> first, last;
+  for (const auto& image : frame.images) {
+    if (!image) continue;
+    first = std::min(first.value_or(image->time_ns), image->time_ns);
+    last = std::max(last.value_or(image->time_ns), image->time_ns);
+  }
+  frame.time_ns = frame.images[0] ? frame.images[0]->time_ns : *first;
+  return *last - *first <= kMaxApart;
+}
+
+}  // namespace
+
+std::optional<FrameGrouping> recorded_frames(std::span<const std::vector<image_files::ImageFile>> images) {
+  std::map<TimeNs, FrameEntry> frames;
+  FrameGrouping out{{}, std::vector<int>(images.size(), 0), std::vector<int>(images.size(), 0)};
+  for (std::size_t c = 0; c < images.size(); ++c) {
+    for (const image_files::ImageFile& image : images[c]) {
+      if (!image.frame_ns) return std::nullopt;
+      FrameEntry& frame = frames[*image.frame_ns];
+      frame.images.resize(images.size());
+      if (frame.images[c]) return std::nullopt;
+      frame.images[c] = image;
+      out.shared_with_camera0[c] += frame.images[0].has_value();
+    }
+  }
+  for (auto& [key, frame] : frames) {
+    if (!set_time(frame)) return std::nullopt;
+    if (!out.frames.empty() && frame.time_ns <= out.frames.back().time_ns) return std::nullopt;
+    out.frames.push_back(std::move(frame));
   }
   return out;
 }

@@ -1,6 +1,7 @@
 // Groups the images of a recording into frames by time.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,5 +23,10 @@ struct FrameGrouping {
 // with it; its images keep their times, and the tolerance is at least a tenth of the period of camera 0. `images[i]`
 // are the images of camera i, strictly increasing in time. Camera 0 must have at least one.
 FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> images, TimeNs tolerance_ns);
+
+// The frames in which the images were recorded (ImageFile::frame_ns). Returns nullopt if that of an image is unknown,
+// or if these are no frames: two images of one camera in one, images of one more than a second apart, or times of
+// frames that do not increase, as with other cameras or time offsets than those of the recording.
+std::optional<FrameGrouping> recorded_frames(std::span<const std::vector<image_files::ImageFile>> images);
 
 }  // namespace bslam::dataset

@@ -21,6 +21,8 @@ struct ImageFile {
   std::filesystem::path mask = {};  // file of a mask of this image alone; empty: none
   std::shared_ptr<const ImageStore> store = {};
   std::int64_t entry = 0;  // number of the image in the store
+  // Images of different cameras with the same number were one frame when they were recorded; nullopt: unknown.
+  std::optional<TimeNs> frame_ns = {};
 };
 
 // For messages: the file of an image, or its place in a recording.

@@ -21,13 +21,13 @@ void lower_priority() {
 
 }  // namespace
 
-FrameSource::FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority)
+DatasetFrames::DatasetFrames(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority)
     : dataset_(dataset), ahead_(ahead), reader_([this, priority](std::stop_token stop) {
         if (priority == ReaderPriority::kLow) lower_priority();
         read(std::move(stop));
       }) {}
 
-std::optional<FrameSource::Item> FrameSource::next() {
+std::optional<FrameSource::Item> DatasetFrames::next() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return !ready_.empty() || finished_; });
   if (ready_.empty()) {
@@ -40,13 +40,14 @@ std::optional<FrameSource::Item> FrameSource::next() {
   return item;
 }
 
-void FrameSource::read(std::stop_token stop) {
+void DatasetFrames::read(std::stop_token stop) {
   std::exception_ptr failure;
   try {
     for (std::size_t i = 0; i < dataset_.frames.size() && !stop.stop_requested(); ++i) {
       const Stopwatch watch;
-      Item item{dataset::read_frame(dataset_, i), 0};
+      Item item{.images = dataset::read_frame(dataset_, i)};
       item.read_ms = watch.ms();
+      if (i + 1 < dataset_.frames.size()) item.next_ns = dataset_.frames[i + 1].time_ns;
       std::unique_lock lock(mutex_);
       if (!changed_.wait(lock, stop, [this] { return ready_.size() < ahead_; })) break;
       ready_.push_back(std::move(item));

@@ -1,4 +1,4 @@
-// Reads the frames of a data set ahead of time, in order, in a separate thread.
+// Where the frames of a run come from: a data set, whose frames are read ahead of time, or live cameras.
 #pragma once
 
 #include <condition_variable>
@@ -12,23 +12,38 @@
 
 namespace bslam::session {
 
+class FrameSource {
+ public:
+  struct Item {
+    image::ImageBundle images;  // without images if the frame was dropped
+    double read_ms = 0;         // time for reading and decoding
+    // Time of the frame after it, by which a late frame is recognised; nullopt if it is the last or unknown.
+    std::optional<TimeNs> next_ns = {};
+    bool dropped = false;  // the source had no room for it, because processing was too slow
+  };
+
+  FrameSource() = default;
+  virtual ~FrameSource() = default;
+  FrameSource(const FrameSource&) = delete;
+  FrameSource& operator=(const FrameSource&) = delete;
+
+  // Waits for the next frame. Frames come in order of time; those that were not dropped are numbered from 0. Returns
+  // nullopt after the last one.
+  virtual std::optional<Item> next() = 0;
+};
+
 // Priority of the reading thread: the same as the other threads, or lower. The lower priority is for sequential runs
 // only; with background stages, a reader with lower priority would get too little processor time.
 enum class ReaderPriority { kNormal, kLow };
 
-class FrameSource {
+// The frames of a data set, read in a separate thread.
+class DatasetFrames final : public FrameSource {
  public:
-  struct Item {
-    image::ImageBundle images;
-    double read_ms = 0;  // time for reading and decoding
-  };
-
   // Keeps a reference to `dataset`, which must outlive this object. Up to `ahead` frames are read in advance.
-  FrameSource(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority = ReaderPriority::kNormal);
-  ~FrameSource() = default;
+  DatasetFrames(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority = ReaderPriority::kNormal);
 
-  // Returns the next frame, or nullopt after the last one. Rethrows exceptions of the reading thread.
-  std::optional<Item> next();
+  // Rethrows exceptions of the reading thread.
+  std::optional<Item> next() override;
 
  private:
   void read(std::stop_token stop);

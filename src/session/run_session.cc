@@ -45,24 +45,45 @@ void report_frame(RunObserver& observer, FrameSource::Item&& item, system::Frame
                      system);
 }
 
-// Feeds the frames to the system in order and returns a list of them. Stops early if the run is interrupted.
-Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const SessionOptions& options,
-                                     system::System& system) {
+// The frames that were fed, and whether they are all.
+struct Fed {
   std::vector<InputFrame> inputs;
-  const bool sequential = options.config.mode == execution::Mode::kSequential;
-  FrameSource source(dataset, kReadAhead, sequential ? ReaderPriority::kLow : ReaderPriority::kNormal);
+  bool all = false;
+};
+
+// Decides which frames are dropped in addition to those that the source has dropped.
+class FrameChoice {
+ public:
+  explicit FrameChoice(const SessionOptions& options) : options_(options) {
+    if (options.replay) recorded_ = recorded_frames(*options.replay);
+  }
+  // Returns true if the replayed run had ended before this frame.
+  bool is_after_replay(const FrameSource::Item& item) const {
+    return options_.replay && (recorded_.empty() || recorded_.back() < item.images.id);
+  }
+  bool drops(const FrameSource::Item& item, const RunControl& control) const {
+    if (options_.replay) return !std::binary_search(recorded_.begin(), recorded_.end(), item.images.id);
+    return options_.late == Late::kDrop && item.next_ns && control.is_overdue(*item.next_ns);
+  }
+
+ private:
+  const SessionOptions& options_;
+  std::vector<FrameId> recorded_;
+};
+
+// Feeds the frames to the system in order. Stops early if the run is interrupted.
+Result<Fed> feed(FrameSource& source, std::size_t count, const SessionOptions& options, system::System& system) {
+  Fed fed;
   RunControl recorded_pace(options.pace == Pace::kRealtime ? 1.0 : 0.0);
   RunControl& control = options.control ? *options.control : recorded_pace;
-  const std::vector<FrameId> recorded = options.replay ? recorded_frames(*options.replay) : std::vector<FrameId>();
-  for (std::size_t i = 0; i < dataset.frames.size() && !options.interrupted.stop_requested(); ++i) {
-    if (options.replay && (recorded.empty() || recorded.back() < FrameId(i))) break;
+  const FrameChoice choice(options);
+  while (!options.interrupted.stop_requested()) {
     auto item = source.next();
-    if (!item) break;
-    if (!control.wait_for(item->images.time_ns, options.interrupted)) break;
-    const bool late = i + 1 < dataset.frames.size() && control.is_overdue(dataset.frames[i + 1].time_ns);
-    const bool drop = options.replay ? !std::binary_search(recorded.begin(), recorded.end(), FrameId(i))
-                                     : options.late == Late::kDrop && late;
-    inputs.push_back({item->images.time_ns, drop, item->read_ms});
+    fed.all = !item;
+    if (!item || choice.is_after_replay(*item)) break;
+    if (!item->dropped && !control.wait_for(item->images.time_ns, options.interrupted)) break;
+    const bool drop = item->dropped || choice.drops(*item, control);
+    fed.inputs.push_back({item->images.time_ns, drop, item->read_ms});
     if (drop) {
       if (options.observer) options.observer->dropped(item->images.time_ns, item->read_ms);
     } else {
@@ -70,10 +91,17 @@ Result<std::vector<InputFrame>> feed(const dataset::Dataset& dataset, const Sess
       if (!processed) return processed.error();
       if (options.observer) report_frame(*options.observer, *std::move(item), *std::move(processed), system);
     }
-    if (options.progress) options.progress(i + 1, dataset.frames.size());
+    if (options.progress) options.progress(fed.inputs.size(), count);
   }
   if (options.observer) options.observer->fed();
-  return inputs;
+  return fed;
+}
+
+Result<Fed> feed(const dataset::Dataset& dataset, const SessionOptions& options, system::System& system) {
+  if (options.source) return feed(*options.source, 0, options, system);
+  const bool sequential = options.config.mode == execution::Mode::kSequential;
+  DatasetFrames source(dataset, kReadAhead, sequential ? ReaderPriority::kLow : ReaderPriority::kNormal);
+  return feed(source, dataset.frames.size(), options, system);
 }
 
 }  // namespace
@@ -96,12 +124,12 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
   const double start_up_s = options.start_up_s + 1e-3 * start_up.ms();
 
   const Stopwatch wall;
-  std::vector<InputFrame> inputs;
+  Fed fed;
   try {
     const std::stop_callback on_interruption(options.interrupted, [&system] { system.interrupt(); });
-    auto fed = feed(dataset, options, system);
-    if (!fed) return fed.error();
-    inputs = std::move(*fed);
+    auto outcome = feed(dataset, options, system);
+    if (!outcome) return outcome.error();
+    fed = *std::move(outcome);
     system.finish();
   } catch (const execution::ReplayMismatch& mismatch) {
     return mismatch.error;
@@ -110,18 +138,17 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
   const double wall_s = 1e-3 * wall.ms();
   result.trajectories = system.trajectories();
   result.live = system.live_trajectories();
-  result.record =
-      build_record({.dataset = dataset,
-                    .config = options.config,
-                    .inputs = inputs,
-                    .system = system,
-                    .trajectories = result.trajectories,
-                    .replayed = options.replay.has_value(),
-                    .loaded = options.map.has_value(),
-                    .complete = inputs.size() == dataset.frames.size() && !options.interrupted.stop_requested(),
-                    .start_up_s = start_up_s,
-                    .wall_s = wall_s},
-                   system.take_frames());
+  result.record = build_record({.dataset = dataset,
+                                .config = options.config,
+                                .inputs = fed.inputs,
+                                .system = system,
+                                .trajectories = result.trajectories,
+                                .replayed = options.replay.has_value(),
+                                .loaded = options.map.has_value(),
+                                .complete = fed.all && !options.interrupted.stop_requested(),
+                                .start_up_s = start_up_s,
+                                .wall_s = wall_s},
+                               system.take_frames());
   result.map = system.snapshot();
   result.rig = system.rig();
   result.calibration = system.calibration();

@@ -1,4 +1,4 @@
-// An offline run: feeds a data set to the SLAM system and writes the results as files.
+// A run: feeds a data set or the images of live cameras to the SLAM system and writes the results as files.
 #pragma once
 
 #include <filesystem>
@@ -9,6 +9,7 @@
 
 #include "dataset/dataset.h"
 #include "evaluation/trajectory.h"
+#include "session/frame_source.h"
 #include "session/run_control.h"
 #include "session/run_observer.h"
 #include "session/run_record.h"
@@ -30,9 +31,11 @@ struct SessionOptions {
   place::VocabularyPtr vocabulary;           // null: no place recognition
   std::optional<map::BundledMap> map;        // map of an earlier run with this rig, which is continued
   std::optional<camera::Rig> initial_rig;    // calibration with which the map begins; nullopt: that of the data set
-  std::function<void(std::size_t done, std::size_t all)> progress;  // called after every frame; may be empty
-  RunObserver* observer = nullptr;                                  // may be null; must outlive the call
-  RunControl* control = nullptr;  // pauses and pace, instead of `pace`; may be null; must outlive the call
+  // Called after every frame with the number of frames so far and of all, 0 if that is not known; may be empty.
+  std::function<void(std::size_t done, std::size_t all)> progress;
+  RunObserver* observer = nullptr;  // may be null; must outlive the call
+  RunControl* control = nullptr;    // pauses and pace, instead of `pace`; may be null; must outlive the call
+  FrameSource* source = nullptr;    // frames instead of those of the data set; may be null; must outlive the call
 };
 
 struct SessionResult {
@@ -50,7 +53,8 @@ struct SessionResult {
   std::optional<TimeNs> subtracted_ns = {};
 };
 
-// Errors: a mask that cannot be read or differs in size from the images of its camera; a journal of another run.
+// A data set without frames describes the rig of a `source`. Errors: a mask that cannot be read or differs in size from
+// the images of its camera; a journal of another run.
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options);
 
 // What report.html shows in addition to the result of a run.

@@ -53,7 +53,7 @@ class Session : public ::testing::Test {
 
 TEST_F(Session, ReadsFramesInOrder) {
   const dataset::Dataset data = dataset();
-  FrameSource source(data, 2);
+  DatasetFrames source(data, 2);
   for (std::size_t i = 0; i < data.frames.size(); ++i) {
     const auto item = source.next();
     ASSERT_TRUE(item.has_value());
@@ -69,8 +69,46 @@ TEST_F(Session, ReadsFramesInOrder) {
 TEST_F(Session, ReaderStopsBeforeTheLastFrameParallel) {
   const dataset::Dataset data = dataset();
   for (std::size_t taken = 0; taken <= data.frames.size(); ++taken) {
-    FrameSource source(data, 1 + taken % 3, taken % 2 == 0 ? ReaderPriority::kLow : ReaderPriority::kNormal);
+    DatasetFrames source(data, 1 + taken % 3, taken % 2 == 0 ? ReaderPriority::kLow : ReaderPriority::kNormal);
     for (std::size_t i = 0; i < taken; ++i) EXPECT_TRUE(source.next().has_value());
+  }
+}
+
+// Passes on the frames of a data set, as live cameras do, with every third one dropped.
+class SomeFrames : public FrameSource {
+ public:
+  explicit SomeFrames(const dataset::Dataset& data) : frames_(data, 2) {}
+  std::optional<Item> next() override {
+    auto item = frames_.next();
+    if (!item) return item;
+    item->next_ns.reset();
+    item->dropped = item->images.id.index() % 3 == 2;
+    if (item->dropped)
+      item->images.images.clear();
+    else
+      item->images.id = FrameId(fed_++);
+    return item;
+  }
+
+ private:
+  DatasetFrames frames_;
+  std::size_t fed_ = 0;
+};
+
+TEST_F(Session, TakesTheFramesOfAnotherSource) {
+  dataset::Dataset data = dataset();
+  SomeFrames source(data);
+  dataset::Dataset rig_only = data;
+  rig_only.frames.clear();
+  SessionOptions o = options();
+  o.source = &source;
+  const auto result = run_session(rig_only, o);
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_TRUE(result->record.complete);
+  ASSERT_EQ(result->record.frames.size(), data.frames.size());
+  for (std::size_t i = 0; i < data.frames.size(); ++i) {
+    EXPECT_EQ(result->record.frames[i].outcome() == FrameOutcome::kDropped, i % 3 == 2);
+    EXPECT_DOUBLE_EQ(result->record.frames[i].time_s, to_seconds(data.frames[i].time_ns - data.first_time_ns));
   }
 }
 

@@ -91,8 +91,9 @@ TEST_F(CommandLine, PrintsVersionAndHelpForEveryCommand) {
   EXPECT_EQ(run("--version").status, 0);
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
   for (const char* verb :
-       {"", "run", "eval", "bench", "simulate", "inspect", "rig", "rig info", "rig convert", "rig calibrate", "map",
-        "map info", "map export", "map merge", "export", "vocab", "vocab info", "vocab train", "settings"}) {
+       {"",          "run",      "live",        "eval",          "bench",       "simulate", "inspect",
+        "rig",       "rig info", "rig convert", "rig calibrate", "map",         "map info", "map export",
+        "map merge", "export",   "vocab",       "vocab info",    "vocab train", "settings"}) {
     EXPECT_EQ(run(std::string(verb) + " --help").status, 0) << verb;
   }
 }
@@ -407,6 +408,67 @@ TEST_F(CommandLine, BenchRejectsAFolderWithoutSequences) {
   const Ran ran = run("bench " + empty.string() + " --out " + out("rejected"));
   EXPECT_EQ(ran.status, 2);
   EXPECT_NE(ran.err.find("found no sequence"), std::string::npos) << ran.err;
+}
+
+// Two cameras of the recording as folders that are played, and two that are not there.
+std::string live_arguments(const std::string& data) {
+  return "live --rig " + data + "/rig.yaml --cameras " + data + "/mav0/cam0," + data +
+         "/mav0/cam1,-,- --set features.per_image=500 --progress never ";
+}
+
+TEST_F(CommandLine, RecordedLiveRunIsRepeatedToTheByte) {
+  const std::string file = out("live.mcap"), journal = out("live.journal");
+  const Ran live = run(live_arguments(data()) + "--out " + out("live") + " --record " + file + " --journal " + journal);
+  ASSERT_EQ(live.status, 0) << live.err;
+  EXPECT_EQ(nlohmann::json::parse(slurp(out("live/summary.json")))["complete"], true);
+  EXPECT_TRUE(fs::exists(out("live/report.html")));
+  const Ran again =
+      run("run " + file + " --out " + out("live_again") + " --replay " + journal + " --set features.per_image=500");
+  ASSERT_EQ(again.status, 0) << again.err;
+  expect_same_trajectories("live", "live_again");
+}
+
+TEST_F(CommandLine, CtrlCEndsALiveRunWithAllItsFiles) {
+  const std::string file = out("ended.mcap"), folder = out("ended");
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string program = BSLAM_PROGRAM;
+    const std::string command = "exec " + program + " " + live_arguments(data()) + "--out " + folder + " --record " +
+                                file + " >/dev/null 2>" + out("stderr");
+    ::execl("/bin/sh", "/bin/sh", "-c", command.c_str(), static_cast<char*>(nullptr));
+    std::_Exit(127);
+  }
+  // Frames are in the file after half a second of 1.5 s.
+  std::error_code error;
+  while (!(fs::file_size(file, error) > 50'000 && !error) && ::waitpid(child, nullptr, WNOHANG) == 0)
+    std::this_thread::yield();
+  ::kill(child, SIGINT);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << status;
+  EXPECT_EQ(WEXITSTATUS(status), 0) << slurp(out("stderr"));
+  const auto summary = nlohmann::json::parse(slurp(folder + "/summary.json"));
+  EXPECT_EQ(summary["complete"], true);
+  EXPECT_GT(summary["frames"]["tracked"], 0);
+  EXPECT_TRUE(fs::exists(folder + "/trajectory.tum"));
+  EXPECT_EQ(run("data info " + file).err, "");
+}
+
+TEST_F(CommandLine, RejectsBadRequestsForLiveRuns) {
+  const std::string rig = "--rig " + data() + "/rig.yaml ", folder = " --out " + out("rejected");
+  expect_rejected("live --cameras a,b" + folder);
+  expect_rejected("live " + rig + folder);
+  expect_rejected("live " + rig + "--cameras /dev/null,-,-,-");
+  expect_rejected("live " + rig + "--cameras /dev/null,-,-,-" + folder);
+  expect_rejected("live " + rig + "--cameras /nowhere/video0,-,-,-" + folder);
+  expect_rejected("live " + rig + "--cameras -,-,-,-" + folder);
+  expect_rejected("live " + rig + "--cameras /dev/video0" + folder);
+  expect_rejected("live " + rig + "--cameras /dev/null,/dev/null,-,-" + folder);
+  expect_rejected("live " + rig + "--cameras /dev/null,-,-,- --exposure bright" + folder);
+  expect_rejected("live " + rig + "--cameras /dev/null,-,-,- --pixels RGB" + folder);
+  expect_rejected("live " + rig + "--cameras " + data() + "/mav0/cam0,-,-,- --record /nowhere/a.mcap" + folder);
+  EXPECT_EQ(run("live --list").status, 0);
 }
 
 TEST_F(CommandLine, AnInterruptedBenchKeepsTheTableSoFar) {

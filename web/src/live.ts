@@ -114,11 +114,18 @@ export class LiveView {
     this.showSpeed();
     if (!this.frame) return;
     const { index, time } = this.frame;
-    morph(this.numbers, [h('b', {}, `frame ${integer(index + 1)}`), ` of ${integer(this.start.live.frames)}, at ${seconds(time)}, `,
+    morph(this.numbers, [h('b', {}, `frame ${integer(index + 1)}`), `${this.all()}, at ${seconds(time)}, `,
       h('b', {}, `${decimal(this.frameMs, 1)} ms`), ' / frame']);
   }
 
+  // How many frames there are; nobody knows it of live cameras.
+  private all() {
+    const { frames } = this.start.live;
+    return frames > 0 ? ` of ${integer(frames)}` : '';
+  }
+
   private showSpeed() {
+    if (this.start.live.frames === 0) this.speed.parentElement!.style.display = 'none';  // cameras have a pace of their own
     const { speed } = this.state;
     if (!kSpeeds.some(([value]) => value === speed)) kSpeeds.push([speed, `${speed} \u00d7 recorded`]);
     morph(this.speed, kSpeeds.map(([value, text]) => h('option', { value }, text)));

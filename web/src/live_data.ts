@@ -25,7 +25,7 @@ export type LiveMessage = { channel: 'frame'; value: LiveFrame } | { channel: 's
 
 // The data in the page when it was loaded.
 export interface LiveStart {
-  live: { data: string; frames: number };
+  live: { data: string; frames: number };  // 0: live cameras, which have no last frame
   state: LiveState;
   frame?: LiveFrame;
   run?: Run;

@@ -1,0 +1,117 @@
+// The cameras of a rig as the source of a run: a thread for each camera, whose images are grouped into frames by
+// bslam::Synchronizer. Frames wait until they are asked for; if too many wait, the oldest are dropped.
+#pragma once
+
+#include <bslam/synchronizer.h>
+
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "camera/rig.h"
+#include "capture/device.h"
+#include "capture/live_frame.h"
+#include "capture/recorder.h"
+#include "session/frame_source.h"
+
+namespace bslam::capture {
+
+struct LiveOptions {
+  std::vector<std::string> paths;  // one per camera of the rig
+  StreamRequest request;           // its resolution is that of the rig
+  OpenDevice open;
+  double sync_tolerance_s = 0.002;
+  std::size_t max_waiting = 3;                   // frames
+  std::chrono::milliseconds silence{2000};       // without an image a camera is opened again
+  std::chrono::milliseconds retry{1000};         // between attempts to open a lost camera
+  std::chrono::milliseconds first_image{10000};  // how long is waited for the first images
+  // Called with lines for the user, such as that a camera was unplugged; by one thread at a time. May be empty.
+  std::function<void(const std::string& line)> say = {};
+};
+
+class LiveCameras final : public session::FrameSource {
+ public:
+  // Opens and starts all cameras. Errors: those of Device::start and OpenDevice, with the name of the camera.
+  static Result<std::unique_ptr<LiveCameras>> open(const camera::Rig& rig, LiveOptions options);
+  ~LiveCameras() override;
+
+  // What each camera was set to.
+  std::vector<Stream> streams() const;
+
+  // Waits until every camera has delivered an image, and returns the time of the first frame. Errors: a camera was lost
+  // or delivered none; stop() was called.
+  Result<TimeNs> wait_for_first_frame();
+
+  // Frames are recorded from now on as they are handed out. `recorder` must outlive this object.
+  void record_to(Recorder* recorder) { recorder_ = recorder; }
+
+  // Begins the run: frames that came before are not part of it. Called once, before next().
+  void begin();
+
+  // Returns nullopt after stop(), or when all
+  // cameras have ended, once the frames before were handed out. Rethrows exceptions of the threads.
+  std::optional<Item> next() override;
+
+  // Ends the capture; may be called from any thread.
+  void stop();
+
+  // For the user, at the end: per camera, images that were damaged or could not be used, and how often it was lost.
+  std::vector<std::string> notes() const;
+
+ private:
+  struct CameraState {
+    std::string path;
+    StreamRequest request;
+    Stream stream;
+    std::unique_ptr<Device> device;  // used by the thread of the camera only
+    // Guarded by mutex_.
+    std::size_t images = 0, damaged = 0, losses = 0;
+    bool lost = false, unstamped = false;
+    std::array<bool, kDropReasons> drop_said{};
+  };
+  struct Waiting {
+    ImageBundle bundle;
+    TimeNs time_ns = 0;
+    bool dropped = false;
+  };
+
+  LiveCameras(const camera::Rig& rig, LiveOptions options);
+  void run(std::size_t camera, const std::stop_token& stop);
+  void capture(std::size_t camera, const std::stop_token& stop);
+  void take(std::size_t camera, const DeviceImage& image);
+  void count_damaged(std::size_t camera);
+  void collect();
+  void lose(std::size_t camera, const std::string& why);
+  bool reopen(std::size_t camera, const std::stop_token& stop);
+  void note_drop(const DroppedImage& image);
+  void say(std::size_t camera, const std::string& text);
+  std::string name_of(std::size_t camera) const;
+
+  const camera::Rig rig_;
+  const LiveOptions options_;
+  Recorder* recorder_ = nullptr;
+  std::optional<Synchronizer> synchronizer_;
+  std::vector<CameraState> cameras_;
+
+  std::mutex say_mutex_;
+  mutable std::mutex mutex_;  // guards all until `threads_`, and what CameraState says
+  std::condition_variable_any changed_;
+  std::deque<Waiting> waiting_;
+  std::size_t frames_waiting_ = 0;  // of them, those that were not dropped
+  bool begun_ = false, ended_ = false, stopped_ = false;
+  std::size_t running_ = 0;  // threads
+  std::exception_ptr failure_;
+  std::uint64_t handed_out_ = 0;
+  std::vector<std::jthread> threads_;
+};
+
+}  // namespace bslam::capture

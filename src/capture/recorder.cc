@@ -1,0 +1,145 @@
+#include "capture/recorder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "containers/ros_writer.h"
+#include "dataset/live_recording.h"
+#include "rig_formats/bslam_rig.h"
+
+namespace bslam::capture {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kMaxWaiting = 32;                       // frames
+constexpr auto kFlushAfter = std::chrono::milliseconds(500);  // what is lost if the program is killed
+
+bool is_name_character(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+}
+
+// Topics of ROS have names of letters, digits and underscores; those of two cameras must differ.
+std::vector<std::string> topics_of(const camera::Rig& rig, const std::vector<bool>& jpeg) {
+  std::vector<std::string> out;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    std::string name = rig.camera(c).name;
+    std::ranges::replace_if(
+        name, [](char k) { return !is_name_character(k); }, '_');
+    if (name.empty() || (name[0] >= '0' && name[0] <= '9')) name = "cam_" + name;
+    std::string topic = fmt::format("/{}/image_raw{}", name, jpeg[c] ? "/compressed" : "");
+    if (std::ranges::find(out, topic) != out.end())
+      topic = fmt::format("/{}_{}/image_raw{}", name, c, jpeg[c] ? "/compressed" : "");
+    out.push_back(std::move(topic));
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<camera::Rig> rig_as_recorded(const camera::Rig& rig) {
+  auto reading = rig_formats::read_bslam_rig(dataset::kLiveRigFile, rig_formats::rig_to_yaml(rig));
+  if (!reading) return reading.error();
+  return camera::Rig(std::move(reading->cameras));
+}
+
+Result<std::unique_ptr<Recorder>> Recorder::create(const std::filesystem::path& path, const camera::Rig& rig,
+                                                   const std::vector<bool>& jpeg) {
+  auto file = containers::McapWriter::create(path);
+  if (!file) return file.error();
+  containers::McapWriter& writer = **file;
+  const std::vector<std::string> topics = topics_of(rig, jpeg);
+  if (const Status s = writer.attach(dataset::kLiveRigFile, "application/yaml", rig_formats::rig_to_yaml(rig)); !s)
+    return s.error();
+  if (const Status s = writer.add_metadata(dataset::kLiveMetadata, dataset::live_metadata(topics)); !s)
+    return s.error();
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    if (jpeg[c])
+      writer.add_topic(topics[c], containers::kCompressedImageType, containers::compressed_image_definition());
+    else
+      writer.add_topic(topics[c], containers::kImageType, containers::image_definition());
+  }
+  return std::unique_ptr<Recorder>(new Recorder(*std::move(file), rig));
+}
+
+Recorder::Recorder(std::unique_ptr<containers::McapWriter> file, const camera::Rig& rig)
+    : rig_(rig), file_(std::move(file)), thread_([this] { run(); }) {}
+
+Recorder::~Recorder() { [[maybe_unused]] const Status last = finish(); }
+
+void Recorder::add(const ImageBundle& frame) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return waiting_.size() < kMaxWaiting || !status_; });
+  if (!status_ || ending_) return;
+  waiting_.push_back(frame);
+  changed_.notify_all();
+}
+
+Status Recorder::write(const ImageBundle& frame) {
+  const TimeNs frame_ns = time_of(frame, rig_);
+  Status status;
+  for (std::size_t c = 0; c < frame.images.size() && status; ++c) {
+    const CameraImage& image = frame.images[c];
+    if (image.data == nullptr) continue;
+    const std::string& name = rig_.camera(c).name;
+    const std::string& jpeg = pixels_of(image).jpeg;
+    const std::string message = jpeg.empty() ? containers::grey_image_message(image.time_ns, name, image.width,
+                                                                              image.height, image.data, image.stride)
+                                             : containers::jpeg_image_message(image.time_ns, name, jpeg);
+    status = file_->write(static_cast<std::uint16_t>(c), frame_ns, message);
+  }
+  return status;
+}
+
+void Recorder::run() {
+  Clock::time_point flushed = Clock::now();
+  std::unique_lock lock(mutex_);
+  while (status_) {
+    changed_.wait_for(lock, kFlushAfter, [this] { return !waiting_.empty() || ending_; });
+    if (waiting_.empty() && ending_) break;
+    std::optional<ImageBundle> frame;
+    if (!waiting_.empty()) {
+      frame = std::move(waiting_.front());
+      waiting_.pop_front();
+      changed_.notify_all();
+    }
+    lock.unlock();
+    Status status = frame ? write(*frame) : Status();
+    if (status && Clock::now() - flushed >= kFlushAfter) {
+      status = file_->flush();
+      flushed = Clock::now();
+    }
+    lock.lock();
+    frames_ += frame && status;
+    status_ = status;
+  }
+  changed_.notify_all();
+}
+
+Status Recorder::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (ending_) return status_;
+    ending_ = true;
+    changed_.notify_all();
+  }
+  thread_.join();
+  if (status_) status_ = file_->finish();
+  bytes_ = file_->bytes();
+  return status_;
+}
+
+std::size_t Recorder::frames() const {
+  const std::lock_guard lock(mutex_);
+  return frames_;
+}
+
+std::uint64_t Recorder::bytes() const {
+  const std::lock_guard lock(mutex_);
+  return bytes_;
+}
+
+}  // namespace bslam::capture

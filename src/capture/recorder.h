@@ -1,0 +1,62 @@
+// Records the frames of a live run in an MCAP file, in a thread of its own. `bslam run` of the file gets the same
+// frames.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "base/result.h"
+#include "camera/rig.h"
+#include "capture/live_frame.h"
+#include "containers/mcap_writer.h"
+
+namespace bslam::capture {
+
+// Returns the rig as it is read back from a recording. Rotations of other formats than that of bslam may differ in
+// their last bits. A run that is to be repeated exactly must use it.
+Result<camera::Rig> rig_as_recorded(const camera::Rig& rig);
+
+class Recorder {
+ public:
+  // `jpeg[i]`: camera i delivers JPEG files, which are recorded as they are; other images are recorded as grey values.
+  // Error: the file cannot be written.
+  static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& path, const camera::Rig& rig,
+                                                  const std::vector<bool>& jpeg);
+  ~Recorder();  // as finish()
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  // Adds a frame. Waits while many frames are still to be written. After an error frames are not recorded any more.
+  void add(const ImageBundle& frame);
+
+  // Writes what is left and ends the file. Error: it could not be written completely.
+  Status finish();
+
+  // How much was written, complete after finish().
+  std::size_t frames() const;
+  std::uint64_t bytes() const;
+
+ private:
+  Recorder(std::unique_ptr<containers::McapWriter> file, const camera::Rig& rig);
+  void run();
+  Status write(const ImageBundle& frame);
+
+  const camera::Rig rig_;
+  const std::unique_ptr<containers::McapWriter> file_;  // used by the thread only, until it has ended
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<ImageBundle> waiting_;  // guarded by mutex_, like all until `thread_`
+  bool ending_ = false;
+  Status status_;
+  std::size_t frames_ = 0;
+  std::uint64_t bytes_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace bslam::capture

@@ -1,0 +1,230 @@
+#include "cli/slam_run.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "base/atomic_file.h"
+#include "base/option_table.h"
+#include "cli/rerun.h"
+#include "cli/run_messages.h"
+#include "cli/shell_command.h"
+#include "cli/verbs.h"
+#include "map/rigs_of_map.h"
+#include "session/record_builder.h"
+#include "session/report_data.h"
+#include "storage/map_file.h"
+#include "storage/vocabulary_file.h"
+#include "system/cameras_of_run.h"
+
+namespace bslam::cli {
+namespace {
+
+// Creates the output folder. An existing folder must be empty unless --overwrite is given, which removes the files of
+// an earlier run except for those that are input of this run.
+Status prepare_folder(const SlamArguments& arguments) {
+  const std::filesystem::path folder = arguments.out;
+  std::error_code error;
+  const bool exists = std::filesystem::exists(folder, error);
+  if (exists && !std::filesystem::is_directory(folder, error)) {
+    return Error{folder.string(), "--out", "a file", "a folder"};
+  }
+  if (exists && !arguments.overwrite && !std::filesystem::is_empty(folder, error)) {
+    return Error{folder.string(), "--out", "a folder that is not empty", "an empty or new folder, or --overwrite"};
+  }
+  std::filesystem::create_directories(folder, error);
+  if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
+  if (const Status status = check_writable(folder / "summary.json"); !status) return status;
+  for (const char* name :
+       {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "report.html", "rig_refined.yaml"}) {
+    const auto is = [&](const std::string& input) {
+      return !input.empty() && std::filesystem::equivalent(folder / name, input, error);
+    };
+    if (!is(arguments.rig) && !is(arguments.config.file)) std::filesystem::remove(folder / name, error);
+  }
+  for (const char* stem : {"trajectory", "trajectory_live"}) {
+    for (std::size_t submap = 0; std::filesystem::remove(folder / session::trajectory_file(stem, submap), error);
+         ++submap) {
+    }
+  }
+  return {};
+}
+
+// Reads the map of an earlier run if one is given, and checks that this run can continue with it.
+Result<std::optional<map::BundledMap>> read_map(const SlamArguments& arguments, const camera::Rig& rig,
+                                                const system::Config& config, const place::Vocabulary& vocabulary) {
+  const std::string& file = arguments.load_map;
+  if (file.empty()) return std::optional<map::BundledMap>();
+  auto map = storage::open_map(file, rig, config.feature_model().pyramid, &vocabulary);
+  if (!map) return map.error();
+  if (const Status status = system::check_settings(config, *map, rig); !status) return status.error();
+  if (system::shared_with_other_rigs(*map, rig) && log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) {
+    const char* const text = map::find_rig(*map, rig)
+                                 ? "has further cameras; the calibration is that of the map and is not estimated"
+                                 : "was made with another rig or calibration; that of this run is kept as given";
+    std::fprintf(stderr, "note: %s %s\n", file.c_str(), text);
+  }
+  return std::optional(*std::move(map));
+}
+
+Status write_files(const session::SessionResult& result, const system::Config& config, const dataset::Dataset& dataset,
+                   const SlamArguments& arguments, const place::Vocabulary& vocabulary) {
+  const auto report =
+      arguments.no_report ? std::nullopt : std::optional(session::ReportSource{dataset, arguments.command});
+  if (const Status status = session::write_outputs(result, config, arguments.out, report); !status) return status;
+  if (!arguments.journal.empty()) {
+    const Status status = write_atomically(arguments.journal, execution::journal_text(result.journal));
+    if (!status) return status;
+  }
+  if (arguments.save_map.empty()) return {};
+  return storage::write_map(*result.map, {vocabulary.id(), result.record.version, result.record.data},
+                            arguments.save_map);
+}
+
+// Shows the report of the run in the browsers that have followed it.
+void end_view(live_view::LiveView* view, const session::SessionResult& result, const system::Config& config,
+              const dataset::Dataset& dataset, const SlamArguments& arguments) {
+  if (view == nullptr || !view->is_watched()) return;
+  view->end(session::report_text(result, config, {dataset, arguments.command}));
+}
+
+void print_after(const session::RunRecord& record, const RunInput& input, const SlamArguments& arguments) {
+  const LogVerbosity verbosity = log_verbosity(arguments.log_level);
+  if (verbosity >= LogVerbosity::kDebug) print_frames(record);
+  if (verbosity >= LogVerbosity::kInfo) print_stage_statistics(record);
+  if (verbosity >= LogVerbosity::kWarning) print_warnings(record, input.dataset.rig, input.check_command);
+  print_result(record, arguments.out);
+}
+
+int exit_status_of(const session::SessionResult& result) {
+  const session::RunRecord& record = result.record;
+  if (!record.complete) return kExitInterrupted;
+  const bool nothing = record.map.loaded ? session::frames_in_loaded_map(record) == 0 : result.live.empty();
+  return nothing ? kExitNothingTracked : kExitOk;
+}
+
+void add_map_options(CLI::App& verb, SlamArguments& a) {
+  verb.add_option("--save-map", a.save_map, "save the final map to this file");
+  verb.add_option("--load-map", a.load_map,
+                  "saved map to continue after relocalising in it; it may be of another rig or calibration");
+  verb.add_flag("--localize-only", a.localize_only, "localise in the loaded map without changing it");
+  verb.add_option("--vocabulary", a.vocabulary,
+                  "vocabulary for place recognition, in bslam or DBoW2 text format; default: the vocabulary shipped "
+                  "with this program");
+}
+
+}  // namespace
+
+Result<system::Config> resolve_run_config(const SlamArguments& arguments) {
+  auto resolved = resolve_config(arguments.config);
+  if (!resolved) return resolved;
+  system::Config& config = *resolved;
+  if (!arguments.mode.empty()) {
+    if (const Status s = OptionTable(config).set("mode", arguments.mode); !s) {
+      return Error{"command line", "--mode", s.error().found, s.error().expected};
+    }
+  }
+  if (arguments.seed) config.seed = *arguments.seed;
+  if (arguments.no_final_ba) config.final_adjustment = false;
+  if (arguments.no_loop) config.looping.loop.enabled = false;
+  if (arguments.localize_only) config.localize_only = true;
+  if (const Status s = system::check_config(config, !arguments.load_map.empty()); !s) {
+    return Error{"command line", s.error().key, s.error().found, s.error().expected};
+  }
+  return resolved;
+}
+
+Status check_output_file(const std::string& file, const char* option, bool overwrite) {
+  if (file.empty()) return {};
+  std::error_code error;
+  const std::filesystem::path path(file), folder = path.has_parent_path() ? path.parent_path() : ".";
+  if (std::filesystem::is_directory(path, error)) return Error{file, option, "a folder", "the name of a file"};
+  if (!std::filesystem::is_directory(folder, error))
+    return Error{folder.string(), option, "no such folder", "an existing folder"};
+  if (std::filesystem::is_regular_file(path, error) && !overwrite)
+    return Error{file, option, "an existing file", "a new name, or --overwrite"};
+  return check_writable(path);
+}
+
+int run_and_write(const SlamArguments& arguments, RunInput input, session::RunControl& control) {
+  const dataset::Dataset& dataset = input.dataset;
+  session::SessionOptions& options = input.options;
+  options.config = input.config;
+  const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
+  if (!vocabulary) return report_error(vocabulary.error());
+  auto map = read_map(arguments, dataset.rig, input.config, **vocabulary);
+  if (!map) return report_error(map.error());
+  for (const auto& [option, file] :
+       {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
+    if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return report_error(s.error());
+  }
+  if (const Status s = arguments.rerun.empty() ? Status() : check_rerun(); !s) return report_error(s.error());
+  auto view = start_view(arguments.view,
+                         {dataset, input.config, arguments.command, *map ? (*map)->keyframe_slots() : 0}, control);
+  if (!view) return report_error(view.error());
+  if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
+  if (*view) std::fprintf(stderr, "view: %s\n", (*view)->url().c_str());
+  if (const Status s = input.before ? input.before() : Status(); !s) return report_error(s.error());
+
+  options.vocabulary = *vocabulary;
+  options.map = std::move(*map);
+  options.observer = view->get();
+  options.control = &control;
+  auto result = session::run_session(dataset, options);
+  if (input.after) input.after();
+  if (!result) return report_error(result.error());
+  if (arguments.image_stamps) result->subtracted_ns = dataset.rig.camera(0).time_offset_ns;
+  if (const Status s = write_files(*result, input.config, dataset, arguments, **vocabulary); !s)
+    return report_error(s.error());
+  const Status sent = arguments.rerun.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
+  end_view(view->get(), *result, input.config, dataset, arguments);
+  print_after(result->record, input, arguments);
+  if (!sent) return report_error(sent.error());
+  return exit_status_of(*result);
+}
+
+std::string command_of(std::span<const char* const> command_line) {
+  std::vector<std::string> words(command_line.begin(), command_line.end());
+  if (!words.empty()) words.front() = std::filesystem::path(words.front()).filename();
+  return shell_command(words);
+}
+
+void add_slam_options(CLI::App& verb, SlamArguments& a) {
+  verb.add_option("--out", a.out, "folder for trajectory, summary, configuration, report and plots")->required();
+  add_config_options(verb, a.config);
+  verb.add_option("--mode", a.mode,
+                  "sequential, lagged or parallel (default). Repeated sequential runs give identical results, and so "
+                  "do repeated lagged "
+                  "runs; the two differ from each other");
+  verb.add_option("--journal", a.journal,
+                  "write a journal to this file: the map version read and written by each stage");
+  verb.add_flag("--no-loop", a.no_loop, "disable loop closing; relocalisation stays enabled");
+  add_map_options(verb, a);
+  verb.add_flag("--image-stamps", a.image_stamps,
+                "write trajectories with the time stamps of the images, without the time offset of camera 0");
+  verb.add_flag("--no-final-ba", a.no_final_ba, "skip the global bundle adjustment at the end");
+  CLI::Option* no_report =
+      verb.add_flag("--no-report", a.no_report, "do not write report.html, the page that shows the run in a browser");
+  verb.add_option(
+          "--rerun", a.rerun,
+          "show the result in Rerun: a file to be written, such as run.rrd, or the address of a viewer, such as "
+          "rerun+http://127.0.0.1:9876/proxy; needs the Python packages bslam and rerun-sdk")
+      ->excludes(no_report);
+  add_view_options(verb, a.view);
+  verb.add_option("--seed", a.seed, "seed of all random numbers; default 1")
+      ->check(CLI::Range(0, std::numeric_limits<int>::max()));
+  verb.add_option("--progress", a.progress, "auto: show a progress bar if stderr is a terminal; never: show none")
+      ->check(CLI::IsMember({"auto", "never"}))
+      ->capture_default_str();
+  verb.add_option("--log-level", a.log_level,
+                  "what is printed on stderr: error, warning, info (also the processing time of every stage) or debug "
+                  "(also the outcome of every frame)")
+      ->check(CLI::IsMember({"error", "warning", "info", "debug"}))
+      ->capture_default_str();
+  verb.add_flag("--overwrite", a.overwrite,
+                "write into a folder that is not empty; files of an earlier run, a map and a journal are replaced");
+}
+
+}  // namespace bslam::cli

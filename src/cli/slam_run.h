@@ -1,0 +1,59 @@
+// What `bslam run` and `bslam live` have in common: options, settings, output files and messages.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cli/config_arguments.h"
+#include "cli/run_log.h"
+#include "cli/view_arguments.h"
+#include "dataset/dataset.h"
+#include "session/run_session.h"
+
+namespace bslam::cli {
+
+struct SlamArguments {
+  ConfigArguments config;
+  ViewArguments view;
+  std::string rig;  // file of the calibration; empty: that of the data
+  std::string out, mode, journal, vocabulary, save_map, load_map, rerun;
+  std::string progress = "auto", log_level = "warning";
+  std::optional<int> seed;
+  bool no_loop = false, localize_only = false, no_final_ba = false, no_report = false, overwrite = false,
+       image_stamps = false;
+  std::string command;  // the command line, as shown in the report
+};
+
+// Adds all options but that of the calibration.
+void add_slam_options(CLI::App& verb, SlamArguments& arguments);
+
+// Returns the command line without the path of the program.
+std::string command_of(std::span<const char* const> command_line);
+
+// Applies the command-line options that override --config and --set. Errors: those of resolve_config; an unknown mode;
+// settings that contradict each other.
+Result<system::Config> resolve_run_config(const SlamArguments& arguments);
+
+// Checks before the run whether the file can be written after it. An existing file is replaced only with --overwrite.
+Status check_output_file(const std::string& file, const char* option, bool overwrite);
+
+// What a run is made of beside its arguments.
+struct RunInput {
+  const system::Config& config;
+  const dataset::Dataset& dataset;  // without frames if there is a source
+  session::SessionOptions options;  // all but settings, vocabulary, map, observer and control
+  std::string check_command;        // tests the calibration against the images
+  // Called when everything else is checked, before the first frame. Its error ends the run.
+  std::function<Status()> before = {};
+  std::function<void()> after = {};  // called after the last frame was processed, before messages about the run
+};
+
+// Loads vocabulary and map, prepares the output folder, runs, and writes the output. Returns the exit status; errors
+// are printed.
+int run_and_write(const SlamArguments& arguments, RunInput input, session::RunControl& control);
+
+}  // namespace bslam::cli

@@ -1,0 +1,33 @@
+// What `bslam live --record` writes into its MCAP files beside the images: which topic is which camera, the rig, and
+// that images recorded at the same time were one frame.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera/rig.h"
+#include "containers/message_file.h"
+
+namespace bslam::dataset {
+
+constexpr const char* kLiveMetadata = "bslam.live";  // name of the metadata
+constexpr const char* kLiveRigFile = "rig.yaml";     // name of the attachment, in the format of bslam
+
+struct LiveRecording {
+  std::vector<std::string> topics;         // of the cameras of the rig, in its order
+  std::vector<camera::RigCamera> cameras;  // as many; empty if the rig cannot be read
+  std::vector<std::string> warnings;       // for the user: why the rig cannot be read
+
+  // Returns the calibration of a topic, or nullptr.
+  const camera::RigCamera* camera_of(const std::string& topic) const;
+};
+
+// The values of the metadata for these topics.
+std::map<std::string, std::string> live_metadata(const std::vector<std::string>& topics);
+
+// Returns nullopt for other recordings.
+std::optional<LiveRecording> live_recording_of(const containers::MessageFile& file);
+
+}  // namespace bslam::dataset

@@ -1,0 +1,365 @@
+#include "capture/live_cameras.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <future>
+#include <opencv2/imgcodecs.hpp>
+
+#include "capture/pixels.h"
+#include "dataset/frame_reader.h"
+#include "support/data_on_disk.h"
+#include "synthetic/rigs.h"
+
+namespace bslam::capture {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr TimeNs kStart = 1'700'000'000'000'000'000, kInterval = 50'000'000, kMs = 1'000'000;
+
+struct Event {
+  enum class Kind { kImage, kDamaged, kNone, kLost, kOpens, kDoesNotOpen, kGate } kind;
+  std::size_t camera;
+  TimeNs time_ns = 0;
+};
+
+// What happens to the cameras, one thing after the other: each waits for its turn, and has done with an event when it
+// asks for the next one. After the last one all cameras end.
+class Script {
+ public:
+  explicit Script(std::vector<Event> events) : events_(std::move(events)) {}
+
+  // Waits for the next event of a camera, for a while.
+  struct Turn {
+    std::optional<Event> event = {};
+    bool end = false;
+  };
+  Turn next(std::size_t camera) {
+    std::unique_lock lock(mutex_);
+    if (busy_ == camera) {
+      busy_.reset();
+      ++at_;
+      changed_.notify_all();
+    }
+    const bool came = changed_.wait_for(lock, milliseconds(20), [&] {
+      return !busy_ && (at_ >= events_.size() ||
+                        (events_[at_].camera == camera && (events_[at_].kind != Event::Kind::kGate || gates_ > 0)));
+    });
+    if (!came) return {};
+    if (at_ >= events_.size()) return {.end = true};
+    if (events_[at_].kind == Event::Kind::kGate) --gates_;
+    busy_ = camera;
+    return {.event = events_[at_]};
+  }
+  // Lets the script pass its next gate.
+  void open_gate() {
+    const std::lock_guard lock(mutex_);
+    ++gates_;
+    changed_.notify_all();
+  }
+  void device_ended() {
+    const std::lock_guard lock(mutex_);
+    ++ended_;
+    changed_.notify_all();
+  }
+  void wait_for_ends(int count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return ended_ >= count; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  const std::vector<Event> events_;
+  std::size_t at_ = 0;
+  std::optional<std::size_t> busy_;  // the camera that deals with the event
+  int gates_ = 0, ended_ = 0;
+};
+
+// Camera 0 delivers grey pixels, camera 1 JPEG files.
+class ScriptedDevice : public Device {
+ public:
+  ScriptedDevice(std::shared_ptr<Script> script, std::size_t camera) : script_(std::move(script)), camera_(camera) {}
+  ~ScriptedDevice() override { script_->device_ended(); }
+
+  Result<Stream> start(const StreamRequest& request) override {
+    image_.create(request.height, request.width, CV_8UC1);
+    return Stream{.pixels = camera_ == 0 ? fourcc("GREY") : fourcc("MJPG"),
+                  .width = request.width,
+                  .height = request.height,
+                  .step = camera_ == 0 ? static_cast<std::size_t>(request.width) : 0};
+  }
+  Result<DeviceImage> read(milliseconds) override {
+    const auto [event, end] = script_->next(camera_);
+    if (end) return DeviceImage{.state = DeviceImage::State::kEnd};
+    if (!event) return DeviceImage{};
+    if (event->kind == Event::Kind::kLost) return Error{"", "", "a camera that was unplugged", ""};
+    if (event->kind == Event::Kind::kDamaged) return DeviceImage{.state = DeviceImage::State::kDamaged};
+    if (event->kind != Event::Kind::kImage) return DeviceImage{};
+    for (int k = 0; k < image_.rows * image_.cols; ++k)
+      image_.data[k] = static_cast<std::uint8_t>(event->time_ns / kMs + k);
+    bytes_.assign(image_.data, image_.data + image_.rows * image_.cols);
+    if (camera_ == 1) cv::imencode(".jpg", image_, bytes_);
+    const std::string_view view(reinterpret_cast<const char*>(bytes_.data()), bytes_.size());
+    return DeviceImage{DeviceImage::State::kImage, view, event->time_ns};
+  }
+
+ private:
+  const std::shared_ptr<Script> script_;
+  const std::size_t camera_;
+  cv::Mat image_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+// Two cameras, the time stamps of the second with an offset in the rig file.
+camera::Rig test_rig() {
+  const camera::Rig ring = synthetic::ring_rig(2, 64);
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < 2; ++c) cameras.push_back({ring.camera(c), ring.body_from_cam(c)});
+  cameras[1].camera.time_offset_ns = 3 * kMs;
+  return camera::Rig(std::move(cameras));
+}
+
+class LiveCamerasTest : public testing::Test {
+ protected:
+  std::unique_ptr<LiveCameras> open(std::vector<Event> events, std::size_t max_waiting = 1000) {
+    script_ = std::make_shared<Script>(std::move(events));
+    LiveOptions options{.paths = {"a", "b"}, .request = {}, .open = opener()};
+    options.retry = milliseconds(0);
+    options.max_waiting = max_waiting;
+    options.say = [this](const std::string& line) { said_.push_back(line); };
+    auto live = LiveCameras::open(rig_, std::move(options));
+    EXPECT_TRUE(live.ok()) << live.error().message();
+    return *std::move(live);
+  }
+  OpenDevice opener() {
+    return [this, first = std::make_shared<int>(0)](const std::string& path) -> Result<std::unique_ptr<Device>> {
+      const std::size_t camera = path == "a" ? 0 : 1;
+      if ((*first)++ >= 2) {  // again
+        const auto [event, end] = script_->next(camera);
+        if (!event || event->kind == Event::Kind::kDoesNotOpen) return Error{path, "", "no such camera", "a camera"};
+      }
+      return std::unique_ptr<Device>(std::make_unique<ScriptedDevice>(script_, camera));
+    };
+  }
+  // All frames until the end.
+  static std::vector<session::FrameSource::Item> all(LiveCameras& live) {
+    std::vector<session::FrameSource::Item> out;
+    while (auto item = live.next()) out.push_back(*std::move(item));
+    return out;
+  }
+  // Images of both cameras from frame `from` to before `to`.
+  static void add_frames(std::vector<Event>& events, int from, int to) {
+    for (int k = from; k < to; ++k) {
+      events.push_back({Event::Kind::kImage, 0, kStart + k * kInterval});
+      events.push_back({Event::Kind::kImage, 1, kStart + k * kInterval - 3 * kMs});
+    }
+  }
+
+  const camera::Rig rig_ = test_rig();
+  std::shared_ptr<Script> script_;
+  std::vector<std::string> said_;
+};
+
+// Images are missing, damaged, repeated, and have wrong times; the gate keeps frames waiting until they are asked for.
+std::vector<Event> eventful() {
+  using Kind = Event::Kind;
+  std::vector<Event> events{{Kind::kImage, 0, kStart - 10 * kInterval}, {Kind::kImage, 1, kStart - 10 * kInterval}};
+  for (int k = -9; k < -5; ++k) {
+    events.push_back({Kind::kImage, 0, kStart + k * kInterval});
+    events.push_back({Kind::kImage, 1, kStart + k * kInterval - 3 * kMs});
+  }
+  events.push_back({Kind::kGate, 0});
+  for (int k = 0; k < 40; ++k) {
+    const TimeNs jitter_ns = (k * 7 % 5 - 2) * kMs / 3;
+    if (k % 9 == 4) events.push_back({Kind::kDamaged, 0});
+    if (k % 9 != 4) events.push_back({Kind::kImage, 0, kStart + k * kInterval});
+    if (k == 20) events.push_back({Kind::kImage, 0, kStart + k * kInterval});          // again
+    if (k == 25) events.push_back({Kind::kImage, 0, kStart + 5 * kInterval});          // back
+    if (k == 30) events.push_back({Kind::kImage, 1, kStart + 1'000'000 * kInterval});  // far ahead
+    if (k % 7 != 3) events.push_back({Kind::kImage, 1, kStart + k * kInterval - 3 * kMs + jitter_ns});
+    if (k % 5 == 0) events.push_back({Kind::kNone, 1});
+  }
+  return events;
+}
+
+TEST_F(LiveCamerasTest, RecordingHasTheSameFrames) {
+  const support::TemporaryFolder folder;
+  const auto file = folder.path() / "live.mcap";
+  auto live = open(eventful());
+  const auto first_ns = live->wait_for_first_frame();
+  ASSERT_TRUE(first_ns.ok()) << first_ns.error().message();
+  auto recorder = Recorder::create(file, rig_, {false, true});
+  ASSERT_TRUE(recorder.ok());
+  live->record_to(recorder->get());
+  live->begin();
+  script_->open_gate();
+  const auto fed = all(*live);
+  ASSERT_TRUE((*recorder)->finish().ok());
+  ASSERT_GE(fed.size(), 35u);
+  EXPECT_EQ((*recorder)->frames(), fed.size());
+
+  const auto data = dataset::open_dataset({.path = file});
+  ASSERT_TRUE(data.ok()) << data.error().message();
+  EXPECT_TRUE(data->warnings.empty()) << data->warnings.front();
+  ASSERT_EQ(data->frames.size(), fed.size());
+  EXPECT_EQ(data->sources, (std::vector<std::string>{"/cam0/image_raw", "/cam1/image_raw/compressed"}));
+  std::size_t missing = 0;
+  for (std::size_t k = 0; k < fed.size(); ++k) {
+    const image::ImageBundle again = dataset::read_frame(*data, k);
+    EXPECT_EQ(again.id, fed[k].images.id);
+    EXPECT_EQ(again.time_ns, fed[k].images.time_ns);
+    EXPECT_FALSE(fed[k].dropped);
+    for (std::size_t c = 0; c < 2; ++c) {
+      const image::CameraImage &was = fed[k].images.images[c], &is = again.images[c];
+      ASSERT_EQ(is.state, was.state);
+      missing += was.state == image::ImageState::kMissing;
+      if (was.state == image::ImageState::kMissing) continue;
+      EXPECT_EQ(is.time_ns, was.time_ns);
+      for (int y = 0; y < is.image.height(); ++y)
+        EXPECT_TRUE(std::equal(is.image.row(y), is.image.row(y) + is.image.width(), was.image.row(y)));
+    }
+  }
+  EXPECT_GE(missing, 8u);
+}
+
+TEST_F(LiveCamerasTest, RecordedRigIsThatOfTheRun) {
+  const auto once = rig_as_recorded(rig_);
+  ASSERT_TRUE(once.ok());
+  const auto twice = rig_as_recorded(*once);
+  ASSERT_TRUE(twice.ok());
+  for (std::size_t c = 0; c < 2; ++c) {
+    EXPECT_EQ(once->body_from_cam(c).matrix(), twice->body_from_cam(c).matrix());
+    EXPECT_LT((once->body_from_cam(c).matrix() - rig_.body_from_cam(c).matrix()).norm(), 1e-13);
+    EXPECT_EQ(twice->camera(c).time_offset_ns, rig_.camera(c).time_offset_ns);
+  }
+}
+
+TEST_F(LiveCamerasTest, TellsWhatWasNotUsed) {
+  auto live = open(eventful());
+  script_->open_gate();
+  live->begin();
+  all(*live);
+  const std::vector<std::string> notes = live->notes();
+  ASSERT_EQ(notes.size(), 3u);
+  EXPECT_EQ(notes[0], "cam0 (a): 4 damaged images were not used");
+  EXPECT_EQ(notes[1], "cam0 (a): 2 images were in no frame (1 duplicate, 1 too-late)");
+  EXPECT_EQ(notes[2], "cam1 (b): 1 images were in no frame (1 far-ahead)");
+  EXPECT_EQ(said_.size(), 4u);
+}
+
+TEST_F(LiveCamerasTest, CameraThatWasUnpluggedIsTakenUpAgain) {
+  using Kind = Event::Kind;
+  std::vector<Event> events;
+  add_frames(events, 0, 10);
+  events.push_back({Kind::kGate, 0});
+  events.push_back({Kind::kLost, 1});
+  for (int k = 10; k < 60; ++k) {
+    events.push_back({Kind::kImage, 0, kStart + k * kInterval});
+    if (k % 10 == 0) events.push_back({Kind::kDoesNotOpen, 1});
+  }
+  events.push_back({Kind::kOpens, 1});
+  add_frames(events, 60, 80);
+  auto live = open(std::move(events));
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  live->begin();
+  script_->open_gate();
+  int both = 0, one = 0;
+  for (const auto& item : all(*live)) {
+    const bool there = item.images.images[1].state == image::ImageState::kPresent;
+    EXPECT_EQ(item.images.images[0].state, image::ImageState::kPresent);
+    both += there;
+    one += !there;
+  }
+  EXPECT_EQ(one, 51);  // its first image comes when its frame is complete, since nothing was expected of it
+  EXPECT_GE(both, 19);
+  ASSERT_EQ(said_.size(), 3u);
+  EXPECT_EQ(
+      said_[0],
+      "cam1 (b): a camera that was unplugged; the run goes on with the other cameras, and with this one when it is "
+      "back");
+  EXPECT_EQ(said_[1], "cam1 (b): images arrive again");
+  EXPECT_EQ(said_[2],
+            "cam1 (b): an image came too late for its frame, or its time stamp went back; it is not used, and further "
+            "ones are counted");
+  EXPECT_EQ(live->notes()[0], "cam1 (b): lost once");
+}
+
+TEST_F(LiveCamerasTest, NewestFramesWinAndDroppedOnesAreReported) {
+  constexpr std::size_t kMaxWaiting = 3;
+  std::vector<Event> events;
+  add_frames(events, 0, 10);
+  events.push_back({Event::Kind::kGate, 0});
+  add_frames(events, 10, 40);
+  auto live = open(std::move(events), kMaxWaiting);
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  live->begin();
+  script_->open_gate();
+  script_->wait_for_ends(2);
+  const auto items = all(*live);
+  ASSERT_GE(items.size(), 30u);
+  std::size_t taken = 0;
+  for (std::size_t k = 0; k < items.size(); ++k) {
+    EXPECT_EQ(items[k].images.time_ns, items[0].images.time_ns + static_cast<TimeNs>(k) * kInterval);
+    EXPECT_EQ(items[k].dropped, k + kMaxWaiting < items.size());
+    if (items[k].dropped) continue;
+    EXPECT_EQ(items[k].images.id, FrameId(taken++));
+    EXPECT_EQ(items[k].images.images.size(), 2u);
+  }
+  EXPECT_EQ(items.back().images.time_ns, kStart + 39 * kInterval);
+}
+
+TEST_F(LiveCamerasTest, SaysWhichCameraDeliversNothing) {
+  using Kind = Event::Kind;
+  std::vector<Event> events;
+  for (int k = 0; k < 10; ++k) events.push_back({Kind::kImage, 0, kStart + k * kInterval});
+  for (int k = 0; k < 3; ++k) events.push_back({Kind::kDamaged, 1});
+  events.push_back({Kind::kLost, 1});
+  for (int k = 0; k < 100; ++k) events.push_back({Kind::kDoesNotOpen, 1});
+  const auto live = open(std::move(events));
+  const auto first = live->wait_for_first_frame();
+  ASSERT_FALSE(first.ok());
+  EXPECT_EQ(first.error().message(), "b: cam1: found 3 damaged images and no good one, expected images of this camera");
+}
+
+TEST_F(LiveCamerasTest, StopEndsItWithWhatIsThere) {
+  std::vector<Event> events;
+  add_frames(events, 0, 1000);
+  auto live = open(std::move(events));
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  live->begin();
+  auto rest = std::async([&live] { return all(*live).size(); });
+  live->stop();
+  EXPECT_LE(rest.get(), 1000u);
+  EXPECT_FALSE(live->next().has_value());
+}
+
+TEST_F(LiveCamerasTest, FailureOfTheDiskEndsTheRecordingOnly) {
+  std::vector<Event> events;
+  add_frames(events, 0, 10);
+  events.push_back({Event::Kind::kGate, 0});
+  add_frames(events, 10, 200);
+  auto live = open(std::move(events));
+  const support::TemporaryFolder folder;
+  auto recorder = Recorder::create(folder.path() / "live.mcap", rig_, {false, true});
+  ASSERT_TRUE(recorder.ok());
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  live->record_to(recorder->get());
+  rlimit before{};
+  ::getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit small{3'000, before.rlim_max};
+  std::signal(SIGXFSZ, SIG_IGN);
+  ::setrlimit(RLIMIT_FSIZE, &small);
+  live->begin();
+  script_->open_gate();
+  EXPECT_GE(all(*live).size(), 189u);
+  const Status written = (*recorder)->finish();
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  ASSERT_FALSE(written.ok());
+  EXPECT_NE(written.error().message().find("expected room for the recording"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace bslam::capture

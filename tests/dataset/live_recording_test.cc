@@ -1,0 +1,84 @@
+#include "dataset/live_recording.h"
+
+#include <gtest/gtest.h>
+
+#include "containers/mcap_writer.h"
+#include "containers/ros_writer.h"
+#include "dataset/dataset.h"
+#include "rig_formats/bslam_rig.h"
+#include "support/data_on_disk.h"
+#include "synthetic/rigs.h"
+
+namespace bslam::dataset {
+namespace {
+
+constexpr TimeNs kStart = 1'700'000'000'000'000'000, kInterval = 50'000'000;
+const std::vector<std::string> kTopics{"/z/image_raw", "/a/image_raw"};  // not in the order of their names
+
+// Frames of two cameras: as a run got them, the second camera's images are up to 8 ms away, and some are missing.
+class LiveRecordingTest : public testing::Test {
+ protected:
+  // Reading rounds the rotations, once.
+  LiveRecordingTest()
+      : rig_(rig_formats::read_bslam_rig("rig.yaml", rig_formats::rig_to_yaml(synthetic::ring_rig(2, 64)))->cameras) {}
+
+  void write(const std::string& rig_text) {
+    auto writer = *containers::McapWriter::create(path());
+    ASSERT_TRUE(writer->attach(kLiveRigFile, "application/yaml", rig_text).ok());
+    ASSERT_TRUE(writer->add_metadata(kLiveMetadata, live_metadata(kTopics)).ok());
+    for (const std::string& topic : kTopics)
+      writer->add_topic(topic, containers::kImageType, containers::image_definition());
+    const camera::Camera& camera = rig_.camera(std::size_t{0});
+    const std::vector<std::uint8_t> pixels(static_cast<std::size_t>(camera.width * camera.height), 9);
+    for (int k = 0; k < 10; ++k) {
+      for (std::uint16_t c = 0; c < 2; ++c) {
+        if (k == 4 + c) continue;
+        const TimeNs stamp_ns = kStart + k * kInterval + c * 8'000'000 * (k % 2);
+        const auto message = containers::grey_image_message(stamp_ns, "camera", camera.width, camera.height,
+                                                            pixels.data(), camera.width);
+        ASSERT_TRUE(writer->write(c, kStart + k * kInterval, message).ok());
+      }
+    }
+    ASSERT_TRUE(writer->finish().ok());
+  }
+  std::filesystem::path path() const { return folder_.path() / "live.mcap"; }
+
+  support::TemporaryFolder folder_;
+  camera::Rig rig_;
+};
+
+TEST_F(LiveRecordingTest, HasTheFramesAndTheRigOfTheRun) {
+  write(rig_formats::rig_to_yaml(rig_));
+  const auto data = open_dataset({.path = path()});
+  ASSERT_TRUE(data.ok()) << data.error().message();
+  EXPECT_EQ(rig_formats::rig_to_yaml(data->rig), rig_formats::rig_to_yaml(rig_));
+  EXPECT_EQ(data->sources, kTopics);
+  ASSERT_EQ(data->frames.size(), 10u);
+  for (std::size_t k = 0; k < 10; ++k) {
+    EXPECT_EQ(data->frames[k].images[0].has_value(), k != 4);
+    EXPECT_EQ(data->frames[k].images[1].has_value(), k != 5);
+  }
+  EXPECT_TRUE(data->warnings.empty()) << data->warnings.front();
+}
+
+TEST_F(LiveRecordingTest, IsGroupedByTimeWhereItsFramesAreNone) {
+  write(rig_formats::rig_to_yaml(rig_));
+  const auto one = open_dataset({.path = path(), .cameras = {1}});
+  ASSERT_TRUE(one.ok()) << one.error().message();
+  EXPECT_EQ(one->frames.size(), 9u);
+  const auto swapped = open_dataset({.path = path(), .topics = {kTopics[1], kTopics[0]}});
+  ASSERT_TRUE(swapped.ok()) << swapped.error().message();
+  EXPECT_EQ(swapped->frames.size(), 10u);
+  EXPECT_EQ(swapped->rig.camera(std::size_t{0}).name, rig_.camera(std::size_t{1}).name);
+  EXPECT_TRUE(swapped->frames[4].images[0].has_value());
+}
+
+TEST_F(LiveRecordingTest, SaysWhyItsRigIsNotUsed) {
+  write("bslam_rig: 1\ncameras: 7\n");
+  const auto data = open_dataset({.path = path()});
+  ASSERT_FALSE(data.ok());
+  EXPECT_NE(data.error().message().find("--rig"), std::string::npos) << data.error().message();
+}
+
+}  // namespace
+}  // namespace bslam::dataset
