@@ -23,6 +23,7 @@
 #include "session/record_builder.h"
 #include "session/report_data.h"
 #include "session/run_session.h"
+#include "session/run_warnings.h"
 #include "storage/map_file.h"
 #include "storage/vocabulary_file.h"
 #include "system/cameras_of_run.h"
@@ -173,16 +174,25 @@ void print_sources(const dataset::Dataset& dataset) {
 void print_before(const dataset::Dataset& dataset, const DatasetArguments& data, LogVerbosity verbosity) {
   if (verbosity < LogVerbosity::kWarning) return;
   if (dataset.format == dataset::DatasetFormat::kBag && data.images.topics.empty()) print_sources(dataset);
-  for (const std::string& warning : dataset.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
-  print_rig_warnings(dataset.rig);
+  print_warnings(session::warnings_before_run(dataset));
 }
 
-void print_after(const session::RunRecord& record, const dataset::Dataset& dataset, const RunArguments& arguments) {
+void print_after(const session::RunRecord& record, const std::vector<std::string>& warnings,
+                 const RunArguments& arguments) {
   const LogVerbosity verbosity = log_verbosity(arguments.log_level);
   if (verbosity >= LogVerbosity::kDebug) print_frames(record);
   if (verbosity >= LogVerbosity::kInfo) print_stage_statistics(record);
-  if (verbosity >= LogVerbosity::kWarning) print_warnings(record, dataset.rig, check_command(arguments.data));
+  if (verbosity >= LogVerbosity::kWarning) print_warnings(warnings);
   print_result(record, arguments.out);
+}
+
+// Returns the warnings after the run; the record gets those before it as well.
+std::vector<std::string> note_warnings(const dataset::Dataset& dataset, const DatasetArguments& data,
+                                       session::RunRecord& record) {
+  const std::vector<std::string> after = session::warnings_after_run(record, dataset.rig, check_command(data));
+  record.warnings = session::warnings_before_run(dataset);
+  record.warnings.insert(record.warnings.end(), after.begin(), after.end());
+  return after;
 }
 
 session::SessionOptions session_options(const RunArguments& arguments, const system::Config& config,
@@ -242,10 +252,11 @@ int run(const RunArguments& arguments) {
   bar.finish();
   if (!result) return report_error(result.error());
   if (arguments.image_stamps) result->subtracted_ns = dataset->rig.camera(0).time_offset_ns;
+  const std::vector<std::string> warnings = note_warnings(*dataset, arguments.data, result->record);
   if (const Status s = write_files(*result, *config, *dataset, arguments, **vocabulary); !s)
     return report_error(s.error());
   end_view(view->get(), *result, *config, *dataset, arguments);
-  print_after(result->record, *dataset, arguments);
+  print_after(result->record, warnings, arguments);
   return exit_status_of(*result);
 }
 

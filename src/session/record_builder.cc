@@ -42,6 +42,40 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
   }
 }
 
+// Whether the status of a camera was `inconsistent` for most of the time in which it delivered images.
+bool disagrees(const CameraRecord& camera) {
+  double all_s = 0, inconsistent_s = 0;
+  for (const CameraInterval& s : camera.states) {
+    all_s += s.to_s - s.from_s;
+    if (s.status.reason == tracking::CameraReason::kInconsistent) inconsistent_s += s.to_s - s.from_s;
+  }
+  return inconsistent_s > 0.5 * all_s;
+}
+
+void add_calibration(const RecordInput& input, RunRecord& record) {
+  CalibrationRecord& calibration = record.calibration;
+  calibration.estimate = input.system.calibration();
+  calibration.excess_bound = input.config.calibration.inconsistent_excess;
+  const map::MapSnapshot map = input.system.snapshot();
+  std::vector<KeyframeId> keyframes = map->keyframe_ids();
+  std::erase_if(keyframes, [&](KeyframeId k) { return k < input.system.first_keyframe(); });
+  calibration.pairs =
+      calibration::test_pairs(*map, keyframes, input.system.first_camera(), input.dataset.rig, input.system.rig());
+  std::erase_if(calibration.pairs,
+                [](const calibration::CameraPair& p) { return !p.contradicted && !p.hardly_matched(); });
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    if (disagrees(record.cameras[c])) calibration.disagreeing.push_back(c);
+  }
+  calibration.accept_estimate(input.complete, input.system.calibration_refined());
+  for (CameraRecord& camera : record.cameras) {
+    if (camera.extrinsics) camera.extrinsics->refined = calibration.refined;
+  }
+  if (calibration.foreign_images() && record.map.scale == map::scale_name(map::Scale::kMetric)) {
+    record.map.scale = map::scale_name(map::Scale::kUnobservable);
+    record.map.scale_deviation.reset();
+  }
+}
+
 void add_stages(const RecordInput& input, RunRecord& record) {
   for (std::size_t i = 0; i < input.inputs.size(); ++i) {
     const RunFrame& frame = record.frames[i];
@@ -139,7 +173,7 @@ RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameReco
   add_stages(input, record);
   const map::MapSnapshot map = input.system.snapshot();
   record.map = map_record(*map, input.loaded);
-  record.calibration = {input.system.calibration(), input.system.calibration_refined()};
+  add_calibration(input, record);
   record.maps_started = input.system.maps_started();
   add_places(input, record);
   record.start_up_s = input.start_up_s;

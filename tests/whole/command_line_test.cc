@@ -358,7 +358,17 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
   ASSERT_TRUE(rig_formats::write_rig(calibration::with_inverse_extrinsics(rig), out("inverse.yaml")));
   const std::string options = " --set features.per_image=500 --progress never --rig ";
   const Ran inverse = run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse"));
-  EXPECT_NE(inverse.err.find("of the features are matched between"), std::string::npos) << inverse.err;
+  EXPECT_NE(inverse.err.find("warning: the images do not belong to the calibration"), std::string::npos) << inverse.err;
+  EXPECT_NE(inverse.out.find("calibration: the images do not belong to it"), std::string::npos) << inverse.out;
+  const auto of_inverse = nlohmann::json::parse(slurp(out("inverse") + "/summary.json"));
+  EXPECT_EQ(of_inverse["calibration"]["verdict"], "inconsistent");
+  EXPECT_EQ(of_inverse["calibration"]["refined"], false);
+  EXPECT_EQ(of_inverse["map"]["scale"], "unobservable");
+  EXPECT_FALSE(fs::exists(out("inverse") + "/rig_refined.yaml"));
+  for (const auto& warning : of_inverse["warnings"])
+    EXPECT_NE(inverse.err.find("warning: " + warning.get<std::string>() + "\n"), std::string::npos) << warning;
+  EXPECT_EQ(of_inverse["warnings"].size(),
+            static_cast<std::size_t>(std::count(inverse.err.begin(), inverse.err.end(), '\n')));
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const geometry::SE3& T = rig.body_from_cam(c);
@@ -381,6 +391,10 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
       << ran.err;
   const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
   EXPECT_EQ(right.err, "");
+  const auto of_right = nlohmann::json::parse(slurp(out("right") + "/summary.json"));
+  EXPECT_EQ(of_right["map"]["scale"], "metric");
+  EXPECT_TRUE(of_right["warnings"].empty());
+  EXPECT_TRUE(of_right["calibration"]["pairs"].empty());
 }
 
 TEST_F(CommandLine, BenchReportsEverySequenceAndFailsIfOneFailed) {
