@@ -277,6 +277,17 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
       run(path + " --format kitti --frame cam1 --axes ros --map " + out("saved.map") + " --out " + out("k.txt")).status,
       0);
   expect_rejected(path + " --frame nobody --out " + out("wrong"));
+  const std::string nav2 = "map export " + out("saved.map") + " --format nav2 --out ";
+  const Ran tilted = run(nav2 + out("tilted")), level = run(nav2 + out("level") + " --up body:z");
+  EXPECT_NE(tilted.err.find("note: upward is that of camera 0 on average"), std::string::npos) << tilted.err;
+  EXPECT_EQ(level.status, 0) << level.err;
+  EXPECT_EQ(level.err, "");
+  expect_rejected("map export " + out("saved.map") + " --format ply --up body:z --out " + out("wrong"));
+  expect_rejected(nav2 + out("wrong") + " --up sky");
+  expect_rejected(path + " --up body:z --out " + out("wrong"));
+  ASSERT_EQ(run(path + " --axes ros --up body:z --out " + out("upright.tum")).status, 0);
+  EXPECT_NE(slurp(out("upright.tum")).find("frame=cam0_ros parent=world_ros "), std::string::npos);
+  expect_rejected("export " + out("upright.tum") + " --out " + out("wrong"));
   expect_rejected("export " + out("saved") + "/trajectory.tum --frame body --out " + out("wrong"));
 
   const auto localised = summary_of("localised", "--cameras 0,1 --localize-only --load-map " + out("saved.map"));
@@ -294,6 +305,33 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
   EXPECT_EQ(one_camera["frames"]["tracked"], 15);
   expect_rejected("run " + data() + " --out " + out("rejected") +
                   " --cameras 2,3 --set calibration.refine=true --load-map " + out("saved.map"));
+}
+
+// A trajectory names the camera whose poses it contains, and conversions use that.
+TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
+  summary_of("second", "--cameras 1,0 --mode sequential");
+  const std::string trajectory = out("second") + "/trajectory.tum", truth = data() + "/groundtruth_cam0.tum";
+  const camera::Rig rig = rig_formats::read_rig(data() + "/rig.yaml").value();
+  EXPECT_NE(slurp(trajectory).find("# bslam trajectory frame=" + rig.camera(1u).name + " parent=world final=true\n"),
+            std::string::npos);
+  const Ran without = run("eval " + trajectory + " " + truth + " --json");
+  EXPECT_NE(without.err.find("contains poses of " + rig.camera(1u).name), std::string::npos) << without.err;
+  const Ran with = run("eval " + trajectory + " " + truth + " --json --rig " + data());
+  EXPECT_EQ(with.err, "");
+  EXPECT_LT(nlohmann::json::parse(with.out)["ate"]["rmse"], nlohmann::json::parse(without.out)["ate"]["rmse"]);
+  const std::string body = "export " + trajectory + " --frame body --rig " + data() + " --out ";
+  ASSERT_EQ(run(body + out("body.tum")).status, 0);
+  const Ran same =
+      run("eval " + trajectory + " " + out("body.tum") + " --gt-frame body --rig " + data() + " --align none --json");
+  EXPECT_LT(nlohmann::json::parse(same.out)["ate"]["max"], 1e-6) << same.err;
+  const Ran other = run(body + out("other.tum") + " --camera 0");
+  EXPECT_NE(other.err.find("but --camera 0 is "), std::string::npos) << other.err;
+  std::ofstream(out("scaled.tum")) << "# bslam trajectory frame=cam0 parent=world final=true\n"
+                                   << "# scale=up-to-scale: lengths are not in metres\n"
+                                   << slurp(truth);
+  const Ran scaled = run("eval " + out("scaled.tum") + " " + truth);
+  EXPECT_NE(scaled.err.find("use --align sim3"), std::string::npos) << scaled.err;
+  EXPECT_EQ(run("eval " + out("scaled.tum") + " " + truth + " --align sim3").err, "");
 }
 
 TEST_F(CommandLine, VocabulariesCanBeTrainedDescribedAndUsed) {
