@@ -12,6 +12,7 @@
 
 #include "base/result.h"
 #include "evaluation/trajectory.h"
+#include "evaluation/trajectory_header.h"
 
 namespace bslam::evaluation {
 
@@ -25,26 +26,9 @@ enum class TrajectoryFormat { kTum, kEurocCsv, kKitti };
 Result<evaluation::Trajectory> read_trajectory(const std::filesystem::path& file,
                                                const std::optional<std::filesystem::path>& times = {});
 
-// What the comments at the top of a trajectory of bslam say about it.
-struct TrajectoryComments {
-  std::string frame;  // whose poses it contains: cam0, body, or the name of a camera; empty if it is not said
-  std::string scale = "metric";  // or up-to-scale, unobservable
-};
-TrajectoryComments read_comments(const std::filesystem::path& file);
-
 // Converts decimal seconds ("1403636579.763555584", "1.044989e-01") to nanoseconds; digits beyond the ninth decimal are
 // rounded half away from zero. Returns nullopt if the text is not a number or is beyond +-4e9 s.
 std::optional<TimeNs> parse_seconds(std::string_view text);
-
-// kFinal: poses resolved against the final map; kLive: poses as reported during the run.
-enum class PoseState { kFinal, kLive };
-
-// The comment line at the top of trajectories written by a run: "bslam trajectory frame=cam0 parent=world final=true".
-std::string trajectory_header(std::string_view frame, PoseState state, std::string_view parent = "world");
-
-// The further comment line of trajectories whose lengths are not metres: "scale=up-to-scale: lengths are not in
-// metres".
-std::string scale_comment(std::string_view scale);
 
 // Returns the content of a trajectory file. TUM begins with "# HEADER" if `header` is not empty. Seconds, metres and
 // quaternions have nine decimals. KITTI contains poses only; `times_text` gives the matching times file.
