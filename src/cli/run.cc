@@ -216,7 +216,7 @@ int exit_status_of(const session::SessionResult& result) {
 int run(const RunArguments& arguments) {
   // Created first: once the output folder exists, an interruption ends the run with complete output files.
   const Interruption interruption;
-  const auto config = resolve_run_config(arguments);
+  auto config = resolve_run_config(arguments);
   if (!config) return report_error(config.error());
   auto replay = read_journal(arguments.replay);
   if (!replay) return report_error(replay.error());
@@ -228,6 +228,7 @@ int run(const RunArguments& arguments) {
   if (!vocabulary) return report_error(vocabulary.error());
   auto map = read_map(arguments, dataset->rig, *config, **vocabulary);
   if (!map) return report_error(map.error());
+  if (*map) system::note_other_rigs(**map, dataset->rig, *config);
   for (const auto& [option, file] :
        {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
     if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return report_error(s.error());

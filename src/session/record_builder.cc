@@ -12,8 +12,23 @@ namespace {
 
 double seconds(const RecordInput& input, TimeNs time_ns) { return to_seconds(time_ns - input.dataset.first_time_ns); }
 
+// The residuals of the poses of a run that adds no keyframes to its map, without their distribution over the image.
+calibration::ImageResiduals residuals_of_frames(const RunRecord& record, std::size_t camera,
+                                                calibration::ImageResiduals empty) {
+  double sum_px2 = 0;
+  for (const RunFrame& frame : record.frames) {
+    if (frame.outcome() != FrameOutcome::kTracked) continue;
+    const tracking::CameraCounts& counts = frame.record->final_result().cameras[camera];
+    empty.observations += static_cast<std::size_t>(counts.inliers);
+    sum_px2 += counts.squared_error_px2;
+  }
+  if (empty.observations > 0) empty.rms_px = std::sqrt(sum_px2 / static_cast<double>(empty.observations));
+  return empty;
+}
+
 void add_cameras(const RecordInput& input, RunRecord& record) {
-  const std::vector<calibration::ImageResiduals> residuals = calibration::image_residuals(*input.system.snapshot());
+  const std::vector<calibration::ImageResiduals> residuals =
+      calibration::image_residuals(*input.system.snapshot(), input.system.first_keyframe());
   for (std::size_t c = 0; c < input.dataset.rig.size(); ++c) {
     CameraRecord camera;
     camera.name = input.dataset.rig.camera(c).name;
@@ -26,6 +41,7 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
     }
     camera.states = camera_intervals(record.frames, c);
     camera.residuals = residuals[input.system.first_camera() + c];
+    if (input.config.localize_only) camera.residuals = residuals_of_frames(record, c, std::move(camera.residuals));
     const auto& found = input.system.calibration().cameras;
     if (c > 0 && c < found.size()) {
       const calibration::CameraRefinement& r = found[c];

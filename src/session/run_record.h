@@ -67,7 +67,8 @@ struct CameraRecord {
   std::vector<CameraInterval> states;
   std::optional<ExtrinsicsRecord> extrinsics = {};  // nullopt for camera 0, whose frame is the rig frame
   std::string first_skipped = {};                   // file and cause of damage of the first skipped image
-  calibration::ImageResiduals residuals = {};       // of the final map
+  // Of the keyframes of the run in the final map; if it only localises, of the poses of its frames.
+  calibration::ImageResiduals residuals = {};
 };
 
 // The estimate of the calibration at the end of the run.

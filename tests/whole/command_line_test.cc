@@ -303,6 +303,8 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
   EXPECT_EQ(run("map info " + out("grown.map")).status, 0);
   const auto one_camera = summary_of("one_camera", "--cameras 0 --localize-only --load-map " + out("saved.map"));
   EXPECT_EQ(one_camera["frames"]["tracked"], 15);
+  run("run " + data() + " --out " + out("second_rig") + " --cameras 2,3 --end 0.5 --load-map " + out("saved.map"));
+  EXPECT_NE(slurp(out("second_rig") + "/config.yaml").find("\n  refine: false"), std::string::npos);
   expect_rejected("run " + data() + " --out " + out("rejected") +
                   " --cameras 2,3 --set calibration.refine=true --load-map " + out("saved.map"));
 }
@@ -332,6 +334,16 @@ TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
   const Ran scaled = run("eval " + out("scaled.tum") + " " + truth);
   EXPECT_NE(scaled.err.find("use --align sim3"), std::string::npos) << scaled.err;
   EXPECT_EQ(run("eval " + out("scaled.tum") + " " + truth + " --align sim3").err, "");
+}
+
+TEST_F(CommandLine, ExplainsAPortAfterViewAndARigOfAnotherResolution) {
+  const Ran port = run("run " + data() + " --out " + out("rejected") + " --view 9000");
+  EXPECT_EQ(port.status, 2);
+  EXPECT_EQ(port.err, "bslam: unexpected '9000'; did you mean '--view=9000'?\n");
+  ASSERT_TRUE(rig_formats::write_rig(synthetic::ring_rig(4, 240), out("other_size.yaml")));
+  const Ran info = run("data info " + data() + " --rig " + out("other_size.yaml"));
+  EXPECT_NE(info.out.find("missing for bslam run: the calibration of 376 x 240 pixels"), std::string::npos) << info.out;
+  EXPECT_EQ(run("data info " + data() + " --rig " + data() + "/rig.yaml").out.find("missing"), std::string::npos);
 }
 
 TEST_F(CommandLine, VocabulariesCanBeTrainedDescribedAndUsed) {
@@ -439,16 +451,18 @@ TEST_F(CommandLine, BenchReportsEverySequenceAndFailsIfOneFailed) {
   const fs::path root = folder_ / "sequences";
   fs::create_directories(root / "broken/mav0/cam0");
   fs::create_directory_symlink(data(), root / "tour");
-  const Ran ran = run("bench " + root.string() + " --runs 2 --out " + out("bench") +
+  const Ran ran = run("bench " + root.string() + " --runs 5 --out " + out("bench") +
                       " --mode sequential --cameras 0,1 --set features.per_image=500");
   EXPECT_EQ(ran.status, 2) << ran.err;
   const std::string report = slurp(out("bench") + "/report.md");
   EXPECT_EQ(ran.out, report);
-  EXPECT_NE(report.find("| broken | none: no errors | 2 | - | - | - | - | - / - | - | 2 of 2 runs failed: "),
+  EXPECT_NE(report.find("| broken | none: no errors | 5 | - | - | - | - | - / - | - | 5 of 5 runs failed: "),
             std::string::npos)
       << report;
   EXPECT_NE(report.find("| tour | body | 2 | 0.0"), std::string::npos) << report;
   EXPECT_NE(report.find("| 15 of 15 |"), std::string::npos) << report;
+  EXPECT_NE(report.find("deterministic: the first two runs are identical"), std::string::npos) << report;
+  EXPECT_FALSE(fs::exists(out("bench") + "/tour/run3"));
   EXPECT_NE(slurp(out("bench") + "/report.html").find("<td>tour</td>"), std::string::npos);
   EXPECT_TRUE(fs::exists(out("bench") + "/tour/run2/trajectory.tum"));
 }
