@@ -59,6 +59,7 @@ std::string truth_text(const Sequence& sequence) {
 }
 
 std::string remark(const SequenceResult& result) {
+  if (result.identical) return "deterministic: the first two runs are identical, others were left out";
   const auto failed = std::ranges::count_if(result.runs, [](const auto& run) { return !run.failure.empty(); });
   if (failed > 0) {
     const auto first = std::ranges::find_if(result.runs, [](const auto& run) { return !run.failure.empty(); });

@@ -12,6 +12,9 @@ namespace bslam::benchmark {
 struct SequenceResult {
   Sequence sequence;
   std::vector<RunMeasurement> runs;  // those that have ended
+  // The first two runs of a deterministic mode gave the same trajectory: their seeds had no effect, and further runs,
+  // which would be copies, were left out.
+  bool identical = false;
 };
 
 struct BenchmarkConditions {

@@ -210,9 +210,7 @@ std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<co
   return evidence;
 }
 
-namespace {
-
-std::string describe(const PairEvidence& pair) {
+std::string describe_pair(const PairEvidence& pair) {
   const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
   if (pair.other) {
     return fmt::format(
@@ -233,6 +231,8 @@ std::string describe(const PairEvidence& pair) {
     text += "; this is few: many matches are wrong, or the intrinsics are inaccurate";
   return text;
 }
+
+namespace {
 
 // For rigs without a fault: the pairs and cameras that could not be tested.
 std::string unjudged(std::span<const PairEvidence> evidence) {
@@ -256,7 +256,7 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
   std::map<Convention, std::vector<std::string>> mistakes;  // pairs
   int fitting = 0, elsewhere = 0;
   for (const PairEvidence& pair : evidence) {
-    text += fmt::format("  cameras {} and {}: {}\n", pair.first, pair.second, describe(pair));
+    text += fmt::format("  cameras {} and {}: {}\n", pair.first, pair.second, describe_pair(pair));
     elsewhere += pair.other ? 1 : 0;
     if (pair.verdict == Convention::kAsGiven) ++fitting;
     if (pair.verdict && pair.verdict != Convention::kAsGiven) {

@@ -58,6 +58,9 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
 std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<const image::ImageBundle> frames,
                                             std::span<const image::Image> masks);
 
+// The evidence on a pair in words, such as "90 of 100 matches are consistent with the calibration as given".
+std::string describe_pair(const PairEvidence& pair);
+
 // The report for users: one line per pair and a conclusion.
 std::string describe_evidence(std::span<const PairEvidence> evidence);
 

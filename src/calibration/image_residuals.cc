@@ -50,14 +50,16 @@ void add_keyframe(const map::BundledMap& map, KeyframeId k, std::vector<ImageRes
 
 }  // namespace
 
-std::vector<ImageResiduals> image_residuals(const map::BundledMap& map) {
+std::vector<ImageResiduals> image_residuals(const map::BundledMap& map, KeyframeId first) {
   std::vector<ImageResiduals> residuals(map.rig().size());
   for (std::size_t c = 0; c < residuals.size(); ++c) {
     residuals[c].width = map.rig().camera(c).width;
     residuals[c].height = map.rig().camera(c).height;
     residuals[c].cells.resize(ImageResiduals::kRows * ImageResiduals::kColumns);
   }
-  for (const KeyframeId k : map.keyframe_ids()) add_keyframe(map, k, residuals);
+  for (const KeyframeId k : map.keyframe_ids()) {
+    if (k >= first) add_keyframe(map, k, residuals);
+  }
   for (ImageResiduals& r : residuals) {
     if (r.observations > 0) r.rms_px = std::sqrt(r.rms_px / static_cast<double>(r.observations));
     for (ResidualCell& cell : r.cells) {

@@ -24,6 +24,7 @@ struct ImageResiduals {
 };
 
 // The residuals of all observations in the map, which are the inliers of the adjustments, for every camera of its rig.
-std::vector<ImageResiduals> image_residuals(const map::BundledMap& map);
+// Only those of the keyframes from `first` on, such as the first one after a loaded map.
+std::vector<ImageResiduals> image_residuals(const map::BundledMap& map, KeyframeId first = KeyframeId(0));
 
 }  // namespace bslam::calibration

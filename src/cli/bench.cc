@@ -5,11 +5,13 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "base/atomic_file.h"
+#include "base/option_table.h"
 #include "benchmark/benchmark_report.h"
 #include "cli/child_process.h"
 #include "cli/config_arguments.h"
@@ -194,24 +196,50 @@ benchmark::BenchmarkConditions conditions_of(const BenchArguments& a, bool loops
           .complete = false};
 }
 
+// Whether two runs in a mode without threads of their own pace gave the same poses. Their seeds had no effect then:
+// random numbers are drawn to start without overlapping cameras, and where tracking is difficult or lost.
+bool are_copies(const BenchArguments& a, const Sequence& sequence, execution::Mode mode) {
+  if (mode == execution::Mode::kParallel) return false;
+  const auto trajectory = [&](const char* run) {
+    return read_file(fs::path(a.out) / sequence.name / run / "trajectory.tum", kMaxLogBytes);
+  };
+  const auto first = trajectory("run1"), second = trajectory("run2");
+  return first && second && *first == *second;
+}
+
+// Runs a sequence as often as requested, but not again if its runs are copies of each other.
+Result<int> run_repeatedly(const BenchArguments& a, const Sequence& sequence, execution::Mode mode,
+                           const std::stop_token& stop, SequenceResult& result, const std::function<Status()>& write) {
+  int status = kExitOk;
+  for (int run = 1; run <= a.runs && !result.identical; ++run) {
+    if (stop.stop_requested()) return kExitInterrupted;
+    const RunOutcome outcome = run_sequence(a, sequence, run, stop);
+    if (stop.stop_requested() && !outcome.measurement.failure.empty()) return kExitInterrupted;
+    result.runs.push_back(outcome.measurement);
+    if (status == kExitOk) status = outcome.status;
+    std::fprintf(stderr, "%s, run %d: %s\n", sequence.name.c_str(), run,
+                 outcome.measurement.failure.empty() ? "done" : outcome.measurement.failure.c_str());
+    result.identical = run == 2 && a.runs > 2 && status == kExitOk && are_copies(a, sequence, mode);
+    if (result.identical)
+      std::fprintf(stderr, "%s: both runs are identical, since this mode is deterministic; no further runs are made\n",
+                   sequence.name.c_str());
+    if (const Status s = write(); !s) return s.error();
+  }
+  return status;
+}
+
 // Runs everything; writes the report after every run. Returns the status of the first run that failed.
-Result<int> run_all(const BenchArguments& a, const std::vector<Sequence>& sequences,
+Result<int> run_all(const BenchArguments& a, const std::vector<Sequence>& sequences, execution::Mode mode,
                     benchmark::BenchmarkConditions conditions, const std::stop_token& stop) {
   std::vector<SequenceResult> results;
   int status = kExitOk;
   if (const Status s = write_report(results, conditions, a.out); !s) return s.error();
   for (const Sequence& sequence : sequences) {
     results.push_back({sequence, {}});
-    for (int run = 1; run <= a.runs; ++run) {
-      if (stop.stop_requested()) return kExitInterrupted;
-      const RunOutcome outcome = run_sequence(a, sequence, run, stop);
-      if (stop.stop_requested() && !outcome.measurement.failure.empty()) return kExitInterrupted;
-      results.back().runs.push_back(outcome.measurement);
-      if (status == kExitOk) status = outcome.status;
-      std::fprintf(stderr, "%s, run %d: %s\n", sequence.name.c_str(), run,
-                   outcome.measurement.failure.empty() ? "done" : outcome.measurement.failure.c_str());
-      if (const Status s = write_report(results, conditions, a.out); !s) return s.error();
-    }
+    const auto ended = run_repeatedly(a, sequence, mode, stop, results.back(),
+                                      [&] { return write_report(results, conditions, a.out); });
+    if (!ended || *ended == kExitInterrupted) return ended;
+    if (status == kExitOk) status = *ended;
   }
   conditions.complete = true;
   if (const Status s = write_report(results, conditions, a.out); !s) return s.error();
@@ -220,14 +248,17 @@ Result<int> run_all(const BenchArguments& a, const std::vector<Sequence>& sequen
 
 int bench(const BenchArguments& a) {
   const Interruption interruption;
-  const auto config = resolve_config(a.config);
+  auto config = resolve_config(a.config);
   if (!config) return report_error(config.error());
+  if (!a.mode.empty()) {
+    if (const Status s = OptionTable(*config).set("mode", a.mode); !s) return report_error(s.error());
+  }
   if (const auto request = dataset_request(a.data, 0.0); !request) return report_error(request.error());
   const auto sequences = benchmark::find_sequences(a.data.path);
   if (!sequences) return report_error(sequences.error());
   if (const Status s = prepare_folder(a); !s) return report_error(s.error());
   const auto conditions = conditions_of(a, config->looping.loop.enabled);
-  const auto status = run_all(a, *sequences, conditions, interruption.token());
+  const auto status = run_all(a, *sequences, config->mode, conditions, interruption.token());
   if (!status) return report_error(status.error());
   if (*status == kExitInterrupted) std::fprintf(stderr, "interrupted\n");
   if (const auto text = read_file(fs::path(a.out) / "report.md", kMaxLogBytes)) {

@@ -37,6 +37,13 @@ std::string path_of(const CLI::App& verb) {
 
 bool is_option(const std::string& word) { return word.size() > 1 && word.front() == '-' && word != "--"; }
 
+// Whether the word is a port that was meant as the value of --view.
+bool is_port_of_view(const CLI::App& verb, const std::string& word) {
+  const CLI::Option* view = verb.get_option_no_throw("--view");
+  return view != nullptr && view->count() > 0 && !word.empty() &&
+         word.find_first_not_of("0123456789") == std::string::npos;
+}
+
 Error sentence_error(std::string sentence) {
   Error error;
   error.sentence = std::move(sentence);
@@ -57,6 +64,8 @@ Error command_line_error(const CLI::App& app, const CLI::ParseError& error) {
   if (word != unknown.end() && !verbs.empty()) {
     return sentence_error("unknown command '" + *word + "'" + hint(nearest_name(*word, verbs)));
   }
+  if (word != unknown.end() && is_port_of_view(verb, *word))
+    return sentence_error("unexpected '" + *word + "'; did you mean '--view=" + *word + "'?");
   const auto option = std::ranges::find_if(unknown, is_option);
   if (option != unknown.end()) {
     const std::string name = option->substr(0, option->find('='));

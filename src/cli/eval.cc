@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/atomic_file.h"
+#include "cli/trajectory_camera.h"
 #include "cli/verbs.h"
 #include "evaluation/trajectory_error.h"
 #include "evaluation/trajectory_file.h"
@@ -30,7 +31,7 @@ struct EvalArguments {
   std::string gt_frame = "cam0";
   double max_dt_s = 0.01;
   double delta_s = 1.0;
-  int camera = 0;
+  std::optional<int> camera;
   std::optional<std::filesystem::path> rig, plot, times;
   bool json = false;
 };
@@ -43,7 +44,18 @@ AlignMode align_mode(const std::string& name) {
 // Returns the estimate in the frame of the ground truth. If that is the body frame: T_world_body = T_world_cam *
 // T_cam_body.
 Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& arguments) {
-  if (arguments.gt_frame != "body") return estimate;
+  const std::string frame = evaluation::read_comments(arguments.estimate).frame;
+  if (frame == "body" && arguments.gt_frame == "body") return estimate;
+  if (arguments.gt_frame != "body" && !arguments.rig) {
+    if (!frame.empty() && frame != "cam0") {
+      fmt::print(
+          stderr,
+          "note: {} contains poses of {}; the ground truth is taken to be of the same frame. --rig FILE compares "
+          "it with poses of camera 0\n",
+          arguments.estimate, frame);
+    }
+    return estimate;
+  }
   if (!arguments.rig) {
     return Error{.file = "command line",
                  .key = "--gt-frame body",
@@ -52,14 +64,17 @@ Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& a
   }
   const auto rig = rig_formats::read_rig(*arguments.rig);
   if (!rig) return rig.error();
-  if (static_cast<std::size_t>(arguments.camera) >= rig->size()) {
-    return Error{.file = arguments.rig->string(),
-                 .key = "--camera",
-                 .found = std::to_string(arguments.camera),
-                 .expected = fmt::format("a camera number below {}", rig->size())};
+  const auto camera = camera_of_trajectory(arguments.estimate, *rig, *arguments.rig, arguments.camera);
+  if (!camera) return camera.error();
+  const geometry::SE3 T_cam_frame =
+      arguments.gt_frame == "body" ? rig->body_from_cam(*camera).inverse() : rig->cam_from_rig(*camera);
+  if (T_cam_frame.translation().norm() > 0 && evaluation::read_comments(arguments.estimate).scale != "metric") {
+    fmt::print(stderr,
+               "note: the camera is {:.3f} m away from the frame of the ground truth, but the unit of {} is not the "
+               "metre: the errors contain the difference\n",
+               T_cam_frame.translation().norm(), arguments.estimate);
   }
-  const auto camera = static_cast<std::size_t>(arguments.camera);
-  return evaluation::moved_to_frame(estimate, rig->body_from_cam(camera).inverse());
+  return evaluation::moved_to_frame(estimate, T_cam_frame);
 }
 
 nlohmann::ordered_json number(double value) {
@@ -118,6 +133,12 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
         "note: EuRoC ground truth contains poses of the body; use --gt-frame body --rig FILE to compare it with "
         "a camera\n");
   }
+  if (const std::string scale = evaluation::read_comments(arguments.estimate).scale;
+      scale != "metric" && arguments.align != "sim3") {
+    fmt::print(stderr,
+               "note: the scale of {} is {}, so that its errors are mainly those of the scale; use --align sim3\n",
+               arguments.estimate, scale);
+  }
   const auto estimate = in_frame_of_truth(std::move(read).value(), arguments);
   if (!estimate) return estimate.error();
   const evaluation::EvaluationOptions options{.align = align_mode(arguments.align),
@@ -164,9 +185,9 @@ void add_eval(CLI::App& app, int& exit_status) {
       ->check(CLI::IsMember({"cam0", "body"}))
       ->capture_default_str();
   verb->add_option("--rig", arguments->rig, "calibration with the pose of the camera on the body");
-  verb->add_option("--camera", arguments->camera, "camera of the rig whose poses are estimated, if it is not the first")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+  verb->add_option("--camera", arguments->camera,
+                   "camera of the rig whose poses are estimated; default: the one that the trajectory names, or 0")
+      ->check(CLI::NonNegativeNumber);
   verb->add_option("--delta", arguments->delta_s, "time in seconds between the two poses of a relative error (RPE)")
       ->check(CLI::Range(1e-6, 1e6))
       ->capture_default_str();

@@ -3,16 +3,17 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "cli/trajectory_camera.h"
 #include "cli/verbs.h"
 #include "evaluation/association.h"
 #include "evaluation/trajectory_file.h"
 #include "geometry/vertical_direction.h"
+#include "map_export/export_map.h"
 #include "map_export/selection.h"
 #include "rig_formats/rig_file.h"
 #include "storage/map_file.h"
@@ -25,23 +26,30 @@ using evaluation::Trajectory;
 using geometry::SE3;
 
 struct TrajectoryArguments {
-  std::string file, out, format, frame, axes, stamps;
+  std::string file, out, format, frame, axes, stamps, up;
   std::optional<fs::path> rig, map, times;
-  int camera = 0;  // of the rig file: camera 0 of the trajectory
+  std::optional<int> camera;  // of the rig file: that of the trajectory
   bool overwrite = false;
 };
+
+// The frame of the poses in the file; camera 0 if it does not say it.
+std::string frame_in_file(const std::string& file) {
+  const std::string frame = evaluation::read_comments(file).frame;
+  return frame.empty() ? "cam0" : frame;
+}
 
 // Reads the rig, whose camera 0 becomes that of the trajectory.
 Result<camera::Rig> rig_of_trajectory(const TrajectoryArguments& arguments, const std::string& needed_by) {
   if (!arguments.rig) return Error{"command line", needed_by, "no --rig", "--rig FILE, the calibration of the run"};
   auto rig = rig_formats::read_rig(*arguments.rig);
-  if (!rig || arguments.camera == 0) return rig;
-  if (static_cast<std::size_t>(arguments.camera) >= rig->size())
-    return Error{arguments.rig->string(), "--camera", std::to_string(arguments.camera),
-                 fmt::format("a camera number below {}", rig->size())};
-  std::vector<int> order = {arguments.camera};
+  if (!rig) return rig;
+  const auto camera = camera_of_trajectory(arguments.file, *rig, *arguments.rig, arguments.camera);
+  if (!camera) return camera.error();
+  if (*camera == 0) return rig;
+  const auto first = static_cast<int>(*camera);
+  std::vector<int> order = {first};
   for (int c = 0; c < static_cast<int>(rig->size()); ++c)
-    if (c != arguments.camera) order.push_back(c);
+    if (c != first) order.push_back(c);
   return rig->subset(order);
 }
 
@@ -58,16 +66,37 @@ Result<SE3> frame_in_cam0(const std::string& name, const TrajectoryArguments& ar
   return Error{"command line", "--frame", name, "cam0, body" + names};
 }
 
+// T_body_cam of the camera of the trajectory, where an upward axis of the body needs it.
+Result<SE3> camera_on_body(const map_export::UpAxis& up, const TrajectoryArguments& arguments) {
+  if (up.frame != map_export::UpAxis::Frame::kBody) return SE3();
+  const auto rig = rig_of_trajectory(arguments, "--up " + arguments.up);
+  if (!rig) return rig.error();
+  return rig->body_from_cam(0);
+}
+
 // The rotation of the world's axes: that of the map if one is given, so that the path fits maps exported for ROS.
 Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArguments& arguments) {
+  std::optional<map_export::UpAxis> up;
+  if (!arguments.up.empty()) {
+    const auto parsed = map_export::parse_up_axis(arguments.up);
+    if (!parsed) return parsed.error();
+    up = *parsed;
+  } else {
+    std::fprintf(stderr, "note: %s\n", map_export::upward_note().c_str());
+  }
   if (!arguments.map) {
     std::vector<SE3> poses;
     for (const evaluation::TimedPose& pose : trajectory) poses.push_back(pose.T_world_frame);
-    return geometry::upright_axes(poses);
+    if (!up) return geometry::upright_axes(poses);
+    const auto T_body_cam = camera_on_body(*up, arguments);
+    if (!T_body_cam) return T_body_cam.error();
+    const auto up_world = map_export::up_in_world(*up, poses, *T_body_cam);
+    if (!up_world) return up_world.error();
+    return geometry::upright_axes(poses, *up_world);
   }
   const auto saved = storage::read_map(arguments.map->string());
   if (!saved) return saved.error();
-  const auto selection = map_export::select_submap(saved->map, std::nullopt);
+  const auto selection = map_export::select_submap(saved->map, std::nullopt, up);
   if (!selection) return selection.error();
   return selection->T_upright_world;
 }
@@ -81,7 +110,7 @@ Status restore_stamps(const TrajectoryArguments& arguments, Trajectory& trajecto
   return {};
 }
 
-// The input is a trajectory of camera 0.
+// The input is a trajectory of a camera, camera 0 of rig_of_trajectory.
 Result<Trajectory> converted(const TrajectoryArguments& arguments) {
   auto read = evaluation::read_trajectory(arguments.file, arguments.times);
   if (!read) return read;
@@ -92,7 +121,7 @@ Result<Trajectory> converted(const TrajectoryArguments& arguments) {
     if (!axes) return axes.error();
     T_upright_world = *axes;
   }
-  if (arguments.frame != "cam0") {
+  if (arguments.frame != frame_in_file(arguments.file)) {
     const auto frame = frame_in_cam0(arguments.frame, arguments);
     if (!frame) return frame.error();
     T_cam0_frame = *frame;
@@ -108,28 +137,29 @@ Result<Trajectory> converted(const TrajectoryArguments& arguments) {
   return trajectory;
 }
 
-// The frame that the first line of a trajectory of bslam names; cam0 if there is no such line.
-std::string frame_in_file(const std::string& file) {
-  std::ifstream in(file);
-  std::string line;
-  std::getline(in, line);
-  const std::size_t at = line.starts_with("# bslam trajectory") ? line.find(" frame=") : std::string::npos;
-  return at == std::string::npos ? "cam0" : line.substr(at + 7, line.find(' ', at + 7) - at - 7);
+// The world of the exported poses. Upright axes without a map are those of this trajectory only.
+std::string parent_frame(const TrajectoryArguments& arguments) {
+  if (arguments.axes != "ros") return "world";
+  return arguments.map ? "map" : "world_ros";
 }
 
-int run_export(const TrajectoryArguments& arguments) {
+int run_export(TrajectoryArguments arguments) {
   std::error_code error;
   if (fs::exists(arguments.out, error) && !arguments.overwrite)
     return report_error({arguments.out, "--out", "an existing file", "a new file, or --overwrite"});
-  if (const std::string frame = frame_in_file(arguments.file); frame != "cam0")
-    return report_error({arguments.file, "frame", frame, "a trajectory of cam0, as bslam run writes it"});
+  const std::string own_frame = frame_in_file(arguments.file);
+  if (own_frame == "body" || own_frame.ends_with("_ros"))
+    return report_error({arguments.file, "frame", own_frame, "a trajectory of a camera, as bslam run writes it"});
+  if (arguments.frame.empty()) arguments.frame = own_frame;
+  if (!arguments.up.empty() && arguments.axes != "ros")
+    return report_error({"command line", "--up", "no --axes ros", "--axes ros"});
   const auto trajectory = converted(arguments);
   if (!trajectory) return report_error(trajectory.error());
   using enum evaluation::TrajectoryFormat;
   const auto format = arguments.format == "euroc" ? kEurocCsv : arguments.format == "kitti" ? kKitti : kTum;
   const std::string frame = arguments.axes == "ros" ? arguments.frame + "_ros" : arguments.frame;
   const std::string header =
-      evaluation::trajectory_header(frame, evaluation::PoseState::kFinal, arguments.axes == "ros" ? "map" : "world");
+      evaluation::trajectory_header(frame, evaluation::PoseState::kFinal, parent_frame(arguments));
   const Status status = evaluation::write_trajectory(arguments.out, *trajectory, format, header, arguments.overwrite);
   if (!status) return report_error(status.error());
   std::printf("%s: %zu poses\n", arguments.out.c_str(), trajectory->size());
@@ -141,24 +171,28 @@ int run_export(const TrajectoryArguments& arguments) {
 void add_export(CLI::App& app, int& exit_status) {
   const auto arguments = std::make_shared<TrajectoryArguments>();
   CLI::App* verb = app.add_subcommand("export", "convert a trajectory to another format, frame or axes");
-  verb->add_option("TRAJECTORY", arguments->file, "a trajectory of camera 0: TUM, EuRoC csv or KITTI")->required();
+  verb->add_option("TRAJECTORY", arguments->file, "a trajectory of a camera: TUM, EuRoC csv or KITTI")->required();
   verb->add_option("--out", arguments->out, "file to write")->required();
   verb->add_option("--format", arguments->format, "format of the file; default: tum")
       ->check(CLI::IsMember({"tum", "euroc", "kitti"}));
-  verb->add_option("--frame", arguments->frame, "whose poses are written: cam0, body, or a camera; default: cam0")
-      ->default_val("cam0");
+  verb->add_option("--frame", arguments->frame,
+                   "whose poses are written: body, or a camera; default: as in the trajectory");
   verb->add_option("--axes", arguments->axes,
                    "camera: as in the trajectory, x right, y down, z forward; ros: x forward, y left, z up, for the "
                    "world and for cameras; default: camera")
       ->check(CLI::IsMember({"camera", "ros"}));
   verb->add_option("--map", arguments->map,
                    "saved map of the run, whose vertical direction --axes ros uses instead of that of the trajectory");
+  verb->add_option("--up", arguments->up,
+                   "with --axes ros: the axis that points upward, such as body:z, camera:-y (of the camera of the "
+                   "trajectory) or world:0,-1,0.2; default: that of the camera's images");
   verb->add_option("--stamps", arguments->stamps,
                    "capture: times of capture, which include the time offset of camera 0; image: time stamps of its "
                    "images; default: capture")
       ->check(CLI::IsMember({"capture", "image"}));
   verb->add_option("--rig", arguments->rig, "calibration of the run, for --frame and --stamps image");
-  verb->add_option("--camera", arguments->camera, "number in the rig file of the camera of the trajectory; default: 0")
+  verb->add_option("--camera", arguments->camera,
+                   "number in the rig file of the camera of the trajectory; default: the one that the trajectory names")
       ->check(CLI::NonNegativeNumber);
   verb->add_option("--times", arguments->times, "times of KITTI poses; default: times.txt beside them");
   verb->add_flag("--overwrite", arguments->overwrite, "replace existing files");

@@ -24,6 +24,7 @@
 #include "cli/slam_run.h"
 #include "cli/verbs.h"
 #include "rig_formats/rig_file.h"
+#include "session/run_warnings.h"
 
 namespace bslam::cli {
 namespace {
@@ -198,7 +199,7 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
   input.options.interrupted = interruption.second();
   input.options.progress = [&bar](std::size_t done, std::size_t all) { bar.show(done, all); };
   input.before = [&]() -> Status {
-    if (!quiet) print_rig_warnings(rig.rig);
+    if (!quiet) print_warnings(session::warnings_before_run(dataset));
     if (!a.record.empty()) {
       auto started = start_recording(a.record, rig.rig, cameras);
       if (!started) return started.error();

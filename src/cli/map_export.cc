@@ -18,6 +18,7 @@ struct ExportArguments {
   std::string file, format, images, rig;
   ImageArguments image_options;
   std::vector<double> height;
+  std::string up;
   map_export::ExportRequest request;
 };
 
@@ -33,6 +34,11 @@ Status complete_request(ExportArguments& arguments) {
   map_export::ExportRequest& request = arguments.request;
   for (const map_export::FormatName& format : map_export::formats())
     if (format.name == arguments.format) request.format = format.format;
+  if (!arguments.up.empty()) {
+    const auto up = map_export::parse_up_axis(arguments.up);
+    if (!up) return up.error();
+    request.up = *up;
+  }
   if (arguments.height.empty()) return {};
   if (request.format != map_export::Format::kNav2)
     return Error{"command line", "--height", "another format", "--format nav2"};
@@ -88,6 +94,9 @@ void add_map_export(CLI::App& map, int& exit_status) {
   out->add_option("--height", arguments->height,
                   "nav2: lower and upper limit of obstacles, in metres above camera 0; default: -0.5 0.5")
       ->expected(2);
+  out->add_option("--up", arguments->up,
+                  "nerfstudio, octomap, nav2: the axis that points upward, such as body:z, camera:-y (of camera 0) or "
+                  "world:0,-1,0.2 (of the trajectory); default: that of camera 0's images");
   out->add_flag("--overwrite", request.overwrite, "replace an existing file, or write into a folder that is not empty");
   out->callback([arguments, &exit_status] { exit_status = run_map_export(*arguments); });
 }

@@ -14,6 +14,7 @@
 #include "cli/shell_command.h"
 #include "cli/slam_run.h"
 #include "cli/verbs.h"
+#include "session/run_warnings.h"
 
 namespace bslam::cli {
 namespace {
@@ -54,8 +55,7 @@ void print_sources(const dataset::Dataset& dataset) {
 void print_before(const dataset::Dataset& dataset, const DatasetArguments& data, LogVerbosity verbosity) {
   if (verbosity < LogVerbosity::kWarning) return;
   if (dataset.format == dataset::DatasetFormat::kBag && data.images.topics.empty()) print_sources(dataset);
-  for (const std::string& warning : dataset.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
-  print_rig_warnings(dataset.rig);
+  print_warnings(session::warnings_before_run(dataset));
 }
 
 session::SessionOptions session_options(const RunArguments& arguments, const Interruption& interruption) {

@@ -15,6 +15,7 @@
 #include "map/rigs_of_map.h"
 #include "session/record_builder.h"
 #include "session/report_data.h"
+#include "session/run_warnings.h"
 #include "storage/map_file.h"
 #include "storage/vocabulary_file.h"
 #include "system/cameras_of_run.h"
@@ -90,11 +91,20 @@ void end_view(live_view::LiveView* view, const session::SessionResult& result, c
   view->end(session::report_text(result, config, {dataset, arguments.command}));
 }
 
-void print_after(const session::RunRecord& record, const RunInput& input, const SlamArguments& arguments) {
+// Returns the warnings after the run; the record gets those before it as well.
+std::vector<std::string> note_warnings(const RunInput& input, session::RunRecord& record) {
+  const std::vector<std::string> after = session::warnings_after_run(record, input.dataset.rig, input.check_command);
+  record.warnings = session::warnings_before_run(input.dataset);
+  record.warnings.insert(record.warnings.end(), after.begin(), after.end());
+  return after;
+}
+
+void print_after(const session::RunRecord& record, const std::vector<std::string>& warnings,
+                 const SlamArguments& arguments) {
   const LogVerbosity verbosity = log_verbosity(arguments.log_level);
   if (verbosity >= LogVerbosity::kDebug) print_frames(record);
   if (verbosity >= LogVerbosity::kInfo) print_stage_statistics(record);
-  if (verbosity >= LogVerbosity::kWarning) print_warnings(record, input.dataset.rig, input.check_command);
+  if (verbosity >= LogVerbosity::kWarning) print_warnings(warnings);
   print_result(record, arguments.out);
 }
 
@@ -151,11 +161,11 @@ Status check_output_file(const std::string& file, const char* option, bool overw
 int run_and_write(const SlamArguments& arguments, RunInput input, session::RunControl& control) {
   const dataset::Dataset& dataset = input.dataset;
   session::SessionOptions& options = input.options;
-  options.config = input.config;
   const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
   auto map = read_map(arguments, dataset.rig, input.config, **vocabulary);
   if (!map) return report_error(map.error());
+  if (*map) system::note_other_rigs(**map, dataset.rig, input.config);
   for (const auto& [option, file] :
        {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
     if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return report_error(s.error());
@@ -168,6 +178,7 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   if (*view) std::fprintf(stderr, "view: %s\n", (*view)->url().c_str());
   if (const Status s = input.before ? input.before() : Status(); !s) return report_error(s.error());
 
+  options.config = input.config;
   options.vocabulary = *vocabulary;
   options.map = std::move(*map);
   options.observer = view->get();
@@ -176,11 +187,12 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   if (input.after) input.after();
   if (!result) return report_error(result.error());
   if (arguments.image_stamps) result->subtracted_ns = dataset.rig.camera(0).time_offset_ns;
+  const std::vector<std::string> warnings = note_warnings(input, result->record);
   if (const Status s = write_files(*result, input.config, dataset, arguments, **vocabulary); !s)
     return report_error(s.error());
   const Status sent = arguments.rerun.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
   end_view(view->get(), *result, input.config, dataset, arguments);
-  print_after(result->record, input, arguments);
+  print_after(result->record, warnings, arguments);
   if (!sent) return report_error(sent.error());
   return exit_status_of(*result);
 }

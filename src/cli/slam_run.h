@@ -43,7 +43,7 @@ Status check_output_file(const std::string& file, const char* option, bool overw
 
 // What a run is made of beside its arguments.
 struct RunInput {
-  const system::Config& config;
+  system::Config config;
   const dataset::Dataset& dataset;  // without frames if there is a source
   session::SessionOptions options;  // all but settings, vocabulary, map, observer and control
   std::string check_command;        // tests the calibration against the images

@@ -79,8 +79,10 @@ class EurocRecording : public Recording {
 
   std::optional<fs::path> ground_truth() const override {
     fs::path file = root_ / "state_groundtruth_estimate0" / "data.csv";
+    fs::path of_camera0 = root_.parent_path() / "groundtruth_cam0.tum";
     std::error_code error;
-    return fs::exists(file, error) ? std::optional(std::move(file)) : std::nullopt;
+    if (fs::exists(file, error)) return file;
+    return fs::exists(of_camera0, error) ? std::optional(std::move(of_camera0)) : std::nullopt;
   }
 
  private:

@@ -49,7 +49,8 @@ std::vector<SynchronyDescription> synchrony(const std::vector<StreamDescription>
 }
 
 // What is needed to run the recording beside its images.
-std::vector<std::string> missing_for(const DatasetRequest& request, const Recording& recording) {
+std::vector<std::string> missing_for(const DatasetRequest& request, const Recording& recording,
+                                     const std::vector<StreamDescription>& streams) {
   std::vector<std::string> missing;
   if (request.rig_file) {
     const auto rig = rig_formats::read_rig(*request.rig_file);
@@ -59,6 +60,17 @@ std::vector<std::string> missing_for(const DatasetRequest& request, const Record
           fmt::format("images of {} cameras: {} has {} cameras and the recording {}; --cameras selects "
                       "cameras of the rig",
                       rig->size(), request.rig_file->string(), rig->size(), recording.camera_count()));
+    }
+    for (const StreamDescription& s : streams) {
+      const auto c = static_cast<std::size_t>(s.camera);  // of the recording
+      const std::size_t of_rig = request.cameras.empty()      ? c
+                                 : c < request.cameras.size() ? static_cast<std::size_t>(request.cameras[c])
+                                                              : rig->size();
+      if (s.camera < 0 || s.width == 0 || of_rig >= rig->size()) continue;
+      const camera::Camera& camera = rig->camera(of_rig);
+      if (camera.width == s.width && camera.height == s.height) continue;
+      missing.push_back(fmt::format("the calibration of {} x {} pixels: {} is calibrated for {} x {} in {}", s.width,
+                                    s.height, camera.name, camera.width, camera.height, request.rig_file->string()));
     }
     return missing;
   }
@@ -80,7 +92,7 @@ Result<RecordingDescription> describe_recording(const DatasetRequest& request) {
   if (out.format.empty()) out.format = format_name(opened->format);
   const std::vector<std::string> damage = opened->recording->warnings();
   out.warnings.insert(out.warnings.begin(), damage.begin(), damage.end());
-  out.missing = missing_for(request, *opened->recording);
+  out.missing = missing_for(request, *opened->recording, out.streams);
   out.synchrony = synchrony(out.streams, request.sync_tolerance_s);
   return out;
 }

@@ -319,10 +319,6 @@ Result<Trajectory> read_trajectory(const std::filesystem::path& file,
   return trajectory;
 }
 
-std::string trajectory_header(std::string_view frame, PoseState state, std::string_view parent) {
-  return fmt::format("bslam trajectory frame={} parent={} final={}", frame, parent, state == PoseState::kFinal);
-}
-
 std::string tum_text(const Trajectory& trajectory, std::string_view header) {
   std::string text = header.empty() ? std::string() : fmt::format("# {}\n", header);
   for (const TimedPose& pose : trajectory) {

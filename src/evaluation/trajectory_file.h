@@ -12,6 +12,7 @@
 
 #include "base/result.h"
 #include "evaluation/trajectory.h"
+#include "evaluation/trajectory_header.h"
 
 namespace bslam::evaluation {
 
@@ -28,12 +29,6 @@ Result<evaluation::Trajectory> read_trajectory(const std::filesystem::path& file
 // Converts decimal seconds ("1403636579.763555584", "1.044989e-01") to nanoseconds; digits beyond the ninth decimal are
 // rounded half away from zero. Returns nullopt if the text is not a number or is beyond +-4e9 s.
 std::optional<TimeNs> parse_seconds(std::string_view text);
-
-// kFinal: poses resolved against the final map; kLive: poses as reported during the run.
-enum class PoseState { kFinal, kLive };
-
-// The comment line at the top of trajectories written by a run: "bslam trajectory frame=cam0 parent=world final=true".
-std::string trajectory_header(std::string_view frame, PoseState state, std::string_view parent = "world");
 
 // Returns the content of a trajectory file. TUM begins with "# HEADER" if `header` is not empty. Seconds, metres and
 // quaternions have nine decimals. KITTI contains poses only; `times_text` gives the matching times file.

@@ -18,8 +18,11 @@ Vector3d vertical_direction(std::span<const SE3> T_world_rig) {
 }
 
 SE3 upright_axes(std::span<const SE3> T_world_rig) {
+  return upright_axes(T_world_rig, vertical_direction(T_world_rig));
+}
+
+SE3 upright_axes(std::span<const SE3> T_world_rig, const Vector3d& up) {
   constexpr double kSteep = 0.2;  // horizontal part of a unit vector: 12 degrees from the vertical
-  const Vector3d up = vertical_direction(T_world_rig);
   const Matrix3d first = T_world_rig.empty() ? Matrix3d::Identity() : T_world_rig.front().matrix3();
   Vector3d forward = first.col(2) - up.dot(first.col(2)) * up;
   if (forward.norm() < kSteep) forward = first.col(0) - up.dot(first.col(0)) * up;

@@ -15,5 +15,7 @@ Vector3d vertical_direction(std::span<const SE3> T_world_rig);
 // viewing direction of camera 0 in the first pose, or its right if it looks along the vertical. The identity of the
 // first image's axes (x right, y down, z forward) becomes x forward, y left, z up, as in ROS. The origin is kept.
 SE3 upright_axes(std::span<const SE3> T_world_rig);
+// The same with a given upward direction, a unit vector in the world.
+SE3 upright_axes(std::span<const SE3> T_world_rig, const Vector3d& up);
 
 }  // namespace bslam::geometry

@@ -122,6 +122,7 @@ Status export_nerfstudio(Exporter& exporter) {
   if (Status s = folder->write("points.ply", ply); !s) return s;
   if (exporter.cameras.undistorted())
     if (Status s = write_undistorted(exporter, *folder); !s) return s;
+  exporter.note_upward();
   exporter.report.summary = fmt::format("{} images, {}", exporter.images.images().size(), counts(exporter));
   return folder->commit();
 }

@@ -39,6 +39,8 @@ Status check_options(const ExportRequest& request) {
   const bool carves = request.format == Format::kOctomap || request.format == Format::kNav2;
   if ((request.resolution || request.max_range) && !carves)
     return Error{"command line", "--resolution, --max-range", "--format " + name, "--format octomap or nav2"};
+  if (request.up && !carves && request.format != Format::kNerfstudio)
+    return Error{"command line", "--up", "--format " + name, "--format nerfstudio, octomap or nav2"};
   return {};
 }
 
@@ -90,6 +92,11 @@ Status write(Exporter& exporter) {
 
 }  // namespace
 
+std::string upward_note() {
+  return "upward is that of camera 0 on average: if it is mounted rolled, or looking down or up, the map is tilted as "
+         "much; --up names the axis of body or camera that points upward";
+}
+
 std::span<const FormatName> formats() { return kFormats; }
 
 LandmarkColours Exporter::colours() {
@@ -118,7 +125,7 @@ Status export_g2o(Exporter& exporter) {
 Result<ExportReport> export_map(const map::BundledMap& map, const ExportRequest& request) {
   for (const Status& status : {check_options(request), check_place(request)})
     if (!status) return status.error();
-  auto selection = select_submap(map, request.submap);
+  auto selection = select_submap(map, request.submap, request.up);
   if (!selection) return selection.error();
   ImageTable images(*selection, request.data, request.data_folder);
   Exporter exporter{request, *std::move(selection), std::move(images), OutputCameras(map.rig(), request.undistort), {}};

@@ -12,6 +12,7 @@
 #include "dataset/dataset.h"
 #include "map/bundled_map.h"
 #include "map_export/occupancy_grid.h"
+#include "map_export/up_axis.h"
 
 namespace bslam::map_export {
 
@@ -36,7 +37,11 @@ struct ExportRequest {
   std::optional<double> resolution;        // kOctomap, kNav2: side of a cell; default: default_resolution, >= 5 cm
   std::optional<double> max_range;         // kOctomap, kNav2: default: ten times the median depth
   HeightBand band;                         // kNav2
+  std::optional<UpAxis> up;                // kNerfstudio, kOctomap, kNav2: default: upward_note()
 };
+
+// What a user should know about the vertical direction if `up` is not given.
+std::string upward_note();
 
 struct ExportReport {
   std::vector<std::string> notes;  // what the user should know, one sentence each

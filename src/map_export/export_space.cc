@@ -28,10 +28,6 @@ std::string axes_text(const Exporter& exporter) {
       q.y(), q.z(), q.w());
 }
 
-// Images alone do not show gravity: the axes follow camera 0, however it is mounted.
-constexpr const char* kTiltNote =
-    "upward is that of camera 0 on average: if it is mounted looking down or up, the map is tilted as much";
-
 // Poses of camera 0 in the frame of the map server, as a file of the format TUM.
 std::string keyframes_text(const Exporter& exporter) {
   storage::Submap submap;
@@ -49,7 +45,7 @@ Status export_octomap(Exporter& exporter) {
   const auto octree = octree_of(scans_of(exporter.selection), options);
   if (!octree) return octree.error();
   exporter.note(axes_text(exporter));
-  exporter.note(kTiltNote);
+  exporter.note_upward();
   exporter.report.summary =
       fmt::format("cells of {:g}, {} occupied and {} free leaves", options.resolution, octree->occupied, octree->free);
   return write_atomically(exporter.request.out, octree->bytes);
@@ -69,7 +65,7 @@ Status export_nav2(Exporter& exporter) {
   if (Status s = folder->write("map.pgm", grid_pgm(*grid)); !s) return s;
   if (Status s = folder->write("map.yaml", grid_yaml(*grid, "map.pgm", comments)); !s) return s;
   if (Status s = folder->write("keyframes.tum", keyframes_text(exporter)); !s) return s;
-  exporter.note(kTiltNote);
+  exporter.note_upward();
   exporter.report.summary = fmt::format("{} x {} cells of {:g}", grid->width, grid->height, options.resolution);
   return folder->commit();
 }

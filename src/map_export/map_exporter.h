@@ -18,6 +18,9 @@ struct Exporter {
 
   const map::BundledMap& map() const { return *selection.map; }
   void note(std::string text) { report.notes.push_back(std::move(text)); }
+  void note_upward() {
+    if (!request.up) note(upward_note());
+  }
   // The colours of the landmarks; notes if they are grey because there are no images.
   LandmarkColours colours();
 };

@@ -10,7 +10,8 @@
 
 namespace bslam::map_export {
 
-Result<Selection> select_submap(const map::BundledMap& map, std::optional<std::size_t> submap) {
+Result<Selection> select_submap(const map::BundledMap& map, std::optional<std::size_t> submap,
+                                const std::optional<UpAxis>& up) {
   const std::vector<storage::Submap> submaps = storage::submaps_of(map);
   if (submaps.empty()) return Error{"", "", "a map without keyframes", "a map with keyframes"};
   if (submap && *submap >= submaps.size())
@@ -25,6 +26,11 @@ Result<Selection> select_submap(const map::BundledMap& map, std::optional<std::s
     poses.push_back(selection.world_from_rig(k));
   }
   selection.T_upright_world = geometry::upright_axes(poses);
+  if (up) {
+    const auto up_world = up_in_world(*up, poses, map.rig().body_from_cam(0));
+    if (!up_world) return up_world.error();
+    selection.T_upright_world = geometry::upright_axes(poses, *up_world);
+  }
   for (const LandmarkId l : map.landmark_ids()) {
     if (selection.selected[map.landmark(l).reference.keyframe.index()]) selection.landmarks.push_back(l);
   }

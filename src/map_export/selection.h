@@ -7,6 +7,7 @@
 
 #include "base/result.h"
 #include "map/bundled_map.h"
+#include "map_export/up_axis.h"
 
 namespace bslam::map_export {
 
@@ -15,14 +16,16 @@ struct Selection {
   std::vector<KeyframeId> keyframes;   // in order of time, at least one
   std::vector<LandmarkId> landmarks;   // in order of id: those whose reference keyframe is selected
   std::vector<std::uint8_t> selected;  // per keyframe slot, 1 if it is one of `keyframes`
-  geometry::SE3 T_upright_world;       // geometry::upright_axes of the keyframes
+  geometry::SE3 T_upright_world;       // geometry::upright_axes of the keyframes, or with the given direction
 
   geometry::SE3 world_from_rig(KeyframeId k) const { return map->keyframe(k).T_rig_world.inverse(); }
 };
 
 // Selects submap number `submap` in the order of storage::submaps_of, or, without a number, the one with most
-// landmarks. Errors: the map has no keyframes; there is no such submap.
-Result<Selection> select_submap(const map::BundledMap& map, std::optional<std::size_t> submap);
+// landmarks. `up`: which direction is upward; without it, it is estimated. Errors: the map has no keyframes; there is
+// no such submap; those of up_in_world.
+Result<Selection> select_submap(const map::BundledMap& map, std::optional<std::size_t> submap,
+                                const std::optional<UpAxis>& up = {});
 
 // Calls visit(KeyframeId, KeypointRef) for every keypoint that observes the landmark in a selected keyframe.
 template <class Visit>

@@ -12,8 +12,23 @@ namespace {
 
 double seconds(const RecordInput& input, TimeNs time_ns) { return to_seconds(time_ns - input.dataset.first_time_ns); }
 
+// The residuals of the poses of a run that adds no keyframes to its map, without their distribution over the image.
+calibration::ImageResiduals residuals_of_frames(const RunRecord& record, std::size_t camera,
+                                                calibration::ImageResiduals empty) {
+  double sum_px2 = 0;
+  for (const RunFrame& frame : record.frames) {
+    if (frame.outcome() != FrameOutcome::kTracked) continue;
+    const tracking::CameraCounts& counts = frame.record->final_result().cameras[camera];
+    empty.observations += static_cast<std::size_t>(counts.inliers);
+    sum_px2 += counts.squared_error_px2;
+  }
+  if (empty.observations > 0) empty.rms_px = std::sqrt(sum_px2 / static_cast<double>(empty.observations));
+  return empty;
+}
+
 void add_cameras(const RecordInput& input, RunRecord& record) {
-  const std::vector<calibration::ImageResiduals> residuals = calibration::image_residuals(*input.system.snapshot());
+  const std::vector<calibration::ImageResiduals> residuals =
+      calibration::image_residuals(*input.system.snapshot(), input.system.first_keyframe());
   for (std::size_t c = 0; c < input.dataset.rig.size(); ++c) {
     CameraRecord camera;
     camera.name = input.dataset.rig.camera(c).name;
@@ -26,6 +41,7 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
     }
     camera.states = camera_intervals(record.frames, c);
     camera.residuals = residuals[input.system.first_camera() + c];
+    if (input.config.localize_only) camera.residuals = residuals_of_frames(record, c, std::move(camera.residuals));
     const auto& found = input.system.calibration().cameras;
     if (c > 0 && c < found.size()) {
       const calibration::CameraRefinement& r = found[c];
@@ -39,6 +55,40 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
                            input.system.calibration_refined()};
     }
     record.cameras.push_back(std::move(camera));
+  }
+}
+
+// Whether the status of a camera was `inconsistent` for most of the time in which it delivered images.
+bool disagrees(const CameraRecord& camera) {
+  double all_s = 0, inconsistent_s = 0;
+  for (const CameraInterval& s : camera.states) {
+    all_s += s.to_s - s.from_s;
+    if (s.status.reason == tracking::CameraReason::kInconsistent) inconsistent_s += s.to_s - s.from_s;
+  }
+  return inconsistent_s > 0.5 * all_s;
+}
+
+void add_calibration(const RecordInput& input, RunRecord& record) {
+  CalibrationRecord& calibration = record.calibration;
+  calibration.estimate = input.system.calibration();
+  calibration.excess_bound = input.config.calibration.inconsistent_excess;
+  const map::MapSnapshot map = input.system.snapshot();
+  std::vector<KeyframeId> keyframes = map->keyframe_ids();
+  std::erase_if(keyframes, [&](KeyframeId k) { return k < input.system.first_keyframe(); });
+  calibration.pairs =
+      calibration::test_pairs(*map, keyframes, input.system.first_camera(), input.dataset.rig, input.system.rig());
+  std::erase_if(calibration.pairs,
+                [](const calibration::CameraPair& p) { return !p.contradicted && !p.hardly_matched(); });
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    if (disagrees(record.cameras[c])) calibration.disagreeing.push_back(c);
+  }
+  calibration.accept_estimate(input.complete, input.system.calibration_refined());
+  for (CameraRecord& camera : record.cameras) {
+    if (camera.extrinsics) camera.extrinsics->refined = calibration.refined;
+  }
+  if (calibration.foreign_images() && record.map.scale == map::scale_name(map::Scale::kMetric)) {
+    record.map.scale = map::scale_name(map::Scale::kUnobservable);
+    record.map.scale_deviation.reset();
   }
 }
 
@@ -139,7 +189,7 @@ RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameReco
   add_stages(input, record);
   const map::MapSnapshot map = input.system.snapshot();
   record.map = map_record(*map, input.loaded);
-  record.calibration = {input.system.calibration(), input.system.calibration_refined()};
+  add_calibration(input, record);
   record.maps_started = input.system.maps_started();
   add_places(input, record);
   record.start_up_s = input.start_up_s;

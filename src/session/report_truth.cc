@@ -19,15 +19,26 @@ ordered_json statistics_json(const evaluation::ErrorStatistics& s) {
   return {{"rmse", number(s.rmse)}, {"median", number(s.median)}, {"max", number(s.max)}, {"count", s.count}};
 }
 
+// T_truth_cam0 of the run's camera 0; nullopt if it is not known. groundtruth_cam0.tum contains poses of the first
+// camera of the rig, all other files poses of the body.
+std::optional<geometry::SE3> camera_in_truth_frame(const dataset::Dataset& dataset) {
+  if (dataset.ground_truth->filename() != "groundtruth_cam0.tum") return dataset.rig.body_from_cam(0);
+  const auto used = static_cast<std::size_t>(dataset.cameras_used.front());
+  if (used == 0) return geometry::SE3();
+  if (!dataset.whole_rig) return std::nullopt;
+  return dataset.whole_rig->rig_from_cam(used);
+}
+
 // The true poses of camera 0 while the recording was processed.
-Trajectory truth_of_camera(const Trajectory& truth, const dataset::Dataset& dataset, TimeNs tolerance_ns) {
+Trajectory truth_of_camera(const Trajectory& truth, const dataset::Dataset& dataset, const geometry::SE3& T_truth_cam0,
+                           TimeNs tolerance_ns) {
   Trajectory kept;
   for (const evaluation::TimedPose& pose : truth) {
     const bool outside = !dataset.frames.empty() && (pose.time_ns < dataset.frames.front().time_ns - tolerance_ns ||
                                                      pose.time_ns > dataset.frames.back().time_ns + tolerance_ns);
     if (!outside) kept.push_back(pose);
   }
-  return moved_to_frame(kept, dataset.rig.body_from_cam(0));
+  return moved_to_frame(kept, T_truth_cam0);
 }
 
 // The true path in the world of the estimate.
@@ -46,11 +57,13 @@ ordered_json true_path(const Trajectory& truth, const geometry::Sim3& T_gt_estim
 
 ordered_json report_truth(const dataset::Dataset& dataset, const Trajectory& path, bool metric) {
   if (!dataset.ground_truth || path.empty()) return nullptr;
-  const auto of_body = evaluation::read_trajectory(*dataset.ground_truth);
-  if (!of_body) return {{"error", of_body.error().message()}};
+  const auto T_truth_cam0 = camera_in_truth_frame(dataset);
+  if (!T_truth_cam0) return nullptr;
+  const auto given = evaluation::read_trajectory(*dataset.ground_truth);
+  if (!given) return {{"error", given.error().message()}};
   const evaluation::EvaluationOptions options{.align =
                                                   metric ? evaluation::AlignMode::kSe3 : evaluation::AlignMode::kSim3};
-  const Trajectory truth = truth_of_camera(*of_body, dataset, options.max_dt_ns);
+  const Trajectory truth = truth_of_camera(*given, dataset, *T_truth_cam0, options.max_dt_ns);
   const auto found = evaluation::evaluate(path, truth, options);
   if (!found) return {{"error", found.error().found + "; expected " + found.error().expected}};
   std::vector<float> time, error;

@@ -10,6 +10,7 @@
 #include "calibration/rig_description.h"
 #include "calibration/rig_warnings.h"
 #include "dataset/frame_reader.h"
+#include "dataset/recording.h"
 #include "image_decoding/image_file.h"
 #include "report/rig_plot.h"
 #include "rig_formats/rig_file.h"
@@ -76,7 +77,36 @@ std::vector<std::string> warnings_of(const camera::Rig& rig) {
   return warnings;
 }
 
-std::string as_json(const rig_formats::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
+// A calibration, and where it is from.
+struct Calibration {
+  rig_formats::RigFile file;
+  std::string format;
+  bool of_recording = false;  // CameraInfo of a bag
+};
+
+// Reads a calibration file, or the CameraInfo of a bag.
+Result<Calibration> read_calibration(const RigReportRequest& request) {
+  dataset::DatasetRequest recording = request.recording;
+  recording.path = request.file;
+  std::error_code error;
+  const bool is_file = std::filesystem::is_regular_file(request.file, error);
+  const bool has_metadata = std::filesystem::exists(recording.path / "metadata.yaml", error);
+  if (is_file || has_metadata) {
+    const auto opened = dataset::open_recording(recording);
+    if (opened && opened->format == dataset::DatasetFormat::kBag) {
+      const auto dataset = dataset::open_dataset(recording);
+      if (!dataset) return dataset.error();
+      return Calibration{{dataset->rig, rig_formats::RigFormat::kBslam, {}}, "CameraInfo of a bag", true};
+    }
+  }
+  auto file = rig_formats::read_rig_file(request.file);
+  if (!file) return file.error();
+  std::string format(rig_formats::format_name(file->format));
+  return Calibration{*std::move(file), std::move(format)};
+}
+
+std::string as_json(const Calibration& calibration, const std::optional<std::vector<PairEvidence>>& evidence) {
+  const rig_formats::RigFile& file = calibration.file;
   const camera::Rig& rig = file.rig;
   Json cameras = Json::array(), baselines = Json::array();
   for (std::size_t i = 0; i < rig.size(); ++i) {
@@ -87,7 +117,7 @@ std::string as_json(const rig_formats::RigFile& file, const std::optional<std::v
     }
   }
   Json json = {{"schema", 1},
-               {"format", rig_formats::format_name(file.format)},
+               {"format", calibration.format},
                {"cameras", std::move(cameras)},
                {"baselines", std::move(baselines)},
                {"notes", file.notes},
@@ -96,21 +126,21 @@ std::string as_json(const rig_formats::RigFile& file, const std::optional<std::v
   return json.dump(1) + "\n";
 }
 
-std::string as_text(const rig_formats::RigFile& file, const std::optional<std::vector<PairEvidence>>& evidence) {
-  std::string text =
-      fmt::format("format: {}\n", rig_formats::format_name(file.format)) + calibration::describe_rig(file.rig);
+std::string as_text(const Calibration& calibration, const std::optional<std::vector<PairEvidence>>& evidence) {
+  const rig_formats::RigFile& file = calibration.file;
+  std::string text = fmt::format("format: {}\n", calibration.format) + calibration::describe_rig(file.rig);
   for (const std::string& note : file.notes) text += "note: " + note + "\n";
   for (const std::string& warning : warnings_of(file.rig)) text += "warning: " + warning + "\n";
   return evidence ? text + calibration::describe_evidence(*evidence) : text;
 }
 
 // Tests the calibration against a few frames spread over a recording.
-Result<std::vector<PairEvidence>> check_against_images(const RigReportRequest& request) {
+Result<std::vector<PairEvidence>> check_against_images(const RigReportRequest& request, bool own_calibration) {
   constexpr double kTolerance_s = 0.1;  // wide enough to group the images of cameras that capture late
   constexpr std::size_t kFrames = 6;
   dataset::DatasetRequest recording = request.recording;
   recording.path = request.images;
-  recording.rig_file = request.file;
+  if (!own_calibration) recording.rig_file = request.file;
   recording.sync_tolerance_s = kTolerance_s;
   const auto dataset = dataset::open_dataset(recording);
   if (!dataset) return dataset.error();
@@ -126,19 +156,19 @@ Result<std::vector<PairEvidence>> check_against_images(const RigReportRequest& r
 }  // namespace
 
 Result<std::string> report_rig(const RigReportRequest& request) {
-  const auto file = rig_formats::read_rig_file(request.file);
-  if (!file) return file.error();
+  const auto calibration = read_calibration(request);
+  if (!calibration) return calibration.error();
   if (!request.svg.empty()) {
-    const Status written = write_atomically(request.svg, report::rig_plot_svg(file->rig));
+    const Status written = write_atomically(request.svg, report::rig_plot_svg(calibration->file.rig));
     if (!written) return written.error();
   }
   std::optional<std::vector<PairEvidence>> evidence;
   if (!request.images.empty()) {
-    auto checked = check_against_images(request);
+    auto checked = check_against_images(request, calibration->of_recording);
     if (!checked) return checked.error();
     evidence = std::move(*checked);
   }
-  return request.json ? as_json(*file, evidence) : as_text(*file, evidence);
+  return request.json ? as_json(*calibration, evidence) : as_text(*calibration, evidence);
 }
 
 }  // namespace bslam::session

@@ -9,7 +9,7 @@
 namespace bslam::session {
 
 struct RigReportRequest {
-  std::string file;                        // a calibration, or the folder of a data set
+  std::string file;                        // a calibration, the folder of a data set, or a bag with CameraInfo
   bool json = false;                       // text otherwise
   std::string svg = {};                    // draw the rig into this file unless empty
   std::string images = {};                 // test the extrinsics against this data set unless empty

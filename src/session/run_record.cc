@@ -11,6 +11,24 @@ FrameOutcome RunFrame::outcome() const {
   return tracked ? FrameOutcome::kTracked : FrameOutcome::kLost;
 }
 
+void CalibrationRecord::accept_estimate(bool complete, bool replaced) {
+  refined = complete && replaced && estimate.done && !foreign_images();
+}
+
+bool CalibrationRecord::foreign_images() const {
+  return std::ranges::any_of(pairs, &calibration::CameraPair::contradicted);
+}
+
+calibration::Verdict CalibrationRecord::verdict() const {
+  if (foreign_images()) return calibration::Verdict::kInconsistent;
+  if (estimate.verdict != calibration::Verdict::kConsistent) return estimate.verdict;
+  return pairs.empty() && disagreeing.empty() ? estimate.verdict : calibration::Verdict::kUnknown;
+}
+
+std::int64_t count(const RunRecord& record, FrameOutcome outcome) {
+  return std::ranges::count(record.frames, outcome, &RunFrame::outcome);
+}
+
 std::vector<CameraInterval> camera_intervals(std::span<const RunFrame> frames, std::size_t camera) {
   std::vector<CameraInterval> intervals;
   for (const RunFrame& frame : frames) {

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "calibration/camera_pairs.h"
 #include "calibration/image_residuals.h"
 #include "calibration/rig_refinement.h"
 #include "tracking/frame_record.h"
@@ -66,13 +67,27 @@ struct CameraRecord {
   std::vector<CameraInterval> states;
   std::optional<ExtrinsicsRecord> extrinsics = {};  // nullopt for camera 0, whose frame is the rig frame
   std::string first_skipped = {};                   // file and cause of damage of the first skipped image
-  calibration::ImageResiduals residuals = {};       // of the final map
+  // Of the keyframes of the run in the final map; if it only localises, of the poses of its frames.
+  calibration::ImageResiduals residuals = {};
 };
 
 // The estimate of the calibration at the end of the run.
 struct CalibrationRecord {
   calibration::RigRefinement estimate;
-  bool refined = false;  // the final map uses an estimated rig
+  bool refined = false;     // the final map uses an estimated rig, which is written to rig_refined.yaml
+  double excess_bound = 0;  // of estimate.excess_error, above which the images contradict the calibration
+  std::vector<calibration::CameraPair> pairs = {};  // that are contradicted or hardly matched
+  std::vector<std::size_t> disagreeing = {};        // cameras that were inconsistent for most of the run
+
+  // Sets `refined`. `complete`: the run was not interrupted; the map of an interrupted run may use an estimate from its
+  // beginning, of which nothing is known. `replaced`: the map uses an estimated rig.
+  void accept_estimate(bool complete, bool replaced);
+  // Whether the images are not those of the calibrated cameras, or the calibration was read in another convention than
+  // meant. Scale, map and estimate mean nothing then.
+  bool foreign_images() const;
+  // The verdict of the estimate, unless the pairs of cameras or single cameras show that it does not apply: the
+  // estimate uses only observations that are consistent with each other.
+  calibration::Verdict verdict() const;
 };
 
 struct MapRecord {
@@ -111,8 +126,12 @@ struct RunRecord {
   int maps_started = 0;
   std::vector<SubmapRecord> submaps;  // in decreasing order of frames
   double start_up_s = 0.0, wall_s = 0.0;
-  std::optional<double> peak_memory_mb;  // maximum resident size; nullopt if unavailable
+  std::optional<double> peak_memory_mb;    // maximum resident size; nullopt if unavailable
+  std::vector<std::string> warnings = {};  // all that were printed
 };
+
+// Returns the number of frames with this outcome.
+std::int64_t count(const RunRecord& record, FrameOutcome outcome);
 
 // Returns the statuses of a camera over the frames that were not dropped; consecutive equal statuses are merged.
 std::vector<CameraInterval> camera_intervals(std::span<const RunFrame> frames, std::size_t camera);

@@ -113,6 +113,15 @@ camera::Rig with_refined_calibration(const camera::Rig& found, const dataset::Da
   return dataset.whole_rig ? dataset.whole_rig->with_calibration_of(found, dataset.cameras_used) : found;
 }
 
+// The map at the end of the run; without metric scale if that means nothing.
+map::MapSnapshot map_of(const system::System& system, const RunRecord& record) {
+  const map::MapSnapshot map = system.snapshot();
+  if (!record.calibration.foreign_images() || map->scale() != map::Scale::kMetric) return map;
+  map::BundledMap copy = *map;
+  copy.set_scale(map::Scale::kUnobservable);
+  return std::make_shared<const map::BundledMap>(std::move(copy));
+}
+
 }  // namespace
 
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options) {
@@ -149,10 +158,10 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
                                 .start_up_s = start_up_s,
                                 .wall_s = wall_s},
                                system.take_frames());
-  result.map = system.snapshot();
+  result.map = map_of(system, result.record);
   result.rig = system.rig();
   result.calibration = system.calibration();
-  if (system.calibration_refined()) result.refined_rig = with_refined_calibration(*result.rig, dataset);
+  if (result.record.calibration.refined) result.refined_rig = with_refined_calibration(*result.rig, dataset);
   result.journal = system.journal();
   return result;
 }

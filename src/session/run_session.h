@@ -45,7 +45,8 @@ struct SessionResult {
   map::MapSnapshot map;                    // its rig may have further cameras, if a map was loaded
   std::optional<camera::Rig> rig;          // that of the run, with the calibration of the map
   calibration::RigRefinement calibration;  // the estimate of the calibration at the end of the run
-  // If extrinsics were refined: the calibration of all cameras, with refined extrinsics for those in use.
+  // If the calibration was refined and the estimate applies (CalibrationRecord::refined): the calibration of all
+  // cameras, with the estimate for those in use.
   std::optional<camera::Rig> refined_rig;
   execution::Journal journal;
   // If set: subtracted from the times of all poses that are written, so that they are time stamps of images. The times

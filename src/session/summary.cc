@@ -24,18 +24,15 @@ double mean_of(double sum, std::size_t count) {
 }
 
 ordered_json frames_json(const RunRecord& record) {
-  const auto count = [&](FrameOutcome outcome) {
-    return std::ranges::count(record.frames, outcome, &RunFrame::outcome);
-  };
   ordered_json intervals = ordered_json::array();
   for (const LostInterval& interval : lost_intervals(record)) {
     intervals.push_back(
         {{"from", seconds(interval.from_s)}, {"to", seconds(interval.to_s)}, {"reason", interval.reason}});
   }
   return {{"input", record.frames.size()},
-          {"tracked", count(FrameOutcome::kTracked)},
-          {"lost", count(FrameOutcome::kLost)},
-          {"dropped", count(FrameOutcome::kDropped)},
+          {"tracked", count(record, FrameOutcome::kTracked)},
+          {"lost", count(record, FrameOutcome::kLost)},
+          {"dropped", count(record, FrameOutcome::kDropped)},
           {"in_loaded_map", record.map.loaded ? ordered_json(frames_in_loaded_map(record)) : ordered_json()},
           {"lost_intervals", intervals}};
 }
@@ -107,8 +104,21 @@ ordered_json calibration_json(const RunRecord& record) {
   ordered_json cameras = ordered_json::array();
   for (std::size_t c = 0; c < estimate.cameras.size() && c < record.cameras.size(); ++c)
     cameras.push_back(calibrated_camera_json(record.cameras[c].name, estimate.cameras[c]));
-  return {{"verdict", calibration::verdict_name(estimate.verdict)},
+  ordered_json pairs = ordered_json::array(), disagreeing = ordered_json::array();
+  for (const calibration::CameraPair& pair : record.calibration.pairs) {
+    pairs.push_back(
+        {{"cameras", {record.cameras[pair.first].name, record.cameras[pair.second].name}},
+         {"overlap", rounded(pair.overlap, 3)},
+         {"matched_share", rounded(pair.matched_share(), 5)},
+         {"contradicted", pair.contradicted},
+         {"evidence", pair.evidence ? ordered_json(calibration::describe_pair(*pair.evidence)) : ordered_json()}});
+  }
+  for (const std::size_t c : record.calibration.disagreeing) disagreeing.push_back(record.cameras[c].name);
+  return {{"verdict", calibration::verdict_name(record.calibration.verdict())},
           {"excess_error", estimate.done ? rounded(estimate.excess_error, 4) : ordered_json()},
+          {"excess_bound", rounded(record.calibration.excess_bound, 4)},
+          {"pairs", pairs},
+          {"disagreeing", disagreeing},
           {"refined", record.calibration.refined},
           {"cameras", cameras}};
 }
@@ -193,31 +203,31 @@ DurationStatistics duration_statistics(std::vector<double> durations_ms) {
 }
 
 ordered_json summary_json(const RunRecord& record) {
-  return {
-      {"schema", 1},
-      {"version", record.version},
-      {"complete", record.complete},
-      {"data", record.data},
-      {"mode", record.mode},
-      {"seed", record.seed},
-      {"cameras_used", record.cameras_used},
-      {"frames", frames_json(record)},
-      {"cameras", cameras_json(record)},
-      {"calibration", calibration_json(record)},
-      {"features", features_json(record)},
-      {"map",
-       {{"keyframes", record.map.keyframes},
-        {"landmarks", record.map.landmarks},
-        {"observations", record.map.observations},
-        {"scale", record.map.scale},
-        {"scale_std", record.map.scale_deviation ? rounded(*record.map.scale_deviation, 4) : ordered_json(nullptr)},
-        {"loaded", record.map.loaded}}},
-      {"loops", events_json(record.loops)},
-      {"relocalisations", events_json(record.relocalisations)},
-      {"maps_started", record.maps_started},
-      {"parts", submaps_json(record.submaps)},  // the submaps; the key is kept for compatibility
-      {"time", time_json(record)},
-      {"memory", {{"peak_mb", record.peak_memory_mb ? rounded(*record.peak_memory_mb, 1) : ordered_json(nullptr)}}}};
+  return {{"schema", 1},
+          {"version", record.version},
+          {"complete", record.complete},
+          {"data", record.data},
+          {"mode", record.mode},
+          {"seed", record.seed},
+          {"cameras_used", record.cameras_used},
+          {"frames", frames_json(record)},
+          {"cameras", cameras_json(record)},
+          {"calibration", calibration_json(record)},
+          {"features", features_json(record)},
+          {"map",
+           {{"keyframes", record.map.keyframes},
+            {"landmarks", record.map.landmarks},
+            {"observations", record.map.observations},
+            {"scale", record.map.scale},
+            {"scale_std", record.map.scale_deviation ? rounded(*record.map.scale_deviation, 4) : ordered_json(nullptr)},
+            {"loaded", record.map.loaded}}},
+          {"loops", events_json(record.loops)},
+          {"relocalisations", events_json(record.relocalisations)},
+          {"maps_started", record.maps_started},
+          {"parts", submaps_json(record.submaps)},  // the submaps; the key is kept for compatibility
+          {"time", time_json(record)},
+          {"memory", {{"peak_mb", record.peak_memory_mb ? rounded(*record.peak_memory_mb, 1) : ordered_json(nullptr)}}},
+          {"warnings", record.warnings}};
 }
 
 std::string summary_text(const RunRecord& record) {

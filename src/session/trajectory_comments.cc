@@ -3,13 +3,25 @@
 #include <fmt/format.h>
 
 namespace bslam::session {
+namespace {
+
+// The frame of the poses: that of the first camera of the run, which is cam0 if it is the first camera of the rig.
+std::string frame_name(const RunRecord& record) {
+  if (record.cameras_used.empty() || record.cameras_used.front() == 0 || record.cameras.empty()) return "cam0";
+  const std::string& name = record.cameras.front().name;
+  const bool is_word = !name.empty() && name.find_first_of(" \t\r\n:") == std::string::npos;
+  return is_word ? name : "cam" + std::to_string(record.cameras_used.front());
+}
+
+}  // namespace
 
 std::string trajectory_comments(const RunRecord& record, std::span<const system::SubmapTrajectory> submaps,
                                 std::size_t index, evaluation::PoseState state) {
   const bool has_poses = index < submaps.size();
   const bool separate = has_poses && (index > 0 || (record.map.loaded && !submaps[index].loaded));
-  std::string text =
-      evaluation::trajectory_header("cam0", state, separate ? fmt::format("world_of_submap_{}", index + 1) : "world");
+  std::string text = evaluation::trajectory_header(frame_name(record), state,
+                                                   separate ? fmt::format("world_of_submap_{}", index + 1) : "world");
+  if (record.map.scale != "metric") text += "\n# " + evaluation::scale_comment(record.map.scale);
   if (submaps.size() > 1) {
     text += fmt::format("\n# submap {} of {}, each with its own world frame: {} of the {} frames have a pose in it",
                         index + 1, submaps.size(), submaps[index].poses.size(), record.frames.size());

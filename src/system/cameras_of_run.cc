@@ -27,6 +27,12 @@ Status check_settings(const Config& config, const map::BundledMap& map, const ca
                "auto or false: the calibration of this run is kept as given"};
 }
 
+void note_other_rigs(const map::BundledMap& map, const camera::Rig& rig, Config& config) {
+  if (!shared_with_other_rigs(map, rig)) return;
+  config.calibration.refine = calibration::Refine::kFalse;
+  config.calibration.check = false;
+}
+
 image::ImageBundle widened(const image::ImageBundle& images, CamerasOfRun cameras, std::size_t all) {
   image::ImageBundle out{images.id, images.time_ns, std::vector<image::CameraImage>(all)};
   for (std::size_t c = 0; c < images.images.size(); ++c) {

@@ -18,6 +18,8 @@ bool shared_with_other_rigs(const map::BundledMap& map, const camera::Rig& rig);
 // Checks the settings of a run with `rig` in the loaded map: in a map with other rigs, the calibration cannot be
 // refined.
 Status check_settings(const Config& config, const map::BundledMap& map, const camera::Rig& rig);
+// Sets what is in force in a map with other rigs: the calibration is not estimated.
+void note_other_rigs(const map::BundledMap& map, const camera::Rig& rig, Config& config);
 
 // The images as those of the map's rig, which has `all` cameras: the other cameras have no images. The pixels are
 // borrowed from `images`.

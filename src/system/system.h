@@ -73,6 +73,8 @@ class System {
 
   // The map. Its rig contains that of the run; if it was loaded, it may have cameras of other rigs as well.
   map::MapSnapshot snapshot() const { return store_.snapshot(); }
+  // Keyframes before this one belong to a loaded map.
+  KeyframeId first_keyframe() const { return first_keyframe_; }
   // Index in the rig of the map of the first camera of the run; the others follow in order.
   std::size_t first_camera() const { return cameras_.first; }
   // The rig of the run with its present calibration, that of the map.

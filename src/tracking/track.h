@@ -35,7 +35,8 @@ struct CameraCounts {
   // Extracted keypoints, those matched to landmarks, and inliers; in a frame that was tracked directly: landmarks
   // searched for, aligned, and inliers.
   int keypoints = 0, matched = 0, inliers = 0;
-  bool excluded = false;  // its image is not consistent with the map (tracking/camera_consensus.h)
+  double squared_error_px2 = 0;  // sum of the squared reprojection errors of the inliers in the map of that time
+  bool excluded = false;         // its image is not consistent with the map (tracking/camera_consensus.h)
 };
 
 struct TrackResult {

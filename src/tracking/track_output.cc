@@ -19,6 +19,21 @@ std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const 
   return counts;
 }
 
+// Adds the reprojection errors of the inliers. Landmarks behind a camera count as none.
+void add_errors(const map::BundledMap& map, const frame::BundledFrame& frame, const geometry::SE3& T_rig_world,
+                const FrameMatches& inliers, std::vector<CameraCounts>& counts) {
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  for (std::size_t c = 0; c < inliers.size(); ++c) {
+    const geometry::SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
+    for (const Match& m : inliers[c]) {
+      const Eigen::Vector2d pixel = frame.cameras[c].keypoints.pixel[m.keypoint.index()].cast<double>();
+      const Eigen::Vector3d point = T_cam_world * map.landmark(m.landmark).position;
+      const auto projected = rig.camera(c).project(rig.shutter(c).at_row(point, pixel.y()));
+      if (projected) counts[c].squared_error_px2 += (pixel - *projected).squaredNorm();
+    }
+  }
+}
+
 // Each landmark predicted visible counts once, even if it is visible in several cameras.
 void count_visibility(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found,
                       TrackerState& state) {
@@ -93,6 +108,7 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found) {
   result.reason = LostReason::kNone;
   result.T_rig_world = found.solution.T_rig_world;
   result.cameras = camera_counts(frame, found.matches, out.matches);
+  add_errors(map, frame, result.T_rig_world, out.matches, result.cameras);
   out.matched = std::move(found.matches);
 
   TrackerState& state = out.state;

@@ -35,6 +35,7 @@ namespace bslam::video {
   F(av_frame_free)                \
   F(av_frame_unref)               \
   F(av_rescale_q)                 \
+  F(av_strerror)                  \
   F(av_log_set_level)
 #define BSLAM_SWSCALE_FUNCTIONS(F) \
   F(sws_getCachedContext)          \

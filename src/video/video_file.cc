@@ -84,9 +84,14 @@ std::string Decoder::open(const std::string& path) {
   if (packet_ == nullptr || frame_ == nullptr) return "no memory";
   // The protocol is named, since a path may look like an address.
   const std::string url = "file:" + path;
-  if (f_.avformat_open_input(&format_, url.c_str(), nullptr, nullptr) < 0)
-    return "a file that is no bag, and no video that FFmpeg can read";
-  if (f_.avformat_find_stream_info(format_, nullptr) < 0) return "a video without readable streams";
+  const auto reason = [this](int error) {
+    char text[AV_ERROR_MAX_STRING_SIZE] = {};
+    return f_.av_strerror(error, text, sizeof(text)) < 0 ? std::string() : fmt::format(" ({})", text);
+  };
+  if (const int error = f_.avformat_open_input(&format_, url.c_str(), nullptr, nullptr); error < 0)
+    return "a file that is no bag, and no video that FFmpeg can read" + reason(error);
+  if (const int error = f_.avformat_find_stream_info(format_, nullptr); error < 0)
+    return "a video without readable streams" + reason(error);
   const AVCodec* codec = nullptr;
   stream_ = f_.av_find_best_stream(format_, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
   if (stream_ < 0 || codec == nullptr) return "no video stream with a supported codec";
@@ -94,7 +99,8 @@ std::string Decoder::open(const std::string& path) {
   if (codec_ == nullptr || f_.avcodec_parameters_to_context(codec_, &parameters()) < 0) return "no memory";
   codec_->thread_count = 2;
   codec_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM;
-  if (f_.avcodec_open2(codec_, codec, nullptr) < 0) return "a codec that cannot be opened";
+  if (const int error = f_.avcodec_open2(codec_, codec, nullptr); error < 0)
+    return "a codec that cannot be opened" + reason(error);
   for (unsigned k = 0; k < format_->nb_streams; ++k)
     format_->streams[k]->discard = static_cast<int>(k) == stream_ ? AVDISCARD_DEFAULT : AVDISCARD_ALL;
   return "";

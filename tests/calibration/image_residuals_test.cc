@@ -36,6 +36,10 @@ TEST(ImageResiduals, OfATrueMapAreTheNoise) {
     observations += r.observations;
   }
   EXPECT_GT(observations, 0u);
+  const auto later = image_residuals(simulated.map, KeyframeId(6));
+  EXPECT_GT(later[0].observations, 0u);
+  EXPECT_LT(later[0].observations, residuals[0].observations);
+  EXPECT_EQ(image_residuals(simulated.map, KeyframeId(12))[0].observations, 0u);
 }
 
 // A focal length that is 2 % too short projects points closer to the centre, so the residuals point outward.

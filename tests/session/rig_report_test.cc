@@ -9,6 +9,8 @@
 #include "camera/stereo_rig.h"
 #include "rig_formats/rig_file.h"
 #include "simulator/simulation_writer.h"
+#include "support/bag_writer.h"
+#include "support/data_on_disk.h"
 #include "synthetic/rigs.h"
 
 namespace bslam::session {
@@ -53,6 +55,34 @@ TEST_F(RigReport, WarnsOfAnUnusableMask) {
   ASSERT_TRUE(text);
   EXPECT_NE(text->find("warning: mask of "), std::string::npos) << *text;
   EXPECT_NE(text->find("none.png"), std::string::npos) << *text;
+}
+
+TEST_F(RigReport, DescribesTheCalibrationOfABag) {
+  std::vector<support::TestMessage> messages;
+  for (int c = 0; c < 2; ++c) {
+    const std::string topic = "/cam" + std::to_string(c);
+    const support::TestCalibration info{32,
+                                        24,
+                                        "plumb_bob",
+                                        {0, 0, 0, 0, 0},
+                                        {20, 0, 15.5, 0, 20, 11.5, 0, 0, 1},
+                                        {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                                        {20, 0, 15.5, c == 0 ? 0 : -20 * 0.11, 0, 20, 11.5, 0, 0, 0, 1, 0}};
+    const support::TestImage image{1'000'000'000, 32, 24, 32, "mono8", std::string(32 * 24, 'x')};
+    messages.push_back({topic + "/camera_info", "sensor_msgs/CameraInfo", 1'000'000'000,
+                        support::calibration_message(support::Wire::kRos1, info)});
+    messages.push_back({topic + "/image_raw", "sensor_msgs/Image", 1'000'000'000,
+                        support::image_message(support::Wire::kRos1, image)});
+  }
+  const fs::path bag = folder_ / "small.bag";
+  support::write_text(bag, support::rosbag1_bytes(messages));
+  const auto text = report_rig({.file = bag.string()});
+  ASSERT_TRUE(text) << text.error().message();
+  EXPECT_NE(text->find("format: CameraInfo of a bag\n2 cameras\n"), std::string::npos) << *text;
+  EXPECT_NE(text->find("11.0 cm"), std::string::npos) << *text;
+  messages.resize(1);  // a bag without images
+  support::write_text(bag, support::rosbag1_bytes(messages));
+  EXPECT_FALSE(report_rig({.file = bag.string()}));
 }
 
 // The complete test: images, features, verdict.

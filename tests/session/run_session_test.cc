@@ -175,6 +175,25 @@ TEST_F(Session, WritesTheReportIfItIsAskedFor) {
   EXPECT_LT(json["truth"]["ate_m"]["rmse"], 0.05);
 }
 
+// Poses of camera 0 beside mav0 are ground truth as well.
+TEST_F(Session, ReportComparesWithTheTruthOfCamera0) {
+  const fs::path linked = folder() / "linked";
+  fs::create_directories(linked / "mav0");
+  for (const char* camera : {"mav0/cam0", "mav0/cam1"})
+    fs::create_directory_symlink(folder() / "data" / camera, linked / camera);
+  fs::copy_file(folder() / "data/groundtruth_cam0.tum", linked / "groundtruth_cam0.tum");
+  for (const std::vector<int>& cameras : {std::vector{0, 1}, std::vector{1, 0}}) {
+    const auto data = dataset::open_dataset({.path = linked, .cameras = cameras});
+    ASSERT_TRUE(data);
+    ASSERT_TRUE(data->ground_truth);
+    const auto result = run_session(*data, options());
+    ASSERT_TRUE(result.ok());
+    const auto truth = report_json(*result, options().config, {*data, ""})["truth"];
+    EXPECT_EQ(truth["file"], "groundtruth_cam0.tum");
+    EXPECT_LT(truth["ate_m"]["rmse"], 0.01) << truth["ate_m"];
+  }
+}
+
 TEST_F(Session, ReportsOfEqualRunsDifferInTimesOnly) {
   const dataset::Dataset data = dataset();
   const SessionOptions o = options();
@@ -265,6 +284,17 @@ TEST_F(Session, ContinuesTheMapOfAnEarlierRun) {
   ASSERT_EQ(second->record.relocalisations.size(), 1u);
   EXPECT_EQ(second->record.relocalisations.front().at_s, 0.0);
   EXPECT_GE(second->record.relocalisations.front().inliers, 50);
+  // The residuals are those of the run, not of the map.
+  for (std::size_t c = 0; c < 2; ++c) {
+    const calibration::ImageResiduals &of_run = second->record.cameras[c].residuals,
+                                      &of_map = first->record.cameras[c].residuals;
+    std::int64_t inliers = 0;
+    for (const RunFrame& frame : second->record.frames) inliers += frame.record->final_result().cameras[c].inliers;
+    EXPECT_EQ(of_run.observations, static_cast<std::size_t>(inliers));
+    EXPECT_NE(of_run.observations, of_map.observations);
+    EXPECT_GT(of_run.rms_px, 0.3 * of_map.rms_px);
+    EXPECT_LT(of_run.rms_px, 3 * of_map.rms_px);
+  }
 }
 
 TEST_F(Session, TracksAllFramesInParallelMode) {

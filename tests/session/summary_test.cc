@@ -35,12 +35,14 @@ TEST(Summary, HasTheDocumentedKeysInOrder) {
   record.loops = {{43.1, 1.2, 83}};
   record.relocalisations = {{12.4, 3.15, 60}};
   record.frames = {frame(1.25, LostReason::kFewMatches)};
+  record.warnings = {"cam0: blurred"};
   add_stage_sample(record, "extract", StageThread::kCaller, {0.0, 9.1});
   const ordered_json json = summary_json(record);
   EXPECT_EQ(keys(json),
             (std::vector<std::string>{"schema", "version", "complete", "data", "mode", "seed", "cameras_used", "frames",
                                       "cameras", "calibration", "features", "map", "loops", "relocalisations",
-                                      "maps_started", "parts", "time", "memory"}));
+                                      "maps_started", "parts", "time", "memory", "warnings"}));
+  EXPECT_EQ(json["warnings"].dump(), R"(["cam0: blurred"])");
   EXPECT_EQ(keys(json["frames"]),
             (std::vector<std::string>{"input", "tracked", "lost", "dropped", "in_loaded_map", "lost_intervals"}));
   EXPECT_EQ(json["frames"]["lost_intervals"].dump(), R"([{"from":1.25,"to":1.25,"reason":"too few matches"}])");
@@ -73,6 +75,28 @@ TEST(Summary, ReportsFramesTimesAndFileOfEverySubmap) {
   EXPECT_EQ(json["parts"].dump(),
             R"([{"frames":60,"from":0.05,"to":7.5,"loaded":false,"trajectory":"trajectory.tum"},)"
             R"({"frames":12,"from":4.0,"to":5.25,"loaded":true,"trajectory":"trajectory_part2.tum"}])");
+}
+
+// An estimate of the calibration is neither offered after an interruption nor if the images belong to another rig.
+TEST(Summary, CalibrationIsRefinedOnlyByAnEstimateThatApplies) {
+  CalibrationRecord calibration;
+  calibration.accept_estimate(true, true);
+  EXPECT_FALSE(calibration.refined);  // a run that was stopped before its last estimate
+  calibration.estimate.done = true;
+  calibration.estimate.verdict = calibration::Verdict::kConsistent;
+  calibration.accept_estimate(false, true);
+  EXPECT_FALSE(calibration.refined);
+  calibration.accept_estimate(true, true);
+  EXPECT_TRUE(calibration.refined);
+  EXPECT_EQ(calibration.verdict(), calibration::Verdict::kConsistent);
+  calibration.disagreeing = {1};
+  EXPECT_EQ(calibration.verdict(), calibration::Verdict::kUnknown);
+  calibration.pairs = {{.first = 0, .second = 1}};
+  EXPECT_EQ(calibration.verdict(), calibration::Verdict::kUnknown);
+  calibration.pairs.front().contradicted = true;
+  calibration.accept_estimate(true, true);
+  EXPECT_FALSE(calibration.refined);
+  EXPECT_EQ(calibration.verdict(), calibration::Verdict::kInconsistent);
 }
 
 TEST(Summary, CountsFramesByOutcome) {

@@ -29,6 +29,21 @@ TEST(TrajectoryComments, ARunWithoutLossesHasItsHeaderOnly) {
             "bslam trajectory frame=cam0 parent=world final=false");
 }
 
+TEST(TrajectoryComments, NameTheCameraOfTheRunAndAScaleThatIsNotMetric) {
+  RunRecord record;
+  record.frames = {frame(0)};
+  record.cameras_used = {2, 0};
+  record.cameras = {{.name = "right", .states = {}}, {.name = "left", .states = {}}};
+  record.map.scale = "up-to-scale";
+  const std::vector<system::SubmapTrajectory> one = {submap(1, false)};
+  EXPECT_EQ(trajectory_comments(record, one, 0, PoseState::kFinal),
+            "bslam trajectory frame=right parent=world final=true\n# scale=up-to-scale: lengths are not in metres");
+  record.cameras.front().name = "right camera";  // frames are single words
+  EXPECT_TRUE(trajectory_comments(record, one, 0, PoseState::kFinal).starts_with("bslam trajectory frame=cam2 "));
+  record.cameras_used = {0, 2};
+  EXPECT_TRUE(trajectory_comments(record, one, 0, PoseState::kFinal).starts_with("bslam trajectory frame=cam0 "));
+}
+
 TEST(TrajectoryComments, NameSubmapsAndLosses) {
   RunRecord record;
   record.frames = {frame(0), frame(0.05, tracking::LostReason::kFewMatches),

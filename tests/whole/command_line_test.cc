@@ -278,6 +278,17 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
       run(path + " --format kitti --frame cam1 --axes ros --map " + out("saved.map") + " --out " + out("k.txt")).status,
       0);
   expect_rejected(path + " --frame nobody --out " + out("wrong"));
+  const std::string nav2 = "map export " + out("saved.map") + " --format nav2 --out ";
+  const Ran tilted = run(nav2 + out("tilted")), level = run(nav2 + out("level") + " --up body:z");
+  EXPECT_NE(tilted.err.find("note: upward is that of camera 0 on average"), std::string::npos) << tilted.err;
+  EXPECT_EQ(level.status, 0) << level.err;
+  EXPECT_EQ(level.err, "");
+  expect_rejected("map export " + out("saved.map") + " --format ply --up body:z --out " + out("wrong"));
+  expect_rejected(nav2 + out("wrong") + " --up sky");
+  expect_rejected(path + " --up body:z --out " + out("wrong"));
+  ASSERT_EQ(run(path + " --axes ros --up body:z --out " + out("upright.tum")).status, 0);
+  EXPECT_NE(slurp(out("upright.tum")).find("frame=cam0_ros parent=world_ros "), std::string::npos);
+  expect_rejected("export " + out("upright.tum") + " --out " + out("wrong"));
   expect_rejected("export " + out("saved") + "/trajectory.tum --frame body --out " + out("wrong"));
 
   const auto localised = summary_of("localised", "--cameras 0,1 --localize-only --load-map " + out("saved.map"));
@@ -293,8 +304,47 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
   EXPECT_EQ(run("map info " + out("grown.map")).status, 0);
   const auto one_camera = summary_of("one_camera", "--cameras 0 --localize-only --load-map " + out("saved.map"));
   EXPECT_EQ(one_camera["frames"]["tracked"], 15);
+  run("run " + data() + " --out " + out("second_rig") + " --cameras 2,3 --end 0.5 --load-map " + out("saved.map"));
+  EXPECT_NE(slurp(out("second_rig") + "/config.yaml").find("\n  refine: false"), std::string::npos);
   expect_rejected("run " + data() + " --out " + out("rejected") +
                   " --cameras 2,3 --set calibration.refine=true --load-map " + out("saved.map"));
+}
+
+// A trajectory names the camera whose poses it contains, and conversions use that.
+TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
+  summary_of("second", "--cameras 1,0 --mode sequential");
+  const std::string trajectory = out("second") + "/trajectory.tum", truth = data() + "/groundtruth_cam0.tum";
+  const camera::Rig rig = rig_formats::read_rig(data() + "/rig.yaml").value();
+  EXPECT_NE(slurp(trajectory).find("# bslam trajectory frame=" + rig.camera(1u).name + " parent=world final=true\n"),
+            std::string::npos);
+  const Ran without = run("eval " + trajectory + " " + truth + " --json");
+  EXPECT_NE(without.err.find("contains poses of " + rig.camera(1u).name), std::string::npos) << without.err;
+  const Ran with = run("eval " + trajectory + " " + truth + " --json --rig " + data());
+  EXPECT_EQ(with.err, "");
+  EXPECT_LT(nlohmann::json::parse(with.out)["ate"]["rmse"], nlohmann::json::parse(without.out)["ate"]["rmse"]);
+  const std::string body = "export " + trajectory + " --frame body --rig " + data() + " --out ";
+  ASSERT_EQ(run(body + out("body.tum")).status, 0);
+  const Ran same =
+      run("eval " + trajectory + " " + out("body.tum") + " --gt-frame body --rig " + data() + " --align none --json");
+  EXPECT_LT(nlohmann::json::parse(same.out)["ate"]["max"], 1e-6) << same.err;
+  const Ran other = run(body + out("other.tum") + " --camera 0");
+  EXPECT_NE(other.err.find("but --camera 0 is "), std::string::npos) << other.err;
+  std::ofstream(out("scaled.tum")) << "# bslam trajectory frame=cam0 parent=world final=true\n"
+                                   << "# scale=up-to-scale: lengths are not in metres\n"
+                                   << slurp(truth);
+  const Ran scaled = run("eval " + out("scaled.tum") + " " + truth);
+  EXPECT_NE(scaled.err.find("use --align sim3"), std::string::npos) << scaled.err;
+  EXPECT_EQ(run("eval " + out("scaled.tum") + " " + truth + " --align sim3").err, "");
+}
+
+TEST_F(CommandLine, ExplainsAPortAfterViewAndARigOfAnotherResolution) {
+  const Ran port = run("run " + data() + " --out " + out("rejected") + " --view 9000");
+  EXPECT_EQ(port.status, 2);
+  EXPECT_EQ(port.err, "bslam: unexpected '9000'; did you mean '--view=9000'?\n");
+  ASSERT_TRUE(rig_formats::write_rig(synthetic::ring_rig(4, 240), out("other_size.yaml")));
+  const Ran info = run("data info " + data() + " --rig " + out("other_size.yaml"));
+  EXPECT_NE(info.out.find("missing for bslam run: the calibration of 376 x 240 pixels"), std::string::npos) << info.out;
+  EXPECT_EQ(run("data info " + data() + " --rig " + data() + "/rig.yaml").out.find("missing"), std::string::npos);
 }
 
 TEST_F(CommandLine, VocabulariesCanBeTrainedDescribedAndUsed) {
@@ -359,7 +409,17 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
   ASSERT_TRUE(rig_formats::write_rig(calibration::with_inverse_extrinsics(rig), out("inverse.yaml")));
   const std::string options = " --set features.per_image=500 --progress never --rig ";
   const Ran inverse = run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse"));
-  EXPECT_NE(inverse.err.find("of the features are matched between"), std::string::npos) << inverse.err;
+  EXPECT_NE(inverse.err.find("warning: the images do not belong to the calibration"), std::string::npos) << inverse.err;
+  EXPECT_NE(inverse.out.find("calibration: the images do not belong to it"), std::string::npos) << inverse.out;
+  const auto of_inverse = nlohmann::json::parse(slurp(out("inverse") + "/summary.json"));
+  EXPECT_EQ(of_inverse["calibration"]["verdict"], "inconsistent");
+  EXPECT_EQ(of_inverse["calibration"]["refined"], false);
+  EXPECT_EQ(of_inverse["map"]["scale"], "unobservable");
+  EXPECT_FALSE(fs::exists(out("inverse") + "/rig_refined.yaml"));
+  for (const auto& warning : of_inverse["warnings"])
+    EXPECT_NE(inverse.err.find("warning: " + warning.get<std::string>() + "\n"), std::string::npos) << warning;
+  EXPECT_EQ(of_inverse["warnings"].size(),
+            static_cast<std::size_t>(std::count(inverse.err.begin(), inverse.err.end(), '\n')));
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const geometry::SE3& T = rig.body_from_cam(c);
@@ -382,22 +442,28 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
       << ran.err;
   const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
   EXPECT_EQ(right.err, "");
+  const auto of_right = nlohmann::json::parse(slurp(out("right") + "/summary.json"));
+  EXPECT_EQ(of_right["map"]["scale"], "metric");
+  EXPECT_TRUE(of_right["warnings"].empty());
+  EXPECT_TRUE(of_right["calibration"]["pairs"].empty());
 }
 
 TEST_F(CommandLine, BenchReportsEverySequenceAndFailsIfOneFailed) {
   const fs::path root = folder_ / "sequences";
   fs::create_directories(root / "broken/mav0/cam0");
   fs::create_directory_symlink(data(), root / "tour");
-  const Ran ran = run("bench " + root.string() + " --runs 2 --out " + out("bench") +
+  const Ran ran = run("bench " + root.string() + " --runs 5 --out " + out("bench") +
                       " --mode sequential --cameras 0,1 --set features.per_image=500");
   EXPECT_EQ(ran.status, 2) << ran.err;
   const std::string report = slurp(out("bench") + "/report.md");
   EXPECT_EQ(ran.out, report);
-  EXPECT_NE(report.find("| broken | none: no errors | 2 | - | - | - | - | - / - | - | 2 of 2 runs failed: "),
+  EXPECT_NE(report.find("| broken | none: no errors | 5 | - | - | - | - | - / - | - | 5 of 5 runs failed: "),
             std::string::npos)
       << report;
   EXPECT_NE(report.find("| tour | body | 2 | 0.0"), std::string::npos) << report;
   EXPECT_NE(report.find("| 15 of 15 |"), std::string::npos) << report;
+  EXPECT_NE(report.find("deterministic: the first two runs are identical"), std::string::npos) << report;
+  EXPECT_FALSE(fs::exists(out("bench") + "/tour/run3"));
   EXPECT_NE(slurp(out("bench") + "/report.html").find("<td>tour</td>"), std::string::npos);
   EXPECT_TRUE(fs::exists(out("bench") + "/tour/run2/trajectory.tum"));
 }

@@ -4,7 +4,17 @@ import { decimal, h, table } from './dom';
 
 export function verdictSentence(run: Run): string {
   const c = run.summary.calibration;
-  const excess = c.excess_error === null ? '' : ` With it the mean squared error is ${decimal(100 * c.excess_error, 1)} % larger than with the best estimate.`;
+  const foreign = c.pairs.filter((p) => p.contradicted);
+  const shares = (foreign.length ? foreign : c.pairs)
+    .map((p) => `${p.cameras.join(' and ')} share ${decimal(100 * p.matched_share, 1)} % of the features in their common view`).join('; ');
+  if (foreign.length) {
+    return `The images do not belong to the calibration, so poses, scale and map are wrong: ${shares}; ${foreign[0].evidence}.`;
+  }
+  if (c.verdict === 'unknown' && (shares || c.disagreeing.length)) {
+    const disagreeing = c.disagreeing.map((name) => `${name} shows other things than the map predicts`);
+    return `Whether the images agree with the calibration cannot be told: ${[shares, ...disagreeing].filter((text) => text).join('; ')}.`;
+  }
+  const excess = c.excess_error === null ? '' : ` With it the mean squared error is ${decimal(100 * c.excess_error, 1)} % larger than with the best estimate; the bound is ${decimal(100 * c.excess_bound, 1)} %.`;
   const texts = {
     consistent: `The images agree with the calibration.${excess}`,
     inconsistent: `The images contradict the calibration.${excess}`,

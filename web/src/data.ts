@@ -16,6 +16,9 @@ export interface CalibratedCamera {
   readout_ms: number; readout_std_ms: number | null;
 }
 
+// Cameras that should see the same things but do not.
+export interface CameraPair { cameras: string[]; overlap: number; matched_share: number; contradicted: boolean; evidence: string | null }
+
 export interface SummaryCamera {
   name: string; images: number; skipped: number;
   states: CameraInterval[];
@@ -29,7 +32,8 @@ export interface Summary {
   frames: { input: number; tracked: number; lost: number; dropped: number; in_loaded_map: number | null; lost_intervals: Interval[] };
   cameras: SummaryCamera[];
   calibration: {
-    verdict: 'consistent' | 'inconsistent' | 'unknown'; excess_error: number | null; refined: boolean;
+    verdict: 'consistent' | 'inconsistent' | 'unknown'; excess_error: number | null; excess_bound: number; refined: boolean;
+    pairs: CameraPair[]; disagreeing: string[];
     cameras: CalibratedCamera[];
   };
   features: { keypoints_per_image: number | null; unique: number | null; monocular: number | null; matched: number | null };
@@ -40,6 +44,7 @@ export interface Summary {
   maps_started: number;
   time: { start_up_s: number; wall_s: number; frame_ms: Statistics; stages_ms: Record<string, Statistics> };
   memory: { peak_mb: number | null };
+  warnings: string[];
 }
 
 export interface RigCamera {

@@ -53,7 +53,10 @@ export function findings(run: Run): Finding[] {
   const grade = { consistent: 'fine', inconsistent: contradicted, unknown: 'note' } as const;
   list.push({ grade: grade[calibration.verdict], text: verdictSentence(run), target: 'calibration' });
   list.push(...faults(run));
-  const suspect = cameras.filter((c) => c.extrinsics?.suspect).map((c) => c.name);
+  const warnings = run.summary.warnings.length;
+  if (warnings) list.push({ grade: 'note', text: `The run printed ${plural(warnings, 'warning')}.`, target: 'warnings' });
+  const foreign = calibration.pairs.some((p) => p.contradicted);
+  const suspect = cameras.filter((c) => !foreign && c.extrinsics?.suspect).map((c) => c.name);
   if (suspect.length) list.push({ grade: contradicted, text: `The extrinsics are suspect: ${suspect.join(', ')}.`, target: 'calibration' });
   if (loops.length) list.push({ grade: 'result', text: `${plural(loops.length, 'loop')} closed.`, target: 'events' });
   const truth = run.truth;

@@ -45,6 +45,8 @@ function sections(map: MapSection): Section[] {
       note: 'The map is adjusted once more with free calibration. Bold: more than three standard deviations.' },
     { id: 'time', title: 'Time', draw: timingSection, note: 'Per frame from images to pose, and per call of each stage.' },
     { id: 'events', title: 'Events', draw: fromElements(eventsSection), note: '' },
+    { id: 'warnings', title: 'Warnings', when: (run) => run.summary.warnings.length > 0,
+      draw: fromElements((run) => [h('ul', {}, ...run.summary.warnings.map((text) => h('li', {}, text)))]), note: 'As printed by the run; docs/messages.md explains them.' },
     { id: 'settings', title: 'Settings', draw: remade(settingsSection, (run) => [run.command, run.settings]), note: 'With config.yaml the run can be repeated.' },
   ];
 }

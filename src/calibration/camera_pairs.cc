@@ -1,0 +1,134 @@
+#include "calibration/camera_pairs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "frame/capture_times.h"
+
+namespace bslam::calibration {
+namespace {
+
+constexpr std::size_t kMinKeypoints = 100;  // per image; images with fewer, of a dark or blank scene, tell nothing
+constexpr double kMuchOverlap = 0.4;        // of views of which some features are expected to be matched
+constexpr double kHardlyAny = 0.02;         // share of matched keypoints; 0.1 to 0.7 is usual
+constexpr double kEnough = 0.2;             // with this share a pair with much overlap needs no further test
+constexpr int kMinKeyframes = 2;            // for a statement about hardly any matches
+constexpr std::size_t kImagePairs = 24, kImagesPerPair = 8;  // maximum numbers that are matched again
+// Least change of a pose that no knock explains.
+constexpr double kOtherRotation_deg = 5, kOtherDisplacement_deg = 45;
+constexpr double kMinExplained = 0.4;  // share of matches that the other arrangement explains
+constexpr double kClearly = 2;         // times as many as the calibration explains
+
+const frame::CameraFrame& image_of(const map::BundledMap& map, KeyframeId k, std::size_t camera) {
+  return map.keyframe(k).frame->cameras[camera];
+}
+
+// The keyframes in which both cameras have an image of the same time with enough keypoints.
+std::vector<KeyframeId> common_keyframes(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
+                                         std::size_t i, std::size_t j) {
+  std::vector<KeyframeId> out;
+  for (const KeyframeId k : keyframes) {
+    const frame::CameraFrame &a = image_of(map, k, i), &b = image_of(map, k, j);
+    if (std::min(a.keypoints.size(), b.keypoints.size()) < kMinKeypoints) continue;
+    if (std::abs(a.time_ns - b.time_ns) <= frame::kTogetherNs) out.push_back(k);
+  }
+  return out;
+}
+
+// The number of features of a keyframe that have a keypoint in both cameras.
+int matched_in(const frame::Bundled& bundled, std::size_t i, std::size_t j) {
+  int matched = 0;
+  for (std::size_t f = 0; f < bundled.num_matched(); ++f) {
+    int found = 0;
+    for (const frame::KeypointRef& ref : bundled.keypoints(FeatureId(f)))
+      found += ref.camera.index() == i || ref.camera.index() == j;
+    matched += found == 2;
+  }
+  return matched;
+}
+
+feature::Detections keypoints_of(const map::BundledMap& map, KeyframeId k, std::size_t camera) {
+  const feature::Keypoints& keypoints = image_of(map, k, camera).keypoints;
+  feature::Detections out;
+  out.pixel = keypoints.pixel.copy();
+  out.descriptor = keypoints.descriptor.copy();
+  return out;
+}
+
+// The keypoints of both cameras in keyframes spread over `keyframes`.
+struct Views {
+  std::vector<feature::Detections> first, second;
+};
+
+Views spread_views(const map::BundledMap& map, std::span<const KeyframeId> keyframes, std::size_t i, std::size_t j,
+                   std::size_t most) {
+  Views out;
+  const std::size_t count = std::min(most, keyframes.size());
+  for (std::size_t n = 0; n < count; ++n) {
+    const KeyframeId k = keyframes[(2 * n + 1) * keyframes.size() / (2 * count)];
+    out.first.push_back(keypoints_of(map, k, i));
+    out.second.push_back(keypoints_of(map, k, j));
+  }
+  return out;
+}
+
+// The pair without evidence.
+CameraPair count_features(const map::BundledMap& map, std::span<const KeyframeId> keyframes, std::size_t first_camera,
+                          const camera::Rig& rig, std::size_t i, std::size_t j) {
+  const double of_i = rig.overlap_share(i, j), of_j = rig.overlap_share(j, i);
+  const std::size_t a = first_camera + i, b = first_camera + j;
+  CameraPair pair{
+      .first = i, .second = j, .overlap = std::max(of_i, of_j), .keyframes = static_cast<int>(keyframes.size())};
+  for (const KeyframeId k : keyframes) {
+    pair.common += std::min(of_i * static_cast<double>(image_of(map, k, a).keypoints.size()),
+                            of_j * static_cast<double>(image_of(map, k, b).keypoints.size()));
+    pair.matched += matched_in(map.keyframe(k).frame->bundled, a, b);
+  }
+  return pair;
+}
+
+bool explained_by(const PairEvidence& evidence) { return evidence.agreeing[0] >= kMinExplained * evidence.matches; }
+
+}  // namespace
+
+bool CameraPair::hardly_matched() const {
+  return overlap >= kMuchOverlap && keyframes >= kMinKeyframes && matched_share() < kHardlyAny;
+}
+
+bool shows_another_arrangement(const PairEvidence& evidence) {
+  const bool mistaken = evidence.verdict && *evidence.verdict != Convention::kAsGiven;
+  const bool elsewhere = evidence.other && (evidence.other->rotated_deg > kOtherRotation_deg ||
+                                            evidence.other->displaced_deg > kOtherDisplacement_deg);
+  if (!mistaken && !elsewhere) return false;
+  const int explained =
+      elsewhere ? evidence.other->agreeing : evidence.agreeing[static_cast<std::size_t>(*evidence.verdict)];
+  return explained >= kMinExplained * evidence.matches && explained >= kClearly * evidence.agreeing[0];
+}
+
+std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
+                                   std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig) {
+  std::vector<CameraPair> pairs;
+  std::vector<std::vector<KeyframeId>> common;
+  std::vector<std::uint8_t> sound(given.size(), 0);  // cameras with a pair that was matched
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    for (std::size_t j = i + 1; j < given.size(); ++j) {
+      common.push_back(common_keyframes(map, keyframes, first_camera + i, first_camera + j));
+      pairs.push_back(count_features(map, common.back(), first_camera, given, i, j));
+      if (pairs.back().overlap >= kMuchOverlap && pairs.back().matched_share() >= kEnough) sound[i] = sound[j] = 1;
+    }
+  }
+  const std::size_t images =
+      std::clamp<std::size_t>(kImagePairs / std::max<std::size_t>(pairs.size(), 1), 2, kImagesPerPair);
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    CameraPair& pair = pairs[p];
+    const std::size_t i = pair.first, j = pair.second;
+    if (common[p].empty() || (sound[i] && sound[j])) continue;
+    const Views views = spread_views(map, common[p], first_camera + i, first_camera + j, images);
+    pair.evidence = judge_pair(given, i, j, views.first, views.second);
+    pair.contradicted = shows_another_arrangement(*pair.evidence) &&
+                        !explained_by(judge_pair(final_rig, i, j, views.first, views.second));
+  }
+  return pairs;
+}
+
+}  // namespace bslam::calibration

@@ -1,0 +1,43 @@
+// Tests after a run whether its images belong to the calibration: cameras whose views overlap must see the same things
+// where the calibration says so. The refinement of a rig cannot tell, since it uses only matches that agree.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "calibration/convention_check.h"
+#include "map/bundled_map.h"
+
+namespace bslam::calibration {
+
+// The features of a run that two of its cameras share.
+struct CameraPair {
+  std::size_t first = 0, second = 0;  // cameras of the run
+  double overlap = 0;                 // largest fraction of the view of one of them that the other observes as well
+  int keyframes = 0;                  // in which both have an image of the same time with enough keypoints
+  // Number of keypoints in these keyframes that are in the common part of the views, for the camera with fewer of them,
+  // and how many of them were matched with a keypoint of the other camera.
+  double common = 0;
+  int matched = 0;
+  // Matches without the calibration; nullopt if enough keypoints were matched with it.
+  std::optional<PairEvidence> evidence = {};
+  bool contradicted = false;  // the evidence shows another arrangement of the cameras than the calibration
+
+  double matched_share() const { return common > 0 ? matched / common : 0; }
+  // Whether the views overlap and have features, but hardly any was matched.
+  bool hardly_matched() const;
+};
+
+// Whether the evidence shows that the images do not belong to the calibration, rather than a calibration that is
+// inaccurate or a camera that was knocked: nearly all matches are consistent with exchanged cameras, with inverted
+// transforms, or with a pose of the second camera that has nothing to do with the calibrated one.
+bool shows_another_arrangement(const PairEvidence& evidence);
+
+// All pairs of the cameras of a run, by keyframes `keyframes` of its map. `given` and `final_rig`: the calibration of
+// the run before and after its refinement, whose camera 0 is camera `first_camera` of the map. A pair is contradicted
+// only if both are. Takes some 10 ms per pair that was hardly matched.
+std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
+                                   std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig);
+
+}  // namespace bslam::calibration

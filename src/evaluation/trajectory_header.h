@@ -1,0 +1,27 @@
+// The comments at the top of trajectory files.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace bslam::evaluation {
+
+// kFinal: poses resolved against the final map; kLive: poses as reported during the run.
+enum class PoseState { kFinal, kLive };
+
+// The comment line at the top of trajectories written by a run: "bslam trajectory frame=cam0 parent=world final=true".
+std::string trajectory_header(std::string_view frame, PoseState state, std::string_view parent = "world");
+
+// The further comment line of trajectories whose lengths are not metres: "scale=up-to-scale: lengths are not in
+// metres".
+std::string scale_comment(std::string_view scale);
+
+// What the comments at the top of a trajectory of bslam say about it.
+struct TrajectoryComments {
+  std::string frame;  // whose poses it contains: cam0, body, or the name of a camera; empty if it is not said
+  std::string scale = "metric";  // or up-to-scale, unobservable
+};
+TrajectoryComments read_comments(const std::filesystem::path& file);
+
+}  // namespace bslam::evaluation

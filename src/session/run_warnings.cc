@@ -1,0 +1,210 @@
+#include "session/run_warnings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "calibration/rig_warnings.h"
+
+namespace bslam::session {
+namespace {
+
+using Warnings = std::vector<std::string>;
+
+template <class... Values>
+void warn(Warnings& warnings, fmt::format_string<Values...> text, Values&&... values) {
+  warnings.push_back(fmt::format(text, std::forward<Values>(values)...));
+}
+
+void warn_of_outages(const CameraRecord& camera, Warnings& warnings) {
+  constexpr std::size_t kShown = 3;
+  std::string shown;
+  std::size_t outages = 0;
+  for (const CameraInterval& s : camera.states) {
+    if (s.status.state == tracking::CameraState::kOk || ++outages > kShown) continue;
+    shown += fmt::format("{}{} {:.1f} - {:.1f} s ({})", shown.empty() ? "" : ", ", tracking::describe(s.status.state),
+                         s.from_s, s.to_s, tracking::describe(s.status.reason));
+  }
+  if (outages == 0) return;
+  if (outages > kShown) shown += fmt::format(" and {} more intervals", outages - kShown);
+  warn(warnings, "{}: {}", camera.name, shown);
+}
+
+void warn_of_extrinsics(const CameraRecord& camera, Warnings& warnings) {
+  const auto& e = camera.extrinsics;
+  if (!e || !e->suspect) return;
+  warn(warnings, "{}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm{}", camera.name,
+       e->change_deg, e->change_mm, e->refined ? "" : "; use the estimate with --set calibration.refine=true");
+}
+
+// Warns if focal lengths or principal points changed by much more than their deviation and than calibrations differ.
+void warn_of_intrinsics(const camera::Camera& camera, const calibration::CameraRefinement& estimate,
+                        Warnings& warnings) {
+  constexpr double kSigmas = 5, kFocal = 0.02, kCentre = 0.01;  // relative to the focal length and the image width
+  const camera::Intrinsics& k = camera::intrinsics(camera.model);
+  std::string shown;
+  for (const calibration::ParameterRefinement& p : estimate.intrinsics) {
+    const bool focal = p.name == "fx" || p.name == "fy", centre = p.name == "cx" || p.name == "cy";
+    const double least = focal ? kFocal * (p.name == "fx" ? k.fx : k.fy) : kCentre * camera.width;
+    if ((!focal && !centre) || std::abs(p.change) < std::max(least, kSigmas * p.std)) continue;
+    shown += fmt::format("{}{} by {:+.1f} px (std {:.1f})", shown.empty() ? "" : ", ", p.name, p.change, p.std);
+  }
+  if (!shown.empty()) warn(warnings, "{}: estimated intrinsics differ from the calibration: {}", camera.name, shown);
+}
+
+// Warns if the images contradict the times of a camera.
+void warn_of_timing(const std::string& name, const calibration::CameraRefinement& camera, Warnings& warnings) {
+  if (camera.time_offset.refined) {
+    warn(warnings, "{}: its images show the scene {:.2f} ms {} than its time stamps say (time_offset_s)", name,
+         std::abs(camera.time_offset.change_ms), camera.time_offset.change_ms > 0 ? "later" : "earlier");
+  }
+  if (camera.readout.refined) {
+    warn(warnings,
+         "{}: its images show a rolling shutter whose readout differs from the calibration by {:.2f} ms "
+         "(rolling_shutter_readout_s)",
+         name, camera.readout.change_ms);
+  }
+}
+
+// Warns of an estimate that differs from the calibration, unless the images do not belong to it: the estimate means
+// nothing then.
+void warn_of_estimate(const RunRecord& record, const camera::Rig& rig, Warnings& warnings) {
+  const CalibrationRecord& calibration = record.calibration;
+  if (calibration.foreign_images()) return;
+  const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
+  for (const CameraRecord& camera : record.cameras) warn_of_extrinsics(camera, warnings);
+  for (std::size_t c = 0; c < std::min(calibration.estimate.cameras.size(), record.cameras.size()); ++c) {
+    if (contradicted) warn_of_intrinsics(rig.camera(c), calibration.estimate.cameras[c], warnings);
+    warn_of_timing(record.cameras[c].name, calibration.estimate.cameras[c], warnings);
+  }
+  if (!contradicted) return;
+  warn(warnings,
+       "the images contradict the calibration, which multiplies their squared reprojection error by {:.1f}; {}",
+       1 + calibration.estimate.excess_error,
+       calibration.refined ? "it was refined: see calibration in summary.json, and rig_refined.yaml"
+                           : "refine it with --set calibration.refine=auto");
+}
+
+// Lists the intervals without a pose.
+void warn_of_losses(const RunRecord& record, Warnings& warnings) {
+  constexpr std::size_t kShown = 5;
+  const std::vector<LostInterval> intervals = lost_intervals(record);
+  if (intervals.empty()) return;
+  std::string shown;
+  for (std::size_t i = 0; i < std::min(kShown, intervals.size()); ++i) {
+    shown += fmt::format("{}{:.2f} - {:.2f} s ({})", i == 0 ? "" : ", ", intervals[i].from_s, intervals[i].to_s,
+                         intervals[i].reason);
+  }
+  if (intervals.size() > kShown)
+    shown += fmt::format(" and {} more intervals, see summary.json", intervals.size() - kShown);
+  warn(warnings, "{} of {} frames have no pose: {}", count(record, FrameOutcome::kLost), record.frames.size(), shown);
+}
+
+// Warns if the poses have no common world frame, or not that of the loaded map.
+void warn_of_submaps(const RunRecord& record, Warnings& warnings) {
+  if (record.submaps.size() > 1) {
+    warn(warnings,
+         "{} submaps remain, each with its own world frame, because no loop closure joined them: "
+         "trajectory.tum contains {} poses, trajectory_part2.tum {}{}",
+         record.submaps.size(), record.submaps[0].frames, record.submaps[1].frames,
+         record.submaps.size() > 2 ? " and so on" : "");
+  }
+  if (!record.map.loaded) return;
+  std::int64_t outside = 0;
+  for (const SubmapRecord& submap : record.submaps) outside += submap.loaded ? 0 : submap.frames;
+  const std::int64_t inside = frames_in_loaded_map(record);
+  if (outside == 0 && inside > 0) return;
+  if (outside == 0) {
+    warn(warnings, "no frames have a pose, since no place of the loaded map was recognised");
+    return;
+  }
+  const std::string found = inside == 0 ? "no" : std::to_string(inside);
+  warn(warnings,
+       "{} frames have a pose in the frame of the loaded map; {} frames are in a new submap, since no "
+       "place of the loaded map was recognised there",
+       found, outside);
+}
+
+// Warns about a camera that is still inconsistent with the others at the end of the run: its extrinsics are probably
+// wrong.
+void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std::string& check_command,
+                          Warnings& warnings) {
+  constexpr tracking::CameraStatus kDisagrees{tracking::CameraState::kDegraded, tracking::CameraReason::kInconsistent};
+  const std::vector<CameraInterval>& states = record.cameras[camera].states;
+  if (states.empty() || states.back().status != kDisagrees) return;
+  std::int64_t keypoints = 0, inliers = 0;
+  for (const RunFrame& frame : record.frames) {
+    if (!frame.record) continue;
+    keypoints += frame.record->final_result().cameras[camera].keypoints;
+    inliers += frame.record->final_result().cameras[camera].inliers;
+  }
+  warn(warnings, "{}: only {} of {} keypoints are inliers: check this camera's extrinsics ({})",
+       record.cameras[camera].name, inliers, keypoints, check_command);
+}
+
+// Warns once if the images do not belong to the calibration, with the pair of cameras that shows it best.
+void warn_of_foreign_images(const RunRecord& record, const std::string& check_command, Warnings& warnings) {
+  const std::vector<calibration::CameraPair>& pairs = record.calibration.pairs;
+  const auto weight = [](const calibration::CameraPair& p) { return p.contradicted ? p.evidence->matches : -1; };
+  const auto best = std::ranges::max_element(pairs, {}, weight);
+  if (best == pairs.end() || !best->contradicted) return;
+  const auto others = std::ranges::count(pairs, true, &calibration::CameraPair::contradicted) - 1;
+  warn(warnings,
+       "the images do not belong to the calibration, so poses, scale and map are wrong: cameras {} and {} share {:.1f} "
+       "% "
+       "of the features in their common view; {}{}. Check which images are of which camera, and the direction of the "
+       "transforms ({})",
+       record.cameras[best->first].name, record.cameras[best->second].name, 100 * best->matched_share(),
+       calibration::describe_pair(*best->evidence), others > 0 ? fmt::format(" (and {} more pairs)", others) : "",
+       check_command);
+}
+
+// Warns of pairs of cameras that should see the same things but do not.
+void warn_of_pairs(const RunRecord& record, const std::string& check_command, Warnings& warnings) {
+  if (record.calibration.foreign_images()) return warn_of_foreign_images(record, check_command, warnings);
+  for (const calibration::CameraPair& pair : record.calibration.pairs) {
+    warn(warnings,
+         "the calibrated views of cameras {} and {} overlap by {:.0f} %, but only {:.1f} % of the features there are "
+         "matched between them, and it cannot be told why: check which images are of which camera, their time stamps, "
+         "and the extrinsics ({})",
+         record.cameras[pair.first].name, record.cameras[pair.second].name, 100 * pair.overlap,
+         100 * pair.matched_share(), check_command);
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> warnings_before_run(const dataset::Dataset& dataset) {
+  constexpr std::size_t kShown = 2;
+  Warnings warnings = dataset.warnings;
+  const Warnings about_rig = calibration::rig_warnings(dataset.rig);
+  for (std::size_t i = 0; i < std::min(kShown, about_rig.size()); ++i) warnings.push_back(about_rig[i]);
+  if (about_rig.size() > kShown)
+    warn(warnings, "{} more warnings about the calibration: bslam rig info", about_rig.size() - kShown);
+  return warnings;
+}
+
+std::vector<std::string> warnings_after_run(const RunRecord& record, const camera::Rig& rig,
+                                            const std::string& check_command) {
+  Warnings warnings;
+  warn_of_pairs(record, check_command, warnings);
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    const CameraRecord& camera = record.cameras[c];
+    if (camera.skipped > 0) {
+      warn(warnings, "{}: {} of its images could not be read, the first: {}", camera.name, camera.skipped,
+           camera.first_skipped);
+    }
+    warn_of_outages(camera, warnings);
+    warn_of_disagreement(record, c, check_command, warnings);
+  }
+  warn_of_estimate(record, rig, warnings);
+  warn_of_losses(record, warnings);
+  warn_of_submaps(record, warnings);
+  const auto dropped = count(record, FrameOutcome::kDropped);
+  if (dropped > 0) warn(warnings, "{} frames dropped: processing is slower than real time", dropped);
+  return warnings;
+}
+
+}  // namespace bslam::session

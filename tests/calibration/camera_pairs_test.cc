@@ -1,0 +1,92 @@
+#include "calibration/camera_pairs.h"
+
+#include <gtest/gtest.h>
+
+#include "calibration/rig_warnings.h"
+#include "geometry/so3.h"
+#include "mapping/simulated_map.h"
+
+namespace bslam::calibration {
+namespace {
+
+// Two cameras that overlap, the second one turned by 15 degrees, so that exchanging them is noticed at all distances.
+camera::Rig turned_pair() {
+  const camera::Rig rig = synthetic::ring_rig(2);
+  const geometry::SE3 turned(geometry::so3_exp({0, geometry::radians(15), 0}), Eigen::Vector3d::Zero());
+  return camera::Rig({{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1) * turned}});
+}
+
+// Keyframes of two cameras that overlap. `matched_share`: fraction of the common landmarks that were matched.
+map::SimulatedMap seen_by(const camera::Rig& rig, double matched_share, int max_keypoints = 300) {
+  synthetic::FeatureSimulatorOptions options;
+  options.landmarks = 2500;
+  options.max_keypoints = max_keypoints;
+  options.matched_share = matched_share;
+  map::SimulatedMap out(synthetic::FeatureSimulator(rig, synthetic::make_orbit({.duration_s = 60}), options));
+  for (int i = 0; i < 6; ++i) out.add_keyframe(FrameId(i), 0.5 * i);
+  return out;
+}
+
+std::vector<CameraPair> tested(const map::SimulatedMap& seen, const camera::Rig& given, const camera::Rig& final_rig) {
+  return test_pairs(seen.map, seen.map.keyframe_ids(), 0, given, final_rig);
+}
+
+TEST(CameraPairs, WithMatchedFeaturesNeedNoFurtherTest) {
+  const camera::Rig rig = synthetic::ring_rig(2);
+  const auto pairs = tested(seen_by(rig, 0.8), rig, rig);
+  ASSERT_EQ(pairs.size(), 1u);
+  EXPECT_EQ(pairs[0].keyframes, 6);
+  EXPECT_GT(pairs[0].overlap, 0.4);
+  EXPECT_GT(pairs[0].matched_share(), 0.2);
+  EXPECT_FALSE(pairs[0].evidence);
+  EXPECT_FALSE(pairs[0].hardly_matched());
+  EXPECT_FALSE(pairs[0].contradicted);
+}
+
+// With a wrong calibration hardly anything is matched between the cameras, and the estimate of the calibration sees
+// only what agrees with it.
+TEST(CameraPairs, RevealExchangedCamerasAndInvertedTransforms) {
+  const camera::Rig rig = turned_pair();
+  const map::SimulatedMap seen = seen_by(rig, 0);
+  const std::array exchange = {1, 0};
+  for (const camera::Rig& wrong : {rig.subset(exchange), with_inverse_extrinsics(rig)}) {
+    const auto pairs = tested(seen, wrong, wrong);
+    ASSERT_TRUE(pairs[0].evidence);
+    EXPECT_TRUE(pairs[0].contradicted) << describe_pair(*pairs[0].evidence);
+    EXPECT_GT(pairs[0].evidence->matches, 200);
+    EXPECT_FALSE(tested(seen, wrong, rig)[0].contradicted);  // the estimate has corrected it
+  }
+  const auto pairs = tested(seen, rig, rig);
+  EXPECT_TRUE(pairs[0].hardly_matched());
+  EXPECT_FALSE(pairs[0].contradicted);
+}
+
+TEST(CameraPairs, OfDarkOrSeparateViewsAreNotAccused) {
+  const camera::Rig rig = turned_pair();
+  const std::array exchange = {1, 0};
+  const auto dark = tested(seen_by(rig, 0, 40), rig.subset(exchange), rig.subset(exchange));
+  EXPECT_EQ(dark[0].keyframes, 0);
+  EXPECT_FALSE(dark[0].hardly_matched() || dark[0].contradicted);
+  std::vector<camera::RigCamera> apart;
+  for (std::size_t c = 0; c < 2; ++c) {
+    const geometry::SE3 turned(geometry::so3_exp({0, c == 0 ? 0.0 : 3.14, 0}), Eigen::Vector3d::Zero());
+    apart.push_back({rig.camera(c), rig.body_from_cam(0) * turned});
+  }
+  const camera::Rig separate(std::move(apart));
+  const auto pairs = tested(seen_by(separate, 0.8), separate, separate);
+  EXPECT_LT(pairs[0].overlap, 0.05);
+  EXPECT_FALSE(pairs[0].hardly_matched() || pairs[0].contradicted);
+}
+
+// A camera that was knocked is a matter of the refinement.
+TEST(CameraPairs, AnotherArrangementIsNoSmallRotation) {
+  PairEvidence evidence{.matches = 100, .agreeing = {5, 1, 1, 1, 1}, .other = OtherPose{90, 1.5, 10}};
+  EXPECT_FALSE(shows_another_arrangement(evidence));
+  evidence.other->rotated_deg = 90;
+  EXPECT_TRUE(shows_another_arrangement(evidence));
+  evidence.agreeing[0] = 50;
+  EXPECT_FALSE(shows_another_arrangement(evidence));
+}
+
+}  // namespace
+}  // namespace bslam::calibration
