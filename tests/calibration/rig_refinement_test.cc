@@ -6,6 +6,7 @@
 
 #include "adjustment/map_adjustment.h"
 #include "camera/model_parameters.h"
+#include "geometry/triangulation.h"
 #include "mapping/simulated_map.h"
 #include "solver/rig_block.h"
 #include "tracking/camera_consensus.h"
@@ -59,8 +60,10 @@ RigRefinement refine(const map::BundledMap& map, const CalibrationOptions& optio
   return refine_rig(map, map.rig(), options, kFeatures);
 }
 
+// Relative to camera 0, which an estimate of its principal point turns in the rig frame.
 double rotation_error_deg(const RigRefinement& result, std::size_t camera, const camera::Rig& truth) {
-  return map::angle_rad(result.rig->cam_from_rig(camera), truth.cam_from_rig(camera)) / kDegree;
+  const SE3 T_cam_cam0 = result.rig->cam_from_rig(camera) * result.rig->rig_from_cam(0);
+  return map::angle_rad(T_cam_cam0, truth.cam_from_rig(camera)) / kDegree;
 }
 
 // Simulated observations are independent, and the intrinsics of these rigs are exact unless a test changes them.
@@ -240,6 +243,13 @@ TEST(RefineRig, ACameraWithoutImagesFollowsTheIntrinsicsOfCamera0) {
   ASSERT_EQ(result.cameras[3].observations, 0);
   for (std::size_t c = 0; c < truth.size(); ++c)
     EXPECT_LT(rotation_error_deg(result, c, truth), 0.25) << "camera " << c;
+  // The rig frame keeps the directions of the pixels, as far as the estimate of their rays allows.
+  const camera::Camera &before = calibrated.camera(0), &after = result.rig->camera(0);
+  const Eigen::Vector2d centre(0.5 * before.width, 0.5 * before.height);
+  const Eigen::Vector3d ray = result.rig->rig_from_cam(0).rotation() * *after.unproject(centre);
+  EXPECT_LT(geometry::angle_between(ray, *before.unproject(centre)) / kDegree, 0.1);
+  EXPECT_GT(geometry::angle_between(*after.unproject(centre), *before.unproject(centre)) / kDegree, 1.0);
+  EXPECT_TRUE(result.rig->body_from_rig().matrix().isApprox(calibrated.body_from_cam(0).matrix(), 1e-9));
 }
 
 TEST(RefineRig, ARefinedMapUsesTheEstimateAndKeepsItsInvariants) {

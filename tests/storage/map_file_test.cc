@@ -323,19 +323,37 @@ TEST(MapFile, KeepsTheGivenCalibrationAndFurtherRigs) {
   EXPECT_FALSE(map::find_rig(saved.map, synthetic::fisheye_rig(2)));
 }
 
-TEST(MapFile, ReadsTheRigOfVersion2) {
+TEST(MapFile, ReadsTheRigsOfEarlierVersions) {
   const map::BundledMap map = small_map(synthetic::ring_rig(2));
   ByteWriter out;
   put_rigs(map, out);
   const std::string bytes = std::move(out).take();
-  const std::size_t one = (bytes.size() - 4) / 2, readouts = 2 * sizeof(double);
-  for (const std::size_t size : {4 + one - readouts, 4 + one}) {  // without and with the readout times
-    ByteReader in(std::string_view(bytes).substr(0, size), "rig");
-    const auto rigs = take_rigs(in, false);
+  constexpr std::size_t kCount = 4, kReadouts = 2 * sizeof(double), kTransform = 7 * sizeof(double);
+  const std::size_t one = (bytes.size() - kCount) / 2, without_frame = one - kTransform;
+  for (const std::size_t size : {without_frame - kReadouts, without_frame}) {  // version 2: readout times are optional
+    ByteReader in(std::string_view(bytes).substr(0, kCount + size), "rig");
+    const auto rigs = take_rigs(in, 2);
     ASSERT_TRUE(rigs) << in.error().message();
     EXPECT_TRUE(rigs->rig->same_calibration(map.rig()));
     EXPECT_EQ(rigs->given, rigs->rig);
   }
+  const std::string version3 = bytes.substr(0, kCount + without_frame) + bytes.substr(kCount + one, without_frame);
+  ByteReader in(version3, "rig");
+  const auto rigs = take_rigs(in, 3);
+  ASSERT_TRUE(rigs) << in.error().message();
+  EXPECT_TRUE(rigs->given->same_calibration(map.given_rig()));
+}
+
+TEST(MapFile, KeepsTheRigFrameOfARefinedCalibration) {
+  const camera::Rig rig = synthetic::ring_rig(2);
+  map::BundledMap map = small_map(rig);
+  const geometry::SE3 T_cam0_rig(geometry::so3_exp({0.01, 0.02, 0}), Eigen::Vector3d::Zero());
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+  map.set_rig(std::make_shared<const camera::Rig>(std::move(cameras), T_cam0_rig), {});
+  const SavedMap saved = read_back(map);
+  EXPECT_EQ(saved.map.rig().cam_from_rig(0).matrix(), map.rig().cam_from_rig(0).matrix());
+  EXPECT_EQ(saved.map.rig().cam_from_rig(1).matrix(), map.rig().cam_from_rig(1).matrix());
 }
 
 }  // namespace

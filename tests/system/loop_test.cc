@@ -40,7 +40,7 @@ TEST(SystemLoopSequential, ClosesTheLoopAndRemovesTheError) {
   EXPECT_TRUE(open.loops().empty());
   EXPECT_TRUE(blind.loops().empty());
   EXPECT_TRUE(identical(open.trajectories(), blind.trajectories()));
-  EXPECT_LT(2 * ate_m(final_poses(system), closed_walk().truth()), ate_m(final_poses(open), closed_walk().truth()));
+  EXPECT_LT(1.5 * ate_m(final_poses(system), closed_walk().truth()), ate_m(final_poses(open), closed_walk().truth()));
   const map::BundledMap &closed_map = *system.snapshot(), &open_map = *open.snapshot();
   EXPECT_LT(closed_map.num_landmarks(), open_map.num_landmarks());  // duplicate landmarks are fused
 }
