@@ -35,19 +35,37 @@ struct Projection {
   double distance;  // metres
 };
 
-// Projection of a point. Returns nullopt if it is outside the image, its distances, or its cone of viewing directions.
-std::optional<Projection> visible_projection(const camera::Camera& camera, const camera::Shutter& shutter,
-                                             const geometry::SE3& T_cam_common, const SearchPoint& p,
-                                             double min_cosine) {
-  const Vector3d in_camera = T_cam_common * p.position;
-  const double distance = in_camera.norm();
-  if (!in_range(p, distance)) return std::nullopt;
-  const auto pixel = camera::project(camera, shutter, in_camera);
-  if (!pixel || !camera.contains(*pixel)) return std::nullopt;
-  const bool outside_cone = in_camera.dot(T_cam_common.rotation() * p.view_direction) < min_cosine * distance;
-  if (outside_cone && p.view_direction != Vector3d::Zero()) return std::nullopt;
-  return Projection{*pixel, distance};
-}
+// An image into which points are projected.
+class View {
+ public:
+  View(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common, double max_view_angle)
+      : camera_(rig.camera(c)),
+        shutter_(rig.shutter(c.index())),
+        R_(T_cam_common.matrix3()),
+        t_(T_cam_common.translation()),
+        centre_(-R_.transpose() * t_),
+        min_cosine_(std::cos(max_view_angle)) {}
+
+  // Projection of a point. Returns nullopt if it is outside the image, its distances, or its cone of viewing
+  // directions.
+  std::optional<Projection> project(const SearchPoint& p) const {
+    const Vector3d ray = p.position - centre_;
+    const double distance = ray.norm();
+    if (!in_range(p, distance)) return std::nullopt;
+    const bool outside_cone = ray.dot(p.view_direction) < min_cosine_ * distance;
+    if (outside_cone && p.view_direction != Vector3d::Zero()) return std::nullopt;
+    const auto pixel = camera::project(camera_, shutter_, R_ * p.position + t_);
+    if (!pixel || !camera_.contains(*pixel)) return std::nullopt;
+    return Projection{*pixel, distance};
+  }
+
+ private:
+  const camera::Camera& camera_;
+  const camera::Shutter& shutter_;
+  Eigen::Matrix3d R_;
+  Vector3d t_, centre_;  // metres; the centre in the common frame
+  double min_cosine_;
+};
 
 Candidate best_candidate(const feature::Keypoints& keypoints, const feature::Descriptor& descriptor,
                          std::span<const std::uint32_t> near, std::span<const std::uint8_t> taken) {
@@ -81,13 +99,13 @@ ProjectionSearchResult search_by_projection(const camera::Rig& rig, CameraIndex 
   const feature::Keypoints& keypoints = frame.keypoints;
   const double log_factor = std::log(options.scale_factor);
   const double radius_px = options.radius / camera.radians_per_pixel();
-  const double min_cosine = std::cos(options.max_view_angle);
+  const View view(rig, c, T_cam_common, options.max_view_angle);
   std::vector<std::uint32_t> near;
   std::vector<std::pair<int, std::uint32_t>> owner(keypoints.size(), {kNone, 0});  // (hamming, position in matches)
   for (std::size_t i = 0; i < points.size(); ++i) {
     const SearchPoint& p = points[i];
     if (!exclusions.points.empty() && exclusions.points[i]) continue;
-    const auto projected = visible_projection(camera, rig.shutter(c.index()), T_cam_common, p, min_cosine);
+    const auto projected = view.project(p);
     if (!projected) continue;
     result.visible.push_back(static_cast<std::uint32_t>(i));
     const double level = predicted_level(p, projected->distance, log_factor);
@@ -139,11 +157,10 @@ std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::
 
 std::vector<VisiblePoint> visible_points(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common,
                                          std::span<const SearchPoint> points, double max_view_angle) {
-  const double min_cosine = std::cos(max_view_angle);
+  const View view(rig, c, T_cam_common, max_view_angle);
   std::vector<VisiblePoint> out;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const auto projected =
-        visible_projection(rig.camera(c), rig.shutter(c.index()), T_cam_common, points[i], min_cosine);
+    const auto projected = view.project(points[i]);
     if (projected) out.push_back({static_cast<std::uint32_t>(i), projected->pixel, projected->distance});
   }
   return out;
