@@ -163,7 +163,7 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
   const KeyframeId parent = choose_parent(k, fallback_parent);
   if (!parent.valid()) return k;
   attach(k, parent);
-  const geometry::SE3 T_rig_parent = T_rig_world * keyframe(parent).T_rig_world.inverse();
+  const geometry::SE3 T_rig_parent = keyframe(k).T_rig_world * keyframe(parent).T_rig_world.inverse();
   edit(k).uncertainty = geometry::transported(keyframe(parent).uncertainty, T_rig_parent);
   return k;
 }
