@@ -56,8 +56,9 @@ std::vector<MapView::Keyframe> MapView::keyframes() const {
   out.reserve(map.num_keyframes());
   for (const KeyframeId k : map.keyframe_ids()) {
     const map::BundledKeyframe& keyframe = map.keyframe(k);
-    out.push_back({k.value(), keyframe.frame->time_ns, api::to_pose(keyframe.T_rig_world.inverse()),
-                   keyframe.parent.value(), submap[k.index()]});
+    out.push_back({k.value(), keyframe.frame->time_ns,
+                   api::to_pose((map.rig().cam_from_rig(0) * keyframe.T_rig_world).inverse()), keyframe.parent.value(),
+                   submap[k.index()]});
   }
   return out;
 }

@@ -12,7 +12,7 @@ constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an obse
 
 // Returns the rig whose difference from `calibrated` is `change` (solver::RigInformation), with the timing of `timed`.
 camera::Rig changed(const camera::Rig& calibrated, const Eigen::VectorXd& change, const camera::Rig& timed) {
-  solver::RigValues values = solver::RigValues::of(calibrated);
+  solver::RigValues values = solver::RigValues::of(calibrated.in_frame_of_camera_0());
   for (std::size_t c = 0; c < calibrated.size(); ++c) {
     const TimeNs shift_ns = timed.camera(c).time_offset_ns - calibrated.camera(c).time_offset_ns;
     values.timing[c] = {to_seconds(shift_ns), timed.camera(c).readout_s};

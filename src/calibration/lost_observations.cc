@@ -73,7 +73,9 @@ void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::si
                      adjustment::BundleProblem& flat) {
   const KeyframeId keyframe = flat.keyframes[pose];
   const frame::BundledFrame& frame = *map.keyframe(keyframe).frame;
-  const camera::Rig moving = frame::rig_of(rig, frame, map.keyframe(keyframe).twist);
+  const geometry::Vector6d& twist =
+      flat.problem.twist.empty() ? map.keyframe(keyframe).twist : flat.problem.twist[pose];
+  const camera::Rig moving = frame::rig_of(rig, frame, twist);
   const matching::ProjectionSearchOptions options{
       .radius = kRadius, .max_hamming = kMaxHamming, .ratio = kRatio, .scale_factor = features.pyramid.scale_factor};
   const auto results = matching::search_cameras(moving, frame, T_cam_world, points,

@@ -1,6 +1,7 @@
 // The rig frame of a refined calibration. An estimate that moves the principal point of camera 0 turns its frame, by
 // about a degree on some real rigs. What is known about the body, and the poses that were already reported, refer to
-// the calibrated rays of the camera, so the rig frame stays with the rays, and camera 0 turns in it.
+// the calibrated rays of the camera, so the rig frame stays with the rays, and camera 0 turns in it. This assumes that
+// the extrinsics absorbed the error of the principal point when they were calibrated, as a fit to a target does.
 #pragma once
 
 #include "calibration/rig_problem.h"

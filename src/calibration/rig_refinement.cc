@@ -125,7 +125,7 @@ solver::RigAdjustmentOptions prior_of(const camera::Rig& rig, const CalibrationO
   return out;
 }
 
-// `rig` with the time offsets of the capture times of a map.
+// `rig` with the time offsets of the capture times of a map, and the frame of camera 0 as the rig frame.
 camera::Rig with_time_offsets_of(const camera::Rig& of_map, const camera::Rig& rig) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
@@ -259,7 +259,7 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   const double path_before = path_length(problem);
   solver::RigAdjustment adjusted = adjust_in_passes(map, features, prior, problem, stop);
   if (!adjusted.done) return out;
-  complete_unobserved_cameras(calibrated, adjusted);
+  complete_unobserved_cameras(reference, adjusted);
   out.done = true;
   for (std::size_t c = 0; c < map.rig().size(); ++c) {
     CameraRefinement& camera = out.cameras.emplace_back();
@@ -273,8 +273,8 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
   out.information = adjusted.information;
   const camera::Rig refined = adjusted.values.applied_to(reference);
-  const geometry::SE3 T_cam0_rig = turn_of_rays(refined.camera(0), reference.camera(0));
-  out.rig = with_rig_frame(refined, T_cam0_rig, reference.body_from_rig());
+  const geometry::SE3 T_cam0_rig = turn_of_rays(refined.camera(0), reference.camera(0)) * calibrated.cam_from_rig(0);
+  out.rig = with_rig_frame(refined, T_cam0_rig, calibrated.body_from_rig());
   move_to_rig_frame(T_cam0_rig, map.rig().cam_from_rig(0), problem);
   out.poses = poses_of(problem.flat);
   // Distances between keyframes that are longer than the rig tell how the calibration changes the scale; a rig that

@@ -59,6 +59,7 @@ Result<std::vector<std::int64_t>> whole_pixels(const std::vector<double>& sides,
 struct RigReading {
   std::vector<RigCamera> cameras;
   std::vector<std::string> notes;
+  geometry::SE3 T_cam0_rig = {};  // see Rig
 };
 
 }  // namespace bslam::camera

@@ -73,7 +73,7 @@ Rig Rig::subset(std::span<const int> indices) const {
     BSLAM_ASSERT(i >= 0 && static_cast<std::size_t>(i) < size(), "the camera index must be within the rig");
     chosen.push_back(calibration_->cameras[static_cast<std::size_t>(i)]);
   }
-  return Rig(std::move(chosen));
+  return Rig(std::move(chosen), indices.front() == 0 ? cam_from_rig(0) : SE3());
 }
 
 Rig Rig::with_calibration_of(const Rig& part, std::span<const int> indices) const {

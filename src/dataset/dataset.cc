@@ -266,7 +266,7 @@ camera::Rig with_names(const camera::Rig& rig, const std::vector<std::string>& n
     cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
     cameras.back().camera.name = names[c];
   }
-  return camera::Rig(std::move(cameras));
+  return camera::Rig(std::move(cameras), rig.cam_from_rig(0));
 }
 
 // The calibration of the recording itself has no names of cameras. Takes those of a rig file in its folder, if that has

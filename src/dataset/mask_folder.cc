@@ -40,7 +40,7 @@ Result<camera::Rig> with_masks(const camera::Rig& rig, const std::vector<int>& c
     return Error{folder.string(), "--masks", "no mask of a camera in use",
                  fmt::format("{}.png, {}/STAMP.png or those of another camera", name, name)};
   }
-  return camera::Rig(std::move(masked));
+  return camera::Rig(std::move(masked), rig.cam_from_rig(0));
 }
 
 Result<std::vector<std::string>> add_image_masks(const fs::path& folder, int number, const camera::Camera& camera,

@@ -30,10 +30,22 @@ bool same_pose(const geometry::SE3& a, const geometry::SE3& b) {
   return geometry::so3_log(D.rotation()).norm() <= kMaxAngle && D.translation().norm() <= kMaxShift;
 }
 
+// Whether a camera of `whole` other than this one has the name. Two cameras may have the same calibration, so that only
+// their names tell them apart.
+bool names_another(const camera::Rig& whole, std::size_t camera, const std::string& name) {
+  const std::string& own = whole.camera(camera).name;
+  if (own == name || own.starts_with(name + "_")) return false;  // find_or_append_rig appends numbers to names
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    if (whole.camera(i).name == name) return true;
+  }
+  return false;
+}
+
 // Whether the cameras of `part` are those of `whole` from `first` on.
 bool contains(const camera::Rig& whole, std::size_t first, const camera::Rig& part) {
   for (std::size_t i = 0; i < part.size(); ++i) {
     if (!same_camera(whole.camera(first + i), part.camera(i))) return false;
+    if (names_another(whole, first + i, part.camera(i).name)) return false;
     if (!same_pose(whole.cam_from_rig(first + i), part.cam_from_rig(i))) return false;
   }
   return true;
@@ -78,6 +90,7 @@ void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::sha
 
 std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig) {
   for (std::size_t first = 0; first + rig.size() <= map.rig().size(); ++first) {
+    if (!same_pose(map.given_rig().cam_from_rig(first), geometry::SE3())) continue;  // within another rig
     if (contains(map.given_rig(), first, rig) || contains(map.rig(), first, rig)) return first;
   }
   return std::nullopt;

@@ -1,7 +1,6 @@
 // A map serves any rig. The cameras of a rig that the map does not have yet are appended to those of the map, so that
 // old keyframes keep the cameras and the calibration with which they were recorded, and every image belongs to a camera
-// of its own calibration. All rigs of a map share the rig frame: the first camera of each has the identity as
-// T_cam_rig.
+// of its own calibration. All rigs of a map share the rig frame, which is the first camera of each as it was given.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +12,7 @@ namespace bslam::map {
 
 // Returns the index of the map's camera that is camera 0 of `rig`, if the cameras of `rig` are consecutive cameras of
 // the map and that one is the first camera of a rig. Cameras are equal if `rig` has their calibration, or that which
-// they had before a run refined it.
+// they had before a run refined it, and the name of no other camera of the map.
 std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig);
 
 // As find_rig, but appends the cameras if the map does not have them. Names that are taken get a number.

@@ -27,7 +27,7 @@ Result<Selection> select_submap(const map::BundledMap& map, std::optional<std::s
   }
   selection.T_upright_world = geometry::upright_axes(poses);
   if (up) {
-    const auto up_world = up_in_world(*up, poses, map.rig().body_from_cam(0));
+    const auto up_world = up_in_world(*up, poses, map.rig().body_from_rig());
     if (!up_world) return up_world.error();
     selection.T_upright_world = geometry::upright_axes(poses, *up_world);
   }

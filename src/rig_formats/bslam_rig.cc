@@ -135,6 +135,24 @@ Result<camera::RigCamera> read_camera(const yaml::YamlMap& yaml, std::size_t ind
                                  yaml.key_path("time_offset_s"), yaml.key_path("rolling_shutter_readout_s")});
 }
 
+// The rotation of camera 0 in the rig frame, by a refined calibration.
+Result<geometry::SE3> read_turn(const yaml::YamlMap& yaml) {
+  constexpr const char* kKey = "T_cam0_rig";
+  const auto rows = yaml.rows(kKey, 4);
+  if (!rows) return rows.error();
+  const auto T_cam0_rig = camera::rigid_transform(*rows, yaml.file(), yaml.key_path(kKey));
+  if (!T_cam0_rig || T_cam0_rig->translation().isZero(0)) return T_cam0_rig;
+  return yaml.error(kKey, "a translation", "a rotation: the frame has the origin of camera 0");
+}
+
+std::string transform_to_yaml(const geometry::SE3& transform, int indent) {
+  const Eigen::Matrix4d T = transform.matrix();
+  std::string yaml;
+  for (int r = 0; r < 4; ++r)
+    yaml += fmt::format("{:{}}- {}\n", "", indent, number_list({T(r, 0), T(r, 1), T(r, 2), T(r, 3)}));
+  return yaml;
+}
+
 std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_body_cam) {
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   std::string yaml =
@@ -142,8 +160,7 @@ std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_
                   camera::model_name(camera.model), camera.width, camera.height);
   yaml += fmt::format("    intrinsics: {}  # fx fy cx cy\n", number_list({k.fx, k.fy, k.cx, k.cy}));
   yaml += fmt::format("    distortion: {}\n    T_body_cam:\n", number_list(camera::distortion(camera.model)));
-  const Eigen::Matrix4d T = T_body_cam.matrix();
-  for (int r = 0; r < 4; ++r) yaml += fmt::format("      - {}\n", number_list({T(r, 0), T(r, 1), T(r, 2), T(r, 3)}));
+  yaml += transform_to_yaml(T_body_cam, 6);
   // Divided instead of multiplied by 1e-9, since the quotient is the double closest to the decimal: its text is short
   // and exact.
   yaml += fmt::format("    time_offset_s: {}\n", format_double(static_cast<double>(camera.time_offset_ns) / 1e9));
@@ -158,7 +175,7 @@ Result<camera::RigReading> read_bslam_rig(const fs::path& file, const std::strin
   const auto parsed = yaml::YamlMap::parse(file, text);
   if (!parsed) return parsed.error();
   const yaml::YamlMap& yaml = *parsed;
-  if (const Status known = yaml.allow_only({"bslam_rig", "cameras"}); !known) return known.error();
+  if (const Status known = yaml.allow_only({"bslam_rig", "T_cam0_rig", "cameras"}); !known) return known.error();
   const auto version = yaml.integer("bslam_rig");
   if (!version) return version.error();
   if (*version != kRigVersion) return yaml.error("bslam_rig", std::to_string(*version), std::to_string(kRigVersion));
@@ -174,11 +191,22 @@ Result<camera::RigReading> read_bslam_rig(const fs::path& file, const std::strin
     }
     reading.cameras.push_back(*std::move(camera));
   }
+  if (yaml.has("T_cam0_rig")) {
+    const auto T_cam0_rig = read_turn(yaml);
+    if (!T_cam0_rig) return T_cam0_rig.error();
+    reading.T_cam0_rig = *T_cam0_rig;
+  }
   return reading;
 }
 
 std::string rig_to_yaml(const camera::Rig& rig) {
-  std::string yaml = fmt::format("bslam_rig: {}\ncameras:\n", kRigVersion);
+  std::string yaml = fmt::format("bslam_rig: {}\n", kRigVersion);
+  const geometry::SE3& T_cam0_rig = rig.cam_from_rig(0);
+  if (!T_cam0_rig.matrix().isIdentity(0)) {
+    yaml += "T_cam0_rig:  # A refined calibration has turned camera 0 in this frame, whose poses are reported.\n";
+    yaml += transform_to_yaml(T_cam0_rig, 2);
+  }
+  yaml += "cameras:\n";
   for (std::size_t i = 0; i < rig.size(); ++i) yaml += camera_to_yaml(rig.camera(i), rig.body_from_cam(i));
   return yaml;
 }

@@ -115,7 +115,7 @@ constexpr std::array kWritable = {RigFormat::kBslam,    RigFormat::kEuroc,  RigF
 
 Result<RigFile> as_file(Result<camera::RigReading> reading, RigFormat format) {
   if (!reading) return reading.error();
-  return RigFile{camera::Rig(std::move(reading->cameras)), format, std::move(reading->notes)};
+  return RigFile{camera::Rig(std::move(reading->cameras), reading->T_cam0_rig), format, std::move(reading->notes)};
 }
 
 Result<RigFile> read_folder(const fs::path& folder) {
@@ -294,7 +294,7 @@ camera::Rig without(const camera::Rig& rig, Droppable what) {
     if (what == Droppable::kRollingShutters) c.camera.readout_s = 0;
     cameras.push_back(std::move(c));
   }
-  return camera::Rig(std::move(cameras));
+  return camera::Rig(std::move(cameras), rig.cam_from_rig(0));
 }
 
 }  // namespace bslam::rig_formats

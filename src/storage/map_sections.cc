@@ -207,6 +207,7 @@ std::shared_ptr<const camera::Rig> take_cameras(ByteReader& in, std::size_t n, s
   }
   if (in.ok() && (version >= 3 || in.remaining() > 0)) take_readouts(in, cameras);
   const SE3 T_cam0_rig = version >= 4 ? take_transform(in) : SE3();
+  in.require(T_cam0_rig.translation().isZero(0), "a rig frame with another origin than camera 0", "a rotation");
   if (!in.ok()) return {};
   return std::make_shared<const camera::Rig>(std::move(cameras), T_cam0_rig);
 }

@@ -16,10 +16,11 @@ namespace {
 constexpr int kMinTrackedClose = 100, kMinUntrackedClose = 70;
 constexpr double kRestMaxParallax = 0.01;  // rad; a rig at rest has a smaller parallax
 constexpr double kRestMinOverlap = 0.95;
-constexpr double kMinShared = 0.6;        // of the inliers, with a similar keyframe
-constexpr std::size_t kNewest = 5;        // number of keyframes that the rig has not left yet
-constexpr double kSimilarParallax = 0.5;  // maximum parallax to it, relative to that of a new keyframe
-constexpr int kFewInliersInterval = 8;    // minimum number of frames between keyframes due to a camera with few inliers
+constexpr std::size_t kMinLandmarks = 100;  // tracked: with fewer, the place may have changed since
+constexpr double kMinShared = 0.6;          // of the inliers, with a similar keyframe
+constexpr std::size_t kNewest = 5;          // number of keyframes that the rig has not left yet
+constexpr double kSimilarParallax = 0.5;    // maximum parallax to it, relative to that of a new keyframe
+constexpr int kFewInliersInterval = 8;  // minimum number of frames between keyframes due to a camera with few inliers
 
 bool untracked_depth(const frame::BundledFrame& frame, const FrameMatches& inliers,
                      const InitialisationOptions& options) {
@@ -70,11 +71,13 @@ std::vector<KeyframeId> keyframes_that_share(const map::BundledMap& map, const s
   return out;
 }
 
-// The fraction of the landmarks of a keyframe that are in the field of view of some camera.
-double share_in_view(const map::BundledMap& map, KeyframeId keyframe, const geometry::SE3& T_rig_world) {
+// The fraction of the landmarks of a keyframe that are in some image of the frame.
+double share_in_view(const map::BundledMap& map, KeyframeId keyframe, const frame::BundledFrame& frame,
+                     const geometry::SE3& T_rig_world) {
   const camera::Rig& rig = map.rig();
   const auto in_view = [&](const Eigen::Vector3d& p_rig) {
     for (std::size_t c = 0; c < rig.size(); ++c) {
+      if (frame.cameras[c].state != image::ImageState::kPresent) continue;
       const auto pixel = rig.camera(c).project(rig.cam_from_rig(c) * p_rig);
       if (pixel && rig.camera(c).contains(*pixel)) return true;
     }
@@ -127,17 +130,18 @@ bool keyframe_due(const KeyframeEvidence& e, const KeyframeOptions& options) {
   return e.frames_since_keyframe >= options.max_interval && !at_rest;
 }
 
-std::optional<KeyframeId> similar_keyframe(const map::BundledMap& map, const FrameMatches& inliers,
-                                           KeyframeId reference, const geometry::SE3& T_rig_world,
-                                           const KeyframeOptions& options) {
+std::optional<KeyframeId> similar_keyframe(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                           const FrameMatches& inliers, KeyframeId reference,
+                                           const geometry::SE3& T_rig_world, const KeyframeOptions& options) {
   const std::vector<LandmarkId> landmarks = landmarks_of(inliers);
+  if (landmarks.size() < kMinLandmarks) return std::nullopt;
   const geometry::SE3 T_world_rig = T_rig_world.inverse();
   std::optional<KeyframeId> similar;
   double smallest = kSimilarParallax * options.max_parallax;
   for (const KeyframeId k : keyframes_that_share(map, landmarks, reference)) {
     const double parallax =
         median(parallaxes_to(map, landmarks, k, T_world_rig, map.keyframe(k).T_rig_world.inverse()));
-    if (parallax >= smallest || share_in_view(map, k, T_rig_world) < options.min_overlap) continue;
+    if (parallax >= smallest || share_in_view(map, k, frame, T_rig_world) < options.min_overlap) continue;
     similar = k;
     smallest = parallax;
   }

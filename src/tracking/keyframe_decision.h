@@ -32,8 +32,8 @@ bool keyframe_due(const KeyframeEvidence& evidence, const KeyframeOptions& optio
 // The keyframe with the smallest parallax among those that show the same as the frame from nearby: it observes most of
 // the inliers, enough of its landmarks are in view, and the parallax to it is small. A frame that is due needs no
 // keyframe of its own then: the rig is back where it was.
-std::optional<KeyframeId> similar_keyframe(const map::BundledMap& map, const FrameMatches& inliers,
-                                           KeyframeId reference, const geometry::SE3& T_rig_world,
-                                           const KeyframeOptions& options);
+std::optional<KeyframeId> similar_keyframe(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                           const FrameMatches& inliers, KeyframeId reference,
+                                           const geometry::SE3& T_rig_world, const KeyframeOptions& options);
 
 }  // namespace bslam::tracking

@@ -88,6 +88,7 @@ struct TrackOutput {
   // excluded cameras have no keypoints. Empty if the frame has no pose.
   frame::BundledFrame frame;
   bool keyframe_due = false;
+  bool at_similar_keyframe = false;  // which is the reference now, so that none is due although the old one is far away
 };
 
 // A pose that direct tracking found for a frame.

@@ -151,12 +151,14 @@ bool keyframe_needed(const map::BundledMap& map, const KeyframeEvidence& evidenc
   if (!keyframe_due(evidence, options)) return false;
   if (evidence.untracked_depth || evidence.camera_with_few_inliers) return true;
   TrackerState& state = out.state;
-  const auto similar = similar_keyframe(map, out.matches, state.anchored.reference, out.result.T_rig_world, options);
+  const auto similar =
+      similar_keyframe(map, out.frame, out.matches, state.anchored.reference, out.result.T_rig_world, options);
   if (!similar) return true;
   state.anchored = map::AnchoredPose::at(map, *similar, out.result.T_rig_world);
   state.frames_since_keyframe = 0;
   state.best_direct_overlap = overlap_by_camera(map, out.matches, *similar);
   state.best_overlap = 0;
+  out.at_similar_keyframe = true;
   return false;
 }
 

@@ -239,7 +239,8 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   update_odometry(*input.map, before, outcome);
   if (options_.localize_only) {
     state.track.visibility_counts.clear();
-  } else if (output.keyframe_due || input.direct.failure == DirectFailure::kKeyframeDue) {
+  } else if (output.keyframe_due ||
+             (input.direct.failure == DirectFailure::kKeyframeDue && !output.at_similar_keyframe)) {
     state.pending.reset();
     propose_keyframe(input, output, outcome);
   }

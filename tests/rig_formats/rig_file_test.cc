@@ -166,6 +166,23 @@ TEST_F(OwnRigFile, KeepsRollingShutters) {
   EXPECT_EQ(wrong.error().key, "cameras[0].rolling_shutter_readout_s");
 }
 
+TEST_F(OwnRigFile, KeepsTheRigFrameOfARefinedCalibration) {
+  const auto rig = read(kGood);
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(rig_to_yaml(*rig).find("T_cam0_rig"), std::string::npos);
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig->size(); ++c) cameras.push_back({rig->camera(c), rig->body_from_cam(c)});
+  const geometry::SE3 T_cam0_rig(geometry::so3_exp({0.01, -0.02, 0}), Eigen::Vector3d::Zero());
+  const std::string text = rig_to_yaml(camera::Rig(cameras, T_cam0_rig));
+  const auto again = read(text);
+  ASSERT_TRUE(again) << again.error().message();
+  EXPECT_TRUE(again->cam_from_rig(0).matrix().isApprox(T_cam0_rig.matrix(), 1e-12));
+  EXPECT_TRUE(again->body_from_rig().matrix().isApprox((rig->body_from_cam(0) * T_cam0_rig).matrix(), 1e-12));
+  std::string moved = text;
+  moved.replace(moved.find(", 0.0]"), 6, ", 0.1]");
+  EXPECT_EQ(read(moved).error().key, "T_cam0_rig");
+}
+
 TEST_F(OwnRigFile, MayOmitKeysWithDefaults) {
   const auto rig = read(
       "bslam_rig: 1\ncameras:\n  - {model: pinhole, resolution: [4, 3], intrinsics: [1, 1, 2, 2],\n"

@@ -344,9 +344,21 @@ TEST(MapFile, ReadsTheRigsOfEarlierVersions) {
   EXPECT_TRUE(rigs->given->same_calibration(map.given_rig()));
 }
 
+TEST(MapFile, ACameraIsNotAnotherOneOfTheSameCalibration) {
+  const camera::Rig rig = synthetic::ring_rig(2);
+  const camera::Camera& left = rig.camera(0);
+  std::vector<camera::RigCamera> twins = {{left, rig.body_from_cam(0)}, {left, rig.body_from_cam(1)}};
+  twins[1].camera.name = "right";
+  const camera::Rig stereo(std::move(twins));
+  const map::BundledMap map = small_map(stereo);
+  EXPECT_EQ(map::find_rig(map, stereo.subset(std::vector<int>{0})), 0u);
+  EXPECT_FALSE(map::find_rig(map, stereo.subset(std::vector<int>{1})));
+}
+
 TEST(MapFile, KeepsTheRigFrameOfARefinedCalibration) {
   const camera::Rig rig = synthetic::ring_rig(2);
   map::BundledMap map = small_map(rig);
+  map.set_given_rig(std::make_shared<const camera::Rig>(rig));
   const geometry::SE3 T_cam0_rig(geometry::so3_exp({0.01, 0.02, 0}), Eigen::Vector3d::Zero());
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
@@ -354,6 +366,8 @@ TEST(MapFile, KeepsTheRigFrameOfARefinedCalibration) {
   const SavedMap saved = read_back(map);
   EXPECT_EQ(saved.map.rig().cam_from_rig(0).matrix(), map.rig().cam_from_rig(0).matrix());
   EXPECT_EQ(saved.map.rig().cam_from_rig(1).matrix(), map.rig().cam_from_rig(1).matrix());
+  EXPECT_EQ(map::find_rig(saved.map, rig), 0u);
+  EXPECT_EQ(map::find_rig(saved.map, map.rig()), 0u);  // as a rig file of the refined calibration has it
 }
 
 }  // namespace

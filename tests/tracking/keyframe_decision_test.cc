@@ -157,18 +157,26 @@ TEST(SimilarKeyframe, IsFoundWhereTheRigIsBackAtAnOldKeyframe) {
   const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
   const KeyframeId newest = world.map.newest_keyframe(), old(1);
   ASSERT_EQ(newest.index(), 8u);
+  const frame::BundledFrame& frame = *world.map.keyframe(old).frame;
   const FrameMatches matches = matches_of(world.map, old);
   const geometry::SE3 here = world.map.keyframe(old).T_rig_world;
-  EXPECT_EQ(similar_keyframe(world.map, matches, newest, here, kOptions), old);
-  EXPECT_NE(similar_keyframe(world.map, matches, old, here, kOptions), old);  // it is the reference already
+  EXPECT_EQ(similar_keyframe(world.map, frame, matches, newest, here, kOptions), old);
+  EXPECT_NE(similar_keyframe(world.map, frame, matches, old, here, kOptions), old);  // it is the reference already
   const geometry::SE3 away(here.rotation(), here.translation() + Eigen::Vector3d(0, 0, 3));
-  EXPECT_FALSE(similar_keyframe(world.map, matches, newest, away, kOptions));
+  EXPECT_FALSE(similar_keyframe(world.map, frame, matches, newest, away, kOptions));
+  FrameMatches few = matches;
+  few[0].resize(50);
+  EXPECT_FALSE(similar_keyframe(world.map, frame, few, newest, here, kOptions));
+  frame::BundledFrame dark = frame;  // the camera that saw most of the landmarks has no image
+  for (frame::CameraFrame& camera : dark.cameras) camera.state = image::ImageState::kMissing;
+  EXPECT_FALSE(similar_keyframe(world.map, dark, matches, newest, here, kOptions));
 }
 
 TEST(SimilarKeyframe, IsNotOneThatTheRigHasNotLeft) {
   const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
   const KeyframeId recent(7);
-  EXPECT_NE(similar_keyframe(world.map, matches_of(world.map, recent), world.map.newest_keyframe(),
+  const frame::BundledFrame& frame = *world.map.keyframe(recent).frame;
+  EXPECT_NE(similar_keyframe(world.map, frame, matches_of(world.map, recent), world.map.newest_keyframe(),
                              world.map.keyframe(recent).T_rig_world, kOptions),
             recent);
 }
