@@ -71,6 +71,7 @@ void print_verdict(const session::RunRecord& record) {
   }
   const std::string doubt = doubt_text(record);
   if (!doubt.empty()) return fmt::print("calibration: cannot be told ({})\n", doubt);
+  if (record.map.loaded) return fmt::print("calibration: not tested in a loaded map\n");
   fmt::print("calibration: not tested, which takes several cameras, enough motion and calibration.check\n");
 }
 
