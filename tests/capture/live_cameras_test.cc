@@ -1,12 +1,16 @@
 #include "capture/live_cameras.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <future>
 #include <opencv2/imgcodecs.hpp>
+#include <random>
 
 #include "capture/pixels.h"
 #include "capture/played_folders.h"
@@ -363,6 +367,32 @@ TEST_F(LiveCamerasTest, AnotherCameraInPlaceOfALostOneIsNotUsed) {
   EXPECT_EQ(said_[1], "cam0 (a): found another at usb-2 in place of camera at usb-2; another camera is not used");
   EXPECT_EQ(said_[2], "cam0 (a): images arrive again");
   EXPECT_EQ(live->notes()[0], "cam0 (a): lost once");
+}
+
+// A pipe that nobody reads is a disk that hangs.
+TEST(RecorderTest, WaitingForADiskThatHangsCanBeStopped) {
+  const support::TemporaryFolder folder;
+  const auto pipe = folder.path() / "live.mcap";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  const camera::Rig rig = synthetic::ring_rig(1, 512);
+  auto recorder = Recorder::create(pipe, rig, {false});
+  ASSERT_TRUE(recorder.ok()) << recorder.error().message();
+  const auto pixels = std::make_shared<CapturedPixels>();
+  std::mt19937 random(1);
+  std::vector<std::uint8_t> noise(512 * 512);
+  for (std::uint8_t& value : noise) value = static_cast<std::uint8_t>(random());
+  const ImageBundle frame{{{noise.data(), 512, 512, 512, kStart, pixels}}};
+  std::stop_source stop;
+  stop.request_stop();
+  int added = 0;
+  while (added < 100'000 && (*recorder)->add(frame, stop.get_token())) ++added;
+  EXPECT_GE(added, 32);
+  EXPECT_LT(added, 100);
+  std::signal(SIGPIPE, SIG_IGN);
+  ::close(reader);
+  EXPECT_FALSE((*recorder)->finish().ok());
 }
 
 TEST(PlayedFolders, GoOnWhereTheyWereAndReportImagesOfAnotherSize) {
