@@ -24,7 +24,9 @@ std::string prefix() {
 
 int main(int, char** argv) {
   const std::string root = prefix();
-  setenv("BSLAM_PYTHON", (root + "/bin/python3").c_str(), 0);  // for --rerun
+  // For --rerun. There is none beside commands that were installed with pip --user: python3 of PATH is used then.
+  const std::string python = root + "/bin/python3";
+  if (access(python.c_str(), X_OK) == 0) setenv("BSLAM_PYTHON", python.c_str(), 0);
   for (const char* packages :
        {"/lib*/python3*/site-packages", "/lib*/python3*/dist-packages", "/local/lib*/python3*/dist-packages", ""}) {
     glob_t found{};

@@ -19,7 +19,7 @@ using FourCc = std::uint32_t;
 // What is asked of a camera.
 struct StreamRequest {
   int width = 0, height = 0;          // pixels
-  std::optional<double> fps = {};     // default: the highest rate of the format
+  std::optional<double> fps = {};     // default: the highest up to 60 that the format offers
   std::optional<FourCc> pixels = {};  // default: the one that needs least conversion at this rate
   enum class Exposure { kAsItIs, kAutomatic, kFixed } exposure = Exposure::kAsItIs;
   int exposure_us = 0;         // if it is fixed
@@ -33,6 +33,7 @@ struct Stream {
   std::size_t step = 0;                 // bytes from one row to the next; 0 for whole files
   std::optional<double> fps = {};       // nullopt: unknown
   std::vector<std::string> notes = {};  // for the user: what differs from the request
+  std::string identity = {};            // "NAME at PORT", by which a camera is known again; empty: by its path only
 };
 
 struct DeviceImage {

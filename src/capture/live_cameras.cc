@@ -79,6 +79,7 @@ LiveCameras::~LiveCameras() {
 }
 
 std::vector<Stream> LiveCameras::streams() const {
+  const std::lock_guard lock(mutex_);
   std::vector<Stream> out;
   for (const CameraState& camera : cameras_) out.push_back(camera.stream);
   return out;
@@ -92,6 +93,7 @@ void LiveCameras::say(std::size_t camera, const std::string& text) {
 
 void LiveCameras::stop() {
   for (std::jthread& thread : threads_) thread.request_stop();
+  stop_recording_.request_stop();
   const std::lock_guard lock(mutex_);
   stopped_ = true;
   changed_.notify_all();
@@ -208,6 +210,7 @@ void LiveCameras::lose(std::size_t c, const std::string& why) {
     const std::lock_guard lock(mutex_);
     first = !std::exchange(cameras_[c].lost, true);
     cameras_[c].losses += first;
+    if (first) cameras_[c].why_lost = why;
     changed_.notify_all();
   }
   if (first) say(c, why + "; the run goes on with the other cameras, and with this one when it is back");
@@ -224,7 +227,16 @@ bool LiveCameras::reopen(std::size_t c, const std::stop_token& stop) {
   auto device = options_.open(camera.path);
   if (!device) return false;
   const auto stream = (*device)->start(camera.request);
-  if (!stream || stream->step != camera.stream.step) return false;
+  if (!stream) return false;
+  if (stream->identity != camera.stream.identity) {
+    if (std::exchange(camera.other_camera, stream->identity) != stream->identity)
+      say(c,
+          fmt::format("found {} in place of {}; another camera is not used", stream->identity, camera.stream.identity));
+    return false;
+  }
+  const std::lock_guard lock(mutex_);
+  camera.stream = *stream;
+  camera.other_camera.clear();
   camera.device = *std::move(device);
   return true;
 }
@@ -250,11 +262,19 @@ Result<TimeNs> LiveCameras::wait_for_first_frame() {
   if (failure_) std::rethrow_exception(failure_);
   if (seen()) return waiting_.front().time_ns;
   if (stopped_) return Error{"bslam live", "", "an interruption", "images"};
-  const auto silent = std::ranges::find(cameras_, std::size_t{0}, &CameraState::images);
-  const auto c = static_cast<std::size_t>(silent == cameras_.end() ? 0 : silent - cameras_.begin());
-  const std::string found =
-      cameras_[c].damaged > 0 ? fmt::format("{} damaged images and no good one", cameras_[c].damaged) : "no image";
-  return Error{cameras_[c].path, rig_.camera(c).name, found, "images of this camera"};
+  return no_images();
+}
+
+// Why there is no frame: a camera was lost, or has delivered nothing. Needs mutex_.
+Error LiveCameras::no_images() const {
+  auto culprit = std::ranges::find(cameras_, true, &CameraState::lost);
+  if (culprit == cameras_.end()) culprit = std::ranges::find(cameras_, std::size_t{0}, &CameraState::images);
+  const auto c = static_cast<std::size_t>(culprit == cameras_.end() ? 0 : culprit - cameras_.begin());
+  const CameraState& camera = cameras_[c];
+  std::string found = camera.lost ? camera.why_lost : "";
+  if (camera.images == 0 && camera.damaged > 0)
+    found += fmt::format("{}{} damaged images and no good one", found.empty() ? "" : " after ", camera.damaged);
+  return Error{camera.path, rig_.camera(c).name, found.empty() ? "no image" : found, "images of this camera"};
 }
 
 void LiveCameras::begin() {
@@ -262,6 +282,12 @@ void LiveCameras::begin() {
   begun_ = true;
   waiting_.clear();
   frames_waiting_ = 0;
+}
+
+std::optional<TimeNs> LiveCameras::wait_for_frame() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return !waiting_.empty() || ended_; });
+  return waiting_.empty() ? std::nullopt : std::optional(waiting_.front().time_ns);
 }
 
 std::optional<session::FrameSource::Item> LiveCameras::next() {
@@ -277,9 +303,9 @@ std::optional<session::FrameSource::Item> LiveCameras::next() {
   }
   Item item;
   item.images.time_ns = frame.time_ns;
-  item.dropped = frame.dropped;
-  if (frame.dropped) return item;
-  if (recorder_) recorder_->add(frame.bundle);
+  // Only frames that are recorded are processed.
+  item.dropped = frame.dropped || (recorder_ && !recorder_->add(frame.bundle, stop_recording_.get_token()));
+  if (item.dropped) return item;
   item.images = frame_of(frame.bundle, rig_, FrameId(handed_out_++));
   for (const CameraImage& image : frame.bundle.images) {
     if (image.data != nullptr) item.read_ms += pixels_of(image).read_ms;

@@ -13,6 +13,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -51,14 +52,17 @@ class LiveCameras final : public session::FrameSource {
   // or delivered none; stop() was called.
   Result<TimeNs> wait_for_first_frame();
 
-  // Frames are recorded from now on as they are handed out. `recorder` must outlive this object.
+  // Frames are recorded from now on as they are handed out. `recorder` must outlive the last call of next().
   void record_to(Recorder* recorder) { recorder_ = recorder; }
 
   // Begins the run: frames that came before are not part of it. Called once, before next().
   void begin();
 
-  // Returns nullopt after stop(), or when all
-  // cameras have ended, once the frames before were handed out. Rethrows exceptions of the threads.
+  // Waits for the frame that next() returns, and returns its time; nullopt if there is none.
+  std::optional<TimeNs> wait_for_frame();
+
+  // Returns nullopt after stop(), or when all cameras have ended, once the frames before were handed out. Rethrows
+  // exceptions of the threads.
   std::optional<Item> next() override;
 
   // Ends the capture; may be called from any thread.
@@ -71,11 +75,13 @@ class LiveCameras final : public session::FrameSource {
   struct CameraState {
     std::string path;
     StreamRequest request;
-    Stream stream;
-    std::unique_ptr<Device> device;  // used by the thread of the camera only
+    Stream stream;                   // written by the thread of the camera, with mutex_
+    std::unique_ptr<Device> device;  // used by the thread of the camera only, like the next one
+    std::string other_camera;        // the identity of another camera that was found in its place
     // Guarded by mutex_.
     std::size_t images = 0, damaged = 0, losses = 0;
     bool lost = false, unstamped = false;
+    std::string why_lost;
     std::array<bool, kDropReasons> drop_said{};
   };
   struct Waiting {
@@ -92,6 +98,7 @@ class LiveCameras final : public session::FrameSource {
   void collect();
   void lose(std::size_t camera, const std::string& why);
   bool reopen(std::size_t camera, const std::stop_token& stop);
+  Error no_images() const;
   void note_drop(const DroppedImage& image);
   void say(std::size_t camera, const std::string& text);
   std::string name_of(std::size_t camera) const;
@@ -99,6 +106,7 @@ class LiveCameras final : public session::FrameSource {
   const camera::Rig rig_;
   const LiveOptions options_;
   Recorder* recorder_ = nullptr;
+  std::stop_source stop_recording_;
   std::optional<Synchronizer> synchronizer_;
   std::vector<CameraState> cameras_;
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <thread>
 
@@ -25,7 +26,8 @@ std::vector<image_files::NumberedImage> images_of(const fs::path& folder) {
   return image_files::images_in(fs::is_directory(folder / "data", error) ? folder / "data" : folder);
 }
 
-// The time at which all folders began to be played.
+// The time at which all folders began to be played, and how far each was played. A folder whose images pause for long
+// is opened again, as a camera would be, and goes on where it was.
 class Playback {
  public:
   explicit Playback(TimeNs first_ns) : first_ns_(first_ns) {}
@@ -33,17 +35,27 @@ class Playback {
     std::call_once(begun_, [this] { start_ = Clock::now(); });
     return start_ + std::chrono::nanoseconds(time_ns - first_ns_);
   }
+  // The number of the next image of a folder, for the one device that plays it.
+  std::size_t& next_of(const std::string& path) {
+    const std::lock_guard lock(mutex_);
+    return next_[path];
+  }
 
  private:
   const TimeNs first_ns_;
   std::once_flag begun_;
   Clock::time_point start_;
+  std::mutex mutex_;
+  std::map<std::string, std::size_t> next_;
 };
 
 class PlayedFolder final : public Device {
  public:
   PlayedFolder(std::string path, std::vector<image_files::NumberedImage> images, std::shared_ptr<Playback> playback)
-      : path_(std::move(path)), images_(std::move(images)), playback_(std::move(playback)) {}
+      : path_(std::move(path)),
+        images_(std::move(images)),
+        playback_(std::move(playback)),
+        next_(playback_->next_of(path_)) {}
 
   Result<Stream> start(const StreamRequest& request) override {
     const auto first = image_decoding::read_image(images_.front().path);
@@ -52,6 +64,8 @@ class PlayedFolder final : public Device {
       return Error{path_, "", fmt::format("images of {}x{}", first->width(), first->height()),
                    fmt::format("{}x{}, the resolution in the rig file", request.width, request.height)};
     }
+    width_ = request.width;
+    height_ = request.height;
     const std::string extension = images_.front().path.extension().string();
     jpeg_ = extension == ".jpg" || extension == ".jpeg";
     return Stream{.pixels = jpeg_ ? fourcc("MJPG") : fourcc("GREY"),
@@ -69,11 +83,12 @@ class PlayedFolder final : public Device {
     ++next_;
     auto file = read_file(image.path, kMaxFileBytes);
     bytes_ = file ? *std::move(file) : std::string();
-    if (const auto grey = jpeg_ ? std::nullopt : image_decoding::decode_grey(bytes_))
+    const auto grey = jpeg_ ? std::nullopt : image_decoding::decode_grey(bytes_);
+    if (grey && grey->width() == width_ && grey->height() == height_)
       bytes_.assign(reinterpret_cast<const char*>(grey->row(0)),
                     static_cast<std::size_t>(grey->width()) * static_cast<std::size_t>(grey->height()));
     else if (!jpeg_)
-      bytes_.clear();
+      bytes_.clear();  // no image of this stream
     return DeviceImage{DeviceImage::State::kImage, bytes_, image.number};
   }
 
@@ -81,7 +96,8 @@ class PlayedFolder final : public Device {
   const std::string path_;
   const std::vector<image_files::NumberedImage> images_;
   const std::shared_ptr<Playback> playback_;
-  std::size_t next_ = 0;
+  std::size_t& next_;  // of playback_
+  int width_ = 0, height_ = 0;
   bool jpeg_ = false;
   std::string bytes_;
 };

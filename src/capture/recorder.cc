@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
+#include <optional>
 #include <utility>
 
 #include "containers/ros_writer.h"
@@ -62,20 +64,21 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const std::filesystem::path& 
     else
       writer.add_topic(topics[c], containers::kImageType, containers::image_definition());
   }
-  return std::unique_ptr<Recorder>(new Recorder(*std::move(file), rig));
+  return std::unique_ptr<Recorder>(new Recorder(path, *std::move(file), rig));
 }
 
-Recorder::Recorder(std::unique_ptr<containers::McapWriter> file, const camera::Rig& rig)
-    : rig_(rig), file_(std::move(file)), thread_([this] { run(); }) {}
+Recorder::Recorder(std::filesystem::path path, std::unique_ptr<containers::McapWriter> file, const camera::Rig& rig)
+    : path_(std::move(path)), rig_(rig), file_(std::move(file)), thread_([this] { run(); }) {}
 
 Recorder::~Recorder() { [[maybe_unused]] const Status last = finish(); }
 
-void Recorder::add(const ImageBundle& frame) {
+bool Recorder::add(const ImageBundle& frame, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return waiting_.size() < kMaxWaiting || !status_; });
-  if (!status_ || ending_) return;
+  if (!changed_.wait(lock, stop, [this] { return waiting_.size() < kMaxWaiting || !status_; })) return false;
+  if (!status_ || ending_) return true;
   waiting_.push_back(frame);
   changed_.notify_all();
+  return true;
 }
 
 Status Recorder::write(const ImageBundle& frame) {
@@ -95,6 +98,16 @@ Status Recorder::write(const ImageBundle& frame) {
 }
 
 void Recorder::run() {
+  try {
+    write_frames();
+  } catch (const std::exception& failure) {
+    const std::lock_guard lock(mutex_);
+    status_ = Error{path_.string(), "", failure.what(), "a recording that can go on"};
+    changed_.notify_all();
+  }
+}
+
+void Recorder::write_frames() {
   Clock::time_point flushed = Clock::now();
   std::unique_lock lock(mutex_);
   while (status_) {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <stop_token>
 #include <thread>
 #include <vector>
 
@@ -32,8 +33,9 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // Adds a frame. Waits while many frames are still to be written. After an error frames are not recorded any more.
-  void add(const ImageBundle& frame);
+  // Adds a frame. Waits while many frames are still to be written; returns false if `stop` was requested before there
+  // was room. After an error frames are not recorded any more.
+  bool add(const ImageBundle& frame, const std::stop_token& stop = {});
 
   // Writes what is left and ends the file. Error: it could not be written completely.
   Status finish();
@@ -43,14 +45,16 @@ class Recorder {
   std::uint64_t bytes() const;
 
  private:
-  Recorder(std::unique_ptr<containers::McapWriter> file, const camera::Rig& rig);
+  Recorder(std::filesystem::path path, std::unique_ptr<containers::McapWriter> file, const camera::Rig& rig);
   void run();
+  void write_frames();
   Status write(const ImageBundle& frame);
 
+  const std::filesystem::path path_;
   const camera::Rig rig_;
   const std::unique_ptr<containers::McapWriter> file_;  // used by the thread only, until it has ended
   mutable std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable_any changed_;
   std::deque<ImageBundle> waiting_;  // guarded by mutex_, like all until `thread_`
   bool ending_ = false;
   Status status_;

@@ -27,6 +27,13 @@ TimeNs monotonic_now() {
   return static_cast<TimeNs>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
 }
 
+// A text of the driver, which fills its array or ends with 0.
+template <std::size_t N>
+std::string text_of(const unsigned char (&text)[N]) {
+  const char* const begin = reinterpret_cast<const char*>(text);
+  return {begin, ::strnlen(begin, N)};
+}
+
 class V4l2Device final : public Device {
  public:
   V4l2Device(VideoCalls& calls, std::string path, int device)
@@ -41,7 +48,7 @@ class V4l2Device final : public Device {
   int control(unsigned long request, void* argument) { return video_ioctl(calls_, device_, request, argument); }
   Error failed(const char* what) const;
   Status set_format(const StreamRequest& request, const VideoMode& mode, Stream& stream);
-  void set_rate(const StreamRequest& request, Stream& stream);
+  void set_rate(const StreamRequest& request, const VideoMode& mode, Stream& stream);
   Status map_buffers();
   Status queue(std::uint32_t buffer);
   Result<DeviceImage> fetch();
@@ -53,6 +60,7 @@ class V4l2Device final : public Device {
   VideoCalls& calls_;
   const std::string path_;
   const int device_;
+  std::string identity_;
   TimeNs clock_offset_ns_ = 0;
   std::vector<Memory> buffers_;
   std::optional<std::uint32_t> taken_;  // the buffer whose bytes the caller has
@@ -84,6 +92,7 @@ Status V4l2Device::check() {
   v4l2_capability found{};
   if (control(VIDIOC_QUERYCAP, &found) < 0)
     return Error{path_, "", "no video device", "a camera; " + devices_in_one_line(calls_)};
+  identity_ = fmt::format("{} at {}", text_of(found.card), text_of(found.bus_info));
   const std::uint32_t what = found.capabilities & V4L2_CAP_DEVICE_CAPS ? found.device_caps : found.capabilities;
   if ((what & V4L2_CAP_VIDEO_CAPTURE) == 0) {
     const char* kind = what & V4L2_CAP_VIDEO_CAPTURE_MPLANE ? "a device with separate planes of pixels"
@@ -120,14 +129,19 @@ Status V4l2Device::set_format(const StreamRequest& request, const VideoMode& mod
 }
 
 // The rate is a wish: cameras lower it in the dark, for example.
-void V4l2Device::set_rate(const StreamRequest& request, Stream& stream) {
+void V4l2Device::set_rate(const StreamRequest& request, const VideoMode& mode, Stream& stream) {
   v4l2_streamparm parameters{};
-  parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  const bool known = control(VIDIOC_G_PARM, &parameters) >= 0;
+  const auto get = [&] {
+    parameters = {};
+    parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    return control(VIDIOC_G_PARM, &parameters) >= 0;
+  };
+  bool known = get();
   v4l2_fract& interval = parameters.parm.capture.timeperframe;
-  if (known && request.fps) {
-    interval = {1000, static_cast<std::uint32_t>(std::lround(1000 * *request.fps))};
-    control(VIDIOC_S_PARM, &parameters);
+  const double wanted = request.fps.value_or(best_rate(mode, request));
+  if (known && wanted > 0) {
+    interval = {1000, static_cast<std::uint32_t>(std::lround(1000 * wanted))};
+    if (control(VIDIOC_S_PARM, &parameters) < 0) known = get();  // it holds what was asked for, not what was set
   }
   if (known && interval.numerator > 0 && interval.denominator > 0)
     stream.fps = static_cast<double>(interval.denominator) / interval.numerator;
@@ -174,9 +188,9 @@ Result<Stream> V4l2Device::start(const StreamRequest& request) {
     return Error{path_, "", modes_text(modes),
                  fmt::format("{}{}x{}, the resolution in the rig file", wanted, request.width, request.height)};
   }
-  Stream stream;
+  Stream stream{.identity = identity_};
   if (const Status s = set_format(request, *mode, stream); !s) return s.error();
-  set_rate(request, stream);
+  set_rate(request, *mode, stream);
   if (const Status s = set_exposure(calls_, device_, path_, request); !s) return s.error();
   if (const Status s = map_buffers(); !s) return s.error();
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;

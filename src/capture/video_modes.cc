@@ -66,19 +66,6 @@ void add_sizes(VideoCalls& calls, int device, FourCc pixels, std::vector<VideoMo
   if (out.size() == before) out.push_back({.pixels = pixels});
 }
 
-// The rate of a mode that suits best: the one that is asked for, or the highest usual one; 0 if it has none.
-double best_rate(const VideoMode& mode, const StreamRequest& request) {
-  double best = 0;
-  if (mode.any_between && !mode.fps.empty()) {
-    const double wanted = request.fps.value_or(std::min(kUsualFps, mode.fps.front()));
-    return wanted <= 1.01 * mode.fps.front() && wanted >= 0.99 * mode.fps.back() ? wanted : 0;
-  }
-  for (const double fps : mode.fps) {
-    if (request.fps ? std::abs(fps - *request.fps) < 0.02 * fps : fps <= kUsualFps) best = std::max(best, fps);
-  }
-  return best;
-}
-
 std::string mode_text(const VideoMode& mode) {
   if (mode.width == 0) return fourcc_text(mode.pixels);
   std::string out = fmt::format("{} {}x{}", fourcc_text(mode.pixels), mode.width, mode.height);
@@ -141,6 +128,18 @@ std::string modes_text(const std::vector<VideoMode>& modes) {
   std::vector<std::string> parts;
   for (const VideoMode& mode : modes) parts.push_back(mode_text(mode));
   return parts.empty() ? "no modes" : fmt::format("{}", fmt::join(parts, ", "));
+}
+
+double best_rate(const VideoMode& mode, const StreamRequest& request) {
+  double best = 0;
+  if (mode.any_between && !mode.fps.empty()) {
+    const double wanted = request.fps.value_or(std::min(kUsualFps, mode.fps.front()));
+    return wanted <= 1.01 * mode.fps.front() && wanted >= 0.99 * mode.fps.back() ? wanted : 0;
+  }
+  for (const double fps : mode.fps) {
+    if (request.fps ? std::abs(fps - *request.fps) < 0.02 * fps : fps <= kUsualFps) best = std::max(best, fps);
+  }
+  return best;
 }
 
 const VideoMode* choose_mode(const std::vector<VideoMode>& modes, const StreamRequest& request) {

@@ -30,6 +30,10 @@ std::vector<VideoMode> video_modes(VideoCalls& calls, int device);
 // One line: "GREY 752x480 (60, 30 frames/s), MJPG 1280x720 (30 frames/s)".
 std::string modes_text(const std::vector<VideoMode>& modes);
 
+// Returns the rate of a mode that suits a request best, in frames per second: the one that is asked for, or the highest
+// up to 60; 0 if it has none or the driver does not tell.
+double best_rate(const VideoMode& mode, const StreamRequest& request);
+
 // Returns the mode for a request: of those of its size and of a known pixel format, one with its rate, or with the
 // highest rate up to 60 frames/s, that needs least conversion; nullptr if there is none.
 const VideoMode* choose_mode(const std::vector<VideoMode>& modes, const StreamRequest& request);

@@ -68,12 +68,8 @@ Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& a
   if (!camera) return camera.error();
   const geometry::SE3 T_cam_frame =
       arguments.gt_frame == "body" ? rig->body_from_cam(*camera).inverse() : rig->cam_from_rig(*camera);
-  if (T_cam_frame.translation().norm() > 0 && evaluation::read_comments(arguments.estimate).scale != "metric") {
-    fmt::print(stderr,
-               "note: the camera is {:.3f} m away from the frame of the ground truth, but the unit of {} is not the "
-               "metre: the errors contain the difference\n",
-               T_cam_frame.translation().norm(), arguments.estimate);
-  }
+  note_lever_arm(T_cam_frame.translation().norm(), "the frame of the ground truth", arguments.estimate,
+                 "the errors contain the difference");
   return evaluation::moved_to_frame(estimate, T_cam_frame);
 }
 

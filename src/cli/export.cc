@@ -32,46 +32,46 @@ struct TrajectoryArguments {
   bool overwrite = false;
 };
 
-// The frame of the poses in the file; camera 0 if it does not say it.
-std::string frame_in_file(const std::string& file) {
-  const std::string frame = evaluation::read_comments(file).frame;
-  return frame.empty() ? "cam0" : frame;
+// The frame of the poses in the file. If it does not name one, or cam0, --camera decides.
+std::string frame_in_file(const TrajectoryArguments& arguments) {
+  const std::string frame = evaluation::read_comments(arguments.file).frame;
+  return frame.empty() || frame == "cam0" ? "cam" + std::to_string(arguments.camera.value_or(0)) : frame;
 }
 
-// Reads the rig, whose camera 0 becomes that of the trajectory.
-Result<camera::Rig> rig_of_trajectory(const TrajectoryArguments& arguments, const std::string& needed_by) {
+// The calibration, and the camera whose poses the trajectory contains.
+struct TrajectoryRig {
+  camera::Rig rig;
+  std::size_t camera = 0;
+};
+
+Result<TrajectoryRig> rig_of_trajectory(const TrajectoryArguments& arguments, const std::string& needed_by) {
   if (!arguments.rig) return Error{"command line", needed_by, "no --rig", "--rig FILE, the calibration of the run"};
   auto rig = rig_formats::read_rig(*arguments.rig);
-  if (!rig) return rig;
+  if (!rig) return rig.error();
   const auto camera = camera_of_trajectory(arguments.file, *rig, *arguments.rig, arguments.camera);
   if (!camera) return camera.error();
-  if (*camera == 0) return rig;
-  const auto first = static_cast<int>(*camera);
-  std::vector<int> order = {first};
-  for (int c = 0; c < static_cast<int>(rig->size()); ++c)
-    if (c != first) order.push_back(c);
-  return rig->subset(order);
+  return TrajectoryRig{*std::move(rig), *camera};
 }
 
-// T_cam0_frame of the frame of this name: the body or a camera.
-Result<SE3> frame_in_cam0(const std::string& name, const TrajectoryArguments& arguments) {
-  const auto rig = rig_of_trajectory(arguments, "--frame " + name);
-  if (!rig) return rig.error();
-  if (name == "body") return rig->body_from_cam(0).inverse();
+// T_cam_frame of the frame of this name, the body or a camera, and of the camera of the trajectory.
+Result<SE3> frame_in_camera(const std::string& name, const TrajectoryArguments& arguments) {
+  const auto source = rig_of_trajectory(arguments, "--frame " + name);
+  if (!source) return source.error();
+  const auto& [rig, camera] = *source;
+  if (name == "body") return rig.body_from_cam(camera).inverse();
+  if (const auto target = name == "cam0" ? std::size_t{0} : camera_named(name, rig))
+    return rig.cam_from_rig(camera) * rig.rig_from_cam(*target);
   std::string names;
-  for (std::size_t c = 0; c < rig->size(); ++c) {
-    if (rig->camera(c).name == name) return rig->rig_from_cam(c);
-    names += ", " + rig->camera(c).name;
-  }
+  for (std::size_t c = 0; c < rig.size(); ++c) names += ", " + rig.camera(c).name;
   return Error{"command line", "--frame", name, "cam0, body" + names};
 }
 
 // T_body_cam of the camera of the trajectory, where an upward axis of the body needs it.
 Result<SE3> camera_on_body(const map_export::UpAxis& up, const TrajectoryArguments& arguments) {
   if (up.frame != map_export::UpAxis::Frame::kBody) return SE3();
-  const auto rig = rig_of_trajectory(arguments, "--up " + arguments.up);
-  if (!rig) return rig.error();
-  return rig->body_from_cam(0);
+  const auto source = rig_of_trajectory(arguments, "--up " + arguments.up);
+  if (!source) return source.error();
+  return source->rig.body_from_cam(source->camera);
 }
 
 // The rotation of the world's axes: that of the map if one is given, so that the path fits maps exported for ROS.
@@ -101,37 +101,47 @@ Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArgume
   return selection->T_upright_world;
 }
 
-// Recorded time stamps instead of capture times: without the time offset of camera 0.
+// Recorded time stamps instead of capture times: without the time offset of the camera.
 Status restore_stamps(const TrajectoryArguments& arguments, Trajectory& trajectory) {
   if (arguments.stamps != "image") return {};
-  const auto rig = rig_of_trajectory(arguments, "--stamps image");
-  if (!rig) return rig.error();
-  for (evaluation::TimedPose& pose : trajectory) pose.time_ns -= rig->camera(0).time_offset_ns;
+  const auto source = rig_of_trajectory(arguments, "--stamps image");
+  if (!source) return source.error();
+  for (evaluation::TimedPose& pose : trajectory) pose.time_ns -= source->rig.camera(source->camera).time_offset_ns;
   return {};
 }
 
-// The input is a trajectory of a camera, camera 0 of rig_of_trajectory.
+// T_cam_frame of the frame that is asked for and of the camera of the trajectory.
+Result<SE3> wanted_frame(const TrajectoryArguments& arguments) {
+  const std::string& frame = arguments.frame;
+  if (frame.empty() || (!arguments.camera && frame == frame_in_file(arguments))) return SE3();
+  const auto T_cam_frame = frame_in_camera(frame, arguments);
+  if (T_cam_frame) {
+    note_lever_arm(T_cam_frame->translation().norm(), frame, arguments.file,
+                   "the distance is added to the path as it is");
+  }
+  return T_cam_frame;
+}
+
+// The input is a trajectory of a camera.
 Result<Trajectory> converted(const TrajectoryArguments& arguments) {
   auto read = evaluation::read_trajectory(arguments.file, arguments.times);
   if (!read) return read;
   Trajectory trajectory = *std::move(read);
-  SE3 T_upright_world, T_cam0_frame;
+  SE3 T_upright_world;
   if (arguments.axes == "ros") {
     const auto axes = upright_axes_of(trajectory, arguments);
     if (!axes) return axes.error();
     T_upright_world = *axes;
   }
-  if (arguments.frame != frame_in_file(arguments.file)) {
-    const auto frame = frame_in_cam0(arguments.frame, arguments);
-    if (!frame) return frame.error();
-    T_cam0_frame = *frame;
-  }
+  const auto frame = wanted_frame(arguments);
+  if (!frame) return frame.error();
+  SE3 T_cam_frame = *frame;
   if (arguments.axes == "ros" && arguments.frame != "body") {
     geometry::Matrix3d R_cam_ros;  // x forward, y left, z up in a camera's x right, y down, z forward
     R_cam_ros << 0, -1, 0, 0, 0, -1, 1, 0, 0;
-    T_cam0_frame = T_cam0_frame * SE3(R_cam_ros, geometry::Vector3d::Zero());
+    T_cam_frame = T_cam_frame * SE3(R_cam_ros, geometry::Vector3d::Zero());
   }
-  trajectory = evaluation::moved_to_frame(trajectory, T_cam0_frame);
+  trajectory = evaluation::moved_to_frame(trajectory, T_cam_frame);
   for (evaluation::TimedPose& pose : trajectory) pose.T_world_frame = T_upright_world * pose.T_world_frame;
   if (const Status s = restore_stamps(arguments, trajectory); !s) return s.error();
   return trajectory;
@@ -143,23 +153,29 @@ std::string parent_frame(const TrajectoryArguments& arguments) {
   return arguments.map ? "map" : "world_ros";
 }
 
-int run_export(TrajectoryArguments arguments) {
+// The comments of the exported file. Lengths that are not metres in the source are none here.
+std::string comments(const TrajectoryArguments& arguments, const std::string& frame) {
+  const std::string whole_name = arguments.axes == "ros" ? frame + "_ros" : frame;
+  std::string out = evaluation::trajectory_header(whole_name, evaluation::PoseState::kFinal, parent_frame(arguments));
+  const std::string scale = evaluation::read_comments(arguments.file).scale;
+  if (scale != "metric") out += "\n# " + evaluation::scale_comment(scale);
+  return out;
+}
+
+int run_export(const TrajectoryArguments& arguments) {
   std::error_code error;
   if (fs::exists(arguments.out, error) && !arguments.overwrite)
     return report_error({arguments.out, "--out", "an existing file", "a new file, or --overwrite"});
-  const std::string own_frame = frame_in_file(arguments.file);
+  const std::string own_frame = frame_in_file(arguments);
   if (own_frame == "body" || own_frame.ends_with("_ros"))
     return report_error({arguments.file, "frame", own_frame, "a trajectory of a camera, as bslam run writes it"});
-  if (arguments.frame.empty()) arguments.frame = own_frame;
   if (!arguments.up.empty() && arguments.axes != "ros")
     return report_error({"command line", "--up", "no --axes ros", "--axes ros"});
   const auto trajectory = converted(arguments);
   if (!trajectory) return report_error(trajectory.error());
   using enum evaluation::TrajectoryFormat;
   const auto format = arguments.format == "euroc" ? kEurocCsv : arguments.format == "kitti" ? kKitti : kTum;
-  const std::string frame = arguments.axes == "ros" ? arguments.frame + "_ros" : arguments.frame;
-  const std::string header =
-      evaluation::trajectory_header(frame, evaluation::PoseState::kFinal, parent_frame(arguments));
+  const std::string header = comments(arguments, arguments.frame.empty() ? own_frame : arguments.frame);
   const Status status = evaluation::write_trajectory(arguments.out, *trajectory, format, header, arguments.overwrite);
   if (!status) return report_error(status.error());
   std::printf("%s: %zu poses\n", arguments.out.c_str(), trajectory->size());

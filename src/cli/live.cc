@@ -1,14 +1,21 @@
 // bslam live: runs the SLAM system on the images of live cameras.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "base/split.h"
 #include "capture/live_cameras.h"
@@ -146,11 +153,15 @@ class Timer {
   std::jthread thread_;
 };
 
-void end_recording(capture::Recorder& recorder, const std::string& file) {
-  const Status written = recorder.finish();
-  if (!written) fmt::print(stderr, "warning: {}; the recording ends there\n", written.error().message());
+// Returns the warning if the recording ended early.
+std::optional<std::string> end_recording(capture::Recorder& recorder, const std::string& file) {
+  std::optional<std::string> warning;
+  if (const Status written = recorder.finish(); !written)
+    warning = written.error().message() + "; the recording ends there";
+  if (warning) fmt::print(stderr, "warning: {}\n", *warning);
   fmt::print(stderr, "recorded: {} frames, {:.1f} MB in {}\n", recorder.frames(),
              1e-6 * static_cast<double>(recorder.bytes()), file);
+  return warning;
 }
 
 dataset::Dataset dataset_of(const LiveRig& rig, TimeNs first_time_ns) {
@@ -188,7 +199,7 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
   const auto first_time_ns = cameras.wait_for_first_frame();
   if (interruption.token().stop_requested()) return kExitInterrupted;
   if (!first_time_ns) return report_error(first_time_ns.error());
-  const dataset::Dataset dataset = dataset_of(rig, *first_time_ns);
+  dataset::Dataset dataset = dataset_of(rig, *first_time_ns);
 
   std::unique_ptr<capture::Recorder> recorder;
   std::optional<Timer> timer;
@@ -207,16 +218,18 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
     }
     cameras.begin();
     if (a.duration_s) timer.emplace(*a.duration_s, [&cameras] { cameras.stop(); });
+    dataset.first_time_ns = cameras.wait_for_frame().value_or(*first_time_ns);  // of those that are processed
     return {};
   };
   input.after = [&] {
     bar.finish();
     timer.reset();
     cameras.stop();
-    if (recorder) end_recording(*recorder, a.record);
-    for (const std::string& note : cameras.notes()) {
-      if (!quiet) fmt::print(stderr, "warning: {}\n", note);
-    }
+    std::vector<std::string> warnings = cameras.notes();
+    if (!quiet) print_warnings(warnings);
+    const auto early = recorder ? end_recording(*recorder, a.record) : std::nullopt;
+    if (early) warnings.push_back(*early);
+    return warnings;
   };
   return run_and_write(a.slam, std::move(input), control);
 }
@@ -262,7 +275,8 @@ void add_live(CLI::App& app, std::span<const char* const> command_line, int& exi
   verb->add_option("--record", a->record,
                    "write the images of all frames that are processed to this MCAP file, of which bslam run makes the "
                    "same frames");
-  verb->add_option("--fps", a->fps, "frame rate to set; default: the highest up to 60")->check(CLI::Range(0.1, 1000.0));
+  verb->add_option("--fps", a->fps, "frame rate to set; default: the highest up to 60 that the camera offers")
+      ->check(CLI::Range(0.1, 1000.0));
   verb->add_option("--exposure", a->exposure,
                    "auto, or a fixed exposure time in microseconds; default: as it is set already");
   verb->add_option("--pixels", a->pixels, "pixel format; default: the one that needs least conversion at this rate")

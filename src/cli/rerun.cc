@@ -16,6 +16,11 @@ std::string interpreter() {
   return chosen != nullptr && *chosen != 0 ? chosen : "python3";
 }
 
+// Python code that is run with -c. Packages in the current folder, which -c would prefer, are not looked for.
+std::string code(const std::string& statements) {
+  return "import sys; sys.path[:] = [folder for folder in sys.path if folder]; " + statements;
+}
+
 // The last line of a log that is not empty.
 std::string last_line(const std::filesystem::path& log) {
   constexpr std::size_t kMaxBytes = std::size_t{1} << 24;
@@ -31,7 +36,7 @@ std::string last_line(const std::filesystem::path& log) {
 }  // namespace
 
 Status check_rerun() {
-  const auto end = run_program(interpreter(), {"-c", "import bslam.rerun, rerun"}, "/dev/null");
+  const auto end = run_program(interpreter(), {"-c", code("import bslam.rerun, rerun")}, "/dev/null");
   if (end && end->exit_status == 0 && end->signal == 0) return {};
   return Error{
       "command line", "--rerun", "no Python packages bslam and rerun-sdk", "both, installed by pip",
@@ -43,8 +48,10 @@ Status check_rerun() {
 Status send_to_rerun(const std::filesystem::path& folder, const std::string& target) {
   const bool address = target.find("://") != std::string::npos;
   const std::filesystem::path log = folder / "rerun.log";
-  const auto end =
-      run_program(interpreter(), {"-m", "bslam.rerun", folder.string(), address ? "--connect" : "--save", target}, log);
+  const auto end = run_program(interpreter(),
+                               {"-c", code("import bslam.rerun; sys.exit(bslam.rerun.main())"), folder.string(),
+                                address ? "--connect" : "--save", target},
+                               log);
   if (!end) return end.error();
   if (end->exit_status != 0 || end->signal != 0)
     return Error{"--rerun", target, last_line(log), "a file or a viewer that takes the run; see " + log.string()};

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "base/atomic_file.h"
 #include "cli/dataset_arguments.h"
@@ -88,7 +89,10 @@ int run(RunArguments& arguments) {
     print_before(*dataset, arguments.data, log_verbosity(arguments.slam.log_level));
     return {};
   };
-  input.after = [&bar] { bar.finish(); };
+  input.after = [&bar] {
+    bar.finish();
+    return std::vector<std::string>();
+  };
   session::RunControl control(arguments.pace == "realtime" ? 1.0 : 0.0);
   return run_and_write(arguments.slam, std::move(input), control);
 }

@@ -39,7 +39,7 @@ Status prepare_folder(const SlamArguments& arguments) {
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
   if (const Status status = check_writable(folder / "summary.json"); !status) return status;
   for (const char* name :
-       {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "report.html", "rig_refined.yaml"}) {
+       {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "report.html", "rig_refined.yaml", "rerun.log"}) {
     const auto is = [&](const std::string& input) {
       return !input.empty() && std::filesystem::equivalent(folder / name, input, error);
     };
@@ -91,10 +91,12 @@ void end_view(live_view::LiveView* view, const session::SessionResult& result, c
   view->end(session::report_text(result, config, {dataset, arguments.command}));
 }
 
-// Returns the warnings after the run; the record gets those before it as well.
-std::vector<std::string> note_warnings(const RunInput& input, session::RunRecord& record) {
+// Returns the warnings after the run; the record gets those before it and of the source of the frames as well.
+std::vector<std::string> note_warnings(const RunInput& input, const std::vector<std::string>& of_source,
+                                       session::RunRecord& record) {
   const std::vector<std::string> after = session::warnings_after_run(record, input.dataset.rig, input.check_command);
   record.warnings = session::warnings_before_run(input.dataset);
+  record.warnings.insert(record.warnings.end(), of_source.begin(), of_source.end());
   record.warnings.insert(record.warnings.end(), after.begin(), after.end());
   return after;
 }
@@ -184,10 +186,10 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   options.observer = view->get();
   options.control = &control;
   auto result = session::run_session(dataset, options);
-  if (input.after) input.after();
+  const std::vector<std::string> of_source = input.after ? input.after() : std::vector<std::string>();
   if (!result) return report_error(result.error());
   if (arguments.image_stamps) result->subtracted_ns = dataset.rig.camera(0).time_offset_ns;
-  const std::vector<std::string> warnings = note_warnings(input, result->record);
+  const std::vector<std::string> warnings = note_warnings(input, of_source, result->record);
   if (const Status s = write_files(*result, input.config, dataset, arguments, **vocabulary); !s)
     return report_error(s.error());
   const Status sent = arguments.rerun.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);

@@ -49,7 +49,9 @@ struct RunInput {
   std::string check_command;        // tests the calibration against the images
   // Called when everything else is checked, before the first frame. Its error ends the run.
   std::function<Status()> before = {};
-  std::function<void()> after = {};  // called after the last frame was processed, before messages about the run
+  // Called after the last frame was processed, before messages about the run. Prints warnings about the source of the
+  // frames, and returns them for the record.
+  std::function<std::vector<std::string>()> after = {};
 };
 
 // Loads vocabulary and map, prepares the output folder, runs, and writes the output. Returns the exit status; errors

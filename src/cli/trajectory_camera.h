@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "base/result.h"
 #include "camera/rig.h"
@@ -15,5 +16,12 @@ namespace bslam::cli {
 // is no such camera; the trajectory is that of a body, or has other axes.
 Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory, const camera::Rig& rig,
                                          const std::filesystem::path& rig_file, std::optional<int> option);
+
+// The camera of this name, or, if no camera has it, number N of a name camN; nullopt if there is none.
+std::optional<std::size_t> camera_named(const std::string& name, const camera::Rig& rig);
+
+// Prints a note if poses of a camera are moved by this distance although the lengths of the trajectory are not metres.
+void note_lever_arm(double distance_m, const std::string& frame, const std::filesystem::path& trajectory,
+                    const std::string& consequence);
 
 }  // namespace bslam::cli

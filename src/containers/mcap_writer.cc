@@ -40,6 +40,9 @@ std::string record(unsigned char op, std::string_view data) {
   return out += data;
 }
 
+// The number of the type of a topic; 0 means none.
+std::uint16_t schema_of(std::size_t topic) { return static_cast<std::uint16_t>(topic + 1); }
+
 std::string compressed(std::string_view bytes) {
   std::string out(ZSTD_compressBound(bytes.size()), '\0');
   const std::size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kLevel);
@@ -114,7 +117,7 @@ Status McapWriter::add_metadata(const std::string& name, const std::map<std::str
   append(index, at_);
   append(index, static_cast<std::uint64_t>(whole.size()));
   append_text(index, name);
-  attachment_indices_ += record(kMetadataIndex, index);
+  metadata_indices_ += record(kMetadataIndex, index);
   ++metadata_;
   return put(whole);
 }
@@ -124,30 +127,37 @@ std::uint16_t McapWriter::add_topic(const std::string& name, const std::string& 
   return static_cast<std::uint16_t>(channels_.size() - 1);
 }
 
-// The records of the type and the topic. Every topic has a type of its own.
+// The record of the type of a topic. Every topic has a type of its own.
+std::string McapWriter::schema_record(std::size_t number) const {
+  std::string out;
+  append(out, schema_of(number));
+  append_text(out, channels_[number].type);
+  append_text(out, "ros2msg");
+  append_text(out, channels_[number].definition);
+  return record(kSchema, out);
+}
+
 std::string McapWriter::channel_record(std::size_t number) const {
-  const Channel& channel = channels_[number];
-  const auto schema_number = static_cast<std::uint16_t>(number + 1);  // 0 means none
-  std::string schema, out;
-  append(schema, schema_number);
-  append_text(schema, channel.type);
-  append_text(schema, "ros2msg");
-  append_text(schema, channel.definition);
+  std::string out;
   append(out, static_cast<std::uint16_t>(number));
-  append(out, schema_number);
-  append_text(out, channel.name);
+  append(out, schema_of(number));
+  append_text(out, channels_[number].name);
   append_text(out, "cdr");
   append_text(out, "");  // no metadata
-  return record(kSchema, schema) + record(kChannel, out);
+  return record(kChannel, out);
 }
 
 Status McapWriter::write(std::uint16_t topic, TimeNs time_ns, std::string_view message) {
+  if (time_ns < 0 && failure_)
+    failure_ = Error{path_.string(), "", "a time before 1970", "times from 1970 on, as MCAP files contain them"};
+  if (!failure_) return failure_;
   const auto time = static_cast<std::uint64_t>(time_ns);
-  for (; described_ < channels_.size(); ++described_) chunk_.records += channel_record(described_);
+  for (; described_ < channels_.size(); ++described_)
+    chunk_.records += schema_record(described_) + channel_record(described_);
   Channel& channel = channels_.at(topic);
-  std::string& entries = chunk_.index[topic];
-  chunk_.first_ns = chunk_.last_ns == 0 ? time : std::min(chunk_.first_ns, time);
+  chunk_.first_ns = chunk_.index.empty() ? time : std::min(chunk_.first_ns, time);
   chunk_.last_ns = std::max(chunk_.last_ns, time);
+  std::string& entries = chunk_.index[topic];
   append(entries, time);
   append(entries, static_cast<std::uint64_t>(chunk_.records.size()));
   std::string head;
@@ -226,9 +236,10 @@ Status McapWriter::finish() {
   std::string end(4, '\0');  // no checksum of the data
   if (const Status s = put(record(kDataEnd, end)); !s) return s;
   const std::uint64_t summary_at = at_;
-  std::string summary;
+  std::string summary;  // records of one kind follow each other, as the specification demands
+  for (std::size_t k = 0; k < described_; ++k) summary += schema_record(k);
   for (std::size_t k = 0; k < described_; ++k) summary += channel_record(k);
-  summary += chunk_indices_ + attachment_indices_ + statistics();
+  summary += chunk_indices_ + attachment_indices_ + metadata_indices_ + statistics();
   std::string footer;
   append(footer, summary_at);
   append(footer, std::uint64_t{0});  // no offsets of the parts of the summary

@@ -35,7 +35,7 @@ class McapWriter {
   std::uint16_t add_topic(const std::string& name, const std::string& type, const std::string& definition);
 
   // Adds a message, which was recorded at `time_ns`, to the chunk, and writes the chunk when it is full. Errors: as of
-  // flush.
+  // flush; a time before 1970, which the format does not know.
   Status write(std::uint16_t topic, TimeNs time_ns, std::string_view message);
   // Writes the chunk. Error: the disk is full or broken. All later calls return it as well and write nothing, so that
   // the file remains readable up to there.
@@ -58,6 +58,7 @@ class McapWriter {
 
   McapWriter(std::filesystem::path path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
   Status put(std::string_view bytes);
+  std::string schema_record(std::size_t number) const;
   std::string channel_record(std::size_t number) const;
   std::string statistics() const;
 
@@ -68,7 +69,7 @@ class McapWriter {
   std::vector<Channel> channels_;
   std::size_t described_ = 0;  // channels whose records are in a chunk
   Chunk chunk_;
-  std::string chunk_indices_, attachment_indices_;  // records for the summary
+  std::string chunk_indices_, attachment_indices_, metadata_indices_;  // records for the summary
   std::uint32_t chunks_ = 0, attachments_ = 0, metadata_ = 0;
   std::uint64_t first_ns_ = 0, last_ns_ = 0;  // times of all messages
 };

@@ -59,7 +59,7 @@ struct Dataset {
   std::vector<FrameEntry> frames;  // in order of time, at least one
   std::optional<std::filesystem::path>
       ground_truth;  // in the format of the data set: EuRoC csv (body), groundtruth_cam0.tum beside mav0 (the first
-                     // camera of the rig), or KITTI poses (camera 0)
+                     // camera of the rig), or KITTI poses (image_0, the body of its calibration)
   std::vector<std::string>
       warnings;  // for the user: entries that were sorted or dropped, images in frames without camera 0
   std::vector<std::string> sources = {};  // of bags and videos: the topic or file of every camera in use

@@ -152,10 +152,9 @@ void warn_of_foreign_images(const RunRecord& record, const std::string& check_co
   if (best == pairs.end() || !best->contradicted) return;
   const auto others = std::ranges::count(pairs, true, &calibration::CameraPair::contradicted) - 1;
   warn(warnings,
-       "the images do not belong to the calibration, so poses, scale and map are wrong: cameras {} and {} share {:.1f} "
-       "% "
-       "of the features in their common view; {}{}. Check which images are of which camera, and the direction of the "
-       "transforms ({})",
+       "the images do not belong to the calibration, so poses, scale and map are wrong: cameras {} and {} share "
+       "{:.1f} % of the features in their common view; {}{}. Check which images are of which camera, and the "
+       "direction of the transforms ({})",
        record.cameras[best->first].name, record.cameras[best->second].name, 100 * best->matched_share(),
        calibration::describe_pair(*best->evidence), others > 0 ? fmt::format(" (and {} more pairs)", others) : "",
        check_command);

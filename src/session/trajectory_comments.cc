@@ -5,12 +5,16 @@
 namespace bslam::session {
 namespace {
 
+// Frames whose names mean something else: the body, camera 0 of the rig, and axes as in ROS.
+bool is_reserved(const std::string& name) { return name == "body" || name == "cam0" || name.ends_with("_ros"); }
+
 // The frame of the poses: that of the first camera of the run, which is cam0 if it is the first camera of the rig.
+// Cameras whose names cannot be used are called by their numbers.
 std::string frame_name(const RunRecord& record) {
   if (record.cameras_used.empty() || record.cameras_used.front() == 0 || record.cameras.empty()) return "cam0";
   const std::string& name = record.cameras.front().name;
   const bool is_word = !name.empty() && name.find_first_of(" \t\r\n:") == std::string::npos;
-  return is_word ? name : "cam" + std::to_string(record.cameras_used.front());
+  return is_word && !is_reserved(name) ? name : "cam" + std::to_string(record.cameras_used.front());
 }
 
 }  // namespace

@@ -1,13 +1,19 @@
 #include "capture/live_cameras.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <future>
 #include <opencv2/imgcodecs.hpp>
+#include <random>
 
 #include "capture/pixels.h"
+#include "capture/played_folders.h"
 #include "dataset/frame_reader.h"
 #include "support/data_on_disk.h"
 #include "synthetic/rigs.h"
@@ -20,7 +26,7 @@ using std::chrono::milliseconds;
 constexpr TimeNs kStart = 1'700'000'000'000'000'000, kInterval = 50'000'000, kMs = 1'000'000;
 
 struct Event {
-  enum class Kind { kImage, kDamaged, kNone, kLost, kOpens, kDoesNotOpen, kGate } kind;
+  enum class Kind { kImage, kDamaged, kNone, kLost, kOpens, kDoesNotOpen, kOpensAnother, kOpensWiderRows, kGate } kind;
   std::size_t camera;
   TimeNs time_ns = 0;
 };
@@ -81,15 +87,17 @@ class Script {
 // Camera 0 delivers grey pixels, camera 1 JPEG files.
 class ScriptedDevice : public Device {
  public:
-  ScriptedDevice(std::shared_ptr<Script> script, std::size_t camera) : script_(std::move(script)), camera_(camera) {}
+  ScriptedDevice(std::shared_ptr<Script> script, std::size_t camera, Event::Kind opened)
+      : script_(std::move(script)), camera_(camera), opened_(opened) {}
   ~ScriptedDevice() override { script_->device_ended(); }
 
   Result<Stream> start(const StreamRequest& request) override {
-    image_.create(request.height, request.width, CV_8UC1);
+    image_.create(request.height, request.width + (opened_ == Event::Kind::kOpensWiderRows ? 8 : 0), CV_8UC1);
     return Stream{.pixels = camera_ == 0 ? fourcc("GREY") : fourcc("MJPG"),
                   .width = request.width,
                   .height = request.height,
-                  .step = camera_ == 0 ? static_cast<std::size_t>(request.width) : 0};
+                  .step = camera_ == 0 ? static_cast<std::size_t>(image_.cols) : 0,
+                  .identity = opened_ == Event::Kind::kOpensAnother ? "another at usb-2" : "camera at usb-2"};
   }
   Result<DeviceImage> read(milliseconds) override {
     const auto [event, end] = script_->next(camera_);
@@ -109,6 +117,7 @@ class ScriptedDevice : public Device {
  private:
   const std::shared_ptr<Script> script_;
   const std::size_t camera_;
+  const Event::Kind opened_;
   cv::Mat image_;
   std::vector<std::uint8_t> bytes_;
 };
@@ -137,11 +146,13 @@ class LiveCamerasTest : public testing::Test {
   OpenDevice opener() {
     return [this, first = std::make_shared<int>(0)](const std::string& path) -> Result<std::unique_ptr<Device>> {
       const std::size_t camera = path == "a" ? 0 : 1;
+      Event::Kind opened = Event::Kind::kOpens;
       if ((*first)++ >= 2) {  // again
         const auto [event, end] = script_->next(camera);
         if (!event || event->kind == Event::Kind::kDoesNotOpen) return Error{path, "", "no such camera", "a camera"};
+        opened = event->kind;
       }
-      return std::unique_ptr<Device>(std::make_unique<ScriptedDevice>(script_, camera));
+      return std::unique_ptr<Device>(std::make_unique<ScriptedDevice>(script_, camera, opened));
     };
   }
   // All frames until the end.
@@ -321,7 +332,87 @@ TEST_F(LiveCamerasTest, SaysWhichCameraDeliversNothing) {
   const auto live = open(std::move(events));
   const auto first = live->wait_for_first_frame();
   ASSERT_FALSE(first.ok());
-  EXPECT_EQ(first.error().message(), "b: cam1: found 3 damaged images and no good one, expected images of this camera");
+  EXPECT_EQ(first.error().message(),
+            "b: cam1: found a camera that was unplugged after 3 damaged images and no good one, "
+            "expected images of this camera");
+}
+
+TEST_F(LiveCamerasTest, TheCameraThatWasLostIsBlamed) {
+  using Kind = Event::Kind;
+  std::vector<Event> events{{Kind::kImage, 1, kStart}, {Kind::kLost, 1}};
+  for (int k = 0; k < 100; ++k) events.push_back({Kind::kDoesNotOpen, 1});
+  const auto live = open(std::move(events));
+  const auto first = live->wait_for_first_frame();
+  ASSERT_FALSE(first.ok());
+  EXPECT_EQ(first.error().message(), "b: cam1: found a camera that was unplugged, expected images of this camera");
+}
+
+TEST_F(LiveCamerasTest, AnotherCameraInPlaceOfALostOneIsNotUsed) {
+  using Kind = Event::Kind;
+  std::vector<Event> events;
+  add_frames(events, 0, 10);
+  for (const Kind kind : {Kind::kGate, Kind::kLost, Kind::kOpensAnother, Kind::kOpensAnother, Kind::kOpensWiderRows})
+    events.push_back({kind, 0});
+  add_frames(events, 10, 30);
+  auto live = open(std::move(events));
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  live->begin();
+  script_->open_gate();
+  const auto first_ns = live->wait_for_frame();
+  const auto items = all(*live);
+  ASSERT_FALSE(items.empty());
+  EXPECT_EQ(first_ns, items.front().images.time_ns);
+  EXPECT_EQ(items.back().images.images[0].state, image::ImageState::kPresent);
+  ASSERT_GE(said_.size(), 3u);
+  EXPECT_EQ(said_[1], "cam0 (a): found another at usb-2 in place of camera at usb-2; another camera is not used");
+  EXPECT_EQ(said_[2], "cam0 (a): images arrive again");
+  EXPECT_EQ(live->notes()[0], "cam0 (a): lost once");
+}
+
+// A pipe that nobody reads is a disk that hangs.
+TEST(RecorderTest, WaitingForADiskThatHangsCanBeStopped) {
+  const support::TemporaryFolder folder;
+  const auto pipe = folder.path() / "live.mcap";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  const camera::Rig rig = synthetic::ring_rig(1, 512);
+  auto recorder = Recorder::create(pipe, rig, {false});
+  ASSERT_TRUE(recorder.ok()) << recorder.error().message();
+  const auto pixels = std::make_shared<CapturedPixels>();
+  std::mt19937 random(1);
+  std::vector<std::uint8_t> noise(512 * 512);
+  for (std::uint8_t& value : noise) value = static_cast<std::uint8_t>(random());
+  const ImageBundle frame{{{noise.data(), 512, 512, 512, kStart, pixels}}};
+  std::stop_source stop;
+  stop.request_stop();
+  int added = 0;
+  while (added < 100'000 && (*recorder)->add(frame, stop.get_token())) ++added;
+  EXPECT_GE(added, 32);
+  EXPECT_LT(added, 100);
+  std::signal(SIGPIPE, SIG_IGN);
+  ::close(reader);
+  EXPECT_FALSE((*recorder)->finish().ok());
+}
+
+TEST(PlayedFolders, GoOnWhereTheyWereAndReportImagesOfAnotherSize) {
+  const support::TemporaryFolder folder;
+  const std::string path = folder.path().string();
+  for (const int k : {1, 2, 3}) support::write_image(folder.path() / fmt::format("{}.png", k), k == 2 ? 48 : 64, 32);
+  const OpenDevice open = play_folders({path});
+  TimeNs expected = 1;
+  for (int opened = 0; opened < 3; ++opened) {
+    auto device = *open(path);
+    const auto stream = device->start({.width = 64, .height = 32});
+    ASSERT_TRUE(stream.ok()) << stream.error().message();
+    const auto image = device->read(milliseconds(1000));
+    ASSERT_TRUE(image.ok());
+    ASSERT_EQ(image->state, DeviceImage::State::kImage);
+    EXPECT_EQ(image->time_ns, expected);
+    EXPECT_EQ(grey_image(*stream, image->bytes).has_value(), expected != 2);
+    ++expected;
+  }
+  EXPECT_EQ((*open(path))->read(milliseconds(0))->state, DeviceImage::State::kEnd);
 }
 
 TEST_F(LiveCamerasTest, StopEndsItWithWhatIsThere) {

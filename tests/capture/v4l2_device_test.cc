@@ -183,6 +183,25 @@ TEST_F(V4l2, TellsWhenItsRateDiffers) {
   set = (*open_v4l2(calls_, kPath))->start(wanted);
   ASSERT_TRUE(set.ok());
   EXPECT_EQ(set->notes, std::vector<std::string>{"15 frames/s instead of 20"});
+  EXPECT_EQ(set->identity, "test camera at usb-1");
+  camera().rate_error = EINVAL;
+  set = (*open_v4l2(calls_, kPath))->start(wanted);
+  ASSERT_TRUE(set.ok());
+  EXPECT_EQ(set->fps, 15);
+  EXPECT_EQ(set->notes, std::vector<std::string>{"15 frames/s instead of 20"});
+}
+
+TEST_F(V4l2, SetsTheHighestRateUpTo60Itself) {
+  camera().modes = {{V4L2_PIX_FMT_GREY, kWidth, kHeight, {120, 60, 30}}};
+  auto set = (*open_v4l2(calls_, kPath))->start(request());
+  ASSERT_TRUE(set.ok());
+  EXPECT_EQ(set->fps, 60);
+  camera().rate_error = EINVAL;
+  camera().set_fps = 30;
+  set = (*open_v4l2(calls_, kPath))->start(request());
+  ASSERT_TRUE(set.ok());
+  EXPECT_EQ(set->fps, 30);
+  EXPECT_TRUE(set->notes.empty());
 }
 
 TEST_F(V4l2, SetsTheExposure) {

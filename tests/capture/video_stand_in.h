@@ -31,7 +31,7 @@ struct StandInCamera {
     std::uint32_t width = 0, height = 0;
     std::vector<std::uint32_t> fps;
   };
-  std::string name = "test camera";
+  std::string name = "test camera", port = "usb-1";
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   std::vector<Mode> modes;
   std::map<std::uint32_t, int> controls;  // those that it has
@@ -42,6 +42,7 @@ struct StandInCamera {
   std::uint32_t extra_step = 0;    // bytes between rows
   std::uint32_t set_fps = 30;
   bool rate_can_be_set = true;
+  int rate_error = 0;  // errno of setting the rate
   // What was done to it.
   int opened = 0, closed = 0, mapped = 0, unmapped = 0;
   bool streaming = false;
@@ -130,6 +131,7 @@ class VideoStandIn : public VideoCalls {
   static int capability(StandInCamera& c, v4l2_capability& out) {
     if (c.capabilities == 0) return ENOTTY;
     std::strncpy(reinterpret_cast<char*>(out.card), c.name.c_str(), sizeof(out.card) - 1);
+    std::strncpy(reinterpret_cast<char*>(out.bus_info), c.port.c_str(), sizeof(out.bus_info) - 1);
     out.capabilities =
         V4L2_CAP_DEVICE_CAPS | V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;  // of all nodes of the device
     out.device_caps = c.capabilities;
@@ -178,6 +180,7 @@ class VideoStandIn : public VideoCalls {
     return 0;
   }
   static int rate(StandInCamera& c, bool set, v4l2_fract& interval) {
+    if (set && c.rate_error != 0) return c.rate_error;
     if (set && c.rate_can_be_set) c.set_fps = interval.denominator / interval.numerator;
     interval = {1, c.set_fps};
     return 0;

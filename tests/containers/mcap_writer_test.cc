@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 
 #include "containers/messages.h"
 #include "containers/ros_writer.h"
@@ -125,6 +126,43 @@ TEST(McapWriter, DamageBeforeTheImagesLosesNoneSilently) {
     }
   }
   EXPECT_GT(complete, 10 * incomplete);
+}
+
+// The kinds of the records of the summary, in order; equal ones in a row once.
+std::string kinds_in_summary(const std::string& file) {
+  std::uint64_t at = 0, size = 0;
+  std::memcpy(&at, file.data() + file.size() - 28, 8);  // the footer ends 8 bytes before the end
+  std::string kinds;
+  for (; at + 9 <= file.size() - 8; at += 9 + size) {
+    if (kinds.empty() || kinds.back() != file[at]) kinds += file[at];
+    std::memcpy(&size, file.data() + at + 1, 8);
+  }
+  return kinds;
+}
+
+TEST(McapWriter, TheSummaryIsGroupedByTheKindOfItsRecords) {
+  const support::TemporaryFolder folder;
+  write_recording(folder.path() / "a.mcap", true);
+  // Schema, Channel, ChunkIndex, AttachmentIndex, MetadataIndex, Statistics, Footer
+  EXPECT_EQ(kinds_in_summary(support::read_text(folder.path() / "a.mcap")), "\x03\x04\x08\x0a\x0d\x0b\x02");
+}
+
+TEST(McapWriter, TimesMayBeZeroButNotNegative) {
+  const support::TemporaryFolder folder;
+  const auto path = folder.path() / "a.mcap";
+  auto writer = *McapWriter::create(path);
+  const auto topic = writer->add_topic("/left/image_raw", kImageType, image_definition());
+  for (const TimeNs time_ns : {0, 5}) EXPECT_TRUE(writer->write(topic, time_ns, message(0)).ok());
+  ASSERT_TRUE(writer->finish().ok());
+  const std::string file = support::read_text(path);
+  const std::string times = std::string(8, '\0') + '\x05' + std::string(7, '\0');  // at the beginning of the chunk
+  EXPECT_EQ(file.substr(file.find('\x06', 8 + 9) + 9, 16), times);
+
+  writer = *McapWriter::create(path);
+  ASSERT_EQ(writer->add_topic("/left/image_raw", kImageType, image_definition()), 0);
+  EXPECT_EQ(writer->write(0, -1, message(0)).error().message(),
+            path.string() + ": found a time before 1970, expected times from 1970 on, as MCAP files contain them");
+  EXPECT_FALSE(writer->finish().ok());
 }
 
 TEST(McapWriter, ReportsAFullDisk) {

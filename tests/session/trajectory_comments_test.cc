@@ -40,6 +40,10 @@ TEST(TrajectoryComments, NameTheCameraOfTheRunAndAScaleThatIsNotMetric) {
             "bslam trajectory frame=right parent=world final=true\n# scale=up-to-scale: lengths are not in metres");
   record.cameras.front().name = "right camera";  // frames are single words
   EXPECT_TRUE(trajectory_comments(record, one, 0, PoseState::kFinal).starts_with("bslam trajectory frame=cam2 "));
+  for (const char* reserved : {"body", "cam0", "left_ros"}) {
+    record.cameras.front().name = reserved;
+    EXPECT_TRUE(trajectory_comments(record, one, 0, PoseState::kFinal).starts_with("bslam trajectory frame=cam2 "));
+  }
   record.cameras_used = {0, 2};
   EXPECT_TRUE(trajectory_comments(record, one, 0, PoseState::kFinal).starts_with("bslam trajectory frame=cam0 "));
 }

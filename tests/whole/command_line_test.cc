@@ -335,6 +335,13 @@ TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
   const Ran scaled = run("eval " + out("scaled.tum") + " " + truth);
   EXPECT_NE(scaled.err.find("use --align sim3"), std::string::npos) << scaled.err;
   EXPECT_EQ(run("eval " + out("scaled.tum") + " " + truth + " --align sim3").err, "");
+  const std::string rig_and_out = " --rig " + data() + " --overwrite --out " + out("exported.tum");
+  EXPECT_NE(run("export " + out("scaled.tum") + " --frame body" + rig_and_out).err.find("is not the metre"),
+            std::string::npos);
+  EXPECT_NE(slurp(out("exported.tum")).find("\n# scale=up-to-scale: lengths are not in metres\n"), std::string::npos);
+  ASSERT_EQ(run("export " + truth + " --camera 1 --frame cam0" + rig_and_out).status, 0);
+  const Ran moved = run("eval " + out("exported.tum") + " " + truth + " --align none --json");
+  EXPECT_GT(nlohmann::json::parse(moved.out)["ate"]["max"], 1e-3) << moved.err;
 }
 
 TEST_F(CommandLine, ExplainsAPortAfterViewAndARigOfAnotherResolution) {
@@ -492,6 +499,10 @@ TEST_F(CommandLine, RecordedLiveRunIsRepeatedToTheByte) {
       run("run " + file + " --out " + out("live_again") + " --replay " + journal + " --set features.per_image=500");
   ASSERT_EQ(again.status, 0) << again.err;
   expect_same_trajectories("live", "live_again");
+  const auto seconds = [](const std::string& name) {
+    return nlohmann::json::parse(slurp(out(name + "/summary.json")))["parts"];
+  };
+  EXPECT_EQ(seconds("live"), seconds("live_again"));
 }
 
 TEST_F(CommandLine, CtrlCEndsALiveRunWithAllItsFiles) {
