@@ -1,10 +1,10 @@
-# Headers of other libraries that most files include, compiled once: a build of everything takes a quarter less time.
+# Headers of other libraries that most files include, compiled once, so that a build of everything takes less time.
 # scripts/test uses them, scripts/test --clang and scripts/build do not, so that a file that lacks an include is found.
 set(bslam_precompiled_headers <algorithm> <array> <cmath> <cstdint> <filesystem> <fstream> <functional> <map> <memory> <mutex>
                               <optional> <set> <span> <string> <string_view> <thread> <utility> <vector>
                               <Eigen/Core> <Eigen/Geometry> <Eigen/Cholesky> <Eigen/LU> <fmt/format.h>)
 
-# bslam_precompile(NAME [HEADERS header...] [LINKS target...]): the target NAME, which holds those headers and the ones named.
+# bslam_precompile(NAME [HEADERS header...] [LINKS target...]): the target NAME, which holds those headers and HEADERS.
 function(bslam_precompile name)
   cmake_parse_arguments(ARG "" "" "HEADERS;LINKS" ${ARGN})
   file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/${name}.cc CONTENT "// Precompiled headers need one source file.\n")
