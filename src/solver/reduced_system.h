@@ -27,9 +27,9 @@ class ReducedSystem {
 
   BlockMatrix& frames() { return frames_; }  // S
   const BlockMatrix& frames() const { return frames_; }
-  Border& border() { return border_; }           // B: (frame unknowns, rig unknowns)
-  Eigen::MatrixXd& rig() { return rig_; }        // C: lower triangle
-  Eigen::VectorXd& rhs() { return rhs_; }        // frames, then rig
+  Border& border() { return border_; }     // B: (frame unknowns, rig unknowns)
+  Eigen::MatrixXd& rig() { return rig_; }  // C: lower triangle
+  Eigen::VectorXd& rhs() { return rhs_; }  // frames, then rig
 
   // Factorises and solves. Returns false if the matrix is not positive definite to machine precision.
   bool solve(Eigen::VectorXd& delta);

@@ -217,7 +217,8 @@ double restore_scale(const RigValues& calibrated, ReprojectionProblem& problem, 
 }
 
 // Whether the previous round, with the same kernel, has already used the observations that a round would use.
-bool repeats(const Round& round, const std::vector<std::uint8_t>& skip, const std::vector<std::uint8_t>& skipped_before) {
+bool repeats(const Round& round, const std::vector<std::uint8_t>& skip,
+             const std::vector<std::uint8_t>& skipped_before) {
   return &round != &kRounds.front() && &round != &kRounds.back() && round.kernel == (&round - 1)->kernel &&
          skip == skipped_before;
 }
