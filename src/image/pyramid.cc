@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 
 #if defined(__SSE2__)
 #include <emmintrin.h>
@@ -84,7 +85,7 @@ BSLAM_VECTORISED void blend_rows(const std::array<const std::uint8_t*, kTaps>& r
 }
 
 // Horizontal pass: from `in` (15 bits) to grey values.
-void blend_columns(const Strip& strip, const std::int16_t* in, std::uint8_t* out) {
+BSLAM_VECTORISED void blend_columns(const Strip& strip, const std::int16_t* in, std::uint8_t* out) {
   int i = 0;
 #if defined(__SSE2__)
   const __m128i half = _mm_set1_epi32(1 << (kShift - 1));
@@ -112,20 +113,43 @@ void blend_columns(const Strip& strip, const std::int16_t* in, std::uint8_t* out
   }
 }
 
-void shrink(const Image& in, Image& out) {
+}  // namespace
+
+struct Resampling {
+  int in_width = 0, in_height = 0, out_width = 0, out_height = 0;  // pixels
+  std::vector<Strip> strips;
+  std::vector<Taps> rows;  // per output row
+
+  static std::shared_ptr<const Resampling> between(const Image& in, const Image& out) {
+    Resampling plan{in.width(), in.height(), out.width(), out.height(), {}, {}};
+    for (int begin = 0; begin < out.width(); begin += kStrip)
+      make_strip(begin, std::min(begin + kStrip, out.width()), in.width(), out.width(), plan.strips.emplace_back());
+    for (int y = 0; y < out.height(); ++y)
+      plan.rows.push_back(make_taps(y, in.height(), out.height(), kRowWeightSum));
+    return std::make_shared<const Resampling>(std::move(plan));
+  }
+
+  bool is_between(const Image& in, const Image& out) const {
+    return in.width() == in_width && in.height() == in_height && out.width() == out_width && out.height() == out_height;
+  }
+};
+
+namespace {
+
+void shrink(const Image& in, const Resampling& plan, Image& out) {
   // A strip covers at most kStrip * ratio input columns. The ratio may slightly exceed 2 because sizes are rounded.
   alignas(16) std::array<std::int16_t, kStrip * 9 / 4 + kTaps> row;
-  Strip strip;
-  for (int begin = 0; begin < out.width(); begin += kStrip) {
-    make_strip(begin, std::min(begin + kStrip, out.width()), in.width(), out.width(), strip);
+  int begin = 0;
+  for (const Strip& strip : plan.strips) {
     BSLAM_ASSERT(strip.input_count <= static_cast<int>(row.size()), "the ratio of pyramid levels must be at most 2");
     for (int y = 0; y < out.height(); ++y) {
-      const Taps taps = make_taps(y, in.height(), out.height(), kRowWeightSum);
+      const Taps& taps = plan.rows[y];
       std::array<const std::uint8_t*, kTaps> rows;
       for (int k = 0; k < kTaps; ++k) rows[k] = in.row(taps.first + k) + strip.input_begin;
       blend_rows(rows, taps.weight, strip.input_count, row.data());
       blend_columns(strip, row.data(), out.row(y) + begin);
     }
+    begin += strip.outputs;
   }
 }
 
@@ -147,7 +171,11 @@ void build_pyramid(const ImageView& base, int levels, double factor, Pyramid& py
     pyramid.scale_x.push_back(static_cast<double>(base.width) / width);
     pyramid.scale_y.push_back(static_cast<double>(base.height) / height);
     if (count > 0) {
-      shrink(pyramid.levels[count - 1], level);
+      const Image& larger = pyramid.levels[count - 1];
+      if (static_cast<int>(pyramid.resampling.size()) < count) pyramid.resampling.emplace_back();
+      std::shared_ptr<const Resampling>& plan = pyramid.resampling[count - 1];
+      if (!plan || !plan->is_between(larger, level)) plan = Resampling::between(larger, level);
+      shrink(larger, *plan, level);
     } else {
       for (int y = 0; y < height; ++y) std::memcpy(level.row(y), base.row(y), static_cast<std::size_t>(width));
     }

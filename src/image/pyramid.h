@@ -1,17 +1,22 @@
 // Image pyramid: level 0 is the raw image; each level is smaller than the previous one by a constant factor.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "image/image.h"
 
 namespace bslam::image {
 
+struct Resampling;  // weights of the pixels of one level in those of the next
+
 // Pixel (x, y) of level l lies at pixel ((x + 0.5) * scale(l) - 0.5, ...) of level 0, since pixel centres have integer
 // coordinates.
 struct Pyramid {
   std::vector<Image> levels;
   std::vector<double> scale_x, scale_y;  // pixels of level 0 per pixel of the level (exact: width_0 / width_l)
+
+  std::vector<std::shared_ptr<const Resampling>> resampling;  // of each level to the next, for images of these sizes
 
   std::size_t size() const { return levels.size(); }
   double to_base_x(std::size_t level, double x) const { return (x + 0.5) * scale_x[level] - 0.5; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "feature/hamming.h"
@@ -35,6 +36,23 @@ struct Projection {
   double distance;  // metres
 };
 
+// A lower bound of the cosine of the angle between the optical axis and the ray of any pixel; -1 if it is not known.
+double cosine_of_view(const camera::Camera& camera) {
+  constexpr int kSteps = 4;        // tested pixels of each side of the image
+  constexpr double kMargin = 0.1;  // rad, for pixels between them, and for the motion during a rolling shutter
+  double largest = 0;              // rad
+  const double right = camera.width - 1, bottom = camera.height - 1;
+  for (int k = 0; k <= kSteps; ++k) {
+    const double x = right * k / kSteps, y = bottom * k / kSteps;
+    for (const Vector2d& pixel : {Vector2d(x, 0), Vector2d(x, bottom), Vector2d(0, y), Vector2d(right, y)}) {
+      const auto ray = camera.unproject(pixel);
+      if (!ray) return -1;
+      largest = std::max(largest, std::atan2(ray->head<2>().norm(), ray->z()));
+    }
+  }
+  return largest + kMargin < std::numbers::pi ? std::cos(largest + kMargin) : -1;
+}
+
 // An image into which points are projected.
 class View {
  public:
@@ -44,14 +62,16 @@ class View {
         R_(T_cam_common.matrix3()),
         t_(T_cam_common.translation()),
         centre_(-R_.transpose() * t_),
-        min_cosine_(std::cos(max_view_angle)) {}
+        axis_(R_.row(2).transpose()),
+        min_cosine_(std::cos(max_view_angle)),
+        min_axis_cosine_(cosine_of_view(camera_)) {}
 
   // Projection of a point. Returns nullopt if it is outside the image, its distances, or its cone of viewing
   // directions.
   std::optional<Projection> project(const SearchPoint& p) const {
     const Vector3d ray = p.position - centre_;
     const double distance = ray.norm();
-    if (!in_range(p, distance)) return std::nullopt;
+    if (!in_range(p, distance) || ray.dot(axis_) < min_axis_cosine_ * distance) return std::nullopt;
     const bool outside_cone = ray.dot(p.view_direction) < min_cosine_ * distance;
     if (outside_cone && p.view_direction != Vector3d::Zero()) return std::nullopt;
     const auto pixel = camera::project(camera_, shutter_, R_ * p.position + t_);
@@ -63,8 +83,8 @@ class View {
   const camera::Camera& camera_;
   const camera::Shutter& shutter_;
   Eigen::Matrix3d R_;
-  Vector3d t_, centre_;  // metres; the centre in the common frame
-  double min_cosine_;
+  Vector3d t_, centre_, axis_;           // metres; centre and optical axis in the common frame
+  double min_cosine_, min_axis_cosine_;  // of the viewing direction of a point, and of the angle to the optical axis
 };
 
 Candidate best_candidate(const feature::Keypoints& keypoints, const feature::Descriptor& descriptor,

@@ -10,7 +10,7 @@ ReducedSystem::ReducedSystem(const BlockPattern& pattern, std::span<const int> f
                              Storage storage)
     : storage_(storage),
       frames_(pattern, frame_sizes),
-      border_(Eigen::MatrixXd::Zero(frames_.rows(), rig_size)),
+      border_(Border::Zero(frames_.rows(), rig_size)),
       rig_(Eigen::MatrixXd::Zero(rig_size, rig_size)),
       rhs_(Eigen::VectorXd::Zero(frames_.rows() + rig_size)) {
   if (storage == Storage::kDense) return;
@@ -26,7 +26,7 @@ bool ReducedSystem::solve_with(const Factor& factor, Eigen::VectorXd& delta) {
   delta.resize(frames + rig);
   delta.head(frames) = factor.solve(rhs_.head(frames));
   if (rig == 0) return delta.allFinite();
-  const Eigen::MatrixXd X = factor.solve(border_);
+  const Eigen::MatrixXd X = factor.solve(Eigen::MatrixXd(border_));
   rig_information_ = rig_.selfadjointView<Eigen::Lower>();
   rig_information_.noalias() -= border_.transpose() * X;
   const Eigen::LLT<Eigen::MatrixXd> rig_factor(rig_information_);
@@ -84,7 +84,7 @@ std::vector<geometry::Matrix6d> ReducedSystem::pose_covariances(std::span<const 
 }
 
 Eigen::MatrixXd ReducedSystem::rig_sensitivity() const {
-  if (sparse()) return -sparse_factor_.solve(border_);
+  if (sparse()) return -sparse_factor_.solve(Eigen::MatrixXd(border_));
   Eigen::MatrixXd X = -border_;
   dense_.triangularView<Eigen::Lower>().solveInPlace(X);
   dense_.triangularView<Eigen::Lower>().transpose().solveInPlace(X);

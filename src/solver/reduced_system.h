@@ -19,6 +19,7 @@ inline double bounded_diagonal(double entry) { return std::clamp(entry, 1e-6, 1e
 
 class ReducedSystem {
  public:
+  using Border = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   enum class Storage { kDense, kSparse };  // storage of the frames' blocks
 
   // `pattern` must be numbered and outlive the system. `frame_sizes`: unknowns of each frame. `rig_size` may be 0.
@@ -26,9 +27,9 @@ class ReducedSystem {
 
   BlockMatrix& frames() { return frames_; }  // S
   const BlockMatrix& frames() const { return frames_; }
-  Eigen::MatrixXd& border() { return border_; }  // B: (frame unknowns, rig unknowns)
-  Eigen::MatrixXd& rig() { return rig_; }        // C: lower triangle
-  Eigen::VectorXd& rhs() { return rhs_; }        // frames, then rig
+  Border& border() { return border_; }     // B: (frame unknowns, rig unknowns)
+  Eigen::MatrixXd& rig() { return rig_; }  // C: lower triangle
+  Eigen::VectorXd& rhs() { return rhs_; }  // frames, then rig
 
   // Factorises and solves. Returns false if the matrix is not positive definite to machine precision.
   bool solve(Eigen::VectorXd& delta);
@@ -53,7 +54,8 @@ class ReducedSystem {
 
   Storage storage_;
   BlockMatrix frames_;
-  Eigen::MatrixXd border_, rig_, rig_information_;
+  Border border_;
+  Eigen::MatrixXd rig_, rig_information_;
   Eigen::VectorXd rhs_;
   Eigen::MatrixXd dense_;
   Eigen::SparseMatrix<double> sparse_;  // lower triangle

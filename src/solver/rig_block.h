@@ -36,7 +36,7 @@ struct RigObservation {
 
 class RigBlock {
  public:
-  using Jacobian = Eigen::Matrix<double, 2, Eigen::Dynamic>;
+  using Jacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
   struct Range {
     int first = 0, size = 0;
   };

@@ -216,12 +216,23 @@ double restore_scale(const RigValues& calibrated, ReprojectionProblem& problem, 
   return factor;
 }
 
-// Runs one round from `state` and leaves its result there. Returns false if it failed or was stopped.
+// Whether the previous round, with the same kernel, has already used the observations that a round would use.
+bool repeats(const Round& round, const std::vector<std::uint8_t>& skip,
+             const std::vector<std::uint8_t>& skipped_before) {
+  return &round != &kRounds.front() && &round != &kRounds.back() && round.kernel == (&round - 1)->kernel &&
+         skip == skipped_before;
+}
+
+// Runs one round from `state` and leaves its result there. Returns false if it failed or was stopped. `skipped`: flags
+// of the observations that the previous round did not use, and then those of this round.
 bool run_round(const ReprojectionProblem& problem, const Round& round, const CalibrationBlocks& blocks,
                const RigValues& calibrated, const RigAdjustmentOptions& options, const std::stop_token& stop,
-               BundleState& state, RigAdjustment& out) {
+               std::vector<std::uint8_t>& skipped, BundleState& state, RigAdjustment& out) {
   const auto chi2 = squared_errors(problem, state.T_rig_world, state.points, state.rig);
-  const BundleStructure structure = make_structure(problem, chi2, beyond(chi2, round.max_chi2));
+  std::vector<std::uint8_t> skip = beyond(chi2, round.max_chi2);
+  if (repeats(round, skip, skipped)) return true;
+  skipped = std::move(skip);
+  const BundleStructure structure = make_structure(problem, chi2, skipped);
   if (structure.num_points() == 0) return false;
   BundleEquations equations(problem, structure, blocks.blocks, round.kernel, kDensePoses, std::move(state));
   const bool last = &round == &kRounds.back();
@@ -257,9 +268,10 @@ RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjustmentOption
   if (blocks.size == 0) return out;
   if (start) state.rig = std::move(*start);
   ReprojectionProblem scaled = problem;
+  std::vector<std::uint8_t> skipped;
   for (const Round& round : kRounds) {
-    if (&round == &kRounds.front() && options.start_is_estimate) continue;
-    if (!run_round(scaled, round, blocks, calibrated, options, stop, state, out)) return out;
+    if (round.kernel == Kernel::kHuber && options.start_is_estimate) continue;
+    if (!run_round(scaled, round, blocks, calibrated, options, stop, skipped, state, out)) return out;
     if (options.sigma_scale > 0) out.scale_change *= restore_scale(calibrated, scaled, state);
   }
   if (!out.done) return out;

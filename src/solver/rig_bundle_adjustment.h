@@ -29,7 +29,7 @@ struct RigAdjustmentOptions {
   // Number of observations with the information of one independent observation. Errors of a landmark in successive
   // images are similar, so that the normal equations overestimate the information of the images.
   double correlated_observations = 1;
-  bool start_is_estimate = false;   // the start is near the result: the first round, with all observations, is omitted
+  bool start_is_estimate = false;   // the start is near the result: the rounds with Huber kernel are omitted
   int iterations = 15;              // maximum number of steps per round
   double relative_decrease = 1e-6;  // a round has converged if a step decreases the cost by a smaller fraction
 };

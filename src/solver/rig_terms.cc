@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "solver/row_update.h"
+
 namespace bslam::solver {
 
 RigTerms::RigTerms(const BundleStructure& structure, std::size_t num_cameras, const RigBlocks& blocks,
@@ -20,7 +22,8 @@ RigTerms::RigTerms(const BundleStructure& structure, std::size_t num_cameras, co
   border_.setZero(frame_unknowns, size);
   b_.setZero(size);
   J_.setZero(2, size);
-  U_.setZero(3, size);
+  wJ_.setZero(2, size);
+  U_.resize(3 * static_cast<std::size_t>(size));
   column_of_.assign(static_cast<std::size_t>(size), -1);
   if (size > 0) couple(structure);
 }
@@ -48,7 +51,7 @@ void RigTerms::couple(const BundleStructure& structure) {
   }
   first_coupling_.push_back(columns);
   first_run_.push_back(runs_.size());
-  W_.setZero(3, static_cast<Eigen::Index>(columns));
+  W_.resize(3 * columns);
 }
 
 double RigTerms::prior_cost(const RigValues& values) const {
@@ -74,11 +77,12 @@ void RigTerms::begin(const RigValues& values) {
 }
 
 void RigTerms::begin_point(std::size_t point) {
-  const auto first = static_cast<Eigen::Index>(first_coupling_[point]);
-  W_.middleCols(first, static_cast<Eigen::Index>(first_coupling_[point + 1]) - first).setZero();
+  W_of_point_ = W_.data() + 3 * first_coupling_[point];
+  W_columns_ = static_cast<std::ptrdiff_t>(first_coupling_[point + 1] - first_coupling_[point]);
+  std::fill_n(W_of_point_, 3 * W_columns_, 0.0);
   for (std::size_t r = first_run_[point]; r < first_run_[point + 1]; ++r) {
     for (int k = 0; k < runs_[r].size; ++k)
-      column_of_[static_cast<std::size_t>(runs_[r].unknown + k)] = first + runs_[r].first + k;
+      column_of_[static_cast<std::size_t>(runs_[r].unknown + k)] = runs_[r].first + k;
   }
 }
 
@@ -92,23 +96,29 @@ void RigTerms::add(const RigObservation& observation, const Matrix23d& A, const 
     columns += size;
   }
   const std::vector<Run>& ranges = ranges_[static_cast<std::size_t>(observation.camera)];
+  const RigBlock::Jacobian& J = J_;
+  wJ_.leftCols(columns) = weight * J.leftCols(columns);
   const Eigen::Matrix<double, 3, 2> wAt = weight * A.transpose();
   const Eigen::Matrix<double, 3, 2> to_point = point.R_rig_world.transpose() * wAt;
   Eigen::Matrix<double, 6, 2> to_pose;
   to_pose << geometry::skew(point.point_rig) * wAt, wAt;
+  const std::ptrdiff_t stride = J.cols(), size = b_.size();
   for (std::size_t i = 0, column = 0; i < ranges.size(); ++i) {
     const Run& range = ranges[i];
-    const auto J = J_.middleCols(static_cast<Eigen::Index>(column), range.size);
-    column += static_cast<std::size_t>(range.size);
-    b_.segment(range.unknown, range.size).noalias() += weight * J.transpose().lazyProduct(e);
+    const double* J_range = J.data() + column;
+    const auto add = [&](const double* left, std::ptrdiff_t left_stride, int rows, double* C, std::ptrdiff_t C_stride) {
+      add_product_2({left, left_stride, J_range, stride, rows, range.size}, C, C_stride);
+    };
+    const Vector2d we = weight * e;
+    add(we.data(), 1, 1, &b_(range.unknown), size);
+    // the columns of the lower triangle
     for (std::size_t k = 0, other = 0; k <= i; ++k) {
-      H_.block(range.unknown, ranges[k].unknown, range.size, ranges[k].size) +=
-          (weight * J.transpose()).lazyProduct(J_.middleCols(static_cast<Eigen::Index>(other), ranges[k].size));
+      add(wJ_.data() + other, stride, ranges[k].size, &H_(range.unknown, ranges[k].unknown), size);
       other += static_cast<std::size_t>(ranges[k].size);
     }
-    W_.middleCols(column_of_[static_cast<std::size_t>(range.unknown)], range.size) += to_point.lazyProduct(J);
-    if (point.pose_offset < 0) continue;
-    border_.block(point.pose_offset, range.unknown, 6, range.size) += to_pose.lazyProduct(J);
+    add(to_point.data(), 3, 3, W_of_point_ + column_of_[static_cast<std::size_t>(range.unknown)], W_columns_);
+    if (point.pose_offset >= 0) add(to_pose.data(), 6, 6, &border_(point.pose_offset, range.unknown), size);
+    column += static_cast<std::size_t>(range.size);
   }
 }
 
@@ -121,33 +131,38 @@ void RigTerms::copy_to(double damping, ReducedSystem& system) const {
 
 void RigTerms::eliminate(std::size_t point, const Matrix3d& L, const Vector3d& y, std::span<const PoseCoupling> poses,
                          ReducedSystem& system) {
-  const auto first = static_cast<Eigen::Index>(first_coupling_[point]);
-  const Eigen::Index count = static_cast<Eigen::Index>(first_coupling_[point + 1]) - first;
-  auto U = U_.leftCols(count);
-  U = W_.middleCols(first, count);
+  const auto count = static_cast<std::ptrdiff_t>(first_coupling_[point + 1] - first_coupling_[point]);
+  const double *W0 = W_.data() + 3 * first_coupling_[point], *W1 = W0 + count, *W2 = W1 + count;
+  double *U0 = U_.data(), *U1 = U0 + count, *U2 = U1 + count;
   const double i0 = 1.0 / L(0, 0), i1 = 1.0 / L(1, 1), i2 = 1.0 / L(2, 2);
-  U.row(0) *= i0;
-  U.row(1) = i1 * (U.row(1) - L(1, 0) * U.row(0));
-  U.row(2) = i2 * (U.row(2) - L(2, 0) * U.row(0) - L(2, 1) * U.row(1));
+  for (std::ptrdiff_t k = 0; k < count; ++k) {
+    U0[k] = W0[k] * i0;
+    U1[k] = i1 * (W1[k] - L(1, 0) * U0[k]);
+    U2[k] = i2 * (W2[k] - L(2, 0) * U0[k] - L(2, 1) * U1[k]);
+  }
   const std::span runs(runs_.data() + first_run_[point], first_run_[point + 1] - first_run_[point]);
+  const Eigen::Index size = b_.size(), frames = border_.rows();
   for (std::size_t a = 0; a < runs.size(); ++a) {
-    const auto Ua = U.middleCols(runs[a].first, runs[a].size);
-    system.rhs().segment(border_.rows() + runs[a].unknown, runs[a].size) -= Ua.transpose().lazyProduct(y);
-    for (std::size_t b = 0; b <= a; ++b) {
-      system.rig().block(runs[a].unknown, runs[b].unknown, runs[a].size, runs[b].size) -=
-          Ua.transpose().lazyProduct(U.middleCols(runs[b].first, runs[b].size));
-    }
-    for (const PoseCoupling& pose : poses) {
-      system.border().block(pose.pose_offset, runs[a].unknown, 6, runs[a].size) -= pose.U.lazyProduct(Ua);
-    }
+    const auto subtract = [&](const double* left, std::ptrdiff_t left_stride, int rows, double* C) {
+      subtract_product_3({left, left_stride, U0 + runs[a].first, count, rows, runs[a].size}, C, size);
+    };
+    subtract(y.data(), 1, 1, &system.rhs()(frames + runs[a].unknown));
+    // the columns of the lower triangle
+    for (std::size_t b = 0; b <= a; ++b)
+      subtract(U0 + runs[b].first, count, runs[b].size, &system.rig()(runs[a].unknown, runs[b].unknown));
+    for (const PoseCoupling& pose : poses)
+      subtract(pose.U.data(), 6, 6, &system.border()(pose.pose_offset, runs[a].unknown));
   }
 }
 
 void RigTerms::substitute(std::size_t point, const Eigen::VectorXd& delta, Vector3d& rhs) const {
+  const std::size_t count = first_coupling_[point + 1] - first_coupling_[point];
   for (std::size_t r = first_run_[point]; r < first_run_[point + 1]; ++r) {
     const Run& run = runs_[r];
-    rhs -= W_.middleCols(static_cast<Eigen::Index>(first_coupling_[point]) + run.first, run.size)
-               .lazyProduct(delta.segment(run.unknown, run.size));
+    const double* W = W_.data() + 3 * first_coupling_[point] + run.first;
+    for (std::size_t row = 0; row < 3; ++row)
+      rhs(static_cast<Eigen::Index>(row)) -=
+          Eigen::Map<const Eigen::VectorXd>(W + row * count, run.size).dot(delta.segment(run.unknown, run.size));
   }
 }
 

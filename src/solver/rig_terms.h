@@ -58,22 +58,24 @@ class RigTerms {
   struct Run {
     int unknown = 0, size = 0, first = 0;
   };
-  using Matrix3Xd = Eigen::Matrix<double, 3, Eigen::Dynamic>;
 
   void couple(const BundleStructure& structure);
 
   const RigBlocks& blocks_;
   std::vector<int> first_of_block_;       // per block: its first unknown
   std::vector<std::vector<Run>> ranges_;  // per camera: the unknowns on which its pixels depend, one range per block
-  Eigen::MatrixXd H_, border_;
+  Eigen::MatrixXd H_;
+  ReducedSystem::Border border_;
   Eigen::VectorXd b_;
-  Matrix3Xd W_;                              // coupling of each point with its unknowns, point by point
-  std::vector<std::size_t> first_coupling_;  // per point, and the end: columns of W_
+  std::vector<double> W_;                    // coupling of each point with its unknowns: three rows, point by point
+  std::vector<std::size_t> first_coupling_;  // per point, and the end: number of unknowns of all points before
   std::vector<Run> runs_;                    // of each point, ascending
   std::vector<std::size_t> first_run_;       // per point, and the end
-  std::vector<Eigen::Index> column_of_;      // per unknown: its column of W_ for the current point
-  RigBlock::Jacobian J_;                     // scratch memory of one observation
-  Matrix3Xd U_;                              // scratch memory of one elimination: L^-1 W
+  double* W_of_point_ = nullptr;             // the rows of W_ of the current point,
+  std::ptrdiff_t W_columns_ = 0;             // their number of columns,
+  std::vector<int> column_of_;               // and, per unknown, its column
+  RigBlock::Jacobian J_, wJ_;                // scratch memory of one observation: J and its weighted copy
+  std::vector<double> U_;                    // scratch memory of one elimination: the rows of L^-1 W
 };
 
 }  // namespace bslam::solver

@@ -1,6 +1,7 @@
 // Tracking: the pose of camera 0 for each frame, from all cameras, against an immutable version of the map.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -54,10 +55,13 @@ struct TrackResult {
   std::vector<CameraCounts> cameras;
 };
 
+struct LocalView;  // tracking/visible_landmarks.h
+
 // State of direct tracking since the last frame with extracted features.
 struct DirectState {
   int frames = 0;                 // number of frames tracked directly
   std::vector<int> best_inliers;  // per camera, largest number of inliers
+  std::shared_ptr<const LocalView> view = {};
 };
 
 // State of tracking that is carried from frame to frame.

@@ -3,31 +3,21 @@
 #include <algorithm>
 #include <utility>
 
-#include "map/search_points.h"
-#include "matching/projection_search.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
 #include "tracking/track_output.h"
+#include "tracking/visible_landmarks.h"
 
 namespace bslam::tracking {
 namespace {
 
 using geometry::SE3;
 
-constexpr double kMaxViewAngle = 1.05;  // rad, as in ProjectionSearchOptions
 // Minimum fraction of the aligned landmarks that agree with the pose: with fewer, features decide between motions.
 constexpr double kMinInlierRatio = 0.5;
 // A camera with few inliers gets features after this number of frames: it may see something new.
 constexpr int kFewInliersInterval = 8;
-
-// A landmark that is predicted visible in a camera.
-struct Candidate {
-  LandmarkId landmark;
-  Eigen::Vector2d pixel;  // predicted
-  double coarseness = 0;  // size of its reference patch in the image, relative to that of a patch of level 0
-};
-using Candidates = std::vector<std::vector<Candidate>>;  // per camera
 
 // Landmarks aligned in the images of a frame.
 struct AlignedLandmarks {
@@ -37,56 +27,6 @@ struct AlignedLandmarks {
 
 bool used(const frame::BundledFrame& frame, std::size_t c) {
   return frame.cameras[c].state == image::ImageState::kPresent;
-}
-
-Candidates visible(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
-                   std::span<const LandmarkId> landmarks, ThreadPool& pool) {
-  const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  const std::vector<matching::SearchPoint> points = map::search_points(map, landmarks);
-  Candidates out(rig.size());
-  pool.for_each(rig.size(), [&](std::size_t c) {
-    if (!used(frame, c)) return;
-    const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
-    for (const auto& v : matching::visible_points(rig, CameraIndex(c), T_cam_world, points, kMaxViewAngle))
-      out[c].push_back({landmarks[v.point], v.pixel, points[v.point].max_distance / v.distance});
-  });
-  return out;
-}
-
-// The `count` landmarks with the largest patches in the image: their alignment tolerates the largest errors of the
-// prediction.
-void keep_coarsest(std::size_t count, std::vector<Candidate>& candidates) {
-  if (candidates.size() <= count) return;
-  std::nth_element(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(count), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) {
-                     return a.coarseness != b.coarseness ? a.coarseness > b.coarseness : a.landmark < b.landmark;
-                   });
-  candidates.resize(count);
-  std::ranges::sort(candidates, {}, &Candidate::landmark);
-}
-
-// At most `count` landmarks, spread over the image: the first ones of each cell of a grid.
-void keep_spread(int count, const camera::Camera& camera, std::vector<Candidate>& candidates) {
-  constexpr int kPerCell = 2;
-  if (static_cast<int>(candidates.size()) <= count) return;
-  const double cell = std::sqrt(static_cast<double>(camera.width) * camera.height * kPerCell / count);
-  const auto columns = static_cast<std::size_t>(camera.width / cell) + 1;
-  std::vector<std::uint8_t> taken(columns * (static_cast<std::size_t>(camera.height / cell) + 1));
-  std::erase_if(candidates, [&](const Candidate& l) {
-    const auto x = static_cast<std::size_t>(std::max(0.0, l.pixel.x() / cell));
-    const auto y = static_cast<std::size_t>(std::max(0.0, l.pixel.y() / cell));
-    std::uint8_t& in_cell = taken[std::min(y * columns + x, taken.size() - 1)];
-    if (in_cell == kPerCell) return true;
-    ++in_cell;
-    return false;
-  });
-}
-
-// Adds the landmarks of a camera to `landmarks`, which are in order of id, each once.
-void add_sorted(const std::vector<Candidate>& camera, std::vector<LandmarkId>& landmarks) {
-  for (const Candidate& l : camera) landmarks.push_back(l.landmark);
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
 }
 
 AlignedLandmarks align(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
@@ -141,6 +81,13 @@ frame::BundledFrame with_keypoints(frame::BundledFrame frame, const AlignedLandm
   return frame;
 }
 
+// Adds landmarks that are not among `landmarks`; all are in order of id.
+void add_sorted(const std::vector<LandmarkId>& added, std::vector<LandmarkId>& landmarks) {
+  const auto before = static_cast<std::ptrdiff_t>(landmarks.size());
+  landmarks.insert(landmarks.end(), added.begin(), added.end());
+  std::inplace_merge(landmarks.begin(), landmarks.begin() + before, landmarks.end());
+}
+
 bool enough(const solver::PoseSolution& solution, std::size_t num_matches, const TrackingOptions& options) {
   return supported(solution, num_matches, options.min_inliers, options) &&
          solution.num_inliers >= kMinInlierRatio * static_cast<double>(num_matches);
@@ -150,8 +97,8 @@ bool enough(const solver::PoseSolution& solution, std::size_t num_matches, const
 // landmarks together decide whether it is right. Updates the pose and the motion of the frame.
 bool track_coarsely(const TrackInput& input, const std::vector<LandmarkId>& last, const TrackingOptions& options,
                     ThreadPool& pool, frame::BundledFrame& frame, SE3& T_rig_world) {
-  Candidates candidates = visible(input.map, frame, T_rig_world, last, pool);
-  for (auto& camera : candidates) keep_coarsest(static_cast<std::size_t>(options.direct.coarse_per_image), camera);
+  const Candidates candidates =
+      coarsest_landmarks(input, frame, T_rig_world, last, options.direct.coarse_per_image, pool);
   std::vector<matching::AlignmentOptions> alignment(input.alignment.begin(), input.alignment.end());
   for (auto& camera : alignment) camera.max_shift_px = options.direct.coarse_shift_px;
   const AlignedLandmarks found = align(input, frame, T_rig_world, candidates, alignment, pool);
@@ -208,44 +155,6 @@ bool predictable(const TrackInput& input, const frame::BundledFrame& frame) {
   return state.anchored.known_in(input.map) && motion_since_last(state, frame.time_ns).has_value();
 }
 
-// The landmarks to align at the pose: those of the last frame and of the local view, spread over the images. Cameras
-// align the same landmarks if they see them, so that their number depends little on which cameras have an image.
-struct LocalLandmarks {
-  std::vector<LandmarkId> in_view;  // all
-  Candidates candidates;
-  std::vector<LandmarkId> expected;  // those of the candidates
-};
-
-LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
-                               const std::vector<LandmarkId>& last, const TrackingOptions& options, ThreadPool& pool) {
-  const map::BundledMap& map = input.map;
-  LocalLandmarks out;
-  const auto near = map::local_landmarks(map, last, input.state.anchored.reference, options.local_view);
-  out.candidates = visible(map, frame, T_rig_world, near, pool);
-  for (const auto& camera : out.candidates) add_sorted(camera, out.in_view);
-  const auto images = std::ranges::count_if(out.candidates, [](const auto& camera) { return !camera.empty(); });
-  const int budget = std::min(options.direct.per_image, options.direct.per_rig / std::max(1, static_cast<int>(images)));
-  for (std::size_t c = 0; c < out.candidates.size(); ++c) {
-    std::vector<Candidate>& candidates = out.candidates[c];
-    std::ranges::stable_partition(
-        candidates, [&](LandmarkId l) { return std::ranges::binary_search(out.expected, l); }, &Candidate::landmark);
-    keep_spread(budget, map.rig().camera(c), candidates);
-    add_sorted(candidates, out.expected);
-  }
-  return out;
-}
-
-// Adds to `landmarks` those of the last frame that are in view but were not aligned because there are enough others: a
-// search with features finds them again. All are in order of id.
-void carry_over(const std::vector<LandmarkId>& last, const LocalLandmarks& local, std::vector<LandmarkId>& landmarks) {
-  const auto found = static_cast<std::ptrdiff_t>(landmarks.size());
-  for (const LandmarkId l : last) {
-    if (std::ranges::binary_search(local.in_view, l) && !std::ranges::binary_search(local.expected, l))
-      landmarks.push_back(l);
-  }
-  std::inplace_merge(landmarks.begin(), landmarks.begin() + found, landmarks.end());
-}
-
 // Completes the output for the pose, and decides whether the frame needs features nevertheless.
 DirectOutput judged(const TrackInput& input, const LocalLandmarks& local, TrackedFrame found,
                     const TrackingOptions& options) {
@@ -257,6 +166,7 @@ DirectOutput judged(const TrackInput& input, const LocalLandmarks& local, Tracke
     result.cameras[c].keypoints = static_cast<int>(local.candidates[c].size());
     update_used_camera(output.frame, c, output.matches[c], options.consensus, state.cameras[c]);
   }
+  state.direct.view = local.view;
   const bool low = support_is_low(output.frame, output.matches, options, state.direct);
   out.all_cameras = !low;
   for (std::size_t c = 0; !low && c < state.cameras.size(); ++c) {
@@ -287,7 +197,8 @@ DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, 
   frame = with_keypoints(std::move(frame), found);
   DirectOutput out =
       judged(input, local, {std::move(frame), std::move(solution), std::move(found.matches), local.expected}, options);
-  carry_over(last, local, out.output->state.landmarks);
+  // a search with features finds the others again
+  add_sorted(local.others, out.output->state.landmarks);
   return out;
 }
 

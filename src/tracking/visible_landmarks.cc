@@ -1,0 +1,126 @@
+#include "tracking/visible_landmarks.h"
+
+#include <algorithm>
+
+#include "map/local_view.h"
+#include "matching/projection_search.h"
+
+namespace bslam::tracking {
+namespace {
+
+using geometry::SE3;
+
+constexpr double kMaxViewAngle = 1.05;  // rad, as in ProjectionSearchOptions
+// Number of frames for which a local view is used while the map does not change.
+constexpr int kFramesOfView = 8;
+
+// Appends the landmarks that are predicted visible in each camera, but those for which `skip` has a flag. `first`: the
+// index of the first landmark.
+void add_visible(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                 std::span<const LandmarkId> landmarks, std::span<const matching::SearchPoint> points,
+                 std::span<const std::uint8_t> skip, std::size_t first, ThreadPool& pool, Candidates& out) {
+  const camera::Rig rig = frame::rig_of(input.map.rig(), frame);
+  pool.for_each(rig.size(), [&](std::size_t c) {
+    if (frame.cameras[c].state != image::ImageState::kPresent) return;
+    const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
+    for (const auto& v : matching::visible_points(rig, CameraIndex(c), T_cam_world, points, kMaxViewAngle)) {
+      if (!skip.empty() && skip[v.point]) continue;
+      out[c].push_back({landmarks[v.point], v.pixel, points[v.point].max_distance / v.distance,
+                        static_cast<std::uint32_t>(first + v.point)});
+    }
+  });
+}
+
+// At most `count` landmarks, spread over the image: the first ones of each cell of a grid.
+void keep_spread(int count, const camera::Camera& camera, std::vector<Candidate>& candidates) {
+  constexpr int kPerCell = 2;
+  if (static_cast<int>(candidates.size()) <= count) return;
+  const double cell = std::sqrt(static_cast<double>(camera.width) * camera.height * kPerCell / count);
+  const auto columns = static_cast<std::size_t>(camera.width / cell) + 1;
+  std::vector<std::uint8_t> taken(columns * (static_cast<std::size_t>(camera.height / cell) + 1));
+  std::erase_if(candidates, [&](const Candidate& l) {
+    const auto x = static_cast<std::size_t>(std::max(0.0, l.pixel.x() / cell));
+    const auto y = static_cast<std::size_t>(std::max(0.0, l.pixel.y() / cell));
+    std::uint8_t& in_cell = taken[std::min(y * columns + x, taken.size() - 1)];
+    if (in_cell == kPerCell) return true;
+    ++in_cell;
+    return false;
+  });
+}
+
+// The view of the frames before if it can still be used, else a new one around the landmarks of the last frame.
+std::shared_ptr<const LocalView> local_view(const TrackInput& input, const std::vector<LandmarkId>& last,
+                                            const TrackingOptions& options) {
+  const map::BundledMap& map = input.map;
+  const KeyframeId reference = input.state.anchored.reference;
+  const DirectState& before = input.state.direct;
+  if (before.view && before.view->version == map.version() && before.view->reference == reference &&
+      before.frames % kFramesOfView != 0)
+    return before.view;
+  LocalView view{map.version(), reference, map::local_landmarks(map, last, reference, options.local_view), {}};
+  view.points = map::search_points(map, view.landmarks);
+  return std::make_shared<const LocalView>(std::move(view));
+}
+
+// Flags of the elements of `ids` that are also in `others`, which are in order of id.
+std::vector<std::uint8_t> contained(const std::vector<LandmarkId>& ids, const std::vector<LandmarkId>& others) {
+  std::vector<std::uint8_t> out(ids.size());
+  if (others.empty()) return out;
+  const std::size_t first = others.front().index(), count = others.back().index() - first + 1;
+  std::vector<std::uint8_t> listed(count);
+  for (const LandmarkId l : others) listed[l.index() - first] = 1;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const std::size_t at = ids[i].index() - first;  // huge if the id is smaller than the first
+    out[i] = at < count && listed[at];
+  }
+  return out;
+}
+
+}  // namespace
+
+Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                              const std::vector<LandmarkId>& last, int count, ThreadPool& pool) {
+  Candidates out(frame.cameras.size());
+  add_visible(input, frame, T_rig_world, last, map::search_points(input.map, last), {}, 0, pool, out);
+  for (std::vector<Candidate>& candidates : out) {
+    if (static_cast<int>(candidates.size()) <= count) continue;
+    std::nth_element(candidates.begin(), candidates.begin() + count, candidates.end(),
+                     [](const Candidate& a, const Candidate& b) {
+                       return a.coarseness != b.coarseness ? a.coarseness > b.coarseness : a.landmark < b.landmark;
+                     });
+    candidates.resize(static_cast<std::size_t>(count));
+    std::ranges::sort(candidates, {}, &Candidate::landmark);
+  }
+  return out;
+}
+
+LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
+                               const std::vector<LandmarkId>& last, const TrackingOptions& options, ThreadPool& pool) {
+  LocalLandmarks out{local_view(input, last, options), Candidates(frame.cameras.size()), {}, {}};
+  const LocalView& view = *out.view;
+  add_visible(input, frame, T_rig_world, last, map::search_points(input.map, last), {}, 0, pool, out.candidates);
+  std::vector<std::uint8_t> in_view(last.size()), expected(last.size() + view.landmarks.size());
+  for (const std::vector<Candidate>& camera : out.candidates) {
+    for (const Candidate& l : camera) in_view[l.index] = 1;
+  }
+  add_visible(input, frame, T_rig_world, view.landmarks, view.points, contained(view.landmarks, last), last.size(),
+              pool, out.candidates);
+  const auto images = std::ranges::count_if(out.candidates, [](const auto& camera) { return !camera.empty(); });
+  const int budget = std::min(options.direct.per_image, options.direct.per_rig / std::max(1, static_cast<int>(images)));
+  for (std::size_t c = 0; c < out.candidates.size(); ++c) {
+    std::vector<Candidate>& candidates = out.candidates[c];
+    std::ranges::stable_partition(candidates, [&](const Candidate& l) { return expected[l.index] != 0; });
+    keep_spread(budget, input.map.rig().camera(c), candidates);
+    for (const Candidate& l : candidates) {
+      if (!expected[l.index]) out.expected.push_back(l.landmark);
+      expected[l.index] = 1;
+    }
+  }
+  std::ranges::sort(out.expected);
+  for (std::size_t i = 0; i < last.size(); ++i) {
+    if (in_view[i] && !expected[i]) out.others.push_back(last[i]);
+  }
+  return out;
+}
+
+}  // namespace bslam::tracking

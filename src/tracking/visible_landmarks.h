@@ -1,0 +1,49 @@
+// Selection of the landmarks that direct tracking aligns in the images of a frame.
+#pragma once
+
+#include <memory>
+
+#include "map/search_points.h"
+#include "tracking/track.h"
+
+namespace bslam::tracking {
+
+// The landmarks near the rig in one version of the map. It is used for several frames.
+struct LocalView {
+  MapVersion version;
+  KeyframeId reference;
+  std::vector<LandmarkId> landmarks;          // as map::local_landmarks returns them
+  std::vector<matching::SearchPoint> points;  // one for each of them
+};
+
+// A landmark that is predicted visible in a camera.
+struct Candidate {
+  LandmarkId landmark;
+  Eigen::Vector2d pixel;    // predicted
+  double coarseness = 0;    // size of its reference patch in the image, relative to that of a patch of level 0
+  std::uint32_t index = 0;  // among all landmarks that were examined
+};
+using Candidates = std::vector<std::vector<Candidate>>;  // per camera
+
+// Of the landmarks of the last frame, in every camera those `count` with the largest patches in the image: their
+// alignment tolerates the largest errors of the predicted pose.
+Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame& frame,
+                              const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& last, int count,
+                              ThreadPool& pool);
+
+// The landmarks to align at the pose: those of the last frame and of the local view, spread over the images. Cameras
+// align the same landmarks if they see them, so that their number depends little on which cameras have an image.
+struct LocalLandmarks {
+  std::shared_ptr<const LocalView> view;
+  Candidates candidates;
+  std::vector<LandmarkId> expected;  // those of the candidates, in order of id, each once
+  // Landmarks of the last frame that are in view but no candidates because there are enough others, in order of id.
+  std::vector<LandmarkId> others;
+};
+
+// `last`: in order of id.
+LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFrame& frame,
+                               const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& last,
+                               const TrackingOptions& options, ThreadPool& pool);
+
+}  // namespace bslam::tracking
