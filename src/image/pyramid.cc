@@ -124,8 +124,7 @@ struct Resampling {
     Resampling plan{in.width(), in.height(), out.width(), out.height(), {}, {}};
     for (int begin = 0; begin < out.width(); begin += kStrip)
       make_strip(begin, std::min(begin + kStrip, out.width()), in.width(), out.width(), plan.strips.emplace_back());
-    for (int y = 0; y < out.height(); ++y)
-      plan.rows.push_back(make_taps(y, in.height(), out.height(), kRowWeightSum));
+    for (int y = 0; y < out.height(); ++y) plan.rows.push_back(make_taps(y, in.height(), out.height(), kRowWeightSum));
     return std::make_shared<const Resampling>(std::move(plan));
   }
 
