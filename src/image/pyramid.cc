@@ -25,11 +25,34 @@ constexpr int kRowWeightSum = 1 << 8;      // sum of the vertical weights; a wei
 constexpr int kColumnWeightSum = 1 << 14;  // sum of the horizontal weights
 constexpr int kShift = 21;  // fixed-point bits of both passes: 8 + 14, minus 1 that is dropped between them
 
-// Weights of the input samples `first` ... `first` + 3 that contribute to output sample `i`.
-struct Taps {
-  int first;
-  std::array<int, kTaps> weight;  // the weights add up to `weight_sum`
+}  // namespace
+
+struct Resampling {
+  // Weights of the input samples `first` ... `first` + 3 that contribute to an output sample.
+  struct Taps {
+    int first;
+    std::array<int, kTaps> weight;  // they add up to kColumnWeightSum or kRowWeightSum
+  };
+  // One strip of output columns: the input position of each column, relative to the first input column of the strip.
+  struct Strip {
+    int input_begin = 0, input_count = 0, outputs = 0;
+    std::array<std::int32_t, kStrip> first;
+    alignas(16) std::array<std::int16_t, kStrip * kTaps> weight;
+  };
+
+  int in_width = 0, in_height = 0, out_width = 0, out_height = 0;  // pixels
+  std::vector<Strip> strips;
+  std::vector<Taps> rows;  // per output row
+
+  bool is_between(const Image& in, const Image& out) const {
+    return in.width() == in_width && in.height() == in_height && out.width() == out_width && out.height() == out_height;
+  }
 };
+
+namespace {
+
+using Taps = Resampling::Taps;
+using Strip = Resampling::Strip;
 
 // Anti-aliasing with a triangle filter of half-width `ratio`, the size of an output pixel; it is bilinear interpolation
 // if the ratio is 1. Samples beyond the border repeat the last one.
@@ -54,13 +77,6 @@ Taps make_taps(int i, int inputs, int outputs, int weight_sum) {
   return taps;
 }
 
-// One strip of output columns: the input position of each column, relative to the first input column of the strip.
-struct Strip {
-  int input_begin = 0, input_count = 0, outputs = 0;
-  std::array<std::int32_t, kStrip> first;
-  alignas(16) std::array<std::int16_t, kStrip * kTaps> weight;
-};
-
 void make_strip(int begin, int end, int inputs, int outputs, Strip& strip) {
   strip.outputs = end - begin;
   for (int i = begin; i < end; ++i) {
@@ -70,6 +86,14 @@ void make_strip(int begin, int end, int inputs, int outputs, Strip& strip) {
     for (int k = 0; k < kTaps; ++k) strip.weight[(i - begin) * kTaps + k] = static_cast<std::int16_t>(taps.weight[k]);
     strip.input_count = taps.first + kTaps - strip.input_begin;
   }
+}
+
+std::shared_ptr<const Resampling> make_resampling(const Image& in, const Image& out) {
+  Resampling plan{in.width(), in.height(), out.width(), out.height(), {}, {}};
+  for (int begin = 0; begin < out.width(); begin += kStrip)
+    make_strip(begin, std::min(begin + kStrip, out.width()), in.width(), out.width(), plan.strips.emplace_back());
+  for (int y = 0; y < out.height(); ++y) plan.rows.push_back(make_taps(y, in.height(), out.height(), kRowWeightSum));
+  return std::make_shared<const Resampling>(std::move(plan));
 }
 
 // Vertical pass: `out` is half the weighted sum of four rows (15 bits).
@@ -113,28 +137,6 @@ BSLAM_VECTORISED void blend_columns(const Strip& strip, const std::int16_t* in, 
   }
 }
 
-}  // namespace
-
-struct Resampling {
-  int in_width = 0, in_height = 0, out_width = 0, out_height = 0;  // pixels
-  std::vector<Strip> strips;
-  std::vector<Taps> rows;  // per output row
-
-  static std::shared_ptr<const Resampling> between(const Image& in, const Image& out) {
-    Resampling plan{in.width(), in.height(), out.width(), out.height(), {}, {}};
-    for (int begin = 0; begin < out.width(); begin += kStrip)
-      make_strip(begin, std::min(begin + kStrip, out.width()), in.width(), out.width(), plan.strips.emplace_back());
-    for (int y = 0; y < out.height(); ++y) plan.rows.push_back(make_taps(y, in.height(), out.height(), kRowWeightSum));
-    return std::make_shared<const Resampling>(std::move(plan));
-  }
-
-  bool is_between(const Image& in, const Image& out) const {
-    return in.width() == in_width && in.height() == in_height && out.width() == out_width && out.height() == out_height;
-  }
-};
-
-namespace {
-
 void shrink(const Image& in, const Resampling& plan, Image& out) {
   // A strip covers at most kStrip * ratio input columns. The ratio may slightly exceed 2 because sizes are rounded.
   alignas(16) std::array<std::int16_t, kStrip * 9 / 4 + kTaps> row;
@@ -173,7 +175,7 @@ void build_pyramid(const ImageView& base, int levels, double factor, Pyramid& py
       const Image& larger = pyramid.levels[count - 1];
       if (static_cast<int>(pyramid.resampling.size()) < count) pyramid.resampling.emplace_back();
       std::shared_ptr<const Resampling>& plan = pyramid.resampling[count - 1];
-      if (!plan || !plan->is_between(larger, level)) plan = Resampling::between(larger, level);
+      if (!plan || !plan->is_between(larger, level)) plan = make_resampling(larger, level);
       shrink(larger, *plan, level);
     } else {
       for (int y = 0; y < height; ++y) std::memcpy(level.row(y), base.row(y), static_cast<std::size_t>(width));
