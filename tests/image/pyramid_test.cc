@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 namespace bslam::image {
@@ -29,6 +31,24 @@ TEST(Pyramid, HasExactRatios) {
     EXPECT_EQ(pyramid.scale_y[l], 481.0 / pyramid.levels[l].height());
     EXPECT_NEAR(pyramid.scale_x[l], std::pow(1.2, l), 0.01 * std::pow(1.2, l));
     EXPECT_NEAR(pyramid.from_base_x(l, pyramid.to_base_x(l, 17.25)), 17.25, 1e-12);
+  }
+}
+
+TEST(Pyramid, OfAnotherSizeInTheSameMemoryEqualsANewOne) {
+  Pyramid reused;
+  for (const auto& [width, height] : {std::pair(640, 480), std::pair(320, 480), std::pair(700, 90)}) {
+    const Image base = make_image(width, height, [](int x, int y) { return (x * x + 3 * x * y + 5 * y) % 256; });
+    Pyramid fresh;
+    build_pyramid(base.view(), 8, 1.2, reused);
+    build_pyramid(base.view(), 8, 1.2, fresh);
+    ASSERT_EQ(reused.size(), fresh.size());
+    for (std::size_t l = 0; l < fresh.size(); ++l) {
+      ASSERT_EQ(reused.levels[l].width(), fresh.levels[l].width());
+      for (int y = 0; y < fresh.levels[l].height(); ++y) {
+        const auto *row = reused.levels[l].row(y), *expected = fresh.levels[l].row(y);
+        EXPECT_TRUE(std::equal(row, row + fresh.levels[l].width(), expected)) << width << " " << l << " " << y;
+      }
+    }
   }
 }
 

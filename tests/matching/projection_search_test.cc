@@ -5,6 +5,7 @@
 #include <set>
 
 #include "base/random.h"
+#include "camera/test_cameras.h"
 
 namespace bslam::matching {
 namespace {
@@ -136,6 +137,26 @@ TEST_F(SearchByProjection, FindsNothingInACameraWithoutImage) {
 }
 
 // Two cameras with the same pose have the same matches; the third has no image.
+// Points in all directions around a camera: those that it projects into its image are visible, whatever its field of
+// view.
+TEST(VisiblePoints, AreThoseThatTheCameraProjectsIntoItsImage) {
+  for (const camera::Camera& camera : camera::test_cameras()) {
+    Random random(3, camera.name);
+    std::vector<SearchPoint> points(5000);
+    std::vector<std::uint32_t> expected;
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+      points[i].position = Vector3d(random.normal(), random.normal(), random.normal());
+      const auto pixel = camera.project(points[i].position);
+      if (pixel && camera.contains(*pixel)) expected.push_back(i);
+    }
+    std::vector<std::uint32_t> found;
+    for (const VisiblePoint& v : visible_points(camera::Rig({{camera, {}}}), CameraIndex(0), SE3(), points, 1.05))
+      found.push_back(v.point);
+    EXPECT_EQ(found, expected) << camera.name;
+    EXPECT_GT(found.size(), 20u) << camera.name;
+  }
+}
+
 TEST_F(SearchByProjection, SearchOfAllCamerasEqualsSearchOfEach) {
   const camera::Rig rig({{camera, SE3()}, {camera, SE3()}, {camera, SE3()}});
   frame::BundledFrame bundled;
