@@ -2,25 +2,10 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace bslam::map {
 namespace {
-
-// Keyframes by decreasing number of observed seeds, newer first on ties.
-std::vector<Covisible> vote(const BundledMap& map, std::span<const LandmarkId> seeds) {
-  std::vector<int> votes(map.keyframe_slots(), 0);
-  for (const LandmarkId l : seeds) {
-    for (const Observation& o : map.observations(l)) ++votes[o.keyframe.index()];
-  }
-  std::vector<Covisible> ranked;
-  for (std::size_t k = 0; k < votes.size(); ++k) {
-    if (votes[k] > 0) ranked.push_back({KeyframeId(k), votes[k]});
-  }
-  std::sort(ranked.begin(), ranked.end(), [](const Covisible& a, const Covisible& b) {
-    return a.weight != b.weight ? a.weight > b.weight : a.keyframe > b.keyframe;
-  });
-  return ranked;
-}
 
 // The first occurrence of each id, in order.
 std::vector<LandmarkId> each_once(std::span<const LandmarkId> ids) {
@@ -39,6 +24,23 @@ std::vector<LandmarkId> each_once(std::span<const LandmarkId> ids) {
 
 }  // namespace
 
+std::vector<Covisible> observers(const BundledMap& map, std::span<const LandmarkId> landmarks) {
+  std::vector<int> count(map.keyframe_slots(), 0);
+  for (const LandmarkId l : landmarks) {
+    KeyframeId last;  // several features of a keyframe may observe a landmark
+    for (const Observation& o : map.observations(l))
+      count[o.keyframe.index()] += std::exchange(last, o.keyframe) != o.keyframe;
+  }
+  std::vector<Covisible> out;
+  for (std::size_t k = 0; k < count.size(); ++k) {
+    if (count[k] > 0) out.push_back({KeyframeId(k), count[k]});
+  }
+  std::sort(out.begin(), out.end(), [](const Covisible& a, const Covisible& b) {
+    return a.weight != b.weight ? a.weight > b.weight : a.keyframe > b.keyframe;
+  });
+  return out;
+}
+
 std::vector<LandmarkId> local_landmarks(const BundledMap& map, std::span<const LandmarkId> seeds, KeyframeId reference,
                                         const LocalViewOptions& options) {
   std::vector<KeyframeId> keyframes;  // most shared landmarks first
@@ -50,7 +52,7 @@ std::vector<LandmarkId> local_landmarks(const BundledMap& map, std::span<const L
     keyframes.push_back(k);
   };
   take(reference);
-  const std::vector<Covisible> ranked = vote(map, seeds);
+  const std::vector<Covisible> ranked = observers(map, seeds);
   for (std::size_t i = 0; i < ranked.size() && keyframes.size() < (2 * limit) / 3; ++i) take(ranked[i].keyframe);
   const std::vector<KeyframeId> direct = keyframes;
   for (const KeyframeId k : direct) {

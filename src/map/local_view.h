@@ -21,6 +21,10 @@ struct LocalViewOptions {
   }
 };
 
+// The keyframes that observe some of the landmarks, with their number as weight: the largest first, newer keyframes
+// first if it is the same.
+std::vector<Covisible> observers(const BundledMap& map, std::span<const LandmarkId> landmarks);
+
 // Returns all landmarks observed by a selection of keyframes, each once, beginning with the `seeds` (distinct, alive
 // landmarks). The keyframes are those that observe the seeds, covisible neighbours of the best of them, and always
 // `reference`.

@@ -1,12 +1,11 @@
 #include "tracking/keyframe_decision.h"
 
 #include <algorithm>
-#include <map>
-#include <utility>
 
 #include "base/median.h"
 #include "geometry/triangulation.h"
 #include "map/keyframe_landmarks.h"
+#include "map/local_view.h"
 #include "tracking/make_keyframe.h"
 
 namespace bslam::tracking {
@@ -52,21 +51,14 @@ std::vector<double> parallaxes_to(const map::BundledMap& map, const std::vector<
   return out;
 }
 
-// The keyframes that observe most of the landmarks, in order of id. The reference does not count, nor do the newest
-// ones: a rig that is still near them has not come back.
+// The keyframes that observe most of the landmarks. The reference does not count, nor do the newest ones: a rig that is
+// still near them has not come back.
 std::vector<KeyframeId> keyframes_that_share(const map::BundledMap& map, const std::vector<LandmarkId>& landmarks,
                                              KeyframeId reference) {
-  std::map<KeyframeId, std::size_t> counts;
-  for (const LandmarkId l : landmarks) {
-    KeyframeId last;  // several features of a keyframe may observe a landmark
-    for (const map::Observation& o : map.observations(l))
-      counts[o.keyframe] += std::exchange(last, o.keyframe) != o.keyframe;
-  }
   std::vector<KeyframeId> out;
-  for (const auto& [keyframe, count] : counts) {
-    if (keyframe.index() + kNewest > map.newest_keyframe().index()) break;
-    if (keyframe != reference && static_cast<double>(count) >= kMinShared * static_cast<double>(landmarks.size()))
-      out.push_back(keyframe);
+  for (const auto& [keyframe, shared] : map::observers(map, landmarks)) {
+    if (shared < kMinShared * static_cast<double>(landmarks.size())) break;
+    if (keyframe != reference && keyframe.index() + kNewest <= map.newest_keyframe().index()) out.push_back(keyframe);
   }
   return out;
 }
