@@ -11,7 +11,7 @@
 namespace bslam::adjustment {
 
 struct AdjustmentOptions {
-  int robust_iterations = 3;                    // with Huber kernel, before outliers are classified
+  int robust_iterations = 4;                    // with Huber kernel, before outliers are classified
   int final_iterations = 5;                     // without robust kernel, on the inliers
   double relative_decrease = 1e-4;              // of the cost; smaller means converged
   double outlier_chi2 = solver::kChi2TwoDof95;  // squared normalised error above which an observation is removed

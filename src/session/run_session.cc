@@ -25,7 +25,7 @@
 namespace bslam::session {
 namespace {
 
-constexpr std::size_t kReadAhead = 4;  // frames
+constexpr std::size_t kReadAhead = 6;  // frames: they are read while a keyframe is mapped
 
 // Returns the frames of the recorded run, in order. There are fewer than in the data set if the run was interrupted or
 // dropped frames.
