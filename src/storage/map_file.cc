@@ -61,7 +61,7 @@ Result<Sections> take_apart(std::string_view bytes) {
   if (!bytes.starts_with(kMagic))
     return damaged("", "a file of another format", fmt::format("a saved map, which begins with {}", kMagic));
   if (bytes.size() < kHeaderBytes) return damaged("header", fmt::format("{} bytes", bytes.size()), "a complete header");
-  ByteReader in(bytes.substr(kMagic.size(), kHeaderBytes - kMagic.size()), "header");
+  SectionReader in(bytes.substr(kMagic.size(), kHeaderBytes - kMagic.size()), "header");
   if (in.number<std::uint32_t>() != kOrderMark) return damaged("header", "another byte order", "little endian");
   const auto version = in.number<std::uint32_t>();
   if (version < kOldestVersion || version > kVersion) {
@@ -101,8 +101,8 @@ Result<Sections> take_apart(std::string_view bytes) {
 }
 
 Result<SavedMap> build(const Sections& sections, std::string file) {
-  const auto reader = [&](std::size_t i) { return ByteReader(sections.bytes[i], kNames[i]); };
-  ByteReader rig_in = reader(0), info_in = reader(1), keyframes_in = reader(2), landmarks_in = reader(3);
+  const auto reader = [&](std::size_t i) { return SectionReader(sections.bytes[i], kNames[i]); };
+  SectionReader rig_in = reader(0), info_in = reader(1), keyframes_in = reader(2), landmarks_in = reader(3);
   auto rigs = take_rigs(rig_in, sections.version);
   if (!rigs) return rig_in.error();
   InfoSection info = take_info(info_in);

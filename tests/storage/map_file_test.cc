@@ -331,14 +331,14 @@ TEST(MapFile, ReadsTheRigsOfEarlierVersions) {
   constexpr std::size_t kCount = 4, kReadouts = 2 * sizeof(double), kTransform = 7 * sizeof(double);
   const std::size_t one = (bytes.size() - kCount) / 2, without_frame = one - kTransform;
   for (const std::size_t size : {without_frame - kReadouts, without_frame}) {  // version 2: readout times are optional
-    ByteReader in(std::string_view(bytes).substr(0, kCount + size), "rig");
+    SectionReader in(std::string_view(bytes).substr(0, kCount + size), "rig");
     const auto rigs = take_rigs(in, 2);
     ASSERT_TRUE(rigs) << in.error().message();
     EXPECT_TRUE(rigs->rig->same_calibration(map.rig()));
     EXPECT_EQ(rigs->given, rigs->rig);
   }
   const std::string version3 = bytes.substr(0, kCount + without_frame) + bytes.substr(kCount + one, without_frame);
-  ByteReader in(version3, "rig");
+  SectionReader in(version3, "rig");
   const auto rigs = take_rigs(in, 3);
   ASSERT_TRUE(rigs) << in.error().message();
   EXPECT_TRUE(rigs->given->same_calibration(map.given_rig()));
