@@ -323,6 +323,27 @@ TEST(MapFile, KeepsTheGivenCalibrationAndFurtherRigs) {
   EXPECT_FALSE(map::find_rig(saved.map, synthetic::fisheye_rig(2)));
 }
 
+// Cameras whose names are taken get other names in the map, but are still known by those that they were given.
+TEST(MapFile, KnowsCamerasByTheNamesThatTheyWereGiven) {
+  map::BundledMap map = small_map(synthetic::ring_rig(2));
+  const camera::Rig wide = synthetic::fisheye_rig(1);
+  const camera::Camera& camera = wide.camera(0);
+  const auto named = [&](std::string first, std::string second) {
+    camera::Camera a = camera, b = camera;
+    a.name = std::move(first);
+    b.name = std::move(second);
+    const geometry::SE3 T(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.2, 0, 0));
+    return camera::Rig({{a, geometry::SE3()}, {b, T}});
+  };
+  EXPECT_EQ(map::find_or_append_rig(map, named("cam0", "cam0_left")), 2u);
+  const map::BundledMap saved = read_back(map).map;
+  EXPECT_EQ(saved.rig().camera(2).name, "cam2");
+  EXPECT_EQ(saved.given_rig().camera(2).name, "cam0");
+  EXPECT_EQ(map::find_rig(saved, named("cam0", "cam0_left")), 2u);
+  EXPECT_EQ(map::find_rig(saved, named("cam0", "another")), 2u);
+  EXPECT_FALSE(map::find_rig(saved, named("cam0_left", "cam0")));  // exchanged
+}
+
 TEST(MapFile, ReadsTheRigsOfEarlierVersions) {
   const map::BundledMap map = small_map(synthetic::ring_rig(2));
   ByteWriter out;
