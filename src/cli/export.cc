@@ -12,6 +12,7 @@
 #include "cli/verbs.h"
 #include "evaluation/association.h"
 #include "evaluation/trajectory_file.h"
+#include "geometry/up_axis.h"
 #include "geometry/vertical_direction.h"
 #include "map_export/export_map.h"
 #include "map_export/selection.h"
@@ -67,8 +68,8 @@ Result<SE3> frame_in_camera(const std::string& name, const TrajectoryArguments& 
 }
 
 // T_body_cam of the camera of the trajectory, where an upward axis of the body needs it.
-Result<SE3> camera_on_body(const map_export::UpAxis& up, const TrajectoryArguments& arguments) {
-  if (up.frame != map_export::UpAxis::Frame::kBody) return SE3();
+Result<SE3> camera_on_body(const geometry::UpAxis& up, const TrajectoryArguments& arguments) {
+  if (up.frame != geometry::UpAxis::Frame::kBody) return SE3();
   const auto source = rig_of_trajectory(arguments, "--up " + arguments.up);
   if (!source) return source.error();
   return source->rig.body_from_cam(source->camera);
@@ -76,9 +77,9 @@ Result<SE3> camera_on_body(const map_export::UpAxis& up, const TrajectoryArgumen
 
 // The rotation of the world's axes: that of the map if one is given, so that the path fits maps exported for ROS.
 Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArguments& arguments) {
-  std::optional<map_export::UpAxis> up;
+  std::optional<geometry::UpAxis> up;
   if (!arguments.up.empty()) {
-    const auto parsed = map_export::parse_up_axis(arguments.up);
+    const auto parsed = geometry::parse_up_axis(arguments.up);
     if (!parsed) return parsed.error();
     up = *parsed;
   } else {
@@ -90,7 +91,7 @@ Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArgume
     if (!up) return geometry::upright_axes(poses);
     const auto T_body_cam = camera_on_body(*up, arguments);
     if (!T_body_cam) return T_body_cam.error();
-    const auto up_world = map_export::up_in_world(*up, poses, *T_body_cam);
+    const auto up_world = geometry::up_in_world(*up, poses, *T_body_cam);
     if (!up_world) return up_world.error();
     return geometry::upright_axes(poses, *up_world);
   }
