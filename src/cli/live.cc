@@ -177,11 +177,11 @@ dataset::Dataset dataset_of(const LiveRig& rig, TimeNs first_time_ns) {
           .sources = rig.paths};
 }
 
-Result<std::unique_ptr<capture::Recorder>> start_recording(const std::string& file, const camera::Rig& rig,
+Result<std::unique_ptr<capture::Recorder>> start_recording(const std::string& file, const LiveRig& rig,
                                                            capture::LiveCameras& cameras) {
   std::vector<bool> jpeg;
   for (const capture::Stream& stream : cameras.streams()) jpeg.push_back(capture::is_jpeg(stream.pixels));
-  auto recorder = capture::Recorder::create(file, rig, jpeg);
+  auto recorder = capture::Recorder::create(file, rig.rig, rig.cameras, jpeg);
   if (recorder) cameras.record_to(recorder->get());
   return recorder;
 }
@@ -212,7 +212,7 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
   input.before = [&]() -> Status {
     if (!quiet) print_warnings(session::warnings_before_run(dataset));
     if (!a.record.empty()) {
-      auto started = start_recording(a.record, rig.rig, cameras);
+      auto started = start_recording(a.record, rig, cameras);
       if (!started) return started.error();
       recorder = *std::move(started);
     }

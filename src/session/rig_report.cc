@@ -83,10 +83,10 @@ std::vector<std::string> warnings_of(const camera::Rig& rig) {
 struct Calibration {
   rig_formats::RigFile file;
   std::string format;
-  bool of_recording = false;  // CameraInfo of a bag
+  bool of_recording = false;  // a bag, with its own calibration
 };
 
-// Reads a calibration file, or the CameraInfo of a bag.
+// Reads a calibration file, or the calibration of a bag.
 Result<Calibration> read_calibration(const RigReportRequest& request) {
   dataset::DatasetRequest recording = request.recording;
   recording.path = request.file;
@@ -98,7 +98,10 @@ Result<Calibration> read_calibration(const RigReportRequest& request) {
     if (opened && opened->format == dataset::DatasetFormat::kBag) {
       const auto dataset = dataset::open_dataset(recording);
       if (!dataset) return dataset.error();
-      return Calibration{{dataset->rig, rig_formats::RigFormat::kBslam, {}}, "CameraInfo of a bag", true};
+      const dataset::Recording& source = *opened->recording;
+      return Calibration{{dataset->rig, rig_formats::RigFormat::kBslam, {}},
+                         source.calibrated() ? source.calibration_origin() : "rig.yaml in the folder of the bag",
+                         true};
     }
   }
   auto file = rig_formats::read_rig_file(request.file);

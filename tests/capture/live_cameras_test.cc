@@ -202,7 +202,7 @@ TEST_F(LiveCamerasTest, RecordingHasTheSameFrames) {
   auto live = open(eventful());
   const auto first_ns = live->wait_for_first_frame();
   ASSERT_TRUE(first_ns.ok()) << first_ns.error().message();
-  auto recorder = Recorder::create(file, rig_, {false, true});
+  auto recorder = Recorder::create(file, rig_, {0, 1}, {false, true});
   ASSERT_TRUE(recorder.ok());
   live->record_to(recorder->get());
   live->begin();
@@ -377,7 +377,7 @@ TEST(RecorderTest, WaitingForADiskThatHangsCanBeStopped) {
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
   ASSERT_GE(reader, 0);
   const camera::Rig rig = synthetic::ring_rig(1, 512);
-  auto recorder = Recorder::create(pipe, rig, {false});
+  auto recorder = Recorder::create(pipe, rig, {0}, {false});
   ASSERT_TRUE(recorder.ok()) << recorder.error().message();
   const auto pixels = std::make_shared<CapturedPixels>();
   std::mt19937 random(1);
@@ -434,7 +434,7 @@ TEST_F(LiveCamerasTest, FailureOfTheDiskEndsTheRecordingOnly) {
   add_frames(events, 10, 200);
   auto live = open(std::move(events));
   const support::TemporaryFolder folder;
-  auto recorder = Recorder::create(folder.path() / "live.mcap", rig_, {false, true});
+  auto recorder = Recorder::create(folder.path() / "live.mcap", rig_, {0, 1}, {false, true});
   ASSERT_TRUE(recorder.ok());
   ASSERT_TRUE(live->wait_for_first_frame().ok());
   live->record_to(recorder->get());
