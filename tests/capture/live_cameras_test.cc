@@ -322,6 +322,25 @@ TEST_F(LiveCamerasTest, NewestFramesWinAndDroppedOnesAreReported) {
   EXPECT_EQ(items.back().images.time_ns, kStart + 39 * kInterval);
 }
 
+TEST_F(LiveCamerasTest, LateImagesAreNotBlamedOnTheCameraWhileFramesWait) {
+  std::vector<Event> events;
+  add_frames(events, 0, 10);
+  events.push_back({Event::Kind::kGate, 0});
+  add_frames(events, 10, 40);
+  events.push_back({Event::Kind::kImage, 0, kStart + 20 * kInterval + kMs});
+  auto live = open(std::move(events), 3);
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  live->begin();
+  script_->open_gate();
+  script_->wait_for_ends(2);
+  ASSERT_EQ(said_.size(), 1u);
+  EXPECT_EQ(said_[0],
+            "cam0 (a): an image came too late for its frame, while the computer does not keep up; it is not used, and "
+            "further ones are counted");
+  EXPECT_EQ(live->notes(), std::vector<std::string>{"cam0 (a): 1 images were in no frame (1 too-late; 1 while the "
+                                                    "computer did not keep up)"});
+}
+
 TEST_F(LiveCamerasTest, SaysWhichCameraDeliversNothing) {
   using Kind = Event::Kind;
   std::vector<Event> events;
