@@ -62,9 +62,11 @@ Result<SE3> frame_in_camera(const std::string& name, const TrajectoryArguments& 
   if (name == "body") return rig.body_from_cam(camera).inverse();
   if (const auto target = name == "cam0" ? std::size_t{0} : camera_named(name, rig))
     return rig.cam_from_rig(camera) * rig.rig_from_cam(*target);
-  std::string names;
-  for (std::size_t c = 0; c < rig.size(); ++c) names += ", " + rig.camera(c).name;
-  return Error{"command line", "--frame", name, "cam0, body" + names};
+  std::string names = "body, cam0";
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    if (rig.camera(c).name != "cam0") names += ", " + rig.camera(c).name;
+  }
+  return Error{"command line", "--frame", name, names};
 }
 
 // T_body_cam of the camera of the trajectory, where an upward axis of the body needs it.
@@ -116,9 +118,13 @@ Result<SE3> wanted_frame(const TrajectoryArguments& arguments) {
   const std::string& frame = arguments.frame;
   if (frame.empty() || (!arguments.camera && frame == frame_in_file(arguments))) return SE3();
   const auto T_cam_frame = frame_in_camera(frame, arguments);
-  if (T_cam_frame) {
-    note_lever_arm(T_cam_frame->translation().norm(), frame, arguments.file,
-                   "the distance is added to the path as it is");
+  const double distance_m = T_cam_frame ? T_cam_frame->translation().norm() : 0;
+  if (distance_m > 0 && evaluation::read_comments(arguments.file).scale != "metric") {
+    fmt::print(
+        stderr,
+        "note: the camera is {:.3f} m away from {}, but the unit of {} is not the metre: the distance is added to "
+        "the path as it is\n",
+        distance_m, frame, arguments.file);
   }
   return T_cam_frame;
 }
@@ -179,7 +185,7 @@ int run_export(const TrajectoryArguments& arguments) {
   const std::string header = comments(arguments, arguments.frame.empty() ? own_frame : arguments.frame);
   const Status status = evaluation::write_trajectory(arguments.out, *trajectory, format, header, arguments.overwrite);
   if (!status) return report_error(status.error());
-  std::printf("%s: %zu poses\n", arguments.out.c_str(), trajectory->size());
+  std::printf("%s: %zu pose%s\n", arguments.out.c_str(), trajectory->size(), trajectory->size() == 1 ? "" : "s");
   return kExitOk;
 }
 
