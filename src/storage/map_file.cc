@@ -227,8 +227,8 @@ Result<SavedMap> read_map(const std::filesystem::path& file) {
   return map_from_bytes(*bytes, file.string());
 }
 
-Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
-                                 const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {
+Result<SavedMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
+                          const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {
   auto saved = read_map(file);
   if (!saved) return saved.error();
   if (const Status status = fits(*saved, pyramid, vocabulary); !status) return status.error();
@@ -238,7 +238,7 @@ Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera
                  fmt::format("at most {}; a map with fewer rigs", kMaxCameras)};
   }
   if (saved->map.num_keyframes() == 0) return Error{file.string(), "keyframes", "none", "a map with keyframes"};
-  return std::move(saved->map);
+  return saved;
 }
 
 Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,

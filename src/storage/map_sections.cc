@@ -239,6 +239,7 @@ void put_info(const map::BundledMap& map, const MapFileInfo& info, ByteWriter& o
   out.number(info.vocabulary);
   out.text(info.version);
   out.text(info.data);
+  if (!info.warning.empty()) out.text(info.warning);
 }
 
 InfoSection take_info(SectionReader& in) {
@@ -247,7 +248,11 @@ InfoSection take_info(SectionReader& in) {
   section.pyramid.levels = in.number<std::int32_t>();
   const auto scale = in.number<std::uint8_t>();
   const std::string kind = in.text();
-  section.info = {in.number<std::uint64_t>(), in.text(), in.text()};
+  section.info = {in.number<std::uint64_t>(), in.text(), in.text(), {}};
+  if (in.remaining() > 0) {
+    section.info.warning = in.text();
+    in.require(!section.info.warning.empty(), "an empty warning", "a warning, or none");
+  }
   section.scale = static_cast<map::Scale>(scale);
   const bool pyramid = section.pyramid.scale_factor > 1 && section.pyramid.scale_factor <= 4 &&
                        section.pyramid.levels >= 1 && section.pyramid.levels <= kMaxLevels;

@@ -304,6 +304,13 @@ TEST(MapFits, OnlyTheVocabularyOfItsKeyframes) {
             "vocabulary");
 }
 
+TEST(MapFile, KeepsTheWarningOfItsRun) {
+  const map::BundledMap map = small_map(synthetic::ring_rig(1));
+  const SavedMap saved = read_back(map, {0, "", "", "the images do not belong to the calibration"});
+  EXPECT_EQ(saved.info.warning, "the images do not belong to the calibration");
+  EXPECT_EQ(read_back(map).info.warning, "");
+}
+
 // ---- rigs
 
 TEST(MapFile, KeepsTheGivenCalibrationAndFurtherRigs) {
