@@ -10,8 +10,10 @@ import base64
 import json
 import os
 import pathlib
+import socket
 import sys
 from typing import TYPE_CHECKING, Any, Union
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 Path = Union[str, "os.PathLike[str]"]
 
 _BEGIN, _END = '<script type="application/json" id="bslam-data">', "</script>"
+_VIEWER_PORT = 9876
 _INSTALL = "rerun-sdk is not installed, which shows runs in Rerun: pip install rerun-sdk"
 
 
@@ -74,6 +77,23 @@ def log(run: Path, recording: rerun.RecordingStream | None = None) -> None:
     rr.log("summary", rr.TextDocument(summary), static=True, recording=recording)
 
 
+def is_reachable(address: str) -> bool:
+    """Returns whether something listens at the address of a viewer.
+
+    Args:
+        address: such as rerun+http://127.0.0.1:9876/proxy.
+    """
+    try:
+        parts = urlsplit(address)
+        if parts.hostname is None:
+            return False
+        port = parts.port or {"rerun+http": 80, "rerun+https": 443}.get(parts.scheme, _VIEWER_PORT)
+        with socket.create_connection((parts.hostname, port), timeout=5):
+            return True
+    except (OSError, ValueError):
+        return False
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Logs a run and returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m bslam.rerun", description="shows the result of a run in Rerun")
@@ -87,18 +107,22 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         rr = _rerun()
         recording = rr.RecordingStream("bslam")
+        part = f"{options.save}.part"  # renamed when it is complete
         if options.save:
-            recording.save(options.save)
+            recording.save(part)
         elif options.connect:
             recording.connect_grpc(options.connect)
         else:
             rr.spawn(recording=recording)
         log(options.run, recording)
         recording.flush()
+        if options.save:
+            recording.disconnect()
+            os.replace(part, options.save)
     except ImportError as failure:
         print(f"bslam: {failure}", file=sys.stderr)
         return 2
-    except Error as failure:
+    except (Error, OSError, RuntimeError) as failure:  # the last one by rerun-sdk
         print(f"bslam: {failure}", file=sys.stderr)
         return 2
     return 0

@@ -1,3 +1,4 @@
+import socket
 import subprocess
 import sys
 
@@ -51,8 +52,15 @@ def test_run_is_written_for_rerun(recording, program, tmp_path, monkeypatch):
     written = file.read_bytes()
     assert written.startswith(b"RRF2")
     assert not (tmp_path / "out/rerun.log").exists()
-    error = program(
-        "run", recording.folder, "--out", tmp_path / "out", "--overwrite", "--rerun", "/nowhere/run.rrd", status=2
-    )
-    assert error.startswith("--rerun: /nowhere/run.rrd: found ")
-    assert (tmp_path / "out/trajectory.tum").exists()
+    assert list(tmp_path.glob("run.rrd*")) == [file]
+    error = program("run", recording.folder, "--out", tmp_path / "again", "--rerun", file, status=2)
+    assert "run.rrd: --rerun: found an existing file" in error
+    assert file.read_bytes() == written
+
+
+def test_viewer_is_looked_for():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"rerun+http://127.0.0.1:{server.getsockname()[1]}/proxy"
+        assert bslam.rerun.is_reachable(address)
+    assert not bslam.rerun.is_reachable(address)
+    assert not bslam.rerun.is_reachable("rerun+http://")

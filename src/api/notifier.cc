@@ -11,10 +11,11 @@ void Notifier::log(LogLevel level, const std::string& line) const {
   if (callbacks_.log) callbacks_.log(level, line);
 }
 
-void Notifier::started(const Rig& rig) {
+void Notifier::started(const Rig& rig, const std::string& map_warning) {
   if (!callbacks_.log) return;
   for (const std::string& note : rig.notes()) log(LogLevel::kInfo, "rig: " + note);
   for (const std::string& warning : rig.warnings()) log(LogLevel::kWarning, "rig: " + warning);
+  if (!map_warning.empty()) log(LogLevel::kWarning, "map: the run that made it has found: " + map_warning);
 }
 
 void Notifier::report_status(const FrameResult& frame) {

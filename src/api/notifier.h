@@ -15,8 +15,8 @@ class Notifier {
  public:
   Notifier(Callbacks callbacks, const camera::Rig& rig) : callbacks_(std::move(callbacks)), rig_(rig) {}
 
-  // Logs notes and warnings about the rig, before the first frame.
-  void started(const Rig& rig);
+  // Logs notes and warnings about the rig, and what is wrong with the loaded map, before the first frame.
+  void started(const Rig& rig, const std::string& map_warning);
   void processed(const FrameResult& frame, const system::System& system);
   void finished(const system::System& system);
 

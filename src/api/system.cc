@@ -51,6 +51,7 @@ Error moved_from(const char* name) {
 struct Resources {
   system::Resources for_system;
   std::uint64_t vocabulary = 0;  // its id; 0 = none
+  std::string map_warning;       // what is wrong with the loaded map
 };
 
 Result<Resources> load_resources(const Rig& rig, const system::Config& config, const Startup& startup) {
@@ -65,8 +66,9 @@ Result<Resources> load_resources(const Rig& rig, const system::Config& config, c
     auto map = storage::open_map(startup.map, api::Access::impl(rig).rig, config.feature_model().pyramid,
                                  out.for_system.vocabulary.get());
     if (!map) return map.error();
-    if (const Status s = system::check_settings(config, *map, api::Access::impl(rig).rig); !s) return s.error();
-    out.for_system.map = *std::move(map);
+    if (const Status s = system::check_settings(config, map->map, api::Access::impl(rig).rig); !s) return s.error();
+    out.for_system.map = std::move(map->map);
+    out.map_warning = std::move(map->info.warning);
   }
   out.for_system.masks = api::Access::impl(rig).masks;
   out.for_system.history = startup.history_frames;
@@ -79,6 +81,7 @@ struct System::Impl {
   Impl(const Rig& of, const system::Config& config, Resources resources, Callbacks callbacks)
       : rig(api::Access::impl(of).rig),
         vocabulary(resources.vocabulary),
+        map_warning(std::move(resources.map_warning)),
         system(rig, config, std::move(resources.for_system)),
         reader(rig),
         notifier(std::move(callbacks), rig) {}
@@ -89,6 +92,7 @@ struct System::Impl {
 
   const camera::Rig rig;
   const std::uint64_t vocabulary;
+  const std::string map_warning;
   system::System system;
   api::BundleReader reader;
   api::Notifier notifier;
@@ -166,7 +170,7 @@ Result<System> System::create(const Rig& rig, const Config& config, Startup star
     auto resources = load_resources(rig, settings, startup);
     if (!resources) return resources.error();
     auto impl = std::make_unique<Impl>(rig, settings, *std::move(resources), std::move(startup.callbacks));
-    impl->notifier.started(rig);
+    impl->notifier.started(rig, impl->map_warning);
     return System(std::move(impl));
   });
 }
@@ -192,7 +196,8 @@ MapView System::map() const { return impl_ ? api::make_map_view(impl_->system.sn
 Status System::save_map(const std::filesystem::path& file) const {
   if (!impl_) return moved_from("System::save_map");
   return api::guarded("System::save_map", [&]() -> Status {
-    return storage::write_map(*impl_->system.snapshot(), {impl_->vocabulary, BSLAM_VERSION, "live"}, file);
+    return storage::write_map(*impl_->system.snapshot(), {impl_->vocabulary, BSLAM_VERSION, "live", impl_->map_warning},
+                              file);
   });
 }
 

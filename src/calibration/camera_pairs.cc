@@ -14,10 +14,8 @@ constexpr double kHardlyAny = 0.02;         // share of matched keypoints; 0.1 t
 constexpr double kEnough = 0.2;             // with this share a pair with much overlap needs no further test
 constexpr int kMinKeyframes = 2;            // for a statement about hardly any matches
 constexpr std::size_t kImagePairs = 24, kImagesPerPair = 8;  // maximum numbers that are matched again
-// Least change of a pose that no knock explains.
-constexpr double kOtherRotation_deg = 5, kOtherDisplacement_deg = 45;
-constexpr double kMinExplained = 0.4;  // share of matches that the other arrangement explains
-constexpr double kClearly = 2;         // times as many as the calibration explains
+constexpr double kMinExplained = 0.4;                        // share of matches that the other arrangement explains
+constexpr double kClearly = 2;                               // times as many as the calibration explains
 
 const frame::CameraFrame& image_of(const map::BundledMap& map, KeyframeId k, std::size_t camera) {
   return map.keyframe(k).frame->cameras[camera];
@@ -97,11 +95,11 @@ bool CameraPair::hardly_matched() const {
 
 bool shows_another_arrangement(const PairEvidence& evidence) {
   const bool mistaken = evidence.verdict && *evidence.verdict != Convention::kAsGiven;
-  const bool elsewhere = evidence.other && (evidence.other->rotated_deg > kOtherRotation_deg ||
-                                            evidence.other->displaced_deg > kOtherDisplacement_deg);
-  if (!mistaken && !elsewhere) return false;
-  const int explained =
-      elsewhere ? evidence.other->agreeing : evidence.agreeing[static_cast<std::size_t>(*evidence.verdict)];
+  const bool elsewhere = evidence.other && evidence.other->is_another_arrangement();
+  if (!mistaken && !elsewhere && !evidence.exchanged) return false;
+  const int explained = evidence.exchanged ? evidence.exchanged->agreeing
+                        : elsewhere        ? evidence.other->agreeing
+                                           : evidence.agreeing[static_cast<std::size_t>(*evidence.verdict)];
   return explained >= kMinExplained * evidence.matches && explained >= kClearly * evidence.agreeing[0];
 }
 

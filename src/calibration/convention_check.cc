@@ -92,6 +92,35 @@ int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
   return agreeing;
 }
 
+// How much the pose of the second camera in the first one differs from the given one.
+OtherPose difference(const SE3& found, const SE3& given) {
+  OtherPose out{.rotated_deg = geometry::degrees(geometry::so3_log((found * given.inverse()).rotation()).norm())};
+  const Eigen::Vector3d lies = found.inverse().translation(), should_lie = given.inverse().translation();
+  if (should_lie.norm() > kNoBaseline && lies.norm() > kNoBaseline)
+    out.displaced_deg = geometry::degrees(geometry::angle_between(lies.normalized(), should_lie.normalized()));
+  return out;
+}
+
+// The calibrations of two cameras, not just those of the pair, that are consistent with most matches. Those of pairs
+// that are arranged much like this one are not tried: they may fit better only because a camera was knocked.
+std::optional<OtherCalibrations> other_calibrations(const camera::Rig& rig, std::size_t i, std::size_t j,
+                                                    std::span<const PixelPair> pairs) {
+  const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
+  OtherCalibrations best;
+  for (std::size_t k = 0; k < rig.size(); ++k) {
+    for (std::size_t l = 0; l < rig.size(); ++l) {
+      if (k == l || (k == i && l == j) || (k == j && l == i)) continue;
+      const Hypothesis hypothesis = hypothesis_of(Convention::kAsGiven, rig, k, l);
+      if (!difference(hypothesis.T_second_first, given).is_another_arrangement()) continue;
+      const int agreeing = count_agreeing(hypothesis, pairs);
+      if (agreeing > best.agreeing) best = {{rig.camera(k).name, rig.camera(l).name}, agreeing};
+    }
+  }
+  if (best.agreeing < kMinAgreeing || best.agreeing < kMinRatio * static_cast<double>(pairs.size()))
+    return std::nullopt;
+  return best;
+}
+
 // The relative pose of camera j estimated from the matches of all frames, independent of the calibrated one.
 std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::size_t j,
                                     std::span<const PixelPair> pairs) {
@@ -109,11 +138,8 @@ std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::
   const auto found = estimators::relative_pose(bearings, options, Random(1, "extrinsics check"));
   if (!found) return std::nullopt;
   const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
-  OtherPose out{.agreeing = found->num_inliers};
-  out.rotated_deg = geometry::degrees(geometry::so3_log((found->T_b_a * given.inverse()).rotation()).norm());
-  const Eigen::Vector3d lies = found->T_b_a.inverse().translation(), should_lie = given.inverse().translation();
-  if (should_lie.norm() > kNoBaseline)
-    out.displaced_deg = geometry::degrees(geometry::angle_between(lies, should_lie.normalized()));
+  OtherPose out = difference(found->T_b_a, given);
+  out.agreeing = found->num_inliers;
   return out;
 }
 
@@ -125,6 +151,11 @@ std::optional<Convention> verdict_of(const PairEvidence& evidence) {
 }
 
 }  // namespace
+
+bool OtherPose::is_another_arrangement() const {
+  constexpr double kRotation_deg = 5, kDisplacement_deg = 45;
+  return rotated_deg > kRotation_deg || displaced_deg > kDisplacement_deg;
+}
 
 std::string_view convention_in_words(Convention convention) {
   switch (convention) {
@@ -159,9 +190,13 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
   evidence.verdict = verdict_of(evidence);
   const int fitting = *std::ranges::max_element(evidence.agreeing);
   if (evidence.verdict && fitting >= kGoodRatio * evidence.matches) return evidence;
-  evidence.other = other_pose(rig, i, j, all);
-  if (evidence.other && evidence.other->agreeing < kClearly * fitting) evidence.other.reset();
-  if (evidence.other) evidence.verdict.reset();
+  const auto clearly_better = [&](auto found) {
+    if (found && found->agreeing < kClearly * fitting) found.reset();
+    return found;
+  };
+  evidence.exchanged = clearly_better(other_calibrations(rig, i, j, all));
+  if (!evidence.exchanged) evidence.other = clearly_better(other_pose(rig, i, j, all));
+  if (evidence.exchanged || evidence.other) evidence.verdict.reset();
   return evidence;
 }
 
@@ -212,6 +247,13 @@ std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<co
 
 std::string describe_pair(const PairEvidence& pair) {
   const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
+  if (pair.exchanged) {
+    return fmt::format(
+        "{} of {} matches are consistent with the calibrations of {} and {} in place of those of the two cameras; {} "
+        "with the calibration as given",
+        pair.exchanged->agreeing, pair.matches, pair.exchanged->cameras[0], pair.exchanged->cameras[1],
+        agreeing(Convention::kAsGiven));
+  }
   if (pair.other) {
     return fmt::format(
         "{} of {} matches are consistent with a pose of the second camera that is rotated by {:.1f} degrees from the "
@@ -254,10 +296,11 @@ std::string unjudged(std::span<const PairEvidence> evidence) {
 std::string describe_evidence(std::span<const PairEvidence> evidence) {
   std::string text = "test against the images:\n";
   std::map<Convention, std::vector<std::string>> mistakes;  // pairs
-  int fitting = 0, elsewhere = 0;
+  int fitting = 0, elsewhere = 0, exchanged = 0;
   for (const PairEvidence& pair : evidence) {
     text += fmt::format("  cameras {} and {}: {}\n", pair.first, pair.second, describe_pair(pair));
     elsewhere += pair.other ? 1 : 0;
+    exchanged += pair.exchanged ? 1 : 0;
     if (pair.verdict == Convention::kAsGiven) ++fitting;
     if (pair.verdict && pair.verdict != Convention::kAsGiven) {
       mistakes[*pair.verdict].push_back(fmt::format("{} and {}", pair.first, pair.second));
@@ -273,6 +316,8 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
                "warning: the images of cameras {} contradict the extrinsics; they are consistent with them {}{}\n",
                fmt::join(pairs, ", "), convention_in_words(most->first), others);
   }
+  if (exchanged > 0)
+    return text + "warning: the images contradict the extrinsics; they are consistent with exchanged cameras\n";
   if (elsewhere > 0) return text + "warning: the images contradict the extrinsics, and no common mistake explains it\n";
   if (fitting == 0) return text + "  the extrinsics could not be tested\n";
   text += "  the extrinsics are consistent with the images" + unjudged(evidence) + "\n";

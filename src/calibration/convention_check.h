@@ -34,6 +34,16 @@ struct OtherPose {
   int agreeing = 0;          // matches consistent with it
   double rotated_deg = 0;    // angle between the estimated and the given orientation of the second camera
   double displaced_deg = 0;  // angle between the estimated and the given direction of the baseline; 0 without baseline
+
+  // Whether no knock explains so large a difference.
+  bool is_another_arrangement() const;
+};
+
+// The calibrations of two other cameras of the rig, or of one of the pair and another one, that are consistent with
+// clearly more matches than any convention: cameras of more than this pair were exchanged.
+struct OtherCalibrations {
+  std::array<std::string, 2> cameras;  // names, for the first and the second camera of the pair
+  int agreeing = 0;                    // matches consistent with them
 };
 
 // Evidence on one pair of cameras.
@@ -43,8 +53,9 @@ struct PairEvidence {
   int matches = 0;                              // feature matches, over all frames
   std::array<int, kConventions> agreeing = {};  // matches consistent with each convention
   // The convention with most consistent matches, if there are enough of them and, for any but kAsGiven, clearly more
-  // than as given. Empty if there is too little evidence or if `other` is set.
+  // than as given. Empty if there is too little evidence or if one of the following is set.
   std::optional<Convention> verdict = {};
+  std::optional<OtherCalibrations> exchanged = {};
   std::optional<OtherPose> other = {};
 };
 

@@ -193,6 +193,7 @@ void LiveCameras::collect() {
       waiting_.pop_front();
       --frames_waiting_;
     }
+    overloaded_ = overloaded_ || (begun_ && frames_waiting_ >= options_.max_waiting);
     if (frames_waiting_ > options_.max_waiting) {
       Waiting& oldest = *std::ranges::find(waiting_, false, &Waiting::dropped);
       oldest.dropped = true;
@@ -242,12 +243,17 @@ bool LiveCameras::reopen(std::size_t c, const std::stop_token& stop) {
 }
 
 void LiveCameras::note_drop(const DroppedImage& image) {
-  bool first = false;
+  bool first = false, overloaded = false;
   {
     const std::lock_guard lock(mutex_);
-    first = !std::exchange(cameras_[image.camera].drop_said[static_cast<std::size_t>(image.reason)], true);
+    CameraState& camera = cameras_[image.camera];
+    overloaded = overloaded_ && image.reason == DropReason::kTooLate;
+    camera.late_under_load += overloaded;
+    first = !std::exchange(camera.drop_said[static_cast<std::size_t>(image.reason)], true);
   }
-  if (first) say(image.camera, std::string(text_of(image.reason)) + "; it is not used, and further ones are counted");
+  const std::string text =
+      overloaded ? "an image came too late for its frame, while the computer does not keep up" : text_of(image.reason);
+  if (first) say(image.camera, text + "; it is not used, and further ones are counted");
 }
 
 // ---- The thread of the run
@@ -300,6 +306,7 @@ std::optional<session::FrameSource::Item> LiveCameras::next() {
     frame = std::move(waiting_.front());
     waiting_.pop_front();
     frames_waiting_ -= !frame.dropped;
+    overloaded_ = overloaded_ && frames_waiting_ > 0;
   }
   Item item;
   item.images.time_ns = frame.time_ns;
@@ -334,6 +341,8 @@ std::vector<std::string> LiveCameras::notes() const {
       reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", counts.dropped[c][r],
                              to_string(static_cast<DropReason>(r)));
     }
+    if (camera.late_under_load > 0)
+      reasons += fmt::format("; {} while the computer did not keep up", camera.late_under_load);
     out.push_back(fmt::format("{}: {} images were in no frame ({})", name, dropped, reasons));
   }
   return out;

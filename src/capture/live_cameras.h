@@ -83,6 +83,7 @@ class LiveCameras final : public session::FrameSource {
     bool lost = false, unstamped = false;
     std::string why_lost;
     std::array<bool, kDropReasons> drop_said{};
+    std::size_t late_under_load = 0;  // images that came too late while frames waited for the tracker
   };
   struct Waiting {
     ImageBundle bundle;
@@ -115,6 +116,7 @@ class LiveCameras final : public session::FrameSource {
   std::condition_variable_any changed_;
   std::deque<Waiting> waiting_;
   std::size_t frames_waiting_ = 0;  // of them, those that were not dropped
+  bool overloaded_ = false;         // as many frames as may wait have been waiting, and some still are
   bool begun_ = false, ended_ = false, stopped_ = false;
   std::size_t running_ = 0;  // threads
   std::exception_ptr failure_;

@@ -49,14 +49,14 @@ Result<camera::Rig> rig_as_recorded(const camera::Rig& rig) {
 }
 
 Result<std::unique_ptr<Recorder>> Recorder::create(const std::filesystem::path& path, const camera::Rig& rig,
-                                                   const std::vector<bool>& jpeg) {
+                                                   const std::vector<int>& numbers, const std::vector<bool>& jpeg) {
   auto file = containers::McapWriter::create(path);
   if (!file) return file.error();
   containers::McapWriter& writer = **file;
   const std::vector<std::string> topics = topics_of(rig, jpeg);
   if (const Status s = writer.attach(dataset::kLiveRigFile, "application/yaml", rig_formats::rig_to_yaml(rig)); !s)
     return s.error();
-  if (const Status s = writer.add_metadata(dataset::kLiveMetadata, dataset::live_metadata(topics)); !s)
+  if (const Status s = writer.add_metadata(dataset::kLiveMetadata, dataset::live_metadata(topics, numbers)); !s)
     return s.error();
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (jpeg[c])

@@ -25,10 +25,10 @@ Result<camera::Rig> rig_as_recorded(const camera::Rig& rig);
 
 class Recorder {
  public:
-  // `jpeg[i]`: camera i delivers JPEG files, which are recorded as they are; other images are recorded as grey values.
-  // Error: the file cannot be written.
+  // `numbers`: of the cameras of `rig` in the rig file. `jpeg[i]`: camera i delivers JPEG files, which are recorded as
+  // they are; other images are recorded as grey values. Error: the file cannot be written.
   static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& path, const camera::Rig& rig,
-                                                  const std::vector<bool>& jpeg);
+                                                  const std::vector<int>& numbers, const std::vector<bool>& jpeg);
   ~Recorder();  // as finish()
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;

@@ -41,11 +41,10 @@ AlignMode align_mode(const std::string& name) {
   return name == "none" ? AlignMode::kNone : AlignMode::kSe3;
 }
 
-// Returns the estimate in the frame of the ground truth. If that is the body frame: T_world_body = T_world_cam *
-// T_cam_body.
-Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& arguments) {
+// Returns T_cam_frame of the frame of the ground truth and of the camera of the estimate.
+Result<geometry::SE3> frame_of_truth(const EvalArguments& arguments) {
   const std::string frame = evaluation::read_comments(arguments.estimate).frame;
-  if (frame == "body" && arguments.gt_frame == "body") return estimate;
+  if (frame == "body" && arguments.gt_frame == "body") return geometry::SE3();
   if (arguments.gt_frame != "body" && !arguments.rig) {
     if (!frame.empty() && frame != "cam0") {
       fmt::print(
@@ -54,7 +53,7 @@ Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& a
           "it with poses of camera 0\n",
           arguments.estimate, frame);
     }
-    return estimate;
+    return geometry::SE3();
   }
   if (!arguments.rig) {
     return Error{.file = "command line",
@@ -66,11 +65,24 @@ Result<Trajectory> in_frame_of_truth(Trajectory estimate, const EvalArguments& a
   if (!rig) return rig.error();
   const auto camera = camera_of_trajectory(arguments.estimate, *rig, *arguments.rig, arguments.camera);
   if (!camera) return camera.error();
-  const geometry::SE3 T_cam_frame =
-      arguments.gt_frame == "body" ? rig->body_from_cam(*camera).inverse() : rig->cam_from_rig(*camera);
-  note_lever_arm(T_cam_frame.translation().norm(), "the frame of the ground truth", arguments.estimate,
-                 "the errors contain the difference");
-  return evaluation::moved_to_frame(estimate, T_cam_frame);
+  return arguments.gt_frame == "body" ? rig->body_from_cam(*camera).inverse() : rig->cam_from_rig(*camera);
+}
+
+// Moves both paths to one frame: that of the ground truth or, if the unit of the estimate is not the metre, in which
+// the distance to that frame is known, the camera of the estimate.
+void move_to_one_frame(const geometry::SE3& T_cam_frame, const EvalArguments& arguments, Trajectory& estimate,
+                       Trajectory& truth) {
+  const double distance_m = T_cam_frame.translation().norm();
+  if (distance_m == 0 || evaluation::read_comments(arguments.estimate).scale == "metric") {
+    estimate = evaluation::moved_to_frame(std::move(estimate), T_cam_frame);
+    return;
+  }
+  fmt::print(
+      stderr,
+      "note: the unit of {} is not the metre: the ground truth was moved by {:.3f} m to its camera, by the rig and "
+      "the orientations of the ground truth\n",
+      arguments.estimate, distance_m);
+  truth = evaluation::moved_to_frame(std::move(truth), T_cam_frame.inverse());
 }
 
 nlohmann::ordered_json number(double value) {
@@ -121,7 +133,7 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
   }
   auto read = evaluation::read_trajectory(arguments.estimate, arguments.times);
   if (!read) return read.error();
-  const auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
+  auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
   if (!ground_truth) return ground_truth.error();
   if (arguments.gt_frame == "cam0" && std::filesystem::path(arguments.ground_truth).extension() == ".csv") {
     std::fprintf(
@@ -135,12 +147,14 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
                "note: the scale of {} is {}, so that its errors are mainly those of the scale; use --align sim3\n",
                arguments.estimate, scale);
   }
-  const auto estimate = in_frame_of_truth(std::move(read).value(), arguments);
-  if (!estimate) return estimate.error();
+  const auto T_cam_frame = frame_of_truth(arguments);
+  if (!T_cam_frame) return T_cam_frame.error();
+  Trajectory estimate = *std::move(read);
+  move_to_one_frame(*T_cam_frame, arguments, estimate, *ground_truth);
   const evaluation::EvaluationOptions options{.align = align_mode(arguments.align),
                                               .max_dt_ns = from_seconds(arguments.max_dt_s),
                                               .rpe_delta_s = arguments.delta_s};
-  auto result = evaluation::evaluate(*estimate, *ground_truth, options);
+  auto result = evaluation::evaluate(estimate, *ground_truth, options);
   if (!result) {
     Error error = result.error();
     error.file = arguments.estimate;

@@ -12,6 +12,7 @@
 #include "cli/verbs.h"
 #include "evaluation/association.h"
 #include "evaluation/trajectory_file.h"
+#include "geometry/up_axis.h"
 #include "geometry/vertical_direction.h"
 #include "map_export/export_map.h"
 #include "map_export/selection.h"
@@ -61,14 +62,16 @@ Result<SE3> frame_in_camera(const std::string& name, const TrajectoryArguments& 
   if (name == "body") return rig.body_from_cam(camera).inverse();
   if (const auto target = name == "cam0" ? std::size_t{0} : camera_named(name, rig))
     return rig.cam_from_rig(camera) * rig.rig_from_cam(*target);
-  std::string names;
-  for (std::size_t c = 0; c < rig.size(); ++c) names += ", " + rig.camera(c).name;
-  return Error{"command line", "--frame", name, "cam0, body" + names};
+  std::string names = "body, cam0";
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    if (rig.camera(c).name != "cam0") names += ", " + rig.camera(c).name;
+  }
+  return Error{"command line", "--frame", name, names};
 }
 
 // T_body_cam of the camera of the trajectory, where an upward axis of the body needs it.
-Result<SE3> camera_on_body(const map_export::UpAxis& up, const TrajectoryArguments& arguments) {
-  if (up.frame != map_export::UpAxis::Frame::kBody) return SE3();
+Result<SE3> camera_on_body(const geometry::UpAxis& up, const TrajectoryArguments& arguments) {
+  if (up.frame != geometry::UpAxis::Frame::kBody) return SE3();
   const auto source = rig_of_trajectory(arguments, "--up " + arguments.up);
   if (!source) return source.error();
   return source->rig.body_from_cam(source->camera);
@@ -76,9 +79,9 @@ Result<SE3> camera_on_body(const map_export::UpAxis& up, const TrajectoryArgumen
 
 // The rotation of the world's axes: that of the map if one is given, so that the path fits maps exported for ROS.
 Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArguments& arguments) {
-  std::optional<map_export::UpAxis> up;
+  std::optional<geometry::UpAxis> up;
   if (!arguments.up.empty()) {
-    const auto parsed = map_export::parse_up_axis(arguments.up);
+    const auto parsed = geometry::parse_up_axis(arguments.up);
     if (!parsed) return parsed.error();
     up = *parsed;
   } else {
@@ -90,7 +93,7 @@ Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArgume
     if (!up) return geometry::upright_axes(poses);
     const auto T_body_cam = camera_on_body(*up, arguments);
     if (!T_body_cam) return T_body_cam.error();
-    const auto up_world = map_export::up_in_world(*up, poses, *T_body_cam);
+    const auto up_world = geometry::up_in_world(*up, poses, *T_body_cam);
     if (!up_world) return up_world.error();
     return geometry::upright_axes(poses, *up_world);
   }
@@ -115,9 +118,13 @@ Result<SE3> wanted_frame(const TrajectoryArguments& arguments) {
   const std::string& frame = arguments.frame;
   if (frame.empty() || (!arguments.camera && frame == frame_in_file(arguments))) return SE3();
   const auto T_cam_frame = frame_in_camera(frame, arguments);
-  if (T_cam_frame) {
-    note_lever_arm(T_cam_frame->translation().norm(), frame, arguments.file,
-                   "the distance is added to the path as it is");
+  const double distance_m = T_cam_frame ? T_cam_frame->translation().norm() : 0;
+  if (distance_m > 0 && evaluation::read_comments(arguments.file).scale != "metric") {
+    fmt::print(
+        stderr,
+        "note: the camera is {:.3f} m away from {}, but the unit of {} is not the metre: the distance is added to "
+        "the path as it is\n",
+        distance_m, frame, arguments.file);
   }
   return T_cam_frame;
 }
@@ -178,7 +185,7 @@ int run_export(const TrajectoryArguments& arguments) {
   const std::string header = comments(arguments, arguments.frame.empty() ? own_frame : arguments.frame);
   const Status status = evaluation::write_trajectory(arguments.out, *trajectory, format, header, arguments.overwrite);
   if (!status) return report_error(status.error());
-  std::printf("%s: %zu poses\n", arguments.out.c_str(), trajectory->size());
+  std::printf("%s: %zu pose%s\n", arguments.out.c_str(), trajectory->size(), trajectory->size() == 1 ? "" : "s");
   return kExitOk;
 }
 

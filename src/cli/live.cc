@@ -121,10 +121,13 @@ std::vector<std::string> pixel_names() {
   return out;
 }
 
+bool is_folder(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::is_directory(path, error);
+}
+
 // Folders of images are played in place of cameras.
 capture::OpenDevice opener(const std::vector<std::string>& paths) {
-  std::error_code error;
-  const auto is_folder = [&](const std::string& path) { return std::filesystem::is_directory(path, error); };
   if (std::ranges::any_of(paths, is_folder)) return capture::play_folders(paths);
   return [](const std::string& path) { return capture::open_v4l2(capture::system_calls(), path); };
 }
@@ -177,11 +180,11 @@ dataset::Dataset dataset_of(const LiveRig& rig, TimeNs first_time_ns) {
           .sources = rig.paths};
 }
 
-Result<std::unique_ptr<capture::Recorder>> start_recording(const std::string& file, const camera::Rig& rig,
+Result<std::unique_ptr<capture::Recorder>> start_recording(const std::string& file, const LiveRig& rig,
                                                            capture::LiveCameras& cameras) {
   std::vector<bool> jpeg;
   for (const capture::Stream& stream : cameras.streams()) jpeg.push_back(capture::is_jpeg(stream.pixels));
-  auto recorder = capture::Recorder::create(file, rig, jpeg);
+  auto recorder = capture::Recorder::create(file, rig.rig, rig.cameras, jpeg);
   if (recorder) cameras.record_to(recorder->get());
   return recorder;
 }
@@ -212,7 +215,7 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
   input.before = [&]() -> Status {
     if (!quiet) print_warnings(session::warnings_before_run(dataset));
     if (!a.record.empty()) {
-      auto started = start_recording(a.record, rig.rig, cameras);
+      auto started = start_recording(a.record, rig, cameras);
       if (!started) return started.error();
       recorder = *std::move(started);
     }
@@ -234,6 +237,24 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
   return run_and_write(a.slam, std::move(input), control);
 }
 
+// Folders of images have nothing that could be set.
+Status check_settings_of_cameras(const LiveArguments& a, const std::vector<std::string>& paths) {
+  const auto folder = std::ranges::find_if(paths, is_folder);
+  if (folder == paths.end()) return {};
+  for (const auto& [option, given] :
+       {std::pair("--fps", a.fps.has_value()), std::pair("--exposure", !a.exposure.empty()),
+        std::pair("--pixels", !a.pixels.empty())}) {
+    if (given) return Error{"command line", option, "the folder " + *folder, "cameras, of which this can be set"};
+  }
+  return {};
+}
+
+Status check_recording(const LiveArguments& a) {
+  if (!a.record.empty() && std::filesystem::path(a.record).extension() != ".mcap")
+    return Error{"command line", "--record", a.record, "the name of an MCAP file, which ends in .mcap"};
+  return check_output_file(a.record, "--record", a.slam.overwrite);
+}
+
 int live(const LiveArguments& a) {
   if (a.list) {
     const std::string text = capture::devices_text(capture::system_calls());
@@ -248,7 +269,9 @@ int live(const LiveArguments& a) {
   if (!rig) return report_error(rig.error());
   const auto request = stream_request(a);
   if (!request) return report_error(request.error());
-  if (const Status s = check_output_file(a.record, "--record", a.slam.overwrite); !s) return report_error(s.error());
+  for (const Status& s : {check_settings_of_cameras(a, rig->paths), check_recording(a), check_outputs(a.slam)}) {
+    if (!s) return report_error(s.error());
+  }
   const bool quiet = log_verbosity(a.slam.log_level) < LogVerbosity::kWarning;
   capture::LiveOptions options{.paths = rig->paths,
                                .request = *request,
@@ -282,7 +305,7 @@ void add_live(CLI::App& app, std::span<const char* const> command_line, int& exi
   verb->add_option("--pixels", a->pixels, "pixel format; default: the one that needs least conversion at this rate")
       ->check(CLI::IsMember(pixel_names()));
   verb->add_option("--duration", a->duration_s, "end after this many seconds; default: at Ctrl-C")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(CLI::Range(0.001, 1e9));
   add_slam_options(*verb, a->slam);
   verb->get_option("--out")->required(false);
   verb->callback([a, &exit_status] { exit_status = live(*a); });

@@ -51,17 +51,19 @@ nlohmann::ordered_json to_json(const storage::SavedMap& saved, std::uintmax_t fi
                        {"from", to_seconds(storage::first_time(map, p))},
                        {"to", to_seconds(storage::last_time(map, p))}});
   }
-  return {{"schema", 1},
-          {"version", saved.info.version},
-          {"data", saved.info.data},
-          {"file_bytes", file_bytes},
-          {"cameras", std::move(cameras)},
-          {"keyframes", map.num_keyframes()},
-          {"landmarks", map.num_landmarks()},
-          {"observations", map.num_observations()},
-          {"scale", map::scale_name(map.scale())},
-          {"vocabulary", vocabulary_name(saved.info.vocabulary)},
-          {"parts", std::move(submaps)}};
+  return {
+      {"schema", 1},
+      {"version", saved.info.version},
+      {"data", saved.info.data},
+      {"warning", saved.info.warning.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(saved.info.warning)},
+      {"file_bytes", file_bytes},
+      {"cameras", std::move(cameras)},
+      {"keyframes", map.num_keyframes()},
+      {"landmarks", map.num_landmarks()},
+      {"observations", map.num_observations()},
+      {"scale", map::scale_name(map.scale())},
+      {"vocabulary", vocabulary_name(saved.info.vocabulary)},
+      {"parts", std::move(submaps)}};
 }
 
 void print_info(const storage::SavedMap& saved, std::uintmax_t file_bytes) {
@@ -86,6 +88,7 @@ void print_info(const storage::SavedMap& saved, std::uintmax_t file_bytes) {
                     submaps[i].keyframes.size(), submaps[i].extent.x(), submaps[i].extent.y(), submaps[i].extent.z(),
                     unit, submaps[i].landmarks, to_seconds(from), to_seconds(to));
   }
+  if (!saved.info.warning.empty()) text += fmt::format("warning of the run that made it: {}\n", saved.info.warning);
   std::fputs(text.c_str(), stdout);
 }
 

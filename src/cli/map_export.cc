@@ -35,7 +35,7 @@ Status complete_request(ExportArguments& arguments) {
   for (const map_export::FormatName& format : map_export::formats())
     if (format.name == arguments.format) request.format = format.format;
   if (!arguments.up.empty()) {
-    const auto up = map_export::parse_up_axis(arguments.up);
+    const auto up = geometry::parse_up_axis(arguments.up);
     if (!up) return up.error();
     request.up = *up;
   }

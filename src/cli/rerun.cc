@@ -1,7 +1,9 @@
 #include "cli/rerun.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "base/atomic_file.h"
@@ -10,6 +12,8 @@
 
 namespace bslam::cli {
 namespace {
+
+constexpr int kNoViewer = 3;  // exit status of the check
 
 std::string interpreter() {
   const char* chosen = std::getenv("BSLAM_PYTHON");
@@ -21,6 +25,18 @@ std::string code(const std::string& statements) {
   return "import sys; sys.path[:] = [folder for folder in sys.path if folder]; " + statements;
 }
 
+// The text without the escape sequences and other characters by which programs colour their messages.
+std::string plain(const std::string& text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '\x1b' && i + 1 < text.size() && text[i + 1] == '[')
+      i = std::min(text.find_first_not_of("0123456789;?", i + 2), text.size());
+    else if (static_cast<unsigned char>(text[i]) >= ' ')
+      out += text[i];
+  }
+  return out;
+}
+
 // The last line of a log that is not empty.
 std::string last_line(const std::filesystem::path& log) {
   constexpr std::size_t kMaxBytes = std::size_t{1} << 24;
@@ -28,16 +44,24 @@ std::string last_line(const std::filesystem::path& log) {
   const auto text = read_file(log, kMaxBytes);
   if (!text) return text.error().message();
   for (const std::string& line : split(*text, '\n')) {
-    if (!line.empty()) out = line;
+    if (std::string text_of_line = plain(line); !text_of_line.empty()) out = std::move(text_of_line);
   }
   return out;
 }
 
 }  // namespace
 
-Status check_rerun() {
-  const auto end = run_program(interpreter(), {"-c", code("import bslam.rerun, rerun")}, "/dev/null");
+bool is_viewer(const std::string& target) { return target.find("://") != std::string::npos; }
+
+Status check_rerun(const std::string& target) {
+  const std::string statements =
+      is_viewer(target) ? "sys.exit(0 if bslam.rerun.is_reachable(sys.argv[1]) else " + std::to_string(kNoViewer) + ")"
+                        : "";
+  const auto end =
+      run_program(interpreter(), {"-c", code("import bslam.rerun, rerun; " + statements), target}, "/dev/null");
   if (end && end->exit_status == 0 && end->signal == 0) return {};
+  if (end && end->exit_status == kNoViewer)
+    return Error{"command line", "--rerun", "no viewer at " + target, "a viewer that was started before the run"};
   return Error{
       "command line", "--rerun", "no Python packages bslam and rerun-sdk", "both, installed by pip",
       "--rerun needs the Python packages bslam and rerun-sdk, which " + interpreter() +
@@ -46,11 +70,10 @@ Status check_rerun() {
 }
 
 Status send_to_rerun(const std::filesystem::path& folder, const std::string& target) {
-  const bool address = target.find("://") != std::string::npos;
   const std::filesystem::path log = folder / "rerun.log";
   const auto end = run_program(interpreter(),
                                {"-c", code("import bslam.rerun; sys.exit(bslam.rerun.main())"), folder.string(),
-                                address ? "--connect" : "--save", target},
+                                is_viewer(target) ? "--connect" : "--save", target},
                                log);
   if (!end) return end.error();
   if (end->exit_status != 0 || end->signal != 0)

@@ -81,6 +81,7 @@ int run(RunArguments& arguments) {
   const auto dataset = dataset::open_dataset(*request);
   if (!dataset) return report_error(dataset.error());
 
+  if (const Status s = check_outputs(arguments.slam); !s) return report_error(s.error());
   RunInput input{*config, *dataset, session_options(arguments, interruption), check_command(arguments.data)};
   ProgressBar bar(arguments.slam.progress == "auto", "frames");
   input.options.replay = std::move(*replay);

@@ -45,8 +45,10 @@ std::string doubt_text(const session::RunRecord& record) {
   std::string text;
   for (const calibration::CameraPair& pair : record.calibration.pairs) {
     if (pair.contradicted != record.calibration.foreign_images()) continue;
-    text += fmt::format("{}{} and {} share {:.1f} % of the features in their common view", text.empty() ? "" : ", ",
-                        record.cameras[pair.first].name, record.cameras[pair.second].name, 100 * pair.matched_share());
+    text += fmt::format("{}{} and {}", text.empty() ? "" : ", ", record.cameras[pair.first].name,
+                        record.cameras[pair.second].name);
+    if (pair.keyframes > 0)
+      text += fmt::format(" share {:.1f} % of the features in their common view", 100 * pair.matched_share());
   }
   if (record.calibration.foreign_images()) return text;
   for (const std::size_t c : record.calibration.disagreeing)
@@ -57,10 +59,10 @@ std::string doubt_text(const session::RunRecord& record) {
 
 // Whether the images agree with the calibration. Silence would be taken for agreement.
 void print_verdict(const session::RunRecord& record) {
-  if (record.map.keyframes == 0) return;
   const session::CalibrationRecord& calibration = record.calibration;
   if (calibration.foreign_images())
     return fmt::print("calibration: the images do not belong to it ({})\n", doubt_text(record));
+  if (record.map.keyframes == 0) return;
   switch (calibration.verdict()) {
     case calibration::Verdict::kConsistent:
       return fmt::print("calibration: consistent with the images{}\n", excess_text(calibration));

@@ -23,18 +23,32 @@
 namespace bslam::cli {
 namespace {
 
-// Creates the output folder. An existing folder must be empty unless --overwrite is given, which removes the files of
-// an earlier run except for those that are input of this run.
+// Whether a new folder can be created in the first folder above it that exists.
+Status check_new_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::path missing = std::filesystem::absolute(folder, error);
+  while (missing.has_relative_path() && !std::filesystem::exists(missing.parent_path(), error))
+    missing = missing.parent_path();
+  const Status s = check_writable(missing);
+  if (s) return {};
+  return Error{folder.string(), "--out", s.error().found, "a folder that can be created"};
+}
+
+// An existing output folder must be empty unless --overwrite is given.
+Status check_folder(const SlamArguments& arguments) {
+  const std::filesystem::path folder = arguments.out;
+  std::error_code error;
+  if (!std::filesystem::exists(folder, error)) return check_new_folder(folder);
+  if (!std::filesystem::is_directory(folder, error)) return Error{folder.string(), "--out", "a file", "a folder"};
+  if (!arguments.overwrite && !std::filesystem::is_empty(folder, error))
+    return Error{folder.string(), "--out", "a folder that is not empty", "an empty or new folder, or --overwrite"};
+  return check_writable(folder / "summary.json");
+}
+
+// Creates the output folder, and removes the files of an earlier run except for those that are input of this run.
 Status prepare_folder(const SlamArguments& arguments) {
   const std::filesystem::path folder = arguments.out;
   std::error_code error;
-  const bool exists = std::filesystem::exists(folder, error);
-  if (exists && !std::filesystem::is_directory(folder, error)) {
-    return Error{folder.string(), "--out", "a file", "a folder"};
-  }
-  if (exists && !arguments.overwrite && !std::filesystem::is_empty(folder, error)) {
-    return Error{folder.string(), "--out", "a folder that is not empty", "an empty or new folder, or --overwrite"};
-  }
   std::filesystem::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
   if (const Status status = check_writable(folder / "summary.json"); !status) return status;
@@ -54,48 +68,64 @@ Status prepare_folder(const SlamArguments& arguments) {
 }
 
 // Reads the map of an earlier run if one is given, and checks that this run can continue with it.
-Result<std::optional<map::BundledMap>> read_map(const SlamArguments& arguments, const camera::Rig& rig,
-                                                const system::Config& config, const place::Vocabulary& vocabulary) {
+Result<std::optional<storage::SavedMap>> read_map(const SlamArguments& arguments, const camera::Rig& rig,
+                                                  const system::Config& config, const place::Vocabulary& vocabulary) {
   const std::string& file = arguments.load_map;
-  if (file.empty()) return std::optional<map::BundledMap>();
-  auto map = storage::open_map(file, rig, config.feature_model().pyramid, &vocabulary);
-  if (!map) return map.error();
-  if (const Status status = system::check_settings(config, *map, rig); !status) return status.error();
-  if (system::shared_with_other_rigs(*map, rig) && log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) {
-    const char* const text = map::find_rig(*map, rig)
+  if (file.empty()) return std::optional<storage::SavedMap>();
+  auto saved = storage::open_map(file, rig, config.feature_model().pyramid, &vocabulary);
+  if (!saved) return saved.error();
+  const map::BundledMap& map = saved->map;
+  if (const Status status = system::check_settings(config, map, rig); !status) return status.error();
+  if (system::shared_with_other_rigs(map, rig) && log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) {
+    const char* const text = map::find_rig(map, rig)
                                  ? "has further cameras; the calibration is that of the map and is not estimated"
                                  : "was made with another rig or calibration; that of this run is kept as given";
     std::fprintf(stderr, "note: %s %s\n", file.c_str(), text);
   }
-  return std::optional(*std::move(map));
+  return std::optional(*std::move(saved));
+}
+
+// What is stored with the map of a run. `map_warning`: what was wrong with the map that it continued.
+storage::MapFileInfo map_info(const session::RunRecord& record, const place::Vocabulary& vocabulary,
+                              const std::string& map_warning) {
+  const std::string warning = session::foreign_images_text(record);
+  return {vocabulary.id(), record.version, record.data, warning.empty() ? map_warning : warning};
 }
 
 Status write_files(const session::SessionResult& result, const system::Config& config, const dataset::Dataset& dataset,
-                   const SlamArguments& arguments, const place::Vocabulary& vocabulary) {
-  const auto report =
-      arguments.no_report ? std::nullopt : std::optional(session::ReportSource{dataset, arguments.command});
+                   const SlamArguments& arguments, const storage::MapFileInfo& info) {
+  const auto report = arguments.no_report
+                          ? std::nullopt
+                          : std::optional(session::ReportSource{dataset, arguments.command, arguments.up});
   if (const Status status = session::write_outputs(result, config, arguments.out, report); !status) return status;
   if (!arguments.journal.empty()) {
     const Status status = write_atomically(arguments.journal, execution::journal_text(result.journal));
     if (!status) return status;
   }
   if (arguments.save_map.empty()) return {};
-  return storage::write_map(*result.map, {vocabulary.id(), result.record.version, result.record.data},
-                            arguments.save_map);
+  return storage::write_map(*result.map, info, arguments.save_map);
 }
 
 // Shows the report of the run in the browsers that have followed it.
 void end_view(live_view::LiveView* view, const session::SessionResult& result, const system::Config& config,
               const dataset::Dataset& dataset, const SlamArguments& arguments) {
   if (view == nullptr || !view->is_watched()) return;
-  view->end(session::report_text(result, config, {dataset, arguments.command}));
+  view->end(session::report_text(result, config, {dataset, arguments.command, arguments.up}));
+}
+
+// What is wrong with a loaded map.
+std::vector<std::string> warnings_of_map(const std::string& file, const std::string& warning) {
+  if (warning.empty()) return {};
+  return {file + ": the run that made this map has found: " + warning};
 }
 
 // Returns the warnings after the run; the record gets those before it and of the source of the frames as well.
-std::vector<std::string> note_warnings(const RunInput& input, const std::vector<std::string>& of_source,
-                                       session::RunRecord& record) {
+std::vector<std::string> note_warnings(const RunInput& input, const std::vector<std::string>& of_map,
+                                       const std::vector<std::string>& of_source, session::RunRecord& record) {
   const std::vector<std::string> after = session::warnings_after_run(record, input.dataset.rig, input.check_command);
-  record.warnings = session::warnings_before_run(input.dataset);
+  record.warnings = of_map;
+  const std::vector<std::string> before = session::warnings_before_run(input.dataset);
+  record.warnings.insert(record.warnings.end(), before.begin(), before.end());
   record.warnings.insert(record.warnings.end(), of_source.begin(), of_source.end());
   record.warnings.insert(record.warnings.end(), after.begin(), after.end());
   return after;
@@ -125,6 +155,18 @@ void add_map_options(CLI::App& verb, SlamArguments& a) {
   verb.add_option("--vocabulary", a.vocabulary,
                   "vocabulary for place recognition, in bslam or DBoW2 text format; default: the vocabulary shipped "
                   "with this program");
+}
+
+void add_up_option(CLI::App& verb, SlamArguments& a) {
+  verb.add_option_function<std::string>(
+      "--up",
+      [&a](const std::string& text) {
+        const auto up = geometry::parse_up_axis(text);
+        if (!up) throw CLI::ValidationError("--up", "found " + up.error().found + ", expected " + up.error().expected);
+        a.up = *up;
+      },
+      "the axis that points upward in the views of report.html and --view, such as body:z, camera:-y or "
+      "world:0,-1,0.2; default: that of camera 0's images");
 }
 
 }  // namespace
@@ -160,38 +202,49 @@ Status check_output_file(const std::string& file, const char* option, bool overw
   return check_writable(path);
 }
 
+Status check_outputs(const SlamArguments& arguments) {
+  if (const Status s = check_folder(arguments); !s) return s;
+  const bool writes_rerun = !is_viewer(arguments.rerun);
+  for (const auto& [option, file] :
+       {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal),
+        std::pair("--rerun", writes_rerun ? arguments.rerun : "")}) {
+    if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return s;
+  }
+  return arguments.rerun.empty() ? Status() : check_rerun(arguments.rerun);
+}
+
 int run_and_write(const SlamArguments& arguments, RunInput input, session::RunControl& control) {
   const dataset::Dataset& dataset = input.dataset;
   session::SessionOptions& options = input.options;
   const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
-  auto map = read_map(arguments, dataset.rig, input.config, **vocabulary);
-  if (!map) return report_error(map.error());
-  if (*map) system::note_other_rigs(**map, dataset.rig, input.config);
-  for (const auto& [option, file] :
-       {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal)}) {
-    if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return report_error(s.error());
-  }
-  if (const Status s = arguments.rerun.empty() ? Status() : check_rerun(); !s) return report_error(s.error());
-  auto view = start_view(arguments.view,
-                         {dataset, input.config, arguments.command, *map ? (*map)->keyframe_slots() : 0}, control);
+  auto loaded = read_map(arguments, dataset.rig, input.config, **vocabulary);
+  if (!loaded) return report_error(loaded.error());
+  const std::string map_warning = *loaded ? (*loaded)->info.warning : "";
+  if (*loaded) options.map = std::move((*loaded)->map);
+  if (options.map) system::note_other_rigs(*options.map, dataset.rig, input.config);
+  auto view = start_view(
+      arguments.view,
+      {dataset, input.config, arguments.command, options.map ? options.map->keyframe_slots() : 0, arguments.up},
+      control);
   if (!view) return report_error(view.error());
   if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
   if (*view) std::fprintf(stderr, "view: %s\n", (*view)->url().c_str());
+  const std::vector<std::string> of_map = warnings_of_map(arguments.load_map, map_warning);
+  if (log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) print_warnings(of_map);
   if (const Status s = input.before ? input.before() : Status(); !s) return report_error(s.error());
 
   options.config = input.config;
   options.vocabulary = *vocabulary;
-  options.map = std::move(*map);
   options.observer = view->get();
   options.control = &control;
   auto result = session::run_session(dataset, options);
   const std::vector<std::string> of_source = input.after ? input.after() : std::vector<std::string>();
   if (!result) return report_error(result.error());
   if (arguments.image_stamps) result->subtracted_ns = dataset.rig.camera(0).time_offset_ns;
-  const std::vector<std::string> warnings = note_warnings(input, of_source, result->record);
-  if (const Status s = write_files(*result, input.config, dataset, arguments, **vocabulary); !s)
-    return report_error(s.error());
+  const std::vector<std::string> warnings = note_warnings(input, of_map, of_source, result->record);
+  const storage::MapFileInfo info = map_info(result->record, **vocabulary, map_warning);
+  if (const Status s = write_files(*result, input.config, dataset, arguments, info); !s) return report_error(s.error());
   const Status sent = arguments.rerun.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
   end_view(view->get(), *result, input.config, dataset, arguments);
   print_after(result->record, warnings, arguments);
@@ -221,6 +274,7 @@ void add_slam_options(CLI::App& verb, SlamArguments& a) {
   verb.add_flag("--no-final-ba", a.no_final_ba, "skip the global bundle adjustment at the end");
   CLI::Option* no_report =
       verb.add_flag("--no-report", a.no_report, "do not write report.html, the page that shows the run in a browser");
+  add_up_option(verb, a);
   verb.add_option(
           "--rerun", a.rerun,
           "show the result in Rerun: a file to be written, such as run.rrd, or the address of a viewer, such as "
@@ -237,8 +291,9 @@ void add_slam_options(CLI::App& verb, SlamArguments& a) {
                   "(also the outcome of every frame)")
       ->check(CLI::IsMember({"error", "warning", "info", "debug"}))
       ->capture_default_str();
-  verb.add_flag("--overwrite", a.overwrite,
-                "write into a folder that is not empty; files of an earlier run, a map and a journal are replaced");
+  verb.add_flag(
+      "--overwrite", a.overwrite,
+      "write into a folder that is not empty; files of an earlier run, and others that are written, are replaced");
 }
 
 }  // namespace bslam::cli

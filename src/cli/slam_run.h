@@ -12,6 +12,7 @@
 #include "cli/run_log.h"
 #include "cli/view_arguments.h"
 #include "dataset/dataset.h"
+#include "geometry/up_axis.h"
 #include "session/run_session.h"
 
 namespace bslam::cli {
@@ -21,6 +22,7 @@ struct SlamArguments {
   ViewArguments view;
   std::string rig;  // file of the calibration; empty: that of the data
   std::string out, mode, journal, vocabulary, save_map, load_map, rerun;
+  std::optional<geometry::UpAxis> up;
   std::string progress = "auto", log_level = "warning";
   std::optional<int> seed;
   bool no_loop = false, localize_only = false, no_final_ba = false, no_report = false, overwrite = false,
@@ -41,6 +43,10 @@ Result<system::Config> resolve_run_config(const SlamArguments& arguments);
 // Checks before the run whether the file can be written after it. An existing file is replaced only with --overwrite.
 Status check_output_file(const std::string& file, const char* option, bool overwrite);
 
+// Checks before the run, without leaving anything, whether all its output can be written: folder, map, journal, and the
+// file or viewer of --rerun.
+Status check_outputs(const SlamArguments& arguments);
+
 // What a run is made of beside its arguments.
 struct RunInput {
   system::Config config;
@@ -54,8 +60,8 @@ struct RunInput {
   std::function<std::vector<std::string>()> after = {};
 };
 
-// Loads vocabulary and map, prepares the output folder, runs, and writes the output. Returns the exit status; errors
-// are printed.
+// Loads vocabulary and map, prepares the output folder, runs, and writes the output, which check_outputs() has checked.
+// Returns the exit status; errors are printed.
 int run_and_write(const SlamArguments& arguments, RunInput input, session::RunControl& control);
 
 }  // namespace bslam::cli

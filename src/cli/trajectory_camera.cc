@@ -19,13 +19,6 @@ std::optional<std::size_t> camera_named(const std::string& name, const camera::R
   return std::nullopt;
 }
 
-void note_lever_arm(double distance_m, const std::string& frame, const std::filesystem::path& trajectory,
-                    const std::string& consequence) {
-  if (distance_m <= 0 || evaluation::read_comments(trajectory).scale == "metric") return;
-  fmt::print(stderr, "note: the camera is {:.3f} m away from {}, but the unit of {} is not the metre: {}\n", distance_m,
-             frame, trajectory.string(), consequence);
-}
-
 Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory, const camera::Rig& rig,
                                          const std::filesystem::path& rig_file, std::optional<int> option) {
   const std::string frame = evaluation::read_comments(trajectory).frame;

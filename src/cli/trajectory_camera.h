@@ -20,8 +20,4 @@ Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory
 // The camera of this name, or, if no camera has it, number N of a name camN; nullopt if there is none.
 std::optional<std::size_t> camera_named(const std::string& name, const camera::Rig& rig);
 
-// Prints a note if poses of a camera are moved by this distance although the lengths of the trajectory are not metres.
-void note_lever_arm(double distance_m, const std::string& frame, const std::filesystem::path& trajectory,
-                    const std::string& consequence);
-
 }  // namespace bslam::cli

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "containers/byte_reader.h"
+#include "base/byte_reader.h"
 #include "containers/chunked_file.h"
 
 namespace bslam::containers {

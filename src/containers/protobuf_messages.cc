@@ -3,7 +3,7 @@
 #include <limits>
 #include <utility>
 
-#include "containers/byte_reader.h"
+#include "base/byte_reader.h"
 #include "containers/messages.h"
 
 namespace bslam::containers {

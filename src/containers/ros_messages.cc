@@ -2,7 +2,7 @@
 // document formal/02-06-51, section 15.3).
 #include <algorithm>
 
-#include "containers/byte_reader.h"
+#include "base/byte_reader.h"
 #include "containers/messages.h"
 
 namespace bslam::containers {

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "containers/byte_reader.h"
+#include "base/byte_reader.h"
 #include "containers/input_file.h"
 #include "containers/message_file.h"
 

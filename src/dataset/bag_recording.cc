@@ -88,7 +88,14 @@ class BagRecording : public Recording {
   bool calibrated() const override {
     return std::ranges::any_of(cameras_, [&](std::size_t c) { return is_calibrated(topics_[c].name); });
   }
+  std::string calibration_origin() const override {
+    return live_ && !live_->cameras.empty() ? "rig of bslam live in its recording" : "CameraInfo of a bag";
+  }
   Result<camera::RigCamera> calibration(std::size_t camera) const override;
+  int number_in_rig(std::size_t camera) const override {
+    const auto number = live_ ? live_->number_of(topics_[cameras_[camera]].name) : std::nullopt;
+    return number.value_or(static_cast<int>(camera));
+  }
   Result<image_files::ImageList> images(std::size_t camera) const override;
   bool has_times() const override { return true; }
   std::vector<std::string> warnings() const override { return warnings_; }

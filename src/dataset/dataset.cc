@@ -286,6 +286,15 @@ void take_names(const fs::path& file, std::size_t camera_count, ChosenRig& chose
   if (chosen.whole && chosen.whole->size() == all.size()) chosen.whole = with_names(*chosen.whole, all);
 }
 
+// A recording may have a part of the rig with which it was made: its cameras have the numbers that they had there.
+void number_as_recorded(const Recording& recording, Dataset& dataset) {
+  for (int& camera : dataset.cameras_used) {
+    const int number = recording.number_in_rig(static_cast<std::size_t>(camera));
+    if (number != camera) dataset.whole_rig.reset();
+    camera = number;
+  }
+}
+
 // Sets what the values of pixels mean: the formats of the images and the vignettes of the cameras.
 Status describe_pixels(const DatasetRequest& request, const std::vector<std::vector<image_files::ImageFile>>& images,
                        Dataset& dataset) {
@@ -351,6 +360,7 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
     if (image.store) dataset.sources.push_back(image.store->stream(image.entry));
   }
   if (const Status status = describe_pixels(request, *images, dataset); !status) return status.error();
+  if (!request.rig_file) number_as_recorded(recording, dataset);
   if (const Status status = group(request, *images, dataset); !status) return status.error();
   if (const Status status = keep_range(request, dataset); !status) return status.error();
   return dataset;

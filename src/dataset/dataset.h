@@ -53,7 +53,7 @@ struct Dataset {
   camera::Rig rig;                // the cameras in use, in the requested order
   std::vector<int> cameras_used;  // their indices in the whole rig
   // All cameras of the calibration, in its order; nullopt if the calibration of a camera that is not in use cannot be
-  // read.
+  // read, or is not in the recording.
   std::optional<camera::Rig> whole_rig;
   TimeNs first_time_ns = 0;  // time of the first frame of the recording, from which the seconds of a run are counted
   std::vector<FrameEntry> frames;  // in order of time, at least one

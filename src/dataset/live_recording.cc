@@ -1,8 +1,10 @@
 #include "dataset/live_recording.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <utility>
 
 #include "base/split.h"
@@ -11,7 +13,21 @@
 namespace bslam::dataset {
 namespace {
 
-constexpr const char* kTopics = "topics";
+constexpr int kMaxNumber = 1000;
+constexpr const char *kTopics = "topics", *kCameras = "cameras";
+
+// The numbers in a list such as "0,2"; empty if it is no list of `count` different numbers.
+std::vector<int> parse_numbers(const std::string& text, std::size_t count) {
+  std::vector<int> out;
+  for (const std::string& part : split(text, ',')) {
+    int number = -1;
+    const auto [rest, error] = std::from_chars(part.data(), part.data() + part.size(), number);
+    if (error != std::errc() || rest != part.data() + part.size() || number < 0 || number > kMaxNumber) return {};
+    if (std::ranges::find(out, number) != out.end()) return {};
+    out.push_back(number);
+  }
+  return out.size() == count ? out : std::vector<int>();
+}
 
 }  // namespace
 
@@ -21,10 +37,16 @@ const camera::RigCamera* LiveRecording::camera_of(const std::string& topic) cons
   return found == topics.end() || index >= cameras.size() ? nullptr : &cameras[index];
 }
 
-std::map<std::string, std::string> live_metadata(const std::vector<std::string>& topics) {
-  std::string joined;
-  for (const std::string& topic : topics) joined += (joined.empty() ? "" : ",") + topic;
-  return {{kTopics, joined}, {"frames", "images with the same log_time are one frame"}};
+std::optional<int> LiveRecording::number_of(const std::string& topic) const {
+  const auto index = static_cast<std::size_t>(std::ranges::find(topics, topic) - topics.begin());
+  return index < numbers.size() ? std::optional(numbers[index]) : std::nullopt;
+}
+
+std::map<std::string, std::string> live_metadata(const std::vector<std::string>& topics,
+                                                 const std::vector<int>& numbers) {
+  return {{kTopics, fmt::format("{}", fmt::join(topics, ","))},
+          {kCameras, fmt::format("{}", fmt::join(numbers, ","))},
+          {"frames", "images with the same log_time are one frame"}};
 }
 
 std::optional<LiveRecording> live_recording_of(const containers::MessageFile& file) {
@@ -32,6 +54,8 @@ std::optional<LiveRecording> live_recording_of(const containers::MessageFile& fi
   if (values == file.metadata().end() || !values->second.contains(kTopics)) return std::nullopt;
   LiveRecording out;
   out.topics = split(values->second.at(kTopics), ',');
+  if (const auto cameras = values->second.find(kCameras); cameras != values->second.end())
+    out.numbers = parse_numbers(cameras->second, out.topics.size());
   const auto rig = std::ranges::find(file.attachments(), kLiveRigFile, &containers::Attachment::name);
   if (rig == file.attachments().end()) return out;
   auto reading = rig_formats::read_bslam_rig(file.path() / kLiveRigFile, rig->bytes);

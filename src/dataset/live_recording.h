@@ -1,5 +1,5 @@
-// What `bslam live --record` writes into its MCAP files beside the images: which topic is which camera, the rig, and
-// that images recorded at the same time were one frame.
+// What `bslam live --record` writes into its MCAP files beside the images: which topic is which camera, the cameras in
+// use with their numbers in the rig file, and that images recorded at the same time were one frame.
 #pragma once
 
 #include <map>
@@ -17,15 +17,19 @@ constexpr const char* kLiveRigFile = "rig.yaml";     // name of the attachment, 
 
 struct LiveRecording {
   std::vector<std::string> topics;         // of the cameras of the rig, in its order
+  std::vector<int> numbers;                // as many: the cameras of the rig file that they were
   std::vector<camera::RigCamera> cameras;  // as many; empty if the rig cannot be read
   std::vector<std::string> warnings;       // for the user: why the rig cannot be read
 
   // Returns the calibration of a topic, or nullptr.
   const camera::RigCamera* camera_of(const std::string& topic) const;
+  // Returns the number of the camera of a topic in the rig file of the run, or nullopt.
+  std::optional<int> number_of(const std::string& topic) const;
 };
 
-// The values of the metadata for these topics.
-std::map<std::string, std::string> live_metadata(const std::vector<std::string>& topics);
+// The values of the metadata for these topics, which are those of cameras `numbers` of the rig file.
+std::map<std::string, std::string> live_metadata(const std::vector<std::string>& topics,
+                                                 const std::vector<int>& numbers);
 
 // Returns nullopt for other recordings.
 std::optional<LiveRecording> live_recording_of(const containers::MessageFile& file);

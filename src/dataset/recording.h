@@ -22,8 +22,12 @@ class Recording {
   virtual std::size_t camera_count() const = 0;
   // Returns true if the data set contains the calibration of at least one camera.
   virtual bool calibrated() const { return true; }
+  // Says what the calibration in it is, such as "CameraInfo of a bag"; empty if it has a format of rig files.
+  virtual std::string calibration_origin() const { return {}; }
   // Returns the calibration in the data set.
   virtual Result<camera::RigCamera> calibration(std::size_t camera) const = 0;
+  // Returns the number of a camera in the rig file with which it was recorded, if that has more cameras.
+  virtual int number_in_rig(std::size_t camera) const { return static_cast<int>(camera); }
   // Returns all listed images with their recorded time stamps; at least one.
   virtual Result<image_files::ImageList> images(std::size_t camera) const = 0;
   virtual std::optional<std::filesystem::path> ground_truth() const { return std::nullopt; }

@@ -76,7 +76,7 @@ std::vector<system::SubmapTrajectory> LiveRecord::paths(const map::BundledMap& m
 }
 
 nlohmann::ordered_json LiveRecord::run_json(const map::BundledMap& map, const camera::Rig& rig,
-                                            const StageResults& results) {
+                                            const StageResults& results, const std::optional<geometry::UpAxis>& up) {
   const std::vector<system::SubmapTrajectory> submaps = paths(map);
   record_.stages = caller_stages_;
   for (const system::StageRecord& run : results.runs) session::add_stage_run(record_, run, dataset_.first_time_ns);
@@ -95,7 +95,7 @@ nlohmann::ordered_json LiveRecord::run_json(const map::BundledMap& map, const ca
   }
   for (std::size_t c = 0; c < record_.cameras.size(); ++c)
     record_.cameras[c].states = session::camera_intervals(record_.frames, c);
-  return session::run_json(record_, map, rig, submaps, dataset_.first_time_ns, kLimits);
+  return session::run_json(record_, map, rig, submaps, dataset_.first_time_ns, kLimits, up);
 }
 
 }  // namespace bslam::live_view

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dataset/dataset.h"
+#include "geometry/up_axis.h"
 #include "session/run_record.h"
 #include "system/system.h"
 
@@ -36,7 +37,8 @@ class LiveRecord {
 
   // The data of the page (session/report_data.h) for the map of this time. Its time is proportional to the number of
   // frames; poses, frames and landmarks are thinned out to a few thousand.
-  nlohmann::ordered_json run_json(const map::BundledMap& map, const camera::Rig& rig, const StageResults& results);
+  nlohmann::ordered_json run_json(const map::BundledMap& map, const camera::Rig& rig, const StageResults& results,
+                                  const std::optional<geometry::UpAxis>& up);
 
   // Seconds since the first image of the data set.
   double seconds(TimeNs time_ns) const { return to_seconds(time_ns - dataset_.first_time_ns); }

@@ -142,7 +142,7 @@ class LiveView::Content final : public web_server::Content {
   ordered_json run_json() {
     results_wanted_ = true;
     const camera::Rig rig = map::cameras_of(last_->map->rig(), last_->first_camera, subject_.dataset.rig.size());
-    ordered_json json = record_.run_json(*last_->map, rig, results_);
+    ordered_json json = record_.run_json(*last_->map, rig, results_, subject_.up);
     json["command"] = subject_.command;
     json["truth"] = nullptr;
     json["settings"] = settings_;

@@ -4,10 +4,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "base/result.h"
 #include "dataset/dataset.h"
+#include "geometry/up_axis.h"
 #include "session/run_control.h"
 #include "session/run_observer.h"
 #include "system/config.h"
@@ -19,8 +21,9 @@ namespace bslam::live_view {
 struct Subject {
   const dataset::Dataset& dataset;
   const system::Config& config;
-  std::string command;               // the command line
-  std::size_t loaded_keyframes = 0;  // keyframe slots of the map that is continued; 0: none
+  std::string command;                      // the command line
+  std::size_t loaded_keyframes = 0;         // keyframe slots of the map that is continued; 0: none
+  std::optional<geometry::UpAxis> up = {};  // what points upward
 };
 
 class LiveView final : public session::RunObserver {

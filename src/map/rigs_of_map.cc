@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <utility>
@@ -9,6 +10,7 @@
 
 #include "base/assert.h"
 #include "camera/model_parameters.h"
+#include "camera/unused_name.h"
 
 namespace bslam::map {
 namespace {
@@ -30,22 +32,21 @@ bool same_pose(const geometry::SE3& a, const geometry::SE3& b) {
   return geometry::so3_log(D.rotation()).norm() <= kMaxAngle && D.translation().norm() <= kMaxShift;
 }
 
-// Whether a camera of `whole` other than this one has the name. Two cameras may have the same calibration, so that only
-// their names tell them apart.
-bool names_another(const camera::Rig& whole, std::size_t camera, const std::string& name) {
-  const std::string& own = whole.camera(camera).name;
-  if (own == name || own.starts_with(name + "_")) return false;  // find_or_append_rig appends numbers to names
-  for (std::size_t i = 0; i < whole.size(); ++i) {
-    if (whole.camera(i).name == name) return true;
+// Whether the name was that of other cameras of the rig when they were given, but not that of this one. Two cameras may
+// have the same calibration, so that only their names tell them apart.
+bool names_another(const camera::Rig& given, std::size_t camera, const std::string& name) {
+  if (given.camera(camera).name == name) return false;
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (given.camera(i).name == name) return true;
   }
   return false;
 }
 
-// Whether the cameras of `part` are those of `whole` from `first` on.
-bool contains(const camera::Rig& whole, std::size_t first, const camera::Rig& part) {
+// Whether the cameras of `part` are those of `whole` from `first` on. `given`: with their names as they were given.
+bool contains(const camera::Rig& whole, const camera::Rig& given, std::size_t first, const camera::Rig& part) {
   for (std::size_t i = 0; i < part.size(); ++i) {
     if (!same_camera(whole.camera(first + i), part.camera(i))) return false;
-    if (names_another(whole, first + i, part.camera(i).name)) return false;
+    if (names_another(given, first + i, part.camera(i).name)) return false;
     if (!same_pose(whole.cam_from_rig(first + i), part.cam_from_rig(i))) return false;
   }
   return true;
@@ -62,15 +63,6 @@ std::vector<camera::RigCamera> moved_into(const camera::Rig& whole, const camera
   std::vector<camera::RigCamera> out;
   for (std::size_t i = 0; i < part.size(); ++i)
     out.push_back({part.camera(i), whole.body_from_rig() * part.rig_from_cam(i)});
-  return out;
-}
-
-std::string unused_name(const std::vector<camera::RigCamera>& taken, const std::string& name) {
-  const auto is_taken = [&](const std::string& n) {
-    return std::ranges::any_of(taken, [&](const camera::RigCamera& c) { return c.camera.name == n; });
-  };
-  std::string out = name;
-  for (int i = 2; is_taken(out); ++i) out = name + "_" + std::to_string(i);
   return out;
 }
 
@@ -91,7 +83,8 @@ void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::sha
 std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig) {
   for (std::size_t first = 0; first + rig.size() <= map.rig().size(); ++first) {
     if (!same_pose(map.given_rig().cam_from_rig(first), geometry::SE3())) continue;  // within another rig
-    if (contains(map.given_rig(), first, rig) || contains(map.rig(), first, rig)) return first;
+    const camera::Rig& given = map.given_rig();
+    if (contains(given, given, first, rig) || contains(map.rig(), given, first, rig)) return first;
   }
   return std::nullopt;
 }
@@ -101,12 +94,10 @@ std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig) {
   const std::size_t first = map.rig().size();
   std::vector<camera::RigCamera> all = cameras(map.rig()), given = cameras(map.given_rig());
   for (camera::RigCamera& added : moved_into(map.rig(), rig)) {
-    added.camera.name = unused_name(all, added.camera.name);
+    added.camera.name = camera::unused_name(all, added.camera.name);
     all.push_back(std::move(added));
   }
-  for (std::size_t i = 0; i < rig.size(); ++i) {
-    given.push_back({all[first + i].camera, map.given_rig().body_from_rig() * rig.rig_from_cam(i)});
-  }
+  std::ranges::move(moved_into(map.given_rig(), rig), std::back_inserter(given));
   map.append_cameras(std::make_shared<const camera::Rig>(std::move(all), map.rig().cam_from_rig(0)),
                      std::make_shared<const camera::Rig>(std::move(given), map.given_rig().cam_from_rig(0)));
   return first;

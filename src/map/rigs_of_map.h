@@ -15,7 +15,8 @@ namespace bslam::map {
 // they had before a run refined it, and the name of no other camera of the map.
 std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig);
 
-// As find_rig, but appends the cameras if the map does not have them. Names that are taken get a number.
+// As find_rig, but appends the cameras if the map does not have them. A name that is taken becomes camN, the number of
+// the camera in the map.
 std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig);
 
 // Returns `whole` with cameras `first`, `first` + 1, ... replaced by those of `part`, whose camera 0 takes the place of

@@ -10,9 +10,9 @@
 
 #include "base/result.h"
 #include "dataset/dataset.h"
+#include "geometry/up_axis.h"
 #include "map/bundled_map.h"
 #include "map_export/occupancy_grid.h"
-#include "map_export/up_axis.h"
 
 namespace bslam::map_export {
 
@@ -37,7 +37,7 @@ struct ExportRequest {
   std::optional<double> resolution;        // kOctomap, kNav2: side of a cell; default: default_resolution, >= 5 cm
   std::optional<double> max_range;         // kOctomap, kNav2: default: ten times the median depth
   HeightBand band;                         // kNav2
-  std::optional<UpAxis> up;                // kNerfstudio, kOctomap, kNav2: default: upward_note()
+  std::optional<geometry::UpAxis> up;      // kNerfstudio, kOctomap, kNav2: default: upward_note()
 };
 
 // What a user should know about the vertical direction if `up` is not given.

@@ -11,7 +11,7 @@
 namespace bslam::map_export {
 
 Result<Selection> select_submap(const map::BundledMap& map, std::optional<std::size_t> submap,
-                                const std::optional<UpAxis>& up) {
+                                const std::optional<geometry::UpAxis>& up) {
   const std::vector<storage::Submap> submaps = storage::submaps_of(map);
   if (submaps.empty()) return Error{"", "", "a map without keyframes", "a map with keyframes"};
   if (submap && *submap >= submaps.size())
@@ -27,7 +27,7 @@ Result<Selection> select_submap(const map::BundledMap& map, std::optional<std::s
   }
   selection.T_upright_world = geometry::upright_axes(poses);
   if (up) {
-    const auto up_world = up_in_world(*up, poses, map.rig().body_from_rig());
+    const auto up_world = geometry::up_in_world(*up, poses, map.rig().body_from_rig());
     if (!up_world) return up_world.error();
     selection.T_upright_world = geometry::upright_axes(poses, *up_world);
   }

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "base/result.h"
+#include "geometry/up_axis.h"
 #include "map/bundled_map.h"
-#include "map_export/up_axis.h"
 
 namespace bslam::map_export {
 
@@ -25,7 +25,7 @@ struct Selection {
 // landmarks. `up`: which direction is upward; without it, it is estimated. Errors: the map has no keyframes; there is
 // no such submap; those of up_in_world.
 Result<Selection> select_submap(const map::BundledMap& map, std::optional<std::size_t> submap,
-                                const std::optional<UpAxis>& up = {});
+                                const std::optional<geometry::UpAxis>& up = {});
 
 // Calls visit(KeyframeId, KeypointRef) for every keypoint that observes the landmark in a selected keyframe.
 template <class Visit>

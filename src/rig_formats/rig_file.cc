@@ -9,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "camera/camera_description.h"
+#include "camera/unused_name.h"
 #include "rig_formats/basalt_rig.h"
 #include "rig_formats/colmap_rig.h"
 #include "rig_formats/euroc_sensor.h"
@@ -137,16 +138,6 @@ Result<RigFile> read_folder(const fs::path& folder) {
                "a folder with mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt, cameras.txt or rig.yaml"};
 }
 
-// Returns a name that no camera of `taken` has.
-std::string unused_name(const std::vector<camera::RigCamera>& taken, const std::string& name) {
-  const auto used = [&](const std::string& n) {
-    return std::ranges::any_of(taken, [&](const camera::RigCamera& c) { return c.camera.name == n; });
-  };
-  std::string out = name;
-  for (std::size_t i = taken.size(); used(out); ++i) out = "cam" + std::to_string(i);
-  return out;
-}
-
 Status make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -243,7 +234,7 @@ Result<RigFile> read_joined_rigs(std::span<const fs::path> files) {
     }
     for (std::size_t c = 0; c < part->rig.size(); ++c) {
       camera::RigCamera camera{part->rig.camera(c), part->rig.body_from_cam(c)};
-      camera.camera.name = unused_name(cameras, camera.camera.name);
+      camera.camera.name = camera::unused_name(cameras, camera.camera.name);
       cameras.push_back(std::move(camera));
     }
     notes.insert(notes.end(), part->notes.begin(), part->notes.end());

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "dataset/frame_reader.h"
+#include "session/image_test.h"
 
 namespace bslam::session {
 namespace {
@@ -79,6 +80,7 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
       calibration::test_pairs(*map, keyframes, input.system.first_camera(), input.dataset.rig, input.system.rig());
   std::erase_if(calibration.pairs,
                 [](const calibration::CameraPair& p) { return !p.contradicted && !p.hardly_matched(); });
+  if (input.complete && never_started(record)) calibration.pairs = contradicted_pairs(input.dataset);
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
     if (disagrees(record.cameras[c])) calibration.disagreeing.push_back(c);
   }
@@ -189,8 +191,8 @@ RunRecord build_record(const RecordInput& input, std::vector<tracking::FrameReco
   add_stages(input, record);
   const map::MapSnapshot map = input.system.snapshot();
   record.map = map_record(*map, input.loaded);
-  add_calibration(input, record);
   record.maps_started = input.system.maps_started();
+  add_calibration(input, record);
   add_places(input, record);
   record.start_up_s = input.start_up_s;
   record.wall_s = input.wall_s;

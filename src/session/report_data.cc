@@ -105,15 +105,15 @@ ordered_json settings_json(const system::Config& config) {
 }
 
 ordered_json run_json(const RunRecord& record, const map::BundledMap& map, const camera::Rig& rig,
-                      std::span<const system::SubmapTrajectory> paths, TimeNs first_time_ns,
-                      const ReportLimits& limits) {
+                      std::span<const system::SubmapTrajectory> paths, TimeNs first_time_ns, const ReportLimits& limits,
+                      const std::optional<geometry::UpAxis>& up) {
   ordered_json stages = ordered_json::array(), residuals = ordered_json::array();
   for (const StageSeries& series : record.stages) stages.push_back(stage_json(series, limits.poses));
   for (const CameraRecord& camera : record.cameras) residuals.push_back(residuals_json(camera.residuals));
   return {{"schema", 1},
           {"summary", summary_json(record)},
           {"rig", report_rig(rig)},
-          {"submaps", report_submaps(map, paths, first_time_ns, limits)},
+          {"submaps", report_submaps(map, paths, first_time_ns, limits, up)},
           {"landmarks", map.num_landmarks()},
           {"frames", frames_json(record, limits.poses)},
           {"stages", std::move(stages)},
@@ -125,7 +125,7 @@ ordered_json report_json(const SessionResult& result, const system::Config& conf
   const evaluation::Trajectory path =
       result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
   ordered_json json = run_json(record, *result.map, result.rig ? *result.rig : result.map->rig(), result.trajectories,
-                               source.dataset.first_time_ns);
+                               source.dataset.first_time_ns, {}, source.up);
   json["command"] = source.command;
   json["truth"] = report_truth(source.dataset, path, record.map.scale == "metric");
   json["settings"] = settings_json(config);

@@ -14,7 +14,7 @@ namespace bslam::session {
 // is that of the run.
 nlohmann::ordered_json run_json(const RunRecord& record, const map::BundledMap& map, const camera::Rig& rig,
                                 std::span<const system::SubmapTrajectory> paths, TimeNs first_time_ns,
-                                const ReportLimits& limits = {});
+                                const ReportLimits& limits = {}, const std::optional<geometry::UpAxis>& up = {});
 
 // All settings with their defaults.
 nlohmann::ordered_json settings_json(const system::Config& config);

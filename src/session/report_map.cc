@@ -4,6 +4,8 @@
 #include <array>
 #include <vector>
 
+#include "geometry/vertical_direction.h"
+
 namespace bslam::session {
 namespace {
 
@@ -98,10 +100,19 @@ Vector3d ray_at_corner(const camera::Camera& camera, const Eigen::Vector2d& corn
   return {0, 0, 1};
 }
 
+Vector3d upward(std::span<const SE3> T_world_rig, const std::optional<geometry::UpAxis>& up, const SE3& T_body_rig) {
+  if (up) {
+    const auto found = geometry::up_in_world(*up, T_world_rig, T_body_rig);
+    if (found) return *found;
+  }
+  return geometry::vertical_direction(T_world_rig);
+}
+
 }  // namespace
 
 ordered_json report_submaps(const map::BundledMap& map, std::span<const system::SubmapTrajectory> paths,
-                            TimeNs first_time_ns, const ReportLimits& limits) {
+                            TimeNs first_time_ns, const ReportLimits& limits,
+                            const std::optional<geometry::UpAxis>& up) {
   std::vector<Submap> submaps = submaps_of(map, paths);
   const std::vector<std::size_t> submap_of = add_keyframes(map, first_time_ns, submaps);
   if (!submaps.empty()) add_points(map, first_time_ns, submap_of, limits.points, submaps);
@@ -113,7 +124,7 @@ ordered_json report_submaps(const map::BundledMap& map, std::span<const system::
         {{"root", submap.root.index()},
          {"loaded", s < paths.size() && paths[s].loaded},
          {"frames", path.size()},
-         {"up", number_list(vertical_direction(submap.T_world_rig))},
+         {"up", number_list(upward(submap.T_world_rig, up, map.rig().body_from_rig()))},
          {"path", path_json(path, first_time_ns, limits.poses)},
          {"keyframes",
           {{"time", float_array(submap.keyframe_time)},

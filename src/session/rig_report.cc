@@ -9,11 +9,11 @@
 #include "calibration/convention_check.h"
 #include "calibration/rig_description.h"
 #include "calibration/rig_warnings.h"
-#include "dataset/frame_reader.h"
 #include "dataset/recording.h"
 #include "image_decoding/image_file.h"
 #include "report/rig_plot.h"
 #include "rig_formats/rig_file.h"
+#include "session/image_test.h"
 
 namespace bslam::session {
 namespace {
@@ -59,6 +59,8 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
                      {"fit_pair_inverted", pair.agreeing[2]},
                      {"fit_swapped", pair.agreeing[3]},
                      {"fit_swapped_inverted", pair.agreeing[4]},
+                     {"fit_exchanged", pair.exchanged ? Json(pair.exchanged->agreeing) : Json()},
+                     {"exchanged_for", pair.exchanged ? Json(pair.exchanged->cameras) : Json()},
                      {"fit_another", pair.other ? Json(pair.other->agreeing) : Json()},
                      {"another_turned_deg", pair.other ? Json(pair.other->rotated_deg) : Json()},
                      {"another_displaced_deg", pair.other ? Json(pair.other->displaced_deg) : Json()},
@@ -81,10 +83,10 @@ std::vector<std::string> warnings_of(const camera::Rig& rig) {
 struct Calibration {
   rig_formats::RigFile file;
   std::string format;
-  bool of_recording = false;  // CameraInfo of a bag
+  bool of_recording = false;  // a bag, with its own calibration
 };
 
-// Reads a calibration file, or the CameraInfo of a bag.
+// Reads a calibration file, or the calibration of a bag.
 Result<Calibration> read_calibration(const RigReportRequest& request) {
   dataset::DatasetRequest recording = request.recording;
   recording.path = request.file;
@@ -96,7 +98,10 @@ Result<Calibration> read_calibration(const RigReportRequest& request) {
     if (opened && opened->format == dataset::DatasetFormat::kBag) {
       const auto dataset = dataset::open_dataset(recording);
       if (!dataset) return dataset.error();
-      return Calibration{{dataset->rig, rig_formats::RigFormat::kBslam, {}}, "CameraInfo of a bag", true};
+      const dataset::Recording& source = *opened->recording;
+      return Calibration{{dataset->rig, rig_formats::RigFormat::kBslam, {}},
+                         source.calibrated() ? source.calibration_origin() : "rig.yaml in the folder of the bag",
+                         true};
     }
   }
   auto file = rig_formats::read_rig_file(request.file);
@@ -134,23 +139,16 @@ std::string as_text(const Calibration& calibration, const std::optional<std::vec
   return evidence ? text + calibration::describe_evidence(*evidence) : text;
 }
 
-// Tests the calibration against a few frames spread over a recording.
+// Tests the calibration against the images of a recording.
 Result<std::vector<PairEvidence>> check_against_images(const RigReportRequest& request, bool own_calibration) {
   constexpr double kTolerance_s = 0.1;  // wide enough to group the images of cameras that capture late
-  constexpr std::size_t kFrames = 6;
   dataset::DatasetRequest recording = request.recording;
   recording.path = request.images;
   if (!own_calibration) recording.rig_file = request.file;
   recording.sync_tolerance_s = kTolerance_s;
   const auto dataset = dataset::open_dataset(recording);
   if (!dataset) return dataset.error();
-  const auto masks = image_decoding::read_masks(dataset->rig);
-  if (!masks) return masks.error();
-  const std::size_t size = dataset->frames.size(), count = std::min(kFrames, size);
-  std::vector<image::ImageBundle> frames;
-  for (std::size_t k = 0; k < count; ++k)
-    frames.push_back(dataset::read_frame(*dataset, (2 * k + 1) * size / (2 * count)));
-  return calibration::check_conventions(dataset->rig, frames, *masks);
+  return test_against_images(*dataset);
 }
 
 }  // namespace

@@ -66,6 +66,14 @@ std::vector<LostInterval> lost_intervals(const RunRecord& record) {
   return intervals;
 }
 
+bool never_started(const RunRecord& record) {
+  const auto had_images = [](const RunFrame& frame) {
+    return frame.record && frame.record->final_result().reason == tracking::LostReason::kNotStarted;
+  };
+  return record.maps_started == 0 && !record.map.loaded && record.cameras.size() > 1 &&
+         std::ranges::any_of(record.frames, had_images);
+}
+
 std::int64_t frames_in_loaded_map(const RunRecord& record) {
   std::int64_t frames = 0;
   for (const SubmapRecord& submap : record.submaps) frames += submap.loaded ? submap.frames : 0;

@@ -76,8 +76,9 @@ struct CalibrationRecord {
   calibration::RigRefinement estimate;
   bool refined = false;     // the final map uses an estimated rig, which is written to rig_refined.yaml
   double excess_bound = 0;  // of estimate.excess_error, above which the images contradict the calibration
-  std::vector<calibration::CameraPair> pairs = {};  // that are contradicted or hardly matched
-  std::vector<std::size_t> disagreeing = {};        // cameras that were inconsistent for most of the run
+  std::vector<calibration::CameraPair> pairs =
+      {};  // that are contradicted or hardly matched; without keyframes if no map was started
+  std::vector<std::size_t> disagreeing = {};  // cameras that were inconsistent for most of the run
 
   // Sets `refined`. `complete`: the run was not interrupted; the map of an interrupted run may use an estimate from its
   // beginning, of which nothing is known. `replaced`: the map uses an estimated rig.
@@ -147,6 +148,9 @@ struct LostInterval {
 };
 
 std::vector<LostInterval> lost_intervals(const RunRecord& record);
+
+// Whether the images of several cameras could be used, but no map was started with them.
+bool never_started(const RunRecord& record);
 
 // Returns the number of frames with a pose in the world frame of the loaded map.
 std::int64_t frames_in_loaded_map(const RunRecord& record);

@@ -9,6 +9,7 @@
 
 #include "dataset/dataset.h"
 #include "evaluation/trajectory.h"
+#include "geometry/up_axis.h"
 #include "session/frame_source.h"
 #include "session/run_control.h"
 #include "session/run_observer.h"
@@ -61,7 +62,8 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
 // What report.html shows in addition to the result of a run.
 struct ReportSource {
   const dataset::Dataset& dataset;
-  std::string command;  // the command line of the run
+  std::string command;                      // the command line of the run
+  std::optional<geometry::UpAxis> up = {};  // what points upward in its views
 };
 
 // Writes summary.json, trajectory.tum, trajectory_live.tum (further submaps: ..._part2.tum), config.yaml,

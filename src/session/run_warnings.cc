@@ -106,8 +106,8 @@ void warn_of_losses(const RunRecord& record, Warnings& warnings) {
 void warn_of_submaps(const RunRecord& record, Warnings& warnings) {
   if (record.submaps.size() > 1) {
     warn(warnings,
-         "{} submaps remain, each with its own world frame, because no loop closure joined them: "
-         "trajectory.tum contains {} poses, trajectory_part2.tum {}{}",
+         "{} submaps remain, each with its own world frame, because no loop closure joined them; number of poses in "
+         "trajectory.tum: {}, in trajectory_part2.tum: {}{}",
          record.submaps.size(), record.submaps[0].frames, record.submaps[1].frames,
          record.submaps.size() > 2 ? " and so on" : "");
   }
@@ -144,25 +144,15 @@ void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std
        record.cameras[camera].name, inliers, keypoints, check_command);
 }
 
-// Warns once if the images do not belong to the calibration, with the pair of cameras that shows it best.
-void warn_of_foreign_images(const RunRecord& record, const std::string& check_command, Warnings& warnings) {
-  const std::vector<calibration::CameraPair>& pairs = record.calibration.pairs;
-  const auto weight = [](const calibration::CameraPair& p) { return p.contradicted ? p.evidence->matches : -1; };
-  const auto best = std::ranges::max_element(pairs, {}, weight);
-  if (best == pairs.end() || !best->contradicted) return;
-  const auto others = std::ranges::count(pairs, true, &calibration::CameraPair::contradicted) - 1;
-  warn(warnings,
-       "the images do not belong to the calibration, so poses, scale and map are wrong: cameras {} and {} share "
-       "{:.1f} % of the features in their common view; {}{}. Check which images are of which camera, and the "
-       "direction of the transforms ({})",
-       record.cameras[best->first].name, record.cameras[best->second].name, 100 * best->matched_share(),
-       calibration::describe_pair(*best->evidence), others > 0 ? fmt::format(" (and {} more pairs)", others) : "",
-       check_command);
-}
-
 // Warns of pairs of cameras that should see the same things but do not.
 void warn_of_pairs(const RunRecord& record, const std::string& check_command, Warnings& warnings) {
-  if (record.calibration.foreign_images()) return warn_of_foreign_images(record, check_command, warnings);
+  if (const std::string foreign = foreign_images_text(record); !foreign.empty()) {
+    return warn(warnings, "{}. Check which images are of which camera, and the direction of the transforms ({})",
+                foreign, check_command);
+  }
+  if (never_started(record))
+    warn(warnings, "no map was started although there were images, maybe because of a wrong calibration: test it ({})",
+         check_command);
   for (const calibration::CameraPair& pair : record.calibration.pairs) {
     warn(warnings,
          "the calibrated views of cameras {} and {} overlap by {:.0f} %, but only {:.1f} % of the features there are "
@@ -174,6 +164,25 @@ void warn_of_pairs(const RunRecord& record, const std::string& check_command, Wa
 }
 
 }  // namespace
+
+std::string foreign_images_text(const RunRecord& record) {
+  const std::vector<calibration::CameraPair>& pairs = record.calibration.pairs;
+  const auto weight = [](const calibration::CameraPair& p) { return p.contradicted ? p.evidence->matches : -1; };
+  const auto best = std::ranges::max_element(pairs, {}, weight);
+  if (best == pairs.end() || !best->contradicted) return {};
+  const auto others = std::ranges::count(pairs, true, &calibration::CameraPair::contradicted) - 1;
+  const std::string names =
+      fmt::format("{} and {}", record.cameras[best->first].name, record.cameras[best->second].name);
+  const std::string shown =
+      best->keyframes == 0
+          ? fmt::format("the images do not belong to the calibration, so no map was started: of cameras {}", names)
+          : fmt::format(
+                "the images do not belong to the calibration, so poses, scale and map are wrong: cameras {} "
+                "share {:.1f} % of the features in their common view;",
+                names, 100 * best->matched_share());
+  return fmt::format("{} {}{}", shown, calibration::describe_pair(*best->evidence),
+                     others > 0 ? fmt::format(" (and {} more pairs)", others) : "");
+}
 
 std::vector<std::string> warnings_before_run(const dataset::Dataset& dataset) {
   constexpr std::size_t kShown = 2;

@@ -13,6 +13,9 @@ namespace bslam::session {
 // Before the run: warnings about the recording, and the first ones about the calibration (calibration/rig_warnings.h).
 std::vector<std::string> warnings_before_run(const dataset::Dataset& dataset);
 
+// Says which pair of cameras shows that the images do not belong to the calibration; empty if none does.
+std::string foreign_images_text(const RunRecord& record);
+
 // After the run: cameras that were out or inconsistent with all other cameras, images that could not be used, dropped
 // frames, losses and submaps, a calibration that the images contradict, and cameras of `rig` (those in use, as
 // calibrated) that do not see the same things although their views overlap. `check_command` tests the calibration

@@ -109,7 +109,7 @@ ordered_json calibration_json(const RunRecord& record) {
     pairs.push_back(
         {{"cameras", {record.cameras[pair.first].name, record.cameras[pair.second].name}},
          {"overlap", rounded(pair.overlap, 3)},
-         {"matched_share", rounded(pair.matched_share(), 5)},
+         {"matched_share", pair.keyframes > 0 ? rounded(pair.matched_share(), 5) : ordered_json()},
          {"contradicted", pair.contradicted},
          {"evidence", pair.evidence ? ordered_json(calibration::describe_pair(*pair.evidence)) : ordered_json()}});
   }

@@ -16,28 +16,23 @@ void ByteWriter::text(std::string_view text) {
   bytes_ += text;
 }
 
-std::size_t ByteReader::count(std::size_t bytes_each) {
+std::size_t SectionReader::count(std::size_t bytes_each) {
   const std::size_t n = number<std::uint32_t>();
-  if (ok() && n > rest_.size() / bytes_each) {
-    fail(std::to_string(n) + " elements in " + std::to_string(rest_.size()) + " bytes",
+  if (ok() && n > remaining() / bytes_each) {
+    fail(std::to_string(n) + " elements in " + std::to_string(remaining()) + " bytes",
          "a count that fits into the section");
   }
   return ok() ? n : 0;
 }
 
-std::string ByteReader::text() {
-  const std::size_t size = count(1);
-  std::string text(rest_.substr(0, size));
-  rest_.remove_prefix(size);
-  return text;
+std::string SectionReader::text() { return std::string(bytes_.take(count(1))); }
+
+bool SectionReader::finish() {
+  return require(remaining() == 0, std::to_string(remaining()) + " excess bytes", "the end of the section");
 }
 
-bool ByteReader::finish() {
-  return require(rest_.empty(), std::to_string(rest_.size()) + " excess bytes", "the end of the section");
-}
-
-void ByteReader::fail(std::string_view found, std::string_view expected) {
-  rest_ = {};
+void SectionReader::fail(std::string_view found, std::string_view expected) {
+  bytes_ = ByteReader({});
   if (error_) return;
   std::string key = section_;
   for (const auto& [kind, index] : place_) {
@@ -47,7 +42,5 @@ void ByteReader::fail(std::string_view found, std::string_view expected) {
   }
   error_ = Error{"", std::move(key), std::string(found), std::string(expected)};
 }
-
-void ByteReader::end_early() { fail("the end of the section", "more bytes"); }
 
 }  // namespace bslam::storage

@@ -1,4 +1,4 @@
-// Writes and reads numbers as little-endian bytes on any machine, for saved maps.
+// Writes and reads the numbers of saved maps, as little-endian bytes on any machine.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,6 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/byte_reader.h"
 #include "base/result.h"
 
 namespace bslam::storage {
@@ -22,21 +22,15 @@ namespace bslam::storage {
 template <class T>
 concept Number = std::integral<T> || std::floating_point<T>;
 
-// Converts `count` numbers between the byte order of this machine and that of the file, in place.
-template <Number T>
-void swap_to_little_endian([[maybe_unused]] char* bytes, [[maybe_unused]] std::size_t count) {
-  if constexpr (std::endian::native == std::endian::big) {
-    for (std::size_t i = 0; i < count; ++i) std::reverse(bytes + i * sizeof(T), bytes + (i + 1) * sizeof(T));
-  }
-}
-
 class ByteWriter {
  public:
   template <Number T>
   void numbers(const T* values, std::size_t count) {
     const std::size_t at = bytes_.size();
     bytes_.append(reinterpret_cast<const char*>(values), count * sizeof(T));
-    swap_to_little_endian<T>(bytes_.data() + at, count);
+    if constexpr (std::endian::native == std::endian::big) {
+      for (std::size_t i = at; i < bytes_.size(); i += sizeof(T)) std::reverse(&bytes_[i], &bytes_[i] + sizeof(T));
+    }
   }
   template <Number T>
   void number(T value) {
@@ -55,13 +49,13 @@ class ByteWriter {
 
 // Reads one section of a file. After the first error, which is kept, all further values are 0 or empty. The
 // Error names the element that was being read, as declared by enter and leave.
-class ByteReader {
+class SectionReader {
  public:
-  ByteReader(std::string_view bytes, std::string section) : rest_(bytes), section_(std::move(section)) {}
+  SectionReader(std::string_view bytes, std::string section) : bytes_(bytes), section_(std::move(section)) {}
 
   bool ok() const { return !error_.has_value(); }
   const Error& error() const { return *error_; }  // Error.file is left empty
-  std::size_t remaining() const { return rest_.size(); }
+  std::size_t remaining() const { return bytes_.left(); }
 
   // Declares that the following bytes belong to element `index` of a kind, such as ("keyframe", 3), until leave is
   // called. Calls can be nested.
@@ -70,15 +64,8 @@ class ByteReader {
 
   template <Number T>
   void numbers(T* out, std::size_t count) {
-    if (count > rest_.size() / sizeof(T)) {
-      std::fill_n(out, count, T{});
-      end_early();
-      return;
-    }
-    if (count == 0) return;
-    std::memcpy(out, rest_.data(), count * sizeof(T));
-    swap_to_little_endian<T>(reinterpret_cast<char*>(out), count);
-    rest_.remove_prefix(count * sizeof(T));
+    bytes_.numbers(out, count);
+    if (!bytes_.ok()) fail("the end of the section", "more bytes");
   }
   template <Number T>
   T number() {
@@ -101,9 +88,8 @@ class ByteReader {
 
  private:
   void fail(std::string_view found, std::string_view expected);
-  void end_early();
 
-  std::string_view rest_;
+  ByteReader bytes_;
   std::string section_;
   std::vector<std::pair<std::string_view, std::size_t>> place_;
   std::optional<Error> error_;

@@ -61,7 +61,7 @@ Result<Sections> take_apart(std::string_view bytes) {
   if (!bytes.starts_with(kMagic))
     return damaged("", "a file of another format", fmt::format("a saved map, which begins with {}", kMagic));
   if (bytes.size() < kHeaderBytes) return damaged("header", fmt::format("{} bytes", bytes.size()), "a complete header");
-  ByteReader in(bytes.substr(kMagic.size(), kHeaderBytes - kMagic.size()), "header");
+  SectionReader in(bytes.substr(kMagic.size(), kHeaderBytes - kMagic.size()), "header");
   if (in.number<std::uint32_t>() != kOrderMark) return damaged("header", "another byte order", "little endian");
   const auto version = in.number<std::uint32_t>();
   if (version < kOldestVersion || version > kVersion) {
@@ -101,8 +101,8 @@ Result<Sections> take_apart(std::string_view bytes) {
 }
 
 Result<SavedMap> build(const Sections& sections, std::string file) {
-  const auto reader = [&](std::size_t i) { return ByteReader(sections.bytes[i], kNames[i]); };
-  ByteReader rig_in = reader(0), info_in = reader(1), keyframes_in = reader(2), landmarks_in = reader(3);
+  const auto reader = [&](std::size_t i) { return SectionReader(sections.bytes[i], kNames[i]); };
+  SectionReader rig_in = reader(0), info_in = reader(1), keyframes_in = reader(2), landmarks_in = reader(3);
   auto rigs = take_rigs(rig_in, sections.version);
   if (!rigs) return rig_in.error();
   InfoSection info = take_info(info_in);
@@ -227,8 +227,8 @@ Result<SavedMap> read_map(const std::filesystem::path& file) {
   return map_from_bytes(*bytes, file.string());
 }
 
-Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
-                                 const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {
+Result<SavedMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
+                          const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {
   auto saved = read_map(file);
   if (!saved) return saved.error();
   if (const Status status = fits(*saved, pyramid, vocabulary); !status) return status.error();
@@ -238,7 +238,7 @@ Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera
                  fmt::format("at most {}; a map with fewer rigs", kMaxCameras)};
   }
   if (saved->map.num_keyframes() == 0) return Error{file.string(), "keyframes", "none", "a map with keyframes"};
-  return std::move(saved->map);
+  return saved;
 }
 
 Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,

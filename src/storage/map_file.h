@@ -18,6 +18,7 @@ struct MapFileInfo {
   std::uint64_t vocabulary = 0;  // Vocabulary::id() of the visual words of its keyframes; 0 if they have none
   std::string version;           // version of the program that wrote the file
   std::string data;              // name of the recording
+  std::string warning = {};      // why its poses cannot be relied on, if the run that wrote it has found that
 };
 
 struct SavedMap {
@@ -48,8 +49,8 @@ Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::Pyrami
 
 // Reads the map that a run with this rig, which may be any rig, continues. Errors: as for read_map and the first fits;
 // the map has no keyframes; it would have too many cameras with those of the run.
-Result<map::BundledMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
-                                 const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
+Result<SavedMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
+                          const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
 
 // Convert a map to and from the content of a file. `file` is the name used in errors. The content may be damaged or
 // malicious: counts are checked against the number of remaining bytes before memory is reserved.

@@ -45,7 +45,7 @@ void put_camera(const frame::CameraFrame& camera, bool with_words, ByteWriter& o
   for (std::size_t i = 0; has_words && i < n; ++i) out.number(camera.words[i].value());
 }
 
-Keypoints take_keypoints(ByteReader& in) {
+Keypoints take_keypoints(SectionReader& in) {
   const std::size_t n = in.count(kKeypointBytes);
   if (n == 0) return {};
   feature::Detections k;
@@ -67,7 +67,7 @@ Keypoints take_keypoints(ByteReader& in) {
 }
 
 // Pixels may be outside of the image, but not by more than its size.
-bool check_keypoints(ByteReader& in, const Keypoints& k, const camera::Camera& camera, int levels) {
+bool check_keypoints(SectionReader& in, const Keypoints& k, const camera::Camera& camera, int levels) {
   const auto width = static_cast<float>(camera.width), height = static_cast<float>(camera.height);
   const auto within = [](float value, float size) { return value >= -size && value <= 2 * size; };  // false for NaN
   bool pixels = true, on_levels = true, numbers = true, unit = true;
@@ -84,7 +84,7 @@ bool check_keypoints(ByteReader& in, const Keypoints& k, const camera::Camera& c
          in.require(unit, "a bearing that is not a unit vector", "unit vectors");
 }
 
-void take_words(ByteReader& in, frame::CameraFrame& camera, bool with_words, std::size_t& words_end) {
+void take_words(SectionReader& in, frame::CameraFrame& camera, bool with_words, std::size_t& words_end) {
   const auto has_words = in.number<std::uint8_t>();
   if (!in.require(has_words <= 1, "an invalid flag", "0 or 1 (words follow)")) return;
   if (has_words == 0 || !in.require(with_words, "words", "none, since the map has no vocabulary")) return;
@@ -100,8 +100,8 @@ void take_words(ByteReader& in, frame::CameraFrame& camera, bool with_words, std
   }
 }
 
-void take_camera(ByteReader& in, const camera::Camera& calibration, int levels, bool with_words, std::size_t& words_end,
-                 frame::CameraFrame& camera) {
+void take_camera(SectionReader& in, const camera::Camera& calibration, int levels, bool with_words,
+                 std::size_t& words_end, frame::CameraFrame& camera) {
   const auto state = in.number<std::uint8_t>();
   if (!in.require(state <= static_cast<int>(image::ImageState::kDamaged), "an unknown image state",
                   "present, missing or damaged"))
@@ -135,7 +135,7 @@ void put_bundled(const frame::Bundled& bundled, ByteWriter& out) {
 }
 
 // Reads one matched feature. `taken` has a flag for every keypoint of every camera, set when a feature uses it.
-std::vector<KeypointRef> take_group(ByteReader& in, const frame::BundledFrame& frame,
+std::vector<KeypointRef> take_group(SectionReader& in, const frame::BundledFrame& frame,
                                     std::vector<std::vector<std::uint8_t>>& taken) {
   const std::size_t size = in.number<std::uint8_t>();
   std::vector<KeypointRef> group;
@@ -158,7 +158,7 @@ std::vector<KeypointRef> take_group(ByteReader& in, const frame::BundledFrame& f
   return group;
 }
 
-std::optional<frame::BundledPoint> take_point(ByteReader& in) {
+std::optional<frame::BundledPoint> take_point(SectionReader& in) {
   const auto has_point = in.number<std::uint8_t>();
   if (!in.require(has_point <= 1, "an invalid flag", "0 or 1 (a point follows)") || has_point == 0) return {};
   frame::BundledPoint point;
@@ -168,7 +168,7 @@ std::optional<frame::BundledPoint> take_point(ByteReader& in) {
   return point;
 }
 
-void take_bundled(ByteReader& in, frame::BundledFrame& frame) {
+void take_bundled(SectionReader& in, frame::BundledFrame& frame) {
   std::vector<std::size_t> counts;
   std::vector<std::vector<std::uint8_t>> taken;
   for (const frame::CameraFrame& c : frame.cameras) {
@@ -199,7 +199,7 @@ void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist
   put_bundled(frame.bundled, out);
 }
 
-frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
+frame::BundledFrame take_frame(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                                bool with_words, std::size_t& words_end) {
   frame::BundledFrame frame;
   frame.id = FrameId(in.number<std::int32_t>());

@@ -33,7 +33,7 @@ SE3 with_exact_rotation(const Quaterniond& q, const Vector3d& translation) {
   return SE3(q, translation);
 }
 
-camera::CameraDescription take_description(ByteReader& in) {
+camera::CameraDescription take_description(SectionReader& in) {
   camera::CameraDescription d;
   d.name = in.text();
   d.model = in.text();
@@ -46,7 +46,7 @@ camera::CameraDescription take_description(ByteReader& in) {
 }
 
 // Checks the same conditions as for rig files, without changing the numbers.
-std::optional<camera::RigCamera> take_rig_camera(ByteReader& in) {
+std::optional<camera::RigCamera> take_rig_camera(SectionReader& in) {
   camera::CameraDescription d = take_description(in);
   const SE3 T_body_cam = take_transform(in);
   const auto offset_ns = in.number<TimeNs>();
@@ -74,7 +74,7 @@ std::vector<double> readouts_of(const camera::Rig& rig) {
 }
 
 // The readout times of rolling shutters, one per camera. They are omitted if all are 0.
-void take_readouts(ByteReader& in, std::vector<camera::RigCamera>& cameras) {
+void take_readouts(SectionReader& in, std::vector<camera::RigCamera>& cameras) {
   for (camera::RigCamera& camera : cameras) {
     camera.camera.readout_s = in.number<double>();
     in.require(std::abs(camera.camera.readout_s) <= 1, "an invalid readout time", "at most 1 second");
@@ -84,7 +84,7 @@ void take_readouts(ByteReader& in, std::vector<camera::RigCamera>& cameras) {
 bool in_range(std::int32_t id, std::size_t end) { return id >= 0 && static_cast<std::size_t>(id) < end; }
 
 // Reads the observations of a landmark and checks that they exist in `map`.
-std::vector<map::Observation> take_observations(ByteReader& in, const map::BundledMap& map) {
+std::vector<map::Observation> take_observations(SectionReader& in, const map::BundledMap& map) {
   const std::size_t n = in.count(kObservationBytes);
   std::vector<map::Observation> observations;
   if (!in.require(n > 0, "no observation", "one or more observations")) return observations;
@@ -118,7 +118,7 @@ bool is_among(const map::LandmarkReference& reference, const std::vector<map::Ob
   return false;
 }
 
-void take_landmark(ByteReader& in, map::BundledMap& map) {
+void take_landmark(SectionReader& in, map::BundledMap& map) {
   Vector3d position;
   in.numbers(position.data(), 3);
   map::LandmarkReference reference;
@@ -160,7 +160,7 @@ void put_transform(const SE3& transform, ByteWriter& out) {
   out.numbers(transform.translation().data(), 3);
 }
 
-SE3 take_transform(ByteReader& in) {
+SE3 take_transform(SectionReader& in) {
   Eigen::Vector4d xyzw;
   Vector3d translation;
   in.numbers(xyzw.data(), 4);
@@ -198,7 +198,7 @@ void put_cameras(const camera::Rig& rig, ByteWriter& out) {
 }
 
 // `version`: of the file, see docs/map_file.md.
-std::shared_ptr<const camera::Rig> take_cameras(ByteReader& in, std::size_t n, std::uint32_t version) {
+std::shared_ptr<const camera::Rig> take_cameras(SectionReader& in, std::size_t n, std::uint32_t version) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t i = 0; i < n && in.ok(); ++i) {
     in.enter("camera", i);
@@ -220,7 +220,7 @@ void put_rigs(const map::BundledMap& map, ByteWriter& out) {
   put_cameras(map.given_rig(), out);
 }
 
-std::optional<RigSection> take_rigs(ByteReader& in, std::uint32_t version) {
+std::optional<RigSection> take_rigs(SectionReader& in, std::uint32_t version) {
   const std::size_t n = in.count(kCameraBytes);
   in.require(n >= 1 && n <= kMaxCameras, std::to_string(n) + " cameras", "1 to " + std::to_string(kMaxCameras));
   if (!in.ok()) return {};
@@ -239,15 +239,20 @@ void put_info(const map::BundledMap& map, const MapFileInfo& info, ByteWriter& o
   out.number(info.vocabulary);
   out.text(info.version);
   out.text(info.data);
+  if (!info.warning.empty()) out.text(info.warning);
 }
 
-InfoSection take_info(ByteReader& in) {
+InfoSection take_info(SectionReader& in) {
   InfoSection section;
   section.pyramid.scale_factor = in.number<double>();
   section.pyramid.levels = in.number<std::int32_t>();
   const auto scale = in.number<std::uint8_t>();
   const std::string kind = in.text();
-  section.info = {in.number<std::uint64_t>(), in.text(), in.text()};
+  section.info = {in.number<std::uint64_t>(), in.text(), in.text(), {}};
+  if (in.remaining() > 0) {
+    section.info.warning = in.text();
+    in.require(!section.info.warning.empty(), "an empty warning", "a warning, or none");
+  }
   section.scale = static_cast<map::Scale>(scale);
   const bool pyramid = section.pyramid.scale_factor > 1 && section.pyramid.scale_factor <= 4 &&
                        section.pyramid.levels >= 1 && section.pyramid.levels <= kMaxLevels;
@@ -269,7 +274,7 @@ void put_keyframes(const map::BundledMap& map, const FileIds& ids, bool with_wor
   }
 }
 
-std::size_t take_keyframes(ByteReader& in, bool with_words, map::BundledMap& map) {
+std::size_t take_keyframes(SectionReader& in, bool with_words, map::BundledMap& map) {
   constexpr std::size_t kKeyframeBytes = kTransformBytes + 4 + 4 + 8 + 4;
   constexpr std::size_t kCameraFrameBytes = 1 + 8 + 4 + 1;
   const std::size_t n = in.count(kKeyframeBytes + map.rig().size() * kCameraFrameBytes);
@@ -312,7 +317,7 @@ void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& o
   }
 }
 
-void take_landmarks(ByteReader& in, map::BundledMap& map) {
+void take_landmarks(SectionReader& in, map::BundledMap& map) {
   const std::size_t n = in.count(kLandmarkBytes);
   for (std::size_t i = 0; i < n && in.ok(); ++i) {
     in.enter("landmark", i);

@@ -37,28 +37,28 @@ struct RigSection {
   std::shared_ptr<const camera::Rig> rig, given;  // BundledMap::rig and given_rig
 };
 // Files before version 3 do not contain the second rig, which is then the first one.
-std::optional<RigSection> take_rigs(ByteReader& in, std::uint32_t version);
+std::optional<RigSection> take_rigs(SectionReader& in, std::uint32_t version);
 
 struct InfoSection {
   feature::PyramidShape pyramid;
   map::Scale scale = map::Scale::kMetric;
   MapFileInfo info;
 };
-InfoSection take_info(ByteReader& in);
+InfoSection take_info(SectionReader& in);
 
 // Adds the keyframes with their spanning trees to an empty map. Returns one more than the highest word id.
-std::size_t take_keyframes(ByteReader& in, bool with_words, map::BundledMap& map);
+std::size_t take_keyframes(SectionReader& in, bool with_words, map::BundledMap& map);
 
-void take_landmarks(ByteReader& in, map::BundledMap& map);
+void take_landmarks(SectionReader& in, map::BundledMap& map);
 
 // Write and read the BundledFrame of a keyframe; implemented in map_frame_bytes.cc.
 void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out);
-frame::BundledFrame take_frame(ByteReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
+frame::BundledFrame take_frame(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                                bool with_words, std::size_t& words_end);
 
 // Write and read a transform as seven numbers, quaternion x y z w and translation. It is read back exactly.
 void put_transform(const geometry::SE3& transform, ByteWriter& out);
-geometry::SE3 take_transform(ByteReader& in);
+geometry::SE3 take_transform(SectionReader& in);
 constexpr std::size_t kTransformBytes = 7 * sizeof(double);
 
 // Returns true if the point is finite and small enough that computations with it do not overflow.

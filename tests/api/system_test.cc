@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "api/textured_wall.h"
+#include "storage/map_file.h"
 #include "support/data_on_disk.h"
 
 namespace bslam {
@@ -109,6 +110,19 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   const auto resumed = System::create(TexturedWall::rig(), sequential(), {.map = file});
   ASSERT_TRUE(resumed) << resumed.error().message();
   EXPECT_EQ(resumed->map().num_landmarks(), landmarks.size());
+  // A warning about a map is logged, and kept.
+  auto saved = storage::read_map(file).value();
+  saved.info.warning = "the images do not belong to the calibration";
+  const auto doubtful = file.parent_path() / "doubtful.bmap", again = file.parent_path() / "again.bmap";
+  ASSERT_TRUE(storage::write_map(saved.map, saved.info, doubtful));
+  std::vector<std::string> lines;
+  Startup startup{.map = doubtful};
+  startup.callbacks.log = [&](LogLevel, std::string_view line) { lines.emplace_back(line); };
+  const auto warned = System::create(TexturedWall::rig(), sequential(), startup);
+  ASSERT_TRUE(warned) << warned.error().message();
+  EXPECT_EQ(std::ranges::count(lines, "map: the run that made it has found: " + saved.info.warning), 1);
+  ASSERT_TRUE(warned->save_map(again));
+  EXPECT_EQ(storage::read_map(again)->info.warning, saved.info.warning);
   CameraCalibration other = TexturedWall::calibration(1);
   other.intrinsics[0] *= 1.1;
   const Rig another = Rig::make({TexturedWall::calibration(0), other}).value();

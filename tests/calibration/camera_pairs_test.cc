@@ -86,6 +86,7 @@ TEST(CameraPairs, AnotherArrangementIsNoSmallRotation) {
   EXPECT_TRUE(shows_another_arrangement(evidence));
   evidence.agreeing[0] = 50;
   EXPECT_FALSE(shows_another_arrangement(evidence));
+  EXPECT_TRUE(shows_another_arrangement({.matches = 100, .exchanged = OtherCalibrations{{"left", "right"}, 60}}));
 }
 
 }  // namespace

@@ -51,6 +51,26 @@ TEST(ConventionCheck, FindsTheIntendedConvention) {
   EXPECT_EQ(judged(with_inverse_extrinsics(swapped), views).verdict, Convention::kSwappedInverse);
 }
 
+// Cameras 1 and 2 of a ring are exchanged: the images of cameras 0 and 1 are those of cameras 0 and 2.
+TEST(ConventionCheck, NamesTheCamerasThatWereExchanged) {
+  const camera::Rig stereo = camera::stereo_rig();
+  const SE3 turned(geometry::so3_exp({0, 1.2, 0}), Eigen::Vector3d(0.1, 0, 0.2));
+  camera::Camera third = stereo.camera(1u);
+  third.name = "third";
+  const camera::Rig wrong({{stereo.camera(0u), stereo.body_from_cam(0)},
+                           {third, stereo.body_from_cam(1) * turned},
+                           {stereo.camera(1u), stereo.body_from_cam(1)}});
+  const PairEvidence evidence = judged(wrong, views_of(stereo));
+  EXPECT_FALSE(evidence.verdict || evidence.other);
+  ASSERT_TRUE(evidence.exchanged);
+  EXPECT_EQ(evidence.exchanged->agreeing, 150);
+  EXPECT_EQ(evidence.exchanged->cameras, (std::array{stereo.camera(0u).name, stereo.camera(1u).name}));
+  EXPECT_NE(describe_pair(evidence).find("150 of 150 matches are consistent with the calibrations of "),
+            std::string::npos);
+  EXPECT_NE(describe_evidence(std::array{evidence}).find("they are consistent with exchanged cameras"),
+            std::string::npos);
+}
+
 TEST(ConventionCheck, HasNoVerdictIfNoConventionFits) {
   const camera::Rig rig = camera::stereo_rig();
   auto views = views_of(rig);

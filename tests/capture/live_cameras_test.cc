@@ -202,7 +202,7 @@ TEST_F(LiveCamerasTest, RecordingHasTheSameFrames) {
   auto live = open(eventful());
   const auto first_ns = live->wait_for_first_frame();
   ASSERT_TRUE(first_ns.ok()) << first_ns.error().message();
-  auto recorder = Recorder::create(file, rig_, {false, true});
+  auto recorder = Recorder::create(file, rig_, {0, 1}, {false, true});
   ASSERT_TRUE(recorder.ok());
   live->record_to(recorder->get());
   live->begin();
@@ -322,6 +322,25 @@ TEST_F(LiveCamerasTest, NewestFramesWinAndDroppedOnesAreReported) {
   EXPECT_EQ(items.back().images.time_ns, kStart + 39 * kInterval);
 }
 
+TEST_F(LiveCamerasTest, LateImagesAreNotBlamedOnTheCameraWhileFramesWait) {
+  std::vector<Event> events;
+  add_frames(events, 0, 10);
+  events.push_back({Event::Kind::kGate, 0});
+  add_frames(events, 10, 40);
+  events.push_back({Event::Kind::kImage, 0, kStart + 20 * kInterval + kMs});
+  auto live = open(std::move(events), 3);
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  live->begin();
+  script_->open_gate();
+  script_->wait_for_ends(2);
+  ASSERT_EQ(said_.size(), 1u);
+  EXPECT_EQ(said_[0],
+            "cam0 (a): an image came too late for its frame, while the computer does not keep up; it is not used, and "
+            "further ones are counted");
+  EXPECT_EQ(live->notes(), std::vector<std::string>{"cam0 (a): 1 images were in no frame (1 too-late; 1 while the "
+                                                    "computer did not keep up)"});
+}
+
 TEST_F(LiveCamerasTest, SaysWhichCameraDeliversNothing) {
   using Kind = Event::Kind;
   std::vector<Event> events;
@@ -377,7 +396,7 @@ TEST(RecorderTest, WaitingForADiskThatHangsCanBeStopped) {
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
   ASSERT_GE(reader, 0);
   const camera::Rig rig = synthetic::ring_rig(1, 512);
-  auto recorder = Recorder::create(pipe, rig, {false});
+  auto recorder = Recorder::create(pipe, rig, {0}, {false});
   ASSERT_TRUE(recorder.ok()) << recorder.error().message();
   const auto pixels = std::make_shared<CapturedPixels>();
   std::mt19937 random(1);
@@ -434,7 +453,7 @@ TEST_F(LiveCamerasTest, FailureOfTheDiskEndsTheRecordingOnly) {
   add_frames(events, 10, 200);
   auto live = open(std::move(events));
   const support::TemporaryFolder folder;
-  auto recorder = Recorder::create(folder.path() / "live.mcap", rig_, {false, true});
+  auto recorder = Recorder::create(folder.path() / "live.mcap", rig_, {0, 1}, {false, true});
   ASSERT_TRUE(recorder.ok());
   ASSERT_TRUE(live->wait_for_first_frame().ok());
   live->record_to(recorder->get());

@@ -22,10 +22,10 @@ class LiveRecordingTest : public testing::Test {
   LiveRecordingTest()
       : rig_(rig_formats::read_bslam_rig("rig.yaml", rig_formats::rig_to_yaml(synthetic::ring_rig(2, 64)))->cameras) {}
 
-  void write(const std::string& rig_text) {
+  void write(const std::string& rig_text, const std::vector<int>& numbers = {0, 1}) {
     auto writer = *containers::McapWriter::create(path());
     ASSERT_TRUE(writer->attach(kLiveRigFile, "application/yaml", rig_text).ok());
-    ASSERT_TRUE(writer->add_metadata(kLiveMetadata, live_metadata(kTopics)).ok());
+    ASSERT_TRUE(writer->add_metadata(kLiveMetadata, live_metadata(kTopics, numbers)).ok());
     for (const std::string& topic : kTopics)
       writer->add_topic(topic, containers::kImageType, containers::image_definition());
     const camera::Camera& camera = rig_.camera(std::size_t{0});
@@ -59,6 +59,18 @@ TEST_F(LiveRecordingTest, HasTheFramesAndTheRigOfTheRun) {
     EXPECT_EQ(data->frames[k].images[1].has_value(), k != 5);
   }
   EXPECT_TRUE(data->warnings.empty()) << data->warnings.front();
+}
+
+// Of a run that did not use all cameras of its rig file.
+TEST_F(LiveRecordingTest, HasTheNumbersOfItsCamerasInTheRigFile) {
+  write(rig_formats::rig_to_yaml(rig_), {1, 3});
+  const auto data = open_dataset({.path = path()});
+  ASSERT_TRUE(data.ok()) << data.error().message();
+  EXPECT_EQ(data->cameras_used, (std::vector{1, 3}));
+  EXPECT_FALSE(data->whole_rig);
+  EXPECT_EQ(open_dataset({.path = path(), .cameras = {1}})->cameras_used, std::vector{3});
+  write(rig_formats::rig_to_yaml(rig_), {1, 1});  // damaged
+  EXPECT_EQ(open_dataset({.path = path()})->cameras_used, (std::vector{0, 1}));
 }
 
 TEST_F(LiveRecordingTest, IsGroupedByTimeWhereItsFramesAreNone) {

@@ -262,7 +262,7 @@ TEST_F(MapExportFiles, ImagesInsideOfARecordingGiveColoursAndUndistortedFiles) {
   EXPECT_EQ(named, ImageTable(selection_, nullptr, {}).images().size());
 }
 
-// The same cameras mounted differently are another rig of the map, whose names are taken: cam0_2 and cam1_2.
+// The same cameras mounted differently are another rig of the map, whose names are taken: they become cam2 and cam3.
 TEST_F(MapExportFiles, TheRecordingOfAnAppendedRigIsFound) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < 2; ++c) cameras.push_back({map_.rig().camera(c), map_.rig().body_from_cam(c)});

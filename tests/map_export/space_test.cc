@@ -11,7 +11,6 @@
 #include "map_export/exported_map.h"
 #include "map_export/occupancy_grid.h"
 #include "map_export/octree.h"
-#include "map_export/up_axis.h"
 
 namespace bslam::map_export {
 namespace {
@@ -32,27 +31,6 @@ std::vector<Scan> scans_of_room() {
     scans.push_back(std::move(scan));
   }
   return scans;
-}
-
-TEST(UpAxis, IsAnAxisOfBodyCameraOrWorld) {
-  EXPECT_EQ(parse_up_axis("body:z").value().direction, Eigen::Vector3d::UnitZ());
-  EXPECT_EQ(parse_up_axis("camera:-y").value().direction, Eigen::Vector3d(0, -1, 0));
-  EXPECT_EQ(parse_up_axis("world:0,-3,4").value().direction, Eigen::Vector3d(0, -0.6, 0.8));
-  for (const char* wrong : {"", "z", "body", "body:", "body:w", "sky:z", "world:1,2", "world:0,0,0", "world:1,nan,2",
-                            "world:1,2,3,4", "body:--z", "world:1e308,1e308,1e308x"})
-    EXPECT_FALSE(parse_up_axis(wrong)) << wrong;
-}
-
-// A camera that is mounted rolled by 34 degrees on a level body that turns about its x axis, which is vertical.
-TEST(UpAxis, OfTheBodyIsTheVerticalHoweverTheCameraIsMounted) {
-  const geometry::SE3 T_body_cam(geometry::so3_exp({0.3, 0.1, 0.6}), Eigen::Vector3d(0.1, 0, 0));
-  std::vector<geometry::SE3> poses;
-  for (int i = 0; i < 30; ++i)
-    poses.push_back(geometry::SE3(geometry::so3_exp({0.2 * i, 0, 0}), Eigen::Vector3d(0, i, 0)) * T_body_cam);
-  const auto up = up_in_world(parse_up_axis("body:x").value(), poses, T_body_cam);
-  ASSERT_TRUE(up);
-  EXPECT_LT((*up - Eigen::Vector3d::UnitX()).norm(), 1e-12);
-  EXPECT_FALSE(up_in_world(parse_up_axis("body:y").value(), poses, T_body_cam));  // it points everywhere
 }
 
 TEST(Carving, EndsBeforeUncertainLandmarks) {

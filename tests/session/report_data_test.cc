@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "evaluation/association.h"
@@ -32,28 +31,6 @@ TEST(ReportArrays, AreThinnedToTheLimit) {
   EXPECT_EQ(report_stride(10, 10), 1u);
   EXPECT_EQ(report_stride(11, 10), 2u);
   EXPECT_EQ(report_stride(1'000'000, 100'000), 10u);
-}
-
-// Poses of a camera that turns around the world's z axis, tilted downward.
-std::vector<SE3> turning_camera(double tilt, double turn) {
-  std::vector<SE3> poses;
-  for (int i = 0; i < 36; ++i) {
-    const Eigen::AngleAxisd yaw(turn * i / 36, Vector3d::UnitZ()), down(tilt, Vector3d::UnitX());
-    const Eigen::AngleAxisd forward(-std::numbers::pi / 2, Vector3d::UnitX());  // z of the camera is y of the world
-    poses.emplace_back(Eigen::Quaterniond(yaw * forward * down), Vector3d(std::cos(i), std::sin(i), 0));
-  }
-  return poses;
-}
-
-TEST(VerticalDirection, IsThatOfUprightImages) {
-  EXPECT_LT((vertical_direction({}) - Vector3d(0, -1, 0)).norm(), 1e-12);
-  EXPECT_LT((vertical_direction(turning_camera(0, 0)) - Vector3d::UnitZ()).norm(), 1e-12);
-  EXPECT_LT((vertical_direction(turning_camera(0, 2 * std::numbers::pi)) - Vector3d::UnitZ()).norm(), 1e-12);
-}
-
-TEST(VerticalDirection, IsTheAxisAboutWhichATiltedCameraTurns) {
-  for (const double tilt : {-0.9, 0.9})
-    EXPECT_LT((vertical_direction(turning_camera(tilt, 2 * std::numbers::pi)) - Vector3d::UnitZ()).norm(), 1e-9);
 }
 
 TEST(ReportRig, LimitsTheRaysOfWideFieldsOfView) {

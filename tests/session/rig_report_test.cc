@@ -7,6 +7,10 @@
 
 #include "calibration/rig_warnings.h"
 #include "camera/stereo_rig.h"
+#include "containers/mcap_writer.h"
+#include "containers/ros_writer.h"
+#include "dataset/live_recording.h"
+#include "rig_formats/bslam_rig.h"
 #include "rig_formats/rig_file.h"
 #include "simulator/simulation_writer.h"
 #include "support/bag_writer.h"
@@ -80,6 +84,22 @@ TEST_F(RigReport, DescribesTheCalibrationOfABag) {
   ASSERT_TRUE(text) << text.error().message();
   EXPECT_NE(text->find("format: CameraInfo of a bag\n2 cameras\n"), std::string::npos) << *text;
   EXPECT_NE(text->find("11.0 cm"), std::string::npos) << *text;
+  // The recording of a live run has its rig as an attachment.
+  const fs::path recording = folder_ / "live.mcap";
+  auto writer = *containers::McapWriter::create(recording);
+  const camera::Rig rig = synthetic::ring_rig(1, 32);
+  ASSERT_TRUE(writer->attach(dataset::kLiveRigFile, "application/yaml", rig_formats::rig_to_yaml(rig)));
+  ASSERT_TRUE(writer->add_metadata(dataset::kLiveMetadata, dataset::live_metadata({"/cam0/image_raw"}, {0})));
+  writer->add_topic("/cam0/image_raw", containers::kImageType, containers::image_definition());
+  const camera::Camera& camera = rig.camera(0u);
+  const std::vector<std::uint8_t> pixels(static_cast<std::size_t>(camera.width * camera.height), 9);
+  ASSERT_TRUE(writer->write(0, 1'000'000'000,
+                            containers::grey_image_message(1'000'000'000, "camera", camera.width, camera.height,
+                                                           pixels.data(), camera.width)));
+  ASSERT_TRUE(writer->finish());
+  const auto of_live = report_rig({.file = recording.string()});
+  ASSERT_TRUE(of_live) << of_live.error().message();
+  EXPECT_NE(of_live->find("format: rig of bslam live in its recording\n1 camera"), std::string::npos) << *of_live;
   messages.resize(1);  // a bag without images
   support::write_text(bag, support::rosbag1_bytes(messages));
   EXPECT_FALSE(report_rig({.file = bag.string()}));

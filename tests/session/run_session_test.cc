@@ -175,6 +175,23 @@ TEST_F(Session, WritesTheReportIfItIsAskedFor) {
   EXPECT_LT(json["truth"]["ate_m"]["rmse"], 0.05);
 }
 
+TEST_F(Session, ViewsOfTheReportHaveTheUpwardDirectionThatIsGiven) {
+  const dataset::Dataset data = dataset();
+  const SessionOptions o = options();
+  const auto result = run_session(data, o);
+  ASSERT_TRUE(result.ok());
+  const auto up_of = [&](const std::optional<geometry::UpAxis>& up) {
+    const auto json = report_json(*result, o.config, {data, "bslam run", up});
+    return Eigen::Vector3d(json["submaps"][0]["up"].get<std::vector<double>>().data());
+  };
+  const Eigen::Vector3d given(0.6, 0, -0.8);
+  EXPECT_LT((up_of(geometry::UpAxis{geometry::UpAxis::Frame::kWorld, given}) - given).norm(), 1e-6);
+  const auto body = up_of(geometry::UpAxis{geometry::UpAxis::Frame::kBody, Eigen::Vector3d::UnitZ()});
+  const auto camera = up_of({});
+  EXPECT_GT(body.dot(camera), 0.95);  // the body is level
+  EXPECT_GT((body - camera).norm(), 1e-6);
+}
+
 // Poses of camera 0 beside mav0 are ground truth as well.
 TEST_F(Session, ReportComparesWithTheTruthOfCamera0) {
   const fs::path linked = folder() / "linked";

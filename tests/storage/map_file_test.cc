@@ -304,6 +304,13 @@ TEST(MapFits, OnlyTheVocabularyOfItsKeyframes) {
             "vocabulary");
 }
 
+TEST(MapFile, KeepsTheWarningOfItsRun) {
+  const map::BundledMap map = small_map(synthetic::ring_rig(1));
+  const SavedMap saved = read_back(map, {0, "", "", "the images do not belong to the calibration"});
+  EXPECT_EQ(saved.info.warning, "the images do not belong to the calibration");
+  EXPECT_EQ(read_back(map).info.warning, "");
+}
+
 // ---- rigs
 
 TEST(MapFile, KeepsTheGivenCalibrationAndFurtherRigs) {
@@ -323,6 +330,27 @@ TEST(MapFile, KeepsTheGivenCalibrationAndFurtherRigs) {
   EXPECT_FALSE(map::find_rig(saved.map, synthetic::fisheye_rig(2)));
 }
 
+// Cameras whose names are taken get other names in the map, but are still known by those that they were given.
+TEST(MapFile, KnowsCamerasByTheNamesThatTheyWereGiven) {
+  map::BundledMap map = small_map(synthetic::ring_rig(2));
+  const camera::Rig wide = synthetic::fisheye_rig(1);
+  const camera::Camera& camera = wide.camera(0);
+  const auto named = [&](std::string first, std::string second) {
+    camera::Camera a = camera, b = camera;
+    a.name = std::move(first);
+    b.name = std::move(second);
+    const geometry::SE3 T(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.2, 0, 0));
+    return camera::Rig({{a, geometry::SE3()}, {b, T}});
+  };
+  EXPECT_EQ(map::find_or_append_rig(map, named("cam0", "cam0_left")), 2u);
+  const map::BundledMap saved = read_back(map).map;
+  EXPECT_EQ(saved.rig().camera(2).name, "cam2");
+  EXPECT_EQ(saved.given_rig().camera(2).name, "cam0");
+  EXPECT_EQ(map::find_rig(saved, named("cam0", "cam0_left")), 2u);
+  EXPECT_EQ(map::find_rig(saved, named("cam0", "another")), 2u);
+  EXPECT_FALSE(map::find_rig(saved, named("cam0_left", "cam0")));  // exchanged
+}
+
 TEST(MapFile, ReadsTheRigsOfEarlierVersions) {
   const map::BundledMap map = small_map(synthetic::ring_rig(2));
   ByteWriter out;
@@ -331,14 +359,14 @@ TEST(MapFile, ReadsTheRigsOfEarlierVersions) {
   constexpr std::size_t kCount = 4, kReadouts = 2 * sizeof(double), kTransform = 7 * sizeof(double);
   const std::size_t one = (bytes.size() - kCount) / 2, without_frame = one - kTransform;
   for (const std::size_t size : {without_frame - kReadouts, without_frame}) {  // version 2: readout times are optional
-    ByteReader in(std::string_view(bytes).substr(0, kCount + size), "rig");
+    SectionReader in(std::string_view(bytes).substr(0, kCount + size), "rig");
     const auto rigs = take_rigs(in, 2);
     ASSERT_TRUE(rigs) << in.error().message();
     EXPECT_TRUE(rigs->rig->same_calibration(map.rig()));
     EXPECT_EQ(rigs->given, rigs->rig);
   }
   const std::string version3 = bytes.substr(0, kCount + without_frame) + bytes.substr(kCount + one, without_frame);
-  ByteReader in(version3, "rig");
+  SectionReader in(version3, "rig");
   const auto rigs = take_rigs(in, 3);
   ASSERT_TRUE(rigs) << in.error().message();
   EXPECT_TRUE(rigs->given->same_calibration(map.given_rig()));

@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "calibration/rig_warnings.h"
+#include "evaluation/trajectory_file.h"
 #include "rig_formats/rig_file.h"
 #include "simulator/simulation_writer.h"
 #include "synthetic/rigs.h"
@@ -335,6 +336,18 @@ TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
   const Ran scaled = run("eval " + out("scaled.tum") + " " + truth);
   EXPECT_NE(scaled.err.find("use --align sim3"), std::string::npos) << scaled.err;
   EXPECT_EQ(run("eval " + out("scaled.tum") + " " + truth + " --align sim3").err, "");
+  // The distance from camera to body has no meaning in the unit of the estimate, so that the ground truth is moved.
+  ASSERT_EQ(run("export " + truth + " --frame body --rig " + data() + " --out " + out("true_body.tum")).status, 0);
+  evaluation::Trajectory quarter = evaluation::read_trajectory(truth).value();
+  for (evaluation::TimedPose& pose : quarter)
+    pose.T_world_frame = {pose.T_world_frame.rotation(), 0.25 * pose.T_world_frame.translation()};
+  std::ofstream(out("quarter.tum")) << evaluation::tum_text(
+      quarter, "# bslam trajectory frame=cam0 parent=world final=true\n# scale=up-to-scale: lengths are not in metres");
+  const Ran of_body = run("eval " + out("quarter.tum") + " " + out("true_body.tum") +
+                          " --gt-frame body --align sim3 --json --rig " + data());
+  EXPECT_NE(of_body.err.find("the ground truth was moved by 0."), std::string::npos) << of_body.err;
+  EXPECT_LT(nlohmann::json::parse(of_body.out)["ate"]["max"], 1e-6) << of_body.out;
+  EXPECT_NEAR(nlohmann::json::parse(of_body.out)["scale"], 4, 1e-6) << of_body.out;
   const std::string rig_and_out = " --rig " + data() + " --overwrite --out " + out("exported.tum");
   EXPECT_NE(run("export " + out("scaled.tum") + " --frame body" + rig_and_out).err.find("is not the metre"),
             std::string::npos);
@@ -352,6 +365,30 @@ TEST_F(CommandLine, ExplainsAPortAfterViewAndARigOfAnotherResolution) {
   const Ran info = run("data info " + data() + " --rig " + out("other_size.yaml"));
   EXPECT_NE(info.out.find("missing for bslam run: the calibration of 376 x 240 pixels"), std::string::npos) << info.out;
   EXPECT_EQ(run("data info " + data() + " --rig " + data() + "/rig.yaml").out.find("missing"), std::string::npos);
+}
+
+// An interpreter that finds the packages, but no viewer, and fails after the run with a coloured message.
+TEST_F(CommandLine, TheTargetOfRerunIsCheckedBeforeTheRun) {
+  const std::string interpreter = out("python"), file = out("run.rrd");
+  std::ofstream(interpreter) << "#!/bin/sh\ncase \"$2\" in\n*is_reachable*) exit 3 ;;\n"
+                             << "*main*) printf 'log\\n\\033[1;31mError\\033[0m: no room\\n'; exit 2 ;;\nesac\n";
+  fs::permissions(interpreter, fs::perms::owner_all);
+  ::setenv("BSLAM_PYTHON", interpreter.c_str(), 1);
+  std::ofstream(file) << "precious";
+  const std::string base = "run " + data() + " --end 0.3 --set features.per_image=300 --progress never --out ";
+  for (const auto& [target, message] :
+       {std::pair(file, "run.rrd: --rerun: found an existing file"),
+        std::pair(out("none/a.rrd"), "--rerun: found no such folder"),
+        std::pair(std::string("rerun+http://127.0.0.1:9/proxy"), "found no viewer at")}) {
+    expect_rejected(base + out("rejected") + " --rerun " + target);
+    EXPECT_NE(run(base + out("rejected") + " --rerun " + target).err.find(message), std::string::npos) << target;
+  }
+  EXPECT_EQ(slurp(file), "precious");
+  const Ran failed = run(base + out("shown") + " --overwrite --rerun " + file);
+  ::unsetenv("BSLAM_PYTHON");
+  EXPECT_EQ(failed.status, 2);
+  EXPECT_NE(failed.err.find("found Error: no room, expected a file or a viewer"), std::string::npos) << failed.err;
+  EXPECT_TRUE(fs::exists(out("shown/trajectory.tum")));
 }
 
 TEST_F(CommandLine, VocabulariesCanBeTrainedDescribedAndUsed) {
@@ -415,7 +452,9 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
   const camera::Rig rig = rig_formats::read_rig(data() + "/rig.yaml").value();
   ASSERT_TRUE(rig_formats::write_rig(calibration::with_inverse_extrinsics(rig), out("inverse.yaml")));
   const std::string options = " --set features.per_image=500 --progress never --rig ";
-  const Ran inverse = run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse"));
+  const std::string map = out("inverse.bmap"), found = "the images do not belong to the calibration";
+  const Ran inverse =
+      run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse") + " --save-map " + map);
   EXPECT_NE(inverse.err.find("warning: the images do not belong to the calibration"), std::string::npos) << inverse.err;
   EXPECT_NE(inverse.out.find("calibration: the images do not belong to it"), std::string::npos) << inverse.out;
   const auto of_inverse = nlohmann::json::parse(slurp(out("inverse") + "/summary.json"));
@@ -423,6 +462,11 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
   EXPECT_EQ(of_inverse["calibration"]["refined"], false);
   EXPECT_EQ(of_inverse["map"]["scale"], "unobservable");
   EXPECT_FALSE(fs::exists(out("inverse") + "/rig_refined.yaml"));
+  EXPECT_NE(run("map info " + map).out.find("warning of the run that made it: " + found), std::string::npos);
+  const Ran continued = run("run " + data() + options + out("inverse.yaml") + " --end 0.5 --localize-only --load-map " +
+                            map + " --out " + out("inverse_again"));
+  EXPECT_NE(continued.err.find("inverse.bmap: the run that made this map has found: " + found), std::string::npos)
+      << continued.err;
   for (const auto& warning : of_inverse["warnings"])
     EXPECT_NE(inverse.err.find("warning: " + warning.get<std::string>() + "\n"), std::string::npos) << warning;
   EXPECT_EQ(of_inverse["warnings"].size(),
@@ -505,6 +549,19 @@ TEST_F(CommandLine, RecordedLiveRunIsRepeatedToTheByte) {
   EXPECT_EQ(seconds("live"), seconds("live_again"));
 }
 
+// The recording has the number that the camera has in the rig file, which is in the trajectory.
+TEST_F(CommandLine, RecordedLiveRunWithoutCamera0HasTheSameFrameAgain) {
+  const std::string file = out("live_second.mcap"), options = " --mode sequential --set features.per_image=500 --out ";
+  const Ran live = run("live --rig " + data() + "/rig.yaml --cameras -," + data() + "/mav0/cam1,-,- --duration 0.5" +
+                       options + out("live_second") + " --record " + file);
+  ASSERT_TRUE(live.status == 0 || live.status == 3) << live.err;
+  const Ran again = run("run " + file + options + out("live_second_again"));
+  EXPECT_EQ(again.status, live.status) << again.err;
+  const std::string trajectory = slurp(out("live_second/trajectory.tum"));
+  EXPECT_EQ(trajectory.rfind("# bslam trajectory frame=cam1 ", 0), 0u) << trajectory;
+  EXPECT_EQ(slurp(out("live_second_again/trajectory.tum")), trajectory);
+}
+
 TEST_F(CommandLine, CtrlCEndsALiveRunWithAllItsFiles) {
   const std::string file = out("ended.mcap"), folder = out("ended");
   const pid_t child = ::fork();
@@ -544,7 +601,22 @@ TEST_F(CommandLine, RejectsBadRequestsForLiveRuns) {
   expect_rejected("live " + rig + "--cameras /dev/null,/dev/null,-,-" + folder);
   expect_rejected("live " + rig + "--cameras /dev/null,-,-,- --exposure bright" + folder);
   expect_rejected("live " + rig + "--cameras /dev/null,-,-,- --pixels RGB" + folder);
-  expect_rejected("live " + rig + "--cameras " + data() + "/mav0/cam0,-,-,- --record /nowhere/a.mcap" + folder);
+  // Before cameras are opened, of which there are none.
+  const std::string none = "live " + rig + "--cameras /nowhere/video0,-,-,- ";
+  for (const auto& [arguments, message] :
+       {std::pair("--record /nowhere/a.mcap" + folder, "/nowhere: --record: found no such folder"),
+        std::pair("--record " + out("a.bag") + folder, "a.bag, expected the name of an MCAP file"),
+        std::pair("--save-map /nowhere/a.bmap" + folder, "/nowhere: --save-map: found no such folder"),
+        std::pair("--rerun " + data() + "/rig.yaml" + folder, "--rerun: found an existing file"),
+        std::pair(" --out " + data(), "--out: found a folder that is not empty"),
+        std::pair("--out " + data() + "/rig.yaml/out", "--out: found "),
+        std::pair("--duration 0" + folder, "--duration: Value 0")}) {
+    const Ran ran = run(none + arguments);
+    EXPECT_EQ(ran.status, 2) << arguments;
+    EXPECT_NE(ran.err.find(message), std::string::npos) << arguments << ": " << ran.err;
+  }
+  const std::string played = "live " + rig + "--cameras " + data() + "/mav0/cam0,-,-,-" + folder;
+  for (const char* setting : {" --fps 10", " --exposure auto", " --pixels GREY"}) expect_rejected(played + setting);
   EXPECT_EQ(run("live --list").status, 0);
 }
 

@@ -1,11 +1,13 @@
 // Runs on real images in ../shared/data, if they are present; they are not part of the repository.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 
 #include "evaluation/trajectory_error.h"
 #include "evaluation/trajectory_file.h"
 #include "session/run_session.h"
+#include "session/run_warnings.h"
 
 namespace bslam {
 namespace {
@@ -49,6 +51,25 @@ TEST_P(RealData, TracksEveryFrameWithEveryCamera) {
 INSTANTIATE_TEST_SUITE_P(Sets, RealData,
                          testing::Values(RealCase{"kitti_06_start", {}, 0.1}, RealCase{"aria_gen2_4cam", {}, 0.01},
                                          RealCase{"aria_gen2_4cam", {0, 1}, 0.01}, RealCase{"kitti_0039", {}, 0.25}));
+
+// Calibrations of two cameras are exchanged: nothing starts, and the images tell why.
+TEST(RealData, ExchangedCalibrationsAreNamedIfNothingStarts) {
+  const std::filesystem::path data = std::filesystem::path(BSLAM_SHARED_DIR) / "data/aria_gen2_4cam";
+  if (!std::filesystem::is_directory(data)) GTEST_SKIP() << data << " is not present";
+  for (const std::array exchange : {std::array{1, 0, 2, 3}, {0, 2, 1, 3}, {0, 3, 2, 1}}) {
+    auto dataset = dataset::open_dataset({.path = data});
+    ASSERT_TRUE(dataset) << dataset.error().message();
+    dataset->rig = dataset->rig.subset(exchange);
+    session::SessionOptions options;
+    options.config.mode = execution::Mode::kSequential;
+    const auto result = session::run_session(*dataset, options);
+    ASSERT_TRUE(result) << result.error().message();
+    EXPECT_EQ(result->record.maps_started, 0);
+    EXPECT_TRUE(result->record.calibration.foreign_images());
+    EXPECT_NE(session::foreign_images_text(result->record).find("so no map was started: of cameras"),
+              std::string::npos);
+  }
+}
 
 TEST(RealData, HasNoMotionWhileTheRigIsAtRest) {
   const std::filesystem::path data = std::filesystem::path(BSLAM_SHARED_DIR) / "data/euroc_v101_rest";

@@ -6,9 +6,10 @@ export function verdictSentence(run: Run): string {
   const c = run.summary.calibration;
   const foreign = c.pairs.filter((p) => p.contradicted);
   const shares = (foreign.length ? foreign : c.pairs)
-    .map((p) => `${p.cameras.join(' and ')} share ${decimal(100 * p.matched_share, 1)} % of the features in their common view`).join('; ');
+    .map((p) => p.cameras.join(' and ') + (p.matched_share === null ? '' : ` share ${decimal(100 * p.matched_share, 1)} % of the features in their common view`)).join('; ');
   if (foreign.length) {
-    return `The images do not belong to the calibration, so poses, scale and map are wrong: ${shares}; ${foreign[0].evidence}.`;
+    const effect = foreign[0].matched_share === null ? 'no map was started' : 'poses, scale and map are wrong';
+    return `The images do not belong to the calibration, so ${effect}: ${shares}; ${foreign[0].evidence}.`;
   }
   if (c.verdict === 'unknown' && (shares || c.disagreeing.length)) {
     const disagreeing = c.disagreeing.map((name) => `${name} shows other things than the map predicts`);

@@ -17,7 +17,7 @@ export interface CalibratedCamera {
 }
 
 // Cameras that should see the same things but do not.
-export interface CameraPair { cameras: string[]; overlap: number; matched_share: number; contradicted: boolean; evidence: string | null }
+export interface CameraPair { cameras: string[]; overlap: number; matched_share: number | null; contradicted: boolean; evidence: string | null }
 
 export interface SummaryCamera {
   name: string; images: number; skipped: number;

@@ -1,4 +1,4 @@
-#include "map_export/up_axis.h"
+#include "geometry/up_axis.h"
 
 #include <charconv>
 #include <cmath>
@@ -7,10 +7,8 @@
 
 #include "base/split.h"
 
-namespace bslam::map_export {
+namespace bslam::geometry {
 namespace {
-
-using geometry::Vector3d;
 
 std::optional<double> number(const std::string& text) {
   double value = 0;
@@ -52,18 +50,17 @@ Result<UpAxis> parse_up_axis(const std::string& text) {
   return UpAxis{frame == "camera" ? kCamera : frame == "body" ? kBody : kWorld, *axis};
 }
 
-Result<Vector3d> up_in_world(const UpAxis& axis, std::span<const geometry::SE3> T_world_cam0,
-                             const geometry::SE3& T_body_cam0) {
+Result<Vector3d> up_in_world(const UpAxis& axis, std::span<const SE3> T_world_cam0, const SE3& T_body_cam0) {
   constexpr double kMinMean = 0.5;  // length of the mean of unit vectors; axes within 60 degrees of it
   if (axis.frame == UpAxis::Frame::kWorld) return axis.direction;
   const Vector3d in_cam0 =
       axis.frame == UpAxis::Frame::kBody ? Vector3d(T_body_cam0.rotation().inverse() * axis.direction) : axis.direction;
   Vector3d mean = Vector3d::Zero();
-  for (const geometry::SE3& T : T_world_cam0) mean += T.rotation() * in_cam0 / static_cast<double>(T_world_cam0.size());
+  for (const SE3& T : T_world_cam0) mean += T.rotation() * in_cam0 / static_cast<double>(T_world_cam0.size());
   if (mean.norm() < kMinMean)
     return Error{"command line", "--up", "an axis that points everywhere during the recording",
                  "an axis that points upward most of the time"};
   return Vector3d(mean.normalized());
 }
 
-}  // namespace bslam::map_export
+}  // namespace bslam::geometry

@@ -1,6 +1,7 @@
 // Reads numbers, strings and arrays from bytes in memory, with every access checked.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -8,7 +9,7 @@
 #include <string_view>
 #include <type_traits>
 
-namespace bslam::containers {
+namespace bslam {
 
 // A read beyond the end gives zero or an empty string, and makes ok() false from then on.
 class ByteReader {
@@ -20,14 +21,22 @@ class ByteReader {
   std::size_t left() const { return bytes_.size() - at_; }
 
   template <class T>
-  T number() {
+  void numbers(T* out, std::size_t count) {
     static_assert(std::is_arithmetic_v<T>);
-    const std::string_view from = take(sizeof(T));
-    if (from.empty()) return T{};
-    char raw[sizeof(T)];
-    for (std::size_t i = 0; i < sizeof(T); ++i) raw[i] = from[order_ == std::endian::native ? i : sizeof(T) - 1 - i];
+    const std::string_view from = count > left() / sizeof(T) ? take(left() + 1) : take(count * sizeof(T));
+    if (from.empty()) {
+      std::fill_n(out, count, T{});
+      return;
+    }
+    char* const raw = reinterpret_cast<char*>(out);
+    std::memcpy(raw, from.data(), from.size());
+    for (std::size_t i = 0; i < count && order_ != std::endian::native; ++i)
+      std::reverse(raw + i * sizeof(T), raw + (i + 1) * sizeof(T));
+  }
+  template <class T>
+  T number() {
     T value;
-    std::memcpy(&value, raw, sizeof(T));
+    numbers(&value, 1);
     return value;
   }
 
@@ -61,4 +70,4 @@ class ByteReader {
   bool ok_ = true;
 };
 
-}  // namespace bslam::containers
+}  // namespace bslam

@@ -1,19 +1,19 @@
-// The direction that is upward in an export, as the user names it. Images alone do not show gravity.
+// The upward direction, as the user names it. Images alone do not show gravity.
 #pragma once
 
 #include <span>
 #include <string>
 
 #include "base/result.h"
-#include "camera/rig.h"
+#include "geometry/se3.h"
 
-namespace bslam::map_export {
+namespace bslam::geometry {
 
 // A direction of camera 0 or of the body, which is upward on average, or of the world of the trajectory.
 struct UpAxis {
   enum class Frame { kCamera, kBody, kWorld };
   Frame frame = Frame::kCamera;
-  geometry::Vector3d direction = {0, -1, 0};  // unit
+  Vector3d direction = {0, -1, 0};  // unit
 };
 
 // Parses FRAME:AXIS with FRAME camera, body or world, and AXIS x, y, z, -x, -y, -z or three numbers with commas between
@@ -22,7 +22,6 @@ Result<UpAxis> parse_up_axis(const std::string& text);
 
 // The unit vector in the world: the mean direction over the poses, or the axis itself if it is of the world.
 // `T_body_cam0` is used for axes of the body. Error: the direction has no mean, since the rig turned all around.
-Result<geometry::Vector3d> up_in_world(const UpAxis& axis, std::span<const geometry::SE3> T_world_cam0,
-                                       const geometry::SE3& T_body_cam0);
+Result<Vector3d> up_in_world(const UpAxis& axis, std::span<const SE3> T_world_cam0, const SE3& T_body_cam0);
 
-}  // namespace bslam::map_export
+}  // namespace bslam::geometry

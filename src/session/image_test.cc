@@ -1,0 +1,36 @@
+#include "session/image_test.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "dataset/frame_reader.h"
+#include "image_decoding/image_file.h"
+
+namespace bslam::session {
+
+Result<std::vector<calibration::PairEvidence>> test_against_images(const dataset::Dataset& dataset) {
+  constexpr std::size_t kFrames = 6;
+  const auto masks = image_decoding::read_masks(dataset.rig);
+  if (!masks) return masks.error();
+  const std::size_t size = dataset.frames.size(), count = std::min(kFrames, size);
+  std::vector<image::ImageBundle> frames;
+  for (std::size_t k = 0; k < count; ++k)
+    frames.push_back(dataset::read_frame(dataset, (2 * k + 1) * size / (2 * count)));
+  return calibration::check_conventions(dataset.rig, frames, *masks);
+}
+
+std::vector<calibration::CameraPair> contradicted_pairs(const dataset::Dataset& dataset) {
+  std::vector<calibration::CameraPair> out;
+  const auto tested = test_against_images(dataset);
+  if (!tested) return out;
+  for (const calibration::PairEvidence& pair : *tested) {
+    if (!calibration::shows_another_arrangement(pair)) continue;
+    const double overlap = std::max(dataset.rig.overlap_share(pair.first, pair.second),
+                                    dataset.rig.overlap_share(pair.second, pair.first));
+    out.push_back(
+        {.first = pair.first, .second = pair.second, .overlap = overlap, .evidence = pair, .contradicted = true});
+  }
+  return out;
+}
+
+}  // namespace bslam::session
