@@ -74,6 +74,61 @@ std::string unused_name(const std::vector<camera::RigCamera>& taken, const std::
   return out;
 }
 
+// Appends a rig with its calibration as it was given and as it is, and returns the index of its first camera.
+std::size_t append_rig(BundledMap& map, const camera::Rig& given_rig, const camera::Rig& rig) {
+  const std::size_t first = map.rig().size();
+  std::vector<camera::RigCamera> all = cameras(map.rig()), given = cameras(map.given_rig());
+  const std::vector<camera::RigCamera> added = moved_into(map.rig(), rig),
+                                       added_given = moved_into(map.given_rig(), given_rig);
+  for (std::size_t i = 0; i < added.size(); ++i) {
+    const std::string name = unused_name(all, added[i].camera.name);
+    for (const auto& [cameras, source] : {std::pair(&all, &added[i]), std::pair(&given, &added_given[i])}) {
+      cameras->push_back(*source);
+      cameras->back().camera.name = name;
+    }
+  }
+  map.append_cameras(std::make_shared<const camera::Rig>(std::move(all), map.rig().cam_from_rig(0)),
+                     std::make_shared<const camera::Rig>(std::move(given), map.given_rig().cam_from_rig(0)));
+  return first;
+}
+
+// The name without numbers that unused_name has appended.
+std::string plain_name(std::string name) {
+  for (;;) {
+    const std::size_t end = name.find_last_not_of("0123456789");
+    if (end == std::string::npos || end == 0 || end + 1 == name.size() || name[end] != '_') return name;
+    name.resize(end);
+  }
+}
+
+camera::Rig with_plain_names(const camera::Rig& rig) {
+  std::vector<camera::RigCamera> out = cameras(rig);
+  for (camera::RigCamera& c : out) c.camera.name = plain_name(std::move(c.camera.name));
+  return camera::Rig(std::move(out), rig.cam_from_rig(0));
+}
+
+// The numbers of cameras of the rigs of a map, in order. A rig begins with a camera in the rig frame, which shares no
+// keyframe with a camera before it.
+std::vector<std::size_t> sizes_of_rigs(const BundledMap& map) {
+  const std::size_t n = map.rig().size();
+  std::vector<std::uint8_t> begins(n);
+  for (std::size_t c = 1; c < n; ++c) begins[c] = same_pose(map.given_rig().cam_from_rig(c), geometry::SE3());
+  for (const KeyframeId k : map.keyframe_ids()) {
+    bool any = false;
+    for (std::size_t c = 0; c < n; ++c) {
+      const bool used = !map.keyframe(k).frame->cameras[c].keypoints.empty();
+      if (any && used) begins[c] = 0;
+      any |= used;
+    }
+  }
+  std::vector<std::size_t> out(1);
+  for (std::size_t c = 0; c < n; ++c) {
+    if (begins[c]) out.push_back(0);
+    ++out.back();
+  }
+  return out;
+}
+
 }  // namespace
 
 void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::shared_ptr<const camera::Rig> given) {
@@ -97,19 +152,21 @@ std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& ri
 }
 
 std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig) {
-  if (const auto found = find_rig(map, rig)) return *found;
-  const std::size_t first = map.rig().size();
-  std::vector<camera::RigCamera> all = cameras(map.rig()), given = cameras(map.given_rig());
-  for (camera::RigCamera& added : moved_into(map.rig(), rig)) {
-    added.camera.name = unused_name(all, added.camera.name);
-    all.push_back(std::move(added));
+  const auto found = find_rig(map, rig);
+  return found ? *found : append_rig(map, rig, rig);
+}
+
+std::vector<CameraIndex> find_or_append_rigs(BundledMap& map, const BundledMap& other) {
+  std::vector<CameraIndex> out;
+  for (const std::size_t size : sizes_of_rigs(other)) {
+    const camera::Rig given = cameras_of(other.given_rig(), out.size(), size);
+    const camera::Rig refined = cameras_of(other.rig(), out.size(), size);
+    auto first = find_rig(map, given);
+    if (!first) first = find_rig(map, with_plain_names(given));
+    if (!first) first = append_rig(map, given, refined);
+    for (std::size_t i = 0; i < size; ++i) out.emplace_back(*first + i);
   }
-  for (std::size_t i = 0; i < rig.size(); ++i) {
-    given.push_back({all[first + i].camera, map.given_rig().body_from_rig() * rig.rig_from_cam(i)});
-  }
-  map.append_cameras(std::make_shared<const camera::Rig>(std::move(all), map.rig().cam_from_rig(0)),
-                     std::make_shared<const camera::Rig>(std::move(given), map.given_rig().cam_from_rig(0)));
-  return first;
+  return out;
 }
 
 camera::Rig with_cameras(const camera::Rig& whole, std::size_t first, const camera::Rig& part) {
