@@ -1,25 +1,15 @@
 #include "cli/rerun.h"
 
-#include <cstdlib>
 #include <system_error>
 #include <vector>
 
 #include "base/atomic_file.h"
 #include "base/split.h"
 #include "cli/child_process.h"
+#include "cli/python_package.h"
 
 namespace bslam::cli {
 namespace {
-
-std::string interpreter() {
-  const char* chosen = std::getenv("BSLAM_PYTHON");
-  return chosen != nullptr && *chosen != 0 ? chosen : "python3";
-}
-
-// Python code that is run with -c. Packages in the current folder, which -c would prefer, are not looked for.
-std::string code(const std::string& statements) {
-  return "import sys; sys.path[:] = [folder for folder in sys.path if folder]; " + statements;
-}
 
 // The last line of a log that is not empty.
 std::string last_line(const std::filesystem::path& log) {
@@ -36,11 +26,11 @@ std::string last_line(const std::filesystem::path& log) {
 }  // namespace
 
 Status check_rerun() {
-  const auto end = run_program(interpreter(), {"-c", code("import bslam.rerun, rerun")}, "/dev/null");
+  const auto end = run_program(python_interpreter(), {"-c", python_code("import bslam.rerun, rerun")}, "/dev/null");
   if (end && end->exit_status == 0 && end->signal == 0) return {};
   return Error{
       "command line", "--rerun", "no Python packages bslam and rerun-sdk", "both, installed by pip",
-      "--rerun needs the Python packages bslam and rerun-sdk, which " + interpreter() +
+      "--rerun needs the Python packages bslam and rerun-sdk, which " + python_interpreter() +
           " does not find: pip install rerun-sdk, and bslam as in its documentation; BSLAM_PYTHON=PATH chooses "
           "the interpreter"};
 }
@@ -48,8 +38,8 @@ Status check_rerun() {
 Status send_to_rerun(const std::filesystem::path& folder, const std::string& target) {
   const bool address = target.find("://") != std::string::npos;
   const std::filesystem::path log = folder / "rerun.log";
-  const auto end = run_program(interpreter(),
-                               {"-c", code("import bslam.rerun; sys.exit(bslam.rerun.main())"), folder.string(),
+  const auto end = run_program(python_interpreter(),
+                               {"-c", python_code("import bslam.rerun; sys.exit(bslam.rerun.main())"), folder.string(),
                                 address ? "--connect" : "--save", target},
                                log);
   if (!end) return end.error();
