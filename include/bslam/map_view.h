@@ -65,6 +65,8 @@ class BSLAM_EXPORT MapView {
 
   std::vector<Keyframe> keyframes() const;  // in order of id
   std::vector<Landmark> landmarks() const;  // in order of id
+  // Of each keyframe in order of id: the distinct visual words of its features, ascending. Empty in maps without words.
+  std::vector<std::vector<std::int32_t>> words() const;
   // Returns the pairs of keyframes with at least `min_landmarks` common landmarks, in order of their ids.
   // `min_landmarks` must be 1 or more.
   std::vector<CovisibilityEdge> covisibility(int min_landmarks = 15) const;

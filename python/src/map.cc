@@ -67,6 +67,18 @@ void bind_keyframes(nb::class_<MapView>& map) {
       .def_prop_ro("poses", poses, nb::rv_policy::move,
                    "(k, 4, 4) T_world_cam0 of the keyframes, in the world frames of their submaps.")
       .def(
+          "words",
+          [](const MapView& m) {
+            nb::list out;
+            for (std::vector<std::int32_t>& words : m.words()) {
+              const std::size_t size = words.size();
+              out.append(make_array<Array<std::int32_t, -1>>(std::move(words), {size}));
+            }
+            return out;
+          },
+          "Returns, for each keyframe, the distinct visual words of its features, ascending.",
+          nb::sig("def words(self) -> list[numpy.typing.NDArray[numpy.int32]]"))
+      .def(
           "covisibility", covisibility, nb::arg("min_landmarks") = 15,
           "Returns the pairs of keyframes with at least `min_landmarks` common landmarks, (e, 3): the ids of both, the "
           "smaller one first, and the number of common landmarks.");

@@ -35,6 +35,14 @@ def test_covisibility_counts_common_landmarks(finished):
         m.covisibility(0)
 
 
+def test_words_are_distinct_and_similar_for_neighbours(finished):
+    words = finished[0].map().words()
+    assert len(words) == finished[0].map().num_keyframes
+    for w in words:
+        assert w.dtype == np.int32 and len(w) > 50 and (np.diff(w) > 0).all()
+    assert len(np.intersect1d(words[0], words[1])) > len(words[0]) / 10
+
+
 def test_saved_map_is_that_of_the_program(finished, program, program_run, tmp_path):
     finished[0].save_map(tmp_path / "map.bmap")
     mine, theirs = (bslam.Map.load(file) for file in (tmp_path / "map.bmap", program_run / "map.bmap"))

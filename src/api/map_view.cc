@@ -79,6 +79,19 @@ std::vector<MapView::Landmark> MapView::landmarks() const {
   return out;
 }
 
+std::vector<std::vector<std::int32_t>> MapView::words() const {
+  std::vector<std::vector<std::int32_t>> out;
+  for (const KeyframeId k : impl_->map->keyframe_ids()) {
+    std::vector<std::int32_t>& words = out.emplace_back();
+    for (const frame::CameraFrame& camera : impl_->map->keyframe(k).frame->cameras) {
+      for (const WordId word : camera.words) words.push_back(word.value());
+    }
+    std::ranges::sort(words);
+    words.erase(std::ranges::unique(words).begin(), words.end());
+  }
+  return out;
+}
+
 std::vector<MapView::CovisibilityEdge> MapView::covisibility(int min_landmarks) const {
   const map::BundledMap& map = *impl_->map;
   std::vector<CovisibilityEdge> out;

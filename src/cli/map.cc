@@ -1,4 +1,4 @@
-// bslam map: describes, exports and merges saved maps.
+// bslam map: describes saved maps; exports and merges them.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -9,13 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "cli/config_arguments.h"
 #include "cli/verbs.h"
-#include "cli/version.h"
-#include "session/merge_maps.h"
 #include "storage/map_file.h"
 #include "storage/submaps.h"
-#include "storage/vocabulary_file.h"
 
 namespace bslam::cli {
 namespace {
@@ -23,15 +19,9 @@ namespace {
 namespace fs = std::filesystem;
 
 struct MapArguments {
-  std::string file, other, out, vocabulary;
-  ConfigArguments config;
-  bool json = false, overwrite = false;
+  std::string file;
+  bool json = false;
 };
-
-// Returns text such as "1 submap" or "2 submaps".
-std::string counted(std::size_t count, std::string_view name) {
-  return fmt::format("{} {}{}", count, name, count == 1 ? "" : "s");
-}
 
 std::string vocabulary_name(std::uint64_t id) { return id == 0 ? "none" : fmt::format("{:016x}", id); }
 
@@ -105,31 +95,6 @@ int map_info(const MapArguments& arguments) {
   return kExitOk;
 }
 
-int map_merge(const MapArguments& arguments) {
-  const auto config = resolve_config(arguments.config);
-  if (!config) return report_error(config.error());
-  const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
-  if (!vocabulary) return report_error(vocabulary.error());
-  std::error_code error;
-  if (fs::exists(arguments.out, error) && !arguments.overwrite) {
-    return report_error({arguments.out, "--out", "an existing file", "a new file, or --overwrite"});
-  }
-  const auto a = storage::read_map(arguments.file);
-  if (!a) return report_error(a.error());
-  const auto b = storage::read_map(arguments.other);
-  if (!b) return report_error(b.error());
-  const auto merged = session::merge_maps(*a, *b, *vocabulary, *config);
-  if (!merged) return report_error(merged.error());
-  const storage::MapFileInfo info{(*vocabulary)->id(), version_number(),
-                                  fmt::format("{} + {}", a->info.data, b->info.data)};
-  if (const Status s = storage::write_map(merged->map, info, arguments.out); !s) return report_error(s.error());
-  fmt::print("{} keyframes, {} landmarks; merged {}, {}, {} remaining\n{}\n", merged->map.num_keyframes(),
-             merged->map.num_landmarks(), counted(static_cast<std::size_t>(merged->joined), "submap"),
-             counted(static_cast<std::size_t>(merged->loops), "further loop closure"),
-             counted(merged->submaps, "submap"), arguments.out);
-  return kExitOk;
-}
-
 }  // namespace
 
 void add_map(CLI::App& app, int& exit_status) {
@@ -143,16 +108,8 @@ void add_map(CLI::App& app, int& exit_status) {
   info->callback([arguments, &exit_status] { exit_status = map_info(*arguments); });
 
   add_map_export(*map, exit_status);
-
-  CLI::App* merge = map->add_subcommand("merge", "merge maps of separate runs that contain common places");
-  merge->add_option("A", arguments->file, "a saved map, whose world frame is kept")->required();
-  merge->add_option("B", arguments->other, "a saved map of the same rig and calibration")->required();
-  merge->add_option("--out", arguments->out, "file for the merged map")->required();
-  merge->add_option("--vocabulary", arguments->vocabulary,
-                    "vocabulary of the maps; default: the vocabulary shipped with this program");
-  merge->add_flag("--overwrite", arguments->overwrite, "replace an existing file");
-  add_config_options(*merge, arguments->config);
-  merge->callback([arguments, &exit_status] { exit_status = map_merge(*arguments); });
+  add_map_merge(*map, exit_status);
+  add_map_transfer(*map, exit_status);
 }
 
 }  // namespace bslam::cli

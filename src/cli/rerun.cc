@@ -1,7 +1,6 @@
 #include "cli/rerun.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -9,21 +8,12 @@
 #include "base/atomic_file.h"
 #include "base/split.h"
 #include "cli/child_process.h"
+#include "cli/python_package.h"
 
 namespace bslam::cli {
 namespace {
 
 constexpr int kNoViewer = 3;  // exit status of the check
-
-std::string interpreter() {
-  const char* chosen = std::getenv("BSLAM_PYTHON");
-  return chosen != nullptr && *chosen != 0 ? chosen : "python3";
-}
-
-// Python code that is run with -c. Packages in the current folder, which -c would prefer, are not looked for.
-std::string code(const std::string& statements) {
-  return "import sys; sys.path[:] = [folder for folder in sys.path if folder]; " + statements;
-}
 
 // The text without the escape sequences and other characters by which programs colour their messages.
 std::string plain(const std::string& text) {
@@ -57,22 +47,22 @@ Status check_rerun(const std::string& target) {
   const std::string statements =
       is_viewer(target) ? "sys.exit(0 if bslam.rerun.is_reachable(sys.argv[1]) else " + std::to_string(kNoViewer) + ")"
                         : "";
-  const auto end =
-      run_program(interpreter(), {"-c", code("import bslam.rerun, rerun; " + statements), target}, "/dev/null");
+  const auto end = run_program(python_interpreter(),
+                               {"-c", python_code("import bslam.rerun, rerun; " + statements), target}, "/dev/null");
   if (end && end->exit_status == 0 && end->signal == 0) return {};
   if (end && end->exit_status == kNoViewer)
     return Error{"command line", "--rerun", "no viewer at " + target, "a viewer that was started before the run"};
   return Error{
       "command line", "--rerun", "no Python packages bslam and rerun-sdk", "both, installed by pip",
-      "--rerun needs the Python packages bslam and rerun-sdk, which " + interpreter() +
+      "--rerun needs the Python packages bslam and rerun-sdk, which " + python_interpreter() +
           " does not find: pip install rerun-sdk, and bslam as in its documentation; BSLAM_PYTHON=PATH chooses "
           "the interpreter"};
 }
 
 Status send_to_rerun(const std::filesystem::path& folder, const std::string& target) {
   const std::filesystem::path log = folder / "rerun.log";
-  const auto end = run_program(interpreter(),
-                               {"-c", code("import bslam.rerun; sys.exit(bslam.rerun.main())"), folder.string(),
+  const auto end = run_program(python_interpreter(),
+                               {"-c", python_code("import bslam.rerun; sys.exit(bslam.rerun.main())"), folder.string(),
                                 is_viewer(target) ? "--connect" : "--save", target},
                                log);
   if (!end) return end.error();

@@ -26,6 +26,9 @@ void add_vocab(CLI::App& app, int& exit_status);
 void add_map(CLI::App& app, int& exit_status);
 void add_export(CLI::App& app, int& exit_status);
 void add_map_export(CLI::App& map, int& exit_status);
+void add_map_merge(CLI::App& map, int& exit_status);
+void add_map_transfer(CLI::App& map, int& exit_status);
+void add_fleet(CLI::App& app, int& exit_status);
 void add_settings(CLI::App& app, int& exit_status);
 
 // Prints "bslam: MESSAGE" as one line on stderr and returns kExitBadInput.

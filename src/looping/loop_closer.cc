@@ -39,6 +39,16 @@ KeyframeId closest_keyframe_of_place(const map::BundledMap& map, KeyframeId keyf
   return best;
 }
 
+bool in_other_submap(const map::BundledMap& map, KeyframeId keyframe, KeyframeId candidate) {
+  return map.root_of(keyframe) != map.root_of(candidate);
+}
+
+// Records that a candidate was given up after this stage.
+void give_up(const map::BundledMap& map, KeyframeId keyframe, KeyframeId candidate, JoinStage after,
+             JoinAttempts& attempts) {
+  if (in_other_submap(map, keyframe, candidate)) attempts.farthest = std::max(attempts.farthest, after);
+}
+
 }  // namespace
 
 LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const LoopingOptions& options,
@@ -46,10 +56,14 @@ LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const Loopin
     : recogniser_(std::move(recogniser)), options_(options), features_(features), seed_(seed) {}
 
 std::optional<PlaceMatch> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map,
-                                             const Candidate& candidate) const {
+                                             const Candidate& candidate, JoinAttempts& attempts) const {
   const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
-  return verify_place(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe,
-                      options_.verification, features_, random);
+  VerificationReport report;
+  auto place_match = verify_place(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe,
+                                  options_.verification, features_, random, &report);
+  if (!place_match && in_other_submap(map, keyframe, candidate.keyframe))
+    attempts.most_inliers = std::max(attempts.most_inliers, report.inliers);
+  return place_match;
 }
 
 // Submaps can have any relative pose, so no pose prior can reject a wrong match, only appearance. Therefore no other
@@ -68,35 +82,46 @@ bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map,
   });
 }
 
-std::optional<std::pair<PlaceMatch, LoopClosure>> LoopCloser::closure_at(KeyframeId keyframe,
-                                                                         const map::BundledMap& map,
-                                                                         PlaceMatch place_match) const {
+LoopCloser::Found LoopCloser::closure_at(KeyframeId keyframe, const map::BundledMap& map, PlaceMatch place_match,
+                                         JoinAttempts& attempts) const {
   const auto scale = relative_scale(map, keyframe, place_match);
   if (!scale) return std::nullopt;
   place_match.scale = *scale;
   place_match.matched_keyframe = closest_keyframe_of_place(map, keyframe, place_match, options_);
   const LoopClosure closure = measure(map, keyframe, place_match);
   if (!plausible(map, closure, options_.loop)) return std::nullopt;
-  if (closure.merged && !is_unambiguous(keyframe, map, place_match)) return std::nullopt;
+  if (closure.merged && !is_unambiguous(keyframe, map, place_match)) {
+    give_up(map, keyframe, place_match.matched_keyframe, JoinStage::kAmbiguous, attempts);
+    return std::nullopt;
+  }
   return std::pair(std::move(place_match), closure);
 }
 
-std::optional<std::pair<PlaceMatch, LoopClosure>> LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map) {
+LoopCloser::Found LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map, JoinAttempts& attempts) {
   const auto joined = joined_.find(map, keyframe, options_);
   const std::vector<Candidate> candidates = recogniser_->query_keyframe(map, keyframe);
+  for (const Candidate& candidate : candidates)
+    give_up(map, keyframe, candidate.keyframe, JoinStage::kNotConsistent, attempts);
   for (const Candidate& candidate : consistent_candidates(map, keyframe, candidates, options_.loop, history_)) {
-    auto place_match = verify(keyframe, map, candidate);
-    if (!place_match || !is_revisit(map, keyframe, *place_match, options_.loop)) continue;
-    if (auto closure = closure_at(keyframe, map, *std::move(place_match))) return closure;
+    give_up(map, keyframe, candidate.keyframe, JoinStage::kNotVerified, attempts);
+    auto place_match = verify(keyframe, map, candidate, attempts);
+    if (!place_match) continue;
+    give_up(map, keyframe, candidate.keyframe, JoinStage::kNotPlausible, attempts);
+    if (!is_revisit(map, keyframe, *place_match, options_.loop)) continue;
+    if (auto closure = closure_at(keyframe, map, *std::move(place_match), attempts)) return closure;
   }
   if (!joined) return std::nullopt;
-  auto place_match = verify(keyframe, map, {*joined});
-  return place_match ? closure_at(keyframe, map, *std::move(place_match)) : std::nullopt;
+  auto place_match = verify(keyframe, map, {*joined}, attempts);
+  return place_match ? closure_at(keyframe, map, *std::move(place_match), attempts) : std::nullopt;
 }
 
-std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft& draft) {
-  const auto found = find(keyframe, draft.map());
-  if (!found) return std::nullopt;
+std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft& draft, JoinAttempts* attempts) {
+  JoinAttempts so_far = attempts != nullptr ? *attempts : JoinAttempts();
+  const auto found = find(keyframe, draft.map(), so_far);
+  if (!found) {
+    if (attempts != nullptr) *attempts = so_far;
+    return std::nullopt;
+  }
   const auto& [place_match, closure] = *found;
   map::MapDraft attempt = draft;
   const bool done = closure.merged ? merge_submaps(closure, place_match, options_.loop, features_, attempt)

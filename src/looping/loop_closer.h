@@ -23,6 +23,14 @@ struct LoopClosure {
   bool merged = false;                // two submaps were merged
 };
 
+// How far keyframes have come in being recognised in other submaps, from the first stage to the last one.
+enum class JoinStage { kNoCandidate, kNotConsistent, kNotVerified, kNotPlausible, kAmbiguous };
+
+struct JoinAttempts {
+  JoinStage farthest = JoinStage::kNoCandidate;  // of all keyframes that were not joined
+  int most_inliers = 0;                          // of the candidates that were not verified
+};
+
 // The loop-closing stage: its options, its place recogniser, and the recognition history between keyframes.
 class LoopCloser {
  public:
@@ -30,15 +38,23 @@ class LoopCloser {
              const feature::FeatureModel& features, std::uint64_t seed);
 
   // If `keyframe` (alive) closes a loop, writes the correction to the draft; otherwise leaves the draft unchanged.
-  // Keyframes must come in order of their ids.
-  std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft);
+  // Keyframes must come in order of their ids. `attempts` is updated with what became of candidates in other submaps.
+  std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft, JoinAttempts* attempts = nullptr);
+
+  // The next keyframe does not continue the path of the previous ones.
+  void begin_path() {
+    history_ = {};
+    joined_ = {};
+  }
 
  private:
-  std::optional<PlaceMatch> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate) const;
+  std::optional<PlaceMatch> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate,
+                                   JoinAttempts& attempts) const;
   bool is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const PlaceMatch& place_match) const;
-  std::optional<std::pair<PlaceMatch, LoopClosure>> find(KeyframeId keyframe, const map::BundledMap& map);
-  std::optional<std::pair<PlaceMatch, LoopClosure>> closure_at(KeyframeId keyframe, const map::BundledMap& map,
-                                                               PlaceMatch place_match) const;
+  using Found = std::optional<std::pair<PlaceMatch, LoopClosure>>;
+  Found find(KeyframeId keyframe, const map::BundledMap& map, JoinAttempts& attempts);
+  Found closure_at(KeyframeId keyframe, const map::BundledMap& map, PlaceMatch place_match,
+                   JoinAttempts& attempts) const;
 
   const std::unique_ptr<PlaceRecogniser> recogniser_;
   const LoopingOptions options_;

@@ -1,16 +1,72 @@
 #include "map/append_map.h"
 
+#include <memory>
+#include <utility>
+
 #include "base/assert.h"
+#include "map/rigs_of_map.h"
 
 namespace bslam::map {
 namespace {
 
-void append_keyframes(BundledMap& onto, const BundledMap& other, AppendedIds& ids) {
+// Converts frames with the cameras of one map to those of another one.
+class CameraChange {
+ public:
+  CameraChange(BundledMap& onto, const BundledMap& other)
+      : before_(other.shared_rig()), camera_(find_or_append_rigs(onto, other)), num_cameras_(onto.rig().size()) {
+    std::vector<camera::RigCamera> calibration;
+    for (const CameraIndex c : camera_)
+      calibration.push_back({onto.rig().camera(c), onto.rig().body_from_cam(c.index())});
+    after_ = std::make_shared<const camera::Rig>(std::move(calibration));
+  }
+
+  frame::KeypointRef operator()(frame::KeypointRef r) const { return {camera_[r.camera.index()], r.keypoint}; }
+
+  std::shared_ptr<const frame::BundledFrame> operator()(const std::shared_ptr<const frame::BundledFrame>& frame) const {
+    const bool recalibrate = frame::changes_frames(*before_, *after_);
+    if (!recalibrate && is_identity()) return frame;
+    const frame::BundledFrame source = recalibrate ? frame::recalibrated(*frame, *before_, *after_) : *frame;
+    frame::BundledFrame out = source;
+    out.cameras.assign(num_cameras_, {});
+    std::vector<std::size_t> counts(num_cameras_, 0);
+    for (std::size_t c = 0; c < camera_.size(); ++c) {
+      if (source.cameras[c].state == image::ImageState::kMissing && source.cameras[c].keypoints.empty()) continue;
+      counts[camera_[c].index()] = source.cameras[c].keypoints.size();
+      out.cameras[camera_[c].index()] = source.cameras[c];
+    }
+    out.bundled = changed(source.bundled, counts);
+    return std::make_shared<const frame::BundledFrame>(std::move(out));
+  }
+
+ private:
+  bool is_identity() const {
+    for (std::size_t c = 0; c < camera_.size(); ++c) {
+      if (camera_[c] != CameraIndex(c)) return false;
+    }
+    return camera_.size() == num_cameras_;
+  }
+
+  frame::Bundled changed(const frame::Bundled& bundled, const std::vector<std::size_t>& counts) const {
+    std::vector<std::vector<frame::KeypointRef>> matched(bundled.num_matched());
+    std::vector<std::optional<frame::BundledPoint>> points;
+    for (std::size_t f = 0; f < matched.size(); ++f) {
+      for (const frame::KeypointRef r : bundled.keypoints(FeatureId(f))) matched[f].push_back((*this)(r));
+      points.push_back(bundled.point(FeatureId(f)));
+    }
+    return {counts, matched, points};
+  }
+
+  std::shared_ptr<const camera::Rig> before_, after_;  // both with the cameras of the other map
+  std::vector<CameraIndex> camera_;                    // of the map to which it is appended, for each of the other map
+  std::size_t num_cameras_ = 0;
+};
+
+void append_keyframes(BundledMap& onto, const BundledMap& other, const CameraChange& change, AppendedIds& ids) {
   const KeyframeId first(onto.keyframe_slots());
   const std::vector<KeyframeId> sources = other.keyframe_ids();
   for (const KeyframeId k : sources) {
     const BundledKeyframe& source = other.keyframe(k);
-    ids.keyframes[k.index()] = onto.add_keyframe(source.frame, source.T_rig_world, {}, {});
+    ids.keyframes[k.index()] = onto.add_keyframe(change(source.frame), source.T_rig_world, {}, {});
     onto.set_twist(ids.keyframes[k.index()], source.twist);
     onto.set_uncertainty(ids.keyframes[k.index()], source.uncertainty);
   }
@@ -59,12 +115,12 @@ bool attach_keyframes(BundledMap& map, KeyframeId first, std::span<const Keyfram
 }
 
 AppendedIds append_map(BundledMap& onto, const BundledMap& other) {
-  BSLAM_ASSERT(onto.rig().size() == other.rig().size(), "both maps must have the same rig");
   BSLAM_ASSERT(
       onto.pyramid().levels == other.pyramid().levels && onto.pyramid().scale_factor == other.pyramid().scale_factor,
       "both maps must have the same pyramid");
   AppendedIds ids{std::vector<KeyframeId>(other.keyframe_slots()), std::vector<LandmarkId>(other.landmark_slots())};
-  append_keyframes(onto, other, ids);
+  const CameraChange change(onto, other);
+  append_keyframes(onto, other, change, ids);
   for (const LandmarkId l : other.landmark_ids()) {
     const Landmark& source = other.landmark(l);
     std::vector<Observation> observations;
@@ -72,7 +128,8 @@ AppendedIds append_map(BundledMap& onto, const BundledMap& other) {
       o.keyframe = ids.keyframes[o.keyframe.index()];
       observations.push_back(o);
     }
-    const LandmarkReference reference{ids.keyframes[source.reference.keyframe.index()], source.reference.keypoint};
+    const LandmarkReference reference{ids.keyframes[source.reference.keyframe.index()],
+                                      change(source.reference.keypoint)};
     const LandmarkId added =
         onto.add_landmark(source.position, observations, reference, nearest_older(ids, source.born));
     onto.add_visibility_counts(added, source.expected, source.found);

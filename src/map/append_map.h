@@ -17,8 +17,9 @@ struct AppendedIds {
 
 // Appends all alive keyframes and landmarks of `other` to `onto` in order of id: poses, spanning trees and observations
 // are kept, frames are shared, and landmark appearance is recomputed. The appended submaps share no landmarks with
-// those of `onto` and keep their own world frames until merge_submaps and a correction of the poses connect them. Both
-// maps must have the same rig and pyramid. The scale and gauge epoch of `onto` are kept.
+// those of `onto` and keep their own world frames until merge_submaps and a correction of the poses connect them.
+// Cameras that `onto` does not have are appended; for the others its calibration is used. Both maps must have the same
+// pyramid. The scale and gauge epoch of `onto` are kept.
 AppendedIds append_map(BundledMap& onto, const BundledMap& other);
 
 // Builds spanning trees from keyframes `first`, `first` + 1, ..., each of which must be a separate submap: each one

@@ -66,6 +66,42 @@ std::vector<camera::RigCamera> moved_into(const camera::Rig& whole, const camera
   return out;
 }
 
+// Appends a rig with its calibration as it was given and as it is, and returns the index of its first camera.
+std::size_t append_rig(BundledMap& map, const camera::Rig& given_rig, const camera::Rig& rig) {
+  const std::size_t first = map.rig().size();
+  std::vector<camera::RigCamera> all = cameras(map.rig()), given = cameras(map.given_rig());
+  for (camera::RigCamera& added : moved_into(map.rig(), rig)) {
+    added.camera.name = camera::unused_name(all, added.camera.name);
+    all.push_back(std::move(added));
+  }
+  std::ranges::move(moved_into(map.given_rig(), given_rig), std::back_inserter(given));
+  map.append_cameras(std::make_shared<const camera::Rig>(std::move(all), map.rig().cam_from_rig(0)),
+                     std::make_shared<const camera::Rig>(std::move(given), map.given_rig().cam_from_rig(0)));
+  return first;
+}
+
+// The numbers of cameras of the rigs of a map, in order. A rig begins with a camera in the rig frame, which shares no
+// keyframe with a camera before it.
+std::vector<std::size_t> sizes_of_rigs(const BundledMap& map) {
+  const std::size_t n = map.rig().size();
+  std::vector<std::uint8_t> begins(n);
+  for (std::size_t c = 1; c < n; ++c) begins[c] = same_pose(map.given_rig().cam_from_rig(c), geometry::SE3());
+  for (const KeyframeId k : map.keyframe_ids()) {
+    bool any = false;
+    for (std::size_t c = 0; c < n; ++c) {
+      const bool used = !map.keyframe(k).frame->cameras[c].keypoints.empty();
+      if (any && used) begins[c] = 0;
+      any |= used;
+    }
+  }
+  std::vector<std::size_t> out(1);
+  for (std::size_t c = 0; c < n; ++c) {
+    if (begins[c]) out.push_back(0);
+    ++out.back();
+  }
+  return out;
+}
+
 }  // namespace
 
 void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::shared_ptr<const camera::Rig> given) {
@@ -90,17 +126,19 @@ std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& ri
 }
 
 std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig) {
-  if (const auto found = find_rig(map, rig)) return *found;
-  const std::size_t first = map.rig().size();
-  std::vector<camera::RigCamera> all = cameras(map.rig()), given = cameras(map.given_rig());
-  for (camera::RigCamera& added : moved_into(map.rig(), rig)) {
-    added.camera.name = camera::unused_name(all, added.camera.name);
-    all.push_back(std::move(added));
+  const auto found = find_rig(map, rig);
+  return found ? *found : append_rig(map, rig, rig);
+}
+
+std::vector<CameraIndex> find_or_append_rigs(BundledMap& map, const BundledMap& other) {
+  std::vector<CameraIndex> out;
+  for (const std::size_t size : sizes_of_rigs(other)) {
+    const camera::Rig given = cameras_of(other.given_rig(), out.size(), size);
+    const auto found = find_rig(map, given);
+    const std::size_t first = found ? *found : append_rig(map, given, cameras_of(other.rig(), out.size(), size));
+    for (std::size_t i = 0; i < size; ++i) out.emplace_back(first + i);
   }
-  std::ranges::move(moved_into(map.given_rig(), rig), std::back_inserter(given));
-  map.append_cameras(std::make_shared<const camera::Rig>(std::move(all), map.rig().cam_from_rig(0)),
-                     std::make_shared<const camera::Rig>(std::move(given), map.given_rig().cam_from_rig(0)));
-  return first;
+  return out;
 }
 
 camera::Rig with_cameras(const camera::Rig& whole, std::size_t first, const camera::Rig& part) {

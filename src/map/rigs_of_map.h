@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "map/bundled_map.h"
 
@@ -18,6 +19,10 @@ std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& ri
 // As find_rig, but appends the cameras if the map does not have them. A name that is taken becomes camN, the number of
 // the camera in the map.
 std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig);
+
+// Finds or appends all rigs of `other`, with their calibrations as given and as refined, and returns for each camera of
+// `other` that of `map`. The cameras of a keyframe keep their order.
+std::vector<CameraIndex> find_or_append_rigs(BundledMap& map, const BundledMap& other);
 
 // Returns `whole` with cameras `first`, `first` + 1, ... replaced by those of `part`, whose camera 0 takes the place of
 // camera `first`. If there are no other cameras, the result is `part`.

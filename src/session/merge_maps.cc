@@ -1,46 +1,159 @@
 #include "session/merge_maps.h"
 
-#include <memory>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <tuple>
+#include <utility>
+
+#include "base/assert.h"
 #include "looping/loop_closer.h"
 #include "map/append_map.h"
 #include "map/map_store.h"
 #include "mapping/map_keyframe.h"
+#include "storage/map_sections.h"
 
 namespace bslam::session {
+namespace {
 
-Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedMap& b,
-                               const place::VocabularyPtr& vocabulary, const system::Config& config) {
-  feature::FeatureModel features = config.feature_model();
-  features.pyramid = a.map.pyramid();
-  for (const storage::SavedMap* saved : {&a, &b}) {
-    if (saved->map.scale() != map::Scale::kMetric)
-      return Error{saved->file, "scale", "a map without metric scale",
+using storage::SavedMap;
+
+bool before(const SavedMap& a, const SavedMap& b) {
+  return std::tuple(b.map.num_keyframes(), a.checksums) < std::tuple(a.map.num_keyframes(), b.checksums);
+}
+
+// `maps` are sorted.
+Status check(const std::vector<SavedMap>& maps, const place::Vocabulary& vocabulary) {
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    const SavedMap& saved = maps[i];
+    if (saved.map.scale() != map::Scale::kMetric)
+      return Error{saved.file, "scale", "a map without metric scale",
                    "a metric map, since only metric maps can be merged"};
-    if (const Status s = storage::fits(*saved, a.map.rig(), a.map.pyramid(), vocabulary.get()); !s) return s.error();
+    if (saved.map.num_keyframes() == 0) return Error{saved.file, "keyframes", "none", "a map with keyframes"};
+    if (i > 0 && saved.checksums == maps[i - 1].checksums)
+      return Error{saved.file, "", "the same map as " + maps[i - 1].file, "different maps"};
+    if (Status s = storage::fits(saved, maps.front().map.pyramid(), &vocabulary); !s) return s;
   }
-  map::BundledMap both = a.map;
-  map::BundledMap other = b.map;
-  other.set_rig(both.shared_rig());
-  const map::AppendedIds ids = map::append_map(both, other);
-  map::MapStore store(std::move(both));
-  MergeResult result{.map = a.map};
-  looping::LoopCloser closer(std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition),
-                             config.looping, features, static_cast<std::uint64_t>(config.seed));
-  for (const KeyframeId k : ids.keyframes) {
-    if (!store.snapshot()->alive(k)) continue;
+  return {};
+}
+
+std::string reason_of(const looping::JoinAttempts& attempts, const looping::LoopingOptions& options) {
+  switch (attempts.farthest) {
+    case looping::JoinStage::kNoCandidate:
+      return "no place looks like one of the other maps";
+    case looping::JoinStage::kNotConsistent:
+      return fmt::format("no place was recognised by {} successive keyframes", options.loop.consistent_keyframes);
+    case looping::JoinStage::kNotVerified:
+      return fmt::format("places look alike, but their geometry does not agree ({} inliers, {} are needed)",
+                         attempts.most_inliers, options.verification.min_inliers);
+    case looping::JoinStage::kNotPlausible:
+      return "places agree, but too few of their landmarks are new";
+    case looping::JoinStage::kAmbiguous:
+      return "the same place fits several places of the other maps";
+  }
+  return {};
+}
+
+struct Inputs {
+  map::BundledMap map;                             // of all of them
+  std::vector<std::vector<KeyframeId>> keyframes;  // of each
+};
+
+Result<Inputs> append_all(const std::vector<SavedMap>& maps) {
+  Inputs out{maps.front().map, {maps.front().map.keyframe_ids()}};
+  for (std::size_t i = 1; i < maps.size(); ++i) {
+    std::vector<KeyframeId> ids = map::append_map(out.map, maps[i].map).keyframes;
+    std::erase_if(ids, [](KeyframeId k) { return !k.valid(); });
+    out.keyframes.push_back(std::move(ids));
+    if (out.map.rig().size() > storage::kMaxCameras)
+      return Error{maps[i].file, "rig", fmt::format("{} cameras with those of the other maps", out.map.rig().size()),
+                   fmt::format("at most {}; maps with fewer rigs", storage::kMaxCameras)};
+  }
+  return out;
+}
+
+// The smallest of the most frequent values.
+std::size_t most_frequent(const std::vector<std::size_t>& values) {
+  std::map<std::size_t, int> count;
+  for (const std::size_t value : values) ++count[value];
+  return std::ranges::max_element(count, {}, [](const auto& entry) { return entry.second; })->first;
+}
+
+// For each input, the position among the roots of the submap with most of its keyframes.
+std::vector<std::size_t> submaps_of_inputs(const map::BundledMap& map,
+                                           const std::vector<std::vector<KeyframeId>>& inputs) {
+  const std::vector<KeyframeId> roots = map.roots();
+  std::vector<std::size_t> out;
+  for (const std::vector<KeyframeId>& keyframes : inputs) {
+    std::vector<std::size_t> submaps;
+    for (const KeyframeId k : keyframes)
+      submaps.push_back(static_cast<std::size_t>(std::ranges::lower_bound(roots, map.root_of(k)) - roots.begin()));
+    out.push_back(most_frequent(submaps));
+  }
+  return out;
+}
+
+// Whether no other input is in the submap of the first one.
+bool is_alone(const map::BundledMap& map, const std::vector<std::vector<KeyframeId>>& inputs) {
+  const std::vector<std::size_t> submaps = submaps_of_inputs(map, inputs);
+  return submaps.size() > 1 && std::ranges::count(submaps, submaps.front()) == 1;
+}
+
+// Searches loop closures for the keyframes of a map, which has been appended, and commits them.
+looping::JoinAttempts join(const std::vector<KeyframeId>& keyframes, looping::LoopCloser& closer, map::MapStore& store,
+                           MergeResult& result) {
+  looping::JoinAttempts attempts;
+  closer.begin_path();
+  for (const KeyframeId k : keyframes) {
     map::MapDraft draft(store.snapshot());
-    const auto closure = closer.close(k, draft);
+    const auto closure = closer.close(k, draft, &attempts);
     if (!closure) continue;
     store.commit(std::move(draft));
     ++(closure->merged ? result.joined : result.loops);
   }
+  return attempts;
+}
+
+}  // namespace
+
+Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::VocabularyPtr& vocabulary,
+                               const system::Config& config) {
+  std::ranges::sort(maps, before);
+  if (Status s = check(maps, *vocabulary); !s) return s.error();
+  feature::FeatureModel features = config.feature_model();
+  features.pyramid = maps.front().map.pyramid();
+  auto inputs = append_all(maps);
+  if (!inputs) return inputs.error();
+  map::MapStore store(std::move(inputs->map));
+  MergeResult result{maps.front().map, {}};
+  looping::LoopCloser closer(std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition),
+                             config.looping, features, static_cast<std::uint64_t>(config.seed));
+  // The first map is the one in which the others are searched; it is searched in them if it has remained alone.
+  std::vector<looping::JoinAttempts> attempts(maps.size());
+  for (std::size_t i = 1; i < maps.size(); ++i) attempts[i] = join(inputs->keyframes[i], closer, store, result);
+  if (is_alone(*store.snapshot(), inputs->keyframes)) attempts[0] = join(inputs->keyframes[0], closer, store, result);
+  result.map = *store.snapshot();
+  BSLAM_ASSERT(result.map.num_keyframes() == result.map.keyframe_slots(), "merging must not remove keyframes");
+  const std::vector<std::size_t> submaps = submaps_of_inputs(result.map, inputs->keyframes);
+  const std::size_t largest = most_frequent(submaps);
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    const bool joined = submaps[i] == largest;
+    result.inputs.push_back({maps[i].file, maps[i].info.data, inputs->keyframes[i].size(), submaps[i],
+                             joined ? "" : reason_of(attempts[i], config.looping)});
+  }
+  return result;
+}
+
+void adjust_merged(map::BundledMap& map, const system::Config& config) {
+  feature::FeatureModel features = config.feature_model();
+  features.pyramid = map.pyramid();
+  map::MapStore store(std::move(map));
   map::MapDraft draft(store.snapshot());
   mapping::adjust_globally(config.mapping, features, draft);
   store.commit(std::move(draft));
-  result.map = *store.snapshot();
-  result.submaps = result.map.roots().size();
-  return result;
+  map = *store.snapshot();
 }
 
 }  // namespace bslam::session

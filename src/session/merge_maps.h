@@ -1,6 +1,10 @@
 // Merges maps of separate runs that contain common places.
 #pragma once
 
+#include <span>
+#include <string>
+#include <vector>
+
 #include "map/bundled_map.h"
 #include "place/vocabulary.h"
 #include "storage/map_file.h"
@@ -8,17 +12,29 @@
 
 namespace bslam::session {
 
-struct MergeResult {
-  map::BundledMap map;
-  int joined = 0;           // submaps that were merged into others
-  int loops = 0;            // further loop closures
-  std::size_t submaps = 0;  // remaining submaps; 1 if everything is in one world frame
+struct MergedInput {
+  std::string file;
+  std::string data;           // name of the recording
+  std::size_t keyframes = 0;  // its keyframes follow those of the previous input, in the same order
+  std::size_t submap = 0;     // of most of its keyframes: position in the roots of the result
+  std::string reason = {};    // why it is not in the submap of most inputs; empty if it is
 };
 
-// Adds the keyframes and landmarks of `b` to `a`, searches a loop closure for every keyframe of `b`, and finally runs a
-// global bundle adjustment. Maps without a common place become separate submaps. Both maps must be of the same rig and
-// vocabulary. Errors: the maps have different rigs or vocabularies, or a map has no metric scale.
-Result<MergeResult> merge_maps(const storage::SavedMap& a, const storage::SavedMap& b,
-                               const place::VocabularyPtr& vocabulary, const system::Config& config);
+struct MergeResult {
+  map::BundledMap map;
+  std::vector<MergedInput> inputs;  // the map with the most keyframes first; the order depends on contents only
+  int joined = 0;                   // submaps that were merged into others
+  int loops = 0;                    // further loop closures
+};
+
+// Appends all maps to the one with the most keyframes, whose world frame is kept, and searches a loop closure for every
+// keyframe of the others. Maps without a common place become separate submaps. The maps may be of different rigs. The
+// result does not depend on the order of `maps`. Errors: two maps are the same, differ in pyramid or vocabulary, have
+// no metric scale or no keyframes, or have too many cameras together.
+Result<MergeResult> merge_maps(std::vector<storage::SavedMap> maps, const place::VocabularyPtr& vocabulary,
+                               const system::Config& config);
+
+// The global bundle adjustment that follows.
+void adjust_merged(map::BundledMap& map, const system::Config& config);
 
 }  // namespace bslam::session

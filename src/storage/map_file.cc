@@ -30,6 +30,7 @@ std::uint32_t checksum(std::string_view bytes) { return libdeflate_crc32(0, byte
 struct Sections {
   std::uint32_t version = kVersion;
   std::array<std::string_view, kTags.size()> bytes = {};
+  std::array<std::uint32_t, kTags.size()> checksums = {};
 };
 
 std::string header_of(const std::array<std::string, kTags.size()>& sections) {
@@ -93,6 +94,7 @@ Result<Sections> take_apart(std::string_view bytes) {
     if (e.size > rest.size())
       return damaged(kNames[i], "a section beyond the end of the file", "a section within the file");
     sections.bytes[i] = rest.substr(0, e.size);
+    sections.checksums[i] = e.checksum;
     rest.remove_prefix(e.size);
     if (checksum(sections.bytes[i]) != e.checksum) return damaged(kNames[i], "a wrong checksum", "an undamaged file");
   }
@@ -108,6 +110,7 @@ Result<SavedMap> build(const Sections& sections, std::string file) {
   InfoSection info = take_info(info_in);
   if (!info_in.ok()) return info_in.error();
   SavedMap saved{std::move(file), map::BundledMap(rigs->rig, info.pyramid), std::move(info.info)};
+  saved.checksums = sections.checksums;
   saved.map.set_given_rig(rigs->given);
   saved.map.set_scale(info.scale);
   saved.words_end = take_keyframes(keyframes_in, saved.info.vocabulary != 0, saved.map);
@@ -116,67 +119,6 @@ Result<SavedMap> build(const Sections& sections, std::string file) {
   if (!landmarks_in.ok()) return landmarks_in.error();
   if (auto broken = saved.map.check_invariants()) return damaged("", *std::move(broken), "a consistent map");
   return saved;
-}
-
-// Functions for comparing rigs: the same cameras, whose calibration may have been refined.
-
-// Largest differences between two calibrations of the same camera.
-constexpr double kMaxFocal = 0.05;                  // relative
-constexpr double kMaxCentre = 0.05;                 // of the image width
-constexpr double kMaxDistortion = 0.3;              // any coefficient or shape parameter
-constexpr double kMaxAngle = 0.1, kMaxShift = 0.1;  // rad, metres
-constexpr double kMaxReadout = 0.05;                // seconds
-
-std::string numbers_text(const std::vector<double>& values) {
-  return values.empty() ? "none" : fmt::format("{:.12g}", fmt::join(values, " "));
-}
-
-std::string transform_text(const geometry::SE3& T) {
-  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = T.matrix().topRows<3>();
-  return numbers_text({rows.data(), rows.data() + rows.size()});
-}
-
-bool near(const camera::Intrinsics& a, const camera::Intrinsics& b, int width) {
-  const auto focal = [](double x, double y) { return std::abs(x - y) <= kMaxFocal * std::abs(y); };
-  const auto centre = [&](double x, double y) { return std::abs(x - y) <= kMaxCentre * width; };
-  return focal(a.fx, b.fx) && focal(a.fy, b.fy) && centre(a.cx, b.cx) && centre(a.cy, b.cy);
-}
-
-bool near(const std::vector<double>& a, const std::vector<double>& b) {
-  const auto close = [](double x, double y) { return std::abs(x - y) <= kMaxDistortion; };
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), close);
-}
-
-bool near(const geometry::SE3& a, const geometry::SE3& b) {
-  const geometry::SE3 D = a * b.inverse();
-  return geometry::so3_log(D.rotation()).norm() <= kMaxAngle && D.translation().norm() <= kMaxShift;
-}
-
-Status compare_camera(const SavedMap& saved, const camera::Rig& rig, std::size_t i) {
-  const camera::Camera &saved_camera = saved.map.rig().camera(i), &camera = rig.camera(i);
-  const auto error = [&](std::string_view field, std::string found, std::string expected) {
-    return Error{saved.file, fmt::format("camera {} ({}): {}", i, saved_camera.name, field), std::move(found),
-                 std::move(expected) + " (this rig)"};
-  };
-  const auto model = camera::model_name(saved_camera.model), camera_model = camera::model_name(camera.model);
-  if (model != camera_model) return error("model", std::string(model), std::string(camera_model));
-  if (saved_camera.width != camera.width || saved_camera.height != camera.height) {
-    return error("resolution", fmt::format("{}x{}", saved_camera.width, saved_camera.height),
-                 fmt::format("{}x{}", camera.width, camera.height));
-  }
-  if (!(std::abs(saved_camera.readout_s - camera.readout_s) <= kMaxReadout)) {
-    return error("rolling_shutter_readout_s", format_double(saved_camera.readout_s), format_double(camera.readout_s));
-  }
-  const camera::Intrinsics &saved_k = camera::intrinsics(saved_camera.model), &k = camera::intrinsics(camera.model);
-  if (!near(saved_k, k, camera.width)) {
-    return error("intrinsics", numbers_text({saved_k.fx, saved_k.fy, saved_k.cx, saved_k.cy}),
-                 numbers_text({k.fx, k.fy, k.cx, k.cy}));
-  }
-  const std::vector<double> saved_d = camera::distortion(saved_camera.model), d = camera::distortion(camera.model);
-  if (!near(saved_d, d)) return error("distortion", numbers_text(saved_d), numbers_text(d));
-  const geometry::SE3 &saved_T = saved.map.rig().cam_from_rig(i), &T = rig.cam_from_rig(i);
-  if (!near(saved_T, T)) return error("extrinsics", transform_text(saved_T), transform_text(T));
-  return {};
 }
 
 }  // namespace
@@ -239,18 +181,6 @@ Result<SavedMap> open_map(const std::filesystem::path& file, const camera::Rig& 
   }
   if (saved->map.num_keyframes() == 0) return Error{file.string(), "keyframes", "none", "a map with keyframes"};
   return saved;
-}
-
-Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
-            const place::Vocabulary* vocabulary) {
-  if (saved.map.rig().size() != rig.size()) {
-    return Error{saved.file, "rig", fmt::format("{} cameras", saved.map.rig().size()),
-                 fmt::format("{} (cameras of this rig)", rig.size())};
-  }
-  for (std::size_t i = 0; i < rig.size(); ++i) {
-    if (Status status = compare_camera(saved, rig, i); !status) return status;
-  }
-  return fits(saved, pyramid, vocabulary);
 }
 
 Status fits(const SavedMap& saved, const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {

@@ -1,6 +1,7 @@
 // Writes and reads saved maps. The format is described in docs/map_file.md.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -25,7 +26,8 @@ struct SavedMap {
   std::string file;
   map::BundledMap map;
   MapFileInfo info;
-  std::size_t words_end = 0;  // one more than the highest word id of its keyframes
+  std::size_t words_end = 0;                    // one more than the highest word id of its keyframes
+  std::array<std::uint32_t, 4> checksums = {};  // of the sections of the file
 };
 
 // Writes the keyframes and landmarks that are not removed, with consecutive ids in the same order. Words are omitted
@@ -41,11 +43,6 @@ Result<SavedMap> read_map(const std::filesystem::path& file);
 // Checks that a run with this pyramid and vocabulary (null: none) can continue the map: equal vocabularies, if both
 // have one. The Error names the difference.
 Status fits(const SavedMap& saved, const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
-
-// Also checks that the map has the same cameras as `rig`: an equal number, with equal models and resolutions, and with
-// calibrations that may be two estimates of the same one. The Error names the camera and the difference.
-Status fits(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
-            const place::Vocabulary* vocabulary);
 
 // Reads the map that a run with this rig, which may be any rig, continues. Errors: as for read_map and the first fits;
 // the map has no keyframes; it would have too many cameras with those of the run.

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "map/rigs_of_map.h"
 #include "synthetic_map.h"
 
 namespace bslam::map {
@@ -88,6 +91,95 @@ TEST(AppendMap, DoesNotChangeTheExistingSubmaps) {
   EXPECT_EQ(map.landmark_ids(), first.landmark_ids());
   EXPECT_EQ(map.roots(), first.roots());
   EXPECT_EQ(map.num_observations(), first.num_observations());
+}
+
+// A map of two keyframes that share a landmark, whose reference is a keypoint of the last camera.
+BundledMap pair_map(const std::shared_ptr<const camera::Rig>& rig, std::uint64_t seed) {
+  Random random(seed);
+  const std::size_t n = rig->size();
+  BundledMap map(rig);
+  const KeyframeId a = map.add_keyframe(synthetic_frame(random, n, 20, 5), random_pose(random, 1), {}, {});
+  const KeyframeId b = map.add_keyframe(synthetic_frame(random, n, 20, 5), random_pose(random, 1), {}, a);
+  const frame::KeypointRef last{CameraIndex(n - 1), KeypointIndex(19)};
+  const FeatureId f = map.keyframe(a).frame->bundled.feature(last);
+  const std::vector<Observation> both = {{a, f}, {b, f}};
+  map.add_landmark(random_point(random), both, {a, last});
+  return map;
+}
+
+std::shared_ptr<const camera::Rig> longer_focal_length(const camera::Rig& rig) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+    cameras.back().camera.model = camera::Pinhole({410, 410, 319.5, 239.5});
+  }
+  return std::make_shared<const camera::Rig>(std::move(cameras));
+}
+
+// Expects that the keyframes from `first` on are those of `other`, in which camera 0 is camera `camera` of `map`.
+void expect_appended(const BundledMap& map, KeyframeId first, const BundledMap& other, std::size_t camera) {
+  for (const KeyframeId k : other.keyframe_ids()) {
+    const frame::BundledFrame &source = *other.keyframe(k).frame,
+                              &added = *map.keyframe(KeyframeId(first.index() + k.index())).frame;
+    ASSERT_EQ(added.cameras.size(), map.rig().size());
+    ASSERT_EQ(added.bundled.size(), source.bundled.size());
+    EXPECT_EQ(added.bundled.num_matched(), source.bundled.num_matched());
+    for (std::size_t f = 0; f < source.bundled.size(); ++f) {
+      const auto before = source.bundled.keypoints(FeatureId(f)), after = added.bundled.keypoints(FeatureId(f));
+      ASSERT_EQ(after.size(), before.size());
+      for (std::size_t i = 0; i < before.size(); ++i) {
+        EXPECT_EQ(after[i].camera.index(), before[i].camera.index() + camera);
+        EXPECT_EQ(after[i].keypoint, before[i].keypoint);
+      }
+    }
+    for (std::size_t c = 0; c < source.cameras.size(); ++c)
+      EXPECT_TRUE(
+          std::ranges::equal(added.cameras[camera + c].keypoints.descriptor, source.cameras[c].keypoints.descriptor));
+  }
+}
+
+TEST(AppendMap, AppendsTheCamerasOfAnotherRig) {
+  const auto rig = synthetic_rig(2), another = longer_focal_length(*synthetic_rig(3));
+  BundledMap map = pair_map(rig, 21);
+  const BundledMap other = pair_map(another, 22);
+  const AppendedIds ids = append_map(map, other);
+  EXPECT_EQ(map.check_invariants().value_or("valid"), "valid");
+  ASSERT_EQ(map.rig().size(), 5u);
+  EXPECT_EQ(map.rig().camera(0).name, "cam0");
+  EXPECT_EQ(map.rig().camera(2).name, "cam0_2");
+  EXPECT_EQ(find_rig(map, *rig), 0u);
+  EXPECT_EQ(find_rig(map, *another), 2u);
+  expect_appended(map, KeyframeId(2), other, 2);
+  EXPECT_EQ(map.landmark(ids.landmarks[0]).reference.keypoint.camera, CameraIndex(4));
+}
+
+TEST(AppendMap, RecognisesRigsInAnyOrder) {
+  const auto rig = synthetic_rig(2), another = longer_focal_length(*synthetic_rig(3));
+  BundledMap map = pair_map(rig, 23), other = pair_map(another, 24);
+  append_map(map, pair_map(another, 25));
+  append_map(other, pair_map(rig, 26));  // its cameras are called cam0_2 and cam1_2 here
+  append_map(map, other);
+  EXPECT_EQ(map.check_invariants().value_or("valid"), "valid");
+  EXPECT_EQ(map.rig().size(), 5u);
+  EXPECT_EQ(map.num_keyframes(), 8u);
+  expect_appended(map, KeyframeId(4), pair_map(another, 24), 2);
+  expect_appended(map, KeyframeId(6), pair_map(rig, 26), 0);
+}
+
+TEST(AppendMap, UsesTheRefinedCalibrationOfTheMapThatIsContinued) {
+  const auto given = synthetic_rig(2), refined = longer_focal_length(*given);
+  BundledMap map = pair_map(given, 27);
+  map.set_rig(refined);
+  const BundledMap other = pair_map(given, 28);
+  append_map(map, other);
+  ASSERT_EQ(map.rig().size(), 2u);
+  const auto bearings = [](const BundledMap& m, std::size_t k) {
+    return m.keypoints(KeyframeId(k), CameraIndex(0)).bearing;
+  };
+  BundledMap expected = other;
+  expected.set_rig(refined);
+  EXPECT_TRUE(std::ranges::equal(bearings(map, 2), bearings(expected, 0)));
+  EXPECT_FALSE(std::ranges::equal(bearings(map, 2), bearings(other, 0)));
 }
 
 TEST(AttachKeyframes, RejectsACycle) {

@@ -92,9 +92,9 @@ TEST_F(CommandLine, PrintsVersionAndHelpForEveryCommand) {
   EXPECT_EQ(run("--version").status, 0);
   EXPECT_NE(run("--version").out.find("Eigen"), std::string::npos);
   for (const char* verb :
-       {"",          "run",      "live",        "eval",          "bench",       "simulate", "inspect",
-        "rig",       "rig info", "rig convert", "rig calibrate", "map",         "map info", "map export",
-        "map merge", "export",   "vocab",       "vocab info",    "vocab train", "settings"}) {
+       {"",          "run",          "live",        "eval",          "bench",      "simulate",    "inspect",
+        "rig",       "rig info",     "rig convert", "rig calibrate", "map",        "map info",    "map export",
+        "map merge", "map transfer", "export",      "vocab",         "vocab info", "vocab train", "settings"}) {
     EXPECT_EQ(run(std::string(verb) + " --help").status, 0) << verb;
   }
 }

@@ -1,0 +1,89 @@
+"""Results of tasks in files, named by the hash of everything they depend on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import pathlib
+import tempfile
+from collections.abc import Callable
+from typing import Any
+
+import fsspec
+from fsspec.implementations.local import LocalFileSystem
+
+Result = dict[str, Any]
+
+
+def sha256_of(file: str | os.PathLike[str]) -> str:
+    """Hash of the content of a file."""
+    with open(file, "rb") as stream:
+        digest = hashlib.sha256()
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def key_of(value: Any) -> str:
+    """Hash of a value that JSON can represent."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+
+
+def cached(cache: str, stage: str, depends_on: Any, make: Callable[[pathlib.Path], Result]) -> Result:
+    """The result of `make`, which writes files into the folder it is given, or that of an earlier call.
+
+    The folder appears under its name when it is complete. `folder` and `computed` are added to the result.
+    """
+    folder = pathlib.Path(cache, stage, key_of([stage, depends_on]))
+    computed = not folder.exists()
+    if computed:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".", dir=folder.parent, ignore_cleanup_errors=True) as work:
+            made = pathlib.Path(work, "made")
+            made.mkdir()
+            (made / "result.json").write_text(json.dumps(make(made)))
+            try:
+                made.rename(folder)
+            except OSError:  # another worker was faster
+                if not folder.exists():
+                    raise
+    result = json.loads((folder / "result.json").read_text())
+    return {**result, "folder": str(folder), "computed": computed}
+
+
+def content_of(cache: str, recording: str) -> str:
+    """Hash of the content of a recording.
+
+    Files on disk are read again only if a size or a time has changed. Of object stores, the listing identifies the
+    content.
+    """
+    system, root = fsspec.url_to_fs(recording)
+    local = isinstance(system, LocalFileSystem)
+    files = sorted(system.find(root))
+    if not files:
+        raise FileNotFoundError(f"cannot open {recording}: No such file or directory")
+    listing = [(os.path.relpath(f, root), *(_stat(f) if local else [system.ukey(f)])) for f in files]
+    if not local:
+        return key_of(listing)
+    return cached(
+        cache,
+        "contents",
+        [root, listing],
+        lambda _: {"content": key_of([(os.path.relpath(f, root), sha256_of(f)) for f in files])},
+    )["content"]
+
+
+def local_copy(recording: str, folder: pathlib.Path) -> str:
+    """The path of a recording, which is fetched into `folder` unless it is on disk."""
+    system, root = fsspec.url_to_fs(recording)
+    if isinstance(system, LocalFileSystem):
+        return root
+    copy = folder / pathlib.PurePosixPath(root).name
+    system.get(root, str(copy), recursive=True)
+    return str(copy)
+
+
+def _stat(file: str) -> list[int]:
+    status = os.stat(file)
+    return [status.st_size, status.st_mtime_ns]

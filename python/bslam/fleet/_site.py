@@ -1,0 +1,324 @@
+"""From recordings to the map of a site: what depends on what. Dask decides when and where it runs."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import pathlib
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Union
+
+import click
+import dask
+import numpy as np
+from distributed import Client, Future, LocalCluster, as_completed
+
+from .. import _bslam
+from . import _tasks
+from ._cache import Result, sha256_of
+from ._sketch import likely_pairs
+
+Path = Union[str, "os.PathLike[str]"]
+
+_NUMBERS = ("keyframes", "landmarks")  # of a map
+
+
+@dataclass
+class Recording:
+    """A recording and what became of it.
+
+    Attributes:
+        name: of its files.
+        data: where it is.
+        state: joined to the map of a site; apart, with a map of its own; or failed.
+        reason: why it was not joined.
+        map: file, relative to the folder of the result.
+        trajectory: file of its trajectory in that map.
+    """
+
+    name: str
+    data: str
+    state: str = "apart"
+    reason: str = ""
+    map: str = ""
+    trajectory: str = ""
+
+
+@dataclass
+class Site:
+    """The result of map_recordings.
+
+    Attributes:
+        folder: of all files.
+        sites: the maps of two or more recordings, the one of most recordings first: file, recordings, keyframes,
+            landmarks.
+        recordings: all recordings, in order of name.
+        computed: number of tasks that were computed.
+        reused: number of tasks whose results were there already.
+    """
+
+    folder: pathlib.Path
+    sites: list[dict[str, Any]] = field(default_factory=list)
+    recordings: list[Recording] = field(default_factory=list)
+    computed: int = 0
+    reused: int = 0
+
+    def lines(self) -> list[str]:
+        """What the command line prints."""
+        out = [f"{r.state}: {r.name}: {r.reason}" for r in self.recordings if r.state != "joined"]
+        for site in self.sites:
+            out.append(
+                f"{len(site['recordings'])} of {len(self.recordings)} recordings in {self.folder / site['map']}: "
+                f"{site['keyframes']} keyframes, {site['landmarks']} landmarks"
+            )
+        return [*out, f"{self.computed} results computed, {self.reused} reused"]
+
+
+def map_recordings(
+    recordings: Sequence[Path],
+    out: Path,
+    *,
+    client: Client | None = None,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    cache: Path | None = None,
+    rig: Path | None = None,
+    config: Path | None = None,
+    settings: Sequence[str] = (),
+    partners: int = 6,
+    overwrite: bool = False,
+    progress: bool = False,
+) -> Site:
+    """Maps recordings, merges the maps that have common places, and writes maps and trajectories.
+
+    Args:
+        recordings: folders and bags, or addresses that fsspec knows, such as s3://BUCKET/NAME.
+        out: folder for site.bmap, trajectories, and site.json, which says what became of each recording.
+        client: Dask client to use.
+        scheduler: address of a Dask scheduler; its workers must see `cache` and the recordings under the same paths.
+        workers: number of local workers without `client` and `scheduler`; default: one per core.
+        cache: folder of intermediate results; default: `out`/cache. Another call with it continues where the last one
+            ended, and computes only what depends on what has changed.
+        rig: calibration of all recordings; default: that of each recording.
+        config: YAML file with settings.
+        settings: settings such as "features.per_image=800".
+        partners: number of other recordings that each one is compared with.
+        overwrite: `out` may contain files of others.
+        progress: show progress on stderr.
+
+    Raises:
+        Error: a folder that is not empty, a file that does not exist, recordings of the same name.
+    """
+    out = pathlib.Path(out).absolute()
+    if (
+        out.exists()
+        and any(out.iterdir())
+        and not overwrite
+        and not (out / "site.json").exists()
+        and not (out / "cache").exists()
+    ):
+        raise _bslam.Error(
+            f"{out}: --out: found a folder that is not empty, expected an empty or new folder, or --overwrite"
+        )
+    folder = pathlib.Path(cache or out / "cache").absolute()
+    setup = _tasks.Setup(str(folder), _tasks.program_hash(), *_options(folder, rig, config, settings))
+    named = _named(recordings)
+    out.mkdir(parents=True, exist_ok=True)
+    with _connected(client, scheduler, workers, progress) as dask_client:
+        return _Mapping(dask_client, setup, out, partners, progress).run(named)
+
+
+def _named(recordings: Sequence[Path]) -> list[Recording]:
+    named: dict[str, Recording] = {}
+    for given in [os.fspath(r) for r in recordings]:
+        data = given if "://" in given else str(pathlib.Path(given).absolute())
+        recording = Recording(pathlib.PurePosixPath(data).name, data)
+        if (other := named.setdefault(recording.name, recording)) is not recording:
+            raise _bslam.Error(f"{data}: found a recording with the name of {other.data}, expected different names")
+        if "://" not in data and not pathlib.Path(data).exists():
+            raise _bslam.Error(f"cannot open {given}: No such file or directory")
+    return [named[name] for name in sorted(named)]
+
+
+def _options(
+    cache: pathlib.Path, rig: Path | None, config: Path | None, settings: Sequence[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The options of `run` and of all commands. Files are copied into the cache, under the hashes of their contents."""
+
+    def shared(file: Path) -> str:
+        try:
+            copy = cache / "files" / f"{sha256_of(file)}{pathlib.Path(file).suffix}"
+        except OSError as error:
+            raise _bslam.Error(f"cannot open {file}: {error.strerror}") from error
+        if not copy.exists():
+            _copy(file, copy)
+        return str(copy)
+
+    return (
+        () if rig is None else (f"--rig={shared(rig)}",),
+        (*(() if config is None else (f"--config={shared(config)}",)), *(f"--set={s}" for s in settings)),
+    )
+
+
+@contextlib.contextmanager
+def _connected(client: Client | None, scheduler: str | None, workers: int | None, progress: bool) -> Iterator[Client]:
+    with contextlib.ExitStack() as stack:
+        if client is None:
+            # A worker that is killed says nothing about its task, which is tried again by another one.
+            stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 100}))
+            address: Any = scheduler
+            if address is None:
+                count = workers or os.cpu_count()
+                address = stack.enter_context(
+                    LocalCluster(n_workers=count, threads_per_worker=1, memory_limit=0, dashboard_address=":0")
+                )
+            try:
+                client = stack.enter_context(Client(address))
+            except OSError as error:
+                raise _bslam.Error(f"the scheduler {scheduler} cannot be reached: {error}") from error
+        if progress:
+            print(f"dashboard: {client.dashboard_link}", file=sys.stderr)
+        yield client
+
+
+class _Mapping:
+    """One call of map_recordings."""
+
+    def __init__(self, client: Client, setup: _tasks.Setup, out: pathlib.Path, partners: int, progress: bool) -> None:
+        self.client, self.setup, self.partners, self.progress = client, setup, partners, progress
+        self.site = Site(out)
+        self.reasons: dict[str, str] = {}  # of maps that were compared with others
+
+    def run(self, recordings: list[Recording]) -> Site:
+        self.site.recordings = recordings
+        made = self._done("maps", [self._submit(_tasks.make_map, r.data) for r in recordings])
+        groups: dict[str, list[tuple[Recording, Result]]] = {}  # recordings with the same map, by its hash
+        for recording, result in zip(recordings, made, strict=True):
+            if "error" in result:
+                recording.state, recording.reason = "failed", result["error"]
+            else:
+                groups.setdefault(result["map"], []).append((recording, result))
+        maps = {key: group[0][1] for key, group in sorted(groups.items())}
+        self._write(
+            [(merged, [pair for key in members for pair in groups[key]]) for merged, members in self._merged(maps)]
+        )
+        return self.site
+
+    def _submit(self, task: Any, *arguments: Any) -> Future:
+        return self.client.submit(task, self.setup, *arguments, retries=2)
+
+    def _done(self, label: str, futures: list[Future]) -> list[Result]:
+        file = sys.stderr if self.progress and futures else io.StringIO()
+        with click.progressbar(length=len(futures), label=f"{label:<12}", file=file, show_pos=True) as bar:
+            for _ in as_completed(futures):
+                bar.update(1)
+        results = self.client.gather(futures)
+        computed = sum(r["computed"] for r in results)
+        self.site.computed += computed
+        self.site.reused += len(results) - computed
+        return results
+
+    def _merged(self, maps: dict[str, Result]) -> list[tuple[Result, tuple[str, ...]]]:
+        """The maps of the sites, each with the hashes of the maps in it; the one of most maps first.
+
+        In each round, every site is compared with others at its likeliest pair of maps, and sites that have a place in
+        common are merged.
+        """
+        pairs = self._likely_pairs(maps)
+        site: dict[str, tuple[str, ...]] = {key: (key,) for key in maps}  # of each map: all maps of its site
+        merged: dict[tuple[str, ...], Any] = {(key,): maps[key] for key in maps}  # of each site
+        merges = []
+        while chosen := _best_pairs(pairs, site):
+            pairs = [pair for pair in pairs if pair not in chosen]
+            self._compare(chosen, maps, site)
+            for members in sorted(set(site.values()) - set(merged)):
+                parts = [merged.pop(part) for part in sorted(merged) if set(part) <= set(members)]
+                merged[members] = self._submit(_tasks.merge, parts)
+                merges.append(merged[members])
+        self._done("merging", merges)
+        final = {members: self._submit(_tasks.merge, [merged[members]], True) for members in merged if len(members) > 1}
+        merged.update(zip(final, self._done("adjusting", list(final.values())), strict=True))
+        return sorted(((m, k) for k, m in merged.items()), key=lambda s: (-len(s[1]), -s[0]["keyframes"], s[1]))
+
+    def _likely_pairs(self, maps: dict[str, Result]) -> list[tuple[str, str]]:
+        metric = [key for key, m in maps.items() if m["scale"] == "metric"]
+        self.reasons = {key: "the scale of its map is not metric" for key in maps if key not in metric}
+        sketches = [np.load(pathlib.Path(maps[key]["folder"], "sketch.npy")) for key in metric]
+        return [(metric[i], metric[j]) for i, j in likely_pairs(sketches, self.partners)]
+
+    def _compare(self, pairs: list[tuple[str, str]], maps: dict[str, Result], site: dict[str, tuple[str, ...]]) -> None:
+        """Joins the sites of pairs with a common place."""
+        verdicts = self._done("comparing", [self._submit(_tasks.compare, maps[a], maps[b]) for a, b in pairs])
+        for (a, b), verdict in zip(pairs, verdicts, strict=True):
+            if verdict["joined"]:
+                members = tuple(sorted(set(site[a] + site[b])))
+                site.update(dict.fromkeys(members, members))
+            else:
+                for key in (a, b):
+                    self.reasons.setdefault(key, verdict["reason"])
+
+    def _write(self, sites: list[tuple[Result, list[tuple[Recording, Result]]]]) -> None:
+        shared = [(merged, r, own) for merged, members in sites if len(members) > 1 for r, own in members]
+        moved = self._done("trajectories", [self._submit(_tasks.transfer, own, merged) for merged, _, own in shared])
+        trajectories = {r.name: m for (_, r, _), m in zip(shared, moved, strict=True)}
+        for merged, members in sites:
+            joined = [r.name for r, _ in members if trajectories.get(r.name, {}).get("joined")]
+            if len(joined) > 1:
+                self._write_site(merged, joined)
+            for r, own in members:
+                if r.name in joined and len(joined) > 1:
+                    r.state, r.map, source = "joined", self.site.sites[-1]["map"], trajectories[r.name]
+                else:
+                    r.reason = self._reason(own["map"], len(members) > 1)
+                    r.map, source = f"apart/{r.name}.bmap", own
+                    _copy(pathlib.Path(own["folder"], "map.bmap"), self.site.folder / r.map)
+                r.trajectory = f"trajectories/{r.name}.tum"
+                _copy(pathlib.Path(source["folder"], "trajectory.tum"), self.site.folder / r.trajectory)
+        self._write_summary()
+
+    def _write_site(self, merged: Result, names: list[str]) -> None:
+        number = len(self.site.sites) + 1
+        file = "site.bmap" if number == 1 else f"site_{number}.bmap"
+        _copy(pathlib.Path(merged["folder"], "map.bmap"), self.site.folder / file)
+        self.site.sites.append({"map": file, "recordings": sorted(names), **{n: merged[n] for n in _NUMBERS}})
+
+    def _reason(self, key: str, verified: bool) -> str:
+        if verified:
+            return "it has a place in common with another recording, but the merged map does not confirm it"
+        return self.reasons.get(key, "no place looks like one of another recording")
+
+    def _write_summary(self) -> None:
+        summary = self.site.folder / "site.json"
+        before = _files_in(json.loads(summary.read_text())) if summary.exists() else set()
+        now = {"schema": 1, "sites": self.site.sites, "recordings": [vars(r) for r in self.site.recordings]}
+        unfinished = summary.with_name(".site.json")
+        unfinished.write_text(json.dumps(now, indent=1) + "\n")
+        unfinished.replace(summary)
+        for name in before - _files_in(now):
+            (self.site.folder / name).unlink(missing_ok=True)
+
+
+def _best_pairs(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) -> list[tuple[str, str]]:
+    """Of each site the first pair in the list that connects it with another one."""
+    best: dict[tuple[str, ...], tuple[str, str]] = {}
+    for a, b in pairs:
+        if site[a] != site[b]:
+            best.setdefault(site[a], (a, b))
+            best.setdefault(site[b], (a, b))
+    return sorted(set(best.values()))
+
+
+def _files_in(summary: dict[str, Any]) -> set[str]:
+    return {r[kind] for r in summary["recordings"] for kind in ("map", "trajectory") if r[kind]}
+
+
+def _copy(source: Path, file: pathlib.Path) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_name(f".{file.name}")
+    shutil.copyfile(source, unfinished)
+    unfinished.replace(file)

@@ -1,0 +1,162 @@
+"""The tasks of workers. Each runs the program and keeps its results in the cache."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import tempfile
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import _bslam
+from .._program import PROGRAM
+from ._cache import Result, cached, content_of, local_copy, sha256_of
+from ._sketch import sketch
+
+_NOTHING_TRACKED = 3  # exit status
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What all tasks have in common."""
+
+    cache: str  # folder
+    program: str  # hash
+    run: tuple[str, ...] = ()  # options of `bslam run`
+    settings: tuple[str, ...] = ()  # options of all commands
+
+    def check(self) -> None:
+        """Results must not depend on which worker has computed them."""
+        if (found := program_hash()) != self.program:
+            raise _bslam.Error(
+                f"worker on {os.uname().nodename}: found another version of bslam ({found[:12]}), "
+                f"expected that of the client ({self.program[:12]})"
+            )
+
+
+@functools.lru_cache
+def program_hash() -> str:
+    """Hash of the program of this installation."""
+    return sha256_of(PROGRAM)
+
+
+def make_map(setup: Setup, recording: str) -> Result:
+    """The map of a recording, with its hash as `map`, its trajectory and its sketch; or the `error`."""
+    setup.check()
+    try:
+        content = content_of(setup.cache, recording)
+    except OSError as error:
+        return {"error": str(error), "computed": False}
+
+    def make(folder: pathlib.Path) -> Result:
+        with tempfile.TemporaryDirectory() as work:
+            data, run = local_copy(recording, pathlib.Path(work)), pathlib.Path(work, "run")
+            done = _run(
+                "run",
+                data,
+                f"--out={run}",
+                f"--save-map={folder}/map.bmap",
+                "--mode=sequential",
+                "--set=execution.threads=1",
+                "--no-report",
+                "--progress=never",
+                *setup.run,
+                *setup.settings,
+            )
+            if done.returncode == _NOTHING_TRACKED:
+                return {"error": "no frame could be tracked"}
+            if done.returncode != 0:
+                raise _bslam.Error(_message(done))
+            for name in ("trajectory.tum", "summary.json"):
+                shutil.copy(run / name, folder)
+        made = _bslam.Map.load(folder / "map.bmap")
+        np.save(folder / "sketch.npy", sketch(made.words()))
+        return {
+            "map": sha256_of(folder / "map.bmap"),
+            "keyframes": made.num_keyframes,
+            "landmarks": made.num_landmarks,
+            "scale": made.scale,
+        }
+
+    try:
+        return cached(setup.cache, "maps", [setup.program, setup.run, setup.settings, content], make)
+    except _bslam.Error as error:
+        return {"error": str(error), "computed": True}
+
+
+def compare(setup: Setup, a: Result, b: Result) -> Result:
+    """Whether two maps have a place in common: `joined`, or the `reason` why not."""
+    setup.check()
+
+    def make(_: pathlib.Path) -> Result:
+        verdict = json.loads(_program("map", "merge", *map(_map_of, (a, b)), "--dry-run", "--json", *setup.settings))
+        reason = next((i["reason"] for i in verdict["inputs"] if not i["joined"]), "")
+        return {"joined": not reason, "reason": reason}
+
+    return cached(setup.cache, "pairs", [setup.program, setup.settings, sorted([a["map"], b["map"]])], make)
+
+
+def merge(setup: Setup, maps: list[Result], final: bool = False) -> Result:
+    """The merged map, with a global bundle adjustment if it is the `final` one."""
+    setup.check()
+
+    def make(folder: pathlib.Path) -> Result:
+        options = ["--json", f"--out={folder}/map.bmap", *setup.settings, *([] if final else ["--no-final-ba"])]
+        merged = json.loads(_program("map", "merge", *map(_map_of, maps), *options))
+        numbers = {name: merged[name] for name in ("keyframes", "landmarks", "submaps")}
+        return {"map": sha256_of(folder / "map.bmap"), **numbers}
+
+    return cached(setup.cache, "merged", [setup.program, setup.settings, final, sorted(m["map"] for m in maps)], make)
+
+
+def transfer(setup: Setup, own: Result, site: Result) -> Result:
+    """The trajectory of a recording in the map of a site; `joined` if it is in the first submap."""
+    setup.check()
+
+    def make(folder: pathlib.Path) -> Result:
+        file = folder / "trajectory.tum"
+        trajectory = pathlib.Path(own["folder"], "trajectory.tum")
+        _program("map", "transfer", str(trajectory), f"--from={_map_of(own)}", f"--to={_map_of(site)}", f"--out={file}")
+        with file.open() as lines:
+            return {"joined": " parent=world " in lines.readline()}
+
+    return cached(setup.cache, "trajectories", [setup.program, own["map"], site["map"]], make)
+
+
+def _map_of(result: Result) -> str:
+    return str(pathlib.Path(result["folder"], "map.bmap"))
+
+
+def _program(*arguments: str) -> str:
+    """Runs the program and returns what it prints."""
+    done = _run(*arguments)
+    if done.returncode != 0:
+        raise _bslam.Error(_message(done))
+    return done.stdout
+
+
+def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Runs the program, which ends with the worker."""
+    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=False, preexec_fn=_end_together)
+    if done.returncode < 0:  # Dask tries again
+        raise RuntimeError(f"bslam {arguments[0]} was ended by signal {-done.returncode}")
+    return done
+
+
+def _message(done: subprocess.CompletedProcess[str]) -> str:
+    lines = done.stderr.strip().splitlines() or [f"bslam: ended with status {done.returncode}"]
+    return lines[-1].removeprefix("bslam: ")
+
+
+_LIBC = ctypes.CDLL(None)
+
+
+def _end_together() -> None:
+    _LIBC.prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG

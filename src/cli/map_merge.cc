@@ -1,0 +1,126 @@
+// bslam map merge: joins maps of separate runs.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/config_arguments.h"
+#include "cli/verbs.h"
+#include "cli/version.h"
+#include "session/merge_maps.h"
+#include "storage/map_file.h"
+#include "storage/vocabulary_file.h"
+
+namespace bslam::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MergeArguments {
+  std::vector<std::string> files;
+  std::string out, vocabulary;
+  ConfigArguments config;
+  bool json = false, overwrite = false, no_final_ba = false, dry_run = false;
+};
+
+// Returns text such as "1 submap" or "2 submaps".
+std::string counted(std::size_t count, std::string_view name) {
+  return fmt::format("{} {}{}", count, name, count == 1 ? "" : "s");
+}
+
+void print_json(const session::MergeResult& merged) {
+  nlohmann::ordered_json inputs = nlohmann::ordered_json::array();
+  for (const session::MergedInput& input : merged.inputs) {
+    inputs.push_back({{"file", input.file},
+                      {"keyframes", input.keyframes},
+                      {"submap", input.submap},
+                      {"joined", input.reason.empty()},
+                      {"reason", input.reason}});
+  }
+  const nlohmann::ordered_json all = {{"schema", 1},
+                                      {"keyframes", merged.map.num_keyframes()},
+                                      {"landmarks", merged.map.num_landmarks()},
+                                      {"submaps", merged.map.roots().size()},
+                                      {"merged", merged.joined},
+                                      {"loops", merged.loops},
+                                      {"inputs", std::move(inputs)}};
+  std::printf("%s\n", all.dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+}
+
+void print_text(const session::MergeResult& merged) {
+  for (const session::MergedInput& input : merged.inputs) {
+    if (!input.reason.empty()) fmt::print("not joined: {}: {} (submap {})\n", input.file, input.reason, input.submap);
+  }
+  fmt::print("{} keyframes, {} landmarks; merged {}, {}, {} remaining\n", merged.map.num_keyframes(),
+             merged.map.num_landmarks(), counted(static_cast<std::size_t>(merged.joined), "submap"),
+             counted(static_cast<std::size_t>(merged.loops), "further loop closure"),
+             counted(merged.map.roots().size(), "submap"));
+}
+
+Result<session::MergeResult> merge(const MergeArguments& arguments, const place::VocabularyPtr& vocabulary) {
+  auto config = resolve_config(arguments.config);
+  if (!config) return config.error();
+  std::vector<storage::SavedMap> maps;
+  for (const std::string& file : arguments.files) {
+    auto saved = storage::read_map(file);
+    if (!saved) return saved.error();
+    maps.push_back(*std::move(saved));
+  }
+  auto merged = session::merge_maps(std::move(maps), vocabulary, *config);
+  if (merged && !arguments.dry_run && !arguments.no_final_ba) session::adjust_merged(merged->map, *config);
+  return merged;
+}
+
+Status write(const session::MergeResult& merged, const place::Vocabulary& vocabulary, const std::string& file) {
+  std::vector<std::string> recordings;
+  for (const session::MergedInput& input : merged.inputs) recordings.push_back(input.data);
+  const storage::MapFileInfo info{vocabulary.id(), version_number(), fmt::format("{}", fmt::join(recordings, " + "))};
+  return storage::write_map(merged.map, info, file);
+}
+
+int map_merge(const MergeArguments& arguments) {
+  if (arguments.out.empty() && !arguments.dry_run)
+    return report_error({"command line", "--out", "no file", "a file for the merged map, or --dry-run"});
+  std::error_code error;
+  if (fs::exists(arguments.out, error) && !arguments.overwrite && !arguments.dry_run)
+    return report_error({arguments.out, "--out", "an existing file", "a new file, or --overwrite"});
+  const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
+  if (!vocabulary) return report_error(vocabulary.error());
+  const auto merged = merge(arguments, *vocabulary);
+  if (!merged) return report_error(merged.error());
+  if (!arguments.dry_run) {
+    if (const Status s = write(*merged, **vocabulary, arguments.out); !s) return report_error(s.error());
+  }
+  arguments.json ? print_json(*merged) : print_text(*merged);
+  if (!arguments.dry_run && !arguments.json) fmt::print("{}\n", arguments.out);
+  return kExitOk;
+}
+
+}  // namespace
+
+void add_map_merge(CLI::App& map, int& exit_status) {
+  const auto arguments = std::make_shared<MergeArguments>();
+  CLI::App* merge = map.add_subcommand("merge", "merge maps of separate runs that contain common places");
+  merge
+      ->add_option("MAPS", arguments->files,
+                   "saved maps, of any rigs; their order does not matter, and one is only adjusted")
+      ->required()
+      ->expected(1, CLI::detail::expected_max_vector_size);
+  merge->add_option("--out", arguments->out, "file for the merged map");
+  merge->add_option("--vocabulary", arguments->vocabulary,
+                    "vocabulary of the maps; default: the vocabulary shipped with this program");
+  merge->add_flag("--no-final-ba", arguments->no_final_ba, "skip the global bundle adjustment at the end");
+  merge->add_flag("--dry-run", arguments->dry_run, "only print which maps would be joined");
+  merge->add_flag("--json", arguments->json, "print JSON");
+  merge->add_flag("--overwrite", arguments->overwrite, "replace an existing file");
+  add_config_options(*merge, arguments->config);
+  merge->callback([arguments, &exit_status] { exit_status = map_merge(*arguments); });
+}
+
+}  // namespace bslam::cli

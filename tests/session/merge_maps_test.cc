@@ -1,0 +1,130 @@
+#include "session/merge_maps.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "looping/simulated_hall.h"
+#include "session/transfer_trajectory.h"
+#include "storage/submaps.h"
+
+namespace bslam::session {
+namespace {
+
+using geometry::SE3;
+using looping::HallMap;
+using storage::SavedMap;
+
+SavedMap saved(const map::BundledMap& map, const std::string& name) {
+  auto out = storage::map_from_bytes(storage::map_to_bytes(map, {looping::small_vocabulary()->id(), "0.1.0", name}),
+                                     name + ".bmap");
+  EXPECT_TRUE(out) << out.error().message();
+  return *std::move(out);
+}
+
+// Keyframes `from` to `to` of a lap through the hall, in a world frame of its own.
+SavedMap part_of_lap(int from, int to, int cameras, const std::string& name) {
+  const synthetic::FeatureSimulator simulator = looping::hall(looping::rig_of(cameras));
+  const double shift = 0.01 * from + to;
+  const geometry::Sim3 world(geometry::Sim3::exp((geometry::Vector7d() << 0.1, 0.2, 0, shift, -3, 1, 0).finished()));
+  HallMap out(simulator.rig());
+  for (int i = from; i < to; ++i) out.add(simulator.frame(FrameId(i), looping::kStepS * i), world, 0, {}, i == from);
+  return saved(out.map, name);
+}
+
+std::string bytes_of(const MergeResult& merged) {
+  return storage::map_to_bytes(merged.map, {looping::small_vocabulary()->id(), "0.1.0", ""});
+}
+
+Result<MergeResult> merged(std::vector<SavedMap> maps) {
+  return merge_maps(std::move(maps), looping::small_vocabulary(), {});
+}
+
+// Three runs through neighbouring parts of the hall, with different rigs, and one through a part far away.
+const std::vector<SavedMap>& runs() {
+  static const std::vector<SavedMap> maps = {part_of_lap(0, 12, 2, "a"), part_of_lap(6, 19, 4, "b"),
+                                             part_of_lap(13, 24, 2, "c"), part_of_lap(34, 42, 2, "apart")};
+  return maps;
+}
+
+const MergeResult& merged_runs() {
+  static const MergeResult result = merged(runs()).value();
+  return result;
+}
+
+TEST(MergeMaps, JoinsRunsOfDifferentRigsAndNamesTheOneThatIsApart) {
+  const MergeResult& result = merged_runs();
+  EXPECT_EQ(result.map.check_invariants(), std::nullopt);
+  EXPECT_EQ(result.map.num_keyframes(), 12u + 13 + 11 + 8);
+  EXPECT_EQ(result.map.roots().size(), 2u);
+  EXPECT_EQ(result.joined, 2);
+  ASSERT_EQ(result.inputs.size(), 4u);
+  EXPECT_EQ(result.inputs.front().file, "b.bmap");  // it has most keyframes
+  for (const MergedInput& input : result.inputs) {
+    EXPECT_EQ(input.submap, input.data == "apart" ? 1u : 0u) << input.file;
+    EXPECT_EQ(input.reason.empty(), input.data != "apart") << input.file << ": " << input.reason;
+  }
+}
+
+TEST(MergeMaps, NamesTheLargestMapIfItIsTheOneThatIsApart) {
+  const auto result = merged({runs()[0], part_of_lap(6, 14, 2, "d"), part_of_lap(28, 46, 2, "largest")});
+  ASSERT_TRUE(result);
+  ASSERT_EQ(result->inputs.front().data, "largest");
+  EXPECT_EQ(result->inputs[0].submap, 0u);
+  EXPECT_FALSE(result->inputs[0].reason.empty());
+  for (const std::size_t i : {1, 2}) {
+    EXPECT_EQ(result->inputs[i].submap, 1u);
+    EXPECT_EQ(result->inputs[i].reason, "");
+  }
+}
+
+TEST(MergeMaps, DoesNotDependOnTheOrderOfTheMaps) {
+  std::vector<SavedMap> maps = runs();
+  const std::string expected = bytes_of(merged_runs());
+  std::ranges::reverse(maps);
+  EXPECT_EQ(bytes_of(merged(maps).value()), expected);
+  std::swap(maps[0], maps[2]);
+  EXPECT_EQ(bytes_of(merged(maps).value()), expected);
+}
+
+TEST(MergeMaps, RejectsTheSameMapTwice) {
+  const auto result = merged({runs()[0], runs()[1], runs()[0]});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().found, "the same map as a.bmap");
+}
+
+TEST(MergeMaps, RejectsAMapWithoutMetricScale) {
+  map::BundledMap map = runs()[0].map;
+  map.set_scale(map::Scale::kUpToScale);
+  const auto result = merged({saved(map, "mono"), runs()[1]});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().file, "mono.bmap");
+  EXPECT_EQ(result.error().key, "scale");
+}
+
+TEST(TransferTrajectory, FollowsTheKeyframesOfTheRun) {
+  const SavedMap site = saved(merged_runs().map, "site"), &own = runs()[0];
+  const evaluation::Trajectory keyframes = storage::keyframe_trajectory(own.map, storage::submaps_of(own.map)[0]);
+  const auto moved = transfer_trajectory(keyframes, own, site);
+  ASSERT_TRUE(moved) << moved.error().message();
+  EXPECT_EQ(moved->keyframes, 12u);
+  EXPECT_EQ(moved->submap, 0u);
+  ASSERT_EQ(moved->poses.size(), keyframes.size());
+  const std::vector<KeyframeId> of_site = site.map.keyframe_ids();
+  for (const evaluation::TimedPose& pose : moved->poses) {
+    EXPECT_TRUE(std::ranges::any_of(of_site, [&](KeyframeId k) {
+      return site.map.keyframe(k).frame->time_ns == pose.time_ns &&
+             looping::distance_m(site.map.keyframe(k).T_rig_world, pose.T_world_frame.inverse()) < 1e-6;
+    }));
+  }
+}
+
+TEST(TransferTrajectory, NamesAMapThatDoesNotContainTheRun) {
+  const auto moved = transfer_trajectory(evaluation::Trajectory(1), runs()[3], runs()[0]);
+  ASSERT_FALSE(moved);
+  EXPECT_EQ(moved.error().file, "a.bmap");
+  EXPECT_EQ(moved.error().found, "none of apart.bmap");
+}
+
+}  // namespace
+}  // namespace bslam::session
