@@ -146,7 +146,7 @@ TEST(AppendMap, AppendsTheCamerasOfAnotherRig) {
   EXPECT_EQ(map.check_invariants().value_or("valid"), "valid");
   ASSERT_EQ(map.rig().size(), 5u);
   EXPECT_EQ(map.rig().camera(0).name, "cam0");
-  EXPECT_EQ(map.rig().camera(2).name, "cam0_2");
+  EXPECT_EQ(map.rig().camera(2).name, "cam2");
   EXPECT_EQ(find_rig(map, *rig), 0u);
   EXPECT_EQ(find_rig(map, *another), 2u);
   expect_appended(map, KeyframeId(2), other, 2);
@@ -157,7 +157,7 @@ TEST(AppendMap, RecognisesRigsInAnyOrder) {
   const auto rig = synthetic_rig(2), another = longer_focal_length(*synthetic_rig(3));
   BundledMap map = pair_map(rig, 23), other = pair_map(another, 24);
   append_map(map, pair_map(another, 25));
-  append_map(other, pair_map(rig, 26));  // its cameras are called cam0_2 and cam1_2 here
+  append_map(other, pair_map(rig, 26));  // its cameras are called cam2 and cam3 here
   append_map(map, other);
   EXPECT_EQ(map.check_invariants().value_or("valid"), "valid");
   EXPECT_EQ(map.rig().size(), 5u);
