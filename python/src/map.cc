@@ -76,7 +76,7 @@ void bind_keyframes(nb::class_<MapView>& map) {
             }
             return out;
           },
-          "Returns, for each keyframe, the distinct visual words of its features, ascending.",
+          "Returns, for each keyframe, the distinct visual words of its features, ascending: arrays of shape (M,).",
           nb::sig("def words(self) -> list[numpy.typing.NDArray[numpy.int32]]"))
       .def(
           "covisibility", covisibility, nb::arg("min_landmarks") = 15,

@@ -140,14 +140,23 @@ def test_requests_that_cannot_be_met(recordings, tmp_path):
         map_recordings(recordings, tmp_path)
 
 
-def test_command_line(recordings, two_workers, tmp_path):
+def test_command_line(recordings, two_workers, cluster, tmp_path):
     environment = {**os.environ, "BSLAM_PYTHON": sys.executable}
-    command = [PROGRAM, "fleet", "map", *recordings, "--out", two_workers.folder, "--workers", "1"]
+    command = [
+        PROGRAM,
+        "fleet",
+        "map",
+        *recordings,
+        "--out",
+        two_workers.folder,
+        "--scheduler",
+        cluster.scheduler_address,
+    ]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[0].startswith("apart: elsewhere: ")
     assert done.stdout.splitlines()[-1].startswith("0 results computed, ")
-    assert "dashboard: http://" in done.stderr
+    assert "dashboard: none" in done.stderr
     command = [PROGRAM, "fleet", "map", tmp_path / "nowhere", "--out", tmp_path / "site"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (2, f"bslam: cannot open {tmp_path}/nowhere: No such file or directory\n")

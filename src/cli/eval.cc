@@ -41,10 +41,11 @@ AlignMode align_mode(const std::string& name) {
   return name == "none" ? AlignMode::kNone : AlignMode::kSe3;
 }
 
-// Returns T_cam_frame of the frame of the ground truth and of the camera of the estimate.
-Result<geometry::SE3> frame_of_truth(const EvalArguments& arguments) {
+// Returns T_cam_frame of the frame of the ground truth and of the camera of the estimate; nullopt if both paths are in
+// one frame.
+Result<std::optional<geometry::SE3>> frame_of_truth(const EvalArguments& arguments) {
   const std::string frame = evaluation::read_comments(arguments.estimate).frame;
-  if (frame == "body" && arguments.gt_frame == "body") return geometry::SE3();
+  if (frame == "body" && arguments.gt_frame == "body") return std::optional<geometry::SE3>();
   if (arguments.gt_frame != "body" && !arguments.rig) {
     if (!frame.empty() && frame != "cam0") {
       fmt::print(
@@ -53,7 +54,7 @@ Result<geometry::SE3> frame_of_truth(const EvalArguments& arguments) {
           "it with poses of camera 0\n",
           arguments.estimate, frame);
     }
-    return geometry::SE3();
+    return std::optional<geometry::SE3>();
   }
   if (!arguments.rig) {
     return Error{.file = "command line",
@@ -65,7 +66,8 @@ Result<geometry::SE3> frame_of_truth(const EvalArguments& arguments) {
   if (!rig) return rig.error();
   const auto camera = camera_of_trajectory(arguments.estimate, *rig, *arguments.rig, arguments.camera);
   if (!camera) return camera.error();
-  return arguments.gt_frame == "body" ? rig->body_from_cam(*camera).inverse() : rig->cam_from_rig(*camera);
+  return std::optional(arguments.gt_frame == "body" ? rig->body_from_cam(*camera).inverse()
+                                                    : rig->cam_from_rig(*camera));
 }
 
 // Moves both paths to one frame: that of the ground truth or, if the unit of the estimate is not the metre, in which
@@ -150,7 +152,7 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
   const auto T_cam_frame = frame_of_truth(arguments);
   if (!T_cam_frame) return T_cam_frame.error();
   Trajectory estimate = *std::move(read);
-  move_to_one_frame(*T_cam_frame, arguments, estimate, *ground_truth);
+  if (*T_cam_frame) move_to_one_frame(**T_cam_frame, arguments, estimate, *ground_truth);
   const evaluation::EvaluationOptions options{.align = align_mode(arguments.align),
                                               .max_dt_ns = from_seconds(arguments.max_dt_s),
                                               .rpe_delta_s = arguments.delta_s};

@@ -25,7 +25,7 @@ StageTask StageTask::of_input(Stage stage, std::int32_t input) {
 
 bool calibration_due(KeyframeId keyframe) {
   constexpr std::size_t kFirst = 8;  // keyframes
-  for (std::size_t due = kFirst; due <= keyframe.index(); due *= 2) {
+  for (std::size_t due = kFirst; due <= keyframe.index(); due += due / 2) {
     if (due == keyframe.index()) return true;
   }
   return false;

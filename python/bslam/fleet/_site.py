@@ -16,7 +16,7 @@ from typing import Any, Union
 import click
 import dask
 import numpy as np
-from distributed import Client, Future, LocalCluster, as_completed
+from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, as_completed
 
 from .. import _bslam
 from . import _tasks
@@ -182,7 +182,7 @@ def _connected(client: Client | None, scheduler: str | None, workers: int | None
             except OSError as error:
                 raise _bslam.Error(f"the scheduler {scheduler} cannot be reached: {error}") from error
         if progress:
-            print(f"dashboard: {client.dashboard_link}", file=sys.stderr)
+            print(f"dashboard: {client.dashboard_link or 'none'}", file=sys.stderr)
         yield client
 
 
@@ -217,7 +217,12 @@ class _Mapping:
         with click.progressbar(length=len(futures), label=f"{label:<12}", file=file, show_pos=True) as bar:
             for _ in as_completed(futures):
                 bar.update(1)
-        results = self.client.gather(futures)
+        try:
+            results = self.client.gather(futures)
+        except (CancelledError, KilledWorker) as error:
+            raise _bslam.Error(
+                f"the scheduler or its workers were lost; the same command continues ({type(error).__name__})"
+            ) from error
         computed = sum(r["computed"] for r in results)
         self.site.computed += computed
         self.site.reused += len(results) - computed

@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import _bslam
 from .._program import PROGRAM
-from ._cache import Result, cached, content_of, local_copy, sha256_of
+from ._cache import Result, cached, content_of, key_of, local_copy, sha256_of
 from ._sketch import sketch
 
 _NOTHING_TRACKED = 3  # exit status
@@ -43,8 +43,8 @@ class Setup:
 
 @functools.lru_cache
 def program_hash() -> str:
-    """Hash of the program of this installation."""
-    return sha256_of(PROGRAM)
+    """Hash of the program of this installation, and of this package."""
+    return key_of([sha256_of(f) for f in (PROGRAM, *sorted(pathlib.Path(__file__).parent.glob("*.py")))])
 
 
 def make_map(setup: Setup, recording: str) -> Result:
