@@ -15,8 +15,10 @@
 #include "base/atomic_file.h"
 #include "bindings.h"
 #include "errors.h"
+#include "evaluation/association.h"
 #include "evaluation/trajectory_error.h"
 #include "evaluation/trajectory_file.h"
+#include "evaluation/trajectory_header.h"
 #include "report/trajectory_plot.h"
 #include "rig_formats/rig_file.h"
 
@@ -60,15 +62,16 @@ evaluation::Trajectory read(const Given& given, const std::string& name, const s
   return from_rows(std::get<Rows>(given), name);
 }
 
-evaluation::Trajectory in_frame_of_truth(evaluation::Trajectory estimate, const Arguments& a) {
-  if (a.gt_frame != "body") return estimate;
+// T_cam_truth of the frame of the ground truth; nullopt if it is that of the estimate.
+std::optional<geometry::SE3> frame_of_truth(const Arguments& a) {
+  if (a.gt_frame != "body") return std::nullopt;
   if (!a.rig) raise({"evaluate", "gt_frame=body", "no rig", "rig=FILE with the pose of the camera on the body"});
   const camera::Rig rig = value_of(rig_formats::read_rig(*a.rig));
   const auto camera = static_cast<std::size_t>(a.camera);
   if (a.camera < 0 || camera >= rig.size()) {
     raise({a.rig->string(), "camera", std::to_string(a.camera), "a camera number below " + std::to_string(rig.size())});
   }
-  return evaluation::moved_to_frame(estimate, rig.body_from_cam(camera).inverse());
+  return rig.body_from_cam(camera).inverse();
 }
 
 evaluation::EvaluationOptions options_of(const Arguments& a) {
@@ -128,10 +131,13 @@ nb::dict dict_of(const evaluation::TrajectoryEvaluation& e) {
 
 nb::dict evaluate(const Given& est, const Given& gt, const Arguments& a) {
   const evaluation::EvaluationOptions options = options_of(a);
-  const auto estimate = in_frame_of_truth(read(est, "est", a.times), a);
-  const auto truth = read(gt, "gt", a.times);
-  auto result = evaluation::evaluate(estimate, truth, options);
+  auto estimate = read(est, "est", a.times);
+  const auto T_cam_truth = frame_of_truth(a);
+  auto truth = read(gt, "gt", a.times);
   const Path* file = std::get_if<Path>(&est);
+  const bool metric = file == nullptr || evaluation::read_comments(*file).scale == "metric";
+  if (T_cam_truth) evaluation::move_to_one_frame(*T_cam_truth, metric, estimate, truth);
+  auto result = evaluation::evaluate(estimate, truth, options);
   if (!result) {
     Error error = result.error();
     error.file = file != nullptr ? file->string() : "est";

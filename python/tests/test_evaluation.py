@@ -36,6 +36,20 @@ def test_poses_of_the_body_are_compared_with_the_rig(recording, program_run, pro
     assert (tmp_path / "plot.svg").read_text().rstrip().endswith("</svg>")
 
 
+def test_a_path_without_metres_is_compared_with_the_camera(recording, program, tmp_path):
+    truth = np.loadtxt(recording.ground_truth)
+    truth[:, 1:4] /= 4
+    quarter = tmp_path / "quarter.tum"
+    header = "bslam trajectory frame=cam0 parent=world final=true\nscale=up-to-scale: lengths are not in metres"
+    np.savetxt(quarter, truth, header=header, fmt=["%.9f"] + 7 * ["%.12f"])
+    files = quarter, recording.folder / "mav0/state_groundtruth_estimate0/data.csv"
+    rig = recording.folder / "rig.yaml"
+    found = bslam.evaluate(*files, "sim3", gt_frame="body", rig=rig)
+    theirs = json.loads(program("eval", *files, "--align=sim3", "--gt-frame=body", "--rig", rig, "--json"))
+    assert found.ate.max < 1e-6 and found.scale == pytest.approx(4, abs=1e-6)
+    assert found.ate.rmse == theirs["ate"]["rmse"] and found.scale == theirs["scale"]
+
+
 def test_errors_are_the_line_of_the_program(recording, program, tmp_path):
     (tmp_path / "bad.tum").write_text("1 2 3\n")
     (tmp_path / "late.tum").write_text("".join(f"{900 + t} {t} 0 0 0 0 0 1\n" for t in range(5)))

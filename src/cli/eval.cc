@@ -70,21 +70,16 @@ Result<std::optional<geometry::SE3>> frame_of_truth(const EvalArguments& argumen
                                                     : rig->cam_from_rig(*camera));
 }
 
-// Moves both paths to one frame: that of the ground truth or, if the unit of the estimate is not the metre, in which
-// the distance to that frame is known, the camera of the estimate.
 void move_to_one_frame(const geometry::SE3& T_cam_frame, const EvalArguments& arguments, Trajectory& estimate,
                        Trajectory& truth) {
-  const double distance_m = T_cam_frame.translation().norm();
-  if (distance_m == 0 || evaluation::read_comments(arguments.estimate).scale == "metric") {
-    estimate = evaluation::moved_to_frame(std::move(estimate), T_cam_frame);
-    return;
-  }
+  const bool metric = evaluation::read_comments(arguments.estimate).scale == "metric";
+  const double distance_m = evaluation::move_to_one_frame(T_cam_frame, metric, estimate, truth);
+  if (distance_m == 0) return;
   fmt::print(
       stderr,
       "note: the unit of {} is not the metre: the ground truth was moved by {:.3f} m to its camera, by the rig and "
       "the orientations of the ground truth\n",
       arguments.estimate, distance_m);
-  truth = evaluation::moved_to_frame(std::move(truth), T_cam_frame.inverse());
 }
 
 nlohmann::ordered_json number(double value) {

@@ -70,4 +70,14 @@ Trajectory moved_to_frame(const Trajectory& trajectory, const geometry::SE3& T_f
   return moved;
 }
 
+double move_to_one_frame(const geometry::SE3& T_cam_truth, bool metric, Trajectory& estimate, Trajectory& truth) {
+  const double distance_m = T_cam_truth.translation().norm();
+  if (metric || distance_m == 0) {
+    estimate = moved_to_frame(estimate, T_cam_truth);
+    return 0;
+  }
+  truth = moved_to_frame(truth, T_cam_truth.inverse());
+  return distance_m;
+}
+
 }  // namespace bslam::evaluation

@@ -33,4 +33,9 @@ double path_length_m(const Trajectory& trajectory);
 // Converts the trajectory to another frame fixed to the moving one: T_world_other = T_world_frame * T_frame_other.
 Trajectory moved_to_frame(const Trajectory& trajectory, const geometry::SE3& T_frame_other);
 
+// Moves the path of a camera and the ground truth of another frame to one frame: that of the ground truth or, if the
+// unit of the estimate is not the metre, in which the distance to that frame is known, the camera of the estimate.
+// Returns the distance in metres by which the ground truth was moved; 0 if it was not.
+double move_to_one_frame(const geometry::SE3& T_cam_truth, bool metric, Trajectory& estimate, Trajectory& truth);
+
 }  // namespace bslam::evaluation

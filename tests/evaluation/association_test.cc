@@ -70,5 +70,17 @@ TEST(Trajectory, ConvertsToAnotherFrameOnTheSameBody) {
   EXPECT_LT(((body[0].T_world_frame * T_body_cam).matrix() - T_world_cam.matrix()).norm(), 1e-12);
 }
 
+// Both paths are then of one frame, whose distance from the camera is known in metres only.
+TEST(Trajectory, IsMovedToOneFrameWithTheGroundTruth) {
+  const SE3 T_world_cam(geometry::so3_exp(Vector3d(0.1, -0.4, 0.9)), Vector3d(1, 2, 3));
+  const SE3 T_cam_body(geometry::so3_exp(Vector3d(1.2, 0.3, -0.2)), Vector3d(0.3, 0, 0.4));
+  for (const bool metric : {true, false}) {
+    Trajectory estimate = {{7, T_world_cam}}, truth = {{7, T_world_cam * T_cam_body}};
+    EXPECT_DOUBLE_EQ(move_to_one_frame(T_cam_body, metric, estimate, truth), metric ? 0 : 0.5);
+    EXPECT_LT((estimate[0].T_world_frame.matrix() - truth[0].T_world_frame.matrix()).norm(), 1e-12);
+    EXPECT_EQ(estimate[0].T_world_frame.matrix() == T_world_cam.matrix(), !metric);
+  }
+}
+
 }  // namespace
 }  // namespace bslam::evaluation
