@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <filesystem>
 
 #include "cli/verbs.h"
 
@@ -7,6 +8,13 @@ namespace bslam::cli {
 int report_error(const Error& error) {
   std::fprintf(stderr, "bslam: %s\n", error.message().c_str());
   return kExitBadInput;
+}
+
+Status check_new_file(const std::string& file, bool overwrite) {
+  std::error_code error;
+  if (!overwrite && std::filesystem::exists(file, error))
+    return Error{file, "--out", "an existing file", "a new file, or --overwrite"};
+  return {};
 }
 
 }  // namespace bslam::cli

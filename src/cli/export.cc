@@ -170,9 +170,7 @@ std::string comments(const TrajectoryArguments& arguments, const std::string& fr
 }
 
 int run_export(const TrajectoryArguments& arguments) {
-  std::error_code error;
-  if (fs::exists(arguments.out, error) && !arguments.overwrite)
-    return report_error({arguments.out, "--out", "an existing file", "a new file, or --overwrite"});
+  if (const Status s = check_new_file(arguments.out, arguments.overwrite); !s) return report_error(s.error());
   const std::string own_frame = frame_in_file(arguments);
   if (own_frame == "body" || own_frame.ends_with("_ros"))
     return report_error({arguments.file, "frame", own_frame, "a trajectory of a camera, as bslam run writes it"});

@@ -3,7 +3,6 @@
 #include <fmt/ranges.h>
 
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -19,8 +18,6 @@
 
 namespace bslam::cli {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct MergeArguments {
   std::vector<std::string> files;
@@ -87,9 +84,8 @@ Status write(const session::MergeResult& merged, const place::Vocabulary& vocabu
 int map_merge(const MergeArguments& arguments) {
   if (arguments.out.empty() && !arguments.dry_run)
     return report_error({"command line", "--out", "no file", "a file for the merged map, or --dry-run"});
-  std::error_code error;
-  if (fs::exists(arguments.out, error) && !arguments.overwrite && !arguments.dry_run)
-    return report_error({arguments.out, "--out", "an existing file", "a new file, or --overwrite"});
+  if (const Status s = check_new_file(arguments.out, arguments.overwrite || arguments.dry_run); !s)
+    return report_error(s.error());
   const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
   const auto merged = merge(arguments, *vocabulary);

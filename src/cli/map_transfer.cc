@@ -1,7 +1,6 @@
 // bslam map transfer: the trajectory of a run in the world frame of a merged map.
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -19,9 +18,7 @@ struct TransferArguments {
 };
 
 int map_transfer(const TransferArguments& arguments) {
-  std::error_code error;
-  if (std::filesystem::exists(arguments.out, error) && !arguments.overwrite)
-    return report_error({arguments.out, "--out", "an existing file", "a new file, or --overwrite"});
+  if (const Status s = check_new_file(arguments.out, arguments.overwrite); !s) return report_error(s.error());
   const auto trajectory = evaluation::read_trajectory(arguments.trajectory);
   if (!trajectory) return report_error(trajectory.error());
   const auto own = storage::read_map(arguments.from);

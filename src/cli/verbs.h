@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <span>
+#include <string>
 
 #include "base/result.h"
 
@@ -33,5 +34,8 @@ void add_settings(CLI::App& app, int& exit_status);
 
 // Prints "bslam: MESSAGE" as one line on stderr and returns kExitBadInput.
 int report_error(const Error& error);
+
+// Checks that the file of --out does not exist, unless it may be overwritten.
+Status check_new_file(const std::string& file, bool overwrite);
 
 }  // namespace bslam::cli
