@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "base/assert.h"
@@ -13,6 +15,27 @@ using geometry::SE3;
 
 const Shutter Rig::kGlobalShutter;
 
+namespace {
+
+// See Rig::min_axis_cosine.
+double min_axis_cosine_of(const Camera& camera) {
+  constexpr int kSteps = 4;        // tested pixels of each side of the image
+  constexpr double kMargin = 0.1;  // rad, for pixels between them, and for the motion during a rolling shutter
+  double largest = 0;              // rad
+  const double right = camera.width - 1, bottom = camera.height - 1;
+  for (int k = 0; k <= kSteps; ++k) {
+    const double x = right * k / kSteps, y = bottom * k / kSteps;
+    for (const Vector2d& pixel : {Vector2d(x, 0), Vector2d(x, bottom), Vector2d(0, y), Vector2d(right, y)}) {
+      const auto ray = camera.unproject(pixel);
+      if (!ray) return -1;
+      largest = std::max(largest, std::atan2(ray->head<2>().norm(), ray->z()));
+    }
+  }
+  return largest + kMargin < std::numbers::pi ? std::cos(largest + kMargin) : -1;
+}
+
+}  // namespace
+
 Rig::Rig(std::vector<RigCamera> cameras, const SE3& T_cam0_rig) {
   BSLAM_ASSERT(!cameras.empty(), "a rig must have at least one camera");
   for (const RigCamera& c : cameras) {
@@ -21,8 +44,10 @@ Rig::Rig(std::vector<RigCamera> cameras, const SE3& T_cam0_rig) {
   }
   T_cam_rig_.front() = T_cam0_rig;
   T_rig_cam_.front() = T_cam0_rig.inverse();
-  std::vector<double> overlap = measured_overlap(cameras);
-  calibration_ = std::make_shared<const Calibration>(Calibration{std::move(cameras), std::move(overlap)});
+  Calibration calibration{{}, measured_overlap(cameras), {}};
+  for (const RigCamera& c : cameras) calibration.min_axis_cosine.push_back(min_axis_cosine_of(c.camera));
+  calibration.cameras = std::move(cameras);
+  calibration_ = std::make_shared<const Calibration>(std::move(calibration));
 }
 
 std::vector<double> Rig::measured_overlap(const std::vector<RigCamera>& cameras) const {

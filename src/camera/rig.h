@@ -48,6 +48,10 @@ class Rig {
   const geometry::SE3& body_from_cam(std::size_t i) const { return calibration_->cameras[i].T_body_cam; }
   geometry::SE3 body_from_rig() const { return body_from_cam(0) * T_cam_rig_.front(); }
 
+  // A lower bound of the cosine of the angle between the optical axis and the ray of any pixel, with a margin for the
+  // motion during a rolling shutter; -1 if it is not known, since not every pixel at the border has a ray.
+  double min_axis_cosine(CameraIndex i) const { return calibration_->min_axis_cosine[i.index()]; }
+
   // Returns true if the fields of view of cameras i and j overlap at some depth. Sampled from the calibration.
   bool overlap(std::size_t i, std::size_t j) const { return overlap_share(i, j) > kMinOverlap; }
   // Fraction of camera i's image that is in view of camera j, in [0, 1]; the maximum over the sampled depths.
@@ -83,7 +87,8 @@ class Rig {
   static constexpr double kMinOverlap = 0.05;  // fraction of the image; a smaller overlap is ignored
   struct Calibration {
     std::vector<RigCamera> cameras;
-    std::vector<double> overlap;  // (N, N) row-major
+    std::vector<double> overlap;          // (N, N) row-major
+    std::vector<double> min_axis_cosine;  // per camera
   };
   std::vector<double> measured_overlap(const std::vector<RigCamera>& cameras) const;
 

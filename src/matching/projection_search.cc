@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "feature/hamming.h"
@@ -36,23 +35,6 @@ struct Projection {
   double distance;  // metres
 };
 
-// A lower bound of the cosine of the angle between the optical axis and the ray of any pixel; -1 if it is not known.
-double cosine_of_view(const camera::Camera& camera) {
-  constexpr int kSteps = 4;        // tested pixels of each side of the image
-  constexpr double kMargin = 0.1;  // rad, for pixels between them, and for the motion during a rolling shutter
-  double largest = 0;              // rad
-  const double right = camera.width - 1, bottom = camera.height - 1;
-  for (int k = 0; k <= kSteps; ++k) {
-    const double x = right * k / kSteps, y = bottom * k / kSteps;
-    for (const Vector2d& pixel : {Vector2d(x, 0), Vector2d(x, bottom), Vector2d(0, y), Vector2d(right, y)}) {
-      const auto ray = camera.unproject(pixel);
-      if (!ray) return -1;
-      largest = std::max(largest, std::atan2(ray->head<2>().norm(), ray->z()));
-    }
-  }
-  return largest + kMargin < std::numbers::pi ? std::cos(largest + kMargin) : -1;
-}
-
 // An image into which points are projected.
 class View {
  public:
@@ -64,7 +46,7 @@ class View {
         centre_(-R_.transpose() * t_),
         axis_(R_.row(2).transpose()),
         min_cosine_(std::cos(max_view_angle)),
-        min_axis_cosine_(cosine_of_view(camera_)) {}
+        min_axis_cosine_(rig.min_axis_cosine(c)) {}
 
   // Projection of a point. Returns nullopt if it is outside the image, its distances, or its cone of viewing
   // directions.
