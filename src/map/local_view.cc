@@ -4,20 +4,17 @@
 #include <iterator>
 #include <utility>
 
+#include "base/id_set.h"
+
 namespace bslam::map {
 namespace {
 
 // The first occurrence of each id, in order.
 std::vector<LandmarkId> each_once(std::span<const LandmarkId> ids) {
   std::vector<LandmarkId> out;
-  if (ids.empty()) return out;
-  const auto [low, high] = std::ranges::minmax(ids);
-  std::vector<bool> listed(high.index() - low.index() + 1);
+  IdSet<LandmarkId> listed(ids);
   for (const LandmarkId l : ids) {
-    const std::size_t i = l.index() - low.index();
-    if (listed[i]) continue;
-    listed[i] = true;
-    out.push_back(l);
+    if (listed.insert(l)) out.push_back(l);
   }
   return out;
 }

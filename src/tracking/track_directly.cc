@@ -95,7 +95,7 @@ bool enough(const solver::PoseSolution& solution, std::size_t num_matches, const
 
 // Pose from the landmarks of the last frame with the largest patches, with which the others are predicted; all
 // landmarks together decide whether it is right. Updates the pose and the motion of the frame.
-bool track_coarsely(const TrackInput& input, const std::vector<LandmarkId>& last, const TrackingOptions& options,
+bool track_coarsely(const TrackInput& input, const LastLandmarks& last, const TrackingOptions& options,
                     ThreadPool& pool, frame::BundledFrame& frame, SE3& T_rig_world) {
   const Candidates candidates =
       coarsest_landmarks(input, frame, T_rig_world, last, options.direct.coarse_per_image, pool);
@@ -184,7 +184,7 @@ DirectOutput judged(const TrackInput& input, const LocalLandmarks& local, Tracke
 DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, const TrackingOptions& options,
                             ThreadPool& pool) {
   if (!predictable(input, frame)) return {.failure = DirectFailure::kNoPrediction};
-  const std::vector<LandmarkId> last = last_landmarks(input.map, input.state);
+  const LastLandmarks last = landmarks_of_last_frame(input);
   SE3 T_rig_world = predict(input, frame.time_ns);
   if (!track_coarsely(input, last, options, pool, frame, T_rig_world)) return {.failure = DirectFailure::kNoPose};
   const LocalLandmarks local = local_landmarks(input, frame, T_rig_world, last, options, pool);

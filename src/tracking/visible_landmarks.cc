@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
+#include "base/id_set.h"
 #include "map/local_view.h"
 #include "matching/projection_search.h"
+#include "tracking/track_output.h"
 
 namespace bslam::tracking {
 namespace {
@@ -62,26 +64,27 @@ std::shared_ptr<const LocalView> local_view(const TrackInput& input, const std::
   return std::make_shared<const LocalView>(std::move(view));
 }
 
-// Flags of the elements of `ids` that are also in `others`, which are in order of id.
+// Flags of the elements of `ids` that are also in `others`.
 std::vector<std::uint8_t> contained(const std::vector<LandmarkId>& ids, const std::vector<LandmarkId>& others) {
+  IdSet<LandmarkId> set(others);
+  for (const LandmarkId l : others) set.insert(l);
   std::vector<std::uint8_t> out(ids.size());
-  if (others.empty()) return out;
-  const std::size_t first = others.front().index(), count = others.back().index() - first + 1;
-  std::vector<std::uint8_t> listed(count);
-  for (const LandmarkId l : others) listed[l.index() - first] = 1;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const std::size_t at = ids[i].index() - first;  // huge if the id is smaller than the first
-    out[i] = at < count && listed[at];
-  }
+  std::ranges::transform(ids, out.begin(), [&](LandmarkId l) { return set.contains(l); });
   return out;
 }
 
 }  // namespace
 
+LastLandmarks landmarks_of_last_frame(const TrackInput& input) {
+  LastLandmarks out{last_landmarks(input.map, input.state), {}};
+  out.points = map::search_points(input.map, out.landmarks);
+  return out;
+}
+
 Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
-                              const std::vector<LandmarkId>& last, int count, ThreadPool& pool) {
+                              const LastLandmarks& last, int count, ThreadPool& pool) {
   Candidates out(frame.cameras.size());
-  add_visible(input, frame, T_rig_world, last, map::search_points(input.map, last), {}, 0, pool, out);
+  add_visible(input, frame, T_rig_world, last.landmarks, last.points, {}, 0, pool, out);
   for (std::vector<Candidate>& candidates : out) {
     if (static_cast<int>(candidates.size()) <= count) continue;
     std::nth_element(candidates.begin(), candidates.begin() + count, candidates.end(),
@@ -95,16 +98,16 @@ Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame
 }
 
 LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
-                               const std::vector<LandmarkId>& last, const TrackingOptions& options, ThreadPool& pool) {
-  LocalLandmarks out{local_view(input, last, options), Candidates(frame.cameras.size()), {}, {}};
+                               const LastLandmarks& last, const TrackingOptions& options, ThreadPool& pool) {
+  LocalLandmarks out{local_view(input, last.landmarks, options), Candidates(frame.cameras.size()), {}, {}};
   const LocalView& view = *out.view;
-  add_visible(input, frame, T_rig_world, last, map::search_points(input.map, last), {}, 0, pool, out.candidates);
-  std::vector<std::uint8_t> in_view(last.size()), expected(last.size() + view.landmarks.size());
+  add_visible(input, frame, T_rig_world, last.landmarks, last.points, {}, 0, pool, out.candidates);
+  std::vector<std::uint8_t> in_view(last.landmarks.size()), expected(last.landmarks.size() + view.landmarks.size());
   for (const std::vector<Candidate>& camera : out.candidates) {
     for (const Candidate& l : camera) in_view[l.index] = 1;
   }
-  add_visible(input, frame, T_rig_world, view.landmarks, view.points, contained(view.landmarks, last), last.size(),
-              pool, out.candidates);
+  add_visible(input, frame, T_rig_world, view.landmarks, view.points, contained(view.landmarks, last.landmarks),
+              last.landmarks.size(), pool, out.candidates);
   const auto images = std::ranges::count_if(out.candidates, [](const auto& camera) { return !camera.empty(); });
   const int budget = std::min(options.direct.per_image, options.direct.per_rig / std::max(1, static_cast<int>(images)));
   for (std::size_t c = 0; c < out.candidates.size(); ++c) {
@@ -117,8 +120,8 @@ LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFram
     }
   }
   std::ranges::sort(out.expected);
-  for (std::size_t i = 0; i < last.size(); ++i) {
-    if (in_view[i] && !expected[i]) out.others.push_back(last[i]);
+  for (std::size_t i = 0; i < last.landmarks.size(); ++i) {
+    if (in_view[i] && !expected[i]) out.others.push_back(last.landmarks[i]);
   }
   return out;
 }

@@ -16,6 +16,13 @@ struct LocalView {
   std::vector<matching::SearchPoint> points;  // one for each of them
 };
 
+// The landmarks of the last frame.
+struct LastLandmarks {
+  std::vector<LandmarkId> landmarks;          // in order of id
+  std::vector<matching::SearchPoint> points;  // one for each of them
+};
+LastLandmarks landmarks_of_last_frame(const TrackInput& input);
+
 // A landmark that is predicted visible in a camera.
 struct Candidate {
   LandmarkId landmark;
@@ -28,8 +35,7 @@ using Candidates = std::vector<std::vector<Candidate>>;  // per camera
 // Of the landmarks of the last frame, in every camera those `count` with the largest patches in the image: their
 // alignment tolerates the largest errors of the predicted pose.
 Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame& frame,
-                              const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& last, int count,
-                              ThreadPool& pool);
+                              const geometry::SE3& T_rig_world, const LastLandmarks& last, int count, ThreadPool& pool);
 
 // The landmarks to align at the pose: those of the last frame and of the local view, spread over the images. Cameras
 // align the same landmarks if they see them, so that their number depends little on which cameras have an image.
@@ -41,9 +47,8 @@ struct LocalLandmarks {
   std::vector<LandmarkId> others;
 };
 
-// `last`: in order of id.
 LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFrame& frame,
-                               const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& last,
+                               const geometry::SE3& T_rig_world, const LastLandmarks& last,
                                const TrackingOptions& options, ThreadPool& pool);
 
 }  // namespace bslam::tracking
