@@ -25,16 +25,16 @@ class CameraChange {
   std::shared_ptr<const frame::BundledFrame> operator()(const std::shared_ptr<const frame::BundledFrame>& frame) const {
     const bool recalibrate = frame::changes_frames(*before_, *after_);
     if (!recalibrate && is_identity()) return frame;
-    const frame::BundledFrame source = recalibrate ? frame::recalibrated(*frame, *before_, *after_) : *frame;
-    frame::BundledFrame out = source;
-    out.cameras.assign(num_cameras_, {});
+    frame::BundledFrame out = recalibrate ? frame::recalibrated(*frame, *before_, *after_) : *frame;
+    std::vector<frame::CameraFrame> source(num_cameras_);
+    source.swap(out.cameras);
     std::vector<std::size_t> counts(num_cameras_, 0);
     for (std::size_t c = 0; c < camera_.size(); ++c) {
-      if (source.cameras[c].state == image::ImageState::kMissing && source.cameras[c].keypoints.empty()) continue;
-      counts[camera_[c].index()] = source.cameras[c].keypoints.size();
-      out.cameras[camera_[c].index()] = source.cameras[c];
+      if (source[c].state == image::ImageState::kMissing && source[c].keypoints.empty()) continue;
+      counts[camera_[c].index()] = source[c].keypoints.size();
+      out.cameras[camera_[c].index()] = std::move(source[c]);
     }
-    out.bundled = changed(source.bundled, counts);
+    out.bundled = changed(out.bundled, counts);
     return std::make_shared<const frame::BundledFrame>(std::move(out));
   }
 

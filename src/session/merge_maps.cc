@@ -20,6 +20,13 @@ namespace {
 
 using storage::SavedMap;
 
+// The features of a map, with which the program may be set to differ.
+feature::FeatureModel features_of(const map::BundledMap& map, const system::Config& config) {
+  feature::FeatureModel features = config.feature_model();
+  features.pyramid = map.pyramid();
+  return features;
+}
+
 bool before(const SavedMap& a, const SavedMap& b) {
   return std::tuple(b.map.num_keyframes(), a.checksums) < std::tuple(a.map.num_keyframes(), b.checksums);
 }
@@ -122,8 +129,7 @@ Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::Vocabula
                                const system::Config& config) {
   std::ranges::sort(maps, before);
   if (Status s = check(maps, *vocabulary); !s) return s.error();
-  feature::FeatureModel features = config.feature_model();
-  features.pyramid = maps.front().map.pyramid();
+  const feature::FeatureModel features = features_of(maps.front().map, config);
   auto inputs = append_all(maps);
   if (!inputs) return inputs.error();
   map::MapStore store(std::move(inputs->map));
@@ -147,8 +153,7 @@ Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::Vocabula
 }
 
 void adjust_merged(map::BundledMap& map, const system::Config& config) {
-  feature::FeatureModel features = config.feature_model();
-  features.pyramid = map.pyramid();
+  const feature::FeatureModel features = features_of(map, config);
   map::MapStore store(std::move(map));
   map::MapDraft draft(store.snapshot());
   mapping::adjust_globally(config.mapping, features, draft);

@@ -1,7 +1,7 @@
 // The rebase rules for submaps, their scale, and the rig.
 #include <gtest/gtest.h>
 
-#include "camera/model_parameters.h"
+#include "camera/focal_lengths.h"
 #include "map/rebase.h"
 #include "rebase_fixture.h"
 
@@ -149,13 +149,8 @@ TEST_F(RebaseTest, MotionScalesWithTheSubmapAndIsDroppedWithItsKeyframe) {
 // The rig with longer focal lengths.
 camera::Rig zoomed(const camera::Rig& rig) {
   std::vector<camera::RigCamera> cameras;
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    camera::Camera camera = rig.camera(c);
-    camera::ModelParameters p = camera::parameters(camera.model);
-    p.head<2>() *= 1.1;
-    camera.model = camera::with_parameters(camera.model, p);
-    cameras.push_back({camera, rig.body_from_cam(c)});
-  }
+  for (std::size_t c = 0; c < rig.size(); ++c)
+    cameras.push_back({camera::zoomed(rig.camera(c), 1.1), rig.body_from_cam(c)});
   return camera::Rig(std::move(cameras));
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "camera/focal_lengths.h"
 #include "rig_formats/bslam_rig.h"
 #include "simulator/simulation_writer.h"
 #include "synthetic/rigs.h"
@@ -53,12 +54,8 @@ camera::Rig rough(const camera::Rig& rig) {
   turn[1] = kDegree;
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
-    camera::Camera camera = rig.camera(c);
-    camera::ModelParameters parameters = camera::parameters(camera.model);
-    parameters.head<2>() *= 1.03;
-    camera.model = camera::with_parameters(camera.model, parameters);
     const geometry::SE3 T_cam_rig = c == 1 ? rig.cam_from_rig(c).perturbed(turn) : rig.cam_from_rig(c);
-    cameras.push_back({camera, rig.body_from_cam(0) * T_cam_rig.inverse()});
+    cameras.push_back({camera::zoomed(rig.camera(c), 1.03), rig.body_from_cam(0) * T_cam_rig.inverse()});
   }
   return camera::Rig(std::move(cameras));
 }
