@@ -25,6 +25,7 @@ from ._sketch import likely_pairs
 
 Path = Union[str, "os.PathLike[str]"]
 
+_FAN_IN = 5  # maps that are merged at once
 _NUMBERS = ("keyframes", "landmarks")  # of a map
 
 
@@ -177,6 +178,7 @@ def _connected(client: Client | None, scheduler: str | None, workers: int | None
                 address = stack.enter_context(
                     LocalCluster(n_workers=count, threads_per_worker=1, memory_limit=0, dashboard_address=":0")
                 )
+                address.adapt(minimum=count, maximum=count)  # replaces workers that do not come back
             try:
                 client = stack.enter_context(Client(address))
             except OSError as error:
@@ -192,7 +194,8 @@ class _Mapping:
     def __init__(self, client: Client, setup: _tasks.Setup, out: pathlib.Path, partners: int, progress: bool) -> None:
         self.client, self.setup, self.partners, self.progress = client, setup, partners, progress
         self.site = Site(out)
-        self.reasons: dict[str, str] = {}  # of maps that were compared with others
+        self.verdicts: dict[tuple[str, str], bool] = {}  # whether the maps of a pair have a place in common
+        self.reasons: dict[str, str] = {}  # of maps that have none with another one
 
     def run(self, recordings: list[Recording]) -> Site:
         self.site.recordings = recordings
@@ -239,8 +242,9 @@ class _Mapping:
         merged: dict[tuple[str, ...], Any] = {(key,): maps[key] for key in maps}  # of each site
         merges = []
         while chosen := _best_pairs(pairs, site):
-            pairs = [pair for pair in pairs if pair not in chosen]
-            self._compare(chosen, maps, site)
+            self._compare([pair for pair in chosen if pair not in self.verdicts], maps)
+            pairs = [pair for pair in pairs if self.verdicts.get(pair, True)]
+            _join([pair for pair in chosen if self.verdicts[pair]], site)
             for members in sorted(set(site.values()) - set(merged)):
                 parts = [merged.pop(part) for part in sorted(merged) if set(part) <= set(members)]
                 merged[members] = self._submit(_tasks.merge, parts)
@@ -256,15 +260,12 @@ class _Mapping:
         sketches = [np.load(pathlib.Path(maps[key]["folder"], "sketch.npy")) for key in metric]
         return [(metric[i], metric[j]) for i, j in likely_pairs(sketches, self.partners)]
 
-    def _compare(self, pairs: list[tuple[str, str]], maps: dict[str, Result], site: dict[str, tuple[str, ...]]) -> None:
-        """Joins the sites of pairs with a common place."""
-        verdicts = self._done("comparing", [self._submit(_tasks.compare, maps[a], maps[b]) for a, b in pairs])
-        for (a, b), verdict in zip(pairs, verdicts, strict=True):
-            if verdict["joined"]:
-                members = tuple(sorted(set(site[a] + site[b])))
-                site.update(dict.fromkeys(members, members))
-            else:
-                for key in (a, b):
+    def _compare(self, pairs: list[tuple[str, str]], maps: dict[str, Result]) -> None:
+        found = self._done("comparing", [self._submit(_tasks.compare, maps[a], maps[b]) for a, b in pairs])
+        for pair, verdict in zip(pairs, found, strict=True):
+            self.verdicts[pair] = verdict["joined"]
+            if not verdict["joined"]:
+                for key in pair:
                     self.reasons.setdefault(key, verdict["reason"])
 
     def _write(self, sites: list[tuple[Result, list[tuple[Recording, Result]]]]) -> None:
@@ -316,6 +317,17 @@ def _best_pairs(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) 
             best.setdefault(site[a], (a, b))
             best.setdefault(site[b], (a, b))
     return sorted(set(best.values()))
+
+
+def _join(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) -> None:
+    """Joins the sites of the pairs, at most _FAN_IN at once, so that a large site is merged by several workers."""
+    parts = dict.fromkeys(site.values(), 1)
+    for a, b in pairs:
+        if site[a] == site[b] or parts[site[a]] + parts[site[b]] > _FAN_IN:
+            continue
+        members = tuple(sorted(site[a] + site[b]))
+        parts[members] = parts[site[a]] + parts[site[b]]
+        site.update(dict.fromkeys(members, members))
 
 
 def _files_in(summary: dict[str, Any]) -> set[str]:
