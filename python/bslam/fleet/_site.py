@@ -316,7 +316,7 @@ def _best_pairs(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) 
         if site[a] != site[b]:
             best.setdefault(site[a], (a, b))
             best.setdefault(site[b], (a, b))
-    return sorted(set(best.values()))
+    return list(dict.fromkeys(best.values()))  # in the order of the list, which another recording hardly changes
 
 
 def _join(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) -> None:
