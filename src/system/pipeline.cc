@@ -52,7 +52,7 @@ Pipeline::Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& c
 Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution::StageExecutor& executor) {
   const Stopwatch whole;
   Outcome outcome;
-  const tracking::ImageFaults faults = monitor_.examine(images);
+  const tracking::ImageFaults faults = monitor_.examine(images, pool_);
   const tracking::FramePlan plan = tracker_.plan(images, faults, state_);
 
   std::vector<StageTime> stages;

@@ -38,12 +38,8 @@ std::uint64_t content(const image::ImageView& image) {
   return rest;
 }
 
-struct Exposure {
-  CameraReason reason = CameraReason::kNone;
-  bool shows_something = true;  // some pixels are neither dark nor bright
-};
-
-Exposure exposure(const image::ImageView& image, const HealthOptions& options) {
+// Completes `health` except for its content and blur.
+void measure_exposure(const image::ImageView& image, const HealthOptions& options, ImageHealth& health) {
   int samples = 0, dark = 0, bright = 0;
   for (int y = 0; y < image.height; y += kSampleStep) {
     for (int x = 0; x < image.width; x += kSampleStep, ++samples) {
@@ -51,10 +47,12 @@ Exposure exposure(const image::ImageView& image, const HealthOptions& options) {
       bright += image.row(y)[x] >= options.bright_level;
     }
   }
-  const bool shows_something = dark + bright < options.black_pixel_ratio * samples;
-  if (dark >= options.black_pixel_ratio * samples) return {CameraReason::kBlack, false};
-  if (bright >= options.over_exposed_pixel_ratio * samples) return {CameraReason::kOverExposed, shows_something};
-  return {};
+  health.shows_something = dark + bright < options.black_pixel_ratio * samples;
+  if (dark >= options.black_pixel_ratio * samples) {
+    health.reason = CameraReason::kBlack;
+  } else if (bright >= options.over_exposed_pixel_ratio * samples) {
+    health.reason = CameraReason::kOverExposed;
+  }
 }
 
 struct Edges {
@@ -92,13 +90,25 @@ std::optional<bool> is_blurred(const image::ImageView& image, const HealthOption
   return edges.sharp < options.min_sharp_edge_ratio * edges.all;
 }
 
+ImageHealth image_health(const image::ImageView& image, const HealthOptions& options) {
+  ImageHealth out{.content = content(image), .blurred = is_blurred(image, options)};
+  measure_exposure(image, options, out);
+  return out;
+}
+
 }  // namespace
 
 CameraMonitor::CameraMonitor(std::size_t cameras, const HealthOptions& options)
     : options_(options), cameras_(cameras) {}
 
-ImageFaults CameraMonitor::examine(const image::ImageBundle& images) {
-  ImageFaults faults{find_outages(images), blurred(images), {}};
+ImageFaults CameraMonitor::examine(const image::ImageBundle& images, ThreadPool& pool) {
+  BSLAM_ASSERT(images.images.size() == cameras_.size(), "there must be one image entry per camera");
+  Health health(cameras_.size());
+  pool.for_each(cameras_.size(), [&](std::size_t c) {
+    const image::CameraImage& input = images.images[c];
+    if (input.state == image::ImageState::kPresent) health[c] = image_health(input.view(), options_);
+  });
+  ImageFaults faults{find_outages(health), find_blurred(health), {}};
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const CameraReason outage = faults.outage[c];
     int& missed = cameras_[c].missed;
@@ -109,21 +119,16 @@ ImageFaults CameraMonitor::examine(const image::ImageBundle& images) {
   return faults;
 }
 
-std::vector<CameraReason> CameraMonitor::find_outages(const image::ImageBundle& images) {
-  BSLAM_ASSERT(images.images.size() == cameras_.size(), "there must be one image entry per camera");
+std::vector<CameraReason> CameraMonitor::find_outages(const Health& images) {
   std::vector<CameraReason> found(cameras_.size(), CameraReason::kNoImages);
-  std::vector<std::uint8_t> same(cameras_.size(), 0), shows_something(cameras_.size(), 0);
+  std::vector<std::uint8_t> same(cameras_.size(), 0);
   bool any_changed = false;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    const image::CameraImage& input = images.images[c];
-    if (input.state != image::ImageState::kPresent) continue;
-    const Exposure exposed = exposure(input.view(), options_);
-    found[c] = exposed.reason;
-    shows_something[c] = exposed.shows_something;
-    const std::uint64_t now = content(input.view());
-    same[c] = cameras_[c].last == now;
+    if (!images[c]) continue;
+    found[c] = images[c]->reason;
+    same[c] = cameras_[c].last == images[c]->content;
     any_changed |= cameras_[c].last && !same[c];
-    cameras_[c].last = now;
+    cameras_[c].last = images[c]->content;
   }
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     Camera& camera = cameras_[c];
@@ -140,12 +145,11 @@ std::vector<CameraReason> CameraMonitor::find_outages(const image::ImageBundle& 
       camera.outage = CameraReason::kNone;
     }
   }
-  admit_if_none_is_left(shows_something, found);
+  admit_if_none_is_left(images, found);
   return found;
 }
 
-void CameraMonitor::admit_if_none_is_left(const std::vector<std::uint8_t>& shows_something,
-                                          std::vector<CameraReason>& found) {
+void CameraMonitor::admit_if_none_is_left(const Health& images, std::vector<CameraReason>& found) {
   const auto any_used = [&] { return std::ranges::find(found, CameraReason::kNone) != found.end(); };
   if (any_used()) return;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
@@ -155,18 +159,16 @@ void CameraMonitor::admit_if_none_is_left(const std::vector<std::uint8_t>& shows
   if (any_used()) return;
   // A large white object may cover the view. What remains of it is better than nothing.
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (found[c] == CameraReason::kOverExposed && shows_something[c]) found[c] = CameraReason::kNone;
+    if (found[c] == CameraReason::kOverExposed && images[c]->shows_something) found[c] = CameraReason::kNone;
   }
 }
 
-std::vector<std::uint8_t> CameraMonitor::blurred(const image::ImageBundle& images) {
-  BSLAM_ASSERT(images.images.size() == cameras_.size(), "there must be one image entry per camera");
+std::vector<std::uint8_t> CameraMonitor::find_blurred(const Health& images) {
   std::vector<std::uint8_t> out(cameras_.size(), 0);
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    const image::CameraImage& input = images.images[c];
-    if (input.state != image::ImageState::kPresent) continue;
+    if (!images[c]) continue;
     Camera& camera = cameras_[c];
-    if (const auto now = is_blurred(input.view(), options_)) {
+    if (const auto now = images[c]->blurred) {
       camera.sharp = *now ? 0 : camera.sharp + 1;
       camera.blurred = *now || (camera.blurred && camera.sharp < options_.readmit_after);
     }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/options.h"
+#include "base/thread_pool.h"
 #include "image/image_bundle.h"
 #include "tracking/camera_status.h"
 
@@ -41,6 +42,14 @@ struct HealthOptions {
   }
 };
 
+// What an image shows of the state of its camera.
+struct ImageHealth {
+  CameraReason reason = CameraReason::kNone;  // black or over-exposed
+  bool shows_something = true;                // some pixels are neither dark nor bright
+  std::uint64_t content = 0;                  // hash of all pixels
+  std::optional<bool> blurred;                // nullopt: there are too few edges
+};
+
 // Faults found in the images of a frame; one entry per camera.
 struct ImageFaults {
   std::vector<CameraReason> outage;   // why the camera is not used in this frame; kNone: it is used
@@ -52,23 +61,24 @@ class CameraMonitor {
  public:
   CameraMonitor(std::size_t cameras, const HealthOptions& options);
 
-  // Checks the images of the next frame: find_outages() and blurred(). `images`: one per camera.
-  ImageFaults examine(const image::ImageBundle& images);
+  // Checks the images of the next frame. `images`: one per camera. The threads of `pool` share them.
+  ImageFaults examine(const image::ImageBundle& images, ThreadPool& pool);
 
-  // Per camera, why it is not used in the next frame. An image is frozen if it is identical to the previous image of
+ private:
+  using Health = std::vector<std::optional<ImageHealth>>;  // per camera; nullopt: it has no image
+
+  // Per camera, why it is not used in this frame. An image is frozen if it is identical to the previous image of
   // its camera while the image of another camera has changed; frozen images are thus not detected with a single camera
   // or if all images are identical. A camera without an image is not used in that frame, and used again with its next
   // image. If all other cameras are out as well, a camera with a good image is used immediately; if there is none,
   // those are used whose image is over-exposed in part.
-  std::vector<CameraReason> find_outages(const image::ImageBundle& images);
+  std::vector<CameraReason> find_outages(const Health& images);
+  void admit_if_none_is_left(const Health& images, std::vector<CameraReason>& found);
   // Per camera: whether it is out of focus or smeared, determined from the slope of the edges in its image. Rows and
   // columns are searched, so that motion blur in one direction is not detected as blur. A blurred camera is still
   // used. Images with few edges do not change the result; a camera is blurred until `readmit_after` consecutive images
   // are sharp.
-  std::vector<std::uint8_t> blurred(const image::ImageBundle& images);
-
- private:
-  void admit_if_none_is_left(const std::vector<std::uint8_t>& shows_something, std::vector<CameraReason>& found);
+  std::vector<std::uint8_t> find_blurred(const Health& images);
 
   struct Camera {
     std::optional<std::uint64_t> last;          // hash of its last image

@@ -148,8 +148,9 @@ enum class FrontEnd {
 
 // Direct tracking (tracking/track_directly.h).
 struct DirectOptions {
-  int per_image = 300;         // maximum number of landmarks aligned in an image
-  int per_rig = 900;           // the same in all images of a frame
+  int per_image = 300;  // maximum number of landmarks aligned in an image
+  int per_rig = 600;    // the same in all images of a frame, but at least `min_per_image` in each
+  int min_per_image = 100;
   int coarse_per_image = 60;   // landmarks of the coarsest levels that are aligned first
   double coarse_shift_px = 4;  // px of the level, maximum distance of these from their predicted positions
   // As KeyframeOptions::min_overlap. Landmarks are aligned from farther away than they are detected again.
@@ -162,7 +163,9 @@ struct DirectOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("per_image", self.per_image, Range{50, 20000}, "", "maximum number of landmarks aligned in an image");
     visitor("per_rig", self.per_rig, Range{50, 100000}, "",
-            "maximum number of landmarks aligned in all images of a frame");
+            "maximum number of landmarks aligned in all images of a frame, but for min_per_image");
+    visitor("min_per_image", self.min_per_image, Range{10, 20000}, "",
+            "number of landmarks aligned in an image however many cameras there are");
     visitor("coarse_per_image", self.coarse_per_image, Range{10, 1000}, "",
             "number of landmarks of coarse pyramid levels that are aligned first");
     visitor("coarse_shift_px", self.coarse_shift_px, Range{0.5, 20}, "px of the level",

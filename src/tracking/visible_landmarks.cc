@@ -109,7 +109,8 @@ LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFram
   add_visible(input, frame, T_rig_world, view.landmarks, view.points, contained(view.landmarks, last.landmarks),
               last.landmarks.size(), pool, out.candidates);
   const auto images = std::ranges::count_if(out.candidates, [](const auto& camera) { return !camera.empty(); });
-  const int budget = std::min(options.direct.per_image, options.direct.per_rig / std::max(1, static_cast<int>(images)));
+  const int share = options.direct.per_rig / std::max(1, static_cast<int>(images));
+  const int budget = std::min(options.direct.per_image, std::max(options.direct.min_per_image, share));
   for (std::size_t c = 0; c < out.candidates.size(); ++c) {
     std::vector<Candidate>& candidates = out.candidates[c];
     std::ranges::stable_partition(candidates, [&](const Candidate& l) { return expected[l.index] != 0; });

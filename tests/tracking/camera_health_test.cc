@@ -35,19 +35,27 @@ image::ImageBundle frame(std::vector<image::Image> images) {
   return bundle;
 }
 
+ImageFaults examine(CameraMonitor& monitor, std::vector<image::Image> images) {
+  ThreadPool pool(2);
+  return monitor.examine(frame(std::move(images)), pool);
+}
+
 using Outages = std::vector<CameraReason>;
+
+Outages outages(CameraMonitor& monitor, std::vector<image::Image> images) {
+  return examine(monitor, std::move(images)).outage;
+}
 
 TEST(CameraMonitor, AcceptsOrdinaryImages) {
   CameraMonitor monitor(2, {});
   for (std::uint64_t k = 0; k < 5; ++k) {
-    EXPECT_EQ(monitor.find_outages(frame({good(2 * k), good(2 * k + 1)})),
-              (Outages{CameraReason::kNone, CameraReason::kNone}));
+    EXPECT_EQ(outages(monitor, {good(2 * k), good(2 * k + 1)}), (Outages{CameraReason::kNone, CameraReason::kNone}));
   }
 }
 
 TEST(CameraMonitor, DistinguishesBlackOverExposedAndMissingImages) {
   CameraMonitor monitor(3, {});
-  EXPECT_EQ(monitor.find_outages(frame({textured_image(1, 0, 12), textured_image(2, 251, 255), {}})),
+  EXPECT_EQ(outages(monitor, {textured_image(1, 0, 12), textured_image(2, 251, 255), {}}),
             (Outages{CameraReason::kBlack, CameraReason::kOverExposed, CameraReason::kNoImages}));
 }
 
@@ -61,10 +69,9 @@ TEST(CameraMonitor, UsesWhatRemainsOfOverExposedImagesIfThereIsNothingBetter) {
     return image;
   };
   CameraMonitor monitor(2, {});
-  EXPECT_EQ(monitor.find_outages(frame({covered(1), covered(2)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
-  EXPECT_EQ(monitor.find_outages(frame({covered(3), good(4)})),
-            (Outages{CameraReason::kOverExposed, CameraReason::kNone}));
-  EXPECT_EQ(monitor.find_outages(frame({textured_image(5, 251, 255), textured_image(6, 251, 255)})),
+  EXPECT_EQ(outages(monitor, {covered(1), covered(2)}), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  EXPECT_EQ(outages(monitor, {covered(3), good(4)}), (Outages{CameraReason::kOverExposed, CameraReason::kNone}));
+  EXPECT_EQ(outages(monitor, {textured_image(5, 251, 255), textured_image(6, 251, 255)}),
             (Outages{CameraReason::kOverExposed, CameraReason::kOverExposed}));
 }
 
@@ -74,61 +81,60 @@ TEST(CameraMonitor, ANightSceneWithLampsIsNotBlack) {
     for (int x = 0; x < 8; ++x) night.row(y)[x] = 180;
   }
   CameraMonitor monitor(1, {});
-  EXPECT_EQ(monitor.find_outages(frame({night})), Outages{CameraReason::kNone});
+  EXPECT_EQ(outages(monitor, {night}), Outages{CameraReason::kNone});
 }
 
 TEST(CameraMonitor, DetectsAFrozenCameraButNotARigAtRest) {
   CameraMonitor monitor(2, {});
-  monitor.find_outages(frame({good(1), good(2)}));
-  EXPECT_EQ(monitor.find_outages(frame({good(1), good(2)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
-  EXPECT_EQ(monitor.find_outages(frame({good(3), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
+  outages(monitor, {good(1), good(2)});
+  EXPECT_EQ(outages(monitor, {good(1), good(2)}), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  EXPECT_EQ(outages(monitor, {good(3), good(2)}), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
 }
 
 TEST(CameraMonitor, AFrozenCameraStaysFrozenIfTheOthersMissAFrame) {
   CameraMonitor monitor(2, {});
-  monitor.find_outages(frame({good(1), good(2)}));
-  EXPECT_EQ(monitor.find_outages(frame({good(3), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
+  outages(monitor, {good(1), good(2)});
+  EXPECT_EQ(outages(monitor, {good(3), good(2)}), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
   for (int k = 0; k < 4; ++k)
-    EXPECT_EQ(monitor.find_outages(frame({{}, good(2)})), (Outages{CameraReason::kNoImages, CameraReason::kFrozen}));
-  EXPECT_EQ(monitor.find_outages(frame({good(4), good(2)})), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
+    EXPECT_EQ(outages(monitor, {{}, good(2)}), (Outages{CameraReason::kNoImages, CameraReason::kFrozen}));
+  EXPECT_EQ(outages(monitor, {good(4), good(2)}), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
 }
 
 TEST(CameraMonitor, AnImageWithOneChangedPixelIsNotFrozen) {
   CameraMonitor monitor(2, {});
   image::Image almost = good(2);
-  monitor.find_outages(frame({good(1), good(2)}));
+  outages(monitor, {good(1), good(2)});
   almost.row(kHeight - 1)[kWidth - 1] ^= 1;
-  EXPECT_EQ(monitor.find_outages(frame({good(3), almost})), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  EXPECT_EQ(outages(monitor, {good(3), almost}), (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
 TEST(CameraMonitor, ReadmitsAfterConsecutiveGoodImages) {
   CameraMonitor monitor(2, {.readmit_after = 3});
-  monitor.find_outages(frame({textured_image(1, 0, 5), good(11)}));
-  EXPECT_EQ(monitor.find_outages(frame({good(1), good(12)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.find_outages(frame({good(2), good(13)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.find_outages(frame({textured_image(2, 0, 5), good(14)})),
+  outages(monitor, {textured_image(1, 0, 5), good(11)});
+  EXPECT_EQ(outages(monitor, {good(1), good(12)}), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(outages(monitor, {good(2), good(13)}), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(outages(monitor, {textured_image(2, 0, 5), good(14)}),
             (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.find_outages(frame({good(3), good(15)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.find_outages(frame({good(4), good(16)})), (Outages{CameraReason::kBlack, CameraReason::kNone}));
-  EXPECT_EQ(monitor.find_outages(frame({good(5), good(17)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  EXPECT_EQ(outages(monitor, {good(3), good(15)}), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(outages(monitor, {good(4), good(16)}), (Outages{CameraReason::kBlack, CameraReason::kNone}));
+  EXPECT_EQ(outages(monitor, {good(5), good(17)}), (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
 TEST(CameraMonitor, ReadmitsImmediatelyIfNoOtherCameraIsLeft) {
   CameraMonitor monitor(3, {.readmit_after = 3});
   const Outages dark(3, CameraReason::kBlack);
-  EXPECT_EQ(monitor.find_outages(frame({textured_image(1, 0, 5), textured_image(2, 0, 5), textured_image(3, 0, 5)})),
-            dark);
-  EXPECT_EQ(monitor.find_outages(frame({textured_image(4, 0, 5), good(1), {}})),
+  EXPECT_EQ(outages(monitor, {textured_image(1, 0, 5), textured_image(2, 0, 5), textured_image(3, 0, 5)}), dark);
+  EXPECT_EQ(outages(monitor, {textured_image(4, 0, 5), good(1), {}}),
             (Outages{CameraReason::kBlack, CameraReason::kNone, CameraReason::kNoImages}));
-  EXPECT_EQ(monitor.find_outages(frame({good(2), good(3), good(4)})),
+  EXPECT_EQ(outages(monitor, {good(2), good(3), good(4)}),
             (Outages{CameraReason::kBlack, CameraReason::kNone, CameraReason::kBlack}));
 }
 
 TEST(CameraMonitor, ACameraIsUsedWithItsFirstImageAfterMissingOnes) {
   CameraMonitor monitor(2, {});
-  monitor.find_outages(frame({good(1), good(2)}));
-  EXPECT_EQ(monitor.find_outages(frame({good(3), {}})), (Outages{CameraReason::kNone, CameraReason::kNoImages}));
-  EXPECT_EQ(monitor.find_outages(frame({good(4), good(5)})), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  outages(monitor, {good(1), good(2)});
+  EXPECT_EQ(outages(monitor, {good(3), {}}), (Outages{CameraReason::kNone, CameraReason::kNoImages}));
+  EXPECT_EQ(outages(monitor, {good(4), good(5)}), (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
 // Tiles of 40 pixels whose edges are blurred with standard deviations of `across` pixels along rows and `along` pixels
@@ -152,21 +158,21 @@ using Flags = std::vector<std::uint8_t>;
 
 TEST(CameraMonitor, DistinguishesBlurredImagesFromSharpAndMotionBlurredOnes) {
   CameraMonitor monitor(3, {});
-  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6), tiles(4, 4), tiles(6, 0.6)})), (Flags{0, 1, 0}));
+  EXPECT_EQ(examine(monitor, {tiles(0.6, 0.6), tiles(4, 4), tiles(6, 0.6)}).blurred, (Flags{0, 1, 0}));
 }
 
 TEST(CameraMonitor, DetectsNoBlurInImagesWithoutEdges) {
   CameraMonitor monitor(2, {});
-  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4, 15), {}})), (Flags{0, 0}));
+  EXPECT_EQ(examine(monitor, {tiles(4, 4, 15), {}}).blurred, (Flags{0, 0}));
 }
 
 TEST(CameraMonitor, ACameraIsBlurredUntilSeveralImagesAreSharp) {
   CameraMonitor monitor(1, {});
-  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4)})), Flags{1});
-  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{1});
-  EXPECT_EQ(monitor.blurred(frame({tiles(4, 4, 15)})), Flags{1});  // too few edges
-  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{1});
-  EXPECT_EQ(monitor.blurred(frame({tiles(0.6, 0.6)})), Flags{0});
+  EXPECT_EQ(examine(monitor, {tiles(4, 4)}).blurred, Flags{1});
+  EXPECT_EQ(examine(monitor, {tiles(0.6, 0.6)}).blurred, Flags{1});
+  EXPECT_EQ(examine(monitor, {tiles(4, 4, 15)}).blurred, Flags{1});  // too few edges
+  EXPECT_EQ(examine(monitor, {tiles(0.6, 0.6)}).blurred, Flags{1});
+  EXPECT_EQ(examine(monitor, {tiles(0.6, 0.6)}).blurred, Flags{0});
 }
 
 }  // namespace
