@@ -12,7 +12,9 @@
 namespace bslam::system {
 namespace {
 
-constexpr std::size_t kMaxFailedMap = 4;  // maximum number of keyframes of a map that is discarded if tracking is lost
+// Maximum number of keyframes of a map without metric scale that is discarded if tracking is lost, and of a map that is
+// discarded if the cameras that tell its scale contradict it.
+constexpr std::size_t kMaxFailedMap = 4, kMaxContradictedMap = 8;
 
 // Returns true if the frame is lost although it has features: the map may be wrong.
 bool disowns_map(const tracking::TrackResult& result) {
@@ -85,7 +87,7 @@ System::System(camera::Rig rig, Config config, Resources resources)
 
 System::~System() = default;
 
-// Discards a wrong monocular initialisation, including the poses it returned.
+// Discards a wrong initialisation, including the poses it returned.
 void System::discard_map() {
   for (FrameRecord& record : frames_) {
     if (record.result.status != tracking::TrackStatus::kTracking) continue;
@@ -172,11 +174,23 @@ void System::mark_created_keyframes() {
   }
 }
 
-// Returns true if a recent monocular initialisation was wrong, because the frames after it are lost.
+// Returns true if no two of the cameras that agree with the map overlap, but others do. Cameras without overlap agree
+// with a wrong scale as well as with the right one: they must not outvote those that tell it.
+bool System::scale_contradicted(const tracking::TrackResult& result) const {
+  if (result.status != tracking::TrackStatus::kTracking) return false;
+  std::vector<std::uint8_t> excluded;
+  for (const tracking::CameraCounts& camera : result.cameras) excluded.push_back(camera.excluded);
+  return run_rig_.any_overlap() && !run_rig_.any_overlap(excluded);
+}
+
+// Returns true if a recent initialisation was wrong: the frames after a monocular one are lost, or the cameras that tell
+// the scale contradict a metric one, as if they saw mostly an object that moved.
 bool System::initialisation_failed(const Pipeline::Outcome& outcome, bool had_pose) const {
+  if (!had_pose || loaded_) return false;
   const map::BundledMap& seen = *outcome.seen;
-  return had_pose && !loaded_ && disowns_map(outcome.record.result) && seen.scale() != map::Scale::kMetric &&
-         seen.keyframe_slots() - first_of_map_.index() <= kMaxFailedMap;
+  const std::size_t keyframes = seen.keyframe_slots() - first_of_map_.index();
+  if (seen.scale() != map::Scale::kMetric) return disowns_map(outcome.record.result) && keyframes <= kMaxFailedMap;
+  return keyframes <= kMaxContradictedMap && scale_contradicted(outcome.record.result);
 }
 
 // Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.

@@ -111,6 +111,7 @@ class System {
   std::vector<SubmapTrajectory> live_trajectories() const;
 
  private:
+  bool scale_contradicted(const tracking::TrackResult& result) const;
   bool initialisation_failed(const Pipeline::Outcome& outcome, bool had_pose) const;
   void discard_map();
   void bound_history();

@@ -85,13 +85,13 @@ Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame
                               const LastLandmarks& last, int count, ThreadPool& pool) {
   Candidates out(frame.cameras.size());
   add_visible(input, frame, T_rig_world, last.landmarks, last.points, {}, 0, pool, out);
-  for (std::vector<Candidate>& candidates : out) {
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    std::vector<Candidate>& candidates = out[c];
     if (static_cast<int>(candidates.size()) <= count) continue;
-    std::nth_element(candidates.begin(), candidates.begin() + count, candidates.end(),
-                     [](const Candidate& a, const Candidate& b) {
-                       return a.coarseness != b.coarseness ? a.coarseness > b.coarseness : a.landmark < b.landmark;
-                     });
-    candidates.resize(static_cast<std::size_t>(count));
+    std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
+      return a.coarseness != b.coarseness ? a.coarseness > b.coarseness : a.landmark < b.landmark;
+    });
+    keep_spread(count, input.map.rig().camera(c), candidates);
     std::ranges::sort(candidates, {}, &Candidate::landmark);
   }
   return out;

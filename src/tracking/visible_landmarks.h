@@ -32,8 +32,9 @@ struct Candidate {
 };
 using Candidates = std::vector<std::vector<Candidate>>;  // per camera
 
-// Of the landmarks of the last frame, in every camera those `count` with the largest patches in the image: their
-// alignment tolerates the largest errors of the predicted pose.
+// Of the landmarks of the last frame, in every camera at most `count` with the largest patches in their parts of the
+// image: their alignment tolerates the largest errors of the predicted pose. They are spread over the image, because
+// the largest of all may belong to one near object, which may move.
 Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame& frame,
                               const geometry::SE3& T_rig_world, const LastLandmarks& last, int count, ThreadPool& pool);
 
