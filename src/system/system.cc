@@ -183,8 +183,8 @@ bool System::scale_contradicted(const tracking::TrackResult& result) const {
   return run_rig_.any_overlap() && !run_rig_.any_overlap(excluded);
 }
 
-// Returns true if a recent initialisation was wrong: the frames after a monocular one are lost, or the cameras that tell
-// the scale contradict a metric one, as if they saw mostly an object that moved.
+// Returns true if a recent initialisation was wrong: the frames after a monocular one are lost, or the cameras that
+// tell the scale contradict a metric one, as if they saw mostly an object that moved.
 bool System::initialisation_failed(const Pipeline::Outcome& outcome, bool had_pose) const {
   if (!had_pose || loaded_) return false;
   const map::BundledMap& seen = *outcome.seen;

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "system/rendered_tour.h"
 
 namespace bslam::system {
@@ -156,6 +158,24 @@ TEST(SystemSequential, UsesOnlyUnmaskedPixels) {
     EXPECT_EQ(record.result.reason, LostReason::kNotStarted);  // no matched features, so no metric initialisation
   }
   EXPECT_TRUE(final_poses(system).empty());
+}
+
+// A third camera without overlap agrees with any scale. It does not outvote two that tell it, unless the map is old.
+TEST(SystemSequential, DiscardsANewMapThatTheCamerasThatTellItsScaleContradict) {
+  const std::array cameras = {0, 1, 4};
+  const RenderedTour tour(synthetic::ring_rig(8, 320).subset(cameras), 64, [](const auto& building, double duration_s) {
+    return simulator::make_tour(building, {.duration_s = duration_s, .seed = 3});
+  });
+  for (const std::size_t change : {8u, 60u}) {
+    System system(tour.rig(), small_config(execution::Mode::kSequential));
+    for (std::size_t k = 0; k < change; ++k) EXPECT_FALSE(must_process(system, tour.frames()[k]).map_withdrawn);
+    image::ImageBundle elsewhere = tour.frames()[change];
+    mirror(elsewhere.images[0]);
+    mirror(elsewhere.images[1]);
+    const FrameRecord record = must_process(system, elsewhere);
+    EXPECT_TRUE(record.result.cameras[0].excluded && record.result.cameras[1].excluded) << change;
+    EXPECT_EQ(record.map_withdrawn, change == 8) << system.snapshot()->keyframe_slots() << " keyframes";
+  }
 }
 
 TEST(SystemSequential, DiscardsANewMapUpToScaleAndItsPosesIfLost) {
