@@ -88,8 +88,9 @@ struct FrameResult {
   bool keyframe = false;
   int keyframe_id = -1;      // its id if it became a keyframe, otherwise the reference keyframe; -1 if none
   bool relocalised = false;  // tracking was recovered by place recognition
-  // The initial map was up to scale and wrong: the rig was lost in it soon after. All poses and keyframes reported so
-  // far are withdrawn, and the map is empty. A new one will be initialised; ids of keyframes are not used again.
+  // The initial map was wrong: it was up to scale, and the rig was lost in it soon after, or the cameras that tell its
+  // scale contradicted it. All poses and keyframes reported so far are withdrawn, and the map is empty. A new one will
+  // be initialised; ids of keyframes are not used again.
   bool map_withdrawn = false;
 
   std::vector<StageTime> stages;

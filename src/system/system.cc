@@ -15,6 +15,7 @@ namespace {
 // Maximum number of keyframes of a map without metric scale that is discarded if tracking is lost, and of a map that is
 // discarded if the cameras that tell its scale contradict it.
 constexpr std::size_t kMaxFailedMap = 4, kMaxContradictedMap = 8;
+constexpr int kMaxContradictions = 3;  // number of such maps after which the cameras themselves are taken to be wrong
 
 // Returns true if the frame is lost although it has features: the map may be wrong.
 bool disowns_map(const tracking::TrackResult& result) {
@@ -136,7 +137,10 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
   const bool refuted = initialisation_failed(outcome, had_pose);
   frames_.push_back(std::move(outcome.record));
   mark_created_keyframes();
-  if (refuted) discard_map();
+  if (refuted) {
+    contradictions_ += outcome.seen->scale() == map::Scale::kMetric;
+    discard_map();
+  }
   FrameRecord record = frames_.back();
   bound_history();
   return record;
@@ -190,7 +194,8 @@ bool System::initialisation_failed(const Pipeline::Outcome& outcome, bool had_po
   const map::BundledMap& seen = *outcome.seen;
   const std::size_t keyframes = seen.keyframe_slots() - first_of_map_.index();
   if (seen.scale() != map::Scale::kMetric) return disowns_map(outcome.record.result) && keyframes <= kMaxFailedMap;
-  return keyframes <= kMaxContradictedMap && scale_contradicted(outcome.record.result);
+  return contradictions_ < kMaxContradictions && keyframes <= kMaxContradictedMap &&
+         scale_contradicted(outcome.record.result);
 }
 
 // Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.

@@ -130,6 +130,7 @@ class System {
   const bool loaded_;                // whether the run began with a loaded map
   const KeyframeId first_keyframe_;  // first keyframe of this run
   KeyframeId first_of_map_;          // after the last map that was withdrawn
+  int contradictions_ = 0;           // number of metric maps that were withdrawn
   KeyframeMaker keyframe_maker_;
   Pipeline pipeline_;
   const std::size_t history_;  // see Resources

@@ -160,22 +160,41 @@ TEST(SystemSequential, UsesOnlyUnmaskedPixels) {
   EXPECT_TRUE(final_poses(system).empty());
 }
 
-// A third camera without overlap agrees with any scale. It does not outvote two that tell it, unless the map is old.
-TEST(SystemSequential, DiscardsANewMapThatTheCamerasThatTellItsScaleContradict) {
-  const std::array cameras = {0, 1, 4};
-  const RenderedTour tour(synthetic::ring_rig(8, 320).subset(cameras), 64, [](const auto& building, double duration_s) {
-    return simulator::make_tour(building, {.duration_s = duration_s, .seed = 3});
-  });
-  for (const std::size_t change : {8u, 60u}) {
-    System system(tour.rig(), small_config(execution::Mode::kSequential));
-    for (std::size_t k = 0; k < change; ++k) EXPECT_FALSE(must_process(system, tour.frames()[k]).map_withdrawn);
-    image::ImageBundle elsewhere = tour.frames()[change];
+// Cameras 0 and 1 overlap and tell the scale; camera 2 agrees with any scale.
+class SystemContradictedMap : public ::testing::Test {
+ protected:
+  // Shows the first `frames` frames, then one in which the cameras that tell the scale are elsewhere.
+  FrameRecord contradict(System& system, std::size_t frames) {
+    for (std::size_t k = 0; k < frames; ++k)
+      EXPECT_FALSE(must_process(system, tour_.replayed(k, shown_)).map_withdrawn) << k;
+    image::ImageBundle elsewhere = tour_.replayed(frames, shown_);
     mirror(elsewhere.images[0]);
     mirror(elsewhere.images[1]);
-    const FrameRecord record = must_process(system, elsewhere);
-    EXPECT_TRUE(record.result.cameras[0].excluded && record.result.cameras[1].excluded) << change;
-    EXPECT_EQ(record.map_withdrawn, change == 8) << system.snapshot()->keyframe_slots() << " keyframes";
+    FrameRecord record = must_process(system, elsewhere);
+    EXPECT_TRUE(record.result.cameras[0].excluded && record.result.cameras[1].excluded);
+    shown_ += frames + 1;
+    return record;
   }
+
+  static constexpr std::array kCameras = {0, 1, 4};
+  const RenderedTour tour_{synthetic::ring_rig(8, 320).subset(kCameras), 64,
+                           [](const auto& building, double duration_s) {
+                             return simulator::make_tour(building, {.duration_s = duration_s, .seed = 3});
+                           }};
+  std::size_t shown_ = 0;
+};
+
+TEST_F(SystemContradictedMap, IsDiscardedIfItIsNew) {
+  System system(tour_.rig(), small_config(execution::Mode::kSequential));
+  EXPECT_TRUE(contradict(system, 8).map_withdrawn);
+  EXPECT_EQ(tracked_frames(system), 0u);
+  EXPECT_FALSE(contradict(system, 60).map_withdrawn);
+  EXPECT_EQ(tracked_frames(system), 61u);
+}
+
+TEST_F(SystemContradictedMap, IsKeptAfterSeveralOthers) {
+  System system(tour_.rig(), small_config(execution::Mode::kSequential));
+  for (int before = 0; before < 4; ++before) EXPECT_EQ(contradict(system, 8).map_withdrawn, before < 3) << before;
 }
 
 TEST(SystemSequential, DiscardsANewMapUpToScaleAndItsPosesIfLost) {
