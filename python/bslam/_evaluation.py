@@ -71,7 +71,7 @@ def evaluate(
         align: alignment of the estimate: a rigid transform, a similarity, or none.
         max_dt: maximum time difference in seconds between a pose and its ground truth.
         delta: time in seconds between the two poses of a relative error.
-        gt_frame: frame of the ground truth poses; body needs `rig`.
+        gt_frame: frame of the ground truth poses; body needs `rig`, unless `est` is a file with poses of the body.
         rig: calibration with the pose of the camera on the body.
         camera: camera of the rig whose poses are estimated.
         times: time stamps of KITTI poses, one per line; default: times.txt in their folder.

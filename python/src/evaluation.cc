@@ -63,8 +63,8 @@ evaluation::Trajectory read(const Given& given, const std::string& name, const s
 }
 
 // T_cam_truth of the frame of the ground truth; nullopt if it is that of the estimate.
-std::optional<geometry::SE3> frame_of_truth(const Arguments& a) {
-  if (a.gt_frame != "body") return std::nullopt;
+std::optional<geometry::SE3> frame_of_truth(const Arguments& a, const evaluation::TrajectoryComments& estimate) {
+  if (a.gt_frame != "body" || estimate.frame == "body") return std::nullopt;
   if (!a.rig) raise({"evaluate", "gt_frame=body", "no rig", "rig=FILE with the pose of the camera on the body"});
   const camera::Rig rig = value_of(rig_formats::read_rig(*a.rig));
   const auto camera = static_cast<std::size_t>(a.camera);
@@ -132,11 +132,12 @@ nb::dict dict_of(const evaluation::TrajectoryEvaluation& e) {
 nb::dict evaluate(const Given& est, const Given& gt, const Arguments& a) {
   const evaluation::EvaluationOptions options = options_of(a);
   auto estimate = read(est, "est", a.times);
-  const auto T_cam_truth = frame_of_truth(a);
   auto truth = read(gt, "gt", a.times);
   const Path* file = std::get_if<Path>(&est);
-  const bool metric = file == nullptr || evaluation::read_comments(*file).scale == "metric";
-  if (T_cam_truth) evaluation::move_to_one_frame(*T_cam_truth, metric, estimate, truth);
+  const auto comments = file != nullptr ? evaluation::read_comments(*file) : evaluation::TrajectoryComments{};
+  if (const auto T_cam_truth = frame_of_truth(a, comments)) {
+    evaluation::move_to_one_frame(*T_cam_truth, comments.scale == "metric", estimate, truth);
+  }
   auto result = evaluation::evaluate(estimate, truth, options);
   if (!result) {
     Error error = result.error();

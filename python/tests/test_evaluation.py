@@ -50,6 +50,15 @@ def test_a_path_without_metres_is_compared_with_the_camera(recording, program, t
     assert found.ate.rmse == theirs["ate"]["rmse"] and found.scale == theirs["scale"]
 
 
+def test_poses_of_the_body_in_both_files_are_not_moved(recording, program, tmp_path):
+    header = "bslam trajectory frame=body parent=world final=true"
+    estimate = tmp_path / "body.tum"
+    np.savetxt(estimate, np.loadtxt(recording.ground_truth), header=header, fmt=["%.9f"] + 7 * ["%.12f"])
+    found = bslam.evaluate(estimate, recording.ground_truth, gt_frame="body")
+    theirs = json.loads(program("eval", estimate, recording.ground_truth, "--gt-frame=body", "--json"))
+    assert found.ate.rmse == theirs["ate"]["rmse"] and found.ate.max < 1e-6
+
+
 def test_errors_are_the_line_of_the_program(recording, program, tmp_path):
     (tmp_path / "bad.tum").write_text("1 2 3\n")
     (tmp_path / "late.tum").write_text("".join(f"{900 + t} {t} 0 0 0 0 0 1\n" for t in range(5)))

@@ -25,12 +25,12 @@ class RenderedTour {
   using Motion = std::function<synthetic::Trajectory(const simulator::Building&, double duration_s)>;
 
   RenderedTour(int cameras, std::size_t frames, TimeNs late_ns = 0)
-      : RenderedTour(
-            cameras, frames,
-            [](const auto& building, double duration_s) {
-              return simulator::make_tour(building, {.duration_s = duration_s, .seed = 3});
-            },
-            late_ns) {}
+      : RenderedTour(late(first_cameras(cameras), late_ns), frames) {}
+
+  RenderedTour(camera::Rig rig, std::size_t frames)
+      : RenderedTour(std::move(rig), frames, [](const auto& building, double duration_s) {
+          return simulator::make_tour(building, {.duration_s = duration_s, .seed = 3});
+        }) {}
 
   // `late_ns`: delay of the images of camera 2 and the following ones.
   RenderedTour(int cameras, std::size_t frames, const Motion& motion, TimeNs late_ns = 0)

@@ -177,10 +177,7 @@ class SystemContradictedMap : public ::testing::Test {
   }
 
   static constexpr std::array kCameras = {0, 1, 4};
-  const RenderedTour tour_{synthetic::ring_rig(8, 320).subset(kCameras), 64,
-                           [](const auto& building, double duration_s) {
-                             return simulator::make_tour(building, {.duration_s = duration_s, .seed = 3});
-                           }};
+  const RenderedTour tour_{synthetic::ring_rig(8, 320).subset(kCameras), 64};
   std::size_t shown_ = 0;
 };
 
