@@ -25,6 +25,7 @@ constexpr int kPasses = 4;
 // A step that decreases the cost less changes what the passes and the verdict on times depend on by a fraction of its
 // deviation: squared errors of 10,000 observations by about one, which has the information of a tenth of that.
 constexpr double kCoarseDecrease = 1e-4;
+constexpr double kScaleSigmas = 2;  // a change of the scale by fewer standard deviations is not significant
 constexpr int kQuickKeyframes = 40, kQuickLandmarks = 1000;  // enough for a verdict
 
 // The options for an estimate from a fraction of the map.
@@ -205,6 +206,26 @@ double path_length(const RigProblem& problem) {
   return sum;
 }
 
+// Standard deviation of path_length().
+double path_deviation(const RigProblem& problem, const std::vector<geometry::PoseUncertainty::Effect>& effects) {
+  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
+  Eigen::RowVectorXd sum;
+  // The perturbation delta moves the centre of a pose by -R^T delta_t.
+  const auto add = [&](std::size_t i, const Vector3d& direction) {
+    if (effects[i].cols() == 0) return;
+    if (sum.size() == 0) sum.setZero(effects[i].cols());
+    sum.noalias() -= (poses[i].rotation() * direction).transpose() * effects[i].bottomRows<3>();
+  };
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    if (problem.group[i] != problem.group[i - 1]) continue;
+    const Vector3d direction =
+        (poses[i].inverse().translation() - poses[i - 1].inverse().translation()).stableNormalized();
+    add(i, direction);
+    add(i - 1, -direction);
+  }
+  return sum.norm();
+}
+
 // The size of a rig: the longest distance of a camera from camera 0.
 double longest_baseline(const camera::Rig& rig) {
   double longest = 0;
@@ -285,8 +306,11 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.poses = poses_of(problem.flat);
   // Distances between keyframes that are longer than the rig tell how the calibration changes the scale; a rig that
   // hardly moved only follows the scale of the baselines.
-  out.scale_change =
-      path_before > longest_baseline(calibrated) ? path_length(problem) / path_before : adjusted.scale_change;
+  out.scale_change = adjusted.scale_change;
+  if (path_before > longest_baseline(calibrated)) {
+    out.scale_change = path_length(problem) / path_before;
+    out.scale_deviation = path_deviation(problem, adjusted.pose_effects) / path_before;
+  }
   return out;
 }
 
@@ -331,7 +355,8 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
 
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
   const double factor = 1 / refinement.scale_change;
-  if (!(std::abs(std::log(factor)) < 0.01 * options.scale_tolerance_percent)) return;
+  const double tolerance = std::max(0.01 * options.scale_tolerance_percent, kScaleSigmas * refinement.scale_deviation);
+  if (!(std::abs(std::log(factor)) < tolerance)) return;
   solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
   for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);
   refinement.rig = with_rig_frame(values.applied_to(*refinement.rig), refinement.rig->cam_from_rig(0),

@@ -35,7 +35,8 @@ struct CalibrationOptions {
   // (camera/model_table.h).
   double sigma_rotation_deg = 2.0, sigma_translation_mm = 5.0;
   double sigma_scale_percent = 0.5;  // of the common scale of all baselines, which images do not reveal
-  // During a run, the map keeps its scale while it differs from that of the calibrated baselines by less than this.
+  // During a run, the map keeps its scale while it differs from that of the calibrated baselines by less than this, or
+  // by less than the estimate of the scale can be wrong.
   double scale_tolerance_percent = 1.0;
   double sigma_focal_percent = 1.0, sigma_aspect_percent = 0.1, sigma_centre_percent = 0.5;
   // Of time offsets and of the readout times of rolling shutters. They are constant unless the images contradict them
@@ -139,6 +140,7 @@ struct RigRefinement {
   std::optional<camera::Rig> rig;
   solver::RigInformation information;  // of the estimate, to combine it with those of other maps
   double scale_change = 1;             // factor by which the lengths of the map change
+  double scale_deviation = 0;          // standard deviation of scale_change; 0 if it is not known
   double kept_scale = 1;               // factor by which keep_scale() multiplied the baselines
   map::SetPoses poses;                 // after this change
 };
@@ -158,9 +160,9 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
                                                 const feature::FeatureModel& features,
                                                 const std::stop_token& stop = {});
 // Scales the estimate so that the distances between the keyframes remain, if this changes the scale of the baselines by
-// less than `scale_tolerance_percent`. The baselines have exactly their calibrated scale before. How the images
-// distribute it over them is uncertain at first; without this function each estimate would change the scale of the live
-// trajectory. The kept difference counts as a deviation of the scale.
+// less than `scale_tolerance_percent` or two standard deviations of the scale. The baselines have exactly their
+// calibrated scale before. How the images distribute it over them is uncertain at first; without this function each
+// estimate would change the scale of the live trajectory. The kept difference counts as a deviation of the scale.
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement);
 // Moves the submap of a keyframe as a whole so that the keyframe has the given pose. The world frame is where the root
 // was at first: the distance of the root from the origin is an error of all keyframes, and added to their uncertainty.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "base/assert.h"
 #include "solver/bundle_equations.h"
@@ -171,6 +172,17 @@ RigInformation in_physical_units(const Eigen::MatrixXd& information, const Eigen
   return physical;
 }
 
+// The perturbation of each pose by the error of the unknowns of the rig, L z with L L^T = covariance.
+std::vector<geometry::PoseUncertainty::Effect> effects_on_poses(const Eigen::MatrixXd& covariance,
+                                                                BundleEquations& equations) {
+  std::vector<int> poses(equations.state().T_rig_world.size());
+  std::iota(poses.begin(), poses.end(), 0);
+  std::vector<geometry::PoseUncertainty::Effect> out;
+  for (auto& effect : equations.rig_effects(poses, covariance.llt().matrixL()))
+    out.push_back(std::move(effect).value_or(geometry::PoseUncertainty::Effect(6, 0)));
+  return out;
+}
+
 // Computes covariances and observed degrees of freedom at the current values. Returns false if the information is
 // singular.
 bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const RigValues& calibrated,
@@ -192,6 +204,7 @@ bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const R
   if (factor.info() != Eigen::Success) return false;
   const Eigen::MatrixXd covariance =
       options.correlated_observations * factor.solve(Eigen::MatrixXd::Identity(blocks.size, blocks.size));
+  out.pose_effects = effects_on_poses(covariance, equations);
   report_extrinsics(covariance, options, out);
   if (blocks.intrinsics != nullptr)
     report_intrinsics(covariance.diagonal().segment(blocks.first_intrinsics(), blocks.intrinsics->size()).cwiseSqrt(),

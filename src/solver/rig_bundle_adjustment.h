@@ -65,6 +65,8 @@ struct RigAdjustment {
   RigValues values;                     // the estimate
   std::vector<CameraEstimate> cameras;  // all cameras; the extrinsics of the first one are exact
   RigInformation information;
+  // Per pose of the problem: its perturbation by the error of the estimate; no columns if the pose is fixed.
+  std::vector<geometry::PoseUncertainty::Effect> pose_effects;
   double final_cost = 0;       // as in LmSummary, of the observations that agree and the prior
   double variance_factor = 1;  // mean squared normalised error over its expectation; if > 1 it scales the covariances
   double scale_change = 1;     // factor by which all lengths of the problem were multiplied, as described above

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "adjustment/map_adjustment.h"
+#include "base/random.h"
 #include "camera/model_parameters.h"
 #include "geometry/triangulation.h"
 #include "mapping/simulated_map.h"
@@ -336,6 +337,57 @@ TEST(KeepScale, TheMapKeepsItsScaleUnlessTheBaselinesDifferTooMuch) {
                 (keeps ? 1.0 : factor) / estimate.scale_change, 1e-9);
     EXPECT_EQ(kept.scale_change, keeps ? 1.0 : factor);
   }
+}
+
+TEST(KeepScale, AChangeThatIsNotSignificantIsNotMade) {
+  const camera::Rig truth = synthetic::default_rig();
+  const RigRefinement estimate = refine(mapped(truth, with_wrong_intrinsics(truth), 20, 0.3).map);
+  ASSERT_TRUE(estimate.done);
+  for (const double deviation : {0.01, 0.03}) {
+    RigRefinement kept = scaled(estimate, 1.05 / estimate.scale_change);
+    kept.scale_deviation = deviation;
+    keep_scale({}, kept);
+    EXPECT_EQ(kept.scale_change, deviation < 0.02 ? 1.05 : 1.0);
+  }
+}
+
+double true_path_length(const map::SimulatedMap& world) {
+  double sum = 0;
+  for (std::size_t i = 1; i < world.frames.size(); ++i)
+    sum += (world.frames[i].T_world_rig.translation() - world.frames[i - 1].T_world_rig.translation()).norm();
+  return sum;
+}
+
+// The rig with a random rotation of camera 1 about its own centre.
+camera::Rig turned(const camera::Rig& rig, double sigma_deg, Random& random) {
+  solver::RigValues values = solver::RigValues::of(rig);
+  geometry::Vector6d turn = geometry::Vector6d::Zero();
+  for (int k = 0; k < 3; ++k) turn(k) = sigma_deg * kDegree * random.normal();
+  values.T_cam_rig[1] = values.T_cam_rig[1].perturbed(turn);
+  return values.applied_to(rig);
+}
+
+// Rotations of camera 1 change all depths.
+TEST(RefineRig, TheDeviationOfTheScaleIsThatOfItsErrors) {
+  const camera::Rig truth = synthetic::ring_rig(2);
+  CalibrationOptions options = kExactIntrinsics;
+  options.sigma_rotation_deg = 0.05;
+  options.sigma_translation_mm = 0.1;
+  options.sigma_scale_percent = 0.01;
+  constexpr int kCalibrations = 12;
+  double sum = 0;
+  Random random(1);
+  for (int i = 0; i < kCalibrations; ++i) {
+    const map::SimulatedMap world = mapped(truth, turned(truth, options.sigma_rotation_deg, random), 8, 0.3);
+    const RigRefinement result = refine(world.map, options);
+    ASSERT_TRUE(result.done);
+    const double error = path_length(world.map) * result.scale_change / true_path_length(world) - 1;
+    EXPECT_GT(result.scale_deviation, 1e-4);
+    EXPECT_LT(result.scale_deviation, 0.1);
+    sum += std::pow(error / result.scale_deviation, 2);
+  }
+  EXPECT_GT(sum / kCalibrations, 0.2);
+  EXPECT_LT(sum / kCalibrations, 2.5);
 }
 
 TEST(MoveSubmap, MovesKeyframesAndLandmarksTogether) {
