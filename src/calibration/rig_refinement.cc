@@ -7,6 +7,7 @@
 
 #include "adjustment/landmark_noise.h"
 #include "calibration/lost_observations.h"
+#include "calibration/path_scale.h"
 #include "calibration/rig_frame.h"
 #include "calibration/rig_problem.h"
 #include "calibration/single_view_landmarks.h"
@@ -25,7 +26,6 @@ constexpr int kPasses = 4;
 // A step that decreases the cost less changes what the passes and the verdict on times depend on by a fraction of its
 // deviation: squared errors of 10,000 observations by about one, which has the information of a tenth of that.
 constexpr double kCoarseDecrease = 1e-4;
-constexpr double kScaleSigmas = 2;  // a change of the scale by fewer standard deviations is not significant
 constexpr int kQuickKeyframes = 40, kQuickLandmarks = 1000;  // enough for a verdict
 
 // The options for an estimate from a fraction of the map.
@@ -195,37 +195,6 @@ void evaluate_timing(const solver::CameraEstimate& estimate, CameraRefinement& o
   out.readout = in_ms(estimate.timing_change.readout_s, estimate.timing_sigma.readout_s);
 }
 
-// Sum of the distances between successive keyframes of the same group.
-double path_length(const RigProblem& problem) {
-  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
-  double sum = 0;
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    if (problem.group[i] == problem.group[i - 1])
-      sum += (poses[i].inverse().translation() - poses[i - 1].inverse().translation()).norm();
-  }
-  return sum;
-}
-
-// Standard deviation of path_length().
-double path_deviation(const RigProblem& problem, const std::vector<geometry::PoseUncertainty::Effect>& effects) {
-  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
-  Eigen::RowVectorXd sum;
-  // The perturbation delta moves the centre of a pose by -R^T delta_t.
-  const auto add = [&](std::size_t i, const Vector3d& direction) {
-    if (effects[i].cols() == 0) return;
-    if (sum.size() == 0) sum.setZero(effects[i].cols());
-    sum.noalias() -= (poses[i].rotation() * direction).transpose() * effects[i].bottomRows<3>();
-  };
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    if (problem.group[i] != problem.group[i - 1]) continue;
-    const Vector3d direction =
-        (poses[i].inverse().translation() - poses[i - 1].inverse().translation()).stableNormalized();
-    add(i, direction);
-    add(i - 1, -direction);
-  }
-  return sum.norm();
-}
-
 // The size of a rig: the longest distance of a camera from camera 0.
 double longest_baseline(const camera::Rig& rig) {
   double longest = 0;
@@ -351,20 +320,6 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
   }
   RigRefinement out = refine_with_prior(map, calibrated, prior, options, features, stop);
   return accepted(out, options) ? std::optional(std::move(out)) : std::nullopt;
-}
-
-void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
-  const double factor = 1 / refinement.scale_change;
-  const double tolerance = std::max(0.01 * options.scale_tolerance_percent, kScaleSigmas * refinement.scale_deviation);
-  if (!(std::abs(std::log(factor)) < tolerance)) return;
-  solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
-  for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);
-  refinement.rig = with_rig_frame(values.applied_to(*refinement.rig), refinement.rig->cam_from_rig(0),
-                                  refinement.rig->body_from_rig());
-  for (auto& [keyframe, T_rig_world] : refinement.poses.keyframes) T_rig_world = geometry::scaled(T_rig_world, factor);
-  for (auto& [landmark, position] : refinement.poses.landmarks) position *= factor;
-  refinement.scale_change = 1;
-  refinement.kept_scale *= factor;
 }
 
 void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft) {

@@ -159,11 +159,6 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
                                                 const CalibrationOptions& options,
                                                 const feature::FeatureModel& features,
                                                 const std::stop_token& stop = {});
-// Scales the estimate so that the distances between the keyframes remain, if this changes the scale of the baselines by
-// less than `scale_tolerance_percent` or two standard deviations of the scale. The baselines have exactly their
-// calibrated scale before. How the images distribute it over them is uncertain at first; without this function each
-// estimate would change the scale of the live trajectory. The kept difference counts as a deviation of the scale.
-void keep_scale(const CalibrationOptions& options, RigRefinement& refinement);
 // Moves the submap of a keyframe as a whole so that the keyframe has the given pose. The world frame is where the root
 // was at first: the distance of the root from the origin is an error of all keyframes, and added to their uncertainty.
 void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft);

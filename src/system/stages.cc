@@ -1,5 +1,6 @@
 #include "system/stages.h"
 
+#include "calibration/path_scale.h"
 #include "mapping/map_keyframe.h"
 
 namespace bslam::system {

@@ -1,0 +1,58 @@
+#include "calibration/path_scale.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/rig_frame.h"
+
+namespace bslam::calibration {
+namespace {
+
+constexpr double kScaleSigmas = 2;  // a change of the scale by fewer standard deviations is not significant
+
+}  // namespace
+
+double path_length(const RigProblem& problem) {
+  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
+  double sum = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    if (problem.group[i] == problem.group[i - 1])
+      sum += (poses[i].inverse().translation() - poses[i - 1].inverse().translation()).norm();
+  }
+  return sum;
+}
+
+double path_deviation(const RigProblem& problem, const std::vector<geometry::PoseUncertainty::Effect>& effects) {
+  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
+  Eigen::RowVectorXd sum;
+  // The perturbation delta moves the centre of a pose by -R^T delta_t.
+  const auto add = [&](std::size_t i, const Eigen::Vector3d& direction) {
+    if (effects[i].cols() == 0) return;
+    if (sum.size() == 0) sum.setZero(effects[i].cols());
+    sum.noalias() -= (poses[i].rotation() * direction).transpose() * effects[i].bottomRows<3>();
+  };
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    if (problem.group[i] != problem.group[i - 1]) continue;
+    const Eigen::Vector3d direction =
+        (poses[i].inverse().translation() - poses[i - 1].inverse().translation()).stableNormalized();
+    add(i, direction);
+    add(i - 1, -direction);
+  }
+  return sum.norm();
+}
+
+void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
+  const double factor = 1 / refinement.scale_change;
+  const double tolerance = std::max(0.01 * options.scale_tolerance_percent, kScaleSigmas * refinement.scale_deviation);
+  if (!(std::abs(std::log(factor)) < tolerance)) return;
+  solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
+  for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);
+  refinement.rig = with_rig_frame(values.applied_to(*refinement.rig), refinement.rig->cam_from_rig(0),
+                                  refinement.rig->body_from_rig());
+  for (auto& [keyframe, T_rig_world] : refinement.poses.keyframes) T_rig_world = geometry::scaled(T_rig_world, factor);
+  for (auto& [landmark, position] : refinement.poses.landmarks) position *= factor;
+  refinement.scale_change = 1;
+  refinement.kept_scale *= factor;
+}
+
+}  // namespace bslam::calibration
