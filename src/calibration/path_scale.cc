@@ -6,12 +6,6 @@
 #include "calibration/rig_frame.h"
 
 namespace bslam::calibration {
-namespace {
-
-constexpr double kScaleSigmas = 2;  // a change of the scale by fewer standard deviations is not significant
-
-}  // namespace
-
 double path_length(const RigProblem& problem) {
   const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
   double sum = 0;
@@ -43,7 +37,7 @@ double path_deviation(const RigProblem& problem, const std::vector<geometry::Pos
 
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
   const double factor = 1 / refinement.scale_change;
-  const double tolerance = std::max(0.01 * options.scale_tolerance_percent, kScaleSigmas * refinement.scale_deviation);
+  const double tolerance = std::max(0.01 * options.scale_tolerance_percent, refinement.scale_deviation);
   if (!(std::abs(std::log(factor)) < tolerance)) return;
   solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
   for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);

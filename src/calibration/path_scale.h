@@ -13,7 +13,7 @@ double path_length(const RigProblem& problem);
 double path_deviation(const RigProblem& problem, const std::vector<geometry::PoseUncertainty::Effect>& effects);
 
 // Scales the estimate so that the distances between the keyframes remain, if this changes the scale of the baselines by
-// less than `scale_tolerance_percent` or two standard deviations of the scale. The baselines have exactly their
+// less than `scale_tolerance_percent` or the standard deviation of the scale. The baselines have exactly their
 // calibrated scale before. How the images distribute it over them is uncertain at first; without this function each
 // estimate would change the scale of the live trajectory. The kept difference counts as a deviation of the scale.
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement);

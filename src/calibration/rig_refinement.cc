@@ -45,6 +45,13 @@ double mahalanobis_distance(const Vector3d& change, const Matrix3d& covariance) 
   return std::sqrt(change.dot(covariance.llt().solve(change)));
 }
 
+// The size of a rig: the longest distance of a camera from camera 0.
+double longest_baseline(const camera::Rig& rig) {
+  double longest = 0;
+  for (std::size_t c = 1; c < rig.size(); ++c) longest = std::max(longest, rig.cam_from_rig(c).translation().norm());
+  return longest;
+}
+
 std::vector<ParameterRefinement> evaluate_intrinsics(const solver::CameraEstimate& estimate,
                                                      const camera::CameraModel& model) {
   std::vector<ParameterRefinement> out;
@@ -119,7 +126,8 @@ solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const feature
 
 solver::RigAdjustmentOptions prior_of(const camera::Rig& rig, const CalibrationOptions& options) {
   solver::RigAdjustmentOptions out{.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
-                                   .sigma_translation = options.sigma_translation_mm / kMillimetres,
+                                   .sigma_translation = translation_deviation(rig, options),
+                                   .sigma_depth = options.sigma_depth_mm / kMillimetres,
                                    .sigma_scale = 0.01 * options.sigma_scale_percent,
                                    .sigma_aspect = 0.01 * options.sigma_aspect_percent,
                                    .correlated_observations = options.correlated_observations};
@@ -195,13 +203,6 @@ void evaluate_timing(const solver::CameraEstimate& estimate, CameraRefinement& o
   out.readout = in_ms(estimate.timing_change.readout_s, estimate.timing_sigma.readout_s);
 }
 
-// The size of a rig: the longest distance of a camera from camera 0.
-double longest_baseline(const camera::Rig& rig) {
-  double longest = 0;
-  for (std::size_t c = 1; c < rig.size(); ++c) longest = std::max(longest, rig.cam_from_rig(c).translation().norm());
-  return longest;
-}
-
 map::SetPoses poses_of(const adjustment::BundleProblem& flat) {
   map::SetPoses out;
   for (std::size_t i = 0; i < flat.keyframes.size(); ++i)
@@ -213,6 +214,11 @@ map::SetPoses poses_of(const adjustment::BundleProblem& flat) {
 }
 
 }  // namespace
+
+double translation_deviation(const camera::Rig& rig, const CalibrationOptions& options) {
+  return std::hypot(options.sigma_translation_mm / kMillimetres,
+                    0.01 * options.sigma_translation_percent * longest_baseline(rig));
+}
 
 std::string_view verdict_name(Verdict verdict) {
   switch (verdict) {

@@ -33,11 +33,13 @@ struct CalibrationOptions {
   // Standard deviations of the given calibration: the prior of the estimate. Extrinsics: per axis. Focal lengths
   // and their ratio: relative. Principal points: per axis, of the image width. Distortion: of the model table
   // (camera/model_table.h).
-  double sigma_rotation_deg = 2.0, sigma_translation_mm = 5.0;
+  double sigma_rotation_deg = 2.0;
+  double sigma_translation_mm = 2.0, sigma_translation_percent = 1.0;  // the latter of the longest baseline
+  double sigma_depth_mm = 5.0;       // of translations along an optical axis, which errors of focal lengths look like
   double sigma_scale_percent = 0.5;  // of the common scale of all baselines, which images do not reveal
   // During a run, the map keeps its scale while it differs from that of the calibrated baselines by less than this, or
   // by less than the estimate of the scale can be wrong.
-  double scale_tolerance_percent = 1.0;
+  double scale_tolerance_percent = 1.5;
   double sigma_focal_percent = 1.0, sigma_aspect_percent = 0.1, sigma_centre_percent = 0.5;
   // Of time offsets and of the readout times of rolling shutters. They are constant unless the images contradict them
   // by more than `suspect_ms`.
@@ -71,6 +73,10 @@ struct CalibrationOptions {
     visitor("sigma_translation_mm", self.sigma_translation_mm, Range{1e-3, 1e4}, "mm",
             "standard deviation of calibrated translations, per axis",
             OptionNote{.formerly = "extrinsics.calibration_mm"});
+    visitor("sigma_translation_percent", self.sigma_translation_percent, Range{0, 100}, "%",
+            "additional deviation of translations, in percent of the longest baseline");
+    visitor("sigma_depth_mm", self.sigma_depth_mm, Range{0, 1e4}, "mm",
+            "additional deviation of translations along the optical axes");
     visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-6, 100}, "%",
             "deviation of the baselines' common scale");
     visitor("scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
@@ -99,6 +105,9 @@ struct CalibrationOptions {
     visitor("suspect_ms", self.suspect_ms, Range{0, 1e3}, "ms", "minimum change of a time that is estimated");
   }
 };
+
+// Standard deviation of the calibrated translations of a rig, per axis, in metres.
+double translation_deviation(const camera::Rig& rig, const CalibrationOptions& options);
 
 // A parameter of a camera model.
 struct ParameterRefinement {

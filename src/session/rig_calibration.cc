@@ -37,7 +37,8 @@ double scale_deviation(const camera::Rig& rig, const calibration::CalibrationOpt
   double squares = 0;
   for (std::size_t c = 1; c < rig.size(); ++c) squares += rig.rig_from_cam(c).translation().squaredNorm();
   if (squares == 0) return 0;
-  return std::max(1e-3 * options.sigma_translation_mm / std::sqrt(squares), 0.01 * options.sigma_scale_percent);
+  return std::max(calibration::translation_deviation(rig, options) / std::sqrt(squares),
+                  0.01 * options.sigma_scale_percent);
 }
 
 // The estimate from one recording, and the runs it took.

@@ -19,7 +19,8 @@ RigBlocks calibration_blocks(const RigValues& rig) {
     intrinsics.sigmas.push_back(camera::ModelParameters::Ones(values.size()));
   }
   RigBlocks blocks;
-  blocks.push_back(std::make_unique<ExtrinsicsBlock>(ExtrinsicPrior{rig.T_cam_rig, 1.0, 1.0}));
+  blocks.push_back(std::make_unique<ExtrinsicsBlock>(
+      ExtrinsicPrior{.T_cam_rig = rig.T_cam_rig, .sigma_rotation = 1.0, .sigma_translation = 1.0}));
   blocks.push_back(std::make_unique<IntrinsicsBlock>(std::move(intrinsics)));
   return blocks;
 }

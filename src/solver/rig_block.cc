@@ -6,12 +6,6 @@ namespace {
 using geometry::Matrix6d;
 using geometry::Vector6d;
 
-Vector6d information_of(const ExtrinsicPrior& prior) {
-  const double rotation = 1.0 / (prior.sigma_rotation * prior.sigma_rotation);
-  const double translation = 1.0 / (prior.sigma_translation * prior.sigma_translation);
-  return (Vector6d() << rotation, rotation, rotation, translation, translation, translation).finished();
-}
-
 // d extrinsic_change / d(left perturbation): exp(w) R has the logarithm phi + J_l^-1 w, its translation is t + w x t +
 // v.
 Matrix6d change_jacobian(const Vector6d& change) {
@@ -46,6 +40,16 @@ Rig RigValues::applied_to(const Rig& rig) const {
   return Rig(std::move(cameras));
 }
 
+Matrix6d covariance_of(const ExtrinsicPrior& prior, std::size_t camera) {
+  const Vector3d axis = Vector3d::UnitZ(), axis_of_camera_0 = prior.T_cam_rig[camera].rotation() * Vector3d::UnitZ();
+  Matrix6d out = Matrix6d::Zero();
+  out.topLeftCorner<3, 3>().diagonal().setConstant(prior.sigma_rotation * prior.sigma_rotation);
+  out.bottomRightCorner<3, 3>().diagonal().setConstant(prior.sigma_translation * prior.sigma_translation);
+  out.bottomRightCorner<3, 3>() += prior.sigma_depth * prior.sigma_depth *
+                                   (axis * axis.transpose() + axis_of_camera_0 * axis_of_camera_0.transpose());
+  return out;
+}
+
 double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated) {
   double sum = 0.0, reference = 0.0;
   for (std::size_t c = 0; c < calibrated.size(); ++c) {
@@ -62,7 +66,10 @@ Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference) {
 
 ExtrinsicsBlock::ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)) {
   double sum = 0.0;
-  for (const SE3& T : prior_.T_cam_rig) sum += T.translation().squaredNorm();
+  for (std::size_t c = 0; c < prior_.T_cam_rig.size(); ++c) {
+    sum += prior_.T_cam_rig[c].translation().squaredNorm();
+    information_.push_back(covariance_of(prior_, c).inverse());
+  }
   if (prior_.sigma_scale > 0 && sum > 0) scale_gradient_ = 1.0 / (prior_.sigma_scale * sum);
 }
 
@@ -83,10 +90,10 @@ void ExtrinsicsBlock::apply(const Eigen::VectorXd& delta, RigValues& values) con
 }
 
 double ExtrinsicsBlock::prior_cost(const RigValues& values) const {
-  const Vector6d information = information_of(prior_);
   double sum = 0.0;
   for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c) {
-    sum += extrinsic_change(values.T_cam_rig[c], prior_.T_cam_rig[c]).cwiseAbs2().dot(information);
+    const Vector6d change = extrinsic_change(values.T_cam_rig[c], prior_.T_cam_rig[c]);
+    sum += change.dot(information_[c] * change);
   }
   const double scale = scale_error(values);
   return 0.5 * (sum + scale * scale);
@@ -94,11 +101,10 @@ double ExtrinsicsBlock::prior_cost(const RigValues& values) const {
 
 void ExtrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H,
                                 Eigen::Ref<Eigen::VectorXd> b) const {
-  const Vector6d information = information_of(prior_);
   for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c) {
     const Vector6d change = extrinsic_change(values.T_cam_rig[c], prior_.T_cam_rig[c]);
     const Matrix6d J = change_jacobian(change);
-    const Matrix6d JtI = J.transpose() * information.asDiagonal();
+    const Matrix6d JtI = J.transpose() * information_[c];
     const auto at = 6 * (static_cast<Eigen::Index>(c) - 1);
     H.block<6, 6>(at, at) += JtI * J;
     b.segment<6>(at) -= JtI * change;

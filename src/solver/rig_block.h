@@ -64,8 +64,14 @@ using RigBlocks =
 struct ExtrinsicPrior {
   std::vector<SE3> T_cam_rig;                        // calibrated, per camera
   double sigma_rotation = 0, sigma_translation = 0;  // radians, metres; per axis
-  double sigma_scale = 0;                            // relative; 0: no prior of its own
+  // Metres, additionally along the optical axes of the camera and of camera 0: to a calibration, an error of the focal
+  // length looks like a displacement along the axis.
+  double sigma_depth = 0;
+  double sigma_scale = 0;  // relative; 0: no prior of its own
 };
+
+// Covariance of extrinsic_change() of a camera by the prior.
+geometry::Matrix6d covariance_of(const ExtrinsicPrior& prior, std::size_t camera);
 
 // The common scale of the baselines relative to that of the calibration, see above. 1 if
 // all cameras of the calibration have the same centre.
@@ -92,7 +98,8 @@ class ExtrinsicsBlock : public RigBlock {
   double scale_error(const RigValues& values) const;  // divided by its standard deviation
 
   ExtrinsicPrior prior_;
-  double scale_gradient_ = 0;  // 1 / (sigma_scale sum |c'|^2); 0 without a prior of the scale
+  std::vector<geometry::Matrix6d> information_;  // per camera: the inverse of covariance_of()
+  double scale_gradient_ = 0;                    // 1 / (sigma_scale sum |c'|^2); 0 without a prior of the scale
 };
 
 // Prior for the intrinsics: normal distributions around the calibrated values, and one of the ratio fx / fy, which is

@@ -55,12 +55,18 @@ std::unique_ptr<TimingBlock> make_timing(const RigAdjustmentOptions& options, do
   return std::make_unique<TimingBlock>(std::move(prior));
 }
 
+ExtrinsicPrior extrinsic_prior(const RigValues& calibrated, const RigAdjustmentOptions& options, double tighter) {
+  return {.T_cam_rig = calibrated.T_cam_rig,
+          .sigma_rotation = tighter * options.sigma_rotation,
+          .sigma_translation = tighter * options.sigma_translation,
+          .sigma_depth = tighter * options.sigma_depth,
+          .sigma_scale = tighter * options.sigma_scale};
+}
+
 CalibrationBlocks make_blocks(const RigValues& calibrated, const RigAdjustmentOptions& options) {
   CalibrationBlocks out;
   const double tighter = 1.0 / std::sqrt(options.correlated_observations);
-  auto extrinsics = std::make_unique<ExtrinsicsBlock>(
-      ExtrinsicPrior{calibrated.T_cam_rig, tighter * options.sigma_rotation, tighter * options.sigma_translation,
-                     tighter * options.sigma_scale});
+  auto extrinsics = std::make_unique<ExtrinsicsBlock>(extrinsic_prior(calibrated, options, tighter));
   out.extrinsics = extrinsics.get();
   out.add(std::move(extrinsics));
   if (!options.sigma_intrinsics.empty()) {
@@ -89,15 +95,15 @@ double variance_factor(const BundleStructure& structure, int rig_unknowns, doubl
   return 2.0 * cost / (redundancy(structure, rig_unknowns) * kVarianceLeft / kFractionLeft);
 }
 
-void report_extrinsics(const Eigen::MatrixXd& covariance, const RigAdjustmentOptions& options, RigAdjustment& out) {
+void report_extrinsics(const Eigen::MatrixXd& covariance, const ExtrinsicPrior& prior, RigAdjustment& out) {
   for (std::size_t c = 1; c < out.cameras.size(); ++c) {
     CameraEstimate& camera = out.cameras[c];
     const auto at = static_cast<Eigen::Index>(6 * (c - 1));
     camera.covariance = covariance.block<6, 6>(at, at);
-    for (int k = 0; k < 6; ++k) {
-      const double sigma = k < 3 ? options.sigma_rotation : options.sigma_translation;
-      camera.observed[static_cast<std::size_t>(k)] = std::sqrt(camera.covariance(k, k)) < kObservedRatio * sigma;
-    }
+    const geometry::Matrix6d of_prior = covariance_of(prior, c);
+    for (int k = 0; k < 6; ++k)
+      camera.observed[static_cast<std::size_t>(k)] =
+          std::sqrt(camera.covariance(k, k)) < kObservedRatio * std::sqrt(of_prior(k, k));
   }
 }
 
@@ -205,7 +211,7 @@ bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const R
   const Eigen::MatrixXd covariance =
       options.correlated_observations * factor.solve(Eigen::MatrixXd::Identity(blocks.size, blocks.size));
   out.pose_effects = effects_on_poses(covariance, equations);
-  report_extrinsics(covariance, options, out);
+  report_extrinsics(covariance, extrinsic_prior(calibrated, options, 1.0), out);
   if (blocks.intrinsics != nullptr)
     report_intrinsics(covariance.diagonal().segment(blocks.first_intrinsics(), blocks.intrinsics->size()).cwiseSqrt(),
                       calibrated, options, out);

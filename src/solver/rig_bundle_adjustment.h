@@ -16,6 +16,7 @@ namespace bslam::solver {
 struct RigAdjustmentOptions {
   double sigma_rotation = 0.035;    // radians, per axis: standard deviation of the calibrated extrinsics (2 degrees)
   double sigma_translation = 0.03;  // metres, per axis
+  double sigma_depth = 0;           // metres, additionally along the optical axes (ExtrinsicPrior)
   // Of the common scale of all baselines, relative. If it is positive, all lengths are scaled so that the baselines
   // keep this scale exactly: images do not reveal it, and iterations along a direction without information do not
   // converge.

@@ -18,7 +18,7 @@ using scene::BundleSpec;
 using scene::Models;
 
 ExtrinsicPrior prior_of(const Rig& rig) {
-  ExtrinsicPrior prior{{}, 0.02, 0.03};
+  ExtrinsicPrior prior{.T_cam_rig = {}, .sigma_rotation = 0.02, .sigma_translation = 0.03, .sigma_depth = 0.04};
   for (std::size_t c = 0; c < rig.size(); ++c) prior.T_cam_rig.push_back(rig.cam_from_rig(c));
   return prior;
 }

@@ -81,7 +81,8 @@ struct PriorError {
     Eigen::Map<geometry::Vector6d> out(residuals);
     out = extrinsic_change(T_cam_rig, calibrated);
     out.head<3>() /= prior.sigma_rotation;
-    out.tail<3>() /= prior.sigma_translation;
+    const Eigen::Matrix3d covariance = covariance_of(prior, camera).bottomRightCorner<3, 3>();
+    covariance.llt().matrixL().solveInPlace(out.tail<3>());
     return true;
   }
 };
