@@ -3,9 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/assert.h"
 #include "calibration/rig_frame.h"
 
 namespace bslam::calibration {
+namespace {
+
+constexpr double kMaxDeviation = 0.05;  // a map whose scale is less certain follows the estimate
+
+}  // namespace
+
 double path_length(const RigProblem& problem) {
   const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
   double sum = 0;
@@ -18,11 +25,11 @@ double path_length(const RigProblem& problem) {
 
 double path_deviation(const RigProblem& problem, const std::vector<geometry::PoseUncertainty::Effect>& effects) {
   const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
-  Eigen::RowVectorXd sum;
+  BSLAM_ASSERT(effects.size() == poses.size(), "every pose must have an effect");
+  if (effects.empty()) return 0;
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(effects.front().cols());
   // The perturbation delta moves the centre of a pose by -R^T delta_t.
   const auto add = [&](std::size_t i, const Eigen::Vector3d& direction) {
-    if (effects[i].cols() == 0) return;
-    if (sum.size() == 0) sum.setZero(effects[i].cols());
     sum.noalias() -= (poses[i].rotation() * direction).transpose() * effects[i].bottomRows<3>();
   };
   for (std::size_t i = 1; i < poses.size(); ++i) {
@@ -37,7 +44,8 @@ double path_deviation(const RigProblem& problem, const std::vector<geometry::Pos
 
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
   const double factor = 1 / refinement.scale_change;
-  const double tolerance = std::max(0.01 * options.scale_tolerance_percent, refinement.scale_deviation);
+  const double tolerance =
+      std::max(0.01 * options.scale_tolerance_percent, std::min(refinement.scale_deviation, kMaxDeviation));
   if (!(std::abs(std::log(factor)) < tolerance)) return;
   solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
   for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);

@@ -274,11 +274,6 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
   out.information = adjusted.information;
-  const camera::Rig refined = adjusted.values.applied_to(reference);
-  const geometry::SE3 T_cam0_rig = turn_of_rays(refined.camera(0), reference.camera(0)) * calibrated.cam_from_rig(0);
-  out.rig = with_rig_frame(refined, T_cam0_rig, calibrated.body_from_rig());
-  move_to_rig_frame(T_cam0_rig, map.rig().cam_from_rig(0), problem);
-  out.poses = poses_of(problem.flat);
   // Distances between keyframes that are longer than the rig tell how the calibration changes the scale; a rig that
   // hardly moved only follows the scale of the baselines.
   out.scale_change = adjusted.scale_change;
@@ -286,6 +281,11 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
     out.scale_change = path_length(problem) / path_before;
     out.scale_deviation = path_deviation(problem, adjusted.pose_effects) / path_before;
   }
+  const camera::Rig refined = adjusted.values.applied_to(reference);
+  const geometry::SE3 T_cam0_rig = turn_of_rays(refined.camera(0), reference.camera(0)) * calibrated.cam_from_rig(0);
+  out.rig = with_rig_frame(refined, T_cam0_rig, calibrated.body_from_rig());
+  move_to_rig_frame(T_cam0_rig, map.rig().cam_from_rig(0), problem);
+  out.poses = poses_of(problem.flat);
   return out;
 }
 

@@ -34,11 +34,11 @@ struct CalibrationOptions {
   // and their ratio: relative. Principal points: per axis, of the image width. Distortion: of the model table
   // (camera/model_table.h).
   double sigma_rotation_deg = 2.0;
-  double sigma_translation_mm = 2.0, sigma_translation_percent = 1.0;  // the latter of the longest baseline
-  double sigma_depth_mm = 5.0;       // of translations along an optical axis, which errors of focal lengths look like
+  double sigma_translation_mm = 2.0, sigma_translation_percent = 1.0;  // added in quadrature
+  double sigma_depth_mm = 5.0;       // of translations, additionally along the optical axes (solver::ExtrinsicPrior)
   double sigma_scale_percent = 0.5;  // of the common scale of all baselines, which images do not reveal
   // During a run, the map keeps its scale while it differs from that of the calibrated baselines by less than this, or
-  // by less than the estimate of the scale can be wrong.
+  // by less than the standard deviation of the estimate.
   double scale_tolerance_percent = 1.5;
   double sigma_focal_percent = 1.0, sigma_aspect_percent = 0.1, sigma_centre_percent = 0.5;
   // Of time offsets and of the readout times of rolling shutters. They are constant unless the images contradict them
@@ -67,30 +67,9 @@ struct CalibrationOptions {
             OptionNote{.formerly = "extrinsics.keyframes"});
     visitor("landmarks", self.landmarks, Range{100, 1e5}, "", "maximum number of landmarks used",
             OptionNote{.formerly = "extrinsics.landmarks"});
-    visitor("sigma_rotation_deg", self.sigma_rotation_deg, Range{1e-3, 20}, "deg",
-            "standard deviation of calibrated rotations, per axis",
-            OptionNote{.formerly = "extrinsics.calibration_deg"});
-    visitor("sigma_translation_mm", self.sigma_translation_mm, Range{1e-3, 1e4}, "mm",
-            "standard deviation of calibrated translations, per axis",
-            OptionNote{.formerly = "extrinsics.calibration_mm"});
-    visitor("sigma_translation_percent", self.sigma_translation_percent, Range{0, 100}, "%",
-            "additional deviation of translations, in percent of the longest baseline");
-    visitor("sigma_depth_mm", self.sigma_depth_mm, Range{0, 1e4}, "mm",
-            "additional deviation of translations along the optical axes");
-    visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-6, 100}, "%",
-            "deviation of the baselines' common scale");
+    visit_deviations(self, visitor);
     visitor("scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
-            "change of the scale of the baselines below which the map keeps its scale during a run");
-    visitor("sigma_focal_percent", self.sigma_focal_percent, Range{1e-3, 50}, "%",
-            "standard deviation of calibrated focal lengths");
-    visitor("sigma_aspect_percent", self.sigma_aspect_percent, Range{1e-3, 50}, "%",
-            "standard deviation of the ratio of calibrated focal lengths, fx / fy");
-    visitor("sigma_centre_percent", self.sigma_centre_percent, Range{1e-3, 50}, "%",
-            "standard deviation of calibrated principal points, per axis, in percent of the image width");
-    visitor("sigma_time_offset_ms", self.sigma_time_offset_ms, Range{1e-6, 1e3}, "ms",
-            "standard deviation of calibrated time offsets");
-    visitor("sigma_readout_ms", self.sigma_readout_ms, Range{1e-6, 1e3}, "ms",
-            "standard deviation of calibrated readout times of rolling shutters");
+            "minimum change of the scale that is made during a run; its standard deviation if that is larger");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
             "number of observations with the information of one");
     visitor("inconsistent_excess", self.inconsistent_excess, Range{0, 100}, "",
@@ -104,9 +83,37 @@ struct CalibrationOptions {
             OptionNote{.formerly = "extrinsics.suspect_mm"});
     visitor("suspect_ms", self.suspect_ms, Range{0, 1e3}, "ms", "minimum change of a time that is estimated");
   }
+
+ private:
+  template <class Self, class Visitor>
+  static void visit_deviations(Self& self, Visitor& visitor) {
+    visitor("sigma_rotation_deg", self.sigma_rotation_deg, Range{1e-3, 20}, "deg",
+            "standard deviation of calibrated rotations, per axis",
+            OptionNote{.formerly = "extrinsics.calibration_deg"});
+    visitor("sigma_translation_mm", self.sigma_translation_mm, Range{1e-3, 1e4}, "mm",
+            "standard deviation of calibrated translations, per axis",
+            OptionNote{.formerly = "extrinsics.calibration_mm"});
+    visitor("sigma_translation_percent", self.sigma_translation_percent, Range{0, 100}, "%",
+            "and, added in quadrature, in percent of the longest distance of a camera from camera 0");
+    visitor("sigma_depth_mm", self.sigma_depth_mm, Range{0, 1e4}, "mm",
+            "and, added in quadrature, along the optical axes of the camera and of camera 0");
+    visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-6, 100}, "%",
+            "deviation of the baselines' common scale");
+    visitor("sigma_focal_percent", self.sigma_focal_percent, Range{1e-3, 50}, "%",
+            "standard deviation of calibrated focal lengths");
+    visitor("sigma_aspect_percent", self.sigma_aspect_percent, Range{1e-3, 50}, "%",
+            "standard deviation of the ratio of calibrated focal lengths, fx / fy");
+    visitor("sigma_centre_percent", self.sigma_centre_percent, Range{1e-3, 50}, "%",
+            "standard deviation of calibrated principal points, per axis, in percent of the image width");
+    visitor("sigma_time_offset_ms", self.sigma_time_offset_ms, Range{1e-6, 1e3}, "ms",
+            "standard deviation of calibrated time offsets");
+    visitor("sigma_readout_ms", self.sigma_readout_ms, Range{1e-6, 1e3}, "ms",
+            "standard deviation of calibrated readout times of rolling shutters");
+  }
 };
 
-// Standard deviation of the calibrated translations of a rig, per axis, in metres.
+// Standard deviation of the calibrated translations of a rig, per axis, in metres. It has a part that is proportional
+// to the longest distance of a camera from camera 0.
 double translation_deviation(const camera::Rig& rig, const CalibrationOptions& options);
 
 // A parameter of a camera model.
@@ -149,7 +156,7 @@ struct RigRefinement {
   std::optional<camera::Rig> rig;
   solver::RigInformation information;  // of the estimate, to combine it with those of other maps
   double scale_change = 1;             // factor by which the lengths of the map change
-  double scale_deviation = 0;          // standard deviation of scale_change; 0 if it is not known
+  double scale_deviation = 0;          // of scale_change, by the error of the calibration; 0 if it is not known
   double kept_scale = 1;               // factor by which keep_scale() multiplied the baselines
   map::SetPoses poses;                 // after this change
 };

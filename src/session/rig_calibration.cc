@@ -32,7 +32,7 @@ bool agree(const solver::RigInformation& a, const solver::RigInformation& b) {
 }
 
 // The common factor of the distances is the weighted mean of the factors of all cameras, whose positions are measured
-// independently of each other.
+// independently of each other. Their larger deviation along the optical axes is left out.
 double scale_deviation(const camera::Rig& rig, const calibration::CalibrationOptions& options) {
   double squares = 0;
   for (std::size_t c = 1; c < rig.size(); ++c) squares += rig.rig_from_cam(c).translation().squaredNorm();

@@ -178,14 +178,14 @@ RigInformation in_physical_units(const Eigen::MatrixXd& information, const Eigen
   return physical;
 }
 
-// The perturbation of each pose by the error of the unknowns of the rig, L z with L L^T = covariance.
-std::vector<geometry::PoseUncertainty::Effect> effects_on_poses(const Eigen::MatrixXd& covariance,
+// The perturbation of each pose by the error of the unknowns of the rig, `deviation` z.
+std::vector<geometry::PoseUncertainty::Effect> effects_on_poses(const Eigen::MatrixXd& deviation,
                                                                 BundleEquations& equations) {
   std::vector<int> poses(equations.state().T_rig_world.size());
   std::iota(poses.begin(), poses.end(), 0);
   std::vector<geometry::PoseUncertainty::Effect> out;
-  for (auto& effect : equations.rig_effects(poses, covariance.llt().matrixL()))
-    out.push_back(std::move(effect).value_or(geometry::PoseUncertainty::Effect(6, 0)));
+  for (auto& effect : equations.rig_effects(poses, deviation))
+    out.push_back(std::move(effect).value_or(geometry::PoseUncertainty::Effect::Zero(6, deviation.cols())));
   return out;
 }
 
@@ -208,9 +208,10 @@ bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const R
   const double scale = kVarianceLeft / kFractionLeft / std::max(1.0, out.variance_factor);
   const Eigen::LLT<Eigen::MatrixXd> factor(scale * of_images + prior);
   if (factor.info() != Eigen::Success) return false;
-  const Eigen::MatrixXd covariance =
-      options.correlated_observations * factor.solve(Eigen::MatrixXd::Identity(blocks.size, blocks.size));
-  out.pose_effects = effects_on_poses(covariance, equations);
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(blocks.size, blocks.size);
+  const Eigen::MatrixXd covariance = options.correlated_observations * factor.solve(identity);
+  out.pose_effects =
+      effects_on_poses(std::sqrt(options.correlated_observations) * factor.matrixU().solve(identity), equations);
   report_extrinsics(covariance, extrinsic_prior(calibrated, options, 1.0), out);
   if (blocks.intrinsics != nullptr)
     report_intrinsics(covariance.diagonal().segment(blocks.first_intrinsics(), blocks.intrinsics->size()).cwiseSqrt(),

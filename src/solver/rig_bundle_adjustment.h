@@ -66,7 +66,7 @@ struct RigAdjustment {
   RigValues values;                     // the estimate
   std::vector<CameraEstimate> cameras;  // all cameras; the extrinsics of the first one are exact
   RigInformation information;
-  // Per pose of the problem: its perturbation by the error of the estimate; no columns if the pose is fixed.
+  // Per pose of the problem: its perturbation by the error of the estimate; zero if the pose is fixed.
   std::vector<geometry::PoseUncertainty::Effect> pose_effects;
   double final_cost = 0;       // as in LmSummary, of the observations that agree and the prior
   double variance_factor = 1;  // mean squared normalised error over its expectation; if > 1 it scales the covariances
