@@ -11,15 +11,21 @@ namespace {
 
 constexpr double kMaxDeviation = 0.05;  // a map whose scale is less certain follows the estimate
 
+// Calls visit(i, step) with the displacement from keyframe i - 1 to keyframe i of the same group.
+template <class Visit>
+void for_each_step(const RigProblem& problem, const Visit& visit) {
+  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    if (problem.group[i] == problem.group[i - 1])
+      visit(i, Eigen::Vector3d(poses[i].inverse().translation() - poses[i - 1].inverse().translation()));
+  }
+}
+
 }  // namespace
 
 double path_length(const RigProblem& problem) {
-  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
   double sum = 0;
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    if (problem.group[i] == problem.group[i - 1])
-      sum += (poses[i].inverse().translation() - poses[i - 1].inverse().translation()).norm();
-  }
+  for_each_step(problem, [&](std::size_t, const Eigen::Vector3d& step) { sum += step.norm(); });
   return sum;
 }
 
@@ -32,13 +38,11 @@ double path_deviation(const RigProblem& problem, const std::vector<geometry::Pos
   const auto add = [&](std::size_t i, const Eigen::Vector3d& direction) {
     sum.noalias() -= (poses[i].rotation() * direction).transpose() * effects[i].bottomRows<3>();
   };
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    if (problem.group[i] != problem.group[i - 1]) continue;
-    const Eigen::Vector3d direction =
-        (poses[i].inverse().translation() - poses[i - 1].inverse().translation()).stableNormalized();
+  for_each_step(problem, [&](std::size_t i, const Eigen::Vector3d& step) {
+    const Eigen::Vector3d direction = step.stableNormalized();
     add(i, direction);
     add(i - 1, -direction);
-  }
+  });
   return sum.norm();
 }
 

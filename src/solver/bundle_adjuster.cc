@@ -48,6 +48,8 @@ std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_of_rig(
   const RigBlocks calibration = calibration_blocks(state.rig);
   BundleEquations equations(problem, some, calibration, kernel, options.dense_poses, state);
   equations.linearise();
+  if (!equations.factorise())
+    return std::vector<std::optional<geometry::PoseUncertainty::Effect>>(options.marginals.size());
   return equations.rig_effects(options.marginals, *options.rig_deviation);
 }
 

@@ -259,6 +259,8 @@ std::optional<Eigen::MatrixXd> BundleEquations::rig_information() {
   return system_.rig_information();
 }
 
+bool BundleEquations::factorise() { return reduce(kInformationDamping).factorise(); }
+
 int BundleEquations::slot_of(int pose) const {
   const auto slot = std::ranges::find(structure_.pose_of_slot, pose);
   return slot == structure_.pose_of_slot.end() ? -1 : static_cast<int>(slot - structure_.pose_of_slot.begin());
@@ -266,7 +268,7 @@ int BundleEquations::slot_of(int pose) const {
 
 std::vector<std::optional<geometry::Matrix6d>> BundleEquations::pose_covariances(std::span<const int> poses) {
   std::vector<std::optional<Matrix6d>> out(poses.size());
-  if (!reduce(kInformationDamping).factorise()) return out;
+  if (!factorise()) return out;
   std::vector<int> slots;
   std::vector<std::size_t> asked;  // position of each slot in `poses`
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -283,9 +285,8 @@ std::vector<std::optional<geometry::Matrix6d>> BundleEquations::pose_covariances
 }
 
 std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rig_effects(
-    std::span<const int> poses, const Eigen::MatrixXd& rig_deviation) {
+    std::span<const int> poses, const Eigen::MatrixXd& rig_deviation) const {
   std::vector<std::optional<geometry::PoseUncertainty::Effect>> out(poses.size());
-  if (!reduce(kInformationDamping).factorise()) return out;
   const Eigen::MatrixXd effect = system_.rig_sensitivity() * rig_deviation;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const int slot = slot_of(poses[i]);

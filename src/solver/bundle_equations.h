@@ -50,13 +50,16 @@ class BundleEquations {
   // Information matrix of the rig's unknowns with poses and points marginalised out, including priors. Returns nullopt
   // if it is singular.
   std::optional<Eigen::MatrixXd> rig_information();
+  // Factorises the equations of the poses with the points eliminated. Returns false if they are singular.
+  bool factorise();
 
   // Of each of these poses at the last linearise(), with all other poses and points marginalised out: the covariance
   // for a rig that is exact, and the effect of a rig whose unknowns have the error rig_deviation z, z ~ N(0, I).
-  // Nullopt if the pose is not a variable or the equations are singular.
+  // Nullopt if the pose is not a variable or the equations are singular. Effects need a successful factorise() or
+  // rig_information() since the last linearise().
   std::vector<std::optional<geometry::Matrix6d>> pose_covariances(std::span<const int> poses);
   std::vector<std::optional<geometry::PoseUncertainty::Effect>> rig_effects(std::span<const int> poses,
-                                                                            const Eigen::MatrixXd& rig_deviation);
+                                                                            const Eigen::MatrixXd& rig_deviation) const;
 
   struct PoseBlock {
     Matrix6d H;  // lower triangle

@@ -180,7 +180,7 @@ RigInformation in_physical_units(const Eigen::MatrixXd& information, const Eigen
 
 // The perturbation of each pose by the error of the unknowns of the rig, `deviation` z.
 std::vector<geometry::PoseUncertainty::Effect> effects_on_poses(const Eigen::MatrixXd& deviation,
-                                                                BundleEquations& equations) {
+                                                                const BundleEquations& equations) {
   std::vector<int> poses(equations.state().T_rig_world.size());
   std::iota(poses.begin(), poses.end(), 0);
   std::vector<geometry::PoseUncertainty::Effect> out;
