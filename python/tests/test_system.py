@@ -67,11 +67,15 @@ def test_rows_may_be_apart_and_arrays_read_only(recording, finished):
 
 def test_images_are_not_copied(system, recording):
     system.process(recording.stamps[0], recording.images[0])
+    peaks = []  # a copy would be in each of them, allocations of another thread of the interpreter are not
     tracemalloc.start()
-    system.process(recording.stamps[1], recording.images[1])
-    _, peak = tracemalloc.get_traced_memory()
+    for i in range(1, 4):
+        tracemalloc.reset_peak()
+        before, _ = tracemalloc.get_traced_memory()
+        system.process(recording.stamps[i], recording.images[i])
+        peaks.append(tracemalloc.get_traced_memory()[1] - before)
     tracemalloc.stop()
-    assert peak < recording.images[0][0].size / 4
+    assert min(peaks) < recording.images[0][0].size / 4
 
 
 def test_masked_images_have_no_keypoints_there(system, recording):
