@@ -139,6 +139,7 @@ RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOpti
   const geometry::SE3 &T_cam0_rig = map.rig().cam_from_rig(0), &T_rig_cam0 = map.rig().rig_from_cam(0);
   for (geometry::SE3& T_cam0_world : out.flat.problem.T_rig_world) T_cam0_world = T_cam0_rig * T_cam0_world;
   for (geometry::SE3& motion : out.flat.problem.motion) motion = T_cam0_rig * motion * T_rig_cam0;
+  if (!timing && out.flat.problem.twist.empty()) return out;  // no camera has a rolling shutter
   out.flat.problem.twist.clear();
   const Eigen::Matrix3d R_cam0_rig = T_cam0_rig.matrix3();
   for (const KeyframeId k : out.flat.keyframes) {

@@ -35,6 +35,13 @@ CalibrationOptions quick(CalibrationOptions options) {
   return options;
 }
 
+// The options of an adjustment whose estimate is not used, but only what it says about the calibration.
+solver::RigAdjustmentOptions for_verdict(solver::RigAdjustmentOptions options) {
+  options.relative_decrease = kCoarseDecrease;
+  options.pose_effects = false;
+  return options;
+}
+
 // Square root of the largest eigenvalue.
 double largest_deviation(const Matrix3d& covariance) {
   return std::sqrt(
@@ -178,9 +185,8 @@ std::vector<solver::TimingPrior> contradicted_timing(const map::BundledMap& map,
   RigProblem problem = choose(map, true, quick(options), features);
   problem.flat.problem.rig = &reference;
   separate_groups(problem);
-  solver::RigAdjustmentOptions with_timing = prior_of(reference, options);
+  solver::RigAdjustmentOptions with_timing = for_verdict(prior_of(reference, options));
   with_timing.timing = timing;
-  with_timing.relative_decrease = kCoarseDecrease;
   const auto adjusted = solver::adjust_rig(problem.flat.problem, with_timing,
                                            solver::RigValues::of(map.rig().in_frame_of_camera_0()), stop);
   if (!adjusted.done) return {};
@@ -279,7 +285,8 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.scale_change = adjusted.scale_change;
   if (path_before > longest_baseline(calibrated)) {
     out.scale_change = path_length(problem) / path_before;
-    out.scale_deviation = path_deviation(problem, adjusted.pose_effects) / path_before;
+    if (!adjusted.pose_effects.empty())
+      out.scale_deviation = path_deviation(problem, adjusted.pose_effects) / path_before;
   }
   const camera::Rig refined = adjusted.values.applied_to(reference);
   const geometry::SE3 T_cam0_rig = turn_of_rays(refined.camera(0), reference.camera(0)) * calibrated.cam_from_rig(0);
@@ -321,7 +328,7 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
   if (options.refine == Refine::kFalse || !can_refine(map)) return std::nullopt;
   const auto prior = prior_for(map, calibrated, options, features, stop);
   if (options.refine == Refine::kAuto && !replaced(map.rig(), calibrated)) {
-    const RigRefinement first = refine_with_prior(map, calibrated, prior, quick(options), features, stop);
+    const RigRefinement first = refine_with_prior(map, calibrated, for_verdict(prior), quick(options), features, stop);
     if (!accepted(first, options)) return std::nullopt;
   }
   RigRefinement out = refine_with_prior(map, calibrated, prior, options, features, stop);

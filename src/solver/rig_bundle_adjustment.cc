@@ -210,8 +210,9 @@ bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const R
   if (factor.info() != Eigen::Success) return false;
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(blocks.size, blocks.size);
   const Eigen::MatrixXd covariance = options.correlated_observations * factor.solve(identity);
-  out.pose_effects =
-      effects_on_poses(std::sqrt(options.correlated_observations) * factor.matrixU().solve(identity), equations);
+  if (options.pose_effects)
+    out.pose_effects =
+        effects_on_poses(std::sqrt(options.correlated_observations) * factor.matrixU().solve(identity), equations);
   report_extrinsics(covariance, extrinsic_prior(calibrated, options, 1.0), out);
   if (blocks.intrinsics != nullptr)
     report_intrinsics(covariance.diagonal().segment(blocks.first_intrinsics(), blocks.intrinsics->size()).cwiseSqrt(),

@@ -30,6 +30,7 @@ struct RigAdjustmentOptions {
   // Number of observations with the information of one independent observation. Errors of a landmark in successive
   // images are similar, so that the normal equations overestimate the information of the images.
   double correlated_observations = 1;
+  bool pose_effects = true;         // compute RigAdjustment::pose_effects
   bool start_is_estimate = false;   // the start is near the result: the rounds with Huber kernel are omitted
   int iterations = 15;              // maximum number of steps per round
   double relative_decrease = 1e-6;  // a round has converged if a step decreases the cost by a smaller fraction
@@ -66,7 +67,8 @@ struct RigAdjustment {
   RigValues values;                     // the estimate
   std::vector<CameraEstimate> cameras;  // all cameras; the extrinsics of the first one are exact
   RigInformation information;
-  // Per pose of the problem: its perturbation by the error of the estimate; zero if the pose is fixed.
+  // Per pose of the problem: its perturbation by the error of the estimate; zero if the pose is fixed. Empty if the
+  // options exclude it.
   std::vector<geometry::PoseUncertainty::Effect> pose_effects;
   double final_cost = 0;       // as in LmSummary, of the observations that agree and the prior
   double variance_factor = 1;  // mean squared normalised error over its expectation; if > 1 it scales the covariances

@@ -1,0 +1,89 @@
+// The program in a folder with a simulated recording, for the tests of the command line.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+
+#include "simulator/simulation_writer.h"
+#include "synthetic/rigs.h"
+
+namespace bslam {
+
+namespace fs = std::filesystem;
+
+// What a run of the program returned and printed.
+struct Ran {
+  int status = -1;
+  std::string out, err;
+};
+
+inline std::string slurp(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+// Runs the program on a simulated recording of four cameras, 1.5 s at 10 Hz, in a folder of its own.
+class CommandLine : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::temp_directory_path() / ("bslam_cli_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+    const simulator::SimulationRequest request{.folder = data(),
+                                               .rig = synthetic::ring_rig(4, 376),
+                                               .recording = {.duration_s = 1.5, .rate_hz = 10},
+                                               .tour = {},
+                                               .imaging = {},
+                                               .world = {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2}};
+    ThreadPool pool(2);
+    const auto made = simulator::write_simulation(request, pool);
+    ASSERT_TRUE(made.ok()) << made.error().message();
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  static std::string data() { return (folder_ / "data").string(); }
+  static std::string out(const std::string& name) { return (folder_ / name).string(); }
+
+  static Ran run(const std::string& arguments) {
+    const std::string command =
+        std::string(BSLAM_PROGRAM) + " " + arguments + " >" + out("stdout") + " 2>" + out("stderr");
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(out("stdout")), slurp(out("stderr"))};
+  }
+
+  static void expect_rejected(const std::string& arguments) {
+    const Ran ran = run(arguments);
+    EXPECT_EQ(ran.status, 2) << arguments;
+    EXPECT_EQ(ran.err.rfind("bslam: ", 0), 0u) << arguments << ": " << ran.err;
+    EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1) << arguments << ": " << ran.err;
+    EXPECT_FALSE(fs::exists(folder_ / "rejected/trajectory.tum")) << arguments;
+  }
+
+  // Runs SLAM on the recording, with fewer features for its small images; the output is in out(name).
+  static nlohmann::json summary_of(const std::string& name, const std::string& more) {
+    const Ran ran =
+        run("run " + data() + " --out " + out(name) + " --set features.per_image=500 --progress never " + more);
+    EXPECT_EQ(ran.status, 0) << more << ": " << ran.err;
+    return nlohmann::json::parse(slurp(out(name) + "/summary.json"), nullptr, false);
+  }
+
+  static void expect_same_trajectories(const std::string& a, const std::string& b) {
+    for (const char* file : {"/trajectory.tum", "/trajectory_live.tum"}) {
+      EXPECT_GT(slurp(out(a) + file).size(), 1000u);
+      EXPECT_EQ(slurp(out(a) + file), slurp(out(b) + file)) << file;
+    }
+  }
+
+  static inline fs::path folder_;
+};
+
+}  // namespace bslam

@@ -1,0 +1,105 @@
+// The command-line program: live runs, and what they record.
+#include <csignal>
+#include <cstdlib>
+#include <thread>
+
+#include "whole/command_line.h"
+
+namespace bslam {
+namespace {
+
+// Two cameras of the recording as folders that are played, and two that are not there.
+std::string live_arguments(const std::string& data) {
+  return "live --rig " + data + "/rig.yaml --cameras " + data + "/mav0/cam0," + data +
+         "/mav0/cam1,-,- --set features.per_image=500 --progress never ";
+}
+
+TEST_F(CommandLine, RecordedLiveRunIsRepeatedToTheByte) {
+  const std::string file = out("live.mcap"), journal = out("live.journal");
+  const Ran live = run(live_arguments(data()) + "--out " + out("live") + " --record " + file + " --journal " + journal);
+  ASSERT_EQ(live.status, 0) << live.err;
+  EXPECT_EQ(nlohmann::json::parse(slurp(out("live/summary.json")))["complete"], true);
+  EXPECT_TRUE(fs::exists(out("live/report.html")));
+  const Ran again =
+      run("run " + file + " --out " + out("live_again") + " --replay " + journal + " --set features.per_image=500");
+  ASSERT_EQ(again.status, 0) << again.err;
+  expect_same_trajectories("live", "live_again");
+  const auto seconds = [](const std::string& name) {
+    return nlohmann::json::parse(slurp(out(name + "/summary.json")))["parts"];
+  };
+  EXPECT_EQ(seconds("live"), seconds("live_again"));
+}
+
+// The recording has the number that the camera has in the rig file, which is in the trajectory.
+TEST_F(CommandLine, RecordedLiveRunWithoutCamera0HasTheSameFrameAgain) {
+  const std::string file = out("live_second.mcap"), options = " --mode sequential --set features.per_image=500 --out ";
+  const Ran live = run("live --rig " + data() + "/rig.yaml --cameras -," + data() + "/mav0/cam1,-,- --duration 0.5" +
+                       options + out("live_second") + " --record " + file);
+  ASSERT_TRUE(live.status == 0 || live.status == 3) << live.err;
+  const Ran again = run("run " + file + options + out("live_second_again"));
+  EXPECT_EQ(again.status, live.status) << again.err;
+  const std::string trajectory = slurp(out("live_second/trajectory.tum"));
+  EXPECT_EQ(trajectory.rfind("# bslam trajectory frame=cam1 ", 0), 0u) << trajectory;
+  EXPECT_EQ(slurp(out("live_second_again/trajectory.tum")), trajectory);
+}
+
+TEST_F(CommandLine, CtrlCEndsALiveRunWithAllItsFiles) {
+  const std::string file = out("ended.mcap"), folder = out("ended");
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string program = BSLAM_PROGRAM;
+    const std::string command = "exec " + program + " " + live_arguments(data()) + "--out " + folder + " --record " +
+                                file + " >/dev/null 2>" + out("stderr");
+    ::execl("/bin/sh", "/bin/sh", "-c", command.c_str(), static_cast<char*>(nullptr));
+    std::_Exit(127);
+  }
+  // Frames are in the file after half a second of 1.5 s.
+  std::error_code error;
+  while (!(fs::file_size(file, error) > 50'000 && !error) && ::waitpid(child, nullptr, WNOHANG) == 0)
+    std::this_thread::yield();
+  ::kill(child, SIGINT);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << status;
+  EXPECT_EQ(WEXITSTATUS(status), 0) << slurp(out("stderr"));
+  const auto summary = nlohmann::json::parse(slurp(folder + "/summary.json"));
+  EXPECT_EQ(summary["complete"], true);
+  EXPECT_GT(summary["frames"]["tracked"], 0);
+  EXPECT_TRUE(fs::exists(folder + "/trajectory.tum"));
+  EXPECT_EQ(run("data info " + file).err, "");
+}
+
+TEST_F(CommandLine, RejectsBadRequestsForLiveRuns) {
+  const std::string rig = "--rig " + data() + "/rig.yaml ", folder = " --out " + out("rejected");
+  expect_rejected("live --cameras a,b" + folder);
+  expect_rejected("live " + rig + folder);
+  expect_rejected("live " + rig + "--cameras /dev/null,-,-,-");
+  expect_rejected("live " + rig + "--cameras /dev/null,-,-,-" + folder);
+  expect_rejected("live " + rig + "--cameras /nowhere/video0,-,-,-" + folder);
+  expect_rejected("live " + rig + "--cameras -,-,-,-" + folder);
+  expect_rejected("live " + rig + "--cameras /dev/video0" + folder);
+  expect_rejected("live " + rig + "--cameras /dev/null,/dev/null,-,-" + folder);
+  expect_rejected("live " + rig + "--cameras /dev/null,-,-,- --exposure bright" + folder);
+  expect_rejected("live " + rig + "--cameras /dev/null,-,-,- --pixels RGB" + folder);
+  // Before cameras are opened, of which there are none.
+  const std::string none = "live " + rig + "--cameras /nowhere/video0,-,-,- ";
+  for (const auto& [arguments, message] :
+       {std::pair("--record /nowhere/a.mcap" + folder, "/nowhere: --record: found no such folder"),
+        std::pair("--record " + out("a.bag") + folder, "a.bag, expected the name of an MCAP file"),
+        std::pair("--save-map /nowhere/a.bmap" + folder, "/nowhere: --save-map: found no such folder"),
+        std::pair("--rerun " + data() + "/rig.yaml" + folder, "--rerun: found an existing file"),
+        std::pair(" --out " + data(), "--out: found a folder that is not empty"),
+        std::pair("--out " + data() + "/rig.yaml/out", "--out: found "),
+        std::pair("--duration 0" + folder, "--duration: Value 0")}) {
+    const Ran ran = run(none + arguments);
+    EXPECT_EQ(ran.status, 2) << arguments;
+    EXPECT_NE(ran.err.find(message), std::string::npos) << arguments << ": " << ran.err;
+  }
+  const std::string played = "live " + rig + "--cameras " + data() + "/mav0/cam0,-,-,-" + folder;
+  for (const char* setting : {" --fps 10", " --exposure auto", " --pixels GREY"}) expect_rejected(played + setting);
+  EXPECT_EQ(run("live --list").status, 0);
+}
+
+}  // namespace
+}  // namespace bslam

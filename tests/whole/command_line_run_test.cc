@@ -1,0 +1,319 @@
+// The command-line program: the files of runs, which are written completely or not at all.
+#include <csignal>
+#include <thread>
+
+#include "calibration/rig_warnings.h"
+#include "evaluation/trajectory_file.h"
+#include "rig_formats/rig_file.h"
+#include "whole/command_line.h"
+
+namespace bslam {
+namespace {
+
+TEST_F(CommandLine, RunWritesItsFilesAndIsRepeatableFromItsConfiguration) {
+  const Ran first = run("run " + data() + " --out " + out("first") +
+                        " --mode sequential --progress never --set features.per_image=700");
+  ASSERT_EQ(first.status, 0) << first.err;
+  for (const char* file : {"trajectory.tum", "trajectory_live.tum", "summary.json", "config.yaml", "trajectory.svg",
+                           "run.svg", "report.html"}) {
+    EXPECT_TRUE(fs::exists(folder_ / "first" / file)) << file;
+  }
+  const auto summary = nlohmann::json::parse(slurp(folder_ / "first/summary.json"));
+  EXPECT_EQ(summary["schema"], 1);
+  EXPECT_EQ(summary["complete"], true);
+  EXPECT_EQ(summary["frames"]["input"], 15);
+  EXPECT_EQ(summary["frames"]["tracked"], 15);
+  EXPECT_EQ(summary["map"]["scale"], "metric");
+  EXPECT_NE(slurp(folder_ / "first/trajectory.tum").find("# bslam trajectory frame=cam0 parent=world final=true\n"),
+            std::string::npos);
+
+  const Ran again =
+      run("run " + data() + " --out " + out("again") + " --progress never --config " + out("first/config.yaml"));
+  ASSERT_EQ(again.status, 0) << again.err;
+  EXPECT_EQ(slurp(folder_ / "first/trajectory.tum"), slurp(folder_ / "again/trajectory.tum"));
+  EXPECT_NE(slurp(folder_ / "first/report.html").find("--set features.per_image=700"), std::string::npos);
+  EXPECT_EQ(run("run " + data() + " --out " + out("again") + " --overwrite --no-report --end 0.3").status, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "again/report.html"));      // that of the earlier run is removed
+  expect_rejected("run " + data() + " --out " + out("again"));  // exists already, and --overwrite is not given
+
+  // A refined rig of an earlier run is removed, unless it is an input of this run.
+  const std::filesystem::path refined = folder_ / "again/rig_refined.yaml";
+  std::filesystem::copy_file(folder_ / "data/rig.yaml", refined);
+  const std::string overwrite = "run " + data() + " --end 0.2 --overwrite --progress never --out " + out("again");
+  ASSERT_EQ(run(overwrite + " --rig " + refined.string()).status, 0);
+  EXPECT_TRUE(std::filesystem::exists(refined));
+  ASSERT_EQ(run(overwrite).status, 0);
+  EXPECT_FALSE(std::filesystem::exists(refined));
+}
+
+TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
+  const auto saved = summary_of("saved", "--mode sequential --cameras 0,1 --save-map " + out("saved.map"));
+  EXPECT_EQ(saved["map"]["loaded"], false);
+  EXPECT_EQ(saved["maps_started"], 1);
+  const Ran again = run("run " + data() + " --out " + out("unsaved") + " --save-map " + out("saved.map"));
+  EXPECT_EQ(again.status, 2);
+  EXPECT_NE(again.err.find("--overwrite"), std::string::npos) << again.err;
+  ASSERT_EQ(saved["parts"].size(), 1u);
+  EXPECT_EQ(saved["parts"][0]["trajectory"], "trajectory.tum");
+
+  const Ran info = run("map info --json " + out("saved.map"));
+  ASSERT_EQ(info.status, 0) << info.err;
+  const auto described = nlohmann::json::parse(info.out);
+  EXPECT_EQ(described["keyframes"], saved["map"]["keyframes"]);
+  EXPECT_EQ(described["landmarks"], saved["map"]["landmarks"]);
+  EXPECT_EQ(described["cameras"].size(), 2u);
+  EXPECT_EQ(described["parts"].size(), 1u);
+  EXPECT_NE(run("map info " + out("saved.map")).out.find("scale metric"), std::string::npos);
+
+  ASSERT_EQ(run("map export " + out("saved.map") + " --out " + out("exported")).status, 0);
+  for (const char* file : {"points.ply", "keyframes.tum", "rig.yaml", "cameras.txt", "images.txt", "points3D.txt"}) {
+    EXPECT_GT(fs::file_size(folder_ / "exported" / file), 50u) << file;
+  }
+  const std::string named = "map export " + out("saved.map") + " --images " + data() + " --out " + out("named");
+  ASSERT_EQ(run(named).status, 0);
+  std::istringstream images(slurp(folder_ / "named/images.txt"));
+  std::size_t existing = 0;
+  for (std::string word; images >> word;) existing += word.ends_with(".png") && fs::exists(data() + "/" + word);
+  EXPECT_GE(existing, 2u);
+  const std::string poses = slurp(folder_ / "exported/keyframes.tum");
+  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 1 + described["keyframes"].get<int>());
+  expect_rejected("map export " + out("saved.map") + " --out " + out("exported"));
+  EXPECT_EQ(run("map export " + out("saved.map") + " --overwrite --out " + out("exported")).status, 0);
+  for (const char* format : {"colmap", "ply", "g2o", "nerfstudio", "octomap", "nav2"}) {
+    const std::string command = "map export " + out("saved.map") + " --format " + format + " --out " + out(format);
+    const Ran exported = run(command);
+    ASSERT_EQ(exported.status, 0) << exported.err;
+    expect_rejected(command);  // it exists now
+  }
+  expect_rejected("map export " + out("saved.map") + " --format nav2 --height 1 0 --out " + out("wrong"));
+  expect_rejected("map export " + out("saved.map") + " --format ply --undistort --out " + out("wrong"));
+  expect_rejected("map export " + out("saved.map") + " --format colmap --submap 7 --out " + out("wrong"));
+
+  const std::string path = "export " + out("saved") + "/trajectory.tum --rig " + data();
+  ASSERT_EQ(run(path + " --format euroc --frame body --out " + out("body.csv")).status, 0);
+  const Ran error = run("eval " + out("saved") + "/trajectory.tum " + out("body.csv") + " --gt-frame body --rig " +
+                        data() + " --align none --json");
+  ASSERT_EQ(error.status, 0) << error.err;
+  EXPECT_LT(nlohmann::json::parse(error.out)["ate"]["max"], 1e-6);
+  ASSERT_EQ(
+      run(path + " --format kitti --frame cam1 --axes ros --map " + out("saved.map") + " --out " + out("k.txt")).status,
+      0);
+  expect_rejected(path + " --frame nobody --out " + out("wrong"));
+  const std::string nav2 = "map export " + out("saved.map") + " --format nav2 --out ";
+  const Ran tilted = run(nav2 + out("tilted")), level = run(nav2 + out("level") + " --up body:z");
+  EXPECT_NE(tilted.err.find("note: upward is that of camera 0 on average"), std::string::npos) << tilted.err;
+  EXPECT_EQ(level.status, 0) << level.err;
+  EXPECT_EQ(level.err, "");
+  expect_rejected("map export " + out("saved.map") + " --format ply --up body:z --out " + out("wrong"));
+  expect_rejected(nav2 + out("wrong") + " --up sky");
+  expect_rejected(path + " --up body:z --out " + out("wrong"));
+  ASSERT_EQ(run(path + " --axes ros --up body:z --out " + out("upright.tum")).status, 0);
+  EXPECT_NE(slurp(out("upright.tum")).find("frame=cam0_ros parent=world_ros "), std::string::npos);
+  expect_rejected("export " + out("upright.tum") + " --out " + out("wrong"));
+  expect_rejected("export " + out("saved") + "/trajectory.tum --frame body --out " + out("wrong"));
+
+  const auto localised = summary_of("localised", "--cameras 0,1 --localize-only --load-map " + out("saved.map"));
+  EXPECT_EQ(localised["map"]["loaded"], true);
+  EXPECT_EQ(localised["frames"]["tracked"], 15);
+  EXPECT_EQ(localised["map"]["keyframes"], saved["map"]["keyframes"]);
+  EXPECT_EQ(localised["maps_started"], 0);
+  ASSERT_EQ(localised["relocalisations"].size(), 1u);
+  EXPECT_EQ(localised["relocalisations"][0]["at"], 0.0);
+  const auto grown =
+      summary_of("grown", "--cameras 0,1 --load-map " + out("saved.map") + " --save-map " + out("grown.map"));
+  EXPECT_EQ(grown["frames"]["tracked"], 15);
+  EXPECT_EQ(run("map info " + out("grown.map")).status, 0);
+  const auto one_camera = summary_of("one_camera", "--cameras 0 --localize-only --load-map " + out("saved.map"));
+  EXPECT_EQ(one_camera["frames"]["tracked"], 15);
+  run("run " + data() + " --out " + out("second_rig") + " --cameras 2,3 --end 0.5 --load-map " + out("saved.map"));
+  EXPECT_NE(slurp(out("second_rig") + "/config.yaml").find("\n  refine: false"), std::string::npos);
+  expect_rejected("run " + data() + " --out " + out("rejected") +
+                  " --cameras 2,3 --set calibration.refine=true --load-map " + out("saved.map"));
+}
+
+// A trajectory names the camera whose poses it contains, and conversions use that.
+TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
+  summary_of("second", "--cameras 1,0 --mode sequential");
+  const std::string trajectory = out("second") + "/trajectory.tum", truth = data() + "/groundtruth_cam0.tum";
+  const camera::Rig rig = rig_formats::read_rig(data() + "/rig.yaml").value();
+  EXPECT_NE(slurp(trajectory).find("# bslam trajectory frame=" + rig.camera(1u).name + " parent=world final=true\n"),
+            std::string::npos);
+  const Ran without = run("eval " + trajectory + " " + truth + " --json");
+  EXPECT_NE(without.err.find("contains poses of " + rig.camera(1u).name), std::string::npos) << without.err;
+  const Ran with = run("eval " + trajectory + " " + truth + " --json --rig " + data());
+  EXPECT_EQ(with.err, "");
+  EXPECT_LT(nlohmann::json::parse(with.out)["ate"]["rmse"], nlohmann::json::parse(without.out)["ate"]["rmse"]);
+  const std::string body = "export " + trajectory + " --frame body --rig " + data() + " --out ";
+  ASSERT_EQ(run(body + out("body.tum")).status, 0);
+  const Ran same =
+      run("eval " + trajectory + " " + out("body.tum") + " --gt-frame body --rig " + data() + " --align none --json");
+  EXPECT_LT(nlohmann::json::parse(same.out)["ate"]["max"], 1e-6) << same.err;
+  const Ran other = run(body + out("other.tum") + " --camera 0");
+  EXPECT_NE(other.err.find("but --camera 0 is "), std::string::npos) << other.err;
+  std::ofstream(out("scaled.tum")) << "# bslam trajectory frame=cam0 parent=world final=true\n"
+                                   << "# scale=up-to-scale: lengths are not in metres\n"
+                                   << slurp(truth);
+  const Ran scaled = run("eval " + out("scaled.tum") + " " + truth);
+  EXPECT_NE(scaled.err.find("use --align sim3"), std::string::npos) << scaled.err;
+  EXPECT_EQ(run("eval " + out("scaled.tum") + " " + truth + " --align sim3").err, "");
+  // The distance from camera to body has no meaning in the unit of the estimate, so that the ground truth is moved.
+  ASSERT_EQ(run("export " + truth + " --frame body --rig " + data() + " --out " + out("true_body.tum")).status, 0);
+  evaluation::Trajectory quarter = evaluation::read_trajectory(truth).value();
+  for (evaluation::TimedPose& pose : quarter)
+    pose.T_world_frame = {pose.T_world_frame.rotation(), 0.25 * pose.T_world_frame.translation()};
+  std::ofstream(out("quarter.tum")) << evaluation::tum_text(
+      quarter, "# bslam trajectory frame=cam0 parent=world final=true\n# scale=up-to-scale: lengths are not in metres");
+  const Ran of_body = run("eval " + out("quarter.tum") + " " + out("true_body.tum") +
+                          " --gt-frame body --align sim3 --json --rig " + data());
+  EXPECT_NE(of_body.err.find("the ground truth was moved by 0."), std::string::npos) << of_body.err;
+  EXPECT_LT(nlohmann::json::parse(of_body.out)["ate"]["max"], 1e-6) << of_body.out;
+  EXPECT_NEAR(nlohmann::json::parse(of_body.out)["scale"], 4, 1e-6) << of_body.out;
+  const std::string rig_and_out = " --rig " + data() + " --overwrite --out " + out("exported.tum");
+  EXPECT_NE(run("export " + out("scaled.tum") + " --frame body" + rig_and_out).err.find("is not the metre"),
+            std::string::npos);
+  EXPECT_NE(slurp(out("exported.tum")).find("\n# scale=up-to-scale: lengths are not in metres\n"), std::string::npos);
+  ASSERT_EQ(run("export " + truth + " --camera 1 --frame cam0" + rig_and_out).status, 0);
+  const Ran moved = run("eval " + out("exported.tum") + " " + truth + " --align none --json");
+  EXPECT_GT(nlohmann::json::parse(moved.out)["ate"]["max"], 1e-3) << moved.err;
+}
+
+TEST_F(CommandLine, AJournalReplaysItsRun) {
+  EXPECT_EQ(summary_of("recorded", "--cameras 0,1 --mode parallel --journal " + out("run.journal"))["mode"],
+            "parallel");
+  EXPECT_EQ(summary_of("replayed", "--cameras 0,1 --mode parallel --replay " + out("run.journal"))["mode"], "replay");
+  expect_same_trajectories("recorded", "replayed");
+  expect_rejected("run " + data() + " --out " + out("other") +
+                  " --cameras 0,1 --set features.per_image=500 --end 0.25 --progress never --replay " +
+                  out("run.journal"));
+}
+
+TEST_F(CommandLine, LaggedRunsAreDeterministic) {
+  EXPECT_EQ(summary_of("lagged", "--mode lagged --set execution.threads=1")["mode"], "lagged");
+  EXPECT_EQ(summary_of("lagged_again", "--mode lagged --set execution.threads=3")["mode"], "lagged");
+  expect_same_trajectories("lagged", "lagged_again");
+}
+
+TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
+  const camera::Rig rig = rig_formats::read_rig(data() + "/rig.yaml").value();
+  ASSERT_TRUE(rig_formats::write_rig(calibration::with_inverse_extrinsics(rig), out("inverse.yaml")));
+  const std::string options = " --set features.per_image=500 --progress never --rig ";
+  const std::string map = out("inverse.bmap"), found = "the images do not belong to the calibration";
+  const Ran inverse =
+      run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse") + " --save-map " + map);
+  EXPECT_NE(inverse.err.find("warning: the images do not belong to the calibration"), std::string::npos) << inverse.err;
+  EXPECT_NE(inverse.out.find("calibration: the images do not belong to it"), std::string::npos) << inverse.out;
+  const auto of_inverse = nlohmann::json::parse(slurp(out("inverse") + "/summary.json"));
+  EXPECT_EQ(of_inverse["calibration"]["verdict"], "inconsistent");
+  EXPECT_EQ(of_inverse["calibration"]["refined"], false);
+  EXPECT_EQ(of_inverse["map"]["scale"], "unobservable");
+  EXPECT_FALSE(fs::exists(out("inverse") + "/rig_refined.yaml"));
+  EXPECT_NE(run("map info " + map).out.find("warning of the run that made it: " + found), std::string::npos);
+  const Ran continued = run("run " + data() + options + out("inverse.yaml") + " --end 0.5 --localize-only --load-map " +
+                            map + " --out " + out("inverse_again"));
+  EXPECT_NE(continued.err.find("inverse.bmap: the run that made this map has found: " + found), std::string::npos)
+      << continued.err;
+  for (const auto& warning : of_inverse["warnings"])
+    EXPECT_NE(inverse.err.find("warning: " + warning.get<std::string>() + "\n"), std::string::npos) << warning;
+  EXPECT_EQ(of_inverse["warnings"].size(),
+            static_cast<std::size_t>(std::count(inverse.err.begin(), inverse.err.end(), '\n')));
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const geometry::SE3& T = rig.body_from_cam(c);
+    cameras.push_back({rig.camera(c), geometry::SE3(T.rotation(), 1000 * T.translation())});
+  }
+  ASSERT_TRUE(rig_formats::write_rig(camera::Rig(cameras), out("millimetres.yaml")));
+  const Ran large = run("run " + data() + options + out("millimetres.yaml") + " --out " + out("millimetres"));
+  EXPECT_NE(large.err.find("are they millimetres?"), std::string::npos) << large.err;
+  const camera::Rig upside_down = [&] {
+    std::vector<camera::RigCamera> rotated;
+    for (std::size_t c = 0; c < rig.size(); ++c) rotated.push_back({rig.camera(c), rig.body_from_cam(c)});
+    rotated[3].T_body_cam = rotated[3].T_body_cam * geometry::SE3(Eigen::Quaterniond(0, 0, 0, 1), {0, 0, 0});
+    return camera::Rig(rotated);
+  }();
+  ASSERT_TRUE(rig_formats::write_rig(upside_down, out("upside_down.yaml")));
+  const Ran ran =
+      run("run " + data() + options + out("upside_down.yaml") + " --mode sequential --out " + out("upside_down"));
+  EXPECT_NE(ran.err.find("keypoints are inliers: check this camera's extrinsics"), std::string::npos) << ran.err;
+  EXPECT_NE(ran.err.find("bslam rig info " + out("upside_down.yaml") + " --images " + data()), std::string::npos)
+      << ran.err;
+  const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
+  EXPECT_EQ(right.err, "");
+  const auto of_right = nlohmann::json::parse(slurp(out("right") + "/summary.json"));
+  EXPECT_EQ(of_right["map"]["scale"], "metric");
+  EXPECT_TRUE(of_right["warnings"].empty());
+  EXPECT_TRUE(of_right["calibration"]["pairs"].empty());
+}
+
+TEST_F(CommandLine, BenchReportsEverySequenceAndFailsIfOneFailed) {
+  const fs::path root = folder_ / "sequences";
+  fs::create_directories(root / "broken/mav0/cam0");
+  fs::create_directory_symlink(data(), root / "tour");
+  const Ran ran = run("bench " + root.string() + " --runs 5 --out " + out("bench") +
+                      " --mode sequential --cameras 0,1 --set features.per_image=500");
+  EXPECT_EQ(ran.status, 2) << ran.err;
+  const std::string report = slurp(out("bench") + "/report.md");
+  EXPECT_EQ(ran.out, report);
+  EXPECT_NE(report.find("| broken | none: no errors | 5 | - | - | - | - | - / - | - | 5 of 5 runs failed: "),
+            std::string::npos)
+      << report;
+  EXPECT_NE(report.find("| tour | body | 2 | 0.0"), std::string::npos) << report;
+  EXPECT_NE(report.find("| 15 of 15 |"), std::string::npos) << report;
+  EXPECT_NE(report.find("deterministic: the first two runs are identical"), std::string::npos) << report;
+  EXPECT_FALSE(fs::exists(out("bench") + "/tour/run3"));
+  EXPECT_NE(slurp(out("bench") + "/report.html").find("<td>tour</td>"), std::string::npos);
+  EXPECT_TRUE(fs::exists(out("bench") + "/tour/run2/trajectory.tum"));
+}
+
+TEST_F(CommandLine, BenchRejectsAFolderWithoutSequences) {
+  const fs::path empty = folder_ / "empty";
+  fs::create_directories(empty);
+  const Ran ran = run("bench " + empty.string() + " --out " + out("rejected"));
+  EXPECT_EQ(ran.status, 2);
+  EXPECT_NE(ran.err.find("found no sequence"), std::string::npos) << ran.err;
+}
+
+TEST_F(CommandLine, AnInterruptedBenchKeepsTheTableSoFar) {
+  const std::string folder = out("bench_interrupted"), log = folder + "/data/run2/log.txt";
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string path = data();
+    std::freopen("/dev/null", "w", stdout);
+    ::execl(BSLAM_PROGRAM, BSLAM_PROGRAM, "bench", path.c_str(), "--out", folder.c_str(), "--runs", "1000", "--pace",
+            "realtime", static_cast<char*>(nullptr));
+    std::_Exit(127);
+  }
+  while (!fs::exists(log) && ::waitpid(child, nullptr, WNOHANG) == 0) std::this_thread::yield();
+  ::kill(child, SIGINT);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << status;
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  const std::string report = slurp(folder + "/report.md");
+  EXPECT_NE(report.find("Not complete"), std::string::npos) << report;
+  EXPECT_NE(report.find("| data | 1 | "), std::string::npos) << report;
+}
+
+TEST_F(CommandLine, AnInterruptedRunWritesItsResultsAndReportsIt) {
+  const std::string folder = out("interrupted");
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string path = data();
+    std::freopen("/dev/null", "w", stdout);
+    ::execl(BSLAM_PROGRAM, BSLAM_PROGRAM, "run", path.c_str(), "--out", folder.c_str(), "--pace", "realtime",
+            "--progress", "never", static_cast<char*>(nullptr));
+    std::_Exit(127);
+  }
+  // The output folder is created before the first frame; at the recorded pace the run then takes 1.5 s.
+  while (!fs::exists(folder) && ::waitpid(child, nullptr, WNOHANG) == 0) std::this_thread::yield();
+  ::kill(child, SIGINT);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << status;
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_EQ(nlohmann::json::parse(slurp(folder + "/summary.json"))["complete"], false);
+}
+
+}  // namespace
+}  // namespace bslam
