@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed value, relative to the prior's
 
-// Returns the rig whose difference from `calibrated` is `change` (solver::RigInformation), with the timing of `timed`.
+// Returns the rig whose difference from `calibrated` is `change` (RigInformation), with the timing of `timed`.
 camera::Rig changed(const camera::Rig& calibrated, const Eigen::VectorXd& change, const camera::Rig& timed) {
   solver::RigValues values = solver::RigValues::of(calibrated.in_frame_of_camera_0());
   for (std::size_t c = 0; c < calibrated.size(); ++c) {

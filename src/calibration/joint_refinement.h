@@ -25,7 +25,7 @@ struct CalibratedCamera {
 struct JointRefinement {
   camera::Rig rig;
   std::vector<CalibratedCamera> cameras;
-  solver::RigInformation information;
+  RigInformation information;
 };
 
 // Mean of estimates that were made from different recordings with the same prior, each weighted by its information. The

@@ -10,7 +10,7 @@ namespace bslam::calibration {
 // Sum of the distances between successive keyframes of the same group, in metres.
 double path_length(const RigProblem& problem);
 // Its standard deviation by the error of the calibration. `effects`: of this error, per pose of the problem and in the
-// frame of the poses (solver::RigAdjustment).
+// frame of the poses (RigAdjustment).
 double path_deviation(const RigProblem& problem, const std::vector<geometry::PoseUncertainty::Effect>& effects);
 
 // Scales the estimate so that the distances between the keyframes remain, if this changes the scale of the baselines by

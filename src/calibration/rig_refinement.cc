@@ -8,11 +8,11 @@
 #include "adjustment/landmark_noise.h"
 #include "calibration/lost_observations.h"
 #include "calibration/path_scale.h"
+#include "calibration/rig_bundle_adjustment.h"
 #include "calibration/rig_frame.h"
 #include "calibration/rig_problem.h"
 #include "calibration/single_view_landmarks.h"
 #include "calibration/unobserved_cameras.h"
-#include "solver/rig_bundle_adjustment.h"
 
 namespace bslam::calibration {
 namespace {
@@ -36,7 +36,7 @@ CalibrationOptions quick(CalibrationOptions options) {
 }
 
 // The options of an adjustment whose estimate is not used, but only what it says about the calibration.
-solver::RigAdjustmentOptions for_verdict(solver::RigAdjustmentOptions options) {
+RigAdjustmentOptions for_verdict(RigAdjustmentOptions options) {
   options.relative_decrease = kCoarseDecrease;
   options.pose_effects = false;
   return options;
@@ -59,8 +59,7 @@ double longest_baseline(const camera::Rig& rig) {
   return longest;
 }
 
-std::vector<ParameterRefinement> evaluate_intrinsics(const solver::CameraEstimate& estimate,
-                                                     const camera::CameraModel& model) {
+std::vector<ParameterRefinement> evaluate_intrinsics(const CameraEstimate& estimate, const camera::CameraModel& model) {
   std::vector<ParameterRefinement> out;
   for (const std::string& name : camera::parameter_names(model)) {
     const auto k = static_cast<Eigen::Index>(out.size());
@@ -70,8 +69,7 @@ std::vector<ParameterRefinement> evaluate_intrinsics(const solver::CameraEstimat
   return out;
 }
 
-void evaluate_extrinsics(const solver::CameraEstimate& estimate, const CalibrationOptions& options,
-                         CameraRefinement& out) {
+void evaluate_extrinsics(const CameraEstimate& estimate, const CalibrationOptions& options, CameraRefinement& out) {
   const Vector3d rotation = estimate.change.head<3>(), translation = estimate.change.tail<3>();
   const Matrix3d rotation_covariance = estimate.covariance.topLeftCorner<3, 3>(),
                  translation_covariance = estimate.covariance.bottomRightCorner<3, 3>();
@@ -86,7 +84,7 @@ void evaluate_extrinsics(const solver::CameraEstimate& estimate, const Calibrati
 }
 
 // Returns true if no extrinsics have moved from `before` by more than their own uncertainty.
-bool converged(const solver::RigAdjustment& adjusted, const solver::RigValues& before) {
+bool converged(const RigAdjustment& adjusted, const solver::RigValues& before) {
   for (std::size_t c = 1; c < before.T_cam_rig.size(); ++c) {
     const geometry::Vector6d change = solver::extrinsic_change(adjusted.values.T_cam_rig[c], before.T_cam_rig[c]);
     if (change.dot(adjusted.cameras[c].covariance.llt().solve(change)) > static_cast<double>(change.size()))
@@ -96,14 +94,14 @@ bool converged(const solver::RigAdjustment& adjusted, const solver::RigValues& b
 }
 
 // Adjusts again with the variance of each landmark (adjustment/landmark_noise.h), from the estimate `from`.
-solver::RigAdjustment adjust_weighted(solver::RigAdjustmentOptions options, solver::RigAdjustment from,
-                                      RigProblem& problem, const std::stop_token& stop) {
+RigAdjustment adjust_weighted(RigAdjustmentOptions options, RigAdjustment from, RigProblem& problem,
+                              const std::stop_token& stop) {
   solver::ReprojectionProblem& flat = problem.flat.problem;
   const auto chi2 = solver::squared_errors(flat, flat.T_rig_world, flat.points, from.values);
   adjustment::apply_variances(adjustment::landmark_variances(flat, chi2, solver::beyond(chi2, solver::kChi2TwoDof95)),
                               flat);
   options.start_is_estimate = true;
-  solver::RigAdjustment out = solver::adjust_rig(flat, options, from.values, stop);
+  RigAdjustment out = adjust_rig(flat, options, from.values, stop);
   if (!out.done) return from;
   out.scale_change *= from.scale_change;
   return out;
@@ -111,19 +109,18 @@ solver::RigAdjustment adjust_weighted(solver::RigAdjustmentOptions options, solv
 
 // A map built with a wrong calibration contains mostly the observations that agree with it, so adjusting it once stops
 // short of the truth. Therefore the rejected observations are searched again with the new calibration.
-solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const feature::FeatureModel& features,
-                                       const solver::RigAdjustmentOptions& options, RigProblem& problem,
-                                       const std::stop_token& stop) {
-  solver::RigAdjustmentOptions coarse = options;
+RigAdjustment adjust_in_passes(const map::BundledMap& map, const feature::FeatureModel& features,
+                               const RigAdjustmentOptions& options, RigProblem& problem, const std::stop_token& stop) {
+  RigAdjustmentOptions coarse = options;
   coarse.relative_decrease = kCoarseDecrease;
   solver::RigValues before = solver::RigValues::of(map.rig().in_frame_of_camera_0());
   separate_groups(problem);
-  solver::RigAdjustment out = solver::adjust_rig(problem.flat.problem, coarse, before, stop);
+  RigAdjustment out = adjust_rig(problem.flat.problem, coarse, before, stop);
   for (int pass = 1; pass < kPasses && out.done && !converged(out, before); ++pass) {
     before = out.values;
     if (recover_observations(map, before.applied_to(map.rig()), features, problem.flat) == 0) break;
     separate_groups(problem);
-    solver::RigAdjustment again = solver::adjust_rig(problem.flat.problem, coarse, before, stop);
+    RigAdjustment again = adjust_rig(problem.flat.problem, coarse, before, stop);
     if (!again.done) break;
     again.scale_change *= out.scale_change;
     out = std::move(again);
@@ -131,13 +128,13 @@ solver::RigAdjustment adjust_in_passes(const map::BundledMap& map, const feature
   return out.done ? adjust_weighted(options, std::move(out), problem, stop) : out;
 }
 
-solver::RigAdjustmentOptions prior_of(const camera::Rig& rig, const CalibrationOptions& options) {
-  solver::RigAdjustmentOptions out{.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
-                                   .sigma_translation = translation_deviation(rig, options),
-                                   .sigma_depth = options.sigma_depth_mm / kMillimetres,
-                                   .sigma_scale = 0.01 * options.sigma_scale_percent,
-                                   .sigma_aspect = 0.01 * options.sigma_aspect_percent,
-                                   .correlated_observations = options.correlated_observations};
+RigAdjustmentOptions prior_of(const camera::Rig& rig, const CalibrationOptions& options) {
+  RigAdjustmentOptions out{.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
+                           .sigma_translation = translation_deviation(rig, options),
+                           .sigma_depth = options.sigma_depth_mm / kMillimetres,
+                           .sigma_scale = 0.01 * options.sigma_scale_percent,
+                           .sigma_aspect = 0.01 * options.sigma_aspect_percent,
+                           .correlated_observations = options.correlated_observations};
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const camera::Camera& camera = rig.camera(c);
     out.sigma_intrinsics.push_back(camera::typical_sigmas(camera.model, 0.01 * options.sigma_focal_percent,
@@ -185,14 +182,14 @@ std::vector<solver::TimingPrior> contradicted_timing(const map::BundledMap& map,
   RigProblem problem = choose(map, true, quick(options), features);
   problem.flat.problem.rig = &reference;
   separate_groups(problem);
-  solver::RigAdjustmentOptions with_timing = for_verdict(prior_of(reference, options));
+  RigAdjustmentOptions with_timing = for_verdict(prior_of(reference, options));
   with_timing.timing = timing;
-  const auto adjusted = solver::adjust_rig(problem.flat.problem, with_timing,
-                                           solver::RigValues::of(map.rig().in_frame_of_camera_0()), stop);
+  const auto adjusted =
+      adjust_rig(problem.flat.problem, with_timing, solver::RigValues::of(map.rig().in_frame_of_camera_0()), stop);
   if (!adjusted.done) return {};
   bool any = false;
   for (std::size_t c = 0; c < timing.size(); ++c) {
-    const solver::CameraEstimate& estimate = adjusted.cameras[c];
+    const CameraEstimate& estimate = adjusted.cameras[c];
     if (!significant(estimate.timing_change.shift_s, estimate.timing_sigma.shift_s, options)) timing[c].sigma_shift = 0;
     if (!significant(estimate.timing_change.readout_s, estimate.timing_sigma.readout_s, options))
       timing[c].sigma_readout = 0;
@@ -201,7 +198,7 @@ std::vector<solver::TimingPrior> contradicted_timing(const map::BundledMap& map,
   return any ? timing : std::vector<solver::TimingPrior>{};
 }
 
-void evaluate_timing(const solver::CameraEstimate& estimate, CameraRefinement& out) {
+void evaluate_timing(const CameraEstimate& estimate, CameraRefinement& out) {
   const auto in_ms = [](double change_s, double sigma_s) {
     return TimeRefinement{kMilliseconds * change_s, kMilliseconds * sigma_s, sigma_s > 0};
   };
@@ -246,17 +243,17 @@ bool can_refine(const map::BundledMap& map) {
 }
 
 // The prior of all parameters that are estimated from the map.
-solver::RigAdjustmentOptions prior_for(const map::BundledMap& map, const camera::Rig& calibrated,
-                                       const CalibrationOptions& options, const feature::FeatureModel& features,
-                                       const std::stop_token& stop) {
-  solver::RigAdjustmentOptions prior = prior_of(calibrated, options);
+RigAdjustmentOptions prior_for(const map::BundledMap& map, const camera::Rig& calibrated,
+                               const CalibrationOptions& options, const feature::FeatureModel& features,
+                               const std::stop_token& stop) {
+  RigAdjustmentOptions prior = prior_of(calibrated, options);
   prior.timing = contradicted_timing(map, with_time_offsets_of(map.rig(), calibrated),
                                      timing_prior(map.rig(), calibrated, options), options, features, stop);
   return prior;
 }
 
 RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& calibrated,
-                                const solver::RigAdjustmentOptions& prior, const CalibrationOptions& options,
+                                const RigAdjustmentOptions& prior, const CalibrationOptions& options,
                                 const feature::FeatureModel& features, const std::stop_token& stop) {
   RigRefinement out;
   const camera::Rig reference = with_time_offsets_of(map.rig(), calibrated);
@@ -265,7 +262,7 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.keyframes = problem.flat.keyframes.size();
   out.landmarks = problem.flat.landmarks.size();
   const double path_before = path_length(problem);
-  solver::RigAdjustment adjusted = adjust_in_passes(map, features, prior, problem, stop);
+  RigAdjustment adjusted = adjust_in_passes(map, features, prior, problem, stop);
   if (!adjusted.done) return out;
   complete_unobserved_cameras(reference, adjusted);
   out.done = true;

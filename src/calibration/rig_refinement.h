@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "base/options.h"
+#include "calibration/rig_bundle_adjustment.h"
 #include "map/map_edit.h"
-#include "solver/rig_bundle_adjustment.h"
 
 namespace bslam::calibration {
 
@@ -154,11 +154,11 @@ struct RigRefinement {
   Verdict verdict = Verdict::kUnknown;
   // If done: the estimated rig, and the poses and landmarks that belong to it, of the keyframes and landmarks used.
   std::optional<camera::Rig> rig;
-  solver::RigInformation information;  // of the estimate, to combine it with those of other maps
-  double scale_change = 1;             // factor by which the lengths of the map change
-  double scale_deviation = 0;          // of scale_change, by the error of the calibration; 0 if it is not known
-  double kept_scale = 1;               // factor by which keep_scale() multiplied the baselines
-  map::SetPoses poses;                 // after this change
+  RigInformation information;  // of the estimate, to combine it with those of other maps
+  double scale_change = 1;     // factor by which the lengths of the map change
+  double scale_deviation = 0;  // of scale_change, by the error of the calibration; 0 if it is not known
+  double kept_scale = 1;       // factor by which keep_scale() multiplied the baselines
+  map::SetPoses poses;         // after this change
 };
 
 // Selects keyframes and landmarks and adjusts them with free calibration, beginning with the rig of the map; the map is

@@ -3,7 +3,7 @@
 #include "calibration/rig_frame.h"
 
 namespace bslam::calibration {
-void complete_unobserved_cameras(const camera::Rig& given, solver::RigAdjustment& adjusted) {
+void complete_unobserved_cameras(const camera::Rig& given, RigAdjustment& adjusted) {
   constexpr int kMinObservations = 100;
   solver::RigValues& values = adjusted.values;
   camera::Camera estimated = given.camera(0);

@@ -1,8 +1,8 @@
 // Extrinsics of cameras that the images do not show.
 #pragma once
 
+#include "calibration/rig_bundle_adjustment.h"
 #include "camera/rig.h"
-#include "solver/rig_bundle_adjustment.h"
 
 namespace bslam::calibration {
 
@@ -11,6 +11,6 @@ namespace bslam::calibration {
 // R_given_estimated, for the centre of the image, an unobserved camera has
 //     T_cam_rig = T_cam_rig,given R_given_estimated.
 // With the given extrinsics it would contradict the other cameras from then on.
-void complete_unobserved_cameras(const camera::Rig& given, solver::RigAdjustment& adjusted);
+void complete_unobserved_cameras(const camera::Rig& given, RigAdjustment& adjusted);
 
 }  // namespace bslam::calibration

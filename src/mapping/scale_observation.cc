@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "adjustment/bundle_problem.h"
-#include "solver/rig_scale.h"
+#include "mapping/rig_scale.h"
 
 namespace bslam::mapping {
 namespace {
@@ -48,7 +48,7 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   if (map.scale() != map::Scale::kUnobservable) return report;
   const adjustment::Selection selection = select_observers(map, keyframe, options.keyframes);
   const auto flat = adjustment::build_problem(map, selection, features);
-  const auto found = solver::rig_scale(flat.problem);
+  const auto found = rig_scale(flat.problem);
   if (!found) return report;
   report.observed = true;
   report.deviation = found->deviation;

@@ -23,7 +23,7 @@ Error nothing_estimated(const dataset::Dataset& recording, const SessionResult& 
 }
 
 // Whether each value of two estimates from the same recording agrees within one standard deviation.
-bool agree(const solver::RigInformation& a, const solver::RigInformation& b) {
+bool agree(const calibration::RigInformation& a, const calibration::RigInformation& b) {
   if (a.change.size() != b.change.size()) return false;
   const Eigen::VectorXd difference = a.change - b.change;
   const Eigen::MatrixXd covariance =

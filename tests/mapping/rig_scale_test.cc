@@ -1,16 +1,20 @@
 // Compares the estimated scale of a map with the truth of simulated trajectories.
-#include "solver/rig_scale.h"
+#include "mapping/rig_scale.h"
 
 #include <gtest/gtest.h>
 
 #include "solver/scene.h"
 
-namespace bslam::solver {
+namespace bslam::mapping {
 namespace {
 
+namespace scene = solver::scene;
+using camera::Rig;
+using geometry::SE3;
+using geometry::Vector3d;
 struct SimulatedMotion {
   Rig rig;
-  ReprojectionProblem problem;  // its rig points to `rig`
+  solver::ReprojectionProblem problem;  // its rig points to `rig`
 };
 
 // Ten poses, 0.15 m apart, rotated by `turn_rad` from one to the next; true values, and pixels with noise of 1 px.
@@ -18,7 +22,7 @@ struct SimulatedMotion {
 // only.
 std::unique_ptr<SimulatedMotion> make_motion(double turn_rad, Random& random, std::size_t cameras = 3) {
   auto out = std::make_unique<SimulatedMotion>(SimulatedMotion{scene::make_rig(cameras, scene::Models::kRadTan), {}});
-  ReprojectionProblem& problem = out->problem;
+  solver::ReprojectionProblem& problem = out->problem;
   problem.rig = &out->rig;
   SE3 T_world_rig;
   for (int k = 0; k < 10; ++k) {
@@ -44,15 +48,15 @@ std::unique_ptr<SimulatedMotion> make_motion(double turn_rad, Random& random, st
 }
 
 // Converts the problem to a map whose unit is 1 / `factor` metres.
-void grow(ReprojectionProblem& problem, double factor) {
+void grow(solver::ReprojectionProblem& problem, double factor) {
   for (SE3& T : problem.T_rig_world) T = SE3(T.rotation(), factor * T.translation());
   for (Vector3d& p : problem.points) p *= factor;
 }
 
 // Adjusts the problem with two fixed poses, so that rotations and positions have the errors due to pixel noise.
-void adjust_with_fixed_poses(ReprojectionProblem& problem) {
+void adjust_with_fixed_poses(solver::ReprojectionProblem& problem) {
   problem.pose_free[1] = 0;
-  adjust(problem, {.iterations = 20});
+  solver::adjust(problem, {.iterations = 20});
   problem.pose_free[1] = 1;
 }
 
@@ -96,13 +100,13 @@ TEST(RigScale, EstimatesTheScaleOfAMapAdjustedWithAWrongOne) {
     Random random(5, "bent");
     const auto motion = make_motion(0.05, random);
     grow(motion->problem, factor);
-    adjust(motion->problem, {.iterations = 10});
+    solver::adjust(motion->problem, {.iterations = 10});
     std::optional<RigScale> found;
     for (int i = 0; i < 4; ++i) {
       found = rig_scale(motion->problem);
       ASSERT_TRUE(found.has_value());
       grow(motion->problem, found->scale);
-      adjust(motion->problem, {.iterations = 10});
+      solver::adjust(motion->problem, {.iterations = 10});
     }
     const double length = motion->problem.T_rig_world.back().inverse().translation().norm();
     Random same(5, "bent");
@@ -129,4 +133,4 @@ TEST(RigScale, IsNotObservableWithOneCamera) {
 }
 
 }  // namespace
-}  // namespace bslam::solver
+}  // namespace bslam::mapping

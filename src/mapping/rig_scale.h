@@ -6,7 +6,7 @@
 
 #include "solver/bundle_adjuster.h"
 
-namespace bslam::solver {
+namespace bslam::mapping {
 
 struct RigScale {
   double scale = 1.0;  // metres per unit of the map
@@ -19,6 +19,6 @@ struct RigScale {
 // if the scale is far off. `problem` is in units of the map and is not changed. Exactly one pose should be fixed; more
 // would constrain the shape of the map and make the deviation too small. `skip`: as for adjust. Returns nullopt if the
 // scale is not observable: all cameras at one position, no rotation, or an estimate that is not positive.
-std::optional<RigScale> rig_scale(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip = {});
+std::optional<RigScale> rig_scale(const solver::ReprojectionProblem& problem, std::span<const std::uint8_t> skip = {});
 
-}  // namespace bslam::solver
+}  // namespace bslam::mapping

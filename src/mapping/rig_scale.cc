@@ -1,4 +1,4 @@
-#include "solver/rig_scale.h"
+#include "mapping/rig_scale.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 #include "solver/bundle_equations.h"
 
-namespace bslam::solver {
+namespace bslam::mapping {
 namespace {
 
 constexpr double kDamping = 1e-12;        // factor of the diagonal; points without parallax do not move
@@ -15,15 +15,16 @@ constexpr double kMinInformation = 1e-9;  // relative to the information if pose
 
 // Derivative of the free poses with respect to a growth of the map around the first fixed pose. Images do not
 // distinguish the size of the map from the length of the extrinsics, so the size is held constant.
-Eigen::VectorXd growth(const ReprojectionProblem& problem, const BundleStructure& structure,
-                       const BlockMatrix& frames) {
+Eigen::VectorXd growth(const solver::ReprojectionProblem& problem, const solver::BundleStructure& structure,
+                       const solver::BlockMatrix& frames) {
   const auto fixed = std::find(problem.pose_free.begin(), problem.pose_free.end(), std::uint8_t{0});
   const auto first = static_cast<std::size_t>(fixed - problem.pose_free.begin());
-  const Vector3d centre =
-      fixed == problem.pose_free.end() ? Vector3d::Zero() : problem.T_rig_world[first].inverse().translation();
+  const geometry::Vector3d centre = fixed == problem.pose_free.end()
+                                        ? geometry::Vector3d::Zero()
+                                        : problem.T_rig_world[first].inverse().translation();
   Eigen::VectorXd out = Eigen::VectorXd::Zero(frames.rows());
   for (std::size_t slot = 0; slot < structure.pose_of_slot.size(); ++slot) {
-    const SE3& T = problem.T_rig_world[static_cast<std::size_t>(structure.pose_of_slot[slot])];
+    const geometry::SE3& T = problem.T_rig_world[static_cast<std::size_t>(structure.pose_of_slot[slot])];
     out.segment<3>(frames.offset(static_cast<int>(slot)) + 3) = T * centre;
   }
   return out.normalized();
@@ -34,7 +35,7 @@ struct ScaleStep {
 };
 
 // One Gauss-Newton step; a stiff term along `growth` holds the size of the map constant.
-std::optional<ScaleStep> scale_step(ReducedSystem& system, const Eigen::VectorXd& growth) {
+std::optional<ScaleStep> scale_step(solver::ReducedSystem& system, const Eigen::VectorXd& growth) {
   const Eigen::Index frames = growth.size();
   Eigen::MatrixXd S = Eigen::MatrixXd::Zero(frames, frames);
   system.frames().copy_to(S);
@@ -52,8 +53,8 @@ std::optional<ScaleStep> scale_step(ReducedSystem& system, const Eigen::VectorXd
 std::optional<double> variance_factor(const std::vector<double>& chi2, std::size_t unknowns) {
   double sum = 0.0, count = 0.0;
   for (const double error : chi2) {
-    if (!(error < kMaxChi2)) continue;
-    const double weight = kernel_weight(Kernel::kHuber, error);
+    if (!(error < solver::kMaxChi2)) continue;
+    const double weight = solver::kernel_weight(solver::Kernel::kHuber, error);
     sum += weight * error;
     count += weight;
   }
@@ -64,20 +65,20 @@ std::optional<double> variance_factor(const std::vector<double>& chi2, std::size
 
 }  // namespace
 
-std::optional<RigScale> rig_scale(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
-  const BundleStructure structure = make_structure(problem, skip);
+std::optional<RigScale> rig_scale(const solver::ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
+  const solver::BundleStructure structure = solver::make_structure(problem, skip);
   const std::size_t slots = structure.pose_of_slot.size();
   if (structure.num_points() == 0 || slots == 0) return std::nullopt;
-  RigBlocks blocks;
-  blocks.push_back(std::make_unique<BaselineScaleBlock>());
-  BundleEquations equations(problem, structure, blocks, Kernel::kHuber, std::numeric_limits<int>::max(),
-                            state_of(problem));
+  solver::RigBlocks blocks;
+  blocks.push_back(std::make_unique<solver::BaselineScaleBlock>());
+  solver::BundleEquations equations(problem, structure, blocks, solver::Kernel::kHuber, std::numeric_limits<int>::max(),
+                                    solver::state_of(problem));
   equations.linearise();
-  ReducedSystem& system = equations.reduce(kDamping);
+  solver::ReducedSystem& system = equations.reduce(kDamping);
   const Eigen::VectorXd size = growth(problem, structure, system.frames());
   const auto step = size.allFinite() ? scale_step(system, size) : std::nullopt;
   const double conditional =
-      bounded_diagonal(equations.rig_terms().H()(0, 0));  // information if all other unknowns were known
+      solver::bounded_diagonal(equations.rig_terms().H()(0, 0));  // information if all other unknowns were known
   if (!step || !(step->information > kMinInformation * conditional)) return std::nullopt;
   const double length = 1.0 + step->change;
   const auto variance = variance_factor(equations.squared_errors(), 6 * slots + 3 * structure.num_points());
@@ -85,4 +86,4 @@ std::optional<RigScale> rig_scale(const ReprojectionProblem& problem, std::span<
   return RigScale{1.0 / length, std::sqrt(std::max(1.0, *variance) / step->information) / length};
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::mapping

@@ -1,13 +1,18 @@
-#include "solver/rig_bundle_adjustment.h"
+#include "calibration/rig_bundle_adjustment.h"
 
 #include <gtest/gtest.h>
 
 #include "solver/scene.h"
 
-namespace bslam::solver {
+namespace bslam::calibration {
 namespace {
 
+namespace scene = solver::scene;
+using camera::Rig;
 using geometry::Matrix6d;
+using geometry::SE3;
+using geometry::Vector2d;
+using geometry::Vector3d;
 using geometry::Vector6d;
 using scene::BundleSpec;
 using scene::Models;
@@ -26,7 +31,7 @@ Rig with_error(const Rig& rig, std::size_t camera, const Vector6d& error) {
 
 // Error of an estimate, as a left perturbation.
 Vector6d error_of(const RigAdjustment& estimate, std::size_t camera, const Rig& truth) {
-  return extrinsic_change(estimate.values.T_cam_rig[camera], truth.cam_from_rig(camera));
+  return solver::extrinsic_change(estimate.values.T_cam_rig[camera], truth.cam_from_rig(camera));
 }
 
 // Points that are visible from all poses, with 0.5 px of noise. The problem is initialised with the truth.
@@ -146,7 +151,7 @@ TEST(AdjustRig, EstimatesTheTimesAtWhichRowsAreExposed) {
 
 // The rig with other intrinsics: focal lengths and principal points that are wrong by some pixels.
 Rig with_wrong_intrinsics(const Rig& rig, Random& random) {
-  RigValues values = RigValues::of(rig);
+  solver::RigValues values = solver::RigValues::of(rig);
   for (camera::CameraModel& model : values.models) {
     camera::ModelParameters p = camera::parameters(model);
     p.head<2>() *= 1 + 0.005 * random.normal();
@@ -182,8 +187,8 @@ TEST(AdjustRig, FindsIntrinsicsAndKeepsTheScaleOfTheBaselines) {
       EXPECT_TRUE(result.cameras[c].intrinsics_observed[0]) << "camera " << c;
       EXPECT_LT(std::abs(error(0)), 0.002 * camera::parameters(scene->rig.camera(c).model)(0)) << "camera " << c;
     }
-    const RigValues truth = RigValues::of(calibrated);
-    EXPECT_NEAR(baseline_scale(result.values.T_cam_rig, truth.T_cam_rig), 1.0, 1e-9);
+    const solver::RigValues truth = solver::RigValues::of(calibrated);
+    EXPECT_NEAR(solver::baseline_scale(result.values.T_cam_rig, truth.T_cam_rig), 1.0, 1e-9);
   }
 }
 
@@ -191,10 +196,10 @@ TEST(AdjustRig, FindsIntrinsicsAndKeepsTheScaleOfTheBaselines) {
 TEST(AdjustRig, TheScaleOfTheBaselinesIsThatOfTheirLengths) {
   const std::vector<SE3> given = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0.1, 0, 0))};
   const std::vector<SE3> found = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0.08, 0.06, 0))};
-  EXPECT_NEAR(baseline_scale(found, given), 1.0, 1e-12);
+  EXPECT_NEAR(solver::baseline_scale(found, given), 1.0, 1e-12);
   const std::vector<SE3> twice = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0, 0, -0.2))};
-  EXPECT_NEAR(baseline_scale(twice, given), 2.0, 1e-12);
-  EXPECT_EQ(baseline_scale(std::vector{SE3(), SE3()}, std::vector{SE3(), SE3()}), 1.0);
+  EXPECT_NEAR(solver::baseline_scale(twice, given), 2.0, 1e-12);
+  EXPECT_EQ(solver::baseline_scale(std::vector{SE3(), SE3()}, std::vector{SE3(), SE3()}), 1.0);
 }
 
 // With a right calibration nothing that the images do not demand is changed.
@@ -206,19 +211,6 @@ TEST(AdjustRig, ARightCalibrationHasNoExcessError) {
   const RigAdjustment result = adjust_rig(scene->problem, options);
   ASSERT_TRUE(result.done);
   EXPECT_LT(result.excess_error, 0.02);
-}
-
-TEST(ExtrinsicPrior, TranslationsAreLessCertainAlongTheOpticalAxes) {
-  const SE3 T_side_cam0(Eigen::AngleAxisd(120 * kDegree, Vector3d::Ones().normalized()).toRotationMatrix(),
-                        Vector3d(0.1, 0, 0));
-  const ExtrinsicPrior prior{.T_cam_rig = {SE3(), SE3(Eigen::Matrix3d::Identity(), Vector3d(-0.1, 0, 0)), T_side_cam0},
-                             .sigma_rotation = 0.1,
-                             .sigma_translation = 3,
-                             .sigma_depth = 4};
-  const Vector6d parallel = (Vector6d() << 0.01, 0.01, 0.01, 9, 9, 9 + 2 * 16).finished(),
-                 side = (Vector6d() << 0.01, 0.01, 0.01, 9 + 16, 9, 9 + 16).finished();  // z of camera 0 is its x
-  EXPECT_LT((covariance_of(prior, 1) - Matrix6d(parallel.asDiagonal())).norm(), 1e-12);
-  EXPECT_LT((covariance_of(prior, 2) - Matrix6d(side.asDiagonal())).norm(), 1e-12);
 }
 
 TEST(AdjustRig, ErrorsMatchTheirStandardDeviations) {
@@ -261,7 +253,7 @@ TEST(AdjustRig, WithoutRotationTheTranslationOfACameraWithoutOverlapIsNotObserve
   const auto scene = straight_line(4, 5);
   // No point is observed by two cameras.
   std::vector<CameraIndex> owner(scene->points.size());
-  std::erase_if(scene->problem.observations, [&](const ReprojectionProblem::Observation& o) {
+  std::erase_if(scene->problem.observations, [&](const solver::ReprojectionProblem::Observation& o) {
     CameraIndex& first = owner[static_cast<std::size_t>(o.point)];
     if (!first.valid()) first = o.camera;
     return o.camera != first;
@@ -301,7 +293,7 @@ TEST(AdjustRig, LengthOfTheOnlyBaselineIsNotObserved) {
 TEST(AdjustRig, CameraWithoutObservationsKeepsItsCalibration) {
   const auto scene = walk(4, 8);
   std::erase_if(scene->problem.observations,
-                [](const ReprojectionProblem::Observation& o) { return o.camera == CameraIndex(2); });
+                [](const solver::ReprojectionProblem::Observation& o) { return o.camera == CameraIndex(2); });
   const RigAdjustmentOptions options;
   const RigAdjustment result = adjust_rig(scene->problem, options);
   ASSERT_TRUE(result.done);
@@ -321,7 +313,7 @@ TEST(AdjustRig, DistinguishesMotionBetweenCamerasFromExtrinsics) {
   const SE3 moved = SE3::exp((Vector6d() << 0, 0.02, 0, 0.01, 0, 0.03).finished());
   scene->problem.motion.assign(scene->T_rig_world.size() * cameras, SE3());
   for (std::size_t k = 0; k < scene->T_rig_world.size(); ++k) scene->problem.motion[k * cameras + late] = moved;
-  for (ReprojectionProblem::Observation& o : scene->problem.observations) {
+  for (solver::ReprojectionProblem::Observation& o : scene->problem.observations) {
     if (o.camera.index() != late) continue;
     const Vector3d before =
         scene->T_rig_world[static_cast<std::size_t>(o.pose)] * scene->points[static_cast<std::size_t>(o.point)];
@@ -329,7 +321,7 @@ TEST(AdjustRig, DistinguishesMotionBetweenCamerasFromExtrinsics) {
                            *scene->rig.camera(late).project(scene->rig.cam_from_rig(late) * before);
     o.pixel += shift.cast<float>();
   }
-  ReprojectionProblem unaware = scene->problem;
+  solver::ReprojectionProblem unaware = scene->problem;
   unaware.motion.clear();
   const RigAdjustment with_motion = adjust_rig(scene->problem), without_motion = adjust_rig(unaware);
   ASSERT_TRUE(with_motion.done && without_motion.done);
@@ -339,19 +331,19 @@ TEST(AdjustRig, DistinguishesMotionBetweenCamerasFromExtrinsics) {
 
 TEST(AdjustRig, DoesNotChangeTheProblemOnFailure) {
   const auto scene = walk(2, 10);
-  const ReprojectionProblem before = scene->problem;
+  const solver::ReprojectionProblem before = scene->problem;
   std::stop_source stop;
   stop.request_stop();
   EXPECT_FALSE(adjust_rig(scene->problem, {}, {}, stop.get_token()).done);
   const Rig alone = scene->rig.subset(std::array{0});
-  ReprojectionProblem single = before;
+  solver::ReprojectionProblem single = before;
   single.rig = &alone;
   std::erase_if(single.observations,
-                [](const ReprojectionProblem::Observation& o) { return o.camera != CameraIndex(0); });
+                [](const solver::ReprojectionProblem::Observation& o) { return o.camera != CameraIndex(0); });
   const RigAdjustment of_one = adjust_rig(single);
   EXPECT_FALSE(of_one.done);
   EXPECT_EQ(of_one.cameras.size(), 1u);
-  ReprojectionProblem empty = before;
+  solver::ReprojectionProblem empty = before;
   empty.observations.clear();
   EXPECT_FALSE(adjust_rig(empty).done);
   EXPECT_EQ(scene->problem.points, before.points);
@@ -361,7 +353,7 @@ TEST(AdjustRig, DoesNotChangeTheProblemOnFailure) {
 TEST(AdjustRig, IsDeterministicAndKeepsFixedPoses) {
   const auto scene = walk(3, 12, 0.05);
   const SE3 fixed = scene->problem.T_rig_world.front();
-  ReprojectionProblem a = scene->problem, b = scene->problem;
+  solver::ReprojectionProblem a = scene->problem, b = scene->problem;
   const RigAdjustment first = adjust_rig(a), second = adjust_rig(b);
   ASSERT_TRUE(first.done);
   EXPECT_EQ(first.final_cost, second.final_cost);
@@ -374,4 +366,4 @@ TEST(AdjustRig, IsDeterministicAndKeepsFixedPoses) {
 }
 
 }  // namespace
-}  // namespace bslam::solver
+}  // namespace bslam::calibration

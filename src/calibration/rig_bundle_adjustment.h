@@ -11,7 +11,7 @@
 #include "solver/bundle_adjuster.h"
 #include "solver/rig_block.h"
 
-namespace bslam::solver {
+namespace bslam::calibration {
 
 struct RigAdjustmentOptions {
   double sigma_rotation = 0.035;    // radians, per axis: standard deviation of the calibrated extrinsics (2 degrees)
@@ -25,8 +25,8 @@ struct RigAdjustmentOptions {
   // constant.
   std::vector<camera::ModelParameters> sigma_intrinsics = {};
   double sigma_aspect = 0;  // of fx / fy, relative; 0: from the above
-  // Per camera; needs ReprojectionProblem::twist. Empty: the timing is constant.
-  std::vector<TimingPrior> timing = {};
+  // Per camera; needs solver::ReprojectionProblem::twist. Empty: the timing is constant.
+  std::vector<solver::TimingPrior> timing = {};
   // Number of observations with the information of one independent observation. Errors of a landmark in successive
   // images are similar, so that the normal equations overestimate the information of the images.
   double correlated_observations = 1;
@@ -64,7 +64,7 @@ struct RigInformation {
 
 struct RigAdjustment {
   bool done = false;                    // false if there is nothing to estimate, or it was stopped or failed
-  RigValues values;                     // the estimate
+  solver::RigValues values;             // the estimate
   std::vector<CameraEstimate> cameras;  // all cameras; the extrinsics of the first one are exact
   RigInformation information;
   // Per pose of the problem: its perturbation by the error of the estimate; zero if the pose is fixed. Empty if the
@@ -83,7 +83,7 @@ struct RigAdjustment {
 // with Huber kernel over all observations, then over those within a widened bound, then twice without kernel within the
 // 95 % bound. Each round classifies all observations again, so that observations rejected because of a wrong
 // calibration are used again. Bitwise deterministic.
-RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjustmentOptions& options = {},
-                         std::optional<RigValues> start = {}, std::stop_token stop = {});
+RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustmentOptions& options = {},
+                         std::optional<solver::RigValues> start = {}, std::stop_token stop = {});
 
-}  // namespace bslam::solver
+}  // namespace bslam::calibration

@@ -1,4 +1,4 @@
-#include "solver/rig_bundle_adjustment.h"
+#include "calibration/rig_bundle_adjustment.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "base/assert.h"
 #include "solver/bundle_equations.h"
 
-namespace bslam::solver {
+namespace bslam::calibration {
 namespace {
 
 constexpr int kDensePoses = 150;
@@ -17,45 +17,47 @@ constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an obse
 constexpr double kEarlyDecrease = 1e-4;
 
 struct Round {
-  Kernel kernel;
+  solver::Kernel kernel;
   double max_chi2;  // maximum squared normalised error of observations that are used
 };
-constexpr std::array kRounds = {Round{Kernel::kHuber, kMaxChi2}, Round{Kernel::kHuber, 16 * kChi2TwoDof95},
-                                Round{Kernel::kNone, kChi2TwoDof95}, Round{Kernel::kNone, kChi2TwoDof95}};
+constexpr std::array kRounds = {
+    Round{solver::Kernel::kHuber, solver::kMaxChi2}, Round{solver::Kernel::kHuber, 16 * solver::kChi2TwoDof95},
+    Round{solver::Kernel::kNone, solver::kChi2TwoDof95}, Round{solver::Kernel::kNone, solver::kChi2TwoDof95}};
 
 // The blocks of an adjustment: the extrinsics, then the intrinsics and the timing unless they are constant.
 struct CalibrationBlocks {
-  RigBlocks blocks;
-  const ExtrinsicsBlock* extrinsics = nullptr;
-  const IntrinsicsBlock* intrinsics = nullptr;  // null if they are constant
-  const TimingBlock* timing = nullptr;          // null if it is constant
-  int size = 0;                                 // number of unknowns
+  solver::RigBlocks blocks;
+  const solver::ExtrinsicsBlock* extrinsics = nullptr;
+  const solver::IntrinsicsBlock* intrinsics = nullptr;  // null if they are constant
+  const solver::TimingBlock* timing = nullptr;          // null if it is constant
+  int size = 0;                                         // number of unknowns
 
   int first_intrinsics() const { return extrinsics->size(); }
-  void add(std::unique_ptr<RigBlock> block) {
+  void add(std::unique_ptr<solver::RigBlock> block) {
     size += block->size();
     blocks.push_back(std::move(block));
   }
 };
 
-std::unique_ptr<IntrinsicsBlock> make_intrinsics(const RigValues& calibrated, const RigAdjustmentOptions& options,
-                                                 double tighter) {
-  IntrinsicPrior prior{{}, options.sigma_intrinsics, tighter * options.sigma_aspect};
+std::unique_ptr<solver::IntrinsicsBlock> make_intrinsics(const solver::RigValues& calibrated,
+                                                         const RigAdjustmentOptions& options, double tighter) {
+  solver::IntrinsicPrior prior{{}, options.sigma_intrinsics, tighter * options.sigma_aspect};
   for (camera::ModelParameters& sigma : prior.sigmas) sigma *= tighter;
   for (const camera::CameraModel& model : calibrated.models) prior.values.push_back(camera::parameters(model));
-  return std::make_unique<IntrinsicsBlock>(std::move(prior));
+  return std::make_unique<solver::IntrinsicsBlock>(std::move(prior));
 }
 
-std::unique_ptr<TimingBlock> make_timing(const RigAdjustmentOptions& options, double tighter) {
-  std::vector<TimingPrior> prior = options.timing;
-  for (TimingPrior& p : prior) {
+std::unique_ptr<solver::TimingBlock> make_timing(const RigAdjustmentOptions& options, double tighter) {
+  std::vector<solver::TimingPrior> prior = options.timing;
+  for (solver::TimingPrior& p : prior) {
     p.sigma_shift *= tighter;
     p.sigma_readout *= tighter;
   }
-  return std::make_unique<TimingBlock>(std::move(prior));
+  return std::make_unique<solver::TimingBlock>(std::move(prior));
 }
 
-ExtrinsicPrior extrinsic_prior(const RigValues& calibrated, const RigAdjustmentOptions& options, double tighter) {
+solver::ExtrinsicPrior extrinsic_prior(const solver::RigValues& calibrated, const RigAdjustmentOptions& options,
+                                       double tighter) {
   return {.T_cam_rig = calibrated.T_cam_rig,
           .sigma_rotation = tighter * options.sigma_rotation,
           .sigma_translation = tighter * options.sigma_translation,
@@ -63,10 +65,10 @@ ExtrinsicPrior extrinsic_prior(const RigValues& calibrated, const RigAdjustmentO
           .sigma_scale = tighter * options.sigma_scale};
 }
 
-CalibrationBlocks make_blocks(const RigValues& calibrated, const RigAdjustmentOptions& options) {
+CalibrationBlocks make_blocks(const solver::RigValues& calibrated, const RigAdjustmentOptions& options) {
   CalibrationBlocks out;
   const double tighter = 1.0 / std::sqrt(options.correlated_observations);
-  auto extrinsics = std::make_unique<ExtrinsicsBlock>(extrinsic_prior(calibrated, options, tighter));
+  auto extrinsics = std::make_unique<solver::ExtrinsicsBlock>(extrinsic_prior(calibrated, options, tighter));
   out.extrinsics = extrinsics.get();
   out.add(std::move(extrinsics));
   if (!options.sigma_intrinsics.empty()) {
@@ -83,7 +85,7 @@ CalibrationBlocks make_blocks(const RigValues& calibrated, const RigAdjustmentOp
 }
 
 // Number of residuals minus number of unknowns, at least 1.
-double redundancy(const BundleStructure& structure, int rig_unknowns) {
+double redundancy(const solver::BundleStructure& structure, int rig_unknowns) {
   const double residuals = 2.0 * static_cast<double>(structure.terms.size());
   const double unknowns = 3.0 * static_cast<double>(structure.num_points()) +
                           6.0 * static_cast<double>(structure.pose_of_slot.size()) + rig_unknowns;
@@ -91,16 +93,16 @@ double redundancy(const BundleStructure& structure, int rig_unknowns) {
 }
 
 // Mean squared error over its expectation for the truncated distribution, corrected for the number of unknowns.
-double variance_factor(const BundleStructure& structure, int rig_unknowns, double cost) {
-  return 2.0 * cost / (redundancy(structure, rig_unknowns) * kVarianceLeft / kFractionLeft);
+double variance_factor(const solver::BundleStructure& structure, int rig_unknowns, double cost) {
+  return 2.0 * cost / (redundancy(structure, rig_unknowns) * solver::kVarianceLeft / solver::kFractionLeft);
 }
 
-void report_extrinsics(const Eigen::MatrixXd& covariance, const ExtrinsicPrior& prior, RigAdjustment& out) {
+void report_extrinsics(const Eigen::MatrixXd& covariance, const solver::ExtrinsicPrior& prior, RigAdjustment& out) {
   for (std::size_t c = 1; c < out.cameras.size(); ++c) {
     CameraEstimate& camera = out.cameras[c];
     const auto at = static_cast<Eigen::Index>(6 * (c - 1));
     camera.covariance = covariance.block<6, 6>(at, at);
-    const geometry::Matrix6d of_prior = covariance_of(prior, c);
+    const geometry::Matrix6d of_prior = solver::covariance_of(prior, c);
     for (int k = 0; k < 6; ++k)
       camera.observed[static_cast<std::size_t>(k)] =
           std::sqrt(camera.covariance(k, k)) < kObservedRatio * std::sqrt(of_prior(k, k));
@@ -108,8 +110,8 @@ void report_extrinsics(const Eigen::MatrixXd& covariance, const ExtrinsicPrior& 
 }
 
 // `sigma`: standard deviations of the unknowns of IntrinsicsBlock, which are relative to those of the prior.
-void report_intrinsics(const Eigen::VectorXd& sigma, const RigValues& calibrated, const RigAdjustmentOptions& options,
-                       RigAdjustment& out) {
+void report_intrinsics(const Eigen::VectorXd& sigma, const solver::RigValues& calibrated,
+                       const RigAdjustmentOptions& options, RigAdjustment& out) {
   Eigen::Index at = 0;
   for (std::size_t c = 0; c < out.cameras.size(); ++c) {
     CameraEstimate& camera = out.cameras[c];
@@ -128,7 +130,7 @@ void report_timing(const Eigen::VectorXd& sigma, const RigAdjustmentOptions& opt
   Eigen::Index at = 0;
   for (std::size_t c = 0; c < out.cameras.size(); ++c) {
     CameraEstimate& camera = out.cameras[c];
-    const TimingPrior& prior = options.timing[c];
+    const solver::TimingPrior& prior = options.timing[c];
     camera.timing_change = {out.values.timing[c].shift_s - prior.mean.shift_s,
                             out.values.timing[c].readout_s - prior.mean.readout_s};
     if (prior.sigma_shift > 0) camera.timing_sigma.shift_s = wider * sigma(at++) * prior.sigma_shift;
@@ -180,7 +182,7 @@ RigInformation in_physical_units(const Eigen::MatrixXd& information, const Eigen
 
 // The perturbation of each pose by the error of the unknowns of the rig, `deviation` z.
 std::vector<geometry::PoseUncertainty::Effect> effects_on_poses(const Eigen::MatrixXd& deviation,
-                                                                const BundleEquations& equations) {
+                                                                const solver::BundleEquations& equations) {
   std::vector<int> poses(equations.state().T_rig_world.size());
   std::iota(poses.begin(), poses.end(), 0);
   std::vector<geometry::PoseUncertainty::Effect> out;
@@ -191,7 +193,7 @@ std::vector<geometry::PoseUncertainty::Effect> effects_on_poses(const Eigen::Mat
 
 // Computes covariances and observed degrees of freedom at the current values. Returns false if the information is
 // singular.
-bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const RigValues& calibrated,
+bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks, const solver::RigValues& calibrated,
             const RigAdjustmentOptions& options, RigAdjustment& out) {
   equations.linearise();
   const auto information = equations.rig_information();
@@ -205,7 +207,7 @@ bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const R
     at += block->size();
   }
   const Eigen::MatrixXd of_images = *information - prior;
-  const double scale = kVarianceLeft / kFractionLeft / std::max(1.0, out.variance_factor);
+  const double scale = solver::kVarianceLeft / solver::kFractionLeft / std::max(1.0, out.variance_factor);
   const Eigen::LLT<Eigen::MatrixXd> factor(scale * of_images + prior);
   if (factor.info() != Eigen::Success) return false;
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(blocks.size, blocks.size);
@@ -227,12 +229,13 @@ bool assess(BundleEquations& equations, const CalibrationBlocks& blocks, const R
 }
 
 // Multiplies all lengths by a factor that gives the baselines the scale of the calibration; returns it.
-double restore_scale(const RigValues& calibrated, ReprojectionProblem& problem, BundleState& state) {
-  const double factor = 1.0 / baseline_scale(state.rig.T_cam_rig, calibrated.T_cam_rig);
-  for (SE3& T : state.rig.T_cam_rig) T = geometry::scaled(T, factor);
-  for (SE3& T : state.T_rig_world) T = geometry::scaled(T, factor);
-  for (Vector3d& point : state.points) point *= factor;
-  for (SE3& T : problem.motion) T = geometry::scaled(T, factor);
+double restore_scale(const solver::RigValues& calibrated, solver::ReprojectionProblem& problem,
+                     solver::BundleState& state) {
+  const double factor = 1.0 / solver::baseline_scale(state.rig.T_cam_rig, calibrated.T_cam_rig);
+  for (geometry::SE3& T : state.rig.T_cam_rig) T = geometry::scaled(T, factor);
+  for (geometry::SE3& T : state.T_rig_world) T = geometry::scaled(T, factor);
+  for (geometry::Vector3d& point : state.points) point *= factor;
+  for (geometry::SE3& T : problem.motion) T = geometry::scaled(T, factor);
   for (geometry::Vector6d& twist : problem.twist) twist.tail<3>() *= factor;
   return factor;
 }
@@ -246,27 +249,27 @@ bool repeats(const Round& round, const std::vector<std::uint8_t>& skip,
 
 // Runs one round from `state` and leaves its result there. Returns false if it failed or was stopped. `skipped`: flags
 // of the observations that the previous round did not use, and then those of this round.
-bool run_round(const ReprojectionProblem& problem, const Round& round, const CalibrationBlocks& blocks,
-               const RigValues& calibrated, const RigAdjustmentOptions& options, const std::stop_token& stop,
-               std::vector<std::uint8_t>& skipped, BundleState& state, RigAdjustment& out) {
-  const auto chi2 = squared_errors(problem, state.T_rig_world, state.points, state.rig);
-  std::vector<std::uint8_t> skip = beyond(chi2, round.max_chi2);
+bool run_round(const solver::ReprojectionProblem& problem, const Round& round, const CalibrationBlocks& blocks,
+               const solver::RigValues& calibrated, const RigAdjustmentOptions& options, const std::stop_token& stop,
+               std::vector<std::uint8_t>& skipped, solver::BundleState& state, RigAdjustment& out) {
+  const auto chi2 = solver::squared_errors(problem, state.T_rig_world, state.points, state.rig);
+  std::vector<std::uint8_t> skip = solver::beyond(chi2, round.max_chi2);
   if (repeats(round, skip, skipped)) return true;
   skipped = std::move(skip);
-  const BundleStructure structure = make_structure(problem, chi2, skipped);
+  const solver::BundleStructure structure = solver::make_structure(problem, chi2, skipped);
   if (structure.num_points() == 0) return false;
-  BundleEquations equations(problem, structure, blocks.blocks, round.kernel, kDensePoses, std::move(state));
+  solver::BundleEquations equations(problem, structure, blocks.blocks, round.kernel, kDensePoses, std::move(state));
   const bool last = &round == &kRounds.back();
   const double decrease = last ? options.relative_decrease : std::max(kEarlyDecrease, options.relative_decrease);
-  const LmSummary summary =
-      minimise(equations, {.iterations = options.iterations, .relative_decrease = decrease}, stop);
+  const solver::LmSummary summary =
+      solver::minimise(equations, {.iterations = options.iterations, .relative_decrease = decrease}, stop);
   if (!summary.usable() || stop.stop_requested()) return false;
   if (last) {
     out.final_cost = summary.final_cost;
     out.variance_factor = variance_factor(structure, blocks.size, summary.final_cost);
     out.values = equations.state().rig;
     for (std::size_t c = 0; c < out.cameras.size(); ++c)
-      out.cameras[c].change = extrinsic_change(out.values.T_cam_rig[c], calibrated.T_cam_rig[c]);
+      out.cameras[c].change = solver::extrinsic_change(out.values.T_cam_rig[c], calibrated.T_cam_rig[c]);
     for (const auto& term : structure.terms) ++out.cameras[static_cast<std::size_t>(term.camera)].observations;
     out.done = assess(equations, blocks, calibrated, options, out);
   }
@@ -276,22 +279,22 @@ bool run_round(const ReprojectionProblem& problem, const Round& round, const Cal
 
 }  // namespace
 
-RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjustmentOptions& options,
-                         std::optional<RigValues> start, std::stop_token stop) {
+RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustmentOptions& options,
+                         std::optional<solver::RigValues> start, std::stop_token stop) {
   BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
   BSLAM_ASSERT(options.sigma_rotation > 0 && options.sigma_translation > 0, "standard deviations must be positive");
   RigAdjustment out;
   out.cameras.resize(problem.rig->size());
   out.cameras.front().observed.fill(true);
-  BundleState state = state_of(problem);
-  const RigValues calibrated = state.rig;
+  solver::BundleState state = solver::state_of(problem);
+  const solver::RigValues calibrated = state.rig;
   const CalibrationBlocks blocks = make_blocks(calibrated, options);
   if (blocks.size == 0) return out;
   if (start) state.rig = std::move(*start);
-  ReprojectionProblem scaled = problem;
+  solver::ReprojectionProblem scaled = problem;
   std::vector<std::uint8_t> skipped;
   for (const Round& round : kRounds) {
-    if (round.kernel == Kernel::kHuber && options.start_is_estimate) continue;
+    if (round.kernel == solver::Kernel::kHuber && options.start_is_estimate) continue;
     if (!run_round(scaled, round, blocks, calibrated, options, stop, skipped, state, out)) return out;
     if (options.sigma_scale > 0) out.scale_change *= restore_scale(calibrated, scaled, state);
   }
@@ -304,4 +307,4 @@ RigAdjustment adjust_rig(ReprojectionProblem& problem, const RigAdjustmentOption
   return out;
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::calibration
