@@ -1,12 +1,14 @@
-// bslam: visual SLAM for a rig of any number of cameras. This header includes the whole library; see docs/cpp.md.
+// bslam: visual SLAM for a rig of any number of cameras. This header includes the whole library.
 //
 //   auto rig = bslam::Rig::load("rig.yaml");
+//   if (!rig) return report(rig.error().message());
 //   auto slam = bslam::System::create(*rig, bslam::Config());
+//   if (!slam) return report(slam.error().message());
 //   for (const bslam::ImageBundle& images : camera_driver) {
 //     auto frame = slam->process(images);
 //     if (frame && frame->tracking()) publish_pose(frame->T_world_body);
 //   }
-//   slam->finish();
+//   if (bslam::Status done = slam->finish(); !done) return report(done.error().message());
 //
 // The headers require only C++17 and the standard library.
 #pragma once

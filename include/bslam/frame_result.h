@@ -40,8 +40,8 @@ BSLAM_EXPORT std::string_view to_string(CameraState state);  // "ok", "degraded"
 
 struct CameraResult {
   CameraState state = CameraState::kOk;
-  // "" if ok, otherwise no-images, black, over-exposed, frozen, inconsistent, blurred or few-features. Points to static
-  // storage.
+  // "" if ok, otherwise no-images (for a camera that has not delivered any image yet: after ten frames), black,
+  // over-exposed, frozen, inconsistent, blurred or few-features. Points to static storage.
   std::string_view reason;
   int keypoints = 0;  // number of keypoints in the image; without extraction: landmarks searched for in it
   int matched = 0;    // keypoints matched to landmarks of the map
@@ -54,7 +54,7 @@ struct StageTime {
 };
 
 struct FrameResult {
-  int frame = 0;             // number of earlier calls of System::process that returned a result
+  int frame = 0;             // number of frames that System::process has processed before
   std::int64_t time_ns = 0;  // time of camera 0's image, or of the earliest image if it is missing; with time offset
 
   TrackingStatus status = TrackingStatus::kNotStarted;
@@ -62,17 +62,20 @@ struct FrameResult {
   bool tracking() const { return status == TrackingStatus::kTracking; }
 
   // The pose in the map; identity unless tracking. The world frame is the frame of camera 0 at the start of the submap:
-  // x right, y down, z forward. The pose jumps when a loop is closed. Poses of different submaps are unrelated; after
-  // submaps were merged, `submap` of later frames may differ for the same place.
+  // x right, y down, z forward, so that T_world_body begins with the pose of the body in camera 0; gravity is not
+  // known. The pose jumps when a loop is closed. Poses of different submaps are unrelated; after submaps were merged,
+  // `submap` of later frames may differ for the same place.
   Pose T_world_cam0, T_world_body;
-  Scale scale = Scale::kMetric;  // of the map then, and so the unit of length of all poses and velocities here
+  Scale scale = Scale::kMetric;  // of the map, and so the unit of length of all poses and velocities; if tracking
   int submap = -1;               // id of the first keyframe of the submap of these poses
   // Covariance of T_world_cam0, if known: of the small motion d, rotation first, in the axes of camera 0, with
   // T_world_cam0(true) = T_world_cam0 exp(d). Relative to the first keyframe of the submap, or to a loaded map: image
   // noise, the drift of the map and, if the calibration was estimated from the images, its remaining error, such as
-  // that of the scale of the baselines. A given calibration counts as exact.
+  // that of the scale of the baselines. A given calibration counts as exact. The standard deviations of the position of
+  // camera 0 along its own axes are the square roots of elements 21, 28 and 35. Nullopt in the first frame of a map.
   std::optional<Covariance6> covariance;
-  std::optional<Velocity> velocity;  // of the body frame, in its own axes; nullopt if unknown
+  // Of the body frame, in its own axes: the mean since the previous frame; nullopt if that has no pose.
+  std::optional<Velocity> velocity;
 
   // The odometry pose (the `odom` frame of ROS REP 105): continuous, since corrections of the map do not change it, and
   // constant while the rig is lost. For control and local planning. T_world_cam0 = T_map_odom * T_odom_cam0, where

@@ -26,22 +26,24 @@ class BSLAM_EXPORT MapView {
  public:
   struct Keyframe {
     int id = -1;               // unique within a run, also after removal
-    std::int64_t time_ns = 0;  // time of its frame
-    Pose T_world_cam0;         // in the world frame of its submap
-    int parent = -1;           // id of its parent in the submap's spanning tree; -1 for the root
-    int submap = -1;           // id of the root keyframe of its submap
+    std::int64_t time_ns = 0;  // of its frame, in the clock of the recording
+    // Pose of camera 0 of the rig that recorded it, in the world frame of its submap; metres if scale() is metric.
+    Pose T_world_cam0;
+    int parent = -1;  // id of its parent in the submap's spanning tree; -1 for the root
+    int submap = -1;  // id of the root keyframe of its submap
   };
   struct Landmark {
     int id = -1;
-    std::array<double, 3> position = {0, 0, 0};  // in the world frame of its submap
+    std::array<double, 3> position = {0, 0, 0};  // in the world frame of its submap; metres if scale() is metric
     int observations = 0;                        // number of keyframes that observe it
-    int submap = -1;
+    int submap = -1;                             // id of the root keyframe of its submap
   };
   struct CovisibilityEdge {
     int first = -1, second = -1;  // ids of keyframes, first < second
     int landmarks = 0;            // number of landmarks observed by both
   };
-  // A connected part of the map with its own world frame; no common place has linked it to another submap yet.
+  // A connected part of the map with its own world frame. No place that it shares with another submap has been
+  // recognised yet.
   struct Submap {
     int root = -1;  // id of its root keyframe, which identifies the submap
     std::size_t keyframes = 0;
@@ -50,8 +52,8 @@ class BSLAM_EXPORT MapView {
   MapView(const MapView& other) = default;  // a move copies as well, so that a MapView always has a map
   MapView& operator=(const MapView& other) = default;
 
-  // Loads a map saved by System::save_map or `bslam run --save-map`. Errors name file and section: a file that cannot
-  // be read, is not a map, is damaged, or has another format version.
+  // Loads a map saved by System::save_map or `bslam run --save-map`. Errors name the file, and the section of the
+  // format that is damaged: a file that cannot be read, is not a map, is damaged, or has another format version.
   static Result<MapView> load(const std::filesystem::path& file);
 
   int version() const;  // incremented by every change of the map; 0 for a loaded map
@@ -65,7 +67,8 @@ class BSLAM_EXPORT MapView {
 
   std::vector<Keyframe> keyframes() const;  // in order of id
   std::vector<Landmark> landmarks() const;  // in order of id
-  // Of each keyframe in order of id: the distinct visual words of its features, ascending. Empty in maps without words.
+  // One entry per keyframe in order of id: the distinct visual words of its keypoints, ascending. The entries are empty
+  // if the map was saved without words.
   std::vector<std::vector<std::int32_t>> words() const;
   // Returns the pairs of keyframes with at least `min_landmarks` common landmarks, in order of their ids.
   // `min_landmarks` must be 1 or more.

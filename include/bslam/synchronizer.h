@@ -35,14 +35,21 @@ struct DroppedImage {
 
 struct SyncOptions {
   double tolerance_s = 0.002;  // maximum time difference within a bundle; must be less than half an image interval
-  double max_wait_s = 0.1;     // maximum delay of a missing image relative to the time stamps of other images
-  double reorder_s = 0;        // maximum time difference between images of one camera that arrive out of order
-  double silent_after_s = 1;   // a camera without an image for this long is ignored until it delivers again
-  double max_ahead_s = 10;     // an image farther ahead of all others is dropped, unless further ones confirm its clock
+  // How long a bundle waits for a missing image, in time stamps of other images. It is checked when an image arrives,
+  // so the delay may be one image interval longer, and a bundle waits as long as no camera delivers.
+  double max_wait_s = 0.1;
+  double reorder_s = 0;       // maximum time difference between images of one camera that arrive out of order
+  double silent_after_s = 1;  // a camera without an image for this long is ignored until it delivers again
+  // An image that is farther ahead of all others than this, and than four intervals of its camera, is dropped unless
+  // the next two of the camera confirm its clock. One that is ahead by less makes all images up to its time too late.
+  // Clocks that go back are not followed: create a new Synchronizer then, and a new System.
+  double max_ahead_s = 1;
   // Maximum number of waiting images per camera; if it is exceeded, the oldest bundle is completed without its missing
   // images.
   std::size_t max_images = 32;
-  std::size_t max_bundles = 4;  // maximum number of bundles to be fetched; if exceeded, the oldest one is dropped
+  // Maximum number of bundles that wait to be fetched; if it is exceeded, the oldest one is dropped. Images pushed
+  // before another thread fetches bundles are therefore lost, although push() succeeds: see on_drop and counts().
+  std::size_t max_bundles = 4;
   // Called by the thread that calls push() or close(); optional. An exception that it throws is returned by the call as
   // an error, after all other images were reported.
   std::function<void(const DroppedImage&)> on_drop = {};
@@ -76,11 +83,13 @@ class BSLAM_EXPORT Synchronizer {
   static Result<Synchronizer> create(const Rig& rig, SyncOptions options = {});
   Synchronizer(Synchronizer&& other) noexcept;
   Synchronizer& operator=(Synchronizer&& other) noexcept;
+  // Ends calls of wait(), which return nullopt, and returns after them. No other call may be in progress or follow:
+  // close it and join the threads that use it first.
   ~Synchronizer();
 
-  // Adds an image of one camera. Its pixels are shared if it has an `owner`, otherwise copied. Errors: a camera index
-  // out of range, no data, a size that differs from the calibration, a stride smaller than the width, a time beyond
-  // +-4e18 ns, a call after close(); those
+  // Adds an image of one camera. Its pixels are shared if it has an `owner`, otherwise copied. Success does not mean
+  // that the image will be in a bundle, see DropReason. Errors: a camera index out of range, no data, a size that
+  // differs from the calibration, a stride smaller than the width, a time beyond +-4e18 ns, a call after close(); those
   // of on_drop, after which the image is taken all the same.
   Status push(std::size_t camera, const CameraImage& image);
 

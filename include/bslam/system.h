@@ -46,8 +46,8 @@ struct CameraEvent {
 // Functions that a System calls to report events. Each may be empty. They are called by the thread that calls process()
 // or finish() (or create(), see `log`), before that call returns; events of background threads are reported during the
 // next of these calls. A callback may read the map, but must not call process(), finish() or trajectory(), which return
-// an error then. An exception thrown by a callback is caught and returned as the error of the call; the System remains
-// usable.
+// an error then, and must not destroy the System. An exception thrown by a callback is caught and returned as the error
+// of the call, whose result is lost; the System remains usable.
 struct Callbacks {
   std::function<void(const KeyframeEvent&)> keyframe;
   std::function<void(const LoopEvent&)> loop;
@@ -70,7 +70,7 @@ struct Startup {
 
 // Owns the map and the threads. Only one thread at a time may call process(), finish() and trajectory(); a call during
 // another one returns an error. map(), save_map() and interrupt() may be called from any thread at any time. The
-// destructor stops background work.
+// destructor stops background work; no other call may be in progress then, and none may follow a move from the System.
 class BSLAM_EXPORT System {
  public:
   // Errors: inconsistent settings (localize_only without a map, calibration.refine=true without final_adjustment); a
@@ -84,8 +84,8 @@ class BSLAM_EXPORT System {
   // during the call, so the caller may reuse the memory afterwards. "Lost" is a result, not an error. Errors, which do
   // not change the state of the System: a number of images that differs from the number of cameras, no image, a size
   // that differs from the calibration, a stride smaller than the width, images more than a second apart, times that do
-  // not increase, a call after finish(). An error of a background thread ends the run and is returned by this and every
-  // later call.
+  // not increase, a call after finish(). An exception of a callback is returned after the frame was processed. An error
+  // of a background thread ends the run and is returned by this and every later call.
   Result<FrameResult> process(const ImageBundle& images);
 
   // Waits for background work and, unless `final_adjustment` is off, adjusts the whole map. Must be called once, after

@@ -1,4 +1,4 @@
-"""Functions that the program carries out: rendering and calibration of recordings take minutes and all cores."""
+"""Wrappers that run the program `bslam` as a child process, for rendering and calibration: minutes on all cores."""
 
 from __future__ import annotations
 
@@ -66,7 +66,8 @@ def simulate(
         back: turn around after half of the duration and return along the same path.
         exposure_ms: exposure time in milliseconds, which causes motion blur.
         noise: factor applied to the sensor noise.
-        faults: YAML or JSON list of faults of the cameras.
+        faults: YAML or JSON file with a list of {type, cameras, from, to}; type: black, frozen, over_exposed, blurred,
+            dropped, or delayed with delay_s.
         threads: number of threads; 0: one per core.
         overwrite: write into a folder that is not empty; an earlier recording in it is replaced.
 
@@ -122,8 +123,9 @@ def calibrate(
     """Estimates intrinsics and extrinsics from recordings of any scene, as `bslam rig calibrate` does.
 
     Args:
-        data: folder, bag or videos of a recording, or of several of the same rig.
-        rig: rough calibration to begin with; default: that of the first recording.
+        data: a recording, or a sequence of recordings of the same rig. Several bags or videos of one recording are
+            one string, joined by commas.
+        rig: rough calibration to begin with; default: the one in the recordings, which must be the same in all.
         out: rig file to write.
         model: begin with this camera model without distortion for all cameras; needs `fov`.
         fov: horizontal field of view in degrees; needs `model`.
@@ -135,15 +137,19 @@ def calibrate(
         end: end of the interval.
         settings: names and values, such as {"calibration.sigma_focal_percent": 5}.
         config: YAML file with settings.
-        rate: the time stamps are numbers of images that were taken at this rate, in Hz.
+        rate: frame rate in Hz; the time stamps in the files are then frame numbers.
         stamp_unit: unit of the time stamps; default: ns.
-        bayer: colour filter of raw images.
-        masks: folder with masks.
-        vignettes: folder with vignettes.
+        bayer: colour filter of raw images: rggb, bggr, grbg, gbrg or none; one, or one per camera joined by commas.
+        masks: folder with camN.png for all images of camera N, or camN/STAMP.png for one image; 0: ignored pixel.
+        vignettes: folder with camN.png, the image of an evenly lit surface.
         overwrite: replace `out` if it exists.
 
+    Returns:
+        The estimate, and a table of it as text.
+
     Raises:
-        Error: a recording that cannot be read, or from which nothing can be estimated.
+        Error: a recording that cannot be read, from which nothing can be estimated, or whose calibration differs
+            from that of the first one.
     """
     folders = [data] if isinstance(data, (str, os.PathLike)) else list(data)
     options = {

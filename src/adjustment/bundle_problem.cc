@@ -7,30 +7,22 @@
 namespace bslam::adjustment {
 namespace {
 
-constexpr int kAbsent = -1;
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-// Index of each keyframe among the poses, or kAbsent.
-std::vector<int> pose_positions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
-  std::vector<int> position(map.keyframe_slots(), kAbsent);
-  for (std::size_t i = 0; i < keyframes.size(); ++i) position[keyframes[i].index()] = static_cast<int>(i);
-  return position;
-}
-
-// Adds the observations of one landmark. Returns false if fewer than two keyframes of the problem observe it, since
-// such a landmark does not constrain the poses.
-bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& position,
+// Adds the observations of one landmark, unless fewer than two keyframes of the problem observe it: such a landmark
+// does not constrain the poses. `pose_index`: as index_by_keyframe.
+void add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& pose_index,
                   const feature::FeatureModel& features, BundleProblem& flat) {
   const auto observations = map.observations(id);
   const auto seen = std::count_if(observations.begin(), observations.end(),
-                                  [&](const map::Observation& o) { return position[o.keyframe.index()] != kAbsent; });
-  if (seen < 2) return false;
+                                  [&](const map::Observation& o) { return pose_index[o.keyframe.index()] >= 0; });
+  if (seen < 2) return;
   const int point = static_cast<int>(flat.landmarks.size());
   std::size_t reference = kNone;
   float min_sigma = std::numeric_limits<float>::infinity();  // among observations aligned to the reference patch
   for (const map::Observation& o : observations) {
-    const int pose = position[o.keyframe.index()];
-    if (pose == kAbsent) continue;
+    const int pose = pose_index[o.keyframe.index()];
+    if (pose < 0) continue;
     const frame::BundledFrame& frame = *map.keyframe(o.keyframe).frame;
     for (const frame::KeypointRef r : frame.bundled.keypoints(o.feature)) {
       const feature::Keypoints& keypoints = frame.keypoints(r.camera);
@@ -46,12 +38,12 @@ bool add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
       flat.sources.push_back({id, o.keyframe});
     }
   }
-  // The reference keypoint defines the landmark, so its detection error does not count as an error of the landmark.
+  // The reference keypoint defines the landmark, so its detection error is not an error of the observation. It gets the
+  // smallest sigma of the keypoints aligned to it, if that is smaller than its own.
   if (reference != kNone)
     flat.problem.observations[reference].sigma = std::min(flat.problem.observations[reference].sigma, min_sigma);
   flat.landmarks.push_back(id);
   flat.problem.points.push_back(map.landmark(id).position);
-  return true;
 }
 
 // Motion of the rig between each keyframe's time and the capture times of its images; empty if all images of all
@@ -80,6 +72,12 @@ std::vector<geometry::Vector6d> twists(const map::BundledMap& map, const std::ve
 
 }  // namespace
 
+std::vector<int> index_by_keyframe(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
+  std::vector<int> out(map.keyframe_slots(), -1);
+  for (std::size_t i = 0; i < keyframes.size(); ++i) out[keyframes[i].index()] = static_cast<int>(i);
+  return out;
+}
+
 BundleProblem build_problem(const map::BundledMap& map, const Selection& selection,
                             const feature::FeatureModel& features) {
   BundleProblem flat;
@@ -94,8 +92,8 @@ BundleProblem build_problem(const map::BundledMap& map, const Selection& selecti
   }
   flat.problem.motion = motions(map, flat.keyframes);
   flat.problem.twist = twists(map, flat.keyframes);
-  const std::vector<int> position = pose_positions(map, flat.keyframes);
-  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, position, features, flat);
+  const std::vector<int> pose_index = index_by_keyframe(map, flat.keyframes);
+  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, pose_index, features, flat);
   return flat;
 }
 

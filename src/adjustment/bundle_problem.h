@@ -32,6 +32,9 @@ struct BundleProblem {
   std::vector<ObservationSource> sources;  // per observation
 };
 
+// The index of each keyframe of the map in `keyframes`, by KeyframeId::index(); -1 for the others.
+std::vector<int> index_by_keyframe(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes);
+
 // Builds the problem. Landmarks observed by fewer than two of the keyframes are ignored. `features` determines the
 // standard deviation of a keypoint that is not aligned to its landmark's patch. The map must outlive the problem.
 BundleProblem build_problem(const map::BundledMap& map, const Selection& selection,

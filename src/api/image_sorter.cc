@@ -11,6 +11,7 @@ namespace {
 constexpr TimeNs kForever = std::numeric_limits<TimeNs>::max() / 2;
 constexpr std::size_t kRateIntervals =
     16;                                // number of intervals between images from which the rate of a camera is computed
+constexpr TimeNs kAheadIntervals = 4;  // number of intervals of its camera that an image may be ahead of all others
 constexpr int kClockChangeImages = 3;  // number of consecutive images far ahead after which the new clock is accepted
 
 // Returns the shortest interval between consecutive times, or 0 for fewer than two. Unlike the median it remains the
@@ -51,8 +52,10 @@ void ImageSorter::flush(std::vector<ImageBundle>& bundles, std::vector<DroppedIm
 }
 
 // A single time stamp of a broken clock must not make all other images late.
-bool ImageSorter::far_ahead(Camera& camera, TimeNs time_ns) const {
-  const bool ahead = newest_ns_ && time_ns - *newest_ns_ > max_ahead_;
+bool ImageSorter::far_ahead(std::size_t c, TimeNs time_ns) {
+  Camera& camera = cameras_[c];
+  const TimeNs bound = std::max(max_ahead_, kAheadIntervals * shortest_interval(recent_[c]));
+  const bool ahead = newest_ns_ && time_ns - *newest_ns_ > bound;
   camera.far_ahead = ahead ? camera.far_ahead + 1 : 0;
   return ahead && camera.far_ahead < kClockChangeImages;
 }
@@ -87,7 +90,7 @@ bool ImageSorter::accept(std::size_t c, TimeNs time_ns, const CameraImage& image
     return false;
   };
   if (std::ranges::binary_search(recent_[c], time_ns)) return drop(DropReason::kDuplicate);
-  if (far_ahead(camera, time_ns)) return drop(DropReason::kFarAhead);
+  if (far_ahead(c, time_ns)) return drop(DropReason::kFarAhead);
   update_times(c, time_ns);
   if (last_bundle_ns_ && in_phase(c, time_ns) <= *last_bundle_ns_) return drop(DropReason::kTooLate);
   if (camera.last_ns && time_ns <= *camera.last_ns)

@@ -39,7 +39,7 @@ class ImageSorter {
   };
 
   bool accept(std::size_t camera, TimeNs time_ns, const CameraImage& image, std::vector<DroppedImage>& dropped);
-  bool far_ahead(Camera& camera, TimeNs time_ns) const;
+  bool far_ahead(std::size_t camera, TimeNs time_ns);
   void update_times(std::size_t camera, TimeNs time_ns);
   void update_phases();
   TimeNs in_phase(std::size_t camera, TimeNs time_ns) const { return time_ns - phases_.later_ns[camera]; }

@@ -8,6 +8,7 @@
 #include "api/guard.h"
 #include "api/map_view_impl.h"
 #include "api/rig_impl.h"
+#include "map/rigs_of_map.h"
 #include "storage/map_file.h"
 
 namespace bslam {
@@ -20,6 +21,13 @@ std::vector<int> submap_by_keyframe(const map::BundledMap& map) {
     for (const KeyframeId k : map.keyframes_of_submap(root)) out[k.index()] = root.value();
   }
   return out;
+}
+
+// The camera of the map that is camera 0 of the rig that recorded a keyframe. `first_of_rig`: per camera of the map.
+std::size_t camera_0_of(const map::BundledKeyframe& keyframe, const std::vector<std::size_t>& first_of_rig) {
+  const auto& cameras = keyframe.frame->cameras;
+  const auto used = std::ranges::find_if(cameras, [](const auto& camera) { return !camera.keypoints.empty(); });
+  return used == cameras.end() ? 0 : first_of_rig[static_cast<std::size_t>(used - cameras.begin())];
 }
 
 }  // namespace
@@ -52,13 +60,14 @@ Rig MapView::rig() const { return api::make_rig(impl_->map->rig()); }
 std::vector<MapView::Keyframe> MapView::keyframes() const {
   const map::BundledMap& map = *impl_->map;
   const std::vector<int> submap = submap_by_keyframe(map);
+  const std::vector<std::size_t> first_of_rig = map::first_cameras_of_rigs(map);
   std::vector<Keyframe> out;
   out.reserve(map.num_keyframes());
   for (const KeyframeId k : map.keyframe_ids()) {
     const map::BundledKeyframe& keyframe = map.keyframe(k);
-    out.push_back({k.value(), keyframe.frame->time_ns,
-                   api::to_pose((map.rig().cam_from_rig(0) * keyframe.T_rig_world).inverse()), keyframe.parent.value(),
-                   submap[k.index()]});
+    const geometry::SE3& T_cam0_rig = map.rig().cam_from_rig(camera_0_of(keyframe, first_of_rig));
+    out.push_back({k.value(), keyframe.frame->time_ns, api::to_pose((T_cam0_rig * keyframe.T_rig_world).inverse()),
+                   keyframe.parent.value(), submap[k.index()]});
   }
   return out;
 }

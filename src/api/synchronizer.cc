@@ -72,15 +72,18 @@ struct Synchronizer::Impl {
   Status report(const std::vector<DroppedImage>& dropped, const char* name) const;
   void commit(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped, std::size_t limit);
   std::optional<ImageBundle> take();
+  std::optional<ImageBundle> wait();
+  void end();  // returns when no call of wait() is in progress
 
   const camera::Rig rig;
   const SyncOptions options;
   std::mutex mutex;
   std::condition_variable changed;
-  api::ImageSorter sorter;  // guarded by mutex, like the next three members
+  api::ImageSorter sorter;  // guarded by mutex, like the next four members
   std::deque<ImageBundle> ready;
   SyncCounts counts;
   bool closed = false;
+  int waiting_threads = 0;
 };
 
 // Adds complete bundles to `ready` and updates the counts. If `limit` is exceeded, the oldest bundles are discarded and
@@ -109,7 +112,7 @@ Status Synchronizer::Impl::push(std::size_t camera, const CameraImage& image) {
   std::vector<DroppedImage> dropped;
   {
     const std::lock_guard lock(mutex);
-    if (closed) return Error{"Synchronizer::push", "", "a call after close()", "no call after close()"};
+    if (closed) return Error{"Synchronizer::push", "", "an image after close()", "images before close() only"};
     ++counts.pushed[camera];
     std::vector<ImageBundle> bundles;
     sorter.push(camera, image.time_ns + rig.camera(camera).time_offset_ns, owned, bundles, dropped);
@@ -155,10 +158,34 @@ std::optional<ImageBundle> Synchronizer::Impl::take() {
   return bundle;
 }
 
+std::optional<ImageBundle> Synchronizer::Impl::wait() {
+  std::unique_lock lock(mutex);
+  ++waiting_threads;
+  changed.wait(lock, [&] { return closed || !ready.empty(); });
+  std::optional<ImageBundle> bundle = take();
+  --waiting_threads;
+  if (closed) changed.notify_all();  // with the mutex held: end() may destroy this afterwards
+  return bundle;
+}
+
+void Synchronizer::Impl::end() {
+  std::unique_lock lock(mutex);
+  closed = true;
+  changed.notify_all();
+  changed.wait(lock, [&] { return waiting_threads == 0; });
+}
+
 Synchronizer::Synchronizer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Synchronizer::Synchronizer(Synchronizer&& other) noexcept = default;
-Synchronizer& Synchronizer::operator=(Synchronizer&& other) noexcept = default;
-Synchronizer::~Synchronizer() = default;
+Synchronizer& Synchronizer::operator=(Synchronizer&& other) noexcept {
+  if (this == &other) return *this;
+  if (impl_) impl_->end();
+  impl_ = std::move(other.impl_);
+  return *this;
+}
+Synchronizer::~Synchronizer() {
+  if (impl_) impl_->end();
+}
 
 Result<Synchronizer> Synchronizer::create(const Rig& rig, SyncOptions options) {
   return api::guarded("Synchronizer::create", [&]() -> Result<Synchronizer> {
@@ -180,9 +207,7 @@ std::optional<ImageBundle> Synchronizer::pop() {
 
 std::optional<ImageBundle> Synchronizer::wait() {
   if (!impl_) return std::nullopt;
-  std::unique_lock lock(impl_->mutex);
-  impl_->changed.wait(lock, [&] { return impl_->closed || !impl_->ready.empty(); });
-  return impl_->take();
+  return impl_->wait();
 }
 
 Status Synchronizer::close() {

@@ -54,17 +54,11 @@ Candidate look_up(const map::BundledMap& map, LandmarkId landmark, const std::ve
   return out;
 }
 
-std::vector<int> positions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
-  std::vector<int> out(map.keyframe_slots(), -1);
-  for (std::size_t i = 0; i < keyframes.size(); ++i) out[keyframes[i].index()] = static_cast<int>(i);
-  return out;
-}
-
 // Segments and cameras alternate in choosing the landmark observed by the most keyframes; the result is in order of
 // id.
 std::vector<LandmarkId> choose_landmarks(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
                                          std::size_t limit) {
-  const std::vector<int> position = positions(map, keyframes);
+  const std::vector<int> position = adjustment::index_by_keyframe(map, keyframes);
   const std::size_t segments = (keyframes.size() + kSegment - 1) / kSegment, cameras = map.rig().size();
   // negated number of keyframes, so that sorting puts the largest first
   std::vector<std::vector<std::pair<int, LandmarkId>>> queues(segments * cameras);
@@ -98,7 +92,7 @@ std::vector<LandmarkId> choose_landmarks(const map::BundledMap& map, const std::
 // keyframe, the index of the first keyframe of its group.
 std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
                                 const std::vector<LandmarkId>& landmarks) {
-  const std::vector<int> position = positions(map, keyframes);
+  const std::vector<int> position = adjustment::index_by_keyframe(map, keyframes);
   const std::size_t n = keyframes.size();
   std::vector<int> shared(n * n, 0);
   std::vector<std::size_t> seen;

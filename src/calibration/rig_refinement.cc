@@ -20,11 +20,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kMillimetres = 1000.0, kMilliseconds = 1000.0;
-// maximum number of passes; each searches again for observations that the previous extrinsics rejected
+constexpr double kMillimetresPerMetre = 1000.0, kMillisecondsPerSecond = 1000.0;
+// Maximum number of adjustments. Before each one but the first, rejected observations are searched for again.
 constexpr int kPasses = 4;
-// A step that decreases the cost less changes what the passes and the verdict on times depend on by a fraction of its
-// deviation: squared errors of 10,000 observations by about one, which has the information of a tenth of that.
+// Relative decrease of the cost at which preliminary adjustments stop. The sum of squared errors of 10,000 observations
+// then changes by about one; since correlated observations count less, the parameters are within a fraction of a
+// standard deviation of the optimum, which does not change a decision.
 constexpr double kCoarseDecrease = 1e-4;
 constexpr int kQuickKeyframes = 40, kQuickLandmarks = 1000;  // enough for a verdict
 
@@ -35,7 +36,7 @@ CalibrationOptions quick(CalibrationOptions options) {
   return options;
 }
 
-// The options of an adjustment whose estimate is not used, but only what it says about the calibration.
+// Options of an adjustment from which only the verdict is used: coarser convergence, no effects on the poses.
 RigAdjustmentOptions for_verdict(RigAdjustmentOptions options) {
   options.relative_decrease = kCoarseDecrease;
   options.pose_effects = false;
@@ -74,9 +75,9 @@ void evaluate_extrinsics(const CameraEstimate& estimate, const CalibrationOption
   const Matrix3d rotation_covariance = estimate.covariance.topLeftCorner<3, 3>(),
                  translation_covariance = estimate.covariance.bottomRightCorner<3, 3>();
   out.change_deg = geometry::degrees(rotation.norm());
-  out.change_mm = translation.norm() * kMillimetres;
+  out.change_mm = translation.norm() * kMillimetresPerMetre;
   out.std_deg = geometry::degrees(largest_deviation(rotation_covariance));
-  out.std_mm = largest_deviation(translation_covariance) * kMillimetres;
+  out.std_mm = largest_deviation(translation_covariance) * kMillimetresPerMetre;
   out.rotation_sigmas = mahalanobis_distance(rotation, rotation_covariance);
   out.translation_sigmas = mahalanobis_distance(translation, translation_covariance);
   out.suspect = (out.rotation_sigmas > options.suspect_sigmas && out.change_deg > options.suspect_deg) ||
@@ -128,10 +129,10 @@ RigAdjustment adjust_in_passes(const map::BundledMap& map, const feature::Featur
   return out.done ? adjust_weighted(options, std::move(out), problem, stop) : out;
 }
 
-RigAdjustmentOptions prior_of(const camera::Rig& rig, const CalibrationOptions& options) {
+RigAdjustmentOptions prior_without_timing(const camera::Rig& rig, const CalibrationOptions& options) {
   RigAdjustmentOptions out{.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
                            .sigma_translation = translation_deviation(rig, options),
-                           .sigma_depth = options.sigma_depth_mm / kMillimetres,
+                           .sigma_depth = options.sigma_depth_mm / kMillimetresPerMetre,
                            .sigma_scale = 0.01 * options.sigma_scale_percent,
                            .sigma_aspect = 0.01 * options.sigma_aspect_percent,
                            .correlated_observations = options.correlated_observations};
@@ -143,7 +144,7 @@ RigAdjustmentOptions prior_of(const camera::Rig& rig, const CalibrationOptions& 
   return out;
 }
 
-// `rig` with the time offsets of the capture times of a map, and the frame of camera 0 as the rig frame.
+// `rig` with the time offsets that were applied to the images of the map, and the frame of camera 0 as the rig frame.
 camera::Rig with_time_offsets_of(const camera::Rig& of_map, const camera::Rig& rig) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
@@ -153,7 +154,7 @@ camera::Rig with_time_offsets_of(const camera::Rig& of_map, const camera::Rig& r
   return camera::Rig(std::move(cameras));
 }
 
-// The prior of all times, which refer to the capture times of the map.
+// Prior of the time offsets, relative to those applied to the images of the map, and of the readout times.
 std::vector<solver::TimingPrior> timing_prior(const camera::Rig& of_map, const camera::Rig& calibrated,
                                               const CalibrationOptions& options) {
   std::vector<solver::TimingPrior> out;
@@ -161,15 +162,15 @@ std::vector<solver::TimingPrior> timing_prior(const camera::Rig& of_map, const c
     const camera::Camera& camera = calibrated.camera(c);
     const double shift_s = to_seconds(camera.time_offset_ns - of_map.camera(c).time_offset_ns);
     out.push_back({{shift_s, camera.readout_s},
-                   c == 0 ? 0.0 : options.sigma_time_offset_ms / kMilliseconds,
-                   options.sigma_readout_ms / kMilliseconds});
+                   c == 0 ? 0.0 : options.sigma_time_offset_ms / kMillisecondsPerSecond,
+                   options.sigma_readout_ms / kMillisecondsPerSecond});
   }
   return out;
 }
 
-// Whether a time changed by more than its uncertainty and than what matters.
+// Returns true if a time changed by more than `suspect_sigmas` standard deviations and `suspect_ms`.
 bool significant(double change_s, double sigma_s, const CalibrationOptions& options) {
-  return std::abs(change_s) > std::max(options.suspect_sigmas * sigma_s, options.suspect_ms / kMilliseconds);
+  return std::abs(change_s) > std::max(options.suspect_sigmas * sigma_s, options.suspect_ms / kMillisecondsPerSecond);
 }
 
 // Estimates all times from a fraction of the map, and returns the prior of those that the images contradict; empty if
@@ -182,7 +183,7 @@ std::vector<solver::TimingPrior> contradicted_timing(const map::BundledMap& map,
   RigProblem problem = choose(map, true, quick(options), features);
   problem.flat.problem.rig = &reference;
   separate_groups(problem);
-  RigAdjustmentOptions with_timing = for_verdict(prior_of(reference, options));
+  RigAdjustmentOptions with_timing = for_verdict(prior_without_timing(reference, options));
   with_timing.timing = timing;
   const auto adjusted =
       adjust_rig(problem.flat.problem, with_timing, solver::RigValues::of(map.rig().in_frame_of_camera_0()), stop);
@@ -200,7 +201,7 @@ std::vector<solver::TimingPrior> contradicted_timing(const map::BundledMap& map,
 
 void evaluate_timing(const CameraEstimate& estimate, CameraRefinement& out) {
   const auto in_ms = [](double change_s, double sigma_s) {
-    return TimeRefinement{kMilliseconds * change_s, kMilliseconds * sigma_s, sigma_s > 0};
+    return TimeRefinement{kMillisecondsPerSecond * change_s, kMillisecondsPerSecond * sigma_s, sigma_s > 0};
   };
   out.time_offset = in_ms(estimate.timing_change.shift_s, estimate.timing_sigma.shift_s);
   out.readout = in_ms(estimate.timing_change.readout_s, estimate.timing_sigma.readout_s);
@@ -219,7 +220,7 @@ map::SetPoses poses_of(const adjustment::BundleProblem& flat) {
 }  // namespace
 
 double translation_deviation(const camera::Rig& rig, const CalibrationOptions& options) {
-  return std::hypot(options.sigma_translation_mm / kMillimetres,
+  return std::hypot(options.sigma_translation_mm / kMillimetresPerMetre,
                     0.01 * options.sigma_translation_percent * longest_baseline(rig));
 }
 
@@ -243,10 +244,10 @@ bool can_refine(const map::BundledMap& map) {
 }
 
 // The prior of all parameters that are estimated from the map.
-RigAdjustmentOptions prior_for(const map::BundledMap& map, const camera::Rig& calibrated,
-                               const CalibrationOptions& options, const feature::FeatureModel& features,
-                               const std::stop_token& stop) {
-  RigAdjustmentOptions prior = prior_of(calibrated, options);
+RigAdjustmentOptions prior_with_timing(const map::BundledMap& map, const camera::Rig& calibrated,
+                                       const CalibrationOptions& options, const feature::FeatureModel& features,
+                                       const std::stop_token& stop) {
+  RigAdjustmentOptions prior = prior_without_timing(calibrated, options);
   prior.timing = contradicted_timing(map, with_time_offsets_of(map.rig(), calibrated),
                                      timing_prior(map.rig(), calibrated, options), options, features, stop);
   return prior;
@@ -277,8 +278,8 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
   out.information = adjusted.information;
-  // Distances between keyframes that are longer than the rig tell how the calibration changes the scale; a rig that
-  // hardly moved only follows the scale of the baselines.
+  // If the path is longer than the longest baseline, the change of its length is the change of scale. Otherwise the
+  // scale is that of the baselines.
   out.scale_change = adjusted.scale_change;
   if (path_before > longest_baseline(calibrated)) {
     out.scale_change = path_length(problem) / path_before;
@@ -298,7 +299,7 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
 RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrated, const CalibrationOptions& options,
                          const feature::FeatureModel& features, std::stop_token stop) {
   if (!can_refine(map)) return {};
-  const auto prior = prior_for(map, calibrated, options, features, stop);
+  const auto prior = prior_with_timing(map, calibrated, options, features, stop);
   return refine_with_prior(map, calibrated, prior, options, features, stop);
 }
 
@@ -309,7 +310,7 @@ bool accepted(const RigRefinement& refinement, const CalibrationOptions& options
 
 namespace {
 
-// Whether an earlier estimate has replaced the calibration.
+// Whether an earlier estimate has replaced the calibration. An accepted estimate always changes extrinsics.
 bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated) {
   for (std::size_t c = 1; c < calibrated.size(); ++c) {
     if (of_map.body_from_cam(c).matrix() != calibrated.body_from_cam(c).matrix()) return true;
@@ -323,7 +324,7 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
                                                 const CalibrationOptions& options,
                                                 const feature::FeatureModel& features, const std::stop_token& stop) {
   if (options.refine == Refine::kFalse || !can_refine(map)) return std::nullopt;
-  const auto prior = prior_for(map, calibrated, options, features, stop);
+  const auto prior = prior_with_timing(map, calibrated, options, features, stop);
   if (options.refine == Refine::kAuto && !replaced(map.rig(), calibrated)) {
     const RigRefinement first = refine_with_prior(map, calibrated, for_verdict(prior), quick(options), features, stop);
     if (!accepted(first, options)) return std::nullopt;
@@ -338,6 +339,7 @@ void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::Map
                       T_old_new = T_new_old.inverse();
   const KeyframeId root = map.root_of(keyframe);
   const map::BundledKeyframe& before = map.keyframe(root);
+  // Replaces the uncertainty of the root by its displacement from the identity, and adds this change to the others.
   const geometry::Vector6d displacement = (before.T_rig_world * T_old_new).log();
   const geometry::PoseUncertainty added{displacement * displacement.transpose() - before.uncertainty.noise};
   map::SetPoses poses{.keyframes = {}, .landmarks = {}, .correction = true};
@@ -356,8 +358,9 @@ void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::Map
 
 namespace {
 
-// L with L L^T the covariance of the estimate, whose last column is the effect of the scale that was kept; null if the
-// covariance is singular.
+// Returns L, (n, n + 1) for the n unknowns of RigInformation: the first n columns are a square root of the covariance
+// of the estimate, the last one is the change of the camera translations that keep_scale() withheld. Returns null if
+// the information is not positive definite.
 std::shared_ptr<const Eigen::MatrixXd> deviation_of(const RigRefinement& refinement) {
   const Eigen::LLT<Eigen::MatrixXd> factor(refinement.information.information);
   if (factor.info() != Eigen::Success) return nullptr;

@@ -53,11 +53,11 @@ struct Keypoints {
   // of `pixel` as an observation of the point shown by the keypoint's reference patch. This patch depends on the
   // alignment of the keypoint:
   // - not aligned: its own patch; sigma is the detector's standard deviation;
-  // - aligned to the first keypoint of its matched feature (bundling): the patch of that keypoint; sigma is valid
-  // between
-  //   cameras of the frame;
+  // - aligned to the first keypoint of the same feature in another camera of the frame (frame/bundled.h): the patch of
+  //   that keypoint; sigma is valid between cameras of the frame;
   // - aligned to a landmark (tracking): the patch of the landmark's reference keypoint; sigma is valid for that
-  // landmark. For any other point the detector's standard deviation applies (FeatureModel::sigma).
+  //   landmark.
+  // For any other point the detector's standard deviation applies (FeatureModel::sigma).
   SharedArray<Eigen::Vector2f> pixel;
   SharedArray<Eigen::Vector3d> bearing;
   SharedArray<float> sigma;
@@ -66,7 +66,8 @@ struct Keypoints {
   SharedArray<Patch> patch;
 
   Keypoints() = default;
-  Keypoints(Detections&& detected);  // NOLINT(google-explicit-constructor): detections are not refined keypoints
+  Keypoints(
+      Detections&& detected);  // NOLINT(google-explicit-constructor): detections are keypoints that are not refined
 
   std::size_t size() const { return pixel.size(); }
   bool empty() const { return pixel.empty(); }

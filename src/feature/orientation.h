@@ -13,10 +13,12 @@ struct Moments {
   friend bool operator==(const Moments&, const Moments&) = default;
 };
 
+// Sums of x * grey and of y * grey, x and y in pixels of the level relative to the keypoint.
 Moments intensity_moments(const Window& window);
+// The same without SIMD. Both give identical results.
 Moments intensity_moments_scalar(const Window& window);
 
-// Angle of the centroid in radians, (-pi, pi], x towards y; 0 if there is none.
+// Angle of the centroid in radians, (-pi, pi], x towards y; 0 if both moments are zero.
 float orientation(const Moments& moments);
 
 }  // namespace bslam::feature

@@ -7,13 +7,14 @@
 
 namespace bslam::geometry {
 
-// The direction in the world that is vertical, if the rig stands or moves upright: the upward direction of camera 0's
-// images, unless another direction of the camera is clearly more constant over the poses. A unit vector.
+// The direction in the world that is vertical, if the rig stands or moves upright: the upward direction (-y) of the rig
+// frame, which is that of camera 0 as calibrated, unless another direction of the rig is clearly more constant over the
+// poses. A unit vector; (0, -1, 0) if there are no poses.
 Vector3d vertical_direction(std::span<const SE3> T_world_rig);
 
-// T_upright_world: a rotation into axes whose z points upward along vertical_direction and whose x is the horizontal
-// viewing direction of camera 0 in the first pose, or its right if it looks along the vertical. The identity of the
-// first image's axes (x right, y down, z forward) becomes x forward, y left, z up, as in ROS. The origin is kept.
+// T_upright_world: a rotation into axes whose z points upward along vertical_direction() and whose x is the horizontal
+// part of the z axis of the rig in the first pose (of its x axis if z is within 12 degrees of the vertical). For a
+// first camera that is level: x forward, y left, z up (ROS REP 103). The origin is kept.
 SE3 upright_axes(std::span<const SE3> T_world_rig);
 // The same with a given upward direction, a unit vector in the world.
 SE3 upright_axes(std::span<const SE3> T_world_rig, const Vector3d& up);

@@ -1,4 +1,4 @@
-// A fast decoder for the common kind of PNG (ISO/IEC 15948). Internal to this folder.
+// A fast decoder for 8-bit grey PNGs without interlacing (ISO/IEC 15948).
 #pragma once
 
 #include <optional>
@@ -12,8 +12,7 @@ namespace bslam::image_files {
 bool is_complete_png(std::string_view bytes);
 
 // Decodes an 8-bit grey PNG without interlacing at about twice the speed of libpng. `bytes` must have passed
-// is_complete_png. Returns nullopt for other kinds of PNG and for damaged data; the caller then uses the general
-// decoder.
+// is_complete_png. Returns nullopt for other kinds of PNG, sides above 20,000 px, and damaged data.
 std::optional<image::Image> decode_grey_png(std::string_view bytes);
 
 }  // namespace bslam::image_files

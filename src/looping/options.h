@@ -12,8 +12,8 @@ struct RecognitionOptions {
   // minimum number of common words of a candidate, relative to the largest number of any keyframe
   double min_common_word_ratio = 0.6;
   double min_group_score_ratio = 0.75;  // minimum score of a group, relative to the best group
-  // Factor on both fractions for frames without a pose prior, so that look-alike places become candidates too, even if
-  // fewer keyframes observe them.
+  // Factor on min_common_word_ratio and min_group_score_ratio for relocalisation, so that look-alike places become
+  // candidates too, even if fewer keyframes observe them.
   double relocalisation_factor = 0.25;
   int group = 10;                    // covisible keyframes whose scores are added up
   int min_neighbour_landmarks = 15;  // minimum number of landmarks shared with a neighbour
@@ -30,13 +30,15 @@ struct RecognitionOptions {
     visitor("min_group_score_ratio", self.min_group_score_ratio, Range{0, 1}, "",
             "minimum score of a candidate group, relative to the best group", OptionNote{.formerly = "group_share"});
     visitor("relocalisation_factor", self.relocalisation_factor, Range{0, 1}, "",
-            "factor on both fractions for frames without a pose prior", OptionNote{.formerly = "rival_share"});
+            "factor on min_common_word_ratio and min_group_score_ratio for frames without a pose prior",
+            OptionNote{.formerly = "rival_share"});
     visitor("group", self.group, Range{1, 100}, "", "covisible keyframes whose scores are added up");
     visitor("min_neighbour_landmarks", self.min_neighbour_landmarks, Range{1, 10000}, "",
-            "minimum number of landmarks shared with a neighbour; neighbours are not candidates",
+            "minimum number of landmarks shared with a neighbouring keyframe, which is not a candidate",
             OptionNote{.formerly = "neighbour_weight"});
     visitor("min_neighbour_ratio", self.min_neighbour_ratio, Range{0, 1}, "",
-            "the same as a fraction of all landmarks of the keyframe", OptionNote{.formerly = "neighbour_share"});
+            "minimum fraction of the keyframe's landmarks shared with a neighbour; both minima must be met",
+            OptionNote{.formerly = "neighbour_share"});
     visitor("max_candidates", self.max_candidates, Range{1, 100}, "", "maximum number of candidates to verify");
   }
 };
@@ -51,7 +53,8 @@ struct VerificationOptions {
   // Minimum fraction of the landmarks predicted visible that must be matched. Places that look partly alike match
   // fewer.
   double min_found_ratio = 0.2;
-  // rad: landmarks observed so far only from directions that differ by more than this need not be matched.
+  // rad: only landmarks whose mean viewing direction differs by at most this from the current one count as predicted
+  // visible. If these are fewer than min_inliers, the limit is 1.05 rad.
   double max_viewing_angle = 0.52;
   estimators::AbsolutePoseOptions consensus;
   solver::PoseSolverOptions pose;
@@ -69,7 +72,7 @@ struct VerificationOptions {
             "minimum fraction of the landmarks predicted visible that must be matched",
             OptionNote{.formerly = "min_found_share"});
     visitor("max_viewing_angle", self.max_viewing_angle, Range{0.01, 1.05}, "rad",
-            "largest angle to a known viewing direction at which a landmark is predicted visible",
+            "largest angle to the mean viewing direction at which a landmark is predicted visible",
             OptionNote{.formerly = "max_turn"});
     visitor.section("consensus", self.consensus);
     visitor.section("pose", self.pose);
@@ -78,19 +81,20 @@ struct VerificationOptions {
 
 struct LoopOptions {
   bool enabled = true;
-  int consistent_keyframes = 2;          // consecutive keyframes that must recognise the same place
-  int max_keyframe_gap = 3;              // largest id difference between two consecutive ones
+  int consistent_keyframes = 2;          // successive recognitions of the same place before a loop is accepted
+  int max_keyframe_gap = 3;              // largest difference of keyframe ids between two successive recognitions
   double min_new_landmark_ratio = 0.25;  // minimum fraction of matched landmarks not already observed by the keyframe
   // Maximum distance to the matched keyframe over the median distance to the matched landmarks; farther away is no
   // revisit.
   double max_distance_over_depth = 0.2;
-  // Maximum correction relative to the path length since the place was last seen; a larger one is a false match, not
-  // drift.
+  // Maximum translation of the correction, relative to the path length since the place was last seen plus the median
+  // depth of the scene; a larger one is a false match, not drift.
   double max_drift = 0.05;
-  double max_drift_free = 0.3;       // the same if the scale is not observable
-  double max_bundle_error_px = 4.0;  // reprojection error up to which bundle adjustment alone suffices
-  int edge_weight = 60;              // minimum number of shared landmarks for a covisibility edge of the pose graph
-  int window = 10;                   // covisible keyframes of the newest one that are fused with the place
+  double max_drift_free = 0.3;  // the same in maps whose scale is not metric
+  // In metric maps, loops with a smaller reprojection error are corrected without a pose graph.
+  double max_bundle_error_px = 4.0;
+  int edge_weight = 60;  // minimum number of shared landmarks for a covisibility edge of the pose graph
+  int window = 10;       // covisible keyframes of the newest one whose landmarks are fused with those of the place
   mapping::LandmarkFusionOptions fusion{.radius = 0.01, .max_hamming = 60, .max_chi2 = 16.0};
   solver::PoseGraphOptions pose_graph;
 
@@ -98,9 +102,9 @@ struct LoopOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("enabled", self.enabled, Range{}, "", "loop closing and merging of submaps", kCommon);
     visitor("consistent_keyframes", self.consistent_keyframes, Range{1, 100}, "",
-            "consecutive keyframes that must recognise the same place", kCommon);
+            "successive recognitions of the same place before a loop is accepted", kCommon);
     visitor("max_keyframe_gap", self.max_keyframe_gap, Range{1, 100}, "",
-            "largest id difference between two consecutive ones");
+            "largest difference of keyframe ids between two successive recognitions of a place");
     visitor("min_new_landmark_ratio", self.min_new_landmark_ratio, Range{0, 1}, "",
             "minimum fraction of matched landmarks not already observed by the keyframe",
             OptionNote{.formerly = "min_news"});
@@ -108,13 +112,15 @@ struct LoopOptions {
             "maximum distance to the matched keyframe over the median distance to the matched landmarks",
             OptionNote{.formerly = "max_apart"});
     visitor("max_drift", self.max_drift, Range{0, 10}, "",
-            "maximum correction relative to the path length since the place was last seen");
-    visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "the same if the scale is not observable");
+            "maximum correction relative to the path length since the place was last seen, plus the scene depth");
+    visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "the same in maps whose scale is not metric");
     visitor("max_bundle_error_px", self.max_bundle_error_px, Range{0, 1000}, "px",
-            "reprojection error up to which bundle adjustment alone suffices", OptionNote{.formerly = "near_px"});
+            "reprojection error up to which a loop of a metric map is corrected without a pose graph",
+            OptionNote{.formerly = "near_px"});
     visitor("edge_weight", self.edge_weight, Range{1, 10000}, "",
             "minimum number of shared landmarks for a covisibility edge of the pose graph");
-    visitor("window", self.window, Range{0, 100}, "", "covisible keyframes that are fused with the place");
+    visitor("window", self.window, Range{0, 100}, "",
+            "covisible keyframes of the newest one whose landmarks are fused with those of the place");
     visitor.section("fusion", self.fusion);
     visitor.section("pose_graph", self.pose_graph);
   }
@@ -123,7 +129,7 @@ struct LoopOptions {
 struct RecoveryOptions {
   // Number of frames with enough features but without a pose after which a new submap is started.
   int new_submap_after = 50;
-  // The same time in seconds, which matters if there are few frames per second; five frames at least.
+  // A new submap is also started after this time without a pose, in s, if there were at least five such frames.
   double new_submap_after_s = 5.0;
 
   template <class Self, class Visitor>
@@ -132,7 +138,8 @@ struct RecoveryOptions {
             "number of frames with features but without a pose after which a new submap is started",
             OptionNote{.common = true, .formerly = "new_part_after"});
     visitor("new_submap_after_s", self.new_submap_after_s, Range{0, 1e6}, "s",
-            "or after this time, if five such frames or more take longer", OptionNote{.common = true});
+            "a new submap is also started after this time without a pose, if there were five such frames",
+            OptionNote{.common = true});
   }
 };
 

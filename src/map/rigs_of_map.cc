@@ -141,6 +141,12 @@ std::vector<CameraIndex> find_or_append_rigs(BundledMap& map, const BundledMap& 
   return out;
 }
 
+std::vector<std::size_t> first_cameras_of_rigs(const BundledMap& map) {
+  std::vector<std::size_t> out;
+  for (const std::size_t size : sizes_of_rigs(map)) out.insert(out.end(), size, out.size());
+  return out;
+}
+
 camera::Rig with_cameras(const camera::Rig& whole, std::size_t first, const camera::Rig& part) {
   BSLAM_ASSERT(first + part.size() <= whole.size(), "the cameras must be part of the rig");
   if (part.size() == whole.size()) return part;

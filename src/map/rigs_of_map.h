@@ -24,6 +24,9 @@ std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig);
 // `other` that of `map`. The cameras of a keyframe keep their order.
 std::vector<CameraIndex> find_or_append_rigs(BundledMap& map, const BundledMap& other);
 
+// For each camera of the map, the first camera of its rig.
+std::vector<std::size_t> first_cameras_of_rigs(const BundledMap& map);
+
 // Returns `whole` with cameras `first`, `first` + 1, ... replaced by those of `part`, whose camera 0 takes the place of
 // camera `first`. If there are no other cameras, the result is `part`.
 camera::Rig with_cameras(const camera::Rig& whole, std::size_t first, const camera::Rig& part);

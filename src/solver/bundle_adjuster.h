@@ -40,17 +40,18 @@ struct ReprojectionProblem {
 struct BundleOptions {
   int iterations = 10;              // maximum number of steps, accepted or rejected
   double relative_decrease = 1e-4;  // converged if a step decreases the cost by a smaller fraction
-  bool robust = true;               // use a Huber kernel with the 95 % bound as threshold
+  bool robust = true;               // Huber kernel with the threshold chi-square 5.991 (95 %, two dof)
   int dense_poses = 150;            // maximum number of free poses for a dense reduced camera system
   std::vector<int> marginals = {};  // free poses whose uncertainty is computed
-  // Of the calibration, which is constant: L with the covariance L L^T, for the unknowns of RigInformation. Null:
-  // exact.
+  // A square root L, (n, any), of the covariance L L^T of the calibration, which the adjustment keeps constant. Rows:
+  // rotation (rad) and translation (m) of cameras 1 to N-1, then the intrinsics of all cameras. Null if it is exact.
   std::shared_ptr<const Eigen::MatrixXd> rig_deviation = {};
 };
 
 struct BundleSummary : LmSummary {
-  // One for each of BundleOptions::marginals, given the fixed poses, with all other poses and points marginalised out.
-  // The noise follows from the standard deviations of the observations. Nullopt if the pose has no observations that
+  // One for each of BundleOptions::marginals if usable() and any observation is used, otherwise empty: given the fixed
+  // poses, with all other poses and points marginalised out. PoseUncertainty::noise assumes the sigmas of the
+  // observations, without scaling by the residuals. Nullopt if the pose has no observations that
   // are used, or if the observations do not determine the poses.
   std::vector<std::optional<geometry::PoseUncertainty>> uncertainties;
 };

@@ -149,6 +149,7 @@ TEST(AppendMap, AppendsTheCamerasOfAnotherRig) {
   EXPECT_EQ(map.rig().camera(2).name, "cam2");
   EXPECT_EQ(find_rig(map, *rig), 0u);
   EXPECT_EQ(find_rig(map, *another), 2u);
+  EXPECT_EQ(first_cameras_of_rigs(map), (std::vector<std::size_t>{0, 0, 2, 2, 2}));
   expect_appended(map, KeyframeId(2), other, 2);
   EXPECT_EQ(map.landmark(ids.landmarks[0]).reference.keypoint.camera, CameraIndex(4));
 }
