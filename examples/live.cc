@@ -1,9 +1,8 @@
-// SLAM with live cameras: one thread per camera delivers images, and one thread runs SLAM and prints poses and the
-// states of the cameras. Here the cameras replay a data set in EuRoC layout at SPEED times its recorded rate. Usage:
-// live DATA [SPEED]
+// live DATA [SPEED]: SLAM with live cameras. One thread per camera delivers images, and the main thread runs SLAM and
+// prints poses and states of cameras. Here the cameras replay a data set in EuRoC layout at SPEED times its rate.
 #include <bslam/bslam.h>
 
-#include <chrono>
+#include <atomic>
 #include <iostream>
 #include <thread>
 
@@ -12,55 +11,47 @@
 int main(int argc, char** argv) {
   const std::string data = argc > 1 ? argv[1] : ".";
   const double speed = argc > 2 ? std::stod(argv[2]) : 1.0;
+  const auto failed = [](const auto& result) { return std::cerr << result.error().message() << '\n', 1; };
   const auto rig = bslam::Rig::load(data);
-  if (!rig) return std::cerr << rig.error().message() << '\n', 1;
+  if (!rig) return failed(rig);
 
   bslam::Startup startup;
-  startup.history_frames = 10000;  // poses of older frames are discarded
-  startup.callbacks.log = [](bslam::LogLevel, std::string_view line) { std::cerr << line << '\n'; };
+  startup.history_frames = 10000;                               // poses of older frames are discarded
   startup.callbacks.camera = [](const bslam::CameraEvent& e) {  // the states of all cameras are also in FrameResult
     std::cout << "camera " << e.camera << ": " << to_string(e.now.state) << ' ' << e.now.reason << '\n';
   };
   auto slam = bslam::System::create(*rig, bslam::Config(), startup);
-  if (!slam) return std::cerr << slam.error().message() << '\n', 1;
+  if (!slam) return failed(slam);
 
   bslam::SyncOptions options;
   options.on_drop = [](const bslam::DroppedImage& d) {
     std::cerr << "camera " << d.camera << ": " << d.time_ns << " dropped: " << to_string(d.reason) << '\n';
   };
   auto synchronizer = bslam::Synchronizer::create(*rig, options);
-  if (!synchronizer) return std::cerr << synchronizer.error().message() << '\n', 1;
-
+  if (!synchronizer) return failed(synchronizer);
+  std::atomic<std::size_t> delivering = rig->size();
   const auto replay = [&](std::size_t camera) {  // on a robot, the callback of the camera driver calls push()
-    const auto files = list_images(data, camera);
-    const auto start = std::chrono::steady_clock::now();
-    for (const auto& [time_ns, file] : files) {
-      const std::chrono::duration<double, std::nano> due(double(time_ns - files.begin()->first) / speed);
-      std::this_thread::sleep_until(start + std::chrono::duration_cast<std::chrono::nanoseconds>(due));
-      const bslam::CameraImage image = read_image(file, time_ns);
-      if (image.data != nullptr && !synchronizer->push(camera, image)) return;
-    }
+    play_images(data, camera, speed, [&](const bslam::CameraImage& image) {
+      if (const auto pushed = synchronizer->push(camera, image); !pushed) failed(pushed);
+    });
+    if (--delivering > 0) return;
+    if (const auto closed = synchronizer->close(); !closed) failed(closed);  // which ends the loop below
   };
   std::vector<std::thread> cameras;
   for (std::size_t c = 0; c < rig->size(); ++c) cameras.emplace_back(replay, c);
-  std::thread end([&] {
-    for (auto& camera : cameras) camera.join();
-    if (const auto closed = synchronizer->close(); !closed) std::cerr << closed.error().message() << '\n';
-  });
 
-  int frames = 0, tracked = 0;
+  int tracked = 0;
   while (const auto bundle = synchronizer->wait()) {
     const auto frame = slam->process(*bundle);
-    if (!frame) std::cerr << frame.error().message() << '\n';
+    if (!frame) failed(frame);
     if (frame && frame->frame % 10 == 0) {
-      const auto& t = frame->T_world_body.translation;  // metres; valid while tracking
+      const auto& t = frame->T_world_body.translation;  // metres, while tracking
       std::cout << to_string(frame->status) << ": " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
     }
-    frames += frame.ok();
     tracked += frame && frame->tracking();
   }
-  end.join();
+  for (std::thread& camera : cameras) camera.join();
   const auto finished = slam->finish();
-  std::cout << tracked << " of " << frames << " frames have a pose, " << slam->map().num_keyframes() << " keyframes\n";
+  std::cout << tracked << " frames with a pose, " << slam->map().num_keyframes() << " keyframes\n";
   return finished && tracked > 0 ? 0 : 1;
 }

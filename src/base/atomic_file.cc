@@ -101,7 +101,7 @@ Result<std::string> read_file(const std::filesystem::path& path, std::size_t max
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return system_error("open", path, "a file that can be read");
   if (!S_ISREG(status.st_mode))
-    return Error{path.string(), "", S_ISDIR(status.st_mode) ? "a folder" : "not a regular file", "a file"};
+    return Error{path.string(), "", S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe", "a file"};
   const Error too_large{path.string(), "", "more than " + std::to_string(max_bytes) + " bytes", "a smaller file"};
   if (static_cast<std::size_t>(status.st_size) > max_bytes) return too_large;
   std::string bytes(static_cast<std::size_t>(status.st_size) + 1,
