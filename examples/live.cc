@@ -16,8 +16,9 @@ int main(int argc, char** argv) {
   if (!rig) return failed(rig);
 
   bslam::Startup startup;
-  startup.history_frames = 10000;                               // poses of older frames are discarded
-  startup.callbacks.camera = [](const bslam::CameraEvent& e) {  // the states of all cameras are also in FrameResult
+  startup.history_frames = 10000;  // poses of older frames are discarded
+  // The states of all cameras are also in FrameResult.
+  startup.callbacks.camera = [](const bslam::CameraEvent& e) {
     std::cout << "camera " << e.camera << ": " << to_string(e.now.state) << ' ' << e.now.reason << '\n';
   };
   auto slam = bslam::System::create(*rig, bslam::Config(), startup);

@@ -54,8 +54,8 @@ void ImageSorter::flush(std::vector<ImageBundle>& bundles, std::vector<DroppedIm
 // A single time stamp of a broken clock must not make all other images late.
 bool ImageSorter::far_ahead(std::size_t c, TimeNs time_ns) {
   Camera& camera = cameras_[c];
-  const TimeNs bound = std::max(max_ahead_, kAheadIntervals * shortest_interval(recent_[c]));
-  const bool ahead = newest_ns_ && time_ns - *newest_ns_ > bound;
+  const TimeNs gap = newest_ns_ ? time_ns - *newest_ns_ : 0;
+  const bool ahead = gap > max_ahead_ && gap / kAheadIntervals > shortest_interval(recent_[c]);
   camera.far_ahead = ahead ? camera.far_ahead + 1 : 0;
   return ahead && camera.far_ahead < kClockChangeImages;
 }

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -22,10 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string slurp(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
+using support::read_text;
 
 TEST(MapPly, ContainsEveryLandmark) {
   ExportedMap map(synthetic::default_rig());
@@ -171,13 +167,13 @@ class MapExportFiles : public testing::Test {
 TEST_F(MapExportFiles, NamesAndColoursAreThoseOfTheImages) {
   const auto report = export_map(map_, request(Format::kColmap, "colmap"));
   ASSERT_TRUE(report) << report.error().message();
-  std::istringstream images(slurp(folder_.path() / "colmap/images.txt"));
+  std::istringstream images(read_text(folder_.path() / "colmap/images.txt"));
   std::size_t named = 0;
   for (std::string word; images >> word;)
     if (word.ends_with(".jpg")) named += fs::exists(root() / word);
   EXPECT_EQ(named, ImageTable(selection_, nullptr, {}).images().size());
   // The mean over the observations: red of those by the left camera, blue of those by the right one.
-  std::istringstream points(slurp(folder_.path() / "colmap/points3D.txt"));
+  std::istringstream points(read_text(folder_.path() / "colmap/points3D.txt"));
   std::size_t checked = 0;
   for (std::string line; std::getline(points, line);) {
     if (line.starts_with("#")) continue;
@@ -200,7 +196,7 @@ TEST_F(MapExportFiles, UndistortedImagesAndTheirCalibrationAreBesideTheModel) {
   undistort.undistort = true;
   const auto report = export_map(map_, undistort);
   ASSERT_TRUE(report) << report.error().message();
-  const auto json = nlohmann::json::parse(slurp(folder_.path() / "nerf/transforms.json"));
+  const auto json = nlohmann::json::parse(read_text(folder_.path() / "nerf/transforms.json"));
   for (const auto& frame : json["frames"]) {
     const cv::Mat image = cv::imread((folder_.path() / "nerf" / frame["file_path"].get<std::string>()).string());
     ASSERT_EQ(image.cols, frame["w"]);
@@ -215,7 +211,7 @@ TEST_F(MapExportFiles, UndistortedImagesAndTheirCalibrationAreBesideTheModel) {
 
 TEST_F(MapExportFiles, PathsOfNerfstudioLeadFromItsFolderToTheRecording) {
   ASSERT_TRUE(export_map(map_, request(Format::kNerfstudio, "nerf")));
-  const auto json = nlohmann::json::parse(slurp(folder_.path() / "nerf/transforms.json"));
+  const auto json = nlohmann::json::parse(read_text(folder_.path() / "nerf/transforms.json"));
   for (const auto& frame : json["frames"])
     EXPECT_TRUE(fs::exists(folder_.path() / "nerf" / frame["file_path"].get<std::string>())) << frame["file_path"];
 }
@@ -228,7 +224,7 @@ class StoredFiles : public image_files::ImageStore {
     return static_cast<std::int64_t>(files_.size() - 1);
   }
   Result<image_files::StoredImage> read(std::int64_t entry) const override {
-    image_files::StoredImage stored{slurp(files_.at(static_cast<std::size_t>(entry)))};
+    image_files::StoredImage stored{read_text(files_.at(static_cast<std::size_t>(entry)))};
     stored.size = stored.bytes.size();
     return stored;
   }
@@ -255,7 +251,7 @@ TEST_F(MapExportFiles, ImagesInsideOfARecordingGiveColoursAndUndistortedFiles) {
   ExportRequest undistort = request(Format::kColmap, "colmap");
   undistort.undistort = true;
   ASSERT_TRUE(export_map(map_, undistort));
-  std::istringstream images(slurp(folder_.path() / "colmap/images.txt"));
+  std::istringstream images(read_text(folder_.path() / "colmap/images.txt"));
   std::size_t named = 0;
   for (std::string word; images >> word;)
     if (word.ends_with(".png")) named += fs::exists(folder_.path() / "colmap/images" / word);

@@ -2,18 +2,14 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 namespace bslam::solver {
 namespace {
 
 using geometry::Matrix6d;
 using geometry::Vector6d;
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 TEST(ExtrinsicPrior, TranslationsAreLessCertainAlongTheOpticalAxes) {
-  const SE3 T_side_cam0(Eigen::AngleAxisd(120 * kDegree, Vector3d::Ones().normalized()).toRotationMatrix(),
+  const SE3 T_side_cam0(Eigen::AngleAxisd(geometry::radians(120), Vector3d::Ones().normalized()).toRotationMatrix(),
                         Vector3d(0.1, 0, 0));
   const ExtrinsicPrior prior{.T_cam_rig = {SE3(), SE3(Eigen::Matrix3d::Identity(), Vector3d(-0.1, 0, 0)), T_side_cam0},
                              .sigma_rotation = 0.1,

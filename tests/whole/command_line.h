@@ -6,14 +6,15 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
+#include <thread>
 
 #include "simulator/simulation_writer.h"
+#include "support/data_on_disk.h"
 #include "synthetic/rigs.h"
 
 namespace bslam {
@@ -26,11 +27,7 @@ struct Ran {
   std::string out, err;
 };
 
-inline std::string slurp(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
+using support::read_text;
 
 // Runs the program on a simulated recording of four cameras, 1.5 s at 10 Hz, in a folder of its own.
 class CommandLine : public testing::Test {
@@ -57,7 +54,7 @@ class CommandLine : public testing::Test {
     const std::string command =
         std::string(BSLAM_PROGRAM) + " " + arguments + " >" + out("stdout") + " 2>" + out("stderr");
     const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(out("stdout")), slurp(out("stderr"))};
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text(out("stdout")), read_text(out("stderr"))};
   }
 
   static void expect_rejected(const std::string& arguments) {
@@ -73,13 +70,30 @@ class CommandLine : public testing::Test {
     const Ran ran =
         run("run " + data() + " --out " + out(name) + " --set features.per_image=500 --progress never " + more);
     EXPECT_EQ(ran.status, 0) << more << ": " << ran.err;
-    return nlohmann::json::parse(slurp(out(name) + "/summary.json"), nullptr, false);
+    return nlohmann::json::parse(read_text(out(name) + "/summary.json"), nullptr, false);
+  }
+
+  // Runs the program, interrupts it as soon as ready() is true, and returns its exit status; -1 if it did not exit.
+  template <class Ready>
+  static int interrupted(const std::string& arguments, const Ready& ready) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const std::string command =
+          std::string("exec ") + BSLAM_PROGRAM + " " + arguments + " >/dev/null 2>" + out("stderr");
+      ::execl("/bin/sh", "/bin/sh", "-c", command.c_str(), static_cast<char*>(nullptr));
+      std::_Exit(127);
+    }
+    if (child < 0) return -1;
+    while (!ready() && ::waitpid(child, nullptr, WNOHANG) == 0) std::this_thread::yield();
+    ::kill(child, SIGINT);
+    int status = 0;
+    return ::waitpid(child, &status, 0) == child && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
   static void expect_same_trajectories(const std::string& a, const std::string& b) {
     for (const char* file : {"/trajectory.tum", "/trajectory_live.tum"}) {
-      EXPECT_GT(slurp(out(a) + file).size(), 1000u);
-      EXPECT_EQ(slurp(out(a) + file), slurp(out(b) + file)) << file;
+      EXPECT_GT(read_text(out(a) + file).size(), 1000u);
+      EXPECT_EQ(read_text(out(a) + file), read_text(out(b) + file)) << file;
     }
   }
 

@@ -1,8 +1,4 @@
 // The command-line program: live runs, and what they record.
-#include <csignal>
-#include <cstdlib>
-#include <thread>
-
 #include "whole/command_line.h"
 
 namespace bslam {
@@ -18,14 +14,14 @@ TEST_F(CommandLine, RecordedLiveRunIsRepeatedToTheByte) {
   const std::string file = out("live.mcap"), journal = out("live.journal");
   const Ran live = run(live_arguments(data()) + "--out " + out("live") + " --record " + file + " --journal " + journal);
   ASSERT_EQ(live.status, 0) << live.err;
-  EXPECT_EQ(nlohmann::json::parse(slurp(out("live/summary.json")))["complete"], true);
+  EXPECT_EQ(nlohmann::json::parse(read_text(out("live/summary.json")))["complete"], true);
   EXPECT_TRUE(fs::exists(out("live/report.html")));
   const Ran again =
       run("run " + file + " --out " + out("live_again") + " --replay " + journal + " --set features.per_image=500");
   ASSERT_EQ(again.status, 0) << again.err;
   expect_same_trajectories("live", "live_again");
   const auto seconds = [](const std::string& name) {
-    return nlohmann::json::parse(slurp(out(name + "/summary.json")))["parts"];
+    return nlohmann::json::parse(read_text(out(name + "/summary.json")))["parts"];
   };
   EXPECT_EQ(seconds("live"), seconds("live_again"));
 }
@@ -38,32 +34,21 @@ TEST_F(CommandLine, RecordedLiveRunWithoutCamera0HasTheSameFrameAgain) {
   ASSERT_TRUE(live.status == 0 || live.status == 3) << live.err;
   const Ran again = run("run " + file + options + out("live_second_again"));
   EXPECT_EQ(again.status, live.status) << again.err;
-  const std::string trajectory = slurp(out("live_second/trajectory.tum"));
+  const std::string trajectory = read_text(out("live_second/trajectory.tum"));
   EXPECT_EQ(trajectory.rfind("# bslam trajectory frame=cam1 ", 0), 0u) << trajectory;
-  EXPECT_EQ(slurp(out("live_second_again/trajectory.tum")), trajectory);
+  EXPECT_EQ(read_text(out("live_second_again/trajectory.tum")), trajectory);
 }
 
 TEST_F(CommandLine, CtrlCEndsALiveRunWithAllItsFiles) {
   const std::string file = out("ended.mcap"), folder = out("ended");
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    const std::string program = BSLAM_PROGRAM;
-    const std::string command = "exec " + program + " " + live_arguments(data()) + "--out " + folder + " --record " +
-                                file + " >/dev/null 2>" + out("stderr");
-    ::execl("/bin/sh", "/bin/sh", "-c", command.c_str(), static_cast<char*>(nullptr));
-    std::_Exit(127);
-  }
   // Frames are in the file after half a second of 1.5 s.
-  std::error_code error;
-  while (!(fs::file_size(file, error) > 50'000 && !error) && ::waitpid(child, nullptr, WNOHANG) == 0)
-    std::this_thread::yield();
-  ::kill(child, SIGINT);
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFEXITED(status)) << status;
-  EXPECT_EQ(WEXITSTATUS(status), 0) << slurp(out("stderr"));
-  const auto summary = nlohmann::json::parse(slurp(folder + "/summary.json"));
+  const auto recorded = [&] {
+    std::error_code error;
+    return fs::file_size(file, error) > 50'000 && !error;
+  };
+  EXPECT_EQ(interrupted(live_arguments(data()) + "--out " + folder + " --record " + file, recorded), 0)
+      << read_text(out("stderr"));
+  const auto summary = nlohmann::json::parse(read_text(folder + "/summary.json"));
   EXPECT_EQ(summary["complete"], true);
   EXPECT_GT(summary["frames"]["tracked"], 0);
   EXPECT_TRUE(fs::exists(folder + "/trajectory.tum"));

@@ -1,7 +1,4 @@
 // The command-line program: the files of runs, which are written completely or not at all.
-#include <csignal>
-#include <thread>
-
 #include "calibration/rig_warnings.h"
 #include "evaluation/trajectory_file.h"
 #include "rig_formats/rig_file.h"
@@ -18,20 +15,20 @@ TEST_F(CommandLine, RunWritesItsFilesAndIsRepeatableFromItsConfiguration) {
                            "run.svg", "report.html"}) {
     EXPECT_TRUE(fs::exists(folder_ / "first" / file)) << file;
   }
-  const auto summary = nlohmann::json::parse(slurp(folder_ / "first/summary.json"));
+  const auto summary = nlohmann::json::parse(read_text(folder_ / "first/summary.json"));
   EXPECT_EQ(summary["schema"], 1);
   EXPECT_EQ(summary["complete"], true);
   EXPECT_EQ(summary["frames"]["input"], 15);
   EXPECT_EQ(summary["frames"]["tracked"], 15);
   EXPECT_EQ(summary["map"]["scale"], "metric");
-  EXPECT_NE(slurp(folder_ / "first/trajectory.tum").find("# bslam trajectory frame=cam0 parent=world final=true\n"),
+  EXPECT_NE(read_text(folder_ / "first/trajectory.tum").find("# bslam trajectory frame=cam0 parent=world final=true\n"),
             std::string::npos);
 
   const Ran again =
       run("run " + data() + " --out " + out("again") + " --progress never --config " + out("first/config.yaml"));
   ASSERT_EQ(again.status, 0) << again.err;
-  EXPECT_EQ(slurp(folder_ / "first/trajectory.tum"), slurp(folder_ / "again/trajectory.tum"));
-  EXPECT_NE(slurp(folder_ / "first/report.html").find("--set features.per_image=700"), std::string::npos);
+  EXPECT_EQ(read_text(folder_ / "first/trajectory.tum"), read_text(folder_ / "again/trajectory.tum"));
+  EXPECT_NE(read_text(folder_ / "first/report.html").find("--set features.per_image=700"), std::string::npos);
   EXPECT_EQ(run("run " + data() + " --out " + out("again") + " --overwrite --no-report --end 0.3").status, 0);
   EXPECT_FALSE(fs::exists(folder_ / "again/report.html"));      // that of the earlier run is removed
   expect_rejected("run " + data() + " --out " + out("again"));  // exists already, and --overwrite is not given
@@ -71,11 +68,11 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
   }
   const std::string named = "map export " + out("saved.map") + " --images " + data() + " --out " + out("named");
   ASSERT_EQ(run(named).status, 0);
-  std::istringstream images(slurp(folder_ / "named/images.txt"));
+  std::istringstream images(read_text(folder_ / "named/images.txt"));
   std::size_t existing = 0;
   for (std::string word; images >> word;) existing += word.ends_with(".png") && fs::exists(data() + "/" + word);
   EXPECT_GE(existing, 2u);
-  const std::string poses = slurp(folder_ / "exported/keyframes.tum");
+  const std::string poses = read_text(folder_ / "exported/keyframes.tum");
   EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 1 + described["keyframes"].get<int>());
   expect_rejected("map export " + out("saved.map") + " --out " + out("exported"));
   EXPECT_EQ(run("map export " + out("saved.map") + " --overwrite --out " + out("exported")).status, 0);
@@ -108,7 +105,7 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
   expect_rejected(nav2 + out("wrong") + " --up sky");
   expect_rejected(path + " --up body:z --out " + out("wrong"));
   ASSERT_EQ(run(path + " --axes ros --up body:z --out " + out("upright.tum")).status, 0);
-  EXPECT_NE(slurp(out("upright.tum")).find("frame=cam0_ros parent=world_ros "), std::string::npos);
+  EXPECT_NE(read_text(out("upright.tum")).find("frame=cam0_ros parent=world_ros "), std::string::npos);
   expect_rejected("export " + out("upright.tum") + " --out " + out("wrong"));
   expect_rejected("export " + out("saved") + "/trajectory.tum --frame body --out " + out("wrong"));
 
@@ -126,7 +123,7 @@ TEST_F(CommandLine, SavedMapsCanBeDescribedExportedAndContinued) {
   const auto one_camera = summary_of("one_camera", "--cameras 0 --localize-only --load-map " + out("saved.map"));
   EXPECT_EQ(one_camera["frames"]["tracked"], 15);
   run("run " + data() + " --out " + out("second_rig") + " --cameras 2,3 --end 0.5 --load-map " + out("saved.map"));
-  EXPECT_NE(slurp(out("second_rig") + "/config.yaml").find("\n  refine: false"), std::string::npos);
+  EXPECT_NE(read_text(out("second_rig") + "/config.yaml").find("\n  refine: false"), std::string::npos);
   expect_rejected("run " + data() + " --out " + out("rejected") +
                   " --cameras 2,3 --set calibration.refine=true --load-map " + out("saved.map"));
 }
@@ -136,8 +133,9 @@ TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
   summary_of("second", "--cameras 1,0 --mode sequential");
   const std::string trajectory = out("second") + "/trajectory.tum", truth = data() + "/groundtruth_cam0.tum";
   const camera::Rig rig = rig_formats::read_rig(data() + "/rig.yaml").value();
-  EXPECT_NE(slurp(trajectory).find("# bslam trajectory frame=" + rig.camera(1u).name + " parent=world final=true\n"),
-            std::string::npos);
+  EXPECT_NE(
+      read_text(trajectory).find("# bslam trajectory frame=" + rig.camera(1u).name + " parent=world final=true\n"),
+      std::string::npos);
   const Ran without = run("eval " + trajectory + " " + truth + " --json");
   EXPECT_NE(without.err.find("contains poses of " + rig.camera(1u).name), std::string::npos) << without.err;
   const Ran with = run("eval " + trajectory + " " + truth + " --json --rig " + data());
@@ -150,9 +148,10 @@ TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
   EXPECT_LT(nlohmann::json::parse(same.out)["ate"]["max"], 1e-6) << same.err;
   const Ran other = run(body + out("other.tum") + " --camera 0");
   EXPECT_NE(other.err.find("but --camera 0 is "), std::string::npos) << other.err;
-  std::ofstream(out("scaled.tum")) << "# bslam trajectory frame=cam0 parent=world final=true\n"
-                                   << "# scale=up-to-scale: lengths are not in metres\n"
-                                   << slurp(truth);
+  support::write_text(out("scaled.tum"),
+                      "# bslam trajectory frame=cam0 parent=world final=true\n"
+                      "# scale=up-to-scale: lengths are not in metres\n" +
+                          read_text(truth));
   const Ran scaled = run("eval " + out("scaled.tum") + " " + truth);
   EXPECT_NE(scaled.err.find("use --align sim3"), std::string::npos) << scaled.err;
   EXPECT_EQ(run("eval " + out("scaled.tum") + " " + truth + " --align sim3").err, "");
@@ -161,8 +160,11 @@ TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
   evaluation::Trajectory quarter = evaluation::read_trajectory(truth).value();
   for (evaluation::TimedPose& pose : quarter)
     pose.T_world_frame = {pose.T_world_frame.rotation(), 0.25 * pose.T_world_frame.translation()};
-  std::ofstream(out("quarter.tum")) << evaluation::tum_text(
-      quarter, "# bslam trajectory frame=cam0 parent=world final=true\n# scale=up-to-scale: lengths are not in metres");
+  support::write_text(
+      out("quarter.tum"),
+      evaluation::tum_text(
+          quarter,
+          "# bslam trajectory frame=cam0 parent=world final=true\n# scale=up-to-scale: lengths are not in metres"));
   const Ran of_body = run("eval " + out("quarter.tum") + " " + out("true_body.tum") +
                           " --gt-frame body --align sim3 --json --rig " + data());
   EXPECT_NE(of_body.err.find("the ground truth was moved by 0."), std::string::npos) << of_body.err;
@@ -171,7 +173,8 @@ TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
   const std::string rig_and_out = " --rig " + data() + " --overwrite --out " + out("exported.tum");
   EXPECT_NE(run("export " + out("scaled.tum") + " --frame body" + rig_and_out).err.find("is not the metre"),
             std::string::npos);
-  EXPECT_NE(slurp(out("exported.tum")).find("\n# scale=up-to-scale: lengths are not in metres\n"), std::string::npos);
+  EXPECT_NE(read_text(out("exported.tum")).find("\n# scale=up-to-scale: lengths are not in metres\n"),
+            std::string::npos);
   ASSERT_EQ(run("export " + truth + " --camera 1 --frame cam0" + rig_and_out).status, 0);
   const Ran moved = run("eval " + out("exported.tum") + " " + truth + " --align none --json");
   EXPECT_GT(nlohmann::json::parse(moved.out)["ate"]["max"], 1e-3) << moved.err;
@@ -202,7 +205,7 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
       run("run " + data() + options + out("inverse.yaml") + " --out " + out("inverse") + " --save-map " + map);
   EXPECT_NE(inverse.err.find("warning: the images do not belong to the calibration"), std::string::npos) << inverse.err;
   EXPECT_NE(inverse.out.find("calibration: the images do not belong to it"), std::string::npos) << inverse.out;
-  const auto of_inverse = nlohmann::json::parse(slurp(out("inverse") + "/summary.json"));
+  const auto of_inverse = nlohmann::json::parse(read_text(out("inverse") + "/summary.json"));
   EXPECT_EQ(of_inverse["calibration"]["verdict"], "inconsistent");
   EXPECT_EQ(of_inverse["calibration"]["refined"], false);
   EXPECT_EQ(of_inverse["map"]["scale"], "unobservable");
@@ -238,7 +241,7 @@ TEST_F(CommandLine, ARunWarnsAboutAWrongCalibration) {
       << ran.err;
   const Ran right = run("run " + data() + options + data() + "/rig.yaml --out " + out("right"));
   EXPECT_EQ(right.err, "");
-  const auto of_right = nlohmann::json::parse(slurp(out("right") + "/summary.json"));
+  const auto of_right = nlohmann::json::parse(read_text(out("right") + "/summary.json"));
   EXPECT_EQ(of_right["map"]["scale"], "metric");
   EXPECT_TRUE(of_right["warnings"].empty());
   EXPECT_TRUE(of_right["calibration"]["pairs"].empty());
@@ -251,7 +254,7 @@ TEST_F(CommandLine, BenchReportsEverySequenceAndFailsIfOneFailed) {
   const Ran ran = run("bench " + root.string() + " --runs 5 --out " + out("bench") +
                       " --mode sequential --cameras 0,1 --set features.per_image=500");
   EXPECT_EQ(ran.status, 2) << ran.err;
-  const std::string report = slurp(out("bench") + "/report.md");
+  const std::string report = read_text(out("bench") + "/report.md");
   EXPECT_EQ(ran.out, report);
   EXPECT_NE(report.find("| broken | none: no errors | 5 | - | - | - | - | - / - | - | 5 of 5 runs failed: "),
             std::string::npos)
@@ -260,7 +263,7 @@ TEST_F(CommandLine, BenchReportsEverySequenceAndFailsIfOneFailed) {
   EXPECT_NE(report.find("| 15 of 15 |"), std::string::npos) << report;
   EXPECT_NE(report.find("deterministic: the first two runs are identical"), std::string::npos) << report;
   EXPECT_FALSE(fs::exists(out("bench") + "/tour/run3"));
-  EXPECT_NE(slurp(out("bench") + "/report.html").find("<td>tour</td>"), std::string::npos);
+  EXPECT_NE(read_text(out("bench") + "/report.html").find("<td>tour</td>"), std::string::npos);
   EXPECT_TRUE(fs::exists(out("bench") + "/tour/run2/trajectory.tum"));
 }
 
@@ -274,45 +277,23 @@ TEST_F(CommandLine, BenchRejectsAFolderWithoutSequences) {
 
 TEST_F(CommandLine, AnInterruptedBenchKeepsTheTableSoFar) {
   const std::string folder = out("bench_interrupted"), log = folder + "/data/run2/log.txt";
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    const std::string path = data();
-    std::freopen("/dev/null", "w", stdout);
-    ::execl(BSLAM_PROGRAM, BSLAM_PROGRAM, "bench", path.c_str(), "--out", folder.c_str(), "--runs", "1000", "--pace",
-            "realtime", static_cast<char*>(nullptr));
-    std::_Exit(127);
-  }
-  while (!fs::exists(log) && ::waitpid(child, nullptr, WNOHANG) == 0) std::this_thread::yield();
-  ::kill(child, SIGINT);
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFEXITED(status)) << status;
-  EXPECT_EQ(WEXITSTATUS(status), 130);
-  const std::string report = slurp(folder + "/report.md");
+  EXPECT_EQ(interrupted("bench " + data() + " --out " + folder + " --runs 1000 --pace realtime",
+                        [&] { return fs::exists(log); }),
+            130)
+      << read_text(out("stderr"));
+  const std::string report = read_text(folder + "/report.md");
   EXPECT_NE(report.find("Not complete"), std::string::npos) << report;
   EXPECT_NE(report.find("| data | 1 | "), std::string::npos) << report;
 }
 
 TEST_F(CommandLine, AnInterruptedRunWritesItsResultsAndReportsIt) {
   const std::string folder = out("interrupted");
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    const std::string path = data();
-    std::freopen("/dev/null", "w", stdout);
-    ::execl(BSLAM_PROGRAM, BSLAM_PROGRAM, "run", path.c_str(), "--out", folder.c_str(), "--pace", "realtime",
-            "--progress", "never", static_cast<char*>(nullptr));
-    std::_Exit(127);
-  }
   // The output folder is created before the first frame; at the recorded pace the run then takes 1.5 s.
-  while (!fs::exists(folder) && ::waitpid(child, nullptr, WNOHANG) == 0) std::this_thread::yield();
-  ::kill(child, SIGINT);
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFEXITED(status)) << status;
-  EXPECT_EQ(WEXITSTATUS(status), 130);
-  EXPECT_EQ(nlohmann::json::parse(slurp(folder + "/summary.json"))["complete"], false);
+  EXPECT_EQ(interrupted("run " + data() + " --out " + folder + " --pace realtime --progress never",
+                        [&] { return fs::exists(folder); }),
+            130)
+      << read_text(out("stderr"));
+  EXPECT_EQ(nlohmann::json::parse(read_text(folder + "/summary.json"))["complete"], false);
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ TEST_F(CommandLine, PrintedSettingsCanBeRead) {
   const Ran all = run("settings --set features.levels=5");
   EXPECT_EQ(all.status, 0);
   EXPECT_NE(all.out.find("levels: 5"), std::string::npos);
-  std::ofstream(out("settings.yaml")) << all.out;
+  support::write_text(out("settings.yaml"), all.out);
   EXPECT_EQ(run("settings --config " + out("settings.yaml")).out, all.out);
 }
 
@@ -121,11 +121,12 @@ TEST_F(CommandLine, ExplainsAPortAfterViewAndARigOfAnotherResolution) {
 // An interpreter that finds the packages, but no viewer, and fails after the run with a coloured message.
 TEST_F(CommandLine, TheTargetOfRerunIsCheckedBeforeTheRun) {
   const std::string interpreter = out("python"), file = out("run.rrd");
-  std::ofstream(interpreter) << "#!/bin/sh\ncase \"$2\" in\n*is_reachable*) exit 3 ;;\n"
-                             << "*main*) printf 'log\\n\\033[1;31mError\\033[0m: no room\\n'; exit 2 ;;\nesac\n";
+  support::write_text(interpreter,
+                      "#!/bin/sh\ncase \"$2\" in\n*is_reachable*) exit 3 ;;\n"
+                      "*main*) printf 'log\\n\\033[1;31mError\\033[0m: no room\\n'; exit 2 ;;\nesac\n");
   fs::permissions(interpreter, fs::perms::owner_all);
   ::setenv("BSLAM_PYTHON", interpreter.c_str(), 1);
-  std::ofstream(file) << "precious";
+  support::write_text(file, "precious");
   const std::string base = "run " + data() + " --end 0.3 --set features.per_image=300 --progress never --out ";
   for (const auto& [target, message] :
        {std::pair(file, "run.rrd: --rerun: found an existing file"),
@@ -134,7 +135,7 @@ TEST_F(CommandLine, TheTargetOfRerunIsCheckedBeforeTheRun) {
     expect_rejected(base + out("rejected") + " --rerun " + target);
     EXPECT_NE(run(base + out("rejected") + " --rerun " + target).err.find(message), std::string::npos) << target;
   }
-  EXPECT_EQ(slurp(file), "precious");
+  EXPECT_EQ(read_text(file), "precious");
   const Ran failed = run(base + out("shown") + " --overwrite --rerun " + file);
   ::unsetenv("BSLAM_PYTHON");
   EXPECT_EQ(failed.status, 2);
@@ -148,7 +149,7 @@ TEST_F(CommandLine, VocabulariesCanBeTrainedDescribedAndUsed) {
                             "/mav0/cam2/data --branching 6 --levels 3 --features 300 --progress never ";
   ASSERT_EQ(run(train + "--threads 1 --out " + out("one.bvoc")).status, 0);
   ASSERT_EQ(run(train + "--threads 2 --out " + out("two.bvoc")).status, 0);
-  EXPECT_EQ(slurp(out("one.bvoc")), slurp(out("two.bvoc")));
+  EXPECT_EQ(read_text(out("one.bvoc")), read_text(out("two.bvoc")));
   expect_rejected(train + "--out " + out("one.bvoc"));  // exists already, and --overwrite is not given
   const Ran info = run("vocab info " + out("one.bvoc"));
   EXPECT_NE(info.out.find("branching    6\nlevels       3\nwords        216\n"), std::string::npos) << info.out;
@@ -166,13 +167,13 @@ TEST_F(CommandLine, SimulateWritesAUsableRecording) {
   ASSERT_EQ(made.status, 0) << made.err;
   const Ran ran = run("run " + out("simulated") + " --out " + out("of_simulated") + " --progress never");
   ASSERT_EQ(ran.status, 0) << ran.err;
-  EXPECT_EQ(nlohmann::json::parse(slurp(out("of_simulated") + "/summary.json"))["frames"]["tracked"], 5);
+  EXPECT_EQ(nlohmann::json::parse(read_text(out("of_simulated") + "/summary.json"))["frames"]["tracked"], 5);
 }
 
 TEST_F(CommandLine, InspectWritesAConsistentBundledTable) {
   const Ran ran = run("inspect " + data() + " --frame 3 --out " + out("frame.json"));
   ASSERT_EQ(ran.status, 0) << ran.err;
-  const auto frame = nlohmann::json::parse(slurp(out("frame.json")));
+  const auto frame = nlohmann::json::parse(read_text(out("frame.json")));
   std::size_t keypoints = 0, seen = 0, matched = 0;
   for (const auto& camera : frame["cameras"]) keypoints += camera["keypoints"].size();
   for (const auto& feature : frame["features"]) {
