@@ -15,8 +15,8 @@ using solver::ReprojectionProblem;
 // over `keypoints` keypoints (Wilson-Hilferty approximation, scaled to be exact for one keypoint).
 double sum_bound(double bound, int keypoints) {
   const auto quantile = [](double degrees) {
-    const double v = 2.0 / (9.0 * degrees);
-    return degrees * std::pow(1.0 - v + 1.645 * std::sqrt(v), 3);
+    const double v = 2.0 / (9.0 * degrees), root = 1.0 - v + 1.645 * std::sqrt(v);
+    return degrees * root * root * root;
   };
   return bound * quantile(2.0 * keypoints) / quantile(2.0);
 }

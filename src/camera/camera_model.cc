@@ -11,37 +11,11 @@
 namespace bslam::camera {
 namespace {
 
-constexpr double kMinDepth = 1e-6;  // metres; points closer to the plane of a pinhole camera are not projected
-
-Vector2d to_pixel(const Intrinsics& k, const Vector2d& m) { return {k.fx * m.x() + k.cx, k.fy * m.y() + k.cy}; }
+using image_plane::kMinDepth;
+using image_plane::to_pixel;
 Vector2d from_pixel(const Intrinsics& k, const Vector2d& u) { return {(u.x() - k.cx) / k.fx, (u.y() - k.cy) / k.fy}; }
 
-// d (x/z, y/z) / d (x, y, z)
-Matrix23d plane_jacobian(const Vector3d& p) {
-  const double iz = 1.0 / p.z();
-  Matrix23d J;
-  J << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz;
-  return J;
-}
-
 }  // namespace
-
-std::optional<Vector2d> Pinhole::project(const Vector3d& point) const {
-  if (!(point.z() > kMinDepth)) return std::nullopt;
-  const Vector2d m = point.head<2>() / point.z();
-  if (!m.allFinite()) return std::nullopt;
-  return to_pixel(k_, m);
-}
-
-std::optional<Projection> Pinhole::project_with_jacobian(const Vector3d& point) const {
-  if (!(point.z() > kMinDepth)) return std::nullopt;
-  const Vector2d m = point.head<2>() / point.z();
-  if (!m.allFinite()) return std::nullopt;
-  Projection out{to_pixel(k_, m), plane_jacobian(point)};
-  out.jacobian.row(0) *= k_.fx;
-  out.jacobian.row(1) *= k_.fy;
-  return out;
-}
 
 std::optional<Vector3d> Pinhole::unproject(const Vector2d& pixel) const {
   if (!pixel.allFinite()) return std::nullopt;
@@ -69,30 +43,6 @@ PinholeRadTan::PinholeRadTan(const Intrinsics& k, const std::vector<double>& dis
   }
 }
 
-PinholeRadTan::Radial PinholeRadTan::radial(double r2) const {
-  const auto [k1, k2, p1, p2, k3, k4, k5, k6] = d_;
-  const double a = 1 + r2 * (k1 + r2 * (k2 + r2 * k3)), da = k1 + r2 * (2 * k2 + r2 * 3 * k3);
-  if (count_ < 8) return {a, da};
-  const double b = 1 + r2 * (k4 + r2 * (k5 + r2 * k6)), db = k4 + r2 * (2 * k5 + r2 * 3 * k6);
-  return {a / b, (da * b - a * db) / (b * b)};
-}
-
-Vector2d PinholeRadTan::distorted(const Vector2d& m, double r2, const Radial& radial) const {
-  const double x = m.x(), y = m.y(), f = radial.factor, p1 = d_[2], p2 = d_[3];
-  return {x * f + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * f + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
-}
-
-PinholeRadTan::Distorted PinholeRadTan::distort(const Vector2d& m) const {
-  const double x = m.x(), y = m.y(), r2 = m.squaredNorm(), p1 = d_[2], p2 = d_[3];
-  const Radial r = radial(r2);
-  const double f = r.factor, df = r.derivative;
-  Distorted out;
-  out.point = distorted(m, r2, r);
-  out.jacobian << f + 2 * x * x * df + 2 * p1 * y + 6 * p2 * x, 2 * x * y * df + 2 * p1 * x + 2 * p2 * y,
-      2 * x * y * df + 2 * p1 * x + 2 * p2 * y, f + 2 * y * y * df + 6 * p1 * y + 2 * p2 * x;
-  return out;
-}
-
 void PinholeRadTan::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const {
   const Vector2d m = point.head<2>() / point.z();
   const double x = m.x(), y = m.y(), r2 = m.squaredNorm();
@@ -105,25 +55,6 @@ void PinholeRadTan::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix
   if (count_ > 4) J.col(4) = r2 * r2 * numerator * m;
   if (count_ == 4 || count_ == 5) return;
   for (int i = 0; i < 3; ++i) J.col(5 + i) = std::pow(r2, i) * denominator * m;
-}
-
-std::optional<Vector2d> PinholeRadTan::project(const Vector3d& point) const {
-  if (!(point.z() > kMinDepth)) return std::nullopt;
-  const Vector2d m = point.head<2>() / point.z();
-  const double r2 = m.squaredNorm();
-  if (!(std::sqrt(r2) < max_radius_)) return std::nullopt;
-  return to_pixel(k_, distorted(m, r2, radial(r2)));
-}
-
-std::optional<Projection> PinholeRadTan::project_with_jacobian(const Vector3d& point) const {
-  if (!(point.z() > kMinDepth)) return std::nullopt;
-  const Vector2d m = point.head<2>() / point.z();
-  if (!(m.norm() < max_radius_)) return std::nullopt;
-  const Distorted d = distort(m);
-  Projection out{to_pixel(k_, d.point), d.jacobian * plane_jacobian(point)};
-  out.jacobian.row(0) *= k_.fx;
-  out.jacobian.row(1) *= k_.fy;
-  return out;
 }
 
 std::optional<Vector3d> PinholeRadTan::unproject(const Vector2d& pixel) const {

@@ -197,3 +197,5 @@ const Intrinsics& intrinsics(const CameraModel& model);
 std::vector<double> distortion(const CameraModel& model);
 
 }  // namespace bslam::camera
+
+#include "camera/pinhole_projection.h"

@@ -197,7 +197,7 @@ Status group(const DatasetRequest& request, const std::vector<std::vector<image_
       dataset.warnings.push_back(fmt::format(
           "{}: {} of {} images are not within {:g} ms of an image of {} and are in frames of their own "
           "(see io.sync_tolerance)",
-          name, grouping.beside_camera0[i], images[i].size(), 1e3 * request.sync_tolerance_s, camera0.name));
+          name, grouping.beside_camera0[i], images[i].size(), 1e3 * to_seconds(grouping.tolerance_ns), camera0.name));
     }
   }
   dataset.frames = std::move(grouping.frames);

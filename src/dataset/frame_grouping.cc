@@ -33,7 +33,7 @@ FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> 
     for (TimeNs& time_ns : times[c]) time_ns -= phases.later_ns[c];
   }
   image::FrameGroups groups = image::group_frames(times, phases.tolerance_ns);
-  FrameGrouping out{{}, std::move(groups.shared_with_camera0), std::vector<int>(images.size(), 0)};
+  FrameGrouping out{{}, std::move(groups.shared_with_camera0), std::vector<int>(images.size(), 0), phases.tolerance_ns};
   const TimeNs near_ns = image::median_interval(times[0]) / 4 * 3;
   for (const image::GroupedFrame& group : groups.frames) {
     FrameEntry& frame = out.frames.emplace_back(
@@ -68,7 +68,7 @@ bool set_time(FrameEntry& frame) {
 
 std::optional<FrameGrouping> recorded_frames(std::span<const std::vector<image_files::ImageFile>> images) {
   std::map<TimeNs, FrameEntry> frames;
-  FrameGrouping out{{}, std::vector<int>(images.size(), 0), std::vector<int>(images.size(), 0)};
+  FrameGrouping out{{}, std::vector<int>(images.size(), 0), std::vector<int>(images.size(), 0), 0};
   for (std::size_t c = 0; c < images.size(); ++c) {
     for (const image_files::ImageFile& image : images[c]) {
       if (!image.frame_ns) return std::nullopt;

@@ -16,12 +16,13 @@ struct FrameGrouping {
   // Per camera: number of images that are in no frame of camera 0 although camera 0 was capturing: one of its images is
   // less than 3/4 of its median interval away.
   std::vector<int> beside_camera0;
+  TimeNs tolerance_ns = 0;  // largest distance from an image of camera 0 at which an image joined its frame
 };
 
-// Groups images by the rule of image/frame_grouping.h: every image belongs to one frame. A camera that always captures
-// at about the same time between two images of camera 0 (image/capture_phase.h) is grouped as if it captured together
-// with it; its images keep their times, and the tolerance is at least a tenth of the period of camera 0. `images[i]`
-// are the images of camera i, strictly increasing in time. Camera 0 must have at least one.
+// Groups images by the rule of image/frame_grouping.h: every image belongs to one frame. A camera that captures at
+// about the same time relative to camera 0 (image/capture_phase.h) is grouped as if it captured together with it; its
+// images keep their times, and the tolerance is at least a tenth of the period of camera 0. `images[i]` are the images
+// of camera i, strictly increasing in time. Camera 0 must have at least one.
 FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> images, TimeNs tolerance_ns);
 
 // The frames in which the images were recorded (ImageFile::frame_ns). Returns nullopt if that of an image is unknown,

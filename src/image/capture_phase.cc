@@ -35,8 +35,8 @@ TimeNs wrapped(TimeNs time_ns, TimeNs period_ns) {
   return rest > period_ns - rest ? rest - period_ns : rest <= -(period_ns + rest) ? rest + period_ns : rest;
 }
 
-std::optional<TimeNs> capture_phase(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times,
-                                    TimeNs period_ns) {
+std::optional<CapturePhase> capture_phase(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times,
+                                          TimeNs period_ns) {
   std::vector<TimeNs> relative = offsets(camera0, times, period_ns);
   if (relative.size() < kMinImages || 2 * relative.size() < times.size()) return std::nullopt;
   const TimeNs first = relative.front();  // differences from it do not wrap around, unlike offsets near half a period
@@ -44,8 +44,8 @@ std::optional<TimeNs> capture_phase(const std::vector<TimeNs>& camera0, const st
   const TimeNs middle = median(relative);
   const auto agree = std::ranges::count_if(
       relative, [&](TimeNs offset) { return std::abs(wrapped(offset - middle, period_ns)) <= period_ns / 10; });
-  if (static_cast<double>(agree) < kMinShare * static_cast<double>(relative.size())) return 0;
-  return wrapped(first + middle, period_ns);
+  if (static_cast<double>(agree) < kMinShare * static_cast<double>(relative.size())) return CapturePhase{false, 0};
+  return CapturePhase{true, wrapped(first + middle, period_ns)};
 }
 
 CapturePhases capture_phases(std::span<const std::vector<TimeNs>> times, TimeNs tolerance_ns,
@@ -55,13 +55,13 @@ CapturePhases capture_phases(std::span<const std::vector<TimeNs>> times, TimeNs 
   const TimeNs period_ns = median_interval(times[0]);
   if (period_ns <= 0 || period_ns > kMaxPeriod) return out;
   for (std::size_t c = 1; c < times.size(); ++c) {
-    const std::optional<TimeNs> found = capture_phase(times[0], times[c], period_ns);
+    const std::optional<CapturePhase> found = capture_phase(times[0], times[c], period_ns);
     TimeNs& later_ns = out.later_ns[c];
-    if (found && std::abs(*found) <= tolerance_ns)
+    if (found && std::abs(found->later_ns) <= tolerance_ns)
       later_ns = 0;
-    else if (found && (later_ns == 0 || std::abs(wrapped(*found - later_ns, period_ns)) > period_ns / 10))
-      later_ns = *found;
-    if (later_ns != 0) out.tolerance_ns = std::max(tolerance_ns, period_ns / 10);
+    else if (found && (later_ns == 0 || std::abs(wrapped(found->later_ns - later_ns, period_ns)) > period_ns / 10))
+      later_ns = found->later_ns;
+    if (later_ns != 0 || (found && found->constant)) out.tolerance_ns = std::max(tolerance_ns, period_ns / 10);
   }
   return out;
 }

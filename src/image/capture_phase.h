@@ -9,13 +9,18 @@
 
 namespace bslam::image {
 
-// Returns how much later than camera 0 a camera captures, between minus and plus half a period of camera 0; 0 if there
-// is no constant time: at least 90 % of the images must be within a tenth of the period of it. Images are compared with
-// the nearest image of camera 0; where camera 0 has a gap, they are ignored. nullopt if fewer than 5 images, or less
-// than half of them, can be compared. `camera0` and `times` are the times of the images of both, strictly increasing;
-// `camera0` has at least one, and `period_ns`, its period, is positive.
-std::optional<TimeNs> capture_phase(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times,
-                                    TimeNs period_ns);
+struct CapturePhase {
+  // Whether at least 90 % of the images are within a tenth of the period of camera 0 of one time.
+  bool constant = false;
+  // How much later than camera 0 the camera captures, between minus and plus half a period; 0 if it is not constant.
+  TimeNs later_ns = 0;
+};
+
+// Images are compared with the nearest image of camera 0; where camera 0 has a gap, they are ignored. Returns nullopt
+// if fewer than 5 images, or less than half of them, can be compared. `camera0` and `times` are the times of the images
+// of both, strictly increasing; `camera0` has at least one, and `period_ns`, its period, is positive.
+std::optional<CapturePhase> capture_phase(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times,
+                                          TimeNs period_ns);
 
 // Returns `time_ns` plus the multiple of the positive period with which it is between minus and plus half a period.
 TimeNs wrapped(TimeNs time_ns, TimeNs period_ns);
@@ -25,7 +30,7 @@ TimeNs wrapped(TimeNs time_ns, TimeNs period_ns);
 struct CapturePhases {
   std::vector<TimeNs>
       later_ns;             // 0 for cameras that differ from camera 0 by at most the tolerance or by no constant time
-  TimeNs tolerance_ns = 0;  // at least a tenth of the period of camera 0 if one of them is not 0
+  TimeNs tolerance_ns = 0;  // at least a tenth of the period of camera 0 if the phase of any other camera is constant
 };
 
 // Returns the phases of cameras whose images have the times `times[i]`, strictly increasing. Those of camera 0 are at

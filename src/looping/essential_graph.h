@@ -4,14 +4,14 @@
 
 #include <vector>
 
+#include "looping/pose_graph.h"
 #include "map/bundled_map.h"
-#include "solver/pose_graph.h"
 
 namespace bslam::looping {
 
 struct EssentialGraph {
   std::vector<KeyframeId> keyframes;  // per vertex, in order of id
-  solver::PoseGraphProblem problem;   // initialised with the current poses; the root is fixed
+  PoseGraphProblem problem;           // initialised with the current poses; the root is fixed
 
   int vertex(KeyframeId k) const;  // returns -1 if k is not in the graph
 };

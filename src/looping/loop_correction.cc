@@ -270,7 +270,7 @@ bool close_loop(const LoopClosure& closure, const PlaceMatch& place_match, const
   add_loop_edges(before, draft.map(), window, closure, graph);
 
   const std::vector<Sim3> S_fused = graph.problem.S_world;
-  if (!solver::optimise(graph.problem, options.pose_graph).usable()) return false;
+  if (!optimise(graph.problem, options.pose_graph).usable()) return false;
   move_map(corrected(draft.map(), graph, S_fused), draft);
   return true;
 }

@@ -3,8 +3,8 @@
 
 #include "base/options.h"
 #include "estimators/absolute_pose.h"
+#include "looping/pose_graph.h"
 #include "mapping/landmark_fusion.h"
-#include "solver/pose_graph.h"
 
 namespace bslam::looping {
 
@@ -96,7 +96,7 @@ struct LoopOptions {
   int edge_weight = 60;  // minimum number of shared landmarks for a covisibility edge of the pose graph
   int window = 10;       // covisible keyframes of the newest one whose landmarks are fused with those of the place
   mapping::LandmarkFusionOptions fusion{.radius = 0.01, .max_hamming = 60, .max_chi2 = 16.0};
-  solver::PoseGraphOptions pose_graph;
+  PoseGraphOptions pose_graph;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

@@ -99,6 +99,8 @@ struct ScaleOptions {
   int min_keyframes = 6;  // minimum number before the map can become metric; outliers are hard to detect among few
   int rounds = 4;         // rounds of scale estimation and adjustment per keyframe while the scale changes
   double converged_change = 0.05;  // relative change of the scale below which no further round follows
+  double sigma_rotation_deg = 0.5;  // standard deviation of calibrated rotations, per axis
+  double correlated_observations = 10;  // number of observations with the information of one
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -112,6 +114,10 @@ struct ScaleOptions {
     visitor("rounds", self.rounds, Range{1, 20}, "", "rounds of scale estimation and adjustment per keyframe");
     visitor("converged_change", self.converged_change, Range{0, 1}, "",
             "relative change of the scale below which no further round follows", OptionNote{.formerly = "settled"});
+    visitor("sigma_rotation_deg", self.sigma_rotation_deg, Range{0, 20}, "deg",
+            "standard deviation of calibrated rotations, per axis");
+    visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
+            "number of observations with the information of one");
   }
 };
 

@@ -31,21 +31,41 @@ Eigen::VectorXd growth(const solver::ReprojectionProblem& problem, const solver:
 }
 
 struct ScaleStep {
-  double change = 0, information = 0;  // for the length of the extrinsics, with poses and points marginalised out
+  double change = 0, information = 0;  // for the length of the extrinsics, with all other unknowns marginalised out
 };
 
-// One Gauss-Newton step; a stiff term along `growth` holds the size of the map constant.
+// One Gauss-Newton step; a stiff term along `growth` holds the size of the map constant. The length of the extrinsics is
+// the first unknown of the rig.
 std::optional<ScaleStep> scale_step(solver::ReducedSystem& system, const Eigen::VectorXd& growth) {
-  const Eigen::Index frames = growth.size();
+  const Eigen::Index frames = growth.size(), rig = system.rig().rows();
   Eigen::MatrixXd S = Eigen::MatrixXd::Zero(frames, frames);
   system.frames().copy_to(S);
   S.selfadjointView<Eigen::Lower>().rankUpdate(growth, S.diagonal().maxCoeff());
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(S);
   if (factor.info() != Eigen::Success) return std::nullopt;
-  const Eigen::VectorXd border = system.border().col(0);
-  const double information = system.rig()(0, 0) - border.dot(factor.solve(border));
-  const double rhs = system.rhs()(frames) - border.dot(factor.solve(system.rhs().head(frames)));
-  return ScaleStep{rhs / information, information};
+  const Eigen::MatrixXd of_rig = system.rig().selfadjointView<Eigen::Lower>();
+  const Eigen::LLT<Eigen::MatrixXd> information(of_rig - system.border().transpose() * factor.solve(system.border()));
+  if (information.info() != Eigen::Success) return std::nullopt;
+  const Eigen::VectorXd rhs =
+      system.rhs().tail(rig) - system.border().transpose() * factor.solve(system.rhs().head(frames));
+  const double variance = information.solve(Eigen::VectorXd::Unit(rig, 0))(0);
+  return ScaleStep{information.solve(rhs)(0), 1.0 / variance};
+}
+
+// The length of all extrinsics and, unless they are exact, the rotations. With the translations' deviation only the
+// length changes.
+solver::RigBlocks unknowns_of(const solver::RigValues& calibrated, const RigScaleOptions& options) {
+  constexpr double kExactTranslation = 1e-6;  // metres
+  solver::RigBlocks blocks;
+  blocks.push_back(std::make_unique<solver::BaselineScaleBlock>());
+  if (options.sigma_rotation > 0) {
+    const double tighter = 1.0 / std::sqrt(options.correlated_observations);
+    blocks.push_back(std::make_unique<solver::ExtrinsicsBlock>(
+        solver::ExtrinsicPrior{.T_cam_rig = calibrated.T_cam_rig,
+                               .sigma_rotation = tighter * options.sigma_rotation,
+                               .sigma_translation = kExactTranslation}));
+  }
+  return blocks;
 }
 
 // Weighted mean squared error over its expectation for this number of unknowns. Returns nullopt if there are not more
@@ -65,14 +85,14 @@ std::optional<double> variance_factor(const std::vector<double>& chi2, std::size
 
 }  // namespace
 
-std::optional<RigScale> rig_scale(const solver::ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
-  const solver::BundleStructure structure = solver::make_structure(problem, skip);
+std::optional<RigScale> rig_scale(const solver::ReprojectionProblem& problem, const RigScaleOptions& options) {
+  const solver::BundleStructure structure = solver::make_structure(problem, std::span<const std::uint8_t>());
   const std::size_t slots = structure.pose_of_slot.size();
   if (structure.num_points() == 0 || slots == 0) return std::nullopt;
-  solver::RigBlocks blocks;
-  blocks.push_back(std::make_unique<solver::BaselineScaleBlock>());
+  solver::BundleState state = solver::state_of(problem);
+  const solver::RigBlocks blocks = unknowns_of(state.rig, options);
   solver::BundleEquations equations(problem, structure, blocks, solver::Kernel::kHuber, std::numeric_limits<int>::max(),
-                                    solver::state_of(problem));
+                                    std::move(state));
   equations.linearise();
   solver::ReducedSystem& system = equations.reduce(kDamping);
   const Eigen::VectorXd size = growth(problem, structure, system.frames());
@@ -83,7 +103,8 @@ std::optional<RigScale> rig_scale(const solver::ReprojectionProblem& problem, st
   const double length = 1.0 + step->change;
   const auto variance = variance_factor(equations.squared_errors(), 6 * slots + 3 * structure.num_points());
   if (!(length > 0.0) || !variance) return std::nullopt;
-  return RigScale{1.0 / length, std::sqrt(std::max(1.0, *variance) / step->information) / length};
+  const double inflation = options.correlated_observations * std::max(1.0, *variance);
+  return RigScale{1.0 / length, std::sqrt(inflation / step->information) / length};
 }
 
 }  // namespace bslam::mapping

@@ -48,7 +48,8 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   if (map.scale() != map::Scale::kUnobservable) return report;
   const adjustment::Selection selection = select_observers(map, keyframe, options.keyframes);
   const auto flat = adjustment::build_problem(map, selection, features);
-  const auto found = rig_scale(flat.problem);
+  const auto found = rig_scale(flat.problem, {.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
+                                              .correlated_observations = options.correlated_observations});
   if (!found) return report;
   report.observed = true;
   report.deviation = found->deviation;

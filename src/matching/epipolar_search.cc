@@ -15,9 +15,10 @@ using Eigen::Vector3d;
 constexpr double kMaxWindow = 0.25;  // rad around the baseline; wider windows occur near the epipole
 constexpr double kSamePlace = 4.0;   // standard deviations; closer keypoints are the same corner on two levels
 
-// A bearing relative to the baseline: angle around it, angle to it (at this camera), angular standard deviation.
+// A bearing relative to the baseline: angle around it, angle to it (at this camera) with its sine and cosine, angular
+// standard deviation.
 struct Polar {
-  double about = 0, from = 0, sigma = 0;
+  double about = 0, from = 0, sine = 0, cosine = 0, sigma = 0;
   std::uint32_t keypoint = 0;
 };
 
@@ -29,29 +30,44 @@ struct BaselineFrame {
   explicit BaselineFrame(const Vector3d& baseline) : e(baseline.normalized()), x(e.unitOrthogonal()), y(e.cross(x)) {}
 };
 
-double sigma_px(const EpipolarView& view, std::size_t k) {
-  return view.features == nullptr ? view.keypoints->sigma[k] : view.features->sigma(view.keypoints->level[k]);
-}
+// Standard deviations of the keypoints in radians.
+class AngularDeviation {
+ public:
+  explicit AngularDeviation(const EpipolarView& view)
+      : keypoints_(*view.keypoints), radians_per_px_(view.camera->radians_per_pixel()) {
+    if (view.features == nullptr || keypoints_.empty()) return;
+    const int coarsest = std::ranges::max(keypoints_.level);
+    for (int l = 0; l <= coarsest; ++l) of_level_.push_back(view.features->sigma(l) * radians_per_px_);
+  }
+  double operator()(std::size_t k) const {
+    return of_level_.empty() ? keypoints_.sigma[k] * radians_per_px_
+                             : of_level_[static_cast<std::size_t>(keypoints_.level[k])];
+  }
+
+ private:
+  const feature::Keypoints& keypoints_;
+  double radians_per_px_;
+  std::vector<double> of_level_;  // empty: each keypoint has its own
+};
 
 std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame) {
   std::vector<Polar> out;
   out.reserve(view.keypoints->size());
-  const double radians_per_px = view.camera->radians_per_pixel();
+  const AngularDeviation sigma(view);
   for (std::size_t k = 0; k < view.keypoints->size(); ++k) {
     if (!view.usable.empty() && !view.usable[k]) continue;
     const double pixel_y = static_cast<double>(view.keypoints->pixel[k].y());
     const Vector3d d =
         view.T_common_cam.rotation() * view.shutter.bearing_at_middle(view.keypoints->bearing[k], pixel_y);
-    const double u = d.dot(frame.x), v = d.dot(frame.y);
-    out.push_back({std::atan2(v, u), std::atan2(std::hypot(u, v), d.dot(frame.e)), sigma_px(view, k) * radians_per_px,
-                   static_cast<std::uint32_t>(k)});
+    const double u = d.dot(frame.x), v = d.dot(frame.y), sine = std::sqrt(u * u + v * v), cosine = d.dot(frame.e);
+    out.push_back({std::atan2(v, u), std::atan2(sine, cosine), sine, cosine, sigma(k), static_cast<std::uint32_t>(k)});
   }
   return out;
 }
 
-// Angle to the baseline at the second camera of a point at `distance` on the ray with angle `from` at the first camera.
-double angle_at_second(double from, double distance, double baseline) {
-  return std::atan2(distance * std::sin(from), distance * std::cos(from) - baseline);
+// Angle to the baseline at the second camera of a point at `distance` on the ray `p` of the first camera.
+double angle_at_second(const Polar& p, double distance, double baseline) {
+  return std::atan2(distance * p.sine, distance * p.cosine - baseline);
 }
 
 // Keypoints of b in order of their angle around the baseline. Those near +-pi are repeated at the other end, so that
@@ -86,11 +102,10 @@ struct Best {
 // The keypoint of b most similar to keypoint `p` of a, if it is clearly more similar than keypoints at other positions.
 std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const EpipolarView& b, const SortedView& sorted,
                                double baseline, const EpipolarOptions& options, std::vector<const Polar*>& candidates) {
-  const double sine = std::sin(p.from);
-  const double window = options.sigmas * both(p.sigma, sorted.max_sigma) / std::max(sine, 1e-9);
+  const double window = options.sigmas * both(p.sigma, sorted.max_sigma) / std::max(p.sine, 1e-9);
   if (!(window < kMaxWindow)) return std::nullopt;
-  const double nearest = angle_at_second(p.from, options.min_depth_m, baseline);
-  const double farthest = angle_at_second(p.from, options.max_depth_m, baseline);
+  const double nearest = angle_at_second(p, options.min_depth_m, baseline);
+  const double farthest = angle_at_second(p, options.max_depth_m, baseline);
   const feature::Descriptor& descriptor = a.keypoints->descriptor[p.keypoint];
   const int level = a.keypoints->level[p.keypoint];
   candidates.clear();
@@ -100,7 +115,7 @@ std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const Epip
                              [](const Polar& q, double value) { return q.about < value; });
   for (; it != sorted.polar.end() && it->about <= p.about + window; ++it) {
     const double slack = options.sigmas * both(p.sigma, it->sigma);
-    if (std::abs(it->about - p.about) * sine > slack) continue;
+    if (std::abs(it->about - p.about) * p.sine > slack) continue;
     if (it->from < farthest - slack || it->from > nearest + slack) continue;
     if (std::abs(b.keypoints->level[it->keypoint] - level) > options.max_level_difference) continue;
     candidates.push_back(&*it);

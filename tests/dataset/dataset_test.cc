@@ -370,6 +370,21 @@ TEST_F(SmallEuroc, ImagesAtVaryingTimesHaveFramesOfTheirOwn) {
   EXPECT_TRUE(together->warnings.empty());
 }
 
+// By up to 4 % of the interval, which is more than the tolerance.
+TEST_F(SmallEuroc, ImagesWithImpreciseTimesShareFrames) {
+  std::string list;
+  for (int k = 0; k < support::kSmallFrames; ++k) {
+    const TimeNs later_ns = support::kSmallInterval / 50 * (k % 5 - 2);
+    list += std::to_string(support::kSmallStart + k * support::kSmallInterval + later_ns) + "," +
+            support::small_image_name(k) + "\n";
+  }
+  support::write_text(camera(1) / "data.csv", list);
+  const auto data_set = open_dataset({.path = data(), .sync_tolerance_s = 0.001});
+  ASSERT_TRUE(data_set);
+  EXPECT_EQ(data_set->frames.size(), 1u * support::kSmallFrames);
+  EXPECT_TRUE(data_set->warnings.empty());
+}
+
 TEST_F(SmallEuroc, AlternatingCamerasShareFrames) {
   std::string list;
   for (int k = 0; k < support::kSmallFrames; ++k) {

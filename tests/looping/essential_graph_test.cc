@@ -60,7 +60,7 @@ TEST(EssentialGraph, HasZeroResidualsAtTheCurrentPosesAndFixesOnlyTheRoot) {
   EssentialGraph graph = essential_graph(map, KeyframeId(0), 60);
   for (std::size_t v = 0; v < graph.keyframes.size(); ++v)
     EXPECT_EQ(graph.problem.fixed[v] != 0, graph.keyframes[v] == KeyframeId(0));
-  const solver::LmSummary summary = solver::optimise(graph.problem, {});
+  const solver::LmSummary summary = optimise(graph.problem, {});
   EXPECT_LT(summary.initial_cost, 1e-12);
 }
 

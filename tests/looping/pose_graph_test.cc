@@ -1,4 +1,4 @@
-#include "solver/pose_graph.h"
+#include "looping/pose_graph.h"
 
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
@@ -10,12 +10,15 @@
 
 #include "solver/scene.h"
 
-namespace bslam::solver {
+namespace bslam::looping {
 namespace {
 
 using geometry::Quaterniond;
 using geometry::Sim3;
+using geometry::Vector3d;
 using geometry::Vector7d;
+using solver::LmStop;
+using solver::LmSummary;
 
 constexpr bool kScaleFree = true, kRigid = false;
 
@@ -87,7 +90,7 @@ TEST(PoseGraph, RecoversTruthFromExactEdges) {
     Circle circle = make_circle(60, 3, true, free_scale, 0.0, random);
     for (std::size_t i = 1; i < circle.truth.size(); ++i) {
       Vector7d off;
-      off << scene::random_twist(random, 0.3, 1.0), free_scale ? random.uniform(-0.3, 0.3) : 0.0;
+      off << solver::scene::random_twist(random, 0.3, 1.0), free_scale ? random.uniform(-0.3, 0.3) : 0.0;
       circle.problem.S_world[i] = circle.problem.S_world[i].perturbed(off);
     }
     const LmSummary summary = optimise(circle.problem, {});
@@ -341,7 +344,7 @@ TEST(PoseGraph, NeedsFewStepsFromAPoorInitialGraph) {
     Circle circle = make_circle(100, 3, true, free_scale, 1.0, random);
     for (std::size_t i = 1; i < 100; ++i) {
       Vector7d off;
-      off << scene::random_twist(random, 0.2, 0.5), free_scale ? random.uniform(-0.2, 0.2) : 0.0;
+      off << solver::scene::random_twist(random, 0.2, 0.5), free_scale ? random.uniform(-0.2, 0.2) : 0.0;
       circle.problem.S_world[i] = circle.problem.S_world[i].perturbed(off);
     }
     PoseGraphOptions options;
@@ -353,4 +356,4 @@ TEST(PoseGraph, NeedsFewStepsFromAPoorInitialGraph) {
 }
 
 }  // namespace
-}  // namespace bslam::solver
+}  // namespace bslam::looping

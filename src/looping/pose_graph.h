@@ -11,7 +11,7 @@
 #include "geometry/sim3.h"
 #include "solver/lm.h"
 
-namespace bslam::solver {
+namespace bslam::looping {
 
 struct PoseGraphProblem {
   struct Edge {
@@ -48,9 +48,10 @@ struct PoseGraphOptions {
   }
 };
 
-// Optimises the vertices in place by Levenberg-Marquardt; on LmStop::kFailed the problem is unchanged. In a connected
-// component without a fixed vertex the first vertex is fixed. The cost is half the sum of squared normalised errors. A
-// stop request ends the optimisation after the current step and keeps the improvement so far. Bitwise deterministic.
-LmSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop = {});
+// Optimises the vertices in place by Levenberg-Marquardt; on solver::LmStop::kFailed the problem is unchanged. In a
+// connected component without a fixed vertex the first vertex is fixed. The cost is half the sum of squared normalised
+// errors. A stop request ends the optimisation after the current step and keeps the improvement so far. Bitwise
+// deterministic.
+solver::LmSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop = {});
 
-}  // namespace bslam::solver
+}  // namespace bslam::looping

@@ -1,4 +1,4 @@
-#include "solver/pose_graph.h"
+#include "looping/pose_graph.h"
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include "base/assert.h"
 #include "solver/block_matrix.h"
 
-namespace bslam::solver {
+namespace bslam::looping {
 namespace {
 
 using geometry::Matrix3d;
@@ -65,9 +65,9 @@ std::vector<int> elimination_order(const PoseGraphProblem& problem) {
   return column;
 }
 
-BlockPattern pattern_of(const PoseGraphProblem& problem, const std::vector<int>& column) {
+solver::BlockPattern pattern_of(const PoseGraphProblem& problem, const std::vector<int>& column) {
   const auto count = std::count_if(column.begin(), column.end(), [](int c) { return c >= 0; });
-  BlockPattern pattern(static_cast<int>(count));
+  solver::BlockPattern pattern(static_cast<int>(count));
   for (int c = 0; c < pattern.size(); ++c) pattern.mark(c, c);
   for (const Edge& edge : problem.edges) {
     const auto [low, high] = std::minmax({column[at(edge.a)], column[at(edge.b)]});
@@ -199,8 +199,8 @@ class PoseGraphEquations {
   const PoseGraphProblem& problem_;
   Poses S_world_, trial_;
   std::vector<int> column_;  // per vertex, -1: constant
-  BlockPattern pattern_;
-  BlockMatrix H_;
+  solver::BlockPattern pattern_;
+  solver::BlockMatrix H_;
   Eigen::VectorXd rhs_;
   Vector inverse_sigma_;
   std::vector<Sim3> S_b_a_;  // per edge, the measurement's inverse
@@ -211,13 +211,14 @@ class PoseGraphEquations {
 
 // Gauss-Newton with damping after a failed step. Writes the result to the problem on success.
 template <int N>
-LmSummary optimise_with(PoseGraphProblem& problem, const PoseGraphOptions& options, const std::stop_token& stop) {
+solver::LmSummary optimise_with(PoseGraphProblem& problem, const PoseGraphOptions& options,
+                                const std::stop_token& stop) {
   PoseGraphEquations<N> equations(problem, options);
-  const LmSummary summary = minimise(equations,
-                                     {.iterations = options.iterations,
-                                      .relative_decrease = options.relative_decrease,
-                                      .rule = DampingRule::kOnFailure},
-                                     stop);
+  const solver::LmSummary summary = solver::minimise(equations,
+                                                     {.iterations = options.iterations,
+                                                      .relative_decrease = options.relative_decrease,
+                                                      .rule = solver::DampingRule::kOnFailure},
+                                                     stop);
   if (summary.usable()) problem.S_world = std::move(equations.S_world());
   return summary;
 }
@@ -238,9 +239,9 @@ void check(const PoseGraphProblem& problem) {
 
 }  // namespace
 
-LmSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop) {
+solver::LmSummary optimise(PoseGraphProblem& problem, const PoseGraphOptions& options, std::stop_token stop) {
   check(problem);
   return problem.free_scale ? optimise_with<7>(problem, options, stop) : optimise_with<6>(problem, options, stop);
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::looping
