@@ -98,8 +98,8 @@ struct ScaleOptions {
   int keyframes = 40;     // maximum number of keyframes used to estimate the scale
   int min_keyframes = 6;  // minimum number before the map can become metric; outliers are hard to detect among few
   int rounds = 4;         // rounds of scale estimation and adjustment per keyframe while the scale changes
-  double converged_change = 0.05;  // relative change of the scale below which no further round follows
-  double sigma_rotation_deg = 0.5;  // standard deviation of calibrated rotations, per axis
+  double converged_change = 0.05;       // relative change of the scale below which no further round follows
+  double sigma_rotation_deg = 0.5;      // standard deviation of calibrated rotations, per axis
   double correlated_observations = 10;  // number of observations with the information of one
 
   template <class Self, class Visitor>

@@ -34,8 +34,8 @@ struct ScaleStep {
   double change = 0, information = 0;  // for the length of the extrinsics, with all other unknowns marginalised out
 };
 
-// One Gauss-Newton step; a stiff term along `growth` holds the size of the map constant. The length of the extrinsics is
-// the first unknown of the rig.
+// One Gauss-Newton step; a stiff term along `growth` holds the size of the map constant. The length of the extrinsics
+// is the first unknown of the rig.
 std::optional<ScaleStep> scale_step(solver::ReducedSystem& system, const Eigen::VectorXd& growth) {
   const Eigen::Index frames = growth.size(), rig = system.rig().rows();
   Eigen::MatrixXd S = Eigen::MatrixXd::Zero(frames, frames);

@@ -24,8 +24,8 @@ struct RigScaleOptions {
 // One Gauss-Newton step over all free poses, all points and the length of the extrinsics in units of the map: T_cam_rig
 // = [R, t / scale]. The projection is linear in that length in homogeneous coordinates, so that one step suffices even
 // if the scale is far off. `problem` is in units of the map and is not changed. Exactly one pose should be fixed; more
-// would constrain the shape of the map and make the deviation too small. Returns nullopt if the scale is not observable:
-// all cameras at one position, no rotation, or an estimate that is not positive.
+// would constrain the shape of the map and make the deviation too small. Returns nullopt if the scale is not
+// observable: all cameras at one position, no rotation, or an estimate that is not positive.
 std::optional<RigScale> rig_scale(const solver::ReprojectionProblem& problem, const RigScaleOptions& options = {});
 
 }  // namespace bslam::mapping

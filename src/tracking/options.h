@@ -71,7 +71,7 @@ struct InitialisationOptions {
   int min_monocular = 80;             // minimum number of matches for a monocular initialisation
   int min_monocular_points = 50;      // minimum number of points of a monocular initialisation
   double assumed_median_depth = 3.0;  // m, assumed median distance of these points if the scale is too uncertain
-  double max_scale_deviation = 0.3;   // maximum relative standard deviation of the scale estimated from two frames
+  double max_scale_deviation = 1.0;   // maximum relative standard deviation of the scale estimated from two frames
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

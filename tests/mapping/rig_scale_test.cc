@@ -115,6 +115,35 @@ TEST(RigScale, EstimatesTheScaleOfAMapAdjustedWithAWrongOne) {
   }
 }
 
+// The rig with all cameras but the first turned by random angles.
+Rig turned(const Rig& rig, double sigma_rotation, Random& random) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const Vector3d angles =
+        c == 0 ? Vector3d::Zero().eval() : sigma_rotation * Vector3d(random.normal(), random.normal(), random.normal());
+    cameras.push_back({rig.camera(c), rig.body_from_cam(c) * SE3(geometry::so3_exp(angles), Vector3d::Zero())});
+  }
+  return Rig(std::move(cameras));
+}
+
+TEST(RigScale, ItsDeviationIncludesThatOfCalibratedRotations) {
+  constexpr int kSeeds = 25;
+  constexpr double kSigmaRotation = 0.005;
+  double squared_z = 0.0, squared_z_exact = 0.0;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed), "turned");
+    const auto motion = make_motion(0.05, random);
+    motion->rig = turned(motion->rig, kSigmaRotation, random);
+    const auto found = rig_scale(motion->problem, {.sigma_rotation = kSigmaRotation});
+    const auto exact = rig_scale(motion->problem);
+    ASSERT_TRUE(found && exact);
+    squared_z += std::pow((found->scale - 1.0) / found->deviation, 2);
+    squared_z_exact += std::pow((exact->scale - 1.0) / exact->deviation, 2);
+  }
+  EXPECT_LT(squared_z / kSeeds, 3.0);
+  EXPECT_GT(squared_z_exact / kSeeds, 9.0);
+}
+
 TEST(RigScale, IsNotObservableOnAStraightLine) {
   for (int seed = 0; seed < 10; ++seed) {
     Random random(static_cast<std::uint64_t>(seed), "straight");
