@@ -28,6 +28,14 @@ synthetic::FeatureSimulatorOptions room(std::uint64_t seed) {
   return options;
 }
 
+// Here the rotations of the cameras are exact and the errors of a landmark in successive images independent.
+MappingOptions independent_noise() {
+  MappingOptions options;
+  options.scale.sigma_rotation_deg = 0.0;
+  options.scale.correlated_observations = 1.0;
+  return options;
+}
+
 // Keyframes at their true poses, 0.25 s apart, in a map with unobservable scale whose length unit is 1 / `factor`
 // metres.
 SimulatedMap simulated_map(const synthetic::Trajectory& trajectory, const camera::Rig& rig, int keyframes,
@@ -65,9 +73,9 @@ TEST(ObserveScale, DeviationAgreesWithTheErrors) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     const SimulatedMap world = simulated_map(orbit(seed), three_sides(), 7, 1.0, seed);
     map::MapDraft draft = world.draft();
-    map_keyframe(KeyframeId(6), {}, kFeatures,
-                 draft);  // the adjustment moves the map from the truth to the optimum for the noisy pixels
-    const ScaleReport report = observe_scale(KeyframeId(6), {}, kFeatures, draft);
+    // The adjustment moves the map from the truth to the optimum for the noisy pixels.
+    map_keyframe(KeyframeId(6), independent_noise(), kFeatures, draft);
+    const ScaleReport report = observe_scale(KeyframeId(6), independent_noise().scale, kFeatures, draft);
     ASSERT_TRUE(report.observed);
     const double z = (length_ratio(world, draft.map()) - 1.0) / report.deviation;
     EXPECT_LT(std::abs(z), 4.0) << "seed " << seed << ": " << length_ratio(world, draft.map()) << " +- "
@@ -82,12 +90,12 @@ TEST(ObserveScale, ConvergesFromThreeTimesTooLargeOrTooSmall) {
   for (const double factor : {1.0 / 3.0, 3.0}) {
     const SimulatedMap world = simulated_map(orbit(1), three_sides(), 8, factor, 1);
     map::MapDraft draft = world.draft();
-    const MappingReport report = map_keyframe(KeyframeId(7), {}, kFeatures, draft);
+    const MappingReport report = map_keyframe(KeyframeId(7), independent_noise(), kFeatures, draft);
     EXPECT_TRUE(report.scale.observed);
     EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);  // a single measurement is not enough
     EXPECT_NEAR(length_ratio(world, draft.map()), 1.0, 0.05) << factor;
-    map_keyframe(KeyframeId(7), {}, kFeatures, draft);
-    map_keyframe(KeyframeId(7), {}, kFeatures, draft);
+    map_keyframe(KeyframeId(7), independent_noise(), kFeatures, draft);
+    map_keyframe(KeyframeId(7), independent_noise(), kFeatures, draft);
     EXPECT_EQ(draft.map().scale(), map::Scale::kMetric) << factor;
     EXPECT_LE(draft.map().scale_deviation(), 0.02);
     EXPECT_NEAR(length_ratio(world, draft.map()), 1.0, 3.5 * draft.map().scale_deviation()) << factor;
