@@ -9,8 +9,7 @@
 namespace bslam::camera {
 namespace {
 
-constexpr double kMinDepth = 1e-6;  // metres; points closer to the plane of the camera are not projected
-constexpr double kOnAxis = 1e-12;   // radii below this one have the limits on the optical axis
+constexpr double kOnAxis = 1e-12;  // radii below this one have the limits on the optical axis
 
 }  // namespace
 
@@ -23,11 +22,11 @@ double Fov::scale(double radius) const {
 }
 
 std::optional<Vector2d> Fov::project(const Vector3d& point) const {
-  if (!(point.z() > kMinDepth)) return std::nullopt;
+  if (!(point.z() > image_plane::kMinDepth)) return std::nullopt;
   const Vector2d m = point.head<2>() / point.z();
   if (!m.allFinite()) return std::nullopt;
   const Vector2d distorted = scale(m.norm()) * m;
-  return Vector2d(k_.fx * distorted.x() + k_.cx, k_.fy * distorted.y() + k_.cy);
+  return image_plane::to_pixel(k_, distorted);
 }
 
 std::optional<Projection> Fov::project_with_jacobian(const Vector3d& point) const {

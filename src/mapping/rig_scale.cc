@@ -52,8 +52,8 @@ std::optional<ScaleStep> scale_step(solver::ReducedSystem& system, const Eigen::
   return ScaleStep{information.solve(rhs)(0), 1.0 / variance};
 }
 
-// The length of all extrinsics and, unless they are exact, the rotations. With the translations' deviation only the
-// length changes.
+// The length of all extrinsics and, unless they are exact, their rotations. The directions of the translations are
+// constant.
 solver::RigBlocks unknowns_of(const solver::RigValues& calibrated, const RigScaleOptions& options) {
   constexpr double kExactTranslation = 1e-6;  // metres
   solver::RigBlocks blocks;
@@ -86,7 +86,7 @@ std::optional<double> variance_factor(const std::vector<double>& chi2, std::size
 }  // namespace
 
 std::optional<RigScale> rig_scale(const solver::ReprojectionProblem& problem, const RigScaleOptions& options) {
-  const solver::BundleStructure structure = solver::make_structure(problem, std::span<const std::uint8_t>());
+  const solver::BundleStructure structure = solver::make_structure(problem, {});
   const std::size_t slots = structure.pose_of_slot.size();
   if (structure.num_points() == 0 || slots == 0) return std::nullopt;
   solver::BundleState state = solver::state_of(problem);
