@@ -34,7 +34,9 @@ struct DroppedImage {
 };
 
 struct SyncOptions {
-  double tolerance_s = 0.002;  // maximum time difference within a bundle; must be less than half an image interval
+  // Maximum time difference within a bundle; must be less than half an image interval. If a camera always captures at
+  // the same time relative to camera 0, it is at least a tenth of the interval of camera 0.
+  double tolerance_s = 0.002;
   // How long a bundle waits for a missing image, in time stamps of other images. It is checked when an image arrives,
   // so the delay may be one image interval longer, and a bundle waits as long as no camera delivers.
   double max_wait_s = 0.1;
@@ -66,10 +68,11 @@ struct SyncCounts {
 // Images are grouped by the same rule as recorded data sets, and every image belongs to exactly one bundle. Each image
 // of camera 0 defines a bundle, to which the nearest image of every other camera within the tolerance belongs. The
 // remaining images form bundles among themselves: the earliest defines one, to which the images of other cameras within
-// the tolerance after it belong. A camera that always captures at the same time between two images of camera 0, such as
-// one of two cameras that take turns, is grouped as if it captured together with it, and the tolerance is at least a
-// tenth of the interval then: as soon as about five images of each have shown it, and again after the time has changed.
-// A recording shows it from its first image on.
+// the tolerance after it belong. A camera that always captures at the same time relative to camera 0, give or take a
+// tenth of the interval of camera 0, is grouped as if it captured together with it, also if that is between two images
+// of camera 0, as of two cameras that take turns; the tolerance is at least this tenth then. This holds as soon as
+// about five images of each have shown it, and again after the time has changed. A recording shows it from its first
+// image on.
 //
 // A bundle is ready when no missing image can be expected for it: each camera has delivered a later image, is not due
 // yet according to its rate, is silent, or max_wait_s has passed. All times are time stamps of images, never of the

@@ -33,7 +33,7 @@ ImageSorter::ImageSorter(std::size_t cameras, const SyncOptions& options)
       max_ahead_(from_seconds(options.max_ahead_s)),
       cameras_(cameras),
       recent_(cameras),
-      phases_{std::vector<TimeNs>(cameras, 0), tolerance_},
+      phases_{std::vector<image::CapturePhase>(cameras), tolerance_},
       anchor_(cameras) {}
 
 std::size_t ImageSorter::waiting() const {
@@ -72,11 +72,12 @@ void ImageSorter::update_times(std::size_t c, TimeNs time_ns) {
 // late because of them.
 void ImageSorter::update_phases() {
   if (recent_[0].empty()) return;
-  image::CapturePhases phases = image::capture_phases(recent_, tolerance_, phases_.later_ns);
-  if (phases.later_ns == phases_.later_ns && phases.tolerance_ns == phases_.tolerance_ns) return;
+  image::CapturePhases phases = image::capture_phases(recent_, tolerance_, phases_.cameras);
+  if (phases == phases_) return;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const std::vector<WaitingImage>& waiting = cameras_[c].waiting;
-    if (last_bundle_ns_ && !waiting.empty() && waiting[0].time_ns - phases.later_ns[c] <= *last_bundle_ns_) return;
+    if (last_bundle_ns_ && !waiting.empty() && waiting[0].time_ns - phases.cameras[c].later_ns <= *last_bundle_ns_)
+      return;
   }
   phases_ = std::move(phases);
   std::ranges::fill(anchor_, std::nullopt);  // which the former phases have made

@@ -42,7 +42,7 @@ class ImageSorter {
   bool far_ahead(std::size_t camera, TimeNs time_ns);
   void update_times(std::size_t camera, TimeNs time_ns);
   void update_phases();
-  TimeNs in_phase(std::size_t camera, TimeNs time_ns) const { return time_ns - phases_.later_ns[camera]; }
+  TimeNs in_phase(std::size_t camera, TimeNs time_ns) const { return time_ns - phases_.cameras[camera].later_ns; }
   TimeNs complete_until(std::size_t camera) const;
   bool is_complete(const image::GroupedFrame& frame) const;
   bool exceeds_limit() const;

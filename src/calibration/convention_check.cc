@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "estimators/epipolar.h"
@@ -203,8 +204,8 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
 namespace {
 
 struct View {
-  TimeNs time_ns = 0;
-  feature::Detections keypoints;  // empty without an image
+  std::optional<TimeNs> time_ns = {};  // nullopt without an image
+  feature::Detections keypoints;
 };
 
 // Keypoints by camera and frame.
@@ -235,9 +236,10 @@ std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<co
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
       std::vector<feature::Detections> of_i, of_j;
       for (std::size_t k = 0; k < views[i].size(); ++k) {
-        if (std::abs(views[i][k].time_ns - views[j][k].time_ns) > frame::kTogetherNs) continue;
-        of_i.push_back(views[i][k].keypoints);
-        of_j.push_back(views[j][k].keypoints);
+        const View &a = views[i][k], &b = views[j][k];
+        if (!a.time_ns || !b.time_ns || std::abs(*a.time_ns - *b.time_ns) > frame::kTogetherNs) continue;
+        of_i.push_back(a.keypoints);
+        of_j.push_back(b.keypoints);
       }
       evidence.push_back(judge_pair(rig, i, j, of_i, of_j));
     }

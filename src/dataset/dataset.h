@@ -32,7 +32,7 @@ struct DatasetRequest {
   std::vector<std::string> topics = {};  // of bags: image topics in the order of the cameras; empty: all, by name
   bool side_by_side = false;             // of a video: each of its images is those of two cameras
   std::vector<int> cameras = {};         // in this order; the first becomes camera 0; empty: all
-  double sync_tolerance_s = 0.002;       // largest time difference within a frame
+  double sync_tolerance_s = 0.002;       // largest time difference within a frame, see IoOptions
   std::optional<double> begin_s = {}, end_s = {};  // seconds from the first frame: begin <= t < end
   TimeStampOptions time_stamps = {};               // unit of the recorded time stamps
   // Colour filters of the cameras in use, in their order, or one for all; empty: none.

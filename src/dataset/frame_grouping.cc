@@ -30,7 +30,7 @@ FrameGrouping group_frames(std::span<const std::vector<image_files::ImageFile>> 
   }
   const image::CapturePhases phases = image::capture_phases(times, tolerance_ns);
   for (std::size_t c = 0; c < times.size(); ++c) {
-    for (TimeNs& time_ns : times[c]) time_ns -= phases.later_ns[c];
+    for (TimeNs& time_ns : times[c]) time_ns -= phases.cameras[c].later_ns;
   }
   image::FrameGroups groups = image::group_frames(times, phases.tolerance_ns);
   FrameGrouping out{{}, std::move(groups.shared_with_camera0), std::vector<int>(images.size(), 0), phases.tolerance_ns};

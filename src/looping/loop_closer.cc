@@ -106,7 +106,6 @@ LoopCloser::Found LoopCloser::find(KeyframeId keyframe, const map::BundledMap& m
     give_up(map, keyframe, candidate.keyframe, JoinStage::kNotVerified, attempts);
     auto place_match = verify(keyframe, map, candidate, attempts);
     if (!place_match) continue;
-    give_up(map, keyframe, candidate.keyframe, JoinStage::kNotPlausible, attempts);
     if (!is_revisit(map, keyframe, *place_match, options_.loop)) continue;
     if (auto closure = closure_at(keyframe, map, *std::move(place_match), attempts)) return closure;
   }

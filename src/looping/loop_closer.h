@@ -24,7 +24,7 @@ struct LoopClosure {
 };
 
 // How far keyframes have come in being recognised in other submaps, from the first stage to the last one.
-enum class JoinStage { kNoCandidate, kNotConsistent, kNotVerified, kNotPlausible, kAmbiguous };
+enum class JoinStage { kNoCandidate, kNotConsistent, kNotVerified, kAmbiguous };
 
 struct JoinAttempts {
   JoinStage farthest = JoinStage::kNoCandidate;  // of all keyframes that were not joined

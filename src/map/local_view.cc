@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <utility>
 
 #include "base/id_set.h"
 
@@ -24,9 +23,7 @@ std::vector<LandmarkId> each_once(std::span<const LandmarkId> ids) {
 std::vector<Covisible> observers(const BundledMap& map, std::span<const LandmarkId> landmarks) {
   std::vector<int> count(map.keyframe_slots(), 0);
   for (const LandmarkId l : landmarks) {
-    KeyframeId last;  // several features of a keyframe may observe a landmark
-    for (const Observation& o : map.observations(l))
-      count[o.keyframe.index()] += std::exchange(last, o.keyframe) != o.keyframe;
+    for (const Observation& o : map.observations(l)) ++count[o.keyframe.index()];
   }
   std::vector<Covisible> out;
   for (std::size_t k = 0; k < count.size(); ++k) {

@@ -93,7 +93,7 @@ struct LocalWindowOptions {
 // Estimation of the metric scale for rigs whose cameras do not overlap.
 struct ScaleOptions {
   double max_deviation = 0.02;  // relative standard deviation below which the map becomes metric
-  // Relative standard deviation above which the measured scale is no better than the initial one.
+  // Relative standard deviation above which the map is not rescaled.
   double max_correcting_deviation = 0.3;
   int keyframes = 40;     // maximum number of keyframes used to estimate the scale
   int min_keyframes = 6;  // minimum number before the map can become metric; outliers are hard to detect among few

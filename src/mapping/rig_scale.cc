@@ -53,44 +53,50 @@ std::optional<ScaleStep> scale_step(solver::ReducedSystem& system, const Eigen::
 }
 
 // The length of all extrinsics and, unless they are exact, their rotations. The directions of the translations are
-// constant.
-solver::RigBlocks unknowns_of(const solver::RigValues& calibrated, const RigScaleOptions& options) {
+// constant. `inflation`: number of observations with the information that the equations give to one.
+solver::RigBlocks unknowns_of(const solver::RigValues& calibrated, double sigma_rotation, double inflation) {
   constexpr double kExactTranslation = 1e-6;  // metres
   solver::RigBlocks blocks;
   blocks.push_back(std::make_unique<solver::BaselineScaleBlock>());
-  if (options.sigma_rotation > 0) {
-    const double tighter = 1.0 / std::sqrt(options.correlated_observations);
+  if (sigma_rotation > 0) {
     blocks.push_back(std::make_unique<solver::ExtrinsicsBlock>(
         solver::ExtrinsicPrior{.T_cam_rig = calibrated.T_cam_rig,
-                               .sigma_rotation = tighter * options.sigma_rotation,
+                               .sigma_rotation = sigma_rotation / std::sqrt(inflation),
                                .sigma_translation = kExactTranslation}));
   }
   return blocks;
 }
 
-// Weighted mean squared error over its expectation for this number of unknowns. Returns nullopt if there are not more
-// observations than unknowns.
-std::optional<double> variance_factor(const std::vector<double>& chi2, std::size_t unknowns) {
-  double sum = 0.0, count = 0.0;
-  for (const double error : chi2) {
-    if (!(error < solver::kMaxChi2)) continue;
-    const double weight = solver::kernel_weight(solver::Kernel::kHuber, error);
-    sum += weight * error;
-    count += weight;
+// Weighted sum of squared errors over its expectation, at least 1. Returns nullopt if there are not more observations
+// than unknowns.
+std::optional<double> variance_factor(const solver::BundleStructure& structure, const std::vector<double>& chi2,
+                                      const solver::ReprojectionProblem& problem) {
+  std::vector<std::uint8_t> used(problem.points.size(), 0);
+  for (std::size_t i = 0; i < structure.num_points(); ++i)
+    used[static_cast<std::size_t>(structure.points[i].point)] = 1;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < chi2.size(); ++i) {
+    if (!(chi2[i] < solver::kMaxChi2) || used[static_cast<std::size_t>(problem.observations[i].point)] == 0) continue;
+    sum += solver::kernel_weight(solver::Kernel::kHuber, chi2[i]) * chi2[i];
   }
-  const double redundancy = 2.0 * count - static_cast<double>(unknowns);
+  const double redundancy = 2.0 * static_cast<double>(structure.terms.size()) -
+                            6.0 * static_cast<double>(structure.pose_of_slot.size()) -
+                            3.0 * static_cast<double>(structure.num_points());
   if (!(redundancy > 0.0)) return std::nullopt;
-  return sum / redundancy;
+  return std::max(1.0, sum / redundancy);
 }
 
 }  // namespace
 
 std::optional<RigScale> rig_scale(const solver::ReprojectionProblem& problem, const RigScaleOptions& options) {
-  const solver::BundleStructure structure = solver::make_structure(problem, {});
-  const std::size_t slots = structure.pose_of_slot.size();
-  if (structure.num_points() == 0 || slots == 0) return std::nullopt;
+  const std::vector<double> chi2 = solver::squared_errors(problem);
+  const solver::BundleStructure structure = solver::make_structure(problem, chi2, {});
+  if (structure.num_points() == 0 || structure.pose_of_slot.empty()) return std::nullopt;
+  const auto variance = variance_factor(structure, chi2, problem);
+  if (!variance) return std::nullopt;
+  const double inflation = options.correlated_observations * *variance;
   solver::BundleState state = solver::state_of(problem);
-  const solver::RigBlocks blocks = unknowns_of(state.rig, options);
+  const solver::RigBlocks blocks = unknowns_of(state.rig, options.sigma_rotation, inflation);
   solver::BundleEquations equations(problem, structure, blocks, solver::Kernel::kHuber, std::numeric_limits<int>::max(),
                                     std::move(state));
   equations.linearise();
@@ -101,9 +107,7 @@ std::optional<RigScale> rig_scale(const solver::ReprojectionProblem& problem, co
       solver::bounded_diagonal(equations.rig_terms().H()(0, 0));  // information if all other unknowns were known
   if (!step || !(step->information > kMinInformation * conditional)) return std::nullopt;
   const double length = 1.0 + step->change;
-  const auto variance = variance_factor(equations.squared_errors(), 6 * slots + 3 * structure.num_points());
-  if (!(length > 0.0) || !variance) return std::nullopt;
-  const double inflation = options.correlated_observations * std::max(1.0, *variance);
+  if (!(length > 0.0)) return std::nullopt;
   return RigScale{1.0 / length, std::sqrt(inflation / step->information) / length};
 }
 

@@ -54,21 +54,22 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   report.observed = true;
   report.deviation = found->deviation;
   report.keyframes = static_cast<int>(flat.keyframes.size());
-  if (found->deviation <= options.max_correcting_deviation) {
-    const double correction = std::clamp(found->scale, 1.0 / kMaxScaleStep, kMaxScaleStep);
-    // every scaling is a map correction, which invalidates the work of other stages
-    if (std::abs(correction - 1.0) > kMinCorrectionSigmas * found->deviation) {
-      report.correction = correction;
-      draft.scale_submap(map.root_of(keyframe), correction);
-    }
+  if (found->deviation > options.max_correcting_deviation) return report;
+  const double correction = std::clamp(found->scale, 1.0 / kMaxScaleStep, kMaxScaleStep);
+  // every scaling is a map correction, which invalidates the work of other stages
+  if (std::abs(correction - 1.0) > kMinCorrectionSigmas * found->deviation) {
+    report.correction = correction;
+    draft.scale_submap(map.root_of(keyframe), correction);
   }
-  draft.set_scale(map::Scale::kUnobservable, found->deviation);
+  const double left = std::abs(found->scale / correction - 1.0);  // of a scale that was too far off for one step
+  draft.set_scale(map::Scale::kUnobservable, std::max(found->deviation, left));
   return report;
 }
 
 bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options) {
-  return report.observed && report.keyframes >= options.min_keyframes && report.deviation <= options.max_deviation &&
-         deviation_before <= options.max_deviation &&
+  const double max_deviation = std::min(options.max_deviation, options.max_correcting_deviation);
+  return report.observed && report.keyframes >= options.min_keyframes && report.deviation <= max_deviation &&
+         deviation_before <= max_deviation &&
          std::abs(report.correction - 1.0) <= kMaxMetricCorrectionSigmas * report.deviation;
 }
 

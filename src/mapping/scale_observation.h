@@ -17,12 +17,13 @@ struct ScaleReport {
 };
 
 // If the scale of the draft's map is kUnobservable, estimates it from `keyframe` and its best covisible keyframes,
-// scales their submap accordingly, and stores the deviation in the draft. Otherwise does nothing.
+// scales their submap accordingly, and stores the deviation in the draft. An estimate that is too uncertain changes
+// nothing (ScaleOptions::max_correcting_deviation).
 ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features,
                           map::MapDraft& draft);
 
-// Returns true if the map can be declared metric: this estimate and the estimate of the previous keyframe, whose
-// deviation is `deviation_before`, are both accurate enough, and this estimate did not change the scale significantly.
+// Returns true if the map can be declared metric: this estimate and the previous one, whose deviation is
+// `deviation_before`, are both accurate enough, and this estimate did not change the scale significantly.
 bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options);
 
 }  // namespace bslam::mapping

@@ -55,8 +55,6 @@ std::string reason_of(const looping::JoinAttempts& attempts, const looping::Loop
     case looping::JoinStage::kNotVerified:
       return fmt::format("places look alike, but their geometry does not agree ({} inliers, {} are needed)",
                          attempts.most_inliers, options.verification.min_inliers);
-    case looping::JoinStage::kNotPlausible:
-      return "places agree, but too few of their landmarks are new";
     case looping::JoinStage::kAmbiguous:
       return "the same place fits several places of the other maps";
   }
@@ -102,10 +100,11 @@ std::vector<std::size_t> submaps_of_inputs(const map::BundledMap& map,
   return out;
 }
 
-// Whether no other input is in the submap of the first one.
-bool is_alone(const map::BundledMap& map, const std::vector<std::vector<KeyframeId>>& inputs) {
+// Whether the first input is not in the submap of most inputs, or in that of no other one.
+bool is_apart(const map::BundledMap& map, const std::vector<std::vector<KeyframeId>>& inputs) {
   const std::vector<std::size_t> submaps = submaps_of_inputs(map, inputs);
-  return submaps.size() > 1 && std::ranges::count(submaps, submaps.front()) == 1;
+  return submaps.size() > 1 &&
+         (std::ranges::count(submaps, submaps.front()) == 1 || submaps.front() != most_frequent(submaps));
 }
 
 // Searches loop closures for the keyframes of a map, which has been appended, and commits them.
@@ -136,10 +135,10 @@ Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::Vocabula
   MergeResult result{maps.front().map, {}};
   looping::LoopCloser closer(std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition),
                              config.looping, features, static_cast<std::uint64_t>(config.seed));
-  // The first map is the one in which the others are searched; it is searched in them if it has remained alone.
+  // The first map is the one in which the others are searched; it is searched in them if it has remained apart.
   std::vector<looping::JoinAttempts> attempts(maps.size());
   for (std::size_t i = 1; i < maps.size(); ++i) attempts[i] = join(inputs->keyframes[i], closer, store, result);
-  if (is_alone(*store.snapshot(), inputs->keyframes)) attempts[0] = join(inputs->keyframes[0], closer, store, result);
+  if (is_apart(*store.snapshot(), inputs->keyframes)) attempts[0] = join(inputs->keyframes[0], closer, store, result);
   result.map = *store.snapshot();
   BSLAM_ASSERT(result.map.num_keyframes() == result.map.keyframe_slots(), "merging must not remove keyframes");
   const std::vector<std::size_t> submaps = submaps_of_inputs(result.map, inputs->keyframes);

@@ -75,7 +75,7 @@ system::Config rig_calibration_config() {
   system::Config config;
   config.mode = execution::Mode::kSequential;
   config.calibration.refine = calibration::Refine::kTrue;
-  config.calibration.sigma_rotation_deg = 3.0;
+  config.calibration.sigma_rotation_deg = config.mapping.scale.sigma_rotation_deg = 3.0;
   config.calibration.sigma_translation_mm = 20.0;
   config.calibration.sigma_focal_percent = 10.0;
   config.calibration.sigma_centre_percent = 2.0;

@@ -19,7 +19,9 @@ struct TrackerOptions;
 namespace bslam::system {
 
 struct IoOptions {
-  double sync_tolerance = 0.002;  // s, maximum time difference between the images of a frame
+  // Seconds. At least a tenth of the interval of camera 0 is used if a camera captures in phase with it
+  // (image/capture_phase.h).
+  double sync_tolerance = 0.002;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

@@ -24,6 +24,13 @@ bool disowns_map(const tracking::TrackResult& result) {
          result.reason == LostReason::kUnstablePose;
 }
 
+bool overlaps_any(const camera::Rig& rig, std::size_t camera) {
+  for (std::size_t other = 0; other < rig.size(); ++other) {
+    if (rig.overlap(camera, other) || rig.overlap(other, camera)) return true;
+  }
+  return false;
+}
+
 map::BundledMap empty_map(const camera::Rig& rig, const camera::Rig& given, const Config& config) {
   map::BundledMap map(std::make_shared<const camera::Rig>(rig), config.feature_model().pyramid);
   map.set_given_rig(std::make_shared<const camera::Rig>(given));
@@ -178,13 +185,17 @@ void System::mark_created_keyframes() {
   }
 }
 
-// Returns true if no two of the cameras that agree with the map overlap, but others do. Cameras without overlap agree
-// with a wrong scale as well as with the right one: they must not outvote those that tell it.
+// Returns true if only cameras that overlap with no other one agree with the map, and others contradict it. Cameras
+// without overlap agree with a wrong scale as well as with the right one: they must not outvote those that tell it.
 bool System::scale_contradicted(const tracking::TrackResult& result) const {
   if (result.status != tracking::TrackStatus::kTracking) return false;
-  std::vector<std::uint8_t> excluded;
-  for (const tracking::CameraCounts& camera : result.cameras) excluded.push_back(camera.excluded);
-  return run_rig_.any_overlap() && !run_rig_.any_overlap(excluded);
+  bool contradicted = false;
+  for (std::size_t c = 0; c < result.cameras.size(); ++c) {
+    if (!overlaps_any(run_rig_, c)) continue;
+    if (!result.cameras[c].excluded && result.cameras[c].inliers > 0) return false;
+    contradicted |= result.cameras[c].excluded;
+  }
+  return contradicted;
 }
 
 // Returns true if a recent initialisation was wrong: the frames after a monocular one are lost, or the cameras that

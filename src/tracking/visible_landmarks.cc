@@ -33,7 +33,7 @@ void add_visible(const TrackInput& input, const frame::BundledFrame& frame, cons
   });
 }
 
-// At most `count` landmarks, spread over the image: the first ones of each cell of a grid.
+// About `count` landmarks, spread over the image: the first ones of each cell of a grid.
 void keep_spread(int count, const camera::Camera& camera, std::vector<Candidate>& candidates) {
   constexpr int kPerCell = 2;
   if (static_cast<int>(candidates.size()) <= count) return;

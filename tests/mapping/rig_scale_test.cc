@@ -142,7 +142,25 @@ TEST(RigScale, ItsDeviationIncludesThatOfCalibratedRotations) {
     squared_z_exact += std::pow((exact->scale - 1.0) / exact->deviation, 2);
   }
   EXPECT_LT(squared_z / kSeeds, 2.0);
+  EXPECT_GT(squared_z / kSeeds, 0.3);
   EXPECT_GT(squared_z_exact / kSeeds, 3.0);
+}
+
+// Observations that are repeated have the information of one, also relative to that of the calibrated rotations.
+TEST(RigScale, ItsDeviationAllowsForCorrelatedObservations) {
+  constexpr double kSigmaRotation = 0.01;
+  Random random(2, "repeated");
+  const auto motion = make_motion(0.03, random);
+  adjust_with_fixed_poses(motion->problem);
+  const auto once = rig_scale(motion->problem, {.sigma_rotation = kSigmaRotation});
+  const auto exact = rig_scale(motion->problem);
+  std::vector<solver::ReprojectionProblem::Observation> four_times;
+  for (const auto& observation : motion->problem.observations) four_times.insert(four_times.end(), 4, observation);
+  motion->problem.observations = std::move(four_times);
+  const auto repeated = rig_scale(motion->problem, {.sigma_rotation = kSigmaRotation, .correlated_observations = 4.0});
+  ASSERT_TRUE(once && exact && repeated);
+  EXPECT_GT(once->deviation, 1.2 * exact->deviation);
+  EXPECT_NEAR(repeated->deviation / once->deviation, 1.0, 0.1);
 }
 
 TEST(RigScale, IsNotObservableOnAStraightLine) {

@@ -108,7 +108,7 @@ TEST(ObserveScale, IsUnobservableOnAStraightLine) {
     const SimulatedMap world = simulated_map(straight_line(), three_sides(), 12, 1.5, seed);
     map::MapDraft draft = world.draft();
     for (int i = 0; i < 2; ++i) {
-      const MappingReport report = map_keyframe(KeyframeId(11), {}, kFeatures, draft);
+      const MappingReport report = map_keyframe(KeyframeId(11), independent_noise(), kFeatures, draft);
       EXPECT_TRUE(!report.scale.observed || report.scale.deviation > 0.1)
           << "seed " << seed << ": " << report.scale.deviation;
     }

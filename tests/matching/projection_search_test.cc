@@ -136,7 +136,6 @@ TEST_F(SearchByProjection, FindsNothingInACameraWithoutImage) {
   EXPECT_TRUE(search().matches.empty());
 }
 
-// Two cameras with the same pose have the same matches; the third has no image.
 // Points in all directions around a camera: those that it projects into its image are visible, whatever its field of
 // view.
 TEST(VisiblePoints, AreThoseThatTheCameraProjectsIntoItsImage) {
@@ -157,6 +156,7 @@ TEST(VisiblePoints, AreThoseThatTheCameraProjectsIntoItsImage) {
   }
 }
 
+// Two cameras with the same pose have the same matches; the third has no image.
 TEST_F(SearchByProjection, SearchOfAllCamerasEqualsSearchOfEach) {
   const camera::Rig rig({{camera, SE3()}, {camera, SE3()}, {camera, SE3()}});
   frame::BundledFrame bundled;
