@@ -19,14 +19,14 @@ function(bslam_layer name)
   endif()
 endfunction()
 
-# bslam_test(NAME [USES layer...] [LINKS target...] [SLOW suite...] [THREAD suite...] [DATA suite...]
+# bslam_test(NAME [SEPARATE] [USES layer...] [LINKS target...] [SLOW suite...] [THREAD suite...] [DATA suite...]
 #            [TOGETHER group=suite+suite...]): one executable of all tests/NAME/*.cc, and one CTest entry for each of its
 # suites, so that what the tests of a suite share is made once. Suites of a TOGETHER group are one entry: they share a static
-# rendering. Labels: `slow` for SLOW, `thread` for THREAD (what ThreadSanitizer looks at), `data` for DATA (reads
+# rendering. SEPARATE: the files use the same names for different things (bslam_unite). Labels: `slow` for SLOW, `thread` for THREAD (what ThreadSanitizer looks at), `data` for DATA (reads
 # recordings that may not be there); `fast` for all that are neither slow nor data.
 function(bslam_test name)
   set(labels SLOW THREAD DATA TOGETHER)
-  cmake_parse_arguments(ARG "" "" "USES;LINKS;${labels}" ${ARGN})
+  cmake_parse_arguments(ARG SEPARATE "" "USES;LINKS;${labels}" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cc)
   if(NOT sources)
     return()
@@ -36,6 +36,9 @@ function(bslam_test name)
   target_link_libraries(test_${name} PRIVATE ${ARG_USES} ${ARG_LINKS} GTest::gtest GTest::gtest_main bslam_test_flags)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   bslam_use_precompiled(test_${name} bslam_tests_precompiled)
+  if(NOT ARG_SEPARATE)
+    bslam_unite(test_${name} 4)
+  endif()
   set(list ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
   list(JOIN CMAKE_CROSSCOMPILING_EMULATOR "," emulator)  # lists are handed on with commas
   foreach(label ${labels})

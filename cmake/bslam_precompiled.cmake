@@ -21,6 +21,14 @@ function(bslam_use_precompiled target name)
   endif()
 endfunction()
 
+# bslam_unite(TARGET FILES): with precompiled headers, FILES sources of the target at a time are compiled as one, since most
+# of the time is spent on the headers that they share. Names in anonymous namespaces of these sources must differ.
+function(bslam_unite target files)
+  if(BSLAM_PRECOMPILED)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${files})
+  endif()
+endfunction()
+
 if(BSLAM_PRECOMPILED)
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     add_compile_options(-fpch-preprocess)  # so that ccache sees what a file includes

@@ -252,7 +252,7 @@ Result<Trajectory> kitti_trajectory(const std::filesystem::path& file, const std
 }
 
 // Seconds with nine decimals, exact.
-std::string seconds_text(TimeNs time_ns) {
+std::string exact_seconds(TimeNs time_ns) {
   const TimeNs magnitude = std::abs(time_ns);
   return fmt::format("{}{}.{:09}", time_ns < 0 ? "-" : "", magnitude / 1'000'000'000, magnitude % 1'000'000'000);
 }
@@ -311,7 +311,7 @@ Result<Trajectory> read_trajectory(const std::filesystem::path& file,
     if (!pose) return pose.error();
     if (!trajectory.empty() && pose->time_ns <= trajectory.back().time_ns) {
       return line_error(file, line.number,
-                        seconds_text(pose->time_ns) + " s after " + seconds_text(trajectory.back().time_ns) + " s",
+                        exact_seconds(pose->time_ns) + " s after " + exact_seconds(trajectory.back().time_ns) + " s",
                         "increasing times");
     }
     trajectory.push_back(*pose);
@@ -325,7 +325,7 @@ std::string tum_text(const Trajectory& trajectory, std::string_view header) {
     const Vector3d& p = pose.T_world_frame.translation();
     const Quaterniond& q = pose.T_world_frame.rotation();
     fmt::format_to(std::back_inserter(text), "{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
-                   seconds_text(pose.time_ns), p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
+                   exact_seconds(pose.time_ns), p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
   }
   return text;
 }
@@ -354,7 +354,7 @@ std::string kitti_text(const Trajectory& trajectory) {
 
 std::string times_text(const Trajectory& trajectory) {
   std::string text;
-  for (const TimedPose& pose : trajectory) text += seconds_text(pose.time_ns) + "\n";
+  for (const TimedPose& pose : trajectory) text += exact_seconds(pose.time_ns) + "\n";
   return text;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,7 +18,9 @@ std::string_view series_colour(std::size_t k);
 
 enum class SeriesStyle { kLine, kDashed, kPoints };
 
-// Points in data units. A point that is not finite interrupts the line.
+inline constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
+
+// Points in data units. A point that is not finite, such as kGap, interrupts the line.
 struct Series {
   std::string label;  // shown in the legend unless empty
   std::vector<std::array<double, 2>> points;

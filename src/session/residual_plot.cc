@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 namespace bslam::session {
@@ -14,7 +13,6 @@ namespace {
 using namespace report;  // figures
 using calibration::ImageResiduals;
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMinObservations = 10;  // of a cell that is drawn
 constexpr std::size_t kPanelsPerRow = 3;
 
@@ -79,7 +77,7 @@ Panel residual_panel(const CameraRecord& camera, const ArrowScale& scale) {
     const double v = (static_cast<double>(i / ImageResiduals::kColumns) + 0.5) * cell_h;
     const Eigen::Vector2d tip = Eigen::Vector2d(u, v) + scale.cells_per_px() * cell_w * r.cells[i].mean_px;
     feet.points.push_back(at(u, v));
-    arrows.points.insert(arrows.points.end(), {at(u, v), at(tip.x(), tip.y()), {kNone, kNone}});
+    arrows.points.insert(arrows.points.end(), {at(u, v), at(tip.x(), tip.y()), {kGap, kGap}});
   }
   Series bar = line({at(0, 1.06 * h), at(scale.bar_cells * cell_w, 1.06 * h)}, kBlack, 3.0);
   bar.label = fmt::format("{:g} px", scale.bar_px);

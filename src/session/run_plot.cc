@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <optional>
 #include <span>
 
@@ -17,7 +16,6 @@ namespace {
 
 using namespace report;  // figures
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kBins = 450;  // intervals of time, about one for every two pixels
 
 using Points = std::vector<std::array<double, 2>>;
@@ -38,7 +36,7 @@ Points camera_points(const RunRecord& record, std::size_t camera, int tracking::
     const bool seen = frame.record && camera < frame.record->images.size() &&
                       frame.record->images[camera] == image::ImageState::kPresent;
     points.push_back(
-        {frame.time_s, seen ? static_cast<double>(frame.record->final_result().cameras[camera].*count) : kNone});
+        {frame.time_s, seen ? static_cast<double>(frame.record->final_result().cameras[camera].*count) : kGap});
   }
   return reduced(points, kBins, Reduction::kMedian);
 }
@@ -141,7 +139,7 @@ std::optional<Panel> camera_fault_panel(const RunRecord& record) {
       if (last != nullptr && (*last)[1] == y && interval.from_s - (*last)[0] < apart_s) {
         (*last)[0] = interval.to_s;
       } else {
-        bars.insert(bars.end(), {{interval.from_s, y}, {interval.to_s, y}, {kNone, kNone}});
+        bars.insert(bars.end(), {{interval.from_s, y}, {interval.to_s, y}, {kGap, kGap}});
       }
     }
   }
@@ -159,7 +157,7 @@ Panel frame_time_panel(const RunRecord& record) {
   Panel panel = time_panel(record, "Processing time per frame, by stage", "time [ms]");
   Points total;
   for (const RunFrame& frame : record.frames) {
-    total.push_back({frame.time_s, frame.record ? frame.record->frame_ms : kNone});
+    total.push_back({frame.time_s, frame.record ? frame.record->frame_ms : kGap});
   }
   if (total.size() > kBins) {
     panel.series.push_back(time_series("frame, maximum", reduced(total, kBins, Reduction::kMaximum), "#BBBBBB", 1.0));
