@@ -1,14 +1,15 @@
 #include "tracking/robust_pose.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 
 #include "estimators/pose_ransac.h"
 
 namespace bslam::tracking {
 namespace {
 
-constexpr std::size_t kTrusted = 3;  // number of keyframes beyond which more do not count
-// Fractions of the matches below which a second pose is estimated, and a third one by RANSAC.
+// Fractions of the matches below which further poses are estimated, and one by RANSAC.
 constexpr double kFewInliers = 0.8, kMinority = 0.5;
 // Maximum squared normalised error, at the initial pose, of the matches that agree with it: four standard deviations.
 constexpr double kAgreesWithStart = 16.0;
@@ -16,47 +17,109 @@ constexpr double kAgreesWithStart = 16.0;
 // Ratio of supports from which on another pose is another motion and not a variation of the first one.
 constexpr double kMoreSupport = 1.1;
 
+constexpr int kCells = 8;              // of the grid on an image, per side
+constexpr double kNew = 0.5;           // support of a new landmark
+constexpr double kTrustedAfter = 1.0;  // s, of observation by keyframes
+
 bool few(const solver::PoseSolution& solution, double fraction, std::size_t matches) {
   return !solution.ok || solution.num_inliers < fraction * static_cast<double>(matches);
 }
 
-void replace_if_better(const map::BundledMap& map, const FrameMatches& matches, solver::PoseSolution other,
-                       solver::PoseSolution& solution) {
-  if (!other.ok) return;
-  if (!solution.ok || support(map, matches, other.inlier) > kMoreSupport * support(map, matches, solution.inlier))
-    solution = std::move(other);
+std::size_t cell_of(const Eigen::Vector2d& pixel, const camera::Camera& camera) {
+  const auto along = [](double position, int size) {
+    return std::clamp(static_cast<int>(kCells * position / size), 0, kCells - 1);
+  };
+  return static_cast<std::size_t>(kCells * along(pixel.y(), camera.height) + along(pixel.x(), camera.width));
+}
+
+// Seconds between the first and the last keyframe that observe a landmark, at most kTrustedAfter.
+double time_observed(const map::BundledMap& map, LandmarkId landmark) {
+  TimeNs first = std::numeric_limits<TimeNs>::max(), last = std::numeric_limits<TimeNs>::lowest();
+  for (const map::Observation& o : map.observations(landmark)) {
+    const TimeNs time_ns = map.keyframe(o.keyframe).frame->time_ns;
+    first = std::min(first, time_ns);
+    last = std::max(last, time_ns);
+  }
+  return first >= last ? 0.0 : std::min(kTrustedAfter, to_seconds(last - first));
+}
+
+// The poses of a frame from which one is chosen.
+class PoseChoice {
+ public:
+  PoseChoice(const map::BundledMap& map, const FrameMatches& matches,
+             std::span<const solver::PoseObservation> observations, solver::PoseSolution first)
+      : map_(map), matches_(matches), observations_(observations), best_(std::move(first)) {
+    if (best_.ok) support_ = support(map_, matches_, observations_, best_.inlier);
+  }
+
+  void consider(solver::PoseSolution other) {
+    if (!other.ok) return;
+    const double of_other = support(map_, matches_, observations_, other.inlier);
+    if (best_.ok && of_other <= kMoreSupport * support_) return;
+    best_ = std::move(other);
+    support_ = of_other;
+  }
+
+  const solver::PoseSolution& best() const { return best_; }
+
+ private:
+  const map::BundledMap& map_;
+  const FrameMatches& matches_;
+  std::span<const solver::PoseObservation> observations_;
+  solver::PoseSolution best_;
+  double support_ = 0.0;
+};
+
+std::vector<solver::PoseObservation> outliers(const solver::PoseSolution& solution,
+                                              std::span<const solver::PoseObservation> observations) {
+  std::vector<solver::PoseObservation> out;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    if (!solution.inlier[i]) out.push_back(observations[i]);
+  }
+  return out;
 }
 
 }  // namespace
 
-int support(const map::BundledMap& map, const FrameMatches& matches, std::span<const std::uint8_t> inlier) {
-  std::size_t sum = 0, i = 0;
-  for (const auto& camera : matches) {
-    for (const Match& m : camera) {
-      if (inlier[i++]) sum += std::min(kTrusted, map.observations(m.landmark).size());
+double support(const map::BundledMap& map, const FrameMatches& matches,
+               std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier) {
+  double sum = 0.0;
+  std::size_t i = 0;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    std::array<double, kCells * kCells> cells{};
+    for (const Match& m : matches[c]) {
+      const std::size_t at = i++;
+      if (!inlier[at]) continue;
+      double& cell = cells[cell_of(observations[at].pixel, map.rig().camera(c))];
+      if (cell < kNew + kTrustedAfter) cell = std::max(cell, kNew + time_observed(map, m.landmark));
     }
+    for (const double cell : cells) sum += cell;
   }
-  return static_cast<int>(sum);
+  return sum;
 }
 
 solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
                                  std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
                                  const solver::MotionModel& motion, const solver::PoseSolverOptions& options) {
   const camera::Rig& rig = input.map.rig();
-  solver::PoseSolution solution = solver::solve_pose(rig, observations, predicted, motion, options);
-  if (!few(solution, kFewInliers, observations.size())) return solution;
+  solver::PoseSolution first = solver::solve_pose(rig, observations, predicted, motion, options);
+  if (!few(first, kFewInliers, observations.size())) return first;
   solver::PoseSolverOptions near_start = options;
   near_start.first_chi2 = kAgreesWithStart;
-  replace_if_better(input.map, matches, solver::solve_pose(rig, observations, predicted, motion, near_start), solution);
-  if (!few(solution, kMinority, observations.size())) return solution;
+  const auto pose_near = [&](const geometry::SE3& start) {
+    return solver::solve_pose(rig, observations, start, motion, near_start);
+  };
+  const auto of_outliers = first.ok ? solver::solve_pose(rig, outliers(first, observations), predicted, motion, options)
+                                    : solver::PoseSolution();
+  PoseChoice choice(input.map, matches, observations, std::move(first));
+  if (of_outliers.ok) choice.consider(pose_near(of_outliers.T_rig_world));
+  choice.consider(pose_near(predicted));
+  if (!few(choice.best(), kMinority, observations.size())) return choice.best();
   const solver::PoseSolution sampled =
       estimators::ransac_pose(frame::rig_of(rig, frame), observations, predicted, options, {},
                               Random(input.seed, "pose", static_cast<std::uint64_t>(frame.id.value())));
-  if (sampled.ok) {
-    replace_if_better(input.map, matches,
-                      solver::solve_pose(rig, observations, sampled.T_rig_world, motion, near_start), solution);
-  }
-  return solution;
+  if (sampled.ok) choice.consider(pose_near(sampled.T_rig_world));
+  return choice.best();
 }
 
 }  // namespace bslam::tracking

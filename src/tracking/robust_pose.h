@@ -8,14 +8,17 @@
 
 namespace bslam::tracking {
 
-// The sum over the inliers of the number of keyframes that observe the landmark, at most three each: landmarks on
-// objects that move are observed by few.
-int support(const map::BundledMap& map, const FrameMatches& matches, std::span<const std::uint8_t> inlier);
+// How far the inliers of a frame spread over its images and over time. Each cell of a grid of 8 x 8 on every image that
+// has inliers counts one, plus the time, in seconds and at most one, between the first and the last keyframe that
+// observe the landmark of one of them, the longest. An object that moves covers a small part of the images, however
+// many of its landmarks are found, and they soon become outliers. `observations` are those of `matches`, in order.
+double support(const map::BundledMap& map, const FrameMatches& matches,
+               std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier);
 
 // As solver::solve_pose for the matches of a frame, in order; `predicted` is the initial pose. A robust kernel follows
 // the majority, and ends between two motions that many matches agree with. If a considerable part of the matches are
-// outliers, further poses are estimated: from those that agree with the prediction at the beginning, and by RANSAC if
-// still most of them are outliers. Another pose replaces the first one if its support is clearly larger, or
+// outliers, further poses are estimated: from the outliers, from the matches that agree with the prediction, and by
+// RANSAC if still most of them are outliers. Another pose replaces the first one if its support is clearly larger, or
 // if the first one could not be estimated.
 solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
                                  std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,

@@ -90,19 +90,70 @@ TEST_F(RobustPose, IsFoundBySamplesIfTheInitialPoseAgreesWithFew) {
   EXPECT_LT(error(solution), 0.01);
 }
 
-TEST_F(RobustPose, CountsAtMostThreeKeyframesPerLandmark) {
+// An inlier counts a half plus the time between the keyframes that observe its landmark; those of one cell as the
+// largest.
+TEST_F(RobustPose, SupportIsTheSpreadOverImagesAndTime) {
   std::vector<std::uint8_t> inlier(count(matches), 0);
-  EXPECT_EQ(support(world.map, matches, inlier), 0);
+  EXPECT_EQ(support(world.map, matches, observations, inlier), 0);
+  double sum = 0, most = 0;
   std::size_t i = 0;
-  int sum = 0;
-  for (const auto& camera : matches) {
-    for (const Match& m : camera) {
-      if (i++ % 2 != 0) continue;
-      inlier[i - 1] = 1;
-      sum += static_cast<int>(std::min<std::size_t>(3, world.map.observations(m.landmark).size()));
+  for (const Match& m : matches[0]) {
+    std::ranges::fill(inlier, std::uint8_t{0});
+    inlier[i++] = 1;
+    std::vector<TimeNs> times;
+    for (const map::Observation& o : world.map.observations(m.landmark))
+      times.push_back(world.map.keyframe(o.keyframe).frame->time_ns);
+    const auto [first, last] = std::ranges::minmax(times);
+    const double expected = 0.5 + std::min(1.0, to_seconds(last - first));
+    EXPECT_DOUBLE_EQ(support(world.map, matches, observations, inlier), expected);
+    sum += expected;
+    most = std::max(most, expected);
+  }
+  std::ranges::fill(inlier, std::uint8_t{0});
+  std::fill_n(inlier.begin(), i, std::uint8_t{1});
+  const double spread = support(world.map, matches, observations, inlier);
+  EXPECT_GT(spread, 4 * most);
+  EXPECT_LT(spread, sum);
+  for (std::size_t k = 0; k < i; ++k) observations[k].pixel = observations[0].pixel;
+  EXPECT_DOUBLE_EQ(support(world.map, matches, observations, inlier), most);
+}
+
+// Landmarks on a small part of an image outnumber all others, and have been observed as long.
+TEST_F(RobustPose, FollowsLandmarksThatSpreadOverTheImages) {
+  const camera::Camera& camera = world.map.rig().camera(std::size_t{0});
+  std::vector<solver::PoseObservation> kept;
+  FrameMatches spread(matches.size());
+  std::size_t i = 0;
+  const auto in_part = [&](const solver::PoseObservation& o) {
+    return o.camera.index() == 0 && std::abs(o.pixel.x() - 0.5 * camera.width) < 0.2 * camera.width &&
+           std::abs(o.pixel.y() - 0.5 * camera.height) < 0.3 * camera.height;
+  };
+  std::size_t in = 0, out = 0;
+  for (const solver::PoseObservation& o : observations) in += in_part(o);
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    for (const Match& m : matches[c]) {
+      solver::PoseObservation o = observations[i++];
+      if (in_part(o)) {
+        const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
+        const auto& model = world.map.rig().camera(o.camera);
+        const auto before = model.project(T_cam_world * o.point_world),
+                   now = model.project(T_cam_world * (o.point_world + Eigen::Vector3d(0.2, 0.05, -0.1)));
+        if (before && now) o.pixel += *now - *before;
+      } else if (3 * out++ >= 2 * in) {
+        continue;
+      }
+      kept.push_back(o);
+      spread[c].push_back(m);
     }
   }
-  EXPECT_EQ(support(world.map, matches, inlier), sum);
+  ASSERT_GT(in, 20u);
+  matches = spread;
+  observations = kept;
+  const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 1e-3, 0, 0.002, 0, 0.001).finished());
+  EXPECT_GT(error(solver::solve_pose(world.map.rig(), observations, predicted, motion, {})), 0.05);
+  const auto solution = pose(predicted);
+  ASSERT_TRUE(solution.ok);
+  EXPECT_LT(error(solution), 0.03);
 }
 
 }  // namespace
