@@ -9,7 +9,7 @@
 namespace bslam::tracking {
 
 // How far the inliers of a frame spread over its images and over time. Each cell of a grid of 8 x 8 on every image that
-// has inliers counts one, plus the time, in seconds and at most one, between the first and the last keyframe that
+// has inliers counts a half, plus the time, in seconds and at most one, between the first and the last keyframe that
 // observe the landmark of one of them, the longest. An object that moves covers a small part of the images, however
 // many of its landmarks are found, and they soon become outliers. `observations` are those of `matches`, in order.
 double support(const map::BundledMap& map, const FrameMatches& matches,
