@@ -22,8 +22,9 @@ endfunction()
 # bslam_test(NAME [SEPARATE] [USES layer...] [LINKS target...] [SLOW suite...] [THREAD suite...] [DATA suite...]
 #            [TOGETHER group=suite+suite...]): one executable of all tests/NAME/*.cc, and one CTest entry for each of its
 # suites, so that what the tests of a suite share is made once. Suites of a TOGETHER group are one entry: they share a static
-# rendering. SEPARATE: the files use the same names for different things (bslam_unite). Labels: `slow` for SLOW, `thread` for THREAD (what ThreadSanitizer looks at), `data` for DATA (reads
-# recordings that may not be there); `fast` for all that are neither slow nor data.
+# rendering. SEPARATE: the files use the same names for different things (bslam_unite). Labels: `slow` for SLOW, `thread` for
+# THREAD (what ThreadSanitizer looks at), `data` for DATA (reads recordings that may not be there); `fast` for all that are
+# neither slow nor data.
 function(bslam_test name)
   set(labels SLOW THREAD DATA TOGETHER)
   cmake_parse_arguments(ARG SEPARATE "" "USES;LINKS;${labels}" ${ARGN})

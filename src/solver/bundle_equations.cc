@@ -90,9 +90,8 @@ void BundleEquations::set_poses(const BundleState& state) {
   }
 }
 
-// Calls visit(chi2) for each term, in order.
-template <class Visit>
-void BundleEquations::for_each_error(const BundleState& state, const Visit& visit) {
+double BundleEquations::cost(const BundleState& state) {
+  double sum = 0.0;
   set_poses(state);
   for (std::size_t i = 0; i < structure_.num_points(); ++i) {
     const Vector3d& point = state.points[static_cast<std::size_t>(structure_.points[i].point)];
@@ -104,23 +103,12 @@ void BundleEquations::for_each_error(const BundleState& state, const Visit& visi
         const auto error =
             residual_error(state.rig.models[static_cast<std::size_t>(term.camera)],
                            in_camera(structure_.groups[g].pose, term, point_rig), term.pixel.cast<double>());
-        visit(error ? (term.inverse_sigma * *error).squaredNorm() : std::numeric_limits<double>::infinity());
+        sum += kernel_cost(
+            kernel_, error ? (term.inverse_sigma * *error).squaredNorm() : std::numeric_limits<double>::infinity());
       }
     }
   }
-}
-
-double BundleEquations::cost(const BundleState& state) {
-  double sum = 0.0;
-  for_each_error(state, [&](double chi2) { sum += kernel_cost(kernel_, chi2); });
   return 0.5 * sum + rig_.prior_cost(state.rig);
-}
-
-std::vector<double> BundleEquations::squared_errors() {
-  std::vector<double> out;
-  out.reserve(structure_.terms.size());
-  for_each_error(state_, [&](double chi2) { out.push_back(chi2); });
-  return out;
 }
 
 BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const Rigid& pose, const Vector3d& point_rig) {

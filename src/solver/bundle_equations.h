@@ -43,8 +43,6 @@ class BundleEquations {
   const BundleState& state() const { return state_; }
   BundleState& state() { return state_; }
 
-  // Squared normalised error of each term of the structure at the current values; infinite if it does not project.
-  std::vector<double> squared_errors();
   // The equations of poses and rig of the last linearise(), with the points eliminated.
   ReducedSystem& reduce(double damping);
   // Information matrix of the rig's unknowns with poses and points marginalised out, including priors. Returns nullopt
@@ -116,8 +114,6 @@ class BundleEquations {
     const auto camera = static_cast<std::size_t>(term.camera);
     return J * shutters_[static_cast<std::size_t>(pose) * cameras_ + camera].row_jacobian(term.pixel.y());
   }
-  template <class Visit>
-  void for_each_error(const BundleState& state, const Visit& visit);
   double cost(const BundleState& state);
   GroupSums sum_group(std::size_t group, const Rigid& pose, const Vector3d& point_rig);
   void add_to_pose(const GroupSums& sums, const Vector3d& point_rig, const Matrix3d& R_rig_world, PoseBlock& pose,

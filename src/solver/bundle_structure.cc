@@ -97,11 +97,6 @@ void number_pairs(BundleStructure& s) {
 
 }  // namespace
 
-BundleStructure make_structure(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
-  check(problem, skip);
-  return make_structure(problem, squared_errors(problem), skip);
-}
-
 BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2,
                                std::span<const std::uint8_t> skip) {
   check(problem, skip);

@@ -48,7 +48,5 @@ struct BundleStructure {
 // observations.
 BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2,
                                std::span<const std::uint8_t> skip);
-// The same with the errors at the problem's values.
-BundleStructure make_structure(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip);
 
 }  // namespace bslam::solver

@@ -59,7 +59,7 @@ class BundleGradient : public testing::TestWithParam<std::tuple<Models, BlockTyp
 TEST_P(BundleGradient, AgreesWithFiniteDifferences) {
   Random random(1, "gradient");
   const auto scene = moving_scene(std::get<Models>(GetParam()), 1.0, random);
-  const BundleStructure structure = make_structure(scene->problem, {});
+  const BundleStructure structure = make_structure(scene->problem, squared_errors(scene->problem), {});
   const RigBlocks blocks = make_blocks(std::get<BlockType>(GetParam()), scene->rig);
   BundleState start = state_of(scene->problem);
   if (std::get<BlockType>(GetParam()) != BlockType::kBaselineScale) {  // with rolling shutters of a moving rig
@@ -135,7 +135,7 @@ TEST(BundleEquations, StepWithRigBlocksConvergesQuadratically) {
     for (std::size_t p = 0; p < scene->points.size(); ++p) {
       scene->problem.points[p] = scene->points[p] + 1e-3 * scene::random_direction(random);
     }
-    const BundleStructure structure = make_structure(scene->problem, {});
+    const BundleStructure structure = make_structure(scene->problem, squared_errors(scene->problem), {});
     RigBlocks blocks;
     blocks.push_back(std::make_unique<ExtrinsicsBlock>(prior_of(scene->rig)));
     BundleState start = state_of(scene->problem);
@@ -160,7 +160,7 @@ TEST(BundleEquations, ReachTheMinimumOfCeresWithFreeExtrinsics) {
     spec.points = 80;
     spec.farthest = 8;
     const auto scene = scene::make_bundle_scene(spec, random);
-    const BundleStructure structure = make_structure(scene->problem, {});
+    const BundleStructure structure = make_structure(scene->problem, squared_errors(scene->problem), {});
     RigBlocks blocks;
     blocks.push_back(std::make_unique<ExtrinsicsBlock>(prior_of(scene->rig)));
     BundleEquations equations(scene->problem, structure, blocks, Kernel::kHuber, 150, state_of(scene->problem));

@@ -37,13 +37,18 @@ class RobustPose : public ::testing::Test {
         solver::PoseObservation& o = observations[i++];
         if (!few_observations(m)) continue;
         const Eigen::Vector3d& distance = m.landmark.value() % 2 == 0 ? of_even : of_odd;
-        const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
-        const auto& model = world.map.rig().camera(o.camera);
-        const auto before = model.project(T_cam_world * o.point_world),
-                   now = model.project(T_cam_world * (o.point_world + distance));
-        if (before && now) o.pixel += *now - *before;
+        move(distance, o);
       }
     }
+  }
+
+  // Moves the pixel as if the point had moved by this distance.
+  void move(const Eigen::Vector3d& distance, solver::PoseObservation& o) const {
+    const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
+    const auto& model = world.map.rig().camera(o.camera);
+    const auto before = model.project(T_cam_world * o.point_world),
+               now = model.project(T_cam_world * (o.point_world + distance));
+    if (before && now) o.pixel += *now - *before;
   }
 
   double error(const solver::PoseSolution& solution) const {
@@ -134,11 +139,7 @@ TEST_F(RobustPose, FollowsLandmarksThatSpreadOverTheImages) {
     for (const Match& m : matches[c]) {
       solver::PoseObservation o = observations[i++];
       if (in_part(o)) {
-        const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
-        const auto& model = world.map.rig().camera(o.camera);
-        const auto before = model.project(T_cam_world * o.point_world),
-                   now = model.project(T_cam_world * (o.point_world + Eigen::Vector3d(0.2, 0.05, -0.1)));
-        if (before && now) o.pixel += *now - *before;
+        move({0.2, 0.05, -0.1}, o);
       } else if (3 * out++ >= 2 * in) {
         continue;
       }
