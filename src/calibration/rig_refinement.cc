@@ -308,17 +308,12 @@ bool accepted(const RigRefinement& refinement, const CalibrationOptions& options
   return options.refine == Refine::kTrue || refinement.verdict == Verdict::kInconsistent;
 }
 
-namespace {
-
-// Whether an earlier estimate has replaced the calibration. An accepted estimate always changes extrinsics.
 bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated) {
   for (std::size_t c = 1; c < calibrated.size(); ++c) {
     if (of_map.body_from_cam(c).matrix() != calibrated.body_from_cam(c).matrix()) return true;
   }
   return false;
 }
-
-}  // namespace
 
 std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,
                                                 const CalibrationOptions& options,

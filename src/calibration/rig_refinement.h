@@ -169,6 +169,8 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
 
 // Whether the rig of a map is to be replaced by the estimate.
 bool accepted(const RigRefinement& refinement, const CalibrationOptions& options);
+// Whether an earlier estimate has replaced the calibration of a map. An accepted estimate always changes extrinsics.
+bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated);
 // As refine_rig, if the estimate is to be accepted. If this depends on the verdict, it is determined first from a
 // fraction of the keyframes and landmarks.
 std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,

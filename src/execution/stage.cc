@@ -23,12 +23,13 @@ StageTask StageTask::of_input(Stage stage, std::int32_t input) {
                                    : StageTask{stage, KeyframeId(input)};
 }
 
-bool calibration_due(KeyframeId keyframe) {
+std::optional<int> calibration_due(KeyframeId keyframe) {
   constexpr std::size_t kFirst = 8;  // keyframes
-  for (std::size_t due = kFirst; due <= keyframe.index(); due += due / 2) {
-    if (due == keyframe.index()) return true;
+  int number = 0;
+  for (std::size_t due = kFirst; due <= keyframe.index(); due += due / 2, ++number) {
+    if (due == keyframe.index()) return number;
   }
-  return false;
+  return std::nullopt;
 }
 
 std::vector<StageTask> following(const StageTask& task, const StageFunctions& functions) {

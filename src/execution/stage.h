@@ -59,10 +59,10 @@ struct StageFunctions {
 // The tasks that follow the commit of another one, in order. The keyframe of the task must be known.
 std::vector<StageTask> following(const StageTask& task, const StageFunctions& functions);
 
-// Whether the rig is calibrated after the mapping of a keyframe: at keyframe numbers that grow by the same factor,
-// since a calibration costs as much as the map is large, and what another one can improve decreases with the size of
-// the map.
-bool calibration_due(KeyframeId keyframe);
+// Number of the calibration of the rig that follows the mapping of a keyframe, counted from 0; nullopt if none does.
+// The numbers of their keyframes grow by the same factor, since a calibration costs as much as the map is large, and
+// what another one can improve decreases with the size of the map.
+std::optional<int> calibration_due(KeyframeId keyframe);
 
 // The stages whose waiting and running tasks are dropped when a result of `stage` is committed. A loop closure and a
 // calibration correct the map, so that a global adjustment of an earlier version is useless; they adjust the map

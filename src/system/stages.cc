@@ -25,10 +25,21 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
   return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }};
 }
 
+// Whether a calibration that is due can be left out: images that contradict the calibration do so in the first
+// estimates already, so that every other one suffices after these while they agree with it.
+bool left_out(const calibration::CalibrationOptions& options, const camera::Rig& of_map, const camera::Rig& calibrated,
+              KeyframeId keyframe) {
+  if (options.refine == calibration::Refine::kTrue || calibration::replaced(of_map, calibrated)) return false;
+  const int number = execution::calibration_due(keyframe).value_or(0);
+  return number >= 2 && number % 2 == 0;
+}
+
 // Replaces the rig by its estimate from the map so far, and adjusts the map with it. The newest keyframe keeps its
 // pose, so that the current pose of the rig does not jump, unless it is in a loaded submap.
 execution::StageResult calibrate(const Config& config, const camera::Rig& calibrated, KeyframeId first,
-                                 const map::MapSnapshot& base, const std::stop_token& stop) {
+                                 const execution::StageTask& task, const map::MapSnapshot& base,
+                                 const std::stop_token& stop) {
+  if (left_out(config.calibration, base->rig(), calibrated, task.keyframe)) return {};
   auto refinement =
       calibration::refine_if_accepted(*base, calibrated, config.calibration, config.feature_model(), stop);
   if (!refinement) return {};
@@ -67,10 +78,10 @@ execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyfr
     return adjust_globally(config, base, std::move(stop));
   };
   if (config.calibration.refine != calibration::Refine::kFalse) {
-    functions[execution::Stage::kCalibrate] = [&config, &calibrated, first](const execution::StageTask&,
+    functions[execution::Stage::kCalibrate] = [&config, &calibrated, first](const execution::StageTask& task,
                                                                             const map::MapSnapshot& base,
                                                                             const std::stop_token& stop) {
-      return calibrate(config, calibrated, first, base, stop);
+      return calibrate(config, calibrated, first, task, base, stop);
     };
   }
   if (!config.looping.loop.enabled || !vocabulary) return functions;
