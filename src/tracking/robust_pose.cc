@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "estimators/pose_ransac.h"
@@ -96,6 +97,21 @@ double support(const map::BundledMap& map, const FrameMatches& matches,
     for (const double cell : cells) sum += cell;
   }
   return sum;
+}
+
+bool agree_beyond_chance(const camera::Rig& rig, std::span<const solver::PoseObservation> observations,
+                         std::span<const double> window_px, const geometry::SE3& T_rig_world,
+                         const solver::MotionModel& motion) {
+  constexpr double kDeviations = 5.0;
+  const solver::PoseSolution at_pose = solver::solve_pose(rig, observations, T_rig_world, motion, {.rounds = 0});
+  double expected = 0.0, variance = 0.0;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const double deviations = window_px[i] / observations[i].sigma;
+    const double by_chance = std::min(1.0, solver::kChi2TwoDof95 / (deviations * deviations));
+    expected += by_chance;
+    variance += by_chance * (1.0 - by_chance);
+  }
+  return at_pose.num_inliers > expected + kDeviations * std::sqrt(variance);
 }
 
 solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,

@@ -1,6 +1,7 @@
 #include "tracking/track.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <numeric>
 
@@ -212,6 +213,29 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   return out;
 }
 
+// Whether the landmarks of the local view, found near their projections at the coarse pose, confirm it. Where there is
+// little but noise, most of them are matched wrongly, and the pose is right nevertheless.
+bool coarse_pose_confirmed(const TrackInput& input, const Coarse& coarse, const Fine& fine,
+                           const TrackingOptions& options) {
+  const std::vector<LandmarkId> known = landmarks_of(coarse.matches);
+  const auto all = pose_observations(input.map, fine.matches, fine.aligned);
+  std::vector<solver::PoseObservation> observations;
+  std::vector<double> window_px;
+  std::size_t i = 0;
+  for (std::size_t c = 0; c < fine.matches.size(); ++c) {
+    const double radius_px = options.matching.local_radius / input.map.rig().camera(c).radians_per_pixel();
+    for (const Match& m : fine.matches[c]) {
+      const std::size_t at = i++;
+      if (std::ranges::binary_search(known, m.landmark)) continue;
+      const auto level = coarse.frame.cameras[c].keypoints.level[m.keypoint.index()];
+      observations.push_back(all[at]);
+      window_px.push_back(radius_px * std::pow(input.features.pyramid.scale_factor, level));
+    }
+  }
+  const solver::MotionModel motion = motion_model(input, coarse.frame);
+  return agree_beyond_chance(input.map.rig(), observations, window_px, coarse.T_rig_world, motion);
+}
+
 // See TrackOutput::frame.
 frame::BundledFrame refined_frame(const camera::Rig& rig, const Coarse& coarse, const Fine& fine,
                                   const InitialisationOptions& options) {
@@ -270,10 +294,10 @@ TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, con
   const Coarse coarse = coarse_pose(input, frame, options, pool);
   if (coarse.reason != LostReason::kNone) return lost(input.state, frame, coarse.reason);
   Fine fine = track_local_view(input, coarse, options, pool);
-  if (!supported(fine.solution, count(fine.matches), options.min_inliers, options)) {
-    const bool few = fine.solution.num_inliers < options.min_inliers;
-    return lost(input.state, frame, few ? LostReason::kFewInliers : LostReason::kUnstablePose);
-  }
+  if (fine.solution.num_inliers < options.min_inliers) return lost(input.state, frame, LostReason::kFewInliers);
+  if (!supported(fine.solution, count(fine.matches), options.min_inliers, options) &&
+      !(fine.solution.ok && coarse_pose_confirmed(input, coarse, fine, options)))
+    return lost(input.state, frame, LostReason::kUnstablePose);
   return tracked(input, coarse, std::move(fine), options);
 }
 

@@ -157,5 +157,26 @@ TEST_F(RobustPose, FollowsLandmarksThatSpreadOverTheImages) {
   EXPECT_LT(error(solution), 0.03);
 }
 
+// Most matches are replaced by wrong ones, which are anywhere in a window of this radius around the right pixel.
+TEST_F(RobustPose, FewRightMatchesConfirmAPoseAndWrongOnesDoNot) {
+  constexpr double kWindow_px = 8.0;
+  Random random(1, "wrong matches");
+  const std::vector<double> windows(observations.size(), kWindow_px);
+  const auto mislead = [&](std::size_t i) {
+    Eigen::Vector2d offset;
+    do {
+      offset = kWindow_px * Eigen::Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
+    } while (offset.norm() > kWindow_px);
+    observations[i].pixel += offset;
+  };
+  const auto confirmed = [&] { return agree_beyond_chance(world.map.rig(), observations, windows, truth, motion); };
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    if (i % 4 != 0) mislead(i);
+  }
+  EXPECT_TRUE(confirmed());
+  for (std::size_t i = 0; i < observations.size(); i += 4) mislead(i);
+  EXPECT_FALSE(confirmed());
+}
+
 }  // namespace
 }  // namespace bslam::tracking
