@@ -16,9 +16,12 @@ using geometry::Matrix6d;
 using geometry::SE3;
 using geometry::Vector6d;
 
-constexpr int kDistances = 41;           // number of distances evaluated, equidistant in their logarithm
+constexpr int kDistances = 13;           // number of initial distances, equidistant in their logarithm
 constexpr double kMinSigma = 1e-5;       // rad, minimum standard deviation of a bearing
 constexpr double kMinCondition = 1e-12;  // minimum condition of the normal equations; if smaller, it is not observable
+// A motion is not excluded unless its cost is higher than the best one's by that of three standard deviations, with ten
+// correlated pairs for the information of one.
+constexpr double kExcluded = 0.5 * 9.0 * 10.0;  // in units of the variance of a bearing
 
 // `cost`: half the sum of squared angles, each at most the square of the knee.
 struct Sums : solver::NormalEquations<6> {
@@ -68,22 +71,6 @@ Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double kne
 
 SE3 at_distance(const SE3& T, double distance) { return {T.rotation(), distance * T.translation().normalized()}; }
 
-// The distance along the given direction with the lowest cost.
-SE3 best_distance(const SE3& T_b_a, std::span<const CameraPairs> cameras, const GeneralisedScaleOptions& options) {
-  SE3 best;
-  double min_cost = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < kDistances; ++i) {
-    const double fraction = static_cast<double>(i) / (kDistances - 1);
-    const SE3 trial = at_distance(T_b_a, options.shortest * std::pow(options.longest / options.shortest, fraction));
-    const double cost = evaluate(trial, cameras, options.inlier_angle).cost;
-    if (cost < min_cost) {
-      min_cost = cost;
-      best = trial;
-    }
-  }
-  return best;
-}
-
 SE3 refine(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) {
   const auto equations_at = [&](const SE3& T) -> solver::NormalEquations<6> { return evaluate(T, cameras, knee); };
   const auto plus = [](const SE3& T, const Vector6d& delta) { return T.perturbed(delta); };
@@ -97,13 +84,44 @@ SE3 refine(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) 
   return problem.state();
 }
 
+struct Motion {
+  SE3 T_b_a;
+  double cost = std::numeric_limits<double>::infinity();
+};
+
+// The motions refined from different distances along the given direction. The cost has several minima: if the map is
+// small enough, each camera moves in a direction of its own.
+std::vector<Motion> refined_motions(const SE3& T_b_a, std::span<const CameraPairs> cameras,
+                                    const GeneralisedScaleOptions& options) {
+  std::vector<Motion> out;
+  for (int i = 0; i < kDistances; ++i) {
+    const double fraction = static_cast<double>(i) / (kDistances - 1);
+    const double distance = options.shortest * std::pow(options.longest / options.shortest, fraction);
+    const SE3 T = refine(at_distance(T_b_a, distance), cameras, options.inlier_angle);
+    out.push_back({T, evaluate(T, cameras, options.inlier_angle).cost});
+  }
+  return out;
+}
+
+// The largest ratio, as a logarithm, of the distances of motions that are not excluded to that of the best one.
+double spread(const std::vector<Motion>& motions, const Motion& best, double variance) {
+  double out = 0.0;
+  for (const Motion& m : motions) {
+    if (m.cost - best.cost < kExcluded * variance)
+      out = std::max(out, std::abs(std::log(m.T_b_a.translation().norm() / best.T_b_a.translation().norm())));
+  }
+  return out;
+}
+
 }  // namespace
 
 std::optional<GeneralisedScale> generalised_scale(const SE3& T_b_a, std::span<const CameraPairs> cameras,
                                                   const GeneralisedScaleOptions& options) {
   if (!(T_b_a.translation().norm() > 0.0)) return std::nullopt;
   GeneralisedScale out;
-  out.T_b_a = refine(best_distance(T_b_a, cameras, options), cameras, options.inlier_angle);
+  const std::vector<Motion> motions = refined_motions(T_b_a, cameras, options);
+  const Motion& best = *std::ranges::min_element(motions, {}, &Motion::cost);
+  out.T_b_a = best.T_b_a;
   const Sums sums = evaluate(out.T_b_a, cameras, options.inlier_angle);
   out.num_inliers = sums.inliers;
   const double distance = out.T_b_a.translation().norm();
@@ -113,7 +131,7 @@ std::optional<GeneralisedScale> generalised_scale(const SE3& T_b_a, std::span<co
   Vector6d per_step = Vector6d::Zero();  // d log(distance) / d[omega, v]
   per_step.tail<3>() = out.T_b_a.translation() / (distance * distance);
   const double variance = std::max(kMinSigma * kMinSigma, sums.squared / (sums.inliers - 6));
-  out.deviation = std::sqrt(variance * per_step.dot(factor.solve(per_step)));
+  out.deviation = std::max(std::sqrt(variance * per_step.dot(factor.solve(per_step))), spread(motions, best, variance));
   if (!std::isfinite(out.deviation) || distance < options.shortest || distance > options.longest) return std::nullopt;
   return out;
 }

@@ -28,10 +28,10 @@ struct GeneralisedScale {
   int num_inliers = 0;
 };
 
-// `T_b_a`: motion of the reference, with a translation of any length. Evaluates distances over the whole range, then
-// refines rotation and translation together starting from the best one, so that the deviation includes the uncertainty
-// of the direction of motion. Returns nullopt if the distance is not observable: one camera, all cameras at one
-// position, or a motion without rotation.
+// `T_b_a`: motion of the reference, with a translation of any length. Refines rotation and translation together, so
+// that the deviation includes the uncertainty of the direction of motion, starting from distances over the whole range;
+// it includes the other minima of the cost that the images do not exclude. Returns nullopt if the distance is not
+// observable: one camera, all cameras at one position, or a motion without rotation.
 std::optional<GeneralisedScale> generalised_scale(const geometry::SE3& T_b_a, std::span<const CameraPairs> cameras,
                                                   const GeneralisedScaleOptions& options = {});
 

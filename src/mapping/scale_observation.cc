@@ -16,6 +16,10 @@ constexpr double kMaxScaleStep = 3.0;
 constexpr double kMaxMetricCorrectionSigmas =
     3.0;                                      // in standard deviations: a smaller correction leaves the map metric
 constexpr double kMinCorrectionSigmas = 0.5;  // in standard deviations: a smaller correction is not applied
+// A metric scale that was estimated from motion is checked at every so many keyframes, and is not metric any more if an
+// estimate contradicts it by both limits.
+constexpr std::size_t kCheckInterval = 4;
+constexpr double kContradictionSigmas = 5.0, kContradiction = 0.05;
 
 // Only the oldest keyframe is fixed: fixing more would constrain the shape from which the scale is estimated.
 adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId keyframe, int limit) {
@@ -39,18 +43,28 @@ adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId ke
   return out;
 }
 
+// Whether the scale is estimated at this keyframe.
+bool due(const map::BundledMap& map, KeyframeId keyframe) {
+  if (map.scale() != map::Scale::kMetric) return map.scale() == map::Scale::kUnobservable;
+  return map.scale_deviation() > 0 && keyframe.index() % kCheckInterval == 0;
+}
+
+bool contradicts(const RigScale& found) {
+  return std::abs(std::log(found.scale)) > std::max(kContradictionSigmas * found.deviation, kContradiction);
+}
+
 }  // namespace
 
 ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features,
                           map::MapDraft& draft) {
   ScaleReport report;
   const map::BundledMap& map = draft.map();
-  if (map.scale() != map::Scale::kUnobservable) return report;
+  if (!due(map, keyframe)) return report;
   const adjustment::Selection selection = select_observers(map, keyframe, options.keyframes);
   const auto flat = adjustment::build_problem(map, selection, features);
   const auto found = rig_scale(flat.problem, {.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
                                               .correlated_observations = options.correlated_observations});
-  if (!found) return report;
+  if (!found || (map.scale() == map::Scale::kMetric && !contradicts(*found))) return report;
   report.observed = true;
   report.deviation = found->deviation;
   report.keyframes = static_cast<int>(flat.keyframes.size());

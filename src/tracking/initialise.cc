@@ -74,6 +74,21 @@ struct Unit {
   double deviation = std::numeric_limits<double>::infinity();
 };
 
+// The length of the motion of a camera from which on the rotation of the rig moves the other cameras only as far apart
+// from it as cannot be noticed.
+double least_length(const TwoView& view, const camera::Rig& rig) {
+  constexpr double kUnnoticed = 0.01;  // rad, change of the direction of motion
+  const Eigen::Matrix3d turn = view.pose.T_b_a.matrix3() - Eigen::Matrix3d::Identity();
+  double apart = 0.0;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const SE3 T_view_cam = rig.cam_from_rig(view.camera) * rig.rig_from_cam(c);
+    apart = std::max(apart, (turn * T_view_cam.translation()).norm());
+  }
+  return apart / kUnnoticed;
+}
+
+// If the scale cannot be estimated well, the images do not show how the other cameras move relative to this one. A map
+// that is too small would claim that they do, and accept the matches of the other cameras that happen to agree with it.
 Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig& rig,
                  const InitialisationOptions& options) {
   std::vector<double> depths;
@@ -89,7 +104,9 @@ Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig
   const auto found = estimators::generalised_scale(view.pose.T_b_a, cameras);
   if (found && found->deviation <= options.max_scale_deviation)
     return {found->T_b_a.translation().norm(), found->deviation};
-  return {options.assumed_median_depth / depth, std::numeric_limits<double>::infinity()};
+  double least = least_length(view, rig);
+  if (found) least = std::min(least, found->T_b_a.translation().norm() * std::exp(found->deviation));
+  return {std::max(options.assumed_median_depth / depth, least), std::numeric_limits<double>::infinity()};
 }
 
 }  // namespace

@@ -128,6 +128,17 @@ TEST(ObserveScale, DoesNotChangeMapsOfKnownOrArbitraryScale) {
   }
 }
 
+TEST(ObserveScale, ContradictsAWrongMetricScaleThatWasEstimatedFromMotion) {
+  for (const double factor : {1.0, 0.4}) {
+    SimulatedMap world = simulated_map(orbit(1), three_sides(), 9, factor, 1);
+    world.map.set_scale(map::Scale::kMetric, 0.01);
+    map::MapDraft draft = world.draft();
+    const ScaleReport report = observe_scale(KeyframeId(8), independent_noise().scale, kFeatures, draft);
+    EXPECT_EQ(report.correction > 1.5, factor < 1.0) << factor;
+    EXPECT_EQ(draft.map().scale(), factor < 1.0 ? map::Scale::kUnobservable : map::Scale::kMetric);
+  }
+}
+
 TEST(ObserveScale, IsUnobservableWithOneCameraOrOneKeyframe) {
   const SimulatedMap one = simulated_map(orbit(1), synthetic::ring_rig(1), 5, 1.5, 1);
   map::MapDraft draft = one.draft();

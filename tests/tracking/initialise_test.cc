@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/alignment.h"
+#include "geometry/triangulation.h"
 #include "tracking/simulated_tracker.h"
 
 namespace bslam::tracking {
@@ -147,9 +148,8 @@ TEST_F(InitialiseMonocular, ARotatingRigWithoutOverlapIsInitialisedAtApproximate
     EXPECT_LT(map::angle_rad(found, truth), 0.5 * kDegree);
     if (!std::isfinite(started->scale_deviation)) continue;
     ++num_estimated;
-    EXPECT_LE(started->scale_deviation, 0.3);
-    const double ratio = found.translation().norm() / truth.translation().norm();
-    EXPECT_NEAR(ratio, 1.0, 4 * started->scale_deviation) << "seed " << seed;
+    EXPECT_LE(started->scale_deviation, 1.0);
+    EXPECT_NEAR(found.translation().norm() / truth.translation().norm(), 1.0, 0.3) << "seed " << seed;
   }
   EXPECT_GE(num_estimated, 3);
 }
@@ -159,7 +159,7 @@ TEST_F(InitialiseMonocular, AssumesTheDepthIfTwoFramesDoNotDetermineTheScale) {
   map::MapDraft draft = empty_draft(sim);
   InitialisationOptions options;
   options.max_scale_deviation = 1e-3;
-  options.assumed_median_depth = 2.0;
+  options.assumed_median_depth = 20.0;
   const auto started = start(sim.frame(FrameId(0), 0.0), sim.frame(FrameId(1), 0.3), draft, options);
   ASSERT_TRUE(started.has_value());
   EXPECT_EQ(started->scale, map::Scale::kUnobservable);
@@ -167,7 +167,22 @@ TEST_F(InitialiseMonocular, AssumesTheDepthIfTwoFramesDoNotDetermineTheScale) {
   std::vector<double> depth;
   for (const LandmarkId l : draft.map().landmark_ids()) depth.push_back(draft.map().landmark(l).position.norm());
   std::nth_element(depth.begin(), depth.begin() + static_cast<std::ptrdiff_t>(depth.size() / 2), depth.end());
-  EXPECT_NEAR(depth[depth.size() / 2], 2.0, 0.2);
+  EXPECT_NEAR(depth[depth.size() / 2], 20.0, 2.0);
+}
+
+TEST_F(InitialiseMonocular, AssumesAMapInWhichCamerasMoveInOneDirection) {
+  const auto sim = simulator(three_sides(), room(1, 0.25));
+  map::MapDraft draft = empty_draft(sim);
+  InitialisationOptions options;
+  options.max_scale_deviation = 1e-3;
+  options.assumed_median_depth = 1e-3;
+  ASSERT_TRUE(start(sim.frame(FrameId(0), 0.0), sim.frame(FrameId(1), 0.3), draft, options).has_value());
+  const SE3 motion = draft.map().keyframe(KeyframeId(1)).T_rig_world;
+  for (std::size_t c = 1; c < sim.rig().size(); ++c) {
+    const SE3 of_camera = sim.rig().cam_from_rig(c) * motion * sim.rig().rig_from_cam(c);
+    const Eigen::Vector3d in_rig = sim.rig().rig_from_cam(c).rotation() * of_camera.translation();
+    EXPECT_LT(geometry::angle_between(in_rig, motion.translation()), 0.06) << c;
+  }
 }
 
 }  // namespace
