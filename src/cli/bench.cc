@@ -210,7 +210,9 @@ void add_bench(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   add_run_options(*verb, *a);
   CLI::Option* time = verb->add_flag(
-      "--time", a->time, "time one recording instead, by stage, and count its work; writes time.json into --out");
+      "--time", a->time,
+      "time one recording instead, by stage, and count its work, by default in mode sequential; writes time.json into "
+      "--out");
   verb->add_option("--against", a->against,
                    "compare with this earlier time.json; exit status 1 if a count differs or a time is slower")
       ->needs(time);
