@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/memory_count.h"
+
 namespace bslam {
 
 // Reads like a const std::vector. To change elements, copy them to a vector and make another array of it.
@@ -33,6 +35,11 @@ class SharedArray {
   const T& back() const { return data_[size_ - 1]; }
   const T* begin() const { return data_; }
   const T* end() const { return data_ + size_; }
+  // The memory of the elements, unless it was counted before.
+  std::size_t memory_bytes(MemoryCount& count) const {
+    if (!values_) return 0;
+    return count.once(data_, sizeof(*values_) + MemoryCount::kShared + values_->capacity() * sizeof(T));
+  }
   std::vector<T> copy() const { return {begin(), end()}; }
   friend bool operator==(const SharedArray& a, const SharedArray& b) {
     return std::equal(a.begin(), a.end(), b.begin(), b.end());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>  // defines __GLIBC__
+#include <string_view>
 
 // Before the definition of a function whose loops the compiler vectorises. All versions give the same bits: the
 // compiler neither reorders sums of floating-point numbers nor contracts products and sums (-ffp-contract=off). A sum
@@ -11,8 +12,16 @@
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__has_attribute) && !defined(BSLAM_ONE_VERSION)
 #if __has_attribute(target_clones)
 #define BSLAM_VECTORISED __attribute__((target_clones("avx2", "default")))
+#define BSLAM_SEVERAL_VERSIONS
 #endif
 #endif
 #ifndef BSLAM_VECTORISED
 #define BSLAM_VECTORISED
 #endif
+
+namespace bslam {
+
+// The instruction set of the version that is called on this processor: "AVX2", "SSE4.2", "NEON" or "none".
+std::string_view instruction_set();
+
+}  // namespace bslam

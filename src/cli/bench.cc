@@ -2,9 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <memory>
 #include <string>
@@ -13,9 +11,7 @@
 #include "base/atomic_file.h"
 #include "base/option_table.h"
 #include "benchmark/benchmark_report.h"
-#include "cli/child_process.h"
-#include "cli/config_arguments.h"
-#include "cli/dataset_arguments.h"
+#include "cli/bench_runs.h"
 #include "cli/interruption.h"
 #include "cli/shell_command.h"
 #include "cli/verbs.h"
@@ -29,78 +25,9 @@ using benchmark::RunMeasurement;
 using benchmark::Sequence;
 using benchmark::SequenceResult;
 
-constexpr std::size_t kMaxLogBytes = std::size_t{1} << 26;
-
-struct BenchArguments {
-  DatasetArguments data;  // `path` is the folder of the sequences
-  ConfigArguments config;
-  std::string out = "bench", mode, pace, late, vocabulary;
-  int runs = 5;
-  bool no_loop = false, no_final_ba = false, overwrite = false;
-};
-
-// Returns the options that every run receives as they are.
-std::vector<std::string> run_options(const BenchArguments& a) {
-  std::vector<std::string> words;
-  const auto add = [&words](const char* option, const std::string& value) {
-    if (!value.empty()) words.insert(words.end(), {option, value});
-  };
-  if (a.data.format != "auto") add("--format", a.data.format);
-  if (a.data.cameras) add("--cameras", *a.data.cameras);
-  if (a.data.begin_s) add("--begin", fmt::format("{}", *a.data.begin_s));
-  if (a.data.end_s) add("--end", fmt::format("{}", *a.data.end_s));
-  add("--topics", a.data.images.topics);
-  if (a.data.images.rate_hz) add("--rate", fmt::format("{}", *a.data.images.rate_hz));
-  add("--stamp-unit", a.data.images.stamp_unit);
-  add("--bayer", a.data.images.bayer);
-  add("--config", a.config.file);
-  for (const std::string& setting : a.config.settings) add("--set", setting);
-  add("--mode", a.mode);
-  add("--pace", a.pace);
-  add("--late", a.late);
-  add("--vocabulary", a.vocabulary);
-  if (a.no_loop) words.emplace_back("--no-loop");
-  if (a.no_final_ba) words.emplace_back("--no-final-ba");
-  return words;
-}
-
 std::string rig_of(const BenchArguments& a, const Sequence& sequence) {
   if (!a.data.rig.empty()) return a.data.rig;
   return sequence.rig ? sequence.rig->string() : "";
-}
-
-// Name of the processor as the kernel reports it; empty if it does not.
-std::string processor_name() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);) {
-    const std::size_t colon = line.find(": ");
-    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "";
-}
-
-// Returns the error that a run printed: its last line, without the name of the program.
-std::string message_in(const fs::path& log) {
-  const auto text = read_file(log, kMaxLogBytes);
-  if (!text) return text.error().message();
-  std::string last = text->substr(0, text->find_last_not_of('\n') + 1);
-  last.erase(0, last.find_last_of('\n') + 1);
-  constexpr std::string_view kPrefix = "bslam: ";
-  return last.starts_with(kPrefix) ? last.substr(kPrefix.size()) : last;
-}
-
-std::string failure_of(const ProcessEnd& end, const fs::path& log) {
-  if (end.signal > 0) return fmt::format("ended by signal {} ({})", end.signal, ::strsignal(end.signal));
-  switch (end.exit_status) {
-    case kExitOk:
-      return "";
-    case kExitNothingTracked:
-      return "no frame could be tracked";
-    case kExitInterrupted:
-      return "interrupted";
-    default:
-      return message_in(log);
-  }
 }
 
 // Returns the calibrated pose of the run's camera 0 in the body.
@@ -166,19 +93,6 @@ Status write_report(const std::vector<SequenceResult>& results, const benchmark:
   const report::Document document = benchmark::benchmark_report(results, conditions);
   if (const Status s = write_atomically(folder / "report.md", report::markdown_text(document)); !s) return s;
   return write_atomically(folder / "report.html", report::html_text(document));
-}
-
-Status prepare_folder(const BenchArguments& a) {
-  const fs::path folder = a.out;
-  std::error_code error;
-  const bool exists = fs::exists(folder, error);
-  if (exists && !fs::is_directory(folder, error)) return Error{a.out, "--out", "a file", "a folder"};
-  if (exists && !a.overwrite && !fs::is_empty(folder, error)) {
-    return Error{a.out, "--out", "a folder that is not empty", "an empty or new folder, or --overwrite"};
-  }
-  fs::create_directories(folder, error);
-  if (error) return Error{a.out, "--out", error.message(), "a folder that can be created"};
-  return check_writable(folder / "report.md");
 }
 
 benchmark::BenchmarkConditions conditions_of(const BenchArguments& a, bool loops) {
@@ -247,6 +161,7 @@ Result<int> run_all(const BenchArguments& a, const std::vector<Sequence>& sequen
 }
 
 int bench(const BenchArguments& a) {
+  if (a.time) return bench_time(a);
   const Interruption interruption;
   auto config = resolve_config(a.config);
   if (!config) return report_error(config.error());
@@ -283,7 +198,9 @@ void add_run_options(CLI::App& verb, BenchArguments& a) {
 void add_bench(CLI::App& app, int& exit_status) {
   const auto a = std::make_shared<BenchArguments>();
   CLI::App* verb = app.add_subcommand(
-      "bench", "run all EuRoC, TUM-VI or KITTI sequences of a folder and write a table of errors, time and memory");
+      "bench",
+      "run all EuRoC, TUM-VI or KITTI sequences of a folder and write a table of errors, time and memory, or time one "
+      "recording by stage");
   add_dataset_options(*verb, a->data);
   verb->get_option("DATA")->description("folder of the sequences, or one sequence");
   verb->add_option("--out", a->out, "folder for report.md, report.html and the files of every run")
@@ -292,6 +209,17 @@ void add_bench(CLI::App& app, int& exit_status) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   add_run_options(*verb, *a);
+  CLI::Option* time = verb->add_flag(
+      "--time", a->time,
+      "time one recording instead, by stage, and count its work, by default in mode sequential; writes time.json into "
+      "--out");
+  verb->add_option("--against", a->against,
+                   "compare with this earlier time.json; exit status 1 if a count differs or a time is slower")
+      ->needs(time);
+  verb->add_option("--margin", a->margin_percent, "by how many percent a time may be slower")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str()
+      ->needs(time);
   verb->add_flag("--overwrite", a->overwrite, "write into a folder that is not empty; earlier results are replaced");
   verb->callback([a, &exit_status] { exit_status = bench(*a); });
 }

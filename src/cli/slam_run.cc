@@ -1,5 +1,7 @@
 #include "cli/slam_run.h"
 
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <filesystem>
 #include <limits>
@@ -8,11 +10,13 @@
 
 #include "base/atomic_file.h"
 #include "base/option_table.h"
+#include "cli/allocation_count.h"
 #include "cli/rerun.h"
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"
 #include "cli/verbs.h"
 #include "map/rigs_of_map.h"
+#include "session/memory_report.h"
 #include "session/record_builder.h"
 #include "session/report_data.h"
 #include "session/run_warnings.h"
@@ -113,6 +117,14 @@ void end_view(live_view::LiveView* view, const session::SessionResult& result, c
   view->end(session::report_text(result, config, {dataset, arguments.command, arguments.up}));
 }
 
+// The data of the report are made while it is written.
+void note_report_size(session::SessionResult& result, const system::Config& config, const dataset::Dataset& dataset,
+                      const SlamArguments& arguments) {
+  if (arguments.no_report) return;
+  const std::string data = session::report_text(result, config, {dataset, arguments.command, arguments.up});
+  session::add_largest(result.record.memory, "data of the report", data.size());
+}
+
 // What is wrong with a loaded map.
 std::vector<std::string> warnings_of_map(const std::string& file, const std::string& warning) {
   if (warning.empty()) return {};
@@ -138,6 +150,7 @@ void print_after(const session::RunRecord& record, const std::vector<std::string
   if (verbosity >= LogVerbosity::kInfo) print_stage_statistics(record);
   if (verbosity >= LogVerbosity::kWarning) print_warnings(warnings);
   print_result(record, arguments.out);
+  if (arguments.memory_report) fmt::print("\n{}", session::memory_text(record));
 }
 
 int exit_status_of(const session::SessionResult& result) {
@@ -238,11 +251,14 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   options.vocabulary = *vocabulary;
   options.observer = view->get();
   options.control = &control;
+  options.memory_report = arguments.memory_report;
+  if (arguments.count_allocations) options.allocations = begin_counting_allocations();
   auto result = session::run_session(dataset, options);
   const std::vector<std::string> of_source = input.after ? input.after() : std::vector<std::string>();
   if (!result) return report_error(result.error());
   if (arguments.image_stamps) result->subtracted_ns = dataset.rig.camera(0).time_offset_ns;
   const std::vector<std::string> warnings = note_warnings(input, of_map, of_source, result->record);
+  if (arguments.memory_report) note_report_size(*result, input.config, dataset, arguments);
   const storage::MapFileInfo info = map_info(result->record, **vocabulary, map_warning);
   if (const Status s = write_files(*result, input.config, dataset, arguments, info); !s) return report_error(s.error());
   const Status sent = arguments.rerun.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
@@ -281,6 +297,11 @@ void add_slam_options(CLI::App& verb, SlamArguments& a) {
           "rerun+http://127.0.0.1:9876/proxy; needs the Python packages bslam and rerun-sdk")
       ->excludes(no_report);
   add_view_options(verb, a.view);
+  verb.add_flag("--memory-report", a.memory_report,
+                "print at the end how much memory the map, the vocabulary, images and records hold; also in "
+                "summary.json");
+  verb.add_flag("--count-allocations", a.count_allocations,
+                "count the heap allocations of the run, for the key `work` of summary.json");
   verb.add_option("--seed", a.seed, "seed of all random numbers; default 1")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   verb.add_option("--progress", a.progress, "auto: show a progress bar if stderr is a terminal; never: show none")

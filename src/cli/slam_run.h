@@ -26,7 +26,7 @@ struct SlamArguments {
   std::string progress = "auto", log_level = "warning";
   std::optional<int> seed;
   bool no_loop = false, localize_only = false, no_final_ba = false, no_report = false, overwrite = false,
-       image_stamps = false;
+       image_stamps = false, memory_report = false, count_allocations = false;
   std::string command;  // the command line, as shown in the report
 };
 

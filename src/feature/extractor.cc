@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/assert.h"
+#include "base/work.h"
 #include "feature/brief_pattern.h"
 #include "feature/distribution.h"
 #include "feature/fast.h"
@@ -153,6 +154,7 @@ void Extractor::extract(const image::Pyramid& pyramid, const image::ImageView& m
                                   options_.fast_threshold, scratch_->chosen);
     scratch_->describe(pyramid, l, mask, camera, options_.sigma_px, detections);
   }
+  count_extraction(detections.size());
 }
 
 }  // namespace bslam::feature

@@ -46,4 +46,11 @@ Keypoints Keypoints::refined(Refinement&& refinement) const {
   return out;
 }
 
+KeypointMemory Keypoints::memory(MemoryCount& count) const {
+  return {.positions = level.memory_bytes(count) + angle.memory_bytes(count) + pixel.memory_bytes(count) +
+                       bearing.memory_bytes(count) + sigma.memory_bytes(count),
+          .descriptors = descriptor.memory_bytes(count),
+          .patches = patch.memory_bytes(count)};
+}
+
 }  // namespace bslam::feature

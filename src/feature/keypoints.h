@@ -41,6 +41,12 @@ struct Refinement {
   std::vector<float> sigma;
 };
 
+// The memory of keypoints.
+struct KeypointMemory {
+  std::size_t positions = 0;  // pixels, bearings, standard deviations, levels, angles
+  std::size_t descriptors = 0, patches = 0;
+};
+
 // The keypoints of one camera in a frame. Immutable: a stage that refines positions creates another value with
 // `refined`, which shares all other arrays with this one.
 struct Keypoints {
@@ -71,6 +77,8 @@ struct Keypoints {
 
   std::size_t size() const { return pixel.size(); }
   bool empty() const { return pixel.empty(); }
+  // Of the arrays that were not counted before.
+  KeypointMemory memory(MemoryCount& count) const;
 
   // A copy of the positions, and these keypoints with other positions (one for each keypoint).
   Refinement positions() const { return {pixel.copy(), bearing.copy(), sigma.copy()}; }

@@ -46,4 +46,9 @@ Bundled::Bundled(std::span<const std::size_t> keypoint_counts, std::span<const s
   camera_begin_ = std::move(camera_begin);
 }
 
+std::size_t Bundled::memory_bytes(MemoryCount& count) const {
+  return refs_.memory_bytes(count) + begin_.memory_bytes(count) + feature_.memory_bytes(count) +
+         camera_begin_.memory_bytes(count) + points_.memory_bytes(count);
+}
+
 }  // namespace bslam::frame

@@ -52,6 +52,9 @@ class Bundled {
   // Nullopt for monocular features, and for matched ones without a valid triangulated point.
   const std::optional<BundledPoint>& point(FeatureId f) const { return is_matched(f) ? points_[f.index()] : kNone; }
 
+  // The memory of the tables that were not counted before.
+  std::size_t memory_bytes(MemoryCount& count) const;
+
  private:
   static inline const std::optional<BundledPoint> kNone;
   SharedArray<KeypointRef> refs_;

@@ -22,6 +22,9 @@ class FeatureGrid {
   void near(const feature::Keypoints& keypoints, const Eigen::Vector2d& pixel, double radius, int low_level,
             int high_level, std::vector<std::uint32_t>& out) const;
 
+  // The memory of the cells, unless it was counted before.
+  std::size_t memory_bytes(MemoryCount& count) const { return begin_.memory_bytes(count) + index_.memory_bytes(count); }
+
  private:
   float cells_per_px_x_ = 0, cells_per_px_y_ = 0;
   SharedArray<std::uint32_t> begin_;  // kColumns * kRows + 1, row by row

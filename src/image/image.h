@@ -43,6 +43,7 @@ class Image {
   int width() const { return width_; }
   int height() const { return height_; }
   bool empty() const { return pixels_.empty(); }
+  std::size_t memory_bytes() const { return pixels_.capacity(); }
   std::uint8_t* row(int y) { return pixels_.data() + static_cast<std::ptrdiff_t>(y) * width_; }
   const std::uint8_t* row(int y) const { return pixels_.data() + static_cast<std::ptrdiff_t>(y) * width_; }
   ImageView view() const { return {pixels_.data(), width_, height_, width_}; }

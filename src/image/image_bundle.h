@@ -36,6 +36,13 @@ struct ImageBundle {
   // Time of the frame: the time of camera 0's image, or of the earliest other image if camera 0 has none.
   TimeNs time_ns = 0;
   std::vector<CameraImage> images;  // one per camera of the rig
+
+  // Of the pixels that it owns.
+  std::size_t memory_bytes() const {
+    std::size_t bytes = 0;
+    for (const CameraImage& i : images) bytes += i.image.memory_bytes() + i.mask.memory_bytes();
+    return bytes;
+  }
 };
 
 }  // namespace bslam::image

@@ -47,6 +47,9 @@ class LoopCloser {
     joined_ = {};
   }
 
+  // Of the index of its place recogniser.
+  std::size_t memory_bytes() const { return recogniser_->memory_bytes(); }
+
  private:
   std::optional<PlaceMatch> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate,
                                    JoinAttempts& attempts) const;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/memory_count.h"
+
 namespace bslam::looping {
 namespace {
 
@@ -50,6 +52,8 @@ std::vector<map::Covisible> neighbours_of(const map::BundledMap& map, KeyframeId
 
 BagOfWordsRecogniser::BagOfWordsRecogniser(place::VocabularyPtr vocabulary, const RecognitionOptions& options)
     : vocabulary_(std::move(vocabulary)), options_(options) {}
+
+std::size_t BagOfWordsRecogniser::memory_bytes() const { return index_.memory_bytes() + bslam::memory_bytes(known_); }
 
 void BagOfWordsRecogniser::describe(frame::BundledFrame& frame) const {
   for (frame::CameraFrame& c : frame.cameras) {

@@ -35,6 +35,9 @@ class PlaceRecogniser {
 
   // Returns keyframes of `map` that may show the place of a frame prepared by describe().
   virtual std::vector<Candidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
+
+  // Of its index.
+  virtual std::size_t memory_bytes() const { return 0; }
 };
 
 // Bag of words: each unique feature of every camera contributes its word.
@@ -45,6 +48,7 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   void describe(frame::BundledFrame& frame) const override;
   std::vector<Candidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) override;
   std::vector<Candidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) override;
+  std::size_t memory_bytes() const override;
 
  private:
   using Words = std::shared_ptr<const place::WordVector>;

@@ -28,6 +28,19 @@ namespace bslam::map {
 enum class Scale { kMetric, kUpToScale, kUnobservable };
 std::string_view scale_name(Scale scale);  // "metric", "up-to-scale", "unobservable"
 
+// The memory of a map in bytes.
+struct MapMemory {
+  std::size_t keyframes = 0;    // poses, spanning tree, and the tables of their landmarks
+  std::size_t features = 0;     // positions and tables of their features
+  std::size_t descriptors = 0;  // of their features
+  std::size_t patches = 0;      // small images of their features
+  std::size_t words = 0;        // of the vocabulary, of their features
+  std::size_t landmarks = 0, observations = 0, covisibility = 0;
+  std::size_t total() const {
+    return keyframes + features + descriptors + patches + words + landmarks + observations + covisibility;
+  }
+};
+
 class BundledMap {
  public:
   explicit BundledMap(std::shared_ptr<const camera::Rig> rig, feature::PyramidShape pyramid = {})
@@ -103,6 +116,9 @@ class BundledMap {
 
   // The keypoints of one camera of a keyframe.
   const feature::Keypoints& keypoints(KeyframeId k, CameraIndex c) const { return keyframe(k).frame->keypoints(c); }
+
+  // In map_memory.cc: the memory of all that was not counted before.
+  MapMemory memory(MemoryCount& count) const;
 
   // Returns a description of the first violated invariant, or nullopt. The invariants: observations and the landmark
   // tables of the keyframes match; an alive landmark has observations, none of them in a removed keyframe; no feature

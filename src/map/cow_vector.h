@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "base/assert.h"
+#include "base/memory_count.h"
 
 namespace bslam::map {
 
@@ -83,6 +84,22 @@ class CowVector {
     return chunk->values[i % kChunk];
   }
 
+  // The memory of the pieces that were not counted before, and what their elements own: owned(element).
+  template <class Owned>
+  std::size_t memory_bytes(MemoryCount& count, const Owned& owned) const {
+    std::size_t bytes = bslam::memory_bytes(nodes_);
+    for (const std::shared_ptr<Node>& node : nodes_) {
+      bytes += count.once(node.get(), sizeof(Node) + MemoryCount::kShared);
+      for (const std::shared_ptr<Chunk>& chunk : node->chunks) {
+        const std::size_t own = count.once(chunk.get(), sizeof(Chunk) + MemoryCount::kShared);
+        if (own == 0) continue;
+        bytes += own;
+        for (const T& value : chunk->values) bytes += owned(value);
+      }
+    }
+    return bytes;
+  }
+
   // Releases the memory of a full chunk: its elements become default values in a piece shared by all such chunks.
   void blank_chunk(std::size_t chunk, std::uint64_t tag) {
     BSLAM_ASSERT((chunk + 1) * kChunk <= size_, "only a full chunk can be released");
@@ -139,6 +156,12 @@ class CowArray {
   const T& operator[](std::size_t i) const { return piece_->values[i]; }
   auto begin() const { return values().begin(); }
   auto end() const { return values().end(); }
+
+  // The memory of the elements, unless it was counted before.
+  std::size_t memory_bytes(MemoryCount& count) const {
+    if (!piece_) return 0;
+    return count.once(piece_.get(), sizeof(Piece) + MemoryCount::kShared + bslam::memory_bytes(piece_->values));
+  }
 
   // Mutable access: detaches the array unless this copy owns it.
   std::vector<T>& mutate(std::uint64_t tag) {

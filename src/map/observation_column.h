@@ -33,6 +33,11 @@ class ObservationColumn {
   // Releases the memory of a full block of landmarks without observations.
   void blank_block(std::size_t block, std::uint64_t tag) { blocks_.blank_chunk(block, tag); }
 
+  // The memory of the blocks that were not counted before.
+  std::size_t memory_bytes(MemoryCount& count) const {
+    return blocks_.memory_bytes(count, [](const Block& block) { return bslam::memory_bytes(block.entries); });
+  }
+
  private:
   struct Block {
     std::array<std::uint32_t, kBlock + 1> begin{};  // indices into entries

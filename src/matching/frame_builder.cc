@@ -96,4 +96,14 @@ image::ImageView FrameBuilder::mask_of(std::size_t camera, const image::CameraIm
   return combined.view();
 }
 
+std::size_t FrameBuilder::memory_bytes() const {
+  std::size_t bytes = 0;
+  for (const image::Pyramid& pyramid : pyramids_) {
+    for (const image::Image& level : pyramid.levels) bytes += level.memory_bytes();
+  }
+  for (const image::Image& mask : masks_) bytes += mask.memory_bytes();
+  for (const image::Image& mask : combined_masks_) bytes += mask.memory_bytes();
+  return bytes;
+}
+
 }  // namespace bslam::matching

@@ -48,6 +48,9 @@ class FrameBuilder {
   // Discards the images.
   void clear();
 
+  // Of the pyramids and masks that it holds.
+  std::size_t memory_bytes() const;
+
  private:
   image::ImageView mask_of(std::size_t camera, const image::CameraImage& image);
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/assert.h"
+#include "base/memory_count.h"
 
 namespace bslam::place {
 
@@ -26,6 +27,15 @@ void InvertedIndex::remove(KeyframeId keyframe) {
     list.erase(std::lower_bound(list.begin(), list.end(), keyframe));
   }
   keyframes_.erase(found);
+}
+
+std::size_t InvertedIndex::memory_bytes() const {
+  constexpr std::size_t kTreeNode = 4 * sizeof(void*);  // colour, parent and children of a node of std::map
+  std::size_t bytes = keyframes_.size() * (kTreeNode + sizeof(decltype(keyframes_)::value_type));
+  for (const auto& [keyframe, words] : keyframes_) bytes += words->memory_bytes() + MemoryCount::kShared;
+  bytes += bslam::memory_bytes(by_word_);
+  for (const std::vector<KeyframeId>& list : by_word_) bytes += bslam::memory_bytes(list);
+  return bytes;
 }
 
 std::shared_ptr<const WordVector> InvertedIndex::words_of(KeyframeId keyframe) const {

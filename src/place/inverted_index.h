@@ -34,6 +34,8 @@ class InvertedIndex {
   // word and a keyframe that contains it, plus a pass over the ids up to the largest.
   std::vector<CommonWords> query(const WordVector& words) const;
 
+  std::size_t memory_bytes() const;
+
  private:
   std::map<KeyframeId, std::shared_ptr<const WordVector>> keyframes_;
   std::vector<std::vector<KeyframeId>> by_word_;  // each list is sorted

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/assert.h"
+#include "base/memory_count.h"
 #include "feature/hamming.h"
 #include "place/content_hash.h"
 
@@ -139,6 +140,11 @@ void Vocabulary::words(std::span<const feature::Descriptor> descriptors, std::sp
     }
     for (std::size_t i = 0; i < count; ++i) words[begin + i] = WordId(at[i].first);
   }
+}
+
+std::size_t Vocabulary::memory_bytes() const {
+  return sizeof(Vocabulary) + bslam::memory_bytes(content_.child_count) + bslam::memory_bytes(content_.descriptor) +
+         bslam::memory_bytes(content_.weight) + bslam::memory_bytes(nodes_);
 }
 
 }  // namespace bslam::place

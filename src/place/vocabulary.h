@@ -60,6 +60,8 @@ class Vocabulary {
 
   const VocabularyContent& content() const { return content_; }
 
+  std::size_t memory_bytes() const;
+
  private:
   struct Node {
     std::int32_t first;  // first child; for a word, its word id

@@ -27,6 +27,7 @@ class WordVector {
   std::span<const WeightedWord> words() const { return words_; }
   std::size_t size() const { return words_.size(); }
   bool empty() const { return words_.empty(); }
+  std::size_t memory_bytes() const { return sizeof(WordVector) + words_.capacity() * sizeof(WeightedWord); }
 
  private:
   std::vector<WeightedWord> words_;

@@ -1,5 +1,6 @@
 #include "session/frame_source.h"
 
+#include <algorithm>
 #include <utility>
 
 #if defined(__linux__)
@@ -36,8 +37,14 @@ std::optional<FrameSource::Item> DatasetFrames::next() {
   }
   Item item = std::move(ready_.front());
   ready_.pop_front();
+  bytes_ -= item.images.memory_bytes();
   changed_.notify_all();
   return item;
+}
+
+std::size_t DatasetFrames::largest_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return largest_bytes_;
 }
 
 void DatasetFrames::read(std::stop_token stop) {
@@ -50,6 +57,8 @@ void DatasetFrames::read(std::stop_token stop) {
       if (i + 1 < dataset_.frames.size()) item.next_ns = dataset_.frames[i + 1].time_ns;
       std::unique_lock lock(mutex_);
       if (!changed_.wait(lock, stop, [this] { return ready_.size() < ahead_; })) break;
+      bytes_ += item.images.memory_bytes();
+      largest_bytes_ = std::max(largest_bytes_, bytes_);
       ready_.push_back(std::move(item));
       changed_.notify_all();
     }

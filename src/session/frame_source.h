@@ -30,6 +30,9 @@ class FrameSource {
   // Waits for the next frame. Frames come in order of time; those that were not dropped are numbered from 0. Returns
   // nullopt after the last one.
   virtual std::optional<Item> next() = 0;
+
+  // The most memory that frames which were read in advance have held so far, in bytes.
+  virtual std::size_t largest_bytes() const { return 0; }
 };
 
 // Priority of the reading thread: the same as the other threads, or lower. The lower priority is for sequential runs
@@ -44,15 +47,17 @@ class DatasetFrames final : public FrameSource {
 
   // Rethrows exceptions of the reading thread.
   std::optional<Item> next() override;
+  std::size_t largest_bytes() const override;
 
  private:
   void read(std::stop_token stop);
 
   const dataset::Dataset& dataset_;
   const std::size_t ahead_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::deque<Item> ready_;  // guarded by mutex_, like the next two members
+  std::deque<Item> ready_;                     // guarded by mutex_, like the next four members
+  std::size_t bytes_ = 0, largest_bytes_ = 0;  // of the images of `ready_`
   bool finished_ = false;
   std::exception_ptr failure_;
   std::jthread reader_;  // declared last, so that it stops before the other members are destroyed

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <string>
 
 #include "dataset/frame_reader.h"
 #include "session/image_test.h"
+#include "session/process_use.h"
 
 namespace bslam::session {
 namespace {
@@ -133,15 +133,6 @@ void add_places(const RecordInput& input, RunRecord& record) {
                               seconds(input, poses.back().time_ns), trajectory_file("trajectory", i),
                               submaps[i].loaded});
   }
-}
-
-// Returns the maximum resident size of this process, as reported by Linux, or nullopt.
-std::optional<double> peak_memory_mb() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.rfind("VmHWM:", 0) == 0) return std::stod(line.substr(6)) / 1024.0;
-  }
-  return std::nullopt;
 }
 
 }  // namespace

@@ -25,6 +25,12 @@ calibration::Verdict CalibrationRecord::verdict() const {
   return pairs.empty() && disagreeing.empty() ? estimate.verdict : calibration::Verdict::kUnknown;
 }
 
+double MemoryReport::sum_mb() const {
+  double sum = 0.0;
+  for (const MemoryPart& part : parts) sum += part.mb;
+  return sum;
+}
+
 std::int64_t count(const RunRecord& record, FrameOutcome outcome) {
   return std::ranges::count(record.frames, outcome, &RunFrame::outcome);
 }

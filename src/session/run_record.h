@@ -113,6 +113,27 @@ struct SubmapRecord {
   bool loaded = false;     // its world frame is that of the loaded map
 };
 
+// Counts of what a run did. They are exact: runs in sequential mode that give the same bytes have equal counts.
+struct WorkRecord {
+  std::int64_t images = 0, keypoints = 0;     // images of which keypoints were extracted, and these
+  std::int64_t solver_steps = 0;              // of nonlinear least squares, accepted or rejected
+  std::optional<std::int64_t> allocations{};  // of the heap; nullopt if not counted
+};
+
+// What a part of a run holds in memory at its end, and the largest size of one that is held for a moment only. MB are
+// 2^20 bytes.
+struct MemoryPart {
+  std::string name;
+  double mb = 0.0;
+  std::optional<double> largest_mb{};
+};
+
+struct MemoryReport {
+  std::vector<MemoryPart> parts{};      // empty: it was not requested
+  std::optional<double> resident_mb{};  // of the whole process, when the parts were measured
+  double sum_mb() const;                // of the parts
+};
+
 struct RunRecord {
   std::string version, data, mode;
   bool complete = true;
@@ -127,6 +148,9 @@ struct RunRecord {
   int maps_started = 0;
   std::vector<SubmapRecord> submaps;  // in decreasing order of frames
   double start_up_s = 0.0, wall_s = 0.0;
+  std::optional<double> cpu_s{};  // processor time during wall_s, of all threads
+  WorkRecord work{};
+  MemoryReport memory{};
   std::optional<double> peak_memory_mb;    // maximum resident size; nullopt if unavailable
   std::vector<std::string> warnings = {};  // all that were printed
 };

@@ -8,12 +8,15 @@
 
 #include "base/atomic_file.h"
 #include "base/stopwatch.h"
+#include "base/work.h"
 #include "evaluation/trajectory_file.h"
 #include "image_decoding/image_file.h"
 #include "report/trajectory_plot.h"
 #include "rig_formats/bslam_rig.h"
 #include "session/covariance_file.h"
 #include "session/frame_source.h"
+#include "session/memory_report.h"
+#include "session/process_use.h"
 #include "session/record_builder.h"
 #include "session/report_data.h"
 #include "session/run_plot.h"
@@ -49,6 +52,7 @@ void report_frame(RunObserver& observer, FrameSource::Item&& item, system::Frame
 struct Fed {
   std::vector<InputFrame> inputs;
   bool all = false;
+  std::size_t read_ahead_bytes = 0;  // most that frames read in advance have held
 };
 
 // Decides which frames are dropped in addition to those that the source has dropped.
@@ -93,6 +97,7 @@ Result<Fed> feed(FrameSource& source, std::size_t count, const SessionOptions& o
     }
     if (options.progress) options.progress(fed.inputs.size(), count);
   }
+  fed.read_ahead_bytes = source.largest_bytes();
   if (options.observer) options.observer->fed();
   return fed;
 }
@@ -122,6 +127,64 @@ map::MapSnapshot map_of(const system::System& system, const RunRecord& record) {
   return std::make_shared<const map::BundledMap>(std::move(copy));
 }
 
+// What a run has used between the construction of the system and its end.
+struct Used {
+  double wall_s = 0;
+  std::optional<double> cpu_s;
+  WorkRecord work;
+};
+
+class Use {
+ public:
+  explicit Use(const SessionOptions& options) : options_(options), allocations_(allocations()) {}
+
+  Used so_far() const {
+    const WorkCounts work = work_so_far() - work_;
+    Used used{.wall_s = 1e-3 * wall_.ms(),
+              .cpu_s = cpu_seconds(),
+              .work = {.images = static_cast<std::int64_t>(work.images),
+                       .keypoints = static_cast<std::int64_t>(work.keypoints),
+                       .solver_steps = static_cast<std::int64_t>(work.solver_steps)}};
+    if (used.cpu_s && cpu_s_) *used.cpu_s -= *cpu_s_;
+    if (options_.allocations) used.work.allocations = allocations() - allocations_;
+    return used;
+  }
+
+ private:
+  std::int64_t allocations() const {
+    return options_.allocations ? static_cast<std::int64_t>(options_.allocations()) : 0;
+  }
+
+  const SessionOptions& options_;
+  const Stopwatch wall_;
+  const std::optional<double> cpu_s_ = cpu_seconds();
+  const WorkCounts work_ = work_so_far();
+  const std::int64_t allocations_;
+};
+
+Result<Fed> run_to_end(const dataset::Dataset& dataset, const SessionOptions& options, system::System& system) {
+  try {
+    const std::stop_callback on_interruption(options.interrupted, [&system] { system.interrupt(); });
+    auto fed = feed(dataset, options, system);
+    if (fed) system.finish();
+    return fed;
+  } catch (const execution::ReplayMismatch& mismatch) {
+    return mismatch.error;
+  }
+}
+
+// What holds the memory of a run at its end.
+void measure_memory(const SessionOptions& options, const system::System& system, const Fed& fed,
+                    SessionResult& result) {
+  if (!options.memory_report) return;
+  result.record.memory = memory_report({.system = system,
+                                        .vocabulary = options.vocabulary.get(),
+                                        .record = result.record,
+                                        .journal = result.journal,
+                                        .trajectories = {&result.trajectories, &result.live},
+                                        .read_ahead_bytes = fed.read_ahead_bytes});
+}
+
 }  // namespace
 
 Result<SessionResult> run_session(const dataset::Dataset& dataset, const SessionOptions& options) {
@@ -132,37 +195,32 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
                         {std::move(*masks), options.vocabulary, options.map, options.initial_rig, options.replay});
   const double start_up_s = options.start_up_s + 1e-3 * start_up.ms();
 
-  const Stopwatch wall;
-  Fed fed;
-  try {
-    const std::stop_callback on_interruption(options.interrupted, [&system] { system.interrupt(); });
-    auto outcome = feed(dataset, options, system);
-    if (!outcome) return outcome.error();
-    fed = *std::move(outcome);
-    system.finish();
-  } catch (const execution::ReplayMismatch& mismatch) {
-    return mismatch.error;
-  }
+  const Use use(options);
+  const Result<Fed> fed = run_to_end(dataset, options, system);
+  if (!fed) return fed.error();
+  const Used used = use.so_far();
   SessionResult result;
-  const double wall_s = 1e-3 * wall.ms();
   result.trajectories = system.trajectories();
   result.live = system.live_trajectories();
   result.record = build_record({.dataset = dataset,
                                 .config = options.config,
-                                .inputs = fed.inputs,
+                                .inputs = fed->inputs,
                                 .system = system,
                                 .trajectories = result.trajectories,
                                 .replayed = options.replay.has_value(),
                                 .loaded = options.map.has_value(),
-                                .complete = fed.all && !options.interrupted.stop_requested(),
+                                .complete = fed->all && !options.interrupted.stop_requested(),
                                 .start_up_s = start_up_s,
-                                .wall_s = wall_s},
+                                .wall_s = used.wall_s},
                                system.take_frames());
+  result.record.cpu_s = used.cpu_s;
+  result.record.work = used.work;
   result.map = map_of(system, result.record);
   result.rig = system.rig();
   result.calibration = system.calibration();
   if (result.record.calibration.refined) result.refined_rig = with_refined_calibration(*result.rig, dataset);
   result.journal = system.journal();
+  measure_memory(options, system, *fed, result);
   return result;
 }
 

@@ -36,7 +36,10 @@ struct SessionOptions {
   std::function<void(std::size_t done, std::size_t all)> progress;
   RunObserver* observer = nullptr;  // may be null; must outlive the call
   RunControl* control = nullptr;    // pauses and pace, instead of `pace`; may be null; must outlive the call
-  FrameSource* source = nullptr;    // frames instead of those of the data set; may be null; must outlive the call
+  // The number of heap allocations of this process so far, for the record; empty: they are not counted.
+  std::function<std::uint64_t()> allocations = {};
+  bool memory_report = false;     // measure at the end which parts hold how much memory
+  FrameSource* source = nullptr;  // frames instead of those of the data set; may be null; must outlive the call
 };
 
 struct SessionResult {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace bslam::session {
 
@@ -180,11 +181,39 @@ ordered_json time_json(const RunRecord& record) {
     for (const StageSample& sample : series.samples) durations.push_back(sample.ms);
     stages[series.name] = durations_json(durations);
     stages[series.name]["count"] = durations.size();
+    stages[series.name]["total"] = rounded(std::accumulate(durations.begin(), durations.end(), 0.0), 3);
   }
   return {{"start_up_s", rounded(record.start_up_s, 3)},
           {"wall_s", rounded(record.wall_s, 3)},
+          {"cpu_s", record.cpu_s ? rounded(*record.cpu_s, 3) : ordered_json()},
           {"frame_ms", durations_json(frame_ms)},
           {"stages_ms", stages}};
+}
+
+ordered_json work_json(const RunRecord& record) {
+  const WorkRecord& work = record.work;
+  return {{"frames", record.frames.size() - static_cast<std::size_t>(count(record, FrameOutcome::kDropped))},
+          {"keyframes", record.map.keyframes},
+          {"landmarks", record.map.landmarks},
+          {"observations", record.map.observations},
+          {"images_extracted", work.images},
+          {"features_extracted", work.keypoints},
+          {"solver_steps", work.solver_steps},
+          {"allocations", work.allocations ? ordered_json(*work.allocations) : ordered_json()}};
+}
+
+ordered_json memory_json(const RunRecord& record) {
+  const auto mb = [](const std::optional<double>& value, int digits) {
+    return value ? rounded(*value, digits) : ordered_json();
+  };
+  ordered_json out = {{"peak_mb", mb(record.peak_memory_mb, 1)}};
+  if (record.memory.parts.empty()) return out;
+  out["resident_mb"] = mb(record.memory.resident_mb, 3);
+  ordered_json parts = ordered_json::array();
+  for (const MemoryPart& part : record.memory.parts)
+    parts.push_back({{"part", part.name}, {"mb", rounded(part.mb, 3)}, {"largest_mb", mb(part.largest_mb, 3)}});
+  out["report"] = std::move(parts);
+  return out;
 }
 
 }  // namespace
@@ -226,7 +255,8 @@ ordered_json summary_json(const RunRecord& record) {
           {"maps_started", record.maps_started},
           {"parts", submaps_json(record.submaps)},  // the submaps; the key is kept for compatibility
           {"time", time_json(record)},
-          {"memory", {{"peak_mb", record.peak_memory_mb ? rounded(*record.peak_memory_mb, 1) : ordered_json(nullptr)}}},
+          {"work", work_json(record)},
+          {"memory", memory_json(record)},
           {"warnings", record.warnings}};
 }
 

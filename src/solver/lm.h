@@ -6,10 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <concepts>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <stop_token>
 #include <utility>
+
+#include "base/work.h"
 
 namespace bslam::solver {
 
@@ -88,7 +91,10 @@ LmSummary minimise(Problem& problem, const LmOptions& options, const std::stop_t
   double& cost = out.final_cost;
   out.initial_cost = cost = problem.linearise();
   if (!std::isfinite(cost)) return out;
-  const auto end = [&](LmStop reason) { return out.stop = reason, out; };
+  const auto end = [&](LmStop reason) {
+    count_solver_steps(static_cast<std::uint64_t>(out.iterations));
+    return out.stop = reason, out;
+  };
   Damping damping(options);
   bool any_solved = options.iterations == 0;
   while (out.iterations < options.iterations) {

@@ -53,6 +53,10 @@ class KeyframeMaker {
   // What the features of a frame have shown; known once its keyframe is in the map. Thread-safe.
   FeatureEvidence take_evidence(FrameId frame);
 
+  // As in pipeline.h. Not while `make` runs.
+  std::size_t pyramid_bytes() const { return builder_.memory_bytes(); }
+  std::size_t place_index_bytes() const { return tracker_.place_index_bytes(); }
+
  private:
   DeferredKeyframe take(FrameId frame);
 

@@ -49,6 +49,10 @@ class Pipeline {
   tracking::TrackStatus status() const { return state_.track.status; }
   const tracking::Tracker& tracker() const { return tracker_; }
 
+  // Of the pyramids of the last frame, and of the index of places of its relocaliser.
+  std::size_t pyramid_bytes() const { return builder_.memory_bytes(); }
+  std::size_t place_index_bytes() const { return tracker_.place_index_bytes(); }
+
  private:
   tracking::TrackOutcome track(const image::ImageBundle& images, const tracking::FramePlan& plan,
                                execution::StageExecutor& executor, Outcome& outcome, std::vector<StageTime>& stages);

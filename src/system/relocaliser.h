@@ -16,6 +16,7 @@ class PlaceRelocaliser : public tracking::Relocaliser {
   void describe(frame::BundledFrame& frame) const override;
   std::optional<tracking::FoundPlace> verify_place(const map::BundledMap& map,
                                                    const frame::BundledFrame& frame) override;
+  std::size_t memory_bytes() const override { return recogniser_->memory_bytes(); }
 
  private:
   const std::unique_ptr<looping::PlaceRecogniser> recogniser_;

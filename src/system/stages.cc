@@ -61,9 +61,16 @@ execution::StageResult adjust_globally(const Config& config, const map::MapSnaps
 
 }  // namespace
 
+std::shared_ptr<looping::LoopCloser> make_loop_closer(const Config& config, const place::VocabularyPtr& vocabulary) {
+  if (!config.looping.loop.enabled || !vocabulary) return nullptr;
+  auto recogniser = std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition);
+  return std::make_shared<looping::LoopCloser>(std::move(recogniser), config.looping, config.feature_model(),
+                                               static_cast<std::uint64_t>(config.seed));
+}
+
 execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyframe_maker,
                                       const camera::Rig& calibrated, KeyframeId first,
-                                      const place::VocabularyPtr& vocabulary, LoopObserver observer) {
+                                      std::shared_ptr<looping::LoopCloser> closer, LoopObserver observer) {
   execution::StageFunctions functions;
   functions[execution::Stage::kKeyframe] = [&keyframe_maker](const execution::StageTask& task,
                                                              const map::MapSnapshot& base, std::stop_token) {
@@ -84,11 +91,8 @@ execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyfr
       return calibrate(config, calibrated, first, task, base, stop);
     };
   }
-  if (!config.looping.loop.enabled || !vocabulary) return functions;
-  auto recogniser = std::make_unique<looping::BagOfWordsRecogniser>(vocabulary, config.looping.recognition);
-  const auto closer = std::make_shared<looping::LoopCloser>(
-      std::move(recogniser), config.looping, config.feature_model(), static_cast<std::uint64_t>(config.seed));
-  functions[execution::Stage::kLoop] = [closer, observer = std::move(observer)](
+  if (!closer) return functions;
+  functions[execution::Stage::kLoop] = [closer = std::move(closer), observer = std::move(observer)](
                                            const execution::StageTask& task, const map::MapSnapshot& base,
                                            std::stop_token) { return close_loop(*closer, observer, task, base); };
   return functions;

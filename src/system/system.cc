@@ -67,6 +67,7 @@ System::System(camera::Rig rig, Config config, Resources resources)
       loaded_(resources.map.has_value()),
       first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0),
       first_of_map_(first_keyframe_),
+      closer_(make_loop_closer(config_, resources.vocabulary)),
       keyframe_maker_(rig_, config_, make_relocaliser(resources.vocabulary, config_),
                       [this](const tracking::CreatedKeyframe& created, TimeNs time_ns) { note(created, time_ns); }),
       pipeline_(rig_, cameras_, config_, widened(std::move(resources.masks), cameras_, rig_.size()),
@@ -86,9 +87,8 @@ System::System(camera::Rig rig, Config config, Resources resources)
     const std::lock_guard lock(records_mutex_);
     stage_runs_.push_back({run, time_of(run.task)});
   };
-  execution::ExecutionSetup setup{
-      make_stages(config_, keyframe_maker_, rig_, first_keyframe_, resources.vocabulary, note_loop), config_.execution,
-      note_run};
+  execution::ExecutionSetup setup{make_stages(config_, keyframe_maker_, rig_, first_keyframe_, closer_, note_loop),
+                                  config_.execution, note_run};
   executor_ = resources.replay ? execution::make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
                                : execution::make_stage_executor(config_.mode, gate_, std::move(setup));
 }
@@ -335,6 +335,14 @@ std::vector<SubmapTrajectory> System::live_trajectories() const {
     return a.poses.size() > b.poses.size();
   });
   return out;
+}
+
+SystemMemory System::memory() const {
+  MemoryCount count;
+  return {.map = store_.snapshot()->memory(count),
+          .place_index = (closer_ ? closer_->memory_bytes() : 0) + pipeline_.place_index_bytes() +
+                         keyframe_maker_.place_index_bytes(),
+          .pyramids = pipeline_.pyramid_bytes() + keyframe_maker_.pyramid_bytes()};
 }
 
 }  // namespace bslam::system

@@ -52,6 +52,13 @@ struct SubmapTrajectory {
   bool loaded = false;           // the submap is part of the loaded map, so the poses are in its world frame
 };
 
+// The memory that a system holds, in bytes.
+struct SystemMemory {
+  map::MapMemory map;           // the newest version
+  std::size_t place_index = 0;  // of loop closing and relocalisation
+  std::size_t pyramids = 0;     // of the last frames and their masks
+};
+
 class System {
  public:
   // The masks of `resources` must have the size of their cameras' images. If a journal is given, the frames must be
@@ -100,6 +107,9 @@ class System {
   double calibration_ms() const { return calibration_ms_; }
   int maps_started() const { return maps_started_; }
 
+  // To be called after finish().
+  SystemMemory memory() const;
+
   std::vector<LoopRecord> loops() const;
   TimeNs keyframe_time(KeyframeId k) const;
 
@@ -127,10 +137,11 @@ class System {
   const camera::Rig rig_;       // of the map, with the calibration that was given
   const camera::Rig run_rig_;   // as given
   const Config config_;
-  const bool loaded_;                // whether the run began with a loaded map
-  const KeyframeId first_keyframe_;  // first keyframe of this run
-  KeyframeId first_of_map_;          // after the last map that was withdrawn
-  int contradictions_ = 0;           // number of metric maps that were withdrawn
+  const bool loaded_;                                  // whether the run began with a loaded map
+  const KeyframeId first_keyframe_;                    // first keyframe of this run
+  KeyframeId first_of_map_;                            // after the last map that was withdrawn
+  int contradictions_ = 0;                             // number of metric maps that were withdrawn
+  const std::shared_ptr<looping::LoopCloser> closer_;  // null: no loops are closed
   KeyframeMaker keyframe_maker_;
   Pipeline pipeline_;
   const std::size_t history_;  // see Resources

@@ -25,6 +25,9 @@ class Relocaliser {
 
   // Searches the whole map for the pose of a described frame. Returns nullopt if no place is confirmed.
   virtual std::optional<FoundPlace> verify_place(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
+
+  // Of its index of places.
+  virtual std::size_t memory_bytes() const { return 0; }
 };
 
 }  // namespace bslam::tracking

@@ -150,6 +150,9 @@ class Tracker {
   // The pose in the current map of a frame captured during a monocular initialisation (see pose_between).
   std::optional<TrackResult> locate_early(const map::BundledMap& map, const BetweenKeyframes& early) const;
 
+  // Of the index of places of its relocaliser.
+  std::size_t place_index_bytes() const { return relocaliser_ ? relocaliser_->memory_bytes() : 0; }
+
  private:
   std::vector<int> budgets(std::span<const double> fractions, std::span<const std::uint8_t> skipped,
                            std::span<const std::uint8_t> failing) const;

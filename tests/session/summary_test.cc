@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "session/memory_report.h"
+
 namespace bslam::session {
 namespace {
 
@@ -39,9 +41,10 @@ TEST(Summary, HasTheDocumentedKeysInOrder) {
   add_stage_sample(record, "extract", StageThread::kCaller, {0.0, 9.1});
   const ordered_json json = summary_json(record);
   EXPECT_EQ(keys(json),
-            (std::vector<std::string>{"schema", "version", "complete", "data", "mode", "seed", "cameras_used", "frames",
-                                      "cameras", "calibration", "features", "map", "loops", "relocalisations",
-                                      "maps_started", "parts", "time", "memory", "warnings"}));
+            (std::vector<std::string>{
+                "schema",       "version", "complete",    "data",     "mode",   "seed",    "cameras_used",
+                "frames",       "cameras", "calibration", "features", "map",    "loops",   "relocalisations",
+                "maps_started", "parts",   "time",        "work",     "memory", "warnings"}));
   EXPECT_EQ(json["warnings"].dump(), R"(["cam0: blurred"])");
   EXPECT_EQ(keys(json["frames"]),
             (std::vector<std::string>{"input", "tracked", "lost", "dropped", "in_loaded_map", "lost_intervals"}));
@@ -56,10 +59,14 @@ TEST(Summary, HasTheDocumentedKeysInOrder) {
             R"({"keyframes":0,"landmarks":0,"observations":0,"scale":"metric","scale_std":null,"loaded":false})");
   EXPECT_EQ(json["loops"].dump(), R"([{"at":43.1,"with":1.2,"inliers":83}])");
   EXPECT_EQ(json["relocalisations"].dump(), R"([{"at":12.4,"with":3.15,"inliers":60}])");
-  EXPECT_EQ(keys(json["time"]), (std::vector<std::string>{"start_up_s", "wall_s", "frame_ms", "stages_ms"}));
-  EXPECT_EQ(json["time"]["stages_ms"].dump(), R"({"extract":{"median":9.1,"p95":9.1,"max":9.1,"count":1}})");
+  EXPECT_EQ(keys(json["time"]), (std::vector<std::string>{"start_up_s", "wall_s", "cpu_s", "frame_ms", "stages_ms"}));
+  EXPECT_EQ(json["time"]["stages_ms"].dump(),
+            R"({"extract":{"median":9.1,"p95":9.1,"max":9.1,"count":1,"total":9.1}})");
   EXPECT_EQ(json["schema"], 1);
-  EXPECT_TRUE(json["memory"]["peak_mb"].is_null());
+  EXPECT_EQ(json["work"].dump(),
+            R"({"frames":1,"keyframes":0,"landmarks":0,"observations":0,"images_extracted":0,"features_extracted":0,)"
+            R"("solver_steps":0,"allocations":null})");
+  EXPECT_EQ(json["memory"].dump(), R"({"peak_mb":null})");
 }
 
 TEST(Summary, ReportsFramesTimesAndFileOfEverySubmap) {
@@ -184,6 +191,24 @@ TEST(Summary, IsNullIfNothingWasMeasured) {
   EXPECT_TRUE(json["features"]["unique"].is_null());
   EXPECT_EQ(json["frames"]["lost_intervals"], ordered_json::array());
   EXPECT_EQ(json["time"]["stages_ms"], ordered_json::object());
+}
+
+TEST(Summary, ListsThePartsOfTheMemoryIfTheyWereMeasured) {
+  RunRecord record;
+  record.memory = {.parts = {{"vocabulary", 17.0, {}}, {"images read ahead", 0.0, 2.5}}, .resident_mb = 80.0};
+  record.work.allocations = 1234;
+  const ordered_json json = summary_json(record);
+  EXPECT_EQ(json["memory"].dump(),
+            R"({"peak_mb":null,"resident_mb":80.0,"report":[{"part":"vocabulary","mb":17.0,"largest_mb":null},)"
+            R"({"part":"images read ahead","mb":0.0,"largest_mb":2.5}]})");
+  EXPECT_EQ(json["work"]["allocations"], 1234);
+  EXPECT_EQ(memory_text(record),
+            "memory at the end of the run\n"
+            "part                               MB  largest MB\n"
+            "vocabulary                      17.00\n"
+            "images read ahead                0.00        2.50\n"
+            "rest: program, libraries, heap  63.00\n"
+            "process                         80.00\n");
 }
 
 TEST(Summary, WritesValidJsonForAnyName) {

@@ -1,0 +1,27 @@
+#include "base/vectorised.h"
+
+namespace bslam {
+namespace {
+
+// What the compiler may use everywhere.
+constexpr std::string_view kBaseline =
+#if defined(__AVX2__)
+    "AVX2";
+#elif defined(__SSE4_2__)
+    "SSE4.2";
+#elif defined(__ARM_NEON)
+    "NEON";
+#else
+    "none";
+#endif
+
+}  // namespace
+
+std::string_view instruction_set() {
+#ifdef BSLAM_SEVERAL_VERSIONS
+  if (__builtin_cpu_supports("avx2")) return "AVX2";  // which is what chooses the version of BSLAM_VECTORISED
+#endif
+  return kBaseline;
+}
+
+}  // namespace bslam
