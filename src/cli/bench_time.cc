@@ -74,7 +74,6 @@ benchmark::TimeConditions conditions_of(const BenchArguments& a, const std::stri
   if (!a.data.rig.empty()) words.insert(words.end(), {"--rig", a.data.rig});
   const auto options = run_options(a);
   words.insert(words.end(), options.begin(), options.end());
-  const std::string version = version_text();
   return {.version = version_number(),
           .data = data,
           .mode = a.mode,
