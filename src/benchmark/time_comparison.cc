@@ -55,13 +55,16 @@ class Comparison {
     out_.figures.push_back(std::move(figure));
   }
 
-  // A count; nullopt if it was not counted or differs between runs.
-  void count(const std::string& name, std::optional<std::int64_t> before, std::optional<std::int64_t> now) {
+  // A count; nullopt if it was not counted or differs between runs, which is a difference if `always`.
+  void count(const std::string& name, std::optional<std::int64_t> before, std::optional<std::int64_t> now,
+             bool always) {
     const auto shown = [](std::optional<std::int64_t> n) { return n ? std::to_string(*n) : kNothing; };
     ComparedFigure figure{name, shown(before), shown(now), kNothing};
     if (before && now) {
       figure.ratio = ratio_text(static_cast<double>(*before), static_cast<double>(*now));
       if (exact_ && *before != *now) figure.change = Change::kDiffers;
+    } else if (exact_ && always && before.has_value() != now.has_value()) {
+      figure.change = Change::kDiffers;
     }
     out_.figures.push_back(std::move(figure));
   }
@@ -79,7 +82,7 @@ class Comparison {
 void compare_stages(const TimeReport& before, const TimeReport& now, Comparison& comparison) {
   const auto name = [](const StageTimes& s) { return s.name; };
   pair_up(before.stages, now.stages, name, [&](const std::string& stage, const StageTimes* a, const StageTimes* b) {
-    comparison.count(stage + ": calls", a ? a->calls : std::nullopt, b ? b->calls : std::nullopt);
+    comparison.count(stage + ": calls", a ? a->calls : std::nullopt, b ? b->calls : std::nullopt, false);
     comparison.time(stage + ": median ms", "_ms", a ? &a->median_ms : nullptr, b ? &b->median_ms : nullptr);
     comparison.time(stage + ": 95 % ms", "_ms", a ? &a->p95_ms : nullptr, b ? &b->p95_ms : nullptr);
     comparison.time(stage + ": total ms", "_ms", a ? &a->total_ms : nullptr, b ? &b->total_ms : nullptr);
@@ -89,7 +92,8 @@ void compare_stages(const TimeReport& before, const TimeReport& now, Comparison&
 std::vector<std::string> notes_of(const TimeConditions& before, const TimeConditions& now) {
   std::vector<std::string> notes;
   const auto note = [&](const char* what, const std::string& a, const std::string& b) {
-    if (a != b) notes.push_back(fmt::format("{}: {} before, {} now; times cannot be compared", what, a, b));
+    if (a != b)
+      notes.push_back(fmt::format("{}: {} before, {} now; times and counts may differ for this reason", what, a, b));
   };
   note("processor", before.processor, now.processor);
   note("instructions", before.instructions, now.instructions);
@@ -129,7 +133,7 @@ TimeComparison compare_times(const TimeReport& before, const TimeReport& now, do
   compare_stages(before, now, comparison);
   pair_up(before.work, now.work, first, [&](const std::string& name, const auto* a, const auto* b) {
     comparison.count(spoken(name), a ? std::optional(a->second) : std::nullopt,
-                     b ? std::optional(b->second) : std::nullopt);
+                     b ? std::optional(b->second) : std::nullopt, true);
   });
   TimeComparison out = comparison.take();
   out.notes = notes_of(before.conditions, now.conditions);

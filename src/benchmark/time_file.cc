@@ -13,6 +13,9 @@ constexpr int kSchema = 1;
 
 ordered_json json_of(const Spread& s) { return {{"median", s.median}, {"min", s.min}, {"max", s.max}}; }
 
+// A value in an error message; of a container, only what it is.
+std::string shown(const ordered_json& value) { return value.is_structured() ? value.type_name() : value.dump(); }
+
 // Reads a JSON object, and keeps the first error.
 class Reader {
  public:
@@ -23,7 +26,7 @@ class Reader {
     static const ordered_json kNull;
     const auto found = value_.find(key);
     if (found != value_.end() && fits(*found)) return *found;
-    fail(key, found == value_.end() ? "nothing" : found->dump(), expected);
+    fail(key, found == value_.end() ? "nothing" : shown(*found), expected);
     return kNull;
   }
   std::string text(const std::string& key) {

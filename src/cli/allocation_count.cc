@@ -38,7 +38,9 @@ void* allocated(const Allocate& allocate) {
 [[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
   const auto align = static_cast<std::size_t>(alignment);
   const std::size_t whole = (size + align - 1) / align * align;  // std::aligned_alloc takes multiples only
-  return allocated([whole, align] { return std::aligned_alloc(align, whole > 0 ? whole : align); });
+  return allocated([size, whole, align]() -> void* {
+    return whole < size ? nullptr : std::aligned_alloc(align, whole > 0 ? whole : align);
+  });
 }
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }

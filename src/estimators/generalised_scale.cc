@@ -19,9 +19,9 @@ using geometry::Vector6d;
 constexpr int kDistances = 13;           // number of initial distances, equidistant in their logarithm
 constexpr double kMinSigma = 1e-5;       // rad, minimum standard deviation of a bearing
 constexpr double kMinCondition = 1e-12;  // minimum condition of the normal equations; if smaller, it is not observable
-// A motion is not excluded unless its cost is higher than the best one's by that of three standard deviations, with ten
+// A motion is excluded if its cost is higher than the best one's by that of three standard deviations, with ten
 // correlated pairs for the information of one.
-constexpr double kExcluded = 0.5 * 9.0 * 10.0;  // in units of the variance of a bearing
+constexpr double kExcludingSigmas = 3.0, kCorrelatedPairs = 10.0;
 
 // `cost`: half the sum of squared angles, each at most the square of the knee.
 struct Sums : solver::NormalEquations<6> {
@@ -103,11 +103,12 @@ std::vector<Motion> refined_motions(const SE3& T_b_a, std::span<const CameraPair
   return out;
 }
 
-// The largest ratio, as a logarithm, of the distances of motions that are not excluded to that of the best one.
-double spread(const std::vector<Motion>& motions, const Motion& best, double variance) {
+// The largest ratio, as a logarithm, of the distance of a motion that is not excluded to that of the best one. `limit`:
+// difference of costs.
+double spread(const std::vector<Motion>& motions, const Motion& best, double limit) {
   double out = 0.0;
   for (const Motion& m : motions) {
-    if (m.cost - best.cost < kExcluded * variance)
+    if (m.cost - best.cost < limit)
       out = std::max(out, std::abs(std::log(m.T_b_a.translation().norm() / best.T_b_a.translation().norm())));
   }
   return out;
@@ -131,7 +132,8 @@ std::optional<GeneralisedScale> generalised_scale(const SE3& T_b_a, std::span<co
   Vector6d per_step = Vector6d::Zero();  // d log(distance) / d[omega, v]
   per_step.tail<3>() = out.T_b_a.translation() / (distance * distance);
   const double variance = std::max(kMinSigma * kMinSigma, sums.squared / (sums.inliers - 6));
-  out.deviation = std::max(std::sqrt(variance * per_step.dot(factor.solve(per_step))), spread(motions, best, variance));
+  const double limit = 0.5 * kExcludingSigmas * kExcludingSigmas * kCorrelatedPairs * variance;
+  out.deviation = std::max(std::sqrt(variance * per_step.dot(factor.solve(per_step))), spread(motions, best, limit));
   if (!std::isfinite(out.deviation) || distance < options.shortest || distance > options.longest) return std::nullopt;
   return out;
 }

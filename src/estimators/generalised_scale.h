@@ -24,14 +24,15 @@ struct GeneralisedScaleOptions {
 
 struct GeneralisedScale {
   geometry::SE3 T_b_a;     // reference camera, metres
-  double deviation = 0.0;  // relative standard deviation of the distance, from the residuals of the inliers
+  double deviation = 0.0;  // relative standard deviation of the distance
   int num_inliers = 0;
 };
 
 // `T_b_a`: motion of the reference, with a translation of any length. Refines rotation and translation together, so
 // that the deviation includes the uncertainty of the direction of motion, starting from distances over the whole range;
-// it includes the other minima of the cost that the images do not exclude. Returns nullopt if the distance is not
-// observable: one camera, all cameras at one position, or a motion without rotation.
+// it is that of the residuals of the inliers, or the difference to another minimum of the cost that they do not
+// exclude. Returns nullopt if the distance is not observable: one camera, all cameras at one position, or a motion
+// without rotation.
 std::optional<GeneralisedScale> generalised_scale(const geometry::SE3& T_b_a, std::span<const CameraPairs> cameras,
                                                   const GeneralisedScaleOptions& options = {});
 

@@ -1,6 +1,7 @@
 #include "mapping/map_keyframe.h"
 
 #include <cmath>
+#include <limits>
 
 #include "mapping/create_landmarks.h"
 #include "mapping/cull.h"
@@ -14,7 +15,9 @@ namespace {
 // measurement of the scale starts from its result.
 void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
                     map::MapDraft& draft, const std::stop_token& stop, MappingReport& report) {
-  const double deviation_before = draft.map().scale_deviation();
+  // One estimate that contradicts a metric scale is not enough to make another one metric.
+  const bool metric = draft.map().scale() == map::Scale::kMetric;
+  const double deviation_before = metric ? std::numeric_limits<double>::infinity() : draft.map().scale_deviation();
   for (int round = 0; round < options.scale.rounds; ++round) {
     report.scale = observe_scale(keyframe, options.scale, features, draft);
     const adjustment::Selection selection = needs_whole_submap(draft.map(), keyframe, options.scale)

@@ -17,7 +17,7 @@ constexpr double kMaxMetricCorrectionSigmas =
     3.0;                                      // in standard deviations: a smaller correction leaves the map metric
 constexpr double kMinCorrectionSigmas = 0.5;  // in standard deviations: a smaller correction is not applied
 // A metric scale that was estimated from motion is checked at every so many keyframes, and is not metric any more if an
-// estimate contradicts it by both limits.
+// estimate differs from it by both limits.
 constexpr std::size_t kCheckInterval = 4;
 constexpr double kContradictionSigmas = 5.0, kContradiction = 0.05;
 
@@ -43,14 +43,24 @@ adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId ke
   return out;
 }
 
-// Whether the scale is estimated at this keyframe.
+// Whether the scale is estimated at this keyframe. Several submaps share a metric scale, which one of them cannot tell.
 bool due(const map::BundledMap& map, KeyframeId keyframe) {
   if (map.scale() != map::Scale::kMetric) return map.scale() == map::Scale::kUnobservable;
-  return map.scale_deviation() > 0 && keyframe.index() % kCheckInterval == 0;
+  return map.scale_deviation() > 0 && keyframe.index() % kCheckInterval == 0 && map.roots().size() == 1;
 }
 
-bool contradicts(const RigScale& found) {
-  return std::abs(std::log(found.scale)) > std::max(kContradictionSigmas * found.deviation, kContradiction);
+// Whether an estimate from so many keyframes contradicts the scale of a metric map.
+bool contradicts(const RigScale& found, const map::BundledMap& map, std::size_t keyframes,
+                 const ScaleOptions& options) {
+  const double deviation = std::hypot(found.deviation, map.scale_deviation());
+  return keyframes >= static_cast<std::size_t>(options.min_keyframes) &&
+         std::abs(std::log(found.scale)) > std::max(kContradictionSigmas * deviation, kContradiction);
+}
+
+// A calibration that was estimated from a map of wrong scale is wrong as well.
+void withdraw_scale(double deviation, map::MapDraft& draft) {
+  draft.set_scale(map::Scale::kUnobservable, deviation);
+  if (draft.map().rig_deviation()) draft.set_rig(draft.map().given_rig(), nullptr);
 }
 
 }  // namespace
@@ -64,7 +74,11 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   const auto flat = adjustment::build_problem(map, selection, features);
   const auto found = rig_scale(flat.problem, {.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
                                               .correlated_observations = options.correlated_observations});
-  if (!found || (map.scale() == map::Scale::kMetric && !contradicts(*found))) return report;
+  if (!found) return report;
+  if (map.scale() == map::Scale::kMetric) {
+    if (!contradicts(*found, map, flat.keyframes.size(), options)) return report;
+    withdraw_scale(found->deviation, draft);
+  }
   report.observed = true;
   report.deviation = found->deviation;
   report.keyframes = static_cast<int>(flat.keyframes.size());

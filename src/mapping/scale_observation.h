@@ -16,10 +16,10 @@ struct ScaleReport {
   int keyframes = 0;                                           // number of keyframes used
 };
 
-// If the scale of the draft's map is kUnobservable, or was before and is due for a check, estimates it from `keyframe`
-// and its best covisible keyframes, scales their submap accordingly, and stores the deviation in the draft. An estimate
-// that is too uncertain changes nothing (ScaleOptions::max_correcting_deviation). A metric scale that the estimate
-// contradicts becomes kUnobservable.
+// If the scale of the draft's map is kUnobservable, or is metric, was estimated from motion and is due for a check,
+// estimates it from `keyframe` and its best covisible keyframes, scales their submap accordingly, and stores the
+// deviation in the draft. An estimate that is too uncertain changes nothing (ScaleOptions::max_correcting_deviation). A
+// metric scale that the estimate contradicts becomes kUnobservable.
 ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features,
                           map::MapDraft& draft);
 

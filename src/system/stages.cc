@@ -26,10 +26,12 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
 }
 
 // Whether a calibration that is due can be left out: images that contradict the calibration do so in the first
-// estimates already, so that every other one suffices after these while they agree with it.
-bool left_out(const calibration::CalibrationOptions& options, const camera::Rig& of_map, const camera::Rig& calibrated,
-              KeyframeId keyframe) {
-  if (options.refine == calibration::Refine::kTrue || calibration::replaced(of_map, calibrated)) return false;
+// estimates already, so that every other one suffices after these while they agree with it. A map that was loaded, or
+// whose scale had to be estimated, may have had none.
+bool left_out(const calibration::CalibrationOptions& options, const map::BundledMap& map, const camera::Rig& calibrated,
+              KeyframeId first, KeyframeId keyframe) {
+  if (options.refine == calibration::Refine::kTrue || calibration::replaced(map.rig(), calibrated)) return false;
+  if (first.index() > 0 || map.scale_deviation() > 0) return false;
   const int number = execution::calibration_due(keyframe).value_or(0);
   return number >= 2 && number % 2 == 0;
 }
@@ -39,7 +41,7 @@ bool left_out(const calibration::CalibrationOptions& options, const camera::Rig&
 execution::StageResult calibrate(const Config& config, const camera::Rig& calibrated, KeyframeId first,
                                  const execution::StageTask& task, const map::MapSnapshot& base,
                                  const std::stop_token& stop) {
-  if (left_out(config.calibration, base->rig(), calibrated, task.keyframe)) return {};
+  if (left_out(config.calibration, *base, calibrated, first, task.keyframe)) return {};
   auto refinement =
       calibration::refine_if_accepted(*base, calibrated, config.calibration, config.feature_model(), stop);
   if (!refinement) return {};

@@ -99,10 +99,11 @@ double support(const map::BundledMap& map, const FrameMatches& matches,
   return sum;
 }
 
-bool agree_beyond_chance(const camera::Rig& rig, std::span<const solver::PoseObservation> observations,
-                         std::span<const double> window_px, const geometry::SE3& T_rig_world,
-                         const solver::MotionModel& motion) {
-  constexpr double kDeviations = 5.0;
+std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
+                                                 std::span<const solver::PoseObservation> observations,
+                                                 std::span<const double> window_px, const geometry::SE3& T_rig_world,
+                                                 const solver::MotionModel& motion) {
+  constexpr double kDeviations = 5.0, kLeast = 10.0;  // matches more than by chance, where these are few
   const solver::PoseSolution at_pose = solver::solve_pose(rig, observations, T_rig_world, motion, {.rounds = 0});
   double expected = 0.0, variance = 0.0;
   for (std::size_t i = 0; i < observations.size(); ++i) {
@@ -111,7 +112,8 @@ bool agree_beyond_chance(const camera::Rig& rig, std::span<const solver::PoseObs
     expected += by_chance;
     variance += by_chance * (1.0 - by_chance);
   }
-  return at_pose.num_inliers > expected + kDeviations * std::sqrt(variance);
+  const bool beyond = at_pose.num_inliers > expected + std::max(kLeast, kDeviations * std::sqrt(variance));
+  return beyond ? at_pose.inlier : std::vector<std::uint8_t>(observations.size(), 0);
 }
 
 solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "solver/pose_solver.h"
 #include "tracking/track.h"
@@ -15,11 +16,12 @@ namespace bslam::tracking {
 double support(const map::BundledMap& map, const FrameMatches& matches,
                std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier);
 
-// Whether clearly more matches agree with a pose that was found without them than wrong matches would. A wrong match is
-// anywhere in its search window; `window_px` is the radius of that of each observation.
-bool agree_beyond_chance(const camera::Rig& rig, std::span<const solver::PoseObservation> observations,
-                         std::span<const double> window_px, const geometry::SE3& T_rig_world,
-                         const solver::MotionModel& motion);
+// Flags the matches that agree with a pose, if they are clearly more than of wrong matches would; otherwise none. A
+// wrong match is anywhere in its search window; `window_px` is the radius of that of each observation.
+std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
+                                                 std::span<const solver::PoseObservation> observations,
+                                                 std::span<const double> window_px, const geometry::SE3& T_rig_world,
+                                                 const solver::MotionModel& motion);
 
 // As solver::solve_pose for the matches of a frame, in order; `predicted` is the initial pose. A robust kernel follows
 // the majority, and ends between two motions that many matches agree with. If a considerable part of the matches are

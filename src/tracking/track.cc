@@ -213,27 +213,39 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   return out;
 }
 
-// Whether the landmarks of the local view, found near their projections at the coarse pose, confirm it. Where there is
-// little but noise, most of them are matched wrongly, and the pose is right nevertheless.
+// Whether the landmarks of the local view, found near their projections at the coarse pose, confirm it, and the fine
+// pose is that of most of these. Where there is little but noise, most of them are matched wrongly, and the pose is
+// right nevertheless. The landmarks that gave a coarse pose from the last frame do not count; those that gave one
+// of direct tracking do, since they have supported it.
 bool coarse_pose_confirmed(const TrackInput& input, const Coarse& coarse, const Fine& fine,
                            const TrackingOptions& options) {
+  constexpr double kMost = 0.5;
   const std::vector<LandmarkId> known = landmarks_of(coarse.matches);
   const auto all = pose_observations(input.map, fine.matches, fine.aligned);
   std::vector<solver::PoseObservation> observations;
   std::vector<double> window_px;
+  std::vector<std::size_t> index;
   std::size_t i = 0;
   for (std::size_t c = 0; c < fine.matches.size(); ++c) {
     const double radius_px = options.matching.local_radius / input.map.rig().camera(c).radians_per_pixel();
     for (const Match& m : fine.matches[c]) {
       const std::size_t at = i++;
       if (std::ranges::binary_search(known, m.landmark)) continue;
-      const auto level = coarse.frame.cameras[c].keypoints.level[m.keypoint.index()];
+      // of the predicted level, from which that of the keypoint may differ by one
+      const int level = std::max(0, coarse.frame.cameras[c].keypoints.level[m.keypoint.index()] - 1);
       observations.push_back(all[at]);
       window_px.push_back(radius_px * std::pow(input.features.pyramid.scale_factor, level));
+      index.push_back(at);
     }
   }
-  const solver::MotionModel motion = motion_model(input, coarse.frame);
-  return agree_beyond_chance(input.map.rig(), observations, window_px, coarse.T_rig_world, motion);
+  const auto agrees = agreeing_beyond_chance(input.map.rig(), observations, window_px, coarse.T_rig_world,
+                                             motion_model(input, coarse.frame));
+  int agreeing = 0, of_fine = 0;
+  for (std::size_t k = 0; k < agrees.size(); ++k) {
+    agreeing += agrees[k];
+    of_fine += agrees[k] != 0 && fine.solution.inlier[index[k]] != 0;
+  }
+  return agreeing > 0 && of_fine >= kMost * agreeing;
 }
 
 // See TrackOutput::frame.

@@ -80,6 +80,7 @@ TEST(GeneralisedScale, EstimatesTheDistanceFromAPoorMotion) {
     ASSERT_TRUE(found.has_value()) << "seed " << seed;
     const double ratio = found->T_b_a.translation().norm() / T_b_a.translation().norm();
     EXPECT_LT(std::abs(std::log(ratio)), 5.0 * found->deviation) << "seed " << seed;
+    EXPECT_LT(std::abs(std::log(ratio)), 1.5) << "seed " << seed;
   }
 }
 

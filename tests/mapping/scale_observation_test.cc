@@ -136,6 +136,10 @@ TEST(ObserveScale, ContradictsAWrongMetricScaleThatWasEstimatedFromMotion) {
     const ScaleReport report = observe_scale(KeyframeId(8), independent_noise().scale, kFeatures, draft);
     EXPECT_EQ(report.correction > 1.5, factor < 1.0) << factor;
     EXPECT_EQ(draft.map().scale(), factor < 1.0 ? map::Scale::kUnobservable : map::Scale::kMetric);
+    map::MapDraft mapped = world.draft();
+    map_keyframe(KeyframeId(8), independent_noise(), kFeatures, mapped);  // a single estimate does not make it metric
+    EXPECT_EQ(mapped.map().scale(), factor < 1.0 ? map::Scale::kUnobservable : map::Scale::kMetric);
+    EXPECT_NEAR(length_ratio(world, mapped.map()), 1.0, 0.1) << factor;
   }
 }
 

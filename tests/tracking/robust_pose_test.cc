@@ -169,7 +169,10 @@ TEST_F(RobustPose, FewRightMatchesConfirmAPoseAndWrongOnesDoNot) {
     } while (offset.norm() > kWindow_px);
     observations[i].pixel += offset;
   };
-  const auto confirmed = [&] { return agree_beyond_chance(world.map.rig(), observations, windows, truth, motion); };
+  const auto confirmed = [&] {
+    const auto agrees = agreeing_beyond_chance(world.map.rig(), observations, windows, truth, motion);
+    return std::ranges::count(agrees, std::uint8_t{1}) > 0;
+  };
   for (std::size_t i = 0; i < observations.size(); ++i) {
     if (i % 4 != 0) mislead(i);
   }
