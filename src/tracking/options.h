@@ -151,7 +151,7 @@ struct DirectOptions {
   int per_image = 300;  // maximum number of landmarks aligned in an image
   int per_rig = 600;    // the same in all images of a frame, but at least `min_per_image` in each
   int min_per_image = 100;
-  int coarse_per_image = 60;   // landmarks of the coarsest levels that are aligned first
+  int coarse_per_image = 60;  // landmarks of the coarsest levels that are aligned first; fewer if cameras share per_rig
   double coarse_shift_px = 4;  // px of the level, maximum distance of these from their predicted positions
   // As KeyframeOptions::min_overlap. Landmarks are aligned from farther away than they are detected again.
   double min_overlap = 0.85;
@@ -167,7 +167,7 @@ struct DirectOptions {
     visitor("min_per_image", self.min_per_image, Range{10, 20000}, "",
             "number of landmarks aligned in an image however many cameras there are");
     visitor("coarse_per_image", self.coarse_per_image, Range{10, 1000}, "",
-            "number of landmarks of coarse pyramid levels that are aligned first");
+            "number of landmarks of coarse pyramid levels that are aligned first, fewer if the images share per_rig");
     visitor("coarse_shift_px", self.coarse_shift_px, Range{0.5, 20}, "px of the level",
             "maximum distance of these from their predicted positions");
     visitor("min_overlap", self.min_overlap, Range{0, 1}, "",

@@ -97,8 +97,7 @@ bool enough(const solver::PoseSolution& solution, std::size_t num_matches, const
 // landmarks together decide whether it is right. Updates the pose and the motion of the frame.
 bool track_coarsely(const TrackInput& input, const LastLandmarks& last, const TrackingOptions& options,
                     ThreadPool& pool, frame::BundledFrame& frame, SE3& T_rig_world) {
-  const Candidates candidates =
-      coarsest_landmarks(input, frame, T_rig_world, last, options.direct.coarse_per_image, pool);
+  const Candidates candidates = coarsest_landmarks(input, frame, T_rig_world, last, options.direct, pool);
   std::vector<matching::AlignmentOptions> alignment(input.alignment.begin(), input.alignment.end());
   for (auto& camera : alignment) camera.max_shift_px = options.direct.coarse_shift_px;
   const AlignedLandmarks found = align(input, frame, T_rig_world, candidates, alignment, pool);

@@ -73,6 +73,13 @@ std::vector<std::uint8_t> contained(const std::vector<LandmarkId>& ids, const st
   return out;
 }
 
+// The number of landmarks to align in each image that shows some.
+int budget_of_image(const Candidates& candidates, const DirectOptions& options) {
+  const auto images = std::ranges::count_if(candidates, [](const auto& camera) { return !camera.empty(); });
+  const int share = options.per_rig / std::max(1, static_cast<int>(images));
+  return std::min(options.per_image, std::max(options.min_per_image, share));
+}
+
 }  // namespace
 
 LastLandmarks landmarks_of_last_frame(const TrackInput& input) {
@@ -82,9 +89,10 @@ LastLandmarks landmarks_of_last_frame(const TrackInput& input) {
 }
 
 Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
-                              const LastLandmarks& last, int count, ThreadPool& pool) {
+                              const LastLandmarks& last, const DirectOptions& options, ThreadPool& pool) {
   Candidates out(frame.cameras.size());
   add_visible(input, frame, T_rig_world, last.landmarks, last.points, {}, 0, pool, out);
+  const int count = options.coarse_per_image * budget_of_image(out, options) / options.per_image;
   for (std::size_t c = 0; c < out.size(); ++c) {
     std::vector<Candidate>& candidates = out[c];
     if (static_cast<int>(candidates.size()) <= count) continue;
@@ -108,9 +116,7 @@ LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFram
   }
   add_visible(input, frame, T_rig_world, view.landmarks, view.points, contained(view.landmarks, last.landmarks),
               last.landmarks.size(), pool, out.candidates);
-  const auto images = std::ranges::count_if(out.candidates, [](const auto& camera) { return !camera.empty(); });
-  const int share = options.direct.per_rig / std::max(1, static_cast<int>(images));
-  const int budget = std::min(options.direct.per_image, std::max(options.direct.min_per_image, share));
+  const int budget = budget_of_image(out.candidates, options.direct);
   for (std::size_t c = 0; c < out.candidates.size(); ++c) {
     std::vector<Candidate>& candidates = out.candidates[c];
     std::ranges::stable_partition(candidates, [&](const Candidate& l) { return expected[l.index] != 0; });

@@ -32,11 +32,13 @@ struct Candidate {
 };
 using Candidates = std::vector<std::vector<Candidate>>;  // per camera
 
-// Of the landmarks of the last frame, in every camera at most `count` with the largest patches in their parts of the
-// image: their alignment tolerates the largest errors of the predicted pose. They are spread over the image, because
-// the largest of all may belong to one near object, which may move.
+// Of the landmarks of the last frame, in every camera those with the largest patches in their parts of the image, as
+// many of `coarse_per_image` as of `per_image` are aligned afterwards: their alignment tolerates the largest errors of
+// the predicted pose. They are spread over the image, because the largest of all may belong to one near object, which
+// may move.
 Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame& frame,
-                              const geometry::SE3& T_rig_world, const LastLandmarks& last, int count, ThreadPool& pool);
+                              const geometry::SE3& T_rig_world, const LastLandmarks& last, const DirectOptions& options,
+                              ThreadPool& pool);
 
 // The landmarks to align at the pose: those of the last frame and of the local view, spread over the images. Cameras
 // align the same landmarks if they see them, so that their number depends little on which cameras have an image.
