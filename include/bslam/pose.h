@@ -12,9 +12,11 @@
 namespace bslam {
 
 enum class Scale {
-  kMetric,       // lengths are metres
-  kUpToScale,    // the cameras do not determine the scale, for example one camera: the unit of length is arbitrary
-  kUnobservable  // the rig can determine the scale, but its motion has not allowed it so far
+  kMetric,     // lengths are metres
+  kUpToScale,  // the cameras do not determine the scale, for example one camera: the unit of length is arbitrary
+  // The rig can determine the scale, but its motion has not allowed it so far, or the scale that it gave has turned out
+  // to be wrong.
+  kUnobservable
 };
 BSLAM_EXPORT std::string_view to_string(Scale scale);  // "metric", "up-to-scale", "unobservable"
 

@@ -24,7 +24,7 @@
 namespace bslam::map {
 
 // kMetric: lengths are in metres. kUpToScale: the rig cannot observe the scale. kUnobservable: the rig can observe the
-// metric scale, but its motion has not made it observable so far.
+// metric scale, but its motion has not made it observable so far, or later motion has contradicted what it gave.
 enum class Scale { kMetric, kUpToScale, kUnobservable };
 std::string_view scale_name(Scale scale);  // "metric", "up-to-scale", "unobservable"
 

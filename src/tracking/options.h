@@ -70,7 +70,7 @@ struct InitialisationOptions {
   double max_chi2 = 7.81;             // maximum squared normalised error of a keypoint to its feature's point
   int min_monocular = 80;             // minimum number of matches for a monocular initialisation
   int min_monocular_points = 50;      // minimum number of points of a monocular initialisation
-  double assumed_median_depth = 3.0;  // m, assumed median distance of these points if the scale is too uncertain
+  double assumed_median_depth = 3.0;  // m, least median distance of these points if the scale is too uncertain
   double max_scale_deviation = 1.0;   // maximum relative standard deviation of the scale estimated from two frames
 
   template <class Self, class Visitor>
