@@ -69,12 +69,7 @@ RunOutcome run_sequence(const BenchArguments& a, const Sequence& sequence, int r
   fs::remove_all(folder, error);
   fs::create_directories(folder, error);
   if (error) return failed(folder.string() + ": " + error.message(), kExitBadInput);
-  std::vector<std::string> words{
-      "run",    sequence.folder.string(), "--out", folder.string(), "--overwrite", "--progress", "never",
-      "--seed", std::to_string(run)};
-  const auto options = run_options(a);
-  words.insert(words.end(), options.begin(), options.end());
-  if (const std::string rig = rig_of(a, sequence); !rig.empty()) words.insert(words.end(), {"--rig", rig});
+  const auto words = run_words(a, sequence.folder.string(), rig_of(a, sequence), folder, run);
   const fs::path log = folder / "log.txt";
   const auto end = run_program(kThisProgram, words, log, stop);
   if (!end) return failed(end.error().message(), kExitFailed);
@@ -90,9 +85,7 @@ RunOutcome run_sequence(const BenchArguments& a, const Sequence& sequence, int r
 
 Status write_report(const std::vector<SequenceResult>& results, const benchmark::BenchmarkConditions& conditions,
                     const fs::path& folder) {
-  const report::Document document = benchmark::benchmark_report(results, conditions);
-  if (const Status s = write_atomically(folder / "report.md", report::markdown_text(document)); !s) return s;
-  return write_atomically(folder / "report.html", report::html_text(document));
+  return write_document(benchmark::benchmark_report(results, conditions), folder);
 }
 
 benchmark::BenchmarkConditions conditions_of(const BenchArguments& a, bool loops) {

@@ -53,6 +53,16 @@ std::vector<std::string> run_options(const BenchArguments& a) {
   return words;
 }
 
+std::vector<std::string> run_words(const BenchArguments& a, const std::string& data, const std::string& rig,
+                                   const fs::path& folder, int seed) {
+  std::vector<std::string> words{"run",        data,    "--out",  folder.string(),     "--overwrite",
+                                 "--progress", "never", "--seed", std::to_string(seed)};
+  const auto options = run_options(a);
+  words.insert(words.end(), options.begin(), options.end());
+  if (!rig.empty()) words.insert(words.end(), {"--rig", rig});
+  return words;
+}
+
 // Name of the processor as the kernel reports it; empty if it does not.
 std::string processor_name() {
   std::ifstream file("/proc/cpuinfo");
@@ -88,6 +98,11 @@ Status prepare_folder(const BenchArguments& a) {
   fs::create_directories(folder, error);
   if (error) return Error{a.out, "--out", error.message(), "a folder that can be created"};
   return check_writable(folder / "report.md");
+}
+
+Status write_document(const report::Document& document, const fs::path& folder) {
+  if (const Status s = write_atomically(folder / "report.md", report::markdown_text(document)); !s) return s;
+  return write_atomically(folder / "report.html", report::html_text(document));
 }
 
 }  // namespace bslam::cli

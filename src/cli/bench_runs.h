@@ -9,6 +9,7 @@
 #include "cli/child_process.h"
 #include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
+#include "report/document.h"
 
 namespace bslam::cli {
 
@@ -26,6 +27,10 @@ struct BenchArguments {
 // Returns the options that every run receives as they are.
 std::vector<std::string> run_options(const BenchArguments& arguments);
 
+// Returns the arguments of `bslam run` for a recording, whose calibration is `rig` or its own if that is empty.
+std::vector<std::string> run_words(const BenchArguments& arguments, const std::string& data, const std::string& rig,
+                                   const std::filesystem::path& folder, int seed);
+
 // Name of the processor as the kernel reports it; empty if it does not.
 std::string processor_name();
 
@@ -34,6 +39,9 @@ std::string failure_of(const ProcessEnd& end, const std::filesystem::path& log);
 
 // Creates the folder of --out and checks that it may be written.
 Status prepare_folder(const BenchArguments& arguments);
+
+// Writes report.md and report.html.
+Status write_document(const report::Document& document, const std::filesystem::path& folder);
 
 // bslam bench --time. Returns the exit status; errors are printed.
 int bench_time(const BenchArguments& arguments);

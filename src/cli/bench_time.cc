@@ -37,12 +37,9 @@ Result<TimedRun> run_once(const BenchArguments& a, int run, const std::stop_toke
   fs::remove_all(folder, error);
   fs::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
-  std::vector<std::string> words{"run",        a.data.path, "--out",       folder.string(),       "--overwrite",
-                                 "--progress", "never",     "--no-report", "--count-allocations", "--seed",
-                                 "1"};
-  const auto options = run_options(a);
-  words.insert(words.end(), options.begin(), options.end());
-  if (!a.data.rig.empty()) words.insert(words.end(), {"--rig", a.data.rig});
+  constexpr int kSeed = 1;
+  std::vector<std::string> words = run_words(a, a.data.path, a.data.rig, folder, kSeed);
+  words.insert(words.end(), {"--no-report", "--count-allocations"});
   const fs::path log = folder / "log.txt";
   const auto end = run_program(kThisProgram, words, log, stop);
   if (!end) return end.error();
@@ -110,8 +107,7 @@ void print(const report::Document& document) {
 
 Status write_files(const TimeReport& report, const report::Document& document, const fs::path& folder) {
   if (const Status s = write_atomically(folder / "time.json", benchmark::time_json(report)); !s) return s;
-  if (const Status s = write_atomically(folder / "report.md", report::markdown_text(document)); !s) return s;
-  return write_atomically(folder / "report.html", report::html_text(document));
+  return write_document(document, folder);
 }
 
 // Runs the recording as often as requested. Returns the status of a run that failed, which ends it.

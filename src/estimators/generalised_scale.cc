@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "solver/lm.h"
 
@@ -86,7 +85,7 @@ SE3 refine(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) 
 
 struct Motion {
   SE3 T_b_a;
-  double cost = std::numeric_limits<double>::infinity();
+  Sums sums;
 };
 
 // The motions refined from different distances along the given direction. The cost has several minima: if the map is
@@ -98,7 +97,7 @@ std::vector<Motion> refined_motions(const SE3& T_b_a, std::span<const CameraPair
     const double fraction = static_cast<double>(i) / (kDistances - 1);
     const double distance = options.shortest * std::pow(options.longest / options.shortest, fraction);
     const SE3 T = refine(at_distance(T_b_a, distance), cameras, options.inlier_angle);
-    out.push_back({T, evaluate(T, cameras, options.inlier_angle).cost});
+    out.push_back({T, evaluate(T, cameras, options.inlier_angle)});
   }
   return out;
 }
@@ -108,7 +107,7 @@ std::vector<Motion> refined_motions(const SE3& T_b_a, std::span<const CameraPair
 double spread(const std::vector<Motion>& motions, const Motion& best, double limit) {
   double out = 0.0;
   for (const Motion& m : motions) {
-    if (m.cost - best.cost < limit)
+    if (m.sums.cost - best.sums.cost < limit)
       out = std::max(out, std::abs(std::log(m.T_b_a.translation().norm() / best.T_b_a.translation().norm())));
   }
   return out;
@@ -121,9 +120,9 @@ std::optional<GeneralisedScale> generalised_scale(const SE3& T_b_a, std::span<co
   if (!(T_b_a.translation().norm() > 0.0)) return std::nullopt;
   GeneralisedScale out;
   const std::vector<Motion> motions = refined_motions(T_b_a, cameras, options);
-  const Motion& best = *std::ranges::min_element(motions, {}, &Motion::cost);
+  const Motion& best = *std::ranges::min_element(motions, {}, [](const Motion& m) { return m.sums.cost; });
+  const Sums& sums = best.sums;
   out.T_b_a = best.T_b_a;
-  const Sums sums = evaluate(out.T_b_a, cameras, options.inlier_angle);
   out.num_inliers = sums.inliers;
   const double distance = out.T_b_a.translation().norm();
   if (sums.inliers <= 6 || !(distance > 0.0)) return std::nullopt;
