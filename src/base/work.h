@@ -21,4 +21,7 @@ void count_extraction(std::uint64_t keypoints);
 void count_solver_steps(std::uint64_t steps);
 WorkCounts work_so_far();
 
+// Levels of the work per frame, from 0 (all of it); see tracking/reduced_work.h.
+inline constexpr int kMaxReduction = 3;
+
 }  // namespace bslam

@@ -298,6 +298,7 @@ std::optional<TimeNs> LiveCameras::wait_for_frame() {
 
 std::optional<session::FrameSource::Item> LiveCameras::next() {
   Waiting frame;
+  Item item;
   {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return !waiting_.empty() || ended_; });
@@ -307,8 +308,8 @@ std::optional<session::FrameSource::Item> LiveCameras::next() {
     waiting_.pop_front();
     frames_waiting_ -= !frame.dropped;
     overloaded_ = overloaded_ && frames_waiting_ > 0;
+    item.waiting = frames_waiting_;
   }
-  Item item;
   item.images.time_ns = frame.time_ns;
   // Only frames that are recorded are processed.
   item.dropped = frame.dropped || (recorder_ && !recorder_->add(frame.bundle, stop_recording_.get_token()));

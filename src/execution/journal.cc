@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "base/number_text.h"
+#include "base/work.h"
 
 namespace bslam::execution {
 namespace {
@@ -20,7 +21,8 @@ constexpr StepName kSteps[] = {{JournalStep::kFrame, "frame"},   {JournalStep::k
                                {JournalStep::kTrack, "track"},   {JournalStep::kKeyframe, "keyframe"},
                                {JournalStep::kMap, "map"},       {JournalStep::kLoop, "loop"},
                                {JournalStep::kGlobal, "global"}, {JournalStep::kCalibrate, "calibrate"},
-                               {JournalStep::kFinal, "final"},   {JournalStep::kRestart, "restart"}};
+                               {JournalStep::kFinal, "final"},   {JournalStep::kRestart, "restart"},
+                               {JournalStep::kReduce, "reduce"}};
 
 std::string_view step_name(JournalStep step) {
   for (const StepName& s : kSteps) {
@@ -76,9 +78,11 @@ std::string objection(const JournalEntry& entry, MapVersion newest, std::int32_t
   if (entry.base > newest) return "a base version up to " + std::to_string(newest.value());
   if (entry.committed && *entry.committed != newest.next())
     return "committed version " + std::to_string(newest.next().value());
-  if (entry.step == JournalStep::kFrame && entry.committed) return "no committed version of a frame";
-  if (entry.step != JournalStep::kFrame && !background_stage(entry.step) && !entry.committed)
-    return "a committed version";
+  const bool edits = entry.step != JournalStep::kFrame && entry.step != JournalStep::kReduce;
+  if (entry.step == JournalStep::kReduce && entry.input > kMaxReduction)
+    return "a level of reduction up to " + std::to_string(kMaxReduction);
+  if (!edits && entry.committed) return "no committed version of this step";
+  if (edits && !background_stage(entry.step) && !entry.committed) return "a committed version";
   return {};
 }
 

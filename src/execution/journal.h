@@ -24,6 +24,7 @@ enum class JournalStep {
   kCalibrate,
   kFinal,    // the adjustment at the end
   kRestart,  // the map was replaced by an empty one
+  kReduce,   // the work per frame changed; input: its level of reduction
 };
 
 JournalStep journal_step(Stage stage);
@@ -31,8 +32,9 @@ std::optional<Stage> background_stage(JournalStep step);  // nullopt if it is no
 
 struct JournalEntry {
   JournalStep step = JournalStep::kFrame;
-  std::int32_t input = -1;  // StageTask::input() of a background stage, else id of the frame; -1: no frame yet
-  MapVersion base;          // version that was read
+  // StageTask::input() of a background stage, level of kReduce, else id of the frame; -1: no frame yet.
+  std::int32_t input = -1;
+  MapVersion base;                      // version that was read
   std::optional<MapVersion> committed;  // version that was created, if any
   friend bool operator==(const JournalEntry&, const JournalEntry&) = default;
 };

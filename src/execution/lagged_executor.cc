@@ -54,6 +54,8 @@ class LaggedExecutor : public StageExecutor {
     return gate_.commit(step, std::move(draft));
   }
 
+  void note_reduction(int level) override { gate_.note_reduction(level); }
+
   void enqueue(const StageTask& task) override {
     rethrow();
     push(task);

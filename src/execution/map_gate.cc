@@ -22,6 +22,11 @@ void MapGate::begin_frame(FrameId frame, const map::MapSnapshot& seen) {
   append({JournalStep::kFrame, frame.value(), seen->version(), std::nullopt});
 }
 
+void MapGate::note_reduction(int level) {
+  const std::lock_guard lock(mutex_);
+  if (keep_journal_) journal_.entries.push_back({JournalStep::kReduce, level, newest_->version(), std::nullopt});
+}
+
 map::CommitReport MapGate::commit(JournalStep step, map::MapDraft draft) {
   const std::lock_guard order(order_);
   return publish(step, frame_.value(), std::move(draft));

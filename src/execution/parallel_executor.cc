@@ -30,6 +30,8 @@ class ParallelExecutor : public StageExecutor {
     return gate_.commit(step, std::move(draft));
   }
 
+  void note_reduction(int level) override { gate_.note_reduction(level); }
+
   void enqueue(const StageTask& task) override {
     {
       std::unique_lock lock(mutex_);

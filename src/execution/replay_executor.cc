@@ -37,6 +37,14 @@ class ReplayExecutor : public StageExecutor {
     return report;
   }
 
+  void note_reduction(int level) override {
+    run_background();
+    if (interrupted()) return;
+    expect(JournalStep::kReduce, level);
+    gate_.note_reduction(level);
+    advance();
+  }
+
   void enqueue(const StageTask& task) override { waiting(task.stage).push_back(task); }
 
   void drain() override { run_background(); }

@@ -14,6 +14,8 @@ class SequentialExecutor : public StageExecutor {
     return gate_.commit(step, std::move(draft));
   }
 
+  void note_reduction(int level) override { gate_.note_reduction(level); }
+
   void enqueue(const StageTask& task) override {
     std::deque<StageTask> tasks = {task};
     for (; !tasks.empty() && !over(); tasks.pop_front()) {

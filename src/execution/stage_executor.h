@@ -24,6 +24,9 @@ class StageExecutor {
   // Commits an edit of the caller's thread.
   virtual map::CommitReport commit(JournalStep step, map::MapDraft draft) = 0;
 
+  // Records that the level of reduction changed before the next frame (System::set_reduction).
+  virtual void note_reduction(int level) = 0;
+
   // Adds a task of kKeyframe or kMap. May block while too many tasks are waiting.
   virtual void enqueue(const StageTask& task) = 0;
   // The same for the mapping of a committed keyframe.

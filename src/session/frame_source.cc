@@ -22,8 +22,9 @@ void lower_priority() {
 
 }  // namespace
 
-DatasetFrames::DatasetFrames(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority)
-    : dataset_(dataset), ahead_(ahead), reader_([this, priority](std::stop_token stop) {
+DatasetFrames::DatasetFrames(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority,
+                             std::function<bool(TimeNs)> skips)
+    : dataset_(dataset), ahead_(ahead), skips_(std::move(skips)), reader_([this, priority](std::stop_token stop) {
         if (priority == ReaderPriority::kLow) lower_priority();
         read(std::move(stop));
       }) {}
@@ -38,6 +39,7 @@ std::optional<FrameSource::Item> DatasetFrames::next() {
   Item item = std::move(ready_.front());
   ready_.pop_front();
   bytes_ -= item.images.memory_bytes();
+  item.waiting = static_cast<std::size_t>(std::ranges::count(ready_, false, &Item::dropped));
   changed_.notify_all();
   return item;
 }
@@ -47,14 +49,23 @@ std::size_t DatasetFrames::largest_bytes() const {
   return largest_bytes_;
 }
 
+FrameSource::Item DatasetFrames::read_item(std::size_t index) const {
+  const Stopwatch watch;
+  Item item;
+  item.images.id = FrameId(index);
+  item.images.time_ns = dataset_.frames[index].time_ns;
+  item.dropped = skips_ && skips_(item.images.time_ns);
+  if (!item.dropped) item.images = dataset::read_frame(dataset_, index);
+  item.read_ms = watch.ms();
+  if (index + 1 < dataset_.frames.size()) item.next_ns = dataset_.frames[index + 1].time_ns;
+  return item;
+}
+
 void DatasetFrames::read(std::stop_token stop) {
   std::exception_ptr failure;
   try {
     for (std::size_t i = 0; i < dataset_.frames.size() && !stop.stop_requested(); ++i) {
-      const Stopwatch watch;
-      Item item{.images = dataset::read_frame(dataset_, i)};
-      item.read_ms = watch.ms();
-      if (i + 1 < dataset_.frames.size()) item.next_ns = dataset_.frames[i + 1].time_ns;
+      Item item = read_item(i);
       std::unique_lock lock(mutex_);
       if (!changed_.wait(lock, stop, [this] { return ready_.size() < ahead_; })) break;
       bytes_ += item.images.memory_bytes();

@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <deque>
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -19,7 +20,8 @@ class FrameSource {
     double read_ms = 0;         // time for reading and decoding
     // Time of the frame after it, by which a late frame is recognised; nullopt if it is the last or unknown.
     std::optional<TimeNs> next_ns = {};
-    bool dropped = false;  // the source had no room for it, because processing was too slow
+    bool dropped = false;     // the source had no room for it, because processing was too slow
+    std::size_t waiting = 0;  // frames that wait behind it
   };
 
   FrameSource() = default;
@@ -43,7 +45,10 @@ enum class ReaderPriority { kNormal, kLow };
 class DatasetFrames final : public FrameSource {
  public:
   // Keeps a reference to `dataset`, which must outlive this object. Up to `ahead` frames are read in advance.
-  DatasetFrames(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority = ReaderPriority::kNormal);
+  // `skips`: called by the reading thread with the time of a frame that is to be read next; if it returns true, the
+  // frame is dropped without being read. May be empty.
+  DatasetFrames(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority = ReaderPriority::kNormal,
+                std::function<bool(TimeNs)> skips = {});
 
   // Rethrows exceptions of the reading thread.
   std::optional<Item> next() override;
@@ -51,9 +56,11 @@ class DatasetFrames final : public FrameSource {
 
  private:
   void read(std::stop_token stop);
+  Item read_item(std::size_t index) const;
 
   const dataset::Dataset& dataset_;
   const std::size_t ahead_;
+  const std::function<bool(TimeNs)> skips_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<Item> ready_;                     // guarded by mutex_, like the next four members

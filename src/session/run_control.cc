@@ -67,10 +67,11 @@ bool RunControl::wait_for(TimeNs time_ns, const std::stop_token& stop) {
   return true;
 }
 
-bool RunControl::is_overdue(TimeNs time_ns) const {
+double RunControl::lateness_s(TimeNs time_ns) const {
   const std::lock_guard lock(mutex_);
   const auto at = due(time_ns);
-  return !paused_ && at && Clock::now() > *at;
+  if (paused_ || !at) return 0;
+  return std::max(0.0, speed_ * std::chrono::duration<double>(Clock::now() - *at).count());
 }
 
 }  // namespace bslam::session

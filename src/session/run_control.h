@@ -37,8 +37,9 @@ class RunControl {
   // requested, and returns false. Frames are due relative to the first one, or to the last one before the pace changed.
   bool wait_for(TimeNs time_ns, const std::stop_token& stop);
 
-  // Returns whether a frame captured at `time_ns` is overdue. Never the case if frames are fed as fast as possible.
-  bool is_overdue(TimeNs time_ns) const;
+  // How late a frame captured at `time_ns` is, in seconds of the recorded pace; 0 if it is not late, while paused, and
+  // if frames are fed as fast as possible.
+  double lateness_s(TimeNs time_ns) const;
 
  private:
   using Clock = std::chrono::steady_clock;

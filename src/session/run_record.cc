@@ -72,6 +72,21 @@ std::vector<LostInterval> lost_intervals(const RunRecord& record) {
   return intervals;
 }
 
+std::vector<ReducedInterval> reduced_intervals(const RunRecord& record) {
+  std::vector<ReducedInterval> intervals;
+  int level = 0;  // of the last frame
+  for (const RunFrame& frame : record.frames) {
+    if (!frame.record) continue;
+    const bool begins = frame.record->reduction != level;
+    level = frame.record->reduction;
+    if (level == 0) continue;
+    if (begins) intervals.push_back({.from_s = frame.time_s, .level = level});
+    intervals.back().to_s = frame.time_s;
+    ++intervals.back().frames;
+  }
+  return intervals;
+}
+
 bool never_started(const RunRecord& record) {
   const auto had_images = [](const RunFrame& frame) {
     return frame.record && frame.record->final_result().reason == tracking::LostReason::kNotStarted;

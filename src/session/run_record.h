@@ -173,6 +173,15 @@ struct LostInterval {
 
 std::vector<LostInterval> lost_intervals(const RunRecord& record);
 
+// An interval of consecutive frames for which the same level of reduced work was done (tracking/reduced_work.h).
+struct ReducedInterval {
+  double from_s = 0.0, to_s = 0.0;
+  int level = 0;
+  std::int64_t frames = 0;
+};
+
+std::vector<ReducedInterval> reduced_intervals(const RunRecord& record);
+
 // Whether the images of several cameras could be used, but no map was started with them.
 bool never_started(const RunRecord& record);
 

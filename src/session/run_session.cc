@@ -15,6 +15,7 @@
 #include "rig_formats/bslam_rig.h"
 #include "session/covariance_file.h"
 #include "session/frame_source.h"
+#include "session/load_control.h"
 #include "session/memory_report.h"
 #include "session/process_use.h"
 #include "session/record_builder.h"
@@ -30,12 +31,19 @@ namespace {
 
 constexpr std::size_t kReadAhead = 6;  // frames: they are read while a keyframe is mapped
 
-// Returns the frames of the recorded run, in order. There are fewer than in the data set if the run was interrupted or
-// dropped frames.
-std::vector<FrameId> recorded_frames(const execution::Journal& journal) {
-  std::vector<FrameId> frames;
+// A frame of the recorded run and its level of reduction.
+struct RecordedFrame {
+  FrameId frame;
+  int reduction = 0;
+};
+
+// In order. There are fewer than in the data set if the run was interrupted or dropped frames.
+std::vector<RecordedFrame> recorded_frames(const execution::Journal& journal) {
+  std::vector<RecordedFrame> frames;
+  int reduction = 0;
   for (const execution::JournalEntry& e : journal.entries) {
-    if (e.step == execution::JournalStep::kFrame) frames.emplace_back(e.input);
+    if (e.step == execution::JournalStep::kReduce) reduction = e.input;
+    if (e.step == execution::JournalStep::kFrame) frames.push_back({FrameId(e.input), reduction});
   }
   return frames;
 }
@@ -55,42 +63,65 @@ struct Fed {
   std::size_t read_ahead_bytes = 0;  // most that frames read in advance have held
 };
 
-// Decides which frames are dropped in addition to those that the source has dropped.
+// At a recorded pace with Late::kDrop: a frame that is later is dropped if another one has been read.
+constexpr double kMaxLateness_s = 0.2;
+
+// Decides which frames are dropped in addition to those that the source has dropped, and how much work is done for the
+// others: at a recorded pace with Late::kDrop, and for live cameras.
 class FrameChoice {
  public:
-  explicit FrameChoice(const SessionOptions& options) : options_(options) {
+  explicit FrameChoice(const SessionOptions& options)
+      : options_(options),
+        reduces_((options.late == Late::kDrop || options.source) && options.config.mode == execution::Mode::kParallel) {
     if (options.replay) recorded_ = recorded_frames(*options.replay);
   }
   // Returns true if the replayed run had ended before this frame.
   bool is_after_replay(const FrameSource::Item& item) const {
-    return options_.replay && (recorded_.empty() || recorded_.back() < item.images.id);
+    return options_.replay && (recorded_.empty() || recorded_.back().frame < item.images.id);
   }
-  bool drops(const FrameSource::Item& item, const RunControl& control) const {
-    if (options_.replay) return !std::binary_search(recorded_.begin(), recorded_.end(), item.images.id);
-    return options_.late == Late::kDrop && item.next_ns && control.is_overdue(*item.next_ns);
+  // The level of reduction of the frame; nullopt if it is dropped.
+  std::optional<int> reduction(const FrameSource::Item& item, const RunControl& control) {
+    if (options_.replay) return recorded_reduction(item.images.id);
+    const double late_s = control.lateness_s(item.images.time_ns);
+    double behind = static_cast<double>(item.waiting);
+    if (item.next_ns) behind = late_s / std::max(kMinInterval_s, to_seconds(*item.next_ns - item.images.time_ns));
+    const int level = reduces_ ? load_.update(behind, item.images.time_ns) : 0;
+    const bool drops = options_.late == Late::kDrop && item.waiting > 0 && behind > 1 && late_s > kMaxLateness_s;
+    return drops ? std::nullopt : std::optional(level);
   }
 
  private:
+  static constexpr double kMinInterval_s = 1e-3;
+
+  std::optional<int> recorded_reduction(FrameId frame) const {
+    const auto found = std::ranges::lower_bound(recorded_, frame, {}, &RecordedFrame::frame);
+    if (found == recorded_.end() || found->frame != frame) return std::nullopt;
+    return found->reduction;
+  }
+
   const SessionOptions& options_;
-  std::vector<FrameId> recorded_;
+  const bool reduces_;
+  LoadControl load_;
+  std::vector<RecordedFrame> recorded_;
 };
 
 // Feeds the frames to the system in order. Stops early if the run is interrupted.
-Result<Fed> feed(FrameSource& source, std::size_t count, const SessionOptions& options, system::System& system) {
+Result<Fed> feed(FrameSource& source, std::size_t count, const SessionOptions& options, RunControl& control,
+                 system::System& system) {
   Fed fed;
-  RunControl recorded_pace(options.pace == Pace::kRealtime ? 1.0 : 0.0);
-  RunControl& control = options.control ? *options.control : recorded_pace;
-  const FrameChoice choice(options);
+  FrameChoice choice(options);
   while (!options.interrupted.stop_requested()) {
     auto item = source.next();
     fed.all = !item;
     if (!item || choice.is_after_replay(*item)) break;
     if (!item->dropped && !control.wait_for(item->images.time_ns, options.interrupted)) break;
-    const bool drop = item->dropped || choice.drops(*item, control);
+    const std::optional<int> reduction = choice.reduction(*item, control);
+    const bool drop = item->dropped || !reduction;
     fed.inputs.push_back({item->images.time_ns, drop, item->read_ms});
     if (drop) {
       if (options.observer) options.observer->dropped(item->images.time_ns, item->read_ms);
     } else {
+      system.set_reduction(*reduction);
       auto processed = system.process(item->images);
       if (!processed) return processed.error();
       if (options.observer) report_frame(*options.observer, *std::move(item), *std::move(processed), system);
@@ -103,10 +134,15 @@ Result<Fed> feed(FrameSource& source, std::size_t count, const SessionOptions& o
 }
 
 Result<Fed> feed(const dataset::Dataset& dataset, const SessionOptions& options, system::System& system) {
-  if (options.source) return feed(*options.source, 0, options, system);
+  RunControl recorded_pace(options.pace == Pace::kRealtime ? 1.0 : 0.0);
+  RunControl& control = options.control ? *options.control : recorded_pace;
+  if (options.source) return feed(*options.source, 0, options, control, system);
   const bool sequential = options.config.mode == execution::Mode::kSequential;
-  DatasetFrames source(dataset, kReadAhead, sequential ? ReaderPriority::kLow : ReaderPriority::kNormal);
-  return feed(source, dataset.frames.size(), options, system);
+  std::function<bool(TimeNs)> skips;
+  if (options.late == Late::kDrop && !options.replay)
+    skips = [&control](TimeNs time_ns) { return control.lateness_s(time_ns) > kMaxLateness_s; };
+  DatasetFrames source(dataset, kReadAhead, sequential ? ReaderPriority::kLow : ReaderPriority::kNormal, skips);
+  return feed(source, dataset.frames.size(), options, control, system);
 }
 
 }  // namespace

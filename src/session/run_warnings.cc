@@ -163,6 +163,19 @@ void warn_of_pairs(const RunRecord& record, const std::string& check_command, Wa
   }
 }
 
+// What was left out because processing was too slow.
+void warn_of_load(const RunRecord& record, Warnings& warnings) {
+  std::int64_t reduced = 0;
+  for (const ReducedInterval& interval : reduced_intervals(record)) reduced += interval.frames;
+  if (reduced > 0) {
+    warn(warnings,
+         "fewer keypoints, landmarks and keyframes in {} of {} frames: all would have been slower than real time",
+         reduced, record.frames.size());
+  }
+  const auto dropped = count(record, FrameOutcome::kDropped);
+  if (dropped > 0) warn(warnings, "{} frames dropped: processing is slower than real time", dropped);
+}
+
 }  // namespace
 
 std::string foreign_images_text(const RunRecord& record) {
@@ -210,8 +223,7 @@ std::vector<std::string> warnings_after_run(const RunRecord& record, const camer
   warn_of_estimate(record, rig, warnings);
   warn_of_losses(record, warnings);
   warn_of_submaps(record, warnings);
-  const auto dropped = count(record, FrameOutcome::kDropped);
-  if (dropped > 0) warn(warnings, "{} frames dropped: processing is slower than real time", dropped);
+  warn_of_load(record, warnings);
   return warnings;
 }
 

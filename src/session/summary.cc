@@ -30,12 +30,17 @@ ordered_json frames_json(const RunRecord& record) {
     intervals.push_back(
         {{"from", seconds(interval.from_s)}, {"to", seconds(interval.to_s)}, {"reason", interval.reason}});
   }
+  ordered_json reduced = ordered_json::array();
+  for (const ReducedInterval& interval : reduced_intervals(record)) {
+    reduced.push_back({{"from", seconds(interval.from_s)}, {"to", seconds(interval.to_s)}, {"level", interval.level}});
+  }
   return {{"input", record.frames.size()},
           {"tracked", count(record, FrameOutcome::kTracked)},
           {"lost", count(record, FrameOutcome::kLost)},
           {"dropped", count(record, FrameOutcome::kDropped)},
           {"in_loaded_map", record.map.loaded ? ordered_json(frames_in_loaded_map(record)) : ordered_json()},
-          {"lost_intervals", intervals}};
+          {"lost_intervals", intervals},
+          {"reduced_work", reduced}};
 }
 
 ordered_json extrinsics_json(const std::optional<ExtrinsicsRecord>& e) {

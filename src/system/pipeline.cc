@@ -66,10 +66,16 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   outcome.record = std::move(tracked.record);
   FrameRecord& record = outcome.record;
   record.stages.insert(record.stages.begin(), stages.begin(), stages.end());
+  record.reduction = state_.reduction;
   record.cameras = status_.update(evidence(images, faults, plan, outcome));
   for (const image::CameraImage& i : images.images) record.images.push_back(i.state);
   record.frame_ms = whole.ms();
   return outcome;
+}
+
+void Pipeline::set_reduction(int level) {
+  tracking::change_level(state_.reduction, level, state_.track);
+  state_.reduction = level;
 }
 
 // Tracks the frame without features if possible. Its features are extracted otherwise, before the map is needed if this

@@ -46,6 +46,10 @@ class Pipeline {
   // Resets tracking; the next frames initialise another map.
   void restart() { state_ = state_.restarted(); }
 
+  // Level of the work per frame, from 0 (all of it) to kMaxReduction, from the next frame on.
+  void set_reduction(int level);
+  int reduction() const { return state_.reduction; }
+
   tracking::TrackStatus status() const { return state_.track.status; }
   const tracking::Tracker& tracker() const { return tracker_; }
 

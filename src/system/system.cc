@@ -153,6 +153,12 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
   return record;
 }
 
+void System::set_reduction(int level) {
+  if (level == pipeline_.reduction()) return;
+  executor_->note_reduction(level);
+  pipeline_.set_reduction(level);
+}
+
 void System::enqueue(FrameId frame, TimeNs time_ns) {
   if (executor_->over()) return keyframe_maker_.withdraw(frame);
   {

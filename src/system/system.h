@@ -71,6 +71,10 @@ class System {
   // exceptions of workers.
   Result<FrameRecord> process(const image::ImageBundle& images);
 
+  // Level of the work per frame, from 0 (all of it) to kMaxReduction (tracking/reduced_work.h), from the next
+  // frame on. It is part of the journal. To be called from the thread that calls process().
+  void set_reduction(int level);
+
   // Waits for the stages and, if configured, adjusts the whole map. Must be called once, after the last frame.
   void finish();
 

@@ -48,6 +48,7 @@ struct FrameRecord {
   bool keyframe = false;
   std::optional<CreatedKeyframe> created;      // a keyframe that tracking used for the first time in this frame
   bool direct = false;                         // the pose was found by direct tracking
+  int reduction = 0;                           // level of reduced work (tracking/reduced_work.h)
   bool recalibrated = false;                   // the calibration of the rig differs from that of the previous frame
   bool map_withdrawn = false;                  // after this frame the map was emptied, because it was not a good start
   int unique = 0, monocular = 0, matched = 0;  // features; unique = monocular + matched

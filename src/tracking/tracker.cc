@@ -77,6 +77,7 @@ void record_motion(TrackOutcome& outcome) {
 FrontEndState FrontEndState::restarted() const {
   FrontEndState state;
   state.blurred = blurred;
+  state.reduction = reduction;
   state.T_rig_odom = T_rig_odom;
   state.T_map_odom = T_map_odom;
   return state;
@@ -84,7 +85,12 @@ FrontEndState FrontEndState::restarted() const {
 
 Tracker::Tracker(const camera::Rig& rig, const TrackerOptions& options, ThreadPool& pool,
                  std::unique_ptr<Relocaliser> relocaliser)
-    : rig_(rig), options_(options), pool_(pool), relocaliser_(std::move(relocaliser)) {}
+    : rig_(rig), options_(options), pool_(pool), relocaliser_(std::move(relocaliser)) {
+  for (std::size_t i = 0; i < levels_.size(); ++i) {
+    const int level = static_cast<int>(i);
+    levels_[i] = {reduced(options.features, level), reduced(options.tracking, level)};
+  }
+}
 
 std::vector<matching::AlignmentOptions> Tracker::alignment(const FrontEndState& state) const {
   return alignment_by_camera(options_.tracking.alignment, state.calibration_errors, rig_.size());
@@ -100,19 +106,20 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
   for (std::size_t c = 0; c < out.size(); ++c) plan.postponed.push_back(plan.skipped[c] && !out[c]);
   std::vector<std::uint8_t> failing = excluded(state.track, rig_.size());
   for (std::size_t c = 0; c < failing.size(); ++c) failing[c] |= faults.failing[c];
-  plan.budgets = budgets(state.budget_fractions, plan.skipped, failing);
+  plan.budgets = budgets(state, plan.skipped, failing);
   plan.alignment = alignment(state);
   if (state.track.twist) plan.twist = *state.track.twist;
   return plan;
 }
 
 // Per camera of the rig; the budget of the rig is divided among the cameras of the run.
-std::vector<int> Tracker::budgets(std::span<const double> fractions, std::span<const std::uint8_t> skipped,
+std::vector<int> Tracker::budgets(const FrontEndState& state, std::span<const std::uint8_t> skipped,
                                   std::span<const std::uint8_t> failing) const {
   const std::size_t first = options_.first_camera, n = options_.num_cameras > 0 ? options_.num_cameras : rig_.size();
   const auto of_run = [&](auto values) { return values.empty() ? values : values.subspan(first, n); };
+  const std::span<const double> fractions = state.budget_fractions;
   const std::vector<int> found =
-      feature_budgets(n, of_run(fractions), of_run(skipped), of_run(failing), options_.features);
+      feature_budgets(n, of_run(fractions), of_run(skipped), of_run(failing), level_of(state).features);
   std::vector<int> out(rig_.size(), 0);
   std::ranges::copy(found, out.begin() + static_cast<std::ptrdiff_t>(first));
   return out;
@@ -145,7 +152,7 @@ DirectAttempt Tracker::process_directly(const FrontEndState& state, const Bundle
   const auto alignment = this->alignment(state);
   TrackInput input = input_of(*map, images.pyramids, alignment, outcome.next);
   input.masks = images.masks;
-  DirectOutput direct = track_directly(input, frame, options_.tracking, pool_);
+  DirectOutput direct = track_directly(input, frame, level_of(state).tracking, pool_);
   if (direct.failure == DirectFailure::kKeyframeDue && options_.localize_only)
     direct.failure = direct.all_cameras ? DirectFailure::kNone : DirectFailure::kFewInliers;
   if (!direct.output) return {.failure = direct.failure};
@@ -211,7 +218,7 @@ TrackOutput Tracker::follow(const Input& input, const FrontEndState& state,
   const auto alignment = this->alignment(state);
   TrackInput track_input = input_of(*input.map, input.pyramids, alignment, state);
   track_input.estimate = estimate;
-  return tracking::track(track_input, input.frame, options_.tracking, pool_);
+  return tracking::track(track_input, input.frame, level_of(state).tracking, pool_);
 }
 
 void Tracker::track(const Input& input, TrackOutcome& outcome) {

@@ -3,6 +3,7 @@
 // of it.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -16,6 +17,7 @@
 #include "tracking/initialise.h"
 #include "tracking/observed_keypoints.h"
 #include "tracking/pose_between.h"
+#include "tracking/reduced_work.h"
 #include "tracking/relocaliser.h"
 #include "tracking/track_directly.h"
 
@@ -66,6 +68,7 @@ struct FrontEndState {
   std::optional<PendingKeyframe> pending;
   // The last pending keyframe was not created: the next one is made of a frame with features.
   bool keyframe_failed = false;
+  int reduction = 0;         // level of tracking/reduced_work.h
   int frames_lost = 0;       // consecutive lost frames with features
   TimeNs lost_since_ns = 0;  // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
@@ -154,7 +157,13 @@ class Tracker {
   std::size_t place_index_bytes() const { return relocaliser_ ? relocaliser_->memory_bytes() : 0; }
 
  private:
-  std::vector<int> budgets(std::span<const double> fractions, std::span<const std::uint8_t> skipped,
+  // Options at a level of reduction.
+  struct Level {
+    feature::FeatureOptions features;
+    TrackingOptions tracking;
+  };
+  const Level& level_of(const FrontEndState& state) const { return levels_[static_cast<std::size_t>(state.reduction)]; }
+  std::vector<int> budgets(const FrontEndState& state, std::span<const std::uint8_t> skipped,
                            std::span<const std::uint8_t> failing) const;
   struct Input {
     frame::BundledFrame& frame;
@@ -187,6 +196,7 @@ class Tracker {
 
   const camera::Rig& rig_;
   const TrackerOptions options_;
+  std::array<Level, kMaxReduction + 1> levels_;
   ThreadPool& pool_;
   const std::unique_ptr<Relocaliser> relocaliser_;
 };

@@ -112,6 +112,72 @@ TEST_F(Session, TakesTheFramesOfAnotherSource) {
   }
 }
 
+TEST_F(Session, ReaderSkipsFramesThatAreNotWanted) {
+  const dataset::Dataset data = dataset();
+  const TimeNs from = data.frames[2].time_ns, to = data.frames[5].time_ns;
+  DatasetFrames source(data, 4, ReaderPriority::kNormal, [&](TimeNs t) { return from <= t && t < to; });
+  for (std::size_t i = 0; i < data.frames.size(); ++i) {
+    const auto item = source.next();
+    ASSERT_TRUE(item.has_value());
+    EXPECT_EQ(item->dropped, 2 <= i && i < 5);
+    EXPECT_EQ(item->images.images.empty(), item->dropped);
+    EXPECT_EQ(item->images.time_ns, data.frames[i].time_ns);
+  }
+}
+
+// Passes on the frames of a data set, as live cameras do for which processing is too slow.
+class Backlog : public FrameSource {
+ public:
+  explicit Backlog(const dataset::Dataset& data) : frames_(data, 2) {}
+  std::optional<Item> next() override {
+    auto item = frames_.next();
+    if (!item) return item;
+    item->next_ns.reset();
+    item->waiting = 2;
+    return item;
+  }
+
+ private:
+  DatasetFrames frames_;
+};
+
+TEST_F(Session, ReducesTheWorkIfFramesWait) {
+  dataset::Dataset data = dataset();
+  Backlog source(data);
+  SessionOptions o = options();
+  o.config.mode = execution::Mode::kParallel;
+  o.source = &source;
+  const auto result = run_session(data, o);
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_EQ(count(result->record, FrameOutcome::kTracked), 8);
+  EXPECT_EQ(result->record.frames.front().record->reduction, 1);
+  EXPECT_EQ(result->record.frames.back().record->reduction, kMaxReduction);
+  EXPECT_EQ(reduced_intervals(result->record).size(), 3u);
+  std::int64_t first = 0, last = 0;
+  for (const tracking::CameraCounts& c : result->record.frames.front().record->result.cameras) first += c.keypoints;
+  for (const auto& keypoints : result->map->keyframe(KeyframeId(0)).frame->cameras)
+    last += static_cast<std::int64_t>(keypoints.keypoints.size());
+  EXPECT_EQ(first, last);
+  EXPECT_LE(first, 2 * 0.75 * o.config.features.per_image);
+
+  SessionOptions again = options();
+  again.replay = result->journal;
+  const auto replayed = run_session(data, again);
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(replayed->journal.entries, result->journal.entries);
+  for (std::size_t i = 0; i < 8; ++i)
+    EXPECT_EQ(replayed->record.frames[i].record->reduction, result->record.frames[i].record->reduction);
+  EXPECT_EQ(evaluation::tum_text(replayed->trajectories.front().poses, ""),
+            evaluation::tum_text(result->trajectories.front().poses, ""));
+
+  o.config.mode = execution::Mode::kSequential;  // repeatable runs do the same whatever the load
+  Backlog once_more(data);
+  o.source = &once_more;
+  const auto repeatable = run_session(data, o);
+  ASSERT_TRUE(repeatable.ok());
+  EXPECT_TRUE(reduced_intervals(repeatable->record).empty());
+}
+
 TEST_F(Session, WritesAllItsFiles) {
   const dataset::Dataset data = dataset();
   SessionOptions o = options();

@@ -46,9 +46,10 @@ TEST(Summary, HasTheDocumentedKeysInOrder) {
                 "frames",       "cameras", "calibration", "features", "map",    "loops",   "relocalisations",
                 "maps_started", "parts",   "time",        "work",     "memory", "warnings"}));
   EXPECT_EQ(json["warnings"].dump(), R"(["cam0: blurred"])");
-  EXPECT_EQ(keys(json["frames"]),
-            (std::vector<std::string>{"input", "tracked", "lost", "dropped", "in_loaded_map", "lost_intervals"}));
+  EXPECT_EQ(keys(json["frames"]), (std::vector<std::string>{"input", "tracked", "lost", "dropped", "in_loaded_map",
+                                                            "lost_intervals", "reduced_work"}));
   EXPECT_EQ(json["frames"]["lost_intervals"].dump(), R"([{"from":1.25,"to":1.25,"reason":"too few matches"}])");
+  EXPECT_EQ(json["frames"]["reduced_work"], ordered_json::array());
   EXPECT_EQ(json["cameras"].dump(),
             R"([{"name":"cam0","images":400,"skipped":1,)"
             R"("states":[{"state":"degraded","reason":"blurred","from":0.0,"to":1.5}],)"
