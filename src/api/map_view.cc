@@ -96,7 +96,7 @@ std::vector<std::vector<std::int32_t>> MapView::words() const {
       for (const WordId word : camera.words) words.push_back(word.value());
     }
     std::ranges::sort(words);
-    words.erase(std::ranges::unique(words).begin(), words.end());
+    words.erase(std::unique(words.begin(), words.end()), words.end());
   }
   return out;
 }

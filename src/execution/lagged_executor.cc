@@ -44,7 +44,7 @@ class LaggedExecutor : public StageExecutor {
     ++now_;
     for (const Stage stage : kStages) {
       const auto& running = queue(stage).running;
-      if (running && now_ >= running->started + lag(stage)) finish_running(stage);
+      while (running && now_ >= running->started + lag(running->task)) finish_running(stage);
     }
     return gate_.begin_frame(frame);
   }
@@ -100,8 +100,10 @@ class LaggedExecutor : public StageExecutor {
   StageQueue& queue(Stage stage) { return queues_[static_cast<std::size_t>(stage)]; }
   Worker& worker(Stage stage) { return workers_[static_cast<std::size_t>(stage)]; }
 
-  int lag(Stage stage) const {
-    switch (stage) {
+  int lag(const StageTask& task) const {
+    if (setup_.options.await_calibration && setup_.functions[Stage::kCalibrate] && awaited(task, *gate_.newest()))
+      return 0;
+    switch (task.stage) {
       case Stage::kKeyframe:
         return setup_.options.lag_keyframe;
       case Stage::kMap:

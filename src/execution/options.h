@@ -19,6 +19,9 @@ enum class Mode {
 struct ExecutionOptions {
   int threads = 0;  // threads for loops over cameras; 0: number of hardware threads, at most one per camera
   int max_pending_keyframes = 3;  // queue length of a background stage; adding to a full queue waits
+  // Frames wait for the first calibrations and the mapping before them (execution::awaited), if the calibration is to
+  // be estimated. Not in sequential mode, which always waits, and not where frames come in real time.
+  bool await_calibration = true;
   // Lagged mode: a stage's result is used this number of frames after the frame at which the stage started. It should
   // be slightly longer than the stage takes, to avoid waiting; lag_global is for maps of some hundred keyframes.
   int lag_keyframe = 1, lag_map = 3, lag_loop = 5, lag_calibrate = 40, lag_global = 40;
@@ -35,6 +38,9 @@ struct ExecutionOptions {
             kCommon);
     visitor("max_pending_keyframes", self.max_pending_keyframes, Range{1, 1000}, "",
             "maximum number of keyframes waiting for a background stage", OptionNote{.formerly = "pending_keyframes"});
+    visitor("await_calibration", self.await_calibration, Range{}, "",
+            "wait at the start until it is known whether the images agree with the calibration; never waited for with "
+            "live cameras and --late drop");
     visitor("lag_keyframe", self.lag_keyframe, Range{1, 10}, "frames",
             "lagged mode: delay from the request of a keyframe to its use");
     visitor("lag_map", self.lag_map, Range{1, 10000}, "frames",

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -21,6 +22,10 @@ class ParallelExecutor : public StageExecutor {
   ~ParallelExecutor() override { interrupt(); }
 
   map::MapSnapshot begin_frame(FrameId frame) override {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return closed_ || !awaits_any(); });
+    }
     rethrow();
     return gate_.begin_frame(frame);
   }
@@ -67,6 +72,7 @@ class ParallelExecutor : public StageExecutor {
   struct StageQueue {
     std::deque<StageTask> waiting;
     std::optional<std::stop_source> running;  // of the running task, until the task that follows it is enqueued
+    StageTask running_task;                   // if one is running
   };
 
   StageQueue& queue(Stage stage) { return queues_[static_cast<std::size_t>(stage)]; }
@@ -83,6 +89,15 @@ class ParallelExecutor : public StageExecutor {
       if (!q.waiting.empty() || q.running) return false;
     }
     return true;
+  }
+
+  bool awaits_any() const {
+    if (!setup_.options.await_calibration || !setup_.functions[Stage::kCalibrate]) return false;
+    const map::MapSnapshot newest = gate_.newest();
+    return std::ranges::any_of(queues_, [&](const StageQueue& q) {
+      return (q.running && awaited(q.running_task, *newest)) ||
+             std::ranges::any_of(q.waiting, [&](const StageTask& task) { return awaited(task, *newest); });
+    });
   }
 
   void drop(StageQueue& q) {
@@ -131,6 +146,7 @@ class ParallelExecutor : public StageExecutor {
     const StageTask task = q.waiting.front();
     q.waiting.pop_front();
     stop = q.running.emplace().get_token();
+    q.running_task = task;
     changed_.notify_all();  // the queue has space
     return task;
   }

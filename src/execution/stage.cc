@@ -23,13 +23,36 @@ StageTask StageTask::of_input(Stage stage, std::int32_t input) {
                                    : StageTask{stage, KeyframeId(input)};
 }
 
+namespace {
+
+constexpr std::size_t kFirstCalibration = 8, kSecondCalibration = 12;  // keyframes
+
+}  // namespace
+
 std::optional<int> calibration_due(KeyframeId keyframe) {
-  constexpr std::size_t kFirst = 8;  // keyframes
+  static_assert(kSecondCalibration == kFirstCalibration + kFirstCalibration / 2);
   int number = 0;
-  for (std::size_t due = kFirst; due <= keyframe.index(); due += due / 2, ++number) {
+  for (std::size_t due = kFirstCalibration; due <= keyframe.index(); due += due / 2, ++number) {
     if (due == keyframe.index()) return number;
   }
   return std::nullopt;
+}
+
+bool awaited(const StageTask& task, const map::BundledMap& newest) {
+  constexpr int kVerdicts = 2, kRefinements = 5;  // calibrations
+  switch (task.stage) {
+    case Stage::kKeyframe:
+    case Stage::kMap:
+      return newest.keyframe_slots() <= kSecondCalibration + 1;
+    case Stage::kCalibrate: {
+      const int number = calibration_due(task.keyframe).value_or(kRefinements);
+      return number < kVerdicts || (newest.rig_deviation() && number < kRefinements);
+    }
+    case Stage::kLoop:
+    case Stage::kGlobal:
+      break;
+  }
+  return false;
 }
 
 std::vector<StageTask> following(const StageTask& task, const StageFunctions& functions) {

@@ -64,6 +64,12 @@ std::vector<StageTask> following(const StageTask& task, const StageFunctions& fu
 // what another one can improve decreases with the size of the map.
 std::optional<int> calibration_due(KeyframeId keyframe);
 
+// Whether the next frame waits for a task (ExecutionOptions::await_calibration). Tracking with a wrong calibration
+// loses observations, cameras or the scale, which no later adjustment brings back. The first keyframes are therefore
+// mapped one after the other until two calibrations have shown whether the images agree; if they do not, some further
+// calibrations are waited for as well. `newest` is the newest version of the map.
+bool awaited(const StageTask& task, const map::BundledMap& newest);
+
 // The stages whose waiting and running tasks are dropped when a result of `stage` is committed. A loop closure and a
 // calibration correct the map, so that a global adjustment of an earlier version is useless; they adjust the map
 // themselves or another adjustment follows. A loop closure also supersedes a calibration.

@@ -12,7 +12,8 @@ FrameOutcome RunFrame::outcome() const {
 }
 
 void CalibrationRecord::accept_estimate(bool complete, bool replaced) {
-  refined = complete && replaced && estimate.done && !foreign_images();
+  applies = complete && estimate.done && pairs.empty() && disagreeing.empty();
+  refined = applies && replaced;
 }
 
 bool CalibrationRecord::foreign_images() const {

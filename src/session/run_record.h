@@ -74,14 +74,17 @@ struct CameraRecord {
 // The estimate of the calibration at the end of the run.
 struct CalibrationRecord {
   calibration::RigRefinement estimate;
-  bool refined = false;     // the final map uses an estimated rig, which is written to rig_refined.yaml
+  // Whether the estimate can be used. If images of cameras disagree as a whole, it may have made a wrong calibration
+  // fit wrong matches, or images that were taken at different times.
+  bool applies = false;
+  bool refined = false;     // the final map uses an estimated rig that applies, which is written to rig_refined.yaml
   double excess_bound = 0;  // of estimate.excess_error, above which the images contradict the calibration
   std::vector<calibration::CameraPair> pairs =
       {};  // that are contradicted or hardly matched; without keyframes if no map was started
   std::vector<std::size_t> disagreeing = {};  // cameras that were inconsistent for most of the run
 
-  // Sets `refined`. `complete`: the run was not interrupted; the map of an interrupted run may use an estimate from its
-  // beginning, of which nothing is known. `replaced`: the map uses an estimated rig.
+  // Sets `applies` and `refined`. `complete`: the run was not interrupted; the map of an interrupted run may use an
+  // estimate from its beginning, of which nothing is known. `replaced`: the map uses an estimated rig.
   void accept_estimate(bool complete, bool replaced);
   // Whether the images are not those of the calibrated cameras, or the calibration was read in another convention than
   // meant. Scale, map and estimate mean nothing then.

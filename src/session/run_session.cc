@@ -209,6 +209,14 @@ Result<Fed> run_to_end(const dataset::Dataset& dataset, const SessionOptions& op
   }
 }
 
+// Frames that come in real time do not wait.
+system::Config config_for(const SessionOptions& options) {
+  system::Config config = options.config;
+  const bool in_real_time = options.pace == Pace::kRealtime && options.late == Late::kDrop;
+  if (options.source || in_real_time) config.execution.await_calibration = false;
+  return config;
+}
+
 // What holds the memory of a run at its end.
 void measure_memory(const SessionOptions& options, const system::System& system, const Fed& fed,
                     SessionResult& result) {
@@ -227,7 +235,7 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
   const Stopwatch start_up;
   auto masks = image_decoding::read_masks(dataset.rig);
   if (!masks) return masks.error();
-  system::System system(dataset.rig, options.config,
+  system::System system(dataset.rig, config_for(options),
                         {std::move(*masks), options.vocabulary, options.map, options.initial_rig, options.replay});
   const double start_up_s = options.start_up_s + 1e-3 * start_up.ms();
 

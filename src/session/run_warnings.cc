@@ -32,11 +32,12 @@ void warn_of_outages(const CameraRecord& camera, Warnings& warnings) {
   warn(warnings, "{}: {}", camera.name, shown);
 }
 
-void warn_of_extrinsics(const CameraRecord& camera, Warnings& warnings) {
+void warn_of_extrinsics(const CameraRecord& camera, bool applies, Warnings& warnings) {
   const auto& e = camera.extrinsics;
   if (!e || !e->suspect) return;
   warn(warnings, "{}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm{}", camera.name,
-       e->change_deg, e->change_mm, e->refined ? "" : "; use the estimate with --set calibration.refine=true");
+       e->change_deg, e->change_mm,
+       applies && !e->refined ? "; use the estimate with --set calibration.refine=true" : "");
 }
 
 // Warns if focal lengths or principal points changed by much more than their deviation and than calibrations differ.
@@ -68,13 +69,22 @@ void warn_of_timing(const std::string& name, const calibration::CameraRefinement
   }
 }
 
+std::string what_became_of_estimate(const RunRecord& record) {
+  const CalibrationRecord& calibration = record.calibration;
+  if (calibration.refined) return "it was refined: see calibration in summary.json, and rig_refined.yaml";
+  if (!record.complete) return "the estimate of a run that was interrupted is not used";
+  if (calibration.applies) return "refine it with --set calibration.refine=auto";
+  return "the estimate cannot be used for other recordings, because the images of some cameras disagree as a whole: "
+         "their time stamps or extrinsics may be far off";
+}
+
 // Warns of an estimate that differs from the calibration, unless the images do not belong to it: the estimate means
 // nothing then.
 void warn_of_estimate(const RunRecord& record, const camera::Rig& rig, Warnings& warnings) {
   const CalibrationRecord& calibration = record.calibration;
   if (calibration.foreign_images()) return;
   const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
-  for (const CameraRecord& camera : record.cameras) warn_of_extrinsics(camera, warnings);
+  for (const CameraRecord& camera : record.cameras) warn_of_extrinsics(camera, calibration.applies, warnings);
   for (std::size_t c = 0; c < std::min(calibration.estimate.cameras.size(), record.cameras.size()); ++c) {
     if (contradicted) warn_of_intrinsics(rig.camera(c), calibration.estimate.cameras[c], warnings);
     warn_of_timing(record.cameras[c].name, calibration.estimate.cameras[c], warnings);
@@ -82,13 +92,11 @@ void warn_of_estimate(const RunRecord& record, const camera::Rig& rig, Warnings&
   if (!contradicted) return;
   warn(warnings,
        "the images contradict the calibration, which multiplies their squared reprojection error by {:.1f}; {}",
-       1 + calibration.estimate.excess_error,
-       calibration.refined ? "it was refined: see calibration in summary.json, and rig_refined.yaml"
-                           : "refine it with --set calibration.refine=auto");
+       1 + calibration.estimate.excess_error, what_became_of_estimate(record));
 }
 
 // Lists the intervals without a pose.
-void warn_of_losses(const RunRecord& record, Warnings& warnings) {
+void warn_of_losses(const RunRecord& record, const std::string& check_command, Warnings& warnings) {
   constexpr std::size_t kShown = 5;
   const std::vector<LostInterval> intervals = lost_intervals(record);
   if (intervals.empty()) return;
@@ -99,7 +107,10 @@ void warn_of_losses(const RunRecord& record, Warnings& warnings) {
   }
   if (intervals.size() > kShown)
     shown += fmt::format(" and {} more intervals, see summary.json", intervals.size() - kShown);
-  warn(warnings, "{} of {} frames have no pose: {}", count(record, FrameOutcome::kLost), record.frames.size(), shown);
+  const std::int64_t lost = count(record, FrameOutcome::kLost);
+  warn(warnings, "{} of {} frames have no pose: {}", lost, record.frames.size(), shown);
+  if (record.cameras.size() > 1 && !record.map.loaded && lost > count(record, FrameOutcome::kTracked))
+    warn(warnings, "most frames have no pose, maybe because of a wrong calibration: test it ({})", check_command);
 }
 
 // Warns if the poses have no common world frame, or not that of the loaded map.
@@ -140,7 +151,7 @@ void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std
     keypoints += frame.record->final_result().cameras[camera].keypoints;
     inliers += frame.record->final_result().cameras[camera].inliers;
   }
-  warn(warnings, "{}: only {} of {} keypoints are inliers: check this camera's extrinsics ({})",
+  warn(warnings, "{}: only {} of {} keypoints are inliers: check this camera's time stamps and extrinsics ({})",
        record.cameras[camera].name, inliers, keypoints, check_command);
 }
 
@@ -221,7 +232,7 @@ std::vector<std::string> warnings_after_run(const RunRecord& record, const camer
     warn_of_disagreement(record, c, check_command, warnings);
   }
   warn_of_estimate(record, rig, warnings);
-  warn_of_losses(record, warnings);
+  warn_of_losses(record, check_command, warnings);
   warn_of_submaps(record, warnings);
   warn_of_load(record, warnings);
   return warnings;

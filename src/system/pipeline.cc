@@ -101,7 +101,7 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   outcome.seen = executor.begin_frame(frame.id);
   const bool recalibrated = adopt_rig(*outcome.seen, frame);
   const auto created = adopt_keyframe(outcome);
-  if (config_.mode == execution::Mode::kLagged) end_stage("results");
+  if (config_.mode != execution::Mode::kSequential) end_stage("results");
 
   tracking::DirectAttempt direct;
   if (directly) {

@@ -119,7 +119,8 @@ LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFram
   const int budget = budget_of_image(out.candidates, options.direct);
   for (std::size_t c = 0; c < out.candidates.size(); ++c) {
     std::vector<Candidate>& candidates = out.candidates[c];
-    std::ranges::stable_partition(candidates, [&](const Candidate& l) { return expected[l.index] != 0; });
+    std::stable_partition(candidates.begin(), candidates.end(),
+                          [&](const Candidate& l) { return expected[l.index] != 0; });
     keep_spread(budget, input.map.rig().camera(c), candidates);
     for (const Candidate& l : candidates) {
       if (!expected[l.index]) out.expected.push_back(l.landmark);

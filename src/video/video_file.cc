@@ -218,9 +218,9 @@ Status FfmpegVideo::prepare() {
       stamps_.push_back(*time);
   }
   std::ranges::sort(stamps_);
-  const auto repeated = std::ranges::unique(stamps_);
-  untimed += repeated.size();
-  stamps_.erase(repeated.begin(), repeated.end());
+  const auto repeated = std::unique(stamps_.begin(), stamps_.end());
+  untimed += static_cast<std::size_t>(stamps_.end() - repeated);
+  stamps_.erase(repeated, stamps_.end());
   if (untimed > 0)
     warnings_.push_back(fmt::format("{}: {} images without a time of their own are not used", path_.string(), untimed));
   if (stamps_.empty()) return Error{path_.string(), "", "no images with times", "a video"};

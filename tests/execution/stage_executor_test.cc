@@ -34,6 +34,7 @@ class Load {
 ExecutionSetup setup(StageFunctions functions, StageObserver observer = {}) {
   ExecutionSetup out{std::move(functions), {}, std::move(observer)};
   out.options.lag_global = 12;
+  out.options.await_calibration = false;
   return out;
 }
 
@@ -110,6 +111,35 @@ TEST(Stage, OnlyACorrectionThatWillBeCommittedSupersedesOthers) {
   EXPECT_EQ(superseded_by(Stage::kLoop, nothing, *store.snapshot()), none);
   EXPECT_EQ(superseded_by(Stage::kLoop, loop, *store.snapshot()), corrections);
   EXPECT_EQ(superseded_by(Stage::kMap, loop, *store.snapshot()), none);
+}
+
+TEST(StageExecutor, FramesAwaitTheFirstCalibrations) {
+  const StageWorld world;
+  map::BundledMap empty = world.empty_map();
+  EXPECT_TRUE(awaited({Stage::kMap, KeyframeId(3)}, empty));
+  EXPECT_TRUE(awaited({Stage::kKeyframe, KeyframeId(), FrameId(3)}, empty));
+  EXPECT_TRUE(awaited({Stage::kCalibrate, KeyframeId(12)}, empty));
+  EXPECT_FALSE(awaited({Stage::kCalibrate, KeyframeId(18)}, empty));
+  EXPECT_FALSE(awaited({Stage::kLoop, KeyframeId(3)}, empty));
+  EXPECT_FALSE(awaited({Stage::kGlobal, KeyframeId(3)}, empty));
+}
+
+TEST(StageExecutorParallel, FramesUseTheFirstMapsAndCalibrations) {
+  for (const Mode mode : kModes) {
+    ExecutionSetup s = setup(hashing_stages(7));
+    s.options.await_calibration = true;
+    s.functions[Stage::kLoop] = {};
+    WorldRun run(mode, std::move(s));
+    for (int i = 0; i < 12; ++i) {
+      run.frame_with_keyframe();
+      // The version after the keyframe, its mapping and, from the eighth on, a calibration now and then.
+      const MapVersion committed = run.store.snapshot()->version();
+      const map::MapSnapshot next = run.executor->begin_frame(FrameId(1000 + i));
+      EXPECT_GE(next->version(), committed);
+      EXPECT_EQ(next->version().value(), 2 * (i + 1) + (i >= 8 ? 1 : 0)) << "mode " << static_cast<int>(mode);
+    }
+    run.executor->drain();
+  }
 }
 
 TEST(MapGate, KeepsNoJournalIfDisabled) {

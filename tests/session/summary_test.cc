@@ -99,6 +99,9 @@ TEST(Summary, CalibrationIsRefinedOnlyByAnEstimateThatApplies) {
   EXPECT_EQ(calibration.verdict(), calibration::Verdict::kConsistent);
   calibration.disagreeing = {1};
   EXPECT_EQ(calibration.verdict(), calibration::Verdict::kUnknown);
+  calibration.accept_estimate(true, true);
+  EXPECT_FALSE(calibration.applies);  // the cameras disagree as a whole
+  EXPECT_FALSE(calibration.refined);
   calibration.pairs = {{.first = 0, .second = 1}};
   EXPECT_EQ(calibration.verdict(), calibration::Verdict::kUnknown);
   calibration.pairs.front().contradicted = true;
