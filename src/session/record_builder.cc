@@ -59,14 +59,22 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
   }
 }
 
-// Whether the status of a camera was `inconsistent` for most of the time in which it delivered images.
-bool disagrees(const CameraRecord& camera) {
+// Fraction of the time in which a camera delivered images and its status was `inconsistent`.
+double inconsistent_fraction(const CameraRecord& camera) {
   double all_s = 0, inconsistent_s = 0;
   for (const CameraInterval& s : camera.states) {
     all_s += s.to_s - s.from_s;
     if (s.status.reason == tracking::CameraReason::kInconsistent) inconsistent_s += s.to_s - s.from_s;
   }
-  return inconsistent_s > 0.5 * all_s;
+  return all_s > 0 ? inconsistent_s / all_s : 0.0;
+}
+
+// Whether the scale has no foundation: the cameras but one have contradicted that one nearly from the start.
+bool single_camera_agrees(const RunRecord& record) {
+  constexpr double kNearlyAlways = 0.9;
+  const auto contradicted = std::ranges::count_if(
+      record.cameras, [](const CameraRecord& camera) { return inconsistent_fraction(camera) > kNearlyAlways; });
+  return contradicted > 0 && static_cast<std::size_t>(contradicted) + 1 >= record.cameras.size();
 }
 
 void add_calibration(const RecordInput& input, RunRecord& record) {
@@ -82,13 +90,14 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
                 [](const calibration::CameraPair& p) { return !p.contradicted && !p.hardly_matched(); });
   if (input.complete && never_started(record)) calibration.pairs = contradicted_pairs(input.dataset);
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
-    if (disagrees(record.cameras[c])) calibration.disagreeing.push_back(c);
+    if (inconsistent_fraction(record.cameras[c]) > 0.5) calibration.disagreeing.push_back(c);
   }
   calibration.accept_estimate(input.complete, input.system.calibration_refined());
   for (CameraRecord& camera : record.cameras) {
     if (camera.extrinsics) camera.extrinsics->refined = calibration.refined;
   }
-  if (calibration.foreign_images() && record.map.scale == map::scale_name(map::Scale::kMetric)) {
+  calibration.scale_unfounded = calibration.foreign_images() || (!record.map.loaded && single_camera_agrees(record));
+  if (calibration.scale_unfounded && record.map.scale == map::scale_name(map::Scale::kMetric)) {
     record.map.scale = map::scale_name(map::Scale::kUnobservable);
     record.map.scale_deviation.reset();
   }

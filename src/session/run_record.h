@@ -80,7 +80,8 @@ struct CalibrationRecord {
   bool refined = false;     // the final map uses an estimated rig that applies, which is written to rig_refined.yaml
   double excess_bound = 0;  // of estimate.excess_error, above which the images contradict the calibration
   std::vector<calibration::CameraPair> pairs =
-      {};  // that are contradicted or hardly matched; without keyframes if no map was started
+      {};                        // that are contradicted or hardly matched; without keyframes if no map was started
+  bool scale_unfounded = false;  // no two cameras agree on which the scale could be based
   std::vector<std::size_t> disagreeing = {};  // cameras that were inconsistent for most of the run
 
   // Sets `applies` and `refined`. `complete`: the run was not interrupted; the map of an interrupted run may use an

@@ -157,7 +157,7 @@ camera::Rig with_refined_calibration(const camera::Rig& found, const dataset::Da
 // The map at the end of the run; without metric scale if that means nothing.
 map::MapSnapshot map_of(const system::System& system, const RunRecord& record) {
   const map::MapSnapshot map = system.snapshot();
-  if (!record.calibration.foreign_images() || map->scale() != map::Scale::kMetric) return map;
+  if (!record.calibration.scale_unfounded || map->scale() != map::Scale::kMetric) return map;
   map::BundledMap copy = *map;
   copy.set_scale(map::Scale::kUnobservable);
   return std::make_shared<const map::BundledMap>(std::move(copy));

@@ -138,13 +138,19 @@ void warn_of_submaps(const RunRecord& record, Warnings& warnings) {
        found, outside);
 }
 
-// Warns about a camera that is still inconsistent with the others at the end of the run: its extrinsics are probably
-// wrong.
+// Warns about a camera that is still inconsistent with the others at the end of the run, or was so for most of it: its
+// time stamps or extrinsics are probably wrong.
 void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std::string& check_command,
                           Warnings& warnings) {
   constexpr tracking::CameraStatus kDisagrees{tracking::CameraState::kDegraded, tracking::CameraReason::kInconsistent};
   const std::vector<CameraInterval>& states = record.cameras[camera].states;
-  if (states.empty() || states.back().status != kDisagrees) return;
+  if (states.empty() || states.back().status != kDisagrees) {
+    if (std::ranges::count(record.calibration.disagreeing, camera) > 0)
+      warn(warnings,
+           "{}: inconsistent with the other cameras for most of the run: check its time stamps and extrinsics ({})",
+           record.cameras[camera].name, check_command);
+    return;
+  }
   std::int64_t keypoints = 0, inliers = 0;
   for (const RunFrame& frame : record.frames) {
     if (!frame.record) continue;
