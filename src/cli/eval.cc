@@ -107,7 +107,7 @@ std::string json_text(const TrajectoryEvaluation& e) {
 
 std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& arguments) {
   const auto row = [](std::string_view name, const std::string& value) {
-    return fmt::format("{:<24}{}\n", name, value);
+    return fmt::format("{:<23} {}\n", name, value);
   };
   const auto errors = [](const evaluation::ErrorStatistics& s, std::string_view unit) {
     if (s.count == 0) return std::string("no pairs of poses with this time difference");

@@ -127,6 +127,8 @@ RecordingResult open_video(const std::vector<fs::path>& files, bool side_by_side
     return Error{"--side-by-side", "", fmt::format("{} videos", files.size()), "one video"};
   std::vector<VideoStore::File> opened;
   for (const fs::path& path : files) {
+    if (std::ranges::count(files, path) > 1)
+      return Error{path.string(), "", "the same video twice", "a video of each camera"};
     auto video = video::VideoFile::open(path);
     if (!video) return video.error();
     opened.push_back({path, *std::move(video)});

@@ -15,7 +15,7 @@ namespace bslam::execution {
 
 enum class JournalStep {
   kFrame,     // a frame began; base: the version it uses
-  kStart,     // the frame initialised a map
+  kStart,     // the frame initialised a map, or corrected the rig before
   kTrack,     // the frame became a keyframe
   kKeyframe,  // a background stage ended
   kMap,

@@ -236,6 +236,14 @@ Result<camera::RigReading> read_kalibr_rig(const fs::path& file, const std::stri
     reading.cameras.push_back(*std::move(camera));
   }
   if (reading.cameras.empty()) return yaml->error("cam0", "nothing", "the first camera of the chain");
+  constexpr std::size_t kLargestGap = 100;
+  for (std::size_t i = 1; i <= kLargestGap; ++i) {
+    const std::string later = fmt::format("cam{}", reading.cameras.size() + i);
+    if (yaml->has(later)) {
+      return yaml->error(fmt::format("cam{}", reading.cameras.size()), "nothing",
+                         "a camera, since the chain has " + later);
+    }
+  }
   if (!imu) reading.notes.push_back("no T_cam_imu: the body frame is camera 0");
   return reading;
 }

@@ -9,6 +9,7 @@ tracking::TrackerOptions tracker_options(const Config& config, CamerasOfRun came
           .features = config.features,
           .seed = static_cast<std::uint64_t>(config.seed),
           .localize_only = config.localize_only,
+          .correct_rig = config.calibration.refine != calibration::Refine::kFalse,
           .first_camera = cameras.first,
           .num_cameras = cameras.size,
           .new_submap_after = config.looping.recovery.new_submap_after,

@@ -10,7 +10,8 @@ namespace {
 using frame::BundledFrame;
 
 execution::JournalStep journal_step(tracking::ProposedEdit::Kind kind) {
-  return kind == tracking::ProposedEdit::Kind::kStart ? execution::JournalStep::kStart : execution::JournalStep::kTrack;
+  return kind == tracking::ProposedEdit::Kind::kKeyframe ? execution::JournalStep::kTrack
+                                                         : execution::JournalStep::kStart;
 }
 
 // Observations about each camera after the frame was tracked.
@@ -57,6 +58,8 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
 
   std::vector<StageTime> stages;
   tracking::TrackOutcome tracked = track(images, plan, executor, outcome, stages);
+  if (tracked.edit && tracked.edit->kind == tracking::ProposedEdit::Kind::kRig)
+    tracked = track_with_corrected_rig(images, plan, std::move(tracked), executor, outcome);
   tracked.record.scale = outcome.seen->scale();
   if (tracked.edit) commit(tracked, executor, outcome);
   state_ = std::move(tracked.next);
@@ -119,6 +122,27 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   found.record.created = created;
   if (found.keyframe_wanted) outcome.deferred = defer_keyframe(plan, std::move(frame), found);
   return found;
+}
+
+// Commits the correction of the rig that a frame gave before a map was started, and bundles and processes the features
+// of the frame again.
+tracking::TrackOutcome Pipeline::track_with_corrected_rig(const image::ImageBundle& images,
+                                                          const tracking::FramePlan& plan,
+                                                          tracking::TrackOutcome&& tracked,
+                                                          execution::StageExecutor& executor, Outcome& outcome) {
+  const Stopwatch watch;
+  outcome.seen = executor.commit(execution::JournalStep::kStart, std::move(tracked.edit->draft)).published;
+  rig_ = outcome.seen->shared_rig();
+  BundledFrame frame = begin(images, plan);
+  builder_.extract(*rig_, frame, pool_, plan.budgets);
+  frame = bundle(plan, frame);
+  const double corrected_ms = watch.ms();
+  tracking::TrackOutcome again =
+      tracker_.process(std::move(tracked.next), std::move(frame), builder_.pyramids(), outcome.seen);
+  if (again.edit && again.edit->kind == tracking::ProposedEdit::Kind::kRig) again.edit.reset();
+  again.record.recalibrated = true;
+  again.record.stages.insert(again.record.stages.begin(), {"correct rig", corrected_ms});
+  return again;
 }
 
 // Passes the images of a frame that was tracked directly on, so that a keyframe is created of it.

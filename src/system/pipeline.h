@@ -66,6 +66,9 @@ class Pipeline {
                          const tracking::TrackOutcome& found);
   std::optional<tracking::CreatedKeyframe> adopt_keyframe(Outcome& outcome);
   bool adopt_rig(const map::BundledMap& map, frame::BundledFrame& frame);
+  tracking::TrackOutcome track_with_corrected_rig(const image::ImageBundle& images, const tracking::FramePlan& plan,
+                                                  tracking::TrackOutcome&& tracked, execution::StageExecutor& executor,
+                                                  Outcome& outcome);
   void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);
 
   const camera::Rig given_;                 // its time offsets are included in the capture times of the images

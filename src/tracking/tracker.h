@@ -28,6 +28,7 @@ struct TrackerOptions {
   feature::FeatureOptions features;
   std::uint64_t seed = 1;
   bool localize_only = false;  // never propose an edit of the map
+  bool correct_rig = true;     // before a map is started (tracking/start_correction.h)
   // The cameras of the rig that the run has, 0: all; the others belong to other rigs of the map, and never have images.
   std::size_t first_camera = 0, num_cameras = 0;
   int new_submap_after = 50;  // number of frames with features but without a pose after which a new submap is started
@@ -79,7 +80,12 @@ struct FrontEndState {
 
 // An edit of the map that tracking proposes.
 struct ProposedEdit {
-  enum class Kind { kStart, kKeyframe };
+  enum class Kind {
+    kStart,
+    kKeyframe,
+    kRig
+  };  // kRig: another calibration of the rig, with
+      // which the frame is to be processed again
   Kind kind = Kind::kKeyframe;
   map::MapDraft draft;
   std::vector<LandmarkId> landmarks;  // landmarks of the newest keyframe, with ids of the draft
@@ -192,6 +198,7 @@ class Tracker {
   void start(const Input& input, TrackOutcome& outcome) const;
   std::optional<StartedMap> initialise(const Input& input, const FrontEndState& state, map::MapDraft& draft) const;
   void keep_reference_frame(const Input& input, FrontEndState& state) const;
+  bool correct_rig(const Input& input, TrackOutcome& outcome) const;
   void complete_start(const map::CommitReport& report, TrackOutcome& outcome) const;
 
   const camera::Rig& rig_;

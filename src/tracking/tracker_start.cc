@@ -1,5 +1,6 @@
 // Initialisation of a map by the tracker, if there is no map or the rig cannot be located in it.
 #include "base/stopwatch.h"
+#include "tracking/start_correction.h"
 #include "tracking/tracker.h"
 
 namespace bslam::tracking {
@@ -44,6 +45,10 @@ bool from_other_cameras(const BundledFrame& a, const BundledFrame& b) {
 void Tracker::start(const Input& input, TrackOutcome& outcome) const {
   const Stopwatch watch;
   outcome.record.result = not_started(input.frame);
+  if (correct_rig(input, outcome)) {
+    outcome.record.stages.push_back({"start", watch.ms()});
+    return;
+  }
   map::MapDraft draft(input.map);
   if (relocaliser_) relocaliser_->describe(input.frame);
   if (std::optional<StartedMap> started = initialise(input, outcome.next, draft)) {
@@ -71,6 +76,20 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
     return std::nullopt;
   const Random random(options_.seed, "start", static_cast<std::uint64_t>(input.frame.id.value()));
   return initialise_monocular(*state.start_reference, input.frame, input.pyramids, options, random, draft);
+}
+
+// Proposes a correction of the rig if the frame shows that one is needed. The caller commits it and processes the frame
+// again.
+bool Tracker::correct_rig(const Input& input, TrackOutcome& outcome) const {
+  if (!options_.correct_rig || input.map->num_keyframes() > 0 || !rig_.any_overlap()) return false;
+  auto corrected = with_corrected_rotations(input.map->rig(), input.frame);
+  if (!corrected) return false;
+  map::MapDraft draft(input.map);
+  draft.set_rig(*std::move(corrected));
+  outcome.edit = ProposedEdit{ProposedEdit::Kind::kRig, std::move(draft), {}, 0};
+  outcome.next.start_reference.reset();
+  outcome.next.waiting.clear();
+  return true;
 }
 
 // Stores the frame. It replaces the reference frame if that is too old or has too few matches with it; frames of other

@@ -114,6 +114,8 @@ TEST_F(Videos, ErrorsNameTheFile) {
   EXPECT_NE(other.error().message().find("no video that FFmpeg can read (Invalid "), std::string::npos)
       << other.error().message();
   EXPECT_EQ(open_dataset(request(pair())).error().file, file("right.y4m").string());
+  const std::string twice = file("left.y4m").string() + "," + file("left.y4m").string();
+  EXPECT_NE(open_dataset(request(twice)).error().message().find("twice"), std::string::npos);
   support::write_text(file("left.y4m"), bytes(0));
   EXPECT_NE(open_dataset({.path = file("left.y4m")}).error().message().find("--rig"), std::string::npos);
 }

@@ -235,6 +235,15 @@ TEST_F(RigFormats, KalibrWithoutImuUsesCamera0AsBody) {
   ASSERT_EQ(file->notes.size(), 1u);
 }
 
+TEST_F(RigFormats, KalibrWithAGapInItsNumbersIsRejected) {
+  std::string text(kKalibr);
+  text.replace(text.find("cam1:"), 5, "cam3:");
+  const auto file = read(text);
+  ASSERT_FALSE(file);
+  EXPECT_EQ(file.error().key, "cam1");
+  EXPECT_NE(file.error().message().find("cam3"), std::string::npos) << file.error().message();
+}
+
 TEST_F(RigFormats, KalibrOmniBecomesTheUnifiedModel) {
   const std::string text = R"(cam0:
   camera_model: omni

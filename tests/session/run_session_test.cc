@@ -146,6 +146,7 @@ TEST_F(Session, ReducesTheWorkIfFramesWait) {
   Backlog source(data);
   SessionOptions o = options();
   o.config.mode = execution::Mode::kParallel;
+  o.config.features.per_image = 1200;  // so that a third of them suffices
   o.source = &source;
   const auto result = run_session(data, o);
   ASSERT_TRUE(result.ok()) << result.error().message();
@@ -161,6 +162,7 @@ TEST_F(Session, ReducesTheWorkIfFramesWait) {
   EXPECT_LE(first, 2 * 0.75 * o.config.features.per_image);
 
   SessionOptions again = options();
+  again.config.features.per_image = 1200;
   again.replay = result->journal;
   const auto replayed = run_session(data, again);
   ASSERT_TRUE(replayed.ok()) << replayed.error().message();

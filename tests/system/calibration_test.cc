@@ -105,5 +105,32 @@ TEST(SystemCalibration, ReportsNothingIfDisabled) {
   EXPECT_FALSE(system.calibration_refined());
 }
 
+// The two cameras share no feature within the tolerance of the calibration, so that the map could not be started with
+// metric scale.
+TEST(SystemCalibration, ARotatedPairIsCorrectedBeforeTheStart) {
+  const RenderedTour tour(2, 20);
+  geometry::Vector6d turn = geometry::Vector6d::Zero();
+  turn[0] = 3 * kDegree;  // across the epipolar planes
+  const camera::Rig& rig = tour.rig();
+  const camera::Rig wrong({{rig.camera(0), rig.body_from_cam(0)},
+                           {rig.camera(1), rig.body_from_cam(0) * rig.cam_from_rig(1).perturbed(turn).inverse()}});
+  for (const auto refine : {calibration::Refine::kAuto, calibration::Refine::kFalse}) {
+    Config config = small_config(execution::Mode::kParallel);
+    config.calibration.refine = refine;
+    System system(wrong, config);
+    for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
+    system.finish();
+    const bool corrected = refine != calibration::Refine::kFalse;
+    EXPECT_EQ(angle_deg(system.snapshot()->rig().cam_from_rig(1), rig.cam_from_rig(1)) < 0.5, corrected);
+    if (!corrected) continue;
+    EXPECT_EQ(tracked_frames(system), tour.frames().size());
+    EXPECT_EQ(system.snapshot()->scale(), map::Scale::kMetric);
+    System again(wrong, config, {.replay = system.journal()});
+    for (const image::ImageBundle& images : tour.frames()) must_process(again, images);
+    again.finish();
+    EXPECT_TRUE(identical(system.trajectories(), again.trajectories()));
+  }
+}
+
 }  // namespace
 }  // namespace bslam::system

@@ -1,0 +1,36 @@
+// Rotation of the second camera of a pair, about its centre, from points that both observe: for a pair whose calibrated
+// rotation is wrong by a few degrees.
+#pragma once
+
+#include "estimators/epipolar.h"
+
+namespace bslam::estimators {
+
+struct PairRotationOptions {
+  double tolerance = 4e-3;  // rad, largest distance from the epipolar plane of a match that agrees
+  double prior = 0.035;     // rad, standard deviation of the given rotation, per axis
+};
+
+struct PairRotation {
+  Eigen::Matrix3d correction = Eigen::Matrix3d::Identity();  // R_b_a = correction * R_b_a as given, t_b_a likewise
+  double angle = 0;                                          // of the correction, rad
+  // Matches that agree without and with the correction: on the epipolar plane, and in front of both cameras or too far
+  // away to have a depth. `with_depth`: those of the latter that are not too far away.
+  int agreed = 0, agree = 0, with_depth = 0;
+};
+
+// Matches that agree with a relative pose, as in PairRotation.
+struct EpipolarAgreement {
+  int all = 0, with_depth = 0;
+};
+
+EpipolarAgreement epipolar_agreement(const EpipolarPose& pose, std::span<const BearingPair> pairs, double tolerance);
+
+// Minimises the distances of the bearings b from the epipolar planes of a, by iteratively reweighted least squares with
+// the weights of Geman and McClure, whose scale decreases from several degrees to the tolerance. What the matches do
+// not tell, mostly the rotation that changes disparities, remains as given. `pairs` may contain wrong matches, but the
+// correct ones must be more than the half.
+PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPair> pairs,
+                           const PairRotationOptions& options);
+
+}  // namespace bslam::estimators

@@ -1,0 +1,104 @@
+#include "tracking/start_correction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimators/pair_rotation.h"
+#include "feature/descriptor_matching.h"
+#include "frame/capture_times.h"
+#include "geometry/so3.h"
+
+namespace bslam::tracking {
+namespace {
+
+constexpr int kMaxHamming = 60;  // bits
+constexpr double kRatio = 0.85;  // of the nearest to the second nearest descriptor
+constexpr std::size_t kMinMatches = 60;
+constexpr double kMinAgreeing = 0.6;  // fraction of the matches that agree with the correction
+constexpr int kMinWithDepth = 25;     // number of these that are in front of both cameras
+constexpr double kClearly = 1.5;      // factor by which their number grows
+constexpr double kTolerancePx = 2.0;
+constexpr double kMaxAngle = 0.1;      // rad; a larger one is another arrangement of the cameras
+constexpr double kMinBaseline = 1e-3;  // m
+
+struct PixelPair {
+  Eigen::Vector2d a, b;
+};
+
+std::vector<PixelPair> matches_of(const frame::CameraFrame& a, const frame::CameraFrame& b) {
+  std::vector<PixelPair> out;
+  for (const feature::DescriptorMatch& m :
+       feature::mutual_matches(a.keypoints.descriptor, b.keypoints.descriptor, kMaxHamming, kRatio,
+                               [](std::size_t, std::size_t) { return true; })) {
+    out.push_back({a.keypoints.pixel[m.a.index()].cast<double>(), b.keypoints.pixel[m.b.index()].cast<double>()});
+  }
+  return out;
+}
+
+std::vector<estimators::BearingPair> bearings(std::span<const PixelPair> pairs, const camera::Camera& of_a,
+                                              const camera::Camera& of_b) {
+  std::vector<estimators::BearingPair> out;
+  for (const PixelPair& pair : pairs) {
+    const auto a = of_a.unproject(pair.a), b = of_b.unproject(pair.b);
+    if (a && b) out.push_back({*a, *b});
+  }
+  return out;
+}
+
+// Whether most matches are explained by the same image of both cameras, by exchanged cameras, or by an inverted
+// transform: mistakes that a small rotation must not hide.
+bool other_mistake(const camera::Camera& of_i, const camera::Camera& of_j, const geometry::SE3& T_j_i,
+                   std::span<const PixelPair> matches, double tolerance) {
+  constexpr double kSamePx = 0.5;
+  const auto needed = static_cast<int>(kMinAgreeing * static_cast<double>(matches.size()));
+  const auto same = std::ranges::count_if(matches, [](const PixelPair& m) { return (m.a - m.b).norm() < kSamePx; });
+  const geometry::SE3 inverse = T_j_i.inverse();
+  const estimators::EpipolarPose pose{inverse.matrix3(), inverse.translation().normalized()};
+  return same > needed || estimators::epipolar_agreement(pose, bearings(matches, of_j, of_i), tolerance).all > needed ||
+         estimators::epipolar_agreement(pose, bearings(matches, of_i, of_j), tolerance).all > needed;
+}
+
+// T_j_i with the rotation of camera j that agrees with most matches: as given, or corrected; nullopt if none does.
+std::optional<geometry::SE3> agreeing_pose(const camera::Rig& rig, std::size_t i, std::size_t j,
+                                           const geometry::SE3& T_j_i, const frame::BundledFrame& frame) {
+  const frame::CameraFrame &a = frame.cameras[i], &b = frame.cameras[j];
+  if (std::min(a.keypoints.size(), b.keypoints.size()) < kMinMatches) return std::nullopt;
+  if (std::abs(a.time_ns - b.time_ns) > frame::kTogetherNs || T_j_i.translation().norm() < kMinBaseline)
+    return std::nullopt;
+  const std::vector<PixelPair> matches = matches_of(a, b);
+  if (matches.size() < kMinMatches) return std::nullopt;
+  const double tolerance =
+      kTolerancePx * std::max(rig.camera(i).radians_per_pixel(), rig.camera(j).radians_per_pixel());
+  const estimators::PairRotation found =
+      estimators::pair_rotation({T_j_i.matrix3(), T_j_i.translation().normalized()},
+                                bearings(matches, rig.camera(i), rig.camera(j)), {.tolerance = tolerance});
+  if (found.agree < kMinAgreeing * static_cast<double>(matches.size())) return std::nullopt;
+  if (found.agree < kClearly * found.agreed) return T_j_i;
+  if (found.angle > kMaxAngle) return std::nullopt;
+  if (found.with_depth < kMinWithDepth || other_mistake(rig.camera(i), rig.camera(j), T_j_i, matches, tolerance))
+    return std::nullopt;
+  return geometry::SE3(Eigen::Quaterniond(found.correction), Eigen::Vector3d::Zero()) * T_j_i;
+}
+
+}  // namespace
+
+std::optional<camera::Rig> with_corrected_rotations(const camera::Rig& rig, const frame::BundledFrame& frame) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+  bool any = false;
+  for (std::size_t j = 1; j < rig.size(); ++j) {
+    for (std::size_t i = 0; i < j; ++i) {
+      if (!rig.overlap(i, j) && !rig.overlap(j, i)) continue;
+      const geometry::SE3 T_j_i = cameras[j].T_body_cam.inverse() * cameras[i].T_body_cam;
+      const auto agreeing = agreeing_pose(rig, i, j, T_j_i, frame);
+      if (!agreeing) continue;
+      any |= !(agreeing->rotation().coeffs() == T_j_i.rotation().coeffs());
+      cameras[j].T_body_cam = cameras[i].T_body_cam * agreeing->inverse();
+      break;
+    }
+  }
+  if (!any) return std::nullopt;
+  return camera::Rig(std::move(cameras), rig.cam_from_rig(0));
+}
+
+}  // namespace bslam::tracking

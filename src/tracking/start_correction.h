@@ -1,0 +1,17 @@
+// Corrects the rotations of a rig before a map is started, if they are so wrong that cameras with a common view share
+// hardly any feature: the map would have to be started without metric scale, and with cameras that contradict each
+// other, from which no later calibration recovers.
+#pragma once
+
+#include <optional>
+
+#include "frame/bundled_frame.h"
+
+namespace bslam::tracking {
+
+// The rig with the rotations of cameras corrected, each relative to an earlier one that overlaps with it, from matches
+// of descriptors in `frame` without the calibration. Returns nullopt unless the correction of some camera makes clearly
+// more matches agree, and most of them. Takes some 5 ms per pair.
+std::optional<camera::Rig> with_corrected_rotations(const camera::Rig& rig, const frame::BundledFrame& frame);
+
+}  // namespace bslam::tracking

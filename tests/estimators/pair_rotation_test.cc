@@ -1,0 +1,65 @@
+#include "estimators/pair_rotation.h"
+
+#include <gtest/gtest.h>
+
+#include "base/random.h"
+#include "geometry/so3.h"
+
+namespace bslam::estimators {
+namespace {
+
+// Points 2 - 20 m in front of a pair that is 0.11 m apart, with noise; every `wrong`th match is wrong (0: none).
+std::vector<BearingPair> matches_of(const EpipolarPose& truth, double baseline, int wrong, Random& random) {
+  std::vector<BearingPair> pairs;
+  for (int i = 0; i < 300; ++i) {
+    const double depth = random.uniform(2, 20);
+    const Eigen::Vector3d in_a(depth * random.uniform(-0.7, 0.7), depth * random.uniform(-0.5, 0.5), depth);
+    Eigen::Vector3d in_b = truth.R_b_a * in_a + baseline * truth.t_b_a;
+    if (wrong > 0 && i % wrong == 0) in_b = Eigen::Vector3d(random.uniform(-0.7, 0.7), random.uniform(-0.5, 0.5), 1);
+    const Eigen::Vector3d noise(random.normal(), random.normal(), random.normal());
+    pairs.push_back({in_a.normalized(), (in_b.normalized() + 5e-4 * noise).normalized()});
+  }
+  return pairs;
+}
+
+TEST(PairRotation, IsFoundAmongWrongMatches) {
+  Random random(3);
+  for (const Eigen::Vector3d& error_deg :
+       {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-2.5, 0, 1), Eigen::Vector3d(4, 0, -3), Eigen::Vector3d(0, 0, 0)}) {
+    const EpipolarPose given{geometry::so3_exp({0.01, -0.02, 0.005}).toRotationMatrix(), -Eigen::Vector3d::UnitX()};
+    const Eigen::Matrix3d error = geometry::so3_exp(error_deg * geometry::radians(1)).toRotationMatrix();
+    const EpipolarPose truth{error * given.R_b_a, error * given.t_b_a};
+    const std::vector<BearingPair> pairs = matches_of(truth, 0.11, 4, random);
+    const PairRotation found = pair_rotation(given, pairs, {.tolerance = 2e-3});
+    const Eigen::Vector3d left =
+        geometry::so3_log(Eigen::Quaterniond(found.correction.transpose() * error)) / geometry::radians(1);
+    EXPECT_LT(std::abs(left.x()), 0.05) << error_deg.transpose();  // moves points across the epipolar planes
+    EXPECT_LT(std::abs(left.z()), 0.05) << error_deg.transpose();
+    EXPECT_LT(std::abs(left.y()), 0.6) << error_deg.transpose();  // moves them along: hardly observable
+    EXPECT_GT(found.agree, 210);
+    if (error_deg.norm() > 0.5) {
+      EXPECT_LT(found.agreed, 80);
+    }
+  }
+}
+
+// Exchanged cameras satisfy the epipolar geometry, but with points behind them.
+TEST(PairRotation, PointsBehindTheCamerasDoNotAgree) {
+  Random random(4);
+  const EpipolarPose given{Eigen::Matrix3d::Identity(), -Eigen::Vector3d::UnitX()};
+  std::vector<BearingPair> pairs = matches_of(given, 0.2, 0, random);
+  EXPECT_GT(pair_rotation(given, pairs, {.tolerance = 2e-3}).with_depth, 250);
+  for (BearingPair& pair : pairs) std::swap(pair.a, pair.b);
+  EXPECT_LT(pair_rotation(given, pairs, {.tolerance = 2e-3}).with_depth, 25);
+  for (BearingPair& pair : pairs) pair.b = pair.a;  // the same image twice
+  EXPECT_EQ(pair_rotation(given, pairs, {.tolerance = 2e-3}).with_depth, 0);
+}
+
+TEST(PairRotation, RemainsAsGivenWithoutMatches) {
+  const PairRotation found = pair_rotation({}, {}, {});
+  EXPECT_EQ(found.angle, 0);
+  EXPECT_EQ(found.agree, 0);
+}
+
+}  // namespace
+}  // namespace bslam::estimators
