@@ -110,9 +110,9 @@ void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit
   verb->add_option("--pace", a->pace, "fast: as fast as possible; realtime: feed images at their recorded rate")
       ->check(CLI::IsMember({"fast", "realtime"}))
       ->capture_default_str();
-  verb->add_option(
-          "--late", a->late,
-          "with --pace realtime, if processing is too slow: block processes every frame late, drop skips frames")
+  verb->add_option("--late", a->late,
+                   "with --pace realtime, if processing is too slow: block processes every frame late, drop does less "
+                   "work per frame and, if that does not suffice, drops frames")
       ->check(CLI::IsMember({"block", "drop"}))
       ->capture_default_str();
   verb->callback([a, &exit_status] { exit_status = run(*a); });

@@ -28,8 +28,8 @@ EpipolarAgreement epipolar_agreement(const EpipolarPose& pose, std::span<const B
 
 // Minimises the distances of the bearings b from the epipolar planes of a, by iteratively reweighted least squares with
 // the weights of Geman and McClure, whose scale decreases from several degrees to the tolerance. What the matches do
-// not tell, mostly the rotation that changes disparities, remains as given. `pairs` may contain wrong matches, but the
-// correct ones must be more than the half.
+// not tell, mostly the rotation that changes disparities, remains as given. More than half of
+// the pairs must be correct.
 PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPair> pairs,
                            const PairRotationOptions& options);
 

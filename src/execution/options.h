@@ -38,9 +38,10 @@ struct ExecutionOptions {
             kCommon);
     visitor("max_pending_keyframes", self.max_pending_keyframes, Range{1, 1000}, "",
             "maximum number of keyframes waiting for a background stage", OptionNote{.formerly = "pending_keyframes"});
-    visitor("await_calibration", self.await_calibration, Range{}, "",
-            "wait at the start until it is known whether the images agree with the calibration; never waited for with "
-            "live cameras and --late drop");
+    visitor(
+        "await_calibration", self.await_calibration, Range{}, "",
+        "frames wait at the start until it is known whether the images agree with the calibration; not with bslam live "
+        "and --late drop; false for a System that is fed in real time");
     visitor("lag_keyframe", self.lag_keyframe, Range{1, 10}, "frames",
             "lagged mode: delay from the request of a keyframe to its use");
     visitor("lag_map", self.lag_map, Range{1, 10000}, "frames",

@@ -23,7 +23,7 @@ void lower_priority() {
 }  // namespace
 
 DatasetFrames::DatasetFrames(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority,
-                             std::function<bool(TimeNs)> skips)
+                             std::function<bool(TimeNs, TimeNs)> skips)
     : dataset_(dataset), ahead_(ahead), skips_(std::move(skips)), reader_([this, priority](std::stop_token stop) {
         if (priority == ReaderPriority::kLow) lower_priority();
         read(std::move(stop));
@@ -54,10 +54,10 @@ FrameSource::Item DatasetFrames::read_item(std::size_t index) const {
   Item item;
   item.images.id = FrameId(index);
   item.images.time_ns = dataset_.frames[index].time_ns;
-  item.dropped = skips_ && skips_(item.images.time_ns);
+  if (index + 1 < dataset_.frames.size()) item.next_ns = dataset_.frames[index + 1].time_ns;
+  item.dropped = skips_ && item.next_ns && skips_(item.images.time_ns, *item.next_ns);
   if (!item.dropped) item.images = dataset::read_frame(dataset_, index);
   item.read_ms = watch.ms();
-  if (index + 1 < dataset_.frames.size()) item.next_ns = dataset_.frames[index + 1].time_ns;
   return item;
 }
 

@@ -45,10 +45,10 @@ enum class ReaderPriority { kNormal, kLow };
 class DatasetFrames final : public FrameSource {
  public:
   // Keeps a reference to `dataset`, which must outlive this object. Up to `ahead` frames are read in advance.
-  // `skips`: called by the reading thread with the time of a frame that is to be read next; if it returns true, the
-  // frame is dropped without being read. May be empty.
+  // `skips`: called by the reading thread with the times of a frame that is to be read next and of the one after it; if
+  // it returns true, the frame is dropped without being read. Not called for the last frame. May be empty.
   DatasetFrames(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority = ReaderPriority::kNormal,
-                std::function<bool(TimeNs)> skips = {});
+                std::function<bool(TimeNs, TimeNs)> skips = {});
 
   // Rethrows exceptions of the reading thread.
   std::optional<Item> next() override;
@@ -60,7 +60,7 @@ class DatasetFrames final : public FrameSource {
 
   const dataset::Dataset& dataset_;
   const std::size_t ahead_;
-  const std::function<bool(TimeNs)> skips_;
+  const std::function<bool(TimeNs, TimeNs)> skips_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<Item> ready_;                     // guarded by mutex_, like the next four members

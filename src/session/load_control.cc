@@ -13,7 +13,9 @@ constexpr double kEffective_s = 0.2;  // time until a change shows
 
 int LoadControl::update(double behind, TimeNs time_ns) {
   if (behind > kInTime) calm_since_ns_ = time_ns;
-  if (behind > kLate && level_ < kMaxReduction && (level_ == 0 || to_seconds(time_ns - raised_ns_) > kEffective_s)) {
+  const bool late = behind > kLate, still_late = late && was_late_;
+  was_late_ = late;
+  if (still_late && level_ < kMaxReduction && (level_ == 0 || to_seconds(time_ns - raised_ns_) > kEffective_s)) {
     // The level was lowered too early: next time it takes longer.
     if (lowered_ns_ > 0 && to_seconds(time_ns - lowered_ns_) < patience_s_)
       patience_s_ = std::min(2 * patience_s_, kMaxPatience_s);

@@ -18,6 +18,7 @@ class LoadControl {
 
  private:
   int level_ = 0;
+  bool was_late_ = false;               // the last frame; a single one does not change the level
   TimeNs raised_ns_ = 0;                // when the level was raised last
   TimeNs calm_since_ns_ = 0;            // since when no frame was late
   TimeNs lowered_ns_ = 0;               // when the level was lowered last

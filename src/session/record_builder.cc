@@ -63,18 +63,22 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
 double inconsistent_fraction(const CameraRecord& camera) {
   double all_s = 0, inconsistent_s = 0;
   for (const CameraInterval& s : camera.states) {
+    if (s.status.reason == tracking::CameraReason::kNoImages) continue;
     all_s += s.to_s - s.from_s;
     if (s.status.reason == tracking::CameraReason::kInconsistent) inconsistent_s += s.to_s - s.from_s;
   }
   return all_s > 0 ? inconsistent_s / all_s : 0.0;
 }
 
-// Whether the scale has no foundation: the cameras but one have contradicted that one nearly from the start.
+// Whether the scale has no foundation: of the cameras with images, all but one have contradicted that one nearly from
+// the start.
 bool single_camera_agrees(const RunRecord& record) {
   constexpr double kNearlyAlways = 0.9;
-  const auto contradicted = std::ranges::count_if(
-      record.cameras, [](const CameraRecord& camera) { return inconsistent_fraction(camera) > kNearlyAlways; });
-  return contradicted > 0 && static_cast<std::size_t>(contradicted) + 1 >= record.cameras.size();
+  const auto used = std::ranges::count_if(record.cameras, [](const CameraRecord& camera) { return camera.images > 0; });
+  const auto contradicted = std::ranges::count_if(record.cameras, [](const CameraRecord& camera) {
+    return camera.images > 0 && inconsistent_fraction(camera) > kNearlyAlways;
+  });
+  return used > 1 && contradicted + 1 >= used;
 }
 
 void add_calibration(const RecordInput& input, RunRecord& record) {

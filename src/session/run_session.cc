@@ -63,7 +63,8 @@ struct Fed {
   std::size_t read_ahead_bytes = 0;  // most that frames read in advance have held
 };
 
-// At a recorded pace with Late::kDrop: a frame that is later is dropped if another one has been read.
+// At a recorded pace with Late::kDrop: a frame that is later, and later than the next one is due, is not read, or
+// dropped if another one has been read.
 constexpr double kMaxLateness_s = 0.2;
 
 // Decides which frames are dropped in addition to those that the source has dropped, and how much work is done for the
@@ -138,9 +139,12 @@ Result<Fed> feed(const dataset::Dataset& dataset, const SessionOptions& options,
   RunControl& control = options.control ? *options.control : recorded_pace;
   if (options.source) return feed(*options.source, 0, options, control, system);
   const bool sequential = options.config.mode == execution::Mode::kSequential;
-  std::function<bool(TimeNs)> skips;
-  if (options.late == Late::kDrop && !options.replay)
-    skips = [&control](TimeNs time_ns) { return control.lateness_s(time_ns) > kMaxLateness_s; };
+  std::function<bool(TimeNs, TimeNs)> skips;
+  if (options.late == Late::kDrop && !options.replay) {
+    skips = [&control](TimeNs time_ns, TimeNs next_ns) {
+      return control.lateness_s(time_ns) > std::max(kMaxLateness_s, to_seconds(next_ns - time_ns));
+    };
+  }
   DatasetFrames source(dataset, kReadAhead, sequential ? ReaderPriority::kLow : ReaderPriority::kNormal, skips);
   return feed(source, dataset.frames.size(), options, control, system);
 }

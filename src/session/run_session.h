@@ -20,7 +20,7 @@
 namespace bslam::session {
 
 enum class Pace { kFast, kRealtime };  // as fast as possible, or at the recorded pace
-enum class Late { kBlock, kDrop };     // at the recorded pace: process every frame, or drop late frames
+enum class Late { kBlock, kDrop };  // at the recorded pace: process every frame late, or do less work and drop frames
 
 struct SessionOptions {
   system::Config config;

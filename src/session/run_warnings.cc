@@ -109,7 +109,13 @@ void warn_of_losses(const RunRecord& record, const std::string& check_command, W
     shown += fmt::format(" and {} more intervals, see summary.json", intervals.size() - kShown);
   const std::int64_t lost = count(record, FrameOutcome::kLost);
   warn(warnings, "{} of {} frames have no pose: {}", lost, record.frames.size(), shown);
-  if (record.cameras.size() > 1 && !record.map.loaded && lost > count(record, FrameOutcome::kTracked))
+  const auto unexplained = std::ranges::count_if(record.frames, [](const RunFrame& frame) {
+    if (frame.outcome() != FrameOutcome::kLost) return false;
+    const tracking::LostReason reason = frame.record->final_result().reason;
+    return reason != tracking::LostReason::kNoImages && reason != tracking::LostReason::kFewFeatures;
+  });
+  if (record.cameras.size() > 1 && !record.map.loaded && !record.calibration.foreign_images() &&
+      unexplained > count(record, FrameOutcome::kTracked))
     warn(warnings, "most frames have no pose, maybe because of a wrong calibration: test it ({})", check_command);
 }
 
@@ -186,7 +192,8 @@ void warn_of_load(const RunRecord& record, Warnings& warnings) {
   for (const ReducedInterval& interval : reduced_intervals(record)) reduced += interval.frames;
   if (reduced > 0) {
     warn(warnings,
-         "fewer keypoints, landmarks and keyframes in {} of {} frames: all would have been slower than real time",
+         "fewer keypoints, landmarks and keyframes in {} of {} frames: processing all would have been slower than real "
+         "time",
          reduced, record.frames.size());
   }
   const auto dropped = count(record, FrameOutcome::kDropped);

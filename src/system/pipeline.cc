@@ -136,7 +136,7 @@ tracking::TrackOutcome Pipeline::track_with_corrected_rig(const image::ImageBund
   BundledFrame frame = begin(images, plan);
   builder_.extract(*rig_, frame, pool_, plan.budgets);
   frame = bundle(plan, frame);
-  const double corrected_ms = watch.ms();
+  const double corrected_ms = tracked.record.stages.back().ms + watch.ms();
   tracking::TrackOutcome again =
       tracker_.process(std::move(tracked.next), std::move(frame), builder_.pyramids(), outcome.seen);
   if (again.edit && again.edit->kind == tracking::ProposedEdit::Kind::kRig) again.edit.reset();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimators/pair_rotation.h"
 #include "feature/descriptor_matching.h"
@@ -69,27 +70,45 @@ std::optional<geometry::SE3> agreeing_pose(const camera::Rig& rig, std::size_t i
   if (matches.size() < kMinMatches) return std::nullopt;
   const double tolerance =
       kTolerancePx * std::max(rig.camera(i).radians_per_pixel(), rig.camera(j).radians_per_pixel());
-  const estimators::PairRotation found =
-      estimators::pair_rotation({T_j_i.matrix3(), T_j_i.translation().normalized()},
-                                bearings(matches, rig.camera(i), rig.camera(j)), {.tolerance = tolerance});
+  // Either camera may be the one that is rotated about its own centre.
+  const geometry::SE3 T_i_j = T_j_i.inverse();
+  const auto rotation = [&](const geometry::SE3& T, const std::vector<estimators::BearingPair>& pairs) {
+    return estimators::pair_rotation({T.matrix3(), T.translation().normalized()}, pairs, {.tolerance = tolerance});
+  };
+  const std::vector<estimators::BearingPair> pairs = bearings(matches, rig.camera(i), rig.camera(j));
+  std::vector<estimators::BearingPair> swapped = pairs;
+  for (estimators::BearingPair& pair : swapped) std::swap(pair.a, pair.b);
+  const estimators::PairRotation of_j = rotation(T_j_i, pairs), of_i = rotation(T_i_j, swapped);
+  const bool second = of_j.agree >= of_i.agree;
+  const estimators::PairRotation& found = second ? of_j : of_i;
   if (found.agree < kMinAgreeing * static_cast<double>(matches.size())) return std::nullopt;
   if (found.agree < kClearly * found.agreed) return T_j_i;
-  if (found.angle > kMaxAngle) return std::nullopt;
   if (found.with_depth < kMinWithDepth || other_mistake(rig.camera(i), rig.camera(j), T_j_i, matches, tolerance))
     return std::nullopt;
-  return geometry::SE3(Eigen::Quaterniond(found.correction), Eigen::Vector3d::Zero()) * T_j_i;
+  const geometry::SE3 correction(Eigen::Quaterniond(found.correction), Eigen::Vector3d::Zero());
+  return second ? correction * T_j_i : (correction * T_i_j).inverse();
+}
+
+// Whether some camera is rotated by more than a knock explains: it is another arrangement of the cameras.
+bool rearranged(const camera::Rig& rig, const camera::Rig& given) {
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const geometry::SE3 difference = rig.cam_from_rig(c) * given.rig_from_cam(c);
+    if (geometry::so3_log(difference.rotation()).norm() > kMaxAngle) return true;
+  }
+  return false;
 }
 
 }  // namespace
 
-std::optional<camera::Rig> with_corrected_rotations(const camera::Rig& rig, const frame::BundledFrame& frame) {
+std::optional<camera::Rig> with_corrected_rotations(const camera::Rig& rig, const camera::Rig& given,
+                                                    const frame::BundledFrame& frame) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
   bool any = false;
   for (std::size_t j = 1; j < rig.size(); ++j) {
     for (std::size_t i = 0; i < j; ++i) {
       if (!rig.overlap(i, j) && !rig.overlap(j, i)) continue;
-      const geometry::SE3 T_j_i = cameras[j].T_body_cam.inverse() * cameras[i].T_body_cam;
+      const geometry::SE3 T_j_i = rig.cam_from_rig(j) * rig.rig_from_cam(i);
       const auto agreeing = agreeing_pose(rig, i, j, T_j_i, frame);
       if (!agreeing) continue;
       any |= !(agreeing->rotation().coeffs() == T_j_i.rotation().coeffs());
@@ -98,7 +117,8 @@ std::optional<camera::Rig> with_corrected_rotations(const camera::Rig& rig, cons
     }
   }
   if (!any) return std::nullopt;
-  return camera::Rig(std::move(cameras), rig.cam_from_rig(0));
+  camera::Rig corrected(std::move(cameras), rig.cam_from_rig(0));
+  return rearranged(corrected, given) ? std::nullopt : std::optional(std::move(corrected));
 }
 
 }  // namespace bslam::tracking

@@ -78,6 +78,7 @@ FrontEndState FrontEndState::restarted() const {
   FrontEndState state;
   state.blurred = blurred;
   state.reduction = reduction;
+  state.rig_corrections = rig_corrections;
   state.T_rig_odom = T_rig_odom;
   state.T_map_odom = T_map_odom;
   return state;

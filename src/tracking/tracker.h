@@ -69,9 +69,10 @@ struct FrontEndState {
   std::optional<PendingKeyframe> pending;
   // The last pending keyframe was not created: the next one is made of a frame with features.
   bool keyframe_failed = false;
-  int reduction = 0;         // level of tracking/reduced_work.h
-  int frames_lost = 0;       // consecutive lost frames with features
-  TimeNs lost_since_ns = 0;  // time of the first of them
+  int rig_checks = 0, rig_corrections = 0;  // before a map is started: frames since the last check, corrections so far
+  int reduction = 0;                        // level of tracking/reduced_work.h
+  int frames_lost = 0;                      // consecutive lost frames with features
+  TimeNs lost_since_ns = 0;                 // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
 
   // The state for the initialisation of another map; the odometry pose is continued.

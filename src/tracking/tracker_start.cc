@@ -81,14 +81,18 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
 // Proposes a correction of the rig if the frame shows that one is needed. The caller commits it and processes the frame
 // again.
 bool Tracker::correct_rig(const Input& input, TrackOutcome& outcome) const {
+  constexpr int kMaxCorrections = 2, kCheckInterval = 5;  // frames
+  FrontEndState& state = outcome.next;
   if (!options_.correct_rig || input.map->num_keyframes() > 0 || !rig_.any_overlap()) return false;
-  auto corrected = with_corrected_rotations(input.map->rig(), input.frame);
+  if (state.rig_corrections >= kMaxCorrections || state.rig_checks++ % kCheckInterval != 0) return false;
+  auto corrected = with_corrected_rotations(input.map->rig(), rig_, input.frame);
   if (!corrected) return false;
+  ++state.rig_corrections;
   map::MapDraft draft(input.map);
   draft.set_rig(*std::move(corrected));
   outcome.edit = ProposedEdit{ProposedEdit::Kind::kRig, std::move(draft), {}, 0};
-  outcome.next.start_reference.reset();
-  outcome.next.waiting.clear();
+  state.start_reference.reset();
+  state.waiting.clear();
   return true;
 }
 

@@ -23,6 +23,7 @@ TEST(SessionLoadControl, KeepsAllWorkWhileFramesAreInTime) {
 TEST(SessionLoadControl, ReducesTheWorkStepByStep) {
   LoadControl control;
   TimeNs now = 0;
+  EXPECT_EQ(after(control, 1, 1.5, now), 0);  // a single frame
   EXPECT_EQ(after(control, 1, 1.5, now), 1);
   EXPECT_EQ(after(control, 4, 1.5, now), 1);  // the first step has had no effect yet
   EXPECT_EQ(after(control, 1, 1.5, now), 2);
@@ -32,7 +33,7 @@ TEST(SessionLoadControl, ReducesTheWorkStepByStep) {
 TEST(SessionLoadControl, DoesAllWorkAgainAfterAWhile) {
   LoadControl control;
   TimeNs now = 0;
-  after(control, 6, 2, now);
+  after(control, 7, 2, now);
   EXPECT_EQ(after(control, 30, 0.5, now), 2);  // in time, but not by much
   EXPECT_EQ(after(control, 39, 0, now), 2);
   EXPECT_EQ(after(control, 2, 0, now), 1);
@@ -42,9 +43,9 @@ TEST(SessionLoadControl, DoesAllWorkAgainAfterAWhile) {
 TEST(SessionLoadControl, WaitsLongerIfTheLoadReturnsAtOnce) {
   LoadControl control;
   TimeNs now = 0;
-  after(control, 1, 2, now);
+  after(control, 2, 2, now);
   EXPECT_EQ(after(control, 41, 0, now), 0);
-  EXPECT_EQ(after(control, 1, 2, now), 1);
+  EXPECT_EQ(after(control, 2, 2, now), 1);
   EXPECT_EQ(after(control, 60, 0, now), 1);
   EXPECT_EQ(after(control, 21, 0, now), 0);
 }

@@ -115,7 +115,7 @@ TEST_F(Session, TakesTheFramesOfAnotherSource) {
 TEST_F(Session, ReaderSkipsFramesThatAreNotWanted) {
   const dataset::Dataset data = dataset();
   const TimeNs from = data.frames[2].time_ns, to = data.frames[5].time_ns;
-  DatasetFrames source(data, 4, ReaderPriority::kNormal, [&](TimeNs t) { return from <= t && t < to; });
+  DatasetFrames source(data, 4, ReaderPriority::kNormal, [&](TimeNs t, TimeNs) { return from <= t && t < to; });
   for (std::size_t i = 0; i < data.frames.size(); ++i) {
     const auto item = source.next();
     ASSERT_TRUE(item.has_value());
@@ -151,16 +151,10 @@ TEST_F(Session, ReducesTheWorkIfFramesWait) {
   const auto result = run_session(data, o);
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(count(result->record, FrameOutcome::kTracked), 8);
-  EXPECT_EQ(result->record.frames.front().record->reduction, 1);
-  EXPECT_EQ(result->record.frames.back().record->reduction, kMaxReduction);
+  EXPECT_EQ(result->record.frames[0].record->reduction, 0);
+  EXPECT_EQ(result->record.frames[1].record->reduction, 1);
+  EXPECT_EQ(result->record.frames[7].record->reduction, kMaxReduction);
   EXPECT_EQ(reduced_intervals(result->record).size(), 3u);
-  std::int64_t first = 0, last = 0;
-  for (const tracking::CameraCounts& c : result->record.frames.front().record->result.cameras) first += c.keypoints;
-  for (const auto& keypoints : result->map->keyframe(KeyframeId(0)).frame->cameras)
-    last += static_cast<std::int64_t>(keypoints.keypoints.size());
-  EXPECT_EQ(first, last);
-  EXPECT_LE(first, 2 * 0.75 * o.config.features.per_image);
-
   SessionOptions again = options();
   again.config.features.per_image = 1200;
   again.replay = result->journal;
