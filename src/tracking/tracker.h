@@ -81,12 +81,8 @@ struct FrontEndState {
 
 // An edit of the map that tracking proposes.
 struct ProposedEdit {
-  enum class Kind {
-    kStart,
-    kKeyframe,
-    kRig
-  };  // kRig: another calibration of the rig, with
-      // which the frame is to be processed again
+  // kRig: another calibration of the rig, with which the frame is to be processed again.
+  enum class Kind { kStart, kKeyframe, kRig };
   Kind kind = Kind::kKeyframe;
   map::MapDraft draft;
   std::vector<LandmarkId> landmarks;  // landmarks of the newest keyframe, with ids of the draft
