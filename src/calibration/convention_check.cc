@@ -8,7 +8,7 @@
 #include <optional>
 #include <set>
 
-#include "estimators/epipolar.h"
+#include "estimators/pair_rotation.h"
 #include "feature/descriptor_matching.h"
 #include "feature/extractor.h"
 #include "frame/capture_times.h"
@@ -75,22 +75,24 @@ double tolerance_of(const camera::Camera& first, const camera::Camera& second) {
   return kTolerancePx * std::max(first.radians_per_pixel(), second.radians_per_pixel());
 }
 
+std::vector<estimators::BearingPair> bearings(std::span<const PixelPair> pairs, const camera::Camera& of_a,
+                                              const camera::Camera& of_b) {
+  std::vector<estimators::BearingPair> out;
+  for (const PixelPair& pair : pairs) {
+    const auto a = of_a.unproject(pair.a), b = of_b.unproject(pair.b);
+    if (a && b) out.push_back({*a, *b});
+  }
+  return out;
+}
+
 int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
   const double tolerance = tolerance_of(*h.first, *h.second);
   const Eigen::Vector3d t = h.T_second_first.translation();
   const bool apart = t.norm() > kNoBaseline;
   const estimators::EpipolarPose pose{h.T_second_first.matrix3(), apart ? Eigen::Vector3d(t.normalized()) : t};
-  int agreeing = 0;
-  for (const PixelPair& pair : pairs) {
-    const auto a = h.first->unproject(pair.a), b = h.second->unproject(pair.b);
-    if (!a || !b) continue;
-    const bool far = geometry::angle_between(pose.R_b_a * *a, *b) < tolerance;  // too far away to have a depth
-    agreeing += far || (apart && estimators::epipolar_angle(pose, {*a, *b}) < tolerance &&
-                        estimators::in_front_of_both(pose, {*a, *b}))
-                    ? 1
-                    : 0;
-  }
-  return agreeing;
+  const estimators::EpipolarAgreement found =
+      estimators::epipolar_agreement(pose, bearings(pairs, *h.first, *h.second), tolerance);
+  return apart ? found.all : found.all - found.with_depth;
 }
 
 // How much the pose of the second camera in the first one differs from the given one.
@@ -126,17 +128,13 @@ std::optional<OtherCalibrations> other_calibrations(const camera::Rig& rig, std:
 std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::size_t j,
                                     std::span<const PixelPair> pairs) {
   const camera::Camera &ci = rig.camera(i), &cj = rig.camera(j);
-  std::vector<estimators::BearingPair> bearings;
-  for (const PixelPair& pair : pairs) {
-    const auto a = ci.unproject(pair.a), b = cj.unproject(pair.b);
-    if (a && b) bearings.push_back({*a, *b});
-  }
-  const int min_inliers = std::max(kMinAgreeing, static_cast<int>(kMinRatio * static_cast<double>(bearings.size())));
+  const std::vector<estimators::BearingPair> all = bearings(pairs, ci, cj);
+  const int min_inliers = std::max(kMinAgreeing, static_cast<int>(kMinRatio * static_cast<double>(all.size())));
   const estimators::RelativePoseOptions options{.iterations = 2000,
                                                 .inlier_angle = tolerance_of(ci, cj),
                                                 .min_parallax = kMinParallax,
                                                 .min_inliers = min_inliers};
-  const auto found = estimators::relative_pose(bearings, options, Random(1, "extrinsics check"));
+  const auto found = estimators::relative_pose(all, options, Random(1, "extrinsics check"));
   if (!found) return std::nullopt;
   const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);
   OtherPose out = difference(found->T_b_a, given);
