@@ -10,10 +10,10 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "image_decoding/plain_files.h"
+
 namespace bslam::image_decoding {
 namespace {
-
-constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;  // a header with more is damaged
 
 const unsigned char* data(std::string_view bytes) { return reinterpret_cast<const unsigned char*>(bytes.data()); }
 
@@ -109,6 +109,7 @@ cv::Mat decode_to_grey(std::string_view bytes) {
     if (bytes.starts_with("\x89PNG")) return decode_png(bytes);
     if (bytes.starts_with("\xff\xd8")) return decode_jpeg(bytes);
     if (bytes.starts_with("RIFF")) return decode_webp(bytes);
+    return decode_plain_file(bytes);
   } catch (const cv::Exception&) {  // no memory for the size in the header: the file is damaged
   }
   return {};

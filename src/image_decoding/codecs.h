@@ -1,4 +1,5 @@
-// PNG, JPEG and WebP files in memory as matrices of grey values, decoded by the libraries of these formats.
+// PNG, JPEG and WebP files in memory as matrices of grey values, decoded by the libraries of these formats, and plain
+// formats (image_decoding/plain_files.h).
 #pragma once
 
 #include <opencv2/core/mat.hpp>
@@ -6,7 +7,7 @@
 
 namespace bslam::image_decoding {
 
-// Decodes to one channel of 8 or, for PNG files with 16 bits, 16 bits. Colours become luminance, transparency and
+// Decodes to one channel of 8 or, for files with 16 bits, 16 bits. Colours become luminance, transparency and
 // orientation tags are ignored. The result is empty if the bytes cannot be decoded.
 cv::Mat decode_to_grey(std::string_view bytes);
 

@@ -10,6 +10,7 @@
 #include "base/atomic_file.h"
 #include "image_decoding/codecs.h"
 #include "image_decoding/pixel_rows.h"
+#include "image_decoding/plain_files.h"
 #include "image_files/mask.h"
 #include "image_files/png_decoder.h"
 
@@ -85,7 +86,8 @@ std::optional<image::Image> decode_values(std::string_view bytes, int bits) {
     auto image = image_files::decode_grey_png(bytes);
     return image ? std::move(image) : decode_with_library(bytes, bits);
   }
-  return is_whole_jpeg(bytes) || is_whole_webp(bytes) ? decode_with_library(bytes, bits) : std::nullopt;
+  const bool whole = is_whole_jpeg(bytes) || is_whole_webp(bytes) || is_plain_file(bytes);
+  return whole ? decode_with_library(bytes, bits) : std::nullopt;
 }
 
 // The bytes of an image in memory. Errors as of the file or the recording.
@@ -110,7 +112,8 @@ Result<image::Image> read_image(const std::filesystem::path& file, const PixelFo
   if (!bytes) return bytes.error();
   auto image = decode_grey(*bytes, format);
   if (!image)
-    return Error{file.string(), "", "an incomplete image or another format", "a complete PNG, JPEG or WebP image"};
+    return Error{file.string(), "", "an incomplete image or another format",
+                 "a complete PNG, JPEG, WebP, PGM, BMP or TIFF image"};
   return *std::move(image);
 }
 
@@ -148,9 +151,11 @@ int bits_in_use(std::span<const image_files::ImageFile> images) {
     }
     const std::string_view bytes = stored->bytes;
     const std::string_view file = bytes.substr(std::min(stored->begin, bytes.size()), stored->size);
-    if (!(is_whole_jpeg(file) || is_whole_webp(file) || image_files::is_complete_png(file))) continue;
-    if (!is_16_bit_png(file)) return 16;
+    const bool png = image_files::is_complete_png(file);
+    if (is_whole_jpeg(file) || is_whole_webp(file) || (png && !is_16_bit_png(file))) return 16;
+    if (!png && !is_plain_file(file)) continue;
     const cv::Mat decoded = decode_to_grey(file);
+    if (!decoded.empty() && decoded.depth() == CV_8U) return 16;
     double value = 0;
     if (!decoded.empty()) cv::minMaxLoc(decoded, nullptr, &value);
     largest = std::max(largest, value);

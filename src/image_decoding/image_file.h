@@ -1,5 +1,5 @@
-// PNG, JPEG and WebP files of every kind, and rows of pixels in recordings, as 8-bit grey images. Files are decoded by
-// libpng, libjpeg-turbo and libwebp if our own PNG decoder does not support them.
+// PNG, JPEG and WebP files of every kind, common PNM, BMP and TIFF files, and rows of pixels in recordings, as 8-bit
+// grey images. Files are decoded by libpng, libjpeg-turbo and libwebp, or by our own decoders.
 #pragma once
 
 #include <filesystem>
@@ -16,7 +16,7 @@
 
 namespace bslam::image_decoding {
 
-// Decodes a PNG, JPEG or WebP in memory to grey values. Orientation tags are ignored, colours are converted to
+// Decodes an image file in memory to grey values. Orientation tags are ignored, colours are converted to
 // luminance, the upper eight of `format.bits` bits of 16-bit images are kept, and raw images with a colour filter are
 // interpolated. Returns nullopt for other formats, truncated files and wrong checksums, for which decoders would return
 // the readable part.

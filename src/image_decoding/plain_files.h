@@ -1,0 +1,26 @@
+// PNM (PGM, PPM), BMP and TIFF files in memory as matrices of grey values. Internal to this folder.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <string_view>
+
+namespace bslam::image_decoding {
+
+// Returns true if the bytes begin as a file of one of these formats.
+bool is_plain_file(std::string_view bytes);
+
+// Decodes to one channel of 8 or 16 bits: PNM with up to 16 bits (P2, P5, P6), BMP with 8, 24 or 32 bits per pixel
+// without compression, and TIFF with 8 or 16 bits per value in strips, without compression or with LZW, Deflate or
+// PackBits. Colours become luminance, transparency is ignored. The result is empty for other kinds of these formats and
+// for files that are incomplete.
+cv::Mat decode_plain_file(std::string_view bytes);
+
+// The same for TIFF.
+cv::Mat decode_tiff(std::string_view bytes);
+
+// Brightness of an image with 1, 3 (blue, green, red) or 4 channels.
+cv::Mat brightness(const cv::Mat& image);
+
+constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;  // a header with more is damaged
+
+}  // namespace bslam::image_decoding
