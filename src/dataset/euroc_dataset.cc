@@ -16,8 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxListBytes = std::size_t{1} << 28;
-// Maximum time in nanoseconds, to which time offsets can be added without overflow.
-constexpr TimeNs kMaxTime = 9'200'000'000'000'000'000;
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\n";

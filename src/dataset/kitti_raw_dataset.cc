@@ -102,7 +102,7 @@ class KittiRawRecording : public Recording {
       images.push_back({folder / "data" / fmt::format("{:010}.png", number), *time});
     }
     if (images.empty()) return Error{file.string(), "", "no times", "the date of every image"};
-    return image_files::in_time_order(std::move(images), file.string());
+    return image_files::in_time_order(std::move(images), file.string(), image_files::StampUnit::kSeconds);
   }
 
  private:

@@ -10,9 +10,6 @@
 namespace bslam::dataset {
 namespace {
 
-constexpr TimeNs kMaxTime = 9'200'000'000'000'000'000;  // time offsets can be added without overflow
-constexpr TimeNs kShortestInterval = 500'000;           // nanoseconds; cameras of 2 kHz
-
 TimeNs median_interval(const std::vector<image_files::ImageFile>& images) {
   std::vector<TimeNs> times;
   for (const image_files::ImageFile& image : images) times.push_back(image.time_ns);
@@ -40,6 +37,27 @@ Status check_nanoseconds(const std::string& source, const std::vector<image_file
                   source, interval, rate, likely_option(interval))};
 }
 
+// The option that makes sense of time stamps that differ by `interval` units, other than the one that was given.
+std::string other_option(TimeNs interval) {
+  return interval >= kShortestInterval ? "no --stamp-unit if they are nanoseconds" : likely_option(interval);
+}
+
+// A unit in which a camera would take impossibly many or few images is a wrong one.
+Status check_unit(const TimeStampOptions& options, const std::string& source, TimeNs interval,
+                  const std::vector<image_files::ImageFile>& images) {
+  const bool as_they_are = options.unit_ns == TimeNs{1};
+  if (images.size() < 2 || as_they_are) return {};
+  const TimeNs converted_ns = median_interval(images);
+  constexpr TimeNs kNumbers = 10;  // consecutive images have numbers that differ by no more
+  const bool slow = converted_ns > kLongestInterval && (options.unit_ns || interval > kNumbers);
+  if (converted_ns >= kShortestInterval && !slow) return {};
+  const std::string rate = fmt::format("{:.3g}", 1e9 / static_cast<double>(std::max<TimeNs>(converted_ns, 1)));
+  const char* const option = options.rate_hz ? "--rate" : "--stamp-unit";
+  return Error{source, "time stamps", fmt::format("{} images per second", rate), "another " + std::string(option),
+               fmt::format("{}: time stamps {} apart would be {} images per second with this {}; give {}", source,
+                           interval, rate, option, other_option(interval))};
+}
+
 Status check_options(const TimeStampOptions& options) {
   if (options.rate_hz && options.unit_ns)
     return Error{"--rate", "", "--stamp-unit as well", "one of --rate and --stamp-unit"};
@@ -52,10 +70,15 @@ Status check_options(const TimeStampOptions& options) {
 
 }  // namespace
 
+bool are_nanoseconds(std::span<const TimeNs> stamps) {
+  return stamps.size() < 2 || image::median_interval(stamps) >= kShortestInterval;
+}
+
 Status convert_time_stamps(const TimeStampOptions& options, const std::string& source,
                            std::vector<image_files::ImageFile>& images) {
   if (const Status status = check_options(options); !status) return status;
   if (!options.rate_hz && !options.unit_ns) return check_nanoseconds(source, images);
+  const TimeNs interval = median_interval(images);
   const double unit_ns = options.rate_hz ? 1e9 / *options.rate_hz : static_cast<double>(*options.unit_ns);
   for (image_files::ImageFile& image : images) {
     const TimeNs stamp = image.time_ns;
@@ -66,7 +89,7 @@ Status convert_time_stamps(const TimeStampOptions& options, const std::string& s
     // Whole units are multiplied exactly; a frame rate rounds every time by itself, so that errors do not add up.
     image.time_ns = options.unit_ns ? stamp * *options.unit_ns : std::llround(static_cast<double>(stamp) * unit_ns);
   }
-  return {};
+  return check_unit(options, source, interval, images);
 }
 
 }  // namespace bslam::dataset

@@ -20,6 +20,43 @@ bool is_image_name(const fs::path& path) {
   return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
 }
 
+std::string images_text(std::size_t count) { return fmt::format("{} image{}", count, count == 1 ? "" : "s"); }
+
+// A stamp of 0 is damaged if it follows others, or is as far from them as no pause of a recording is.
+std::size_t remove_damaged_zeros(std::vector<ImageFile>& images) {
+  constexpr TimeNs kPause = 20, kLongestPause = 1000;  // intervals between images
+  std::vector<TimeNs> others;
+  bool follows = false;
+  std::size_t zeros = 0;
+  for (const ImageFile& image : images) {
+    zeros += image.time_ns == 0;
+    follows |= image.time_ns == 0 && !others.empty();
+    if (image.time_ns != 0) others.push_back(image.time_ns);
+  }
+  if (zeros == 0 || others.size() < 2) return 0;
+  std::ranges::sort(others);
+  const TimeNs duration = others.back() - others.front();
+  const TimeNs interval = std::max<TimeNs>(1, duration / (std::ssize(others) - 1));
+  const bool far = others.front() > duration && others.front() / kLongestPause > interval;
+  if (!(follows ? others.front() / kPause > interval : far)) return 0;
+  std::erase_if(images, [](const ImageFile& image) { return image.time_ns == 0; });
+  return zeros;
+}
+
+// Says how often time stamps step back, and where first; empty if they do not.
+std::string steps_back_text(const std::vector<ImageFile>& images, StampUnit unit) {
+  std::size_t steps = 0, first = 0;
+  for (std::size_t k = 1; k < images.size(); ++k) {
+    if (images[k].time_ns < images[k - 1].time_ns && steps++ == 0) first = k;
+  }
+  if (steps == 0) return {};
+  const auto stamp = [unit](TimeNs time_ns) {
+    return unit == StampUnit::kSeconds ? fmt::format("{:.9f} s", to_seconds(time_ns)) : std::to_string(time_ns);
+  };
+  return fmt::format("time stamps step back {} time{}, first from {} to {}; images have been sorted", steps,
+                     steps == 1 ? "" : "s", stamp(images[first - 1].time_ns), stamp(images[first].time_ns));
+}
+
 }  // namespace
 
 std::string name_of(const ImageFile& image) {
@@ -30,18 +67,19 @@ std::string source_of(const ImageFile& image) {
   return image.store ? image.store->source(image.entry) : image.path.parent_path().string();
 }
 
-ImageList in_time_order(std::vector<image_files::ImageFile> images, const std::string& source) {
+ImageList in_time_order(std::vector<ImageFile> images, const std::string& source, StampUnit unit) {
   ImageList list;
-  const auto earlier = [](const image_files::ImageFile& a, const image_files::ImageFile& b) {
-    return a.time_ns < b.time_ns;
-  };
-  if (!std::is_sorted(images.begin(), images.end(), earlier)) {
-    list.warnings.push_back(fmt::format("{}: time stamps were out of order and have been sorted", source));
-    std::stable_sort(images.begin(), images.end(), earlier);
+  if (const std::size_t damaged = remove_damaged_zeros(images); damaged > 0) {
+    list.warnings.push_back(fmt::format("{}: {} {} the damaged time stamp 0 and {} not used", source,
+                                        images_text(damaged), damaged == 1 ? "has" : "have",
+                                        damaged == 1 ? "is" : "are"));
   }
-  const auto last = std::unique(
-      images.begin(), images.end(),
-      [](const image_files::ImageFile& a, const image_files::ImageFile& b) { return a.time_ns == b.time_ns; });
+  if (std::string text = steps_back_text(images, unit); !text.empty()) {
+    list.warnings.push_back(fmt::format("{}: {}", source, text));
+    std::ranges::stable_sort(images, {}, &ImageFile::time_ns);
+  }
+  const auto last = std::unique(images.begin(), images.end(),
+                                [](const ImageFile& a, const ImageFile& b) { return a.time_ns == b.time_ns; });
   if (last != images.end()) {
     list.warnings.push_back(
         fmt::format("{}: {} images with the time stamp of another image are not used", source, images.end() - last));

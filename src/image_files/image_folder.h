@@ -36,9 +36,12 @@ struct ImageList {
   std::vector<std::string> warnings;
 };
 
-// Sorts by time and removes the second of two images with equal time stamps. Both are reported in the warnings, which
-// name `source`.
-ImageList in_time_order(std::vector<ImageFile> images, const std::string& source);
+// How messages write time stamps: as the whole numbers that they are in a file or in names, or in seconds.
+enum class StampUnit { kOfFile, kSeconds };
+
+// Sorts by time and removes the second of two images with equal time stamps. A stamp of 0 among others that are far
+// from 0 is damaged, and its image is removed. All three are reported in the warnings, which name `source`.
+ImageList in_time_order(std::vector<ImageFile> images, const std::string& source, StampUnit unit = StampUnit::kOfFile);
 
 struct NumberedImage {
   std::int64_t number = 0;

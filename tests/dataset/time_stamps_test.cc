@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <tuple>
 
 namespace bslam::dataset {
 namespace {
@@ -58,6 +59,25 @@ TEST(TimeStamps, NumbersAtARate) {
   EXPECT_EQ(images[0].time_ns, 33'333'333);
   EXPECT_EQ(images[1].time_ns, 100 * kMillisecond);
   EXPECT_EQ(images[2].time_ns, 100'000'000 * kMillisecond);
+}
+
+// A unit that makes a camera impossibly fast or slow is asked about like none.
+TEST(TimeStamps, AWrongUnitIsAskedAbout) {
+  const TimeNs us = 1000, ms = kMillisecond, s = 1000 * kMillisecond;
+  for (const auto& [interval, unit, proposal] : {std::tuple<TimeNs, TimeNs, const char*>(1, us, "--rate HZ if"),
+                                                 {50, us, "--stamp-unit ms if"},
+                                                 {50'000'000, us, "no --stamp-unit if they are nanoseconds"},
+                                                 {50'000, ms, "--stamp-unit us if"},
+                                                 {50, s, "--stamp-unit ms if"}}) {
+    auto images = images_at(1000, interval);
+    const Status status = convert_time_stamps({.unit_ns = unit}, "data/cam0", images);
+    ASSERT_FALSE(status) << interval << " " << unit;
+    EXPECT_NE(status.error().message().find(proposal), std::string::npos) << status.error().message();
+  }
+  auto stamps = images_at(1000, 50'000'000), numbers = images_at(0, 1), slow = images_at(0, 1);
+  EXPECT_FALSE(convert_time_stamps({.rate_hz = 20}, "cam0", stamps));
+  EXPECT_TRUE(convert_time_stamps({.rate_hz = 0.01}, "cam0", slow));
+  EXPECT_TRUE(convert_time_stamps({.unit_ns = s}, "cam0", numbers));
 }
 
 TEST(TimeStamps, RejectsValuesOutOfRange) {

@@ -1,0 +1,50 @@
+#include "image_files/image_folder.h"
+
+#include <gtest/gtest.h>
+
+namespace bslam::image_files {
+namespace {
+
+ImageList sorted(const std::vector<TimeNs>& stamps, StampUnit unit = StampUnit::kOfFile) {
+  std::vector<ImageFile> images;
+  for (const TimeNs stamp : stamps) images.push_back({"image.png", stamp});
+  return in_time_order(std::move(images), "cam0", unit);
+}
+
+TEST(TimeOrder, StepsBackAreCountedAndTheFirstIsNamed) {
+  const ImageList list = sorted({100, 150, 120, 200, 250, 240});
+  ASSERT_EQ(list.warnings.size(), 1u);
+  EXPECT_EQ(list.warnings[0], "cam0: time stamps step back 2 times, first from 150 to 120; images have been sorted");
+  EXPECT_EQ(list.images[1].time_ns, 120);
+  EXPECT_EQ(sorted({1'500'000'000, 1'250'000'000}, StampUnit::kSeconds).warnings[0],
+            "cam0: time stamps step back 1 time, first from 1.500000000 s to 1.250000000 s; images have been sorted");
+  EXPECT_TRUE(sorted({1, 2, 3}).warnings.empty());
+}
+
+TEST(TimeOrder, ImagesWithTheStampOfAnotherAreCounted) {
+  const ImageList list = sorted({100, 100, 150, 150, 150});
+  EXPECT_EQ(list.images.size(), 2u);
+  EXPECT_EQ(list.warnings,
+            (std::vector<std::string>{"cam0: 3 images with the time stamp of another image are not used"}));
+}
+
+TEST(TimeOrder, ZerosFarFromAllOthersAreDamaged) {
+  const TimeNs first = 1'403'636'579'763'555'584, interval = 50'000'000;
+  for (const std::size_t place : {0, 2, 4}) {
+    std::vector<TimeNs> stamps = {first, first + interval, first + 2 * interval, first + 3 * interval};
+    stamps.insert(stamps.begin() + static_cast<std::ptrdiff_t>(place), 0);
+    const ImageList list = sorted(stamps);
+    EXPECT_EQ(list.images.size(), 4u);
+    EXPECT_EQ(list.warnings, (std::vector<std::string>{"cam0: 1 image has the damaged time stamp 0 and is not used"}));
+  }
+}
+
+TEST(TimeOrder, ZerosAtTheBeginningAreStamps) {
+  EXPECT_EQ(sorted({0, 1, 2}).images.size(), 3u);
+  EXPECT_EQ(sorted({100, 0, 50}).images.size(), 3u);           // not sorted
+  EXPECT_EQ(sorted({0, 5000, 5050, 5100}).images.size(), 4u);  // a pause after the first image
+  EXPECT_EQ(sorted({0}).images.size(), 1u);
+}
+
+}  // namespace
+}  // namespace bslam::image_files
