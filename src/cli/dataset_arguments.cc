@@ -44,7 +44,8 @@ Result<std::vector<image_decoding::Bayer>> parse_bayer(const std::string& text) 
 void add_image_options(CLI::App& verb, ImageArguments& a) {
   verb.add_option(
       "--topics", a.topics,
-      "image topics of a bag in the order of the rig's cameras, separated by commas; default: all, by name");
+      "image topics of a bag, or folders with images in DATA, in the order of the rig's cameras, separated by "
+      "commas; default: all, by name");
   verb.add_flag("--side-by-side", a.side_by_side, "each image of the video consists of those of two cameras");
   verb.add_option("--rate", a.rate_hz,
                   "the time stamps of the images are their numbers, and they were taken at this rate [Hz]");

@@ -44,18 +44,24 @@ std::string check_command(const DatasetArguments& data) {
   return shell_command({"bslam", "rig", "info", data.rig.empty() ? data.path : data.rig, "--images", data.path});
 }
 
-// Says which topic or video is which camera, if the command line does not say it.
+// Says which topic or folder is which camera, if the command line does not say it.
 void print_sources(const dataset::Dataset& dataset) {
   std::string text;
   for (std::size_t c = 0; c < dataset.sources.size(); ++c) {
     text += (c == 0 ? "" : ", ") + dataset.rig.camera(c).name + " = " + dataset.sources[c];
   }
-  if (!text.empty()) std::fprintf(stderr, "cameras: %s (choose with --topics)\n", text.c_str());
+  const bool folders = dataset.format == dataset::DatasetFormat::kFolder;
+  const char* const how = dataset.sources_by_name ? "by their names"
+                          : folders               ? "in the order of their names; choose with --topics"
+                                                  : "choose with --topics";
+  if (!text.empty()) std::fprintf(stderr, "cameras: %s (%s)\n", text.c_str(), how);
 }
 
 void print_before(const dataset::Dataset& dataset, const DatasetArguments& data, LogVerbosity verbosity) {
   if (verbosity < LogVerbosity::kWarning) return;
-  if (dataset.format == dataset::DatasetFormat::kBag && data.images.topics.empty()) print_sources(dataset);
+  const bool named =
+      dataset.format == dataset::DatasetFormat::kBag || dataset.format == dataset::DatasetFormat::kFolder;
+  if (named && data.images.topics.empty()) print_sources(dataset);
   print_warnings(session::warnings_before_run(dataset));
 }
 

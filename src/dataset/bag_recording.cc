@@ -23,8 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr TimeNs kMaxTime = 9'200'000'000'000'000'000;  // time offsets can be added without overflow
-
 // "/cam0/image_raw/compressed" -> "/cam0/image_raw", the topic of which it is a copy.
 std::string without_transport(std::string topic) {
   constexpr std::string_view kTransport = "/compressed";
@@ -125,9 +123,19 @@ class BagRecording : public Recording {
   bool proposed_ = true;  // the topics were not requested
 };
 
+// Depth images of 16 bits can be read, but are no photographs.
+bool is_depth(const ImageTopic& topic) {
+  std::string name = topic.name;
+  std::ranges::transform(name, name.begin(),
+                         [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return name.find("depth") != std::string::npos && topic.encoding.starts_with("16UC1");
+}
+
 // A topic and its compressed copy are one camera.
 std::string BagRecording::why_unused(const ImageTopic& topic) const {
   if (!topic.unusable.empty()) return topic.unusable;
+  const auto is_photograph = [](const ImageTopic& t) { return t.unusable.empty() && !is_depth(t); };
+  if (is_depth(topic) && std::ranges::any_of(topics_, is_photograph)) return "depth images; --topics can name it";
   const std::string plain = without_transport(topic.name);
   if (plain == topic.name) return "";
   const auto original = std::ranges::find(topics_, plain, &ImageTopic::name);
@@ -256,7 +264,7 @@ Result<image_files::ImageList> BagRecording::images(std::size_t camera) const {
   }
   const std::size_t without_stamp = stamps.size() - images.size();
   if (images.empty()) return Error{source, "", "no image with a time stamp", "images with time stamps"};
-  image_files::ImageList list = image_files::in_time_order(std::move(images), source);
+  image_files::ImageList list = image_files::in_time_order(std::move(images), source, image_files::StampUnit::kSeconds);
   if (!has_header_stamps(topic))
     list.warnings.push_back(source + ": the headers have no time stamps; the times of recording are used");
   if (without_stamp > 0)

@@ -7,12 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numeric>
-#include <set>
 #include <system_error>
 #include <utility>
 
+#include "dataset/camera_choice.h"
 #include "dataset/frame_grouping.h"
+#include "dataset/image_checks.h"
 #include "dataset/mask_folder.h"
 #include "dataset/recording.h"
 #include "dataset/vignette_folder.h"
@@ -33,109 +33,12 @@ std::string name_of(const fs::path& path) {
   return fs::is_directory(whole, error) ? whole.filename().string() : whole.stem().string();
 }
 
-// Returns the requested cameras, or all `count` cameras if none were requested.
-Result<std::vector<int>> chosen_cameras(const std::vector<int>& requested, std::size_t count) {
-  std::vector<int> cameras = requested;
-  if (cameras.empty()) {
-    cameras.resize(count);
-    std::iota(cameras.begin(), cameras.end(), 0);
-  }
-  std::set<int> seen;
-  for (const int camera : cameras) {
-    if (camera < 0 || static_cast<std::size_t>(camera) >= count) {
-      return Error{"--cameras", "", std::to_string(camera), fmt::format("camera numbers from 0 to {}", count - 1)};
-    }
-    if (!seen.insert(camera).second) {
-      return Error{"--cameras", "", fmt::format("camera {} twice", camera), "each camera at most once"};
-    }
-  }
-  return cameras;
-}
-
-struct ChosenRig {
-  std::vector<int> cameras;
-  camera::Rig rig;
-  std::optional<camera::Rig> whole;
-  std::vector<std::string> warnings;
-};
-
-Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recording& recording) {
-  const auto rig = rig_formats::read_rig(*request.rig_file);
-  if (!rig) return rig.error();
-  const auto cameras = chosen_cameras(request.cameras, rig->size());
-  if (!cameras) return cameras.error();
-  for (const int camera : *cameras) {
-    if (static_cast<std::size_t>(camera) < recording.camera_count()) continue;
-    const std::size_t there = recording.camera_count();
-    return Error{request.path.string(), "", fmt::format("images of {} camera{}", there, there == 1 ? "" : "s"),
-                 fmt::format("images of camera {} as well, since {} has {} cameras; --cameras selects a subset", camera,
-                             request.rig_file->string(), rig->size())};
-  }
-  ChosenRig chosen{*cameras, rig->subset(*cameras), *rig, {}};
-  if (recording.camera_count() > rig->size()) {
-    chosen.warnings.push_back(
-        fmt::format("{} has {} cameras but the data set has {}; the additional cameras are not used",
-                    request.rig_file->string(), rig->size(), recording.camera_count()));
-  }
-  return chosen;
-}
-
-// Returns nullopt if the calibration of any camera cannot be read.
-std::optional<camera::Rig> whole_rig(const Recording& recording) {
-  std::vector<camera::RigCamera> cameras;
-  for (std::size_t c = 0; c < recording.camera_count(); ++c) {
-    auto calibration = recording.calibration(c);
-    if (!calibration) return std::nullopt;
-    cameras.push_back(*std::move(calibration));
-  }
-  return camera::Rig(std::move(cameras));
-}
-
-Result<ChosenRig> choose_own(const DatasetRequest& request, const Recording& recording) {
-  auto cameras = chosen_cameras(request.cameras, recording.camera_count());
-  if (!cameras) return cameras.error();
-  if (auto whole = whole_rig(recording)) {
-    camera::Rig rig = whole->subset(*cameras);
-    return ChosenRig{*std::move(cameras), std::move(rig), std::move(whole), {}};
-  }
-  std::vector<camera::RigCamera> calibrated;
-  for (const int camera : *cameras) {
-    auto calibration = recording.calibration(static_cast<std::size_t>(camera));
-    if (!calibration) return calibration.error();
-    calibrated.push_back(*std::move(calibration));
-  }
-  return ChosenRig{*std::move(cameras), camera::Rig(std::move(calibrated)), std::nullopt, {}};
-}
-
-// Checks that an image exists, and that one of the first readable images has the calibrated resolution.
-Status check_images(const std::vector<image_files::ImageFile>& images, const camera::Camera& camera) {
-  constexpr int kTries = 5;
-  int read = 0;
-  bool any = false;
-  std::string found;
-  for (const image_files::ImageFile& file : images) {
-    std::error_code error;
-    if (!file.store && !fs::exists(file.path, error)) continue;
-    any = true;
-    if (++read > kTries) break;
-    const auto image = image_decoding::read_image(file);
-    if (!image) continue;
-    if (image->width() == camera.width && image->height() == camera.height) return {};
-    found = fmt::format("{}x{} pixels", image->width(), image->height());
-  }
-  const std::string folder = image_files::source_of(images.front());
-  if (!any) return Error{folder, camera.name, "none of the listed images", "at least one image"};
-  if (found.empty()) return {};  // the first images are damaged, which is reported when they are read
-  return Error{folder, camera.name, "images of " + found,
-               fmt::format("{}x{}, the resolution of the calibration", camera.width, camera.height)};
-}
-
 // Returns the images of every camera in use, with time offsets applied to the time stamps.
 Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const DatasetRequest& request,
                                                                         const Recording& recording, ChosenRig& chosen) {
   std::vector<std::vector<image_files::ImageFile>> images;
   for (std::size_t i = 0; i < chosen.cameras.size(); ++i) {
-    auto list = recording.images(static_cast<std::size_t>(chosen.cameras[i]));
+    auto list = recording.images(static_cast<std::size_t>(chosen.recorded[i]));
     if (!list) return list.error();
     chosen.warnings.insert(chosen.warnings.end(), list->warnings.begin(), list->warnings.end());
     const camera::Camera& camera = chosen.rig.camera(i);
@@ -151,6 +54,7 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Da
     for (image_files::ImageFile& image : list->images) image.time_ns += camera.time_offset_ns;
     images.push_back(std::move(list->images));
   }
+  if (const Status s = check_different_images(images); !s) return s.error();
   return images;
 }
 
@@ -235,15 +139,6 @@ Status keep_range(const DatasetRequest& request, Dataset& dataset) {
                fmt::format("a range that contains frames, which are between 0 and {:.3f} s", last_s)};
 }
 
-// Returns the rig file in the folder of a recording, or nullopt if there is none.
-std::optional<fs::path> rig_file_in_folder(const DatasetRequest& request) {
-  fs::path folder = request.path.filename().empty() ? request.path.parent_path() : request.path;
-  if (folder.filename() == "mav0") folder = folder.parent_path();
-  fs::path file = folder / "rig.yaml";
-  std::error_code error;
-  return fs::is_regular_file(file, error) ? std::optional(std::move(file)) : std::nullopt;
-}
-
 // The calibration of the recording itself is used. Warns if a rig file in its folder has time offsets, which are then
 // ignored.
 void warn_of_times(const fs::path& file, std::vector<std::string>& warnings) {
@@ -320,6 +215,18 @@ Status check_time_stamps(const DatasetRequest& request, const OpenRecording& ope
                kitti ? "no unit, since times.txt contains seconds" : "no unit"};
 }
 
+// Takes the masks of whole cameras from a folder.
+Status use_masks(const DatasetRequest& request, const Recording& recording, ChosenRig& chosen) {
+  if (!request.masks) return {};
+  auto masked = with_masks(chosen.rig, chosen.cameras, *request.masks);
+  if (!masked) return masked.error();
+  chosen.rig = *std::move(masked);
+  const auto unused =
+      masks_of_no_camera(*request.masks, chosen.whole ? chosen.whole->size() : recording.camera_count());
+  chosen.warnings.insert(chosen.warnings.end(), unused.begin(), unused.end());
+  return {};
+}
+
 }  // namespace
 
 Result<Dataset> open_dataset(const DatasetRequest& original) {
@@ -333,11 +240,7 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
   if (const Status status = check_time_stamps(request, *opened); !status) return status.error();
   auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
-  if (request.masks) {
-    auto masked = with_masks(chosen->rig, chosen->cameras, *request.masks);
-    if (!masked) return masked.error();
-    chosen->rig = *std::move(masked);
-  }
+  if (const Status s = use_masks(request, recording, *chosen); !s) return s.error();
   if (own_rig_file && !request.rig_file) {
     warn_of_times(*own_rig_file, chosen->warnings);
     take_names(*own_rig_file, recording.camera_count(), *chosen);
@@ -357,8 +260,9 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
                   std::move(chosen->warnings)};
   for (const std::vector<image_files::ImageFile>& of_camera : *images) {
     const image_files::ImageFile& image = of_camera.front();
-    if (image.store) dataset.sources.push_back(image.store->stream(image.entry));
+    dataset.sources.push_back(image.store ? image.store->stream(image.entry) : image_files::source_of(image));
   }
+  dataset.sources_by_name = chosen->by_name;
   if (const Status status = describe_pixels(request, *images, dataset); !status) return status.error();
   if (!request.rig_file) number_as_recorded(recording, dataset);
   if (const Status status = group(request, *images, dataset); !status) return status.error();

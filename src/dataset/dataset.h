@@ -29,10 +29,11 @@ struct DatasetRequest {
   std::filesystem::path path;
   DatasetFormat format = DatasetFormat::kAuto;
   std::optional<std::filesystem::path> rig_file = {};  // default: the calibration in the data set
-  std::vector<std::string> topics = {};  // of bags: image topics in the order of the cameras; empty: all, by name
-  bool side_by_side = false;             // of a video: each of its images is those of two cameras
-  std::vector<int> cameras = {};         // in this order; the first becomes camera 0; empty: all
-  double sync_tolerance_s = 0.002;       // largest time difference within a frame, see IoOptions
+  // Of bags image topics, of the format kFolder sub-folders, in the order of the cameras; empty: all, by name.
+  std::vector<std::string> topics = {};
+  bool side_by_side = false;                       // of a video: each of its images is those of two cameras
+  std::vector<int> cameras = {};                   // in this order; the first becomes camera 0; empty: all
+  double sync_tolerance_s = 0.002;                 // largest time difference within a frame, see IoOptions
   std::optional<double> begin_s = {}, end_s = {};  // seconds from the first frame: begin <= t < end
   TimeStampOptions time_stamps = {};               // unit of the recorded time stamps
   // Colour filters of the cameras in use, in their order, or one for all; empty: none.
@@ -62,7 +63,8 @@ struct Dataset {
                      // camera of the rig), or KITTI poses (image_0, the body of its calibration)
   std::vector<std::string>
       warnings;  // for the user: entries that were sorted or dropped, images in frames without camera 0
-  std::vector<std::string> sources = {};  // of bags and videos: the topic or file of every camera in use
+  std::vector<std::string> sources = {};  // the topic, file or folder of every camera in use
+  bool sources_by_name = false;           // they were found by the names of the cameras in the calibration
   std::vector<image_decoding::PixelFormat> pixel_formats = {};  // one per camera in use
   std::vector<image_decoding::Vignette> vignettes = {};         // one per camera in use, or none
 };
@@ -72,7 +74,7 @@ struct Dataset {
 // damaged. Errors: the folder does not exist or has an unknown format; the calibration is missing or invalid; a list is
 // missing, empty or malformed; a camera has no image file, or its images differ from the calibrated resolution; two
 // cameras have no common frame; a camera is requested twice or does not exist; the time range is empty or reversed; the
-// time stamps are hardly nanoseconds (dataset/time_stamps.h).
+// time stamps are hardly nanoseconds (dataset/time_stamps.h); two cameras have the same images.
 Result<Dataset> open_dataset(const DatasetRequest& request);
 
 }  // namespace bslam::dataset

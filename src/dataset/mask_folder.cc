@@ -1,7 +1,9 @@
 #include "dataset/mask_folder.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <system_error>
@@ -41,6 +43,22 @@ Result<camera::Rig> with_masks(const camera::Rig& rig, const std::vector<int>& c
                  fmt::format("{}.png, {}/STAMP.png or those of another camera", name, name)};
   }
   return camera::Rig(std::move(masked), rig.cam_from_rig(0));
+}
+
+std::vector<std::string> masks_of_no_camera(const fs::path& folder, std::size_t count) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const std::string stem = it->path().stem().string(), extension = it->path().extension().string();
+    if (!stem.starts_with("cam") || !(extension.empty() || extension == ".png")) continue;
+    const auto number = parse_integer(stem.substr(3));
+    if (number && (*number < 0 || static_cast<std::uint64_t>(*number) >= count))
+      names.push_back(it->path().filename().string());
+  }
+  if (names.empty()) return {};
+  std::ranges::sort(names);
+  return {fmt::format("{}: {} are masks of no camera, since there are {} (cam0 is the first)", folder.string(),
+                      fmt::join(names, ", "), count)};
 }
 
 Result<std::vector<std::string>> add_image_masks(const fs::path& folder, int number, const camera::Camera& camera,

@@ -2,6 +2,7 @@
 // camN/STAMP.png for the image with this time stamp.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -18,6 +19,9 @@ namespace bslam::dataset {
 // the folder does not exist, or it has neither a mask of one of these cameras nor of their images.
 Result<camera::Rig> with_masks(const camera::Rig& rig, const std::vector<int>& cameras,
                                const std::filesystem::path& folder);
+
+// Returns a warning if the folder has masks of cameras beyond the `count` of the calibration.
+std::vector<std::string> masks_of_no_camera(const std::filesystem::path& folder, std::size_t count);
 
 // Adds the masks of single images of camera `number` to its images, whose times are the recorded ones in ns. STAMP is
 // this time or the number by which the image's file is named. Returns warnings for the user, if masks belong to no

@@ -17,10 +17,11 @@ Result<DatasetFormat> detect_format(const fs::path& folder) {
   if (looks_like_kitti(folder) || looks_like_kitti_raw(folder)) return DatasetFormat::kKitti;
   if (looks_like_folder(folder)) return DatasetFormat::kFolder;
   if (looks_like_bag(folder)) return DatasetFormat::kBag;
-  return Error{folder.string(), "", "no data set of a known format",
-               "mav0/camN/data.csv (euroc), image_N with times.txt or image_NN with timestamps.txt (kitti), camN or "
-               "left and right "
-               "with images named by their time stamps (folder), or a ROS 2 bag (metadata.yaml)"};
+  if (has_folders_of_images(folder)) return DatasetFormat::kFolder;
+  return Error{
+      folder.string(), "", "no data set of a known format",
+      "mav0/camN/data.csv (euroc), image_N with times.txt or image_NN with timestamps.txt (kitti), a folder of "
+      "images for each camera (folder), or a ROS 2 bag (metadata.yaml)"};
 }
 
 // The files that are joined by commas, or the only one, whose name may contain commas.
@@ -35,8 +36,8 @@ std::vector<fs::path> files_of(const fs::path& path) {
 }
 
 Status check_bag_options(const DatasetRequest& request, DatasetFormat format) {
-  if (!request.topics.empty() && format != DatasetFormat::kBag)
-    return Error{"--topics", "", "data without topics", "a ROS bag or an MCAP file"};
+  if (!request.topics.empty() && format != DatasetFormat::kBag && format != DatasetFormat::kFolder)
+    return Error{"--topics", "", "data without topics", "a ROS bag, an MCAP file, or folders of images (folder)"};
   if (request.side_by_side && format != DatasetFormat::kVideo)
     return Error{"--side-by-side", "", "data that is no video", "a video"};
   return {};
@@ -86,9 +87,10 @@ Result<OpenRecording> open_recording(const DatasetRequest& request) {
   const auto format = format_of(request, files);
   if (!format) return format.error();
   if (const Status s = check_bag_options(request, *format); !s) return s.error();
+  const bool lists = !request.time_stamps.rate_hz && !request.time_stamps.unit_ns;
   auto recording = *format == DatasetFormat::kEuroc    ? open_euroc(files.front())
                    : *format == DatasetFormat::kKitti  ? open_kitti_of_any_kind(files.front())
-                   : *format == DatasetFormat::kFolder ? open_folder(files.front())
+                   : *format == DatasetFormat::kFolder ? open_folder(files.front(), request.topics, lists)
                    : *format == DatasetFormat::kBag    ? open_bag(files, request.topics)
                                                        : open_video(files, request.side_by_side);
   if (!recording) return recording.error();
@@ -109,7 +111,7 @@ RecordingDescription Recording::describe() const {
     stream.name = image_files::source_of(list->images.front());
     stream.count = list->images.size();
     for (const image_files::ImageFile& image : list->images) stream.times.push_back(image.time_ns);
-    stream.stamps = has_times() ? "times.txt" : "names or data.csv";
+    stream.stamps = stamps_from(c);
     stream.camera = static_cast<int>(c);
     stream.calibrated = calibration(c).ok();
     stream.encoding = list->images.front().path.extension().string();

@@ -33,6 +33,13 @@ class Recording {
   virtual std::optional<std::filesystem::path> ground_truth() const { return std::nullopt; }
   // Returns true if its time stamps have a known unit.
   virtual bool has_times() const { return false; }
+  // For the user: where the time stamps of a camera are from.
+  virtual std::string stamps_from(std::size_t) const { return has_times() ? "times.txt" : "names or data.csv"; }
+  // Returns the names of the folders of all cameras, which may be those of cameras in the rig file; empty if they have
+  // none, or the order of the cameras was requested.
+  virtual std::vector<std::string> folder_names() const { return {}; }
+  // Returns true if these names tell no order of the cameras.
+  virtual bool has_own_names() const { return false; }
   // For the user: what was found damaged or missing when the recording was opened.
   virtual std::vector<std::string> warnings() const { return {}; }
   // Describes the images of the cameras, and what else the recording contains. Warnings and what is missing are added
@@ -53,7 +60,9 @@ Result<OpenRecording> open_recording(const DatasetRequest& request);
 RecordingResult open_euroc(const std::filesystem::path& folder);      // mav0/camN/data.csv
 RecordingResult open_kitti(const std::filesystem::path& folder);      // image_N/NNNNNN.png and times.txt
 RecordingResult open_kitti_raw(const std::filesystem::path& folder);  // image_NN/data/*.png and timestamps.txt
-RecordingResult open_folder(const std::filesystem::path& folder);     // camN/<ns>.png, or left/ and right/
+// A folder of images for each camera: `names`, or all if that is empty. `lists`: numbers in names of images get their
+// times from times.txt and the like (dataset/time_list.h), if there is one.
+RecordingResult open_folder(const std::filesystem::path& folder, const std::vector<std::string>& names, bool lists);
 // Videos: one per camera, or one with the images of two cameras side by side. Their first images were taken together.
 RecordingResult open_video(const std::vector<std::filesystem::path>& files, bool side_by_side);
 
@@ -61,6 +70,7 @@ RecordingResult open_video(const std::vector<std::filesystem::path>& files, bool
 bool looks_like_euroc(const std::filesystem::path& folder);
 bool looks_like_kitti(const std::filesystem::path& folder);
 bool looks_like_kitti_raw(const std::filesystem::path& folder);
-bool looks_like_folder(const std::filesystem::path& folder);
+bool looks_like_folder(const std::filesystem::path& folder);      // camN, or left and right
+bool has_folders_of_images(const std::filesystem::path& folder);  // of any names
 
 }  // namespace bslam::dataset

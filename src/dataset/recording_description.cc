@@ -9,6 +9,8 @@
 #include <limits>
 
 #include "base/median.h"
+#include "dataset/camera_choice.h"
+#include "dataset/image_checks.h"
 #include "dataset/recording.h"
 #include "rig_formats/rig_file.h"
 
@@ -83,6 +85,41 @@ std::vector<std::string> missing_for(const DatasetRequest& request, const Record
   return missing;
 }
 
+// Decodes a few images of every camera.
+void try_images(const Recording& recording, RecordingDescription& out) {
+  std::vector<std::vector<image_files::ImageFile>> images;
+  for (StreamDescription& stream : out.streams) {
+    if (stream.camera < 0) continue;
+    auto list = recording.images(static_cast<std::size_t>(stream.camera));
+    if (!list) continue;
+    if (auto note = unreadable_note(list->images)) stream.notes.push_back(*std::move(note));
+    images.push_back(std::move(list->images));
+  }
+  if (const Status s = check_different_images(images); !s) out.missing.push_back(s.error().message());
+}
+
+// Gives the cameras of a recording their numbers in the rig file, if they are found by its names.
+void number_by_names(const DatasetRequest& request, const Recording& recording, RecordingDescription& out) {
+  DatasetRequest with_rig = request;
+  if (!with_rig.rig_file && !recording.calibrated()) with_rig.rig_file = rig_file_in_folder(request);
+  if (!with_rig.rig_file) return;
+  const auto rig = rig_formats::read_rig(*with_rig.rig_file);
+  if (!rig) return;
+  const auto cameras = chosen_cameras(request.cameras, rig->size());
+  if (!cameras) return;
+  const auto recorded = recorded_cameras(with_rig, recording, *rig, *cameras);
+  if (!recorded) {
+    if (recording.has_own_names()) out.missing.push_back(recorded.error().message());
+    return;
+  }
+  if (!recorded->by_name) return;
+  for (StreamDescription& stream : out.streams) {
+    const auto place = std::ranges::find(recorded->numbers, stream.camera);
+    if (stream.camera < 0) continue;
+    stream.camera = place == recorded->numbers.end() ? -1 : static_cast<int>(place - recorded->numbers.begin());
+  }
+}
+
 }  // namespace
 
 Result<RecordingDescription> describe_recording(const DatasetRequest& request) {
@@ -92,7 +129,10 @@ Result<RecordingDescription> describe_recording(const DatasetRequest& request) {
   if (out.format.empty()) out.format = format_name(opened->format);
   const std::vector<std::string> damage = opened->recording->warnings();
   out.warnings.insert(out.warnings.begin(), damage.begin(), damage.end());
-  out.missing = missing_for(request, *opened->recording, out.streams);
+  try_images(*opened->recording, out);
+  number_by_names(request, *opened->recording, out);
+  const std::vector<std::string> missing = missing_for(request, *opened->recording, out.streams);
+  out.missing.insert(out.missing.end(), missing.begin(), missing.end());
   out.synchrony = synchrony(out.streams, request.sync_tolerance_s);
   return out;
 }

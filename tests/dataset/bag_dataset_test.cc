@@ -223,8 +223,52 @@ TEST_F(SmallBag, TimesOfTheHeadersThatGoBackAreSorted) {
   write(all);
   const auto dataset = open_dataset(request(bag()));
   ASSERT_TRUE(dataset) << dataset.error().message();
-  EXPECT_TRUE(has(dataset->warnings, "out of order"));
+  EXPECT_TRUE(has(dataset->warnings,
+                  "time stamps step back 2 times, first from 1000.350000000 s to 1000.300000000 s; "
+                  "images have been sorted"));
   EXPECT_TRUE(has(dataset->warnings, "1 images with the time stamp of another"));
+}
+
+TEST_F(SmallBag, DepthImagesAreNoCameraBesideOthers) {
+  std::vector<TestMessage> all = messages(Wire::kRos1), depth;
+  for (int k = 0; k < support::kSmallFrames; ++k) {
+    support::TestImage one = image(0, k);
+    one.encoding = "16UC1";
+    one.step = 2 * one.width;
+    one.data += one.data;
+    depth.push_back({"/a/Depth/image", "sensor_msgs/Image", one.stamp_ns, support::image_message(Wire::kRos1, one)});
+  }
+  all.insert(all.begin(), depth.begin(), depth.end());
+  write(all);
+  const auto both = open_dataset(request(bag()));
+  ASSERT_TRUE(both) << both.error().message();
+  EXPECT_EQ(both->sources, (std::vector<std::string>{topic(0), topic(1)}));
+  EXPECT_TRUE(has(both->warnings, "/a/Depth/image is not used: depth images; --topics can name it"));
+  DatasetRequest named = request(bag());
+  named.topics = {"/a/Depth/image"};
+  named.cameras = {0};
+  EXPECT_TRUE(open_dataset(named));
+  write(depth);
+  named.topics.clear();
+  EXPECT_TRUE(open_dataset(named));  // they are all that there is
+}
+
+TEST_F(SmallBag, TheSameTopicUnderTwoNamesIsRefused) {
+  auto all = messages(Wire::kRos1);
+  for (std::size_t m = 1; m < all.size(); m += 2) all[m].bytes = all[m - 1].bytes;
+  write(all);
+  const auto dataset = open_dataset(request(bag()));
+  ASSERT_FALSE(dataset);
+  EXPECT_TRUE(dataset.error().found.starts_with("the same images as in ")) << dataset.error().message();
+}
+
+TEST_F(SmallBag, DescriptionsSayWhichImagesCannotBeDecoded) {
+  for (const int k : {0, support::kSmallFrames - 1})
+    support::write_text(data() / "mav0/cam1/data" / support::small_image_name(k), "damaged");
+  const auto described = describe_recording({.path = data()});
+  ASSERT_TRUE(described);
+  EXPECT_TRUE(described->streams[0].notes.empty());
+  EXPECT_TRUE(has(described->streams[1].notes, "2 of 5 images that were tried cannot be decoded, the first: "));
 }
 
 TEST_F(SmallBag, WithoutStampsTheTimesOfRecordingAreUsed) {

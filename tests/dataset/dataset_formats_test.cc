@@ -18,7 +18,7 @@ class SmallKitti : public testing::Test {
     std::string times;
     for (int k = 0; k < 10; ++k) {
       times += std::to_string(k) + ".044989e-01\n";
-      for (const int c : {0, 1}) support::write_image(image(k, c), 60, 20, k);
+      for (const int c : {0, 1}) support::write_image(image(k, c), 60, 20, 100 * c + k);
     }
     support::write_text(data() / "times.txt", times);
     support::write_text(data() / "calib.txt",
@@ -115,7 +115,7 @@ TEST(KittiRaw, DatesAndTheCalibrationOfTheDayAreRead) {
     std::string dates;
     for (int k = 0; k < 5; ++k) {
       dates += "2011-09-26 13:02:25." + std::to_string(100000445 + 100000000 * k) + "\n";
-      support::write_image(folder / "data" / ("000000000" + std::to_string(k) + ".png"), 60, 20, k);
+      support::write_image(folder / "data" / ("000000000" + std::to_string(k) + ".png"), 60, 20, 100 * c + k);
     }
     support::write_text(folder / "timestamps.txt", dates);
   }

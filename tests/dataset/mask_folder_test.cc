@@ -69,6 +69,16 @@ TEST_F(MaskFolder, MasksThatBelongToNoImageAreReported) {
   EXPECT_NE(dataset->warnings[0].find("1 of 2 masks belong to no image of cam1"), std::string::npos);
 }
 
+TEST_F(MaskFolder, MasksOfNoCameraAreReported) {
+  support::write_image(masks() / "cam1.png", support::kSmallWidth, support::kSmallHeight);
+  support::write_image(masks() / "cam2.png", support::kSmallWidth, support::kSmallHeight);
+  std::filesystem::create_directories(masks() / "cam7");
+  const auto dataset = open({1});  // the mask of camera 0 would be one of the rig
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->warnings.size(), 1u);
+  EXPECT_NE(dataset->warnings[0].find("cam2.png, cam7 are masks of no camera, since there are 2"), std::string::npos);
+}
+
 TEST_F(MaskFolder, AnImageWhoseMaskCannotBeReadIsDamaged) {
   std::filesystem::create_directories(masks() / "cam1");
   const auto file = [&](int frame) { return masks() / "cam1" / support::small_image_name(frame); };

@@ -1,0 +1,45 @@
+// Which cameras of the calibration and of the recording are used. Internal to this folder.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera/rig.h"
+#include "dataset/recording.h"
+
+namespace bslam::dataset {
+
+struct ChosenRig {
+  std::vector<int> cameras;  // their numbers in the whole rig
+  camera::Rig rig;
+  std::optional<camera::Rig> whole;
+  std::vector<std::string> warnings;
+  std::vector<int> recorded = {};  // their numbers in the recording
+  bool by_name = false;            // the recorded cameras were found by the names of the rig
+};
+
+// Returns the requested cameras, or all `count` cameras if none were requested.
+Result<std::vector<int>> chosen_cameras(const std::vector<int>& requested, std::size_t count);
+
+// Returns the rig file in the folder of a recording, or nullopt if there is none.
+std::optional<std::filesystem::path> rig_file_in_folder(const DatasetRequest& request);
+
+struct RecordedCameras {
+  std::vector<int> numbers;  // in the recording, one for each of the cameras of the rig
+  bool by_name = false;
+};
+
+// Finds `cameras` of a rig in a recording: folders with the names of the cameras, or else the folders in their order.
+// Errors: folders with names of their own of which only some are those of cameras, or which are not as many as the
+// rig has; images of too few cameras.
+Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Recording& recording,
+                                         const camera::Rig& rig, const std::vector<int>& cameras);
+
+// The calibration of the rig file that is requested. Errors: those of the file, and as above.
+Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recording& recording);
+// The calibration that the recording contains.
+Result<ChosenRig> choose_own(const DatasetRequest& request, const Recording& recording);
+
+}  // namespace bslam::dataset

@@ -1,0 +1,135 @@
+#include "dataset/image_checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <system_error>
+
+#include "image_decoding/image_file.h"
+
+namespace bslam::dataset {
+namespace {
+
+using Images = std::vector<image_files::ImageFile>;
+
+bool exists(const image_files::ImageFile& file) {
+  std::error_code error;
+  return file.store || std::filesystem::exists(file.path, error);
+}
+
+// The first images that exist, and then others spread over the list.
+std::vector<const image_files::ImageFile*> samples_of(const Images& images) {
+  constexpr std::size_t kTries = 5;
+  std::vector<const image_files::ImageFile*> samples;
+  for (std::size_t k = 0; k < images.size() && samples.size() < kTries; ++k) {
+    if (exists(images[k])) samples.push_back(&images[k]);
+  }
+  for (std::size_t k = 1; k <= kTries && !samples.empty(); ++k) {
+    const image_files::ImageFile* const image = &images[(images.size() - 1) * k / kTries];
+    if (exists(*image) && std::ranges::find(samples, image) == samples.end()) samples.push_back(image);
+  }
+  return samples;
+}
+
+bool is_flat(const image::Image& image) {
+  for (int y = 0; y < image.height(); ++y) {
+    if (!std::all_of(image.row(y), image.row(y) + image.width(), [&](auto v) { return v == *image.row(0); }))
+      return false;
+  }
+  return true;
+}
+
+bool is_equal(const image::Image& a, const image::Image& b) {
+  if (a.width() != b.width() || a.height() != b.height()) return false;
+  for (int y = 0; y < a.height(); ++y) {
+    if (!std::equal(a.row(y), a.row(y) + a.width(), b.row(y))) return false;
+  }
+  return true;
+}
+
+// The first images of a camera, decoded when they are needed; nullopt: cannot be read.
+class FirstImages {
+ public:
+  explicit FirstImages(const Images& images) : images_(images) {}
+  const std::optional<image::Image>& at(std::size_t k) {
+    while (decoded_.size() <= k) {
+      auto image = image_decoding::read_image(images_[decoded_.size()]);
+      decoded_.push_back(image ? std::optional(*std::move(image)) : std::nullopt);
+    }
+    return decoded_[k];
+  }
+  std::size_t size() const { return images_.size(); }
+
+ private:
+  const Images& images_;
+  std::vector<std::optional<image::Image>> decoded_;
+};
+
+bool have_same_images(FirstImages& a, FirstImages& b) {
+  constexpr std::size_t kTries = 20, kEqual = 3;
+  std::size_t equal = 0;
+  for (std::size_t k = 0; k < std::min({kTries, a.size(), b.size()}) && equal < kEqual; ++k) {
+    const std::optional<image::Image>&first = a.at(k), &second = b.at(k);
+    if (!first || !second) continue;
+    if (!is_equal(*first, *second)) return false;
+    equal += !is_flat(*first);
+  }
+  return equal >= kEqual;
+}
+
+}  // namespace
+
+Status check_images(const Images& images, const camera::Camera& camera) {
+  std::string found;
+  std::optional<Error> first_error;
+  const std::vector<const image_files::ImageFile*> samples = samples_of(images);
+  for (const image_files::ImageFile* file : samples) {
+    const auto image = image_decoding::read_image(*file);
+    if (!image && !first_error) first_error = image.error();
+    if (!image) continue;
+    if (image->width() == camera.width && image->height() == camera.height) return {};
+    found = fmt::format("{}x{} pixels", image->width(), image->height());
+  }
+  if (samples.empty()) {
+    return Error{image_files::name_of(images.front()), camera.name,
+                 fmt::format("no such file, as for all {} listed images", images.size()), "at least one image"};
+  }
+  if (found.empty()) {
+    return Error{first_error->file, camera.name, first_error->found,
+                 fmt::format("an image that can be read: none of {} that were tried can be", samples.size())};
+  }
+  return Error{image_files::source_of(images.front()), camera.name, "images of " + found,
+               fmt::format("{}x{}, the resolution of the calibration", camera.width, camera.height)};
+}
+
+Status check_different_images(const std::vector<Images>& images) {
+  std::vector<FirstImages> first;
+  for (const Images& of_camera : images) first.emplace_back(of_camera);
+  for (std::size_t c = 1; c < images.size(); ++c) {
+    for (std::size_t other = 0; other < c; ++other) {
+      if (!have_same_images(first[c], first[other])) continue;
+      return Error{image_files::source_of(images[c].front()), "",
+                   "the same images as in " + image_files::source_of(images[other].front()), "images of each camera"};
+    }
+  }
+  return {};
+}
+
+std::optional<std::string> unreadable_note(const Images& images) {
+  constexpr std::size_t kTries = 5;
+  const std::size_t count = std::min(kTries, images.size());
+  std::size_t unreadable = 0;
+  std::string first;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t at = count == 1 ? 0 : (images.size() - 1) * k / (count - 1);
+    const auto image = image_decoding::read_image(images[at]);
+    if (!image && unreadable++ == 0)
+      first = fmt::format("{} ({})", image_files::name_of(images[at]), image.error().found);
+  }
+  if (unreadable == 0) return std::nullopt;
+  return fmt::format("{} of {} images that were tried cannot be decoded, the first: {}", unreadable, count, first);
+}
+
+}  // namespace bslam::dataset

@@ -1,0 +1,27 @@
+// Looks at a few images of a recording before it is used. Internal to this folder.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "camera/camera.h"
+#include "image_files/image_folder.h"
+
+namespace bslam::dataset {
+
+// Checks that one of the first readable images of a camera has the calibrated resolution. Errors: another resolution;
+// no image exists; none of those that were tried, which are the first ones and others spread over the recording, can
+// be read.
+Status check_images(const std::vector<image_files::ImageFile>& images, const camera::Camera& camera);
+
+// Checks that no two cameras have the same images: several of their first ones in a row, except those of one value
+// everywhere, which may be equal by chance.
+Status check_different_images(const std::vector<std::vector<image_files::ImageFile>>& images);
+
+// Tries to decode a few images spread over the recording. Returns a note that says how many cannot be decoded, and
+// which is the first; nullopt if all can.
+std::optional<std::string> unreadable_note(const std::vector<image_files::ImageFile>& images);
+
+}  // namespace bslam::dataset

@@ -1,0 +1,211 @@
+#include "dataset/image_names.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "base/number_text.h"
+#include "evaluation/trajectory_file.h"
+
+namespace bslam::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+// The extension in lower case, without the point.
+std::string kind_of(const fs::path& file) {
+  std::string kind = file.extension().string();
+  kind.erase(0, kind.starts_with('.') ? 1 : 0);
+  std::ranges::transform(kind, kind.begin(),
+                         [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return kind;
+}
+
+bool is_one_of(const std::string& kind, std::initializer_list<std::string_view> kinds) {
+  return std::ranges::find(kinds, kind) != kinds.end();
+}
+
+// A name without its extension, as numbers and the texts around them: one more than numbers.
+struct SplitName {
+  fs::path file;
+  std::vector<std::string> numbers, texts = {""};
+};
+
+SplitName split_name(const fs::path& file) {
+  SplitName out{.file = file, .numbers = {}};
+  bool in_number = false;
+  for (const char c : file.stem().string()) {
+    if (is_digit(c)) {
+      if (!in_number) out.numbers.emplace_back();
+      out.numbers.back() += c;
+    } else {
+      if (in_number) out.texts.emplace_back();
+      out.texts.back() += c;
+    }
+    in_number = is_digit(c);
+  }
+  if (in_number) out.texts.emplace_back();
+  return out;
+}
+
+// Names of one kind have the same texts, and the same extension. PNG and JPEG may be mixed.
+using Kind = std::pair<std::vector<std::string>, std::string>;
+using Group = std::vector<SplitName>;
+
+const Kind kDigitsOnly = {{"", ""}, ""};
+
+std::map<Kind, Group> kinds_of(const std::vector<fs::path>& files) {
+  std::map<Kind, Group> kinds;
+  for (const fs::path& file : files) {
+    SplitName name = split_name(file);
+    std::string extension = kind_of(file);
+    if (is_one_of(extension, {"png", "jpg", "jpeg"})) extension.clear();
+    if (extension == "tiff") extension = "tif";
+    Kind kind{name.texts, extension};
+    kinds[std::move(kind)].push_back(std::move(name));
+  }
+  return kinds;
+}
+
+// Returns the only kind of names that several images have.
+Result<const Group*> chosen_kind(const fs::path& folder, const std::map<Kind, Group>& kinds) {
+  std::vector<const Group*> several, single;
+  for (const auto& [kind, group] : kinds) {
+    if (kind.first.size() > 1) (group.size() > 1 ? several : single).push_back(&group);
+  }
+  const auto digits = kinds.find(kDigitsOnly);
+  if (digits != kinds.end() && (digits->second.size() > 1 || several.empty())) return &digits->second;
+  const std::vector<const Group*>& found = several.empty() ? single : several;
+  if (found.size() == 1) return found[0];
+  if (found.empty())
+    return Error{folder.string(), "", "no images with a number in their names", "images named by their time stamps"};
+  return Error{folder.string(), "",
+               fmt::format("images with names of several kinds, such as {} and {}",
+                           found[0]->front().file.filename().string(), found[1]->front().file.filename().string()),
+               "one kind of names in a folder, and a folder for each camera"};
+}
+
+// Returns which of the numbers differ between the names.
+std::vector<std::size_t> varying_numbers(const Group& group) {
+  std::vector<std::size_t> varying;
+  for (std::size_t k = 0; k < group.front().numbers.size(); ++k) {
+    if (std::ranges::any_of(group, [&](const SplitName& name) { return name.numbers[k] != group[0].numbers[k]; }))
+      varying.push_back(k);
+  }
+  if (!varying.empty()) return varying;
+  const auto longest = std::ranges::max_element(group.front().numbers, {}, &std::string::size);  // of a single image
+  return {static_cast<std::size_t>(longest - group.front().numbers.begin())};
+}
+
+// Returns the first of two numbers that are decimal seconds, "1403636579.763555527", if all that differs is in them.
+std::optional<std::size_t> decimal_seconds(const Group& group, const std::vector<std::size_t>& varying) {
+  const SplitName& name = group.front();
+  for (std::size_t k = 0; k + 1 < name.numbers.size(); ++k) {
+    const bool begins = name.texts[k].empty() || std::string_view("_- ").find(name.texts[k].back()) < 3;
+    if (name.texts[k + 1] != "." || !begins || name.texts[k + 2].starts_with('.')) continue;
+    if (std::ranges::all_of(varying, [&](std::size_t v) { return v == k || v == k + 1; })) return k;
+  }
+  return std::nullopt;
+}
+
+// Some programs write seconds, a point and nanoseconds without their leading zeros.
+Status check_fractions(const fs::path& folder, const Group& group, std::size_t fraction) {
+  constexpr std::size_t kNanoseconds = 9;
+  const auto length = [&](const SplitName& name) { return name.numbers[fraction].size(); };
+  const auto [least, most] = std::ranges::minmax_element(group, {}, length);
+  if (length(*least) == length(*most) || length(*most) != kNanoseconds) return {};
+  return Error{folder.string(), "",
+               fmt::format("seconds with {} and with {} digits behind the point ({}, {})", length(*least),
+                           length(*most), least->file.filename().string(), most->file.filename().string()),
+               "as many digits in all names: these are decimals, or nanoseconds without their zeros"};
+}
+
+std::string example_names(const Group& group) {
+  return group.front().file.filename().string() + " and " + group.back().file.filename().string();
+}
+
+Result<NamedImages> read_names(const fs::path& folder, const Group& group) {
+  NamedImages out;
+  const std::vector<std::size_t> varying = varying_numbers(group);
+  const auto seconds = decimal_seconds(group, varying);
+  if (varying.size() > 1 && !seconds) {
+    return Error{folder.string(), "", "names in which several numbers differ, such as " + example_names(group),
+                 "names that differ in one number, or times.txt with lines of TIME FILENAME"};
+  }
+  if (seconds) {
+    if (const Status s = check_fractions(folder, group, *seconds + 1); !s) return s.error();
+  }
+  out.in_seconds = seconds.has_value();
+  for (const SplitName& name : group) {
+    const auto time = seconds ? evaluation::parse_seconds(name.numbers[*seconds] + "." + name.numbers[*seconds + 1])
+                              : parse_integer(name.numbers[varying.front()]);
+    if (time) {
+      out.images.push_back({name.file, *time});
+    } else if (out.left_out_count++ == 0) {
+      out.left_out = name.file.string();
+    }
+  }
+  if (out.images.empty())
+    return Error{folder.string(), "", "names such as " + group.front().file.filename().string(),
+                 "numbers below 9223372036854775808"};
+  std::ranges::sort(out.images, [](const auto& a, const auto& b) {
+    return a.time_ns != b.time_ns ? a.time_ns < b.time_ns : a.path < b.path;
+  });
+  return out;
+}
+
+}  // namespace
+
+std::vector<fs::path> image_files_of(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    if (is_one_of(kind_of(it->path()), {"png", "jpg", "jpeg", "webp", "pgm", "ppm", "pnm", "bmp", "tif", "tiff"}) &&
+        !it->path().filename().string().starts_with('.'))
+      files.push_back(it->path());
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+bool may_be_image(const fs::path& file) {
+  return is_one_of(kind_of(file), {"gif", "jp2", "exr", "hdr", "dng", "raw", "tga", "heic", "avif", "jxl", "pfm"});
+}
+
+bool naturally_before(const std::string& a, const std::string& b) {
+  const auto parts = [](const std::string& text) {
+    std::vector<std::pair<std::int64_t, std::string>> out;  // a number, or a text
+    for (std::size_t at = 0; at < text.size();) {
+      std::size_t end = at + 1;
+      while (end < text.size() && is_digit(text[end]) == is_digit(text[at])) ++end;
+      const std::string part = text.substr(at, end - at);
+      out.emplace_back(parse_integer(part).value_or(-1), part);
+      at = end;
+    }
+    return out;
+  };
+  return std::pair(parts(a), a) < std::pair(parts(b), b);
+}
+
+Result<NamedImages> images_by_name(const fs::path& folder, const std::vector<fs::path>& files) {
+  const std::map<Kind, Group> kinds = kinds_of(files);
+  const auto chosen = chosen_kind(folder, kinds);
+  if (!chosen) return chosen.error();
+  auto out = read_names(folder, **chosen);
+  if (!out) return out;
+  for (const auto& [kind, group] : kinds) {
+    if (&group == *chosen) continue;
+    if (out->left_out_count == 0) out->left_out = group.front().file.string();
+    out->left_out_count += group.size();
+  }
+  return out;
+}
+
+}  // namespace bslam::dataset

@@ -1,0 +1,284 @@
+// Folders of images with names of all kinds, and the times of their images.
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "dataset/dataset.h"
+#include "dataset/frame_reader.h"
+#include "rig_formats/rig_file.h"
+#include "support/data_on_disk.h"
+
+namespace bslam::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool has_text(const std::vector<std::string>& lines, std::string_view part) {
+  return std::ranges::any_of(lines, [&](const std::string& line) { return line.find(part) != std::string::npos; });
+}
+
+// Folders of 60 x 20 pixels, and rigs for them.
+class ImageFolders : public testing::Test {
+ protected:
+  static constexpr int kImages = 6;
+
+  // Writes images named by `name` to a folder; images of different folders differ.
+  void add(const std::string& folder, const std::function<std::string(int)>& name) {
+    ++folders_;
+    for (int k = 0; k < kImages; ++k) support::write_image(data() / folder / name(k), 60, 20, 100 * folders_ + k);
+  }
+  void add_stamped(const std::string& folder) {
+    add(folder, [](int k) { return std::to_string(1'000'000'000'000 + 50'000'000LL * k) + ".png"; });
+  }
+  static std::string numbered(int k) { return "00000" + std::to_string(k) + ".png"; }
+
+  fs::path rig(const std::vector<std::string>& names) const {
+    std::string text = "bslam_rig: 1\ncameras:\n";
+    for (const std::string& name : names) {
+      text += "  - name: " + name +
+              "\n    model: pinhole\n    resolution: [60, 20]\n    intrinsics: [50, 50, 30, 10]\n"
+              "    T_body_cam: [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+    }
+    const fs::path file = folder_.path() / "rig.yaml";
+    support::write_text(file, text);
+    return file;
+  }
+  Result<Dataset> open(const std::vector<std::string>& rig_names, std::vector<std::string> topics = {},
+                       TimeStampOptions stamps = {}) const {
+    return open_dataset(
+        {.path = data(), .rig_file = rig(rig_names), .topics = std::move(topics), .time_stamps = stamps});
+  }
+  // Expects that opening fails with these words.
+  void expect_error(const Result<Dataset>& dataset, std::string_view words) const {
+    ASSERT_FALSE(dataset);
+    EXPECT_NE(dataset.error().message().find(words), std::string::npos) << dataset.error().message();
+  }
+  fs::path data() const { return folder_.path() / "walk"; }
+  static fs::path folder_of(const Dataset& dataset, std::size_t camera) {
+    return dataset.frames[0].images[camera]->path.parent_path().filename();
+  }
+
+  support::TemporaryFolder folder_;
+  int folders_ = 0;
+};
+
+TEST_F(ImageFolders, OfTheNamesOfCamerasAreFoundByName) {
+  add_stamped("front");
+  add_stamped("rear");
+  const auto dataset = open({"rear", "front"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->format, DatasetFormat::kFolder);
+  EXPECT_EQ(folder_of(*dataset, 0), "rear");
+  EXPECT_EQ(folder_of(*dataset, 1), "front");
+  EXPECT_TRUE(dataset->sources_by_name);
+  EXPECT_EQ(dataset->sources[0], (data() / "rear").string());
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+}
+
+TEST_F(ImageFolders, OfOtherNamesAreInNaturalOrder) {
+  for (const char* name : {"image_10", "image_2", "image_1"}) add_stamped(name);
+  const auto dataset = open({"a", "b", "c"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(folder_of(*dataset, 0), "image_1");
+  EXPECT_EQ(folder_of(*dataset, 1), "image_2");
+  EXPECT_EQ(folder_of(*dataset, 2), "image_10");
+  EXPECT_FALSE(dataset->sources_by_name);
+}
+
+TEST_F(ImageFolders, TheOrderIsAskedForIfItIsNotClear) {
+  for (const char* name : {"infra1", "infra2", "rgb"}) add_stamped(name);
+  expect_error(open({"left", "right"}), "--topics");
+  expect_error(open({"rgb", "right", "left"}), "name the folders in their order with --topics");
+  const auto named = open({"left", "right"}, {"infra2", "infra1"});
+  ASSERT_TRUE(named) << named.error().message();
+  EXPECT_EQ(folder_of(*named, 0), "infra2");
+  EXPECT_EQ(folder_of(*named, 1), "infra1");
+  expect_error(open({"left"}, {"infra3"}), "--topics: found infra3, expected folders with images");
+  expect_error(open({"left", "right"}, {"rgb", "rgb"}), "rgb twice");
+}
+
+TEST_F(ImageFolders, ASubsetOfTheRigIsFoundByName) {
+  for (const char* name : {"cam0", "cam2"}) add_stamped(name);
+  const auto dataset = open_dataset({.path = data(), .rig_file = rig({"cam0", "cam1", "cam2"}), .cameras = {0, 2}});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(folder_of(*dataset, 1), "cam2");
+}
+
+TEST_F(ImageFolders, DepthImagesAndMasksAreLeftOut) {
+  for (const char* name : {"depth", "rgb", "masks"}) add_stamped(name);
+  const auto dataset = open({"camera"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(folder_of(*dataset, 0), "rgb");
+  EXPECT_TRUE(has_text(dataset->warnings, "images in depth, masks are not used"));
+  EXPECT_TRUE(open({"camera"}, {"depth"}));
+}
+
+TEST_F(ImageFolders, OneFolderIsOneCamera) {
+  add_stamped(".");
+  const auto dataset = open({"camera"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+}
+
+TEST_F(ImageFolders, TheVaryingDigitsOfANameAreItsStamp) {
+  add("cam_left", [](int k) { return "left_2_" + std::to_string(1'000'000'000'000 + 50'000'000LL * k) + ".png"; });
+  add("cam_right", [](int k) { return std::to_string(1'000'000'000'000 + 50'000'000LL * k) + "_rgb.jpg"; });
+  const auto dataset = open({"l", "r"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+  EXPECT_EQ(dataset->frames[2].time_ns, 1'000'100'000'000);
+  EXPECT_TRUE(dataset->frames[2].images[1]);
+}
+
+TEST_F(ImageFolders, NumbersWithPrefixesTakeARate) {
+  add("cam0", [](int k) { return "frame_00012" + std::to_string(k) + ".png"; });
+  expect_error(open({"a"}), "--rate HZ if they are image numbers");
+  const auto dataset = open({"a"}, {}, {.rate_hz = 10});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[1].time_ns, 12'100'000'000);
+}
+
+TEST_F(ImageFolders, NamesMayBeDecimalSeconds) {
+  add("cam0", [](int k) { return "1403636579.7" + std::to_string(k) + "3555527.png"; });
+  add("cam1", [](int k) { return "1403636579.7" + std::to_string(k) + "3555.png"; });
+  const auto dataset = open({"a", "b"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+  EXPECT_EQ(dataset->frames[1].images[0]->time_ns, 1'403'636'579'713'555'527);
+  EXPECT_EQ(dataset->frames[1].images[1]->time_ns, 1'403'636'579'713'555'000);
+  expect_error(open({"a", "b"}, {}, {.unit_ns = 1000}), "--stamp-unit: found a recording with times of its own");
+}
+
+TEST_F(ImageFolders, NamesOfSecondsAndUnpaddedNanosecondsAreAskedAbout) {
+  add("cam0", [](int k) { return "12." + std::string(k < 3 ? "9" : "10") + std::to_string(1000000 + k) + ".png"; });
+  expect_error(open({"a"}), "expected as many digits in all names");
+}
+
+TEST_F(ImageFolders, NamesOfSeveralKindsAreAskedAbout) {
+  add("cam0", [](int k) { return "left_" + numbered(k); });
+  add("cam0", [](int k) { return "right_" + numbered(k); });
+  expect_error(open({"a"}), "found images with names of several kinds, such as left_000000.png and right_000000.png");
+}
+
+TEST_F(ImageFolders, NamesWithSeveralNumbersAreAskedAbout) {
+  add("cam0", [](int k) { return std::to_string(k) + "_" + std::to_string(50'000'000LL * k) + ".png"; });
+  expect_error(open({"a"}), "several numbers differ");
+}
+
+TEST_F(ImageFolders, FilesThatAreNotUsedAreCounted) {
+  add_stamped("cam0");
+  support::write_image(data() / "cam0/preview.png", 60, 20);
+  support::write_image(data() / "cam0/mean_1.png", 60, 20);
+  support::write_text(data() / "cam0/scan.exr", "");
+  support::write_text(data() / "cam0/notes.txt", "");
+  const auto dataset = open({"a"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+  EXPECT_TRUE(has_text(dataset->warnings, "3 files that look like images are not used"));
+}
+
+TEST_F(ImageFolders, OtherKindsOfFilesAreRead) {
+  for (const char* kind : {"pgm", "bmp", "tiff"}) {
+    add(kind, [&](int k) { return std::to_string(1'000'000'000'000 + 50'000'000LL * k) + "." + kind; });
+  }
+  const auto dataset = open({"a", "b", "c"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  const image::ImageBundle bundle = read_frame(*dataset, 3);
+  for (const image::CameraImage& image : bundle.images) EXPECT_EQ(image.state, image::ImageState::kPresent);
+}
+
+TEST_F(ImageFolders, TimesOfNumbersAreListed) {
+  add("image_0", numbered);
+  add("left", numbered);
+  support::write_text(data() / "image_0/times.txt", "0\n0.1\n0.2\n3e-1\n0.4\n0.5\n");
+  fs::rename(data() / "image_0", data() / "front");
+  fs::rename(data() / "left", data() / "back");
+  support::write_text(data() / "timestamps.txt", "# seconds\n0.00\n0.10\n0.20\n0.30\n0.40\n0.50\n");
+  const auto dataset = open({"front", "back"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+  EXPECT_EQ(dataset->frames[3].images[0]->time_ns, 300'000'000);
+  EXPECT_EQ(dataset->frames[3].images[1]->time_ns, 300'000'000);
+  const auto rate = open({"front", "back"}, {}, {.rate_hz = 20});  // says what the numbers are
+  ASSERT_TRUE(rate) << rate.error().message();
+  EXPECT_EQ(rate->frames[3].time_ns, 150'000'000);
+}
+
+TEST_F(ImageFolders, ListsMayNameTheImages) {
+  add("rgb", [](int k) { return "colour" + std::to_string(k) + "x" + std::to_string(7 * k) + ".png"; });
+  std::string tum = "# timestamp filename\n", csv = "timestamp [ns],filename\n";
+  for (int k = 0; k < kImages - 1; ++k) {
+    const std::string name = "colour" + std::to_string(k) + "x" + std::to_string(7 * k) + ".png";
+    tum += "130503110" + std::to_string(k) + ".175304 rgb/" + name + "\n";
+    csv += std::to_string(1'000'000'000'000 + 50'000'000LL * k) + "," + name + "\n";
+  }
+  support::write_text(data() / "rgb.txt", tum);
+  auto dataset = open({"a"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages) - 1);
+  EXPECT_EQ(dataset->frames[4].time_ns, 1'305'031'104'175'304'000);
+  EXPECT_EQ(dataset->frames[4].images[0]->path.filename(), "colour4x28.png");
+  EXPECT_TRUE(has_text(dataset->warnings, "1 files that look like images are not used"));
+  support::write_text(data() / "rgb/data.csv", csv);
+  dataset = open({"a"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[4].time_ns, 1'000'200'000'000);
+}
+
+TEST_F(ImageFolders, ListsThatDoNotFitAreRefused) {
+  add("cam0", numbered);
+  const std::pair<const char*, const char*> cases[] = {
+      {"0.0\n0.1\n0.2\n", "times.txt: found 3 times, expected 6, one for each image in"},
+      {"0.0\nsoon\n", "times.txt: line 2: found soon, expected TIME"},
+      {"0\n1\n2\n3\n4\n5\n", "found whole numbers 1 apart, expected seconds with a decimal point"},
+      {"0.0\n50.0\n100.0\n150.0\n200.0\n250.0\n", "found times 50 s apart"},
+      {"0.1 elsewhere/1.png\n0.2 elsewhere/2.png\n", "found no image of"}};
+  for (const auto& [text, words] : cases) {
+    support::write_text(data() / "times.txt", text);
+    expect_error(open({"a"}), words);
+  }
+  support::write_text(data() / "timestamps.txt", "0.0\n");
+  expect_error(open({"a"}), "found times.txt and timestamps.txt, expected one file");
+}
+
+TEST_F(ImageFolders, StampsInNamesAreUsedRatherThanALoneList) {
+  add_stamped("cam0");
+  support::write_text(data() / "times.txt", "1.0\n");
+  const auto dataset = open({"a"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[0].time_ns, 1'000'000'000'000);
+}
+
+TEST_F(ImageFolders, TheSameImagesTwiceAreRefused) {
+  add_stamped("cam0");
+  fs::copy(data() / "cam0", data() / "cam1");
+  expect_error(open({"a", "b"}), "cam1: found the same images as in ");
+}
+
+TEST_F(ImageFolders, ASingleEqualImageIsNoCopy) {
+  add_stamped("cam0");
+  add_stamped("cam1");
+  const std::string first = "1000000000000.png";
+  fs::copy_file(data() / "cam0" / first, data() / "cam1" / first, fs::copy_options::overwrite_existing);
+  EXPECT_TRUE(open({"a", "b"}));
+}
+
+TEST_F(ImageFolders, NoneOfWhoseImagesCanBeReadAreRefusedWithTheReason) {
+  add_stamped("cam0");
+  for (const auto& entry : fs::directory_iterator(data() / "cam0")) support::write_text(entry.path(), "no image");
+  expect_error(open({"a"}),
+               "1000000000000.png: a: found an incomplete image or another format, expected an image that "
+               "can be read: none of 6 that were tried can be");
+}
+
+TEST_F(ImageFolders, AZeroAmongLargeStampsIsDamaged) {
+  add_stamped("cam0");
+  support::write_image(data() / "cam0/0.png", 60, 20);
+  const auto dataset = open({"a"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+  EXPECT_TRUE(has_text(dataset->warnings, "1 image has the damaged time stamp 0 and is not used"));
+}
+
+}  // namespace
+}  // namespace bslam::dataset
