@@ -1,11 +1,16 @@
 #include "cli/command_line_error.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "base/nearest_name.h"
+#include "base/number_text.h"
 
 namespace bslam::cli {
 namespace {
@@ -50,6 +55,69 @@ Error sentence_error(std::string sentence) {
   return error;
 }
 
+// What is before and behind a word in a text.
+struct Parts {
+  std::string before, behind;
+};
+
+std::optional<Parts> parted(const std::string& text, std::string_view word) {
+  const std::size_t at = text.find(word);
+  if (at == std::string::npos) return std::nullopt;
+  return Parts{text.substr(0, at), text.substr(at + word.size())};
+}
+
+Error option_error(const std::string& option, std::string found, std::string expected) {
+  return {"command line", option, std::move(found), std::move(expected)};
+}
+
+// The numbers of a range, as the parser writes it: "0 to 10", or in later versions "[0 - 10]".
+std::string range_text(std::string range) {
+  std::erase_if(range, [](char c) { return c == '[' || c == ']'; });
+  auto bounds = parted(range, " to ");
+  if (!bounds) bounds = parted(range, " - ");
+  const auto least = bounds ? parse_double(bounds->before) : std::nullopt;
+  const auto most = bounds ? parse_double(bounds->behind) : std::nullopt;
+  constexpr double kNoBound = 1e300;
+  if (!least || !most) return "a number in the range " + range;
+  if (*most > kNoBound)
+    return *least > 0 && *least < 1 / kNoBound ? "a number above 0"
+                                               : fmt::format("a number of {:.10g} or more", *least);
+  return fmt::format("a number from {:.10g} to {:.10g}", *least, *most);
+}
+
+std::string kind_of_value(const CLI::App& verb, const std::string& option) {
+  const CLI::Option* const known = verb.get_option_no_throw(option);
+  const std::string type = known == nullptr ? "" : known->get_type_name();
+  if (type.find("FLOAT") != std::string::npos) return "a number";
+  return type.find("INT") != std::string::npos ? "a whole number" : "a value";
+}
+
+// The parser's messages about the value of an option as what was found and what is expected; nullopt: another message.
+std::optional<Error> value_error(const CLI::App& verb, const std::string& text) {
+  if (const auto parts = parted(text, "Could not convert: ")) {
+    const auto value = parted(parts->behind, " = ");
+    if (value) return option_error(value->before, value->behind, kind_of_value(verb, value->before));
+  }
+  if (const auto pair = parted(text, " excludes "))
+    return option_error(pair->before, pair->behind + " as well",
+                        fmt::format("one of {} and {}", pair->before, pair->behind));
+  if (const auto pair = parted(text, " requires "))
+    return option_error(pair->before, "no " + pair->behind, pair->behind + " as well");
+  const auto parts = parted(text, ": ");
+  if (!parts) return std::nullopt;
+  if (text.find(" required ") != std::string::npos && text.ends_with(" missing"))
+    return option_error(parts->before, "no value behind it", kind_of_value(verb, parts->before));
+  if (const auto set = parted(parts->behind, " not in {"); set && set->behind.ends_with('}')) {
+    std::string names = set->behind.substr(0, set->behind.size() - 1);
+    for (std::size_t at = 0; (at = names.find(',', at)) != std::string::npos; at += 2) names.replace(at, 1, ", ");
+    return option_error(parts->before, set->before, "one of: " + names);
+  }
+  if (const auto range = parted(parts->behind, " not in range "); range && range->before.starts_with("Value "))
+    return option_error(parts->before, range->before.substr(std::string_view("Value ").size()),
+                        range_text(range->behind));
+  return std::nullopt;
+}
+
 }  // namespace
 
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error) {
@@ -73,6 +141,7 @@ Error command_line_error(const CLI::App& app, const CLI::ParseError& error) {
     if (nearest == name) return sentence_error("option '" + name + "' must follow the command");
     return sentence_error("unknown option '" + name + "'" + hint(nearest));
   }
+  if (auto of_value = value_error(verb, error.what())) return *std::move(of_value);
   return sentence_error(std::string(error.what()) + " (" + see_help + ")");
 }
 

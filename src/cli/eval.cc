@@ -41,6 +41,21 @@ AlignMode align_mode(const std::string& name) {
   return name == "none" ? AlignMode::kNone : AlignMode::kSe3;
 }
 
+// A calibration without a body has that of camera 0.
+void note_of_body(const camera::Rig& rig, const std::filesystem::path& file) {
+  const geometry::SE3& T_body_cam0 = rig.body_from_cam(0);
+  if (!T_body_cam0.matrix().isIdentity(0)) return;
+  fmt::print(stderr,
+             "note: {} gives camera 0 no pose on the body other than the identity: the body is taken to be camera 0\n",
+             file.string());
+}
+
+// The plot is written as SVG, and so must its name say.
+Status check_plot_name(const std::optional<std::filesystem::path>& plot) {
+  if (!plot || plot->extension().empty() || plot->extension() == ".svg" || plot->extension() == ".SVG") return {};
+  return Error{"command line", "--plot", plot->string(), "a name that ends in .svg, the format that is written"};
+}
+
 // Returns T_cam_frame of the frame of the ground truth and of the camera of the estimate; nullopt if both paths are in
 // one frame.
 Result<std::optional<geometry::SE3>> frame_of_truth(const EvalArguments& arguments) {
@@ -66,6 +81,7 @@ Result<std::optional<geometry::SE3>> frame_of_truth(const EvalArguments& argumen
   if (!rig) return rig.error();
   const auto camera = camera_of_trajectory(arguments.estimate, *rig, *arguments.rig, arguments.camera);
   if (!camera) return camera.error();
+  if (arguments.gt_frame == "body") note_of_body(*rig, *arguments.rig);
   return std::optional(arguments.gt_frame == "body" ? rig->body_from_cam(*camera).inverse()
                                                     : rig->cam_from_rig(*camera));
 }
@@ -128,6 +144,7 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
     if (std::isfinite(value)) continue;
     return Error{.file = "command line", .key = "--max-dt, --delta", .found = "not a number", .expected = "seconds"};
   }
+  if (const Status status = check_plot_name(arguments.plot); !status) return status.error();
   auto read = evaluation::read_trajectory(arguments.estimate, arguments.times);
   if (!read) return read.error();
   auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);

@@ -96,18 +96,21 @@ storage::MapFileInfo map_info(const session::RunRecord& record, const place::Voc
   return {vocabulary.id(), record.version, record.data, warning.empty() ? map_warning : warning};
 }
 
-Status write_files(const session::SessionResult& result, const system::Config& config, const dataset::Dataset& dataset,
-                   const SlamArguments& arguments, const storage::MapFileInfo& info) {
+// Writes all files that can be written. Returns what could not be.
+std::vector<Error> write_files(const session::SessionResult& result, const system::Config& config,
+                               const dataset::Dataset& dataset, const SlamArguments& arguments,
+                               const storage::MapFileInfo& info) {
   const auto report = arguments.no_report
                           ? std::nullopt
                           : std::optional(session::ReportSource{dataset, arguments.command, arguments.up});
-  if (const Status status = session::write_outputs(result, config, arguments.out, report); !status) return status;
-  if (!arguments.journal.empty()) {
-    const Status status = write_atomically(arguments.journal, execution::journal_text(result.journal));
-    if (!status) return status;
-  }
-  if (arguments.save_map.empty()) return {};
-  return storage::write_map(*result.map, info, arguments.save_map);
+  std::vector<Error> errors;
+  const auto note = [&errors](const Status& status) {
+    if (!status) errors.push_back(status.error());
+  };
+  note(session::write_outputs(result, config, arguments.out, report));
+  if (!arguments.journal.empty()) note(write_atomically(arguments.journal, execution::journal_text(result.journal)));
+  if (!arguments.save_map.empty()) note(storage::write_map(*result.map, info, arguments.save_map));
+  return errors;
 }
 
 // Shows the report of the run in the browsers that have followed it.
@@ -260,10 +263,13 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   const std::vector<std::string> warnings = note_warnings(input, of_map, of_source, result->record);
   if (arguments.memory_report) note_report_size(*result, input.config, dataset, arguments);
   const storage::MapFileInfo info = map_info(result->record, **vocabulary, map_warning);
-  if (const Status s = write_files(*result, input.config, dataset, arguments, info); !s) return report_error(s.error());
-  const Status sent = arguments.rerun.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
+  const std::vector<Error> unwritten = write_files(*result, input.config, dataset, arguments, info);
+  const Status sent =
+      arguments.rerun.empty() || !unwritten.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
   end_view(view->get(), *result, input.config, dataset, arguments);
   print_after(result->record, warnings, arguments);
+  for (const Error& error : unwritten) report_error(error);
+  if (!unwritten.empty()) return kExitBadInput;
   if (!sent) return report_error(sent.error());
   return exit_status_of(*result);
 }
