@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cstdint>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -13,7 +11,6 @@
 #include <utility>
 
 #include "base/atomic_file.h"
-#include "image_decoding/codecs.h"
 #include "image_decoding/image_file.h"
 
 namespace bslam::dataset {
@@ -41,49 +38,6 @@ Result<std::vector<fs::path>> images_below(const fs::path& folder) {
   if (error) return Error{folder.string(), "", error.message(), "a folder that can be searched"};
   std::sort(found.begin(), found.end());
   return found;
-}
-
-// Reads a number of a PGM header, after white space and comments.
-std::optional<int> header_number(std::string_view& bytes) {
-  constexpr std::string_view kBlanks = " \t\r\n\v\f";
-  for (;;) {
-    bytes.remove_prefix(std::min(bytes.find_first_not_of(kBlanks), bytes.size()));
-    if (!bytes.starts_with('#')) break;
-    bytes.remove_prefix(std::min(bytes.find('\n'), bytes.size()));
-  }
-  int value = 0;
-  const auto [end, error] = std::from_chars(bytes.data(), bytes.data() + bytes.size(), value);
-  if (error != std::errc() || value <= 0) return std::nullopt;
-  bytes.remove_prefix(static_cast<std::size_t>(end - bytes.data()));
-  return value;
-}
-
-// Binary PGM with 8 bits per pixel.
-std::optional<image::Image> decode_pgm(std::string_view bytes) {
-  bytes.remove_prefix(2);  // "P5"
-  const auto width = header_number(bytes), height = header_number(bytes), most = header_number(bytes);
-  if (!width || !height || !most || *most > 255 || bytes.empty()) return std::nullopt;
-  bytes.remove_prefix(1);  // the single white space before the pixels
-  if (bytes.size() < static_cast<std::uint64_t>(*width) * static_cast<std::uint64_t>(*height)) return std::nullopt;
-  image::Image image(*width, *height);
-  const auto* from = reinterpret_cast<const std::uint8_t*>(bytes.data());
-  std::copy_n(from, static_cast<std::size_t>(*width) * static_cast<std::size_t>(*height), image.row(0));
-  return image;
-}
-
-std::optional<image::Image> decode_webp(std::string_view bytes) {
-  const cv::Mat decoded = image_decoding::decode_to_grey(bytes);
-  if (decoded.empty()) return std::nullopt;
-  image::Image image(decoded.cols, decoded.rows);
-  for (int y = 0; y < decoded.rows; ++y) std::copy_n(decoded.ptr<std::uint8_t>(y), decoded.cols, image.row(y));
-  return image;
-}
-
-// Supports more formats than the images of recordings.
-std::optional<image::Image> decode_any(std::string_view bytes) {
-  if (bytes.starts_with("P5")) return decode_pgm(bytes);
-  if (bytes.starts_with("RIFF") && bytes.size() > 12 && bytes.substr(8, 4) == "WEBP") return decode_webp(bytes);
-  return image_decoding::decode_grey(bytes);
 }
 
 image::Image shrink(const image::Image& image, int max_side) {
@@ -125,7 +79,7 @@ Result<std::vector<fs::path>> find_images(const std::vector<std::string>& paths)
 Result<image::Image> read_training_image(const fs::path& file, int max_side) {
   const auto bytes = read_file(file, kMaxImageBytes);
   if (!bytes) return bytes.error();
-  auto image = decode_any(*bytes);
+  auto image = image_decoding::decode_grey(*bytes);
   if (!image)
     return Error{file.string(), "", "an incomplete image or another format", "a PNG, JPEG, PGM or WebP image"};
   const bool large = max_side > 0 && std::max(image->width(), image->height()) > max_side;

@@ -15,6 +15,8 @@
 namespace bslam::image_decoding {
 namespace {
 
+constexpr std::size_t kMostBytes = std::size_t{1} << 29;  // of an image
+constexpr std::size_t kMostRatio = 3000;  // of any of the compressions; a header that says more is damaged
 constexpr std::uint32_t kNone = 1, kLzw = 5, kDeflate = 8, kPackBits = 32773, kOldDeflate = 32946;
 
 // Reads numbers in the byte order of the file. Outside of the file they are 0.
@@ -112,7 +114,8 @@ std::optional<TiffImage> read_fields(const TiffBytes& in) {
   const bool known = (grey || colour) && image.equal_bits && (image.bits == 8 || image.bits == 16) &&
                      image.planes == 1 && image.sample_format == 1 && (image.predictor == 1 || image.predictor == 2);
   if (!known || image.width < 1 || image.height < 1 || image.width > kSide || image.height > kSide) return std::nullopt;
-  if (std::uint64_t{image.width} * image.height > kMaxPixels) return std::nullopt;
+  const std::uint64_t size = std::uint64_t{image.width} * image.height * image.samples * (image.bits / 8);
+  if (size > kMostBytes || size / kMostRatio > in.bytes.size()) return std::nullopt;
   image.rows_per_strip = std::clamp(image.rows_per_strip, 1U, image.height);
   const std::size_t strips = (image.height + image.rows_per_strip - 1) / image.rows_per_strip;
   return image.offsets.size() == strips && image.sizes.size() == strips ? std::optional(std::move(image))
@@ -168,7 +171,6 @@ std::string unpack_lzw(std::string_view in, std::size_t size) {
 }
 
 std::string unpack_deflate(std::string_view in, std::size_t size) {
-  constexpr std::size_t kMostRatio = 1100;  // of the format; a header that says more is damaged
   if (size / kMostRatio > in.size()) return {};
   const std::unique_ptr<libdeflate_decompressor, void (*)(libdeflate_decompressor*)> decompressor(
       libdeflate_alloc_decompressor(), libdeflate_free_decompressor);

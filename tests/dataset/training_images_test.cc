@@ -59,8 +59,9 @@ TEST(TrainingImages, OfPgmMayHaveComments) {
   ASSERT_TRUE(image.ok());
   EXPECT_EQ(image->width(), 3);
   EXPECT_EQ(image->row(1)[2], 'f');
-  for (const char* text : {"P5", "P5 3", "P5 3 2 65535\nabcdefabcdef", "P5 3 2 255\nabcde", "P5 -3 2 255\nabcdef",
-                           "P5 99999999999 2 255\na", "P5 2000000000 2000000000 255\na", "P5 #"}) {
+  for (const char* text :
+       {"P5", "P5 3", "P5 3 2 65535\nabcdef", "P5 3 2 65536\nabcdefabcdef", "P5 3 2 255\nabcde", "P5 -3 2 255\nabcdef",
+        "P5 99999999999 2 255\na", "P5 2000000000 2000000000 255\na", "P5 #"}) {
     support::write_text(folder.path() / "a.pgm", text);
     EXPECT_FALSE(read_training_image(folder.path() / "a.pgm", 0).ok()) << text;
   }
