@@ -34,11 +34,15 @@ std::string names_of(const camera::Rig& rig) {
 }
 
 // The order of names tells nothing if they are not one for each camera.
-Error unknown_order(const DatasetRequest& request, const std::vector<std::string>& folders, const camera::Rig& rig) {
+Error unknown_order(const DatasetRequest& request, const Recording& recording, const std::vector<std::string>& folders,
+                    const camera::Rig& rig) {
+  for (std::size_t c = 0; c < recording.camera_count(); ++c) {
+    if (const auto images = recording.images(c); !images) return images.error();  // may be those of several cameras
+  }
   const std::string file = request.rig_file ? request.rig_file->string() : "the calibration";
   return {request.path.string(), "", fmt::format("folders of images {}", fmt::join(folders, ", ")),
-          fmt::format("those of the cameras of {} ({}): name the folders in their order with --topics, or call them "
-                      "like the cameras",
+          fmt::format("those of the cameras of {} ({}): name the folders in their order with --topics, call them "
+                      "like the cameras, or select cameras with --cameras",
                       file, names_of(rig))};
 }
 
@@ -93,7 +97,7 @@ Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Re
   if (!folders.empty() && std::ranges::all_of(found, is_found)) return RecordedCameras{found, true};
   if (recording.has_own_names() && !folders.empty() &&
       (folders.size() != rig.size() || std::ranges::any_of(folders_by_name(folders, rig, all), is_found)))
-    return unknown_order(request, folders, rig);
+    return unknown_order(request, recording, folders, rig);
   for (const int camera : cameras) {
     if (static_cast<std::size_t>(camera) < recording.camera_count()) continue;
     const std::size_t there = recording.camera_count();

@@ -171,7 +171,8 @@ bool has_folders_of_images(const fs::path& folder) {
   return found && !found->cameras.empty();
 }
 
-RecordingResult open_folder(const fs::path& folder, const std::vector<std::string>& names, bool lists) {
+RecordingResult open_folder(const fs::path& path, const std::vector<std::string>& names, bool lists) {
+  const fs::path folder = path.has_filename() ? path : path.parent_path();
   auto folders = find_camera_folders(folder, names);
   if (!folders) return folders.error();
   if (folders->cameras.empty())

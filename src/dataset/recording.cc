@@ -103,6 +103,7 @@ RecordingDescription Recording::describe() const {
     StreamDescription stream{.name = "", .type = "images", .encoding = ""};
     const auto list = images(c);
     if (!list) {
+      if (const std::vector<std::string> names = folder_names(); c < names.size()) stream.name = names[c];
       stream.unused = list.error().message();
       out.streams.push_back(std::move(stream));
       continue;

@@ -62,7 +62,7 @@ RecordingResult open_kitti(const std::filesystem::path& folder);      // image_N
 RecordingResult open_kitti_raw(const std::filesystem::path& folder);  // image_NN/data/*.png and timestamps.txt
 // A folder of images for each camera: `names`, or all if that is empty. `lists`: numbers in names of images get their
 // times from times.txt and the like (dataset/time_list.h), if there is one.
-RecordingResult open_folder(const std::filesystem::path& folder, const std::vector<std::string>& names, bool lists);
+RecordingResult open_folder(const std::filesystem::path& path, const std::vector<std::string>& names, bool lists);
 // Videos: one per camera, or one with the images of two cameras side by side. Their first images were taken together.
 RecordingResult open_video(const std::vector<std::filesystem::path>& files, bool side_by_side);
 

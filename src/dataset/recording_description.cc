@@ -85,13 +85,16 @@ std::vector<std::string> missing_for(const DatasetRequest& request, const Record
   return missing;
 }
 
-// Decodes a few images of every camera.
+// Decodes a few images of every camera, and adds the warnings about their time stamps.
 void try_images(const Recording& recording, RecordingDescription& out) {
   std::vector<std::vector<image_files::ImageFile>> images;
   for (StreamDescription& stream : out.streams) {
     if (stream.camera < 0) continue;
     auto list = recording.images(static_cast<std::size_t>(stream.camera));
     if (!list) continue;
+    for (const std::string& warning : list->warnings) {
+      if (std::ranges::find(out.warnings, warning) == out.warnings.end()) out.warnings.push_back(warning);
+    }
     if (auto note = unreadable_note(list->images)) stream.notes.push_back(*std::move(note));
     images.push_back(std::move(list->images));
   }

@@ -108,13 +108,14 @@ Result<TimeList> read_time_list(const fs::path& file) {
 }
 
 Result<std::optional<TimeList>> find_time_list(const fs::path& folder, const fs::path& data) {
-  const std::string name = folder.filename().string();
+  const bool deeper = folder != data && folder.parent_path() != data;
+  const std::string name = (deeper ? folder.parent_path() : folder).filename().string();
   const std::vector<std::string> usual = {"times.txt", "timestamps.txt", "times.csv", "timestamps.csv"};
   const std::vector<std::string> of_camera = {name + ".txt", name + ".csv"};
   std::vector<std::string> inside = usual;
   inside.insert(inside.end(), {"data.csv", of_camera[0], of_camera[1]});
   std::vector<std::pair<fs::path, std::vector<std::string>>> places = {{folder, inside}};
-  if (folder != data && folder.parent_path() != data) places.emplace_back(folder.parent_path(), inside);
+  if (deeper) places.emplace_back(folder.parent_path(), inside);
   if (folder != data) {
     places.emplace_back(data, of_camera);
     places.emplace_back(data, usual);

@@ -158,6 +158,10 @@ TEST_F(ImageFolders, NamesOfSeveralKindsAreAskedAbout) {
   add("cam0", [](int k) { return "left_" + numbered(k); });
   add("cam0", [](int k) { return "right_" + numbered(k); });
   expect_error(open({"a"}), "found images with names of several kinds, such as left_000000.png and right_000000.png");
+  fs::rename(data() / "cam0", folder_.path() / "both");
+  fs::remove_all(data());
+  fs::rename(folder_.path() / "both", data());
+  expect_error(open({"a", "b"}), "found images with names of several kinds");  // rather than the number of folders
 }
 
 TEST_F(ImageFolders, NamesWithSeveralNumbersAreAskedAbout) {
@@ -223,6 +227,20 @@ TEST_F(ImageFolders, ListsMayNameTheImages) {
   dataset = open({"a"});
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(dataset->frames[4].time_ns, 1'000'200'000'000);
+}
+
+TEST_F(ImageFolders, ImagesMayBeOneFolderDeeper) {
+  add("front/data", numbered);
+  std::string csv;
+  for (int k = 0; k < kImages; ++k)
+    csv += std::to_string(1'000'000'000'000 + 50'000'000LL * k) + "," + numbered(k) + "\n";
+  for (const char* list : {"front/data.csv", "front.txt"}) {
+    support::write_text(data() / list, csv);
+    const auto dataset = open_dataset({.path = data() / "", .rig_file = rig({"front"})});
+    ASSERT_TRUE(dataset) << list << dataset.error().message();
+    EXPECT_EQ(dataset->frames[3].time_ns, 1'000'150'000'000) << list;
+    fs::remove(data() / list);
+  }
 }
 
 TEST_F(ImageFolders, ListsThatDoNotFitAreRefused) {
