@@ -297,5 +297,38 @@ TEST_F(CommandLine, AnInterruptedRunWritesItsResultsAndReportsIt) {
   EXPECT_EQ(nlohmann::json::parse(read_text(folder + "/summary.json"))["complete"], false);
 }
 
+// A limit of the sizes of files stands for a full disk: trajectories fit, the map does not.
+TEST_F(CommandLine, ARunWhoseMapCannotBeWrittenStillPrintsItsResult) {
+  const std::string script = out("full.sh");
+  support::write_text(script, "trap '' XFSZ\nulimit -f 100\nexec \"$@\"\n");
+  const std::string command = "sh " + script + " " + BSLAM_PROGRAM + " run " + data() + " --out " + out("full") +
+                              " --no-report --progress never --log-level error --save-map " + out("full.map") + " >" +
+                              out("stdout") + " 2>" + out("stderr");
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_NE(WEXITSTATUS(status), 0);
+  const std::string printed = read_text(out("stdout")), errors = read_text(out("stderr"));
+  EXPECT_NE(printed.find("of 15 frames have a pose"), std::string::npos) << printed << errors;
+  EXPECT_NE(errors.find("full.map"), std::string::npos) << errors;
+  EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << errors;
+  EXPECT_TRUE(fs::exists(out("full/trajectory.tum")));
+  EXPECT_FALSE(fs::exists(out("full.map")));
+}
+
+TEST_F(CommandLine, EvalSaysWhatItCannotKnowOrWrite) {
+  const std::string truth = data() + "/groundtruth_cam0.tum", both = "eval " + truth + " " + truth;
+  const Ran plot = run(both + " --plot " + out("plot.png"));
+  EXPECT_EQ(plot.status, 2);
+  EXPECT_NE(plot.err.find("plot.png, expected a name that ends in .svg"), std::string::npos) << plot.err;
+  EXPECT_FALSE(fs::exists(out("plot.png")));
+  EXPECT_EQ(run(both + " --plot " + out("plot.svg")).status, 0);
+  support::write_text(out("bodiless.yaml"),
+                      "cam0:\n  camera_model: pinhole\n  intrinsics: [50, 50, 30, 10]\n  distortion_model: none\n"
+                      "  distortion_coeffs: []\n  resolution: [60, 20]\n");
+  const Ran body = run(both + " --gt-frame body --rig " + out("bodiless.yaml"));
+  EXPECT_EQ(body.status, 0) << body.err;
+  EXPECT_NE(body.err.find("the body is taken to be camera 0\n"), std::string::npos) << body.err;
+}
+
 }  // namespace
 }  // namespace bslam
