@@ -71,18 +71,17 @@ Error option_error(const std::string& option, std::string found, std::string exp
 }
 
 // The numbers of a range, as the parser writes it: "0 to 10", or in later versions "[0 - 10]".
-std::string range_text(std::string range) {
+std::string range_text(std::string range, const std::string& kind) {
   std::erase_if(range, [](char c) { return c == '[' || c == ']'; });
   auto bounds = parted(range, " to ");
   if (!bounds) bounds = parted(range, " - ");
   const auto least = bounds ? parse_double(bounds->before) : std::nullopt;
   const auto most = bounds ? parse_double(bounds->behind) : std::nullopt;
   constexpr double kNoBound = 1e300;
-  if (!least || !most) return "a number in the range " + range;
+  if (!least || !most) return kind + " in the range " + range;
   if (*most > kNoBound)
-    return *least > 0 && *least < 1 / kNoBound ? "a number above 0"
-                                               : fmt::format("a number of {:.10g} or more", *least);
-  return fmt::format("a number from {:.10g} to {:.10g}", *least, *most);
+    return *least > 0 && *least < 1 / kNoBound ? kind + " above 0" : fmt::format("{} of {:.10g} or more", kind, *least);
+  return fmt::format("{} from {:.10g} to {:.10g}", kind, *least, *most);
 }
 
 std::string kind_of_value(const CLI::App& verb, const std::string& option) {
@@ -114,7 +113,7 @@ std::optional<Error> value_error(const CLI::App& verb, const std::string& text) 
   }
   if (const auto range = parted(parts->behind, " not in range "); range && range->before.starts_with("Value "))
     return option_error(parts->before, range->before.substr(std::string_view("Value ").size()),
-                        range_text(range->behind));
+                        range_text(range->behind, kind_of_value(verb, parts->before)));
   return std::nullopt;
 }
 

@@ -268,6 +268,7 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
       arguments.rerun.empty() || !unwritten.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
   end_view(view->get(), *result, input.config, dataset, arguments);
   print_after(result->record, warnings, arguments);
+  std::fflush(stdout);  // the result comes before what could not be written
   for (const Error& error : unwritten) report_error(error);
   if (!unwritten.empty()) return kExitBadInput;
   if (!sent) return report_error(sent.error());

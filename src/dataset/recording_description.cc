@@ -85,8 +85,8 @@ std::vector<std::string> missing_for(const DatasetRequest& request, const Record
   return missing;
 }
 
-// Decodes a few images of every camera, and adds the warnings about their time stamps.
-void try_images(const Recording& recording, RecordingDescription& out) {
+// Decodes a few images of every camera, and adds what is wrong with their time stamps.
+void try_images(const DatasetRequest& request, const Recording& recording, RecordingDescription& out) {
   std::vector<std::vector<image_files::ImageFile>> images;
   for (StreamDescription& stream : out.streams) {
     if (stream.camera < 0) continue;
@@ -96,6 +96,9 @@ void try_images(const Recording& recording, RecordingDescription& out) {
       if (std::ranges::find(out.warnings, warning) == out.warnings.end()) out.warnings.push_back(warning);
     }
     if (auto note = unreadable_note(list->images)) stream.notes.push_back(*std::move(note));
+    const std::string source = image_files::source_of(list->images.front());
+    if (const Status s = convert_time_stamps(request.time_stamps, source, list->images); !s)
+      out.missing.push_back(s.error().message());
     images.push_back(std::move(list->images));
   }
   if (const Status s = check_different_images(images); !s) out.missing.push_back(s.error().message());
@@ -132,7 +135,7 @@ Result<RecordingDescription> describe_recording(const DatasetRequest& request) {
   if (out.format.empty()) out.format = format_name(opened->format);
   const std::vector<std::string> damage = opened->recording->warnings();
   out.warnings.insert(out.warnings.begin(), damage.begin(), damage.end());
-  try_images(*opened->recording, out);
+  try_images(request, *opened->recording, out);
   number_by_names(request, *opened->recording, out);
   const std::vector<std::string> missing = missing_for(request, *opened->recording, out.streams);
   out.missing.insert(out.missing.end(), missing.begin(), missing.end());

@@ -5,6 +5,7 @@
 
 #include "dataset/dataset.h"
 #include "dataset/frame_reader.h"
+#include "dataset/recording_description.h"
 #include "rig_formats/rig_file.h"
 #include "support/data_on_disk.h"
 
@@ -133,6 +134,8 @@ TEST_F(ImageFolders, TheVaryingDigitsOfANameAreItsStamp) {
 TEST_F(ImageFolders, NumbersWithPrefixesTakeARate) {
   add("cam0", [](int k) { return "frame_00012" + std::to_string(k) + ".png"; });
   expect_error(open({"a"}), "--rate HZ if they are image numbers");
+  const auto described = describe_recording({.path = data(), .rig_file = rig({"a"})});
+  EXPECT_TRUE(has_text(described->missing, "--rate HZ if they are image numbers"));
   const auto dataset = open({"a"}, {}, {.rate_hz = 10});
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(dataset->frames[1].time_ns, 12'100'000'000);

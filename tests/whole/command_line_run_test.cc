@@ -300,7 +300,7 @@ TEST_F(CommandLine, AnInterruptedRunWritesItsResultsAndReportsIt) {
 // A limit of the sizes of files stands for a full disk: trajectories fit, the map does not.
 TEST_F(CommandLine, ARunWhoseMapCannotBeWrittenStillPrintsItsResult) {
   const std::string script = out("full.sh");
-  support::write_text(script, "trap '' XFSZ\nulimit -f 100\nexec \"$@\"\n");
+  support::write_text(script, "trap '' XFSZ\nulimit -f 1500\nexec \"$@\"\n");
   const std::string command = "sh " + script + " " + BSLAM_PROGRAM + " run " + data() + " --out " + out("full") +
                               " --no-report --progress never --log-level error --save-map " + out("full.map") + " >" +
                               out("stdout") + " 2>" + out("stderr");
