@@ -76,7 +76,7 @@ TEST_F(CommandLine, RejectsBadRequestsForLiveRuns) {
         std::pair("--rerun " + data() + "/rig.yaml" + folder, "--rerun: found an existing file"),
         std::pair(" --out " + data(), "--out: found a folder that is not empty"),
         std::pair("--out " + data() + "/rig.yaml/out", "--out: found "),
-        std::pair("--duration 0" + folder, "--duration: Value 0")}) {
+        std::pair("--duration 0" + folder, "--duration: found 0")}) {
     const Ran ran = run(none + arguments);
     EXPECT_EQ(ran.status, 2) << arguments;
     EXPECT_NE(ran.err.find(message), std::string::npos) << arguments << ": " << ran.err;
