@@ -39,6 +39,10 @@ CameraImages from_names(NamedImages named, const fs::path& folder) {
           .left_out_count = named.left_out_count};
 }
 
+image_files::StampUnit unit_of(const TimeList& list) {
+  return list.in_seconds ? image_files::StampUnit::kSeconds : image_files::StampUnit::kOfFile;
+}
+
 // Times of images in the order of their numbers.
 Result<CameraImages> with_times(const TimeList& list, NamedImages named, const fs::path& folder) {
   if (list.times_ns.size() != named.images.size()) {
@@ -46,11 +50,10 @@ Result<CameraImages> with_times(const TimeList& list, NamedImages named, const f
                  fmt::format("{}, one for each image in {}", named.images.size(), folder.string())};
   }
   for (std::size_t k = 0; k < named.images.size(); ++k) named.images[k].time_ns = list.times_ns[k];
-  CameraImages out{
-      .list = image_files::in_time_order(std::move(named.images), list.file.string(), image_files::StampUnit::kSeconds),
-      .times_from = list.file.filename().string(),
-      .left_out = std::move(named.left_out),
-      .left_out_count = named.left_out_count};
+  CameraImages out{.list = image_files::in_time_order(std::move(named.images), list.file.string(), unit_of(list)),
+                   .times_from = list.file.filename().string(),
+                   .left_out = std::move(named.left_out),
+                   .left_out_count = named.left_out_count};
   return out;
 }
 
@@ -72,9 +75,8 @@ Result<CameraImages> with_named_times(const TimeList& list, const std::vector<fs
     return Error{list.file.string(), "", "no image of " + folder.string(),
                  "lines of TIME FILENAME for the images in it"};
   }
-  CameraImages out{
-      .list = image_files::in_time_order(std::move(images), list.file.string(), image_files::StampUnit::kSeconds),
-      .times_from = list.file.filename().string()};
+  CameraImages out{.list = image_files::in_time_order(std::move(images), list.file.string(), unit_of(list)),
+                   .times_from = list.file.filename().string()};
   for (const auto& [file, is_unused] : unused) {
     if (is_unused && out.left_out_count++ == 0) out.left_out = (folder / file).string();
   }

@@ -97,6 +97,7 @@ Result<TimeList> read_time_list(const fs::path& file) {
   if (!lines) return lines.error();
   TimeList list{.file = file, .times_ns = {}, .names = {}};
   const bool whole = std::ranges::all_of(*lines, is_whole);
+  list.in_seconds = !whole;
   for (const Line& line : *lines) {
     const auto time = whole ? parse_integer(line.time) : evaluation::parse_seconds(line.time);
     if (!time || *time < 0 || *time > kMaxTime) return line_error(file, line);

@@ -15,6 +15,7 @@ struct TimeList {
   std::filesystem::path file;
   std::vector<TimeNs> times_ns;
   std::vector<std::string> names;  // as many as times, or none
+  bool in_seconds = true;          // else whole nanoseconds
 };
 
 // Returns the list of times of a folder of images: times.txt, timestamps.txt, the same with .csv, data.csv or

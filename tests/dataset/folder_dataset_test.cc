@@ -226,10 +226,12 @@ TEST_F(ImageFolders, ListsMayNameTheImages) {
   EXPECT_EQ(dataset->frames[4].time_ns, 1'305'031'104'175'304'000);
   EXPECT_EQ(dataset->frames[4].images[0]->path.filename(), "colour4x28.png");
   EXPECT_TRUE(has_text(dataset->warnings, "1 files that look like images are not used"));
+  csv += "1000010000000,colour5x35.png\n";
   support::write_text(data() / "rgb/data.csv", csv);
   dataset = open({"a"});
   ASSERT_TRUE(dataset) << dataset.error().message();
-  EXPECT_EQ(dataset->frames[4].time_ns, 1'000'200'000'000);
+  EXPECT_EQ(dataset->frames[5].time_ns, 1'000'200'000'000);
+  EXPECT_TRUE(has_text(dataset->warnings, "step back 1 time, first from 1000200000000 to 1000010000000"));
 }
 
 TEST_F(ImageFolders, ImagesMayBeOneFolderDeeper) {
