@@ -151,7 +151,9 @@ class FolderRecording : public Recording {
     }
     if (count == 0) return;
     folders_.warnings.push_back(
-        fmt::format("{}: {} files that look like images are not used, such as {}", data_.string(), count, first));
+        count == 1
+            ? fmt::format("{}: a file that looks like an image is not used: {}", data_.string(), first)
+            : fmt::format("{}: {} files that look like images are not used, such as {}", data_.string(), count, first));
   }
 
   fs::path data_;

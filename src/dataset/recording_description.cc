@@ -95,7 +95,10 @@ void try_images(const DatasetRequest& request, const Recording& recording, Recor
     for (const std::string& warning : list->warnings) {
       if (std::ranges::find(out.warnings, warning) == out.warnings.end()) out.warnings.push_back(warning);
     }
-    if (auto note = unreadable_note(list->images)) stream.notes.push_back(*std::move(note));
+    if (auto note = unreadable_note(list->images)) {
+      if (stream.width == 0) out.missing.push_back(stream.name + ": images that can be read");
+      stream.notes.push_back(*std::move(note));
+    }
     const std::string source = image_files::source_of(list->images.front());
     if (const Status s = convert_time_stamps(request.time_stamps, source, list->images); !s)
       out.missing.push_back(s.error().message());

@@ -76,6 +76,19 @@ TEST_F(ImageFolders, OfTheNamesOfCamerasAreFoundByName) {
   EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
 }
 
+TEST_F(ImageFolders, AreDescribedWithTheNumbersOfTheRig) {
+  for (const char* name : {"front", "other", "rear"}) add_stamped(name);
+  const auto described = describe_recording({.path = data(), .rig_file = rig({"rear", "front"})});
+  ASSERT_TRUE(described);
+  ASSERT_EQ(described->streams.size(), 3u);
+  EXPECT_EQ(described->streams[0].camera, 1);
+  EXPECT_EQ(described->streams[1].camera, -1);
+  EXPECT_EQ(described->streams[2].camera, 0);
+  const auto unclear = describe_recording({.path = data(), .rig_file = rig({"rear", "left"})});
+  ASSERT_TRUE(unclear);
+  EXPECT_TRUE(has_text(unclear->missing, "--topics"));
+}
+
 TEST_F(ImageFolders, OfOtherNamesAreInNaturalOrder) {
   for (const char* name : {"image_10", "image_2", "image_1"}) add_stamped(name);
   const auto dataset = open({"a", "b", "c"});
@@ -225,7 +238,7 @@ TEST_F(ImageFolders, ListsMayNameTheImages) {
   ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages) - 1);
   EXPECT_EQ(dataset->frames[4].time_ns, 1'305'031'104'175'304'000);
   EXPECT_EQ(dataset->frames[4].images[0]->path.filename(), "colour4x28.png");
-  EXPECT_TRUE(has_text(dataset->warnings, "1 files that look like images are not used"));
+  EXPECT_TRUE(has_text(dataset->warnings, "a file that looks like an image is not used: "));
   csv += "1000010000000,colour5x35.png\n";
   support::write_text(data() / "rgb/data.csv", csv);
   dataset = open({"a"});
@@ -292,6 +305,7 @@ TEST_F(ImageFolders, NoneOfWhoseImagesCanBeReadAreRefusedWithTheReason) {
   expect_error(open({"a"}),
                "1000000000000.png: a: found an incomplete image or another format, expected an image that "
                "can be read: none of 6 that were tried can be");
+  EXPECT_TRUE(has_text(describe_recording({.path = data()})->missing, "cam0: images that can be read"));
 }
 
 TEST_F(ImageFolders, AZeroAmongLargeStampsIsDamaged) {
