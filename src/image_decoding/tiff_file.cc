@@ -1,4 +1,5 @@
-// TIFF 6.0 (Adobe, 1992): images in strips of rows, with the compressions that cameras and libraries write.
+// TIFF 6.0 (Adobe, 1992): images in strips of rows, with the compressions that cameras and libraries write. libtiff is
+// not used: as distributed it needs libjbig, which has a GPL licence.
 #include <libdeflate.h>
 
 #include <algorithm>

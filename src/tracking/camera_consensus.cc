@@ -8,6 +8,15 @@ namespace bslam::tracking {
 
 using geometry::SE3;
 
+namespace {
+
+bool conflict(const LandmarkCounts& agreeing, const ConsensusOptions& options) {
+  return agreeing.expected >= options.min_expected &&
+         agreeing.found < options.conflict_inlier_ratio * agreeing.expected;
+}
+
+}  // namespace
+
 CameraConsensusState readmitted(bool established) {
   CameraConsensusState camera;
   camera.established = established;
@@ -49,62 +58,89 @@ std::vector<LandmarkCounts> count_reobserved(const map::BundledMap& map, const f
   return out;
 }
 
-std::vector<std::uint8_t> conflicting_cameras(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
-                                              const std::vector<CameraConsensusState>& states,
-                                              const ConsensusOptions& options) {
-  std::vector<std::uint8_t> out(matches.size(), 0);
-  for (std::size_t c = 0; c < states.size(); ++c) {
-    if (!states[c].established) continue;
-    const auto found = static_cast<int>(matches[c].size());
-    out[c] = found >= options.min_expected && inliers_per_camera[c] < options.conflict_inlier_ratio * found;
+std::vector<LandmarkCounts> count_agreeing(const FrameMatches& matches, std::span<const std::uint8_t> inlier,
+                                           const ConsensusOptions& options) {
+  std::vector<LandmarkCounts> out(matches.size());
+  std::vector<std::vector<LandmarkId>> outliers(matches.size());
+  std::size_t i = 0;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    out[c].expected = static_cast<int>(matches[c].size());
+    for (const Match& m : matches[c]) {
+      const bool agrees = inlier[i++] != 0;
+      out[c].found += agrees;
+      if (!agrees) outliers[c].push_back(m.landmark);
+    }
+  }
+  std::vector<LandmarkId> moved;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    if (!conflict(out[c], options)) moved.insert(moved.end(), outliers[c].begin(), outliers[c].end());
+  }
+  std::ranges::sort(moved);
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    if (!conflict(out[c], options)) continue;
+    out[c].expected -= static_cast<int>(
+        std::ranges::count_if(outliers[c], [&](LandmarkId l) { return std::ranges::binary_search(moved, l); }));
   }
   return out;
 }
 
-std::vector<std::uint8_t> contradicting_cameras(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
+std::vector<std::uint8_t> conflicting_cameras(const std::vector<LandmarkCounts>& agreeing,
+                                              const std::vector<CameraConsensusState>& states,
+                                              const ConsensusOptions& options) {
+  std::vector<std::uint8_t> out(agreeing.size(), 0);
+  for (std::size_t c = 0; c < states.size(); ++c) out[c] = states[c].established && conflict(agreeing[c], options);
+  return out;
+}
+
+std::vector<std::uint8_t> contradicting_cameras(const std::vector<LandmarkCounts>& agreeing,
                                                 const std::vector<CameraConsensusState>& states,
                                                 const ConsensusOptions& options) {
   constexpr double kClearlyLess = 0.5;  // of the largest inlier ratio
-  const auto ratio = [&](std::size_t c) {
-    return matches[c].empty() ? 0.0 : inliers_per_camera[c] / static_cast<double>(matches[c].size());
-  };
-  std::vector<std::uint8_t> out = conflicting_cameras(matches, inliers_per_camera, states, options);
+  std::vector<std::uint8_t> out = conflicting_cameras(agreeing, states, options);
   double best = 0;
-  for (std::size_t c = 0; c < out.size(); ++c) {
-    if (static_cast<int>(matches[c].size()) >= options.min_expected) best = std::max(best, ratio(c));
+  for (const LandmarkCounts& camera : agreeing) {
+    if (camera.expected >= options.min_expected) best = std::max(best, camera.ratio());
   }
   for (std::size_t c = 0; c < out.size(); ++c) {
-    if (ratio(c) >= kClearlyLess * best) out[c] = 0;
+    if (agreeing[c].ratio() >= kClearlyLess * best) out[c] = 0;
   }
   return out;
 }
 
 solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, const FrameMatches& matches,
                                                     std::span<const solver::PoseObservation> observations,
-                                                    const SE3& predicted, const ConsensusOptions& options,
+                                                    const solver::PoseSolution& of_all, const SE3& predicted,
+                                                    const ConsensusOptions& options,
                                                     const solver::PoseSolverOptions& pose) {
   constexpr double kRadiansPerMetre = 1.0;  // weight of a translation relative to a rotation
-  constexpr double kMaxChi2 = 25.0;  // squared normalised error of observations that agree with a camera's own pose
+  constexpr double kMaxChi2 = 25.0;         // squared normalised error of observations that agree with such a pose
   solver::PoseSolution best;
   double min_distance = std::numeric_limits<double>::infinity();
-  std::size_t first = 0;
-  for (const auto& camera : matches) {
-    const auto own = observations.subspan(first, camera.size());
-    first += camera.size();
-    if (static_cast<int>(camera.size()) < options.min_expected) continue;
-    const solver::PoseSolution single = solver::solve_pose(rig, own, predicted, pose);
-    if (!single.ok || single.num_inliers < options.healthy_reobservation_ratio * static_cast<double>(camera.size()))
-      continue;
-    const geometry::Vector6d difference = (single.T_rig_world * predicted.inverse()).log();
+  const auto consider = [&](const SE3& T_rig_world) {
+    const geometry::Vector6d difference = (T_rig_world * predicted.inverse()).log();
     const double distance = difference.head<3>().norm() + kRadiansPerMetre * difference.tail<3>().norm();
-    if (distance >= min_distance) continue;
+    if (distance >= min_distance) return;
     solver::PoseSolverOptions near = pose;
     near.first_chi2 = kMaxChi2;
-    solver::PoseSolution joint = solver::solve_pose(rig, observations, single.T_rig_world, near);
-    if (!joint.ok) continue;
+    solver::PoseSolution joint = solver::solve_pose(rig, observations, T_rig_world, near);
+    if (!joint.ok) return;
     min_distance = distance;
     best = std::move(joint);
+  };
+  const auto healthy = [&](int inliers, std::size_t found) {
+    return inliers >= options.healthy_reobservation_ratio * static_cast<double>(found);
+  };
+  std::size_t first = 0;
+  bool any_healthy = false;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    const auto own = observations.subspan(first, matches[c].size());
+    first += own.size();
+    if (static_cast<int>(own.size()) < options.min_expected) continue;
+    const solver::PoseSolution single = solver::solve_pose(rig, own, predicted, pose);
+    if (single.ok && healthy(single.num_inliers, own.size())) consider(single.T_rig_world);
+    any_healthy = any_healthy || (of_all.ok && healthy(of_all.inliers_per_camera[c], own.size()));
   }
+  if (any_healthy) consider(of_all.T_rig_world);
   return best;
 }
 

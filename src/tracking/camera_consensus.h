@@ -43,24 +43,31 @@ std::vector<LandmarkCounts> count_reobserved(const map::BundledMap& map, const f
                                              const std::vector<CameraConsensusState>& states,
                                              const FrameMatches& found);
 
+// Per camera: how many of its matches tell whether it agrees with a pose, and how many of these do. `inlier`: of the
+// matches, in order. A landmark that a camera without conflict finds elsewhere too has moved by itself; that it is an
+// outlier of a camera that few matches agree with does not count.
+std::vector<LandmarkCounts> count_agreeing(const FrameMatches& matches, std::span<const std::uint8_t> inlier,
+                                           const ConsensusOptions& options);
+
 // Flags the cameras that have many matches of which few agree with the pose. A camera that is not established is not
 // flagged: the landmarks in its view were observed by other cameras only, so that its matches may be wrong.
-std::vector<std::uint8_t> conflicting_cameras(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
+std::vector<std::uint8_t> conflicting_cameras(const std::vector<LandmarkCounts>& agreeing,
                                               const std::vector<CameraConsensusState>& states,
                                               const ConsensusOptions& options);
 // Flags those of the conflicting cameras that agree clearly less with the pose than the best camera does. In a blurred
 // or badly predicted frame all cameras agree little; this is no reason to exclude one.
-std::vector<std::uint8_t> contradicting_cameras(const FrameMatches& matches, const std::vector<int>& inliers_per_camera,
+std::vector<std::uint8_t> contradicting_cameras(const std::vector<LandmarkCounts>& agreeing,
                                                 const std::vector<CameraConsensusState>& states,
                                                 const ConsensusOptions& options);
 
 // The pose if cameras contradict each other. A pose is estimated from each camera with enough matches, and used if it
-// has enough inliers (`healthy_reobservation_ratio`). The one nearest to the prediction of the motion model is refined
-// with all observations that agree with it. Returns a solution that is not ok if there is none. `observations`: those
-// of `matches`, in the same order.
+// has enough inliers (`healthy_reobservation_ratio`), as is `of_all`, the pose from all cameras, if it has enough in
+// one of them. The one nearest to the prediction of the motion model is refined with all observations that agree with
+// it. Returns a solution that is not ok if there is none. `observations`: those of `matches`, in the same order.
 solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, const FrameMatches& matches,
                                                     std::span<const solver::PoseObservation> observations,
-                                                    const geometry::SE3& predicted, const ConsensusOptions& options,
+                                                    const solver::PoseSolution& of_all, const geometry::SE3& predicted,
+                                                    const ConsensusOptions& options,
                                                     const solver::PoseSolverOptions& pose);
 
 // Flags the cameras that lost most of their landmarks from one frame to the next while another camera re-observed its

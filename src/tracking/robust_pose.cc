@@ -140,4 +140,23 @@ solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFr
   return choice.best();
 }
 
+solver::PoseSolution sampled_pose(const TrackInput& input, const frame::BundledFrame& frame,
+                                  const FrameMatches& matches, std::span<const solver::PoseObservation> observations,
+                                  const geometry::SE3& predicted, const solver::PoseSolverOptions& options) {
+  const camera::Rig rig = frame::rig_of(input.map.rig(), frame);
+  const auto sample = [&](std::span<const solver::PoseObservation> from, const char* name) {
+    return estimators::ransac_pose(rig, from, predicted, options, {},
+                                   Random(input.seed, name, static_cast<std::uint64_t>(frame.id.value())));
+  };
+  solver::PoseSolution first = sample(observations, "wide search");
+  if (!few(first, kFewInliers, observations.size())) return first;
+  solver::PoseSolverOptions near_start = options;
+  near_start.first_chi2 = kAgreesWithStart;
+  const auto of_outliers = first.ok ? sample(outliers(first, observations), "outliers") : solver::PoseSolution();
+  PoseChoice choice(input.map, matches, observations, std::move(first));
+  if (of_outliers.ok) choice.consider(solver::solve_pose(rig, observations, of_outliers.T_rig_world, near_start));
+  choice.consider(solver::solve_pose(rig, observations, predicted, near_start));
+  return choice.best();
+}
+
 }  // namespace bslam::tracking

@@ -32,4 +32,10 @@ solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFr
                                  std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
                                  const solver::MotionModel& motion, const solver::PoseSolverOptions& options);
 
+// The same for matches found in wide windows, many of which are wrong: the first pose and that of its outliers are
+// estimated by RANSAC.
+solver::PoseSolution sampled_pose(const TrackInput& input, const frame::BundledFrame& frame,
+                                  const FrameMatches& matches, std::span<const solver::PoseObservation> observations,
+                                  const geometry::SE3& predicted, const solver::PoseSolverOptions& options);
+
 }  // namespace bslam::tracking

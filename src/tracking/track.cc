@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <numeric>
 
-#include "estimators/pose_ransac.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
@@ -58,13 +57,15 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
   const solver::MotionModel motion = motion_model(input, frame);
   auto solution = robust_pose(input, frame, found, observations, predicted, motion, options.pose);
-  if (any(conflicting_cameras(found, solution.inliers_per_camera, input.state.cameras, options.consensus))) {
+  const auto conflicting = [&](const solver::PoseSolution& pose, const auto& flags) {
+    return flags(count_agreeing(found, pose.inlier, options.consensus), input.state.cameras, options.consensus);
+  };
+  if (any(conflicting(solution, conflicting_cameras))) {
     const SE3 from_motion = predict(input, frame.time_ns);
-    const auto consistent =
-        pose_of_most_consistent_camera(rig, found, observations, from_motion, options.consensus, options.pose);
+    const auto consistent = pose_of_most_consistent_camera(rig, found, observations, solution, from_motion,
+                                                           options.consensus, options.pose);
     if (consistent.ok) {
-      const auto wrong =
-          contradicting_cameras(found, consistent.inliers_per_camera, input.state.cameras, options.consensus);
+      const auto wrong = conflicting(consistent, contradicting_cameras);
       for (std::size_t c = 0; c < wrong.size(); ++c) excluded[c] |= wrong[c];
       drop(excluded, found);
       observations = pose_observations(map, frame, found, input.features);
@@ -99,9 +100,7 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   drop(out.excluded, search.found);
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return false;
   const auto observations = pose_observations(map, frame, search.found, input.features);
-  const auto solution =
-      estimators::ransac_pose(frame::rig_of(map.rig(), frame), observations, out.T_rig_world, options.pose, {},
-                              Random(input.seed, "wide search", static_cast<std::uint64_t>(frame.id.value())));
+  const auto solution = sampled_pose(input, frame, search.found, observations, out.T_rig_world, options.pose);
   out.reason = LostReason::kFewInliers;
   if (!solution.ok || solution.num_inliers < options.min_inliers_wide) return false;
   if (!supported(solution, observations.size(), options.min_inliers_wide, options)) {

@@ -90,26 +90,49 @@ TEST(CameraConsensus, ReadmitsOnlyCamerasThatObserveThePlaceAfterALoss) {
 // In a blurred frame few matches of any camera agree with the pose. Only a camera with clearly fewer than the best one
 // contradicts it.
 TEST(CameraConsensus, FewInliersInAllCamerasAreNoContradiction) {
-  const FrameMatches matches{FrameMatches::value_type(100), FrameMatches::value_type(200)};
   std::vector<CameraConsensusState> cameras(2);
   for (CameraConsensusState& camera : cameras) camera.established = true;
-  EXPECT_EQ(conflicting_cameras(matches, {34, 56}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
-  EXPECT_EQ(contradicting_cameras(matches, {34, 56}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
-  EXPECT_EQ(contradicting_cameras(matches, {34, 30}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
-  EXPECT_EQ(contradicting_cameras(matches, {90, 56}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
-  EXPECT_EQ(contradicting_cameras(matches, {90, 120}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(conflicting_cameras({{100, 34}, {200, 56}}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(contradicting_cameras({{100, 34}, {200, 56}}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(contradicting_cameras({{100, 34}, {200, 30}}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(contradicting_cameras({{100, 90}, {200, 56}}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(contradicting_cameras({{100, 90}, {200, 120}}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
+}
+
+// Camera 1 has few matches, most of them on something that moves. If camera 0 sees it move as well, and agrees with the
+// pose nevertheless, this is no evidence against camera 1.
+TEST(CameraConsensus, WhatMovesInTheImagesOfTwoCamerasIsNoConflict) {
+  std::vector<CameraConsensusState> cameras(2);
+  for (CameraConsensusState& camera : cameras) camera.established = true;
+  for (const bool same_landmarks : {true, false}) {
+    FrameMatches matches(2);
+    std::vector<std::uint8_t> inlier;
+    for (std::size_t i = 0; i < 100; ++i) {  // the last 40 move
+      matches[0].push_back({KeypointIndex(i), LandmarkId(i)});
+      inlier.push_back(i < 60);
+    }
+    for (std::size_t i = 0; i < 40; ++i) {  // 8 do not move
+      matches[1].push_back({KeypointIndex(i), LandmarkId(i < 8 ? i : 60 + i + (same_landmarks ? 0 : 100))});
+      inlier.push_back(i < 8);
+    }
+    const std::vector<LandmarkCounts> agreeing = count_agreeing(matches, inlier, {});
+    EXPECT_EQ(agreeing[0].expected, 100);
+    EXPECT_EQ(agreeing[0].found, 60);
+    EXPECT_EQ(agreeing[1].expected, same_landmarks ? 8 : 40);
+    EXPECT_EQ(agreeing[1].found, 8);
+    EXPECT_EQ(conflicting_cameras(agreeing, cameras, {})[1], !same_landmarks);
+  }
 }
 
 // A camera that captures late is skipped until the motion is known. Its first matches are to landmarks observed by
 // other cameras only, and may be wrong.
 TEST(CameraConsensus, DoesNotFlagACameraThatIsNotEstablished) {
-  const FrameMatches matches{FrameMatches::value_type(100), FrameMatches::value_type(33)};
   std::vector<CameraConsensusState> cameras(2);
   cameras[0].established = true;
-  EXPECT_EQ(conflicting_cameras(matches, {95, 7}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
-  EXPECT_EQ(conflicting_cameras(matches, {20, 7}, cameras, {}), (std::vector<std::uint8_t>{1, 0}));
+  EXPECT_EQ(conflicting_cameras({{100, 95}, {33, 7}}, cameras, {}), (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(conflicting_cameras({{100, 20}, {33, 7}}, cameras, {}), (std::vector<std::uint8_t>{1, 0}));
   cameras[1].established = true;
-  EXPECT_EQ(conflicting_cameras(matches, {95, 7}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(conflicting_cameras({{100, 95}, {33, 7}}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
   update_exclusion(cameras[1], {100, 2}, 0, {});
   for (int k = 1; k <= ConsensusOptions{}.readmit_after; ++k) update_exclusion(cameras[1], {100, 60}, k, {});
   EXPECT_FALSE(cameras[1].excluded);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "estimators/pose_ransac.h"
+#include "tracking/camera_consensus.h"
 #include "tracking/simulated_tracker.h"
 
 namespace bslam::tracking {
@@ -97,6 +99,41 @@ TEST_F(RobustPose, IsFoundBySamplesIfTheInitialPoseAgreesWithFew) {
 
 // An inlier counts a half plus the time between the keyframes that observe its landmark; those of one cell as the
 // largest.
+TEST_F(RobustPose, OfWideWindowsFollowsTheLargerSupportAsWell) {
+  move({0.2, 0.05, -0.1}, {0.2, 0.05, -0.1});
+  const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 0.01, 0, 0.04, 0, 0.02).finished());
+  const camera::Rig rig = frame::rig_of(world.map.rig(), seen.frame);
+  const auto majority = estimators::ransac_pose(rig, observations, predicted, {}, {}, Random(1, "test", 0));
+  ASSERT_TRUE(majority.ok);
+  EXPECT_GT(error(majority), 0.05);
+  const TrackerState state;
+  const auto solution = sampled_pose({.map = world.map, .pyramids = {}, .alignment = {}, .state = state}, seen.frame,
+                                     matches, observations, predicted, {});
+  ASSERT_TRUE(solution.ok);
+  EXPECT_LT(error(solution), 0.005);
+}
+
+// What moves outnumbers the rest in the images of every camera, so that no pose from a single camera is right.
+TEST_F(RobustPose, OfAllCamerasIsKeptInAConflictIfItIsNearestToThePrediction) {
+  std::size_t i = 0;
+  for (const auto& camera : matches) {
+    for (std::size_t k = 0; k < camera.size(); ++k, ++i) {
+      if (k % 9 < 5) move({0.2, 0.05, -0.1}, observations[i]);
+    }
+  }
+  const camera::Rig rig = frame::rig_of(world.map.rig(), seen.frame);
+  const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 1e-3, 0, 0.002, 0, 0.001).finished());
+  solver::PoseSolverOptions near_start;
+  near_start.first_chi2 = 25.0;
+  const solver::PoseSolution at_rest = solver::solve_pose(rig, observations, predicted, near_start);
+  for (const bool known : {false, true}) {
+    const auto chosen = pose_of_most_consistent_camera(rig, matches, observations,
+                                                       known ? at_rest : solver::PoseSolution(), predicted, {}, {});
+    ASSERT_TRUE(chosen.ok);
+    EXPECT_EQ(error(chosen) < 0.005, known) << error(chosen);
+  }
+}
+
 TEST_F(RobustPose, SupportIsTheSpreadOverImagesAndTime) {
   std::vector<std::uint8_t> inlier(count(matches), 0);
   EXPECT_EQ(support(world.map, matches, observations, inlier), 0);
