@@ -4,8 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "estimators/pose_ransac.h"
+#include "tracking/image_cells.h"
+#include "tracking/scene_agreement.h"
 
 namespace bslam::tracking {
 namespace {
@@ -18,19 +21,11 @@ constexpr double kAgreesWithStart = 16.0;
 // Ratio of supports from which on another pose is another motion and not a variation of the first one.
 constexpr double kMoreSupport = 1.1;
 
-constexpr int kCells = 8;              // of the grid on an image, per side
 constexpr double kNew = 0.5;           // support of a new landmark
 constexpr double kTrustedAfter = 1.0;  // s, of observation by keyframes
 
 bool few(const solver::PoseSolution& solution, double fraction, std::size_t matches) {
   return !solution.ok || solution.num_inliers < fraction * static_cast<double>(matches);
-}
-
-std::size_t cell_of(const Eigen::Vector2d& pixel, const camera::Camera& camera) {
-  const auto along = [](double position, int size) {
-    return std::clamp(static_cast<int>(kCells * position / size), 0, kCells - 1);
-  };
-  return static_cast<std::size_t>(kCells * along(pixel.y(), camera.height) + along(pixel.x(), camera.width));
 }
 
 // Seconds between the first and the last keyframe that observe a landmark, at most kTrustedAfter.
@@ -47,15 +42,17 @@ double time_observed(const map::BundledMap& map, LandmarkId landmark) {
 // The poses of a frame from which one is chosen.
 class PoseChoice {
  public:
-  PoseChoice(const map::BundledMap& map, const FrameMatches& matches,
-             std::span<const solver::PoseObservation> observations, solver::PoseSolution first)
-      : map_(map), matches_(matches), observations_(observations), best_(std::move(first)) {
-    if (best_.ok) support_ = support(map_, matches_, observations_, best_.inlier);
+  PoseChoice(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
+             std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
+             solver::PoseSolution first)
+      : map_(input.map), matches_(matches), observations_(observations), best_(std::move(first)) {
+    if (newly_started(input, frame)) scene_.emplace(input, frame, observations, predicted);
+    if (best_.ok) support_ = support_of(best_);
   }
 
   void consider(solver::PoseSolution other) {
     if (!other.ok) return;
-    const double of_other = support(map_, matches_, observations_, other.inlier);
+    const double of_other = support_of(other);
     if (best_.ok && of_other <= kMoreSupport * support_) return;
     best_ = std::move(other);
     support_ = of_other;
@@ -64,9 +61,15 @@ class PoseChoice {
   const solver::PoseSolution& best() const { return best_; }
 
  private:
+  double support_of(const solver::PoseSolution& solution) const {
+    const double of_landmarks = support(map_, matches_, observations_, solution.inlier);
+    return scene_ ? of_landmarks + kNew * scene_->agreeing_cells(solution.T_rig_world) : of_landmarks;
+  }
+
   const map::BundledMap& map_;
   const FrameMatches& matches_;
   std::span<const solver::PoseObservation> observations_;
+  std::optional<SceneMatches> scene_;
   solver::PoseSolution best_;
   double support_ = 0.0;
 };
@@ -81,6 +84,13 @@ std::vector<solver::PoseObservation> outliers(const solver::PoseSolution& soluti
 }
 
 }  // namespace
+
+bool newly_started(const TrackInput& input, const frame::BundledFrame& frame) {
+  if (!input.state.anchored.known_in(input.map)) return false;
+  const map::BundledKeyframe& root = input.map.keyframe(input.map.root_of(input.state.anchored.reference));
+  const double age_s = to_seconds(frame.time_ns - root.frame->time_ns);
+  return age_s >= 0.0 && age_s < kTrustedAfter;
+}
 
 double support(const map::BundledMap& map, const FrameMatches& matches,
                std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier) {
@@ -129,7 +139,7 @@ solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFr
   };
   const auto of_outliers = first.ok ? solver::solve_pose(rig, outliers(first, observations), predicted, motion, options)
                                     : solver::PoseSolution();
-  PoseChoice choice(input.map, matches, observations, std::move(first));
+  PoseChoice choice(input, frame, matches, observations, predicted, std::move(first));
   if (of_outliers.ok) choice.consider(pose_near(of_outliers.T_rig_world));
   choice.consider(pose_near(predicted));
   if (!few(choice.best(), kMinority, observations.size())) return choice.best();
@@ -153,7 +163,7 @@ solver::PoseSolution sampled_pose(const TrackInput& input, const frame::BundledF
   solver::PoseSolverOptions near_start = options;
   near_start.first_chi2 = kAgreesWithStart;
   const auto of_outliers = first.ok ? sample(outliers(first, observations), "outliers") : solver::PoseSolution();
-  PoseChoice choice(input.map, matches, observations, std::move(first));
+  PoseChoice choice(input, frame, matches, observations, predicted, std::move(first));
   if (of_outliers.ok) choice.consider(solver::solve_pose(rig, observations, of_outliers.T_rig_world, near_start));
   choice.consider(solver::solve_pose(rig, observations, predicted, near_start));
   return choice.best();

@@ -16,6 +16,9 @@ namespace bslam::tracking {
 double support(const map::BundledMap& map, const FrameMatches& matches,
                std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier);
 
+// Whether the map was started so short a time before the frame that no landmark has been observed for long.
+bool newly_started(const TrackInput& input, const frame::BundledFrame& frame);
+
 // Flags the matches that agree with a pose, if they are clearly more than of wrong matches would; otherwise none. A
 // wrong match is anywhere in its search window; `window_px` is the radius of that of each observation.
 std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,

@@ -14,8 +14,9 @@ namespace {
 
 using geometry::SE3;
 
-// Minimum fraction of the aligned landmarks that agree with the pose: with fewer, features decide between motions.
-constexpr double kMinInlierRatio = 0.5;
+// Minimum fraction of the aligned landmarks that agree with the pose: with fewer, features decide between motions. In a
+// map that was just started, most landmarks may be on something that moves.
+constexpr double kMinInlierRatio = 0.5, kMinRatioAtStart = 0.8;
 // A camera with few inliers gets features after this number of frames: it may see something new.
 constexpr int kFewInliersInterval = 8;
 
@@ -192,10 +193,13 @@ DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, 
   const solver::MotionModel motion = motion_model(input, frame);
   auto solution = robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
   if (!enough(solution, observations.size(), options)) return {.failure = DirectFailure::kNoPose};
+  const bool doubtful =
+      newly_started(input, frame) && solution.num_inliers < kMinRatioAtStart * static_cast<double>(observations.size());
   frame.twist = motion.twist(solution.T_rig_world);
   frame = with_keypoints(std::move(frame), found);
   DirectOutput out =
       judged(input, local, {std::move(frame), std::move(solution), std::move(found.matches), local.expected}, options);
+  if (doubtful) out.failure = DirectFailure::kDoubtful;
   // a search with features finds the others again
   add_sorted(local.others, out.output->state.landmarks);
   return out;

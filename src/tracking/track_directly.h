@@ -16,6 +16,7 @@ enum class DirectFailure {
   kNoPose,        // too few landmarks could be aligned
   kFewInliers,    // some camera has lost a considerable part of its inliers since the last extraction
   kKeyframeDue,
+  kDoubtful,  // of a map that was just started, many landmarks do not agree
 };
 
 struct DirectOutput {

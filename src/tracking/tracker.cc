@@ -49,7 +49,9 @@ void update_odometry(const map::BundledMap& map, const TrackerState& before, Tra
 void pause_direct_tracking(DirectFailure failure, FrontEndState& state) {
   constexpr int kFailures = 3, kPause = 10;
   if (state.direct_pause > 0) --state.direct_pause;
-  if (failure == DirectFailure::kFewInliers || failure == DirectFailure::kKeyframeDue) state.direct_failures = 0;
+  if (failure == DirectFailure::kFewInliers || failure == DirectFailure::kKeyframeDue ||
+      failure == DirectFailure::kDoubtful)
+    state.direct_failures = 0;
   if (failure != DirectFailure::kNoPose) return;
   if (++state.direct_failures >= kFailures) state.direct_pause = kPause;
 }
@@ -61,7 +63,7 @@ void count_features(const BundledFrame& frame, FrameRecord& record) {
 }
 
 std::optional<EstimatedPose> estimate_of(const DirectAttempt& direct) {
-  if (!direct.outcome) return std::nullopt;
+  if (!direct.outcome || direct.failure == DirectFailure::kDoubtful) return std::nullopt;
   return EstimatedPose{direct.outcome->record.result.T_rig_world, direct.all_cameras};
 }
 

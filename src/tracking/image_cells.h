@@ -1,0 +1,21 @@
+// The grid by which tracking judges how far matches spread over an image.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstddef>
+
+#include "camera/camera.h"
+
+namespace bslam::tracking {
+
+constexpr int kCells = 8;  // per side
+
+inline std::size_t cell_of(const Eigen::Vector2d& pixel, const camera::Camera& camera) {
+  const auto along = [](double position, int size) {
+    return std::clamp(static_cast<int>(kCells * position / size), 0, kCells - 1);
+  };
+  return static_cast<std::size_t>(kCells * along(pixel.y(), camera.height) + along(pixel.x(), camera.width));
+}
+
+}  // namespace bslam::tracking

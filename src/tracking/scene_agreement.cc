@@ -1,0 +1,94 @@
+#include "tracking/scene_agreement.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/median.h"
+#include "feature/descriptor_matching.h"
+#include "tracking/image_cells.h"
+
+namespace bslam::tracking {
+namespace {
+
+using geometry::SE3;
+
+constexpr int kMaxHamming = 60;         // bits
+constexpr double kRatio = 0.85;         // of the nearest to the second nearest descriptor
+constexpr double kMinCosine = 0.95;     // of the angle between the bearings of a match: 18 degrees
+constexpr double kDeviations = 1.5;     // of the difference of two positions
+constexpr double kNearest = 0.1;        // of the median distance
+constexpr double kMostOfMatches = 0.5;  // of a cell
+
+// Distance on the unit sphere, to first order, between a bearing and the arc on which the point is seen: from
+// `infinite` to `nearest`. Infinite if the bearing is on another side.
+double distance_to_arc(const Eigen::Vector3d& bearing, const Eigen::Vector3d& infinite,
+                       const Eigen::Vector3d& nearest) {
+  const auto in_tangent_plane = [&](const Eigen::Vector3d& direction) -> Eigen::Vector3d {
+    return direction / direction.dot(bearing) - bearing;
+  };
+  if (infinite.dot(bearing) <= 0.0) return std::numeric_limits<double>::infinity();
+  const Eigen::Vector3d from = in_tangent_plane(infinite);
+  if (nearest.dot(bearing) <= 0.0) return from.norm();
+  const Eigen::Vector3d along = in_tangent_plane(nearest) - from;
+  const double length2 = along.squaredNorm();
+  const double at = length2 > 0.0 ? std::clamp(-from.dot(along) / length2, 0.0, 1.0) : 0.0;
+  return (from + at * along).norm();
+}
+
+double median_distance(std::span<const solver::PoseObservation> observations, const SE3& T_rig_world) {
+  std::vector<double> distances;
+  for (const solver::PoseObservation& o : observations) distances.push_back((T_rig_world * o.point_world).norm());
+  return distances.empty() ? 0.0 : median(distances);
+}
+
+}  // namespace
+
+SceneMatches::SceneMatches(const TrackInput& input, const frame::BundledFrame& frame,
+                           std::span<const solver::PoseObservation> observations, const SE3& T_rig_world)
+    : T_world_keyframe_(input.map.resolved_pose(input.state.anchored.reference).inverse()),
+      nearest_(kNearest * median_distance(observations, T_rig_world)) {
+  const frame::BundledFrame& before = *input.map.keyframe(input.state.anchored.reference).frame;
+  const camera::Rig rig_before = frame::rig_of(input.map.rig(), before), rig = frame::rig_of(input.map.rig(), frame);
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    const feature::Keypoints &a = before.cameras[c].keypoints, &b = frame.cameras[c].keypoints;
+    const camera::Camera& camera = rig.camera(c);
+    T_rig_camera_before_.push_back(rig_before.rig_from_cam(c));
+    T_camera_rig_.push_back(rig.cam_from_rig(c));
+    for (const feature::DescriptorMatch& m : feature::mutual_matches(
+             a.descriptor, b.descriptor, kMaxHamming, kRatio,
+             [&](std::size_t i, std::size_t j) { return a.bearing[i].dot(b.bearing[j]) > kMinCosine; })) {
+      const std::size_t i = m.a.index(), j = m.b.index();
+      const double sigma = std::hypot(input.features.sigma(a.level[i]), input.features.sigma(b.level[j]));
+      pairs_.push_back({c,
+                        cell_of(b.pixel[j].cast<double>(), camera),
+                        {a.bearing[i], b.bearing[j]},
+                        kDeviations * sigma * camera.radians_per_pixel()});
+    }
+  }
+}
+
+int SceneMatches::agreeing_cells(const SE3& T_rig_world) const {
+  struct Counts {
+    int all = 0, agree = 0;
+  };
+  std::vector<std::array<Counts, kCells * kCells>> cells(T_camera_rig_.size());
+  std::vector<SE3> T_now_before;  // of each camera
+  for (std::size_t c = 0; c < cells.size(); ++c)
+    T_now_before.push_back(T_camera_rig_[c] * T_rig_world * T_world_keyframe_ * T_rig_camera_before_[c]);
+  for (const Pair& pair : pairs_) {
+    const SE3& T = T_now_before[pair.camera];
+    const Eigen::Vector3d infinite = T.rotation() * pair.bearings.a;
+    const Eigen::Vector3d nearest = (nearest_ * infinite + T.translation()).normalized();
+    Counts& cell = cells[pair.camera][pair.cell];
+    ++cell.all;
+    cell.agree += distance_to_arc(pair.bearings.b, infinite, nearest) <= pair.tolerance;
+  }
+  int agreeing = 0;
+  for (const auto& camera : cells)
+    agreeing += static_cast<int>(std::ranges::count_if(
+        camera, [](const Counts& cell) { return cell.all > 0 && cell.agree > kMostOfMatches * cell.all; }));
+  return agreeing;
+}
+
+}  // namespace bslam::tracking
