@@ -57,18 +57,20 @@ std::unique_ptr<solver::TimingBlock> make_timing(const RigAdjustmentOptions& opt
 }
 
 solver::ExtrinsicPrior extrinsic_prior(const solver::RigValues& calibrated, const RigAdjustmentOptions& options,
-                                       double tighter) {
+                                       double tighter, std::vector<std::uint8_t> displaced = {}) {
   return {.T_cam_rig = calibrated.T_cam_rig,
           .sigma_rotation = tighter * options.sigma_rotation,
           .sigma_translation = tighter * options.sigma_translation,
           .sigma_depth = tighter * options.sigma_depth,
-          .sigma_scale = tighter * options.sigma_scale};
+          .sigma_scale = tighter * options.sigma_scale,
+          .displaced = std::move(displaced)};
 }
 
-CalibrationBlocks make_blocks(const solver::RigValues& calibrated, const RigAdjustmentOptions& options) {
+CalibrationBlocks make_blocks(const solver::RigValues& calibrated, const RigAdjustmentOptions& options,
+                              const std::vector<std::uint8_t>& displaced) {
   CalibrationBlocks out;
   const double tighter = 1.0 / std::sqrt(options.correlated_observations);
-  auto extrinsics = std::make_unique<solver::ExtrinsicsBlock>(extrinsic_prior(calibrated, options, tighter));
+  auto extrinsics = std::make_unique<solver::ExtrinsicsBlock>(extrinsic_prior(calibrated, options, tighter, displaced));
   out.extrinsics = extrinsics.get();
   out.add(std::move(extrinsics));
   if (!options.sigma_intrinsics.empty()) {
@@ -229,9 +231,9 @@ bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks,
 }
 
 // Multiplies all lengths by a factor that gives the baselines the scale of the calibration; returns it.
-double restore_scale(const solver::RigValues& calibrated, solver::ReprojectionProblem& problem,
-                     solver::BundleState& state) {
-  const double factor = 1.0 / solver::baseline_scale(state.rig.T_cam_rig, calibrated.T_cam_rig);
+double restore_scale(const solver::RigValues& calibrated, std::span<const std::uint8_t> displaced,
+                     solver::ReprojectionProblem& problem, solver::BundleState& state) {
+  const double factor = 1.0 / solver::baseline_scale(state.rig.T_cam_rig, calibrated.T_cam_rig, displaced);
   for (geometry::SE3& T : state.rig.T_cam_rig) T = geometry::scaled(T, factor);
   for (geometry::SE3& T : state.T_rig_world) T = geometry::scaled(T, factor);
   for (geometry::Vector3d& point : state.points) point *= factor;
@@ -288,15 +290,19 @@ RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustme
   out.cameras.front().observed.fill(true);
   solver::BundleState state = solver::state_of(problem);
   const solver::RigValues calibrated = state.rig;
-  const CalibrationBlocks blocks = make_blocks(calibrated, options);
+  const auto displaced = [&] {
+    return solver::displaced_cameras(state.rig.T_cam_rig, extrinsic_prior(calibrated, options, 1.0));
+  };
+  CalibrationBlocks blocks = make_blocks(calibrated, options, {});
   if (blocks.size == 0) return out;
   if (start) state.rig = std::move(*start);
   solver::ReprojectionProblem scaled = problem;
   std::vector<std::uint8_t> skipped;
   for (const Round& round : kRounds) {
     if (round.kernel == solver::Kernel::kHuber && options.start_is_estimate) continue;
+    blocks = make_blocks(calibrated, options, displaced());
     if (!run_round(scaled, round, blocks, calibrated, options, stop, skipped, state, out)) return out;
-    if (options.sigma_scale > 0) out.scale_change *= restore_scale(calibrated, scaled, state);
+    if (options.sigma_scale > 0) out.scale_change *= restore_scale(calibrated, displaced(), scaled, state);
   }
   if (!out.done) return out;
   out.values = std::move(state.rig);

@@ -1,10 +1,17 @@
 #include "solver/rig_block.h"
 
+#include <algorithm>
+#include <utility>
+
+#include "base/median.h"
+
 namespace bslam::solver {
 namespace {
 
 using geometry::Matrix6d;
 using geometry::Vector6d;
+
+constexpr double kWiderIfDisplaced = 10.0;
 
 // d extrinsic_change / d(left perturbation): exp(w) R has the logarithm phi + J_l^-1 w, its translation is t + w x t +
 // v.
@@ -42,21 +49,46 @@ Rig RigValues::applied_to(const Rig& rig) const {
 
 Matrix6d covariance_of(const ExtrinsicPrior& prior, std::size_t camera) {
   const Vector3d axis = Vector3d::UnitZ(), axis_of_camera_0 = prior.T_cam_rig[camera].rotation() * Vector3d::UnitZ();
+  const bool displaced = !prior.displaced.empty() && prior.displaced[camera];
+  const double sigma_translation = (displaced ? kWiderIfDisplaced : 1.0) * prior.sigma_translation;
   Matrix6d out = Matrix6d::Zero();
   out.topLeftCorner<3, 3>().diagonal().setConstant(prior.sigma_rotation * prior.sigma_rotation);
-  out.bottomRightCorner<3, 3>().diagonal().setConstant(prior.sigma_translation * prior.sigma_translation);
+  out.bottomRightCorner<3, 3>().diagonal().setConstant(sigma_translation * sigma_translation);
   out.bottomRightCorner<3, 3>() += prior.sigma_depth * prior.sigma_depth *
                                    (axis * axis.transpose() + axis_of_camera_0 * axis_of_camera_0.transpose());
   return out;
 }
 
-double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated) {
+double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated,
+                      std::span<const std::uint8_t> displaced) {
   double sum = 0.0, reference = 0.0;
   for (std::size_t c = 0; c < calibrated.size(); ++c) {
+    if (!displaced.empty() && displaced[c]) continue;
     sum += T_cam_rig[c].translation().squaredNorm();
     reference += calibrated[c].translation().squaredNorm();
   }
   return reference > 0 ? std::sqrt(sum / reference) : 1.0;
+}
+
+std::vector<std::uint8_t> displaced_cameras(std::span<const SE3> T_cam_rig, const ExtrinsicPrior& prior) {
+  constexpr std::size_t kMinBaselines = 3;
+  constexpr double kDeviations = 4.0;
+  const std::vector<SE3>& calibrated = prior.T_cam_rig;
+  std::vector<std::uint8_t> out(calibrated.size(), 0);
+  std::vector<double> ratios;
+  for (std::size_t c = 1; c < calibrated.size(); ++c) {
+    const double length = calibrated[c].translation().norm();
+    if (length > kDeviations * prior.sigma_translation) ratios.push_back(T_cam_rig[c].translation().norm() / length);
+  }
+  if (ratios.size() < kMinBaselines) return out;
+  const double scale = lower_median(std::move(ratios));
+  for (std::size_t c = 1; c < calibrated.size(); ++c) {
+    const Vector3d change = extrinsic_change(geometry::scaled(T_cam_rig[c], 1.0 / scale), calibrated[c]).tail<3>();
+    const Eigen::Matrix3d covariance = covariance_of(prior, c).bottomRightCorner<3, 3>();
+    out[c] = change.dot(covariance.inverse() * change) > kDeviations * kDeviations;
+  }
+  if (2 * std::ranges::count(out, std::uint8_t{1}) >= std::ssize(out)) std::ranges::fill(out, std::uint8_t{0});
+  return out;
 }
 
 Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference) {
@@ -67,7 +99,8 @@ Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference) {
 ExtrinsicsBlock::ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)) {
   double sum = 0.0;
   for (std::size_t c = 0; c < prior_.T_cam_rig.size(); ++c) {
-    sum += prior_.T_cam_rig[c].translation().squaredNorm();
+    const bool displaced = !prior_.displaced.empty() && prior_.displaced[c];
+    if (!displaced) sum += prior_.T_cam_rig[c].translation().squaredNorm();
     information_.push_back(covariance_of(prior_, c).inverse());
   }
   if (prior_.sigma_scale > 0 && sum > 0) scale_gradient_ = 1.0 / (prior_.sigma_scale * sum);
@@ -75,7 +108,7 @@ ExtrinsicsBlock::ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)
 
 double ExtrinsicsBlock::scale_error(const RigValues& values) const {
   if (scale_gradient_ == 0) return 0.0;
-  return (baseline_scale(values.T_cam_rig, prior_.T_cam_rig) - 1.0) / prior_.sigma_scale;
+  return (baseline_scale(values.T_cam_rig, prior_.T_cam_rig, prior_.displaced) - 1.0) / prior_.sigma_scale;
 }
 
 void ExtrinsicsBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {
@@ -110,11 +143,13 @@ void ExtrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::Matri
     b.segment<6>(at) -= JtI * change;
   }
   // The distance |t| of a camera changes by t . v / |t| for the left perturbation (w, v) of T_cam_rig = [R, t].
-  const double gradient = scale_gradient_ / baseline_scale(values.T_cam_rig, prior_.T_cam_rig);
+  const double gradient = scale_gradient_ / baseline_scale(values.T_cam_rig, prior_.T_cam_rig, prior_.displaced);
   Eigen::VectorXd scale_jacobian = Eigen::VectorXd::Zero(size());
-  for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c)
+  for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c) {
+    if (!prior_.displaced.empty() && prior_.displaced[c]) continue;
     scale_jacobian.segment<3>(6 * (static_cast<Eigen::Index>(c) - 1) + 3) =
         gradient * values.T_cam_rig[c].translation();
+  }
   H += scale_jacobian * scale_jacobian.transpose();
   b -= scale_error(values) * scale_jacobian;
 }

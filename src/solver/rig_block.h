@@ -68,14 +68,23 @@ struct ExtrinsicPrior {
   // length looks like a displacement along the axis.
   double sigma_depth = 0;
   double sigma_scale = 0;  // relative; 0: no prior of its own
+  // Per camera: its position is far from the calibrated one. Its translation gets ten times the deviation, and its
+  // baseline does not count for the scale. Empty: none.
+  std::vector<std::uint8_t> displaced = {};
 };
 
 // Covariance of extrinsic_change() of a camera by the prior.
 geometry::Matrix6d covariance_of(const ExtrinsicPrior& prior, std::size_t camera);
 
-// The common scale of the baselines relative to that of the calibration, see above. 1 if
-// all cameras of the calibration have the same centre.
-double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated);
+// The common scale of the baselines relative to that of the calibration, see above, of the cameras that are not
+// `displaced`. 1 if these have the same centre in the calibration.
+double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated,
+                      std::span<const std::uint8_t> displaced = {});
+
+// Flags the cameras whose centres are farther than four standard deviations from the calibrated ones, at the scale that
+// half of the baselines do not exceed: with a mean, one camera that was displaced would spoil the scale of all. At
+// least three baselines are needed, and more than half of the cameras are not displaced.
+std::vector<std::uint8_t> displaced_cameras(std::span<const SE3> T_cam_rig, const ExtrinsicPrior& prior);
 
 // Difference of extrinsics to a reference: for D = T_cam_rig reference^-1, the logarithm of the rotation (radians),
 // then the translation (metres), both in the axes of the camera. The length of the translation is the distance by which

@@ -192,6 +192,36 @@ TEST(AdjustRig, FindsIntrinsicsAndKeepsTheScaleOfTheBaselines) {
   }
 }
 
+// The others keep their baselines: the displacement of one camera is no change of the scale.
+TEST(AdjustRig, ADisplacedCameraDoesNotChangeTheScale) {
+  const auto scene = walk(4, 6, 0.05, 600);
+  const Vector6d error = (Vector6d() << 0, 0, 0, 0.03, 0.04, 0.05).finished();
+  const Rig calibrated = with_error(scene->rig, 3, error);
+  scene->problem.rig = &calibrated;
+  RigAdjustmentOptions options;
+  options.sigma_translation = 0.005;
+  options.sigma_scale = 5e-3;
+  const RigAdjustment result = adjust_rig(scene->problem, options);
+  ASSERT_TRUE(result.done);
+  for (const std::size_t c : {1u, 2u, 3u})
+    EXPECT_LT(error_of(result, c, scene->rig).tail<3>().norm(), 0.004) << "camera " << c;
+}
+
+TEST(AdjustRig, CamerasAreDisplacedAtTheScaleOfTheOthers) {
+  const auto at = [](double x, double y) { return SE3(Eigen::Quaterniond::Identity(), Vector3d(x, y, 0)); };
+  const solver::ExtrinsicPrior prior{
+      .T_cam_rig = {SE3(), at(0.1, 0), at(0, 0.2), at(-0.15, 0)}, .sigma_rotation = 0.01, .sigma_translation = 0.005};
+  const auto displaced = [&](double scale, double of_3, double of_2) {
+    return solver::displaced_cameras(
+        std::vector{SE3(), at(0.1 * scale, 0), at(0, scale * (0.2 + of_2)), at(scale * -0.15, scale * of_3)}, prior);
+  };
+  EXPECT_EQ(displaced(1.0, 0.015, 0), (std::vector<std::uint8_t>{0, 0, 0, 0}));
+  EXPECT_EQ(displaced(1.2, 0.03, 0), (std::vector<std::uint8_t>{0, 0, 0, 1}));
+  EXPECT_EQ(displaced(1.0, 0.03, 0.1), (std::vector<std::uint8_t>{0, 0, 0, 0}));  // no majority for any scale
+  const solver::ExtrinsicPrior of_pair{.T_cam_rig = {SE3(), at(0.1, 0)}, .sigma_translation = 0.005};
+  EXPECT_EQ(solver::displaced_cameras(std::vector{SE3(), at(0.2, 0)}, of_pair), (std::vector<std::uint8_t>{0, 0}));
+}
+
 // A baseline whose direction is corrected keeps its length.
 TEST(AdjustRig, TheScaleOfTheBaselinesIsThatOfTheirLengths) {
   const std::vector<SE3> given = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0.1, 0, 0))};
