@@ -252,7 +252,7 @@ Status check_settings_of_cameras(const LiveArguments& a, const std::vector<std::
 Status check_recording(const LiveArguments& a) {
   if (!a.record.empty() && std::filesystem::path(a.record).extension() != ".mcap")
     return Error{"command line", "--record", a.record, "the name of an MCAP file, which ends in .mcap"};
-  return check_output_file(a.record, "--record", a.slam.overwrite);
+  return check_output_file(a.record, "--record", a.slam.overwrite, "\x89MCAP");
 }
 
 int live(const LiveArguments& a) {

@@ -4,8 +4,11 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <memory>
+#include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "base/atomic_file.h"
@@ -206,7 +209,18 @@ Result<system::Config> resolve_run_config(const SlamArguments& arguments) {
   return resolved;
 }
 
-Status check_output_file(const std::string& file, const char* option, bool overwrite) {
+namespace {
+
+bool begins_with(const std::filesystem::path& file, std::string_view text) {
+  std::string begin(text.size(), '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return stream.gcount() == 0 || begin.substr(0, static_cast<std::size_t>(stream.gcount())) == text;
+}
+
+}  // namespace
+
+Status check_output_file(const std::string& file, const char* option, bool overwrite, std::string_view begin) {
   if (file.empty()) return {};
   std::error_code error;
   const std::filesystem::path path(file), folder = path.has_parent_path() ? path.parent_path() : ".";
@@ -215,16 +229,19 @@ Status check_output_file(const std::string& file, const char* option, bool overw
     return Error{folder.string(), option, "no such folder", "an existing folder"};
   if (std::filesystem::is_regular_file(path, error) && !overwrite)
     return Error{file, option, "an existing file", "a new name, or --overwrite"};
+  if (std::filesystem::is_regular_file(path, error) && !begins_with(path, begin))
+    return Error{file, option, "an existing file of another kind",
+                 "a new name; --overwrite replaces files of its kind"};
   return check_writable(path);
 }
 
 Status check_outputs(const SlamArguments& arguments) {
   if (const Status s = check_folder(arguments); !s) return s;
   const bool writes_rerun = !is_viewer(arguments.rerun);
-  for (const auto& [option, file] :
-       {std::pair("--save-map", arguments.save_map), std::pair("--journal", arguments.journal),
-        std::pair("--rerun", writes_rerun ? arguments.rerun : "")}) {
-    if (const Status s = check_output_file(file, option, arguments.overwrite); !s) return s;
+  for (const auto& [option, file, begin] : {std::tuple("--save-map", arguments.save_map, "BSLAMMAP"),
+                                            std::tuple("--journal", arguments.journal, "bslam-journal"),
+                                            std::tuple("--rerun", writes_rerun ? arguments.rerun : "", "")}) {
+    if (const Status s = check_output_file(file, option, arguments.overwrite, begin); !s) return s;
   }
   return arguments.rerun.empty() ? Status() : check_rerun(arguments.rerun);
 }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "cli/config_arguments.h"
@@ -40,8 +41,9 @@ std::string command_of(std::span<const char* const> command_line);
 // settings that contradict each other.
 Result<system::Config> resolve_run_config(const SlamArguments& arguments);
 
-// Checks before the run whether the file can be written after it. An existing file is replaced only with --overwrite.
-Status check_output_file(const std::string& file, const char* option, bool overwrite);
+// Checks before the run whether the file can be written after it. An existing file is replaced only with --overwrite,
+// and if it begins with `begin` or is empty: the name of another file was a mistake.
+Status check_output_file(const std::string& file, const char* option, bool overwrite, std::string_view begin);
 
 // Checks before the run, without leaving anything, whether all its output can be written: folder, map, journal, and the
 // file or viewer of --rerun.

@@ -42,18 +42,6 @@ CameraFolder camera_folder(const fs::path& folder) {
   return {folder.filename().string(), images_below(folder).value_or(folder)};
 }
 
-// cam0, cam1, ..., or left and right.
-std::vector<CameraFolder> usual_folders(const fs::path& data) {
-  std::vector<CameraFolder> out;
-  for (const fs::path& folder : rig_formats::camera_folders(data, "")) out.push_back(camera_folder(folder));
-  if (!out.empty()) return out;
-  std::error_code error;
-  for (const char* side : {"left", "right"}) {
-    if (fs::is_directory(data / side, error)) out.push_back(camera_folder(data / side));
-  }
-  return out;
-}
-
 // Returns true if a folder has the name of one whose images are no photographs.
 bool holds_other_images(const std::string& folder) {
   std::string name = folder;
@@ -67,6 +55,22 @@ std::vector<CameraFolder> all_folders(const fs::path& data) {
   std::vector<CameraFolder> out;
   for (const fs::path& folder : folders_in(data)) {
     if (auto images = images_below(folder)) out.push_back({folder.filename().string(), *std::move(images)});
+  }
+  return out;
+}
+
+// cam0, cam1, ..., or left and right if no other folder may be a camera.
+std::vector<CameraFolder> usual_folders(const fs::path& data) {
+  std::vector<CameraFolder> out;
+  for (const fs::path& folder : rig_formats::camera_folders(data, "")) out.push_back(camera_folder(folder));
+  if (!out.empty()) return out;
+  const auto other = [](const CameraFolder& folder) {
+    return folder.name != "left" && folder.name != "right" && !holds_other_images(folder.name);
+  };
+  if (std::ranges::any_of(all_folders(data), other)) return out;
+  std::error_code error;
+  for (const char* side : {"left", "right"}) {
+    if (fs::is_directory(data / side, error)) out.push_back(camera_folder(data / side));
   }
   return out;
 }

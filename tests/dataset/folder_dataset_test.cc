@@ -63,6 +63,17 @@ class ImageFolders : public testing::Test {
   int folders_ = 0;
 };
 
+// left and right are the cameras only if no other folder may be one.
+TEST_F(ImageFolders, OfTheNamesOfTheRigComeBeforeLeftAndRight) {
+  for (const char* name : {"front", "left", "rear", "right"}) add_stamped(name);
+  const auto dataset = open({"rear", "front"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(folder_of(*dataset, 0), "rear");
+  EXPECT_EQ(folder_of(*dataset, 1), "front");
+  EXPECT_TRUE(open({"left", "front", "rear", "right"}));
+  expect_error(open({"a", "b"}), "name the folders in their order with --topics");
+}
+
 TEST_F(ImageFolders, OfTheNamesOfCamerasAreFoundByName) {
   add_stamped("front");
   add_stamped("rear");

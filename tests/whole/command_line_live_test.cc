@@ -74,6 +74,10 @@ TEST_F(CommandLine, RejectsBadRequestsForLiveRuns) {
         std::pair("--record " + out("a.bag") + folder, "a.bag, expected the name of an MCAP file"),
         std::pair("--save-map /nowhere/a.bmap" + folder, "/nowhere: --save-map: found no such folder"),
         std::pair("--rerun " + data() + "/rig.yaml" + folder, "--rerun: found an existing file"),
+        std::pair("--overwrite --save-map " + data() + "/rig.yaml" + folder,
+                  "--save-map: found an existing file of another kind"),
+        std::pair("--overwrite --journal " + data() + "/rig.yaml" + folder,
+                  "--journal: found an existing file of another kind"),
         std::pair(" --out " + data(), "--out: found a folder that is not empty"),
         std::pair("--out " + data() + "/rig.yaml/out", "--out: found "),
         std::pair("--duration 0" + folder, "--duration: found 0")}) {
