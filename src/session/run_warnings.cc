@@ -55,6 +55,20 @@ void warn_of_intrinsics(const camera::Camera& camera, const calibration::CameraR
   if (!shown.empty()) warn(warnings, "{}: estimated intrinsics differ from the calibration: {}", camera.name, shown);
 }
 
+// Warns if a focal length changed by more than a run can be trusted to find.
+void warn_of_wrong_focal_length(const camera::Camera& camera, const calibration::CameraRefinement& estimate,
+                                Warnings& warnings) {
+  constexpr double kFar = 0.05;  // relative
+  const double given = camera::intrinsics(camera.model).fx;
+  for (const calibration::ParameterRefinement& p : estimate.intrinsics) {
+    if (p.name != "fx" || std::abs(p.change) < kFar * given) continue;
+    warn(warnings,
+         "{}: the focal length seems to be wrong by {:.0f} % or more; poses, their scale and the estimated calibration "
+         "may be wrong as well: check that it belongs to images of this size, or start from bslam rig calibrate",
+         camera.name, 100 * std::abs(p.change) / given);
+  }
+}
+
 // Warns if the images contradict the times of a camera.
 void warn_of_timing(const std::string& name, const calibration::CameraRefinement& camera, Warnings& warnings) {
   if (camera.time_offset.refined) {
@@ -86,7 +100,10 @@ void warn_of_estimate(const RunRecord& record, const camera::Rig& rig, Warnings&
   const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
   for (const CameraRecord& camera : record.cameras) warn_of_extrinsics(camera, calibration.applies, warnings);
   for (std::size_t c = 0; c < std::min(calibration.estimate.cameras.size(), record.cameras.size()); ++c) {
-    if (contradicted) warn_of_intrinsics(rig.camera(c), calibration.estimate.cameras[c], warnings);
+    if (contradicted) {
+      warn_of_intrinsics(rig.camera(c), calibration.estimate.cameras[c], warnings);
+      warn_of_wrong_focal_length(rig.camera(c), calibration.estimate.cameras[c], warnings);
+    }
     warn_of_timing(record.cameras[c].name, calibration.estimate.cameras[c], warnings);
   }
   if (!contradicted) return;
