@@ -30,7 +30,8 @@ std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
 // the majority, and ends between two motions that many matches agree with. If a considerable part of the matches are
 // outliers, further poses are estimated: from the outliers, from the matches that agree with the prediction, and by
 // RANSAC if still most of them are outliers. Another pose replaces the first one if its support is clearly larger, or
-// if the first one could not be estimated.
+// if the first one could not be estimated. In a map that was just started, the agreement of all keypoints adds to the
+// support (tracking/scene_agreement.h).
 solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
                                  std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
                                  const solver::MotionModel& motion, const solver::PoseSolverOptions& options);
