@@ -20,6 +20,9 @@ constexpr double kAgreesWithStart = 16.0;
 
 // Ratio of supports from which on another pose is another motion and not a variation of the first one.
 constexpr double kMoreSupport = 1.1;
+// Ratio of the supports by landmarks from which on the whole images may decide otherwise than the landmarks. These know
+// the pose in the map; the images know the motion since the reference keyframe, whose pose may be wrong.
+constexpr double kComparable = 0.75;
 
 constexpr double kNew = 0.5;           // support of a new landmark
 constexpr double kTrustedAfter = 1.0;  // s, of observation by keyframes
@@ -52,8 +55,9 @@ class PoseChoice {
 
   void consider(solver::PoseSolution other) {
     if (!other.ok) return;
-    const double of_other = support_of(other);
-    if (best_.ok && of_other <= kMoreSupport * support_) return;
+    const Support of_other = support_of(other);
+    if (best_.ok && of_other.landmarks < kComparable * support_.landmarks) return;
+    if (best_.ok && of_other.sum() <= kMoreSupport * support_.sum()) return;
     best_ = std::move(other);
     support_ = of_other;
   }
@@ -61,9 +65,14 @@ class PoseChoice {
   const solver::PoseSolution& best() const { return best_; }
 
  private:
-  double support_of(const solver::PoseSolution& solution) const {
-    const double of_landmarks = support(map_, matches_, observations_, solution.inlier);
-    return scene_ ? of_landmarks + kNew * scene_->agreeing_cells(solution.T_rig_world) : of_landmarks;
+  struct Support {
+    double landmarks = 0.0, scene = 0.0;
+    double sum() const { return landmarks + scene; }
+  };
+
+  Support support_of(const solver::PoseSolution& solution) const {
+    return {support(map_, matches_, observations_, solution.inlier),
+            scene_ ? kNew * scene_->agreeing_cells(solution.T_rig_world) : 0.0};
   }
 
   const map::BundledMap& map_;
@@ -71,7 +80,7 @@ class PoseChoice {
   std::span<const solver::PoseObservation> observations_;
   std::optional<SceneMatches> scene_;
   solver::PoseSolution best_;
-  double support_ = 0.0;
+  Support support_;
 };
 
 std::vector<solver::PoseObservation> outliers(const solver::PoseSolution& solution,
