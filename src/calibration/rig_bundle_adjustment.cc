@@ -297,12 +297,15 @@ RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustme
   if (blocks.size == 0) return out;
   if (start) state.rig = std::move(*start);
   solver::ReprojectionProblem scaled = problem;
-  std::vector<std::uint8_t> skipped;
+  std::vector<std::uint8_t> skipped, flagged(out.cameras.size(), 0);
   for (const Round& round : kRounds) {
     if (round.kernel == solver::Kernel::kHuber && options.start_is_estimate) continue;
-    blocks = make_blocks(calibrated, options, displaced());
+    const std::vector<std::uint8_t> flags = displaced();
+    if (flags != flagged) skipped.clear();  // with another prior, no round repeats the one before
+    flagged = flags;
+    blocks = make_blocks(calibrated, options, flagged);
     if (!run_round(scaled, round, blocks, calibrated, options, stop, skipped, state, out)) return out;
-    if (options.sigma_scale > 0) out.scale_change *= restore_scale(calibrated, displaced(), scaled, state);
+    if (options.sigma_scale > 0) out.scale_change *= restore_scale(calibrated, flagged, scaled, state);
   }
   if (!out.done) return out;
   out.values = std::move(state.rig);

@@ -73,7 +73,8 @@ std::vector<LandmarkCounts> count_agreeing(const FrameMatches& matches, std::spa
   }
   std::vector<LandmarkId> moved;
   for (std::size_t c = 0; c < matches.size(); ++c) {
-    if (!conflict(out[c], options)) moved.insert(moved.end(), outliers[c].begin(), outliers[c].end());
+    if (out[c].expected >= options.min_expected && !conflict(out[c], options))
+      moved.insert(moved.end(), outliers[c].begin(), outliers[c].end());
   }
   std::ranges::sort(moved);
   for (std::size_t c = 0; c < matches.size(); ++c) {

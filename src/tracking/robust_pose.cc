@@ -97,6 +97,7 @@ std::vector<solver::PoseObservation> outliers(const solver::PoseSolution& soluti
 bool newly_started(const TrackInput& input, const frame::BundledFrame& frame) {
   if (!input.state.anchored.known_in(input.map)) return false;
   const map::BundledKeyframe& root = input.map.keyframe(input.map.root_of(input.state.anchored.reference));
+  if (root.frame == nullptr) return false;
   const double age_s = to_seconds(frame.time_ns - root.frame->time_ns);
   return age_s >= 0.0 && age_s < kTrustedAfter;
 }

@@ -21,20 +21,21 @@ constexpr double kDeviations = 1.5;     // of the difference of two positions
 constexpr double kNearest = 0.1;        // of the median distance
 constexpr double kMostOfMatches = 0.5;  // of a cell
 
-// Distance on the unit sphere, to first order, between a bearing and the arc on which the point is seen: from
-// `infinite` to `nearest`. Infinite if the bearing is on another side.
+// Distance, in the plane that touches the unit sphere at a bearing, to the arc on which the point is seen: from
+// `infinite` to `nearest`. Infinite if the bearing is on another side. If the nearest point is behind the camera, the
+// rig would have passed it since the keyframe; the distance is then that to `infinite`, so that an absurd motion, with
+// which a long arc agrees easily, gains nothing.
 double distance_to_arc(const Eigen::Vector3d& bearing, const Eigen::Vector3d& infinite,
                        const Eigen::Vector3d& nearest) {
-  const auto in_tangent_plane = [&](const Eigen::Vector3d& direction) -> Eigen::Vector3d {
-    return direction / direction.dot(bearing) - bearing;
-  };
-  if (infinite.dot(bearing) <= 0.0) return std::numeric_limits<double>::infinity();
-  const Eigen::Vector3d from = in_tangent_plane(infinite);
-  if (nearest.dot(bearing) <= 0.0) return from.norm();
-  const Eigen::Vector3d along = in_tangent_plane(nearest) - from;
+  const double i = infinite.dot(bearing), n = nearest.dot(bearing);
+  if (i <= 0.0) return std::numeric_limits<double>::infinity();
+  const Eigen::Vector3d from = infinite / i - bearing;
+  const Eigen::Vector3d along = i * nearest - n * infinite;  // times 1 / (i n): from one end to the other
   const double length2 = along.squaredNorm();
-  const double at = length2 > 0.0 ? std::clamp(-from.dot(along) / length2, 0.0, 1.0) : 0.0;
-  return (from + at * along).norm();
+  if (length2 == 0.0) return from.norm();
+  if (n <= 0.0) return from.norm();
+  const double end = 1.0 / (i * n);
+  return (from + std::clamp(-from.dot(along) / length2, 0.0, end) * along).norm();
 }
 
 double median_distance(std::span<const solver::PoseObservation> observations, const SE3& T_rig_world) {
@@ -47,15 +48,20 @@ double median_distance(std::span<const solver::PoseObservation> observations, co
 
 SceneMatches::SceneMatches(const TrackInput& input, const frame::BundledFrame& frame,
                            std::span<const solver::PoseObservation> observations, const SE3& T_rig_world)
-    : T_world_keyframe_(input.map.resolved_pose(input.state.anchored.reference).inverse()),
-      nearest_(kNearest * median_distance(observations, T_rig_world)) {
-  const frame::BundledFrame& before = *input.map.keyframe(input.state.anchored.reference).frame;
+    : nearest_(kNearest * median_distance(observations, T_rig_world)) {
+  const KeyframeId reference = input.map.nearest_alive_ancestor(input.state.anchored.reference);
+  if (!reference.valid()) return;
+  T_world_keyframe_ = input.map.resolved_pose(reference).inverse();
+  const frame::BundledFrame& before = *input.map.keyframe(reference).frame;
   const camera::Rig rig_before = frame::rig_of(input.map.rig(), before), rig = frame::rig_of(input.map.rig(), frame);
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    const std::vector<CameraConsensusState>& cameras = input.state.cameras;
+    const bool excluded = c < cameras.size() && cameras[c].excluded;
     const feature::Keypoints &a = before.cameras[c].keypoints, &b = frame.cameras[c].keypoints;
     const camera::Camera& camera = rig.camera(c);
     T_rig_camera_before_.push_back(rig_before.rig_from_cam(c));
     T_camera_rig_.push_back(rig.cam_from_rig(c));
+    if (excluded) continue;
     for (const feature::DescriptorMatch& m : feature::mutual_matches(
              a.descriptor, b.descriptor, kMaxHamming, kRatio,
              [&](std::size_t i, std::size_t j) { return a.bearing[i].dot(b.bearing[j]) > kMinCosine; })) {

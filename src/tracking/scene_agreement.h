@@ -18,8 +18,9 @@ class SceneMatches {
                std::span<const solver::PoseObservation> observations, const geometry::SE3& T_rig_world);
 
   // Number of cells of the grids of `support` (tracking/robust_pose.h) in which most of the matches agree with the
-  // pose: the point may have any distance from a tenth of the median one to infinity. What moves with the rig looks
-  // like points at infinity, and agrees with any translation; other points contradict a pose that follows it.
+  // pose: the point may have any distance from a tenth of the median one to infinity. While the rig does not turn,
+  // what moves with it looks like points at infinity and agrees with any translation; other points contradict a pose
+  // that follows it. Excluded cameras have no matches.
   int agreeing_cells(const geometry::SE3& T_rig_world) const;
 
  private:
