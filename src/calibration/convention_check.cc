@@ -31,9 +31,8 @@ constexpr double kClearly = 1.3;      // factor between numbers of consistent ma
 constexpr double kNoBaseline = 1e-6;  // metres
 constexpr double kMinParallax = 0.005;  // rad, for the estimation of another pose
 
-struct PixelPair {
-  Eigen::Vector2d a, b;
-};
+using estimators::bearing_pairs;
+using estimators::PixelPair;
 
 // Mutual best matches. No geometric constraint is used, since the geometry itself is tested.
 std::vector<PixelPair> match(const feature::Detections& a, const feature::Detections& b) {
@@ -75,23 +74,13 @@ double tolerance_of(const camera::Camera& first, const camera::Camera& second) {
   return kTolerancePx * std::max(first.radians_per_pixel(), second.radians_per_pixel());
 }
 
-std::vector<estimators::BearingPair> bearings(std::span<const PixelPair> pairs, const camera::Camera& of_a,
-                                              const camera::Camera& of_b) {
-  std::vector<estimators::BearingPair> out;
-  for (const PixelPair& pair : pairs) {
-    const auto a = of_a.unproject(pair.a), b = of_b.unproject(pair.b);
-    if (a && b) out.push_back({*a, *b});
-  }
-  return out;
-}
-
 int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
   const double tolerance = tolerance_of(*h.first, *h.second);
   const Eigen::Vector3d t = h.T_second_first.translation();
   const bool apart = t.norm() > kNoBaseline;
   const estimators::EpipolarPose pose{h.T_second_first.matrix3(), apart ? Eigen::Vector3d(t.normalized()) : t};
   const estimators::EpipolarAgreement found =
-      estimators::epipolar_agreement(pose, bearings(pairs, *h.first, *h.second), tolerance);
+      estimators::epipolar_agreement(pose, bearing_pairs(pairs, *h.first, *h.second), tolerance);
   return apart ? found.all : found.all - found.with_depth;
 }
 
@@ -128,7 +117,7 @@ std::optional<OtherCalibrations> other_calibrations(const camera::Rig& rig, std:
 std::optional<OtherPose> other_pose(const camera::Rig& rig, std::size_t i, std::size_t j,
                                     std::span<const PixelPair> pairs) {
   const camera::Camera &ci = rig.camera(i), &cj = rig.camera(j);
-  const std::vector<estimators::BearingPair> all = bearings(pairs, ci, cj);
+  const std::vector<estimators::BearingPair> all = bearing_pairs(pairs, ci, cj);
   const int min_inliers = std::max(kMinAgreeing, static_cast<int>(kMinRatio * static_cast<double>(all.size())));
   const estimators::RelativePoseOptions options{.iterations = 2000,
                                                 .inlier_angle = tolerance_of(ci, cj),

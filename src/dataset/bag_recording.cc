@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/lower_case.h"
 #include "containers/input_file.h"
 #include "dataset/bag_images.h"
 #include "dataset/camera_info.h"
@@ -125,10 +126,7 @@ class BagRecording : public Recording {
 
 // Depth images of 16 bits can be read, but are no photographs.
 bool is_depth(const ImageTopic& topic) {
-  std::string name = topic.name;
-  std::ranges::transform(name, name.begin(),
-                         [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return name.find("depth") != std::string::npos && topic.encoding.starts_with("16UC1");
+  return lower_case(topic.name).find("depth") != std::string::npos && topic.encoding.starts_with("16UC1");
 }
 
 // A topic and its compressed copy are one camera.

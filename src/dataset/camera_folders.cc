@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/lower_case.h"
 #include "dataset/image_names.h"
 #include "rig_formats/euroc_sensor.h"
 
@@ -44,9 +45,7 @@ CameraFolder camera_folder(const fs::path& folder) {
 
 // Returns true if a folder has the name of one whose images are no photographs.
 bool holds_other_images(const std::string& folder) {
-  std::string name = folder;
-  std::ranges::transform(name, name.begin(),
-                         [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  const std::string name = lower_case(folder);
   return name.find("depth") != std::string::npos || name.find("mask") != std::string::npos ||
          name.find("vignette") != std::string::npos;
 }

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/lower_case.h"
 #include "base/number_text.h"
 #include "evaluation/trajectory_file.h"
 
@@ -21,11 +22,8 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 // The extension in lower case, without the point.
 std::string kind_of(const fs::path& file) {
-  std::string kind = file.extension().string();
-  kind.erase(0, kind.starts_with('.') ? 1 : 0);
-  std::ranges::transform(kind, kind.begin(),
-                         [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return kind;
+  const std::string extension = lower_case(file.extension().string());
+  return extension.substr(extension.starts_with('.') ? 1 : 0);
 }
 
 bool is_one_of(const std::string& kind, std::initializer_list<std::string_view> kinds) {

@@ -160,6 +160,16 @@ RelativePose describe(const EpipolarPose& pose, std::span<const BearingPair> pai
 
 }  // namespace
 
+std::vector<BearingPair> bearing_pairs(std::span<const PixelPair> pixels, const camera::Camera& of_a,
+                                       const camera::Camera& of_b) {
+  std::vector<BearingPair> out;
+  for (const PixelPair& pair : pixels) {
+    const auto a = of_a.unproject(pair.a), b = of_b.unproject(pair.b);
+    if (a && b) out.push_back({*a, *b});
+  }
+  return out;
+}
+
 std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
                                           Random random) {
   if (pairs.size() < std::max<std::size_t>(kSampleSize, static_cast<std::size_t>(std::max(0, options.min_inliers)))) {

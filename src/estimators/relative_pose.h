@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "camera/camera.h"
 #include "geometry/se3.h"
 
 namespace bslam::estimators {
@@ -13,6 +14,15 @@ namespace bslam::estimators {
 struct BearingPair {
   Eigen::Vector3d a, b;  // unit bearings of one point in the two images
 };
+
+// Pixels of one point in two images.
+struct PixelPair {
+  Eigen::Vector2d a, b;
+};
+
+// The bearings of the pairs of which both pixels have one, in order.
+std::vector<BearingPair> bearing_pairs(std::span<const PixelPair> pixels, const camera::Camera& of_a,
+                                       const camera::Camera& of_b);
 
 struct RelativePoseOptions {
   int iterations = 300;        // maximum number of RANSAC samples

@@ -22,9 +22,8 @@ constexpr double kTolerancePx = 2.0;
 constexpr double kMaxAngle = 0.1;      // rad; a larger one is another arrangement of the cameras
 constexpr double kMinBaseline = 1e-3;  // m
 
-struct PixelPair {
-  Eigen::Vector2d a, b;
-};
+using estimators::bearing_pairs;
+using estimators::PixelPair;
 
 std::vector<PixelPair> matches_of(const frame::CameraFrame& a, const frame::CameraFrame& b) {
   std::vector<PixelPair> out;
@@ -32,16 +31,6 @@ std::vector<PixelPair> matches_of(const frame::CameraFrame& a, const frame::Came
        feature::mutual_matches(a.keypoints.descriptor, b.keypoints.descriptor, kMaxHamming, kRatio,
                                [](std::size_t, std::size_t) { return true; })) {
     out.push_back({a.keypoints.pixel[m.a.index()].cast<double>(), b.keypoints.pixel[m.b.index()].cast<double>()});
-  }
-  return out;
-}
-
-std::vector<estimators::BearingPair> bearings(std::span<const PixelPair> pairs, const camera::Camera& of_a,
-                                              const camera::Camera& of_b) {
-  std::vector<estimators::BearingPair> out;
-  for (const PixelPair& pair : pairs) {
-    const auto a = of_a.unproject(pair.a), b = of_b.unproject(pair.b);
-    if (a && b) out.push_back({*a, *b});
   }
   return out;
 }
@@ -55,8 +44,9 @@ bool other_mistake(const camera::Camera& of_i, const camera::Camera& of_j, const
   const auto same = std::ranges::count_if(matches, [](const PixelPair& m) { return (m.a - m.b).norm() < kSamePx; });
   const geometry::SE3 inverse = T_j_i.inverse();
   const estimators::EpipolarPose pose{inverse.matrix3(), inverse.translation().normalized()};
-  return same > needed || estimators::epipolar_agreement(pose, bearings(matches, of_j, of_i), tolerance).all > needed ||
-         estimators::epipolar_agreement(pose, bearings(matches, of_i, of_j), tolerance).all > needed;
+  return same > needed ||
+         estimators::epipolar_agreement(pose, bearing_pairs(matches, of_j, of_i), tolerance).all > needed ||
+         estimators::epipolar_agreement(pose, bearing_pairs(matches, of_i, of_j), tolerance).all > needed;
 }
 
 // T_j_i with the rotation of camera j that agrees with most matches: as given, or corrected; nullopt if none does.
@@ -75,7 +65,7 @@ std::optional<geometry::SE3> agreeing_pose(const camera::Rig& rig, std::size_t i
   const auto rotation = [&](const geometry::SE3& T, const std::vector<estimators::BearingPair>& pairs) {
     return estimators::pair_rotation({T.matrix3(), T.translation().normalized()}, pairs, {.tolerance = tolerance});
   };
-  const std::vector<estimators::BearingPair> pairs = bearings(matches, rig.camera(i), rig.camera(j));
+  const std::vector<estimators::BearingPair> pairs = bearing_pairs(matches, rig.camera(i), rig.camera(j));
   std::vector<estimators::BearingPair> swapped = pairs;
   for (estimators::BearingPair& pair : swapped) std::swap(pair.a, pair.b);
   const estimators::PairRotation of_j = rotation(T_j_i, pairs), of_i = rotation(T_i_j, swapped);
