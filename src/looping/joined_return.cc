@@ -9,6 +9,9 @@ namespace bslam::looping {
 namespace {
 
 constexpr int kAway = 10;  // successive keyframes without sight of a place after which seeing it again is a return
+// A place is in sight while at least this fraction of its landmarks is that is observed on the return. In a wide room,
+// cameras all around observe some of it from everywhere.
+constexpr double kInSight = 0.25;
 
 double distance(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
   const auto centre = [&](KeyframeId k) -> Eigen::Vector3d {
@@ -17,9 +20,12 @@ double distance(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
   return (centre(a) - centre(b)).norm();
 }
 
-// Whether kAway successive keyframes between the two are not neighbours of the earlier one.
-bool was_away(const map::BundledMap& map, KeyframeId earlier, KeyframeId later, const RecognitionOptions& options) {
-  const auto neighbours = neighbours_of(map, earlier, options);
+// Whether kAway successive keyframes between the two have lost sight of the place of the earlier one, of which the
+// later one observes `weight` landmarks.
+bool was_away(const map::BundledMap& map, KeyframeId earlier, KeyframeId later, int weight,
+              const RecognitionOptions& options) {
+  auto neighbours = neighbours_of(map, earlier, options);
+  std::erase_if(neighbours, [&](const map::Covisible& c) { return c.weight < kInSight * weight; });
   const KeyframeId root = map.root_of(earlier);
   int away = 0;
   for (std::size_t i = earlier.index() + 1; i < later.index() && away < kAway; ++i) {
@@ -39,7 +45,7 @@ std::optional<KeyframeId> JoinedReturns::find(const map::BundledMap& map, Keyfra
   for (const map::Covisible& c : neighbours_of(map, keyframe, options.recognition)) {
     if (c.keyframe > keyframe) continue;
     const double d = distance(map, c.keyframe, keyframe);
-    if (d > least || !was_away(map, c.keyframe, keyframe, options.recognition)) continue;
+    if (d > least || !was_away(map, c.keyframe, keyframe, c.weight, options.recognition)) continue;
     least = d;
     closest = c.keyframe;
   }

@@ -53,5 +53,23 @@ TEST_F(JoinedReturn, IsClosedAsALoop) {
   EXPECT_LT(closed.front().translation_correction, 0.05);
 }
 
+// Distant landmarks of the hall are observed all along, so that no keyframe is ever without covisible ones.
+TEST(JoinedReturnInAWideRoom, IsFoundAlthoughSomeOfThePlaceIsAlwaysInSight) {
+  synthetic::FeatureSimulatorOptions options = hall_options();
+  options.landmarks = 6000;
+  options.farthest_base = 12;
+  const FeatureSimulator simulator(rig_of(4), laps(), options);
+  HallMap hall_map{simulator.rig(), 1000};
+  JoinedReturns returns;
+  std::vector<int> at;
+  for (int i = 0; i < kLapKeyframes + kAfter; ++i) {
+    hall_map.add(simulator.frame(FrameId(i), kStepS * i));
+    if (returns.find(hall_map.map, hall_map.map.newest_keyframe(), {})) at.push_back(i);
+  }
+  EXPECT_EQ(neighbours_of(hall_map.map, KeyframeId(0), {}).size(), hall_map.map.num_keyframes() - 1);
+  ASSERT_FALSE(at.empty());
+  EXPECT_GT(at.front(), kLapKeyframes - 3);
+}
+
 }  // namespace
 }  // namespace bslam::looping
