@@ -17,6 +17,9 @@ struct Selection {
   // the result is a correction of the map, which must not be undone by work based on older versions
   bool whole_map = false;
   std::vector<KeyframeId> with_uncertainty = {};  // free keyframes whose uncertainty is estimated
+  // Information about the calibration that was given, if it has not been compared with images yet
+  // (solver::BundleOptions::rig_prior).
+  std::shared_ptr<const Eigen::MatrixXd> rig_prior = {};
 };
 
 // The landmark and keyframe that an observation of the problem belongs to.

@@ -76,9 +76,16 @@ PoseUncertainties adjust_inliers(const map::BundledMap& map, const Selection& se
                                     .relative_decrease = options.relative_decrease,
                                     .robust = false,
                                     .marginals = poses_with_uncertainty(selection, flat),
-                                    .rig_deviation = map.rig_deviation()};
+                                    .rig_deviation = map.rig_deviation(),
+                                    .rig_prior = selection.rig_prior,
+                                    .correlated_observations = options.correlated_observations};
   const auto summary = adjust_with_variances(flat.problem, variances, solve, skip, std::move(stop));
-  return pose_uncertainties(map, flat, solve.marginals, summary.uncertainties, options.correlated_observations);
+  PoseUncertainties out;
+  if (!solve.rig_deviation && !solve.rig_prior) out = without_calibration(map);
+  for (auto& entry :
+       pose_uncertainties(map, flat, solve.marginals, summary.uncertainties, options.correlated_observations))
+    out.push_back(std::move(entry));
+  return out;
 }
 
 }  // namespace

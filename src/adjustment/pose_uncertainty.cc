@@ -45,9 +45,18 @@ PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundlePro
     const geometry::SE3 T_k_anchor =
         T_rig_world[static_cast<std::size_t>(poses[i])] * T_rig_world[static_cast<std::size_t>(anchor)].inverse();
     const geometry::PoseUncertainty of_adjustment{factor * marginals[i]->noise, marginals[i]->calibration};
-    const geometry::PoseUncertainty& of_anchor =
-        map.keyframe(flat.keyframes[static_cast<std::size_t>(anchor)]).uncertainty;
+    geometry::PoseUncertainty of_anchor = map.keyframe(flat.keyframes[static_cast<std::size_t>(anchor)]).uncertainty;
+    if (of_adjustment.calibration.cols() == 0) of_anchor = geometry::without_calibration(of_anchor);
     out.emplace_back(k, of_adjustment + geometry::transported(of_anchor, T_k_anchor));
+  }
+  return out;
+}
+
+PoseUncertainties without_calibration(const map::BundledMap& map) {
+  PoseUncertainties out;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    const geometry::PoseUncertainty& uncertainty = map.keyframe(k).uncertainty;
+    if (uncertainty.calibration.cols() > 0) out.emplace_back(k, geometry::without_calibration(uncertainty));
   }
   return out;
 }

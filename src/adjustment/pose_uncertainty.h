@@ -36,4 +36,8 @@ PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundlePro
                                      std::span<const std::optional<geometry::PoseUncertainty>> marginals,
                                      double correlated_observations);
 
+// The uncertainties of the keyframes that have an effect of the calibration's error, without it: the calibration has
+// been compared with images and counts as exact.
+PoseUncertainties without_calibration(const map::BundledMap& map);
+
 }  // namespace bslam::adjustment

@@ -161,19 +161,30 @@ Eigen::MatrixXd without_timing(const Eigen::MatrixXd& information, const Calibra
          coupling * information.bottomRightCorner(timing, timing).ldlt().solve(coupling.transpose());
 }
 
-// `information` and `prior` in the unknowns of the blocks, in which intrinsics are relative to their deviations.
+// Factors that convert a derivative with respect to the unknowns of the blocks, in which intrinsics are relative to
+// their deviations, to radians, metres and the units of the camera models.
+Eigen::VectorXd physical_units(const RigAdjustmentOptions& options, Eigen::Index unknowns) {
+  Eigen::VectorXd unit = Eigen::VectorXd::Ones(unknowns);
+  Eigen::Index at = unknowns;
+  for (const camera::ModelParameters& sigma : options.sigma_intrinsics) at -= sigma.size();
+  for (const camera::ModelParameters& sigma : options.sigma_intrinsics) {
+    unit.segment(at, sigma.size()) = sigma.cwiseInverse() * std::sqrt(options.correlated_observations);
+    at += sigma.size();
+  }
+  return unit;
+}
+
+// `information` and `prior` in the unknowns of the blocks, without timing.
 RigInformation in_physical_units(const Eigen::MatrixXd& information, const Eigen::MatrixXd& prior,
                                  const RigAdjustmentOptions& options, const RigAdjustment& out) {
+  const Eigen::VectorXd unit = physical_units(options, information.rows());
   RigInformation physical;
   physical.change.resize(information.rows());
-  Eigen::VectorXd unit = Eigen::VectorXd::Ones(information.rows());
   Eigen::Index at = 0;
   for (std::size_t c = 1; c < out.cameras.size(); ++c, at += 6) physical.change.segment<6>(at) = out.cameras[c].change;
   for (std::size_t c = 0; c < out.cameras.size() && at < information.rows(); ++c) {
     const camera::ModelParameters& change = out.cameras[c].intrinsics_change;
     physical.change.segment(at, change.size()) = change;
-    unit.segment(at, change.size()) =
-        options.sigma_intrinsics[c].cwiseInverse() * std::sqrt(options.correlated_observations);
     at += change.size();
   }
   const double weight = 1 / options.correlated_observations;
@@ -193,6 +204,17 @@ std::vector<geometry::PoseUncertainty::Effect> effects_on_poses(const Eigen::Mat
   return out;
 }
 
+Eigen::MatrixXd information_of_prior(const CalibrationBlocks& blocks, const solver::RigValues& values) {
+  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(blocks.size, blocks.size);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(blocks.size);
+  int at = 0;
+  for (const auto& block : blocks.blocks) {
+    block->add_prior(values, prior.block(at, at, block->size(), block->size()), gradient.segment(at, block->size()));
+    at += block->size();
+  }
+  return prior;
+}
+
 // Computes covariances and observed degrees of freedom at the current values. Returns false if the information is
 // singular.
 bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks, const solver::RigValues& calibrated,
@@ -200,14 +222,7 @@ bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks,
   equations.linearise();
   const auto information = equations.rig_information();
   if (!information) return false;
-  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(blocks.size, blocks.size);
-  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(blocks.size);
-  int at = 0;
-  for (const auto& block : blocks.blocks) {
-    block->add_prior(out.values, prior.block(at, at, block->size(), block->size()),
-                     gradient.segment(at, block->size()));
-    at += block->size();
-  }
+  const Eigen::MatrixXd prior = information_of_prior(blocks, out.values);
   const Eigen::MatrixXd of_images = *information - prior;
   const double scale = solver::kVarianceLeft / solver::kFractionLeft / std::max(1.0, out.variance_factor);
   const Eigen::LLT<Eigen::MatrixXd> factor(scale * of_images + prior);
@@ -280,6 +295,13 @@ bool run_round(const solver::ReprojectionProblem& problem, const Round& round, c
 }
 
 }  // namespace
+
+Eigen::MatrixXd prior_information(const solver::RigValues& calibrated, const RigAdjustmentOptions& options) {
+  const CalibrationBlocks blocks = make_blocks(calibrated, options, {});
+  const Eigen::VectorXd unit = physical_units(options, blocks.size);
+  return unit.asDiagonal() * information_of_prior(blocks, calibrated) * unit.asDiagonal() /
+         options.correlated_observations;
+}
 
 RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustmentOptions& options,
                          std::optional<solver::RigValues> start, std::stop_token stop) {

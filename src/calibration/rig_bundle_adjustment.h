@@ -77,6 +77,9 @@ struct RigAdjustment {
   double excess_error = 0;
 };
 
+// RigInformation::prior of these options, which must have no timing.
+Eigen::MatrixXd prior_information(const solver::RigValues& calibrated, const RigAdjustmentOptions& options);
+
 // Optimises free poses and points in place; fixed poses and motions change by the scale only. The problem is unchanged
 // if the result is not `done`. The problem's rig must be the calibrated one. `start`: initial values of the rig;
 // nullopt: the calibrated ones. At least one pose must be fixed in every component that is connected by points. Rounds:

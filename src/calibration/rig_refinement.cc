@@ -303,6 +303,11 @@ RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrat
   return refine_with_prior(map, calibrated, prior, options, features, stop);
 }
 
+Eigen::MatrixXd prior_information(const camera::Rig& calibrated, const CalibrationOptions& options) {
+  const camera::Rig rig = calibrated.in_frame_of_camera_0();
+  return prior_information(solver::RigValues::of(rig), prior_without_timing(rig, options));
+}
+
 bool accepted(const RigRefinement& refinement, const CalibrationOptions& options) {
   if (!refinement.done || options.refine == Refine::kFalse) return false;
   return options.refine == Refine::kTrue || refinement.verdict == Verdict::kInconsistent;

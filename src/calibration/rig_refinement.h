@@ -167,6 +167,9 @@ struct RigRefinement {
 RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrated, const CalibrationOptions& options,
                          const feature::FeatureModel& features, std::stop_token stop = {});
 
+// The inverse of the covariance of the given calibration, (n, n), in the unknowns of RigInformation.
+Eigen::MatrixXd prior_information(const camera::Rig& calibrated, const CalibrationOptions& options);
+
 // Whether the rig of a map is to be replaced by the estimate.
 bool accepted(const RigRefinement& refinement, const CalibrationOptions& options);
 // Whether an earlier estimate has replaced the calibration of a map. An accepted estimate always changes extrinsics.

@@ -38,6 +38,8 @@ std::optional<int> calibration_due(KeyframeId keyframe) {
   return std::nullopt;
 }
 
+bool before_first_calibration(KeyframeId keyframe) { return keyframe.index() <= kFirstCalibration; }
+
 bool awaited(const StageTask& task, const map::BundledMap& newest) {
   constexpr int kVerdicts = 2, kRefinements = 5;  // calibrations
   switch (task.stage) {

@@ -64,6 +64,9 @@ std::vector<StageTask> following(const StageTask& task, const StageFunctions& fu
 // what another one can improve decreases with the size of the map.
 std::optional<int> calibration_due(KeyframeId keyframe);
 
+// Whether no calibration of a map that begins with keyframe 0 has been finished when this keyframe is mapped.
+bool before_first_calibration(KeyframeId keyframe);
+
 // Whether the next frame waits for a task (ExecutionOptions::await_calibration). Tracking with a wrong calibration
 // loses observations, cameras or the scale, which no later adjustment brings back. The first keyframes are therefore
 // mapped one after the other until two calibrations have shown whether the images agree; if they do not, some further

@@ -27,6 +27,9 @@ inline PoseUncertainty operator+(const PoseUncertainty& a, const PoseUncertainty
   return {a.noise + b.noise, sum(a.calibration, b.calibration)};
 }
 
+// The uncertainty if the calibration turns out to count as exact.
+inline PoseUncertainty without_calibration(const PoseUncertainty& uncertainty) { return {uncertainty.noise}; }
+
 // The uncertainty of T_b_a T_a, where T_a has this uncertainty and T_b_a is exact.
 inline PoseUncertainty transported(const PoseUncertainty& uncertainty, const SE3& T_b_a) {
   const Matrix6d A = T_b_a.adjoint();

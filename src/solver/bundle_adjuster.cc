@@ -25,13 +25,16 @@ RigBlocks calibration_blocks(const RigValues& rig) {
   return blocks;
 }
 
-// Flags all observations but those of every n-th point, with n such that about kPointsPerPose points per free pose
-// remain. `skip` is empty or flags observations that are ignored anyway.
-std::vector<std::uint8_t> thinned_out(const ReprojectionProblem& problem, const BundleStructure& structure,
-                                      std::span<const std::uint8_t> skip) {
+// The n of thinned_out(): about kPointsPerPose points per free pose remain.
+std::size_t thinning(const BundleStructure& structure) {
   constexpr std::size_t kPointsPerPose = 50;
   const std::size_t wanted = kPointsPerPose * structure.pose_of_slot.size();
-  const std::size_t every = std::max<std::size_t>(1, structure.num_points() / std::max<std::size_t>(1, wanted));
+  return std::max<std::size_t>(1, structure.num_points() / std::max<std::size_t>(1, wanted));
+}
+
+// Flags all observations but those of every n-th point. `skip` is empty or flags observations that are ignored anyway.
+std::vector<std::uint8_t> thinned_out(const ReprojectionProblem& problem, std::size_t every,
+                                      std::span<const std::uint8_t> skip) {
   std::vector<std::uint8_t> out(skip.begin(), skip.end());
   out.resize(problem.observations.size(), 0);
   for (std::size_t i = 0; i < out.size(); ++i)
@@ -39,18 +42,34 @@ std::vector<std::uint8_t> thinned_out(const ReprojectionProblem& problem, const 
   return out;
 }
 
+// L of BundleOptions::rig_prior, from the equations of every n-th point. Nullopt if they are singular with the prior.
+std::optional<Eigen::MatrixXd> deviation_after(const BundleOptions& options,
+                                               const ReducedSystem::RigEquations& of_images, std::size_t every) {
+  const double weight = static_cast<double>(every) / options.correlated_observations;
+  const Eigen::LLT<Eigen::MatrixXd> factor(weight * of_images.information + *options.rig_prior);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  const Eigen::Index n = of_images.rhs.size();
+  Eigen::MatrixXd L(n, n + 1);
+  L.leftCols(n) = factor.matrixU().solve(Eigen::MatrixXd::Identity(n, n));
+  L.col(n) = factor.solve(weight * of_images.rhs);
+  return L;
+}
+
 // The effect of the deviation of the rig on the poses. It is a ratio of two quantities that grow in the same way with
 // the number of points, so that some of them suffice.
 std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_of_rig(
     const ReprojectionProblem& problem, const BundleStructure& structure, const BundleOptions& options, Kernel kernel,
     const BundleState& state, const std::vector<double>& chi2, std::span<const std::uint8_t> skip) {
-  const BundleStructure some = make_structure(problem, chi2, thinned_out(problem, structure, skip));
+  const std::vector<std::optional<geometry::PoseUncertainty::Effect>> unknown(options.marginals.size());
+  const std::size_t every = thinning(structure);
+  const BundleStructure some = make_structure(problem, chi2, thinned_out(problem, every, skip));
   const RigBlocks calibration = calibration_blocks(state.rig);
   BundleEquations equations(problem, some, calibration, kernel, options.dense_poses, state);
   equations.linearise();
-  if (!equations.factorise())
-    return std::vector<std::optional<geometry::PoseUncertainty::Effect>>(options.marginals.size());
-  return equations.rig_effects(options.marginals, *options.rig_deviation);
+  if (!equations.factorise()) return unknown;
+  if (options.rig_deviation) return equations.rig_effects(options.marginals, *options.rig_deviation);
+  const auto deviation = deviation_after(options, equations.rig_equations(), every);
+  return deviation ? equations.rig_effects(options.marginals, *deviation) : unknown;
 }
 
 // The uncertainty of the poses at the values of `adjusted`, whose rig is constant.
@@ -61,7 +80,8 @@ std::vector<std::optional<geometry::PoseUncertainty>> uncertainties_of(
   const auto noise = adjusted.pose_covariances(options.marginals);
   std::vector<std::optional<geometry::PoseUncertainty::Effect>> effect(noise.size(),
                                                                        geometry::PoseUncertainty::Effect(6, 0));
-  if (options.rig_deviation) effect = effects_of_rig(problem, structure, options, kernel, adjusted.state(), chi2, skip);
+  if (options.rig_deviation || options.rig_prior)
+    effect = effects_of_rig(problem, structure, options, kernel, adjusted.state(), chi2, skip);
   std::vector<std::optional<geometry::PoseUncertainty>> out(noise.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
     if (noise[i] && effect[i]) out[i] = geometry::PoseUncertainty{*noise[i], *effect[i]};

@@ -46,6 +46,11 @@ struct BundleOptions {
   // A square root L, (n, any), of the covariance L L^T of the calibration, which the adjustment keeps constant. Rows:
   // rotation (rad) and translation (m) of cameras 1 to N-1, then the intrinsics of all cameras. Null if it is exact.
   std::shared_ptr<const Eigen::MatrixXd> rig_deviation = {};
+  // If the calibration has not been compared with images yet: the inverse of its covariance, (n, n). The images of the
+  // problem then tell more about it: L, (n, n + 1), is a square root of the covariance of the estimate from this prior
+  // and the images, and, in the last column, the difference between this estimate and the calibration.
+  std::shared_ptr<const Eigen::MatrixXd> rig_prior = {};
+  double correlated_observations = 1;  // number of observations with the information of one, for `rig_prior`
 };
 
 struct BundleSummary : LmSummary {

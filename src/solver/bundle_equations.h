@@ -50,6 +50,9 @@ class BundleEquations {
   std::optional<Eigen::MatrixXd> rig_information();
   // Factorises the equations of the poses with the points eliminated. Returns false if they are singular.
   bool factorise();
+  // The equations of the rig with poses and points eliminated. Needs a successful factorise() since the last
+  // linearise().
+  ReducedSystem::RigEquations rig_equations() const { return system_.rig_equations(); }
 
   // Of each of these poses at the last linearise(), with all other poses and points marginalised out: the covariance
   // for a rig that is exact, and the effect of a rig whose unknowns have the error rig_deviation z, z ~ N(0, I).

@@ -91,4 +91,12 @@ Eigen::MatrixXd ReducedSystem::rig_sensitivity() const {
   return X;
 }
 
+ReducedSystem::RigEquations ReducedSystem::rig_equations() const {
+  const Eigen::MatrixXd sensitivity = rig_sensitivity();
+  RigEquations out{rig_.selfadjointView<Eigen::Lower>(), rhs_.tail(rig_.rows())};
+  out.information.noalias() += border_.transpose() * sensitivity;
+  out.rhs.noalias() += sensitivity.transpose() * rhs_.head(border_.rows());
+  return out;
+}
+
 }  // namespace bslam::solver

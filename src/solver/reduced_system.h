@@ -41,6 +41,13 @@ class ReducedSystem {
   Eigen::MatrixXd rig_sensitivity() const;
   // C - B^T S^-1 B, the information matrix of the rig with the frames marginalised out. Valid after solve().
   const Eigen::MatrixXd& rig_information() const { return rig_information_; }
+  // The equations of the rig with the frames marginalised out, (C - B^T S^-1 B) x = r_rig - B^T S^-1 r_frames, which
+  // may be singular. Valid after factorise().
+  struct RigEquations {
+    Eigen::MatrixXd information;
+    Eigen::VectorXd rhs;
+  };
+  RigEquations rig_equations() const;
 
  private:
   // Whether S is factorised sparsely; without frames it never is.

@@ -6,11 +6,14 @@
 namespace bslam::system {
 namespace {
 
-execution::StageResult map_keyframe(const Config& config, const execution::StageTask& task,
-                                    const map::MapSnapshot& base, std::stop_token stop) {
+// `rig_prior`: of the given calibration if it is to be compared with the images of the map, else null.
+execution::StageResult map_keyframe(const Config& config, const std::shared_ptr<const Eigen::MatrixXd>& rig_prior,
+                                    const execution::StageTask& task, const map::MapSnapshot& base,
+                                    std::stop_token stop) {
   if (!base->alive(task.keyframe)) return {};
   map::MapDraft draft(base);
-  mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop));
+  mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop),
+                        execution::before_first_calibration(task.keyframe) ? rig_prior : nullptr);
   return {std::move(draft), {}};
 }
 
@@ -23,6 +26,13 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
   const auto time_of = [&](KeyframeId k) { return base->keyframe(k).frame->time_ns; };
   const LoopRecord record{*closure, time_of(closure->keyframe), time_of(closure->matched_keyframe)};
   return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }};
+}
+
+// As the parameter of map_keyframe. A map that was loaded has been compared with its calibration.
+std::shared_ptr<const Eigen::MatrixXd> rig_prior(const calibration::CalibrationOptions& options,
+                                                 const camera::Rig& calibrated, KeyframeId first) {
+  if (options.refine == calibration::Refine::kFalse || calibrated.size() < 2 || first.index() > 0) return nullptr;
+  return std::make_shared<const Eigen::MatrixXd>(calibration::prior_information(calibrated, options));
 }
 
 // Whether a calibration that is due can be left out: images that contradict the calibration do so in the first
@@ -78,9 +88,10 @@ execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyfr
                                                              const map::MapSnapshot& base, std::stop_token) {
     return keyframe_maker.make(task.frame, base);
   };
-  functions[execution::Stage::kMap] = [&config](const execution::StageTask& task, const map::MapSnapshot& base,
-                                                std::stop_token stop) {
-    return map_keyframe(config, task, base, std::move(stop));
+  functions[execution::Stage::kMap] = [&config, prior = rig_prior(config.calibration, calibrated, first)](
+                                          const execution::StageTask& task, const map::MapSnapshot& base,
+                                          std::stop_token stop) {
+    return map_keyframe(config, prior, task, base, std::move(stop));
   };
   functions[execution::Stage::kGlobal] = [&config](const execution::StageTask&, const map::MapSnapshot& base,
                                                    std::stop_token stop) {

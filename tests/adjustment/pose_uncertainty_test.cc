@@ -103,6 +103,36 @@ TEST(PoseUncertainties, IncludeTheErrorOfTheCalibration) {
   EXPECT_LT(sum / kSeeds, 1.5);
 }
 
+// The error of a calibration that no images have tested is estimated from its prior and the images of the window.
+TEST(PoseUncertainties, IncludeTheErrorOfACalibrationThatIsNotTestedYet) {
+  constexpr int kKeyframes = 5;
+  double sum = 0, exact = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    map::SimulatedMap world = simulated(seed, kKeyframes);
+    solver::RigValues values = solver::RigValues::of(world.map.rig());
+    const auto intrinsics = camera::parameters(values.models[0]).size();
+    Eigen::VectorXd deviations = Eigen::VectorXd::Constant(6 + 2 * intrinsics, 1e-6);
+    deviations.head<6>() << 1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3;
+    Random random(seed, "calibration");
+    geometry::Vector6d error;
+    for (int i = 0; i < 6; ++i) error(i) = deviations(i) * random.normal();
+    values.T_cam_rig[1] = values.T_cam_rig[1].perturbed(error);
+    world.map.set_rig(std::make_shared<const camera::Rig>(values.applied_to(world.map.rig())), nullptr);
+    Selection selection = window(world.map, kKeyframes - 1, kKeyframes - 1, 1);
+    selection.rig_prior = std::make_shared<const Eigen::MatrixXd>(deviations.cwiseAbs2().cwiseInverse().asDiagonal());
+    adjust(selection, kIndependent, world.map);
+    const KeyframeId newest(kKeyframes - 1);
+    sum += nees(world, newest);
+    selection.rig_prior.reset();
+    adjust(selection, kIndependent, world.map);
+    EXPECT_EQ(world.map.keyframe(newest).uncertainty.calibration.cols(), 0);
+    exact += nees(world, newest);
+  }
+  EXPECT_GT(exact / kSeeds, 2.0);
+  EXPECT_GT(sum / kSeeds, 0.6);
+  EXPECT_LT(sum / kSeeds, 1.5);
+}
+
 TEST(PoseUncertainties, AddTheTransportedCovarianceOfTheAnchor) {
   map::SimulatedMap world = simulated(1, 6);
   map::SimulatedMap displaced = simulated(1, 6);
